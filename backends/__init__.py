@@ -1,0 +1,3 @@
+"""Radios: IQ samples in and out."""
+
+__all__: list[str] = []

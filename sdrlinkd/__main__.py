@@ -1,0 +1,61 @@
+"""The daemon's command line: `sdrlinkd --config FILE`."""
+
+import argparse
+import asyncio
+import logging
+import sys
+from pathlib import Path
+
+import uvloop
+
+from sdrlinkd import __version__, daemon
+from sdrlinkd.config import Setup, load_config, make_setup
+from sdrlinkd.errors import UserError
+
+DEFAULT_CONFIG = Path("/etc/sdrlinkd/sdrlinkd.toml")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the daemon; 0 after an orderly stop, 2 for what a person can mend."""
+    options = _parser().parse_args(arguments)
+    logging.basicConfig(
+        level=options.log_level.upper(),
+        format="%(levelname)s %(message)s" if options.log_level == "debug" else "%(message)s",
+    )
+    try:
+        setup = _read(options.config)
+        if options.check:
+            sys.stdout.write("\n".join([*setup.summary(), "the configuration is good", ""]))
+            return 0
+        with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+            runner.run(daemon.run(setup, lambda: _read(options.config)))
+    except UserError as error:
+        sys.stderr.write(f"sdrlinkd: {error}\n")
+        return 2
+    return 0
+
+
+def _read(path: Path) -> Setup:
+    return make_setup(load_config(path), path.parent, str(path))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="sdrlinkd", description="ROS 2 messages between robots over software radio."
+    )
+    parser.add_argument(
+        "--config", type=Path, default=DEFAULT_CONFIG, metavar="FILE",
+        help=f"configuration (TOML); default {DEFAULT_CONFIG}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--check", action="store_true", help="read the configuration, say what follows, stop"
+    )
+    parser.add_argument(
+        "--log-level", choices=("debug", "info", "warning", "error"), default="info"
+    )
+    parser.add_argument("--version", action="version", version=f"sdrlinkd {__version__}")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

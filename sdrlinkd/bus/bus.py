@@ -1,0 +1,190 @@
+"""The local bus: messages in from producers, messages out to consumers."""
+
+import asyncio
+import time
+from typing import Protocol
+
+import msgspec
+import zmq
+
+from sdrlinkd import __version__
+from sdrlinkd.bus import envelope
+from sdrlinkd.bus.reader import SocketReader
+from sdrlinkd.bus.sockets import RuntimeDirectory
+from sdrlinkd.client import ACK_PREFIX, IN_PUB_SOCKET, IN_SOCKET, OUT_SOCKET
+from sdrlinkd.config import Setup
+from sdrlinkd.errors import EnvelopeError
+from sdrlinkd.link import CDR_HEADER_SIZE, QOS_BY_LABEL, Delivered, Qos
+from sdrlinkd.reports import BusReport
+
+# ZeroMQ never queues for us: what arrives is taken at once, so that every drop is ours and named.
+IN_HWM = 64
+PDU_TAP = b"\0pdu\0"
+
+
+class Ingress(Protocol):
+    """Who takes messages from the bus."""
+
+    def submit(
+        self,
+        topic_id: int,
+        payload: bytes,
+        qos: Qos | None = None,
+        priority: int | None = None,
+        dst: int | None = None,
+        lifespan_s: float | None = None,
+    ) -> None:
+        """A good message."""
+
+    def refuse(self, reason: str, topic_id: int | None = None) -> None:
+        """A message that cannot be taken, and the ledger's reason."""
+
+
+class Bus:
+    """Sockets `in`, `in-pub` and `out` of one daemon."""
+
+    def __init__(
+        self,
+        context: zmq.Context[zmq.Socket[bytes]],
+        directory: RuntimeDirectory,
+        setup: Setup,
+        ingress: Ingress,
+    ) -> None:
+        self._context = context
+        self._directory = directory
+        self._topic_ids = {name.encode() + b"\0": id_ for name, id_ in setup.topics_in.items()}
+        self._types = {topic.id: topic.type for topic in setup.registry.topics}
+        self._republished_as = setup.republished_as
+        self._max_message_bytes = setup.config.bus.max_message_bytes
+        self._ingress = ingress
+        self._names_out: dict[tuple[int, int], str] = {}
+        self._frames_out: dict[tuple[int, int], bytes] = {}
+        self._received = 0
+        self._published = 0
+        self._bad_last = ""
+        self._taps = 0
+        self._welcome = envelope.VERSION_BYTE + msgspec.msgpack.encode(
+            envelope.Welcome("sdrlinkd", __version__, [1], list(setup.topics_in))
+        )
+        loop = asyncio.get_running_loop()
+        self._sockets: list[zmq.Socket[bytes]] = []
+        pull = self._bind(zmq.PULL, IN_SOCKET, {zmq.RCVHWM: IN_HWM})
+        sub = self._bind(zmq.SUB, IN_PUB_SOCKET, {zmq.RCVHWM: IN_HWM, zmq.SUBSCRIBE: b""})
+        out_options = {zmq.SNDHWM: setup.config.rx_depth, zmq.XPUB_WELCOME_MSG: b"\0" + self._welcome}
+        self._out = self._bind(zmq.XPUB, OUT_SOCKET, out_options)
+        self._ingress_readers = [
+            SocketReader(loop, each, each.recv_multipart, self._take) for each in (pull, sub)
+        ]
+        self._out_reader = SocketReader(
+            loop, self._out, self._out.recv_multipart, self._take_subscription
+        )
+
+    @property
+    def is_tapped(self) -> bool:
+        """Whether someone watches PDUs."""
+        return self._taps > 0
+
+    def publish(self, message: Delivered, age_s: float | None, received_ns: int) -> None:
+        """Hand a message from the air to its consumers."""
+        key = (message.src, message.topic_id)
+        topic = self._frames_out.get(key)
+        if topic is None:
+            self._names_out[key] = self._republished_as(*key)
+            topic = self._frames_out[key] = self._names_out[key].encode() + b"\0"
+        header = envelope.OutHeader(
+            s=message.src,
+            n=message.number,
+            tr=received_ns,
+            ty=self._types[message.topic_id],
+            g=message.lost_pdus,
+            h=message.hops_left,
+            age=None if age_s is None else round(age_s * 1e6),
+            sn=message.snr_db,
+        )
+        self._published += 1
+        self._out.send_multipart(envelope.encode(topic, header, message.payload))
+        self._out_reader.recheck()
+
+    def tap(self, direction: str, data: bytes) -> None:
+        """Show a PDU to those who watch."""
+        header = msgspec.msgpack.encode({"dir": direction, "t": time.time_ns()})
+        self._out.send_multipart([PDU_TAP, envelope.VERSION_BYTE + header, data])
+        self._out_reader.recheck()
+
+    def names_out(self) -> dict[tuple[int, int], str]:
+        """Bus topics published so far, by (source, topic id)."""
+        return self._names_out
+
+    def stop_ingress(self) -> None:
+        """Take no more messages."""
+        while self._ingress_readers:
+            self._ingress_readers.pop().close()
+
+    def close(self) -> None:
+        """Close all sockets; consumers get what ZeroMQ already has for them."""
+        self.stop_ingress()
+        self._out_reader.close()
+        for socket in self._sockets:
+            socket.close(linger=200)
+
+    def report(self, control_requests: int) -> BusReport:
+        """Counters."""
+        return BusReport(
+            runtime_dir=str(self._directory.path),
+            received=self._received,
+            published=self._published,
+            control_requests=control_requests,
+            bad_envelope_last=self._bad_last,
+        )
+
+    def _bind(self, kind: int, name: str, options: dict[int, int | bytes]) -> zmq.Socket[bytes]:
+        bound = self._directory.bind(self._context, kind, name, options)
+        self._sockets.append(bound)
+        return bound
+
+    def _take(self, frames: list[bytes]) -> None:
+        self._received += 1
+        try:
+            topic, header, payload = envelope.decode(frames)
+        except EnvelopeError as error:
+            self._bad(str(error))
+            return
+        topic_id = self._topic_ids.get(topic)
+        if topic_id is None:
+            self._ingress.refuse("tx_unknown_topic")
+            self._bad_last = f"unknown topic {topic[:-1].decode(errors='replace')}"
+            return
+        size = len(payload)
+        if size < CDR_HEADER_SIZE:
+            self._bad(f"payload of {size} bytes has no room for the CDR header", topic_id)
+        elif size > self._max_message_bytes:
+            self._ingress.refuse("tx_too_big", topic_id)
+            self._bad_last = (
+                f"message of {size} B; bus.max_message_bytes allows {self._max_message_bytes}"
+            )
+        elif header is None:
+            self._ingress.submit(topic_id, payload)
+        elif header.ty is not None and header.ty != self._types[topic_id]:
+            self._bad(f"type {header.ty}; the registry has {self._types[topic_id]}", topic_id)
+        else:
+            self._ingress.submit(
+                topic_id,
+                payload,
+                None if header.q is None else QOS_BY_LABEL[header.q],
+                header.p,
+                header.d,
+                None if header.ls is None else header.ls * 1e-3,
+            )
+
+    def _bad(self, what: str, topic_id: int | None = None) -> None:
+        self._bad_last = what
+        self._ingress.refuse("tx_bad_envelope", topic_id)
+
+    def _take_subscription(self, frames: list[bytes]) -> None:
+        subscribed, topic = frames[0][:1] == b"\x01", frames[0][1:]
+        if topic == PDU_TAP:
+            self._taps = int(subscribed)
+        elif subscribed and topic.startswith(ACK_PREFIX):
+            # Subscriptions are processed in order: those before this one are active now.
+            self._out.send_multipart([topic, self._welcome])
+            self._out_reader.recheck()

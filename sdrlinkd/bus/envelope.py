@@ -1,0 +1,80 @@
+"""Bus frames, version 1 (bus document, section 3)."""
+
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from sdrlinkd.errors import EnvelopeError
+
+VERSION_BYTE = b"\x01"
+MAX_HEADER_BYTES = 256
+
+
+class InHeader(msgspec.Struct, frozen=True, gc=False):
+    """What a producer may say of a message; all optional, unknown fields are ignored."""
+
+    q: Literal["urgent", "latency", "default", "bulk"] | None = None
+    p: Annotated[int, Meta(ge=0, le=127)] | None = None
+    d: Annotated[int, Meta(ge=0, le=255)] | None = None
+    ls: Annotated[float, Meta(gt=0)] | None = None
+    t: int | None = None
+    ty: str | None = None
+    id: str | None = None
+
+
+class OutHeader(msgspec.Struct, omit_defaults=True, gc=False):
+    """What a consumer learns of a message."""
+
+    s: int
+    n: int
+    tr: int
+    ty: str
+    g: int = 0
+    h: int = 0
+    age: int | None = None
+    sn: float | None = None
+
+
+class Welcome(msgspec.Struct, frozen=True):
+    """What a new subscriber is told."""
+
+    daemon: str
+    version: str
+    envelope: list[int]
+    topics: list[str]
+
+
+_from_msgpack = msgspec.msgpack.Decoder(InHeader)
+_from_json = msgspec.json.Decoder(InHeader)
+_to_msgpack = msgspec.msgpack.Encoder()
+
+
+def decode(frames: Sequence[bytes]) -> tuple[bytes, InHeader | None, bytes]:
+    """(topic with its NUL, header or None when it says nothing, payload).
+
+    Raises EnvelopeError that says what is wrong.
+    """
+    if len(frames) != 3:
+        raise EnvelopeError(f"{len(frames)} frames; an envelope has 3: topic, header, payload")
+    topic, header, payload = frames
+    if topic[-1:] != b"\0":
+        raise EnvelopeError("the topic frame does not end with NUL")
+    if header in (b"\x01\x80", b"{}"):
+        return topic, None, payload
+    if len(header) > MAX_HEADER_BYTES:
+        raise EnvelopeError(f"header of {len(header)} bytes; at most {MAX_HEADER_BYTES}")
+    try:
+        if header[:1] == VERSION_BYTE:
+            return topic, _from_msgpack.decode(header[1:]), payload
+        if header[:1] == b"{":
+            return topic, _from_json.decode(header), payload
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise EnvelopeError(f"header: {error}") from None
+    raise EnvelopeError(f"header begins with {header[:1]!r}; allowed: 0x01 (MessagePack) or {{")
+
+
+def encode(topic: bytes, header: OutHeader, payload: bytes) -> list[bytes]:
+    """The three frames of a message to consumers; `topic` has its NUL."""
+    return [topic, VERSION_BYTE + _to_msgpack.encode(header), payload]

@@ -1,0 +1,95 @@
+"""Opening the runtime directory and the sockets in it, without harm to another daemon."""
+
+import fcntl
+import os
+import socket
+from collections.abc import Mapping
+from pathlib import Path
+
+import zmq
+
+from sdrlinkd.client import endpoint
+from sdrlinkd.errors import BusError
+
+LOCK_NAME = "lock"
+# A Unix socket's path is at most 107 bytes; the longest of our socket names counts.
+MAX_DIRECTORY_BYTES = 107 - len("/in-pub.sock")
+
+
+class RuntimeDirectory:
+    """The directory of one daemon's sockets, held by a lock for as long as it runs.
+
+    The lock comes first: ZeroMQ lets a second bind steal a live path without a word.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if len(os.fsencode(path)) > MAX_DIRECTORY_BYTES:
+            raise BusError(
+                f"bus.runtime_dir: {path} has {len(os.fsencode(path))} bytes; a socket path "
+                f"allows {MAX_DIRECTORY_BYTES}"
+            )
+        try:
+            path.mkdir(mode=0o750, parents=True, exist_ok=True)
+            self._lock = os.open(path / LOCK_NAME, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o640)
+        except OSError as error:
+            raise BusError(
+                f"bus.runtime_dir: {path} cannot be used ({error.strerror}); name a directory "
+                "this user may write to"
+            ) from None
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            owner = os.read(self._lock, 32).decode(errors="replace").strip() or "unknown"
+            os.close(self._lock)
+            raise BusError(
+                f"another sdrlinkd (pid {owner}) already runs in {path}; stop it, or give this "
+                "one its own bus.runtime_dir"
+            ) from None
+        os.ftruncate(self._lock, 0)
+        os.pwrite(self._lock, f"{os.getpid()}\n".encode(), 0)
+
+    def bind(
+        self,
+        context: zmq.Context[zmq.Socket[bytes]],
+        kind: int,
+        name: str,
+        options: Mapping[int, int | bytes],
+    ) -> zmq.Socket[bytes]:
+        """A socket bound to `name` here, for the owner and the group only."""
+        path = self.path / name
+        if _is_live(path):
+            raise BusError(
+                f"{path} is in use by another program; stop it, or set another bus.runtime_dir"
+            )
+        bound = context.socket(kind)
+        bound.linger = 0
+        for option, value in options.items():
+            bound.setsockopt(option, value)
+        before = os.umask(0o007)
+        try:
+            bound.bind(endpoint(self.path, name))
+        except zmq.ZMQError as error:
+            bound.close()
+            raise BusError(f"{path} cannot be bound: {error.strerror}") from None
+        finally:
+            os.umask(before)
+        return bound
+
+    def close(self) -> None:
+        """Remove the sockets and give up the lock."""
+        for path in self.path.glob("*.sock"):
+            path.unlink(missing_ok=True)
+        os.close(self._lock)
+
+
+def _is_live(path: Path) -> bool:
+    """Whether some program accepts connections at `path`."""
+    if not path.exists():
+        return False
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        try:
+            probe.connect(os.fspath(path))
+        except OSError:
+            return False
+    return True

@@ -1,0 +1,109 @@
+"""Publish and subscribe from asyncio programs."""
+
+import asyncio
+import os
+from collections.abc import AsyncIterator
+from types import TracebackType
+from typing import Self
+
+import zmq
+import zmq.asyncio
+
+from sdrlinkd.client.blocking import LINGER_MS, RECEIVE_HWM, no_daemon
+from sdrlinkd.client.messages import Message, decode_in, encode_out, new_ack_token, topic_filter
+from sdrlinkd.client.paths import IN_SOCKET, OUT_SOCKET, endpoint, runtime_dir
+
+
+class _AsyncSocket:
+    """A ZeroMQ socket in its own context, closed by `async with`."""
+
+    def __init__(self, kind: int, directory: str | os.PathLike[str] | None, timeout_s: float) -> None:
+        self.directory = runtime_dir(directory)
+        self._timeout_s = timeout_s
+        self._context = zmq.asyncio.Context()
+        self._socket = self._context.socket(kind)
+        self._socket.linger = LINGER_MS
+
+    async def close(self) -> None:
+        """Close the socket; what was sent has 200 ms to leave."""
+        self._socket.close()
+        self._context.term()
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.close()
+
+
+class AsyncPublisher(_AsyncSocket):
+    """As `Publisher`, awaiting instead of blocking."""
+
+    def __init__(
+        self, directory: str | os.PathLike[str] | None = None, timeout_s: float = 5.0
+    ) -> None:
+        super().__init__(zmq.PUSH, directory, timeout_s)
+        self._socket.immediate = True
+        self._socket.connect(endpoint(self.directory, IN_SOCKET))
+
+    async def send(
+        self,
+        topic: str,
+        cdr: bytes,
+        *,
+        qos: str | None = None,
+        priority: int | None = None,
+        dst: int | None = None,
+        lifespan_ms: float | None = None,
+        type: str | None = None,  # noqa: A002
+    ) -> None:
+        """Publish `cdr` under `topic`. Raises NoDaemonError after the timeout."""
+        fields = {"q": qos, "p": priority, "d": dst, "ls": lifespan_ms, "ty": type}
+        try:
+            async with asyncio.timeout(self._timeout_s):
+                await self._socket.send_multipart(encode_out(topic, cdr, fields))
+        except TimeoutError:
+            raise no_daemon(self.directory) from None
+
+
+class AsyncSubscriber(_AsyncSocket):
+    """As `Subscriber`, an asynchronous iterator; enter it with `async with`."""
+
+    def __init__(
+        self,
+        *topics: str,
+        directory: str | os.PathLike[str] | None = None,
+        timeout_s: float = 5.0,
+    ) -> None:
+        super().__init__(zmq.SUB, directory, timeout_s)
+        self._topics = topics or ("/*",)
+        self._socket.rcvhwm = RECEIVE_HWM
+
+    async def __aenter__(self) -> Self:
+        self._socket.connect(endpoint(self.directory, OUT_SOCKET))
+        token = new_ack_token()
+        for topic in self._topics:
+            self._socket.subscribe(topic_filter(topic))
+        self._socket.subscribe(token)
+        try:
+            async with asyncio.timeout(self._timeout_s):
+                while (await self._socket.recv_multipart())[0] != token:
+                    pass
+        except TimeoutError:
+            await self.close()
+            raise no_daemon(self.directory) from None
+        self._socket.unsubscribe(token)
+        return self
+
+    async def receive(self) -> Message:
+        """The next message."""
+        while True:
+            message = decode_in(await self._socket.recv_multipart())
+            if message is not None:
+                return message
+
+    async def __aiter__(self) -> AsyncIterator[Message]:
+        while True:
+            yield await self.receive()

@@ -1,0 +1,130 @@
+"""Publish and subscribe from ordinary, blocking programs."""
+
+import os
+import time
+from collections.abc import Iterator
+from types import TracebackType
+from typing import Self
+
+import zmq
+
+from sdrlinkd.client.messages import Message, decode_in, encode_out, new_ack_token, topic_filter
+from sdrlinkd.client.paths import IN_SOCKET, OUT_SOCKET, endpoint, runtime_dir
+
+RECEIVE_HWM = 1000
+LINGER_MS = 200
+
+
+class NoDaemonError(ConnectionError):
+    """No sdrlinkd listens there."""
+
+
+def no_daemon(directory: object) -> NoDaemonError:
+    """The error for a runtime directory without a daemon."""
+    return NoDaemonError(
+        f"no sdrlinkd answers in {directory}; start one (sdrlinkd --config FILE), or name its "
+        "directory with SDRLINKD_RUNTIME_DIR"
+    )
+
+
+class _Socket:
+    """A ZeroMQ socket in its own context, closed by `with`."""
+
+    def __init__(self, kind: int, directory: str | os.PathLike[str] | None) -> None:
+        self.directory = runtime_dir(directory)
+        self._context = zmq.Context()
+        self._socket = self._context.socket(kind)
+        self._socket.linger = LINGER_MS
+
+    def close(self) -> None:
+        """Close the socket; what was sent has 200 ms to leave."""
+        self._socket.close()
+        self._context.term()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class Publisher(_Socket):
+    """Hands messages to the local daemon.
+
+    `send` blocks for at most `timeout_s` while the daemon is away or busy, then raises
+    NoDaemonError: nothing is ever queued for a daemon that is not there.
+    """
+
+    def __init__(
+        self, directory: str | os.PathLike[str] | None = None, timeout_s: float = 5.0
+    ) -> None:
+        super().__init__(zmq.PUSH, directory)
+        self._socket.immediate = True
+        self._socket.sndtimeo = int(timeout_s * 1000)
+        self._socket.connect(endpoint(self.directory, IN_SOCKET))
+
+    def send(
+        self,
+        topic: str,
+        cdr: bytes,
+        *,
+        qos: str | None = None,
+        priority: int | None = None,
+        dst: int | None = None,
+        lifespan_ms: float | None = None,
+        type: str | None = None,  # noqa: A002
+    ) -> None:
+        """Publish `cdr` under `topic`. What is left out comes from the daemon's configuration."""
+        fields = {"q": qos, "p": priority, "d": dst, "ls": lifespan_ms, "ty": type}
+        try:
+            self._socket.send_multipart(encode_out(topic, cdr, fields))
+        except zmq.Again:
+            raise no_daemon(self.directory) from None
+
+
+class Subscriber(_Socket):
+    """Receives what other robots sent. A topic that ends with `*` is a prefix."""
+
+    def __init__(
+        self,
+        *topics: str,
+        directory: str | os.PathLike[str] | None = None,
+        timeout_s: float = 5.0,
+    ) -> None:
+        super().__init__(zmq.SUB, directory)
+        self._socket.rcvhwm = RECEIVE_HWM
+        self._socket.connect(endpoint(self.directory, OUT_SOCKET))
+        for topic in topics or ("/*",):
+            self._socket.subscribe(topic_filter(topic))
+        self._wait_until_subscribed(timeout_s)
+
+    def receive(self, timeout_s: float | None = None) -> Message | None:
+        """The next message; None when `timeout_s` passed without one."""
+        deadline = None if timeout_s is None else time.monotonic() + timeout_s
+        while True:
+            left_ms = None if deadline is None else max(0, (deadline - time.monotonic()) * 1000)
+            if not self._socket.poll(left_ms):
+                return None
+            message = decode_in(self._socket.recv_multipart())
+            if message is not None:
+                return message
+
+    def __iter__(self) -> Iterator[Message]:
+        while True:
+            message = self.receive()
+            assert message is not None
+            yield message
+
+    def _wait_until_subscribed(self, timeout_s: float) -> None:
+        """The daemon answers subscriptions in order, so its answer to ours means all are active."""
+        token = new_ack_token()
+        self._socket.subscribe(token)
+        deadline = time.monotonic() + timeout_s
+        while (left_s := deadline - time.monotonic()) > 0:
+            if self._socket.poll(left_s * 1000) and self._socket.recv_multipart()[0] == token:
+                self._socket.unsubscribe(token)
+                return
+        self.close()
+        raise no_daemon(self.directory)

@@ -1,0 +1,72 @@
+"""Bus messages as Python values (bus document, section 3)."""
+
+import secrets
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sdrlinkd.client.flatmap import Value, pack_map, unpack
+
+ENVELOPE_VERSION = b"\x01"
+ACK_PREFIX = b"\0ack\0"
+
+
+class EnvelopeMismatch(ValueError):
+    """What arrived is not an envelope of version 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A message another robot sent.
+
+    `number` runs per (source, topic): a step of more than one is what this consumer missed on the
+    bus. `lost_pdus` is how many PDUs of the source are known lost on the air so far. `age_us` is
+    how old the message was when it was handed over, None when unknown.
+    """
+
+    topic: str
+    payload: bytes
+    type: str
+    source: int
+    number: int
+    lost_pdus: int
+    age_us: int | None
+    received_ns: int
+    hops_left: int
+    snr_db: float | None
+
+
+def encode_out(topic: str, payload: bytes, fields: dict[str, Value]) -> list[bytes]:
+    """The three frames of a message to the daemon; fields that are None are left out."""
+    given = {key: value for key, value in fields.items() if value is not None}
+    return [topic.encode() + b"\0", ENVELOPE_VERSION + pack_map(given), payload]
+
+
+def decode_in(frames: Sequence[bytes]) -> Message | None:
+    """A message from the daemon's frames; None for its own announcements."""
+    if frames[0].startswith(b"\0"):
+        return None
+    if len(frames) != 3 or frames[1][:1] != ENVELOPE_VERSION:
+        raise EnvelopeMismatch("the daemon speaks another envelope version; update the client")
+    fields = unpack(frames[1][1:])
+    return Message(
+        topic=frames[0][:-1].decode(),
+        payload=frames[2],
+        type=fields.get("ty", ""),
+        source=fields["s"],
+        number=fields["n"],
+        lost_pdus=fields.get("g", 0),
+        age_us=fields.get("age"),
+        received_ns=fields.get("tr", 0),
+        hops_left=fields.get("h", 0),
+        snr_db=fields.get("sn"),
+    )
+
+
+def topic_filter(topic: str) -> bytes:
+    """The subscription for `topic`: exact, or a prefix when it ends with `*`."""
+    return topic[:-1].encode() if topic.endswith("*") else topic.encode() + b"\0"
+
+
+def new_ack_token() -> bytes:
+    """A topic that only one subscriber asks for; the daemon answers on it at once."""
+    return ACK_PREFIX + secrets.token_hex(8).encode() + b"\0"

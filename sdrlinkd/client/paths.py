@@ -1,0 +1,28 @@
+"""Where the daemon's sockets are."""
+
+import os
+from pathlib import Path
+
+IN_SOCKET = "in.sock"
+IN_PUB_SOCKET = "in-pub.sock"
+OUT_SOCKET = "out.sock"
+CONTROL_SOCKET = "ctl.sock"
+
+SYSTEM_DIR = Path("/run/sdrlinkd")
+
+
+def runtime_dir(given: str | os.PathLike[str] | None = None) -> Path:
+    """The runtime directory: as given, else $SDRLINKD_RUNTIME_DIR, else the system service's
+    (/run/sdrlinkd) when it runs, else the user's own."""
+    chosen = given or os.environ.get("SDRLINKD_RUNTIME_DIR")
+    if chosen:
+        return Path(chosen)
+    if (SYSTEM_DIR / CONTROL_SOCKET).exists():
+        return SYSTEM_DIR
+    base = os.environ.get("XDG_RUNTIME_DIR")
+    return Path(base) / "sdrlinkd" if base else Path(f"/tmp/sdrlinkd-{os.getuid()}")  # noqa: S108
+
+
+def endpoint(directory: Path, socket: str) -> str:
+    """The ZeroMQ endpoint of one of the sockets."""
+    return f"ipc://{directory / socket}"

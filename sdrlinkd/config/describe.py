@@ -1,0 +1,72 @@
+"""What a key allows, in words, from its type."""
+
+import math
+
+import msgspec
+from msgspec import inspect
+
+
+def allowed(kind: inspect.Type) -> str:
+    """For error messages: `a whole number from 32 to 2047`, `one of direct, loopback`, …"""
+    if isinstance(kind, inspect.IntType):
+        return "a whole number" + _range(kind.ge, kind.gt, kind.le, kind.lt)
+    if isinstance(kind, inspect.FloatType):
+        return "a number" + _range(kind.ge, kind.gt, kind.le, kind.lt)
+    if isinstance(kind, inspect.BoolType):
+        return "true or false"
+    if isinstance(kind, inspect.StrType):
+        return 'text in "quotes"'
+    if isinstance(kind, inspect.LiteralType):
+        return "one of " + ", ".join(f'"{value}"' for value in kind.values)
+    if isinstance(kind, inspect.ListType):
+        return f"a list, each of it {allowed(kind.item_type)}"
+    if isinstance(kind, inspect.StructType | inspect.DictType):
+        return "a table"
+    if isinstance(kind, inspect.UnionType):
+        return " or ".join(
+            allowed(each) for each in kind.types if not isinstance(each, inspect.NoneType)
+        )
+    return str(kind)
+
+
+def given(value: object) -> str:
+    """A value as a person would recognise it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, float) and math.isinf(value):
+        return "inf" if value > 0 else "-inf"
+    return str(value)
+
+
+def keys_of(kind: inspect.Type) -> list[str] | None:
+    """Names a table may have; None when any will do."""
+    return [field.encode_name for field in kind.fields] if isinstance(kind, inspect.StructType) else None
+
+
+def child(kind: inspect.Type, key: str) -> inspect.Type | None:
+    """Type of `key` inside a table."""
+    if isinstance(kind, inspect.StructType):
+        return next((field.type for field in kind.fields if field.encode_name == key), None)
+    if isinstance(kind, inspect.DictType):
+        return kind.value_type
+    return None
+
+
+def type_of(struct: type[msgspec.Struct]) -> inspect.Type:
+    """The inspectable type of a struct."""
+    return inspect.type_info(struct)
+
+
+def _range(ge: float | None, gt: float | None, le: float | None, lt: float | None) -> str:
+    if ge is not None and le is not None:
+        return f" from {ge} to {le}"
+    bounds = [
+        f"{word} {bound}"
+        for word, bound in (("at least", ge), ("above", gt), ("at most", le), ("below", lt))
+        if bound is not None
+    ]
+    return " " + " and ".join(bounds) if bounds else ""

@@ -1,0 +1,120 @@
+"""TOML into `Config`, with errors that cite file, line, key, given and allowed."""
+
+import re
+import tomllib
+from difflib import get_close_matches
+from pathlib import Path
+
+import msgspec
+from msgspec import inspect
+
+from sdrlinkd.config import describe
+from sdrlinkd.config.schema import Config
+from sdrlinkd.errors import ConfigError
+
+_AT = re.compile(r" - at `\$\.?(.*)`$")
+
+
+def load_config(path: Path) -> Config:
+    """The configuration in `path`. Raises ConfigError."""
+    try:
+        text = path.read_text()
+    except OSError as error:
+        raise ConfigError(
+            f"{path}: cannot be read ({error.strerror}); name a configuration with --config FILE"
+        ) from None
+    except UnicodeDecodeError:
+        raise ConfigError(f"{path}: is not a text file") from None
+    return parse_config(text, str(path))
+
+
+def parse_config(text: str, source: str = "config") -> Config:
+    """The configuration in TOML `text`. Raises ConfigError that cites `source`."""
+    try:
+        raw = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{source}: not TOML: {error}") from None
+    _refuse_unknown(raw, describe.type_of(Config), [], text, source)
+    try:
+        return msgspec.convert(raw, Config)
+    except msgspec.ValidationError as error:
+        raise _explain(error, raw, text, source) from None
+
+
+def cite(source: str, text: str, path: list[str]) -> str:
+    """`file:line: section.key`, as far as the line can be found."""
+    line = _line_of(text, path)
+    return f"{source}:{line}: {'.'.join(path)}" if line else f"{source}: {'.'.join(path)}"
+
+
+def _refuse_unknown(
+    table: dict[str, object], kind: inspect.Type, path: list[str], text: str, source: str
+) -> None:
+    known = describe.keys_of(kind)
+    for key, value in table.items():
+        here = [*path, key]
+        if known is not None and key not in known:
+            close = get_close_matches(key, known, n=1)
+            hint = f"did you mean {close[0]}? " if close else ""
+            raise ConfigError(
+                f"{cite(source, text, here)}: unknown key; {hint}allowed: {', '.join(known)}"
+            )
+        inner = describe.child(kind, key)
+        if isinstance(value, dict) and inner is not None:
+            _refuse_unknown(value, inner, here, text, source)
+
+
+def _explain(
+    error: msgspec.ValidationError, raw: dict[str, object], text: str, source: str
+) -> ConfigError:
+    found = _AT.search(str(error))
+    # msgspec writes `[...]` for the values of a dict, `[3]` for those of a list.
+    path = re.findall(r"[^.\[\]]+", found[1].replace("[...]", ".*")) if found else []
+    kind: inspect.Type | None = describe.type_of(Config)
+    value: object = raw
+    named: list[str] = []
+    for step in path:
+        if isinstance(value, list):
+            index = int(step) if step.isdigit() else 0
+            value = value[index]
+            kind = kind.item_type if isinstance(kind, inspect.ListType) else None
+        elif isinstance(value, dict):
+            key = _first_bad_key(value, kind) if step == "*" else step
+            named.append(key)
+            value = value.get(key)
+            kind = describe.child(kind, key) if kind is not None else None
+    what = describe.allowed(kind) if kind is not None else str(error)
+    return ConfigError(
+        f"{cite(source, text, named)}: got {describe.given(value)}; allowed: {what}"
+    )
+
+
+def _first_bad_key(table: dict[str, object], kind: inspect.Type | None) -> str:
+    """Key of the value in `table` that does not convert."""
+    struct = kind.value_type if isinstance(kind, inspect.DictType) else None
+    for key, value in table.items():
+        try:
+            if isinstance(struct, inspect.StructType):
+                msgspec.convert(value, struct.cls)
+        except msgspec.ValidationError:
+            return key
+    return "*"
+
+
+def _line_of(text: str, path: list[str]) -> int | None:
+    """Line of `path` in the TOML text; the section's line when the key is not spelled plainly."""
+    section: list[str] = []
+    best = None
+    for number, line in enumerate(text.splitlines(), start=1):
+        header = re.match(r"\s*\[([^\[\]]+)\]", line)
+        if header:
+            section = [part.strip().strip("\"'") for part in header[1].split(".")]
+            if section == path[: len(section)]:
+                best = number
+            continue
+        key = re.match(r"\s*([\w\"'.\-]+)\s*=", line)
+        if key:
+            dotted = [*section, *(part.strip("\"'") for part in key[1].split("."))]
+            if dotted == path[: len(dotted)]:
+                return number
+    return best

@@ -1,0 +1,63 @@
+"""The configuration file as types: the parts' own parameters, composed."""
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from sdrlinkd.link import LinkParams, QueueParams, ReassemblyParams, TopicPolicy
+
+
+class BusParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The local ZeroMQ bus."""
+
+    runtime_dir: str = ""
+    """Directory of the sockets; empty: systemd's, or the user's own."""
+    max_message_bytes: Annotated[int, Meta(ge=64, le=1 << 24)] = 1 << 20
+
+
+class DirectParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The direct link: PDUs straight back to this daemon, with faults on demand."""
+
+    hear_self: bool = True
+    rate_bit_s: Annotated[float, Meta(ge=0)] = 0.0
+    """Pace of the link in bit/s; 0: as fast as it goes."""
+    loss: Annotated[float, Meta(ge=0, le=1)] = 0.0
+    """Share of PDUs that vanish."""
+    delay_s: Annotated[float, Meta(ge=0, le=60)] = 0.0
+    jitter_s: Annotated[float, Meta(ge=0, le=60)] = 0.0
+    """Further delay, uniform from 0; PDUs overtake each other."""
+    duplicate: Annotated[float, Meta(ge=0, le=1)] = 0.0
+    """Share of PDUs that arrive twice."""
+    corrupt: Annotated[float, Meta(ge=0, le=1)] = 0.0
+    """Share of PDUs that arrive with a flipped bit."""
+    max_pdus_per_burst: Annotated[int, Meta(ge=1, le=63)] = 16
+
+
+class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One daemon's configuration. Every key has a default; see etc/sdrlinkd.toml."""
+
+    namespace: str = "robot_1"
+    """ROS namespace of this robot's topics; empty: the registry holds absolute names."""
+    robot_id: Annotated[int, Meta(ge=-1, le=254)] = -1
+    """Source id on the air; -1: the last digits of the namespace."""
+    registry: str = "registry.csv"
+    """Topic registry, relative to the configuration file; the same file at all nodes."""
+    topics: list[str] = []
+    """Registry names to take from the bus; empty: all."""
+    rx_format: str = "/rx_robot_{src_id}"
+    """Namespace under which another robot's topics are republished."""
+    rx_depth: Annotated[int, Meta(ge=0)] = 64
+    """Messages kept for a consumer that does not read; 0: without bound."""
+    backend: Literal["direct"] = "direct"
+    drain_s: Annotated[float, Meta(ge=0, le=60)] = 1.0
+    """Time to send what is queued when the daemon is stopped."""
+    seed: int | None = None
+    """Seed of all chance; absent: from the operating system."""
+    link: LinkParams = LinkParams()
+    queue: QueueParams = QueueParams()
+    reassembly: ReassemblyParams = ReassemblyParams()
+    bus: BusParams = BusParams()
+    direct: DirectParams = DirectParams()
+    topic: dict[str, TopicPolicy] = {}
+    """Policies by registry name: `[topic.odom]`."""

@@ -1,0 +1,158 @@
+"""From a configuration to what the parts are built with; every contradiction is found here."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from sdrlinkd.config.schema import Config
+from sdrlinkd.errors import ConfigError, RegistryError
+from sdrlinkd.link import TopicPolicy
+from sdrlinkd.wire import Registry, equal_payload, max_message_size, parse_registry
+
+_DIGITS = re.compile(r"\d+")
+_NAMESPACE = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+_PLACEHOLDER = re.compile(r"\{(src_id|src)\}")
+
+# Types whose messages have no upper size, and which a small PDU may not carry whole.
+UNBOUNDED_TYPES = {
+    "nav_msgs/msg/OccupancyGrid",
+    "nav_msgs/msg/Path",
+    "sensor_msgs/msg/CompressedImage",
+    "sensor_msgs/msg/Image",
+    "sensor_msgs/msg/PointCloud2",
+    "visualization_msgs/msg/MarkerArray",
+}
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What one node is: everything that follows from its configuration and registry."""
+
+    config: Config
+    registry: Registry
+    node_id: int
+    topics_in: dict[str, int]
+    """Bus topic → topic id, of the topics taken from the bus."""
+    policies: dict[int, TopicPolicy]
+    warnings: list[str]
+
+    def republished_as(self, src: int, topic_id: int) -> str:
+        """Bus topic of another robot's message."""
+        topic = self.registry.by_id(topic_id)
+        name = topic.name if topic else str(topic_id)
+        return _PLACEHOLDER.sub(str(src), self.config.rx_format).rstrip("/") + "/" + name
+
+    def summary(self) -> list[str]:
+        """What `--check` prints."""
+        config = self.config
+        size = config.link.pdu_size
+        return [
+            f"robot {self.node_id}, namespace {config.namespace or '(none)'}, "
+            f"backend {config.backend}",
+            f"PDUs of {size} B; messages up to {max_message_size(size)} B",
+            *(
+                f"  {topic_id:>2}  {name}  {self.registry.topics[topic_id].type}"
+                for name, topic_id in self.topics_in.items()
+            ),
+            f"heard messages appear as {self.republished_as(2, 0)} (from robot 2)",
+            *(f"warning: {warning}" for warning in self.warnings),
+        ]
+
+
+def make_setup(config: Config, base: Path, source: str = "config") -> Setup:
+    """Resolve `config`; file names in it are relative to `base`. Raises UserError."""
+    registry = load_registry(base / config.registry)
+    _check_texts(config, source)
+    return Setup(
+        config=config,
+        registry=registry,
+        node_id=_node_id(config, source),
+        topics_in=_topics_in(config, registry, source),
+        policies=_policies(config, registry, source),
+        warnings=_warnings(config, registry),
+    )
+
+
+def load_registry(path: Path) -> Registry:
+    """The registry in `path`. Raises RegistryError."""
+    try:
+        text = path.read_text()
+    except OSError as error:
+        raise RegistryError(
+            f"{path}: the topic registry cannot be read ({error.strerror}); "
+            "it is a CSV of `name,type` lines, named by the key `registry`"
+        ) from None
+    except UnicodeDecodeError:
+        raise RegistryError(f"{path}: is not a text file; a registry is `name,type` lines") from None
+    return parse_registry(text, str(path))
+
+
+def _node_id(config: Config, source: str) -> int:
+    if config.robot_id >= 0:
+        return config.robot_id
+    runs = _DIGITS.findall(config.namespace)
+    if runs and int(runs[-1]) < 255:
+        return int(runs[-1])
+    raise ConfigError(
+        f'{source}: robot_id: got -1 (from the namespace), but namespace "{config.namespace}" '
+        "ends in no number below 255; allowed: robot_id from 0 to 254, or a namespace "
+        'such as "robot_1"'
+    )
+
+
+def _check_texts(config: Config, source: str) -> None:
+    if config.namespace and not _NAMESPACE.fullmatch(config.namespace):
+        raise ConfigError(
+            f'{source}: namespace: got "{config.namespace}"; allowed: a ROS namespace such as '
+            '"robot_1", or ""'
+        )
+    if not _PLACEHOLDER.search(config.rx_format) or not config.rx_format.startswith("/"):
+        raise ConfigError(
+            f'{source}: rx_format: got "{config.rx_format}"; allowed: a name that starts with / '
+            'and holds {src_id}, such as "/rx_robot_{src_id}"'
+        )
+    most = equal_payload(config.link.pdu_size, 1)
+    if config.link.min_fragment > most:
+        raise ConfigError(
+            f"{source}: link.min_fragment: got {config.link.min_fragment}; allowed: at most "
+            f"{most} with link.pdu_size = {config.link.pdu_size}"
+        )
+
+
+def _topics_in(config: Config, registry: Registry, source: str) -> dict[str, int]:
+    for name in config.topics:
+        if registry.by_name(name) is None:
+            raise ConfigError(
+                f'{source}: topics: got "{name}"; allowed: names of the registry: '
+                f"{registry.suggest(name)}"
+            )
+    wanted = {name.removeprefix("/") for name in config.topics}
+    prefix = "/" + config.namespace.strip("/") if config.namespace else ""
+    return {
+        f"{prefix}/{topic.name}": topic.id
+        for topic in registry.topics
+        if not wanted or topic.name in wanted
+    }
+
+
+def _policies(config: Config, registry: Registry, source: str) -> dict[int, TopicPolicy]:
+    policies = {}
+    for name, policy in config.topic.items():
+        topic = registry.by_name(name)
+        if topic is None:
+            raise ConfigError(
+                f'{source}: topic."{name}": unknown topic; allowed: names of the registry: '
+                f"{registry.suggest(name)}"
+            )
+        policies[topic.id] = policy
+    return policies
+
+
+def _warnings(config: Config, registry: Registry) -> list[str]:
+    most = max_message_size(config.link.pdu_size)
+    return [
+        f"{topic.name} ({topic.type}) can be larger than the {most} B that 255 fragments of "
+        f"{config.link.pdu_size} B PDUs carry; larger messages are refused (tx_too_big)"
+        for topic in registry.topics
+        if topic.type in UNBOUNDED_TYPES
+    ]

@@ -1,0 +1,168 @@
+"""Opens, runs and stops one node. Knows all parts and holds no algorithm."""
+
+import asyncio
+import contextlib
+import logging
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import zmq
+
+from sdrlinkd import __version__
+from sdrlinkd.bus import Bus, RuntimeDirectory
+from sdrlinkd.client import runtime_dir
+from sdrlinkd.config import Config, Setup
+from sdrlinkd.control import Control, Verb
+from sdrlinkd.errors import UserError
+from sdrlinkd.link import Link
+from sdrlinkd.node import Node
+from sdrlinkd.pdulink import make_pdu_link
+from sdrlinkd.sdnotify import Notifier
+
+log = logging.getLogger("sdrlinkd")
+
+STATUS_LINE_PERIOD_S = 5.0
+
+Reload = Callable[[], Setup]
+
+
+async def run(setup: Setup, reload: Reload) -> None:
+    """Run the node of `setup` until SIGTERM or SIGINT.
+
+    `reload` reads the configuration anew, for SIGHUP. Raises UserError when the node cannot be
+    opened.
+    """
+    stop = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        loop.add_signal_handler(number, stop.set)
+    notifier = Notifier()
+    async with contextlib.AsyncExitStack() as stack:
+        node, control = await _open(setup, stack, reload)
+        loop.add_signal_handler(signal.SIGHUP, _reload_on_signal, node, reload)
+        stack.callback(loop.remove_signal_handler, signal.SIGHUP)
+        async with asyncio.TaskGroup() as tasks:
+            running = [
+                tasks.create_task(node.transmit(), name="transmit"),
+                tasks.create_task(node.tick(), name="tick"),
+                tasks.create_task(_notify(notifier, node, control), name="notify"),
+            ]
+            notifier.ready()
+            await stop.wait()
+            log.info("stopping: %d messages queued", node.snapshot(0).link.tx.queued)
+            notifier.stopping()
+            node.stop_ingress()
+            await node.drain(setup.config.drain_s)
+            for task in running:
+                task.cancel()
+        for problem in node.audit():
+            log.error("ledger: %s", problem)
+        log.info("stopped: %s", status_line(node, control))
+
+
+async def _open(
+    setup: Setup, stack: contextlib.AsyncExitStack, reload: Reload
+) -> tuple[Node, Control]:
+    config = setup.config
+    rng = Random(os.urandom(16) if config.seed is None else config.seed)
+    directory = RuntimeDirectory(_runtime_directory(config))
+    stack.callback(directory.close)
+    link = Link(
+        config.link,
+        config.queue,
+        config.reassembly,
+        setup.registry,
+        setup.node_id,
+        rng,
+        hears_self=config.direct.hear_self,
+    )
+    link.set_policies(setup.policies)
+    pdu_link = make_pdu_link(config, rng)
+    node = Node(setup, link, pdu_link)
+    context = zmq.Context()
+    stack.callback(context.term)
+    bus = Bus(context, directory, setup, node)
+    stack.callback(bus.close)
+    node.attach(bus)
+    control = Control(context, directory)
+    stack.callback(control.close)
+    control.serve(_verbs(setup, node, control, reload))
+    stack.push_async_callback(pdu_link.close)
+    await pdu_link.open(node)
+    log.info(
+        "sdrlinkd %s: robot %d on %s, %d topics, sockets in %s",
+        __version__, setup.node_id, config.backend, len(setup.topics_in), directory.path,
+    )  # fmt: skip
+    for warning in setup.warnings:
+        log.warning("%s", warning)
+    return node, control
+
+
+def _runtime_directory(config: Config) -> Path:
+    # systemd's RuntimeDirectory= may name several, the first is ours.
+    given = config.bus.runtime_dir or os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
+    return runtime_dir(given or None)
+
+
+def _verbs(setup: Setup, node: Node, control: Control, reload: Reload) -> dict[str, Verb]:
+    def hello(_: dict[str, Any]) -> object:
+        return {
+            "daemon": "sdrlinkd",
+            "version": __version__,
+            "node": setup.node_id,
+            "verbs": {name: verb.help for name, verb in verbs.items()},
+        }
+
+    def reload_policies(_: dict[str, Any]) -> object:
+        node.reload(reload())
+        log.info("topic policies re-read on request")
+        return {"reloaded": "topic policies", "unchanged": "all other keys need a restart"}
+
+    verbs = {
+        "hello": Verb(hello, "who answers, and what it can do"),
+        "status": Verb(lambda _: node.snapshot(control.requests), "the whole snapshot"),
+        "topics": Verb(lambda _: node.snapshot(control.requests).link.topics, "topics sent"),
+        "peers": Verb(lambda _: node.snapshot(control.requests).link.neighbors, "who is heard"),
+        "config": Verb(lambda _: setup.config, "the configuration in force"),
+        "check": Verb(
+            lambda _: {"problems": node.audit(), "ledger": node.snapshot(control.requests).link},
+            "whether the ledger adds up",
+        ),
+        "reload": Verb(reload_policies, "read the topic policies anew", changes=True),
+    }
+    return verbs
+
+
+def _reload_on_signal(node: Node, reload: Reload) -> None:
+    try:
+        node.reload(reload())
+    except UserError as error:
+        log.error("not reloaded, the old policies stay: %s", error)  # noqa: TRY400
+    else:
+        log.info("topic policies re-read; all other keys need a restart")
+
+
+async def _notify(notifier: Notifier, node: Node, control: Control) -> None:
+    """Feed the watchdog from the event loop, and keep the status line fresh; for ever."""
+    period_s = STATUS_LINE_PERIOD_S
+    if notifier.watchdog_s:
+        period_s = min(period_s, notifier.watchdog_s / 3)
+    while True:
+        notifier.alive()
+        notifier.status(status_line(node, control))
+        await asyncio.sleep(period_s)
+
+
+def status_line(node: Node, control: Control) -> str:
+    """One line for systemd and the log."""
+    snapshot = node.snapshot(control.requests)
+    tx, rx = snapshot.link.tx, snapshot.link.rx
+    return (
+        f"{snapshot.carrier.kind} {snapshot.carrier.state}; "
+        f"out {tx.sent}/{tx.accepted} sent, {tx.queued} queued, {sum(tx.dropped.values())} dropped; "
+        f"in {rx.delivered} delivered from {len(snapshot.link.neighbors)} robots"
+    )

@@ -1,0 +1,53 @@
+"""Every error of sdrlinkd, by who is to blame.
+
+    SdrlinkError
+    ├── UserError            what a person or a file gave us; exit code 2, never a traceback
+    │   ├── ConfigError      a key of the configuration
+    │   ├── RegistryError    a line of the topic registry
+    │   ├── BusError         sockets, runtime directory, a second instance, no daemon
+    │   └── BagError         a recording that cannot be read
+    ├── PduError             bytes a peer put on the air; counted by `reason`, never logged as ours
+    └── EnvelopeError        a bus message that breaks the envelope; counted, the next one works
+
+Anything else that is raised is a bug of ours.
+"""
+
+
+class SdrlinkError(Exception):
+    """Root of all errors that are not bugs."""
+
+
+class UserError(SdrlinkError):
+    """Bad input from a person; the message names what was given and what is allowed."""
+
+
+class ConfigError(UserError):
+    """A configuration key; the message cites key, given and allowed."""
+
+
+class RegistryError(UserError):
+    """A topic registry that cannot be used; the message cites file and line."""
+
+
+class BusError(UserError):
+    """The local bus cannot be opened or reached."""
+
+
+class BagError(UserError):
+    """A recording that cannot be read, or only in part."""
+
+
+class PduError(SdrlinkError):
+    """A received PDU that must not be used.
+
+    `reason` is the ledger's name for it (`rx_crc`, `rx_entry`, …); the message says more.
+    """
+
+    def __init__(self, reason: str, detail: str) -> None:
+        super().__init__(f"{reason}: {detail}")
+        self.reason = reason
+        self.detail = detail
+
+
+class EnvelopeError(SdrlinkError):
+    """A bus message whose frames do not form an envelope (bus document, section 3)."""

@@ -1,0 +1,32 @@
+"""The link: queues, packing, duplicates, ages and the ledger, as a calculator over `now`."""
+
+from sdrlinkd.link.inbox import CDR_HEADER_SIZE, Delivered
+from sdrlinkd.link.ledger import RX_PDU_REASONS, RX_REASONS, TX_REASONS
+from sdrlinkd.link.link import Link
+from sdrlinkd.link.outbox import Outbox, Outgoing
+from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
+from sdrlinkd.link.qos import MAX_PRIORITY, QOS_BY_LABEL, Qos, TopicPolicy
+from sdrlinkd.link.report import link_notices, link_report
+from sdrlinkd.link.sender import Burst, Outcome
+
+__all__ = [
+    "CDR_HEADER_SIZE",
+    "MAX_PRIORITY",
+    "QOS_BY_LABEL",
+    "RX_PDU_REASONS",
+    "RX_REASONS",
+    "TX_REASONS",
+    "Burst",
+    "Delivered",
+    "Link",
+    "LinkParams",
+    "Outbox",
+    "Outcome",
+    "Outgoing",
+    "Qos",
+    "QueueParams",
+    "ReassemblyParams",
+    "TopicPolicy",
+    "link_notices",
+    "link_report",
+]

@@ -1,0 +1,200 @@
+"""The receive half of the link: from PDUs heard to messages delivered."""
+
+from collections import Counter
+from typing import NamedTuple
+
+from sdrlinkd.errors import PduError
+from sdrlinkd.link.ages import Ages
+from sdrlinkd.link.ledger import RxTally, balance
+from sdrlinkd.link.neighbors import Neighbor
+from sdrlinkd.link.params import LinkParams, ReassemblyParams
+from sdrlinkd.wire import (
+    BROADCAST,
+    CONTROL_TOPIC_ID,
+    Beacon,
+    Pdu,
+    Reassembly,
+    ReassemblyLimits,
+    Record,
+    Registry,
+    RegistryDigest,
+    Stamp,
+    identity,
+    parse,
+    parse_records,
+)
+
+CDR_HEADER_SIZE = 4
+
+
+class Delivered(NamedTuple):
+    """A whole message from the air.
+
+    `number` runs per (source, topic) from 1; `lost_pdus` are those known missing from the source
+    so far; `origin_at` is when it was submitted, in the receiver's own time (absent when no STAMP
+    came), so its age at any moment is that moment less `origin_at`.
+    """
+
+    src: int
+    topic_id: int
+    payload: bytes
+    number: int
+    lost_pdus: int
+    origin_at: float | None
+    heard_at: float
+    hops_left: int
+    snr_db: float | None
+
+
+class Inbox:
+    """Checks, duplicate suppression, reassembly and the RX ledger of one node."""
+
+    def __init__(
+        self,
+        params: LinkParams,
+        reassembly: ReassemblyParams,
+        registry: Registry,
+        own_id: int,
+        hears_self: bool,
+    ) -> None:
+        self._pdu_size = params.pdu_size
+        self._registry = registry
+        self._own_id = own_id
+        self._hears_self = hears_self
+        self._has_control = registry.has_control
+        limits = ReassemblyLimits(
+            reassembly.timeout_s, reassembly.source_bytes, reassembly.total_bytes
+        )
+        self.reassembly = Reassembly(limits)
+        self._ages = Ages(reassembly.timeout_s)
+        self.neighbors: dict[int, Neighbor] = {}
+        self.tallies: dict[tuple[int, int], RxTally] = {}
+        self.pdus_heard = 0
+        self.pdus_used = 0
+        self.pdus_dropped: Counter[str] = Counter()
+
+    def hear(self, data: bytes, at: float, snr_db: float | None = None) -> list[Delivered]:
+        """Take a PDU whose burst's preamble arrived at `at`; the messages it completed."""
+        self.pdus_heard += 1
+        try:
+            pdu = parse(data, self._pdu_size)
+            reason = self._refusal(pdu)
+            records = [] if reason else self._control_records(pdu)
+        except PduError as error:
+            reason = error.reason
+        if reason is None:
+            neighbor = self._neighbor(pdu.src, at)
+            _, seq, crc = identity(data)
+            if not neighbor.track.heard(seq, crc):
+                neighbor.duplicates += 1
+                reason = "rx_dup"
+        if reason is not None:
+            self.pdus_dropped[reason] += 1
+            return []
+        neighbor.heard += 1
+        neighbor.hops_left = pdu.hop
+        neighbor.snr_db = snr_db
+        for record in records:
+            if isinstance(record, Stamp):
+                self._ages.stamp(pdu.src, record.topic_id, record.entry_id, record.age_us, at)
+            elif isinstance(record, Beacon):
+                if neighbor.take_beacon(record):
+                    neighbor.track.restart(seq, crc)
+            elif isinstance(record, RegistryDigest):
+                neighbor.digest = record
+        if self._has_control and all(e.topic_id == CONTROL_TOPIC_ID for e in pdu.entries):
+            self.pdus_dropped["rx_control"] += 1
+            return []
+        self.pdus_used += 1
+        return self._take_entries(pdu, neighbor, at)
+
+    def expire(self, now: float) -> None:
+        """Give up what has waited too long."""
+        self.reassembly.expire(now)
+        self._ages.expire(now)
+        self._note_lost()
+
+    def audit(self) -> list[str]:
+        """What does not add up in the RX ledgers; empty when all does."""
+        dropped: Counter[str] = Counter()
+        for tally in self.tallies.values():
+            dropped.update(tally.dropped)
+        return balance(
+            "rx pdus", self.pdus_heard, {"used": self.pdus_used, **self.pdus_dropped}
+        ) + balance(
+            "rx messages",
+            self.reassembly.started,
+            {
+                "delivered": sum(tally.delivered for tally in self.tallies.values()),
+                "held": self.reassembly.held,
+                **dropped,
+            },
+        )
+
+    def _refusal(self, pdu: Pdu) -> str | None:
+        if pdu.compressed:
+            return "rx_flags"
+        if pdu.src == self._own_id and not self._hears_self:
+            return "rx_own"
+        if pdu.dst not in (BROADCAST, self._own_id) and not self._hears_self:
+            return "rx_not_for_us"
+        return None
+
+    def _control_records(self, pdu: Pdu) -> list[Record]:
+        records: list[Record] = []
+        if self._has_control:
+            for entry in pdu.entries:
+                if entry.topic_id == CONTROL_TOPIC_ID:
+                    if entry.total != 1:
+                        raise PduError("rx_entry", "control records are never fragmented")
+                    records += parse_records(entry.payload)
+        return records
+
+    def _neighbor(self, src: int, at: float) -> Neighbor:
+        neighbor = self.neighbors.get(src)
+        if neighbor is None:
+            neighbor = self.neighbors[src] = Neighbor(src)
+        neighbor.last_heard_at = at
+        return neighbor
+
+    def _take_entries(self, pdu: Pdu, neighbor: Neighbor, at: float) -> list[Delivered]:
+        src = pdu.src
+        delivered = []
+        for entry in pdu.entries:
+            topic_id = entry.topic_id
+            if topic_id == CONTROL_TOPIC_ID and self._has_control:
+                continue
+            payload = self.reassembly.add(src, entry, at)
+            if payload is None:
+                continue
+            tally = self._tally(src, topic_id)
+            if self._registry.by_id(topic_id) is None:
+                tally.dropped["rx_unknown_topic"] += 1
+                continue
+            if len(payload) < CDR_HEADER_SIZE:
+                tally.dropped["rx_bad_cdr"] += 1
+                continue
+            tally.delivered += 1
+            tally.delivered_bytes += len(payload)
+            delivered.append(
+                Delivered(
+                    src, topic_id, payload, tally.delivered, neighbor.track.lost,
+                    self._ages.origin(src, topic_id, entry.entry_id), at, pdu.hop,
+                    neighbor.snr_db,
+                )
+            )  # fmt: skip
+        self._note_lost()
+        return delivered
+
+    def _note_lost(self) -> None:
+        for src, topic_id, reason in self.reassembly.take_lost():
+            self._tally(src, topic_id).dropped[reason] += 1
+
+    def _tally(self, src: int, topic_id: int) -> RxTally:
+        key = (src, topic_id)
+        tally = self.tallies.get(key)
+        if tally is None:
+            tally = self.tallies[key] = RxTally()
+        return tally
+
+

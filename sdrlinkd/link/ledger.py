@@ -1,0 +1,81 @@
+"""The ledger: what entered, and what became of it (bus document, section 6)."""
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+TX_REASONS = {
+    "tx_bad_envelope": "the bus message does not follow the envelope",
+    "tx_unknown_topic": "the topic is not in the registry, or not subscribed",
+    "tx_denied": "the producer may not publish this",
+    "tx_too_big": "larger than 255 fragments can carry",
+    "tx_size_cap": "larger than the topic's own size cap",
+    "tx_throttled": "faster than the topic's period",
+    "tx_unchanged": "same content as the last one, and the topic sends changes only",
+    "tx_superseded": "a newer message of the topic took its place (depth)",
+    "tx_overflow_old": "shed from a full queue: oldest of the lowest class",
+    "tx_overflow_new": "refused by a full queue that holds only higher classes",
+    "tx_expired": "its lifespan ended before it was sent",
+    "tx_radio_down": "no radio to send it",
+    "tx_radio_failed": "the radio reported that a burst did not leave whole",
+    "tx_no_nonce": "no packet number may be used (security)",
+    "tx_shutdown": "the daemon stopped before it was sent",
+}
+
+RX_PDU_REASONS = {
+    "rx_short": "not pdu_size bytes long",
+    "rx_crc": "CRC mismatch",
+    "rx_version": "another version of the wire format",
+    "rx_flags": "sealed or compressed, which this node does not speak",
+    "rx_entry": "entries or control records that contradict themselves",
+    "rx_pad": "PAD is not zero",
+    "rx_not_for_us": "for another destination",
+    "rx_own": "our own source id",
+    "rx_dup": "heard before",
+    "rx_relayed": "for others; forwarded",
+    "rx_control": "control records only",
+    "sec_cleartext": "not sealed where sealing is required",
+    "sec_unknown_kid": "sealed with a key we do not hold",
+    "sec_replay": "packet number seen before",
+    "sec_bad_tag": "authentication failed",
+}
+
+RX_REASONS = {
+    "rx_partial_timeout": "fragments missing when the reassembly timeout ended",
+    "rx_partial_superseded": "the sender used the entry id for another message",
+    "rx_partial_evicted": "given up for newer ones: the source's memory bound",
+    "rx_partial_memory": "given up: the bound on memory of all sources",
+    "rx_bad_cdr": "no room for the four bytes of CDR encapsulation",
+    "rx_unknown_topic": "a topic id that our registry does not have",
+}
+
+
+@dataclass(slots=True)
+class TxTally:
+    """Messages of one topic on their way out."""
+
+    accepted: int = 0
+    sent: int = 0
+    sent_bytes: int = 0
+    dropped: Counter[str] = field(default_factory=Counter)
+
+    def drop(self, reason: str) -> None:
+        """Count one message as dropped."""
+        self.dropped[reason] += 1
+
+
+@dataclass(slots=True)
+class RxTally:
+    """Messages of one topic from one source."""
+
+    delivered: int = 0
+    delivered_bytes: int = 0
+    dropped: Counter[str] = field(default_factory=Counter)
+
+
+def balance(name: str, entered: int, parts: dict[str, int]) -> list[str]:
+    """Empty when `entered` is the sum of `parts`, else one sentence that says by how much not."""
+    total = sum(parts.values())
+    if total == entered and min(parts.values(), default=0) >= 0:
+        return []
+    listed = " + ".join(f"{value} {key}" for key, value in parts.items())
+    return [f"{name}: {entered} entered, but {listed} = {total}"]

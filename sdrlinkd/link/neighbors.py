@@ -1,0 +1,44 @@
+"""Who is heard, how well, and whether both mean the same by a topic id."""
+
+from dataclasses import dataclass, field
+
+from sdrlinkd.link.duplicates import SequenceTrack
+from sdrlinkd.wire import Beacon, Registry, RegistryDigest
+
+
+@dataclass(slots=True)
+class Neighbor:
+    """One source of PDUs."""
+
+    src: int
+    track: SequenceTrack = field(default_factory=SequenceTrack)
+    heard: int = 0
+    duplicates: int = 0
+    last_heard_at: float = 0.0
+    hops_left: int = 0
+    snr_db: float | None = None
+    boot_id: int | None = None
+    reboots: int = 0
+    digest: RegistryDigest | None = None
+
+    def take_beacon(self, beacon: Beacon) -> bool:
+        """Note who it is; True when it has started anew since we last heard a beacon."""
+        rebooted = self.boot_id not in (None, beacon.boot_id)
+        self.boot_id = beacon.boot_id
+        self.reboots += rebooted
+        return rebooted
+
+    def disagreement(self, registry: Registry, own: RegistryDigest) -> str | None:
+        """In words, where this neighbor's registry differs from ours; None when it does not."""
+        if self.digest is None or self.digest.overall == own.overall:
+            return None
+        differing = []
+        for topic_id in own.differing_ids(self.digest):
+            topic = registry.by_id(topic_id)
+            differing.append(f"{topic_id} (ours: {topic.name})" if topic else f"{topic_id} (not ours)")
+        where = f"topic id {', '.join(differing)}" if differing else "dictionaries"
+        return (
+            f"robot {self.src} has another registry: {where} differ; "
+            f"ours {own.overall.hex()[:8]}, theirs {self.digest.overall.hex()[:8]}. "
+            "Give both the same registry file"
+        )

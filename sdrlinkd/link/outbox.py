@@ -1,0 +1,283 @@
+"""What waits to be sent, and who goes next.
+
+A *lane* is one topic at one class, priority and destination; inside it messages keep their order.
+Lanes of equal class and priority form a *level*. Service order is level by level, inside a level
+by earliest expiry, and among equals round robin: a lane that gave an entry goes to the back.
+"""
+
+from bisect import bisect_left, insort
+from collections import OrderedDict, deque
+from collections.abc import Iterator
+from enum import Enum, auto
+
+from sdrlinkd.link.ledger import TxTally
+from sdrlinkd.link.params import QueueParams
+from sdrlinkd.link.qos import Qos
+from sdrlinkd.wire import ENTRY_HEADER_SIZE
+
+
+class Fate(Enum):
+    """Where a message stands in the ledger."""
+
+    QUEUED = auto()
+    IN_FLIGHT = auto()
+    SENT = auto()
+    DROPPED = auto()
+
+
+class Outgoing:
+    """One message on its way out."""
+
+    __slots__ = (
+        "arrived_at", "dst", "entry_id", "expires_at", "fate", "k", "lane", "next_index",
+        "payload", "priority", "qos", "rests_id", "stamped", "tally", "topic_id", "total",
+        "unconfirmed",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        topic_id: int,
+        payload: bytes,
+        qos: Qos,
+        priority: int,
+        dst: int,
+        arrived_at: float,
+        expires_at: float,
+        wants_stamp: bool,
+        tally: TxTally,
+    ) -> None:
+        self.topic_id = topic_id
+        self.payload = payload
+        self.qos = qos
+        self.priority = priority
+        self.dst = dst
+        self.arrived_at = arrived_at
+        self.expires_at = expires_at
+        self.stamped = not wants_stamp
+        self.tally = tally
+        self.fate = Fate.QUEUED
+        self.lane: Lane
+        # Set when the first fragment is cut, then frozen.
+        self.entry_id = 0
+        self.k = 0
+        self.total = 0
+        self.next_index = 0
+        self.rests_id = False
+        self.unconfirmed = 0
+
+
+class Lane:
+    """One topic at one class, priority and destination."""
+
+    __slots__ = ("current", "dst", "level", "order", "topic_id", "waiting")
+
+    def __init__(self, topic_id: int, dst: int, level: "Level") -> None:
+        self.topic_id = topic_id
+        self.dst = dst
+        self.level = level
+        self.current: Outgoing | None = None
+        self.waiting: deque[Outgoing] = deque()
+        self.order: tuple[float, int] = (0.0, 0)
+
+    @property
+    def head(self) -> Outgoing | None:
+        """The message whose fragment goes next."""
+        return self.current or (self.waiting[0] if self.waiting else None)
+
+
+class Level:
+    """The non-empty lanes of one class and priority, in service order."""
+
+    __slots__ = ("key", "lanes", "per_dst")
+
+    def __init__(self, key: tuple[int, int]) -> None:
+        self.key = key
+        self.lanes: list[Lane] = []
+        self.per_dst: dict[int, int] = {}
+
+
+def _order(lane: Lane) -> tuple[float, int]:
+    return lane.order
+
+
+class Outbox:
+    """The queue of one node. Every operation costs the same with ten messages or ten thousand."""
+
+    def __init__(self, limits: QueueParams) -> None:
+        self._limits = limits
+        self._lanes: dict[tuple[int, int, int, int], Lane] = {}
+        self._levels: list[Level] = []
+        self._level_by_key: dict[tuple[int, int], Level] = {}
+        self._by_class: dict[Qos, OrderedDict[Outgoing, None]] = {q: OrderedDict() for q in Qos}
+        self._by_topic: dict[int, OrderedDict[Outgoing, None]] = {}
+        self._turn = 0
+        self.queued = 0
+        self.queued_bytes = 0
+        # Begun and not yet settled; whoever settles a message takes it out.
+        self.in_flight: set[Outgoing] = set()
+
+    def __bool__(self) -> bool:
+        return bool(self._levels)
+
+    def put(self, message: Outgoing, depth: int = 0) -> list[tuple[Outgoing, str]]:
+        """Queue `message`; what had to go for it, each with its reason (perhaps itself)."""
+        shed: list[tuple[Outgoing, str]] = []
+        topic = self._by_topic.get(message.topic_id)
+        if depth and topic is not None:
+            while len(topic) >= depth:
+                shed.append((self._withdraw_waiting(next(iter(topic))), "tx_superseded"))
+        size = len(message.payload)
+        limits = self._limits
+        if size > limits.max_bytes:
+            return [*shed, (message, "tx_overflow_new")]
+        while self.queued >= limits.max_messages or self.queued_bytes + size > limits.max_bytes:
+            victim = self._oldest_of_lowest_class()
+            if victim is None or victim.qos < message.qos:
+                shed.append((message, "tx_overflow_new"))
+                return shed
+            shed.append((self._withdraw_waiting(victim), "tx_overflow_old"))
+        self._enqueue(message)
+        return shed
+
+    def levels(self) -> list[Level]:
+        """Levels in service order."""
+        return self._levels
+
+    def begin(self, lane: Lane) -> Outgoing:
+        """The lane's first waiting message becomes the one being fragmented."""
+        message = lane.waiting.popleft()
+        self._forget_queued(message)
+        lane.current = message
+        message.fate = Fate.IN_FLIGHT
+        self.in_flight.add(message)
+        return message
+
+    def served(self, lane: Lane) -> None:
+        """The lane gave an entry; it goes behind its equals, or away when it is empty."""
+        head = lane.head
+        if head is None:
+            self._unlink(lane)
+            del self._lanes[lane.level.key[0], lane.level.key[1], lane.topic_id, lane.dst]
+            return
+        level = lane.level
+        if len(level.lanes) == 1:
+            lane.order = (head.expires_at, self._next_turn())
+            return
+        self._unlink(lane)
+        self._link(lane, head)
+
+    def withdraw_head(self, lane: Lane) -> Outgoing:
+        """Take the lane's head out, fragments and all."""
+        if lane.current is not None:
+            message, lane.current = lane.current, None
+        else:
+            message = lane.waiting.popleft()
+            self._forget_queued(message)
+        self.served(lane)
+        return message
+
+    def withdraw_all(self) -> Iterator[Outgoing]:
+        """Take everything out, in service order."""
+        while self._levels:
+            yield self.withdraw_head(self._levels[0].lanes[0])
+
+    def oldest_arrival(self) -> float:
+        """When the longest waiting head arrived; infinity when nothing waits."""
+        return min(
+            (
+                lane.head.arrived_at
+                for level in self._levels
+                for lane in level.lanes
+                if lane.head is not None
+            ),
+            default=float("inf"),
+        )
+
+    def pending_bytes(self, enough: int) -> int:
+        """Bytes of all that waits, entry headers included; counting stops at `enough`."""
+        total = -ENTRY_HEADER_SIZE
+        for level in self._levels:
+            for lane in level.lanes:
+                if lane.current is not None:
+                    message = lane.current
+                    total += len(message.payload) - message.next_index * message.k
+                    total += ENTRY_HEADER_SIZE
+                for message in lane.waiting:
+                    total += len(message.payload) + ENTRY_HEADER_SIZE
+                    if total >= enough:
+                        return total
+        return total
+
+    def queued_by_class(self) -> dict[Qos, int]:
+        """Messages of each class of which nothing has been sent yet."""
+        return {qos: len(queue) for qos, queue in self._by_class.items()}
+
+    def queued_of_topic(self, topic_id: int) -> int:
+        """Messages of one topic of which nothing has been sent yet."""
+        return len(self._by_topic.get(topic_id, ()))
+
+    def _enqueue(self, message: Outgoing) -> None:
+        key = (message.qos, -message.priority, message.topic_id, message.dst)
+        lane = self._lanes.get(key)
+        if lane is None:
+            lane = self._lanes[key] = Lane(message.topic_id, message.dst, self._level(key[:2]))
+            lane.waiting.append(message)
+            self._link(lane, message)
+        else:
+            lane.waiting.append(message)
+        message.lane = lane
+        self._by_class[message.qos][message] = None
+        topic = self._by_topic.get(message.topic_id)
+        if topic is None:
+            topic = self._by_topic[message.topic_id] = OrderedDict()
+        topic[message] = None
+        self.queued += 1
+        self.queued_bytes += len(message.payload)
+
+    def _level(self, key: tuple[int, int]) -> Level:
+        level = self._level_by_key.get(key)
+        if level is None:
+            level = self._level_by_key[key] = Level(key)
+            insort(self._levels, level, key=lambda each: each.key)
+        return level
+
+    def _link(self, lane: Lane, head: Outgoing) -> None:
+        level = self._level(lane.level.key)
+        lane.level = level
+        lane.order = (head.expires_at, self._next_turn())
+        insort(level.lanes, lane, key=_order)
+        level.per_dst[lane.dst] = level.per_dst.get(lane.dst, 0) + 1
+
+    def _unlink(self, lane: Lane) -> None:
+        level = lane.level
+        del level.lanes[bisect_left(level.lanes, lane.order, key=_order)]
+        level.per_dst[lane.dst] -= 1
+        if not level.lanes:
+            del self._level_by_key[level.key]
+            del self._levels[bisect_left(self._levels, level.key, key=lambda each: each.key)]
+
+    def _oldest_of_lowest_class(self) -> Outgoing | None:
+        for qos in reversed(Qos):
+            if self._by_class[qos]:
+                return next(iter(self._by_class[qos]))
+        return None
+
+    def _withdraw_waiting(self, message: Outgoing) -> Outgoing:
+        """`message` is the oldest of its class or topic, so it is first among its lane's waiting."""
+        lane = message.lane
+        first = lane.waiting.popleft()
+        assert first is message
+        self._forget_queued(message)
+        if lane.current is None:
+            self.served(lane)
+        return message
+
+    def _forget_queued(self, message: Outgoing) -> None:
+        del self._by_class[message.qos][message]
+        del self._by_topic[message.topic_id][message]
+        self.queued -= 1
+        self.queued_bytes -= len(message.payload)
+
+    def _next_turn(self) -> int:
+        self._turn += 1
+        return self._turn

@@ -1,0 +1,256 @@
+"""From queued messages to PDUs: the paper's packing policy (section 5.2), class by class.
+
+Among topics of equal class and priority: with two or more pending, PDUs of two entries, a fragment
+having k = max(k*(2), k_min) bytes, round robin; with one, a single entry of k = P_max − 13. k
+freezes at a message's first fragment. Greedy: further entries of the same topics while they fit.
+Lower classes fill what is left over.
+"""
+
+from random import Random
+from typing import NamedTuple
+
+from sdrlinkd.link.draft import Draft
+from sdrlinkd.link.entry_ids import REST_FACTOR, EntryIds
+from sdrlinkd.link.outbox import Lane, Level, Outbox, Outgoing
+from sdrlinkd.link.params import LinkParams
+from sdrlinkd.link.qos import Qos
+from sdrlinkd.wire import (
+    BROADCAST,
+    ENTRY_HEADER_SIZE,
+    MAX_AGE_US,
+    MAX_ENTRIES,
+    MAX_FRAGMENTS,
+    Entry,
+    Record,
+    Stamp,
+    equal_payload,
+    fragment_count,
+)
+
+# Lanes looked at while one PDU is filled; past that the room left is not worth the search.
+MAX_LANES_PER_PDU = 4 * MAX_ENTRIES
+
+
+class BuiltPdu(NamedTuple):
+    """A PDU and the messages it carries an entry of."""
+
+    data: bytes
+    carried: list[Outgoing]
+
+
+class Packetizer:
+    """Fills PDUs from the outbox. Chance (sequence start, entry ids) comes from `rng`."""
+
+    def __init__(
+        self, params: LinkParams, src: int, outbox: Outbox, rng: Random, reassembly_timeout_s: float
+    ) -> None:
+        self._params = params
+        self._src = src
+        self._outbox = outbox
+        self._rng = rng
+        self._seq = rng.randrange(256)
+        self._control_entry_id = rng.randrange(256)
+        self._rest_s = REST_FACTOR * reassembly_timeout_s
+        self._entry_ids: dict[int, EntryIds] = {}
+        self._k_single = equal_payload(params.pdu_size, 1)
+        self._k_shared = min(
+            max(equal_payload(params.pdu_size, 2), params.min_fragment), self._k_single
+        )
+        self._spare_records: list[Record] = []
+        self._flushing = False
+        self._expired: list[Outgoing] = []
+
+    def offer(self, records: list[Record]) -> None:
+        """Records to send in spare room of the PDUs to come (replaces what was offered)."""
+        self._spare_records = records
+
+    @property
+    def offered(self) -> bool:
+        """Whether offered records still wait for a PDU with room."""
+        return bool(self._spare_records)
+
+    def expire(self, now: float) -> None:
+        """Withdraw heads whose lifespan ended; see `take_expired`."""
+        for level in tuple(self._outbox.levels()):
+            for lane in tuple(level.lanes):
+                self._live_head(lane, now)
+
+    def take_expired(self) -> list[Outgoing]:
+        """Messages withdrawn because their lifespan ended, since the last call."""
+        expired, self._expired = self._expired, []
+        return expired
+
+    def abandon(self, lane: Lane, now: float) -> None:
+        """Send no more of the message the lane is in the middle of."""
+        self._retire(self._outbox.withdraw_head(lane), now)
+
+    def flush(self) -> None:
+        """From now on partial PDUs do not wait."""
+        self._flushing = True
+
+    def next_pdu(self, start: float) -> BuiltPdu | None:
+        """The next PDU of a burst whose preamble leaves at `start`, or None.
+
+        Messages found expired are withdrawn on the way; see `take_expired`.
+        """
+        if self._must_wait(start):
+            return None
+        draft = Draft(self._params.pdu_size)
+        looked_at = 0
+        for level in tuple(self._outbox.levels()):
+            self._fill_from(level, draft, start)
+            looked_at += len(level.lanes) + 1
+            if not draft.is_empty and (
+                draft.room <= ENTRY_HEADER_SIZE or looked_at > MAX_LANES_PER_PDU
+            ):
+                break
+        if draft.is_empty:
+            return None
+        for message in draft.carried:
+            if not message.stamped:
+                self._stamp(draft, message, start)
+        if self._spare_records and draft.dst == BROADCAST and draft.add_records(self._spare_records):
+            self._spare_records = []
+        return self._finish(draft)
+
+    def records_pdu(self) -> BuiltPdu | None:
+        """A PDU of its own for the offered records, when there are any."""
+        draft = Draft(self._params.pdu_size)
+        if not self._spare_records or not draft.add_records(self._spare_records):
+            return None
+        self._spare_records = []
+        draft.dst = BROADCAST
+        draft.qos = Qos.DEFAULT
+        return self._finish(draft)
+
+    def next_wakeup(self, now: float) -> float:
+        """When `next_pdu` may next have something to send; −inf: now; infinity: nothing waits."""
+        if not self._outbox:
+            return float("inf")
+        if self._must_wait(now):
+            return self._outbox.oldest_arrival() + self._params.flush_s
+        return min(
+            self._ids(lane.topic_id).next_free() if lane.current is None else float("-inf")
+            for level in self._outbox.levels()
+            for lane in level.lanes
+        )
+
+    def _finish(self, draft: Draft) -> BuiltPdu:
+        data = draft.build(self._src, self._seq, self._params.hop_limit, self._control_entry_id)
+        self._seq = (self._seq + 1) & 0xFF
+        self._control_entry_id = (self._control_entry_id + 1) & 0xFF
+        return BuiltPdu(data, draft.carried)
+
+    def _fill_from(self, level: Level, draft: Draft, start: float) -> None:
+        lanes = tuple(level.lanes)
+        more = True
+        while more:
+            more = False
+            for lane in lanes:
+                if draft.room < 0:
+                    return
+                head = self._live_head(lane, start)
+                if head is None or (draft.dst >= 0 and head.dst != draft.dst):
+                    continue
+                if self._place(lane, head, level, draft, start):
+                    more = self._params.greedy
+
+    def _live_head(self, lane: Lane, start: float) -> Outgoing | None:
+        head = lane.head
+        while head is not None and head.expires_at <= start:
+            if lane.current is None:
+                self._outbox.withdraw_head(lane)
+            else:
+                self.abandon(lane, start)
+            self._expired.append(head)
+            head = lane.head
+        return head
+
+    def _place(
+        self, lane: Lane, head: Outgoing, level: Level, draft: Draft, start: float
+    ) -> bool:
+        """Put the lane's next entry into the draft if it fits."""
+        size = len(head.payload)
+        k = head.k or self._fragment_size(size, level.per_dst[lane.dst])
+        at = head.next_index * k
+        length = min(k, size - at)
+        is_last = at + length >= size
+        needs_stamp = is_last and not head.stamped
+        if needs_stamp and length > draft.room_beside_records(Stamp.SIZE):
+            # The age goes ahead in a PDU of its own only where even an empty one is too small.
+            return draft.is_empty and self._send_stamp_ahead(lane, head, k, draft, start)
+        if length > draft.room or not self._begin(lane, head, k, start):
+            return False
+        draft.add(
+            head,
+            Entry(
+                head.topic_id, head.entry_id, head.next_index, head.total,
+                head.payload[at : at + length],
+            ),
+        )  # fmt: skip
+        head.next_index += 1
+        head.unconfirmed += 1
+        if is_last:
+            if needs_stamp:
+                self._stamp(draft, head, start)
+            self._retire(head, start)
+            lane.current = None
+        self._outbox.served(lane)
+        return True
+
+    def _send_stamp_ahead(
+        self, lane: Lane, head: Outgoing, k: int, draft: Draft, start: float
+    ) -> bool:
+        if not self._begin(lane, head, k, start):
+            return False
+        self._stamp(draft, head, start)
+        head.rests_id = True
+        draft.dst = head.dst
+        draft.qos = head.qos
+        return True
+
+    def _fragment_size(self, size: int, topics_pending: int) -> int:
+        k = self._k_shared if topics_pending >= 2 else self._k_single
+        return max(k, fragment_count(size, MAX_FRAGMENTS))
+
+    def _begin(self, lane: Lane, head: Outgoing, k: int, start: float) -> bool:
+        """Make `head` the message being fragmented; False while the topic has no free id."""
+        if lane.current is not None:
+            return True
+        entry_id = self._ids(head.topic_id).take(start)
+        if entry_id is None:
+            return False
+        head.entry_id = entry_id
+        head.k = k
+        head.total = fragment_count(len(head.payload), k)
+        head.rests_id = head.total > 1
+        self._outbox.begin(lane)
+        return True
+
+    def _retire(self, head: Outgoing, start: float) -> None:
+        ids = self._ids(head.topic_id)
+        if head.rests_id:
+            ids.rest(head.entry_id, start)
+        else:
+            ids.give_back(head.entry_id)
+
+    def _stamp(self, draft: Draft, message: Outgoing, start: float) -> None:
+        age_us = round((start - message.arrived_at) * 1e6)
+        stamp = Stamp(message.topic_id, message.entry_id, min(max(age_us, 0), MAX_AGE_US))
+        message.stamped = draft.add_records([stamp])
+
+    def _ids(self, topic_id: int) -> EntryIds:
+        ids = self._entry_ids.get(topic_id)
+        if ids is None:
+            ids = self._entry_ids[topic_id] = EntryIds(self._rng, self._rest_s)
+        return ids
+
+    def _must_wait(self, now: float) -> bool:
+        """Whether what is pending should wait for more (paper section 4.3, Flush Timeout)."""
+        if self._params.flush_s <= 0 or self._flushing or not self._outbox:
+            return False
+        if self._outbox.levels()[0].key[0] <= Qos.LATENCY:
+            return False
+        if now >= self._outbox.oldest_arrival() + self._params.flush_s:
+            return False
+        return self._outbox.pending_bytes(self._k_single) < self._k_single

@@ -1,0 +1,158 @@
+"""The link's report: counters in, frozen structs out."""
+
+from collections import Counter
+
+from sdrlinkd.link.link import Link
+from sdrlinkd.reports import (
+    LinkReport,
+    NeighborReport,
+    ReceivedTopicReport,
+    RxReport,
+    TopicReport,
+    TxReport,
+)
+
+
+def link_report(
+    link: Link, now: float, names_in: dict[int, str], name_out: dict[tuple[int, int], str]
+) -> LinkReport:
+    """The whole link at `now`.
+
+    `names_in` are the bus topics subscribed to, by topic id; `name_out` the bus topics that
+    (source, topic id) are republished as.
+    """
+    return LinkReport(
+        pdu_size=link.params.pdu_size,
+        control_channel=link.registry.has_control,
+        registry_digest=link.digest.overall.hex(),
+        tx=_tx(link),
+        rx=_rx(link),
+        topics=_topics(link, now, names_in),
+        received=_received(link, now, name_out),
+        neighbors=_neighbors(link, now),
+    )
+
+
+def _tx(link: Link) -> TxReport:
+    sender = link.sender
+    tallies = [sender.refused, *(sender.tally(topic.id) for topic in link.registry.topics)]
+    return TxReport(
+        accepted=sum(tally.accepted for tally in tallies),
+        sent=sum(tally.sent for tally in tallies),
+        queued=sender.outbox.queued,
+        queued_bytes=sender.outbox.queued_bytes,
+        in_flight=len(sender.outbox.in_flight),
+        dropped=dict(sum((tally.dropped for tally in tallies), Counter())),
+        queued_by_class={q.label: n for q, n in sender.outbox.queued_by_class().items()},
+        pdus_composed=sender.pdus_composed,
+        pdus_sent=sender.pdus_sent,
+        pdus_failed=sender.pdus_failed,
+        bursts_sent=sender.bursts_sent,
+        bursts_failed=sender.bursts_failed,
+    )
+
+
+def _rx(link: Link) -> RxReport:
+    inbox = link.inbox
+    tallies = inbox.tallies.values()
+    return RxReport(
+        pdus_heard=inbox.pdus_heard,
+        pdus_used=inbox.pdus_used,
+        pdus_dropped=dict(inbox.pdus_dropped),
+        started=inbox.reassembly.started,
+        delivered=sum(tally.delivered for tally in tallies),
+        held=inbox.reassembly.held,
+        held_bytes=inbox.reassembly.held_bytes,
+        dropped=dict(sum((tally.dropped for tally in tallies), Counter())),
+    )
+
+
+def _topics(link: Link, now: float, names_in: dict[int, str]) -> list[TopicReport]:
+    reports = []
+    for topic in link.registry.topics:
+        tally = link.sender.tally(topic.id)
+        qos, priority = link.sender.treatment(topic.id)
+        reports.append(
+            TopicReport(
+                topic_id=topic.id,
+                name=names_in.get(topic.id, "/" + topic.name),
+                type=topic.type,
+                subscribed=topic.id in names_in,
+                qos=qos.label,
+                priority=priority,
+                accepted=tally.accepted,
+                accepted_per_s=link.rates.per_s(("tx", topic.id), tally.accepted, now),
+                sent=tally.sent,
+                sent_bytes=tally.sent_bytes,
+                queued=link.sender.outbox.queued_of_topic(topic.id),
+                dropped=dict(tally.dropped),
+            )
+        )
+    return reports
+
+
+def _received(
+    link: Link, now: float, name_out: dict[tuple[int, int], str]
+) -> list[ReceivedTopicReport]:
+    reports = []
+    for (src, topic_id), tally in sorted(link.inbox.tallies.items()):
+        topic = link.registry.by_id(topic_id)
+        ages = link.ages.get((src, topic_id))
+        ended = tally.delivered + sum(tally.dropped.values())
+        reports.append(
+            ReceivedTopicReport(
+                src=src,
+                topic_id=topic_id,
+                name="/" + topic.name if topic else f"(topic id {topic_id})",
+                republished_as=name_out.get((src, topic_id), ""),
+                delivered=tally.delivered,
+                delivered_per_s=link.rates.per_s(("rx", src, topic_id), tally.delivered, now),
+                delivered_bytes=tally.delivered_bytes,
+                dropped=dict(tally.dropped),
+                pdr=tally.delivered / ended if ended else None,
+                age_ms_last=ages.last_ms() if ages else None,
+                age_ms_p50=ages.quantile_ms(0.5) if ages else None,
+                age_ms_p99=ages.quantile_ms(0.99) if ages else None,
+            )
+        )
+    return reports
+
+
+def _neighbors(link: Link, now: float) -> list[NeighborReport]:
+    reports = []
+    for src, neighbor in sorted(link.inbox.neighbors.items()):
+        lost = neighbor.track.lost
+        registry = "unknown"
+        if neighbor.digest is not None:
+            registry = "same" if neighbor.digest.overall == link.digest.overall else "differs"
+        reports.append(
+            NeighborReport(
+                src=src,
+                is_self=src == link.own_id,
+                last_heard_s_ago=max(0.0, now - neighbor.last_heard_at),
+                pdus_heard=neighbor.heard,
+                pdus_lost=lost,
+                per=lost / (neighbor.heard + lost) if neighbor.heard + lost else 0.0,
+                duplicates=neighbor.duplicates,
+                hops_left=neighbor.hops_left,
+                reboots=neighbor.reboots,
+                snr_db=neighbor.snr_db,
+                registry=registry,
+            )
+        )
+    return reports
+
+
+def link_notices(link: Link) -> list[str]:
+    """What a person should know about this link, in sentences."""
+    notices = []
+    if not link.registry.has_control:
+        notices.append(
+            "the registry uses all 16 topic ids, so there is no control channel: no ages, no "
+            "beacons, no registry check; drop one topic to have them"
+        )
+    for _, neighbor in sorted(link.inbox.neighbors.items()):
+        disagreement = neighbor.disagreement(link.registry, link.digest)
+        if disagreement:
+            notices.append(disagreement)
+    return notices

@@ -1,0 +1,225 @@
+"""The transmit half of the link: from submitted messages to confirmed bursts."""
+
+from collections.abc import Mapping
+from enum import Enum
+from random import Random
+from typing import NamedTuple
+
+from sdrlinkd.link.ledger import TxTally, balance
+from sdrlinkd.link.outbox import Fate, Outbox, Outgoing
+from sdrlinkd.link.packetizer import Packetizer
+from sdrlinkd.link.params import LinkParams, QueueParams
+from sdrlinkd.link.qos import QOS_BY_LABEL, Qos, TopicPolicy
+from sdrlinkd.wire import Registry, max_message_size
+
+
+class Burst(NamedTuple):
+    """PDUs that leave together, and the messages each carries an entry of."""
+
+    pdus: list[bytes]
+    carried: list[list[Outgoing]]
+
+
+class Outcome(Enum):
+    """What the radio says of a burst after its last sample."""
+
+    SENT = "sent"
+    LATE = "late"
+    UNDERFLOW = "underflow"
+    LOST = "lost"
+
+
+class _TopicState:
+    """A topic's policy, resolved once, and its tally."""
+
+    __slots__ = ("depth", "dst", "lifespan_s", "priority", "qos", "stamp", "tally")
+
+    def __init__(self, policy: TopicPolicy, dst: int, has_control: bool) -> None:
+        self.tally = TxTally()
+        self.apply(policy, dst, has_control)
+
+    def apply(self, policy: TopicPolicy, dst: int, has_control: bool) -> None:
+        self.qos = QOS_BY_LABEL[policy.qos]
+        self.priority = policy.priority
+        self.depth = policy.depth
+        self.lifespan_s = policy.lifespan_s
+        self.dst = dst if policy.dst is None else policy.dst
+        self.stamp = policy.stamp and has_control
+
+
+class Sender:
+    """Queue, packetizer and the TX ledger of one node."""
+
+    def __init__(
+        self,
+        params: LinkParams,
+        queue: QueueParams,
+        registry: Registry,
+        src: int,
+        rng: Random,
+        reassembly_timeout_s: float,
+    ) -> None:
+        self._params = params
+        self._registry = registry
+        self.outbox = Outbox(queue)
+        self.packetizer = Packetizer(params, src, self.outbox, rng, reassembly_timeout_s)
+        self._topics = [
+            _TopicState(TopicPolicy(), params.dst, registry.has_control) for _ in registry.topics
+        ]
+        self.refused = TxTally()
+        """Messages that never became a topic's: bad envelopes, unknown topics."""
+        self.pdus_composed = 0
+        self.pdus_sent = 0
+        self.pdus_failed = 0
+        self.bursts_sent = 0
+        self.bursts_failed = 0
+
+    def set_policies(self, policies: Mapping[int, TopicPolicy]) -> None:
+        """Apply policies by topic id; topics without one get the defaults."""
+        for topic_id, state in enumerate(self._topics):
+            policy = policies.get(topic_id, TopicPolicy())
+            state.apply(policy, self._params.dst, self._registry.has_control)
+
+    def submit(
+        self,
+        topic_id: int,
+        payload: bytes,
+        now: float,
+        qos: Qos | None = None,
+        priority: int | None = None,
+        dst: int | None = None,
+        lifespan_s: float | None = None,
+    ) -> str | None:
+        """Queue a message; None, or the ledger's reason why it was refused.
+
+        What the producer leaves open comes from the topic's policy.
+        """
+        topic = self._topics[topic_id]
+        tally = topic.tally
+        tally.accepted += 1
+        if len(payload) > max_message_size(self._params.pdu_size):
+            tally.drop("tx_too_big")
+            return "tx_too_big"
+        message = Outgoing(
+            topic_id,
+            payload,
+            topic.qos if qos is None else qos,
+            topic.priority if priority is None else priority,
+            topic.dst if dst is None else dst,
+            now,
+            now + (topic.lifespan_s if lifespan_s is None else lifespan_s),
+            topic.stamp,
+            tally,
+        )
+        refused = None
+        for shed, reason in self.outbox.put(message, topic.depth):
+            self._drop(shed, reason)
+            if shed is message:
+                refused = reason
+        return refused
+
+    def refuse(self, reason: str, topic_id: int | None = None) -> None:
+        """Count a message that the bus could not hand over."""
+        tally = self.refused if topic_id is None else self._topics[topic_id].tally
+        tally.accepted += 1
+        tally.drop(reason)
+
+    def compose(self, start: float, max_pdus: int) -> Burst | None:
+        """The next burst, whose preamble leaves at `start`; None when nothing is to be sent."""
+        pdus: list[bytes] = []
+        carried: list[list[Outgoing]] = []
+        while len(pdus) < max_pdus:
+            built = self.packetizer.next_pdu(start)
+            if built is None:
+                break
+            pdus.append(built.data)
+            carried.append(built.carried)
+        self._settle_expired()
+        return self._burst(pdus, carried)
+
+    def expire(self, now: float) -> None:
+        """Drop heads whose lifespan ended while no burst could go."""
+        self.packetizer.expire(now)
+        self._settle_expired()
+
+    def compose_records(self) -> Burst | None:
+        """A burst of one PDU for control records that found no spare room."""
+        built = self.packetizer.records_pdu()
+        return None if built is None else self._burst([built.data], [[]])
+
+    def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
+        """The radio's word on a burst: its messages are sent, or dropped by name."""
+        if outcome is Outcome.SENT:
+            self.bursts_sent += 1
+            self.pdus_sent += len(burst.pdus)
+        else:
+            self.bursts_failed += 1
+            self.pdus_failed += len(burst.pdus)
+        for messages in burst.carried:
+            for message in messages:
+                message.unconfirmed -= 1
+                if message.fate is not Fate.IN_FLIGHT:
+                    continue
+                if outcome is not Outcome.SENT:
+                    self._fail(message, now)
+                elif message.next_index == message.total and not message.unconfirmed:
+                    self._settle_sent(message)
+
+    def shut_down(self) -> None:
+        """Drop what is still waiting or unconfirmed as tx_shutdown."""
+        for message in self.outbox.withdraw_all():
+            self._drop(message, "tx_shutdown")
+        for message in list(self.outbox.in_flight):
+            self._drop(message, "tx_shutdown")
+
+    def tally(self, topic_id: int) -> TxTally:
+        """Counters of one topic."""
+        return self._topics[topic_id].tally
+
+    def treatment(self, topic_id: int) -> tuple[Qos, int]:
+        """Class and priority that a topic's messages get by default."""
+        topic = self._topics[topic_id]
+        return topic.qos, topic.priority
+
+    def audit(self) -> list[str]:
+        """What does not add up in the TX ledger; empty when all does."""
+        tallies = [self.refused, *(topic.tally for topic in self._topics)]
+        dropped: dict[str, int] = {}
+        for each in tallies:
+            for reason, count in each.dropped.items():
+                dropped[reason] = dropped.get(reason, 0) + count
+        return balance(
+            "tx messages",
+            sum(each.accepted for each in tallies),
+            {
+                "sent": sum(each.sent for each in tallies),
+                "queued": self.outbox.queued,
+                "in_flight": len(self.outbox.in_flight),
+                **dropped,
+            },
+        )
+
+    def _burst(self, pdus: list[bytes], carried: list[list[Outgoing]]) -> Burst | None:
+        self.pdus_composed += len(pdus)
+        return Burst(pdus, carried) if pdus else None
+
+    def _settle_expired(self) -> None:
+        for message in self.packetizer.take_expired():
+            self._drop(message, "tx_expired")
+
+    def _settle_sent(self, message: Outgoing) -> None:
+        message.fate = Fate.SENT
+        self.outbox.in_flight.discard(message)
+        message.tally.sent += 1
+        message.tally.sent_bytes += len(message.payload)
+
+    def _fail(self, message: Outgoing, now: float) -> None:
+        self._drop(message, "tx_radio_failed")
+        if message.lane.current is message:
+            self.packetizer.abandon(message.lane, now)
+
+    def _drop(self, message: Outgoing, reason: str) -> None:
+        message.fate = Fate.DROPPED
+        self.outbox.in_flight.discard(message)
+        message.tally.drop(reason)
+

@@ -1,0 +1,155 @@
+"""One node at work: the link between its bus and its PDU link."""
+
+import asyncio
+import time
+from collections.abc import Sequence
+
+from sdrlinkd import __version__
+from sdrlinkd.bus import Bus
+from sdrlinkd.config import Setup
+from sdrlinkd.link import Burst, Link, Outcome, Qos, link_notices, link_report
+from sdrlinkd.pdulink import Heard, PduLink
+from sdrlinkd.reports import Snapshot
+
+TICK_S = 0.05
+
+
+class Node:
+    """Asks the link what to do and does it. Holds no queue and no decision of its own."""
+
+    def __init__(self, setup: Setup, link: Link, pdu_link: PduLink) -> None:
+        self._setup = setup
+        self._link = link
+        self._pdu_link = pdu_link
+        self._bus: Bus | None = None
+        self._work = asyncio.Event()
+        self._started_at = time.monotonic()
+        self._loop_lag_s = 0.0
+        self._draining = False
+
+    def attach(self, bus: Bus) -> None:
+        """The bus that takes what is heard."""
+        self._bus = bus
+
+    # The bus's Ingress.
+
+    def submit(
+        self,
+        topic_id: int,
+        payload: bytes,
+        qos: Qos | None = None,
+        priority: int | None = None,
+        dst: int | None = None,
+        lifespan_s: float | None = None,
+    ) -> None:
+        """A message from a producer."""
+        now = self._pdu_link.now()
+        self._link.submit(topic_id, payload, now, qos, priority, dst, lifespan_s)
+        self._work.set()
+
+    def refuse(self, reason: str, topic_id: int | None = None) -> None:
+        """A message that the bus could not take."""
+        self._link.sender.refuse(reason, topic_id)
+
+    # The PDU link's listener.
+
+    def heard(self, pdus: Sequence[Heard]) -> None:
+        """PDUs from the air."""
+        bus = self._bus
+        for data, at, snr_db in pdus:
+            if bus is not None and bus.is_tapped:
+                bus.tap("rx", data)
+            for message in self._link.hear(data, at, snr_db):
+                if bus is not None:
+                    now = self._pdu_link.now()
+                    age_s = self._link.delivered(message, now)
+                    received_ns = time.time_ns() - round((now - message.heard_at) * 1e9)
+                    bus.publish(message, age_s, received_ns)
+
+    def settled(self, burst: Burst, outcome: Outcome, at: float) -> None:
+        """A burst has left, or not."""
+        self._link.confirm(burst, outcome, at)
+
+    # The daemon's tasks.
+
+    async def transmit(self) -> None:
+        """Compose a burst whenever the carrier can take one; for ever."""
+        while True:
+            opportunity = await self._pdu_link.opportunity()
+            burst = self._link.compose(opportunity.start, opportunity.max_pdus)
+            if burst is None:
+                await self._wait_for_work()
+                continue
+            if self._bus is not None and self._bus.is_tapped:
+                for data in burst.pdus:
+                    self._bus.tap("tx", data)
+            self._pdu_link.send(burst)
+
+    async def tick(self) -> None:
+        """Let the link's time pass, and measure how late the event loop is; for ever."""
+        while True:
+            due = time.monotonic() + TICK_S
+            await asyncio.sleep(TICK_S)
+            self._loop_lag_s = max(time.monotonic() - due, 0.9 * self._loop_lag_s)
+            self._link.handle_timers(self._pdu_link.now())
+
+    def stop_ingress(self) -> None:
+        """Take no more messages from producers."""
+        if self._bus is not None:
+            self._bus.stop_ingress()
+
+    async def drain(self, at_most_s: float) -> None:
+        """Send what is queued, for at most `at_most_s`; drop the rest by name."""
+        self._draining = True
+        self._link.drain()
+        self._work.set()
+        try:
+            async with asyncio.timeout(at_most_s):
+                while self._link.sender.outbox:
+                    await asyncio.sleep(0.005)
+                await self._pdu_link.idle()
+        except TimeoutError:
+            pass
+        self._link.shut_down()
+
+    def reload(self, setup: Setup) -> None:
+        """Apply the per-topic policies of `setup`; everything else stays."""
+        self._link.set_policies(setup.policies)
+
+    def snapshot(self, control_requests: int) -> Snapshot:
+        """Everything there is to know, at this moment."""
+        assert self._bus is not None
+        now = self._pdu_link.now()
+        return Snapshot(
+            version=__version__,
+            node=self._setup.node_id,
+            namespace=self._setup.config.namespace,
+            state="draining" if self._draining else "running",
+            taken_at_unix_ns=time.time_ns(),
+            uptime_s=time.monotonic() - self._started_at,
+            loop_lag_ms=self._loop_lag_s * 1e3,
+            carrier=self._pdu_link.report(),
+            bus=self._bus.report(control_requests),
+            link=link_report(
+                self._link,
+                now,
+                {topic_id: name for name, topic_id in self._setup.topics_in.items()},
+                self._bus.names_out(),
+            ),
+            notices=[*self._setup.warnings, *link_notices(self._link)],
+        )
+
+    def audit(self) -> list[str]:
+        """Where the ledger does not add up; empty when it does."""
+        return self._link.audit()
+
+    async def _wait_for_work(self) -> None:
+        """Until something was submitted, or the link's own time comes."""
+        self._work.clear()
+        now = self._pdu_link.now()
+        wait_s = max(0.0, self._link.next_wakeup(now) - now)
+        try:
+            async with asyncio.timeout(None if wait_s == float("inf") else wait_s):
+                await self._work.wait()
+        except TimeoutError:
+            return

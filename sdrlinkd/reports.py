@@ -1,0 +1,149 @@
+"""The status schema: what each part tells of itself.
+
+Frozen, with the unit in the name; counters only grow; `*_per_s` are means over the last
+`RATE_WINDOW_S`. One `Snapshot` is built from all of them, and every view renders that snapshot.
+"""
+
+import msgspec
+
+RATE_WINDOW_S = 5.0
+
+
+class Report(msgspec.Struct, frozen=True, kw_only=True):
+    """Base of all reports."""
+
+
+class TopicReport(Report):
+    """One topic of the registry on its way out."""
+
+    topic_id: int
+    name: str
+    type: str
+    subscribed: bool
+    qos: str
+    priority: int
+    accepted: int = 0
+    accepted_per_s: float = 0.0
+    sent: int = 0
+    sent_bytes: int = 0
+    queued: int = 0
+    dropped: dict[str, int] = {}
+
+
+class ReceivedTopicReport(Report):
+    """One topic of one source, as heard here. `pdr` is delivered over begun messages."""
+
+    src: int
+    topic_id: int
+    name: str
+    republished_as: str
+    delivered: int = 0
+    delivered_per_s: float = 0.0
+    delivered_bytes: int = 0
+    dropped: dict[str, int] = {}
+    pdr: float | None = None
+    age_ms_last: float | None = None
+    age_ms_p50: float | None = None
+    age_ms_p99: float | None = None
+
+
+class NeighborReport(Report):
+    """One source of PDUs. `per` is PDUs known lost over PDUs sent, from sequence numbers."""
+
+    src: int
+    is_self: bool
+    last_heard_s_ago: float
+    pdus_heard: int
+    pdus_lost: int
+    per: float
+    duplicates: int
+    hops_left: int
+    reboots: int
+    snr_db: float | None = None
+    registry: str = "unknown"
+    """same | differs | unknown"""
+
+
+class TxReport(Report):
+    """The transmit ledger: accepted = sent + queued + in_flight + every reason of `dropped`."""
+
+    accepted: int
+    sent: int
+    queued: int
+    queued_bytes: int
+    in_flight: int
+    dropped: dict[str, int]
+    queued_by_class: dict[str, int]
+    pdus_composed: int
+    pdus_sent: int
+    pdus_failed: int
+    bursts_sent: int
+    bursts_failed: int
+
+
+class RxReport(Report):
+    """The receive ledgers.
+
+    pdus_heard = pdus_used + every reason of `pdus_dropped`;
+    started = delivered + held + every reason of `dropped`.
+    """
+
+    pdus_heard: int
+    pdus_used: int
+    pdus_dropped: dict[str, int]
+    started: int
+    delivered: int
+    held: int
+    held_bytes: int
+    dropped: dict[str, int]
+
+
+class LinkReport(Report):
+    """Everything the link knows."""
+
+    pdu_size: int
+    control_channel: bool
+    registry_digest: str
+    tx: TxReport
+    rx: RxReport
+    topics: list[TopicReport]
+    received: list[ReceivedTopicReport]
+    neighbors: list[NeighborReport]
+
+
+class CarrierReport(Report):
+    """What carries the PDUs, and how it fares."""
+
+    kind: str
+    state: str
+    """up | down"""
+    detail: str = ""
+    counters: dict[str, int] = {}
+
+
+class BusReport(Report):
+    """The local bus."""
+
+    runtime_dir: str
+    received: int
+    published: int
+    control_requests: int
+    bad_envelope_last: str = ""
+
+
+class Snapshot(Report):
+    """One moment of one daemon."""
+
+    version: str
+    node: int
+    namespace: str
+    state: str
+    """running | draining"""
+    taken_at_unix_ns: int
+    uptime_s: float
+    loop_lag_ms: float
+    carrier: CarrierReport
+    bus: BusReport
+    link: LinkReport
+    notices: list[str] = []
+    """Sentences a person should read: what is switched off, disagrees or was refused."""

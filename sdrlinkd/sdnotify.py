@@ -1,0 +1,41 @@
+"""Telling systemd how the service is (sd_notify(3)), over its datagram socket."""
+
+import os
+import socket
+
+
+class Notifier:
+    """Sends states to $NOTIFY_SOCKET; silent when the service manager asks for none."""
+
+    def __init__(self) -> None:
+        address = os.environ.get("NOTIFY_SOCKET", "")
+        # An abstract socket's name begins with NUL, which the environment spells "@".
+        self._address = "\0" + address[1:] if address.startswith("@") else address
+        interval_us = os.environ.get("WATCHDOG_USEC", "")
+        self.watchdog_s = int(interval_us) / 1e6 if interval_us.isdigit() else None
+
+    def ready(self) -> None:
+        """The service is up."""
+        self._send("READY=1")
+
+    def stopping(self) -> None:
+        """The service is on its way down."""
+        self._send("STOPPING=1")
+
+    def alive(self) -> None:
+        """Feed the watchdog."""
+        self._send("WATCHDOG=1")
+
+    def status(self, line: str) -> None:
+        """One line for `systemctl status`."""
+        self._send(f"STATUS={line}")
+
+    def _send(self, state: str) -> None:
+        if not self._address:
+            return
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as sock:
+            sock.setblocking(False)
+            try:
+                sock.sendto(state.encode(), self._address)
+            except OSError:
+                return

@@ -1,0 +1,157 @@
+"""Fragments back into messages (wire document, section 5.3)."""
+
+from collections import OrderedDict
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from sdrlinkd.wire.pdu import Entry
+
+# What a held fragment costs beside its payload, so that many tiny ones count too.
+PARTIAL_OVERHEAD = 512
+FRAGMENT_OVERHEAD = 128
+
+
+@dataclass(frozen=True, slots=True)
+class ReassemblyLimits:
+    """How long and how much the receiver keeps of incomplete messages."""
+
+    timeout_s: float = 1.0
+    """Seconds without a new fragment after which a message is given up."""
+    source_bytes: int = 1 << 20
+    """Most memory for one source, overheads included."""
+    total_bytes: int = 8 << 20
+    """Most memory for all sources together."""
+
+
+class Lost(NamedTuple):
+    """An incomplete message that was given up, and the ledger's reason."""
+
+    src: int
+    topic_id: int
+    reason: str
+
+
+@dataclass(slots=True)
+class _Partial:
+    total: int
+    touched_at: float
+    parts: dict[int, bytes] = field(default_factory=dict)
+    cost: int = PARTIAL_OVERHEAD
+
+
+@dataclass(slots=True)
+class _Source:
+    partials: OrderedDict[tuple[int, int], _Partial] = field(default_factory=OrderedDict)
+    cost: int = 0
+
+
+class Reassembly:
+    """Joins fragments per (source, topic id, entry id), in any order, duplicates ignored.
+
+    The oldest activity stands first in each source's table, so timeouts and evictions look at
+    fronts only. What is given up appears in `take_lost`.
+    """
+
+    def __init__(self, limits: ReassemblyLimits) -> None:
+        self._limits = limits
+        self._sources: dict[int, _Source] = {}
+        self._lost: list[Lost] = []
+        self._next_expiry = float("inf")
+        self.held_bytes = 0
+        self.held = 0
+        self.started = 0
+        self.duplicate_fragments = 0
+
+    def add(self, src: int, entry: Entry, now: float) -> bytes | None:
+        """Take one entry; the whole message when it is the last missing one, else None."""
+        topic_id, entry_id, index, total, payload = entry
+        source = self._sources.get(src)
+        if total == 1:
+            if source is not None and (topic_id, entry_id) in source.partials:
+                self._give_up(src, source, (topic_id, entry_id), "rx_partial_superseded")
+            self.started += 1
+            return payload
+        if source is None:
+            source = self._sources[src] = _Source()
+        key = (topic_id, entry_id)
+        partial = source.partials.get(key)
+        if partial is not None and self._is_other_message(partial, entry):
+            # The sender uses the entry id anew: the old message can never be completed.
+            self._give_up(src, source, key, "rx_partial_superseded")
+            partial = None
+        if partial is None:
+            partial = self._start(source, key, total, now)
+        elif index in partial.parts:
+            self.duplicate_fragments += 1
+            return None
+        if len(partial.parts) == total - 1:
+            partial.parts[index] = payload
+            self._remove(source, key)
+            return b"".join([partial.parts[i] for i in range(total)])
+        partial.parts[index] = payload
+        partial.touched_at = now
+        source.partials.move_to_end(key)
+        cost = len(payload) + FRAGMENT_OVERHEAD
+        partial.cost += cost
+        source.cost += cost
+        self.held_bytes += cost
+        self._keep_bounds(src, source)
+        return None
+
+    def expire(self, now: float) -> None:
+        """Give up what has been silent for the timeout."""
+        if now < self._next_expiry:
+            return
+        horizon = now - self._limits.timeout_s
+        self._next_expiry = float("inf")
+        for src, source in list(self._sources.items()):
+            while source.partials:
+                key, partial = next(iter(source.partials.items()))
+                if partial.touched_at > horizon:
+                    due = partial.touched_at + self._limits.timeout_s
+                    self._next_expiry = min(self._next_expiry, due)
+                    break
+                self._give_up(src, source, key, "rx_partial_timeout")
+            if not source.partials:
+                del self._sources[src]
+
+    def next_expiry(self) -> float:
+        """When `expire` may next have something to do; infinity when nothing is held."""
+        return self._next_expiry
+
+    def take_lost(self) -> list[Lost]:
+        """What was given up since the last call."""
+        lost, self._lost = self._lost, []
+        return lost
+
+    def _start(self, source: _Source, key: tuple[int, int], total: int, now: float) -> _Partial:
+        partial = source.partials[key] = _Partial(total, now)
+        source.cost += PARTIAL_OVERHEAD
+        self.held_bytes += PARTIAL_OVERHEAD
+        self.held += 1
+        self.started += 1
+        self._next_expiry = min(self._next_expiry, now + self._limits.timeout_s)
+        return partial
+
+    @staticmethod
+    def _is_other_message(partial: _Partial, entry: Entry) -> bool:
+        known = partial.parts.get(entry.index)
+        return partial.total != entry.total or (known is not None and known != entry.payload)
+
+    def _keep_bounds(self, src: int, source: _Source) -> None:
+        while source.cost > self._limits.source_bytes:
+            self._give_up(src, source, next(iter(source.partials)), "rx_partial_evicted")
+        while self.held_bytes > self._limits.total_bytes:
+            greedy = max(self._sources, key=lambda s: self._sources[s].cost)
+            victim = self._sources[greedy]
+            self._give_up(greedy, victim, next(iter(victim.partials)), "rx_partial_memory")
+
+    def _give_up(self, src: int, source: _Source, key: tuple[int, int], reason: str) -> None:
+        self._remove(source, key)
+        self._lost.append(Lost(src, key[0], reason))
+
+    def _remove(self, source: _Source, key: tuple[int, int]) -> None:
+        partial = source.partials.pop(key)
+        source.cost -= partial.cost
+        self.held_bytes -= partial.cost
+        self.held -= 1

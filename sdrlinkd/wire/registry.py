@@ -1,0 +1,138 @@
+"""The topic registry: which name and type each topic id stands for (wire document, section 7)."""
+
+import hashlib
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from sdrlinkd.errors import RegistryError
+
+MAX_TOPICS = 16
+CONTROL_TOPIC_ID = 0xF
+
+_NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+_TYPE = re.compile(r"([A-Za-z]\w*)/(?:msg/)?([A-Za-z]\w*)", re.ASCII)
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """One line of the registry. `name` has no leading slash; `type` reads `pkg/msg/Name`."""
+
+    id: int
+    name: str
+    type: str
+
+
+@dataclass(frozen=True, slots=True)
+class RegistryDigest:
+    """What two nodes compare: 8 bytes over all, and one byte a topic to name the culprit."""
+
+    overall: bytes
+    per_topic: bytes
+
+    def differing_ids(self, other: "RegistryDigest") -> list[int]:
+        """Topic ids on which the two registries (seem to) disagree; empty when they agree."""
+        if self.overall == other.overall:
+            return []
+        most = max(len(self.per_topic), len(other.per_topic))
+        mine = self.per_topic.ljust(most, b"\0")
+        theirs = other.per_topic.ljust(most, b"\0")
+        longer = range(min(len(self.per_topic), len(other.per_topic)), most)
+        return [i for i in range(most) if mine[i] != theirs[i] or i in longer]
+
+
+class Registry:
+    """Name ↔ topic id, both ways. Topic ids are the order of the lines."""
+
+    def __init__(self, topics: Sequence[Topic]) -> None:
+        self.topics = tuple(topics)
+        self._by_name = {topic.name: topic for topic in topics}
+
+    def __len__(self) -> int:
+        return len(self.topics)
+
+    @property
+    def has_control(self) -> bool:
+        """Topic id 0xF is the control channel unless the registry needs all sixteen."""
+        return len(self.topics) < MAX_TOPICS
+
+    def by_id(self, topic_id: int) -> Topic | None:
+        """The topic under `topic_id`, or None."""
+        return self.topics[topic_id] if topic_id < len(self.topics) else None
+
+    def by_name(self, name: str) -> Topic | None:
+        """The topic called `name` (with or without leading slash), or None."""
+        return self._by_name.get(name.removeprefix("/"))
+
+    def suggest(self, name: str) -> str:
+        """What a person who wrote `name` may have meant; for error messages."""
+        close = get_close_matches(name.removeprefix("/"), self._by_name, n=1)
+        hint = f"; did you mean {close[0]}?" if close else ""
+        return f"the registry has {', '.join(self._by_name) or 'no topics'}{hint}"
+
+    def digest(self) -> RegistryDigest:
+        """Digest over ids, names and types (wire document, section 7.2)."""
+        lines = [f"{topic.id},{topic.name},{topic.type}\n".encode() for topic in self.topics]
+        return RegistryDigest(
+            overall=hashlib.sha256(b"".join(lines)).digest()[:8],
+            per_topic=bytes(hashlib.sha256(line).digest()[0] for line in lines),
+        )
+
+    def csv(self) -> str:
+        """The registry as a CSV that `parse_registry` reads back."""
+        return "".join(f"{topic.name},{topic.type}\n" for topic in self.topics)
+
+
+def parse_registry(text: str, source: str = "registry") -> Registry:
+    """Registry from CSV text: one `name,type` a line; empty lines and `#` comments are skipped.
+
+    Raises RegistryError that cites `source` and the line.
+    """
+    pairs = []
+    for number, raw in enumerate(text.splitlines(), start=1):
+        line = raw.split("#", 1)[0].strip()
+        if not line or (number == 1 and line.replace(" ", "").lower() == "name,type"):
+            continue
+        fields = [field.strip() for field in line.split(",")]
+        if len(fields) != 2:
+            raise RegistryError(
+                f"{source}:{number}: got {raw.strip()!r}; a line is `name,type`, "
+                "for example `odom,nav_msgs/Odometry`"
+            )
+        pairs.append((fields[0], fields[1], f"{source}:{number}"))
+    return _assemble(pairs, source)
+
+
+def make_registry(pairs: Iterable[tuple[str, str]], source: str = "registry") -> Registry:
+    """Registry from (name, type) pairs. Raises RegistryError as `parse_registry` does."""
+    return _assemble([(name, kind, source) for name, kind in pairs], source)
+
+
+def _assemble(pairs: list[tuple[str, str, str]], source: str) -> Registry:
+    topics: list[Topic] = []
+    seen: dict[str, str] = {}
+    for raw_name, raw_type, where in pairs:
+        if not _NAME.fullmatch(raw_name):
+            raise RegistryError(
+                f"{where}: topic name {raw_name!r}; allowed: ROS names such as odom or camera/image"
+            )
+        kind = _TYPE.fullmatch(raw_type)
+        if not kind:
+            raise RegistryError(
+                f"{where}: type {raw_type!r}; allowed: package/Name or package/msg/Name"
+            )
+        name = raw_name.removeprefix("/")
+        if name in seen:
+            raise RegistryError(f"{where}: topic {name} is listed twice, first at {seen[name]}")
+        seen[name] = where
+        topics.append(Topic(len(topics), name, f"{kind[1]}/msg/{kind[2]}"))
+    if len(topics) > MAX_TOPICS:
+        raise RegistryError(
+            f"{source}: {len(topics)} topics; a PDU's topic id has room for {MAX_TOPICS} "
+            f"(and for {MAX_TOPICS - 1} with ages, beacons and link reports)"
+        )
+    if not topics:
+        raise RegistryError(f"{source}: no topics; write at least one line such as "
+                            "`odom,nav_msgs/Odometry`")  # fmt: skip
+    return Registry(topics)
