@@ -4,7 +4,6 @@ import asyncio
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import msgspec
@@ -45,12 +44,13 @@ class Control:
         directory: RuntimeDirectory,
     ) -> None:
         self._verbs: Mapping[str, Verb] = {}
-        self._socket = directory.bind(context, zmq.ROUTER, CONTROL_SOCKET, {zmq.ROUTER_MANDATORY: 1})
+        self._socket = directory.bind(
+            context, zmq.ROUTER, CONTROL_SOCKET, {zmq.ROUTER_MANDATORY: 1}
+        )
         self._allowed_uids = {0, os.getuid()}
         self.requests = 0
-        receive_frames = partial(self._socket.recv_multipart, copy=False)
         loop = asyncio.get_running_loop()
-        self._reader = SocketReader(loop, self._socket, receive_frames, self._take)
+        self._reader = SocketReader(loop, self._socket, self._receive, self._take)
 
     def serve(self, verbs: Mapping[str, Verb]) -> None:
         """Answer `verbs` from now on."""
@@ -60,6 +60,9 @@ class Control:
         """Stop serving; answers on their way have 200 ms."""
         self._reader.close()
         self._socket.close(linger=200)
+
+    def _receive(self, flags: int) -> list[zmq.Frame]:
+        return self._socket.recv_multipart(flags, copy=False)
 
     def _take(self, frames: list[zmq.Frame]) -> None:
         self.requests += 1

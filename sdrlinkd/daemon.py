@@ -6,6 +6,7 @@ import logging
 import os
 import signal
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -43,7 +44,7 @@ async def run(setup: Setup, reload: Reload) -> None:
     notifier = Notifier()
     async with contextlib.AsyncExitStack() as stack:
         node, control = await _open(setup, stack, reload)
-        loop.add_signal_handler(signal.SIGHUP, _reload_on_signal, node, reload)
+        loop.add_signal_handler(signal.SIGHUP, _reload_on_signal, node, setup, reload)
         stack.callback(loop.remove_signal_handler, signal.SIGHUP)
         async with asyncio.TaskGroup() as tasks:
             running = [
@@ -55,7 +56,6 @@ async def run(setup: Setup, reload: Reload) -> None:
             await stop.wait()
             log.info("stopping: %d messages queued", node.snapshot(0).link.tx.queued)
             notifier.stopping()
-            node.stop_ingress()
             await node.drain(setup.config.drain_s)
             for task in running:
                 task.cancel()
@@ -82,12 +82,11 @@ async def _open(
     )
     link.set_policies(setup.policies)
     pdu_link = make_pdu_link(config, rng)
-    node = Node(setup, link, pdu_link)
     context = zmq.Context()
-    stack.callback(context.term)
-    bus = Bus(context, directory, setup, node)
-    stack.callback(bus.close)
-    node.attach(bus)
+    # Closes what a part that failed half-way left open; term() would wait for it for ever.
+    stack.callback(context.destroy)
+    node = Node(setup, link, pdu_link, partial(Bus, context, directory, setup))
+    stack.callback(node.bus.close)
     control = Control(context, directory)
     stack.callback(control.close)
     control.serve(_verbs(setup, node, control, reload))
@@ -118,7 +117,7 @@ def _verbs(setup: Setup, node: Node, control: Control, reload: Reload) -> dict[s
         }
 
     def reload_policies(_: dict[str, Any]) -> object:
-        node.reload(reload())
+        _reload_policies(node, setup, reload)
         log.info("topic policies re-read on request")
         return {"reloaded": "topic policies", "unchanged": "all other keys need a restart"}
 
@@ -137,9 +136,17 @@ def _verbs(setup: Setup, node: Node, control: Control, reload: Reload) -> dict[s
     return verbs
 
 
-def _reload_on_signal(node: Node, reload: Reload) -> None:
+def _reload_policies(node: Node, setup: Setup, reload: Reload) -> None:
+    """Apply the policies of the configuration as it is now. Raises UserError, changing nothing."""
+    changed = reload()
+    if changed.registry.digest() != setup.registry.digest():
+        raise UserError("the topic registry has changed, and topic ids with it; restart the daemon")
+    node.set_policies(changed.policies)
+
+
+def _reload_on_signal(node: Node, setup: Setup, reload: Reload) -> None:
     try:
-        node.reload(reload())
+        _reload_policies(node, setup, reload)
     except UserError as error:
         log.error("not reloaded, the old policies stay: %s", error)  # noqa: TRY400
     else:
@@ -163,6 +170,7 @@ def status_line(node: Node, control: Control) -> str:
     tx, rx = snapshot.link.tx, snapshot.link.rx
     return (
         f"{snapshot.carrier.kind} {snapshot.carrier.state}; "
-        f"out {tx.sent}/{tx.accepted} sent, {tx.queued} queued, {sum(tx.dropped.values())} dropped; "
-        f"in {rx.delivered} delivered from {len(snapshot.link.neighbors)} robots"
+        f"out {tx.sent}/{tx.accepted} sent, {tx.queued} queued, "
+        f"{sum(tx.dropped.values())} dropped; "
+        f"in {rx.delivered} delivered, {len(snapshot.link.neighbors)} robots heard"
     )

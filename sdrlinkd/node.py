@@ -2,12 +2,12 @@
 
 import asyncio
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from sdrlinkd import __version__
-from sdrlinkd.bus import Bus
+from sdrlinkd.bus import Bus, Ingress
 from sdrlinkd.config import Setup
-from sdrlinkd.link import Burst, Link, Outcome, Qos, link_notices, link_report
+from sdrlinkd.link import Burst, Link, Outcome, Qos, TopicPolicy, link_notices, link_report
 from sdrlinkd.pdulink import Heard, PduLink
 from sdrlinkd.reports import Snapshot
 
@@ -17,19 +17,18 @@ TICK_S = 0.05
 class Node:
     """Asks the link what to do and does it. Holds no queue and no decision of its own."""
 
-    def __init__(self, setup: Setup, link: Link, pdu_link: PduLink) -> None:
+    def __init__(
+        self, setup: Setup, link: Link, pdu_link: PduLink, open_bus: Callable[[Ingress], Bus]
+    ) -> None:
         self._setup = setup
         self._link = link
         self._pdu_link = pdu_link
-        self._bus: Bus | None = None
         self._work = asyncio.Event()
+        self._burst_settled = asyncio.Event()
         self._started_at = time.monotonic()
         self._loop_lag_s = 0.0
         self._draining = False
-
-    def attach(self, bus: Bus) -> None:
-        """The bus that takes what is heard."""
-        self._bus = bus
+        self.bus = open_bus(self)
 
     # The bus's Ingress.
 
@@ -55,20 +54,19 @@ class Node:
 
     def heard(self, pdus: Sequence[Heard]) -> None:
         """PDUs from the air."""
-        bus = self._bus
         for data, at, snr_db in pdus:
-            if bus is not None and bus.is_tapped:
-                bus.tap("rx", data)
+            if self.bus.is_tapped:
+                self.bus.tap("rx", data)
             for message in self._link.hear(data, at, snr_db):
-                if bus is not None:
-                    now = self._pdu_link.now()
-                    age_s = self._link.delivered(message, now)
-                    received_ns = time.time_ns() - round((now - message.heard_at) * 1e9)
-                    bus.publish(message, age_s, received_ns)
+                now = self._pdu_link.now()
+                age_s = self._link.delivered(message, now)
+                received_ns = time.time_ns() - round((now - message.heard_at) * 1e9)
+                self.bus.publish(message, age_s, received_ns)
 
     def settled(self, burst: Burst, outcome: Outcome, at: float) -> None:
         """A burst has left, or not."""
         self._link.confirm(burst, outcome, at)
+        self._burst_settled.set()
 
     # The daemon's tasks.
 
@@ -80,9 +78,9 @@ class Node:
             if burst is None:
                 await self._wait_for_work()
                 continue
-            if self._bus is not None and self._bus.is_tapped:
+            if self.bus.is_tapped:
                 for data in burst.pdus:
-                    self._bus.tap("tx", data)
+                    self.bus.tap("tx", data)
             self._pdu_link.send(burst)
 
     async def tick(self) -> None:
@@ -93,32 +91,28 @@ class Node:
             self._loop_lag_s = max(time.monotonic() - due, 0.9 * self._loop_lag_s)
             self._link.handle_timers(self._pdu_link.now())
 
-    def stop_ingress(self) -> None:
-        """Take no more messages from producers."""
-        if self._bus is not None:
-            self._bus.stop_ingress()
-
     async def drain(self, at_most_s: float) -> None:
-        """Send what is queued, for at most `at_most_s`; drop the rest by name."""
+        """Take nothing more, send what is queued for at most `at_most_s`, drop the rest by name."""
         self._draining = True
+        self.bus.stop_ingress()
         self._link.drain()
         self._work.set()
         try:
             async with asyncio.timeout(at_most_s):
                 while self._link.sender.outbox:
-                    await asyncio.sleep(0.005)
+                    self._burst_settled.clear()
+                    await self._burst_settled.wait()
                 await self._pdu_link.idle()
         except TimeoutError:
             pass
         self._link.shut_down()
 
-    def reload(self, setup: Setup) -> None:
-        """Apply the per-topic policies of `setup`; everything else stays."""
-        self._link.set_policies(setup.policies)
+    def set_policies(self, policies: Mapping[int, TopicPolicy]) -> None:
+        """Apply per-topic policies, by topic id; everything else stays."""
+        self._link.set_policies(policies)
 
     def snapshot(self, control_requests: int) -> Snapshot:
         """Everything there is to know, at this moment."""
-        assert self._bus is not None
         now = self._pdu_link.now()
         return Snapshot(
             version=__version__,
@@ -129,12 +123,12 @@ class Node:
             uptime_s=time.monotonic() - self._started_at,
             loop_lag_ms=self._loop_lag_s * 1e3,
             carrier=self._pdu_link.report(),
-            bus=self._bus.report(control_requests),
+            bus=self.bus.report(control_requests),
             link=link_report(
                 self._link,
                 now,
                 {topic_id: name for name, topic_id in self._setup.topics_in.items()},
-                self._bus.names_out(),
+                self.bus.names_out(),
             ),
             notices=[*self._setup.warnings, *link_notices(self._link)],
         )

@@ -9,11 +9,7 @@ import msgspec
 RATE_WINDOW_S = 5.0
 
 
-class Report(msgspec.Struct, frozen=True, kw_only=True):
-    """Base of all reports."""
-
-
-class TopicReport(Report):
+class TopicReport(msgspec.Struct, frozen=True, kw_only=True):
     """One topic of the registry on its way out."""
 
     topic_id: int
@@ -30,7 +26,7 @@ class TopicReport(Report):
     dropped: dict[str, int] = {}
 
 
-class ReceivedTopicReport(Report):
+class ReceivedTopicReport(msgspec.Struct, frozen=True, kw_only=True):
     """One topic of one source, as heard here. `pdr` is delivered over begun messages."""
 
     src: int
@@ -47,7 +43,7 @@ class ReceivedTopicReport(Report):
     age_ms_p99: float | None = None
 
 
-class NeighborReport(Report):
+class NeighborReport(msgspec.Struct, frozen=True, kw_only=True):
     """One source of PDUs. `per` is PDUs known lost over PDUs sent, from sequence numbers."""
 
     src: int
@@ -64,7 +60,7 @@ class NeighborReport(Report):
     """same | differs | unknown"""
 
 
-class TxReport(Report):
+class TxReport(msgspec.Struct, frozen=True, kw_only=True):
     """The transmit ledger: accepted = sent + queued + in_flight + every reason of `dropped`."""
 
     accepted: int
@@ -74,6 +70,7 @@ class TxReport(Report):
     in_flight: int
     dropped: dict[str, int]
     queued_by_class: dict[str, int]
+    entries: int
     pdus_composed: int
     pdus_sent: int
     pdus_failed: int
@@ -81,7 +78,7 @@ class TxReport(Report):
     bursts_failed: int
 
 
-class RxReport(Report):
+class RxReport(msgspec.Struct, frozen=True, kw_only=True):
     """The receive ledgers.
 
     pdus_heard = pdus_used + every reason of `pdus_dropped`;
@@ -98,7 +95,7 @@ class RxReport(Report):
     dropped: dict[str, int]
 
 
-class LinkReport(Report):
+class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """Everything the link knows."""
 
     pdu_size: int
@@ -111,7 +108,7 @@ class LinkReport(Report):
     neighbors: list[NeighborReport]
 
 
-class CarrierReport(Report):
+class CarrierReport(msgspec.Struct, frozen=True, kw_only=True):
     """What carries the PDUs, and how it fares."""
 
     kind: str
@@ -121,7 +118,7 @@ class CarrierReport(Report):
     counters: dict[str, int] = {}
 
 
-class BusReport(Report):
+class BusReport(msgspec.Struct, frozen=True, kw_only=True):
     """The local bus."""
 
     runtime_dir: str
@@ -131,7 +128,7 @@ class BusReport(Report):
     bad_envelope_last: str = ""
 
 
-class Snapshot(Report):
+class Snapshot(msgspec.Struct, frozen=True, kw_only=True):
     """One moment of one daemon."""
 
     version: str

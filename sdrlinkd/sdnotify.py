@@ -8,15 +8,16 @@ class Notifier:
     """Sends states to $NOTIFY_SOCKET; silent when the service manager asks for none."""
 
     def __init__(self) -> None:
-        address = os.environ.get("NOTIFY_SOCKET", "")
+        address = os.environ.pop("NOTIFY_SOCKET", "")
         # An abstract socket's name begins with NUL, which the environment spells "@".
         self._address = "\0" + address[1:] if address.startswith("@") else address
-        interval_us = os.environ.get("WATCHDOG_USEC", "")
-        self.watchdog_s = int(interval_us) / 1e6 if interval_us.isdigit() else None
+        interval_us = os.environ.pop("WATCHDOG_USEC", "")
+        for_us = os.environ.pop("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
+        self.watchdog_s = int(interval_us) / 1e6 if interval_us.isdigit() and for_us else None
 
     def ready(self) -> None:
         """The service is up."""
-        self._send("READY=1")
+        self._send("READY=1", wait_s=1.0)
 
     def stopping(self) -> None:
         """The service is on its way down."""
@@ -30,11 +31,11 @@ class Notifier:
         """One line for `systemctl status`."""
         self._send(f"STATUS={line}")
 
-    def _send(self, state: str) -> None:
+    def _send(self, state: str, wait_s: float = 0.0) -> None:
         if not self._address:
             return
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as sock:
-            sock.setblocking(False)
+            sock.settimeout(wait_s)
             try:
                 sock.sendto(state.encode(), self._address)
             except OSError:

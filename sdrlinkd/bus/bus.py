@@ -11,14 +11,16 @@ from sdrlinkd import __version__
 from sdrlinkd.bus import envelope
 from sdrlinkd.bus.reader import SocketReader
 from sdrlinkd.bus.sockets import RuntimeDirectory
-from sdrlinkd.client import ACK_PREFIX, IN_PUB_SOCKET, IN_SOCKET, OUT_SOCKET
+from sdrlinkd.client import ACK_PREFIX, IN_PUB_SOCKET, IN_SOCKET, OUT_SOCKET, SYNC_PREFIX
 from sdrlinkd.config import Setup
 from sdrlinkd.errors import EnvelopeError
 from sdrlinkd.link import CDR_HEADER_SIZE, QOS_BY_LABEL, Delivered, Qos
 from sdrlinkd.reports import BusReport
 
-# ZeroMQ never queues for us: what arrives is taken at once, so that every drop is ours and named.
-IN_HWM = 64
+# ZeroMQ hardly queues for us: what arrives is taken at once, so that every drop is ours and named.
+# Not too small either: when a producer leaves while its pipe stands full, libzmq drops the rest.
+IN_HWM = 1000
+LINGER_MS = 200
 PDU_TAP = b"\0pdu\0"
 
 
@@ -70,7 +72,10 @@ class Bus:
         self._sockets: list[zmq.Socket[bytes]] = []
         pull = self._bind(zmq.PULL, IN_SOCKET, {zmq.RCVHWM: IN_HWM})
         sub = self._bind(zmq.SUB, IN_PUB_SOCKET, {zmq.RCVHWM: IN_HWM, zmq.SUBSCRIBE: b""})
-        out_options = {zmq.SNDHWM: setup.config.rx_depth, zmq.XPUB_WELCOME_MSG: b"\0" + self._welcome}
+        out_options: dict[int, int | bytes] = {
+            zmq.SNDHWM: setup.config.rx_depth,
+            zmq.XPUB_WELCOME_MSG: b"\0" + self._welcome,
+        }
         self._out = self._bind(zmq.XPUB, OUT_SOCKET, out_options)
         self._ingress_readers = [
             SocketReader(loop, each, each.recv_multipart, self._take) for each in (pull, sub)
@@ -125,7 +130,7 @@ class Bus:
         self.stop_ingress()
         self._out_reader.close()
         for socket in self._sockets:
-            socket.close(linger=200)
+            socket.close(linger=LINGER_MS)
 
     def report(self, control_requests: int) -> BusReport:
         """Counters."""
@@ -143,6 +148,9 @@ class Bus:
         return bound
 
     def _take(self, frames: list[bytes]) -> None:
+        if frames[0].startswith(SYNC_PREFIX):
+            self._acknowledge(ACK_PREFIX + frames[0].removeprefix(SYNC_PREFIX))
+            return
         self._received += 1
         try:
             topic, header, payload = envelope.decode(frames)
@@ -186,5 +194,8 @@ class Bus:
             self._taps = int(subscribed)
         elif subscribed and topic.startswith(ACK_PREFIX):
             # Subscriptions are processed in order: those before this one are active now.
-            self._out.send_multipart([topic, self._welcome])
-            self._out_reader.recheck()
+            self._acknowledge(topic)
+
+    def _acknowledge(self, topic: bytes) -> None:
+        self._out.send_multipart([topic, self._welcome])
+        self._out_reader.recheck()

@@ -29,15 +29,18 @@ class SocketReader(Generic[Received]):
         self._socket = socket
         self._take = take
         self._receive = receive
-        self._descriptor = socket.FD
+        self._descriptor: int = socket.getsockopt(zmq.FD)  # type: ignore[assignment]
         self._again: asyncio.Handle | None = None
         loop.add_reader(self._descriptor, self._drain)
         self.recheck()
 
     def recheck(self) -> None:
         """Look again in the next turn if there is something to read."""
-        if self._again is None and self._socket.EVENTS & zmq.POLLIN:
+        if self._again is None and self._readable():
             self._again = self._loop.call_soon(self._drain)
+
+    def _readable(self) -> bool:
+        return bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
 
     def close(self) -> None:
         """Stop reading; the socket stays open."""

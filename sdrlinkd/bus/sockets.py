@@ -46,6 +46,7 @@ class RuntimeDirectory:
                 f"another sdrlinkd (pid {owner}) already runs in {path}; stop it, or give this "
                 "one its own bus.runtime_dir"
             ) from None
+        self._bound: list[Path] = []
         os.ftruncate(self._lock, 0)
         os.pwrite(self._lock, f"{os.getpid()}\n".encode(), 0)
 
@@ -74,11 +75,12 @@ class RuntimeDirectory:
             raise BusError(f"{path} cannot be bound: {error.strerror}") from None
         finally:
             os.umask(before)
+        self._bound.append(path)
         return bound
 
     def close(self) -> None:
-        """Remove the sockets and give up the lock."""
-        for path in self.path.glob("*.sock"):
+        """Remove the sockets bound here and give up the lock."""
+        for path in self._bound:
             path.unlink(missing_ok=True)
         os.close(self._lock)
 

@@ -1,17 +1,24 @@
 """For programs on the robot: publish to other robots, and hear them. Needs pyzmq only.
 
-    with Publisher() as out:
-        out.send("/robot_1/odom", cdr_bytes)
+with Publisher() as out:
+    out.send("/robot_1/odom", cdr_bytes)
 
-    with Subscriber("/rx_robot_2/odom") as heard:
-        for message in heard:
-            print(message.source, message.age_us, len(message.payload))
+with Subscriber("/rx_robot_2/odom") as heard:
+    for message in heard:
+        print(message.source, message.age_us, len(message.payload))
 """
 
 from sdrlinkd.client.aio import AsyncPublisher, AsyncSubscriber
-from sdrlinkd.client.blocking import NoDaemonError, Publisher, Subscriber
+from sdrlinkd.client.blocking import NoDaemonError, Publisher, Subscriber, no_daemon
+from sdrlinkd.client.control import ControlClient, RefusedError
 from sdrlinkd.client.flatmap import pack_map, unpack
-from sdrlinkd.client.messages import ACK_PREFIX, ENVELOPE_VERSION, EnvelopeMismatch, Message
+from sdrlinkd.client.messages import (
+    ACK_PREFIX,
+    ENVELOPE_VERSION,
+    SYNC_PREFIX,
+    EnvelopeMismatchError,
+    Message,
+)
 from sdrlinkd.client.paths import (
     CONTROL_SOCKET,
     IN_PUB_SOCKET,
@@ -28,14 +35,18 @@ __all__ = [
     "IN_PUB_SOCKET",
     "IN_SOCKET",
     "OUT_SOCKET",
+    "SYNC_PREFIX",
     "AsyncPublisher",
     "AsyncSubscriber",
-    "EnvelopeMismatch",
+    "ControlClient",
+    "EnvelopeMismatchError",
     "Message",
     "NoDaemonError",
     "Publisher",
+    "RefusedError",
     "Subscriber",
     "endpoint",
+    "no_daemon",
     "pack_map",
     "runtime_dir",
     "unpack",

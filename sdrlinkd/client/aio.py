@@ -10,14 +10,23 @@ import zmq
 import zmq.asyncio
 
 from sdrlinkd.client.blocking import LINGER_MS, RECEIVE_HWM, no_daemon
-from sdrlinkd.client.messages import Message, decode_in, encode_out, new_ack_token, topic_filter
+from sdrlinkd.client.messages import (
+    Message,
+    decode_in,
+    encode_out,
+    new_ack_topic,
+    sync_frames,
+    topic_filter,
+)
 from sdrlinkd.client.paths import IN_SOCKET, OUT_SOCKET, endpoint, runtime_dir
 
 
 class _AsyncSocket:
     """A ZeroMQ socket in its own context, closed by `async with`."""
 
-    def __init__(self, kind: int, directory: str | os.PathLike[str] | None, timeout_s: float) -> None:
+    def __init__(
+        self, kind: int, directory: str | os.PathLike[str] | None, timeout_s: float
+    ) -> None:
         self.directory = runtime_dir(directory)
         self._timeout_s = timeout_s
         self._context = zmq.asyncio.Context()
@@ -33,7 +42,10 @@ class _AsyncSocket:
         return self
 
     async def __aexit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         await self.close()
 
@@ -46,6 +58,7 @@ class AsyncPublisher(_AsyncSocket):
     ) -> None:
         super().__init__(zmq.PUSH, directory, timeout_s)
         self._socket.immediate = True
+        self._sent = False
         self._socket.connect(endpoint(self.directory, IN_SOCKET))
 
     async def send(
@@ -64,8 +77,35 @@ class AsyncPublisher(_AsyncSocket):
         try:
             async with asyncio.timeout(self._timeout_s):
                 await self._socket.send_multipart(encode_out(topic, cdr, fields))
+            self._sent = True
         except TimeoutError:
             raise no_daemon(self.directory) from None
+
+    async def flush(self) -> None:
+        """Wait until the daemon has taken everything sent. Raises NoDaemonError."""
+        ack_topic = new_ack_topic()
+        with self._context.socket(zmq.SUB) as answers:
+            answers.connect(endpoint(self.directory, OUT_SOCKET))
+            answers.subscribe(ack_topic)
+            try:
+                async with asyncio.timeout(self._timeout_s):
+                    await answers.recv_multipart()
+                    await self._socket.send_multipart(sync_frames(ack_topic))
+                    await answers.recv_multipart()
+            except TimeoutError:
+                raise no_daemon(self.directory) from None
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            if error is None and self._sent:
+                await self.flush()
+        finally:
+            await self.close()
 
 
 class AsyncSubscriber(_AsyncSocket):
@@ -83,7 +123,7 @@ class AsyncSubscriber(_AsyncSocket):
 
     async def __aenter__(self) -> Self:
         self._socket.connect(endpoint(self.directory, OUT_SOCKET))
-        token = new_ack_token()
+        token = new_ack_topic()
         for topic in self._topics:
             self._socket.subscribe(topic_filter(topic))
         self._socket.subscribe(token)

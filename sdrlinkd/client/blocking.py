@@ -1,5 +1,6 @@
 """Publish and subscribe from ordinary, blocking programs."""
 
+import math
 import os
 import time
 from collections.abc import Iterator
@@ -8,7 +9,14 @@ from typing import Self
 
 import zmq
 
-from sdrlinkd.client.messages import Message, decode_in, encode_out, new_ack_token, topic_filter
+from sdrlinkd.client.messages import (
+    Message,
+    decode_in,
+    encode_out,
+    new_ack_topic,
+    sync_frames,
+    topic_filter,
+)
 from sdrlinkd.client.paths import IN_SOCKET, OUT_SOCKET, endpoint, runtime_dir
 
 RECEIVE_HWM = 1000
@@ -27,7 +35,7 @@ def no_daemon(directory: object) -> NoDaemonError:
     )
 
 
-class _Socket:
+class Endpoint:
     """A ZeroMQ socket in its own context, closed by `with`."""
 
     def __init__(self, kind: int, directory: str | os.PathLike[str] | None) -> None:
@@ -35,6 +43,13 @@ class _Socket:
         self._context = zmq.Context()
         self._socket = self._context.socket(kind)
         self._socket.linger = LINGER_MS
+
+    def _connect(self, name: str) -> None:
+        self._socket.connect(endpoint(self.directory, name))
+
+    def _poll(self, timeout_s: float | None) -> bool:
+        timeout_ms = None if timeout_s is None else math.ceil(timeout_s * 1000)
+        return bool(self._socket.poll(timeout_ms))
 
     def close(self) -> None:
         """Close the socket; what was sent has 200 ms to leave."""
@@ -45,12 +60,15 @@ class _Socket:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self.close()
 
 
-class Publisher(_Socket):
+class Publisher(Endpoint):
     """Hands messages to the local daemon.
 
     `send` blocks for at most `timeout_s` while the daemon is away or busy, then raises
@@ -63,7 +81,8 @@ class Publisher(_Socket):
         super().__init__(zmq.PUSH, directory)
         self._socket.immediate = True
         self._socket.sndtimeo = int(timeout_s * 1000)
-        self._socket.connect(endpoint(self.directory, IN_SOCKET))
+        self._sent = False
+        self._connect(IN_SOCKET)
 
     def send(
         self,
@@ -80,22 +99,57 @@ class Publisher(_Socket):
         fields = {"q": qos, "p": priority, "d": dst, "ls": lifespan_ms, "ty": type}
         try:
             self._socket.send_multipart(encode_out(topic, cdr, fields))
+            self._sent = True
         except zmq.Again:
             raise no_daemon(self.directory) from None
 
+    def flush(self, timeout_s: float = 5.0) -> None:
+        """Wait until the daemon has taken everything sent. Raises NoDaemonError.
 
-class Subscriber(_Socket):
-    """Receives what other robots sent. A topic that ends with `*` is a prefix."""
+        ZeroMQ may drop the end of a long burst when the sender goes at once; who leaves the
+        `with` block in peace has flushed.
+        """
+        ack_topic = new_ack_topic()
+        with self._context.socket(zmq.SUB) as answers:
+            answers.connect(endpoint(self.directory, OUT_SOCKET))
+            answers.subscribe(ack_topic)
+            for step in ("subscribed", "taken"):
+                if not answers.poll(math.ceil(timeout_s * 1000)):
+                    raise no_daemon(self.directory)
+                answers.recv_multipart()
+                if step == "subscribed":
+                    self._socket.send_multipart(sync_frames(ack_topic))
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            if error is None and self._sent:
+                self.flush()
+        finally:
+            self.close()
+
+
+class Subscriber(Endpoint):
+    """Receives what other robots sent. A topic that ends with `*` is a prefix.
+
+    `depth` messages wait for a slow reader, 0: without bound; what is beyond is missing, and shows
+    as a step in `Message.number`.
+    """
 
     def __init__(
         self,
         *topics: str,
         directory: str | os.PathLike[str] | None = None,
         timeout_s: float = 5.0,
+        depth: int = RECEIVE_HWM,
     ) -> None:
         super().__init__(zmq.SUB, directory)
-        self._socket.rcvhwm = RECEIVE_HWM
-        self._socket.connect(endpoint(self.directory, OUT_SOCKET))
+        self._socket.rcvhwm = depth
+        self._connect(OUT_SOCKET)
         for topic in topics or ("/*",):
             self._socket.subscribe(topic_filter(topic))
         self._wait_until_subscribed(timeout_s)
@@ -104,8 +158,7 @@ class Subscriber(_Socket):
         """The next message; None when `timeout_s` passed without one."""
         deadline = None if timeout_s is None else time.monotonic() + timeout_s
         while True:
-            left_ms = None if deadline is None else max(0, (deadline - time.monotonic()) * 1000)
-            if not self._socket.poll(left_ms):
+            if not self._poll(None if deadline is None else max(0.0, deadline - time.monotonic())):
                 return None
             message = decode_in(self._socket.recv_multipart())
             if message is not None:
@@ -114,16 +167,16 @@ class Subscriber(_Socket):
     def __iter__(self) -> Iterator[Message]:
         while True:
             message = self.receive()
-            assert message is not None
-            yield message
+            if message is not None:
+                yield message
 
     def _wait_until_subscribed(self, timeout_s: float) -> None:
         """The daemon answers subscriptions in order, so its answer to ours means all are active."""
-        token = new_ack_token()
+        token = new_ack_topic()
         self._socket.subscribe(token)
         deadline = time.monotonic() + timeout_s
         while (left_s := deadline - time.monotonic()) > 0:
-            if self._socket.poll(left_s * 1000) and self._socket.recv_multipart()[0] == token:
+            if self._poll(left_s) and self._socket.recv_multipart()[0] == token:
                 self._socket.unsubscribe(token)
                 return
         self.close()

@@ -5,12 +5,13 @@ these few lines instead of a dependency. https://github.com/msgpack/msgpack/blob
 """
 
 import struct
+from collections.abc import Mapping
 from typing import Any
 
 Value = None | bool | int | float | str | bytes
 
 
-def pack_map(values: dict[str, Value]) -> bytes:
+def pack_map(values: Mapping[str, Value]) -> bytes:
     """MessagePack bytes of a map with at most 15 entries."""
     if len(values) > 15:
         raise ValueError("a bus header has at most 15 fields")
@@ -39,12 +40,16 @@ def _pack(value: Value) -> bytes:
     if isinstance(value, int):
         if 0 <= value < 0x80:
             return bytes((value,))
-        return b"\xcf" + struct.pack(">Q", value) if value > 0 else b"\xd3" + struct.pack(">q", value)
+        return (
+            b"\xcf" + struct.pack(">Q", value) if value > 0 else b"\xd3" + struct.pack(">q", value)
+        )
     if isinstance(value, float):
         return b"\xcb" + struct.pack(">d", value)
     if isinstance(value, str):
         raw = value.encode()
-        return (bytes((0xA0 | len(raw),)) if len(raw) < 32 else b"\xda" + struct.pack(">H", len(raw))) + raw
+        return (
+            bytes((0xA0 | len(raw),)) if len(raw) < 32 else b"\xda" + struct.pack(">H", len(raw))
+        ) + raw
     return b"\xc5" + struct.pack(">H", len(value)) + value
 
 

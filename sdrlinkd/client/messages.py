@@ -1,16 +1,19 @@
 """Bus messages as Python values (bus document, section 3)."""
 
 import secrets
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from sdrlinkd.client.flatmap import Value, pack_map, unpack
 
 ENVELOPE_VERSION = b"\x01"
+# A topic that only one client asks for; the daemon answers on it when the subscription is active,
+# and again when a message under SYNC_PREFIX with the same token has been taken.
 ACK_PREFIX = b"\0ack\0"
+SYNC_PREFIX = b"\0sync\0"
 
 
-class EnvelopeMismatch(ValueError):
+class EnvelopeMismatchError(ValueError):
     """What arrived is not an envelope of version 1."""
 
 
@@ -35,7 +38,7 @@ class Message:
     snr_db: float | None
 
 
-def encode_out(topic: str, payload: bytes, fields: dict[str, Value]) -> list[bytes]:
+def encode_out(topic: str, payload: bytes, fields: Mapping[str, Value]) -> list[bytes]:
     """The three frames of a message to the daemon; fields that are None are left out."""
     given = {key: value for key, value in fields.items() if value is not None}
     return [topic.encode() + b"\0", ENVELOPE_VERSION + pack_map(given), payload]
@@ -46,7 +49,7 @@ def decode_in(frames: Sequence[bytes]) -> Message | None:
     if frames[0].startswith(b"\0"):
         return None
     if len(frames) != 3 or frames[1][:1] != ENVELOPE_VERSION:
-        raise EnvelopeMismatch("the daemon speaks another envelope version; update the client")
+        raise EnvelopeMismatchError("the daemon speaks another envelope version; update the client")
     fields = unpack(frames[1][1:])
     return Message(
         topic=frames[0][:-1].decode(),
@@ -67,6 +70,11 @@ def topic_filter(topic: str) -> bytes:
     return topic[:-1].encode() if topic.endswith("*") else topic.encode() + b"\0"
 
 
-def new_ack_token() -> bytes:
-    """A topic that only one subscriber asks for; the daemon answers on it at once."""
+def new_ack_topic() -> bytes:
+    """A topic for one handshake with the daemon."""
     return ACK_PREFIX + secrets.token_hex(8).encode() + b"\0"
+
+
+def sync_frames(ack_topic: bytes) -> list[bytes]:
+    """The message that asks for a second answer on `ack_topic`."""
+    return [SYNC_PREFIX + ack_topic.removeprefix(ACK_PREFIX), ENVELOPE_VERSION + b"\x80", b""]

@@ -1,5 +1,6 @@
 """Where the daemon's sockets are."""
 
+import contextlib
 import os
 from pathlib import Path
 
@@ -17,8 +18,10 @@ def runtime_dir(given: str | os.PathLike[str] | None = None) -> Path:
     chosen = given or os.environ.get("SDRLINKD_RUNTIME_DIR")
     if chosen:
         return Path(chosen)
-    if (SYSTEM_DIR / CONTROL_SOCKET).exists():
-        return SYSTEM_DIR
+    # A user outside the service's group may not even look.
+    with contextlib.suppress(PermissionError):
+        if (SYSTEM_DIR / CONTROL_SOCKET).exists():
+            return SYSTEM_DIR
     base = os.environ.get("XDG_RUNTIME_DIR")
     return Path(base) / "sdrlinkd" if base else Path(f"/tmp/sdrlinkd-{os.getuid()}")  # noqa: S108
 

@@ -44,7 +44,11 @@ def given(value: object) -> str:
 
 def keys_of(kind: inspect.Type) -> list[str] | None:
     """Names a table may have; None when any will do."""
-    return [field.encode_name for field in kind.fields] if isinstance(kind, inspect.StructType) else None
+    return (
+        [field.encode_name for field in kind.fields]
+        if isinstance(kind, inspect.StructType)
+        else None
+    )
 
 
 def child(kind: inspect.Type, key: str) -> inspect.Type | None:

@@ -84,9 +84,7 @@ def _explain(
             value = value.get(key)
             kind = describe.child(kind, key) if kind is not None else None
     what = describe.allowed(kind) if kind is not None else str(error)
-    return ConfigError(
-        f"{cite(source, text, named)}: got {describe.given(value)}; allowed: {what}"
-    )
+    return ConfigError(f"{cite(source, text, named)}: got {describe.given(value)}; allowed: {what}")
 
 
 def _first_bad_key(table: dict[str, object], kind: inspect.Type | None) -> str:

@@ -47,8 +47,7 @@ class Setup:
         config = self.config
         size = config.link.pdu_size
         return [
-            f"robot {self.node_id}, namespace {config.namespace or '(none)'}, "
-            f"backend {config.backend}",
+            f"robot {self.node_id}, namespace {config.namespace or '-'}, backend {config.backend}",
             f"PDUs of {size} B; messages up to {max_message_size(size)} B",
             *(
                 f"  {topic_id:>2}  {name}  {self.registry.topics[topic_id].type}"
@@ -83,7 +82,9 @@ def load_registry(path: Path) -> Registry:
             "it is a CSV of `name,type` lines, named by the key `registry`"
         ) from None
     except UnicodeDecodeError:
-        raise RegistryError(f"{path}: is not a text file; a registry is `name,type` lines") from None
+        raise RegistryError(
+            f"{path}: is not a text file; a registry is `name,type` lines"
+        ) from None
     return parse_registry(text, str(path))
 
 

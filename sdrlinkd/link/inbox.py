@@ -58,7 +58,7 @@ class Inbox:
         hears_self: bool,
     ) -> None:
         self._pdu_size = params.pdu_size
-        self._registry = registry
+        self._n_topics = len(registry)
         self._own_id = own_id
         self._hears_self = hears_self
         self._has_control = registry.has_control
@@ -79,11 +79,12 @@ class Inbox:
         try:
             pdu = parse(data, self._pdu_size)
             reason = self._refusal(pdu)
-            records = [] if reason else self._control_records(pdu)
+            records = self._control_records(pdu) if reason is None else None
         except PduError as error:
             reason = error.reason
         if reason is None:
-            neighbor = self._neighbor(pdu.src, at)
+            neighbor = self.neighbors.get(pdu.src) or self._new_neighbor(pdu.src)
+            neighbor.last_heard_at = at
             _, seq, crc = identity(data)
             if not neighbor.track.heard(seq, crc):
                 neighbor.duplicates += 1
@@ -94,7 +95,7 @@ class Inbox:
         neighbor.heard += 1
         neighbor.hops_left = pdu.hop
         neighbor.snr_db = snr_db
-        for record in records:
+        for record in records or ():
             if isinstance(record, Stamp):
                 self._ages.stamp(pdu.src, record.topic_id, record.entry_id, record.age_us, at)
             elif isinstance(record, Beacon):
@@ -102,7 +103,7 @@ class Inbox:
                     neighbor.track.restart(seq, crc)
             elif isinstance(record, RegistryDigest):
                 neighbor.digest = record
-        if self._has_control and all(e.topic_id == CONTROL_TOPIC_ID for e in pdu.entries):
+        if records is not None and len(pdu.entries) == 1:
             self.pdus_dropped["rx_control"] += 1
             return []
         self.pdus_used += 1
@@ -140,35 +141,34 @@ class Inbox:
             return "rx_not_for_us"
         return None
 
-    def _control_records(self, pdu: Pdu) -> list[Record]:
-        records: list[Record] = []
+    def _control_records(self, pdu: Pdu) -> list[Record] | None:
+        """The records in control entries; None when the PDU has no such entry."""
+        records: list[Record] | None = None
         if self._has_control:
             for entry in pdu.entries:
                 if entry.topic_id == CONTROL_TOPIC_ID:
                     if entry.total != 1:
                         raise PduError("rx_entry", "control records are never fragmented")
-                    records += parse_records(entry.payload)
+                    records = (records or []) + parse_records(entry.payload)
         return records
 
-    def _neighbor(self, src: int, at: float) -> Neighbor:
-        neighbor = self.neighbors.get(src)
-        if neighbor is None:
-            neighbor = self.neighbors[src] = Neighbor(src)
-        neighbor.last_heard_at = at
+    def _new_neighbor(self, src: int) -> Neighbor:
+        neighbor = self.neighbors[src] = Neighbor(src)
         return neighbor
 
     def _take_entries(self, pdu: Pdu, neighbor: Neighbor, at: float) -> list[Delivered]:
         src = pdu.src
+        reassembly = self.reassembly
         delivered = []
         for entry in pdu.entries:
             topic_id = entry.topic_id
             if topic_id == CONTROL_TOPIC_ID and self._has_control:
                 continue
-            payload = self.reassembly.add(src, entry, at)
+            payload = reassembly.add(src, entry, at)
             if payload is None:
                 continue
-            tally = self._tally(src, topic_id)
-            if self._registry.by_id(topic_id) is None:
+            tally = self.tallies.get((src, topic_id)) or self._tally(src, topic_id)
+            if topic_id >= self._n_topics:
                 tally.dropped["rx_unknown_topic"] += 1
                 continue
             if len(payload) < CDR_HEADER_SIZE:
@@ -183,7 +183,8 @@ class Inbox:
                     neighbor.snr_db,
                 )
             )  # fmt: skip
-        self._note_lost()
+        if reassembly.lost:
+            self._note_lost()
         return delivered
 
     def _note_lost(self) -> None:
@@ -191,10 +192,4 @@ class Inbox:
             self._tally(src, topic_id).dropped[reason] += 1
 
     def _tally(self, src: int, topic_id: int) -> RxTally:
-        key = (src, topic_id)
-        tally = self.tallies.get(key)
-        if tally is None:
-            tally = self.tallies[key] = RxTally()
-        return tally
-
-
+        return self.tallies.setdefault((src, topic_id), RxTally())

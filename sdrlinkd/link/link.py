@@ -1,6 +1,6 @@
 """The link: one node's whole traffic, as a calculator over bytes and `now`."""
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from random import Random
 
 from sdrlinkd.link.inbox import Delivered, Inbox
@@ -9,7 +9,7 @@ from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
 from sdrlinkd.link.qos import Qos, TopicPolicy
 from sdrlinkd.link.sender import Burst, Outcome, Sender
 from sdrlinkd.reports import RATE_WINDOW_S
-from sdrlinkd.wire import Beacon, Record, Registry
+from sdrlinkd.wire import Beacon, Record, Registry, build_records, equal_payload
 
 INFINITE = float("inf")
 
@@ -36,6 +36,9 @@ class Link:
         self.registry = registry
         self.own_id = own_id
         self.digest = registry.digest()
+        self._beacon_digest = self.digest
+        if len(build_records([self.digest])) > equal_payload(params.pdu_size, 1):
+            self._beacon_digest = self.digest.shortened()
         self.sender = Sender(params, queue, registry, own_id, rng, reassembly.timeout_s)
         self.inbox = Inbox(params, reassembly, registry, own_id, hears_self)
         self.rates = RateMeter(RATE_WINDOW_S)
@@ -73,7 +76,7 @@ class Link:
         if start >= self._beacon_at:
             overdue = self.sender.packetizer.offered
             self._offer_beacon(start)
-        burst = None if overdue else self.sender.compose(start, max_pdus)
+        burst = self.sender.compose_records() if overdue else self.sender.compose(start, max_pdus)
         if burst is None and self.sender.packetizer.offered:
             burst = self.sender.compose_records()
         return burst
@@ -122,17 +125,18 @@ class Link:
         """Where the ledger does not add up; empty when it does."""
         return self.sender.audit() + self.inbox.audit()
 
-    def rate_counters(self) -> dict[object, int]:
+    def rate_counters(self) -> dict[Hashable, int]:
         """The counters of which the snapshot shows rates."""
-        tx = {
-            ("tx", topic.id): self.sender.tally(topic.id).accepted
-            for topic in self.registry.topics
+        tx: dict[Hashable, int] = {
+            ("tx", topic.id): self.sender.tally(topic.id).accepted for topic in self.registry.topics
         }
-        rx = {("rx", *key): tally.delivered for key, tally in self.inbox.tallies.items()}
+        rx: dict[Hashable, int] = {
+            ("rx", *key): tally.delivered for key, tally in self.inbox.tallies.items()
+        }
         return {**tx, **rx}
 
     def _offer_beacon(self, start: float) -> None:
-        records: list[Record] = [Beacon(self._boot_id, self._beacon_number), self.digest]
+        records: list[Record] = [Beacon(self._boot_id, self._beacon_number), self._beacon_digest]
         self.sender.packetizer.offer(records)
         self._beacon_number = (self._beacon_number + 1) & 0xFFFF
         self._beacon_at = start + self.params.beacon_s

@@ -35,10 +35,12 @@ class Neighbor:
         differing = []
         for topic_id in own.differing_ids(self.digest):
             topic = registry.by_id(topic_id)
-            differing.append(f"{topic_id} (ours: {topic.name})" if topic else f"{topic_id} (not ours)")
-        where = f"topic id {', '.join(differing)}" if differing else "dictionaries"
+            differing.append(
+                f"{topic_id} (ours: {topic.name})" if topic else f"{topic_id} (not ours)"
+            )
+        where = f"topic id {', '.join(differing)}" if differing else "some topic"
         return (
-            f"robot {self.src} has another registry: {where} differ; "
+            f"robot {self.src} has another registry, differing in {where}; "
             f"ours {own.overall.hex()[:8]}, theirs {self.digest.overall.hex()[:8]}. "
             "Give both the same registry file"
         )

@@ -106,7 +106,8 @@ class Outbox:
     def __init__(self, limits: QueueParams) -> None:
         self._limits = limits
         self._lanes: dict[tuple[int, int, int, int], Lane] = {}
-        self._levels: list[Level] = []
+        # Levels with lanes, in service order.
+        self.levels: list[Level] = []
         self._level_by_key: dict[tuple[int, int], Level] = {}
         self._by_class: dict[Qos, OrderedDict[Outgoing, None]] = {q: OrderedDict() for q in Qos}
         self._by_topic: dict[int, OrderedDict[Outgoing, None]] = {}
@@ -117,7 +118,7 @@ class Outbox:
         self.in_flight: set[Outgoing] = set()
 
     def __bool__(self) -> bool:
-        return bool(self._levels)
+        return bool(self.levels)
 
     def put(self, message: Outgoing, depth: int = 0) -> list[tuple[Outgoing, str]]:
         """Queue `message`; what had to go for it, each with its reason (perhaps itself)."""
@@ -138,10 +139,6 @@ class Outbox:
             shed.append((self._withdraw_waiting(victim), "tx_overflow_old"))
         self._enqueue(message)
         return shed
-
-    def levels(self) -> list[Level]:
-        """Levels in service order."""
-        return self._levels
 
     def begin(self, lane: Lane) -> Outgoing:
         """The lane's first waiting message becomes the one being fragmented."""
@@ -178,15 +175,15 @@ class Outbox:
 
     def withdraw_all(self) -> Iterator[Outgoing]:
         """Take everything out, in service order."""
-        while self._levels:
-            yield self.withdraw_head(self._levels[0].lanes[0])
+        while self.levels:
+            yield self.withdraw_head(self.levels[0].lanes[0])
 
     def oldest_arrival(self) -> float:
         """When the longest waiting head arrived; infinity when nothing waits."""
         return min(
             (
                 lane.head.arrived_at
-                for level in self._levels
+                for level in self.levels
                 for lane in level.lanes
                 if lane.head is not None
             ),
@@ -196,7 +193,7 @@ class Outbox:
     def pending_bytes(self, enough: int) -> int:
         """Bytes of all that waits, entry headers included; counting stops at `enough`."""
         total = -ENTRY_HEADER_SIZE
-        for level in self._levels:
+        for level in self.levels:
             for lane in level.lanes:
                 if lane.current is not None:
                     message = lane.current
@@ -238,7 +235,7 @@ class Outbox:
         level = self._level_by_key.get(key)
         if level is None:
             level = self._level_by_key[key] = Level(key)
-            insort(self._levels, level, key=lambda each: each.key)
+            insort(self.levels, level, key=lambda each: each.key)
         return level
 
     def _link(self, lane: Lane, head: Outgoing) -> None:
@@ -254,7 +251,7 @@ class Outbox:
         level.per_dst[lane.dst] -= 1
         if not level.lanes:
             del self._level_by_key[level.key]
-            del self._levels[bisect_left(self._levels, level.key, key=lambda each: each.key)]
+            del self.levels[bisect_left(self.levels, level.key, key=lambda each: each.key)]
 
     def _oldest_of_lowest_class(self) -> Outgoing | None:
         for qos in reversed(Qos):
@@ -263,10 +260,9 @@ class Outbox:
         return None
 
     def _withdraw_waiting(self, message: Outgoing) -> Outgoing:
-        """`message` is the oldest of its class or topic, so it is first among its lane's waiting."""
+        """`message` is the oldest of its class or topic, so first among its lane's waiting."""
         lane = message.lane
-        first = lane.waiting.popleft()
-        assert first is message
+        lane.waiting.popleft()
         self._forget_queued(message)
         if lane.current is None:
             self.served(lane)

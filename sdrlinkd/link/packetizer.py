@@ -6,29 +6,35 @@ freezes at a message's first fragment. Greedy: further entries of the same topic
 Lower classes fill what is left over.
 """
 
+from collections.abc import Iterable
 from random import Random
 from typing import NamedTuple
 
-from sdrlinkd.link.draft import Draft
+from sdrlinkd.link.draft import NO_DST, Draft
 from sdrlinkd.link.entry_ids import REST_FACTOR, EntryIds
 from sdrlinkd.link.outbox import Lane, Level, Outbox, Outgoing
 from sdrlinkd.link.params import LinkParams
-from sdrlinkd.link.qos import Qos
+from sdrlinkd.link.qos import WIRE_BITS, Qos
 from sdrlinkd.wire import (
     BROADCAST,
     ENTRY_HEADER_SIZE,
     MAX_AGE_US,
     MAX_ENTRIES,
     MAX_FRAGMENTS,
-    Entry,
+    STAMP_SIZE,
     Record,
-    Stamp,
+    build_records,
+    build_stamp,
     equal_payload,
+    flags,
     fragment_count,
 )
 
 # Lanes looked at while one PDU is filled; past that the room left is not worth the search.
 MAX_LANES_PER_PDU = 4 * MAX_ENTRIES
+
+# Less room for one more entry than this, and a STAMP does not even fit behind other records.
+MIN_ROOM_FOR_STAMP = STAMP_SIZE - ENTRY_HEADER_SIZE - 1
 
 
 class BuiltPdu(NamedTuple):
@@ -45,6 +51,7 @@ class Packetizer:
         self, params: LinkParams, src: int, outbox: Outbox, rng: Random, reassembly_timeout_s: float
     ) -> None:
         self._params = params
+        self._pdu_size = params.pdu_size
         self._src = src
         self._outbox = outbox
         self._rng = rng
@@ -56,13 +63,13 @@ class Packetizer:
         self._k_shared = min(
             max(equal_payload(params.pdu_size, 2), params.min_fragment), self._k_single
         )
-        self._spare_records: list[Record] = []
-        self._flushing = False
+        self._spare_records: list[bytes] = []
+        self._may_wait = params.flush_s > 0
         self._expired: list[Outgoing] = []
 
-    def offer(self, records: list[Record]) -> None:
+    def offer(self, records: Iterable[Record]) -> None:
         """Records to send in spare room of the PDUs to come (replaces what was offered)."""
-        self._spare_records = records
+        self._spare_records = [build_records([record]) for record in records]
 
     @property
     def offered(self) -> bool:
@@ -71,7 +78,7 @@ class Packetizer:
 
     def expire(self, now: float) -> None:
         """Withdraw heads whose lifespan ended; see `take_expired`."""
-        for level in tuple(self._outbox.levels()):
+        for level in tuple(self._outbox.levels):
             for lane in tuple(level.lanes):
                 self._live_head(lane, now)
 
@@ -86,39 +93,40 @@ class Packetizer:
 
     def flush(self) -> None:
         """From now on partial PDUs do not wait."""
-        self._flushing = True
+        self._may_wait = False
 
     def next_pdu(self, start: float) -> BuiltPdu | None:
         """The next PDU of a burst whose preamble leaves at `start`, or None.
 
         Messages found expired are withdrawn on the way; see `take_expired`.
         """
-        if self._must_wait(start):
+        levels = self._outbox.levels
+        if not levels or (self._may_wait and self._must_wait(start)):
             return None
-        draft = Draft(self._params.pdu_size)
+        draft = Draft(self._pdu_size)
         looked_at = 0
-        for level in tuple(self._outbox.levels()):
-            self._fill_from(level, draft, start)
-            looked_at += len(level.lanes) + 1
-            if not draft.is_empty and (
-                draft.room <= ENTRY_HEADER_SIZE or looked_at > MAX_LANES_PER_PDU
-            ):
+        for level in tuple(levels):
+            looked_at += len(level.lanes)
+            if self._may_fit(level, draft.room):
+                self._fill_from(level, draft, start)
+            if draft.room <= 0 or looked_at > MAX_LANES_PER_PDU:
                 break
         if draft.is_empty:
             return None
-        for message in draft.carried:
-            if not message.stamped:
-                self._stamp(draft, message, start)
-        if self._spare_records and draft.dst == BROADCAST and draft.add_records(self._spare_records):
-            self._spare_records = []
+        if draft.room >= MIN_ROOM_FOR_STAMP:
+            for message in draft.carried:
+                if not message.stamped:
+                    self._stamp(draft, message, start)
+        if self._spare_records and draft.dst == BROADCAST:
+            self._add_spare_records(draft)
         return self._finish(draft)
 
     def records_pdu(self) -> BuiltPdu | None:
         """A PDU of its own for the offered records, when there are any."""
-        draft = Draft(self._params.pdu_size)
-        if not self._spare_records or not draft.add_records(self._spare_records):
+        draft = Draft(self._pdu_size)
+        self._add_spare_records(draft)
+        if draft.is_empty:
             return None
-        self._spare_records = []
         draft.dst = BROADCAST
         draft.qos = Qos.DEFAULT
         return self._finish(draft)
@@ -127,19 +135,35 @@ class Packetizer:
         """When `next_pdu` may next have something to send; −inf: now; infinity: nothing waits."""
         if not self._outbox:
             return float("inf")
-        if self._must_wait(now):
+        if self._may_wait and self._must_wait(now):
             return self._outbox.oldest_arrival() + self._params.flush_s
         return min(
             self._ids(lane.topic_id).next_free() if lane.current is None else float("-inf")
-            for level in self._outbox.levels()
+            for level in self._outbox.levels
             for lane in level.lanes
         )
 
     def _finish(self, draft: Draft) -> BuiltPdu:
-        data = draft.build(self._src, self._seq, self._params.hop_limit, self._control_entry_id)
+        data = draft.build(
+            flags(WIRE_BITS[draft.qos]), self._src, draft.dst, self._seq,
+            self._params.hop_limit, self._control_entry_id,
+        )  # fmt: skip
         self._seq = (self._seq + 1) & 0xFF
         self._control_entry_id = (self._control_entry_id + 1) & 0xFF
         return BuiltPdu(data, draft.carried)
+
+    def _may_fit(self, level: Level, room: int) -> bool:
+        """Whether some lane's next entry may fit: a quick no spares the look at each.
+
+        A fragment that is not its message's last has at least k_shared bytes.
+        """
+        if room >= self._k_shared:
+            return True
+        for lane in level.lanes:
+            head = lane.current or lane.waiting[0]
+            if len(head.payload) - head.next_index * head.k <= room:
+                return True
+        return False
 
     def _fill_from(self, level: Level, draft: Draft, start: float) -> None:
         lanes = tuple(level.lanes)
@@ -147,16 +171,15 @@ class Packetizer:
         while more:
             more = False
             for lane in lanes:
-                if draft.room < 0:
-                    return
                 head = self._live_head(lane, start)
-                if head is None or (draft.dst >= 0 and head.dst != draft.dst):
+                if head is None or (draft.dst != NO_DST and head.dst != draft.dst):
                     continue
                 if self._place(lane, head, level, draft, start):
                     more = self._params.greedy
+            more = more and draft.room > 0 and self._may_fit(level, draft.room)
 
     def _live_head(self, lane: Lane, start: float) -> Outgoing | None:
-        head = lane.head
+        head = lane.current or (lane.waiting[0] if lane.waiting else None)
         while head is not None and head.expires_at <= start:
             if lane.current is None:
                 self._outbox.withdraw_head(lane)
@@ -166,9 +189,7 @@ class Packetizer:
             head = lane.head
         return head
 
-    def _place(
-        self, lane: Lane, head: Outgoing, level: Level, draft: Draft, start: float
-    ) -> bool:
+    def _place(self, lane: Lane, head: Outgoing, level: Level, draft: Draft, start: float) -> bool:
         """Put the lane's next entry into the draft if it fits."""
         size = len(head.payload)
         k = head.k or self._fragment_size(size, level.per_dst[lane.dst])
@@ -176,18 +197,17 @@ class Packetizer:
         length = min(k, size - at)
         is_last = at + length >= size
         needs_stamp = is_last and not head.stamped
-        if needs_stamp and length > draft.room_beside_records(Stamp.SIZE):
+        if needs_stamp and length > draft.room_beside_stamp:
             # The age goes ahead in a PDU of its own only where even an empty one is too small.
             return draft.is_empty and self._send_stamp_ahead(lane, head, k, draft, start)
         if length > draft.room or not self._begin(lane, head, k, start):
             return False
-        draft.add(
-            head,
-            Entry(
-                head.topic_id, head.entry_id, head.next_index, head.total,
-                head.payload[at : at + length],
-            ),
-        )  # fmt: skip
+        payload = head.payload if length == size else head.payload[at : at + length]
+        draft.add(head.topic_id, head.entry_id, head.next_index, head.total, payload)
+        draft.carried.append(head)
+        draft.dst = head.dst
+        if head.qos < draft.qos:
+            draft.qos = head.qos
         head.next_index += 1
         head.unconfirmed += 1
         if is_last:
@@ -211,7 +231,7 @@ class Packetizer:
 
     def _fragment_size(self, size: int, topics_pending: int) -> int:
         k = self._k_shared if topics_pending >= 2 else self._k_single
-        return max(k, fragment_count(size, MAX_FRAGMENTS))
+        return max(k, fragment_count(size, MAX_FRAGMENTS)) if size > k * MAX_FRAGMENTS else k
 
     def _begin(self, lane: Lane, head: Outgoing, k: int, start: float) -> bool:
         """Make `head` the message being fragmented; False while the topic has no free id."""
@@ -235,9 +255,12 @@ class Packetizer:
             ids.give_back(head.entry_id)
 
     def _stamp(self, draft: Draft, message: Outgoing, start: float) -> None:
-        age_us = round((start - message.arrived_at) * 1e6)
-        stamp = Stamp(message.topic_id, message.entry_id, min(max(age_us, 0), MAX_AGE_US))
-        message.stamped = draft.add_records([stamp])
+        age_us = min(max(round((start - message.arrived_at) * 1e6), 0), MAX_AGE_US)
+        message.stamped = draft.add_record(build_stamp(message.topic_id, message.entry_id, age_us))
+
+    def _add_spare_records(self, draft: Draft) -> None:
+        waiting = self._spare_records
+        self._spare_records = [record for record in waiting if not draft.add_record(record)]
 
     def _ids(self, topic_id: int) -> EntryIds:
         ids = self._entry_ids.get(topic_id)
@@ -247,9 +270,7 @@ class Packetizer:
 
     def _must_wait(self, now: float) -> bool:
         """Whether what is pending should wait for more (paper section 4.3, Flush Timeout)."""
-        if self._params.flush_s <= 0 or self._flushing or not self._outbox:
-            return False
-        if self._outbox.levels()[0].key[0] <= Qos.LATENCY:
+        if self._outbox.levels[0].key[0] <= Qos.LATENCY:
             return False
         if now >= self._outbox.oldest_arrival() + self._params.flush_s:
             return False

@@ -44,6 +44,7 @@ def _tx(link: Link) -> TxReport:
         in_flight=len(sender.outbox.in_flight),
         dropped=dict(sum((tally.dropped for tally in tallies), Counter())),
         queued_by_class={q.label: n for q, n in sender.outbox.queued_by_class().items()},
+        entries=sender.entries_composed,
         pdus_composed=sender.pdus_composed,
         pdus_sent=sender.pdus_sent,
         pdus_failed=sender.pdus_failed,

@@ -68,6 +68,7 @@ class Sender:
         ]
         self.refused = TxTally()
         """Messages that never became a topic's: bad envelopes, unknown topics."""
+        self.entries_composed = 0
         self.pdus_composed = 0
         self.pdus_sent = 0
         self.pdus_failed = 0
@@ -201,6 +202,7 @@ class Sender:
 
     def _burst(self, pdus: list[bytes], carried: list[list[Outgoing]]) -> Burst | None:
         self.pdus_composed += len(pdus)
+        self.entries_composed += sum(map(len, carried))
         return Burst(pdus, carried) if pdus else None
 
     def _settle_expired(self) -> None:
@@ -222,4 +224,3 @@ class Sender:
         message.fate = Fate.DROPPED
         self.outbox.in_flight.discard(message)
         message.tally.drop(reason)
-

@@ -3,6 +3,7 @@
 Bytes in, fields out, and back. The document beside this file says what the bytes mean.
 """
 
+from sdrlinkd.wire.builder import VERSION, PduBuilder
 from sdrlinkd.wire.capacity import (
     CRC_SIZE,
     ENTRY_HEADER_SIZE,
@@ -19,6 +20,7 @@ from sdrlinkd.wire.capacity import (
 )
 from sdrlinkd.wire.control import (
     MAX_AGE_US,
+    STAMP_SIZE,
     Beacon,
     LinkReport,
     Receipt,
@@ -26,9 +28,10 @@ from sdrlinkd.wire.control import (
     RecordType,
     Stamp,
     build_records,
+    build_stamp,
     parse_records,
 )
-from sdrlinkd.wire.pdu import BROADCAST, VERSION, Entry, Pdu, build, identity, parse
+from sdrlinkd.wire.pdu import BROADCAST, Entry, Pdu, build, flags, identity, parse
 from sdrlinkd.wire.reassembly import Lost, Reassembly, ReassemblyLimits
 from sdrlinkd.wire.registry import (
     CONTROL_TOPIC_ID,
@@ -52,12 +55,14 @@ __all__ = [
     "MAX_PDU_SIZE",
     "MAX_TOPICS",
     "MIN_PDU_SIZE",
+    "STAMP_SIZE",
     "VERSION",
     "Beacon",
     "Entry",
     "LinkReport",
     "Lost",
     "Pdu",
+    "PduBuilder",
     "Reassembly",
     "ReassemblyLimits",
     "Receipt",
@@ -69,8 +74,10 @@ __all__ = [
     "Topic",
     "build",
     "build_records",
+    "build_stamp",
     "entry_budget",
     "equal_payload",
+    "flags",
     "fragment_count",
     "identity",
     "make_registry",

@@ -1,19 +1,20 @@
 """Control records: TLVs in entries of topic id 0xF (wire document, section 6)."""
 
 import struct
-from dataclasses import dataclass
+from collections.abc import Iterable
 from enum import IntEnum
-from typing import ClassVar
+from typing import NamedTuple
 
 from sdrlinkd.errors import PduError
 from sdrlinkd.wire.registry import RegistryDigest
 
 TLV_HEADER_SIZE = 2
 MAX_AGE_US = 0xFFFFFFFF
+MAX_VALUE_SIZE = 255
 
 
 class RecordType(IntEnum):
-    """First byte of a record. Numbers are never reused."""
+    """First octet of a record. Numbers are never reused."""
 
     STAMP = 1
     BEACON = 2
@@ -24,32 +25,22 @@ class RecordType(IntEnum):
     FRAME = 7
 
 
-@dataclass(frozen=True, slots=True)
-class Stamp:
+class Stamp(NamedTuple):
     """Age of a message at this burst's preamble, in µs."""
 
     topic_id: int
     entry_id: int
     age_us: int
 
-    TYPE: ClassVar = RecordType.STAMP
-    FORMAT: ClassVar = struct.Struct(">BBI")
-    SIZE: ClassVar = TLV_HEADER_SIZE + 6
 
-
-@dataclass(frozen=True, slots=True)
-class Beacon:
+class Beacon(NamedTuple):
     """I am here: `boot_id` changes with every start, `number` counts up modulo 2^16."""
 
     boot_id: int
     number: int
 
-    TYPE: ClassVar = RecordType.BEACON
-    FORMAT: ClassVar = struct.Struct(">HH")
 
-
-@dataclass(frozen=True, slots=True)
-class LinkReport:
+class LinkReport(NamedTuple):
     """How well the sender of this record hears `node`.
 
     SNR in quarter decibels (signed), PER in 1/255, the MCS it would like to hear.
@@ -60,33 +51,46 @@ class LinkReport:
     per_255: int
     mcs: int
 
-    TYPE: ClassVar = RecordType.LINK_REPORT
-    FORMAT: ClassVar = struct.Struct(">BbBB")
 
-
-@dataclass(frozen=True, slots=True)
-class Receipt:
+class Receipt(NamedTuple):
     """What became of a message at the far end."""
 
     topic_id: int
     entry_id: int
     status: int
 
-    TYPE: ClassVar = RecordType.RECEIPT
-    FORMAT: ClassVar = struct.Struct(">BBB")
 
+FixedRecord = Stamp | Beacon | LinkReport | Receipt
+Record = FixedRecord | RegistryDigest
 
-Record = Stamp | Beacon | LinkReport | Receipt | RegistryDigest
-
-_BY_TYPE: dict[int, type[Stamp] | type[Beacon] | type[LinkReport] | type[Receipt]] = {
-    kind.TYPE: kind for kind in (Stamp, Beacon, LinkReport, Receipt)
+_TYPES: dict[type[FixedRecord], RecordType] = {
+    Stamp: RecordType.STAMP,
+    Beacon: RecordType.BEACON,
+    LinkReport: RecordType.LINK_REPORT,
+    Receipt: RecordType.RECEIPT,
 }
-_DIGEST_SIZE = 8
+_FORMATS = {
+    RecordType.STAMP: struct.Struct(">BBI"),
+    RecordType.BEACON: struct.Struct(">HH"),
+    RecordType.LINK_REPORT: struct.Struct(">BbBB"),
+    RecordType.RECEIPT: struct.Struct(">BBB"),
+}
+# What the parser needs of a type, by its number: the fields' class and format.
+_KNOWN = {int(number): (kind, _FORMATS[number]) for kind, number in _TYPES.items()}
+
+STAMP_SIZE = TLV_HEADER_SIZE + _FORMATS[RecordType.STAMP].size
+_STAMP_RECORD = struct.Struct(">BBBBI")
 
 
-def build_records(records: list[Record]) -> bytes:
+def build_records(records: Iterable[Record]) -> bytes:
     """The payload of one control entry. Raises ValueError when a field is out of range."""
     return b"".join(_build(record) for record in records)
+
+
+def build_stamp(topic_id: int, entry_id: int, age_us: int) -> bytes:
+    """A STAMP record: every message has one, so it is built without detours."""
+    value_size = STAMP_SIZE - TLV_HEADER_SIZE
+    return bytes(_STAMP_RECORD.pack(RecordType.STAMP, value_size, topic_id, entry_id, age_us))
 
 
 def parse_records(payload: bytes) -> list[Record]:
@@ -96,35 +100,36 @@ def parse_records(payload: bytes) -> list[Record]:
     (rx_entry) when a record overruns the payload or is too short for its type.
     """
     records: list[Record] = []
-    at = 0
-    while at < len(payload):
-        if at + TLV_HEADER_SIZE > len(payload):
+    at, end = 0, len(payload)
+    while at < end:
+        if at + TLV_HEADER_SIZE > end:
             raise PduError("rx_entry", "a control record is cut in its header")
-        kind, length = payload[at], payload[at + 1]
+        number, length = payload[at], payload[at + 1]
         at += TLV_HEADER_SIZE
-        value = payload[at : at + length]
-        if len(value) != length:
-            raise PduError("rx_entry", f"control record {kind} of {length} bytes overruns")
+        if at + length > end:
+            raise PduError("rx_entry", f"control record {number} of {length} bytes overruns")
+        if number in _KNOWN:
+            kind, fields = _KNOWN[number]
+            if length < fields.size:
+                raise PduError("rx_entry", f"control record {number} has only {length} bytes")
+            records.append(kind(*fields.unpack_from(payload, at)))
+        elif number == RecordType.DIGEST:
+            if length < RegistryDigest.OVERALL_SIZE:
+                raise PduError("rx_entry", f"control record {number} has only {length} bytes")
+            records.append(RegistryDigest.from_bytes(payload[at : at + length]))
         at += length
-        known = _BY_TYPE.get(kind)
-        if known is not None:
-            if length < known.FORMAT.size:
-                raise PduError("rx_entry", f"control record {kind} has only {length} bytes")
-            records.append(known(*known.FORMAT.unpack_from(value)))
-        elif kind == RecordType.DIGEST:
-            if length < _DIGEST_SIZE:
-                raise PduError("rx_entry", f"control record {kind} has only {length} bytes")
-            records.append(RegistryDigest(value[:_DIGEST_SIZE], value[_DIGEST_SIZE:]))
     return records
 
 
 def _build(record: Record) -> bytes:
     if isinstance(record, RegistryDigest):
-        value = record.overall + record.per_topic
-        return bytes((RecordType.DIGEST, len(value))) + value
-    fields = [getattr(record, name) for name in record.__slots__]
-    try:
-        value = record.FORMAT.pack(*fields)
-    except struct.error as error:
-        raise ValueError(f"{record} does not fit its record: {error}") from None
-    return bytes((record.TYPE, len(value))) + value
+        number, value = RecordType.DIGEST, record.overall + record.per_topic
+        if len(record.overall) != RegistryDigest.OVERALL_SIZE or len(value) > MAX_VALUE_SIZE:
+            raise ValueError(f"a digest is 8 octets, and one a topic: {record}")
+    else:
+        number = _TYPES[type(record)]
+        try:
+            value = _FORMATS[number].pack(*record)
+        except struct.error as error:
+            raise ValueError(f"{record} does not fit its record: {error}") from None
+    return bytes((number, len(value))) + value

@@ -1,23 +1,22 @@
 """A PDU as bytes and as fields (wire document, sections 3 to 5)."""
 
 import binascii
-import struct
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
 from sdrlinkd.errors import PduError
-from sdrlinkd.wire.capacity import CRC_SIZE, ENTRY_HEADER_SIZE, HEADER_SIZE, MAX_ENTRIES
+from sdrlinkd.wire.builder import (
+    ENTRY_HEADER,
+    FLAG_COMPRESSED,
+    FLAG_SEALED,
+    HEADER,
+    VERSION,
+    PduBuilder,
+)
+from sdrlinkd.wire.capacity import CRC_SIZE, ENTRY_HEADER_SIZE, HEADER_SIZE
 
-VERSION = 0
 BROADCAST = 0xFF
-
-_HEADER = struct.Struct(">BBBBB")
-_ENTRY = struct.Struct(">BBBH")
-_SINGLE = struct.Struct(">BBBBBBBBBH")
-
-_FLAG_COMPRESSED = 0x02
-_FLAG_SEALED = 0x01
 
 
 class Entry(NamedTuple):
@@ -25,7 +24,7 @@ class Entry(NamedTuple):
 
     topic_id: int
     entry_id: int
-    index: int
+    index: int  # type: ignore[assignment]  # the format's own word
     total: int
     payload: bytes
 
@@ -47,38 +46,17 @@ def build(pdu: Pdu, pdu_size: int) -> bytes:
 
     Raises ValueError when a field is out of range or the entries do not fit: the sender's bug.
     """
-    entries = pdu.entries
-    n = len(entries)
-    if not 1 <= n <= MAX_ENTRIES:
-        raise ValueError(f"a PDU holds 1 to {MAX_ENTRIES} entries, not {n}")
-    flags = VERSION << 4 | _check("qos", pdu.qos, 3) << 2
-    if pdu.compressed:
-        flags |= _FLAG_COMPRESSED
-    hop_count = _check("hop", pdu.hop, 15) << 4 | n
-    try:
-        if n == 1:
-            topic_id, entry_id, index, total, payload = entries[0]
-            tid = _check("topic id", topic_id, 15) << 4
-            _check_index(index, total)
-            head = _SINGLE.pack(
-                flags, pdu.src, pdu.dst, pdu.seq, hop_count, tid,
-                entry_id, index, total, len(payload),
-            )  # fmt: skip
-            parts = [head, payload]
-        else:
-            parts = [
-                _HEADER.pack(flags, pdu.src, pdu.dst, pdu.seq, hop_count),
-                _pack_topic_ids([entry.topic_id for entry in entries]),
-            ]
-            for _, entry_id, index, total, payload in entries:
-                _check_index(index, total)
-                parts += (_ENTRY.pack(entry_id, index, total, len(payload)), payload)
-    except struct.error as error:
-        raise ValueError(f"a field does not fit its octets: {error}") from None
-    body = b"".join(parts).ljust(pdu_size - CRC_SIZE, b"\0")
-    if len(body) != pdu_size - CRC_SIZE:
-        raise ValueError(f"{n} entries overrun a PDU of {pdu_size} bytes")
-    return body + binascii.crc_hqx(body, 0).to_bytes(2, "big")
+    if not 0 <= pdu.qos <= 3:
+        raise ValueError(f"qos is {pdu.qos}, allowed 0 to 3")
+    builder = PduBuilder(pdu_size)
+    for entry in pdu.entries:
+        builder.add(*entry)
+    return builder.build(flags(pdu.qos, pdu.compressed), pdu.src, pdu.dst, pdu.seq, pdu.hop)
+
+
+def flags(qos: int, compressed: bool = False) -> int:
+    """The first octet of a PDU of this version."""
+    return VERSION << 4 | qos << 2 | (FLAG_COMPRESSED if compressed else 0)
 
 
 def parse(data: bytes, pdu_size: int) -> Pdu:
@@ -93,11 +71,11 @@ def parse(data: bytes, pdu_size: int) -> Pdu:
     # A CRC with no final xor over data and its own CRC leaves zero.
     if binascii.crc_hqx(data, 0):
         raise PduError("rx_crc", "CRC-16 does not match")
-    flags, src, dst, seq, hop_count = _HEADER.unpack_from(data)
-    if flags >> 4 != VERSION:
-        raise PduError("rx_version", f"version {flags >> 4}, this is version {VERSION}")
-    if flags & _FLAG_SEALED:
-        raise PduError("rx_flags", "sealed PDU (E=1) and no key")
+    first, src, dst, seq, hop_count = HEADER.unpack_from(data)
+    if first >> 4 != VERSION:
+        raise PduError("rx_version", f"version {first >> 4}, this is version {VERSION}")
+    if first & (FLAG_SEALED | FLAG_COMPRESSED):
+        raise PduError("rx_flags", "sealed (E=1) or compressed (C=1), reserved in version 0")
     n = hop_count & 0x0F
     if n == 0:
         raise PduError("rx_entry", "no entries")
@@ -107,7 +85,7 @@ def parse(data: bytes, pdu_size: int) -> Pdu:
         nibbles = data[HEADER_SIZE + i // 2]
         if at + ENTRY_HEADER_SIZE > end:
             raise PduError("rx_entry", f"entry {i} begins past the end")
-        entry_id, index, total, length = _ENTRY.unpack_from(data, at)
+        entry_id, index, total, length = ENTRY_HEADER.unpack_from(data, at)
         at += ENTRY_HEADER_SIZE
         if at + length > end:
             raise PduError("rx_entry", f"entry {i} of {length} bytes overruns the PDU")
@@ -120,7 +98,7 @@ def parse(data: bytes, pdu_size: int) -> Pdu:
         raise PduError("rx_entry", "the unused topic id nibble is not zero")
     if data.count(0, at, end) != end - at:
         raise PduError("rx_pad", "PAD is not zero")
-    return Pdu((flags >> 2) & 3, bool(flags & _FLAG_COMPRESSED), src, dst, seq, hop_count >> 4, entries)
+    return Pdu((first >> 2) & 3, False, src, dst, seq, hop_count >> 4, entries)
 
 
 def identity(data: bytes) -> tuple[int, int, int]:
@@ -138,21 +116,3 @@ def _hop_shares(pdu_size: int) -> tuple[int, ...]:
     """CRC of a body that is zero but for each of the 16 hop nibbles."""
     rest = bytes(pdu_size - HEADER_SIZE - CRC_SIZE)
     return tuple(binascii.crc_hqx(bytes((0, 0, 0, 0, hop << 4)) + rest, 0) for hop in range(16))
-
-
-def _pack_topic_ids(topic_ids: list[int]) -> bytes:
-    padded = [*topic_ids, 0]
-    for topic_id in topic_ids:
-        _check("topic id", topic_id, 15)
-    return bytes(padded[i] << 4 | padded[i + 1] for i in range(0, len(topic_ids), 2))
-
-
-def _check(name: str, value: int, most: int) -> int:
-    if not 0 <= value <= most:
-        raise ValueError(f"{name} is {value}, allowed 0 to {most}")
-    return value
-
-
-def _check_index(index: int, total: int) -> None:
-    if index >= total:
-        raise ValueError(f"entry index {index} of total {total}")

@@ -55,7 +55,8 @@ class Reassembly:
     def __init__(self, limits: ReassemblyLimits) -> None:
         self._limits = limits
         self._sources: dict[int, _Source] = {}
-        self._lost: list[Lost] = []
+        # Given up and not taken yet; see `take_lost`.
+        self.lost: list[Lost] = []
         self._next_expiry = float("inf")
         self.held_bytes = 0
         self.held = 0
@@ -75,10 +76,14 @@ class Reassembly:
             source = self._sources[src] = _Source()
         key = (topic_id, entry_id)
         partial = source.partials.get(key)
-        if partial is not None and self._is_other_message(partial, entry):
-            # The sender uses the entry id anew: the old message can never be completed.
-            self._give_up(src, source, key, "rx_partial_superseded")
-            partial = None
+        if partial is not None:
+            # Never add to what the sender may have forgotten: its entry id can be another's now.
+            if self._is_silent(partial, now):
+                self._give_up(src, source, key, "rx_partial_timeout")
+                partial = None
+            elif self._is_other_message(partial, entry):
+                self._give_up(src, source, key, "rx_partial_superseded")
+                partial = None
         if partial is None:
             partial = self._start(source, key, total, now)
         elif index in partial.parts:
@@ -102,12 +107,11 @@ class Reassembly:
         """Give up what has been silent for the timeout."""
         if now < self._next_expiry:
             return
-        horizon = now - self._limits.timeout_s
         self._next_expiry = float("inf")
         for src, source in list(self._sources.items()):
             while source.partials:
                 key, partial = next(iter(source.partials.items()))
-                if partial.touched_at > horizon:
+                if not self._is_silent(partial, now):
                     due = partial.touched_at + self._limits.timeout_s
                     self._next_expiry = min(self._next_expiry, due)
                     break
@@ -117,11 +121,11 @@ class Reassembly:
 
     def next_expiry(self) -> float:
         """When `expire` may next have something to do; infinity when nothing is held."""
-        return self._next_expiry
+        return self._next_expiry if self.held else float("inf")
 
     def take_lost(self) -> list[Lost]:
         """What was given up since the last call."""
-        lost, self._lost = self._lost, []
+        lost, self.lost = self.lost, []
         return lost
 
     def _start(self, source: _Source, key: tuple[int, int], total: int, now: float) -> _Partial:
@@ -132,6 +136,9 @@ class Reassembly:
         self.started += 1
         self._next_expiry = min(self._next_expiry, now + self._limits.timeout_s)
         return partial
+
+    def _is_silent(self, partial: _Partial, now: float) -> bool:
+        return now >= partial.touched_at + self._limits.timeout_s
 
     @staticmethod
     def _is_other_message(partial: _Partial, entry: Entry) -> bool:
@@ -148,7 +155,7 @@ class Reassembly:
 
     def _give_up(self, src: int, source: _Source, key: tuple[int, int], reason: str) -> None:
         self._remove(source, key)
-        self._lost.append(Lost(src, key[0], reason))
+        self.lost.append(Lost(src, key[0], reason))
 
     def _remove(self, source: _Source, key: tuple[int, int]) -> None:
         partial = source.partials.pop(key)

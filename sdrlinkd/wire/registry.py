@@ -5,6 +5,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from typing import ClassVar
 
 from sdrlinkd.errors import RegistryError
 
@@ -31,9 +32,20 @@ class RegistryDigest:
     overall: bytes
     per_topic: bytes
 
+    OVERALL_SIZE: ClassVar = 8
+
+    @classmethod
+    def from_bytes(cls, value: bytes) -> "RegistryDigest":
+        """From the value of a DIGEST record."""
+        return cls(value[: cls.OVERALL_SIZE], value[cls.OVERALL_SIZE :])
+
+    def shortened(self) -> "RegistryDigest":
+        """Without the octets by topic, for PDUs too small for them."""
+        return RegistryDigest(self.overall, b"")
+
     def differing_ids(self, other: "RegistryDigest") -> list[int]:
-        """Topic ids on which the two registries (seem to) disagree; empty when they agree."""
-        if self.overall == other.overall:
+        """Topic ids on which the two registries disagree, as far as single octets can tell."""
+        if self.overall == other.overall or not (self.per_topic and other.per_topic):
             return []
         most = max(len(self.per_topic), len(other.per_topic))
         mine = self.per_topic.ljust(most, b"\0")
@@ -75,7 +87,7 @@ class Registry:
         """Digest over ids, names and types (wire document, section 7.2)."""
         lines = [f"{topic.id},{topic.name},{topic.type}\n".encode() for topic in self.topics]
         return RegistryDigest(
-            overall=hashlib.sha256(b"".join(lines)).digest()[:8],
+            overall=hashlib.sha256(b"".join(lines)).digest()[: RegistryDigest.OVERALL_SIZE],
             per_topic=bytes(hashlib.sha256(line).digest()[0] for line in lines),
         )
 
@@ -89,10 +101,10 @@ def parse_registry(text: str, source: str = "registry") -> Registry:
 
     Raises RegistryError that cites `source` and the line.
     """
-    pairs = []
-    for number, raw in enumerate(text.splitlines(), start=1):
+    pairs: list[tuple[str, str, str]] = []
+    for number, raw in enumerate(text.removeprefix("\ufeff").split("\n"), start=1):
         line = raw.split("#", 1)[0].strip()
-        if not line or (number == 1 and line.replace(" ", "").lower() == "name,type"):
+        if not line or (not pairs and line.replace(" ", "").lower() == "name,type"):
             continue
         fields = [field.strip() for field in line.split(",")]
         if len(fields) != 2:

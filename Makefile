@@ -1,0 +1,44 @@
+# make demo   set up, then the main job        make check  format, lint, types, import rules
+# make test   set up, then all tests           make bench  measurements beside peers
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+SOURCES := sdrlinkd backends phy benchmarks
+
+.PHONY: setup demo test check format bench system-packages clean
+
+setup: $(STAMP)
+
+$(STAMP): pyproject.toml constraints.txt sdrlinkd/__init__.py
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "sdrlinkd needs Python 3.11 or newer; name one: make PYTHON=python3.12"; exit 1; }
+	@$(PYTHON) -m venv $(VENV) || \
+		{ echo "python3 has no venv module; on Debian: apt-get install python3-venv"; exit 1; }
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[plots,dev]'
+	@touch $@
+
+demo: setup
+	$(BIN)/sdrlinkctl demo
+
+test: setup system-packages
+	$(BIN)/python -m pytest
+
+check: setup
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: setup
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+bench: setup
+	$(BIN)/python -m benchmarks.bus
+
+system-packages:
+	@sh etc/install-apt-packages.sh
+
+clean:
+	rm -rf $(VENV) build .hypothesis .mypy_cache .pytest_cache .ruff_cache .import_linter_cache

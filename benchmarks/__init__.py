@@ -1,0 +1,1 @@
+"""Measurements beside peers; each is run as `python -m benchmarks.NAME`."""

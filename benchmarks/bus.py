@@ -1,0 +1,23 @@
+"""The inner path: bus into the queue, queue into PDUs, PDUs into messages, and the whole."""
+
+import sys
+
+from benchmarks.bus_ingress import ingress_row
+from benchmarks.bus_latency import latency_row
+from benchmarks.path_cost import path_cost_row
+from benchmarks.queue_cost import queue_cost_row
+from benchmarks.report import Row, main
+
+
+def measure(seed: int, quick: bool) -> list[Row]:
+    """All rows; `quick` takes about a quarter of the trials."""
+    return [
+        ingress_row(20_000 if quick else 60_000, 3 if quick else 5),
+        path_cost_row(seed, 20 if quick else 60),
+        latency_row(300 if quick else 1500),
+        queue_cost_row(seed, 15 if quick else 45),
+    ]
+
+
+if __name__ == "__main__":
+    sys.exit(main("bus", measure))

@@ -1,0 +1,72 @@
+"""Rows of a benchmark, as a table for people and as JSON for programs."""
+
+import argparse
+import json
+import os
+import platform
+import sys
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+from typing import Literal
+
+from rich.console import Console
+from rich.table import Table
+
+
+@dataclass
+class Row:
+    """One measured figure beside its target and its peers."""
+
+    name: str
+    value: float
+    unit: str
+    target: float
+    better: Literal["more", "less"]
+    trials: int
+    peers: dict[str, float] = field(default_factory=dict)
+    paper: float | None = None
+    note: str = ""
+
+    @property
+    def ok(self) -> bool:
+        """Whether the target is met."""
+        return self.value >= self.target if self.better == "more" else self.value <= self.target
+
+
+def main(benchmark: str, measure: Callable[[int, bool], list[Row]]) -> int:
+    """Parse the options all benchmarks share, measure, print; 1 when a row misses its target."""
+    parser = argparse.ArgumentParser(prog=f"python -m benchmarks.{benchmark}")
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--quick", action="store_true", help="fewer trials, the same rows")
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    rows = measure(options.seed, options.quick)
+    machine = f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
+    if options.json:
+        report = {
+            "benchmark": benchmark,
+            "machine": machine,
+            "seed": options.seed,
+            "rows": [{**asdict(row), "ok": row.ok} for row in rows],
+        }
+        sys.stdout.write(json.dumps(report, indent=2) + "\n")
+    else:
+        Console().print(_table(benchmark, rows))
+    return 0 if all(row.ok for row in rows) else 1
+
+
+def _table(benchmark: str, rows: list[Row]) -> Table:
+    table = Table(title=f"benchmarks.{benchmark}", title_justify="left")
+    for column in ("row", "value", "target", "peers in the same run", "trials"):
+        table.add_column(column)
+    for row in rows:
+        sign = "≥" if row.better == "more" else "≤"
+        table.add_row(
+            row.name,
+            f"{row.value:,.4g} {row.unit}",
+            f"{sign} {row.target:,.4g}",
+            ", ".join(f"{name} {value:,.4g}" for name, value in row.peers.items()),
+            str(row.trials),
+            style="" if row.ok else "bold red",
+        )
+    return table

@@ -1,0 +1,20 @@
+"""The world outside: recordings, message types, a robot for demonstrations."""
+
+from sdrlinkd.adapters.bags import Bag, BagMessage, BagTopic, open_bag
+from sdrlinkd.adapters.pacing import first_seconds, paced
+from sdrlinkd.adapters.robot import BuiltInRobot
+from sdrlinkd.adapters.typestore import empty, from_cdr, knows, to_cdr
+
+__all__ = [
+    "Bag",
+    "BagMessage",
+    "BagTopic",
+    "BuiltInRobot",
+    "empty",
+    "first_seconds",
+    "from_cdr",
+    "knows",
+    "open_bag",
+    "paced",
+    "to_cdr",
+]

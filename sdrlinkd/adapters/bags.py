@@ -1,0 +1,139 @@
+"""Recordings: rosbag2 (SQLite, MCAP) verbatim, ROS 1 bags converted, damaged ones in part."""
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from rosbags.highlevel import AnyReader, AnyReaderError
+
+from sdrlinkd.adapters.salvage import Piece, salvage
+from sdrlinkd.adapters.typestore import Ros1Converter, ros2_types
+from sdrlinkd.errors import BagError
+
+
+class BagTopic(NamedTuple):
+    """One topic of a recording."""
+
+    name: str
+    type: str
+    n_messages: int
+
+
+class BagMessage(NamedTuple):
+    """One message: CDR bytes as recorded, and when, in ns."""
+
+    topic: str
+    type: str
+    time_ns: int
+    cdr: bytes
+
+
+class Bag(Protocol):
+    """A recording that can be played."""
+
+    path: Path
+    damage: str
+    """What could not be read, in words; empty when all could."""
+
+    def topics(self) -> list[BagTopic]:
+        """Topics in the order of their names."""
+
+    def messages(self) -> Iterator[BagMessage]:
+        """All messages in the order of time."""
+
+    def close(self) -> None:
+        """Release the file."""
+
+
+def open_bag(path: Path) -> Bag:
+    """The recording at `path`: a rosbag2 folder, an .mcap, .db3 or ROS 1 .bag file.
+
+    A damaged one opens with what can be read; see `damage`. Raises BagError when that is nothing.
+    """
+    if not path.exists():
+        raise BagError(
+            f"{path}: no such file or folder; a bag is a rosbag2 folder, .mcap, .db3 or .bag"
+        )
+    try:
+        return _WholeBag(path)
+    except (AnyReaderError, OSError, ValueError, KeyError, AttributeError) as error:
+        return _DamagedBag(path, str(error))
+
+
+class _WholeBag:
+    """A bag that rosbags can open."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.damage = ""
+        self._reader = AnyReader([path], default_typestore=ros2_types())
+        self._reader.open()
+        self._ros1 = None if self._reader.is2 else Ros1Converter(self._reader.typestore)
+
+    def topics(self) -> list[BagTopic]:
+        counts: Counter[tuple[str, str]] = Counter()
+        for connection in self._reader.connections:
+            counts[connection.topic, connection.msgtype] += connection.msgcount
+        return [BagTopic(*key, count) for key, count in sorted(counts.items())]
+
+    def messages(self) -> Iterator[BagMessage]:
+        done = 0
+        total = sum(topic.n_messages for topic in self.topics())
+        try:
+            for connection, time_ns, data in self._reader.messages():
+                cdr = bytes(data)
+                if self._ros1 is not None:
+                    cdr = self._ros1.convert(cdr, connection.msgtype)
+                done += 1
+                yield BagMessage(connection.topic, connection.msgtype, time_ns, cdr)
+        except GeneratorExit:
+            raise
+        except Exception as error:
+            # A reader has many ways to say "damaged".
+            self.damage = f"{self.path}: unreadable after {done} of {total} messages ({error})"
+
+    def close(self) -> None:
+        self._reader.close()
+
+
+class _DamagedBag:
+    """What salvage finds; held in memory, as order and counts are only known at the end."""
+
+    def __init__(self, path: Path, why: str) -> None:
+        self.path = path
+        self._unconvertible: Counter[str] = Counter()
+        self._converters: dict[str, Ros1Converter] = {}
+        found = [message for piece in salvage(path) if (message := self._message(piece))]
+        self._found = sorted(found, key=lambda message: message.time_ns)
+        if not found:
+            raise BagError(f"{path}: cannot be read ({why}), and nothing in it can be saved")
+        self.damage = f"{path}: damaged ({why}); {len(found)} messages could be read"
+        for kind, count in self._unconvertible.items():
+            self.damage += f"; {count} of type {kind} could not be converted"
+
+    def topics(self) -> list[BagTopic]:
+        counts = Counter((message.topic, message.type) for message in self._found)
+        return [BagTopic(*key, count) for key, count in sorted(counts.items())]
+
+    def messages(self) -> Iterator[BagMessage]:
+        yield from self._found
+
+    def close(self) -> None:
+        self._found = []
+
+    def _message(self, piece: Piece) -> BagMessage | None:
+        kind = piece.type if "/msg/" in piece.type else piece.type.replace("/", "/msg/")
+        if not piece.definition:
+            return BagMessage(piece.topic, kind, piece.time_ns, piece.data)
+        try:
+            converter = self._converters.get(kind)
+            if converter is None:
+                converter = Ros1Converter.from_definition(kind, piece.definition)
+                self._converters[kind] = converter
+            cdr = converter.convert(piece.data, kind)
+        except Exception:
+            # A damaged message fails in as many ways as there are types.
+            self._unconvertible[kind] += 1
+            return None
+        return BagMessage(piece.topic, kind, piece.time_ns, cdr)

@@ -1,0 +1,39 @@
+"""Playing a recording at the pace it was made, or another."""
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+
+from sdrlinkd.adapters.bags import BagMessage
+
+
+def paced(
+    messages: Iterable[BagMessage],
+    rate: float,
+    clock: Callable[[], float] = time.monotonic,
+    sleep: Callable[[float], None] = time.sleep,
+) -> Iterator[BagMessage]:
+    """Each message at its time, `rate` times as fast as recorded; infinity: at once.
+
+    The wait is to an absolute time, so a late message does not delay those after it.
+    """
+    start = clock()
+    first_ns: int | None = None
+    for message in messages:
+        if first_ns is None:
+            first_ns = message.time_ns
+        due = start + (message.time_ns - first_ns) * 1e-9 / rate
+        wait_s = due - clock()
+        if wait_s > 0:
+            sleep(wait_s)
+        yield message
+
+
+def first_seconds(messages: Iterable[BagMessage], duration_s: float) -> Iterator[BagMessage]:
+    """Messages of the first `duration_s` of a recording."""
+    first_ns: int | None = None
+    for message in messages:
+        if first_ns is None:
+            first_ns = message.time_ns
+        if (message.time_ns - first_ns) * 1e-9 >= duration_s:
+            return
+        yield message

@@ -1,0 +1,13 @@
+"""What salvage yields."""
+
+from typing import NamedTuple
+
+
+class Piece(NamedTuple):
+    """A message that could still be read; `definition` only where the bag's format needs it."""
+
+    topic: str
+    type: str
+    time_ns: int
+    data: bytes
+    definition: str = ""

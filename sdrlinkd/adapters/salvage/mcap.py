@@ -1,0 +1,74 @@
+"""Messages from the readable part of a damaged MCAP file (https://mcap.dev/spec)."""
+
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+
+import lz4.frame
+import zstandard
+
+from sdrlinkd.adapters.salvage.base import Piece
+
+MAGIC = b"\x89MCAP0\r\n"
+_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 3, 4, 5, 6
+_RECORD = struct.Struct("<BQ")
+
+
+def salvage(path: Path) -> Iterator[Piece]:
+    """Every message up to the point where the file ends or stops making sense."""
+    data = path.read_bytes()
+    if not data.startswith(MAGIC):
+        return
+    schemas: dict[int, str] = {}
+    channels: dict[int, tuple[str, str]] = {}
+    for op, content in _top_records(data[len(MAGIC) :]):
+        if op == _SCHEMA:
+            name, _ = _text(content, 2)
+            schemas[int.from_bytes(content[:2], "little")] = name
+        elif op == _CHANNEL:
+            number, schema = struct.unpack_from("<HH", content)
+            topic, _ = _text(content, 4)
+            channels[number] = (topic, schemas.get(schema, ""))
+        elif op == _MESSAGE:
+            number, _, time_ns, _ = struct.unpack_from("<HIQQ", content)
+            if number in channels:
+                yield Piece(*channels[number], time_ns, content[22:])
+
+
+def _top_records(data: bytes) -> Iterator[tuple[int, bytes]]:
+    for op, content in _records(data, cut_chunks=True):
+        if op == _CHUNK:
+            yield from _records(_inflate(content), cut_chunks=False)
+        else:
+            yield op, content
+
+
+def _records(data: bytes, *, cut_chunks: bool) -> Iterator[tuple[int, bytes]]:
+    at = 0
+    while at + _RECORD.size <= len(data):
+        op, length = _RECORD.unpack_from(data, at)
+        at += _RECORD.size
+        content = data[at : at + length]
+        if len(content) < length and not (cut_chunks and op == _CHUNK):
+            return
+        yield op, content
+        at += length
+
+
+def _inflate(chunk: bytes) -> bytes:
+    """The records of a chunk, as many as its compressed bytes still yield."""
+    try:
+        compression, at = _text(chunk, 28)
+        packed = chunk[at + 8 :]
+        if compression == "zstd":
+            return zstandard.ZstdDecompressor().decompressobj().decompress(packed)
+        if compression == "lz4":
+            return bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed))
+    except (struct.error, UnicodeDecodeError, zstandard.ZstdError, RuntimeError):
+        return b""
+    return packed if not compression else b""
+
+
+def _text(data: bytes, at: int) -> tuple[str, int]:
+    end = at + 4 + struct.unpack_from("<I", data, at)[0]
+    return data[at + 4 : end].decode(), end

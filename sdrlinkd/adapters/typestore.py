@@ -1,0 +1,81 @@
+"""ROS message types: definitions, CDR and defaults, by rosbags."""
+
+from functools import cache
+from typing import Any
+
+from rosbags.convert.converter import default_message, is_same_wireformat, migrate_bytes
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
+
+from sdrlinkd.errors import UserError
+
+
+@cache
+def ros2_types() -> Typestore:
+    """The message types of ROS 2 Humble."""
+    return get_typestore(Stores.ROS2_HUMBLE)
+
+
+def knows(kind: str) -> bool:
+    """Whether messages of `kind` can be read here."""
+    return kind in ros2_types().fielddefs
+
+
+def to_cdr(message: object, kind: str) -> bytes:
+    """CDR bytes of a message."""
+    return bytes(ros2_types().serialize_cdr(message, kind))
+
+
+def from_cdr(data: bytes, kind: str) -> Any:  # noqa: ANN401
+    """The message in CDR bytes."""
+    return ros2_types().deserialize_cdr(data, kind)
+
+
+def empty(kind: str) -> Any:  # noqa: ANN401
+    """A message of `kind` with all fields at their defaults. Raises UserError when unknown."""
+    if not knows(kind):
+        raise UserError(
+            f"type {kind} is not known; allowed: ROS 2 types such as nav_msgs/msg/Odometry"
+        )
+    return default_message(ros2_types(), kind)
+
+
+class Ros1Converter:
+    """ROS 1 messages to ROS 2 CDR, field by field where the definitions differ."""
+
+    def __init__(self, source: Typestore) -> None:
+        self._source = source
+        self._cache: dict[str, object] = {}
+
+    @classmethod
+    def from_definition(cls, kind: str, definition: str) -> "Ros1Converter":
+        """A converter for the type whose ROS 1 definition is given as text."""
+        store = get_typestore(Stores.ROS1_NOETIC)
+        store.register(
+            {
+                name: fields
+                for name, fields in get_types_from_msg(definition, kind).items()
+                if name not in store.fielddefs
+            }
+        )
+        return cls(store)
+
+    def convert(self, data: bytes, kind: str) -> bytes:
+        """CDR of a ROS 1 message of `kind` (`pkg/msg/Name`)."""
+        target = ros2_types()
+        if kind not in target.fielddefs:
+            text = self._source.generate_msgdef(kind, ros_version=2)[0]
+            target.register(
+                {
+                    name: fields
+                    for name, fields in get_types_from_msg(text, kind).items()
+                    if name not in target.fielddefs
+                }
+            )
+        if is_same_wireformat(self._source, target, kind, kind):
+            return bytes(target.ros1_to_cdr(data, kind))
+        return bytes(
+            migrate_bytes(
+                self._source, target, kind, kind, self._cache, data, src_is2=False, dst_is2=True
+            )
+        )

@@ -1,0 +1,62 @@
+"""The command tree of sdrlinkctl, and how its errors end."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sdrlinkd import __version__
+from sdrlinkd.client import ControlClient, NoDaemonError, RefusedError
+from sdrlinkd.errors import UserError
+
+app = typer.Typer(
+    name="sdrlinkctl",
+    help="Shows and steers sdrlinkd: ROS 2 messages between robots over software radio.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+
+RuntimeDir = Annotated[
+    Path | None,
+    typer.Option(
+        "--runtime-dir",
+        envvar="SDRLINKD_RUNTIME_DIR",
+        help="Directory of the daemon's sockets; by default the system service's or your own.",
+        show_default=False,
+    ),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
+
+
+def main() -> None:
+    """Run sdrlinkctl; exit code 2 for what a person can mend, 130 after Ctrl-C."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command line; the exit code."""
+    try:
+        app(arguments, prog_name="sdrlinkctl")
+    except SystemExit as done:
+        return done.code if isinstance(done.code, int) else 1
+    except KeyboardInterrupt:
+        return 130
+    except (UserError, NoDaemonError, RefusedError) as error:
+        sys.stderr.write(f"sdrlinkctl: {error}\n")
+        return 2
+    return 0
+
+
+def connect(runtime_dir: Path | None) -> ControlClient:
+    """The control socket of the running daemon."""
+    return ControlClient(runtime_dir)
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
+) -> None:
+    if version:
+        typer.echo(f"sdrlinkctl {__version__}")
+        raise typer.Exit

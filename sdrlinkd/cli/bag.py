@@ -1,0 +1,116 @@
+"""`bag play`: a recording into a running daemon."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from sdrlinkd.adapters import BagMessage, BagTopic, first_seconds, open_bag, paced
+from sdrlinkd.cli.app import RuntimeDir, app, connect
+from sdrlinkd.cli.status import ask_status
+from sdrlinkd.client import Publisher
+from sdrlinkd.errors import BagError, UserError
+from sdrlinkd.reports import TopicReport
+
+bags = typer.Typer(help="Recordings.", no_args_is_help=True)
+app.add_typer(bags, name="bag")
+
+
+@bags.command()
+def info(bag: Annotated[Path, typer.Argument(help="rosbag2 folder, .mcap, .db3 or .bag")]) -> None:
+    """Topics of a recording."""
+    opened = open_bag(bag)
+    console = Console()
+    for topic in opened.topics():
+        console.print(
+            f"{topic.n_messages:>7}  {topic.name}  [dim]{topic.type}[/dim]", highlight=False
+        )
+    opened.close()
+    if opened.damage:
+        raise BagError(opened.damage)
+
+
+@bags.command()
+def play(
+    bag: Annotated[Path, typer.Argument(help="rosbag2 folder, .mcap, .db3 or .bag")],
+    rate: Annotated[
+        float, typer.Option("--rate", "-r", min=0.001, help="Times as fast as recorded.")
+    ] = 1.0,
+    duration: Annotated[
+        float | None, typer.Option(min=0.001, help="Only the first seconds of the recording.")
+    ] = None,
+    topics: Annotated[
+        list[str] | None, typer.Option("--topics", help="Only this topic; may be repeated.")
+    ] = None,
+    remap: Annotated[
+        list[str] | None, typer.Option(help="FROM:=TO, the daemon's topic for one of the bag.")
+    ] = None,
+    runtime_dir: RuntimeDir = None,
+) -> None:
+    """Play a recording to the daemon: rosbag2 verbatim, ROS 1 converted."""
+    console = Console(stderr=True)
+    opened = open_bag(bag)
+    with connect(runtime_dir) as control:
+        snapshot = ask_status(control)
+    taken = {topic.name: topic for topic in snapshot.link.topics if topic.subscribed}
+    route = _route(opened.topics(), taken, snapshot.namespace, topics or [], remap or [])
+    for name, target in route.items():
+        if target is None:
+            console.print(
+                f"left out: {name} (the daemon's registry does not have it)", style="yellow"
+            )
+    if not any(route.values()):
+        raise UserError(f"{bag}: the daemon takes none of its topics; it takes {', '.join(taken)}")
+    total = sum(topic.n_messages for topic in opened.topics() if route.get(topic.name))
+    messages: Iterator[BagMessage] = (m for m in opened.messages() if route.get(m.topic))
+    if duration is not None:
+        messages = first_seconds(messages, duration)
+    sent = 0
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+    )
+    with Publisher(runtime_dir) as publisher, Progress(*columns, console=console) as progress:
+        task = progress.add_task(bag.name, total=None if duration else total)
+        for message in paced(messages, rate):
+            publisher.send(str(route[message.topic]), message.cdr, type=message.type)
+            sent += 1
+            progress.advance(task)
+    opened.close()
+    typer.echo(f"played {sent} messages of {bag}")
+    if opened.damage:
+        raise BagError(opened.damage)
+
+
+def _route(
+    topics: list[BagTopic],
+    taken: dict[str, TopicReport],
+    namespace: str,
+    only: list[str],
+    remap: list[str],
+) -> dict[str, str | None]:
+    """The daemon's topic for each of the bag's; None where there is none."""
+    mapping = {}
+    for rule in remap:
+        source, separator, target = rule.partition(":=")
+        if not separator:
+            raise UserError(f"--remap: got {rule!r}; allowed: /from:=/to")
+        mapping[source] = target
+    known = {topic.name for topic in topics}
+    for name in (*only, *mapping):
+        if name not in known:
+            raise UserError(f"got {name}; allowed: the bag's topics {', '.join(sorted(known))}")
+    route: dict[str, str | None] = {}
+    for topic in topics:
+        if only and topic.name not in only:
+            continue
+        candidates = [mapping.get(topic.name, topic.name)]
+        if namespace and topic.name not in mapping:
+            candidates.append(f"/{namespace.strip('/')}{topic.name}")
+        route[topic.name] = next((name for name in candidates if name in taken), None)
+    return route

@@ -1,0 +1,172 @@
+"""`pub` and `echo`: single messages by hand, as `ros2 topic` does."""
+
+import time
+from io import StringIO
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.console import Console
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from sdrlinkd.adapters import empty, from_cdr, knows, to_cdr
+from sdrlinkd.cli.app import RuntimeDir, app, connect
+from sdrlinkd.cli.status import ask_status
+from sdrlinkd.client import Message, Publisher, Subscriber
+from sdrlinkd.errors import UserError
+
+MAX_SHOWN_ITEMS = 12
+
+
+@app.command()
+def pub(
+    topic: Annotated[str, typer.Argument(help="Bus topic, such as /robot_1/cmd_vel.")],
+    values: Annotated[
+        str, typer.Argument(help="Fields in YAML: '{linear: {x: 0.5}}'; the rest is default.")
+    ] = "{}",
+    cdr_file: Annotated[
+        Path | None, typer.Option("--cdr", help="Send this file's CDR bytes instead.")
+    ] = None,
+    rate: Annotated[float, typer.Option("--rate", "-r", min=0.0, help="Hz; 0: once.")] = 0.0,
+    times: Annotated[int, typer.Option("--times", "-t", min=0, help="0: until Ctrl-C.")] = 0,
+    qos: Annotated[str | None, typer.Option(help="urgent, latency, default or bulk.")] = None,
+    priority: Annotated[int | None, typer.Option(min=0, max=127)] = None,
+    dst: Annotated[int | None, typer.Option(min=0, max=255, help="Destination robot.")] = None,
+    lifespan: Annotated[float | None, typer.Option(min=0.001, help="Seconds.")] = None,
+    runtime_dir: RuntimeDir = None,
+) -> None:
+    """Publish a message to the daemon."""
+    if qos not in (None, "urgent", "latency", "default", "bulk"):
+        raise UserError(f'--qos: got "{qos}"; allowed: urgent, latency, default, bulk')
+    with connect(runtime_dir) as control:
+        sent = {each.name: each for each in ask_status(control).link.topics if each.subscribed}
+    if topic not in sent:
+        raise UserError(f"topic {topic} is not taken by the daemon; allowed: {', '.join(sent)}")
+    kind = sent[topic].type
+    payload = _read(cdr_file) if cdr_file else to_cdr(_fill(empty(kind), values, kind), kind)
+    lifespan_ms = None if lifespan is None else lifespan * 1e3
+    with Publisher(runtime_dir) as publisher:
+        count = 0
+        while True:
+            publisher.send(
+                topic,
+                payload,
+                qos=qos,
+                priority=priority,
+                dst=dst,
+                lifespan_ms=lifespan_ms,
+                type=kind,
+            )
+            count += 1
+            if not rate or count == times:
+                break
+            time.sleep(1 / rate)
+    typer.echo(f"published {count} × {len(payload)} B on {topic} ({kind})")
+
+
+@app.command()
+def echo(
+    topic: Annotated[
+        str, typer.Argument(help="Bus topic, such as /rx_robot_2/odom, or a prefix with *.")
+    ] = "/*",
+    raw: Annotated[bool, typer.Option("--raw", help="Show the CDR bytes in hex.")] = False,
+    count: Annotated[int, typer.Option("--count", "-n", min=0, help="0: until Ctrl-C.")] = 0,
+    timeout: Annotated[
+        float | None, typer.Option(min=0, help="Stop after this many seconds of silence.")
+    ] = None,
+    runtime_dir: RuntimeDir = None,
+) -> None:
+    """Show messages heard from other robots."""
+    console = Console()
+    shown = 0
+    with Subscriber(topic, directory=runtime_dir) as subscriber:
+        while message := subscriber.receive(timeout):
+            console.print(_headline(message), style="bold", highlight=False)
+            if raw:
+                console.print(message.payload.hex(" "), highlight=False)
+            else:
+                console.print(as_yaml(message), highlight=False, end="")
+            console.print("---")
+            shown += 1
+            if shown == count:
+                return
+    if count or not shown:
+        raise UserError(
+            f"{topic}: {shown} messages in the time given; `sdrlinkctl topics` lists what is heard"
+        )
+
+
+def as_yaml(message: Message) -> str:
+    """A message's fields as YAML, long arrays cut."""
+    if not knows(message.type):
+        return f"({message.type} is not known here; --raw shows {len(message.payload)} bytes)\n"
+    out = StringIO()
+    writer = YAML(typ="safe", pure=True)
+    writer.default_flow_style = None
+    writer.width = 100
+    writer.dump(_plain(from_cdr(message.payload, message.type)), out)
+    return out.getvalue()
+
+
+def _headline(message: Message) -> str:
+    age = "age unknown" if message.age_us is None else f"age {message.age_us / 1e3:.2f} ms"
+    return f"{message.topic} from robot {message.source}, number {message.number}, {age}"
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401
+    """A message as dicts, lists and numbers."""
+    if hasattr(value, "__msgtype__"):
+        names = [name for name in value.__dataclass_fields__ if not name.startswith("_")]
+        return {name: _plain(getattr(value, name)) for name in names}
+    if isinstance(value, np.ndarray | list):
+        items = [_plain(item) for item in value[:MAX_SHOWN_ITEMS]]
+        more = len(value) - len(items)
+        return [*items, f"… {more} more"] if more else items
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _fill(message: Any, values: str, kind: str) -> Any:  # noqa: ANN401
+    try:
+        given = YAML(typ="safe", pure=True).load(values)
+    except YAMLError as error:
+        raise UserError(f"fields of {kind}: not YAML: {error}") from None
+    if not isinstance(given, dict):
+        raise UserError(
+            f"fields of {kind}: got {values!r}; allowed: a map such as '{{linear: {{x: 0.5}}}}'"
+        )
+    _assign(message, given, kind)
+    return message
+
+
+def _assign(message: Any, given: dict[str, Any], path: str) -> None:  # noqa: ANN401
+    names = [name for name in message.__dataclass_fields__ if not name.startswith("_")]
+    for name, value in given.items():
+        if name not in names:
+            raise UserError(f"{path}: has no field {name}; allowed: {', '.join(names)}")
+        current = getattr(message, name)
+        if hasattr(current, "__msgtype__"):
+            if not isinstance(value, dict):
+                raise UserError(f"{path}.{name}: got {value!r}; allowed: a map of its fields")
+            _assign(current, value, f"{path}.{name}")
+        else:
+            setattr(message, name, _convert(current, value, f"{path}.{name}"))
+
+
+def _convert(current: Any, value: Any, path: str) -> Any:  # noqa: ANN401
+    try:
+        if isinstance(current, np.ndarray):
+            return np.asarray(value, dtype=current.dtype)
+        if isinstance(current, int | float) and not isinstance(current, bool):
+            return float(value) if isinstance(value, float) else int(value)
+    except (TypeError, ValueError):
+        raise UserError(f"{path}: got {value!r}; allowed: numbers") from None
+    return value
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise UserError(f"--cdr: {path} cannot be read ({error.strerror})") from None

@@ -1,0 +1,57 @@
+"""Asking the daemon: status, checks, and the few things that can be changed."""
+
+import os
+import secrets
+import time
+from typing import Any
+
+import zmq
+
+from sdrlinkd.client.blocking import Endpoint, no_daemon
+from sdrlinkd.client.flatmap import Value, pack_map, unpack
+from sdrlinkd.client.paths import CONTROL_SOCKET
+
+PROTOCOL = b"sdrl1"
+
+
+class RefusedError(Exception):
+    """The daemon's no; `code` is for programs, the message for people."""
+
+    def __init__(self, code: str, reason: str) -> None:
+        super().__init__(reason)
+        self.code = code
+
+
+class ControlClient(Endpoint):
+    """One request at a time over the control socket."""
+
+    def __init__(
+        self, directory: str | os.PathLike[str] | None = None, timeout_s: float = 5.0
+    ) -> None:
+        super().__init__(zmq.DEALER, directory)
+        self._timeout_s = timeout_s
+        self._socket.immediate = True
+        self._connect(CONTROL_SOCKET)
+
+    def ask(self, verb: str, arguments: dict[str, Value] | None = None) -> Any:  # noqa: ANN401
+        """The daemon's answer to `verb`. Raises RefusedError, or NoDaemonError in time."""
+        request_id = secrets.token_bytes(4)
+        deadline = time.monotonic() + self._timeout_s
+        self._socket.sndtimeo = int(self._timeout_s * 1000)
+        try:
+            self._socket.send_multipart(
+                [PROTOCOL, request_id, verb.encode(), pack_map(arguments or {})]
+            )
+        except zmq.Again:
+            raise no_daemon(self.directory) from None
+        while (left_s := deadline - time.monotonic()) > 0:
+            if not self._poll(left_s):
+                break
+            _, answered_id, status, body = self._socket.recv_multipart()
+            # A late answer to an earlier request that timed out is not for us.
+            if answered_id == request_id:
+                answer = unpack(body)
+                if status != b"ok":
+                    raise RefusedError(answer["code"], answer["reason"])
+                return answer
+        raise no_daemon(self.directory)

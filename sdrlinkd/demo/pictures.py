@@ -1,0 +1,63 @@
+"""The paper's Figures 6 and 7 for our runs."""
+
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+
+mpl.use("Agg")
+from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
+
+from sdrlinkd.demo.trace import Trace, latencies_s
+
+SENT_MARK_EVERY = 50
+
+
+def latency_cdf(runs: dict[str, Trace], path: Path, caption: str) -> None:
+    """Figure 6: distribution of the end-to-end latency, one line a run."""
+    figure, axes = plt.subplots(figsize=(6.4, 4.0), layout="constrained")
+    for name, trace in runs.items():
+        ordered = latencies_s(trace.matches()[0]) * 1e3
+        if len(ordered):
+            share = np.arange(1, len(ordered) + 1) / len(ordered)
+            median = float(np.median(ordered))
+            axes.step(ordered, share, where="post", label=f"{name} (median {median:.2f} ms)")
+    axes.set_xscale("log")
+    axes.set(xlabel="end-to-end latency in ms", ylabel="share of messages", ylim=(0, 1.02))
+    axes.grid(visible=True, which="both", alpha=0.25)
+    axes.set_title("Latency, publish to reception")
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="lower right")
+    _save(figure, path, caption)
+
+
+def paths(trace: Trace, path: Path, caption: str) -> None:
+    """Figure 7: the path sent and the path received, one panel per odometry topic."""
+    topics = trace.odometry_topics()
+    figure, panels = plt.subplots(
+        1, max(1, len(topics)), figsize=(5.2 * max(1, len(topics)), 4.8),
+        layout="constrained", squeeze=False,
+    )  # fmt: skip
+    pairs, _ = trace.matches()
+    for axes, name in zip(panels[0], topics, strict=False):
+        sent = trace.path(trace.sent[name])
+        got = trace.path([sample for _, sample in pairs.get(name, [])])
+        axes.plot(*sent.T, color="tab:blue", linewidth=1.2, label=f"sent ({len(sent)})")
+        marks = sent[::SENT_MARK_EVERY]
+        axes.plot(*marks.T, "o", color="tab:blue", markersize=5)
+        axes.plot(*got.T, ".", color="tab:red", markersize=2.5, label=f"received ({len(got)})")
+        axes.set(title=f"/{name}", xlabel="x in m", ylabel="y in m", aspect="equal")
+        axes.set_adjustable("datalim")
+        axes.grid(visible=True, alpha=0.25)
+        axes.legend(loc="best")
+    if not topics:
+        panels[0][0].text(0.5, 0.5, "no odometry was sent", ha="center", va="center")
+        panels[0][0].set_axis_off()
+    _save(figure, path, caption)
+
+
+def _save(figure: Figure, path: Path, caption: str) -> None:
+    figure.text(0.01, -0.03, caption, fontsize=7, color="0.35", va="top")
+    figure.savefig(path, dpi=120, bbox_inches="tight")
+    plt.close(figure)

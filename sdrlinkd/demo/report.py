@@ -1,0 +1,126 @@
+"""report.json: what one demonstration measured."""
+
+import numpy as np
+from msgspec import Struct
+
+from sdrlinkd.demo.trace import Trace, goodput_bytes_per_s, latencies_s, path_error_m
+
+QUANTILES = {"p50": 0.50, "p90": 0.90, "p99": 0.99}
+
+
+class TopicResult(Struct, frozen=True, kw_only=True):
+    """One topic of one run."""
+
+    name: str
+    type: str
+    sent: int
+    received: int
+    pdr: float
+    path_error_m: float | None = None
+
+
+class RunResult(Struct, frozen=True, kw_only=True):
+    """One run: a link, a source, and how it went."""
+
+    name: str
+    source: str
+    seed: int
+    pdu_size: int
+    duration_s: float
+    sent: int
+    received: int
+    pdr: float
+    goodput_bytes_per_s: float
+    latency_ms: dict[str, float]
+    path_error_m: float | None
+    bytes_identical: bool
+    entries_per_message: float
+    pdus_sent: int
+    ledger_adds_up: bool
+    dropped: dict[str, int]
+    topics: list[TopicResult]
+    left_out: list[str]
+    damage: str
+
+
+class DemoReport(Struct, frozen=True, kw_only=True):
+    """All runs of one call."""
+
+    version: str
+    runs: list[RunResult]
+
+
+def latency_ms(trace: Trace) -> dict[str, float]:
+    """Quantiles of the end-to-end latency; empty when nothing arrived."""
+    pairs, _ = trace.matches()
+    ordered = latencies_s(pairs) * 1e3
+    if not len(ordered):
+        return {}
+    quantiles = {name: float(np.quantile(ordered, q)) for name, q in QUANTILES.items()}
+    return {**quantiles, "max": float(ordered[-1])}
+
+
+def topic_results(trace: Trace) -> list[TopicResult]:
+    """Each topic's share, in the order of names."""
+    pairs, _ = trace.matches()
+    results = []
+    for name in sorted(trace.sent):
+        sent, matched = trace.sent[name], pairs.get(name, [])
+        error = None
+        if name in trace.odometry_topics():
+            got = [sample for _, sample in matched]
+            error = path_error_m(trace.path(sent), trace.path(got))
+        results.append(
+            TopicResult(
+                name=name,
+                type=trace.types[name],
+                sent=len(sent),
+                received=len(matched),
+                pdr=len(matched) / len(sent),
+                path_error_m=error,
+            )
+        )
+    return results
+
+
+def run_result(
+    trace: Trace,
+    *,
+    name: str,
+    source: str,
+    seed: int,
+    pdu_size: int,
+    duration_s: float,
+    pdus_sent: int,
+    entries: int,
+    ledger_adds_up: bool,
+    dropped: dict[str, int],
+    left_out: list[str],
+    damage: str,
+) -> RunResult:
+    """The figures of a finished run."""
+    pairs, foreign = trace.matches()
+    topics = topic_results(trace)
+    errors = [topic.path_error_m for topic in topics if topic.path_error_m is not None]
+    received = sum(len(found) for found in pairs.values())
+    return RunResult(
+        name=name,
+        source=source,
+        seed=seed,
+        pdu_size=pdu_size,
+        duration_s=duration_s,
+        sent=trace.n_sent,
+        received=received,
+        pdr=received / trace.n_sent if trace.n_sent else 0.0,
+        goodput_bytes_per_s=goodput_bytes_per_s(pairs),
+        latency_ms=latency_ms(trace),
+        path_error_m=max(errors) if errors else None,
+        bytes_identical=foreign == 0 and received == trace.n_received and received > 0,
+        entries_per_message=entries / trace.n_sent if trace.n_sent else 0.0,
+        pdus_sent=pdus_sent,
+        ledger_adds_up=ledger_adds_up,
+        dropped=dropped,
+        topics=topics,
+        left_out=left_out,
+        damage=damage,
+    )

@@ -1,0 +1,145 @@
+"""What the demonstration sends: a bag or the built-in robot, and the registry for it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+from sdrlinkd.adapters import BagMessage, BagTopic, BuiltInRobot, first_seconds, open_bag
+from sdrlinkd.config import load_registry
+from sdrlinkd.errors import UserError
+from sdrlinkd.wire import Registry, make_registry
+
+NAMESPACE = "robot_1"
+BUILT_IN_DURATION_S = 15.0
+# The sixteenth topic id is the control channel's: ages and beacons.
+MAX_BAG_TOPICS = 15
+
+# The registry of the paper's Table 4.
+BUILT_IN_REGISTRY = (
+    ("scan", "sensor_msgs/LaserScan"),
+    ("odom", "nav_msgs/Odometry"),
+    ("imu", "sensor_msgs/Imu"),
+    ("cmd_vel", "geometry_msgs/Twist"),
+    ("map", "nav_msgs/OccupancyGrid"),
+    ("clock", "rosgraph_msgs/Clock"),
+)
+
+
+class Recording(Protocol):
+    """What can be played: a bag, or the built-in robot."""
+
+    damage: str
+
+    def topics(self) -> list[BagTopic]:
+        """Its topics."""
+
+    def messages(self) -> Iterator[BagMessage]:
+        """Its messages in the order of time."""
+
+    def close(self) -> None:
+        """Release it."""
+
+
+@dataclass
+class Source:
+    """A recording, the registry it is sent under, and what of it is left out."""
+
+    title: str
+    recording: Recording
+    registry: Registry
+    namespace: str
+    duration_s: float
+    topics: list[BagTopic]
+    left_out: list[str] = field(default_factory=list)
+
+    def messages(self) -> Iterator[BagMessage]:
+        """The messages to send, in the order of time."""
+        wanted = {topic.name for topic in self.topics}
+        messages = first_seconds(self.recording.messages(), self.duration_s)
+        return (message for message in messages if message.topic in wanted)
+
+    def expected(self) -> int | None:
+        """How many messages that will be, where it is known beforehand."""
+        return (
+            sum(topic.n_messages for topic in self.topics)
+            if self.duration_s == float("inf")
+            else None
+        )
+
+
+def open_source(
+    bag: Path | None,
+    registry_path: Path | None,
+    topics: list[str],
+    duration_s: float | None,
+    seed: int,
+) -> Source:
+    """The source that the options of `sdrlinkctl demo` describe. Raises UserError."""
+    if bag is None:
+        source = _built_in(registry_path, duration_s or BUILT_IN_DURATION_S, seed)
+    else:
+        source = _from_bag(bag, registry_path, duration_s or float("inf"))
+    if topics:
+        _select(source, topics)
+    if not source.topics:
+        raise UserError(f"{source.title}: no topic is left to send")
+    return source
+
+
+def _built_in(registry_path: Path | None, duration_s: float, seed: int) -> Source:
+    robot = BuiltInRobot(NAMESPACE, duration_s, seed)
+    registry = load_registry(registry_path) if registry_path else make_registry(BUILT_IN_REGISTRY)
+    source = Source("built-in robot", robot, registry, NAMESPACE, duration_s, robot.topics())
+    _match(source)
+    return source
+
+
+def _from_bag(path: Path, registry_path: Path | None, duration_s: float) -> Source:
+    bag = open_bag(path)
+    found = [topic for topic in bag.topics() if topic.n_messages]
+    left_out = [f"{topic.name}: no messages" for topic in bag.topics() if not topic.n_messages]
+    if registry_path:
+        registry = load_registry(registry_path)
+    else:
+        found.sort(key=lambda topic: -topic.n_messages)
+        left_out += [
+            f"{topic.name}: a registry made from a bag has room for {MAX_BAG_TOPICS} topics"
+            for topic in found[MAX_BAG_TOPICS:]
+        ]
+        found = sorted(found[:MAX_BAG_TOPICS])
+        if not found:
+            raise UserError(f"{path}: holds no messages")
+        registry = make_registry([(topic.name, topic.type) for topic in found], str(path))
+    source = Source(path.name, bag, registry, "", duration_s, found, left_out)
+    _match(source)
+    return source
+
+
+def _match(source: Source) -> None:
+    """Leave out what the registry does not have."""
+    prefix = f"/{source.namespace}/" if source.namespace else "/"
+    kept = []
+    for topic in source.topics:
+        entry = source.registry.by_name(topic.name.removeprefix(prefix))
+        if entry is None:
+            source.left_out.append(f"{topic.name}: not in the registry")
+        elif entry.type != topic.type:
+            source.left_out.append(f"{topic.name}: is {topic.type}, the registry has {entry.type}")
+        else:
+            kept.append(topic)
+    source.topics = kept
+
+
+def _select(source: Source, names: list[str]) -> None:
+    wanted = {name if name.startswith("/") else f"/{name}" for name in names}
+    with_namespace = (
+        {f"/{source.namespace}{name}" for name in wanted} if source.namespace else set()
+    )
+    known = {topic.name for topic in source.topics}
+    unknown = [n for n in wanted if n not in known and f"/{source.namespace}{n}" not in known]
+    if unknown:
+        raise UserError(
+            f"--topics: got {', '.join(sorted(unknown))}; allowed: {', '.join(sorted(known))}"
+        )
+    source.topics = [t for t in source.topics if t.name in wanted | with_namespace]

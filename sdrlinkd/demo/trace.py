@@ -1,0 +1,111 @@
+"""What was sent and what came back, and the paper's figures of merit over both."""
+
+from collections import defaultdict
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sdrlinkd.adapters import from_cdr
+
+ODOMETRY = "nav_msgs/msg/Odometry"
+GRID_POINTS = 1000
+
+Path2D = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """A message at one end: payload, and when by the one monotonic clock, in s."""
+
+    at: float
+    payload: bytes
+
+
+@dataclass
+class Trace:
+    """Messages per registry name at the producer and at the consumer."""
+
+    types: dict[str, str]
+    sent: dict[str, list[Sample]] = field(default_factory=lambda: defaultdict(list))
+    received: dict[str, list[Sample]] = field(default_factory=lambda: defaultdict(list))
+
+    @property
+    def n_sent(self) -> int:
+        """Messages sent, counted at the producer."""
+        return sum(len(samples) for samples in self.sent.values())
+
+    @property
+    def n_received(self) -> int:
+        """Messages the consumer got, whatever they hold."""
+        return sum(len(samples) for samples in self.received.values())
+
+    def matches(self) -> tuple[dict[str, list[tuple[Sample, Sample]]], int]:
+        """((sent, received) pairs per topic, received messages that nobody sent).
+
+        Order holds within a topic, so each received message is looked for behind the one before.
+        """
+        pairs: dict[str, list[tuple[Sample, Sample]]] = {}
+        foreign = 0
+        for name, received in self.received.items():
+            sent = self.sent.get(name, [])
+            found: list[tuple[Sample, Sample]] = []
+            at = 0
+            for sample in received:
+                match = next(
+                    (i for i in range(at, len(sent)) if sent[i].payload == sample.payload), None
+                )
+                if match is None:
+                    foreign += 1
+                else:
+                    found.append((sent[match], sample))
+                    at = match + 1
+            pairs[name] = found
+        return pairs, foreign
+
+    def path(self, samples: list[Sample]) -> Path2D:
+        """Positions `[n, 2]` of odometry messages, in m."""
+        poses = (from_cdr(sample.payload, ODOMETRY).pose.pose.position for sample in samples)
+        points = np.array([(p.x, p.y) for p in poses], dtype=np.float64).reshape(-1, 2)
+        return points[np.isfinite(points).all(axis=1)]
+
+    def odometry_topics(self) -> list[str]:
+        """Registry names of odometry topics that were sent."""
+        return [name for name in self.sent if self.types[name] == ODOMETRY]
+
+
+def latencies_s(pairs: dict[str, list[tuple[Sample, Sample]]]) -> NDArray[np.float64]:
+    """Publish at the producer to reception at the consumer, ascending, in s."""
+    return np.sort([got.at - was.at for found in pairs.values() for was, got in found])
+
+
+def goodput_bytes_per_s(pairs: dict[str, list[tuple[Sample, Sample]]]) -> float:
+    """Payload bytes delivered over the time from the first publish to the last reception."""
+    flat = [pair for found in pairs.values() for pair in found]
+    if not flat:
+        return 0.0
+    span_s = max(got.at for _, got in flat) - min(was.at for was, _ in flat)
+    return sum(len(got.payload) for _, got in flat) / span_s if span_s > 0 else 0.0
+
+
+def path_error_m(sent: Path2D, received: Path2D) -> float | None:
+    """Mean distance of two paths on a common grid of arc length (paper section 6).
+
+    Interpolating both over their own normalised length discounts harmless stretching in time.
+    None when either has no two distinct points.
+    """
+    grids = [_along(path) for path in (sent, received)]
+    if grids[0] is None or grids[1] is None:
+        return None
+    return float(np.linalg.norm(grids[0] - grids[1], axis=1).mean())
+
+
+def _along(path: Path2D) -> Path2D | None:
+    if len(path) < 2:
+        return None
+    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    length = np.concatenate(([0.0], np.cumsum(steps)))
+    if length[-1] == 0:
+        return None
+    grid = np.linspace(0, length[-1], GRID_POINTS)
+    return np.stack([np.interp(grid, length, path[:, i]) for i in range(2)], axis=1)

@@ -1,0 +1,119 @@
+"""Filling a PDU entry by entry, up to its capacity."""
+
+import binascii
+import struct
+from functools import lru_cache
+
+from sdrlinkd.wire.capacity import CRC_SIZE, ENTRY_HEADER_SIZE, MAX_ENTRIES, entry_budget
+from sdrlinkd.wire.control import STAMP_SIZE
+from sdrlinkd.wire.registry import CONTROL_TOPIC_ID
+
+VERSION = 0
+FLAG_COMPRESSED = 0x02
+FLAG_SEALED = 0x01
+
+HEADER = struct.Struct(">BBBBB")
+ENTRY_HEADER = struct.Struct(">BBBH")
+
+
+@lru_cache(maxsize=8)
+def _budgets(pdu_size: int) -> tuple[int, ...]:
+    """`entry_budget` for 0 to 15 entries, and nothing for a sixteenth."""
+    return (*(entry_budget(pdu_size, n) for n in range(MAX_ENTRIES + 1)), 0)
+
+
+class PduBuilder:
+    """Knows the bytes left; what to put in is the caller's business.
+
+    `room` is the payload that one more entry could have, `room_beside_stamp` the same if a STAMP
+    were added as well; negative: none fits. Control records join in one entry, the last.
+    """
+
+    __slots__ = (
+        "_budgets", "_parts", "_pdu_size", "_records", "_records_size", "_topic_ids", "_used",
+        "room", "room_beside_stamp",
+    )  # fmt: skip
+
+    def __init__(self, pdu_size: int) -> None:
+        self._pdu_size = pdu_size
+        self._budgets = budgets = _budgets(pdu_size)
+        self._parts: list[bytes] = []
+        self._topic_ids: list[int] = []
+        self._used = 0
+        self._records: list[bytes] = []
+        self._records_size = 0
+        self.room = budgets[1] - ENTRY_HEADER_SIZE
+        self.room_beside_stamp = budgets[2] - 2 * ENTRY_HEADER_SIZE - STAMP_SIZE
+
+    @property
+    def is_empty(self) -> bool:
+        """Neither entries nor records yet."""
+        return not self._topic_ids and not self._records
+
+    def add(self, topic_id: int, entry_id: int, index: int, total: int, payload: bytes) -> None:
+        """Add an entry. Raises ValueError when it does not fit or a field is out of range."""
+        size = len(payload)
+        if size > self.room or index >= total or not 0 <= topic_id <= 15:
+            raise ValueError(
+                f"entry {index} of {total}, topic id {topic_id}, {size} bytes: allowed are an "
+                f"index below the total, topic ids 0 to 15 and {self.room} bytes"
+            )
+        try:
+            header = ENTRY_HEADER.pack(entry_id, index, total, size)
+        except struct.error as error:
+            raise ValueError(f"a field does not fit its octets: {error}") from None
+        self._parts += (header, payload)
+        self._topic_ids.append(topic_id)
+        self._used += ENTRY_HEADER_SIZE + size
+        self._note_room()
+
+    def add_record(self, record: bytes) -> bool:
+        """Add a control record if it fits."""
+        n = len(self._topic_ids) + 1
+        size = self._records_size + len(record)
+        if n > MAX_ENTRIES or self._used + ENTRY_HEADER_SIZE + size > self._budgets[n]:
+            return False
+        self._records.append(record)
+        self._records_size = size
+        self._note_room()
+        return True
+
+    def _note_room(self) -> None:
+        """Bring `room` and `room_beside_stamp` up to date."""
+        budgets, size = self._budgets, self._records_size
+        n = len(self._topic_ids)
+        # With a control entry: its header, its records, and one entry more in the count.
+        with_control = budgets[min(n + 2, MAX_ENTRIES + 1)] - self._used - size
+        self.room_beside_stamp = with_control - STAMP_SIZE - 2 * ENTRY_HEADER_SIZE
+        if size:
+            self.room = with_control - 2 * ENTRY_HEADER_SIZE
+        else:
+            self.room = budgets[n + 1] - self._used - ENTRY_HEADER_SIZE
+
+    def build(
+        self, flags: int, src: int, dst: int, seq: int, hop: int, control_entry_id: int = 0
+    ) -> bytes:
+        """The PDU's octets. Raises ValueError without entries, or for a field out of range."""
+        ids = self._topic_ids
+        if self._records:
+            header = ENTRY_HEADER.pack(control_entry_id, 0, 1, self._records_size)
+            self._parts += (header, *self._records)
+            ids.append(CONTROL_TOPIC_ID)
+        n = len(ids)
+        if n == 0:
+            raise ValueError(f"a PDU holds 1 to {MAX_ENTRIES} entries, not 0")
+        if not 0 <= hop <= 15:
+            raise ValueError(f"hop is {hop}, allowed 0 to 15")
+        try:
+            header = HEADER.pack(flags, src, dst, seq, hop << 4 | n)
+        except struct.error as error:
+            raise ValueError(f"a field does not fit its octet: {error}") from None
+        if n == 1:
+            nibbles = bytes((ids[0] << 4,))
+        elif n == 2:
+            nibbles = bytes((ids[0] << 4 | ids[1],))
+        else:
+            padded = [*ids, 0]
+            nibbles = bytes(padded[i] << 4 | padded[i + 1] for i in range(0, n, 2))
+        body = b"".join((header, nibbles, *self._parts)).ljust(self._pdu_size - CRC_SIZE, b"\0")
+        return body + binascii.crc_hqx(body, 0).to_bytes(2, "big")

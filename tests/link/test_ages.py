@@ -1,0 +1,53 @@
+"""Age travels, not time."""
+
+import pytest
+
+from sdrlinkd.link.ages import MAX_WAITING, Ages
+from tests.link.world import make_link, send_all
+
+
+def carry(sender, receiver, sent_at, heard_at, **kwargs):
+    """PDUs composed at `sent_at` of the sender's clock arrive at `heard_at` of the receiver's."""
+    return [m for pdu in send_all(sender, sent_at, **kwargs) for m in receiver.hear(pdu, heard_at)]
+
+
+@pytest.mark.parametrize("size", [20, 51, 60, 724, 2000])
+def test_age_needs_no_common_clock(size):
+    sender, receiver = make_link(1, pdu_size=64), make_link(2, pdu_size=64)
+    sender.submit(0, bytes(size), 100.0)
+    (message,) = carry(sender, receiver, sent_at=100.3, heard_at=7.0)
+    assert receiver.delivered(message, 7.002) == pytest.approx(0.302, abs=2e-6)
+
+
+def test_age_grows_between_the_stamp_and_the_last_fragment():
+    sender, receiver = make_link(1, pdu_size=64), make_link(2, pdu_size=64)
+    sender.submit(0, bytes(80), 0.0)
+    first, second = sender.compose(0.010, 1).pdus[0], sender.compose(0.030, 1).pdus[0]
+    assert receiver.hear(second, 5.030) == []
+    (message,) = receiver.hear(first, 5.040)
+    assert receiver.delivered(message, 5.040) == pytest.approx(0.040, abs=2e-6)
+
+
+def test_no_stamp_no_age():
+    sender, receiver = make_link(1, pdu_size=64), make_link(2, pdu_size=64)
+    sender.submit(0, bytes(51), 0.0)
+    _, entry_pdu = send_all(sender)
+    (message,) = receiver.hear(entry_pdu, 1.0)
+    assert receiver.delivered(message, 1.0) is None
+
+
+def test_a_stale_stamp_is_forgotten():
+    ages = Ages(timeout_s=1.0)
+    ages.stamp(1, 2, 3, age_us=500, at=10.0)
+    ages.expire(10.9)
+    assert ages.origin(1, 2, 3) == pytest.approx(9.9995)
+    ages.stamp(1, 2, 3, age_us=500, at=10.0)
+    ages.expire(11.0)
+    assert ages.origin(1, 2, 3) is None
+
+
+def test_stamps_that_wait_are_bounded():
+    ages = Ages(timeout_s=1.0)
+    for i in range(3 * MAX_WAITING):
+        ages.stamp(i % 256, i % 16, i // 4096, 0, 0.0)
+    assert len(ages._origins) <= MAX_WAITING

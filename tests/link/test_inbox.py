@@ -1,0 +1,103 @@
+"""What a node takes from the air, and what it refuses by name."""
+
+from random import Random
+
+import pytest
+
+from sdrlinkd.wire import Entry, Pdu, build
+from tests.link.world import TOPICS, make_link, send_all
+
+
+def pdu(src=1, dst=255, seq=0, topic_id=0, payload=b"\0\1\0\0data", total=1, hop=1):
+    return build(Pdu(0, False, src, dst, seq, hop, [Entry(topic_id, 9, 0, total, payload)]), 64)
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (b"short", "rx_short"),
+        (bytes(64), "rx_entry"),
+        (pdu()[:-1] + b"\xff", "rx_crc"),
+        (pdu(src=2), "rx_own"),
+        (pdu(dst=7), "rx_not_for_us"),
+        (pdu(topic_id=15, total=2), "rx_entry"),
+        (pdu(topic_id=15, payload=b"\1\x06short"), "rx_entry"),
+        (pdu(topic_id=15, payload=b"\xee\x00"), "rx_control"),
+    ],
+)
+def test_refused_by_name(data, reason):
+    link = make_link(2, pdu_size=64)
+    assert link.hear(data, 0.0) == []
+    assert dict(link.inbox.pdus_dropped) == {reason: 1}
+    assert link.audit() == []
+
+
+def test_duplicates_are_refused_also_from_a_relay():
+    link = make_link(2, pdu_size=64)
+    assert len(link.hear(pdu(hop=3), 0.0)) == 1
+    assert link.hear(pdu(hop=3), 0.1) == []
+    assert link.hear(pdu(hop=2), 0.2) == []
+    assert link.inbox.pdus_dropped["rx_dup"] == 2
+
+
+def test_what_is_for_us_arrives():
+    link = make_link(2, pdu_size=64)
+    assert len(link.hear(pdu(dst=2), 0.0)) == 1
+
+
+def test_messages_of_unknown_topics_and_without_cdr_are_named():
+    link = make_link(2, pdu_size=64)
+    link.hear(pdu(topic_id=9), 0.0)
+    link.hear(pdu(seq=1, payload=b"abc"), 0.0)
+    assert link.inbox.tallies[1, 9].dropped["rx_unknown_topic"] == 1
+    assert link.inbox.tallies[1, 0].dropped["rx_bad_cdr"] == 1
+    assert link.audit() == []
+
+
+def test_messages_carry_a_number_and_the_losses_before_them():
+    link = make_link(2, pdu_size=64)
+    messages = [m for seq in (0, 1, 4) for m in link.hear(pdu(seq=seq), 0.0)]
+    assert [(m.number, m.lost_pdus) for m in messages] == [(1, 0), (2, 0), (3, 2)]
+
+
+def test_a_different_registry_is_named_on_both_sides():
+    other = (*TOPICS[:2], ("imu_raw", "sensor_msgs/Imu"))
+    one, two = make_link(1, beacon_s=1.0), make_link(2, topics=other, beacon_s=1.0)
+    for a, b in ((one, two), (two, one)):
+        for data in send_all(a):
+            b.hear(data, 0.0)
+    for link, src in ((one, 2), (two, 1)):
+        neighbor = link.inbox.neighbors[src]
+        assert "topic id 2" in neighbor.disagreement(link.registry, link.digest)
+
+
+def test_a_reboot_is_seen_and_its_pdus_are_not_taken_for_duplicates():
+    before, after, receiver = (make_link(1, seed=s, beacon_s=1.0) for s in (1, 2, 3))
+    receiver = make_link(2, beacon_s=1.0)
+    after.sender.packetizer._seq = before.sender.packetizer._seq
+    for link in (before, after):
+        for second in range(40):
+            link.submit(0, bytes(30), float(second))
+            for data in send_all(link, now=float(second)):
+                receiver.hear(data, 0.0)
+    assert receiver.inbox.neighbors[1].reboots == 1
+    assert receiver.inbox.tallies[1, 0].delivered == 80
+    assert receiver.inbox.pdus_dropped["rx_dup"] == 0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_any_bytes_keep_the_ledger(seed):
+    rng = Random(seed)
+    link = make_link(2, pdu_size=64)
+    good = [pdu(src=rng.randrange(256), seq=rng.randrange(256)) for _ in range(50)]
+    for _ in range(2000):
+        data = bytearray(rng.choice(good))
+        for _ in range(rng.randrange(3)):
+            data[rng.randrange(64)] = rng.randrange(256)
+        if rng.random() < 0.5:
+            import binascii
+
+            data[-2:] = binascii.crc_hqx(bytes(data[:-2]), 0).to_bytes(2, "big")
+        link.hear(bytes(data[: rng.choice((64, 64, 64, rng.randrange(64)))]), rng.random())
+        assert link.audit() == [], f"seed {seed}"
+    assert link.inbox.pdus_used > 100

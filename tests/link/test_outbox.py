@@ -1,0 +1,138 @@
+"""What waits, who is shed, and that nobody starves among equals."""
+
+import pytest
+
+from sdrlinkd.link import Outcome, Qos, QueueParams, TopicPolicy
+from tests.link.world import layouts, make_link, send_all
+
+
+def dropped(link):
+    counts = {}
+    for topic in link.registry.topics:
+        for reason, count in link.sender.tally(topic.id).dropped.items():
+            counts[topic.name, reason] = count
+    return counts
+
+
+def payloads_left(link):
+    from sdrlinkd.wire import parse
+
+    pdus = send_all(link)
+    return [e.payload for pdu in pdus for e in parse(pdu, 64).entries if e.topic_id != 15]
+
+
+def test_depth_one_means_the_latest_wins():
+    link = make_link(pdu_size=64)
+    link.set_policies({0: TopicPolicy(depth=1, stamp=False)})
+    for i in range(5):
+        link.submit(0, bytes([i]) * 8, 0.0)
+    assert payloads_left(link) == [bytes([4]) * 8]
+    assert dropped(link) == {("odom", "tx_superseded"): 4}
+    assert link.audit() == []
+
+
+def test_a_message_in_fragments_is_not_superseded():
+    link = make_link(pdu_size=64)
+    link.set_policies({0: TopicPolicy(depth=1, stamp=False)})
+    link.submit(0, b"a" * 100, 0.0)
+    link.confirm(link.compose(0.0, 1), Outcome.SENT, 0.0)
+    link.submit(0, b"b" * 8, 0.0)
+    link.submit(0, b"c" * 8, 0.0)
+    assert payloads_left(link) == [b"a" * 49, b"c" * 8]
+
+
+def test_overflow_sheds_the_lowest_class_oldest_first():
+    link = make_link(pdu_size=64, queue=QueueParams(max_messages=3))
+    link.submit(0, b"d1" * 4, 0.0)
+    link.submit(1, b"b1" * 4, 1.0, qos=Qos.BULK)
+    link.submit(1, b"b2" * 4, 2.0, qos=Qos.BULK)
+    assert link.submit(0, b"d2" * 4, 3.0) is None
+    assert dropped(link) == {("scan", "tx_overflow_old"): 1}
+    assert link.submit(2, b"u1" * 4, 4.0, qos=Qos.URGENT) is None
+    assert dropped(link) == {("scan", "tx_overflow_old"): 2}
+    assert link.submit(1, b"b3" * 4, 5.0, qos=Qos.BULK) == "tx_overflow_new"
+    assert link.audit() == []
+
+
+def test_bytes_are_bounded_too():
+    link = make_link(queue=QueueParams(max_bytes=1000))
+    for _ in range(5):
+        link.submit(0, bytes(400), 0.0)
+    assert link.sender.outbox.queued_bytes == 800
+    assert link.submit(0, bytes(1001), 0.0) == "tx_overflow_new"
+    assert link.sender.outbox.queued_bytes == 800
+
+
+def test_expired_messages_are_not_sent():
+    link = make_link(pdu_size=64)
+    link.submit(0, bytes(8), 0.0, lifespan_s=1.0)
+    link.submit(0, bytes(9), 0.0, lifespan_s=2.0)
+    assert [pdu[0][3] for pdu in layouts(send_all(link, now=1.0), 64)] == [9]
+    assert dropped(link) == {("odom", "tx_expired"): 1}
+
+
+def test_the_rest_of_an_expired_message_is_withdrawn():
+    link = make_link(pdu_size=64)
+    link.submit(0, bytes(200), 0.0, lifespan_s=1.0)
+    burst = link.compose(0.5, 2)
+    assert link.compose(1.5, 8) is None
+    assert link.audit() == []
+    link.confirm(burst, Outcome.SENT, 1.6)
+    assert link.sender.tally(0).sent == 0
+    assert dropped(link) == {("odom", "tx_expired"): 1}
+    assert link.audit() == []
+
+
+def test_timers_expire_what_no_burst_looked_at():
+    link = make_link()
+    link.submit(0, bytes(8), 0.0, lifespan_s=1.0)
+    link.handle_timers(1.5)
+    assert link.sender.outbox.queued == 0
+
+
+@pytest.mark.parametrize("outcome", [Outcome.LATE, Outcome.UNDERFLOW, Outcome.LOST])
+def test_a_burst_that_did_not_leave_drops_its_messages_by_name(outcome):
+    link = make_link(pdu_size=64)
+    link.submit(0, bytes(200), 0.0)
+    link.confirm(link.compose(0.0, 1), outcome, 0.1)
+    assert dropped(link) == {("odom", "tx_radio_failed"): 1}
+    assert link.compose(0.2, 8) is None
+    assert link.audit() == []
+
+
+def test_shut_down_drops_the_rest_by_name():
+    link = make_link(pdu_size=64)
+    for _ in range(3):
+        link.submit(0, bytes(200), 0.0)
+    link.compose(0.0, 1)
+    link.shut_down()
+    assert dropped(link) == {("odom", "tx_shutdown"): 3}
+    assert link.audit() == []
+
+
+def test_equals_take_turns_however_much_one_sends():
+    link = make_link(pdu_size=64, greedy=False)
+    for _ in range(50):
+        link.submit(0, bytes(51), 0.0)
+    for _ in range(3):
+        link.submit(1, bytes(51), 0.0)
+    carriers = [
+        i for i, pdu in enumerate(layouts(send_all(link), 64)) if any(e[0] == 1 for e in pdu)
+    ]
+    assert len(carriers) == 9
+    assert carriers[-1] <= 9
+
+
+def test_a_topic_without_a_free_entry_id_waits_and_others_go_on():
+    link = make_link(pdu_size=64, greedy=False)
+    link.set_policies({i: TopicPolicy(stamp=False) for i in range(3)})
+    for _ in range(260):
+        link.submit(0, bytes(60), 0.0)
+    link.submit(1, bytes(60), 0.0)
+    sent = layouts(send_all(link, now=0.0), 64)
+    assert sum(1 for pdu in sent for entry in pdu if entry[0] == 0 and entry[1] == 0) == 256
+    assert any(entry[0] == 1 for pdu in sent for entry in pdu)
+    assert link.sender.outbox.queued == 4
+    assert link.next_wakeup(0.0) == pytest.approx(1.25)
+    send_all(link, now=1.25)
+    assert link.sender.outbox.queued == 0

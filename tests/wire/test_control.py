@@ -1,0 +1,172 @@
+"""Control records: a sequence of type, length, value."""
+
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sdrlinkd.errors import PduError
+from sdrlinkd.wire import (
+    MAX_AGE_US,
+    Beacon,
+    LinkReport,
+    Receipt,
+    RegistryDigest,
+    Stamp,
+    build_records,
+    parse_records,
+)
+from tests.wire.vectors import RECORDS
+
+SEED = 6
+CASES = 20_000
+
+# Octets that the fields of each type need (clause 6).
+NEED = {1: 6, 2: 4, 3: 8, 4: 4, 5: 3}
+
+octet = st.integers(0, 255)
+records = st.one_of(
+    st.builds(Stamp, octet, octet, st.integers(0, MAX_AGE_US)),
+    st.builds(Beacon, st.integers(0, 0xFFFF), st.integers(0, 0xFFFF)),
+    st.builds(LinkReport, octet, st.integers(-128, 127), octet, octet),
+    st.builds(Receipt, octet, octet, octet),
+    st.builds(RegistryDigest, st.binary(min_size=8, max_size=8), st.binary(max_size=247)),
+)
+unknown = st.builds(
+    lambda kind, value: bytes([kind, len(value)]) + value,
+    octet.filter(lambda kind: kind not in NEED),
+    st.binary(max_size=255),
+)
+
+
+@settings(derandomize=True, deadline=None)
+@given(st.lists(records))
+def test_parse_undoes_build(sent):
+    assert parse_records(build_records(sent)) == sent
+
+
+@settings(derandomize=True, deadline=None)
+@given(st.lists(st.tuples(unknown, records)), unknown)
+def test_unknown_types_are_skipped(pairs, last):
+    payload = b"".join(skipped + build_records([record]) for skipped, record in pairs) + last
+    assert parse_records(payload) == [record for _, record in pairs]
+
+
+@pytest.mark.parametrize("kind", [0, 6, 7, 8, 255])
+def test_reserved_types_are_skipped(kind):
+    assert parse_records(bytes([kind, 2, 1, 6, 5, 3, 1, 2, 3])) == [Receipt(1, 2, 3)]
+
+
+@settings(derandomize=True, deadline=None)
+@given(
+    records.filter(lambda record: not isinstance(record, RegistryDigest)),
+    st.binary(max_size=200),
+    st.lists(records),
+)
+def test_longer_known_records_are_accepted(record, more, rest):
+    payload = bytearray(build_records([record]) + more)
+    payload[1] += len(more)
+    assert parse_records(bytes(payload) + build_records(rest)) == [record, *rest]
+
+
+@pytest.mark.parametrize(
+    ("kind", "size"), [(kind, size) for kind, need in NEED.items() for size in range(need)]
+)
+def test_short_known_record(kind, size):
+    # There would be room for the missing octets in the payload.
+    refused(bytes([kind, size]) + bytes(size) + bytes([200, 10]) + bytes(10))
+
+
+@pytest.mark.parametrize("kind", [*NEED, 6, 7, 200])
+def test_record_that_overruns(kind):
+    need = NEED.get(kind, 3)
+    refused(bytes([kind]))
+    refused(bytes([kind, need]) + bytes(need - 1))
+    refused(bytes([kind, 255]) + bytes(254))
+
+
+def test_one_bad_record_spoils_all():
+    good = build_records([Stamp(1, 2, 3)])
+    assert parse_records(good + good) == [Stamp(1, 2, 3), Stamp(1, 2, 3)]
+    refused(good + b"\x01")
+    refused(good + bytes([2, 3, 0, 0, 0]))
+
+
+@pytest.mark.parametrize("vector", RECORDS, ids=lambda v: v.name)
+def test_any_truncation_between_records_is_refused(vector):
+    sizes = set()
+    at = 0
+    while at < len(vector.payload):
+        sizes.add(at)
+        at += 2 + vector.payload[at + 1]
+    for size in range(len(vector.payload)):
+        if size in sizes:
+            parse_records(vector.payload[:size])
+        else:
+            refused(vector.payload[:size])
+
+
+def test_any_bytes_are_records_or_refused():
+    rng = Random(SEED)
+    parsed = 0
+    for case in range(CASES):
+        payload = bytearray()
+        for _ in range(rng.randrange(4)):
+            kind = rng.choice((1, 2, 3, 4, 5, rng.randrange(256)))
+            size = max(0, NEED.get(kind, 2) + rng.choice((0, 0, 0, 1, -1)))
+            payload += bytes([kind, size]) + rng.randbytes(size)
+        if payload and rng.randrange(3) == 0:
+            payload[rng.randrange(len(payload))] = rng.randrange(256)
+        where = f"seed {SEED} case {case}: {payload.hex()}"
+        try:
+            found = parse_records(bytes(payload))
+        except PduError as error:
+            reason = error.reason
+        except Exception as error:
+            raise AssertionError(where) from error
+        else:
+            assert parse_records(build_records(found)) == found, where
+            reason = None
+            parsed += bool(found)
+        assert reason in (None, "rx_entry"), where
+    assert CASES // 4 < parsed < CASES * 3 // 4
+
+
+@pytest.mark.parametrize(
+    "record",
+    [
+        Stamp(-1, 0, 0),
+        Stamp(256, 0, 0),
+        Stamp(0, 256, 0),
+        Stamp(0, 0, -1),
+        Stamp(0, 0, MAX_AGE_US + 1),
+        Beacon(65536, 0),
+        Beacon(0, 65536),
+        LinkReport(256, 0, 0, 0),
+        LinkReport(0, -129, 0, 0),
+        LinkReport(0, 128, 0, 0),
+        LinkReport(0, 0, 256, 0),
+        LinkReport(0, 0, 0, 256),
+        Receipt(256, 0, 0),
+        Receipt(0, 256, 0),
+        Receipt(0, 0, 256),
+        RegistryDigest(bytes(8), bytes(248)),
+    ],
+    ids=str,
+)
+def test_field_out_of_range(record):
+    with pytest.raises(ValueError):
+        build_records([record])
+
+
+def refused(payload):
+    with pytest.raises(PduError) as error:
+        parse_records(payload)
+    assert error.value.reason == "rx_entry"
+
+
+@pytest.mark.parametrize("size", [0, 4, 7, 9])
+def test_digest_of_another_length(size):
+    with pytest.raises(ValueError, match="digest"):
+        build_records([RegistryDigest(bytes(size), b"")])
