@@ -1,0 +1,63 @@
+"""The runtime directory: one daemon in it, nobody else's sockets touched."""
+
+import os
+import socket
+import stat
+
+import pytest
+import zmq
+
+from sdrlinkd.bus import RuntimeDirectory
+from sdrlinkd.errors import BusError
+
+
+@pytest.fixture
+def context():
+    context = zmq.Context()
+    yield context
+    context.destroy(linger=0)
+
+
+def test_a_second_instance_is_refused_and_the_first_unharmed(tmp_path):
+    first = RuntimeDirectory(tmp_path)
+    with pytest.raises(BusError, match=f"pid {os.getpid()}"):
+        RuntimeDirectory(tmp_path)
+    first.close()
+    RuntimeDirectory(tmp_path).close()
+
+
+def test_a_socket_of_another_program_is_neither_stolen_nor_removed(tmp_path, context):
+    with socket.socket(socket.AF_UNIX) as other:
+        other.bind(os.fspath(tmp_path / "in.sock"))
+        other.listen()
+        directory = RuntimeDirectory(tmp_path)
+        with pytest.raises(BusError, match="in use by another program"):
+            directory.bind(context, zmq.PULL, "in.sock", {})
+        directory.close()
+        assert (tmp_path / "in.sock").exists()
+
+
+def test_a_stale_socket_file_is_replaced(tmp_path, context):
+    with socket.socket(socket.AF_UNIX) as dead:
+        dead.bind(os.fspath(tmp_path / "in.sock"))
+    directory = RuntimeDirectory(tmp_path)
+    directory.bind(context, zmq.PULL, "in.sock", {}).close()
+    directory.close()
+    assert not (tmp_path / "in.sock").exists()
+
+
+def test_others_cannot_connect(tmp_path, context):
+    directory = RuntimeDirectory(tmp_path / "new")
+    bound = directory.bind(context, zmq.PULL, "in.sock", {})
+    assert stat.S_IMODE((tmp_path / "new").stat().st_mode) & 0o007 == 0
+    assert stat.S_IMODE((tmp_path / "new" / "in.sock").stat().st_mode) & 0o007 == 0
+    bound.close()
+    directory.close()
+
+
+def test_a_path_that_is_too_long_or_no_directory_is_named(tmp_path):
+    with pytest.raises(BusError, match="allows 95"):
+        RuntimeDirectory(tmp_path / ("x" * 100))
+    (tmp_path / "file").write_text("")
+    with pytest.raises(BusError, match="cannot be used"):
+        RuntimeDirectory(tmp_path / "file")

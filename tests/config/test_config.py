@@ -1,0 +1,117 @@
+"""The configuration: the shipped file is the defaults; every error cites key, given, allowed."""
+
+from pathlib import Path
+
+import pytest
+
+from sdrlinkd.config import Config, load_config, make_setup, parse_config
+from sdrlinkd.errors import ConfigError, RegistryError, UserError
+
+ROOT = Path(__file__).parents[2]
+ETC = ROOT / "etc"
+
+
+def test_shipped_file_equals_the_defaults():
+    assert load_config(ETC / "sdrlinkd.toml") == Config()
+
+
+def test_shipped_file_shows_every_key():
+    text = (ETC / "sdrlinkd.toml").read_text()
+    for struct in (
+        Config,
+        *(
+            type(getattr(Config(), name))
+            for name in ("link", "queue", "reassembly", "bus", "direct")
+        ),
+    ):
+        for key in struct.__struct_fields__:
+            assert f"\n{key} = " in text or f"\n# {key} = " in text or f"[{key}" in text, key
+
+
+def test_shipped_registry_is_the_papers_table_4():
+    setup = make_setup(Config(), ETC)
+    assert [(t.name, t.type) for t in setup.registry.topics] == [
+        ("scan", "sensor_msgs/msg/LaserScan"),
+        ("odom", "nav_msgs/msg/Odometry"),
+        ("imu", "sensor_msgs/msg/Imu"),
+        ("cmd_vel", "geometry_msgs/msg/Twist"),
+        ("map", "nav_msgs/msg/OccupancyGrid"),
+        ("clock", "rosgraph_msgs/msg/Clock"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ('[link]\npdu_size = "64"', ["f.toml:2", "link.pdu_size", '"64"', "from 32 to 2047"]),
+        ("[link]\npdu_size = 3000", ["link.pdu_size", "3000", "from 32 to 2047"]),
+        ("[link]\npdu_sise = 64", ["f.toml:2", "link.pdu_sise", "did you mean pdu_size"]),
+        ("robot_id = 300", ["f.toml:1", "robot_id", "300", "from -1 to 254"]),
+        ("topics = [1]", ["topics", "got 1", "text"]),
+        ("link = 3", ["link", "got 3", "a table"]),
+        ("[link]\nflush_s = nan", ["link.flush_s", "nan"]),
+        ("[link]\ngreedy = 1", ["link.greedy", "got 1", "true or false"]),
+        ('backend = "usrp"', ["backend", '"usrp"', 'one of "direct"']),
+        ("nonsense", ["not TOML"]),
+        ('[topic.odom]\nqos = "hi"', ["f.toml:2", "topic.odom.qos", '"hi"', '"urgent"']),
+        ("[topic.odom]\nprio = 3", ["topic.odom.prio", "did you mean priority"]),
+        (
+            "[topic.a]\npriority = 4\n[topic.odom]\npriority = 400",
+            ["f.toml:4", "topic.odom.priority", "400", "127"],
+        ),
+        ("[topic]\nodom = 3", ["topic.odom", "got 3", "a table"]),
+        ("[topic.odo]\n", ["odo", "did you mean odom"]),
+        ('topics = ["od"]', ["topics", '"od"', "did you mean odom"]),
+        ('namespace = "robot"', ["robot_id", "-1", "robot_1"]),
+        ('namespace = "a b1"', ["namespace", '"a b1"']),
+        ('rx_format = "x"', ["rx_format", '"x"', "{src_id}"]),
+        ("[link]\nmin_fragment = 2000", ["link.min_fragment", "2000", "1011"]),
+        ("[direct]\nloss = 1.5", ["direct.loss", "1.5", "from 0 to 1"]),
+    ],
+)  # fmt: skip
+def test_an_error_cites_key_given_and_allowed(text, parts):
+    with pytest.raises(ConfigError) as error:
+        make_setup(parse_config(text, "f.toml"), ETC, "f.toml")
+    message = str(error.value)
+    assert "\n" not in message
+    for part in parts:
+        assert part in message
+
+
+@pytest.mark.parametrize(
+    ("namespace", "node_id"),
+    [("robot_1", 1), ("/robot_34", 34), ("fleet2/robot7", 7), ("r254", 254)],
+)
+def test_robot_id_is_the_last_digits_of_the_namespace(namespace, node_id):
+    assert make_setup(Config(namespace=namespace), ETC).node_id == node_id
+
+
+@pytest.mark.parametrize("namespace", ["robot", "r255", ""])
+def test_a_namespace_without_a_usable_number_needs_a_robot_id(namespace):
+    with pytest.raises(ConfigError, match="robot_id"):
+        make_setup(Config(namespace=namespace), ETC)
+    assert make_setup(Config(namespace=namespace, robot_id=9), ETC).node_id == 9
+
+
+def test_topics_are_taken_under_the_namespace_and_republished_by_source():
+    setup = make_setup(Config(topics=["odom", "/scan"]), ETC)
+    assert setup.topics_in == {"/robot_1/scan": 0, "/robot_1/odom": 1}
+    assert setup.republished_as(7, 1) == "/rx_robot_7/odom"
+
+
+def test_a_topic_that_can_be_too_large_is_warned_about():
+    setup = make_setup(parse_config("[link]\npdu_size = 64"), ETC)
+    assert any("map" in warning and "13005 B" in warning for warning in setup.warnings)
+
+
+def test_a_missing_registry_says_what_it_is(tmp_path):
+    with pytest.raises(RegistryError, match="registry cannot be read"):
+        make_setup(Config(), tmp_path)
+
+
+def test_a_missing_or_binary_file_is_a_user_error(tmp_path):
+    with pytest.raises(UserError, match="--config"):
+        load_config(tmp_path / "none.toml")
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(UserError, match="not a text file"):
+        load_config(tmp_path / "binary.toml")

@@ -1,0 +1,280 @@
+"""Real daemons and what goes wrong around them: the ledger holds, others lose nothing."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+from itertools import pairwise
+
+import pytest
+import zmq
+
+from sdrlinkd.client import Publisher, RefusedError, Subscriber
+from tests.waiting import wait_for
+
+CDR = b"\0\1\0\0"
+
+
+def spawn(code, directory):
+    """A Python program that finds the daemon in `directory`; prints a line when it is ready."""
+    return subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(code)],
+        stdout=subprocess.PIPE,
+        env={**os.environ, "SDRLINKD_RUNTIME_DIR": str(directory)},
+    )
+
+
+def problems(daemon):
+    with daemon.control() as control:
+        return control.ask("check")["problems"]
+
+
+def test_message_out_message_in_and_the_snapshot_tells(start_daemon):
+    daemon = start_daemon()
+    payload = CDR + os.urandom(720)
+    with Subscriber(directory=daemon.directory) as heard, Publisher(daemon.directory) as out:
+        out.send("/robot_1/odom", payload, qos="latency", priority=90, type="nav_msgs/msg/Odometry")
+        message = heard.receive(5)
+    assert message.topic == "/rx_robot_1/odom"
+    assert message.payload == payload
+    assert message.type == "nav_msgs/msg/Odometry"
+    assert (message.source, message.number, message.lost_pdus) == (1, 1, 0)
+    assert 0 <= message.age_us < 5_000_000
+    snapshot = daemon.snapshot()
+    assert snapshot.link.tx.sent == snapshot.link.rx.delivered == 1
+    assert snapshot.link.neighbors[0].registry == "same"
+    assert problems(daemon) == []
+
+
+def test_malformed_messages_are_counted_and_the_next_one_works(start_daemon):
+    daemon = start_daemon()
+    context = zmq.Context()
+    with context.socket(zmq.PUSH) as push, Subscriber(directory=daemon.directory) as heard:
+        push.connect(f"ipc://{daemon.directory}/in.sock")
+        for frames in (
+            [b"x"],
+            [b"/robot_1/odom", b"{}", CDR],
+            [b"/robot_1/odom\0", b"\x09", CDR],
+            [b"/robot_1/odom\0", b"{}", b"abc"],
+            [b"/robot_1/odom\0", b'{"ty": "std_msgs/msg/String"}', CDR],
+            [b"/robot_1/nothing\0", b"{}", CDR],
+            [b"/robot_1/odom\0", b"{}", CDR + bytes(1 << 20)],
+            [b"/robot_1/odom\0", b"{}", CDR + bytes(300_000)],
+            [b"/robot_1/odom\0", b"{}", CDR + b"good"],
+        ):
+            push.send_multipart(frames)
+        assert heard.receive(5).payload == CDR + b"good"
+    context.term()
+    tx = daemon.snapshot().link.tx
+    assert tx.dropped == {"tx_bad_envelope": 5, "tx_unknown_topic": 1, "tx_too_big": 2}
+    assert tx.accepted == 9
+    assert tx.sent == 1
+    assert problems(daemon) == []
+
+
+@pytest.mark.slow
+def test_a_producer_killed_in_mid_message_harms_nobody(start_daemon):
+    daemon = start_daemon("[link]\npdu_size = 64\n[direct]\nrate_bit_s = 2e6\n")
+    flood = """
+        from sdrlinkd.client import Publisher
+        out = Publisher()
+        payload = bytes([0, 1, 0, 0]) + b"k" * 9000
+        print("ready", flush=True)
+        while True:
+            out.send("/robot_1/scan", payload, qos="bulk")
+    """
+    with Subscriber("/rx_robot_1/*", directory=daemon.directory, depth=0) as heard:
+        for round_ in range(5):
+            producer = spawn(flood, daemon.directory)
+            producer.stdout.readline()
+            with Publisher(daemon.directory) as out:
+                out.send("/robot_1/odom", CDR + bytes([round_]), qos="urgent")
+            enough = 50 * (round_ + 1)
+            wait_for(lambda enough=enough: daemon.snapshot().link.tx.accepted > enough)
+            producer.send_signal(signal.SIGKILL)
+            producer.wait()
+            producer.stdout.close()
+            assert problems(daemon) == []
+        got = []
+        while len([m for m in got if m.topic.endswith("odom")]) < 5:
+            got.append(heard.receive(10))
+        torn = [m for m in got if m.topic.endswith("scan") and m.payload != CDR + b"k" * 9000]
+        assert not torn
+        assert [m.payload[-1] for m in got if m.topic.endswith("odom")] == list(range(5))
+
+
+@pytest.mark.slow
+def test_a_frozen_consumer_sees_its_own_gap_and_others_lose_nothing(start_daemon):
+    daemon = start_daemon()
+    count = 3000
+    frozen = spawn(
+        """
+        from sdrlinkd.client import Subscriber
+        with Subscriber("/rx_robot_1/odom", depth=50) as heard:
+            print("ready", flush=True)
+            for message in heard:
+                print(message.number, flush=True)
+        """,
+        daemon.directory,
+    )
+    assert frozen.stdout.readline() == b"ready\n"
+    frozen.send_signal(signal.SIGSTOP)
+    healthy_numbers = []
+    with Subscriber("/rx_robot_1/odom", directory=daemon.directory, depth=0) as healthy:
+
+        def take():
+            while len(healthy_numbers) < count and (message := healthy.receive(10)):
+                healthy_numbers.append(message.number)
+
+        taker = threading.Thread(target=take)
+        taker.start()
+        with Publisher(daemon.directory) as out:
+            for i in range(count):
+                out.send("/robot_1/odom", CDR + bytes(2000))
+                if i % 20 == 19:
+                    wait_for(lambda i=i: len(healthy_numbers) > i - 40)
+        taker.join()
+    assert healthy_numbers == list(range(1, count + 1))
+    assert problems(daemon) == []
+    frozen.send_signal(signal.SIGCONT)
+    with Publisher(daemon.directory) as out:
+        numbers = [0]
+        while numbers[-1] < count:
+            out.send("/robot_1/odom", CDR)
+            numbers.append(int(frozen.stdout.readline()))
+    frozen.kill()
+    frozen.wait()
+    frozen.stdout.close()
+    steps = [b - a for a, b in pairwise(numbers)]
+    assert min(steps) == 1
+    assert max(steps) > 1, "the frozen consumer must see its own gap"
+
+
+def test_the_ledger_holds_at_any_moment_of_an_overload(start_daemon):
+    daemon = start_daemon(
+        "[queue]\nmax_messages = 50\n[link]\npdu_size = 64\n[direct]\nrate_bit_s = 1e6\n"
+        "loss = 0.05\nduplicate = 0.05\ncorrupt = 0.05\njitter_s = 0.01\n"
+    )
+    with Publisher(daemon.directory) as out:
+        for i in range(40):
+            for _ in range(25):
+                out.send("/robot_1/scan", CDR + bytes(700), qos="bulk")
+            out.send("/robot_1/odom", CDR + bytes([i]), qos="urgent")
+            assert problems(daemon) == []
+            tx = daemon.snapshot().link.tx
+            assert tx.accepted == tx.sent + tx.queued + tx.in_flight + sum(tx.dropped.values())
+    tx = daemon.snapshot().link.tx
+    assert tx.dropped["tx_overflow_old"] + tx.dropped.get("tx_overflow_new", 0) > 100
+    urgent = next(t for t in daemon.snapshot().link.topics if t.name == "/robot_1/odom")
+    assert urgent.dropped == {}
+
+
+def test_sigterm_drains_the_queue_and_names_what_is_left(start_daemon):
+    daemon = start_daemon("drain_s = 0.2\n[link]\npdu_size = 64\n[direct]\nrate_bit_s = 1e5\n")
+    with Publisher(daemon.directory) as out:
+        for _ in range(200):
+            out.send("/robot_1/odom", CDR + bytes(700))
+    daemon.process.send_signal(signal.SIGTERM)
+    assert daemon.process.wait(5) == 0
+    assert "dropped" in daemon.log()
+    assert "ledger:" not in daemon.log()
+    assert not list(daemon.directory.glob("*.sock"))
+
+
+def test_a_second_instance_exits_with_2_and_the_first_is_unharmed(start_daemon):
+    daemon = start_daemon()
+    second = subprocess.run(
+        [sys.executable, "-m", "sdrlinkd", "--config", str(daemon.config)],
+        capture_output=True, text=True, timeout=30,
+    )  # fmt: skip
+    assert second.returncode == 2
+    assert f"pid {daemon.process.pid}" in second.stderr
+    assert "Traceback" not in second.stderr
+    assert daemon.snapshot().state == "running"
+
+
+@pytest.mark.parametrize("name", ["in.sock", "in-pub.sock", "out.sock", "ctl.sock"])
+def test_an_occupied_socket_is_named_and_left_alone(tmp_path, name, write_config):
+    context = zmq.Context()
+    with context.socket(zmq.PULL) as other:
+        other.bind(f"ipc://{tmp_path}/{name}")
+        config = write_config(tmp_path)
+        refused = subprocess.run(
+            [sys.executable, "-m", "sdrlinkd", "--config", str(config)],
+            capture_output=True, text=True, timeout=30,
+        )  # fmt: skip
+        assert refused.returncode == 2
+        assert f"{name} is in use by another program" in refused.stderr
+        assert "Traceback" not in refused.stderr
+        assert (tmp_path / name).exists()
+    context.term()
+
+
+def test_sighup_rereads_policies_and_keeps_the_old_on_error(start_daemon):
+    daemon = start_daemon()
+    text = daemon.config.read_text()
+
+    def qos():
+        return next(t.qos for t in daemon.snapshot().link.topics if t.name == "/robot_1/odom")
+
+    assert qos() == "default"
+    daemon.config.write_text(text + '[topic.odom]\nqos = "urgent"\n')
+    daemon.process.send_signal(signal.SIGHUP)
+    wait_for(lambda: qos() == "urgent")
+    daemon.config.write_text(text + '[topic.odom]\nqos = "fastest"\n')
+    daemon.process.send_signal(signal.SIGHUP)
+    wait_for(lambda: "not reloaded" in daemon.log())
+    assert qos() == "urgent"
+    with daemon.control() as control, pytest.raises(RefusedError, match="fastest"):
+        control.ask("reload")
+
+
+def test_a_changed_registry_is_not_reloaded(start_daemon, tmp_path):
+    registry = tmp_path / "own.csv"
+    registry.write_text("odom,nav_msgs/Odometry\n")
+    daemon = start_daemon(f'registry = "{registry}"\n')
+    registry.write_text("imu,sensor_msgs/Imu\nodom,nav_msgs/Odometry\n")
+    with daemon.control() as control, pytest.raises(RefusedError, match="restart"):
+        control.ask("reload")
+
+
+def test_control_refuses_in_words(start_daemon):
+    daemon = start_daemon()
+    with daemon.control() as control:
+        with pytest.raises(RefusedError, match="this daemon has hello, status"):
+            control.ask("explode")
+        assert control.ask("hello")["node"] == 1
+        assert control.ask("config")["link"]["pdu_size"] == 1024
+    context = zmq.Context()
+    with context.socket(zmq.DEALER) as dealer:
+        dealer.connect(f"ipc://{daemon.directory}/ctl.sock")
+        for frames, code in (
+            ([b"sdrl1", b"1", b"status"], b"bad_request"),
+            ([b"sdrl9", b"1", b"status", b""], b"bad_version"),
+            ([b"sdrl1", b"1", b"status", b"\xc1"], b"bad_request"),
+        ):
+            dealer.send_multipart(frames)
+            assert dealer.poll(5000)
+            assert code in dealer.recv_multipart()[3]
+    context.term()
+    assert daemon.snapshot().state == "running"
+
+
+def test_config_check_prints_what_follows(write_config, tmp_path):
+    config = write_config(tmp_path)
+    checked = subprocess.run(
+        [sys.executable, "-m", "sdrlinkd", "--check", "--config", str(config)],
+        capture_output=True, text=True, timeout=30,
+    )  # fmt: skip
+    assert checked.returncode == 0
+    assert "/robot_1/odom" in checked.stdout
+    config.write_text("[link]\npdu_size = 7\n")
+    refused = subprocess.run(
+        [sys.executable, "-m", "sdrlinkd", "--check", "--config", str(config)],
+        capture_output=True, text=True, timeout=30,
+    )  # fmt: skip
+    assert refused.returncode == 2
+    assert refused.stderr.count("\n") == 1
+    assert "link.pdu_size: got 7; allowed: a whole number from 32 to 2047" in refused.stderr
