@@ -91,6 +91,7 @@ def demo(
         f"{result.entries_per_message:.1f} entries a message; "
         f"dropped: {result.dropped or 'nothing'}",
         highlight=False,
+        soft_wrap=True,
     )
     console.print(f"wrote {out}/report.json, latency_cdf.png, path.png", highlight=False)
     if result.damage:

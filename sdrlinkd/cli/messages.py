@@ -81,6 +81,7 @@ def echo(
     """Show messages heard from other robots."""
     console = Console()
     shown = 0
+    connect(runtime_dir).close()
     with Subscriber(topic, directory=runtime_dir) as subscriber:
         while message := subscriber.receive(timeout):
             console.print(_headline(message), style="bold", highlight=False)

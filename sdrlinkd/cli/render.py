@@ -63,7 +63,7 @@ def sent_topics(topics: list[TopicReport]) -> Table:
         ("topic", "left"), ("class", "left"), ("prio", "right"), ("rate", "right"),
         ("in", "right"), ("sent", "right"), ("queued", "right"), ("dropped", "right"),
     ):  # fmt: skip
-        table.add_column(column, justify=justify)  # type: ignore[arg-type]
+        table.add_column(column, justify=justify, no_wrap=True)  # type: ignore[arg-type]
     for topic in topics:
         table.add_row(
             topic.name,
@@ -83,11 +83,11 @@ def received_topics(topics: list[ReceivedTopicReport]) -> Table:
     """Topics from the air."""
     table = _table("heard")
     for column, justify in (
-        ("topic", "left"), ("from", "right"), ("rate", "right"), ("delivered", "right"),
-        ("lost", "right"), ("PDR", "right"), ("age", "right"), ("age p50", "right"),
-        ("age p99", "right"),
+        ("topic", "left"), ("from", "right"), ("rate", "right"), ("in", "right"),
+        ("lost", "right"), ("PDR", "right"), ("age ms", "right"), ("p50", "right"),
+        ("p99", "right"),
     ):  # fmt: skip
-        table.add_column(column, justify=justify)  # type: ignore[arg-type]
+        table.add_column(column, justify=justify, no_wrap=True)  # type: ignore[arg-type]
     for topic in topics:
         table.add_row(
             topic.republished_as or topic.name,
@@ -110,7 +110,7 @@ def neighbors(reports: list[NeighborReport]) -> Table:
         ("robot", "left"), ("heard", "right"), ("PDUs", "right"), ("lost", "right"),
         ("PER", "right"), ("twice", "right"), ("SNR", "right"), ("registry", "left"),
     ):  # fmt: skip
-        table.add_column(column, justify=justify)  # type: ignore[arg-type]
+        table.add_column(column, justify=justify, no_wrap=True)  # type: ignore[arg-type]
     for report in reports:
         table.add_row(
             f"{report.src} (this one)" if report.is_self else str(report.src),
@@ -151,10 +151,10 @@ def dropped(snapshot: Snapshot) -> Table | None:
 
 
 def milliseconds(value: float | None) -> str:
-    """An age."""
+    """An age in ms."""
     if value is None:
         return NOTHING
-    return f"{value:.2f} ms" if value < 10 else f"{value:.0f} ms"
+    return f"{value:.2f}" if value < 100 else f"{value:.0f}"
 
 
 def duration(seconds: float) -> str:
@@ -175,4 +175,10 @@ def size(n_bytes: int) -> str:
 
 
 def _table(title: str) -> Table:
-    return Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    return Table(
+        title=title,
+        title_justify="left",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        collapse_padding=True,
+    )

@@ -23,12 +23,15 @@ class RefusedError(Exception):
 
 
 class ControlClient(Endpoint):
-    """One request at a time over the control socket."""
+    """One request at a time over the control socket. Raises NoDaemonError where there is none."""
 
     def __init__(
         self, directory: str | os.PathLike[str] | None = None, timeout_s: float = 5.0
     ) -> None:
         super().__init__(zmq.DEALER, directory)
+        if not (self.directory / CONTROL_SOCKET).exists():
+            self.close()
+            raise no_daemon(self.directory)
         self._timeout_s = timeout_s
         self._socket.immediate = True
         self._connect(CONTROL_SOCKET)

@@ -47,7 +47,7 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """Registry names to take from the bus; empty: all."""
     rx_format: str = "/rx_robot_{src_id}"
     """Namespace under which another robot's topics are republished."""
-    rx_depth: Annotated[int, Meta(ge=0)] = 64
+    rx_depth: Annotated[int, Meta(ge=0)] = 256
     """Messages kept for a consumer that does not read; 0: without bound."""
     backend: Literal["direct"] = "direct"
     drain_s: Annotated[float, Meta(ge=0, le=60)] = 1.0

@@ -18,7 +18,7 @@ def latency_cdf(runs: dict[str, Trace], path: Path, caption: str) -> None:
     """Figure 6: distribution of the end-to-end latency, one line a run."""
     figure, axes = plt.subplots(figsize=(6.4, 4.0), layout="constrained")
     for name, trace in runs.items():
-        ordered = latencies_s(trace.matches()[0]) * 1e3
+        ordered = latencies_s(trace.all_pairs()) * 1e3
         if len(ordered):
             share = np.arange(1, len(ordered) + 1) / len(ordered)
             median = float(np.median(ordered))

@@ -1,9 +1,11 @@
 """report.json: what one demonstration measured."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from msgspec import Struct
 
-from sdrlinkd.demo.trace import Trace, goodput_bytes_per_s, latencies_s, path_error_m
+from sdrlinkd.demo.trace import Pair, Trace, goodput_bytes_per_s, latencies_s, path_error_m
 
 QUANTILES = {"p50": 0.50, "p90": 0.90, "p99": 0.99}
 
@@ -16,6 +18,8 @@ class TopicResult(Struct, frozen=True, kw_only=True):
     sent: int
     received: int
     pdr: float
+    goodput_bytes_per_s: float
+    latency_ms: dict[str, float]
     path_error_m: float | None = None
 
 
@@ -50,9 +54,8 @@ class DemoReport(Struct, frozen=True, kw_only=True):
     runs: list[RunResult]
 
 
-def latency_ms(trace: Trace) -> dict[str, float]:
+def latency_ms(pairs: Sequence[Pair]) -> dict[str, float]:
     """Quantiles of the end-to-end latency; empty when nothing arrived."""
-    pairs, _ = trace.matches()
     ordered = latencies_s(pairs) * 1e3
     if not len(ordered):
         return {}
@@ -77,6 +80,8 @@ def topic_results(trace: Trace) -> list[TopicResult]:
                 sent=len(sent),
                 received=len(matched),
                 pdr=len(matched) / len(sent),
+                goodput_bytes_per_s=goodput_bytes_per_s(matched),
+                latency_ms=latency_ms(matched),
                 path_error_m=error,
             )
         )
@@ -102,7 +107,8 @@ def run_result(
     pairs, foreign = trace.matches()
     topics = topic_results(trace)
     errors = [topic.path_error_m for topic in topics if topic.path_error_m is not None]
-    received = sum(len(found) for found in pairs.values())
+    flat = [pair for found in pairs.values() for pair in found]
+    received = len(flat)
     return RunResult(
         name=name,
         source=source,
@@ -112,8 +118,8 @@ def run_result(
         sent=trace.n_sent,
         received=received,
         pdr=received / trace.n_sent if trace.n_sent else 0.0,
-        goodput_bytes_per_s=goodput_bytes_per_s(pairs),
-        latency_ms=latency_ms(trace),
+        goodput_bytes_per_s=goodput_bytes_per_s(flat),
+        latency_ms=latency_ms(flat),
         path_error_m=max(errors) if errors else None,
         bytes_identical=foreign == 0 and received == trace.n_received and received > 0,
         entries_per_message=entries / trace.n_sent if trace.n_sent else 0.0,

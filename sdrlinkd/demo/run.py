@@ -78,13 +78,13 @@ def run_demo(source: Source, options: Options, progress: Progress) -> tuple[RunR
 def _write_config(directory: Path, source: Source, options: Options) -> Path:
     (directory / "registry.csv").write_text(source.registry.csv())
     # Entry ids rest for the reassembly timeout, so faster play needs a shorter one.
-    timeout_s = min(1.0, 1.0 / options.speed)
+    timeout_s = min(0.5, 0.5 / options.speed)
     path = directory / "sdrlinkd.toml"
     path.write_text(
         f'namespace = "{source.namespace}"\nrobot_id = {NODE_ID}\nseed = {options.seed}\n'
         f"rx_depth = 0\n"
         f"[link]\npdu_size = {options.pdu_size}\n"
-        f"[reassembly]\ntimeout_s = {max(timeout_s, 0.05)}\n"
+        f"[reassembly]\ntimeout_s = {max(timeout_s, 0.02)}\n"
         f'[bus]\nruntime_dir = "{directory}"\n'
     )
     return path

@@ -1,6 +1,7 @@
 """What was sent and what came back, and the paper's figures of merit over both."""
 
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,6 +23,10 @@ class Sample:
     payload: bytes
 
 
+# What was sent, and the same as received.
+Pair = tuple[Sample, Sample]
+
+
 @dataclass
 class Trace:
     """Messages per registry name at the producer and at the consumer."""
@@ -40,16 +45,16 @@ class Trace:
         """Messages the consumer got, whatever they hold."""
         return sum(len(samples) for samples in self.received.values())
 
-    def matches(self) -> tuple[dict[str, list[tuple[Sample, Sample]]], int]:
+    def matches(self) -> tuple[dict[str, list[Pair]], int]:
         """((sent, received) pairs per topic, received messages that nobody sent).
 
         Order holds within a topic, so each received message is looked for behind the one before.
         """
-        pairs: dict[str, list[tuple[Sample, Sample]]] = {}
+        pairs: dict[str, list[Pair]] = {}
         foreign = 0
         for name, received in self.received.items():
             sent = self.sent.get(name, [])
-            found: list[tuple[Sample, Sample]] = []
+            found: list[Pair] = []
             at = 0
             for sample in received:
                 match = next(
@@ -63,6 +68,10 @@ class Trace:
             pairs[name] = found
         return pairs, foreign
 
+    def all_pairs(self) -> list[Pair]:
+        """The (sent, received) pairs of all topics."""
+        return [pair for found in self.matches()[0].values() for pair in found]
+
     def path(self, samples: list[Sample]) -> Path2D:
         """Positions `[n, 2]` of odometry messages, in m."""
         poses = (from_cdr(sample.payload, ODOMETRY).pose.pose.position for sample in samples)
@@ -74,18 +83,17 @@ class Trace:
         return [name for name in self.sent if self.types[name] == ODOMETRY]
 
 
-def latencies_s(pairs: dict[str, list[tuple[Sample, Sample]]]) -> NDArray[np.float64]:
+def latencies_s(pairs: Sequence[Pair]) -> NDArray[np.float64]:
     """Publish at the producer to reception at the consumer, ascending, in s."""
-    return np.sort([got.at - was.at for found in pairs.values() for was, got in found])
+    return np.sort([got.at - was.at for was, got in pairs])
 
 
-def goodput_bytes_per_s(pairs: dict[str, list[tuple[Sample, Sample]]]) -> float:
+def goodput_bytes_per_s(pairs: Sequence[Pair]) -> float:
     """Payload bytes delivered over the time from the first publish to the last reception."""
-    flat = [pair for found in pairs.values() for pair in found]
-    if not flat:
+    if not pairs:
         return 0.0
-    span_s = max(got.at for _, got in flat) - min(was.at for was, _ in flat)
-    return sum(len(got.payload) for _, got in flat) / span_s if span_s > 0 else 0.0
+    span_s = max(got.at for _, got in pairs) - min(was.at for was, _ in pairs)
+    return sum(len(got.payload) for _, got in pairs) / span_s if span_s > 0 else 0.0
 
 
 def path_error_m(sent: Path2D, received: Path2D) -> float | None:

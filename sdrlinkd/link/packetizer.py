@@ -6,6 +6,7 @@ freezes at a message's first fragment. Greedy: further entries of the same topic
 Lower classes fill what is left over.
 """
 
+from collections import Counter
 from collections.abc import Iterable
 from random import Random
 from typing import NamedTuple
@@ -66,6 +67,8 @@ class Packetizer:
         self._spare_records: list[bytes] = []
         self._may_wait = params.flush_s > 0
         self._expired: list[Outgoing] = []
+        # How often a topic had to wait because all its entry ids were at rest.
+        self.waits_for_entry_id: Counter[int] = Counter()
 
     def offer(self, records: Iterable[Record]) -> None:
         """Records to send in spare room of the PDUs to come (replaces what was offered)."""
@@ -239,6 +242,7 @@ class Packetizer:
             return True
         entry_id = self._ids(head.topic_id).take(start)
         if entry_id is None:
+            self.waits_for_entry_id[head.topic_id] += 1
             return False
         head.entry_id = entry_id
         head.k = k

@@ -18,8 +18,9 @@ class QueueParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 class ReassemblyParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How long and how much is kept of messages that are not complete yet."""
 
-    timeout_s: Annotated[float, Meta(gt=0, le=60)] = 1.0
-    """Seconds without a new fragment; must not be longer than the senders' own value."""
+    timeout_s: Annotated[float, Meta(gt=0, le=60)] = 0.5
+    """Seconds without a new fragment; the same at all nodes. A topic can send 256 fragmented
+    messages in 1.25 times this."""
     source_bytes: Annotated[int, Meta(ge=1 << 16)] = 1 << 20
     total_bytes: Annotated[int, Meta(ge=1 << 16)] = 8 << 20
 

@@ -152,6 +152,13 @@ def link_notices(link: Link) -> list[str]:
             "the registry uses all 16 topic ids, so there is no control channel: no ages, no "
             "beacons, no registry check; drop one topic to have them"
         )
+    for topic_id in sorted(link.sender.packetizer.waits_for_entry_id):
+        topic = link.registry.topics[topic_id]
+        notices.append(
+            f"{topic.name} had to wait for a free entry id: fragmented messages come faster than "
+            "256 in 1.25 reassembly timeouts; give all robots a larger link.pdu_size or a shorter "
+            "reassembly.timeout_s"
+        )
     for _, neighbor in sorted(link.inbox.neighbors.items()):
         disagreement = neighbor.disagreement(link.registry, link.digest)
         if disagreement:

@@ -132,7 +132,7 @@ def test_a_frozen_consumer_sees_its_own_gap_and_others_lose_nothing(start_daemon
         taker.start()
         with Publisher(daemon.directory) as out:
             for i in range(count):
-                out.send("/robot_1/odom", CDR + bytes(2000))
+                out.send("/robot_1/odom", CDR + bytes(900))
                 if i % 20 == 19:
                     wait_for(lambda i=i: len(healthy_numbers) > i - 40)
         taker.join()

@@ -155,5 +155,5 @@ def test_entry_ids_are_not_used_again_before_their_rest(topics):
                     if e.topic_id != 15:
                         last_total_at = used.get((e.topic_id, e.entry_id))
                         if e.index == 0:
-                            assert last_total_at is None or now - last_total_at >= 1.25 - 1e-9
+                            assert last_total_at is None or now - last_total_at >= 0.625 - 1e-9
                         used[e.topic_id, e.entry_id] = now

@@ -1,0 +1,5 @@
+"""`python -m sdrlinkd.cli`."""
+
+from sdrlinkd.cli import main
+
+main()

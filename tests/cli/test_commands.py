@@ -1,0 +1,253 @@
+"""sdrlinkctl against real daemons, and what bad input gets."""
+
+import json
+import subprocess
+import sys
+import threading
+
+import msgspec
+import pytest
+
+from sdrlinkd.adapters import BuiltInRobot, empty, to_cdr
+from sdrlinkd.cli import run
+from sdrlinkd.client import Publisher, Subscriber
+from sdrlinkd.reports import Snapshot
+from tests.waiting import wait_for
+from tests.wire.vectors import DOCUMENTED
+
+ODOM = "/robot_1/odom"
+
+
+@pytest.fixture
+def ctl(capsys):
+    """Runs a command line; (exit code, stdout, stderr). No traceback, ever."""
+
+    def call(*arguments):
+        code = run([str(argument) for argument in arguments])
+        out, err = capsys.readouterr()
+        assert "Traceback" not in out + err
+        return code, out, err
+
+    return call
+
+
+def publish(daemon, count=3):
+    with Publisher(daemon.directory) as out:
+        for _ in range(count):
+            out.send(ODOM, to_cdr(empty("nav_msgs/msg/Odometry"), "nav_msgs/msg/Odometry"))
+
+
+def test_status_for_people_and_programs(start_daemon, ctl):
+    daemon = start_daemon()
+    publish(daemon)
+    code, out, _ = ctl("status", "--runtime-dir", daemon.directory)
+    assert code == 0
+    assert "3 in = 3 sent + 0 queued" in out
+    assert "/rx_robot_1/odom" in out
+    code, out, _ = ctl("status", "--json", "--runtime-dir", daemon.directory)
+    snapshot = msgspec.json.decode(out, type=Snapshot)
+    assert snapshot.link.tx.sent == 3
+
+
+def test_topics_check_reload(start_daemon, ctl):
+    daemon = start_daemon()
+    publish(daemon)
+    code, out, _ = ctl("topics", "--runtime-dir", daemon.directory)
+    assert code == 0
+    assert "/robot_1/odom" in out
+    assert "/rx_robot_1/odom" in out
+    code, out, _ = ctl("check", "--runtime-dir", daemon.directory)
+    assert code == 0
+    assert "the ledger adds up" in out
+    code, out, _ = ctl("check", "--json", "--runtime-dir", daemon.directory)
+    assert json.loads(out)["problems"] == []
+    code, out, _ = ctl("reload", "--runtime-dir", daemon.directory)
+    assert (code, "reloaded" in out) == (0, True)
+
+
+def test_pub_and_echo(start_daemon, ctl):
+    daemon = start_daemon()
+    dir_ = ("--runtime-dir", daemon.directory)
+    echo = subprocess.Popen(
+        [sys.executable, "-m", "sdrlinkd.cli", "echo", "/rx_robot_1/*", "-n", "1", "--timeout",
+         "20", "--runtime-dir", str(daemon.directory)],
+        stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    done = threading.Event()
+
+    def repeat():
+        while not done.wait(0.05):
+            ctl("pub", "/robot_1/cmd_vel", "{linear: {x: 0.5}}", "--qos", "urgent", *dir_)
+
+    thread = threading.Thread(target=repeat)
+    thread.start()
+    out, _ = echo.communicate(timeout=30)
+    done.set()
+    thread.join()
+    assert echo.returncode == 0
+    assert "/rx_robot_1/cmd_vel from robot 1" in out
+    assert "linear: {x: 0.5, y: 0.0, z: 0.0}" in out
+
+
+def test_pub_refuses_in_words(start_daemon, ctl):
+    daemon = start_daemon()
+    dir_ = ("--runtime-dir", daemon.directory)
+    for arguments, says in (
+        (("/robot_1/nothing",), "allowed: /robot_1/scan"),
+        (("/robot_1/cmd_vel", "{linear: {q: 1}}"), "has no field q; allowed: x, y, z"),
+        (("/robot_1/cmd_vel", "{linear: 3}"), "got 3; allowed: a map"),
+        (("/robot_1/cmd_vel", "{linear: {x: fast}}"), "got 'fast'; allowed: numbers"),
+        (("/robot_1/cmd_vel", "[1]"), "allowed: a map"),
+        (("/robot_1/cmd_vel", "{"), "not YAML"),
+        (("/robot_1/cmd_vel", "{}", "--qos", "fast"), "allowed: urgent"),
+        (("/robot_1/cmd_vel", "{}", "--cdr", "/nothing"), "cannot be read"),
+    ):
+        code, _, err = ctl("pub", *arguments, *dir_)
+        assert code == 2, arguments
+        assert says in err, arguments
+    code, _, _ = ctl("pub", "/robot_1/cmd_vel", "{}", "--priority", "200", *dir_)
+    assert code == 2
+
+
+def test_echo_says_when_nothing_comes(start_daemon, ctl):
+    daemon = start_daemon()
+    code, _, err = ctl(
+        "echo", "/rx_robot_9/odom", "--timeout", "0.1", "--runtime-dir", daemon.directory
+    )
+    assert code == 2
+    assert "0 messages in the time given" in err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("status",), ("topics",), ("check",), ("reload",), ("echo",), ("pdu", "watch"),
+     ("pub", "/robot_1/odom"), ("bag", "play", "BAG")],
+)  # fmt: skip
+def test_without_a_daemon(ctl, tmp_path, arguments, recorded):
+    arguments = [recorded if a == "BAG" else a for a in arguments]
+    code, _, err = ctl(*arguments, "--runtime-dir", tmp_path)
+    assert code == 2
+    assert f"no sdrlinkd answers in {tmp_path}" in err
+
+
+@pytest.fixture
+def recorded(tmp_path_factory):
+    """A rosbag2 folder with two seconds of the built-in robot."""
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    path = tmp_path_factory.mktemp("bag") / "robot"
+    robot = BuiltInRobot("", 2.0, 1)
+    with Writer(path, version=9) as writer:
+        connections = {
+            t.name: writer.add_connection(t.name.replace("//", "/"), t.type, typestore=types)
+            for t in robot.topics()
+        }
+        for message in robot.messages():
+            writer.write(connections[message.topic], message.time_ns, message.cdr)
+    return path
+
+
+def test_bag_play_and_info(start_daemon, ctl, recorded):
+    daemon = start_daemon()
+    dir_ = ("--runtime-dir", daemon.directory)
+    code, out, _ = ctl("bag", "info", recorded)
+    assert code == 0
+    assert "60  /odom" in out
+    with Subscriber(
+        ODOM.replace("robot_1", "rx_robot_1"), directory=daemon.directory, depth=0
+    ) as heard:
+        code, out, _ = ctl("bag", "play", recorded, "--rate", "20", *dir_)
+        assert code == 0
+        assert "played 200 messages" in out
+        assert [heard.receive(5).number for _ in range(60)] == list(range(1, 61))
+    code, out, _ = ctl(
+        "bag", "play", recorded, "--rate", "20", "--topics", "/imu", "--duration", "1", *dir_
+    )
+    assert "played 50 messages" in out
+    code, out, _ = ctl(
+        "bag",
+        "play",
+        recorded,
+        "--rate",
+        "20",
+        "--topics",
+        "/imu",
+        "--remap",
+        "/imu:=/robot_1/imu",
+        *dir_,
+    )
+    assert "played 100 messages" in out
+    for arguments, says in (
+        (("--topics", "/none"), "allowed: the bag's topics"),
+        (("--remap", "/imu=/x"), "allowed: /from:=/to"),
+        (("--topics", "/imu", "--remap", "/imu:=/x"), "takes none of its topics"),
+    ):
+        code, _, err = ctl("bag", "play", recorded, *arguments, *dir_)
+        assert (code, says in err) == (2, True), err
+
+
+def test_a_truncated_bag_is_played_as_far_as_it_goes(start_daemon, ctl, recorded):
+    daemon = start_daemon()
+    file = next(recorded.glob("*.db3"))
+    file.write_bytes(file.read_bytes()[: file.stat().st_size * 2 // 3])
+    code, out, err = ctl("bag", "play", recorded, "--rate", "50", "--runtime-dir", daemon.directory)
+    assert code == 2
+    assert "played" in out
+    assert "damaged" in err
+    wait_for(lambda: 0 < daemon.snapshot().link.tx.sent < 200)
+
+
+def test_pdu_decode_shows_the_layout(ctl, tmp_path):
+    octets = bytes.fromhex(DOCUMENTED["message_and_stamp"])
+    registry = tmp_path / "r.csv"
+    registry.write_text("scan,sensor_msgs/LaserScan\nodom,nav_msgs/Odometry\n")
+    code, out, _ = ctl("pdu", "decode", octets.hex(" "), "--registry", registry)
+    assert code == 0
+    for part in (
+        "src 1",
+        "dst 255",
+        "latency",
+        "entries 2",
+        "odom, control",
+        "age_us=1234567",
+        "pad     0 B",
+        "good",
+    ):
+        assert part in out
+    code, out, err = ctl("pdu", "decode", octets[:-1].hex() + "00")
+    assert code == 2
+    assert "rx_crc" in err
+    assert "src 1" in out
+    code, _, err = ctl("pdu", "decode", "zz")
+    assert code == 2
+    assert "allowed: octets" in err
+
+
+def test_pdu_watch_shows_both_directions(start_daemon):
+    daemon = start_daemon()
+    watch = subprocess.Popen(
+        [sys.executable, "-m", "sdrlinkd.cli", "pdu", "watch", "-n", "4", "--runtime-dir",
+         str(daemon.directory)],
+        stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    while watch.poll() is None:
+        publish(daemon, 1)
+    out = watch.stdout.read()
+    watch.stdout.close()
+    assert "→ src 1 dst all" in out
+    assert "← src 1 dst all" in out
+
+
+def test_completion_and_help(ctl):
+    code, out, _ = ctl("--help")
+    assert code == 0
+    for command in ("status", "topics", "pub", "echo", "pdu", "bag", "demo", "check"):
+        assert command in out
+    code, out, _ = ctl("--show-completion", "bash")
+    assert code == 0 or "completion" in out
+    code, out, _ = ctl("--version")
+    assert out.startswith("sdrlinkctl 0.")
+    code, _, _ = ctl("explode")
+    assert code == 2

@@ -1,0 +1,86 @@
+"""Rules of this house that no linter knows."""
+
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import backends
+import phy
+import sdrlinkd
+from sdrlinkd.link import RX_PDU_REASONS, RX_REASONS, TX_REASONS
+
+ROOT = Path(__file__).parents[1]
+LONGEST = 300
+
+
+def sources(*folders):
+    return [path for folder in folders for path in sorted((ROOT / folder).rglob("*.py"))]
+
+
+def test_phy_and_backends_are_ours():
+    """Both are names of other projects too."""
+    home = Path(sdrlinkd.__file__).parents[1]
+    assert Path(phy.__file__).parents[1] == home
+    assert Path(backends.__file__).parents[1] == home
+
+
+def test_no_source_file_is_longer_than_a_room():
+    long = {
+        str(path.relative_to(ROOT)): lines
+        for path in sources("sdrlinkd", "backends", "phy", "benchmarks")
+        if (lines := len(path.read_text().splitlines())) > LONGEST
+    }
+    assert not long
+
+
+def test_the_bus_document_names_every_reason():
+    text = (ROOT / "sdrlinkd/bus/README.md").read_text()
+    for reason in (*TX_REASONS, *RX_PDU_REASONS, *RX_REASONS):
+        assert f"`{reason}`" in text, reason
+
+
+def test_every_reason_in_the_code_has_a_name_in_the_table():
+    known = {*TX_REASONS, *RX_PDU_REASONS, *RX_REASONS}
+    used = set()
+    for path in sources("sdrlinkd"):
+        used |= set(re.findall(r'"((?:tx|rx)_[a-z_]+)"', path.read_text()))
+    assert used - known <= {"rx_format", "rx_depth"}
+
+
+def test_constraints_hold_exact_versions_and_no_addresses():
+    lines = (ROOT / "constraints.txt").read_text().splitlines()
+    pins = [line for line in lines if line and not line.startswith("#")]
+    assert pins
+    for line in pins:
+        assert re.fullmatch(r"[A-Za-z0-9_.\-]+==[A-Za-z0-9_.+!\-]+", line), line
+
+
+def test_every_dependency_is_pinned():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = project["optional-dependencies"].values()
+    wanted = [*project["dependencies"], *(name for names in extras for name in names)]
+    pinned = (ROOT / "constraints.txt").read_text().lower()
+    for requirement in wanted:
+        name = re.match(r"[A-Za-z0-9_.\-]+", requirement)[0].lower()
+        assert f"\n{name}==" in pinned, name
+
+
+def test_the_client_imports_nothing_but_zmq():
+    code = (
+        "import sys; before = set(sys.modules); import sdrlinkd.client;"
+        "print(*{m.split('.')[0] for m in sys.modules})"
+    )
+
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    for heavy in ("msgspec", "numpy", "rosbags", "typer", "rich", "uvloop"):
+        assert heavy not in loaded.stdout.split()
+
+
+def test_the_readme_shows_what_the_documents_are_called():
+    text = (ROOT / "README.md").read_text()
+    for link in re.findall(r"\]\(([^)#:]+)\)", text):
+        assert (ROOT / link).exists(), link
