@@ -1,0 +1,116 @@
+"""The client against a real daemon."""
+
+import asyncio
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+import zmq
+
+from sdrlinkd.client import (
+    AsyncPublisher,
+    AsyncSubscriber,
+    NoDaemonError,
+    Publisher,
+    Subscriber,
+)
+
+CDR = b"\0\1\0\0"
+
+
+def test_five_lines_each(start_daemon, monkeypatch):
+    monkeypatch.setenv("SDRLINKD_RUNTIME_DIR", str(start_daemon().directory))
+    with Subscriber("/rx_robot_1/odom") as heard:
+        with Publisher() as out:
+            out.send("/robot_1/odom", CDR + b"hello")
+        for message in heard:
+            assert message.payload == CDR + b"hello"
+            break
+
+
+async def test_five_lines_each_in_asyncio(start_daemon, monkeypatch):
+    monkeypatch.setenv("SDRLINKD_RUNTIME_DIR", str(start_daemon().directory))
+    async with AsyncSubscriber("/rx_robot_1/odom") as heard:
+        async with AsyncPublisher() as out:
+            await out.send("/robot_1/odom", CDR + b"hello")
+        async for message in heard:
+            assert message.payload == CDR + b"hello"
+            break
+
+
+def test_a_prefix_takes_all_and_a_name_only_itself(start_daemon):
+    registry_topics = "imu,sensor_msgs/Imu\nimu2,sensor_msgs/Imu\n"
+    directory = start_daemon().directory
+    own = directory / "own.csv"
+    own.write_text(registry_topics)
+    daemon = start_daemon(f'registry = "{own}"\n')
+    with (
+        Subscriber("/rx_robot_1/imu", directory=daemon.directory) as one,
+        Subscriber("/rx_robot_1/*", directory=daemon.directory) as both,
+        Publisher(daemon.directory) as out,
+    ):
+        out.send("/robot_1/imu2", CDR + b"2")
+        out.send("/robot_1/imu", CDR + b"1")
+        assert [both.receive(5).payload[-1:] for _ in range(2)] == [b"2", b"1"]
+        assert one.receive(5).payload[-1:] == b"1"
+        assert one.receive(0) is None
+
+
+def test_a_burst_and_an_immediate_exit_arrive_whole(start_daemon):
+    daemon = start_daemon()
+    code = (
+        "from sdrlinkd.client import Publisher\n"
+        "with Publisher() as out:\n"
+        "    for i in range(20000): out.send('/robot_1/odom', bytes([0, 1, 0, 0]) + bytes(700))\n"
+    )
+    environment = {**os.environ, "SDRLINKD_RUNTIME_DIR": str(daemon.directory)}
+    subprocess.run([sys.executable, "-c", code], check=True, env=environment, timeout=60)
+    assert daemon.snapshot().link.tx.accepted == 20_000
+
+
+@pytest.mark.parametrize(
+    "make",
+    [lambda d: Publisher(d, timeout_s=0.2), lambda d: Subscriber(directory=d, timeout_s=0.2)],
+)
+def test_without_a_daemon_it_says_where_it_looked(tmp_path, make):
+    with pytest.raises(NoDaemonError, match=str(tmp_path)), make(tmp_path) as socket:
+        socket.send("/a", CDR)
+
+
+async def test_without_a_daemon_in_asyncio(tmp_path):
+    with pytest.raises(NoDaemonError, match=str(tmp_path)):
+        async with asyncio.timeout(10), AsyncPublisher(tmp_path, timeout_s=0.2) as out:
+            await out.send("/a", CDR)
+    with pytest.raises(NoDaemonError, match=str(tmp_path)):
+        async with asyncio.timeout(10), AsyncSubscriber(directory=tmp_path, timeout_s=0.2):
+            pass
+
+
+def test_a_program_that_publishes_with_pub_and_json(start_daemon):
+    daemon = start_daemon()
+    context = zmq.Context()
+    header = json.dumps({"q": "urgent", "p": 3}).encode()
+    with context.socket(zmq.PUB) as pub, Subscriber(directory=daemon.directory) as heard:
+        pub.connect(f"ipc://{daemon.directory}/in-pub.sock")
+        message = None
+        while message is None:
+            pub.send_multipart([b"/robot_1/odom\0", header, CDR + b"pub"])
+            message = heard.receive(0.05)
+        assert message.payload == CDR + b"pub"
+    context.term()
+
+
+def test_the_welcome_tells_who_answers(start_daemon):
+    daemon = start_daemon()
+    context = zmq.Context()
+    with context.socket(zmq.SUB) as sub:
+        sub.subscribe(b"\0")
+        sub.connect(f"ipc://{daemon.directory}/out.sock")
+        assert sub.poll(5000)
+        (frame,) = sub.recv_multipart()
+        assert frame.startswith(b"\0\x01")
+        assert b"sdrlinkd" in frame
+        assert b"/robot_1/odom" in frame
+    context.term()

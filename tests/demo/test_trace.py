@@ -1,0 +1,95 @@
+"""The paper's figures of merit, by hand."""
+
+import numpy as np
+import pytest
+
+from sdrlinkd.demo.report import latency_ms, topic_results
+from sdrlinkd.demo.source import open_source
+from sdrlinkd.demo.trace import Sample, Trace, goodput_bytes_per_s, path_error_m
+from sdrlinkd.errors import RegistryError, UserError
+from tests.adapters.recordings import STORAGES, ros2_bag
+
+
+def trace_of(sent, received):
+    trace = Trace({"a": "std_msgs/msg/String"})
+    trace.sent["a"] = [Sample(at, payload) for at, payload in sent]
+    trace.received["a"] = [Sample(at, payload) for at, payload in received]
+    return trace
+
+
+def test_pairs_under_loss_and_equal_payloads():
+    trace = trace_of(
+        [(0, b"x"), (1, b"x"), (2, b"y"), (3, b"z")], [(0.1, b"x"), (1.1, b"x"), (3.1, b"z")]
+    )
+    pairs, foreign = trace.matches()
+    assert [(was.at, got.at) for was, got in pairs["a"]] == [(0, 0.1), (1, 1.1), (3, 3.1)]
+    assert foreign == 0
+
+
+def test_what_nobody_sent_is_foreign_and_so_is_a_copy():
+    trace = trace_of([(0, b"x")], [(0.1, b"x"), (0.2, b"x"), (0.3, b"?")])
+    assert trace.matches()[1] == 2
+
+
+def test_latency_goodput_and_pdr():
+    trace = trace_of(
+        [(i, bytes([i]) * 100) for i in range(10)],
+        [(i + 0.01 * i, bytes([i]) * 100) for i in range(9)],
+    )
+    (result,) = topic_results(trace)
+    assert (result.sent, result.received, result.pdr) == (10, 9, 0.9)
+    assert result.latency_ms["p50"] == pytest.approx(40)
+    assert result.latency_ms["max"] == pytest.approx(80)
+    assert result.goodput_bytes_per_s == pytest.approx(900 / 8.08)
+    assert latency_ms([]) == {}
+    assert goodput_bytes_per_s([]) == 0
+
+
+def test_path_error_by_hand():
+    line = np.stack([np.linspace(0, 10, 50), np.zeros(50)], axis=1)
+    assert path_error_m(line, line) == 0
+    assert path_error_m(line, line + np.array((0, 0.3))) == pytest.approx(0.3)
+    assert path_error_m(line, line[::7]) == pytest.approx(0.0, abs=0.2)
+    assert path_error_m(line[[0, -1]], line) == pytest.approx(0, abs=1e-9)
+    # A path that ends half way: the mean distance of points at equal shares of the length.
+    assert path_error_m(line, line * [0.5, 1]) == pytest.approx(2.5, rel=1e-3)
+    assert path_error_m(line, line[:1]) is None
+    assert path_error_m(line, np.zeros((5, 2))) is None
+
+
+def string_bag(path, topics):
+    return ros2_bag(
+        path, STORAGES["sqlite3"],
+        [(t, "std_msgs/msg/String", i, b"\0\1\0\0") for t, n in topics for i in range(n)],
+    )  # fmt: skip
+
+
+def test_the_fifteen_busiest_topics_make_a_registry(tmp_path):
+    bag = string_bag(tmp_path / "bag", [(f"/t{i:02}", i + 1) for i in range(18)])
+    source = open_source(bag, None, [], None, 1)
+    assert len(source.registry) == 15
+    assert source.registry.has_control
+    assert [reason.split(":")[0] for reason in source.left_out] == ["/t02", "/t01", "/t00"]
+
+
+def test_topics_can_be_chosen(tmp_path):
+    bag = string_bag(tmp_path / "bag", [("/a", 2), ("/b", 3)])
+    source = open_source(bag, None, ["b"], None, 1)
+    assert [m.topic for m in source.messages()] == ["/b"] * 3
+    with pytest.raises(UserError, match="allowed: /a, /b"):
+        open_source(bag, None, ["/c"], None, 1)
+    assert [t.name for t in open_source(None, None, ["odom"], 1, 1).topics] == ["/robot_1/odom"]
+
+
+def test_what_the_registry_lacks_is_left_out_by_name(tmp_path):
+    bag = string_bag(tmp_path / "bag", [("/a", 2), ("/b", 3), ("/c", 1)])
+    registry = tmp_path / "r.csv"
+    registry.write_text("a,std_msgs/String\nb,std_msgs/Bool\n")
+    source = open_source(bag, registry, [], None, 1)
+    assert [t.name for t in source.topics] == ["/a"]
+    assert source.left_out == [
+        "/b: is std_msgs/msg/String, the registry has std_msgs/msg/Bool", "/c: not in the registry",
+    ]  # fmt: skip
+    registry.write_text("".join(f"t{i},a/B\n" for i in range(17)))
+    with pytest.raises(RegistryError, match="17 topics"):
+        open_source(bag, registry, [], None, 1)
