@@ -16,7 +16,7 @@ import zmq.asyncio
 from benchmarks.report import Row
 from sdrlinkd.bus import Bus, RuntimeDirectory
 from sdrlinkd.config import make_setup, parse_config
-from sdrlinkd.link import Link, Qos
+from sdrlinkd.link import AS_CONFIGURED, Link, Overrides
 
 PAYLOAD_BYTES = 700
 
@@ -33,17 +33,9 @@ class _Counted:
         self.count = 0
         self.done = asyncio.Event()
 
-    def submit(
-        self,
-        topic_id: int,
-        payload: bytes,
-        qos: Qos | None = None,
-        priority: int | None = None,
-        dst: int | None = None,
-        lifespan_s: float | None = None,
-    ) -> None:
+    def submit(self, topic_id: int, payload: bytes, overrides: Overrides = AS_CONFIGURED) -> None:
         """Queue a message."""
-        self._link.submit(topic_id, payload, time.monotonic(), qos, priority, dst, lifespan_s)
+        self._link.submit(topic_id, payload, time.monotonic(), overrides)
         self.count += 1
         if self.count == self._expected:
             self.done.set()

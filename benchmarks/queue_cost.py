@@ -6,7 +6,7 @@ import time
 from random import Random
 
 from benchmarks.report import Row
-from sdrlinkd.link import Link, LinkParams, Outcome, QueueParams, ReassemblyParams
+from sdrlinkd.link import Link, LinkParams, Outcome, Overrides, QueueParams, ReassemblyParams
 from sdrlinkd.wire import make_registry
 
 OPERATIONS = 1000
@@ -33,13 +33,14 @@ def _cost(depth: int, seed: int) -> float:
         rng,
     )
     payload = bytes(700)
+    wishes = [Overrides(priority=8 * topic) for topic in range(TOPICS)]
     topics = [rng.randrange(TOPICS) for _ in range(depth + OPERATIONS)]
     for topic in topics[:depth]:
-        link.submit(topic, payload, 0.0, priority=topic * 8)
+        link.submit(topic, payload, 0.0, wishes[topic])
     gc.collect()
     start = time.process_time()
     for topic in topics[depth:]:
-        link.submit(topic, payload, 0.0, priority=topic * 8)
+        link.submit(topic, payload, 0.0, wishes[topic])
         burst = link.compose(0.0, 1)
         if burst is not None:
             link.confirm(burst, Outcome.SENT, 0.0)

@@ -7,7 +7,16 @@ from collections.abc import Callable, Mapping, Sequence
 from sdrlinkd import __version__
 from sdrlinkd.bus import Bus, Ingress
 from sdrlinkd.config import Setup
-from sdrlinkd.link import Burst, Link, Outcome, Qos, TopicPolicy, link_notices, link_report
+from sdrlinkd.link import (
+    AS_CONFIGURED,
+    Burst,
+    Link,
+    Outcome,
+    Overrides,
+    TopicPolicy,
+    link_notices,
+    link_report,
+)
 from sdrlinkd.pdulink import Heard, PduLink
 from sdrlinkd.reports import Snapshot
 
@@ -32,18 +41,10 @@ class Node:
 
     # The bus's Ingress.
 
-    def submit(
-        self,
-        topic_id: int,
-        payload: bytes,
-        qos: Qos | None = None,
-        priority: int | None = None,
-        dst: int | None = None,
-        lifespan_s: float | None = None,
-    ) -> None:
+    def submit(self, topic_id: int, payload: bytes, overrides: Overrides = AS_CONFIGURED) -> None:
         """A message from a producer."""
         now = self._pdu_link.now()
-        self._link.submit(topic_id, payload, now, qos, priority, dst, lifespan_s)
+        self._link.submit(topic_id, payload, now, overrides)
         self._work.set()
 
     def refuse(self, reason: str, topic_id: int | None = None) -> None:

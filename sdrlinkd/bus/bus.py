@@ -14,7 +14,13 @@ from sdrlinkd.bus.sockets import RuntimeDirectory
 from sdrlinkd.client import ACK_PREFIX, IN_PUB_SOCKET, IN_SOCKET, OUT_SOCKET, SYNC_PREFIX
 from sdrlinkd.config import Setup
 from sdrlinkd.errors import EnvelopeError
-from sdrlinkd.link import CDR_HEADER_SIZE, QOS_BY_LABEL, Delivered, Qos
+from sdrlinkd.link import (
+    AS_CONFIGURED,
+    CDR_HEADER_SIZE,
+    QOS_BY_LABEL,
+    Delivered,
+    Overrides,
+)
 from sdrlinkd.reports import BusReport
 
 # ZeroMQ hardly queues for us: what arrives is taken at once, so that every drop is ours and named.
@@ -27,15 +33,7 @@ PDU_TAP = b"\0pdu\0"
 class Ingress(Protocol):
     """Who takes messages from the bus."""
 
-    def submit(
-        self,
-        topic_id: int,
-        payload: bytes,
-        qos: Qos | None = None,
-        priority: int | None = None,
-        dst: int | None = None,
-        lifespan_s: float | None = None,
-    ) -> None:
+    def submit(self, topic_id: int, payload: bytes, overrides: Overrides = AS_CONFIGURED) -> None:
         """A good message."""
 
     def refuse(self, reason: str, topic_id: int | None = None) -> None:
@@ -175,14 +173,13 @@ class Bus:
         elif header.ty is not None and header.ty != self._types[topic_id]:
             self._bad(f"type {header.ty}; the registry has {self._types[topic_id]}", topic_id)
         else:
-            self._ingress.submit(
-                topic_id,
-                payload,
+            overrides = Overrides(
                 None if header.q is None else QOS_BY_LABEL[header.q],
                 header.p,
                 header.d,
                 None if header.ls is None else header.ls * 1e-3,
             )
+            self._ingress.submit(topic_id, payload, overrides)
 
     def _bad(self, what: str, topic_id: int | None = None) -> None:
         self._bad_last = what

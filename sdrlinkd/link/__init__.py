@@ -5,11 +5,19 @@ from sdrlinkd.link.ledger import RX_PDU_REASONS, RX_REASONS, TX_REASONS
 from sdrlinkd.link.link import Link
 from sdrlinkd.link.outbox import Outbox, Outgoing
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
-from sdrlinkd.link.qos import MAX_PRIORITY, QOS_BY_LABEL, Qos, TopicPolicy
+from sdrlinkd.link.qos import (
+    AS_CONFIGURED,
+    MAX_PRIORITY,
+    QOS_BY_LABEL,
+    Overrides,
+    Qos,
+    TopicPolicy,
+)
 from sdrlinkd.link.report import link_notices, link_report
 from sdrlinkd.link.sender import Burst, Outcome
 
 __all__ = [
+    "AS_CONFIGURED",
     "CDR_HEADER_SIZE",
     "MAX_PRIORITY",
     "QOS_BY_LABEL",
@@ -23,6 +31,7 @@ __all__ = [
     "Outbox",
     "Outcome",
     "Outgoing",
+    "Overrides",
     "Qos",
     "QueueParams",
     "ReassemblyParams",

@@ -6,7 +6,7 @@ from random import Random
 from sdrlinkd.link.inbox import Delivered, Inbox
 from sdrlinkd.link.meters import RateMeter, RecentAges
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
-from sdrlinkd.link.qos import Qos, TopicPolicy
+from sdrlinkd.link.qos import AS_CONFIGURED, Overrides, TopicPolicy
 from sdrlinkd.link.sender import Burst, Outcome, Sender
 from sdrlinkd.reports import RATE_WINDOW_S
 from sdrlinkd.wire import Beacon, Record, Registry, build_records, equal_payload
@@ -58,13 +58,10 @@ class Link:
         topic_id: int,
         payload: bytes,
         now: float,
-        qos: Qos | None = None,
-        priority: int | None = None,
-        dst: int | None = None,
-        lifespan_s: float | None = None,
+        overrides: Overrides = AS_CONFIGURED,
     ) -> str | None:
         """Queue a message; None, or the ledger's reason for refusing it."""
-        return self.sender.submit(topic_id, payload, now, qos, priority, dst, lifespan_s)
+        return self.sender.submit(topic_id, payload, now, overrides)
 
     def compose(self, start: float, max_pdus: int) -> Burst | None:
         """The burst that should leave at `start`, decided now; None when there is nothing.

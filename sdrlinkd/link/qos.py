@@ -1,7 +1,7 @@
 """How a message is to be treated: its class, priority, lifespan and depth."""
 
 from enum import IntEnum
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import msgspec
 from msgspec import Meta
@@ -28,6 +28,18 @@ WIRE_BITS = {Qos.DEFAULT: 0, Qos.LATENCY: 1, Qos.BULK: 2, Qos.URGENT: 3}
 QOS_BY_LABEL = {qos.label: qos for qos in Qos}
 
 MAX_PRIORITY = 127
+
+
+class Overrides(NamedTuple):
+    """What a producer asks of one message; None leaves it to the topic's policy."""
+
+    qos: Qos | None = None
+    priority: int | None = None
+    dst: int | None = None
+    lifespan_s: float | None = None
+
+
+AS_CONFIGURED = Overrides()
 
 
 class TopicPolicy(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -9,7 +9,7 @@ from sdrlinkd.link.ledger import TxTally, balance
 from sdrlinkd.link.outbox import Fate, Outbox, Outgoing
 from sdrlinkd.link.packetizer import Packetizer
 from sdrlinkd.link.params import LinkParams, QueueParams
-from sdrlinkd.link.qos import QOS_BY_LABEL, Qos, TopicPolicy
+from sdrlinkd.link.qos import AS_CONFIGURED, QOS_BY_LABEL, Overrides, Qos, TopicPolicy
 from sdrlinkd.wire import Registry, max_message_size
 
 
@@ -60,6 +60,7 @@ class Sender:
         reassembly_timeout_s: float,
     ) -> None:
         self._params = params
+        self._max_message_size = max_message_size(params.pdu_size)
         self._registry = registry
         self.outbox = Outbox(queue)
         self.packetizer = Packetizer(params, src, self.outbox, rng, reassembly_timeout_s)
@@ -86,19 +87,14 @@ class Sender:
         topic_id: int,
         payload: bytes,
         now: float,
-        qos: Qos | None = None,
-        priority: int | None = None,
-        dst: int | None = None,
-        lifespan_s: float | None = None,
+        overrides: Overrides = AS_CONFIGURED,
     ) -> str | None:
-        """Queue a message; None, or the ledger's reason why it was refused.
-
-        What the producer leaves open comes from the topic's policy.
-        """
+        """Queue a message; None, or the ledger's reason why it was refused."""
+        qos, priority, dst, lifespan_s = overrides
         topic = self._topics[topic_id]
         tally = topic.tally
         tally.accepted += 1
-        if len(payload) > max_message_size(self._params.pdu_size):
+        if len(payload) > self._max_message_size:
             tally.drop("tx_too_big")
             return "tx_too_big"
         message = Outgoing(

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sdrlinkd.config import DirectParams
-from sdrlinkd.link import Outcome, Qos, QueueParams, ReassemblyParams, TopicPolicy
+from sdrlinkd.link import Outcome, Overrides, Qos, QueueParams, ReassemblyParams, TopicPolicy
 from sdrlinkd.link.outbox import Fate
 from sdrlinkd.pdulink import Impairment
 from tests.link.world import make_link
@@ -57,8 +57,10 @@ def test_the_ledger_holds_at_every_step_of_any_run(seed):
         if action < 0.5:
             link.submit(
                 rng.randrange(3), bytes(rng.randrange(4, 600)), now,
-                rng.choice((None, *Qos)), rng.choice((None, 0, 127)), rng.choice((None, 1)),
-                rng.choice((None, 0.05)),
+                Overrides(
+                    rng.choice((None, *Qos)), rng.choice((None, 0, 127)), rng.choice((None, 1)),
+                    rng.choice((None, 0.05)),
+                ),
             )  # fmt: skip
         elif action < 0.75:
             burst = link.compose(now, rng.randrange(1, 6))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from sdrlinkd.link import Outcome, Qos, QueueParams, TopicPolicy, link_notices
+from sdrlinkd.link import Outcome, Overrides, Qos, QueueParams, TopicPolicy, link_notices
 from tests.link.world import layouts, make_link, send_all
 
 
@@ -44,13 +44,13 @@ def test_a_message_in_fragments_is_not_superseded():
 def test_overflow_sheds_the_lowest_class_oldest_first():
     link = make_link(pdu_size=64, queue=QueueParams(max_messages=3))
     link.submit(0, b"d1" * 4, 0.0)
-    link.submit(1, b"b1" * 4, 1.0, qos=Qos.BULK)
-    link.submit(1, b"b2" * 4, 2.0, qos=Qos.BULK)
+    link.submit(1, b"b1" * 4, 1.0, Overrides(qos=Qos.BULK))
+    link.submit(1, b"b2" * 4, 2.0, Overrides(qos=Qos.BULK))
     assert link.submit(0, b"d2" * 4, 3.0) is None
     assert dropped(link) == {("scan", "tx_overflow_old"): 1}
-    assert link.submit(2, b"u1" * 4, 4.0, qos=Qos.URGENT) is None
+    assert link.submit(2, b"u1" * 4, 4.0, Overrides(qos=Qos.URGENT)) is None
     assert dropped(link) == {("scan", "tx_overflow_old"): 2}
-    assert link.submit(1, b"b3" * 4, 5.0, qos=Qos.BULK) == "tx_overflow_new"
+    assert link.submit(1, b"b3" * 4, 5.0, Overrides(qos=Qos.BULK)) == "tx_overflow_new"
     assert link.audit() == []
 
 
@@ -65,15 +65,15 @@ def test_bytes_are_bounded_too():
 
 def test_expired_messages_are_not_sent():
     link = make_link(pdu_size=64)
-    link.submit(0, bytes(8), 0.0, lifespan_s=1.0)
-    link.submit(0, bytes(9), 0.0, lifespan_s=2.0)
+    link.submit(0, bytes(8), 0.0, Overrides(lifespan_s=1.0))
+    link.submit(0, bytes(9), 0.0, Overrides(lifespan_s=2.0))
     assert [pdu[0][3] for pdu in layouts(send_all(link, now=1.0), 64)] == [9]
     assert dropped(link) == {("odom", "tx_expired"): 1}
 
 
 def test_the_rest_of_an_expired_message_is_withdrawn():
     link = make_link(pdu_size=64)
-    link.submit(0, bytes(200), 0.0, lifespan_s=1.0)
+    link.submit(0, bytes(200), 0.0, Overrides(lifespan_s=1.0))
     burst = link.compose(0.5, 2)
     assert link.compose(1.5, 8) is None
     assert link.audit() == []
@@ -85,7 +85,7 @@ def test_the_rest_of_an_expired_message_is_withdrawn():
 
 def test_timers_expire_what_no_burst_looked_at():
     link = make_link()
-    link.submit(0, bytes(8), 0.0, lifespan_s=1.0)
+    link.submit(0, bytes(8), 0.0, Overrides(lifespan_s=1.0))
     link.handle_timers(1.5)
     assert link.sender.outbox.queued == 0
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from sdrlinkd.link import Outcome, Qos, TopicPolicy
+from sdrlinkd.link import Outcome, Overrides, Qos, TopicPolicy
 from sdrlinkd.wire import BROADCAST, Beacon, RegistryDigest, Stamp, parse, parse_records
 from tests.link.world import layouts, make_link, send_all
 
@@ -66,8 +66,8 @@ def test_greedy_adds_further_entries_of_the_topic():
 
 def test_lower_classes_fill_what_is_left():
     link = no_stamps(make_link(pdu_size=220))
-    link.submit(1, bytes(60), 0.0, qos=Qos.BULK)
-    link.submit(0, bytes(100), 0.0, qos=Qos.LATENCY)
+    link.submit(1, bytes(60), 0.0, Overrides(qos=Qos.BULK))
+    link.submit(0, bytes(100), 0.0, Overrides(qos=Qos.LATENCY))
     (pdu,) = send_all(link)
     assert layouts([pdu], 220) == [[(0, 0, 1, 100), (1, 0, 1, 60)]]
     assert parse(pdu, 220).qos == 1  # the highest class inside
@@ -78,7 +78,7 @@ def test_lower_classes_fill_what_is_left():
 )
 def test_class_on_the_wire(qos, bits):
     link = make_link(pdu_size=220)
-    link.submit(0, bytes(8), 0.0, qos=qos)
+    link.submit(0, bytes(8), 0.0, Overrides(qos=qos))
     assert parse(send_all(link)[0], 220).qos == bits
 
 
@@ -91,15 +91,15 @@ def test_order_is_class_then_priority_then_expiry():
         (3, Qos.DEFAULT, 2, 5.0), (4, Qos.LATENCY, 0, 10.0), (5, Qos.URGENT, 0, 10.0),
     ]  # fmt: skip
     for topic, qos, priority, lifespan_s in submissions:
-        link.submit(topic, bytes(51), 0.0, qos, priority, None, lifespan_s)
+        link.submit(topic, bytes(51), 0.0, Overrides(qos, priority, None, lifespan_s))
     order = [entry[0] for pdu in layouts(send_all(link), 64) for entry in pdu]
     assert list(dict.fromkeys(order)) == [5, 4, 3, 2, 1, 0]
 
 
 def test_destinations_never_share_a_pdu():
     link = no_stamps(make_link(pdu_size=220))
-    link.submit(0, bytes(10), 0.0, dst=2)
-    link.submit(1, bytes(10), 0.0, dst=3)
+    link.submit(0, bytes(10), 0.0, Overrides(dst=2))
+    link.submit(1, bytes(10), 0.0, Overrides(dst=3))
     link.submit(2, bytes(10), 0.0)
     pdus = [parse(pdu, 220) for pdu in send_all(link)]
     assert sorted(pdu.dst for pdu in pdus) == [2, 3, BROADCAST]
@@ -145,7 +145,7 @@ class TestFlush:
     @pytest.mark.parametrize("qos", [Qos.URGENT, Qos.LATENCY])
     def test_urgent_and_latency_never_wait(self, qos):
         link = make_link(pdu_size=220, flush_s=INFINITE)
-        link.submit(0, bytes(50), 0.0, qos=qos)
+        link.submit(0, bytes(50), 0.0, Overrides(qos=qos))
         assert len(link.compose(0.0, 8).pdus) == 1
 
 
