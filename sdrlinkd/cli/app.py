@@ -1,5 +1,6 @@
 """The command tree of sdrlinkctl, and how its errors end."""
 
+import os
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -9,6 +10,8 @@ import typer
 from sdrlinkd import __version__
 from sdrlinkd.client import ControlClient, NoDaemonError, RefusedError
 from sdrlinkd.errors import UserError
+
+DEBUG_VARIABLE = "SDRLINKD_DEBUG"
 
 app = typer.Typer(
     name="sdrlinkctl",
@@ -45,6 +48,14 @@ def run(arguments: list[str]) -> int:
     except (UserError, NoDaemonError, RefusedError) as error:
         sys.stderr.write(f"sdrlinkctl: {error}\n")
         return 2
+    except Exception as error:
+        if os.environ.get(DEBUG_VARIABLE):
+            raise
+        sys.stderr.write(
+            f"sdrlinkctl: a bug of ours: {type(error).__name__}: {error}; {DEBUG_VARIABLE}=1 shows "
+            "where, please report it\n"
+        )
+        return 1
     return 0
 
 

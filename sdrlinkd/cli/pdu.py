@@ -15,6 +15,8 @@ from sdrlinkd.errors import PduError, UserError
 from sdrlinkd.wire import (
     BROADCAST,
     CONTROL_TOPIC_ID,
+    MAX_PDU_SIZE,
+    MIN_PDU_SIZE,
     Pdu,
     Registry,
     pad_length,
@@ -44,6 +46,10 @@ def decode(
         data = bytes.fromhex("".join(text.replace(":", " ").split()))
     except ValueError as error:
         raise UserError(f"HEX: {error}; allowed: octets such as 0001ff…") from None
+    if not MIN_PDU_SIZE <= len(data) <= MAX_PDU_SIZE:
+        raise UserError(
+            f"HEX: got {len(data)} octets; allowed: a whole PDU, {MIN_PDU_SIZE} to {MAX_PDU_SIZE}"
+        )
     names = load_registry(registry) if registry else None
     Console().print(explain(data, names), highlight=False)
     try:

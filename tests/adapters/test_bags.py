@@ -1,5 +1,6 @@
 """Recordings: verbatim, converted, and as far as they can be read."""
 
+import sqlite3
 from contextlib import closing
 from itertools import pairwise
 from pathlib import Path
@@ -7,6 +8,9 @@ from random import Random
 
 import pytest
 from rosbags.rosbag1 import Writer as Writer1
+from rosbags.rosbag2 import CompressionFormat, CompressionMode
+from rosbags.rosbag2 import Writer as Writer2
+from rosbags.typesys import Stores, get_typestore
 
 from sdrlinkd.adapters import from_cdr, open_bag
 from sdrlinkd.errors import BagError
@@ -49,6 +53,70 @@ def test_ros1_is_converted(tmp_path, compression):
         assert not hasattr(reading.header, "seq")
 
 
+def packed_bag(path, storage, mode, messages):
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    writer = Writer2(path, version=9, storage_plugin=STORAGES[storage])
+    writer.set_compression(mode, CompressionFormat.ZSTD)
+    with writer:
+        connections = {}
+        for topic, kind, time_ns, cdr in messages:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(topic, kind, typestore=types)
+            writer.write(connections[topic], time_ns, cdr)
+    return path
+
+
+def data_file(path):
+    (file,) = (f for f in path.iterdir() if f.name != "metadata.yaml")
+    return file
+
+
+def chunks_of(mcap):
+    """How many chunk records follow the magic, up to the end of the data section."""
+    data, at, count = mcap.read_bytes(), 8, 0
+    while data[at] != 0x0F:
+        count += data[at] == 6
+        at += 9 + int.from_bytes(data[at + 1 : at + 9], "little")
+    return count
+
+
+PACKED = [
+    ("sqlite3", CompressionMode.FILE),
+    ("sqlite3", CompressionMode.MESSAGE),
+    ("mcap", CompressionMode.FILE),
+    ("mcap", CompressionMode.MESSAGE),
+    ("mcap", CompressionMode.STORAGE),
+]
+
+
+@pytest.mark.parametrize(("storage", "mode"), PACKED, ids=lambda v: getattr(v, "name", v))
+def test_compressed_rosbag2_is_verbatim(tmp_path, storage, mode):
+    written = noisy_messages(seed=4, count=200)
+    assert read(packed_bag(tmp_path / "bag", storage, mode, written)) == (written, "")
+
+
+@pytest.mark.parametrize("mode", [CompressionMode.NONE, CompressionMode.STORAGE])
+def test_mcap_of_several_chunks_whole_and_cut(tmp_path, mode):
+    written = noisy_messages(seed=6, count=4500)
+    path = packed_bag(tmp_path / "bag", "mcap", mode, written)
+    file = data_file(path)
+    assert chunks_of(file) >= 2
+    assert read(path) == (written, "")
+    data = file.read_bytes()
+    file.write_bytes(data[: len(data) // 2])
+    messages, damage = read(path)
+    assert 1000 < len(messages) < 3500
+    assert messages == written[: len(messages)]
+    assert str(path) in damage
+
+
+def test_a_single_file_needs_no_metadata(tmp_path):
+    written = noisy_messages(seed=8, count=50)
+    for storage in STORAGES:
+        path = ros2_bag(tmp_path / storage, STORAGES[storage], written)
+        assert read(data_file(path)) == (written, ""), storage
+
+
 def read_or_refusal(path):
     try:
         return *read(path), ""
@@ -79,8 +147,12 @@ def check_damaged(path, file, whole, seed):
         if refusal:
             assert str(path) in refusal, f"seed {seed}"
             assert "\n" not in refusal, f"seed {seed}"
-        elif kind == "cut":
+            continue
+        assert "Traceback" not in damage, f"seed {seed}"
+        if kind == "cut":
             assert set(messages) <= originals, f"seed {seed}"
+            assert len(set(messages)) == len(messages), f"seed {seed}"
+            assert all(a[2] <= b[2] for a, b in pairwise(messages)), f"seed {seed}"
             assert damage or len(messages) == len(whole), f"seed {seed}"
             saved += len(messages)
     file.write_bytes(data)
@@ -96,11 +168,109 @@ def test_a_damaged_rosbag2_gives_what_is_left_unaltered(tmp_path, storage, seed)
     check_damaged(path, file, written, seed)
 
 
-@pytest.mark.parametrize("compression", [None, Writer1.CompressionFormat.BZ2])
+@pytest.mark.parametrize("compression", [None, *Writer1.CompressionFormat])
 def test_a_damaged_ros1_bag_gives_what_is_left_unaltered(tmp_path, compression):
     path = ros1_bag(tmp_path / "run.bag", compression, 4000)
     whole, _ = read(path)
     check_damaged(path, path, whole, seed=3)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_damaged_compressed_mcap_gives_what_is_left_unaltered(tmp_path, seed):
+    written = noisy_messages(seed, count=300)
+    path = packed_bag(tmp_path / "bag", "mcap", CompressionMode.STORAGE, written)
+    check_damaged(path, data_file(path), written, seed)
+
+
+@pytest.mark.xfail(reason="SQLite reads the missing end of its last page as zeros", strict=True)
+def test_a_database_cut_within_its_last_page_is_damaged(tmp_path):
+    written = noisy_messages(seed=1, count=600)
+    path = ros2_bag(tmp_path / "bag", STORAGES["sqlite3"], written)
+    file = data_file(path)
+    file.write_bytes(file.read_bytes()[:-85])
+    messages, damage = read(path)
+    assert set(messages) <= set(written)
+    assert damage
+
+
+@pytest.mark.xfail(reason="TypeError for a row without data", strict=True, raises=TypeError)
+def test_a_row_without_data_costs_only_itself(tmp_path):
+    written = noisy_messages(seed=1, count=100)
+    path = ros2_bag(tmp_path / "bag", STORAGES["sqlite3"], written)
+    file = data_file(path)
+    with closing(sqlite3.connect(file)) as database, database:
+        database.execute("UPDATE messages SET data = NULL WHERE id = 50")
+    (path / "metadata.yaml").write_text("junk")
+    messages, damage = read(path)
+    assert messages == written[:49] + written[50:]
+    assert damage
+
+
+@pytest.mark.xfail(reason="salvage hands out messages still compressed", strict=True)
+@pytest.mark.parametrize("storage", STORAGES)
+def test_damage_leaves_no_message_compressed(tmp_path, storage):
+    written = noisy_messages(seed=2, count=300)
+    path = packed_bag(tmp_path / "bag", storage, CompressionMode.MESSAGE, written)
+    file = data_file(path)
+    data = file.read_bytes()
+    file.write_bytes(data[: len(data) // 2])
+    messages, _, refusal = read_or_refusal(path)
+    assert set(messages) <= set(written)
+    assert messages or refusal
+
+
+@pytest.mark.xfail(reason="EOFError from a cut .zstd file", strict=True, raises=EOFError)
+@pytest.mark.parametrize("storage", STORAGES)
+def test_a_cut_compressed_file_is_refused_in_words(tmp_path, storage):
+    path = packed_bag(
+        tmp_path / "bag", storage, CompressionMode.FILE, noisy_messages(seed=2, count=100)
+    )
+    file = data_file(path)
+    file.write_bytes(file.read_bytes()[:-1000])
+    with pytest.raises(BagError, match="bag"):
+        open_bag(path)
+
+
+def flip_until(path, file, seed, change):
+    """Damage `file` in 400 seeded ways; what BagError does not cover is the test's failure."""
+    data, rng = file.read_bytes(), Random(seed)
+    for _ in range(400):
+        damaged = bytearray(data)
+        change(damaged, rng)
+        file.write_bytes(damaged)
+        _, damage, refusal = read_or_refusal(path)
+        assert "\n" not in damage + refusal
+
+
+def zero_a_stretch(damaged, rng):
+    at, size = rng.randrange(len(damaged)), rng.choice([1, 8, 64, 512, 4096])
+    damaged[at : at + size] = bytes(len(damaged[at : at + size]))
+
+
+def flip_some(damaged, rng):
+    for _ in range(rng.randrange(1, 6)):
+        damaged[rng.randrange(len(damaged))] ^= rng.randrange(1, 256)
+
+
+@pytest.mark.xfail(
+    reason="AssertionError from rosbags; KeyError 'time' in salvage; messages of many lines",
+    strict=True,
+)
+@pytest.mark.parametrize("change", [zero_a_stretch, flip_some])
+def test_a_ros1_bag_damaged_anywhere_gives_words(tmp_path, change):
+    path = ros1_bag(tmp_path / "run.bag", Writer1.CompressionFormat.LZ4, 300)
+    flip_until(path, path, 5, change)
+
+
+@pytest.mark.xfail(reason="a message definition that rosbags cannot parse", strict=True)
+@pytest.mark.parametrize("storage", STORAGES)
+def test_damage_is_told_in_one_line(tmp_path, storage):
+    path = ros2_bag(tmp_path / "bag", STORAGES[storage], noisy_messages(seed=1, count=50))
+    file = data_file(path)
+    file.write_bytes(file.read_bytes().replace(b"Time stamp", b"Ti!e stamp"))
+    _, damage, refusal = read_or_refusal(path)
+    assert damage or refusal
+    assert "\n" not in damage + refusal
 
 
 @pytest.mark.parametrize("name", ["nothing.mcap", "empty", "junk.mcap", "junk.bag", "junk.db3"])
@@ -110,8 +280,9 @@ def test_what_is_no_bag_is_refused_in_words(tmp_path, name):
         path.mkdir()
     elif name.startswith("junk"):
         path.write_bytes(b"no recording at all" * 50)
-    with pytest.raises(BagError, match=name):
+    with pytest.raises(BagError, match=name) as refused:
         open_bag(path)
+    assert "\n" not in str(refused.value)
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from sdrlinkd.adapters import BuiltInRobot, first_seconds, from_cdr, paced
-from sdrlinkd.adapters.bags import BagMessage
+from sdrlinkd.adapters import BuiltInRobot, from_cdr
 from sdrlinkd.adapters.robot import ROOM_HALF_M, Pose
 
 
@@ -49,6 +48,16 @@ def test_the_laser_sees_the_walls(messages):
         x = pose.x + scan.ranges * np.cos(angles)
         y = pose.y + scan.ranges * np.sin(angles)
         assert np.abs(np.maximum(np.abs(x), np.abs(y)) - ROOM_HALF_M).max() < 0.06
+        assert np.isfinite(scan.ranges).all()
+        assert (scan.range_min, scan.range_max) == (pytest.approx(0.12), 18)
+        assert scan.range_min <= scan.ranges.min() <= scan.ranges.max() <= scan.range_max
+
+
+@pytest.mark.parametrize("seconds", [0.1, 1.0, 2.55])
+def test_the_topic_list_tells_the_counts(seconds):
+    robot = BuiltInRobot("/robot_1/", seconds, 3)
+    counts = Counter(m.topic for m in robot.messages())
+    assert {t.name: t.n_messages for t in robot.topics()} == counts
 
 
 @pytest.mark.parametrize("t", [0.3, 1.7, 5.2, 11.0])
@@ -60,35 +69,16 @@ def test_velocity_and_turn_rate_are_derivatives(t):
     assert (b.speed - a.speed) / (2 * d) == pytest.approx(pose.acceleration, rel=1e-3, abs=1e-6)
 
 
-class FakeTime:
-    """A clock that sleeping moves."""
-
-    def __init__(self):
-        self.now = 100.0
-
-    def clock(self):
-        return self.now
-
-    def sleep(self, seconds):
-        self.now += seconds
-
-
-def at(*seconds):
-    return [BagMessage("/a", "b/msg/C", round(s * 1e9), b"") for s in seconds]
-
-
-def test_pace_is_absolute_and_a_late_message_delays_no_other():
-    fake, seen = FakeTime(), []
-    for message in paced(at(5, 6, 7, 9), 2.0, fake.clock, fake.sleep):
-        seen.append(round(fake.now - 100, 6))
-        if message.time_ns == 6_000_000_000:
-            fake.now += 0.8  # the consumer dawdles past the next message's time
-    assert seen == [0.0, 0.5, 1.3, 2.0]
-
-
-def test_first_seconds():
-    assert first_seconds(at(5, 5.5, 6, 6.01), 1.0)
-    assert [m.time_ns for m in first_seconds(at(5, 5.5, 6, 6.01), 1.0)] == [
-        5_000_000_000,
-        5_500_000_000,
-    ]
+def test_odometry_tells_the_velocity_of_the_path(messages):
+    for message in (m for m in messages if m.topic.endswith("odom")):
+        t, d = message.time_ns * 1e-9, 1e-5
+        a, b = Pose(t - d), Pose(t + d)
+        odom = from_cdr(message.cdr, message.type)
+        twist, turn = odom.twist.twist, odom.pose.pose.orientation
+        assert twist.linear.x == pytest.approx(math.hypot(b.x - a.x, b.y - a.y) / (2 * d), rel=1e-4)
+        assert twist.angular.z == pytest.approx(
+            math.remainder(b.heading - a.heading, 2 * math.pi) / (2 * d), rel=1e-3, abs=1e-5
+        )
+        heading = math.atan2(b.y - a.y, b.x - a.x)
+        off = math.remainder(2 * math.atan2(turn.z, turn.w) - heading, 2 * math.pi)
+        assert off == pytest.approx(0, abs=1e-4)

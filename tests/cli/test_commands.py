@@ -1,5 +1,6 @@
 """sdrlinkctl against real daemons, and what bad input gets."""
 
+import contextlib
 import json
 import subprocess
 import sys
@@ -220,6 +221,8 @@ def test_pdu_decode_shows_the_layout(ctl, tmp_path):
     assert code == 2
     assert "rx_crc" in err
     assert "src 1" in out
+    code, _, err = ctl("pdu", "decode", "00")
+    assert (code, "got 1 octets; allowed: a whole PDU" in err) == (2, True)
     code, _, err = ctl("pdu", "decode", "zz")
     assert code == 2
     assert "allowed: octets" in err
@@ -238,6 +241,21 @@ def test_pdu_watch_shows_both_directions(start_daemon):
     watch.stdout.close()
     assert "→ src 1 dst all" in out
     assert "← src 1 dst all" in out
+
+
+def test_a_bug_of_ours_is_one_line_too(ctl, monkeypatch):
+    def broken(*_):
+        raise ZeroDivisionError("oh")
+
+    monkeypatch.setattr("sdrlinkd.cli.status.ask_status", broken)
+    monkeypatch.setattr("sdrlinkd.cli.status.connect", lambda _: contextlib.nullcontext())
+    code, _, err = ctl("status")
+    assert code == 1
+    assert err.count("\n") == 1
+    assert "SDRLINKD_DEBUG=1" in err
+    monkeypatch.setenv("SDRLINKD_DEBUG", "1")
+    with pytest.raises(ZeroDivisionError):
+        ctl("status")
 
 
 def test_completion_and_help(ctl):
