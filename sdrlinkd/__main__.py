@@ -32,6 +32,9 @@ def main(arguments: list[str] | None = None) -> int:
     except UserError as error:
         sys.stderr.write(f"sdrlinkd: {error}\n")
         return 2
+    except KeyboardInterrupt:
+        # Before the daemon's own handler stood.
+        return 130
     return 0
 
 

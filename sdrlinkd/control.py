@@ -1,6 +1,7 @@
 """The control socket: versioned verbs, answered from the node (bus document, section 5)."""
 
 import asyncio
+import logging
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -12,6 +13,8 @@ import zmq
 from sdrlinkd.bus import RuntimeDirectory, SocketReader
 from sdrlinkd.client import CONTROL_SOCKET
 from sdrlinkd.errors import UserError
+
+log = logging.getLogger("sdrlinkd")
 
 PROTOCOL = b"sdrl1"
 
@@ -93,6 +96,9 @@ class Control:
             return error(problem.code, str(problem))
         except UserError as problem:
             return error("refused", str(problem))
+        except Exception as problem:
+            log.exception("a bug of ours in the verb %s", name)
+            return error("internal", f"a bug of ours, see the daemon's log: {problem}")
 
     def _reply(self, identity: bytes, request_id: bytes, answer: tuple[bytes, object]) -> None:
         status, body = answer

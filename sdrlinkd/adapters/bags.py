@@ -5,11 +5,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from rosbags.highlevel import AnyReader, AnyReaderError
+from rosbags.highlevel import AnyReader
 
-from sdrlinkd.adapters.salvage import Piece, salvage
+from sdrlinkd.adapters.salvage import Piece, looks_cut, salvage
 from sdrlinkd.adapters.typestore import Ros1Converter, ros2_types
 from sdrlinkd.errors import BagError
+
+# Of a reader's reason, as much as a person reads.
+MAX_REASON = 200
 
 
 class BagTopic(NamedTuple):
@@ -51,14 +54,23 @@ def open_bag(path: Path) -> Bag:
 
     A damaged one opens with what can be read; see `damage`. Raises BagError when that is nothing.
     """
-    if not path.exists():
+    try:
+        if looks_cut(path):
+            return _DamagedBag(path, "shorter than its header says")
+        return _WholeBag(path)
+    except BagError:
+        raise
+    except FileNotFoundError as error:
+        if path.exists():
+            return _DamagedBag(path, _one_line(error))
         raise BagError(
             f"{path}: no such file or folder; a bag is a rosbag2 folder, .mcap, .db3 or .bag"
-        )
-    try:
-        return _WholeBag(path)
-    except (AnyReaderError, OSError, ValueError, KeyError, AttributeError) as error:
-        return _DamagedBag(path, str(error))
+        ) from None
+    except PermissionError as error:
+        raise BagError(f"{path}: cannot be read ({error.strerror})") from None
+    except Exception as error:
+        # A reader has many ways to say "damaged", running out of memory among them.
+        return _DamagedBag(path, _one_line(error))
 
 
 class _WholeBag:
@@ -91,7 +103,9 @@ class _WholeBag:
             raise
         except Exception as error:
             # A reader has many ways to say "damaged".
-            self.damage = f"{self.path}: unreadable after {done} of {total} messages ({error})"
+            self.damage = (
+                f"{self.path}: unreadable after {done} of {total} messages ({_one_line(error)})"
+            )
 
     def close(self) -> None:
         self._reader.close()
@@ -137,3 +151,8 @@ class _DamagedBag:
             self._unconvertible[kind] += 1
             return None
         return BagMessage(piece.topic, kind, piece.time_ns, cdr)
+
+
+def _one_line(error: Exception) -> str:
+    """What an error says; some readers draw pictures over many lines."""
+    return (" ".join(str(error).split()) or type(error).__name__)[:MAX_REASON]

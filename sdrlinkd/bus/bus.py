@@ -68,15 +68,16 @@ class Bus:
         )
         loop = asyncio.get_running_loop()
         self._sockets: list[zmq.Socket[bytes]] = []
-        pull = self._bind(zmq.PULL, IN_SOCKET, {zmq.RCVHWM: IN_HWM})
-        sub = self._bind(zmq.SUB, IN_PUB_SOCKET, {zmq.RCVHWM: IN_HWM, zmq.SUBSCRIBE: b""})
+        self._pull = self._bind(zmq.PULL, IN_SOCKET, {zmq.RCVHWM: IN_HWM})
+        self._sub = self._bind(zmq.SUB, IN_PUB_SOCKET, {zmq.RCVHWM: IN_HWM, zmq.SUBSCRIBE: b""})
         out_options: dict[int, int | bytes] = {
             zmq.SNDHWM: setup.config.rx_depth,
             zmq.XPUB_WELCOME_MSG: b"\0" + self._welcome,
         }
         self._out = self._bind(zmq.XPUB, OUT_SOCKET, out_options)
         self._ingress_readers = [
-            SocketReader(loop, each, each.recv_multipart, self._take) for each in (pull, sub)
+            SocketReader(loop, each, each.recv_multipart, self._take)
+            for each in (self._pull, self._sub)
         ]
         self._out_reader = SocketReader(
             loop, self._out, self._out.recv_multipart, self._take_subscription
@@ -119,9 +120,11 @@ class Bus:
         return self._names_out
 
     def stop_ingress(self) -> None:
-        """Take no more messages."""
+        """Take what has arrived, and then no more: producers see the sockets close."""
         while self._ingress_readers:
-            self._ingress_readers.pop().close()
+            self._ingress_readers.pop().close(drain=True)
+        for socket in (self._pull, self._sub):
+            socket.close()
 
     def close(self) -> None:
         """Close all sockets; consumers get what ZeroMQ already has for them."""

@@ -31,6 +31,7 @@ class RuntimeDirectory:
             )
         try:
             path.mkdir(mode=0o750, parents=True, exist_ok=True)
+            _refuse_foreign(path)
             self._lock = os.open(path / LOCK_NAME, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o640)
         except OSError as error:
             raise BusError(
@@ -82,7 +83,20 @@ class RuntimeDirectory:
         """Remove the sockets bound here and give up the lock."""
         for path in self._bound:
             path.unlink(missing_ok=True)
+        os.ftruncate(self._lock, 0)
         os.close(self._lock)
+
+
+def _refuse_foreign(path: Path) -> None:
+    """A directory that others own or may write to could be prepared to receive our sockets."""
+    about = path.stat()
+    if about.st_uid not in (0, os.getuid()) or (
+        about.st_mode & 0o002 and not about.st_mode & 0o1000
+    ):
+        raise BusError(
+            f"bus.runtime_dir: {path} belongs to another user or is open to all; name a directory "
+            "of this user's own"
+        )
 
 
 def _is_live(path: Path) -> bool:

@@ -1,6 +1,7 @@
 """The command tree of sdrlinkctl, and how its errors end."""
 
 import os
+import signal
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -34,6 +35,9 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")
 
 def main() -> None:
     """Run sdrlinkctl; exit code 2 for what a person can mend, 130 after Ctrl-C."""
+    # A closed terminal or a kill unwinds like Ctrl-C, so that nothing is left running.
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda got, _: sys.exit(128 + got))
     sys.exit(run(sys.argv[1:]))
 
 
@@ -47,6 +51,9 @@ def run(arguments: list[str]) -> int:
         return 130
     except (UserError, NoDaemonError, RefusedError) as error:
         sys.stderr.write(f"sdrlinkctl: {error}\n")
+        return 2
+    except OSError as error:
+        sys.stderr.write(f"sdrlinkctl: {error.filename or ''}: {error.strerror or error}\n")
         return 2
     except Exception as error:
         if os.environ.get(DEBUG_VARIABLE):

@@ -26,7 +26,7 @@ def info(bag: Annotated[Path, typer.Argument(help="rosbag2 folder, .mcap, .db3 o
     console = Console()
     for topic in opened.topics():
         console.print(
-            f"{topic.n_messages:>7}  {topic.name}  [dim]{topic.type}[/dim]", highlight=False
+            f"{topic.n_messages:>7}  {topic.name}  {topic.type}", highlight=False, markup=False
         )
     opened.close()
     if opened.damage:
@@ -56,21 +56,18 @@ def play(
     with connect(runtime_dir) as control:
         snapshot = ask_status(control)
     taken = {topic.name: topic for topic in snapshot.link.topics if topic.subscribed}
-    route = _route(opened.topics(), taken, snapshot.namespace, topics or [], remap or [])
-    for name, target in route.items():
-        if target is None:
-            console.print(
-                f"left out: {name} (the daemon's registry does not have it)", style="yellow"
-            )
-    if not any(route.values()):
+    route, left_out = _route(opened.topics(), taken, snapshot.namespace, topics or [], remap or [])
+    for name, reason in left_out.items():
+        console.print(f"left out: {name} ({reason})", style="yellow", markup=False)
+    if not route:
         raise UserError(f"{bag}: the daemon takes none of its topics; it takes {', '.join(taken)}")
-    total = sum(topic.n_messages for topic in opened.topics() if route.get(topic.name))
-    messages: Iterator[BagMessage] = (m for m in opened.messages() if route.get(m.topic))
+    total = sum(topic.n_messages for topic in opened.topics() if topic.name in route)
+    messages: Iterator[BagMessage] = (m for m in opened.messages() if m.topic in route)
     if duration is not None:
         messages = first_seconds(messages, duration)
     sent = 0
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
@@ -78,7 +75,7 @@ def play(
     with Publisher(runtime_dir) as publisher, Progress(*columns, console=console) as progress:
         task = progress.add_task(bag.name, total=None if duration else total)
         for message in paced(messages, rate):
-            publisher.send(str(route[message.topic]), message.cdr, type=message.type)
+            publisher.send(route[message.topic], message.cdr, type=message.type)
             sent += 1
             progress.advance(task)
     opened.close()
@@ -93,8 +90,8 @@ def _route(
     namespace: str,
     only: list[str],
     remap: list[str],
-) -> dict[str, str | None]:
-    """The daemon's topic for each of the bag's; None where there is none."""
+) -> tuple[dict[str, str], dict[str, str]]:
+    """(the daemon's topic for each of the bag's, those that have none and why)."""
     mapping = {}
     for rule in remap:
         source, separator, target = rule.partition(":=")
@@ -105,12 +102,19 @@ def _route(
     for name in (*only, *mapping):
         if name not in known:
             raise UserError(f"got {name}; allowed: the bag's topics {', '.join(sorted(known))}")
-    route: dict[str, str | None] = {}
+    route: dict[str, str] = {}
+    left_out: dict[str, str] = {}
     for topic in topics:
         if only and topic.name not in only:
             continue
         candidates = [mapping.get(topic.name, topic.name)]
         if namespace and topic.name not in mapping:
             candidates.append(f"/{namespace.strip('/')}{topic.name}")
-        route[topic.name] = next((name for name in candidates if name in taken), None)
-    return route
+        target = next((name for name in candidates if name in taken), "")
+        if not target:
+            left_out[topic.name] = "the daemon's registry does not have it"
+        elif taken[target].type != topic.type:
+            left_out[topic.name] = f"is {topic.type}, the registry has {taken[target].type}"
+        else:
+            route[topic.name] = target
+    return route, left_out

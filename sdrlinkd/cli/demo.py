@@ -2,6 +2,7 @@
 
 from enum import StrEnum
 from pathlib import Path
+from types import ModuleType
 from typing import Annotated
 
 import msgspec
@@ -37,7 +38,7 @@ def demo(
     ] = None,
     duration: Annotated[
         float | None,
-        typer.Option(min=0.1, help="Seconds of the recording; by default all (built-in: 15)."),
+        typer.Option(min=0.1, max=1e6, help="Seconds of it; by default all (built-in: 15)."),
     ] = None,
     speed: Annotated[float, typer.Option(min=0.01, help="Times as fast as recorded.")] = 1.0,
     pdu_size: Annotated[
@@ -53,14 +54,16 @@ def demo(
 ) -> None:
     """Send a robot's messages through a daemon and back; measure what the paper measured."""
     console = Console()
+    pictures = _load_pictures()
+    _make_folder(out)
     source = open_source(bag, registry, topics or [], duration, seed)
     for reason in source.left_out:
-        console.print(f"left out: {reason}", style="yellow", highlight=False)
+        console.print(f"left out: {reason}", style="yellow", highlight=False, markup=False)
     expected = source.expected()
     if isinstance(source.recording, BuiltInRobot):
         expected = sum(topic.n_messages for topic in source.topics)
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         TextColumn("sent {task.completed:.0f}, received {task.fields[received]}"),
         TimeElapsedColumn(),
@@ -75,9 +78,6 @@ def demo(
     source.recording.close()
     report = DemoReport(version=__version__, runs=[result])
     _write(out, json_file, report)
-    # Matplotlib is an extra, and slow to load.
-    from sdrlinkd.demo import pictures
-
     caption = (
         f"sdrlinkctl demo --link {link.value}, {source.title}, PDUs of {pdu_size} B, seed {seed}"
     )
@@ -91,11 +91,34 @@ def demo(
         f"{result.entries_per_message:.1f} entries a message; "
         f"dropped: {result.dropped or 'nothing'}",
         highlight=False,
+        markup=False,
         soft_wrap=True,
     )
-    console.print(f"wrote {out}/report.json, latency_cdf.png, path.png", highlight=False)
+    console.print(
+        f"wrote {out}/report.json, latency_cdf.png, path.png", highlight=False, markup=False
+    )
     if result.damage:
-        console.print(f"warning: {result.damage}", style="yellow", highlight=False)
+        console.print(f"warning: {result.damage}", style="yellow", highlight=False, markup=False)
+
+
+def _load_pictures() -> ModuleType:
+    """Matplotlib is an extra, and slow to load: only here, and before a run rather than after."""
+    try:
+        from sdrlinkd.demo import pictures
+    except ImportError:
+        raise UserError(
+            "the pictures need matplotlib; install it with: pip install 'sdrlinkd[plots]'"
+        ) from None
+    return pictures
+
+
+def _make_folder(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for name in ("report.json", "latency_cdf.png", "path.png"):
+            (out / name).open("ab").close()
+    except OSError as error:
+        raise UserError(f"{error.filename} cannot be written ({error.strerror})") from None
 
 
 def _write(out: Path, json_file: Path | None, report: DemoReport) -> None:

@@ -16,6 +16,7 @@ from sdrlinkd.cli.app import RuntimeDir, app, connect
 from sdrlinkd.cli.status import ask_status
 from sdrlinkd.client import Message, Publisher, Subscriber
 from sdrlinkd.errors import UserError
+from sdrlinkd.link import CDR_HEADER_SIZE
 
 MAX_SHOWN_ITEMS = 12
 
@@ -29,7 +30,9 @@ def pub(
     cdr_file: Annotated[
         Path | None, typer.Option("--cdr", help="Send this file's CDR bytes instead.")
     ] = None,
-    rate: Annotated[float, typer.Option("--rate", "-r", min=0.0, help="Hz; 0: once.")] = 0.0,
+    rate: Annotated[
+        float, typer.Option("--rate", "-r", min=0.0, max=1e6, help="Hz; 0: once.")
+    ] = 0.0,
     times: Annotated[int, typer.Option("--times", "-t", min=0, help="0: until Ctrl-C.")] = 0,
     qos: Annotated[str | None, typer.Option(help="urgent, latency, default or bulk.")] = None,
     priority: Annotated[int | None, typer.Option(min=0, max=127)] = None,
@@ -45,7 +48,9 @@ def pub(
     if topic not in sent:
         raise UserError(f"topic {topic} is not taken by the daemon; allowed: {', '.join(sent)}")
     kind = sent[topic].type
-    payload = _read(cdr_file) if cdr_file else to_cdr(_fill(empty(kind), values, kind), kind)
+    payload = _read(cdr_file) if cdr_file else _serialize(values, kind)
+    if times > 1 and not rate:
+        rate = 1.0
     lifespan_ms = None if lifespan is None else lifespan * 1e3
     with Publisher(runtime_dir) as publisher:
         count = 0
@@ -62,7 +67,7 @@ def pub(
             count += 1
             if not rate or count == times:
                 break
-            time.sleep(1 / rate)
+            time.sleep(min(1 / rate, 1e6))
     typer.echo(f"published {count} × {len(payload)} B on {topic} ({kind})")
 
 
@@ -74,7 +79,7 @@ def echo(
     raw: Annotated[bool, typer.Option("--raw", help="Show the CDR bytes in hex.")] = False,
     count: Annotated[int, typer.Option("--count", "-n", min=0, help="0: until Ctrl-C.")] = 0,
     timeout: Annotated[
-        float | None, typer.Option(min=0, help="Stop after this many seconds of silence.")
+        float | None, typer.Option(min=0, max=1e6, help="Stop after this many silent seconds.")
     ] = None,
     runtime_dir: RuntimeDir = None,
 ) -> None:
@@ -84,11 +89,11 @@ def echo(
     connect(runtime_dir).close()
     with Subscriber(topic, directory=runtime_dir) as subscriber:
         while message := subscriber.receive(timeout):
-            console.print(_headline(message), style="bold", highlight=False)
+            console.print(_headline(message), style="bold", highlight=False, markup=False)
             if raw:
-                console.print(message.payload.hex(" "), highlight=False)
+                console.print(message.payload.hex(" "), highlight=False, markup=False)
             else:
-                console.print(as_yaml(message), highlight=False, end="")
+                console.print(as_yaml(message), highlight=False, markup=False, end="")
             console.print("---")
             shown += 1
             if shown == count:
@@ -156,18 +161,40 @@ def _assign(message: Any, given: dict[str, Any], path: str) -> None:  # noqa: AN
 
 
 def _convert(current: Any, value: Any, path: str) -> Any:  # noqa: ANN401
+    """`value` as the field's own kind, which its default shows."""
     try:
         if isinstance(current, np.ndarray):
-            return np.asarray(value, dtype=current.dtype)
-        if isinstance(current, int | float) and not isinstance(current, bool):
-            return float(value) if isinstance(value, float) else int(value)
-    except (TypeError, ValueError):
+            return np.asarray(value, dtype=current.dtype).reshape(-1)
+        if isinstance(current, float):
+            return float(value)
+    except (TypeError, ValueError, OverflowError):
         raise UserError(f"{path}: got {value!r}; allowed: numbers") from None
+    kinds = {bool: "true or false", int: "a number", str: "text", list: "a list"}
+    for kind, words in kinds.items():
+        if isinstance(current, kind) and not isinstance(
+            value, (int, float) if kind is int else kind
+        ):
+            raise UserError(f"{path}: got {value!r}; allowed: {words}")
     return value
+
+
+def _serialize(values: str, kind: str) -> bytes:
+    message = _fill(empty(kind), values, kind)
+    try:
+        return to_cdr(message, kind)
+    except Exception as error:
+        # The serializer is made from the definition; what does not fit fails in its own ways.
+        raise UserError(
+            f"{kind}: {values} does not fit its fields ({error}); lists of messages can be sent "
+            "with --cdr FILE"
+        ) from None
 
 
 def _read(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        data = path.read_bytes()
     except OSError as error:
         raise UserError(f"--cdr: {path} cannot be read ({error.strerror})") from None
+    if len(data) < CDR_HEADER_SIZE:
+        raise UserError(f"--cdr: {path} has {len(data)} bytes; CDR begins with a header of 4")
+    return data

@@ -8,7 +8,7 @@ import zmq
 from rich.console import Console
 
 from sdrlinkd.cli.app import RuntimeDir, app
-from sdrlinkd.client import OUT_SOCKET, endpoint, no_daemon, unpack
+from sdrlinkd.client import OUT_SOCKET, ControlClient, endpoint, unpack
 from sdrlinkd.client import runtime_dir as find_runtime_dir
 from sdrlinkd.config import load_registry
 from sdrlinkd.errors import PduError, UserError
@@ -28,6 +28,7 @@ pdus = typer.Typer(help="PDUs on the air.", no_args_is_help=True)
 app.add_typer(pdus, name="pdu")
 
 PDU_TAP = b"\0pdu\0"
+SILENCE_MS = 1000
 QOS_NAMES = ("default", "latency", "bulk", "urgent")
 
 RegistryOption = Annotated[
@@ -51,7 +52,7 @@ def decode(
             f"HEX: got {len(data)} octets; allowed: a whole PDU, {MIN_PDU_SIZE} to {MAX_PDU_SIZE}"
         )
     names = load_registry(registry) if registry else None
-    Console().print(explain(data, names), highlight=False)
+    Console().print(explain(data, names), highlight=False, markup=False)
     try:
         parse(data, len(data))
     except PduError as error:
@@ -69,23 +70,32 @@ def watch(
     names = load_registry(registry) if registry else None
     console = Console()
     directory = find_runtime_dir(runtime_dir)
-    if not (directory / OUT_SOCKET).exists():
-        raise no_daemon(directory)
+    _ask_hello(directory)
     context = zmq.Context()
     with context.socket(zmq.SUB) as socket:
         socket.connect(endpoint(directory, OUT_SOCKET))
         socket.subscribe(PDU_TAP)
         shown = 0
         while not count or shown < count:
+            if not socket.poll(SILENCE_MS):
+                _ask_hello(directory)
+                continue
             _, header, data = socket.recv_multipart()
             direction = unpack(header[1:])["dir"]
             arrow = "→" if direction == "tx" else "←"
             console.print(
                 f"{arrow} {explain(data, names) if layout else one_line(data, names)}",
                 highlight=False,
+                markup=False,
             )
             shown += 1
     context.term()
+
+
+def _ask_hello(directory: Path) -> None:
+    """Raises NoDaemonError when the daemon has gone."""
+    with ControlClient(directory) as control:
+        control.ask("hello")
 
 
 def one_line(data: bytes, registry: Registry | None) -> str:

@@ -31,7 +31,7 @@ def no_daemon(directory: object) -> NoDaemonError:
     """The error for a runtime directory without a daemon."""
     return NoDaemonError(
         f"no sdrlinkd answers in {directory}; start one (sdrlinkd --config FILE), or name its "
-        "directory with SDRLINKD_RUNTIME_DIR"
+        "directory with SDRLINKD_RUNTIME_DIR; a service's is open to members of its group only"
     )
 
 
@@ -45,7 +45,11 @@ class Endpoint:
         self._socket.linger = LINGER_MS
 
     def _connect(self, name: str) -> None:
-        self._socket.connect(endpoint(self.directory, name))
+        try:
+            self._socket.connect(endpoint(self.directory, name))
+        except zmq.ZMQError:
+            self.close()
+            raise no_daemon(self.directory) from None
 
     def _poll(self, timeout_s: float | None) -> bool:
         timeout_ms = None if timeout_s is None else math.ceil(timeout_s * 1000)
@@ -118,7 +122,10 @@ class Publisher(Endpoint):
                     raise no_daemon(self.directory)
                 answers.recv_multipart()
                 if step == "subscribed":
-                    self._socket.send_multipart(sync_frames(ack_topic))
+                    try:
+                        self._socket.send_multipart(sync_frames(ack_topic))
+                    except zmq.Again:
+                        raise no_daemon(self.directory) from None
 
     def __exit__(
         self,

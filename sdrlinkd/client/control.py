@@ -9,7 +9,7 @@ import zmq
 
 from sdrlinkd.client.blocking import Endpoint, no_daemon
 from sdrlinkd.client.flatmap import Value, pack_map, unpack
-from sdrlinkd.client.paths import CONTROL_SOCKET
+from sdrlinkd.client.paths import CONTROL_SOCKET, is_there
 
 PROTOCOL = b"sdrl1"
 
@@ -29,7 +29,7 @@ class ControlClient(Endpoint):
         self, directory: str | os.PathLike[str] | None = None, timeout_s: float = 5.0
     ) -> None:
         super().__init__(zmq.DEALER, directory)
-        if not (self.directory / CONTROL_SOCKET).exists():
+        if not is_there(self.directory / CONTROL_SOCKET):
             self.close()
             raise no_daemon(self.directory)
         self._timeout_s = timeout_s

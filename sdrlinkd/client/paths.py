@@ -1,6 +1,5 @@
 """Where the daemon's sockets are."""
 
-import contextlib
 import os
 from pathlib import Path
 
@@ -18,12 +17,18 @@ def runtime_dir(given: str | os.PathLike[str] | None = None) -> Path:
     chosen = given or os.environ.get("SDRLINKD_RUNTIME_DIR")
     if chosen:
         return Path(chosen)
-    # A user outside the service's group may not even look.
-    with contextlib.suppress(PermissionError):
-        if (SYSTEM_DIR / CONTROL_SOCKET).exists():
-            return SYSTEM_DIR
+    if is_there(SYSTEM_DIR / CONTROL_SOCKET):
+        return SYSTEM_DIR
     base = os.environ.get("XDG_RUNTIME_DIR")
     return Path(base) / "sdrlinkd" if base else Path(f"/tmp/sdrlinkd-{os.getuid()}")  # noqa: S108
+
+
+def is_there(path: Path) -> bool:
+    """Whether `path` exists, as far as this user may know: outside the group one may not look."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
 
 
 def endpoint(directory: Path, socket: str) -> str:

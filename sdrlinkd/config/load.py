@@ -32,7 +32,7 @@ def parse_config(text: str, source: str = "config") -> Config:
     """The configuration in TOML `text`. Raises ConfigError that cites `source`."""
     try:
         raw = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise ConfigError(f"{source}: not TOML: {error}") from None
     _refuse_unknown(raw, describe.type_of(Config), [], text, source)
     try:

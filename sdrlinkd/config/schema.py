@@ -20,7 +20,7 @@ class DirectParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """The direct link: PDUs straight back to this daemon, with faults on demand."""
 
     hear_self: bool = True
-    rate_bit_s: Annotated[float, Meta(ge=0)] = 0.0
+    rate_bit_s: Annotated[float, Meta(ge=0, le=1e12)] = 0.0
     """Pace of the link in bit/s; 0: as fast as it goes."""
     loss: Annotated[float, Meta(ge=0, le=1)] = 0.0
     """Share of PDUs that vanish."""

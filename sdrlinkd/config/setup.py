@@ -9,8 +9,11 @@ from sdrlinkd.errors import ConfigError, RegistryError
 from sdrlinkd.link import TopicPolicy
 from sdrlinkd.wire import Registry, equal_payload, max_message_size, parse_registry
 
+MAX_ID_DIGITS = 3
+MIN_BEACON_S = 0.01
 _DIGITS = re.compile(r"\d+")
 _NAMESPACE = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+_RX_NAME = re.compile(r"(/[A-Za-z_]\w*)+/?", re.ASCII)
 _PLACEHOLDER = re.compile(r"\{(src_id|src)\}")
 
 # Types whose messages have no upper size, and which a small PDU may not carry whole.
@@ -76,14 +79,10 @@ def load_registry(path: Path) -> Registry:
     """The registry in `path`. Raises RegistryError."""
     try:
         text = path.read_text()
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise RegistryError(
-            f"{path}: the topic registry cannot be read ({error.strerror}); "
+            f"{str(path)!r}: the topic registry cannot be read ({error}); "
             "it is a CSV of `name,type` lines, named by the key `registry`"
-        ) from None
-    except UnicodeDecodeError:
-        raise RegistryError(
-            f"{path}: is not a text file; a registry is `name,type` lines"
         ) from None
     return parse_registry(text, str(path))
 
@@ -92,7 +91,7 @@ def _node_id(config: Config, source: str) -> int:
     if config.robot_id >= 0:
         return config.robot_id
     runs = _DIGITS.findall(config.namespace)
-    if runs and int(runs[-1]) < 255:
+    if runs and len(runs[-1]) <= MAX_ID_DIGITS and int(runs[-1]) < 255:
         return int(runs[-1])
     raise ConfigError(
         f'{source}: robot_id: got -1 (from the namespace), but namespace "{config.namespace}" '
@@ -107,11 +106,19 @@ def _check_texts(config: Config, source: str) -> None:
             f'{source}: namespace: got "{config.namespace}"; allowed: a ROS namespace such as '
             '"robot_1", or ""'
         )
-    if not _PLACEHOLDER.search(config.rx_format) or not config.rx_format.startswith("/"):
+    named = _PLACEHOLDER.sub("1", config.rx_format)
+    if named == config.rx_format or not _RX_NAME.fullmatch(named):
         raise ConfigError(
             f'{source}: rx_format: got "{config.rx_format}"; allowed: a name that starts with / '
             'and holds {src_id}, such as "/rx_robot_{src_id}"'
         )
+    if 0 < config.link.beacon_s < MIN_BEACON_S:
+        raise ConfigError(
+            f"{source}: link.beacon_s: got {config.link.beacon_s}; allowed: 0 (none), or at least "
+            f"{MIN_BEACON_S}"
+        )
+    if "\0" in config.bus.runtime_dir:
+        raise ConfigError(f"{source}: bus.runtime_dir: holds a NUL; allowed: a directory's name")
     most = equal_payload(config.link.pdu_size, 1)
     if config.link.min_fragment > most:
         raise ConfigError(
@@ -145,6 +152,8 @@ def _policies(config: Config, registry: Registry, source: str) -> dict[int, Topi
                 f'{source}: topic."{name}": unknown topic; allowed: names of the registry: '
                 f"{registry.suggest(name)}"
             )
+        if topic.id in policies:
+            raise ConfigError(f'{source}: topic."{name}": stands twice, with and without the slash')
         policies[topic.id] = policy
     return policies
 

@@ -110,6 +110,7 @@ class Outbox:
         self.levels: list[Level] = []
         self._level_by_key: dict[tuple[int, int], Level] = {}
         self._by_class: dict[Qos, OrderedDict[Outgoing, None]] = {q: OrderedDict() for q in Qos}
+        self._class_bytes = dict.fromkeys(Qos, 0)
         self._by_topic: dict[int, OrderedDict[Outgoing, None]] = {}
         self._turn = 0
         self.queued = 0
@@ -122,20 +123,16 @@ class Outbox:
 
     def put(self, message: Outgoing, depth: int = 0) -> list[tuple[Outgoing, str]]:
         """Queue `message`; what had to go for it, each with its reason (perhaps itself)."""
+        if not self._can_make_room(message):
+            return [(message, "tx_overflow_new")]
         shed: list[tuple[Outgoing, str]] = []
         topic = self._by_topic.get(message.topic_id)
         if depth and topic is not None:
             while len(topic) >= depth:
                 shed.append((self._withdraw_waiting(next(iter(topic))), "tx_superseded"))
-        size = len(message.payload)
-        limits = self._limits
-        if size > limits.max_bytes:
-            return [*shed, (message, "tx_overflow_new")]
+        limits, size = self._limits, len(message.payload)
         while self.queued >= limits.max_messages or self.queued_bytes + size > limits.max_bytes:
             victim = self._oldest_of_lowest_class()
-            if victim is None or victim.qos < message.qos:
-                shed.append((message, "tx_overflow_new"))
-                return shed
             shed.append((self._withdraw_waiting(victim), "tx_overflow_old"))
         self._enqueue(message)
         return shed
@@ -230,6 +227,7 @@ class Outbox:
         topic[message] = None
         self.queued += 1
         self.queued_bytes += len(message.payload)
+        self._class_bytes[message.qos] += len(message.payload)
 
     def _level(self, key: tuple[int, int]) -> Level:
         level = self._level_by_key.get(key)
@@ -253,11 +251,20 @@ class Outbox:
             del self._level_by_key[level.key]
             del self.levels[bisect_left(self.levels, level.key, key=lambda each: each.key)]
 
-    def _oldest_of_lowest_class(self) -> Outgoing | None:
-        for qos in reversed(Qos):
-            if self._by_class[qos]:
-                return next(iter(self._by_class[qos]))
-        return None
+    def _can_make_room(self, message: Outgoing) -> bool:
+        """Whether it fits when all that waits in its class and below is shed."""
+        limits, size = self._limits, len(message.payload)
+        if self.queued < limits.max_messages and self.queued_bytes + size <= limits.max_bytes:
+            return True
+        higher = [qos for qos in Qos if qos < message.qos]
+        return (
+            sum(len(self._by_class[qos]) for qos in higher) < limits.max_messages
+            and sum(self._class_bytes[qos] for qos in higher) + size <= limits.max_bytes
+        )
+
+    def _oldest_of_lowest_class(self) -> Outgoing:
+        lowest = max(qos for qos, queue in self._by_class.items() if queue)
+        return next(iter(self._by_class[lowest]))
 
     def _withdraw_waiting(self, message: Outgoing) -> Outgoing:
         """`message` is the oldest of its class or topic, so first among its lane's waiting."""
@@ -273,6 +280,7 @@ class Outbox:
         del self._by_topic[message.topic_id][message]
         self.queued -= 1
         self.queued_bytes -= len(message.payload)
+        self._class_bytes[message.qos] -= len(message.payload)
 
     def _next_turn(self) -> int:
         self._turn += 1

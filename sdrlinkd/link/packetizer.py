@@ -112,7 +112,7 @@ class Packetizer:
             looked_at += len(level.lanes)
             if self._may_fit(level, draft.room):
                 self._fill_from(level, draft, start)
-            if draft.room <= 0 or looked_at > MAX_LANES_PER_PDU:
+            if draft.room <= 0 or (looked_at > MAX_LANES_PER_PDU and not draft.is_empty):
                 break
         if draft.is_empty:
             return None

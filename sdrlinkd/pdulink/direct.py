@@ -18,7 +18,9 @@ class DirectLink:
 
     def __init__(self, params: DirectParams, pdu_size: int, rng: Random) -> None:
         self._params = params
-        self._airtime_per_pdu_s = 8 * pdu_size / params.rate_bit_s if params.rate_bit_s else 0.0
+        self._airtime_per_pdu_s = (
+            8 * pdu_size / max(params.rate_bit_s, 1.0) if params.rate_bit_s else 0.0
+        )
         self._impairment = Impairment(params, rng)
         self._listener: PduListener | None = None
         self._free_at = 0.0

@@ -97,7 +97,7 @@ def test_pub_refuses_in_words(start_daemon, ctl):
         (("/robot_1/nothing",), "allowed: /robot_1/scan"),
         (("/robot_1/cmd_vel", "{linear: {q: 1}}"), "has no field q; allowed: x, y, z"),
         (("/robot_1/cmd_vel", "{linear: 3}"), "got 3; allowed: a map"),
-        (("/robot_1/cmd_vel", "{linear: {x: fast}}"), "got 'fast'; allowed: numbers"),
+        (("/robot_1/cmd_vel", "{linear: {x: fast}}"), "got 'fast'; allowed: a number"),
         (("/robot_1/cmd_vel", "[1]"), "allowed: a map"),
         (("/robot_1/cmd_vel", "{"), "not YAML"),
         (("/robot_1/cmd_vel", "{}", "--qos", "fast"), "allowed: urgent"),

@@ -1,19 +1,65 @@
 """What can still be read of damaged recordings. The readers of rosbags need whole files."""
 
-from collections.abc import Iterator
+import re
+from collections.abc import Callable, Iterator
 from pathlib import Path
+
+import zstandard
 
 from sdrlinkd.adapters.salvage import mcap, ros1, sqlite
 from sdrlinkd.adapters.salvage.base import Piece
 
-__all__ = ["Piece", "salvage"]
+__all__ = ["Piece", "looks_cut", "salvage"]
 
-_BY_SUFFIX = {".mcap": mcap.salvage, ".db3": sqlite.salvage, ".bag": ros1.salvage}
+MAX_MESSAGE_BYTES = 1 << 28
+
+_BY_SUFFIX: dict[str, Callable[[Path], Iterator[Piece]]] = {
+    ".mcap": mcap.salvage,
+    ".db3": sqlite.salvage,
+    ".bag": ros1.salvage,
+}
+_PER_MESSAGE = re.compile(r"compression_mode:\s*[\'\"]?message", re.IGNORECASE)
+
+
+def looks_cut(path: Path) -> bool:
+    """Whether a database in `path` is shorter than it says; SQLite would read zeros there."""
+    return any(sqlite.is_cut(file) for file in _files(path) if file.suffix == ".db3")
 
 
 def salvage(path: Path) -> Iterator[Piece]:
     """Messages of the readable part of `path` (a file, or a rosbag2 folder), in file order."""
-    files = sorted(path.iterdir()) if path.is_dir() else [path]
-    for file in files:
-        if file.suffix in _BY_SUFFIX:
-            yield from _BY_SUFFIX[file.suffix](file)
+    compressed = _is_compressed_per_message(path)
+    for file in _files(path):
+        for piece in _readable_part(file):
+            if not compressed:
+                yield piece
+            elif (data := _inflate(piece.data)) is not None:
+                yield piece._replace(data=data)
+
+
+def _files(path: Path) -> list[Path]:
+    return sorted(file for file in path.iterdir() if file.is_file()) if path.is_dir() else [path]
+
+
+def _readable_part(file: Path) -> Iterator[Piece]:
+    if file.suffix not in _BY_SUFFIX:
+        return
+    try:
+        yield from _BY_SUFFIX[file.suffix](file)
+    except GeneratorExit:
+        raise
+    except Exception:
+        # Where a damaged file stops making sense, its readable part ends.
+        return
+
+
+def _is_compressed_per_message(path: Path) -> bool:
+    metadata = path / "metadata.yaml"
+    return metadata.is_file() and bool(_PER_MESSAGE.search(metadata.read_text(errors="replace")))
+
+
+def _inflate(data: bytes) -> bytes | None:
+    try:
+        return zstandard.ZstdDecompressor().decompress(data, max_output_size=MAX_MESSAGE_BYTES)
+    except zstandard.ZstdError:
+        return None

@@ -1,7 +1,6 @@
 """Messages from the readable part of a damaged rosbag2 SQLite file."""
 
 import contextlib
-import os
 import shutil
 import sqlite3
 import struct
@@ -11,40 +10,55 @@ from pathlib import Path
 
 from sdrlinkd.adapters.salvage.base import Piece
 
+# Offsets in the file header (https://www.sqlite.org/fileformat.html, section 1.3).
 _HEADER_BYTES = 100
-_FILLING_BYTES = 16
+MIN_PAGE_SIZE = 512
+_PAGE_SIZE_AT = 16
+_PAGE_COUNT_AT = 28
+
+
+def is_cut(path: Path) -> bool:
+    """Whether the file has fewer pages than its header says."""
+    page_size, pages = _layout(path)
+    return page_size > 0 and path.stat().st_size < page_size * pages
 
 
 def salvage(path: Path) -> Iterator[Piece]:
     """Every row before the first page that is missing or makes no sense."""
-    with path.open("rb") as file:
-        header = file.read(_HEADER_BYTES)
-    if len(header) < _HEADER_BYTES or not header.startswith(b"SQLite format 3\0"):
+    page_size, _ = _layout(path)
+    if page_size < MIN_PAGE_SIZE:
         return
-    page_size = struct.unpack_from(">H", header, 16)[0]
-    pages = struct.unpack_from(">I", header, 28)[0]
     with tempfile.TemporaryDirectory() as folder:
-        # SQLite refuses a file shorter than its header says. Filled up, it reads until a page
-        # makes no sense; the filling is random so that a row which reaches into it is known.
-        whole = Path(folder) / "whole.db3"
-        shutil.copyfile(path, whole)
-        filling = os.urandom(_FILLING_BYTES)
-        missing = (65536 if page_size == 1 else page_size) * pages - whole.stat().st_size
-        with whole.open("ab") as file:
-            file.write(filling * (max(0, missing) // len(filling) + 1))
-        with contextlib.closing(sqlite3.connect(f"file:{whole}?mode=ro", uri=True)) as database:
-            yield from _rows(database, filling)
+        # SQLite refuses a file with fewer pages than its header says; of a copy that says what
+        # there is, it reads all rows but those that reach into missing pages.
+        copy = Path(folder) / "copy.db3"
+        shutil.copyfile(path, copy)
+        pages = copy.stat().st_size // page_size
+        with copy.open("r+b") as file:
+            file.truncate(pages * page_size)
+            file.seek(_PAGE_COUNT_AT)
+            file.write(struct.pack(">I", pages))
+        with contextlib.closing(sqlite3.connect(f"file:{copy}?mode=ro", uri=True)) as database:
+            yield from _rows(database)
 
 
-def _rows(database: sqlite3.Connection, filling: bytes) -> Iterator[Piece]:
-    with contextlib.suppress(sqlite3.Error, UnicodeDecodeError):
+def _rows(database: sqlite3.Connection) -> Iterator[Piece]:
+    with contextlib.suppress(sqlite3.Error, UnicodeDecodeError, OverflowError, MemoryError):
         topics = {
             number: (name, kind)
             for number, name, kind in database.execute("SELECT id, name, type FROM topics")
         }
         rows = database.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY rowid")
         for number, time_ns, data in rows:
-            if filling in data:
-                return
-            if number in topics and isinstance(data, bytes):
+            if number in topics and isinstance(data, bytes) and isinstance(time_ns, int):
                 yield Piece(*topics[number], time_ns, data)
+
+
+def _layout(path: Path) -> tuple[int, int]:
+    """(page size in bytes, pages) by the header; zeros where there is none."""
+    with path.open("rb") as file:
+        header = file.read(_HEADER_BYTES)
+    if len(header) < _HEADER_BYTES or not header.startswith(b"SQLite format 3\0"):
+        return 0, 0
+    stored = struct.unpack_from(">H", header, _PAGE_SIZE_AT)[0]
+    return 65536 if stored == 1 else stored, struct.unpack_from(">I", header, _PAGE_COUNT_AT)[0]
