@@ -95,7 +95,7 @@ class Node:
     async def drain(self, at_most_s: float) -> None:
         """Take nothing more, send what is queued for at most `at_most_s`, drop the rest by name."""
         self._draining = True
-        self.bus.stop_ingress()
+        await self.bus.stop_ingress()
         self._link.drain()
         self._work.set()
         try:

@@ -27,6 +27,11 @@ from sdrlinkd.reports import BusReport
 # Not too small either: when a producer leaves while its pipe stands full, libzmq drops the rest.
 IN_HWM = 1000
 LINGER_MS = 200
+# At the end, messages on their way are waited for until none has come for a while; a producer that
+# never stops cannot hold up the end for long.
+QUIET_S = 0.01
+QUIET_ROUNDS = 3
+LAST_MESSAGES_S = 0.3
 PDU_TAP = b"\0pdu\0"
 
 
@@ -119,16 +124,26 @@ class Bus:
         """Bus topics published so far, by (source, topic id)."""
         return self._names_out
 
-    def stop_ingress(self) -> None:
+    async def stop_ingress(self) -> None:
         """Take what has arrived, and then no more: producers see the sockets close."""
+        # Not unbound before: libzmq would close the connections, and what they still hold is lost.
+        deadline = time.monotonic() + LAST_MESSAGES_S
+        quiet = 0
+        while quiet < QUIET_ROUNDS and time.monotonic() < deadline:
+            seen = self._received
+            await asyncio.sleep(QUIET_S)
+            quiet = quiet + 1 if seen == self._received else 0
+        self._close_ingress()
+
+    def _close_ingress(self) -> None:
         while self._ingress_readers:
-            self._ingress_readers.pop().close(drain=True)
+            self._ingress_readers.pop().close()
         for socket in (self._pull, self._sub):
             socket.close()
 
     def close(self) -> None:
         """Close all sockets; consumers get what ZeroMQ already has for them."""
-        self.stop_ingress()
+        self._close_ingress()
         self._out_reader.close()
         for socket in self._sockets:
             socket.close(linger=LINGER_MS)

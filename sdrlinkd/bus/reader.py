@@ -9,8 +9,6 @@ import zmq
 Received = TypeVar("Received")
 
 DRAIN_LIMIT = 64
-# More than the pipes of many producers hold; one that never stops cannot hold up the end.
-MAX_LAST_MESSAGES = 100_000
 
 
 class SocketReader(Generic[Received]):
@@ -44,16 +42,11 @@ class SocketReader(Generic[Received]):
     def _readable(self) -> bool:
         return bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
 
-    def close(self, *, drain: bool = False) -> None:
-        """Stop reading, after what has arrived when told to; the socket stays open."""
+    def close(self) -> None:
+        """Stop reading; the socket stays open."""
         self._loop.remove_reader(self._descriptor)
         if self._again is not None:
             self._again.cancel()
-        if drain:
-            for _ in range(MAX_LAST_MESSAGES):
-                if not self._readable():
-                    return
-                self._take(self._receive(zmq.NOBLOCK))
 
     def _drain(self) -> None:
         if self._again is not None:

@@ -110,6 +110,75 @@ def test_pub_refuses_in_words(start_daemon, ctl):
     assert code == 2
 
 
+@pytest.mark.parametrize(
+    ("kind", "fields"),
+    [
+        ("std_msgs/String", "{data: 5}"),
+        ("std_msgs/String", "{data: null}"),
+        ("std_msgs/UInt8", "{data: 300}"),
+        ("std_msgs/UInt8", "{data: 1.5}"),
+        ("nav_msgs/Odometry", "{pose: {covariance: [1, 2]}}"),
+        ("nav_msgs/Odometry", "{header: {stamp: {sec: 1.5}}}"),
+        ("nav_msgs/Path", "{poses: [{pose: 1}]}"),
+        ("sensor_msgs/JointState", "{name: left}"),
+        ("sensor_msgs/JointState", "{name: [1, 2]}"),
+    ],
+)
+def test_values_that_do_not_fit_are_refused_in_words(start_daemon, ctl, tmp_path, kind, fields):
+    registry = tmp_path / "own.csv"
+    registry.write_text(f"topic,{kind}\n")
+    daemon = start_daemon(f'registry = "{registry}"\n')
+    code, _, err = ctl("pub", "/robot_1/topic", fields, "--runtime-dir", daemon.directory)
+    assert code == 2, err
+    assert err.count("\n") == 1
+
+
+def test_what_others_send_is_shown_as_it_is(start_daemon, tmp_path):
+    registry = tmp_path / "own.csv"
+    registry.write_text("say,std_msgs/String\n")
+    daemon = start_daemon(f'registry = "{registry}"\n')
+    echo = subprocess.Popen(
+        [sys.executable, "-m", "sdrlinkd.cli", "echo", "-n", "1", "--runtime-dir",
+         str(daemon.directory)],
+        stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    message = empty("std_msgs/msg/String")
+    message.data = "[bold]not[/odom] markup"
+    with Publisher(daemon.directory) as out:
+        while echo.poll() is None:
+            out.send("/robot_1/say", to_cdr(message, "std_msgs/msg/String"))
+            wait_for(lambda: True)
+    assert "[bold]not[/odom] markup" in echo.stdout.read()
+    echo.stdout.close()
+
+
+def test_a_bag_with_another_type_is_left_out_by_name(start_daemon, ctl, recorded, tmp_path):
+    registry = tmp_path / "own.csv"
+    registry.write_text("odom,std_msgs/String\nimu,sensor_msgs/Imu\n")
+    daemon = start_daemon(f'registry = "{registry}"\n')
+    code, out, err = ctl("bag", "play", recorded, "--rate", "50", "--runtime-dir", daemon.directory)
+    assert code == 0
+    assert "played 100 messages" in out
+    assert "/odom (is nav_msgs/msg/Odometry, the registry has std_msgs/msg/String)" in " ".join(
+        err.split()
+    )
+    assert daemon.snapshot().link.tx.dropped == {}
+
+
+def test_pdu_watch_ends_with_the_daemon(start_daemon):
+    daemon = start_daemon("[link]\nbeacon_s = 0\n")
+    watch = subprocess.Popen(
+        [sys.executable, "-m", "sdrlinkd.cli", "pdu", "watch", "--runtime-dir",
+         str(daemon.directory)],
+        stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    wait_for(lambda: daemon.snapshot().bus.control_requests > 2)
+    daemon.process.terminate()
+    assert watch.wait(15) == 2
+    assert "no sdrlinkd answers" in watch.stderr.read()
+    watch.stderr.close()
+
+
 def test_echo_says_when_nothing_comes(start_daemon, ctl):
     daemon = start_daemon()
     code, _, err = ctl(

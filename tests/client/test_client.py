@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 
 import pytest
 import zmq
@@ -70,13 +71,85 @@ def test_a_burst_and_an_immediate_exit_arrive_whole(start_daemon):
     assert daemon.snapshot().link.tx.accepted == 20_000
 
 
+def test_flush_ends_when_all_is_taken(start_daemon):
+    daemon = start_daemon()
+    code = (
+        "import os\n"
+        "from sdrlinkd.client import Publisher\n"
+        "out = Publisher()\n"
+        "for i in range(3000): out.send('/robot_1/odom', bytes([0, 1, 0, 0]) + bytes(700))\n"
+        "out.flush()\n"
+        "os._exit(0)\n"
+    )
+    environment = {**os.environ, "SDRLINKD_RUNTIME_DIR": str(daemon.directory)}
+    subprocess.run([sys.executable, "-c", code], check=True, env=environment, timeout=60)
+    snapshot = daemon.snapshot()
+    assert (snapshot.link.tx.accepted, snapshot.bus.received) == (3000, 3000)
+
+
+def test_numbers_run_per_topic_and_nothing_is_lost(start_daemon):
+    daemon = start_daemon()
+    before_ns = time.time_ns()
+    with (
+        Subscriber("/rx_robot_1/*", directory=daemon.directory) as heard,
+        Publisher(daemon.directory) as out,
+    ):
+        for i in range(20):
+            out.send("/robot_1/odom", CDR + bytes([i]))
+            out.send("/robot_1/imu", CDR + bytes([i]), type="sensor_msgs/msg/Imu")
+        messages = [heard.receive(5) for _ in range(40)]
+        assert heard.receive(0) is None
+    for name, kind in (("odom", "nav_msgs/msg/Odometry"), ("imu", "sensor_msgs/msg/Imu")):
+        mine = [m for m in messages if m.topic == f"/rx_robot_1/{name}"]
+        assert [m.payload for m in mine] == [CDR + bytes([i]) for i in range(20)]
+        assert [m.number - mine[0].number for m in mine] == list(range(20))
+        assert {(m.source, m.type, m.lost_pdus) for m in mine} == {(1, kind, 0)}
+        assert all(before_ns <= m.received_ns <= time.time_ns() for m in mine)
+
+
+def test_a_slow_reader_sees_the_gap_in_the_numbers(start_daemon):
+    daemon = start_daemon()
+    sent = 6000
+    with (
+        Subscriber("/rx_robot_1/odom", directory=daemon.directory, depth=1) as slow,
+        Subscriber("/rx_robot_1/odom", directory=daemon.directory, depth=0) as quick,
+        Publisher(daemon.directory) as out,
+    ):
+        for i in range(sent):
+            out.send("/robot_1/odom", CDR + i.to_bytes(4, "little") + bytes(700))
+            if i % 20 == 19:
+                for _ in range(20):
+                    last = quick.receive(5)
+        kept = []
+        while (message := slow.receive(0.2)) is not None:
+            kept.append(message)
+    first = kept[0].number - int.from_bytes(kept[0].payload[4:8], "little")
+    assert last.number - first == sent - 1
+    assert len(kept) < sent
+    for message in kept:
+        assert message.number - first == int.from_bytes(message.payload[4:8], "little")
+
+
+def test_a_wrong_type_is_refused_and_counted(start_daemon):
+    daemon = start_daemon()
+    with Publisher(daemon.directory) as out:
+        out.send("/robot_1/odom", CDR, type="sensor_msgs/msg/Imu")
+        out.send("/robot_1/nothing", CDR)
+    snapshot = daemon.snapshot()
+    assert snapshot.link.tx.accepted == 0
+    assert sum(snapshot.link.tx.dropped.values()) == 2
+    assert "unknown topic" in snapshot.bus.bad_envelope_last
+
+
 @pytest.mark.parametrize(
     "make",
     [lambda d: Publisher(d, timeout_s=0.2), lambda d: Subscriber(directory=d, timeout_s=0.2)],
 )
 def test_without_a_daemon_it_says_where_it_looked(tmp_path, make):
+    started_at = time.monotonic()
     with pytest.raises(NoDaemonError, match=str(tmp_path)), make(tmp_path) as socket:
         socket.send("/a", CDR)
+    assert 0.15 < time.monotonic() - started_at < 3
 
 
 async def test_without_a_daemon_in_asyncio(tmp_path):
@@ -88,10 +161,10 @@ async def test_without_a_daemon_in_asyncio(tmp_path):
             pass
 
 
-def test_a_program_that_publishes_with_pub_and_json(start_daemon):
+@pytest.mark.parametrize("header", [json.dumps({"q": "urgent", "p": 3}).encode(), b"\x01\x80"])
+def test_a_program_that_publishes_with_pub(start_daemon, header):
     daemon = start_daemon()
     context = zmq.Context()
-    header = json.dumps({"q": "urgent", "p": 3}).encode()
     with context.socket(zmq.PUB) as pub, Subscriber(directory=daemon.directory) as heard:
         pub.connect(f"ipc://{daemon.directory}/in-pub.sock")
         message = None

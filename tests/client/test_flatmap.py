@@ -1,5 +1,8 @@
 """The client's MessagePack against a real one."""
 
+import struct
+import tracemalloc
+
 import msgspec
 import pytest
 from hypothesis import given, settings
@@ -53,6 +56,49 @@ def test_any_bytes_are_a_value_or_refused(data):
 def test_huge_claims_are_refused_at_once(data):
     with pytest.raises(ValueError, match="MessagePack"):
         unpack(data)
+
+
+@pytest.mark.parametrize("head", [b"\xdd", b"\xdf"])
+def test_a_huge_claim_costs_no_more_than_the_bytes_there_are(head):
+    tracemalloc.start()
+    with pytest.raises(ValueError, match="MessagePack"):
+        unpack(head + b"\xff\xff\xff\xff" + b"\xc0" * 10_000)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1_000_000
+
+
+@settings(derandomize=True, deadline=None, max_examples=500)
+@given(nested, st.data())
+def test_a_cut_value_is_refused(value, data):
+    whole = msgspec.msgpack.encode(value)
+    with pytest.raises(ValueError):
+        unpack(whole[: data.draw(st.integers(0, len(whole) - 1))])
+
+
+def test_more_than_one_value_is_refused():
+    with pytest.raises(ValueError, match="1 bytes after"):
+        unpack(b"\x01\x02")
+
+
+@pytest.mark.parametrize(
+    "value",
+    [0, 127, 128, 255, 256, 65535, 65536, 2**32 - 1, 2**32, 2**63, 2**64 - 1, -1, -32, -33, -128,
+     -129, -32769, -(2**31) - 1, -(2**63), "é" * 16, "a" * 31, "a" * 32, "a" * 65535, b"",
+     b"a" * 65535, float("inf"), True, False, None],
+)  # fmt: skip
+def test_values_at_the_edges(value):
+    packed = pack_map({"k": value})
+    assert msgspec.msgpack.decode(packed) == unpack(packed) == {"k": value}
+    assert type(unpack(packed)["k"]) is type(value)
+    assert unpack(msgspec.msgpack.encode(value)) == value
+
+
+@pytest.mark.xfail(reason="struct.error instead of ValueError", strict=True, raises=struct.error)
+@pytest.mark.parametrize("value", [2**64, -(2**63) - 1, "a" * 65536, b"a" * 65536])
+def test_what_does_not_fit_is_refused_in_words(value):
+    with pytest.raises(ValueError):
+        pack_map({"k": value})
 
 
 def test_too_many_fields():

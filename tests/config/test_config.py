@@ -66,11 +66,19 @@ def test_shipped_registry_is_the_papers_table_4():
         ('namespace = "a b1"', ["namespace", '"a b1"']),
         ('rx_format = "x"', ["rx_format", '"x"', "{src_id}"]),
         ("[link]\nmin_fragment = 2000", ["link.min_fragment", "2000", "1011"]),
+        ('registry = "a\\u0000b"', ["registry cannot be read"]),
+        ("seed = " + "9" * 5000, ["not TOML"]),
+        ("a = " + "[" * 3000, ["not TOML"]),
+        ('namespace = "robot_' + "1" * 5000 + '"', ["robot_id"]),
+        ('[bus]\nruntime_dir = "a\\u0000b"', ["bus.runtime_dir", "NUL"]),
+        ('rx_format = "/x y{src_id}"', ["rx_format"]),
+        ('[topic.odom]\n[topic."/odom"]', ["stands twice"]),
+        ("[link]\nbeacon_s = 1e-9", ["link.beacon_s", "at least 0.01"]),
         ("[direct]\nloss = 1.5", ["direct.loss", "1.5", "from 0 to 1"]),
     ],
 )  # fmt: skip
 def test_an_error_cites_key_given_and_allowed(text, parts):
-    with pytest.raises(ConfigError) as error:
+    with pytest.raises(UserError) as error:
         make_setup(parse_config(text, "f.toml"), ETC, "f.toml")
     message = str(error.value)
     assert "\n" not in message

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import textwrap
 import threading
+import time
 from itertools import pairwise
 
 import pytest
@@ -181,6 +182,40 @@ def test_sigterm_drains_the_queue_and_names_what_is_left(start_daemon):
     assert "dropped" in daemon.log()
     assert "ledger:" not in daemon.log()
     assert not list(daemon.directory.glob("*.sock"))
+
+
+def test_what_has_arrived_before_sigterm_is_in_the_ledger(start_daemon):
+    daemon = start_daemon("drain_s = 0\n[link]\npdu_size = 64\n[direct]\nrate_bit_s = 1e5\n")
+    context = zmq.Context()
+    with context.socket(zmq.PUSH) as push:
+        push.connect(f"ipc://{daemon.directory}/in.sock")
+        push.send_multipart([b"/robot_1/odom\0", b"{}", CDR])
+        wait_for(lambda: daemon.snapshot().link.tx.accepted == 1)
+        daemon.process.send_signal(signal.SIGSTOP)
+        for _ in range(299):
+            push.send_multipart([b"/robot_1/odom\0", b"{}", CDR + bytes(100)])
+        # The pipe is written by ZeroMQ's own thread; what it holds when the daemon wakes counts.
+        time.sleep(0.3)
+        daemon.process.send_signal(signal.SIGTERM)
+        daemon.process.send_signal(signal.SIGCONT)
+        assert daemon.process.wait(10) == 0
+    context.destroy(linger=0)
+    assert "/300 sent" in daemon.log()
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+def test_a_demo_that_is_ended_leaves_nothing_behind(tmp_path, number):
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    demo = subprocess.Popen(
+        [sys.executable, "-m", "sdrlinkd.cli", "demo", "--out", str(tmp_path / "out")],
+        env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    wait_for(lambda: list(tmp_path.glob("sdrlink-*/ctl.sock")))
+    demo.send_signal(number)
+    assert demo.wait(20) != 0
+    assert "Traceback" not in demo.stderr.read()
+    demo.stderr.close()
+    assert not list(tmp_path.glob("sdrlink-*"))
 
 
 def test_a_second_instance_exits_with_2_and_the_first_is_unharmed(start_daemon):

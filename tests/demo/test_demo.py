@@ -5,6 +5,7 @@ import json
 import pytest
 
 from sdrlinkd.cli import run
+from sdrlinkd.demo import Options, open_source, run_demo
 from tests.adapters.recordings import STORAGES, noisy_messages, ros2_bag
 
 
@@ -35,6 +36,31 @@ def test_everything_arrives_unchanged(tmp_path, pdu_size):
         assert len(picture) > 5000
 
 
+@pytest.mark.parametrize("pdu_size", [64, 1024])
+def test_a_run_adds_up(pdu_size):
+    seen = []
+    source = open_source(None, None, [], 2.0, 1)
+    result, trace = run_demo(
+        source, Options("direct", pdu_size, 4.0, 1), lambda *counts: seen.append(counts)
+    )
+    assert (result.sent, result.received, result.pdr) == (200, 200, 1)
+    assert result.bytes_identical
+    assert result.ledger_adds_up
+    assert (result.path_error_m, result.dropped, result.pdu_size) == (0, {}, pdu_size)
+    assert result.pdus_sent > 0
+    assert 0.4 < result.duration_s < 10
+    for name, samples in trace.sent.items():
+        assert [s.payload for s in trace.received[name]] == [s.payload for s in samples]
+    assert seen == sorted(seen)
+    assert seen[-1] == (200, 200)
+
+
+def test_a_picture_that_cannot_be_written_is_told_in_words(tmp_path, capsys):
+    (tmp_path / "path.png").mkdir()
+    assert demo("--duration", 0.2, "--out", tmp_path) == 2
+    assert "path.png" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("storage", STORAGES)
 def test_a_bag_with_garbage_in_its_padding_arrives_unchanged(tmp_path, storage, capsys):
     bag = ros2_bag(
@@ -63,6 +89,7 @@ def test_bad_input_is_refused_in_words(tmp_path, capsys):
         assert demo(*arguments) == 2, arguments
         out, err = capsys.readouterr()
         assert says in err, arguments
+        assert err.count("\n") == 1, err
         assert "Traceback" not in out + err
     assert demo("--pdu-size", "7") == 2
     assert demo("--link", "carrier-pigeon") == 2

@@ -137,3 +137,27 @@ def test_a_topic_without_a_free_entry_id_waits_and_others_go_on():
     assert link.next_wakeup(0.0) == pytest.approx(0.625)
     send_all(link, now=0.625)
     assert link.sender.outbox.queued == 0
+
+
+def test_nothing_is_shed_for_a_message_that_cannot_fit_anyway():
+    link = make_link(queue=QueueParams(max_bytes=1000))
+    link.submit(0, bytes(10), 0.0, Overrides(qos=Qos.BULK))
+    link.submit(0, bytes(950), 0.0, Overrides(qos=Qos.URGENT))
+    assert link.submit(0, bytes(500), 0.0) == "tx_overflow_new"
+    assert link.sender.outbox.queued == 2
+    link.set_policies({1: TopicPolicy(depth=1)})
+    link.submit(1, bytes(8), 0.0)
+    assert link.submit(1, bytes(1001), 0.0) == "tx_overflow_new"
+    assert link.sender.outbox.queued == 3
+
+
+def test_lanes_that_wait_for_ids_hold_up_no_lower_level():
+    link = make_link(pdu_size=64)
+    link.set_policies({i: TopicPolicy(stamp=False) for i in range(3)})
+    for i in range(340):
+        link.submit(0, bytes(60), 0.0, Overrides(priority=100, dst=i % 255))
+    send_all(link)
+    assert link.sender.outbox.queued == 84
+    link.submit(1, bytes(20), 0.0, Overrides(qos=Qos.BULK))
+    assert len(send_all(link)) == 1
+    assert link.next_wakeup(0.0) == pytest.approx(0.625)
