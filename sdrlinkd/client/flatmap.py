@@ -16,8 +16,11 @@ def pack_map(values: Mapping[str, Value]) -> bytes:
     if len(values) > 15:
         raise ValueError("a bus header has at most 15 fields")
     parts = [bytes((0x80 | len(values),))]
-    for key, value in values.items():
-        parts += (_pack(key), _pack(value))
+    try:
+        for key, value in values.items():
+            parts += (_pack(key), _pack(value))
+    except struct.error as error:
+        raise ValueError(f"a bus header's value is too large: {error}") from None
     return b"".join(parts)
 
 

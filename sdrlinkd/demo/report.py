@@ -79,7 +79,7 @@ def topic_results(trace: Trace) -> list[TopicResult]:
                 type=trace.types[name],
                 sent=len(sent),
                 received=len(matched),
-                pdr=len(matched) / len(sent),
+                pdr=len(matched) / len(sent) if sent else 0.0,
                 goodput_bytes_per_s=goodput_bytes_per_s(matched),
                 latency_ms=latency_ms(matched),
                 path_error_m=error,

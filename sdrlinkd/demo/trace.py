@@ -57,9 +57,7 @@ class Trace:
             found: list[Pair] = []
             at = 0
             for sample in received:
-                match = next(
-                    (i for i in range(at, len(sent)) if sent[i].payload == sample.payload), None
-                )
+                match = _next_match(sent, at, sample)
                 if match is None:
                     foreign += 1
                 else:
@@ -117,3 +115,13 @@ def _along(path: Path2D) -> Path2D | None:
         return None
     grid = np.linspace(0, length[-1], GRID_POINTS)
     return np.stack([np.interp(grid, length, path[:, i]) for i in range(2)], axis=1)
+
+
+def _next_match(sent: Sequence[Sample], at: int, received: Sample) -> int | None:
+    """Index from `at` of the first message that `received` can be: sent before, the same bytes."""
+    for i in range(at, len(sent)):
+        if sent[i].at > received.at:
+            return None
+        if sent[i].payload == received.payload:
+            return i
+    return None

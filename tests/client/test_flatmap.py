@@ -1,6 +1,5 @@
 """The client's MessagePack against a real one."""
 
-import struct
 import tracemalloc
 
 import msgspec
@@ -68,7 +67,7 @@ def test_a_huge_claim_costs_no_more_than_the_bytes_there_are(head):
     assert peak < 1_000_000
 
 
-@settings(derandomize=True, deadline=None, max_examples=500)
+@settings(derandomize=True, deadline=None, max_examples=150)
 @given(nested, st.data())
 def test_a_cut_value_is_refused(value, data):
     whole = msgspec.msgpack.encode(value)
@@ -94,7 +93,6 @@ def test_values_at_the_edges(value):
     assert unpack(msgspec.msgpack.encode(value)) == value
 
 
-@pytest.mark.xfail(reason="struct.error instead of ValueError", strict=True, raises=struct.error)
 @pytest.mark.parametrize("value", [2**64, -(2**63) - 1, "a" * 65536, b"a" * 65536])
 def test_what_does_not_fit_is_refused_in_words(value):
     with pytest.raises(ValueError):

@@ -47,7 +47,6 @@ def test_a_copy_of_distinct_payloads_costs_no_other_its_pair():
     assert foreign == 1
 
 
-@pytest.mark.xfail(reason="a copy is paired with a message sent after it arrived", strict=True)
 def test_nothing_arrives_before_it_is_sent():
     trace = trace_of(
         [(0, b"x"), (1, b"y"), (2, b"x")], [(0.1, b"x"), (0.2, b"x"), (1.1, b"y"), (2.1, b"x")]
@@ -89,7 +88,7 @@ def test_bytes_are_identical_only_if_all_that_arrived_was_sent():
     assert not finished(trace_of([(0, b"x")], [(0.1, b"x"), (0.2, b"?")])).bytes_identical
     nothing = finished(trace_of([(0, b"x")], []))
     assert (nothing.bytes_identical, nothing.pdr, nothing.latency_ms) == (False, 0, {})
-    assert finished(trace_of([], [])).pdr == 0
+    assert finished(Trace({})).pdr == 0
 
 
 def test_latency_quantiles_by_hand():
@@ -127,8 +126,8 @@ def test_path_error_by_hand():
 def test_path_error_of_a_corner():
     corner = np.array([(0.0, 0.0), (4.0, 0.0), (4.0, 4.0)])
     assert path_error_m(corner, corner + (3, 4)) == pytest.approx(5)  # noqa: RUF005
-    # Against its own diagonal: s along the corner, s/√2 along the diagonal; mean √(32)/4.
-    assert path_error_m(corner, corner[[0, 2]]) == pytest.approx(np.sqrt(2), rel=1e-3)
+    # At share t < 1/2 the corner is at (8t, 0) and its diagonal at (4t, 4t): 4√2·t apart, mean √2.
+    assert path_error_m(corner, corner[[0, 2]]) == pytest.approx(np.sqrt(2), rel=2e-3)
 
 
 def string_bag(path, topics):
