@@ -1,0 +1,31 @@
+"""The benchmarks run and print their rows; how fast a machine is, is not a test's business."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.mark.slow
+def test_the_bus_benchmark_prints_its_rows():
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks.bus", "--quick", "--json"],
+        cwd=ROOT, capture_output=True, text=True, timeout=110,
+    )  # fmt: skip
+    report = json.loads(done.stdout)
+    assert report["benchmark"] == "bus"
+    rows = {row["name"]: row for row in report["rows"]}
+    assert set(rows) == {
+        "ingress_msgs_per_cpu_s_700B",
+        "path_cost_over_crc_and_join_1024B",
+        "path_latency_ms_p50",
+        "queue_cost_ratio_10_to_10000",
+    }
+    for row in rows.values():
+        assert {"value", "unit", "target", "ok", "peers", "paper", "trials"} <= row.keys()
+        assert row["value"] > 0
+    assert done.returncode == (0 if all(row["ok"] for row in rows.values()) else 1)
