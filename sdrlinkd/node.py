@@ -33,7 +33,7 @@ class Node:
         self._link = link
         self._pdu_link = pdu_link
         self._work = asyncio.Event()
-        self._burst_settled = asyncio.Event()
+        self._queue_moved = asyncio.Event()
         self._started_at = time.monotonic()
         self._loop_lag_s = 0.0
         self._draining = False
@@ -67,7 +67,7 @@ class Node:
     def settled(self, burst: Burst, outcome: Outcome, at: float) -> None:
         """A burst has left, or not."""
         self._link.confirm(burst, outcome, at)
-        self._burst_settled.set()
+        self._queue_moved.set()
 
     # The daemon's tasks.
 
@@ -91,6 +91,7 @@ class Node:
             await asyncio.sleep(TICK_S)
             self._loop_lag_s = max(time.monotonic() - due, 0.9 * self._loop_lag_s)
             self._link.handle_timers(self._pdu_link.now())
+            self._queue_moved.set()  # messages may have expired
 
     async def drain(self, at_most_s: float) -> None:
         """Take nothing more, send what is queued for at most `at_most_s`, drop the rest by name."""
@@ -101,8 +102,8 @@ class Node:
         try:
             async with asyncio.timeout(at_most_s):
                 while self._link.sender.outbox:
-                    self._burst_settled.clear()
-                    await self._burst_settled.wait()
+                    self._queue_moved.clear()
+                    await self._queue_moved.wait()
                 await self._pdu_link.idle()
         except TimeoutError:
             pass

@@ -62,7 +62,6 @@ class Bus:
         self._republished_as = setup.republished_as
         self._max_message_bytes = setup.config.bus.max_message_bytes
         self._ingress = ingress
-        self._names_out: dict[tuple[int, int], str] = {}
         self._frames_out: dict[tuple[int, int], bytes] = {}
         self._received = 0
         self._published = 0
@@ -98,8 +97,7 @@ class Bus:
         key = (message.src, message.topic_id)
         topic = self._frames_out.get(key)
         if topic is None:
-            self._names_out[key] = self._republished_as(*key)
-            topic = self._frames_out[key] = self._names_out[key].encode() + b"\0"
+            topic = self._frames_out[key] = self._republished_as(*key).encode() + b"\0"
         header = envelope.OutHeader(
             s=message.src,
             n=message.number,
@@ -122,7 +120,7 @@ class Bus:
 
     def names_out(self) -> dict[tuple[int, int], str]:
         """Bus topics published so far, by (source, topic id)."""
-        return self._names_out
+        return {key: frame[:-1].decode() for key, frame in self._frames_out.items()}
 
     async def stop_ingress(self) -> None:
         """Take what has arrived, and then no more: producers see the sockets close."""

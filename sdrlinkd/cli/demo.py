@@ -11,7 +11,6 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from sdrlinkd import __version__
-from sdrlinkd.adapters import BuiltInRobot
 from sdrlinkd.cli.app import app
 from sdrlinkd.demo import DemoReport, Options, open_source, run_demo, table_6, topic_table
 from sdrlinkd.errors import UserError
@@ -59,9 +58,6 @@ def demo(
     source = open_source(bag, registry, topics or [], duration, seed)
     for reason in source.left_out:
         console.print(f"left out: {reason}", style="yellow", highlight=False, markup=False)
-    expected = source.expected()
-    if isinstance(source.recording, BuiltInRobot):
-        expected = sum(topic.n_messages for topic in source.topics)
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
@@ -69,7 +65,9 @@ def demo(
         TimeElapsedColumn(),
     )
     with Progress(*columns, console=console) as progress:
-        task = progress.add_task(f"{link.value}: {source.title}", total=expected, received=0)
+        task = progress.add_task(
+            f"{link.value}: {source.title}", total=source.expected(), received=0
+        )
         result, trace = run_demo(
             source,
             Options(link.value, pdu_size, speed, seed),

@@ -90,7 +90,9 @@ def open_source(
 def _built_in(registry_path: Path | None, duration_s: float, seed: int) -> Source:
     robot = BuiltInRobot(NAMESPACE, duration_s, seed)
     registry = load_registry(registry_path) if registry_path else make_registry(BUILT_IN_REGISTRY)
-    source = Source("built-in robot", robot, registry, NAMESPACE, duration_s, robot.topics())
+    # The robot ends by itself.
+    endless = float("inf")
+    source = Source("built-in robot", robot, registry, NAMESPACE, endless, robot.topics())
     _match(source)
     return source
 
