@@ -1,0 +1,7 @@
+"""What happens to samples between a transmitter and a receiver, as a seeded calculator."""
+
+from phy.channel.front_end import FrontEnd, FrontEndParams
+from phy.channel.path import Path, PathParams
+from phy.channel.profiles import PROFILES
+
+__all__ = ["PROFILES", "FrontEnd", "FrontEndParams", "Path", "PathParams"]

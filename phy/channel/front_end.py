@@ -1,0 +1,55 @@
+"""What a receiver adds to everything that reaches it, sample by sample, for ever."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class FrontEndParams:
+    """Powers in dB below full scale (inf: none); `image_db` below the signal.
+
+    `bits`: resolution of the converter, which also clips at full scale; 0: neither.
+    """
+
+    noise_dbfs: float = -np.inf
+    image_db: float = np.inf
+    dc_dbfs: float = -np.inf
+    bits: int = 0
+
+
+class FrontEnd:
+    """Noise, IQ imbalance, DC offset and quantisation of one receiver."""
+
+    def __init__(self, params: FrontEndParams, rng: Generator) -> None:
+        self._params = params
+        self._rng = rng
+        self._noise = np.float32(np.sqrt(10 ** (params.noise_dbfs / 10) / 2))
+        self._image = np.float32(10 ** (-params.image_db / 20))
+        self._dc = np.complex64(10 ** (params.dc_dbfs / 20))
+
+    def receive(self, x: NDArray[np.complex64]) -> NDArray[np.complex64]:
+        """The digital samples `[n]` of antenna samples `[n]`; `x` may be used up.
+
+        Any chunking of the same stream gives the same samples.
+        """
+        if self._noise:
+            noise = self._rng.standard_normal(2 * len(x), np.float32)
+            noise *= self._noise
+            x = x + noise.view(np.complex64)
+        if self._image:
+            x = x + self._image * x.conj()
+        if self._dc:
+            x = x + self._dc
+        if self._params.bits:
+            x = _quantised(x, self._params.bits)
+        return x
+
+
+def _quantised(x: NDArray[np.complex64], bits: int) -> NDArray[np.complex64]:
+    full = np.float32(2 ** (bits - 1))
+    parts = np.ascontiguousarray(x).view(np.float32) * full
+    parts = np.clip(np.round(parts), -full, full - 1) / full
+    return parts.astype(np.float32).view(np.complex64)

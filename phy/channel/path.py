@@ -1,0 +1,87 @@
+"""One burst from antenna to antenna: what the transmitter, the echoes and the clocks do to it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+from scipy import signal
+
+from phy.channel.profiles import PROFILES
+from phy.channel.resampling import N_TAPS, echo_filter, stretch
+
+
+@dataclass(frozen=True)
+class PathParams:
+    """Frequencies in Hz, times in s, `clock_ppm` the sender's crystal against the receiver's.
+
+    One crystal makes carrier and samples: at `carrier_hz` it moves both. `image_db` and `leak_db`
+    are the transmitter's IQ imbalance and LO leakage below the signal (inf: none).
+    """
+
+    rate_hz: float
+    carrier_hz: float = 0.0
+    profile: str = "awgn"
+    delay_spread_s: float = 100e-9
+    loss_db: float = 0.0
+    delay_s: float = 0.0
+    clock_ppm: float = 0.0
+    image_db: float = np.inf
+    leak_db: float = np.inf
+
+
+class Path:
+    """A path from one transmitter to one receiver; fading is drawn anew for each burst."""
+
+    def __init__(self, params: PathParams, rng: Generator) -> None:
+        if params.profile not in PROFILES:
+            raise ValueError(
+                f'channel: got "{params.profile}"; allowed: one of {", ".join(PROFILES)}'
+            )
+        self._params = params
+        self._rng = rng
+
+    def carry(self, burst: NDArray[np.complex64]) -> tuple[int, NDArray[np.complex64]]:
+        """(index relative to the burst's own, samples) of a burst as it arrives, mean gain −loss.
+
+        Its carrier phase is drawn from the path's chance.
+        """
+        params = self._params
+        offset = 0
+        x = _imperfect(burst, params.image_db, params.leak_db)
+        delay = params.delay_s * params.rate_hz
+        error = params.clock_ppm * 1e-6
+        whole = int(delay)
+        if error or delay != whole:
+            x = stretch(x, delay - whole, error)
+        offset += whole
+        echoes = PROFILES[params.profile]
+        if echoes is not None:
+            x = signal.fftconvolve(x, self._fading(echoes)).astype(np.complex64)
+            offset -= N_TAPS // 2 - 1
+        turn = np.exp(2j * np.pi * self._rng.random()) * 10 ** (-params.loss_db / 20)
+        frequency = params.carrier_hz * error / params.rate_hz
+        if frequency:
+            phase = 2j * np.pi * frequency * np.arange(len(x))
+            return offset, (x * (turn * np.exp(phase))).astype(np.complex64)
+        return offset, x * np.complex64(turn)
+
+    def _fading(self, echoes: tuple[tuple[float, float], ...]) -> NDArray[np.complex64]:
+        delay, power_db = np.array(echoes).T
+        power = 10 ** (power_db / 10)
+        n = len(echoes)
+        draws = self._rng.standard_normal(2 * n).reshape(2, n)
+        gains = (draws[0] + 1j * draws[1]) * np.sqrt(power / power.sum() / 2)
+        samples = (delay - delay.min()) * self._params.delay_spread_s * self._params.rate_hz
+        return echo_filter(samples, gains)
+
+
+def _imperfect(
+    burst: NDArray[np.complex64], image_db: float, leak_db: float
+) -> NDArray[np.complex64]:
+    if np.isinf(image_db) and np.isinf(leak_db):
+        return burst
+    image = np.complex64(10 ** (-image_db / 20))
+    power = float(np.mean(burst.real**2 + burst.imag**2))
+    leak = np.complex64(np.sqrt(power) * 10 ** (-leak_db / 20))
+    return burst + image * burst.conj() + leak

@@ -1,0 +1,47 @@
+"""Samples between samples: windowed-sinc interpolation for delays and clock differences."""
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phy.kernels.resampler import interpolate
+
+N_TAPS = 32
+N_PHASES = 512
+_KAISER = 9.0
+
+
+@cache
+def _filters() -> NDArray[np.float32]:
+    """Interpolation filters for delays of 0 … 1 sample `[N_PHASES + 1, N_TAPS]`."""
+    delay = np.arange(N_PHASES + 1)[:, None] / N_PHASES
+    t = np.arange(N_TAPS) - (N_TAPS // 2 - 1) - delay
+    window = np.i0(_KAISER * np.sqrt(np.clip(1 - (t / (N_TAPS / 2)) ** 2, 0, None)))
+    return (np.sinc(t) * window / np.i0(_KAISER)).astype(np.float32)
+
+
+def stretch(x: NDArray[np.complex64], delay: float, clock_error: float) -> NDArray[np.complex64]:
+    """`x` delayed by `delay` ≥ 0 samples, as a clock sees it that is fast by `clock_error`.
+
+    Sample n of the result is x at n / (1 + clock_error) − delay; it is long enough for all of `x`.
+    """
+    n = int(np.ceil((len(x) + delay) * (1 + clock_error))) + N_TAPS // 2
+    out = np.empty(n, np.complex64)
+    interpolate(x, _filters(), -delay, 1 / (1 + clock_error), out)
+    return out
+
+
+def echo_filter(
+    delays: NDArray[np.float64], gains: NDArray[np.complex128]
+) -> NDArray[np.complex64]:
+    """FIR filter of echoes at `delays` samples with `gains`, its own delay N_TAPS / 2 − 1."""
+    n = int(np.ceil(delays.max())) + N_TAPS
+    taps = np.zeros(n, np.complex128)
+    filters = _filters()
+    for delay, gain in zip(delays, gains, strict=True):
+        whole = int(delay)
+        phase = round((1 - (delay - whole)) * N_PHASES)
+        # A filter looks ahead by its phase from one sample back; reversed, it is a response.
+        taps[whole : whole + N_TAPS] += gain * filters[phase][::-1]
+    return taps.astype(np.complex64)

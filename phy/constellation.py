@@ -1,0 +1,57 @@
+"""Bits to points, Gray-coded per axis (IEEE 802.11-2020, 17.3.5.8)."""
+
+from enum import Enum
+from functools import cache
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Modulation(Enum):
+    """How many bits a carrier takes."""
+
+    BPSK = 1
+    QPSK = 2
+    QAM16 = 4
+    QAM64 = 6
+
+    @property
+    def bits(self) -> int:
+        """Coded bits on one carrier."""
+        return self.value
+
+    @property
+    def unit(self) -> float:
+        """Half the distance of neighbouring points, at mean power 1."""
+        levels = _levels(self.axis_bits)
+        axes = 1 if self is Modulation.BPSK else 2
+        return float(1 / np.sqrt(axes * np.mean(levels**2)))
+
+    @property
+    def axis_bits(self) -> int:
+        """Coded bits on one axis; BPSK has the real one only."""
+        return max(1, self.bits // 2)
+
+    @classmethod
+    def of(cls, bits: int) -> Self:
+        """The modulation with `bits` a carrier."""
+        return cls(bits)
+
+
+@cache
+def points(modulation: Modulation) -> NDArray[np.complex64]:
+    """Points of mean power 1 by the number that their bits make, first bit highest `[2^bits]`."""
+    levels = _levels(modulation.axis_bits) * modulation.unit
+    if modulation is Modulation.BPSK:
+        return levels.astype(np.complex64)
+    return (levels[:, None] + 1j * levels[None, :]).reshape(-1).astype(np.complex64)
+
+
+def _levels(axis_bits: int) -> NDArray[np.float64]:
+    """Odd numbers by the Gray code of their rank `[2^axis_bits]`."""
+    n = 1 << axis_bits
+    rank = np.arange(n)
+    levels = np.empty(n)
+    levels[rank ^ rank >> 1] = 2 * rank - (n - 1)
+    return levels

@@ -1,0 +1,72 @@
+"""The K=7 convolutional code (133, 171) of IEEE 802.11-2020, 17.3.5.6, and its puncturing."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phy.kernels.convolution import convolve
+from phy.kernels.viterbi import MAX_LLR, ViterbiWorkspace, decode_terminated
+
+N_TAIL = 6
+
+__all__ = [
+    "HALF",
+    "MAX_LLR",
+    "THREE_QUARTERS",
+    "TWO_THIRDS",
+    "CodeRate",
+    "ViterbiWorkspace",
+    "decode",
+    "encode",
+]
+
+
+@dataclass(frozen=True)
+class CodeRate:
+    """A rate, as which of the mother code's bits are sent: 1 in `pattern`, A and B in turn."""
+
+    name: str
+    rate: Fraction
+    pattern: tuple[int, ...]
+
+    def n_coded(self, n_bits: int) -> int:
+        """Coded bits for `n_bits` of information and the tail."""
+        return len(self.kept(n_bits))
+
+    def kept(self, n_bits: int) -> NDArray[np.int32]:
+        """Which of the 2 (n_bits + 6) bits of the mother code are sent, ascending."""
+        return _kept(self.pattern, n_bits)
+
+
+@lru_cache(maxsize=64)
+def _kept(pattern: tuple[int, ...], n_bits: int) -> NDArray[np.int32]:
+    n = 2 * (n_bits + N_TAIL)
+    return np.flatnonzero(np.resize(np.array(pattern), n)).astype(np.int32)
+
+
+HALF = CodeRate("1/2", Fraction(1, 2), (1, 1))
+TWO_THIRDS = CodeRate("2/3", Fraction(2, 3), (1, 1, 1, 0))
+THREE_QUARTERS = CodeRate("3/4", Fraction(3, 4), (1, 1, 1, 0, 0, 1))
+
+
+def encode(data: NDArray[np.uint8], code: CodeRate) -> NDArray[np.uint8]:
+    """Coded bits `[n, n_coded]` of `n` blocks of bytes `[n, n_bytes]`, each ended by a tail."""
+    n_bits = 8 * data.shape[1]
+    bits = np.zeros((len(data), n_bits + N_TAIL), np.uint8)
+    bits[:, :n_bits] = np.unpackbits(data, axis=1)
+    mother = np.empty((len(data), 2 * bits.shape[1]), np.uint8)
+    convolve(bits, mother)
+    return mother if code is HALF else mother[:, code.kept(n_bits)]
+
+
+def decode(
+    llr: NDArray[np.int16],
+    n_bytes: int,
+    code: CodeRate,
+    workspace: ViterbiWorkspace,
+) -> NDArray[np.uint8]:
+    """The likeliest bytes `[n_bytes]` behind LLRs `[n_coded]`, positive for 0, in ±MAX_LLR."""
+    return decode_terminated(llr, code.kept(8 * n_bytes), n_bytes, workspace)

@@ -1,0 +1,1 @@
+"""Compiled loops. Everything outside reads like the equations; what must be fast is here."""

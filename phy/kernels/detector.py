@@ -1,0 +1,142 @@
+"""The preamble detector: the metric of a sample is a fixed tree of sums over 192 samples.
+
+No running sum is carried from sample to sample, so there is nothing to drift, every loop is
+vectorised, and the result does not depend on how the stream was cut into chunks.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+SEGMENT = 16
+SHORT = 192
+HISTORY = SHORT - 1
+"""Samples before a sample that its metric needs."""
+
+# E is over 192 samples, P over the 176 products of neighbours 16 apart.
+_SHARE = np.float32((SHORT - SEGMENT) / SHORT)
+
+
+@njit(nogil=True, cache=True)
+def detector_sums(x: NDArray[np.complex64], dc: complex, work: NDArray[np.float32], n: int) -> None:
+    """P (rows 0, 1: real, imaginary) and E (row 2) for the `n` samples after HISTORY of `x`.
+
+    P[n] = Σ_k b_k Σ_m x[n − 16 (10 − k) − m] x*[n − 16 (11 − k) − m], b the Barker code, m = 0…15;
+    E[n] = Σ |x|² over the 192 samples that end at n, times 11/12. `work` is `[7, HISTORY + n]`.
+    """
+    size = HISTORY + n
+    re, im = work[5, :size], work[6, :size]
+    dc_re, dc_im = np.float32(dc.real), np.float32(dc.imag)
+    for i in range(size):
+        re[i] = x[i].real - dc_re
+        im[i] = x[i].imag - dc_im
+    # Products of samples 16 apart, and powers.
+    p_re, p_im, power = work[0], work[1], work[2]
+    late_re, late_im = re[SEGMENT:], im[SEGMENT:]
+    for i in range(size - SEGMENT):
+        p_re[i] = late_re[i] * re[i] + late_im[i] * im[i]
+        p_im[i] = late_im[i] * re[i] - late_re[i] * im[i]
+    for i in range(size):
+        power[i] = re[i] * re[i] + im[i] * im[i]
+    # Sums of 16 by doubling; entry i is the sum that begins at i.
+    a, b, c = work[3], work[4], work[5]
+    _double(p_re, a, size - SEGMENT, 1)
+    _double(a, p_re, size - SEGMENT - 1, 2)
+    _double(p_re, a, size - SEGMENT - 3, 4)
+    _double(a, p_re, size - SEGMENT - 7, 8)
+    _double(p_im, a, size - SEGMENT, 1)
+    _double(a, p_im, size - SEGMENT - 1, 2)
+    _double(p_im, a, size - SEGMENT - 3, 4)
+    _double(a, p_im, size - SEGMENT - 7, 8)
+    _double(power, a, size, 1)
+    _double(a, power, size - 1, 2)
+    _double(power, a, size - 3, 4)
+    _double(a, power, size - 7, 8)
+    # 192 = 64 · 3.
+    _double(power, a, size - 15, 16)
+    _double(a, power, size - 31, 32)
+    energy_0, energy_1, energy_2 = power, power[64:], power[128:]
+    for i in range(n):
+        c[i] = _SHARE * (energy_0[i] + energy_1[i] + energy_2[i])
+    _despread(p_re, a, n)
+    _despread(p_im, b, n)
+    for i in range(n):
+        p_re[i], p_im[i], power[i] = a[i], b[i], c[i]
+
+
+@njit(nogil=True, cache=True)
+def _double(x: NDArray[np.float32], out: NDArray[np.float32], n: int, step: int) -> None:
+    later = x[step:]
+    for i in range(n - step):
+        out[i] = x[i] + later[i]
+
+
+@njit(nogil=True, cache=True)
+def _despread(q: NDArray[np.float32], out: NDArray[np.float32], n: int) -> None:
+    """Σ b_k q[i + 16 k], b = + + + − − − + − − + −."""
+    q0, q1, q2, q3 = q, q[16:], q[32:], q[48:]
+    q4, q5, q6, q7 = q[64:], q[80:], q[96:], q[112:]
+    q8, q9, q10 = q[128:], q[144:], q[160:]
+    for i in range(n):
+        out[i] = (
+            ((q0[i] + q1[i]) + (q2[i] - q3[i]))
+            + ((q6[i] - q4[i]) - (q5[i] + q7[i]))
+            + ((q9[i] - q8[i]) - q10[i])
+        )
+
+
+@njit(nogil=True, cache=True)
+def search(
+    x: NDArray[np.complex64],
+    n_hops: int,
+    hop: int,
+    threshold: float,
+    dc_state: NDArray[np.float64],
+    work: NDArray[np.float32],
+) -> int:
+    """Index in `x` of the first sample with |P| > threshold · E, or -1 after `n_hops` hops.
+
+    `x` begins HISTORY samples before the first hop. DC (`dc_state`: real, imaginary, hops seen)
+    follows the mean slowly, hop by hop; a hop with a crossing leaves it as it is.
+    """
+    limit = np.float32(threshold * threshold)
+    for h in range(n_hops):
+        begin = h * hop
+        dc = complex(dc_state[0], dc_state[1])
+        detector_sums(x[begin : begin + HISTORY + hop], dc, work, hop)
+        p_re, p_im, energy = work[0], work[1], work[2]
+        crossings = 0
+        for i in range(hop):
+            magnitude = p_re[i] * p_re[i] + p_im[i] * p_im[i]
+            crossings += magnitude > limit * (energy[i] * energy[i])
+        if crossings:
+            for i in range(hop):
+                magnitude = p_re[i] * p_re[i] + p_im[i] * p_im[i]
+                if magnitude > limit * (energy[i] * energy[i]):
+                    return begin + HISTORY + i
+        _follow_dc(x[begin + HISTORY : begin + HISTORY + hop], dc_state)
+    return -1
+
+
+@njit(nogil=True, cache=True)
+def _follow_dc(x: NDArray[np.complex64], dc_state: NDArray[np.float64]) -> None:
+    re, im = 0.0, 0.0
+    for i in range(x.size):
+        re += x[i].real
+        im += x[i].imag
+    dc_state[2] += 1
+    weight = max(1 / 64, 1 / dc_state[2])
+    dc_state[0] += weight * (re / x.size - dc_state[0])
+    dc_state[1] += weight * (im / x.size - dc_state[1])
+
+
+@njit(nogil=True, cache=True)
+def sanitise(x: NDArray[np.complex64], limit: float) -> int:
+    """Set samples that are not finite or beyond `limit` to 0. How many were."""
+    bad = 0
+    most = np.float32(limit)
+    for i in range(x.size):
+        good = (abs(x[i].real) < most) & (abs(x[i].imag) < most)
+        bad += not good
+        x[i] = x[i] if good else np.complex64(0)
+    return bad

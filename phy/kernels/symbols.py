@@ -1,0 +1,58 @@
+"""Samples of a burst to FFT windows, and coded bits to carriers."""
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+
+@njit(nogil=True, cache=True)
+def gather(
+    samples: NDArray[np.complex64],
+    starts: NDArray[np.int64],
+    frequency: float,
+    dc: complex,
+    gain: float,
+    out: NDArray[np.complex64],
+) -> None:
+    """Cut windows `[n, n_fft]` out, less `dc`, turned back by `frequency`, times `gain`."""
+    n_fft = out.shape[1]
+    turn = np.empty(n_fft, np.complex64)
+    step = -2 * math.pi * frequency
+    for m in range(n_fft):
+        turn[m] = np.complex64(gain * complex(math.cos(step * m), math.sin(step * m)))
+    offset = np.complex64(dc)
+    for row in range(starts.size):
+        first = starts[row]
+        phase = step * first
+        begin = np.complex64(complex(math.cos(phase), math.sin(phase)))
+        window = samples[first : first + n_fft]
+        for m in range(n_fft):
+            out[row, m] = (window[m] - offset) * (turn[m] * begin)
+
+
+@njit(nogil=True, cache=True)
+def map_bits(
+    coded: NDArray[np.uint8],
+    order: NDArray[np.int32],
+    points: NDArray[np.complex64],
+    data_bins: NDArray[np.int64],
+    pilot_bins: NDArray[np.int64],
+    pilots: NDArray[np.float32],
+    polarity: NDArray[np.float32],
+    out: NDArray[np.complex64],
+) -> None:
+    """Interleave coded bits and put them and the pilots on the bins of symbols `[n, n_fft]`."""
+    bits = order.size // data_bins.size
+    carrier_bits = np.empty(order.size, np.uint8)
+    for row in range(out.shape[0]):
+        for k in range(order.size):
+            carrier_bits[order[k]] = coded[row * order.size + k]
+        for d in range(data_bins.size):
+            number = 0
+            for b in range(bits):
+                number = number << 1 | carrier_bits[d * bits + b]
+            out[row, data_bins[d]] = points[number]
+        for p in range(pilot_bins.size):
+            out[row, pilot_bins[p]] = pilots[p] * polarity[row]

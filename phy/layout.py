@@ -1,0 +1,69 @@
+"""How long a burst is and which symbols hold which PDU."""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+from phy import header, preamble
+from phy.crc import CRC32_SIZE
+from phy.mcs import MCS_TABLE, Mcs
+from phy.numerology import Numerology
+
+
+@dataclass(frozen=True)
+class BurstLayout:
+    """A burst of `n_pdus` PDUs of `pdu_bytes` each. The PDUs' coded bits follow one another."""
+
+    grid: Numerology
+    mcs: Mcs
+    n_pdus: int
+    pdu_bytes: int
+
+    @property
+    def block_bytes(self) -> int:
+        """A PDU with its CRC-32."""
+        return self.pdu_bytes + CRC32_SIZE
+
+    @cached_property
+    def coded_bits(self) -> int:
+        """Coded bits of a PDU."""
+        return self.mcs.code.n_coded(8 * self.block_bytes)
+
+    @property
+    def symbol_bits(self) -> int:
+        """Coded bits of an OFDM symbol."""
+        return self.grid.n_data * self.mcs.modulation.bits
+
+    @property
+    def n_symbols(self) -> int:
+        """Payload symbols of the burst."""
+        return self.symbols_through(self.n_pdus)
+
+    @property
+    def n_samples(self) -> int:
+        """Samples of the whole burst, preamble and header included."""
+        return preamble.LENGTH + (header.N_SYMBOLS + self.n_symbols) * self.grid.n_symbol
+
+    def symbols_through(self, n_pdus: int) -> int:
+        """Payload symbols that must be in before the first `n_pdus` PDUs can be decoded."""
+        return -(-n_pdus * self.coded_bits // self.symbol_bits)
+
+
+@lru_cache(maxsize=256)
+def layout(grid: Numerology, mcs: int, n_pdus: int, pdu_bytes: int) -> BurstLayout:
+    """The layout of a burst. Raises ValueError, naming what is allowed."""
+    for name, value, low, high in (
+        ("MCS", mcs, 0, len(MCS_TABLE) - 1),
+        ("PDUs in a burst", n_pdus, 1, header.MAX_PDUS),
+        ("bytes of a PDU", pdu_bytes, 1, header.MAX_PDU_BYTES),
+    ):
+        if not low <= value <= high:
+            raise ValueError(f"{name}: got {value}; allowed: {low} to {high}")
+    return BurstLayout(grid, MCS_TABLE[mcs], n_pdus, pdu_bytes)
+
+
+def most_pdus(grid: Numerology, mcs: int, pdu_bytes: int, n_samples: int) -> int:
+    """How many PDUs a burst of at most `n_samples` holds; at least 1, at most 63."""
+    one = layout(grid, mcs, 1, pdu_bytes)
+    fixed = preamble.LENGTH + header.N_SYMBOLS * grid.n_symbol
+    symbols = max(0, n_samples - fixed) // grid.n_symbol
+    return max(1, min(header.MAX_PDUS, symbols * one.symbol_bits // one.coded_bits))

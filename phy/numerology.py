@@ -1,0 +1,76 @@
+"""Which carriers an OFDM symbol has, and what each is for (IEEE 802.11-2020, 17.3.5.10)."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Carriers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Numerology:
+    """An OFDM grid. Carriers are numbered from -n_fft/2; 0 is DC and carries nothing."""
+
+    n_fft: int
+    n_cp: int
+    edge: int
+    """Outermost carrier in use."""
+    pilots: tuple[int, ...]
+    pilot_signs: tuple[int, ...]
+
+    @property
+    def n_symbol(self) -> int:
+        """Samples of a symbol with its cyclic prefix."""
+        return self.n_fft + self.n_cp
+
+    @cached_property
+    def n_data(self) -> int:
+        """Data carriers."""
+        return self.n_used - len(self.pilots)
+
+    @property
+    def n_used(self) -> int:
+        """Carriers that are on."""
+        return 2 * self.edge
+
+    @cached_property
+    def used(self) -> Carriers:
+        """Numbers of the carriers that are on, ascending `[n_used]`."""
+        return np.array([k for k in range(-self.edge, self.edge + 1) if k], np.int64)
+
+    @cached_property
+    def bins(self) -> Carriers:
+        """FFT bins of `used` `[n_used]`."""
+        return self.used % self.n_fft
+
+    @cached_property
+    def data_at(self) -> Carriers:
+        """Positions of the data carriers in `used` `[n_data]`."""
+        return np.flatnonzero(~np.isin(self.used, self.pilots))
+
+    @cached_property
+    def pilots_at(self) -> Carriers:
+        """Positions of the pilots in `used` `[n_pilots]`."""
+        return np.flatnonzero(np.isin(self.used, self.pilots))
+
+    @cached_property
+    def pilot_values(self) -> NDArray[np.float32]:
+        """Pilots of a symbol with polarity +1 `[n_pilots]`."""
+        return np.array(self.pilot_signs, np.float32)
+
+    @cached_property
+    def scale(self) -> float:
+        """Factor of the inverse FFT that gives samples of mean power 1."""
+        return float(self.n_fft / np.sqrt(self.n_used))
+
+
+def _map_of_802_11(n_cp: int) -> Numerology:
+    return Numerology(64, n_cp, 26, (-21, -7, 7, 21), (1, 1, 1, -1))
+
+
+OFDM_64_16 = _map_of_802_11(16)
+"""The default: 48 data carriers and 4 pilots, a quarter of the time for echoes."""
+OFDM_64_8 = _map_of_802_11(8)
+"""For rates of a few Msps, where echoes last less than 8 samples."""

@@ -1,0 +1,62 @@
+"""What the receiver tells."""
+
+from typing import NamedTuple
+
+
+class BurstQuality(NamedTuple):
+    """A burst as received.
+
+    `start` is the absolute index of the preamble's first sample. SNR is mean burst power over noise
+    power in the sample band; EVM is that of the header's points.
+    """
+
+    start: int
+    mcs: int
+    n_pdus: int
+    pdu_bytes: int
+    network: int
+    snr_db: float
+    rssi_dbfs: float
+    evm_db: float
+    cfo: float
+    """Carrier offset in cycles a sample."""
+
+
+class PduHeard(NamedTuple):
+    """The `number`-th PDU of a burst, its CRC-32 right; `at` is the index after its last sample."""
+
+    data: bytes
+    number: int
+    at: int
+    burst: BurstQuality
+
+
+class BurstOver(NamedTuple):
+    """The end of a burst whose header was read.
+
+    `ending`: "whole", or why it ended early: "faded" (its power was gone), "cut" (samples are
+    missing), "foreign" (another network's: not decoded).
+    """
+
+    burst: BurstQuality
+    n_good: int
+    ending: str
+
+
+Event = PduHeard | BurstOver
+
+COUNTERS = (
+    "samples",
+    "samples_bad",
+    "gaps",
+    "triggers",
+    "preambles",
+    "headers_bad",
+    "bursts",
+    "bursts_foreign",
+    "bursts_faded",
+    "bursts_cut",
+    "pdus_good",
+    "pdus_bad",
+)
+"""What a receiver counts, all growing from 0."""

@@ -1,0 +1,248 @@
+"""The streaming receiver: samples in, PDUs out.
+
+SEARCH → ALIGN → ACQUIRE → PAYLOAD. Every step waits until the samples it needs are there and then
+takes exactly those, so any chunking of the same samples yields the same events.
+"""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phy import ofdm, preamble
+from phy.acquisition import BEFORE, Acquired, Acquisition, Missed, needed_after
+from phy.constellation import Modulation
+from phy.convolutional import N_TAIL, ViterbiWorkspace
+from phy.crc import CRC32_SIZE
+from phy.demodulation import Demodulator, PduDecoder
+from phy.header import MAX_PDU_BYTES, N_SYMBOLS
+from phy.kernels.detector import HISTORY, detector_sums, search
+from phy.layout import layout
+from phy.numerology import OFDM_64_16, Numerology
+from phy.quality import BurstOver, Event, PduHeard
+from phy.stream import SampleStream
+
+HOP = 512
+ALIGN_SPAN = preamble.SHORT
+THRESHOLD = 0.25
+# After a false alarm, the search goes on so many samples later.
+RETRY_AFTER = 16
+PIECE = 1 << 15
+# Kept for acquisition before the sample at which the search stands.
+_KEPT = BEFORE + preamble.SHORT + HISTORY
+# A PDU fails with less than this share of the burst's power above the noise: the burst is gone.
+_FADED = 0.25
+
+
+@dataclass
+class _Burst:
+    """A burst being received."""
+
+    acquired: Acquired
+    decoder: PduDecoder
+    demodulator: Demodulator
+    n_symbols_in: int = 0
+    n_good: int = 0
+
+
+class Receiver:
+    """Finds bursts in a stream and decodes them. Not for several threads at once.
+
+    `max_frequency` is the largest carrier offset expected, in cycles a sample. Bursts of other
+    networks than `network` are skipped; None takes all. `on_points` gets the equalised points
+    `[n, n_data]` of payload symbols, for pictures.
+    """
+
+    def __init__(
+        self,
+        network: int | None = 0,
+        max_frequency: float = 0.02,
+        grid: Numerology = OFDM_64_16,
+        start: int = 0,
+        on_points: Callable[[NDArray[np.complex64], Modulation], None] | None = None,
+    ) -> None:
+        self._network = network
+        self._grid = grid
+        self._on_points = on_points
+        self._acquisition = Acquisition(grid, max_frequency)
+        self._demodulators = {each: Demodulator(each, grid) for each in Modulation}
+        self._workspace = ViterbiWorkspace(8 * (MAX_PDU_BYTES + CRC32_SIZE) + N_TAIL)
+        self._work = np.zeros((7, HISTORY + HOP), np.float32)
+        self._dc = np.zeros(3)
+        self._stream = SampleStream(start, 1 << 18)
+        self._burst: _Burst | None = None
+        self._crossing: int | None = None
+        self._peak: tuple[int, float] | None = None
+        self._at = start
+        self.counters: Counter[str] = Counter()
+        self._begin(start)
+
+    @property
+    def next_index(self) -> int:
+        """Absolute index of the next sample to push."""
+        return self._stream.end
+
+    def push(self, samples: NDArray[np.complex64]) -> list[Event]:
+        """Take the next samples `[n]`, complex64; what they complete, in order."""
+        events: list[Event] = []
+        for first in range(0, len(samples), PIECE):
+            piece = samples[first : first + PIECE]
+            self.counters["samples_bad"] += self._stream.append(piece)
+            self.counters["samples"] += len(piece)
+            while self._step(events):
+                pass
+            self._stream.forget_before(self._at - _KEPT)
+        return events
+
+    def gap(self, n: int) -> list[Event]:
+        """`n` samples are missing here: a burst they cut is over, the search begins behind them."""
+        events: list[Event] = []
+        self.counters["gaps"] += 1
+        if self._burst is not None:
+            self._end(self._burst, events, "cut")
+        self._begin(self._stream.end + n)
+        return events
+
+    def flush(self) -> list[Event]:
+        """The stream has ended: what its last samples hold, as if silence followed."""
+        n = self._grid.n_symbol + HOP + ALIGN_SPAN + needed_after(self._grid)
+        samples = self.counters["samples"]
+        events = self.push(np.zeros(n, np.complex64))
+        self.counters["samples"] = samples
+        if self._burst is not None:
+            self._end(self._burst, events, "cut")
+        return events
+
+    def _begin(self, index: int) -> None:
+        """Search from `index`, with silence before it."""
+        self._crossing = self._peak = None
+        self._stream.restart(index - _KEPT)
+        self._stream.append(np.zeros(_KEPT, np.complex64))
+        self._at = index
+
+    def _step(self, events: list[Event]) -> bool:
+        """Go one step on; False when samples are missing for it."""
+        if self._burst is not None:
+            return self._payload(self._burst, events)
+        if self._peak is not None:
+            return self._acquire(*self._peak, events)
+        if self._crossing is not None:
+            return self._align(self._crossing)
+        return self._search()
+
+    def _search(self) -> bool:
+        n_hops = (self._stream.end - self._at) // HOP
+        if n_hops < 1:
+            return False
+        first = self._at - HISTORY
+        x = self._stream.view(first, self._at + n_hops * HOP)
+        found = search(x, n_hops, HOP, THRESHOLD, self._dc, self._work)
+        if found < 0:
+            self._at += n_hops * HOP
+        else:
+            self.counters["triggers"] += 1
+            self._at = self._crossing = first + found
+        return True
+
+    def _align(self, crossing: int) -> bool:
+        """The metric's maximum within a preamble's length of the first crossing."""
+        if self._stream.end < crossing + ALIGN_SPAN:
+            return False
+        x = self._stream.view(crossing - HISTORY, crossing + ALIGN_SPAN)
+        detector_sums(x, self._dc_value, self._work, ALIGN_SPAN)
+        p = self._work[0, :ALIGN_SPAN] + 1j * self._work[1, :ALIGN_SPAN]
+        energy = self._work[2, :ALIGN_SPAN]
+        metric = np.abs(p) / np.where(energy > 0, energy, 1)
+        peak = int(metric.argmax())
+        turn = float(np.angle(p[peak])) / (2 * np.pi * preamble.SEGMENT)
+        self._at = crossing + peak
+        self._crossing, self._peak = None, (crossing + peak, turn)
+        return True
+
+    def _acquire(self, peak: int, coarse: float, events: list[Event]) -> bool:
+        nominal = peak + 1 + preamble.GUARD
+        if self._stream.end < nominal + needed_after(self._grid):
+            return False
+        base = nominal - BEFORE
+        x = self._stream.view(base, nominal + needed_after(self._grid))
+        found = self._acquisition.acquire(x, base, coarse, self._dc_value)
+        self._peak = None
+        if isinstance(found, Missed):
+            self._at = peak + RETRY_AFTER
+            if found.stage == "header":
+                self.counters["preambles"] += 1
+                self.counters["headers_bad"] += 1
+            return True
+        self.counters["preambles"] += 1
+        told = found.header
+        plan = layout(self._grid, told.mcs, told.n_pdus, told.pdu_bytes)
+        self._burst = _Burst(
+            found, PduDecoder(plan, self._workspace), self._demodulators[plan.mcs.modulation]
+        )
+        if self._network is not None and told.network != self._network:
+            self._burst.n_symbols_in = plan.n_symbols
+            self._end(self._burst, events, "foreign")
+        else:
+            self.counters["bursts"] += 1
+            self._at = found.window
+        return True
+
+    def _payload(self, burst: _Burst, events: list[Event]) -> bool:
+        """One PDU more, once all its symbols are in."""
+        plan, found = burst.decoder.layout, burst.acquired
+        number = burst.decoder.n_decoded
+        last = plan.symbols_through(number + 1)
+        n = last - burst.n_symbols_in
+        first = found.window + burst.n_symbols_in * self._grid.n_symbol
+        end = found.window + (last - 1) * self._grid.n_symbol + self._grid.n_fft if n else first
+        if self._stream.end < end:
+            return False
+        starts = self._grid.n_symbol * np.arange(n)
+        x = self._stream.view(first, end)
+        bins = ofdm.to_bins(x, starts, found.frequency, self._dc_value, self._grid)
+        # Bins are turned back from the first window on, the channel estimate from its own.
+        bins *= np.complex64(np.exp(-2j * np.pi * found.frequency * self._since(burst, first)))
+        llr, points = burst.demodulator.demap(
+            bins, found.channel, found.tracking, N_SYMBOLS + burst.n_symbols_in
+        )
+        if self._on_points is not None and n:
+            self._on_points(points, plan.mcs.modulation)
+        burst.n_symbols_in = last
+        self._at = first
+        data = burst.decoder.decode_next(llr)
+        if data is not None:
+            burst.n_good += 1
+            self.counters["pdus_good"] += 1
+            events.append(PduHeard(data, number, end, found.quality))
+        else:
+            self.counters["pdus_bad"] += 1
+        if number + 1 == plan.n_pdus:
+            self._end(burst, events, "whole")
+        elif data is None and self._is_gone(bins, found):
+            self._end(burst, events, "faded")
+        return True
+
+    def _since(self, burst: _Burst, index: int) -> int:
+        """Samples from the channel estimate's window to `index`."""
+        grid = self._grid
+        head = preamble.N_LONG * grid.n_fft + N_SYMBOLS * grid.n_symbol + grid.n_cp
+        return index - (burst.acquired.window - head)
+
+    def _is_gone(self, bins: NDArray[np.complex64], found: Acquired) -> bool:
+        used = bins[:, self._grid.bins]
+        power = float(np.mean(used.real**2 + used.imag**2)) if len(used) else np.inf
+        return power < found.channel.no + _FADED * found.channel.gain
+
+    def _end(self, burst: _Burst, events: list[Event], ending: str) -> None:
+        self._burst = None
+        if ending != "whole":
+            self.counters[f"bursts_{ending}"] += 1
+        events.append(BurstOver(burst.acquired.quality, burst.n_good, ending))
+        grid = self._grid
+        self._at = burst.acquired.window + burst.n_symbols_in * grid.n_symbol - grid.n_cp
+
+    @property
+    def _dc_value(self) -> complex:
+        return complex(self._dc[0], self._dc[1])

@@ -1,0 +1,38 @@
+"""Shift-register sequences: the whitening of payloads and the polarity of pilots."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def lfsr(taps: tuple[int, ...], state: int, n_bits: int) -> NDArray[np.uint8]:
+    """`n_bits` of the feedback register with polynomial 1 + Σ x^tap; `state` ≠ 0 starts it."""
+    degree = max(taps)
+    out = np.empty(n_bits, np.uint8)
+    for i in range(n_bits):
+        bit = 0
+        for tap in taps:
+            bit ^= state >> (tap - 1) & 1
+        state = (state << 1 | bit) & ((1 << degree) - 1)
+        out[i] = bit
+    return out
+
+
+_MAX_SYMBOLS = 1 << 17
+_POLARITY = np.resize(1 - 2 * lfsr((4, 7), 0b1111111, 127).astype(np.float32), _MAX_SYMBOLS)
+
+
+def polarity(n_symbols: int, start: int = 0) -> NDArray[np.float32]:
+    """Sign of the pilots from symbol `start`, the header's first being 0 (802.11, 17.3.5.10)."""
+    return _POLARITY[start : start + n_symbols]
+
+
+# x^15 + x^14 + 1 has 32767 bits; 8 and 32767 share no factor, so its bytes repeat as late.
+_N_PERIODS = 4
+_WHITE = np.tile(np.packbits(np.tile(lfsr((14, 15), 0x2AAA, 32767), 8)), _N_PERIODS)
+PADDING = np.unpackbits(_WHITE[:256])
+"""Bits that fill up the last symbol of a burst."""
+
+
+def whitening(n_bytes: int, start: int = 0) -> NDArray[np.uint8]:
+    """What the bytes of a burst from `start` are XORed with, so that zeros make no peaks."""
+    return _WHITE[start : start + n_bytes]

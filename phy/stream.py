@@ -1,0 +1,66 @@
+"""The last part of an endless stream of samples, by absolute index."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phy.kernels.detector import sanitise
+
+# Larger values are a fault; their squares must stay finite.
+LARGEST_SAMPLE = 1e6
+
+
+class SampleStream:
+    """Appends at the end, forgets at the beginning; what is kept lies in one piece."""
+
+    def __init__(self, start: int, capacity: int) -> None:
+        self._samples = np.zeros(capacity, np.complex64)
+        self._begin = 0
+        self._size = 0
+        self._start = start
+
+    @property
+    def start(self) -> int:
+        """Absolute index of the oldest sample kept."""
+        return self._start
+
+    @property
+    def end(self) -> int:
+        """Absolute index after the newest sample."""
+        return self._start + self._size
+
+    def append(self, samples: NDArray[np.complex64]) -> int:
+        """Take samples; those that are no numbers become 0. Returns how many were."""
+        n = len(samples)
+        if self._begin + self._size + n > len(self._samples):
+            self._make_room(n)
+        at = self._begin + self._size
+        room = self._samples[at : at + n]
+        room[:] = samples
+        self._size += n
+        return int(sanitise(room, LARGEST_SAMPLE))
+
+    def view(self, first: int, last: int) -> NDArray[np.complex64]:
+        """Samples from `first` up to before `last`, not copied: valid until the next `append`."""
+        begin = self._begin + first - self._start
+        return self._samples[begin : begin + last - first]
+
+    def forget_before(self, index: int) -> None:
+        """Samples before `index` are not needed any more."""
+        n = min(max(0, index - self._start), self._size)
+        self._begin += n
+        self._start += n
+        self._size -= n
+
+    def restart(self, start: int) -> None:
+        """Forget everything; the next sample has index `start`."""
+        self._begin, self._size, self._start = 0, 0, start
+
+    def _make_room(self, n: int) -> None:
+        kept = self._samples[self._begin : self._begin + self._size]
+        if self._size + n > len(self._samples) // 2:
+            larger = np.zeros(2 * (self._size + n), np.complex64)
+            larger[: self._size] = kept
+            self._samples = larger
+        else:
+            self._samples[: self._size] = kept.copy()
+        self._begin = 0
