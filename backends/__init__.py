@@ -1,3 +1,38 @@
 """Radios: IQ samples in and out."""
 
-__all__: list[str] = []
+from backends.air import Channel
+from backends.base import (
+    BackendError,
+    Capabilities,
+    Radio,
+    RxBlock,
+    Samples,
+    Tuning,
+    TxBurst,
+    TxOutcome,
+    TxReport,
+)
+from backends.iqfile import IqFileRadio
+from backends.loopback import LoopbackRadio
+from backends.recording import RecordingInfo, RecordingReader, RecordingWriter, describe
+from backends.samples import SAMPLE_TYPES
+
+__all__ = [
+    "SAMPLE_TYPES",
+    "BackendError",
+    "Capabilities",
+    "Channel",
+    "IqFileRadio",
+    "LoopbackRadio",
+    "Radio",
+    "RecordingInfo",
+    "RecordingReader",
+    "RecordingWriter",
+    "RxBlock",
+    "Samples",
+    "Tuning",
+    "TxBurst",
+    "TxOutcome",
+    "TxReport",
+    "describe",
+]

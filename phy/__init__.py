@@ -1,5 +1,6 @@
 """The OFDM modem: bits to samples and back."""
 
+from phy.channel import PROFILES, FrontEnd, FrontEndParams, Path, PathParams
 from phy.constellation import Modulation, points
 from phy.header import MAX_PDU_BYTES, MAX_PDUS, N_NETWORKS
 from phy.layout import BurstLayout, layout, most_pdus
@@ -18,13 +19,18 @@ __all__ = [
     "N_NETWORKS",
     "OFDM_64_8",
     "OFDM_64_16",
+    "PROFILES",
     "BurstLayout",
     "BurstOver",
     "BurstQuality",
     "Event",
+    "FrontEnd",
+    "FrontEndParams",
     "Mcs",
     "Modulation",
     "Numerology",
+    "Path",
+    "PathParams",
     "PduHeard",
     "Receiver",
     "Transmitter",

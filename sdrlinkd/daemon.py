@@ -21,7 +21,7 @@ from sdrlinkd.control import Control, Verb
 from sdrlinkd.errors import UserError
 from sdrlinkd.link import Link
 from sdrlinkd.node import Node
-from sdrlinkd.pdulink import make_pdu_link
+from sdrlinkd.pdulink import DirectLink, PduLink
 from sdrlinkd.sdnotify import Notifier
 
 log = logging.getLogger("sdrlinkd")
@@ -48,6 +48,7 @@ async def run(setup: Setup, reload: Reload) -> None:
         stack.callback(loop.remove_signal_handler, signal.SIGHUP)
         async with asyncio.TaskGroup() as tasks:
             running = [
+                tasks.create_task(node.carry(), name="carry"),
                 tasks.create_task(node.transmit(), name="transmit"),
                 tasks.create_task(node.tick(), name="tick"),
                 tasks.create_task(_notify(notifier, node, control), name="notify"),
@@ -78,10 +79,10 @@ async def _open(
         setup.registry,
         setup.node_id,
         rng,
-        hears_self=config.direct.hear_self,
+        hears_self=config.hears_self,
     )
     link.set_policies(setup.policies)
-    pdu_link = make_pdu_link(config, rng)
+    pdu_link = _make_pdu_link(config, rng)
     context = zmq.Context()
     # Closes what a part that failed half-way left open; term() would wait for it for ever.
     stack.callback(context.destroy)
@@ -99,6 +100,15 @@ async def _open(
     for warning in setup.warnings:
         log.warning("%s", warning)
     return node, control
+
+
+def _make_pdu_link(config: Config, rng: Random) -> PduLink:
+    if config.backend == "direct":
+        return DirectLink(config.direct, config.link.pdu_size, rng)
+    # The modem brings numba and scipy, which take their time to load.
+    from sdrlinkd.modem import make_modem
+
+    return make_modem(config, rng)
 
 
 def _runtime_directory(config: Config) -> Path:

@@ -71,6 +71,12 @@ class Node:
 
     # The daemon's tasks.
 
+    async def carry(self) -> None:
+        """Let the PDU link run; for ever."""
+        if self._setup.config.iqfile.wait_for_consumer:
+            await self.bus.has_consumer.wait()
+        await self._pdu_link.run()
+
     async def transmit(self) -> None:
         """Compose a burst whenever the carrier can take one; for ever."""
         while True:
@@ -116,6 +122,7 @@ class Node:
     def snapshot(self, control_requests: int) -> Snapshot:
         """Everything there is to know, at this moment."""
         now = self._pdu_link.now()
+        carrier = self._pdu_link.report()
         return Snapshot(
             version=__version__,
             node=self._setup.node_id,
@@ -124,7 +131,7 @@ class Node:
             taken_at_unix_ns=time.time_ns(),
             uptime_s=time.monotonic() - self._started_at,
             loop_lag_ms=self._loop_lag_s * 1e3,
-            carrier=self._pdu_link.report(),
+            carrier=carrier,
             bus=self.bus.report(control_requests),
             link=link_report(
                 self._link,
@@ -132,7 +139,7 @@ class Node:
                 {topic_id: name for name, topic_id in self._setup.topics_in.items()},
                 self.bus.names_out(),
             ),
-            notices=[*self._setup.warnings, *link_notices(self._link)],
+            notices=[*self._setup.warnings, *carrier.notices, *link_notices(self._link)],
         )
 
     def audit(self) -> list[str]:

@@ -113,9 +113,12 @@ class CarrierReport(msgspec.Struct, frozen=True, kw_only=True):
 
     kind: str
     state: str
-    """up | down"""
+    """up | down | ended (a recording is over)"""
     detail: str = ""
     counters: dict[str, int] = {}
+    realtime_ratio: float | None = None
+    """How many times faster than real time the receiver works, in processor time."""
+    notices: list[str] = []
 
 
 class BusReport(msgspec.Struct, frozen=True, kw_only=True):

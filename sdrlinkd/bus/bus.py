@@ -67,6 +67,8 @@ class Bus:
         self._published = 0
         self._bad_last = ""
         self._taps = 0
+        self.has_consumer = asyncio.Event()
+        """Set once somebody has subscribed to messages from the air."""
         self._welcome = envelope.VERSION_BYTE + msgspec.msgpack.encode(
             envelope.Welcome("sdrlinkd", __version__, [1], list(setup.topics_in))
         )
@@ -208,6 +210,8 @@ class Bus:
         elif subscribed and topic.startswith(ACK_PREFIX):
             # Subscriptions are processed in order: those before this one are active now.
             self._acknowledge(topic)
+        elif subscribed and topic.startswith(b"/"):
+            self.has_consumer.set()
 
     def _acknowledge(self, topic: bytes) -> None:
         self._out.send_multipart([topic, self._welcome])

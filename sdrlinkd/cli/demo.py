@@ -12,20 +12,47 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from sdrlinkd import __version__
 from sdrlinkd.cli.app import app
-from sdrlinkd.demo import DemoReport, Options, open_source, run_demo, table_6, topic_table
+from sdrlinkd.demo import (
+    DemoReport,
+    Options,
+    RunResult,
+    Source,
+    Trace,
+    open_source,
+    run_demo,
+    table_6,
+    topic_table,
+)
 from sdrlinkd.errors import UserError
 from sdrlinkd.wire import MAX_PDU_SIZE, MIN_PDU_SIZE
 
 
 class LinkKind(StrEnum):
-    """What carries the PDUs."""
+    """What carries the PDUs: modem and loopback radio, modem and recording, neither."""
 
+    OFDM = "ofdm"
+    IQFILE = "iqfile"
     DIRECT = "direct"
+
+
+class ChannelKind(StrEnum):
+    """The simulated air."""
+
+    AWGN = "awgn"
+    RAYLEIGH = "rayleigh"
+    TDL_A = "tdl-a"
+    TDL_C = "tdl-c"
+
+
+PICTURES = ("latency_cdf.png", "path.png")
 
 
 @app.command()
 def demo(
-    link: Annotated[LinkKind, typer.Option(help="What carries the PDUs.")] = LinkKind.DIRECT,
+    link: Annotated[
+        list[LinkKind] | None,
+        typer.Option(help="What carries the PDUs; may be repeated. By default all, one by one."),
+    ] = None,
     bag: Annotated[
         Path | None, typer.Option(help="Send this recording; by default a built-in robot drives.")
     ] = None,
@@ -43,6 +70,27 @@ def demo(
     pdu_size: Annotated[
         int, typer.Option(min=MIN_PDU_SIZE, max=MAX_PDU_SIZE, help="Octets of a PDU.")
     ] = 64,
+    mcs: Annotated[
+        int, typer.Option(min=0, max=6, help="Modulation and code rate; `phy info` lists them.")
+    ] = 1,
+    snr: Annotated[
+        float, typer.Option(min=-30, help="Burst power over noise power in the band, in dB.")
+    ] = 15.0,
+    ppm: Annotated[
+        float,
+        typer.Option(
+            "--cfo-ppm", min=-40, max=40, help="Sender's crystal against the receiver's, in ppm."
+        ),
+    ] = 10.0,
+    channel: Annotated[
+        ChannelKind, typer.Option(help="The simulated air: noise alone, or echoes that fade.")
+    ] = ChannelKind.AWGN,
+    rate: Annotated[
+        float, typer.Option(min=1e4, max=2e8, help="Samples a second of the modem.")
+    ] = 5e6,
+    record: Annotated[
+        Path | None, typer.Option(help="Keep the recording of iqfile under this name (SigMF).")
+    ] = None,
     seed: Annotated[int, typer.Option(help="Of all chance.")] = 1,
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Also write the report here.")
@@ -51,13 +99,39 @@ def demo(
         "build/demo"
     ),
 ) -> None:
-    """Send a robot's messages through a daemon and back; measure what the paper measured."""
+    """Send a robot's messages through daemons and radios; measure what the paper measured."""
     console = Console()
     pictures = _load_pictures()
     _make_folder(out)
-    source = open_source(bag, registry, topics or [], duration, seed)
-    for reason in source.left_out:
-        console.print(f"left out: {reason}", style="yellow", highlight=False, markup=False)
+    results: list[RunResult] = []
+    traces: dict[str, Trace] = {}
+    for kind in dict.fromkeys(link or list(LinkKind)):
+        source = open_source(bag, registry, topics or [], duration, seed)
+        if not results:
+            for reason in source.left_out:
+                _say(console, f"left out: {reason}", style="yellow")
+        options = Options(
+            link=kind.value, pdu_size=pdu_size, speed=speed, seed=seed, mcs=mcs, snr_db=snr,
+            clock_ppm=ppm, channel=channel.value, rate_hz=rate, recording=record,
+        )  # fmt: skip
+        result, traces[kind.value] = _run(console, source, options)
+        results.append(result)
+        source.recording.close()
+    _write(out, json_file, DemoReport(version=__version__, runs=results))
+    caption = _caption(results[0])
+    pictures.latency_cdf(traces, out / PICTURES[0], caption)
+    pictures.paths(traces, out / PICTURES[1], caption)
+    for result in results if len(results) == 1 else ():
+        console.print(topic_table(result))
+    console.print(table_6(results))
+    for result in results:
+        _say(console, _summary(result))
+    _say(console, f"wrote {out}/report.json, {', '.join(PICTURES)}")
+    if results[0].damage:
+        _say(console, f"warning: {results[0].damage}", style="yellow")
+
+
+def _run(console: Console, source: Source, options: Options) -> tuple[RunResult, Trace]:
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
@@ -66,37 +140,44 @@ def demo(
     )
     with Progress(*columns, console=console) as progress:
         task = progress.add_task(
-            f"{link.value}: {source.title}", total=source.expected(), received=0
+            f"{options.link}: {source.title}", total=source.expected(), received=0
         )
-        result, trace = run_demo(
+        return run_demo(
             source,
-            Options(link.value, pdu_size, speed, seed),
+            options,
             lambda sent, received: progress.update(task, completed=sent, received=received),
         )
-    source.recording.close()
-    report = DemoReport(version=__version__, runs=[result])
-    _write(out, json_file, report)
-    caption = (
-        f"sdrlinkctl demo --link {link.value}, {source.title}, PDUs of {pdu_size} B, seed {seed}"
-    )
-    pictures.latency_cdf({result.name: trace}, out / "latency_cdf.png", caption)
-    pictures.paths(trace, out / "path.png", caption)
-    console.print(topic_table(result))
-    console.print(table_6([result]))
-    console.print(
-        f"bytes identical: {'yes' if result.bytes_identical else 'NO'}; "
+
+
+def _summary(result: RunResult) -> str:
+    text = (
+        f"{result.name}: bytes identical: {'yes' if result.bytes_identical else 'NO'}; "
         f"ledger adds up: {'yes' if result.ledger_adds_up else 'NO'}; "
         f"{result.entries_per_message:.1f} entries a message; "
-        f"dropped: {result.dropped or 'nothing'}",
-        highlight=False,
-        markup=False,
-        soft_wrap=True,
+        f"dropped: {result.dropped or 'nothing'}"
     )
-    console.print(
-        f"wrote {out}/report.json, latency_cdf.png, path.png", highlight=False, markup=False
-    )
-    if result.damage:
-        console.print(f"warning: {result.damage}", style="yellow", highlight=False, markup=False)
+    if result.phy is not None:
+        heard = result.phy
+        text += (
+            f"; {heard.pdus_good} of {result.pdus_sent} PDUs good in {heard.bursts} bursts, "
+            f"{heard.pdus_bad} bad"
+        )
+    return text
+
+
+def _caption(result: RunResult) -> str:
+    text = f"sdrlinkctl demo, {result.source}, PDUs of {result.pdu_size} B, seed {result.seed}"
+    if result.phy is not None:
+        heard = result.phy
+        text += (
+            f"; {heard.mcs} at {heard.rate_hz / 1e6:g} Msps, {heard.channel} {heard.snr_db:g} dB, "
+            f"{heard.clock_ppm:g} ppm"
+        )
+    return text
+
+
+def _say(console: Console, text: str, style: str | None = None) -> None:
+    console.print(text, style=style, highlight=False, markup=False, soft_wrap=True)
 
 
 def _load_pictures() -> ModuleType:
@@ -113,7 +194,7 @@ def _load_pictures() -> ModuleType:
 def _make_folder(out: Path) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
-        for name in ("report.json", "latency_cdf.png", "path.png"):
+        for name in ("report.json", *PICTURES):
             (out / name).open("ab").close()
     except OSError as error:
         raise UserError(f"{error.filename} cannot be written ({error.strerror})") from None

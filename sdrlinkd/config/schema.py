@@ -5,6 +5,13 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from sdrlinkd.config.carriers import (
+    ChannelParams,
+    DirectParams,
+    IqFileParams,
+    LoopbackParams,
+    ModemParams,
+)
 from sdrlinkd.link import LinkParams, QueueParams, ReassemblyParams, TopicPolicy
 
 
@@ -14,24 +21,6 @@ class BusParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     runtime_dir: str = ""
     """Directory of the sockets; empty: systemd's, or the user's own."""
     max_message_bytes: Annotated[int, Meta(ge=64, le=1 << 24)] = 1 << 20
-
-
-class DirectParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The direct link: PDUs straight back to this daemon, with faults on demand."""
-
-    hear_self: bool = True
-    rate_bit_s: Annotated[float, Meta(ge=0, le=1e12)] = 0.0
-    """Pace of the link in bit/s; 0: as fast as it goes."""
-    loss: Annotated[float, Meta(ge=0, le=1)] = 0.0
-    """Share of PDUs that vanish."""
-    delay_s: Annotated[float, Meta(ge=0, le=60)] = 0.0
-    jitter_s: Annotated[float, Meta(ge=0, le=60)] = 0.0
-    """Further delay, uniform from 0; PDUs overtake each other."""
-    duplicate: Annotated[float, Meta(ge=0, le=1)] = 0.0
-    """Share of PDUs that arrive twice."""
-    corrupt: Annotated[float, Meta(ge=0, le=1)] = 0.0
-    """Share of PDUs that arrive with a flipped bit."""
-    max_pdus_per_burst: Annotated[int, Meta(ge=1, le=63)] = 16
 
 
 class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -49,7 +38,7 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """Namespace under which another robot's topics are republished."""
     rx_depth: Annotated[int, Meta(ge=0)] = 256
     """Messages kept for a consumer that does not read; 0: without bound."""
-    backend: Literal["direct"] = "direct"
+    backend: Literal["direct", "loopback", "iqfile"] = "direct"
     drain_s: Annotated[float, Meta(ge=0, le=60)] = 1.0
     """Time to send what is queued when the daemon is stopped."""
     seed: int | None = None
@@ -59,5 +48,18 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     reassembly: ReassemblyParams = ReassemblyParams()
     bus: BusParams = BusParams()
     direct: DirectParams = DirectParams()
+    modem: ModemParams = ModemParams()
+    loopback: LoopbackParams = LoopbackParams()
+    iqfile: IqFileParams = IqFileParams()
+    channel: ChannelParams = ChannelParams()
     topic: dict[str, TopicPolicy] = {}
     """Policies by registry name: `[topic.odom]`."""
+
+    @property
+    def hears_self(self) -> bool:
+        """Whether this node takes its own PDUs (the paper's experiment)."""
+        return {
+            "direct": self.direct.hear_self,
+            "loopback": self.loopback.hear_self,
+            "iqfile": self.iqfile.hear_self,
+        }[self.backend]

@@ -4,6 +4,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from sdrlinkd.config.carrier_checks import check_carrier, with_paths
 from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError, RegistryError
 from sdrlinkd.link import TopicPolicy
@@ -65,6 +66,8 @@ def make_setup(config: Config, base: Path, source: str = "config") -> Setup:
     """Resolve `config`; file names in it are relative to `base`. Raises UserError."""
     registry = load_registry(base / config.registry)
     _check_texts(config, source)
+    check_carrier(config, source)
+    config = with_paths(config, base)
     return Setup(
         config=config,
         registry=registry,

@@ -7,9 +7,10 @@ import numpy as np
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sdrlinkd.demo.trace import Trace, latencies_s
+from sdrlinkd.demo.trace import Path2D, Trace, latencies_s
 
 SENT_MARK_EVERY = 50
 
@@ -32,29 +33,35 @@ def latency_cdf(runs: dict[str, Trace], path: Path, caption: str) -> None:
     _save(figure, path, caption)
 
 
-def paths(trace: Trace, path: Path, caption: str) -> None:
-    """Figure 7: the path sent and the path received, one panel per odometry topic."""
-    topics = trace.odometry_topics()
+def paths(runs: dict[str, Trace], path: Path, caption: str) -> None:
+    """Figure 7: the path sent and the path received; a row a run, a column an odometry topic."""
+    topics = next(iter(runs.values())).odometry_topics()
+    n_columns = max(1, len(topics))
     figure, panels = plt.subplots(
-        1, max(1, len(topics)), figsize=(5.2 * max(1, len(topics)), 4.8),
+        len(runs), n_columns, figsize=(5.2 * n_columns, 4.4 * len(runs)),
         layout="constrained", squeeze=False,
     )  # fmt: skip
-    pairs, _ = trace.matches()
-    for axes, name in zip(panels[0], topics, strict=False):
-        sent = trace.path(trace.sent[name])
-        got = trace.path([sample for _, sample in pairs.get(name, [])])
-        axes.plot(*sent.T, color="tab:blue", linewidth=1.2, label=f"sent ({len(sent)})")
-        marks = sent[::SENT_MARK_EVERY]
-        axes.plot(*marks.T, "o", color="tab:blue", markersize=5)
-        axes.plot(*got.T, ".", color="tab:red", markersize=2.5, label=f"received ({len(got)})")
-        axes.set(title=f"/{name}", xlabel="x in m", ylabel="y in m", aspect="equal")
-        axes.set_adjustable("datalim")
-        axes.grid(visible=True, alpha=0.25)
-        axes.legend(loc="best")
-    if not topics:
-        panels[0][0].text(0.5, 0.5, "no odometry was sent", ha="center", va="center")
-        panels[0][0].set_axis_off()
+    for row, (run, trace) in zip(panels, runs.items(), strict=True):
+        pairs, _ = trace.matches()
+        for axes, name in zip(row, topics, strict=False):
+            sent = trace.path(trace.sent[name])
+            got = trace.path([sample for _, sample in pairs.get(name, [])])
+            _draw_path(axes, sent, got)
+            axes.set_title(f"{run}: /{name}")
+        if not topics:
+            row[0].text(0.5, 0.5, "no odometry was sent", ha="center", va="center")
+            row[0].set_axis_off()
     _save(figure, path, caption)
+
+
+def _draw_path(axes: Axes, sent: Path2D, got: Path2D) -> None:
+    axes.plot(*sent.T, color="tab:blue", linewidth=1.2, label=f"sent ({len(sent)})")
+    axes.plot(*sent[::SENT_MARK_EVERY].T, "o", color="tab:blue", markersize=5)
+    axes.plot(*got.T, ".", color="tab:red", markersize=2.5, label=f"received ({len(got)})")
+    axes.set(xlabel="x in m", ylabel="y in m", aspect="equal")
+    axes.set_adjustable("datalim")
+    axes.grid(visible=True, alpha=0.25)
+    axes.legend(loc="best")
 
 
 def _save(figure: Figure, path: Path, caption: str) -> None:

@@ -5,7 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from msgspec import Struct
 
+from sdrlinkd.demo.links import Options
+from sdrlinkd.demo.source import Source
 from sdrlinkd.demo.trace import Pair, Trace, goodput_bytes_per_s, latencies_s, path_error_m
+from sdrlinkd.reports import Snapshot
 
 QUANTILES = {"p50": 0.50, "p90": 0.90, "p99": 0.99}
 
@@ -21,6 +24,22 @@ class TopicResult(Struct, frozen=True, kw_only=True):
     goodput_bytes_per_s: float
     latency_ms: dict[str, float]
     path_error_m: float | None = None
+
+
+class PhyResult(Struct, frozen=True, kw_only=True):
+    """What the modem was told, and what its receiver counted."""
+
+    mcs: str
+    rate_hz: float
+    channel: str
+    snr_db: float
+    clock_ppm: float
+    bursts: int
+    pdus_good: int
+    pdus_bad: int
+    headers_bad: int
+    snr_db_measured: float | None
+    realtime_ratio: float | None
 
 
 class RunResult(Struct, frozen=True, kw_only=True):
@@ -45,6 +64,7 @@ class RunResult(Struct, frozen=True, kw_only=True):
     topics: list[TopicResult]
     left_out: list[str]
     damage: str
+    phy: PhyResult | None = None
 
 
 class DemoReport(Struct, frozen=True, kw_only=True):
@@ -91,17 +111,12 @@ def topic_results(trace: Trace) -> list[TopicResult]:
 def run_result(
     trace: Trace,
     *,
-    name: str,
-    source: str,
-    seed: int,
-    pdu_size: int,
+    source: Source,
+    options: Options,
     duration_s: float,
-    pdus_sent: int,
-    entries: int,
+    sender: Snapshot,
+    receiver: Snapshot,
     ledger_adds_up: bool,
-    dropped: dict[str, int],
-    left_out: list[str],
-    damage: str,
 ) -> RunResult:
     """The figures of a finished run."""
     pairs, foreign = trace.matches()
@@ -109,11 +124,13 @@ def run_result(
     errors = [topic.path_error_m for topic in topics if topic.path_error_m is not None]
     flat = [pair for found in pairs.values() for pair in found]
     received = len(flat)
+    tx, rx = sender.link.tx, receiver.link.rx
+    pdus = {k: v for k, v in rx.pdus_dropped.items() if k not in ("rx_control", "rx_dup")}
     return RunResult(
-        name=name,
-        source=source,
-        seed=seed,
-        pdu_size=pdu_size,
+        name=options.link,
+        source=source.title,
+        seed=options.seed,
+        pdu_size=options.pdu_size,
         duration_s=duration_s,
         sent=trace.n_sent,
         received=received,
@@ -122,11 +139,30 @@ def run_result(
         latency_ms=latency_ms(flat),
         path_error_m=max(errors) if errors else None,
         bytes_identical=foreign == 0 and received == trace.n_received and received > 0,
-        entries_per_message=entries / trace.n_sent if trace.n_sent else 0.0,
-        pdus_sent=pdus_sent,
+        entries_per_message=tx.entries / trace.n_sent if trace.n_sent else 0.0,
+        pdus_sent=tx.pdus_sent,
         ledger_adds_up=ledger_adds_up,
-        dropped=dropped,
+        dropped={**tx.dropped, **rx.dropped, **pdus},
         topics=topics,
-        left_out=left_out,
-        damage=damage,
+        left_out=source.left_out,
+        damage=source.recording.damage,
+        phy=None if options.link == "direct" else _phy_result(options, receiver),
+    )
+
+
+def _phy_result(options: Options, receiver: Snapshot) -> PhyResult:
+    counters = receiver.carrier.counters
+    snr = [each.snr_db for each in receiver.link.neighbors if each.snr_db is not None]
+    return PhyResult(
+        mcs=receiver.carrier.detail.split(",")[0],
+        rate_hz=options.rate_hz,
+        channel=options.channel,
+        snr_db=options.snr_db,
+        clock_ppm=options.clock_ppm,
+        bursts=counters["bursts"],
+        pdus_good=counters["pdus_good"],
+        pdus_bad=counters["pdus_bad"],
+        headers_bad=counters["headers_bad"],
+        snr_db_measured=snr[0] if snr else None,
+        realtime_ratio=receiver.carrier.realtime_ratio,
     )

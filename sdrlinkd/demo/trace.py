@@ -17,10 +17,14 @@ Path2D = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """A message at one end: payload, and when by the one monotonic clock, in s."""
+    """A message at one end: payload, and when by the one monotonic clock, in s.
+
+    `age_s`: how long it took by the link's own count, where reception was later than the radio's.
+    """
 
     at: float
     payload: bytes
+    age_s: float | None = None
 
 
 # What was sent, and the same as received.
@@ -39,6 +43,11 @@ class Trace:
     def n_sent(self) -> int:
         """Messages sent, counted at the producer."""
         return sum(len(samples) for samples in self.sent.values())
+
+    @property
+    def last_sent_at(self) -> float:
+        """When the last message was sent."""
+        return max((samples[-1].at for samples in self.sent.values() if samples), default=0.0)
 
     @property
     def n_received(self) -> int:
@@ -61,7 +70,7 @@ class Trace:
                 if match is None:
                     foreign += 1
                 else:
-                    found.append((sent[match], sample))
+                    found.append((sent[match], _as_on_air(sent[match], sample)))
                     at = match + 1
             pairs[name] = found
         return pairs, foreign
@@ -115,6 +124,13 @@ def _along(path: Path2D) -> Path2D | None:
         return None
     grid = np.linspace(0, length[-1], GRID_POINTS)
     return np.stack([np.interp(grid, length, path[:, i]) for i in range(2)], axis=1)
+
+
+def _as_on_air(sent: Sample, received: Sample) -> Sample:
+    """The reception as it was on the air, when that was recorded and played later."""
+    if received.age_s is None:
+        return received
+    return Sample(sent.at + received.age_s, received.payload)
 
 
 def _next_match(sent: Sequence[Sample], at: int, received: Sample) -> int | None:

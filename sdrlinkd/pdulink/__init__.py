@@ -1,8 +1,5 @@
-"""PDU links: what carries PDUs between nodes, behind one seam."""
+"""PDU links: what carries PDUs between nodes, behind one seam; and the one without a radio."""
 
-from random import Random
-
-from sdrlinkd.config import Config
 from sdrlinkd.pdulink.base import Heard, Opportunity, PduLink, PduListener
 from sdrlinkd.pdulink.direct import DirectLink
 from sdrlinkd.pdulink.impairment import Arrival, Impairment
@@ -15,10 +12,4 @@ __all__ = [
     "Opportunity",
     "PduLink",
     "PduListener",
-    "make_pdu_link",
 ]
-
-
-def make_pdu_link(config: Config, rng: Random) -> PduLink:
-    """The PDU link that `config.backend` names."""
-    return DirectLink(config.direct, config.link.pdu_size, rng)

@@ -44,6 +44,9 @@ class PduLink(Protocol):
     async def open(self, listener: PduListener) -> None:
         """Begin to listen. Raises UserError when the carrier cannot be had."""
 
+    async def run(self) -> None:
+        """Carry PDUs until cancelled, in the daemon's task group."""
+
     async def opportunity(self) -> Opportunity:
         """Wait until the carrier can take the next burst."""
 

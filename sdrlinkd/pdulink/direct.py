@@ -38,6 +38,10 @@ class DirectLink:
         """Begin to listen."""
         self._listener = listener
 
+    async def run(self) -> None:
+        """Nothing to do: a burst is delivered by timers."""
+        await asyncio.Event().wait()
+
     async def opportunity(self) -> Opportunity:
         """When the burst before has left; at once, but never without a turn of the loop."""
         await asyncio.sleep(max(0.0, self._free_at - self.now()))

@@ -21,7 +21,17 @@ def test_shipped_file_shows_every_key():
         Config,
         *(
             type(getattr(Config(), name))
-            for name in ("link", "queue", "reassembly", "bus", "direct")
+            for name in (
+                "link",
+                "queue",
+                "reassembly",
+                "bus",
+                "direct",
+                "modem",
+                "loopback",
+                "iqfile",
+                "channel",
+            )
         ),
     ):
         for key in struct.__struct_fields__:

@@ -1,0 +1,110 @@
+"""What every radio is to those above it: blocks of samples in, bursts out.
+
+Provisional until a half-duplex radio has passed the contract test.
+"""
+
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Samples = NDArray[np.complex64]
+
+
+class BackendError(Exception):
+    """A radio or recording that cannot be used; the message says what to do about it."""
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """What a radio can do.
+
+    `paced`: blocks come in real time; else as fast as they are taken. `lead_s`: how long before its
+    start a burst must be handed over.
+    """
+
+    receives: bool
+    transmits: bool
+    full_duplex: bool
+    timestamps: bool
+    paced: bool
+    lead_s: float = 0.0
+    turnaround_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """What a radio is set to; one rate for both directions, samples at ±1 full scale."""
+
+    rate_hz: float
+    frequency_hz: float
+
+
+@dataclass(frozen=True, slots=True)
+class RxBlock:
+    """`n` received samples from absolute index `index` on, or, when `samples` is None, a gap.
+
+    `host_ns` is the monotonic time at which the last of them was there. `index_uncertainty`: by how
+    many samples the index may be wrong (radios without time stamps, after a gap).
+    """
+
+    index: int
+    n: int
+    samples: Samples | None
+    gap_reason: str
+    host_ns: int
+    index_uncertainty: int = 0
+
+
+class TxBurst(NamedTuple):
+    """Samples whose first leaves at absolute index `start` of the received stream."""
+
+    start: int
+    samples: Samples
+
+
+class TxOutcome(Enum):
+    """What became of a burst."""
+
+    SENT = "sent"
+    LATE = "late"
+    UNDERFLOW = "underflow"
+    LOST = "lost"
+
+
+class TxReport(NamedTuple):
+    """`end` is the index after the last sample that left."""
+
+    outcome: TxOutcome
+    end: int
+
+
+class Radio(Protocol):
+    """One radio. Everything but `send` is called from one task."""
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What it can do; known before it is opened."""
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What it counts: overflows, late bursts, …; all growing from 0."""
+
+    @property
+    def detail(self) -> str:
+        """One line for people: which device, which file."""
+
+    async def open(self, tuning: Tuning) -> None:
+        """Begin. Raises BackendError."""
+
+    def blocks(self) -> AsyncIterator[RxBlock]:
+        """Contiguous blocks from index 0 on; gaps are blocks too. Ends with the recording."""
+
+    async def send(self, burst: TxBurst) -> TxReport:
+        """Take a burst at once, in the order of the calls; returns when its last sample left."""
+
+    async def close(self) -> None:
+        """Stop; bursts on their way are lost. Closing twice is fine."""

@@ -1,0 +1,97 @@
+"""What carries the PDUs: the direct link, the modem, its radios and their simulated air."""
+
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+Decibel = Annotated[float, Meta(ge=-300)]
+
+
+class DirectParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The direct link: PDUs straight back to this daemon, with faults on demand."""
+
+    hear_self: bool = True
+    rate_bit_s: Annotated[float, Meta(ge=0, le=1e12)] = 0.0
+    """Pace of the link in bit/s; 0: as fast as it goes."""
+    loss: Annotated[float, Meta(ge=0, le=1)] = 0.0
+    """Share of PDUs that vanish."""
+    delay_s: Annotated[float, Meta(ge=0, le=60)] = 0.0
+    jitter_s: Annotated[float, Meta(ge=0, le=60)] = 0.0
+    """Further delay, uniform from 0; PDUs overtake each other."""
+    duplicate: Annotated[float, Meta(ge=0, le=1)] = 0.0
+    """Share of PDUs that arrive twice."""
+    corrupt: Annotated[float, Meta(ge=0, le=1)] = 0.0
+    """Share of PDUs that arrive with a flipped bit."""
+    max_pdus_per_burst: Annotated[int, Meta(ge=1, le=63)] = 16
+
+
+class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The OFDM modem, on every radio."""
+
+    rate_hz: Annotated[float, Meta(ge=1e4, le=2e8)] = 5e6
+    """Samples a second, and the width of the channel; the same at all nodes."""
+    frequency_hz: Annotated[float, Meta(ge=0, le=1e11)] = 2.45e9
+    mcs: Annotated[int, Meta(ge=0, le=6)] = 1
+    """Modulation and code rate; `sdrlinkctl phy info` lists them."""
+    network: Annotated[int, Meta(ge=0, le=7)] = 0
+    """Bursts of other networks are skipped."""
+    max_burst_s: Annotated[float, Meta(gt=0, le=1)] = 0.005
+    """Longest burst of several PDUs: how long an urgent message may have to wait."""
+    tx_lead_s: Annotated[float, Meta(ge=0, le=1)] = 0.001
+    """How long before it leaves a burst is composed."""
+    backoff_db: Annotated[float, Meta(ge=0, le=60)] = 12.0
+    """Mean power of a burst below full scale: room for its peaks."""
+    max_cfo_hz: Annotated[float, Meta(ge=0, le=1e6)] = 1e5
+    """Largest carrier offset between two radios."""
+    block_s: Annotated[float, Meta(ge=1e-4, le=0.1)] = 0.001
+    """Samples are received in pieces of this length."""
+
+
+class LoopbackParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A radio that hears itself through the simulated air."""
+
+    hear_self: bool = True
+    paced: bool = True
+    """In real time, or as fast as it goes."""
+
+
+class IqFileParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A radio that is a recording."""
+
+    receive: str = ""
+    """Recording to play, SigMF or raw; empty: none."""
+    receive_format: Literal["", "cf32_le", "ci16_le", "ci8", "cu8"] = ""
+    """Sample type of `receive` where it does not tell itself."""
+    transmit: str = ""
+    """SigMF recording to write; empty: none."""
+    format: Literal["cf32_le", "ci16_le", "ci8"] = "ci16_le"
+    """Sample type of `transmit`."""
+    paced: bool = True
+    """In real time, or as fast as it goes."""
+    hear_self: bool = True
+    wait_for_consumer: bool = False
+    """Begin to play when the first consumer subscribes."""
+
+
+class ChannelParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The simulated air of `loopback` and `iqfile`."""
+
+    profile: Literal["awgn", "rayleigh", "tdl-a", "tdl-c"] = "awgn"
+    """One path, or echoes that fade anew for each burst."""
+    snr_db: Decibel = 30.0
+    """Burst power over noise power in the sample band; inf: no noise."""
+    clock_ppm: Annotated[float, Meta(ge=-200, le=200)] = 0.0
+    """The sender's crystal against the receiver's: carrier and sampling clock."""
+    delay_s: Annotated[float, Meta(ge=0, le=1)] = 0.0
+    delay_spread_s: Annotated[float, Meta(ge=0, le=1e-3)] = 1e-7
+    """Spread of the echoes (rms)."""
+    loss_db: Decibel = 0.0
+    tx_image_db: Decibel = float("inf")
+    """IQ imbalance of the sender: its image below the signal."""
+    tx_leak_db: Decibel = float("inf")
+    """LO leakage of the sender below the signal."""
+    rx_image_db: Decibel = float("inf")
+    rx_dc_dbfs: Annotated[float, Meta(le=0)] = float("-inf")
+    adc_bits: Annotated[int, Meta(ge=0, le=24)] = 0
+    """Resolution of the receiver's converter; 0: ideal."""

@@ -1,0 +1,77 @@
+"""The configurations of a run: one node; for a recording, one that writes, one that plays."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from sdrlinkd.demo.source import Source
+
+NODE_ID = 1
+LISTENER_ID = 2
+LINKS = ("ofdm", "iqfile", "direct")
+MAX_CFO_HZ = 1e5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """What a run may be told. From `mcs` on only for `ofdm` and `iqfile`."""
+
+    link: str
+    pdu_size: int = 64
+    speed: float = 1.0
+    seed: int = 1
+    mcs: int = 1
+    snr_db: float = 15.0
+    clock_ppm: float = 10.0
+    channel: str = "awgn"
+    rate_hz: float = 5e6
+    recording: Path | None = None
+    """Where `iqfile` keeps its recording; None: nowhere."""
+
+
+def write_config(
+    directory: Path, source: Source, options: Options, role: str, recording: Path
+) -> Path:
+    """The configuration of a node whose sockets are in `directory`.
+
+    `role`: "both" for a node that hears itself, "record" and "play" for the two of a recording.
+    """
+    directory.mkdir(exist_ok=True)
+    (directory / "registry.csv").write_text(source.registry.csv())
+    # Entry ids rest for the reassembly timeout, so faster play needs a shorter one.
+    timeout_s = max(0.02, min(0.5, 0.5 / options.speed))
+    backend = {"direct": "direct", "ofdm": "loopback", "iqfile": "iqfile"}[options.link]
+    node = LISTENER_ID if role == "play" else NODE_ID
+    lines = [
+        f'namespace = "{source.namespace}"',
+        f"robot_id = {node}",
+        f"seed = {options.seed}",
+        "rx_depth = 0",
+        f'backend = "{backend}"',
+        "[link]",
+        f"pdu_size = {options.pdu_size}",
+        *(["beacon_s = 0"] if role == "play" else []),
+        "[reassembly]",
+        f"timeout_s = {timeout_s}",
+        "[bus]",
+        f'runtime_dir = "{directory}"',
+    ]
+    if options.link != "direct":
+        lines += [
+            "[modem]",
+            f"rate_hz = {options.rate_hz}",
+            f"mcs = {options.mcs}",
+            f"max_cfo_hz = {min(MAX_CFO_HZ, options.rate_hz / 4)}",
+            "[channel]",
+            f'profile = "{options.channel}"',
+            f"snr_db = {options.snr_db}",
+            f"clock_ppm = {options.clock_ppm}",
+        ]
+    if options.link == "iqfile":
+        lines += ["[iqfile]", 'format = "ci8"']
+        if role == "record":
+            lines += [f"transmit = '{recording}'"]
+        else:
+            lines += [f"receive = '{recording}'", "paced = false", "wait_for_consumer = true"]
+    path = directory / "sdrlinkd.toml"
+    path.write_text("\n".join(lines) + "\n")
+    return path

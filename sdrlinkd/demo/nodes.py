@@ -1,0 +1,105 @@
+"""Daemons of their own process, and the consumer that listens to one."""
+
+import contextlib
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Self
+
+import msgspec
+
+from sdrlinkd.client import ControlClient, NoDaemonError, Subscriber
+from sdrlinkd.demo.links import NODE_ID
+from sdrlinkd.demo.trace import Sample, Trace
+from sdrlinkd.errors import UserError
+from sdrlinkd.reports import Snapshot
+
+# Compiling the modem from nothing takes a while on a small machine.
+START_TIMEOUT_S = 120.0
+STOP_TIMEOUT_S = 20.0
+
+
+@contextlib.contextmanager
+def daemon(config: Path) -> Iterator[None]:
+    """A running daemon; its log is shown only when it fails."""
+    directory = config.parent
+    log_path = directory / "log"
+    with log_path.open("w") as log_file:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "sdrlinkd", "--config", str(config)],
+            stdout=log_file,
+            stderr=log_file,
+        )
+    try:
+        _wait_until_up(process, directory, log_path)
+        yield
+    finally:
+        process.terminate()
+        try:
+            process.wait(timeout=STOP_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def snapshot_of(directory: Path) -> Snapshot:
+    """The snapshot of the daemon whose sockets are in `directory`."""
+    with ControlClient(directory) as control:
+        return msgspec.convert(control.ask("status"), Snapshot)
+
+
+def problems_of(directory: Path) -> list[str]:
+    """Where its ledger does not add up."""
+    with ControlClient(directory) as control:
+        problems: list[str] = control.ask("check")["problems"]
+        return problems
+
+
+def _wait_until_up(process: subprocess.Popen[bytes], directory: Path, log_path: Path) -> None:
+    deadline = time.monotonic() + START_TIMEOUT_S
+    while process.poll() is None and time.monotonic() < deadline:
+        with contextlib.suppress(NoDaemonError), ControlClient(directory, timeout_s=0.5) as control:
+            control.ask("hello")
+            return
+    raise UserError(f"the daemon did not start:\n{log_path.read_text().strip()}")
+
+
+class Consumer(threading.Thread):
+    """Takes what a daemon republishes, on a thread of its own.
+
+    `by_age`: the messages were recorded before, so that only their age tells how long they took.
+    """
+
+    def __init__(self, directory: Path, trace: Trace, by_age: bool = False) -> None:
+        super().__init__(name="consumer", daemon=True)
+        self._prefix = f"/rx_robot_{NODE_ID}/"
+        self._trace = trace
+        self._by_age = by_age
+        self._subscriber = Subscriber(self._prefix + "*", directory=directory, depth=0)
+        self._done = threading.Event()
+        self.count = 0
+        self.last_at = 0.0
+
+    def run(self) -> None:
+        """Receive until told to end."""
+        while not self._done.is_set():
+            message = self._subscriber.receive(timeout_s=0.1)
+            if message is not None:
+                self.last_at = time.monotonic()
+                name = message.topic.removeprefix(self._prefix)
+                age_us = message.age_us if self._by_age else None
+                age_s = None if age_us is None else age_us * 1e-6
+                self._trace.received[name].append(Sample(self.last_at, message.payload, age_s))
+                self.count += 1
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._done.set()
+        self.join()
+        self._subscriber.close()

@@ -1,0 +1,31 @@
+"""When the next burst may leave, in samples."""
+
+
+class AirPlan:
+    """Keeps what is committed to the air below the radio's lead plus one burst."""
+
+    GAP = 32
+    """Samples of silence between bursts."""
+
+    def __init__(self, lead: int) -> None:
+        self._lead = lead
+        self._free_at = 0
+
+    def wait(self, now: int) -> int:
+        """Samples until the next burst may be composed; 0: at once."""
+        return max(0, self._free_at - now - self._lead)
+
+    def start(self, now: int) -> int:
+        """Where a burst composed now begins."""
+        return max(now + self._lead, self._free_at)
+
+    def commit(self, start: int, n_samples: int) -> None:
+        """A burst of `n_samples` will leave at `start`."""
+        self._free_at = max(self._free_at, start + n_samples + self.GAP)
+
+    def slip(self, start: int, earliest: int, n_samples: int) -> int:
+        """Where a burst planned for `start` really begins when `earliest` is the first possible."""
+        begins = max(start, earliest)
+        if begins > start:
+            self.commit(begins, n_samples)
+        return begins

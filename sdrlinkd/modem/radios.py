@@ -1,0 +1,73 @@
+"""From the configuration to a modem with its radio."""
+
+from pathlib import Path
+from random import Random
+
+import phy
+from backends import BackendError, Channel, IqFileRadio, LoopbackRadio, Radio
+from sdrlinkd.config import Config
+from sdrlinkd.errors import ConfigError, UserError
+from sdrlinkd.modem.link import ModemLink
+
+
+def make_modem(config: Config, rng: Random) -> ModemLink:
+    """The modem on the radio that `config.backend` names. Raises UserError."""
+    _check_airtime(config)
+    try:
+        radio = _make_radio(config, rng)
+    except BackendError as error:
+        raise UserError(str(error)) from None
+    return ModemLink(config.modem, config.link.pdu_size, radio, config.backend)
+
+
+def _make_radio(config: Config, rng: Random) -> Radio:
+    channel = _channel(config, rng.getrandbits(32))
+    modem, loopback, iqfile = config.modem, config.loopback, config.iqfile
+    if config.backend == "iqfile":
+        return IqFileRadio(
+            Path(iqfile.receive) if iqfile.receive else None,
+            Path(iqfile.transmit) if iqfile.transmit else None,
+            channel,
+            modem.block_s,
+            paced=iqfile.paced,
+            type_name=iqfile.format,
+            receive_type=iqfile.receive_format,
+        )
+    return LoopbackRadio(channel, modem.block_s, paced=loopback.paced, hear_self=loopback.hear_self)
+
+
+def _check_airtime(config: Config) -> None:
+    modem, size = config.modem, config.link.pdu_size
+    airtime_s = phy.layout(phy.OFDM_64_16, modem.mcs, 1, size).n_samples / modem.rate_hz
+    if airtime_s > config.reassembly.timeout_s / 2:
+        raise ConfigError(
+            f"modem.rate_hz: got {modem.rate_hz:g}; a PDU of {size} B takes {airtime_s:.2g} s on "
+            f"the air with {phy.MCS_TABLE[modem.mcs].name}; allowed: at most half of "
+            f"reassembly.timeout_s, {config.reassembly.timeout_s / 2:g} s: raise modem.rate_hz or "
+            "modem.mcs, or make link.pdu_size smaller"
+        )
+
+
+def _channel(config: Config, seed: int) -> Channel:
+    """The simulated air; its noise is `snr_db` below bursts of the modem's own power."""
+    modem, air = config.modem, config.channel
+    return Channel(
+        phy.PathParams(
+            rate_hz=modem.rate_hz,
+            carrier_hz=modem.frequency_hz,
+            profile=air.profile,
+            delay_spread_s=air.delay_spread_s,
+            loss_db=air.loss_db,
+            delay_s=air.delay_s,
+            clock_ppm=air.clock_ppm,
+            image_db=air.tx_image_db,
+            leak_db=air.tx_leak_db,
+        ),
+        phy.FrontEndParams(
+            noise_dbfs=-modem.backoff_db - air.snr_db,
+            image_db=air.rx_image_db,
+            dc_dbfs=air.rx_dc_dbfs,
+            bits=air.adc_bits,
+        ),
+        seed,
+    )
