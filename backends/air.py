@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from backends.base import Samples
+from backends.base import BackendError, Samples
 from phy import FrontEnd, FrontEndParams, Path, PathParams
 
 
@@ -17,33 +17,56 @@ class Channel:
     seed: int = 0
 
     def make_path(self) -> Path:
-        """The path. Raises ValueError for a profile that does not exist."""
-        return Path(self.path, np.random.default_rng([self.seed, 1]))
+        """The path. Raises BackendError for a profile that does not exist."""
+        try:
+            return Path(self.path, np.random.default_rng([self.seed, 1]))
+        except ValueError as error:
+            raise BackendError(str(error)) from None
 
     def make_front_end(self) -> FrontEnd:
         """The front end, with chance of its own."""
-        return FrontEnd(self.front_end, np.random.default_rng([self.seed, 2]))
+        rng = np.random.Generator(np.random.SFC64([self.seed, 2]))
+        return FrontEnd(self.front_end, rng)
 
 
 class Timeline:
-    """Bursts laid on an endless line of samples, read once from beginning to end."""
+    """Bursts laid on an endless line of samples, read once from beginning to end.
 
-    def __init__(self) -> None:
-        self._pieces: list[tuple[int, Samples]] = []
+    A burst goes through its path when its first sample is read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._sent: list[tuple[int, Samples]] = []
+        self._arriving: list[tuple[int, Samples]] = []
+        self._silence = np.zeros(0, np.complex64)
 
     def add(self, start: int, samples: Samples) -> None:
-        """Lay `samples` at `start`; overlapping pieces add up."""
-        self._pieces.append((start, samples))
+        """Send `samples` at `start`; what overlaps adds up."""
+        self._sent.append((start, samples))
 
     def take(self, index: int, n: int) -> Samples:
-        """The sum of all pieces in `index … index + n`; what is before it is forgotten."""
+        """What arrives in `index … index + n`, not to be written to; earlier is forgotten."""
+        self._carry(index + n)
+        if not self._arriving:
+            if len(self._silence) < n:
+                self._silence = np.zeros(n, np.complex64)
+            return self._silence[:n]
         out = np.zeros(n, np.complex64)
         kept = []
-        for start, samples in self._pieces:
+        for start, samples in self._arriving:
             low, high = max(index, start), min(index + n, start + len(samples))
             if low < high:
                 out[low - index : high - index] += samples[low - start : high - start]
             if start + len(samples) > index + n:
                 kept.append((start, samples))
-        self._pieces = kept
+        self._arriving = kept
         return out
+
+    def _carry(self, before: int) -> None:
+        due = [each for each in self._sent if each[0] < before]
+        for each in due:
+            self._sent.remove(each)
+            start, samples = each
+            offset, arriving = self._path.carry(samples)
+            self._arriving.append((start + offset, arriving))

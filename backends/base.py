@@ -60,10 +60,15 @@ class RxBlock:
 
 
 class TxBurst(NamedTuple):
-    """Samples whose first leaves at absolute index `start` of the received stream."""
+    """Samples whose first leaves at absolute index `start` of the received stream.
+
+    A burst that comes too late, or overlaps the one before, begins as soon as it can; one that is
+    `exact` does not leave at all.
+    """
 
     start: int
     samples: Samples
+    exact: bool = False
 
 
 class TxOutcome(Enum):
@@ -76,9 +81,10 @@ class TxOutcome(Enum):
 
 
 class TxReport(NamedTuple):
-    """`end` is the index after the last sample that left."""
+    """`start` and `end`: index of the first sample that left, and after the last."""
 
     outcome: TxOutcome
+    start: int
     end: int
 
 

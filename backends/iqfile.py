@@ -1,9 +1,7 @@
 """A radio that is a recording: it receives from one, transmits into one, or both."""
 
-import asyncio
+import threading
 from collections.abc import AsyncIterator
-from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from pathlib import Path
 
 from backends.air import Channel
@@ -17,11 +15,10 @@ from backends.base import (
     TxOutcome,
     TxReport,
 )
+from backends.feed import BlockFeed
 from backends.outstanding import Outstanding
 from backends.pace import Pace
 from backends.recording import RecordingReader, RecordingWriter, describe
-
-MAX_BEHIND_S = 0.5
 
 
 class IqFileRadio:
@@ -43,21 +40,20 @@ class IqFileRadio:
     ) -> None:
         self._receive, self._transmit = receive, transmit
         self._receive_type, self._type_name = receive_type, type_name
-        try:
-            self._path = channel.make_path()
-        except ValueError as error:
-            raise BackendError(str(error)) from None
+        self._path = channel.make_path()
         self._front_end = channel.make_front_end()
         self._block_s = block_s
         self._paced = paced
         self._reader: RecordingReader | None = None
         self._writer: RecordingWriter | None = None
+        self._to_record: list[TxBurst] = []
         self._outstanding = Outstanding()
+        self._feed = BlockFeed(self._next_block, "iqfile")
+        # The next block's index and the bursts to record belong together.
+        self._lock = threading.Lock()
         self._next = 0
-        self._closed = asyncio.Event()
-        self._closed.set()
-        self._thread = ThreadPoolExecutor(1, "iqfile")
-        self._counters = {"overflows": 0, "samples_lost": 0, "late": 0}
+        self._is_open = False
+        self._late = 0
         self._damage = ""
 
     @property
@@ -74,7 +70,7 @@ class IqFileRadio:
     @property
     def counters(self) -> dict[str, int]:
         """Also values that were too large for the recording's sample type."""
-        return {**self._counters, "clipped": self._writer.clipped if self._writer else 0}
+        return {"late": self._late, "clipped": self._writer.clipped if self._writer else 0}
 
     @property
     def detail(self) -> str:
@@ -104,59 +100,66 @@ class IqFileRadio:
                 self._transmit, self._type_name, tuning.rate_hz, tuning.frequency_hz
             )
         self._n = max(1, round(self._block_s * tuning.rate_hz))
-        self._pace = Pace(tuning.rate_hz, self._paced, MAX_BEHIND_S)
-        self._closed.clear()
+        self._pace = Pace(tuning.rate_hz, self._paced)
+        self._is_open = True
 
     async def blocks(self) -> AsyncIterator[RxBlock]:
         """The recording from its beginning to its end; without one, gaps without end."""
-        loop = asyncio.get_running_loop()
         self._pace.restart()
-        while not self._closed.is_set():
-            first, n = self._next, self._n
-            samples: Samples | None = None
-            if self._reader is not None:
-                play = partial(self._play, self._reader, first, n)
-                samples = await loop.run_in_executor(self._thread, play)
-                n = len(samples)
-                if not n:
-                    self._outstanding.lose()
-                    return
-            await self._pace.wait_for(first + n)
-            if self._closed.is_set():
-                return
-            self._next += n
-            self._outstanding.settle(self._next)
-            reason = "" if samples is not None else "nothing to receive"
-            yield RxBlock(first, n, samples, reason, self._pace.host_ns(first + n))
+        async for block in self._feed.blocks():
+            self._outstanding.settle(block.index + block.n)
+            yield block
+        self._outstanding.lose()
 
     async def send(self, burst: TxBurst) -> TxReport:
-        """Record a burst. Raises BackendError when the disk will not take it."""
-        if self._closed.is_set() or self._writer is None:
-            return TxReport(TxOutcome.LOST, burst.start)
-        if burst.start < self._next:
-            self._counters["late"] += 1
-            return TxReport(TxOutcome.LATE, burst.start)
-        loop = asyncio.get_running_loop()
-        await loop.run_in_executor(self._thread, self._record, self._writer, burst)
-        return await self._outstanding.left(burst.start + len(burst.samples))
+        """Record a burst; blocks() raises BackendError when the disk will not take it."""
+        if not self._is_open or self._writer is None:
+            return TxReport(TxOutcome.LOST, burst.start, burst.start)
+        with self._lock:
+            start = self._outstanding.place(burst, self._next)
+            if start is None:
+                self._late += 1
+                return TxReport(TxOutcome.LATE, burst.start, burst.start)
+            self._to_record.append(burst._replace(start=start))
+        return await self._outstanding.left(start, len(burst.samples))
 
     async def close(self) -> None:
         """Close the files; a recording lasts until now."""
-        if not self._closed.is_set() and self._writer is not None:
-            self._writer.extend_to(self._next)
-        self._closed.set()
+        if self._is_open:
+            self._is_open = False
+            self._pace.end()
+            self._feed.stop()
         self._outstanding.lose()
-        self._thread.shutdown(wait=True)
         if self._reader is not None:
             self._reader.close()
         if self._writer is not None:
+            self._writer.extend_to(self._next)
             self._writer.close()
 
-    def _play(self, reader: RecordingReader, first: int, n: int) -> Samples:
-        return self._front_end.receive(reader.read(first, n))
+    def _next_block(self) -> RxBlock | None:
+        """In the feed's thread: what is received next, and what has left recorded."""
+        first, n = self._next, self._n
+        samples: Samples | None = None
+        if self._reader is not None:
+            samples = self._reader.read(first, n)
+            n = len(samples)
+            if not n:
+                return None
+            samples = self._front_end.receive(samples)
+        self._pace.wait_for(first + n)
+        with self._lock:
+            self._next += n
+            leaving = [each for each in self._to_record if each.start < self._next]
+            self._to_record = [each for each in self._to_record if each.start >= self._next]
+        for burst in leaving:
+            self._record(burst)
+        reason = "" if samples is not None else "nothing to receive"
+        return RxBlock(first, n, samples, reason, self._pace.host_ns(first + n))
 
-    def _record(self, writer: RecordingWriter, burst: TxBurst) -> None:
+    def _record(self, burst: TxBurst) -> None:
+        if self._writer is None:
+            return
         offset, samples = self._path.carry(burst.samples)
         start = burst.start + offset
         cut = max(0, -start)
-        writer.write(start + cut, samples[cut:])
+        self._writer.write(start + cut, samples[cut:])

@@ -1,15 +1,17 @@
 """A radio whose antenna hears itself, through a simulated channel."""
 
-import asyncio
+import threading
 from collections.abc import AsyncIterator
-from concurrent.futures import ThreadPoolExecutor
 
 from backends.air import Channel, Timeline
-from backends.base import BackendError, Capabilities, RxBlock, Tuning, TxBurst, TxOutcome, TxReport
+from backends.base import Capabilities, RxBlock, Samples, Tuning, TxBurst, TxOutcome, TxReport
+from backends.feed import BlockFeed
 from backends.outstanding import Outstanding
 from backends.pace import Pace
 
 MAX_BEHIND_S = 0.5
+# A reader that is late gets fewer, larger blocks.
+MAX_LATE_BLOCKS = 8
 
 
 class LoopbackRadio:
@@ -21,21 +23,18 @@ class LoopbackRadio:
     def __init__(
         self, channel: Channel, block_s: float, paced: bool = True, hear_self: bool = True
     ) -> None:
-        try:
-            self._path = channel.make_path()
-        except ValueError as error:
-            raise BackendError(str(error)) from None
+        self._timeline = Timeline(channel.make_path())
         self._front_end = channel.make_front_end()
         self._profile = channel.path.profile
         self._block_s = block_s
         self._paced = paced
         self._hear_self = hear_self
-        self._timeline = Timeline()
         self._outstanding = Outstanding()
+        self._feed = BlockFeed(self._next_block, "loopback")
+        # The next block's index and the bursts sent belong together.
+        self._lock = threading.Lock()
         self._next = 0
-        self._closed = asyncio.Event()
-        self._closed.set()
-        self._thread = ThreadPoolExecutor(1, "loopback")
+        self._is_open = False
         self.counters = {"overflows": 0, "samples_lost": 0, "late": 0}
 
     @property
@@ -53,47 +52,54 @@ class LoopbackRadio:
     async def open(self, tuning: Tuning) -> None:
         """Begin at index 0."""
         self._n = max(1, round(self._block_s * tuning.rate_hz))
-        self._pace = Pace(tuning.rate_hz, self._paced, MAX_BEHIND_S)
-        self._closed.clear()
+        self._max_behind = round(MAX_BEHIND_S * tuning.rate_hz)
+        self._pace = Pace(tuning.rate_hz, self._paced)
+        self._is_open = True
 
     async def blocks(self) -> AsyncIterator[RxBlock]:
         """What the antenna hears; when the reader is far behind, what it missed is a gap."""
-        loop = asyncio.get_running_loop()
         self._pace.restart()
-        while not self._closed.is_set():
-            first, n = self._next, self._n
-            behind = await self._pace.wait_for(first + n)
-            lost = self._pace.overdue(behind)
-            if self._closed.is_set():
-                return
-            self._next += n + lost
-            if lost:
-                self.counters["overflows"] += 1
-                self.counters["samples_lost"] += n + lost
-                self._timeline.take(first, n + lost)
-                samples = None
-            else:
-                heard = self._timeline.take(first, n)
-                samples = await loop.run_in_executor(self._thread, self._front_end.receive, heard)
-            self._outstanding.settle(self._next)
-            reason = "the reader was too slow" if lost else ""
-            host_ns = self._pace.host_ns(first + n + lost)
-            yield RxBlock(first, n + lost, samples, reason, host_ns)
+        async for block in self._feed.blocks():
+            self._outstanding.settle(block.index + block.n)
+            yield block
 
     async def send(self, burst: TxBurst) -> TxReport:
-        """Put a burst on the air, unless its first sample should have left already."""
-        if self._closed.is_set():
-            return TxReport(TxOutcome.LOST, burst.start)
-        if burst.start < self._next:
-            self.counters["late"] += 1
-            return TxReport(TxOutcome.LATE, burst.start)
-        offset, samples = self._path.carry(burst.samples)
-        if self._hear_self:
-            self._timeline.add(burst.start + offset, samples)
-        return await self._outstanding.left(burst.start + len(burst.samples))
+        """Put a burst on the air."""
+        if not self._is_open:
+            return TxReport(TxOutcome.LOST, burst.start, burst.start)
+        with self._lock:
+            start = self._outstanding.place(burst, self._next)
+            if start is None:
+                self.counters["late"] += 1
+                return TxReport(TxOutcome.LATE, burst.start, burst.start)
+            if self._hear_self:
+                self._timeline.add(start, burst.samples)
+        return await self._outstanding.left(start, len(burst.samples))
 
     async def close(self) -> None:
         """Stop."""
-        self._closed.set()
+        if self._is_open:
+            self._is_open = False
+            self._pace.end()
+            self._feed.stop()
         self._outstanding.lose()
-        self._thread.shutdown(wait=False)
+
+    def _next_block(self) -> RxBlock:
+        """In the feed's thread."""
+        first, n = self._next, self._n
+        behind = self._pace.wait_for(first + n)
+        samples: Samples | None = None
+        reason = ""
+        if behind > self._max_behind:
+            n += behind
+            reason = "the reader was too slow"
+            self.counters["overflows"] += 1
+            self.counters["samples_lost"] += n
+        else:
+            n += min(behind, MAX_LATE_BLOCKS * n)
+        with self._lock:
+            heard = self._timeline.take(first, n)
+            self._next += n
+        if not reason:
+            samples = self._front_end.receive(heard)
+        return RxBlock(first, n, samples, reason, self._pace.host_ns(first + n))

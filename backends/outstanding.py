@@ -2,34 +2,45 @@
 
 import asyncio
 
-from backends.base import TxOutcome, TxReport
+from backends.base import TxBurst, TxOutcome, TxReport
+
+GAP = 32
+"""Samples of silence after a burst, for its echoes."""
 
 
 class Outstanding:
-    """Answers each burst when the stream has passed its end."""
+    """Places bursts one after another, and answers each when the stream has passed its end."""
 
     def __init__(self) -> None:
-        self._waiting: list[tuple[int, asyncio.Future[TxReport]]] = []
+        self._waiting: list[tuple[TxReport, asyncio.Future[TxReport]]] = []
+        self._free_from = 0
 
-    async def left(self, end: int) -> TxReport:
-        """Wait until the sample before `end` has left, or all is lost."""
-        report: asyncio.Future[TxReport] = asyncio.get_running_loop().create_future()
-        self._waiting.append((end, report))
-        return await report
+    def place(self, burst: TxBurst, earliest: int) -> int | None:
+        """Where a burst begins when `earliest` is the first index possible; None: too late."""
+        start = max(burst.start, earliest, self._free_from)
+        if burst.exact and start > burst.start:
+            return None
+        self._free_from = start + len(burst.samples) + GAP
+        return start
+
+    async def left(self, start: int, n_samples: int) -> TxReport:
+        """Wait until the last sample has left, or all is lost."""
+        report = TxReport(TxOutcome.SENT, start, start + n_samples)
+        answer: asyncio.Future[TxReport] = asyncio.get_running_loop().create_future()
+        self._waiting.append((report, answer))
+        return await answer
 
     def settle(self, index: int) -> None:
         """Every sample before `index` has left."""
-        self._answer(index, TxOutcome.SENT)
+        left = [each for each in self._waiting if each[0].end <= index]
+        self._waiting = [each for each in self._waiting if each[0].end > index]
+        for report, answer in left:
+            if not answer.done():
+                answer.set_result(report)
 
     def lose(self) -> None:
         """Nothing more will leave."""
-        self._answer(None, TxOutcome.LOST)
-
-    def _answer(self, before: int | None, outcome: TxOutcome) -> None:
-        kept = []
-        for end, report in self._waiting:
-            if before is not None and end > before:
-                kept.append((end, report))
-            elif not report.done():
-                report.set_result(TxReport(outcome, end))
-        self._waiting = kept
+        waiting, self._waiting = self._waiting, []
+        for report, answer in waiting:
+            if not answer.done():
+                answer.set_result(report._replace(outcome=TxOutcome.LOST))

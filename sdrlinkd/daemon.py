@@ -5,6 +5,7 @@ import contextlib
 import logging
 import os
 import signal
+import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -27,6 +28,7 @@ from sdrlinkd.sdnotify import Notifier
 log = logging.getLogger("sdrlinkd")
 
 STATUS_LINE_PERIOD_S = 5.0
+SWITCH_INTERVAL_S = 0.0005
 
 Reload = Callable[[], Setup]
 
@@ -105,6 +107,8 @@ async def _open(
 def _make_pdu_link(config: Config, rng: Random) -> PduLink:
     if config.backend == "direct":
         return DirectLink(config.direct, config.link.pdu_size, rng)
+    # Else a busy event loop keeps the modem's threads from the interpreter for 5 ms at a time.
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
     # The modem brings numba and scipy, which take their time to load.
     from sdrlinkd.modem import make_modem
 

@@ -31,14 +31,16 @@ class FrontEnd:
         self._dc = np.complex64(10 ** (params.dc_dbfs / 20))
 
     def receive(self, x: NDArray[np.complex64]) -> NDArray[np.complex64]:
-        """The digital samples `[n]` of antenna samples `[n]`; `x` may be used up.
+        """The digital samples `[n]` of antenna samples `[n]`, which stay as they are.
 
         Any chunking of the same stream gives the same samples.
         """
         if self._noise:
             noise = self._rng.standard_normal(2 * len(x), np.float32)
             noise *= self._noise
-            x = x + noise.view(np.complex64)
+            noisy = noise.view(np.complex64)
+            noisy += x
+            x = noisy
         if self._image:
             x = x + self._image * x.conj()
         if self._dc:

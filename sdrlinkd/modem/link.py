@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import phy
-from backends import BackendError, Radio, RxBlock, Samples, Tuning, TxBurst, TxOutcome
+from backends import BackendError, Radio, Samples, Tuning, TxBurst, TxOutcome
 from sdrlinkd.config import ModemParams
 from sdrlinkd.errors import UserError
 from sdrlinkd.link import Burst, Outcome
 from sdrlinkd.modem.clock import StreamClock
-from sdrlinkd.modem.load import LoadMeter
 from sdrlinkd.modem.plan import AirPlan
+from sdrlinkd.modem.rx_thread import ReceiverThread
 from sdrlinkd.pdulink import Heard, Opportunity, PduListener
 from sdrlinkd.reports import CarrierReport
 
@@ -43,8 +43,7 @@ class ModemLink:
         lead_s = max(params.tx_lead_s, radio.capabilities.lead_s)
         self._plan = AirPlan(round(lead_s * params.rate_hz))
         self._planned_start = 0
-        self._load = LoadMeter()
-        self._rx_thread = ThreadPoolExecutor(1, "phy-rx")
+        self._rx: ReceiverThread | None = None
         self._tx_thread = ThreadPoolExecutor(1, "phy-tx")
         self._listener: PduListener | None = None
         self._tasks: asyncio.TaskGroup | None = None
@@ -62,21 +61,29 @@ class ModemLink:
     async def open(self, listener: PduListener) -> None:
         """Load the compiled code and open the radio."""
         loop = asyncio.get_running_loop()
-        await loop.run_in_executor(self._rx_thread, phy.warm_up)
+        await loop.run_in_executor(self._tx_thread, phy.warm_up)
         tuning = Tuning(self._params.rate_hz, self._params.frequency_hz)
         try:
             await self._radio.open(tuning)
         except BackendError as error:
             raise UserError(str(error)) from None
         self._clock.observe(0, time.monotonic())
+        self._rx = ReceiverThread(
+            self._receiver,
+            self._params.rate_hz,
+            self._deliver,
+            every_block=not self._radio.capabilities.paced,
+        )
         self._listener = listener
         self._state = "up"
 
     async def run(self) -> None:
         """Receive, and send what is handed over, until cancelled."""
+        if self._rx is None:
+            raise RuntimeError("run before open")
         async with asyncio.TaskGroup() as self._tasks:
             try:
-                await self._receive()
+                await self._receive(self._rx)
             except BackendError as error:
                 self._state, self._problem = "down", str(error)
             await asyncio.Event().wait()
@@ -123,14 +130,15 @@ class ModemLink:
                 listener.settled(burst, Outcome.LOST, self.now())
         self._on_air.clear()
         self._state = "down"
-        for thread in (self._rx_thread, self._tx_thread):
-            thread.shutdown(wait=True, cancel_futures=True)
+        if self._rx is not None:
+            self._rx.stop()
+        self._tx_thread.shutdown(wait=True, cancel_futures=True)
 
     def report(self) -> CarrierReport:
         """State, counters of radio and receiver, and whether the PHY keeps up."""
         params = self._params
         counted = self._receiver.counters
-        ratio = self._load.realtime_ratio
+        ratio = self._realtime_ratio
         return CarrierReport(
             kind=self._kind,
             state=self._state,
@@ -148,48 +156,44 @@ class ModemLink:
 
     def _notices(self) -> list[str]:
         notices = [self._problem] if self._problem else []
-        lost = self._radio.counters.get("overflows", 0)
-        ratio = self._load.realtime_ratio
-        if lost:
+        counted = self._radio.counters
+        if counted.get("overflows"):
             notices.append(
-                f"the receiver fell behind {lost} times and lost "
-                f"{self._radio.counters.get('samples_lost', 0)} samples; it runs at {ratio:.2f} "
-                f"times real time at {self._params.rate_hz / 1e6:g} Msps: lower modem.rate_hz"
+                f"the receiver fell behind {counted['overflows']} times and lost "
+                f"{counted['samples_lost']} samples; at {self._params.rate_hz / 1e6:g} Msps it "
+                f"runs at {self._realtime_ratio:.2f} times real time: lower modem.rate_hz"
             )
         if self._state != "down" and not self._radio.capabilities.transmits:
             notices.append("this radio only receives: what is to be sent stays in the queue")
         return notices
+
+    @property
+    def _realtime_ratio(self) -> float:
+        return self._rx.load.realtime_ratio if self._rx is not None else 0.0
 
     def _can_send(self) -> bool:
         return (
             self._tasks is not None and self._state == "up" and self._radio.capabilities.transmits
         )
 
-    async def _receive(self) -> None:
-        loop = asyncio.get_running_loop()
+    async def _receive(self, receiver: ReceiverThread) -> None:
+        """Take blocks from the radio; when the receiver is far behind, the radio has to wait."""
         self._moved.set()
-        rate = self._params.rate_hz
         async for block in self._radio.blocks():
-            self._clock.observe(block.index + block.n, block.host_ns * 1e-9)
-            self._moved.set()
-            events, cpu_s = await loop.run_in_executor(self._rx_thread, self._process, block)
-            if block.samples is not None:
-                self._load.add(cpu_s, block.n / rate)
-            self._deliver(events)
-        self._deliver(await loop.run_in_executor(self._rx_thread, self._receiver.flush))
+            if self._radio.capabilities.paced:
+                self._clock.observe(block.index + block.n, block.host_ns * 1e-9)
+                self._moved.set()
+            await receiver.put(block)
+        await receiver.finish()
         self._state = "ended"
         self._moved.set()
 
-    def _process(self, block: RxBlock) -> tuple[list[phy.Event], float]:
-        """In the receiver's thread: (what a block completed, processor time in s)."""
-        began = time.thread_time()
-        if block.samples is None:
-            events = self._receiver.gap(block.n)
-        else:
-            events = self._receiver.push(block.samples)
-        return events, time.thread_time() - began
-
-    def _deliver(self, events: Sequence[phy.Event]) -> None:
+    def _deliver(self, events: Sequence[phy.Event], end: int) -> None:
+        """Events that the samples before index `end` completed."""
+        if not self._radio.capabilities.paced:
+            # Blocks wait for the receiver, and the clock with them.
+            self._clock.observe(end, time.monotonic())
+            self._moved.set()
         rate = self._params.rate_hz
         heard = [
             Heard(event.data, event.burst.start / rate, event.burst.snr_db)
@@ -203,10 +207,9 @@ class ModemLink:
         loop = asyncio.get_running_loop()
         try:
             samples = await loop.run_in_executor(self._tx_thread, self._modulate, burst.pdus)
-            start = self._plan.slip(planned, self._clock.end, len(samples))
-            self._bursts_slipped += start > planned
             self._tx_samples += len(samples)
-            report = await self._radio.send(TxBurst(start, samples))
+            report = await self._radio.send(TxBurst(planned, samples))
+            self._bursts_slipped += report.start > planned
             outcome, end = OUTCOMES[report.outcome], report.end
         except BackendError as error:
             outcome, end = Outcome.LOST, planned

@@ -22,10 +22,3 @@ class AirPlan:
     def commit(self, start: int, n_samples: int) -> None:
         """A burst of `n_samples` will leave at `start`."""
         self._free_at = max(self._free_at, start + n_samples + self.GAP)
-
-    def slip(self, start: int, earliest: int, n_samples: int) -> int:
-        """Where a burst planned for `start` really begins when `earliest` is the first possible."""
-        begins = max(start, earliest)
-        if begins > start:
-            self.commit(begins, n_samples)
-        return begins

@@ -1,0 +1,75 @@
+"""The receiver on a thread of its own."""
+
+import asyncio
+import queue
+import threading
+import time
+from collections.abc import Callable, Sequence
+
+import phy
+from backends import RxBlock
+from sdrlinkd.modem.load import LoadMeter
+
+# Samples that may wait for the receiver, in blocks.
+MAX_BLOCKS = 64
+
+Deliver = Callable[[Sequence[phy.Event], int], None]
+
+
+class ReceiverThread:
+    """Blocks in; events and the index they stand at out, by `deliver` on the event loop.
+
+    The loop is woken only when there are events, or for `every_block`.
+    """
+
+    def __init__(
+        self, receiver: phy.Receiver, rate_hz: float, deliver: Deliver, every_block: bool
+    ) -> None:
+        self._receiver = receiver
+        self._rate_hz = rate_hz
+        self._deliver = deliver
+        self._every_block = every_block
+        self._blocks: queue.SimpleQueue[RxBlock | None] = queue.SimpleQueue()
+        self._loop = asyncio.get_running_loop()
+        self._has_room = asyncio.Event()
+        self._ended = asyncio.Event()
+        self._thread = threading.Thread(target=self._work, name="phy-rx", daemon=True)
+        self._thread.start()
+        self.load = LoadMeter()
+
+    async def put(self, block: RxBlock) -> None:
+        """Hand over a block; waits while too many are waiting already."""
+        while self._blocks.qsize() >= MAX_BLOCKS:
+            self._has_room.clear()
+            await self._has_room.wait()
+        self._blocks.put(block)
+
+    async def finish(self) -> None:
+        """The stream is over: deliver what its last samples hold, and end the thread."""
+        self._blocks.put(None)
+        await self._ended.wait()
+
+    def stop(self) -> None:
+        """End the thread, whatever waits."""
+        self._blocks.put(None)
+        self._thread.join()
+
+    def _work(self) -> None:
+        while (block := self._blocks.get()) is not None:
+            began = time.thread_time()
+            if block.samples is None:
+                events = self._receiver.gap(block.n)
+            else:
+                events = self._receiver.push(block.samples)
+                self.load.add(time.thread_time() - began, block.n / self._rate_hz)
+            if events or self._every_block:
+                self._call(self._deliver, events, block.index + block.n)
+            if self._blocks.qsize() == MAX_BLOCKS // 2:
+                self._call(self._has_room.set)
+        end = self._receiver.next_index
+        self._call(self._deliver, self._receiver.flush(), end)
+        self._call(self._ended.set)
+
+    def _call(self, what: Callable[..., None], *arguments: object) -> None:
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(what, *arguments)
