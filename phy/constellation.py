@@ -22,6 +22,11 @@ class Modulation(Enum):
         return self.value
 
     @property
+    def label(self) -> str:
+        """As people say it: `16QAM`."""
+        return f"{1 << self.bits}QAM" if self.bits > 2 else self.name
+
+    @property
     def unit(self) -> float:
         """Half the distance of neighbouring points, at mean power 1."""
         levels = _levels(self.axis_bits)

@@ -20,7 +20,7 @@ class Mcs:
     @property
     def name(self) -> str:
         """As people say it: `QPSK 1/2`."""
-        return f"{self.modulation.name} {self.code.name}"
+        return f"{self.modulation.label} {self.code.name}"
 
     @property
     def bits_per_carrier(self) -> Fraction:

@@ -1,0 +1,242 @@
+"""`phy`: the modem's tables, and what is in a recording of samples. Needs no daemon."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Annotated
+
+import msgspec
+import typer
+from rich import box
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from sdrlinkd.cli.app import AsJson, app
+from sdrlinkd.cli.pdu import one_line
+from sdrlinkd.config import load_registry
+from sdrlinkd.errors import UserError
+from sdrlinkd.wire import MAX_PDU_SIZE, MIN_PDU_SIZE
+
+if TYPE_CHECKING:
+    import phy
+    from sdrlinkd.iq import IqRecording
+    from sdrlinkd.iq.recording import Progress as OnProgress
+
+phys = typer.Typer(help="The modem, and recordings of samples.", no_args_is_help=True)
+app.add_typer(phys, name="phy")
+
+RecordingFile = Annotated[
+    Path, typer.Argument(metavar="FILE", help="SigMF recording, or raw samples (.cf32, .i16, …).")
+]
+SampleType = Annotated[
+    str, typer.Option("--type", help="Of raw samples: cf32_le, ci16_le, ci8 or cu8.")
+]
+Rate = Annotated[
+    float | None, typer.Option(min=1, help="Samples a second, where the file does not tell.")
+]
+Network = Annotated[int, typer.Option(min=-1, max=7, help="Only bursts of this network; -1: all.")]
+Out = Annotated[Path | None, typer.Option(help="PNG to write; by default named like FILE.")]
+
+
+@phys.command()
+def info(
+    rate: Annotated[float, typer.Option(min=1e4, max=2e8, help="Samples a second.")] = 5e6,
+    pdu_size: Annotated[
+        int, typer.Option(min=MIN_PDU_SIZE, max=MAX_PDU_SIZE, help="Octets of a PDU.")
+    ] = 1024,
+    max_burst: Annotated[float, typer.Option(min=1e-6, max=1, help="Longest burst in s.")] = 0.005,
+    json: AsJson = False,
+) -> None:
+    """Carriers, rates and airtimes of every MCS."""
+    from sdrlinkd.iq import modem_info
+
+    told = modem_info(rate, pdu_size, max_burst)
+    if json:
+        typer.echo(msgspec.json.encode(told))
+        return
+    console = Console()
+    console.print(
+        f"{told.rate_hz / 1e6:g} Msps: {told.n_fft} carriers {told.spacing_hz / 1e3:g} kHz apart, "
+        f"{told.n_data} for data, {told.n_pilots} pilots, {told.occupied_hz / 1e6:.3g} MHz wide\n"
+        f"symbols of {told.symbol_us:g} µs, of these {told.echoes_us:g} µs for echoes; "
+        f"preamble and header {told.preamble_us:g} µs a burst",
+        highlight=False,
+        soft_wrap=True,
+    )
+    table = Table(
+        title=f"PDUs of {told.pdu_size} B, bursts up to {told.max_burst_s * 1e3:g} ms",
+        title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True,
+    )  # fmt: skip
+    table.add_column("MCS", justify="right")
+    table.add_column("modulation")
+    for column in ("Mbit/s", "1 PDU", "PDUs a burst", "burst", "goodput Mbit/s"):
+        table.add_column(column, justify="right")
+    for row in told.mcs:
+        table.add_row(
+            str(row.mcs),
+            row.name,
+            f"{row.rate_bit_s / 1e6:.3g}",
+            f"{row.one_pdu_ms:.3g} ms",
+            str(row.burst_pdus),
+            f"{row.burst_ms:.3g} ms",
+            f"{row.burst_goodput_bit_s / 1e6:.3g}",
+        )
+    console.print(table)
+
+
+@phys.command()
+def decode(
+    file: RecordingFile,
+    type_name: SampleType = "",
+    rate: Rate = None,
+    network: Network = -1,
+    registry: Annotated[Path | None, typer.Option(help="Names the topics.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
+) -> None:
+    """Bursts in a recording, how well they were received, and their PDUs."""
+    names = load_registry(registry) if registry else None
+    console = Console(soft_wrap=True)
+    recording = _open(file, type_name, rate)
+    counters: dict[str, int] = {}
+    with _progress(f"decode {file.name}", recording) as progress:
+        pdus: list[tuple[int, bytes]] = []
+        for event, receiver in recording.decode(None if network < 0 else network, progress):
+            counters = dict(receiver.counters)
+            ending = getattr(event, "ending", None)
+            if ending is None:
+                pdus.append((event.number, event.data))  # type: ignore[union-attr]
+                continue
+            if json:
+                _json_lines(event.burst, ending, pdus, recording.info.rate_hz)
+            else:
+                told = _burst_line(event.burst, len(pdus), ending, recording.info.rate_hz)
+                lines = [f"  {number}  {one_line(data, names)}" for number, data in pdus]
+                console.print("\n".join([told, *lines]), highlight=False, markup=False)
+            pdus = []
+    recording.close()
+    if not json:
+        _print_counters(console, counters, recording)
+
+
+@phys.command()
+def spectrum(
+    file: RecordingFile, type_name: SampleType = "", rate: Rate = None, out: Out = None
+) -> None:
+    """Draw power over frequency and time."""
+    from sdrlinkd.iq import spectrum_of
+
+    pictures = _load_pictures()
+    console = Console()
+    recording = _open(file, type_name, rate)
+    with _progress(f"spectrum of {file.name}", recording) as progress:
+        measured = spectrum_of(recording, progress)
+    path = out or Path(f"{_stem(file)}.spectrum.png")
+    pictures.draw_spectrum(measured, recording.info.rate_hz, file.name, path)
+    console.print(f"wrote {path}", highlight=False, markup=False, soft_wrap=True)
+
+
+@phys.command()
+def constellation(
+    file: RecordingFile,
+    type_name: SampleType = "",
+    rate: Rate = None,
+    network: Network = -1,
+    out: Out = None,
+) -> None:
+    """Draw the equalised points of the bursts in a recording."""
+    pictures = _load_pictures()
+    console = Console()
+    recording = _open(file, type_name, rate)
+    with _progress(f"points in {file.name}", recording) as progress:
+        points = recording.points(None if network < 0 else network, progress)
+    if not points.by_modulation:
+        raise UserError(
+            f"{file}: no burst was found in {recording.info.n_samples} samples; "
+            "`sdrlinkctl phy spectrum` shows what is there"
+        )
+    path = out or Path(f"{_stem(file)}.constellation.png")
+    title = f"{file.name}, {len(points.bursts)} bursts"
+    pictures.draw_constellation(points, title, path)
+    console.print(f"wrote {path}", highlight=False, markup=False, soft_wrap=True)
+
+
+def _open(file: Path, type_name: str, rate: float | None) -> "IqRecording":
+    from sdrlinkd.iq import IqRecording
+
+    recording = IqRecording(file, type_name, rate)
+    if recording.info.damage:
+        Console(stderr=True).print(
+            f"warning: {recording.info.damage}", style="yellow", highlight=False, markup=False,
+            soft_wrap=True,
+        )  # fmt: skip
+    return recording
+
+
+@contextmanager
+def _progress(what: str, recording: "IqRecording") -> Iterator["OnProgress"]:
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task(what, total=recording.info.n_samples)
+        yield lambda done: progress.update(task, completed=done)
+
+
+def _burst_line(burst: "phy.BurstQuality", n_good: int, ending: str, rate_hz: float | None) -> str:
+    import phy
+
+    at = f"{burst.start / rate_hz:.6f} s" if rate_hz else f"sample {burst.start}"
+    offset = (
+        f"{burst.cfo * rate_hz / 1e3:+.3f} kHz" if rate_hz else f"{burst.cfo:+.6f} cycles a sample"
+    )
+    return (
+        f"{at}  {phy.MCS_TABLE[burst.mcs].name}  {n_good} of {burst.n_pdus} PDUs of "
+        f"{burst.pdu_bytes} B good  SNR {burst.snr_db:.1f} dB  EVM {burst.evm_db:.1f} dB  "
+        f"CFO {offset}  {burst.rssi_dbfs:.1f} dBFS  network {burst.network}"
+        + ("" if ending == "whole" else f"  ({ending})")
+    )
+
+
+def _json_lines(
+    burst: "phy.BurstQuality",
+    ending: str,
+    pdus: list[tuple[int, bytes]],
+    rate_hz: float | None,
+) -> None:
+    told = {
+        **burst._asdict(),
+        "start_s": burst.start / rate_hz if rate_hz else None,
+        "cfo_hz": burst.cfo * rate_hz if rate_hz else None,
+        "ending": ending,
+        "pdus": [{"number": number, "hex": data.hex()} for number, data in pdus],
+    }
+    typer.echo(msgspec.json.encode(told))
+
+
+def _print_counters(console: Console, counters: dict[str, int], recording: "IqRecording") -> None:
+    if not counters:
+        console.print(
+            f"no burst in {recording.info.n_samples} samples", highlight=False, markup=False
+        )
+        return
+    console.print(
+        ", ".join(f"{name} {counters[name]}" for name in counters if counters[name]),
+        highlight=False,
+        markup=False,
+    )
+
+
+def _stem(file: Path) -> str:
+    return str(file).removesuffix(".sigmf-meta").removesuffix(".sigmf-data")
+
+
+def _load_pictures() -> ModuleType:
+    """Matplotlib is an extra, and slow to load: only here."""
+    try:
+        from sdrlinkd.iq import pictures
+    except ImportError:
+        raise UserError(
+            "the pictures need matplotlib; install it with: pip install 'sdrlinkd[plots]'"
+        ) from None
+    return pictures

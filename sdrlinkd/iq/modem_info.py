@@ -1,0 +1,83 @@
+"""What the modem offers at a rate: grid, rates, airtimes."""
+
+import msgspec
+
+import phy
+from sdrlinkd.errors import UserError
+
+
+class McsInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """One MCS at one rate and PDU size. `rate_bit_s` is without preamble and header."""
+
+    mcs: int
+    name: str
+    rate_bit_s: float
+    one_pdu_ms: float
+    burst_pdus: int
+    burst_ms: float
+    burst_goodput_bit_s: float
+    """PDU bits over the time of the longest burst."""
+
+
+class ModemInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """The grid at one rate, and every MCS on it."""
+
+    rate_hz: float
+    pdu_size: int
+    max_burst_s: float
+    n_fft: int
+    n_cp: int
+    n_data: int
+    n_pilots: int
+    spacing_hz: float
+    occupied_hz: float
+    symbol_us: float
+    echoes_us: float
+    """Echoes that the cyclic prefix takes."""
+    preamble_us: float
+    """Preamble and header of each burst."""
+    mcs: list[McsInfo]
+
+
+def modem_info(rate_hz: float, pdu_size: int, max_burst_s: float) -> ModemInfo:
+    """Everything that follows from rate, PDU size and longest burst. Raises UserError."""
+    grid = phy.OFDM_64_16
+    try:
+        rows = [_mcs_info(grid, each, rate_hz, pdu_size, max_burst_s) for each in phy.MCS_TABLE]
+    except ValueError as error:
+        raise UserError(str(error)) from None
+    one = phy.layout(grid, 0, 1, pdu_size)
+    opening = one.n_samples - one.n_symbols * grid.n_symbol
+    return ModemInfo(
+        rate_hz=rate_hz,
+        pdu_size=pdu_size,
+        max_burst_s=max_burst_s,
+        n_fft=grid.n_fft,
+        n_cp=grid.n_cp,
+        n_data=grid.n_data,
+        n_pilots=len(grid.pilots),
+        spacing_hz=rate_hz / grid.n_fft,
+        occupied_hz=(grid.n_used + 1) * rate_hz / grid.n_fft,
+        symbol_us=grid.n_symbol / rate_hz * 1e6,
+        echoes_us=grid.n_cp / rate_hz * 1e6,
+        preamble_us=opening / rate_hz * 1e6,
+        mcs=rows,
+    )
+
+
+def _mcs_info(
+    grid: phy.Numerology, mcs: phy.Mcs, rate_hz: float, pdu_size: int, max_burst_s: float
+) -> McsInfo:
+    one = phy.layout(grid, mcs.index, 1, pdu_size)
+    n_pdus = phy.most_pdus(grid, mcs.index, pdu_size, round(max_burst_s * rate_hz))
+    burst = phy.layout(grid, mcs.index, n_pdus, pdu_size)
+    burst_s = burst.n_samples / rate_hz
+    return McsInfo(
+        mcs=mcs.index,
+        name=mcs.name,
+        rate_bit_s=float(mcs.bits_per_carrier) * grid.n_data * rate_hz / grid.n_symbol,
+        one_pdu_ms=one.n_samples / rate_hz * 1e3,
+        burst_pdus=n_pdus,
+        burst_ms=burst_s * 1e3,
+        burst_goodput_bit_s=8 * pdu_size * n_pdus / burst_s,
+    )

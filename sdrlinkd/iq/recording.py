@@ -1,0 +1,87 @@
+"""A recording, read piece by piece, and what a receiver finds in it."""
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+import phy
+from backends import BackendError, RecordingInfo, RecordingReader, Samples, describe
+from sdrlinkd.errors import UserError
+
+PIECE = 1 << 18
+MAX_POINTS = 20_000
+MAX_CFO_HZ = 1e5
+
+Progress = Callable[[int], None]
+
+
+class Points(NamedTuple):
+    """Equalised points by modulation, the last MAX_POINTS of each, and the bursts they are of."""
+
+    by_modulation: dict[phy.Modulation, NDArray[np.complex64]]
+    bursts: list[phy.BurstQuality]
+
+
+class IqRecording:
+    """A recording opened for reading. Raises UserError when it cannot be."""
+
+    def __init__(self, path: Path, type_name: str = "", rate_hz: float | None = None) -> None:
+        try:
+            self.info: RecordingInfo = describe(path, type_name, rate_hz)
+            self._reader = RecordingReader(self.info)
+        except BackendError as error:
+            raise UserError(str(error)) from None
+        if not self.info.n_samples:
+            raise UserError(f"{self.info.path}: holds no samples")
+
+    def read(self, first: int, n: int) -> Samples:
+        """Up to `n` samples from `first` on."""
+        return self._reader.read(first, n)
+
+    def decode(
+        self, network: int | None, progress: Progress
+    ) -> Iterator[tuple[phy.Event, phy.Receiver]]:
+        """What a receiver of `network` (None: any) finds; `progress(samples read)` on the way."""
+        yield from self._decode(phy.Receiver(network, self._max_frequency()), progress)
+
+    def points(self, network: int | None, progress: Progress) -> Points:
+        """The equalised points of all bursts."""
+        kept: dict[phy.Modulation, list[NDArray[np.complex64]]] = defaultdict(list)
+
+        def keep(points: NDArray[np.complex64], modulation: phy.Modulation) -> None:
+            pieces = kept[modulation]
+            pieces.append(points.reshape(-1))
+            while len(pieces) > 1 and sum(map(len, pieces[1:])) >= MAX_POINTS:
+                del pieces[0]
+
+        receiver = phy.Receiver(network, self._max_frequency(), on_points=keep)
+        bursts = [
+            event.burst
+            for event, _ in self._decode(receiver, progress)
+            if isinstance(event, phy.BurstOver)
+        ]
+        return Points(
+            {each: np.concatenate(pieces)[-MAX_POINTS:] for each, pieces in kept.items()}, bursts
+        )
+
+    def close(self) -> None:
+        """Close the file."""
+        self._reader.close()
+
+    def _decode(
+        self, receiver: phy.Receiver, progress: Progress
+    ) -> Iterator[tuple[phy.Event, phy.Receiver]]:
+        for first in range(0, self.info.n_samples, PIECE):
+            for event in receiver.push(self.read(first, PIECE)):
+                yield event, receiver
+            progress(min(first + PIECE, self.info.n_samples))
+        for event in receiver.flush():
+            yield event, receiver
+
+    def _max_frequency(self) -> float:
+        """In cycles a sample."""
+        return min(0.25, MAX_CFO_HZ / self.info.rate_hz) if self.info.rate_hz else 0.1
