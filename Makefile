@@ -36,6 +36,7 @@ format: setup
 
 bench: setup
 	$(BIN)/python -m benchmarks.bus
+	$(BIN)/python -m benchmarks.modem_path
 
 system-packages:
 	@sh etc/install-apt-packages.sh

@@ -68,5 +68,5 @@ def decode(
     code: CodeRate,
     workspace: ViterbiWorkspace,
 ) -> NDArray[np.uint8]:
-    """The likeliest bytes `[n_bytes]` behind LLRs `[n_coded]`, positive for 0, in ±MAX_LLR."""
+    """The likeliest bytes `[n, n_bytes]` behind LLRs `[n, n_coded]`, positive for 0, ±MAX_LLR."""
     return decode_terminated(llr, code.kept(8 * n_bytes), n_bytes, workspace)

@@ -39,12 +39,14 @@ class Demodulator:
     def __init__(self, modulation: Modulation, grid: Numerology) -> None:
         self._grid = grid
         self._bits, self._unit = modulation.bits, modulation.unit
-        self._order = mapping(modulation, grid).order
+        order = mapping(modulation, grid).order
+        plane, carrier = order % modulation.bits, order // modulation.bits
+        self._gather = (plane * grid.n_data + carrier).astype(np.int32)
         self._h_bins = np.zeros(grid.n_fft, np.complex64)
         self._data_bins = grid.bins[grid.data_at]
         self._pilot_bins = grid.bins[grid.pilots_at]
-        self._data_carriers = grid.used[grid.data_at].astype(np.float64)
-        self._pilot_carriers = grid.used[grid.pilots_at].astype(np.float64)
+        self._data_carriers = grid.used[grid.data_at]
+        self._pilot_carriers = grid.used[grid.pilots_at]
 
     def demap(
         self,
@@ -58,7 +60,7 @@ class Demodulator:
         `tracking` moves on; the header's first symbol is number 0.
         """
         n = len(bins)
-        llr = np.empty(n * len(self._order), np.int16)
+        llr = np.empty(n * len(self._gather), np.int16)
         points = np.empty((n, self._grid.n_data), np.complex64)
         self._h_bins[self._grid.bins] = channel.h_hat
         demap(
@@ -71,9 +73,10 @@ class Demodulator:
             self._pilot_carriers,
             self._grid.pilot_values,
             polarity(n, first_symbol),
-            self._order,
+            self._gather,
             self._bits,
             self._unit,
+            self._grid.edge,
             tracking,
             points,
             llr,
@@ -92,13 +95,16 @@ class PduDecoder:
         self.n_decoded = 0
         self._rest = np.empty(0, np.int16)
 
-    def decode_next(self, llr: NDArray[np.int16]) -> bytes | None:
-        """The next PDU, whose last symbols' LLRs are `llr`; None when its check fails."""
+    def decode(self, llr: NDArray[np.int16], n_pdus: int) -> list[bytes | None]:
+        """The next `n_pdus` PDUs, whose last symbols' LLRs are `llr`; None where a check fails."""
         plan = self.layout
         bits = np.concatenate((self._rest, llr))
-        self._rest = bits[plan.coded_bits :]
+        n_bits = n_pdus * plan.coded_bits
+        self._rest = bits[n_bits:]
         size = plan.block_bytes
-        white = decode(bits[: plan.coded_bits], size, plan.mcs.code, self.workspace)
-        start = self.n_decoded * size
-        self.n_decoded += 1
-        return checked((white ^ whitening(size, start)).tobytes())
+        white = decode(
+            bits[:n_bits].reshape(n_pdus, -1), size, plan.mcs.code, self.workspace
+        ).reshape(-1)
+        blocks = (white ^ whitening(len(white), self.n_decoded * size)).tobytes()
+        self.n_decoded += n_pdus
+        return [checked(blocks[at : at + size]) for at in range(0, len(blocks), size)]

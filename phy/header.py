@@ -44,7 +44,7 @@ def parse_header(llr: NDArray[np.int16], workspace: ViterbiWorkspace) -> BurstHe
     n = CODE.n_coded(N_BITS)
     folded = llr[:n] // 2
     folded[: len(llr) - n] += llr[n:] // 2
-    data = decode(folded, N_BITS // 8, CODE, workspace).tobytes()
+    data = decode(folded[None, :], N_BITS // 8, CODE, workspace).tobytes()
     if crc8(data[:3]) != data[3]:
         return None
     fields = int.from_bytes(data[:3], "big")

@@ -4,6 +4,8 @@ SEARCH → ALIGN → ACQUIRE → PAYLOAD. Every step waits until the samples it 
 takes exactly those, so any chunking of the same samples yields the same events.
 """
 
+import cmath
+import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,7 +20,7 @@ from phy.convolutional import N_TAIL, ViterbiWorkspace
 from phy.crc import CRC32_SIZE
 from phy.demodulation import Demodulator, PduDecoder
 from phy.header import MAX_PDU_BYTES, N_SYMBOLS
-from phy.kernels.detector import HISTORY, detector_sums, search
+from phy.kernels.detector import HISTORY, search, strongest
 from phy.layout import layout
 from phy.numerology import OFDM_64_16, Numerology
 from phy.quality import BurstOver, Event, PduHeard
@@ -151,12 +153,8 @@ class Receiver:
         if self._stream.end < crossing + ALIGN_SPAN:
             return False
         x = self._stream.view(crossing - HISTORY, crossing + ALIGN_SPAN)
-        detector_sums(x, self._dc_value, self._work, ALIGN_SPAN)
-        p = self._work[0, :ALIGN_SPAN] + 1j * self._work[1, :ALIGN_SPAN]
-        energy = self._work[2, :ALIGN_SPAN]
-        metric = np.abs(p) / np.where(energy > 0, energy, 1)
-        peak = int(metric.argmax())
-        turn = float(np.angle(p[peak])) / (2 * np.pi * preamble.SEGMENT)
+        peak, p = strongest(x, ALIGN_SPAN, self._dc_value, self._work)
+        turn = cmath.phase(p) / (2 * math.pi * preamble.SEGMENT)
         self._at = crossing + peak
         self._crossing, self._peak = None, (crossing + peak, turn)
         return True
@@ -190,39 +188,58 @@ class Receiver:
         return True
 
     def _payload(self, burst: _Burst, events: list[Event]) -> bool:
-        """One PDU more, once all its symbols are in."""
+        """The PDUs whose symbols are all in, one or more."""
         plan, found = burst.decoder.layout, burst.acquired
-        number = burst.decoder.n_decoded
-        last = plan.symbols_through(number + 1)
+        first_pdu = burst.decoder.n_decoded
+        n_pdus = self._complete_pdus(burst)
+        if not n_pdus:
+            return False
+        last = plan.symbols_through(first_pdu + n_pdus)
         n = last - burst.n_symbols_in
         first = found.window + burst.n_symbols_in * self._grid.n_symbol
-        end = found.window + (last - 1) * self._grid.n_symbol + self._grid.n_fft if n else first
-        if self._stream.end < end:
-            return False
+        x = self._stream.view(first, self._end_of_symbol(found, last) if n else first)
         starts = self._grid.n_symbol * np.arange(n)
-        x = self._stream.view(first, end)
         bins = ofdm.to_bins(x, starts, found.frequency, self._dc_value, self._grid)
         # Bins are turned back from the first window on, the channel estimate from its own.
-        bins *= np.complex64(np.exp(-2j * np.pi * found.frequency * self._since(burst, first)))
+        bins *= np.complex64(cmath.exp(-2j * math.pi * found.frequency * self._since(burst, first)))
         llr, points = burst.demodulator.demap(
             bins, found.channel, found.tracking, N_SYMBOLS + burst.n_symbols_in
         )
         if self._on_points is not None and n:
             self._on_points(points, plan.mcs.modulation)
-        burst.n_symbols_in = last
-        self._at = first
-        data = burst.decoder.decode_next(llr)
-        if data is not None:
-            burst.n_good += 1
-            self.counters["pdus_good"] += 1
-            events.append(PduHeard(data, number, end, found.quality))
-        else:
+        decoded = burst.decoder.decode(llr, n_pdus)
+        for number, data in enumerate(decoded, start=first_pdu):
+            through = plan.symbols_through(number + 1)
+            before = burst.n_symbols_in
+            burst.n_symbols_in = through
+            if data is not None:
+                burst.n_good += 1
+                self.counters["pdus_good"] += 1
+                end = self._end_of_symbol(found, through)
+                events.append(PduHeard(data, number, end, found.quality))
+                continue
             self.counters["pdus_bad"] += 1
-        if number + 1 == plan.n_pdus:
+            own = bins[len(bins) - (last - before) : len(bins) - (last - through)]
+            if number + 1 < plan.n_pdus and self._is_gone(own, found):
+                self._end(burst, events, "faded")
+                return True
+        self._at = self._end_of_symbol(found, burst.n_symbols_in)
+        if first_pdu + n_pdus == plan.n_pdus:
             self._end(burst, events, "whole")
-        elif data is None and self._is_gone(bins, found):
-            self._end(burst, events, "faded")
         return True
+
+    def _complete_pdus(self, burst: _Burst) -> int:
+        """How many PDUs can be decoded with the samples that are there."""
+        plan, found = burst.decoder.layout, burst.acquired
+        number = burst.decoder.n_decoded
+        n_symbols = (self._stream.end - found.window + self._grid.n_cp) // self._grid.n_symbol
+        n_symbols = min(n_symbols, plan.n_symbols)
+        by_symbols = n_symbols * plan.symbol_bits // plan.coded_bits - number
+        return max(0, min(by_symbols, plan.n_pdus - number))
+
+    def _end_of_symbol(self, found: Acquired, n_symbols: int) -> int:
+        """Absolute index after the window of the `n_symbols`-th payload symbol."""
+        return found.window + n_symbols * self._grid.n_symbol - self._grid.n_cp
 
     def _since(self, burst: _Burst, index: int) -> int:
         """Samples from the channel estimate's window to `index`."""
@@ -232,7 +249,9 @@ class Receiver:
 
     def _is_gone(self, bins: NDArray[np.complex64], found: Acquired) -> bool:
         used = bins[:, self._grid.bins]
-        power = float(np.mean(used.real**2 + used.imag**2)) if len(used) else np.inf
+        if not len(used):
+            return False
+        power = float(np.mean(used.real**2 + used.imag**2))
         return power < found.channel.no + _FADED * found.channel.gain
 
     def _end(self, burst: _Burst, events: list[Event], ending: str) -> None:

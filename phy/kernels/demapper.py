@@ -45,7 +45,7 @@ def _track(
     h_hat: NDArray[np.complex64],
     no: float,
     pilot_bins: NDArray[np.int64],
-    pilot_carriers: NDArray[np.float64],
+    pilot_carriers: NDArray[np.int64],
     pilots: NDArray[np.float32],
     polarity: float,
     tracking: NDArray[np.float64],
@@ -94,35 +94,52 @@ def _axis_llrs(
     u: NDArray[np.float32],
     weight: NDArray[np.float32],
     axis_bits: int,
-    first: int,
-    stride: int,
     out: NDArray[np.int16],
 ) -> None:
-    """Exact max-log LLRs of a Gray-coded axis, quantised.
+    """Exact max-log LLRs of a Gray-coded axis, quantised: `out` `[axis_bits · n]`, bit by bit.
 
     `u` `[n]` in units of half a point distance. An LLR is the difference of squared distances to
     the nearest points with the bit 1 and 0; as a function of |u| it is a few straight lines.
     """
+    n = u.size
     four, most = np.float32(4), np.float32(MAX_LLR)
-    for d in range(u.size):
+    first = out[:n]
+    for d in range(n):
         a = abs(u[d])
-        w = weight[d]
-        at = first + stride * d
         outer = four * a
         if axis_bits >= 2:
             outer = max(outer, 2 * four * a - 2 * four)
         if axis_bits == 3:
             outer = max(outer, max(3 * four * a - 6 * four, 4 * four * a - 12 * four))
         signed = -outer if u[d] > 0 else outer
-        out[at] = np.int16(min(max(w * signed, -most), most))
-        if axis_bits == 2:
-            out[at + 1] = np.int16(min(max(w * (four * a - 2 * four), -most), most))
-        if axis_bits == 3:
+        first[d] = np.int16(min(max(weight[d] * signed, -most), most))
+    if axis_bits == 2:
+        second = out[n:]
+        for d in range(n):
+            value = four * abs(u[d]) - 2 * four
+            second[d] = np.int16(min(max(weight[d] * value, -most), most))
+    if axis_bits == 3:
+        second, third = out[n:], out[2 * n :]
+        for d in range(n):
+            a = abs(u[d])
             inner = min(2 * four * a - 6 * four, four * a - 4 * four)
-            second = max(inner, 2 * four * a - 10 * four)
-            third = max(2 * four - four * a, four * a - 6 * four)
-            out[at + 1] = np.int16(min(max(w * second, -most), most))
-            out[at + 2] = np.int16(min(max(w * third, -most), most))
+            value = max(inner, 2 * four * a - 10 * four)
+            second[d] = np.int16(min(max(weight[d] * value, -most), most))
+            value = max(2 * four - four * a, four * a - 6 * four)
+            third[d] = np.int16(min(max(weight[d] * value, -most), most))
+
+
+@njit(nogil=True, cache=True)
+def _turns(phase: float, slope: float, edge: int, out: NDArray[np.complex64]) -> None:
+    """exp(−j (phase + slope · k)) for the carriers k = −edge … edge `[2 edge + 1]`."""
+    common = complex(math.cos(phase), -math.sin(phase))
+    step = complex(math.cos(slope), -math.sin(slope))
+    turn = complex(1.0)
+    out[edge] = np.complex64(common)
+    for k in range(1, edge + 1):
+        turn *= step
+        out[edge + k] = np.complex64(common * turn)
+        out[edge - k] = np.complex64(common * turn.conjugate())
 
 
 @njit(nogil=True, cache=True)
@@ -131,14 +148,15 @@ def demap(
     h_hat: NDArray[np.complex64],
     no: float,
     data_bins: NDArray[np.int64],
-    data_carriers: NDArray[np.float64],
+    data_carriers: NDArray[np.int64],
     pilot_bins: NDArray[np.int64],
-    pilot_carriers: NDArray[np.float64],
+    pilot_carriers: NDArray[np.int64],
     pilots: NDArray[np.float32],
     polarity: NDArray[np.float32],
-    order: NDArray[np.int32],
+    gather: NDArray[np.int32],
     bits: int,
     unit: float,
+    edge: int,
     tracking: NDArray[np.float64],
     equalised: NDArray[np.complex64],
     llr: NDArray[np.int16],
@@ -146,7 +164,8 @@ def demap(
     """Symbols `y` `[n, n_fft]` to LLRs `[n · n_data · bits]` in the code's order, positive for 0.
 
     `h_hat` `[n_fft]`, `no` the noise power on a carrier. `tracking` `[2, 5]` goes on from call to
-    call. `equalised` `[n, n_data]` gets the points.
+    call. `equalised` `[n, n_data]` gets the points. `gather` `[n_data · bits]`: where each bit of
+    the code's order is when a symbol's bits lie plane by plane.
     """
     n_data = data_bins.size
     axis_bits = max(1, bits // 2)
@@ -158,35 +177,20 @@ def demap(
         weight[d] = np.float32(LLR_SCALE * unit * unit * power / no)
         equaliser[d] = np.complex64(h.conjugate() / power) if power > 0.0 else np.complex64(0)
     u, v = np.empty(n_data, np.float32), np.empty(n_data, np.float32)
-    as_sent = np.empty(order.size, np.int16)
+    planes = np.empty(gather.size, np.int16)
+    turns = np.empty(2 * edge + 1, np.complex64)
     per_unit = np.float32(1 / unit)
     for row in range(y.shape[0]):
         _track(y[row], h_hat, no, pilot_bins, pilot_carriers, pilots, polarity[row], tracking)
-        _turns(tracking[PHASE, 0], tracking[SLOPE, 0], data_carriers, equalised[row])
+        _turns(tracking[PHASE, 0], tracking[SLOPE, 0], edge, turns)
         for d in range(n_data):
-            value = y[row, data_bins[d]] * equaliser[d] * equalised[row, d]
+            value = y[row, data_bins[d]] * equaliser[d] * turns[data_carriers[d] + edge]
             equalised[row, d] = value
             u[d] = value.real * per_unit
             v[d] = value.imag * per_unit
-        _axis_llrs(u, weight, axis_bits, 0, bits, as_sent)
+        _axis_llrs(u, weight, axis_bits, planes)
         if bits > 1:
-            _axis_llrs(v, weight, axis_bits, axis_bits, bits, as_sent)
-        base = row * order.size
-        for k in range(order.size):
-            llr[base + k] = as_sent[order[k]]
-
-
-@njit(nogil=True, cache=True)
-def _turns(
-    phase: float, slope: float, carriers: NDArray[np.float64], out: NDArray[np.complex64]
-) -> None:
-    """exp(−j (phase + slope · carrier)) for ascending carriers."""
-    angle = phase + slope * carriers[0]
-    turn = complex(math.cos(angle), -math.sin(angle))
-    step = complex(math.cos(slope), -math.sin(slope))
-    at = carriers[0]
-    for d in range(carriers.size):
-        while at < carriers[d]:
-            turn *= step
-            at += 1.0
-        out[d] = np.complex64(turn)
+            _axis_llrs(v, weight, axis_bits, planes[axis_bits * n_data :])
+        sorted_llr = llr[row * gather.size : (row + 1) * gather.size]
+        for k in range(gather.size):
+            sorted_llr[k] = planes[gather[k]]

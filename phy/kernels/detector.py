@@ -119,6 +119,23 @@ def search(
 
 
 @njit(nogil=True, cache=True)
+def strongest(
+    x: NDArray[np.complex64], n: int, dc: complex, work: NDArray[np.float32]
+) -> tuple[int, complex]:
+    """(offset of the largest |P| / E among the `n` samples after HISTORY of `x`, its P)."""
+    detector_sums(x, dc, work, n)
+    p_re, p_im, energy = work[0], work[1], work[2]
+    best, best_metric = 0, -1.0
+    for i in range(n):
+        if energy[i] > 0:
+            power = float(p_re[i]) * p_re[i] + float(p_im[i]) * p_im[i]
+            metric = power / (float(energy[i]) * energy[i])
+            if metric > best_metric:
+                best, best_metric = i, metric
+    return best, complex(p_re[best], p_im[best])
+
+
+@njit(nogil=True, cache=True)
 def _follow_dc(x: NDArray[np.complex64], dc_state: NDArray[np.float64]) -> None:
     re, im = 0.0, 0.0
     for i in range(x.size):

@@ -57,8 +57,8 @@ class ViterbiWorkspace:
 def decode_terminated(
     llr: NDArray[np.int16], kept: NDArray[np.int32], n_bytes: int, work: ViterbiWorkspace
 ) -> NDArray[np.uint8]:
-    """The likeliest bytes `[n_bytes]` when `llr[i]` belongs to bit `kept[i]` of the mother code."""
-    out = np.empty(n_bytes, np.uint8)
+    """The likeliest bytes `[n, n_bytes]`; `llr[:, i]` is of bit `kept[i]` of the mother code."""
+    out = np.empty((len(llr), n_bytes), np.uint8)
     n_steps = 8 * n_bytes + 6
     _decode(llr, kept, work.mother[: 2 * n_steps], work.decisions[:n_steps], out)
     return out
@@ -138,14 +138,15 @@ def _decode(
     out: NDArray[np.uint8],
 ) -> None:
     mother[:] = 0
-    for i in range(kept.size):
-        mother[kept[i]] = llr[i]
-    _forward(mother, decisions)
     out[:] = 0
-    state = 0
-    n_bits = 8 * out.size
-    for t in range(decisions.size - 1, -1, -1):
-        if t < n_bits:
-            out[t >> 3] |= np.uint8((state >> 5) << (7 - (t & 7)))
-        won_by_odd = int(decisions[t] >> np.uint64(state)) & 1
-        state = (state & 31) << 1 | won_by_odd
+    n_bits = 8 * out.shape[1]
+    for block in range(llr.shape[0]):
+        for i in range(kept.size):
+            mother[kept[i]] = llr[block, i]
+        _forward(mother, decisions)
+        state = 0
+        for t in range(decisions.size - 1, -1, -1):
+            if t < n_bits:
+                out[block, t >> 3] |= np.uint8((state >> 5) << (7 - (t & 7)))
+            won_by_odd = int(decisions[t] >> np.uint64(state)) & 1
+            state = (state & 31) << 1 | won_by_odd
