@@ -16,6 +16,8 @@ $(STAMP): pyproject.toml constraints.txt sdrlinkd/__init__.py
 	@$(PYTHON) -m venv $(VENV) || \
 		{ echo "python3 has no venv module; on Debian: apt-get install python3-venv"; exit 1; }
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[plots,dev]'
+	@echo "compiling the modem (once)"
+	@$(BIN)/python -c 'import phy; phy.warm_up()'
 	@touch $@
 
 demo: setup

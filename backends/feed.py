@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Callable
 from backends.base import RxBlock
 
 # Blocks that may wait for the event loop; past that the thread waits.
-MAX_WAITING = 64
+MAX_WAITING = 16
 
 
 class BlockFeed:

@@ -105,6 +105,9 @@ class BuiltInRobot:
         self._namespace = "/" + namespace.strip("/")
         self._duration_s = duration_s
         self._seed = seed
+        # The first of each type takes long: its serialiser is made. Not when time is measured.
+        for kind, _ in _TYPES.values():
+            to_cdr(empty(kind), kind)
 
     def topics(self) -> list[BagTopic]:
         """What it publishes."""

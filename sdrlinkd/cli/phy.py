@@ -98,9 +98,11 @@ def decode(
     """Bursts in a recording, how well they were received, and their PDUs."""
     names = load_registry(registry) if registry else None
     console = Console(soft_wrap=True)
-    recording = _open(file, type_name, rate)
     counters: dict[str, int] = {}
-    with _progress(f"decode {file.name}", recording) as progress:
+    with (
+        _open(file, type_name, rate) as recording,
+        _progress(f"decode {file.name}", recording) as progress,
+    ):
         pdus: list[tuple[int, bytes]] = []
         for event, receiver in recording.decode(None if network < 0 else network, progress):
             counters = dict(receiver.counters)
@@ -115,7 +117,6 @@ def decode(
                 lines = [f"  {number}  {one_line(data, names)}" for number, data in pdus]
                 console.print("\n".join([told, *lines]), highlight=False, markup=False)
             pdus = []
-    recording.close()
     if not json:
         _print_counters(console, counters, recording)
 
@@ -129,8 +130,10 @@ def spectrum(
 
     pictures = _load_pictures()
     console = Console()
-    recording = _open(file, type_name, rate)
-    with _progress(f"spectrum of {file.name}", recording) as progress:
+    with (
+        _open(file, type_name, rate) as recording,
+        _progress(f"spectrum of {file.name}", recording) as progress,
+    ):
         measured = spectrum_of(recording, progress)
     path = out or Path(f"{_stem(file)}.spectrum.png")
     pictures.draw_spectrum(measured, recording.info.rate_hz, file.name, path)
@@ -148,8 +151,10 @@ def constellation(
     """Draw the equalised points of the bursts in a recording."""
     pictures = _load_pictures()
     console = Console()
-    recording = _open(file, type_name, rate)
-    with _progress(f"points in {file.name}", recording) as progress:
+    with (
+        _open(file, type_name, rate) as recording,
+        _progress(f"points in {file.name}", recording) as progress,
+    ):
         points = recording.points(None if network < 0 else network, progress)
     if not points.by_modulation:
         raise UserError(
@@ -178,7 +183,8 @@ def _open(file: Path, type_name: str, rate: float | None) -> "IqRecording":
 def _progress(what: str, recording: "IqRecording") -> Iterator["OnProgress"]:
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True) as progress:
+    hidden = not console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=hidden) as progress:
         task = progress.add_task(what, total=recording.info.n_samples)
         yield lambda done: progress.update(task, completed=done)
 

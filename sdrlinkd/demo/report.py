@@ -114,9 +114,11 @@ def run_result(
     source: Source,
     options: Options,
     duration_s: float,
-    sender: Snapshot,
-    receiver: Snapshot,
+    pdus_sent: int,
+    entries: int,
+    dropped: dict[str, int],
     ledger_adds_up: bool,
+    phy: PhyResult | None = None,
 ) -> RunResult:
     """The figures of a finished run."""
     pairs, foreign = trace.matches()
@@ -124,8 +126,6 @@ def run_result(
     errors = [topic.path_error_m for topic in topics if topic.path_error_m is not None]
     flat = [pair for found in pairs.values() for pair in found]
     received = len(flat)
-    tx, rx = sender.link.tx, receiver.link.rx
-    pdus = {k: v for k, v in rx.pdus_dropped.items() if k not in ("rx_control", "rx_dup")}
     return RunResult(
         name=options.link,
         source=source.title,
@@ -139,18 +139,19 @@ def run_result(
         latency_ms=latency_ms(flat),
         path_error_m=max(errors) if errors else None,
         bytes_identical=foreign == 0 and received == trace.n_received and received > 0,
-        entries_per_message=tx.entries / trace.n_sent if trace.n_sent else 0.0,
-        pdus_sent=tx.pdus_sent,
+        entries_per_message=entries / trace.n_sent if trace.n_sent else 0.0,
+        pdus_sent=pdus_sent,
         ledger_adds_up=ledger_adds_up,
-        dropped={**tx.dropped, **rx.dropped, **pdus},
+        dropped=dropped,
         topics=topics,
         left_out=source.left_out,
         damage=source.recording.damage,
-        phy=None if options.link == "direct" else _phy_result(options, receiver),
+        phy=phy,
     )
 
 
-def _phy_result(options: Options, receiver: Snapshot) -> PhyResult:
+def phy_result(options: Options, receiver: Snapshot) -> PhyResult:
+    """What the modem of the receiving node counted."""
     counters = receiver.carrier.counters
     snr = [each.snr_db for each in receiver.link.neighbors if each.snr_db is not None]
     return PhyResult(

@@ -9,7 +9,7 @@ from sdrlinkd.adapters import paced
 from sdrlinkd.client import Publisher
 from sdrlinkd.demo.links import Options, write_config
 from sdrlinkd.demo.nodes import Consumer, daemon, problems_of, snapshot_of
-from sdrlinkd.demo.report import RunResult, run_result
+from sdrlinkd.demo.report import RunResult, phy_result, run_result
 from sdrlinkd.demo.source import Source
 from sdrlinkd.demo.trace import Sample, Trace
 from sdrlinkd.reports import Snapshot
@@ -36,14 +36,18 @@ def run_demo(source: Source, options: Options, progress: Progress) -> tuple[RunR
         else:
             sent, duration_s, problems = _to_itself(Path(folder), source, options, trace, progress)
             heard = sent
+    tx, rx = sent.link.tx, heard.link.rx
+    pdus = {k: v for k, v in rx.pdus_dropped.items() if k not in ("rx_control", "rx_dup")}
     result = run_result(
         trace,
         source=source,
         options=options,
         duration_s=duration_s,
-        sender=sent,
-        receiver=heard,
+        pdus_sent=tx.pdus_sent,
+        entries=tx.entries,
+        dropped={**tx.dropped, **rx.dropped, **pdus},
         ledger_adds_up=not problems,
+        phy=None if options.link == "direct" else phy_result(options, heard),
     )
     return result, trace
 
@@ -73,13 +77,13 @@ def _over_recording(
     with daemon(config):
         began = time.monotonic()
         _produce(source, options, config.parent, trace, lambda: progress(trace.n_sent, 0))
-        sent = _wait_until_through(config.parent, None, trace.n_sent, lambda: None)
+        sent = _wait_until_sent(config.parent, trace.n_sent)
         duration_s = time.monotonic() - began
         problems = problems_of(config.parent)
     config = write_config(folder / "listener", source, options, "play", recording.absolute())
     with daemon(config), Consumer(config.parent, trace, by_age=True) as consumer:
-        heard = _wait_until_through(
-            config.parent, consumer, 0, lambda: progress(trace.n_sent, consumer.count)
+        heard = _wait_until_played(
+            config.parent, consumer, lambda: progress(trace.n_sent, consumer.count)
         )
         problems += problems_of(config.parent)
     return sent, heard, duration_s, problems
@@ -97,29 +101,59 @@ def _produce(
             progress()
 
 
+def _wait_until_sent(directory: Path, n_sent: int) -> Snapshot:
+    """Until all has left, or nothing moves for a while."""
+    return _watch(
+        directory,
+        lambda at: at.bus.received == n_sent and not at.link.tx.queued and not at.link.tx.in_flight,
+        lambda at: (at.bus.received, at.link.tx.sent),
+    )
+
+
 def _wait_until_through(
-    directory: Path, consumer: Consumer | None, n_sent: int, progress: Callable[[], None]
+    directory: Path, consumer: Consumer, n_sent: int, progress: Callable[[], None]
 ) -> Snapshot:
     """Until nothing is on its way any more, or nothing moves for a while."""
-    moved_at = time.monotonic()
+
+    def is_through(at: Snapshot) -> bool:
+        progress()
+        tx, rx = at.link.tx, at.link.rx
+        on_its_way = tx.queued or tx.in_flight or rx.held
+        return at.bus.received == n_sent and not on_its_way and consumer.count == rx.delivered
+
+    return _watch(
+        directory,
+        is_through,
+        lambda at: (at.bus.received, at.link.tx.sent, at.link.rx.pdus_heard, consumer.count),
+    )
+
+
+def _wait_until_played(
+    directory: Path, consumer: Consumer, progress: Callable[[], None]
+) -> Snapshot:
+    """Until the recording is over and all that was in it has come."""
+
+    def is_over(at: Snapshot) -> bool:
+        progress()
+        rx = at.link.rx
+        return at.carrier.state == "ended" and not rx.held and consumer.count == rx.delivered
+
+    return _watch(directory, is_over, lambda at: (at.carrier.counters["samples"], consumer.count))
+
+
+def _watch(
+    directory: Path, is_done: Callable[[Snapshot], bool], moving: Callable[[Snapshot], object]
+) -> Snapshot:
+    """The snapshot when `is_done` has held while nothing moved for SETTLE_S; at last QUIET_S."""
     seen: object = None
+    still_since = time.monotonic()
     while True:
         snapshot = snapshot_of(directory)
-        progress()
-        tx, rx, carrier = snapshot.link.tx, snapshot.link.rx, snapshot.carrier
-        count = consumer.count if consumer else 0
-        now_seen = (tx.sent, count, carrier.counters.get("samples") if not count else None)
+        done = is_done(snapshot)
+        now_seen = moving(snapshot)
         if now_seen != seen:
-            seen, moved_at = now_seen, time.monotonic()
-        still_s = time.monotonic() - moved_at
-        done = (
-            snapshot.bus.received == n_sent
-            and not (tx.queued or tx.in_flight or rx.held)
-            and (consumer is None or count == rx.delivered)
-            and (carrier.state == "ended" or consumer is None or n_sent)
-        )
-        if (done and still_s > SETTLE_S) or (still_s > QUIET_S and carrier.state != "up"):
-            return snapshot
-        if still_s > QUIET_S and n_sent:
+            seen, still_since = now_seen, time.monotonic()
+        still_s = time.monotonic() - still_since
+        if (done and still_s > SETTLE_S) or still_s > QUIET_S:
             return snapshot
         time.sleep(0.02)

@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ class Points(NamedTuple):
 
 
 class IqRecording:
-    """A recording opened for reading. Raises UserError when it cannot be."""
+    """A recording opened for reading, to be used by `with`. Raises UserError when it cannot be."""
 
     def __init__(self, path: Path, type_name: str = "", rate_hz: float | None = None) -> None:
         try:
@@ -36,6 +36,7 @@ class IqRecording:
         except BackendError as error:
             raise UserError(str(error)) from None
         if not self.info.n_samples:
+            self._reader.close()
             raise UserError(f"{self.info.path}: holds no samples")
 
     def read(self, first: int, n: int) -> Samples:
@@ -68,8 +69,10 @@ class IqRecording:
             {each: np.concatenate(pieces)[-MAX_POINTS:] for each, pieces in kept.items()}, bursts
         )
 
-    def close(self) -> None:
-        """Close the file."""
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
         self._reader.close()
 
     def _decode(

@@ -52,7 +52,7 @@ class ModemLink:
         self._state = "down"
         self._problem = ""
         self._bursts_slipped = 0
-        self._tx_samples = 0
+        self._samples_sent = 0
 
     def now(self) -> float:
         """Seconds on the received stream."""
@@ -147,7 +147,7 @@ class ModemLink:
             counters={
                 **self._radio.counters,
                 "bursts_slipped": self._bursts_slipped,
-                "tx_samples": self._tx_samples,
+                "samples_sent": self._samples_sent,
                 **{name: counted[name] for name in phy.COUNTERS},
             },
             realtime_ratio=round(ratio, 2) if ratio else None,
@@ -156,16 +156,21 @@ class ModemLink:
 
     def _notices(self) -> list[str]:
         notices = [self._problem] if self._problem else []
-        counted = self._radio.counters
-        if counted.get("overflows"):
-            notices.append(
-                f"the receiver fell behind {counted['overflows']} times and lost "
-                f"{counted['samples_lost']} samples; at {self._params.rate_hz / 1e6:g} Msps it "
-                f"runs at {self._realtime_ratio:.2f} times real time: lower modem.rate_hz"
-            )
+        if self._radio.counters.get("overflows"):
+            notices.append(self._overflow_notice())
         if self._state != "down" and not self._radio.capabilities.transmits:
             notices.append("this radio only receives: what is to be sent stays in the queue")
         return notices
+
+    def _overflow_notice(self) -> str:
+        counted = self._radio.counters
+        lost = counted["samples_lost"]
+        kept = 1 - lost / max(1, self._clock.end)
+        return (
+            f"the receiver fell behind {counted['overflows']} times and lost {lost} samples: it "
+            f"keeps up with {kept:.2f} of real time at {self._params.rate_hz / 1e6:g} Msps "
+            f"(demodulation alone with {self._realtime_ratio:.2f}); lower modem.rate_hz"
+        )
 
     @property
     def _realtime_ratio(self) -> float:
@@ -204,10 +209,12 @@ class ModemLink:
             self._listener.heard(heard)
 
     async def _transmit(self, burst: Burst, planned: int) -> None:
+        if self._listener is None:
+            return
         loop = asyncio.get_running_loop()
         try:
             samples = await loop.run_in_executor(self._tx_thread, self._modulate, burst.pdus)
-            self._tx_samples += len(samples)
+            self._samples_sent += len(samples)
             report = await self._radio.send(TxBurst(planned, samples))
             self._bursts_slipped += report.start > planned
             outcome, end = OUTCOMES[report.outcome], report.end

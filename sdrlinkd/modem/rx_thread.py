@@ -10,8 +10,8 @@ import phy
 from backends import RxBlock
 from sdrlinkd.modem.load import LoadMeter
 
-# Samples that may wait for the receiver, in blocks.
-MAX_BLOCKS = 64
+# Blocks that may wait for the receiver.
+MAX_BLOCKS = 16
 
 Deliver = Callable[[Sequence[phy.Event], int], None]
 

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from sdrlinkd.cli import run
-from sdrlinkd.demo import Options, open_source, run_demo
+from sdrlinkd.demo import LINKS, Options, open_source, run_demo
 from tests.adapters.recordings import STORAGES, noisy_messages, ros2_bag
 
 
@@ -13,51 +13,80 @@ def demo(*arguments):
     return run(["demo", *(str(argument) for argument in arguments)])
 
 
-@pytest.mark.parametrize("pdu_size", [64, 1024])
-def test_everything_arrives_unchanged(tmp_path, pdu_size):
-    code = demo("--duration", 4, "--speed", 4, "--pdu-size", pdu_size, "--out", tmp_path, "--json",
-                tmp_path / "copy.json")  # fmt: skip
+@pytest.mark.slow
+def test_the_whole_of_table_6(tmp_path, capsys):
+    code = demo("--duration", 4, "--out", tmp_path, "--json", tmp_path / "copy.json",
+                "--record", tmp_path / "recording")  # fmt: skip
     assert code == 0
     report = json.loads((tmp_path / "report.json").read_text())
     assert report == json.loads((tmp_path / "copy.json").read_text())
-    (result,) = report["runs"]
-    assert (result["name"], result["sent"], result["received"]) == ("direct", 400, 400)
-    assert (result["pdr"], result["bytes_identical"], result["path_error_m"]) == (1.0, True, 0.0)
-    assert result["ledger_adds_up"]
-    assert result["dropped"] == {}
-    assert result["goodput_bytes_per_s"] > 100_000
-    assert set(result["latency_ms"]) == {"p50", "p90", "p99", "max"}
-    assert {topic["name"]: topic["sent"] for topic in result["topics"]} == {
-        "odom": 120, "imu": 200, "scan": 40, "cmd_vel": 40,
-    }  # fmt: skip
+    assert [run["name"] for run in report["runs"]] == list(LINKS)
+    for result in report["runs"]:
+        assert (result["sent"], result["received"], result["pdr"]) == (400, 400, 1.0), result
+        assert (result["bytes_identical"], result["path_error_m"]) == (True, 0.0)
+        assert result["ledger_adds_up"]
+        assert result["dropped"] == {}
+        assert result["goodput_bytes_per_s"] > 40_000
+        assert set(result["latency_ms"]) == {"p50", "p90", "p99", "max"}
+        assert 0 < result["latency_ms"]["p50"] < 500
+        assert {topic["name"]: topic["sent"] for topic in result["topics"]} == {
+            "odom": 120, "imu": 200, "scan": 40, "cmd_vel": 40,
+        }  # fmt: skip
+    ofdm, iqfile, direct = report["runs"]
+    assert direct["phy"] is None
+    for result in (ofdm, iqfile):
+        heard = result["phy"]
+        assert (heard["mcs"], heard["channel"]) == ("QPSK 1/2", "awgn")
+        assert heard["pdus_good"] == result["pdus_sent"]
+        assert heard["pdus_bad"] == heard["headers_bad"] == 0
+        assert 14 < heard["snr_db_measured"] < 16
     for name in ("latency_cdf.png", "path.png"):
         picture = (tmp_path / name).read_bytes()
         assert picture.startswith(b"\x89PNG")
         assert len(picture) > 5000
+    out = capsys.readouterr().out
+    assert "0.01" in out
+    assert "228.6" in out
+    assert (tmp_path / "recording.sigmf-meta").is_file()
 
 
-@pytest.mark.parametrize("pdu_size", [64, 1024])
-def test_a_run_adds_up(pdu_size):
+@pytest.mark.parametrize(
+    ("link", "pdu_size", "speed"),
+    [("direct", 64, 4.0), ("direct", 1024, 4.0), ("ofdm", 1024, 1.0), ("iqfile", 220, 1.0)],
+)
+def test_a_run_adds_up(link, pdu_size, speed):
     seen = []
     source = open_source(None, None, [], 2.0, 1)
     result, trace = run_demo(
-        source, Options("direct", pdu_size, 4.0, 1), lambda *counts: seen.append(counts)
+        source,
+        Options(link=link, pdu_size=pdu_size, speed=speed),
+        lambda *counts: seen.append(counts),
     )
     assert (result.sent, result.received, result.pdr) == (200, 200, 1)
     assert result.bytes_identical
     assert result.ledger_adds_up
     assert (result.path_error_m, result.dropped, result.pdu_size) == (0, {}, pdu_size)
     assert result.pdus_sent > 0
-    assert 0.4 < result.duration_s < 10
+    assert 0.4 < result.duration_s < 20
     for name, samples in trace.sent.items():
         assert [s.payload for s in trace.received[name]] == [s.payload for s in samples]
     assert seen == sorted(seen)
     assert seen[-1] == (200, 200)
 
 
+def test_noise_beyond_the_code_loses_messages_by_name():
+    source = open_source(None, None, [], 2.0, 1)
+    options = Options(link="ofdm", pdu_size=220, snr_db=0.5)
+    result, _ = run_demo(source, options, lambda *_: None)
+    assert result.pdr < 0.9
+    assert result.phy.pdus_bad > 0
+    assert result.ledger_adds_up
+    assert result.received == 0 or result.bytes_identical
+
+
 def test_a_picture_that_cannot_be_written_is_told_in_words(tmp_path, capsys):
     (tmp_path / "path.png").mkdir()
-    assert demo("--duration", 0.2, "--out", tmp_path) == 2
+    assert demo("--duration", 0.2, "--link", "direct", "--out", tmp_path) == 2
     assert "path.png" in capsys.readouterr().err
 
 
@@ -67,7 +96,7 @@ def test_a_bag_with_garbage_in_its_padding_arrives_unchanged(tmp_path, storage, 
         tmp_path / "bag", STORAGES[storage],
         [(t, k, ns * 1000, cdr) for t, k, ns, cdr in noisy_messages(5, 120) if t == "/chat"],
     )  # fmt: skip
-    assert demo("--bag", bag, "--out", tmp_path / "out") == 0
+    assert demo("--bag", bag, "--link", "direct", "--out", tmp_path / "out") == 0
     (result,) = json.loads((tmp_path / "out/report.json").read_text())["runs"]
     assert (result["pdr"], result["bytes_identical"], result["path_error_m"]) == (1.0, True, None)
 
@@ -93,3 +122,5 @@ def test_bad_input_is_refused_in_words(tmp_path, capsys):
         assert "Traceback" not in out + err
     assert demo("--pdu-size", "7") == 2
     assert demo("--link", "carrier-pigeon") == 2
+    assert demo("--mcs", "9") == 2
+    assert demo("--channel", "vacuum") == 2

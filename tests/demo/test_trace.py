@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from sdrlinkd.demo.links import Options
 from sdrlinkd.demo.report import latency_ms, run_result, topic_results
 from sdrlinkd.demo.source import open_source
 from sdrlinkd.demo.trace import Sample, Trace, goodput_bytes_per_s, path_error_m
@@ -67,9 +68,11 @@ def test_topics_are_told_apart():
 
 
 def finished(trace):
+    source = open_source(None, None, [], 1.0, 7)
+    source.left_out = ["/b: none"]
     return run_result(
-        trace, name="direct", source="s", seed=7, pdu_size=64, duration_s=2.5, pdus_sent=30,
-        entries=20, ledger_adds_up=True, dropped={"tx_stale": 1}, left_out=["/b: none"], damage="",
+        trace, source=source, options=Options(link="direct"), duration_s=2.5, pdus_sent=30,
+        entries=20, dropped={"tx_stale": 1}, ledger_adds_up=True,
     )  # fmt: skip
 
 

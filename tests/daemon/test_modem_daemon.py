@@ -1,0 +1,126 @@
+"""A real daemon on the modem: messages over the air, files that are radios, a PHY too slow."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from sdrlinkd.client import Publisher, Subscriber
+from tests.waiting import wait_for
+
+CDR = b"\0\1\0\0"
+
+LOOPBACK = """backend = "loopback"
+[link]
+pdu_size = 64
+[modem]
+rate_hz = 2e6
+max_cfo_hz = 1e5
+[channel]
+snr_db = 15.0
+clock_ppm = 10.0
+"""
+
+
+def payloads(n):
+    return [CDR + i.to_bytes(2, "big") * (20 + 3 * i) for i in range(n)]
+
+
+def test_messages_go_over_the_air_unchanged_with_ages_and_snr(start_daemon):
+    node = start_daemon(LOOPBACK)
+    with (
+        Subscriber("/rx_robot_1/odom", directory=node.directory) as heard,
+        Publisher(node.directory) as out,
+    ):
+        for payload in payloads(40):
+            out.send("/robot_1/odom", payload)
+        got = [heard.receive(20) for _ in range(40)]
+    assert [message.payload for message in got] == payloads(40)
+    for message in got:
+        assert 1_000 < message.age_us < 10_000_000
+        assert 12 < message.snr_db < 18
+    snapshot = node.snapshot()
+    carrier, counters = snapshot.carrier, snapshot.carrier.counters
+    assert (carrier.kind, carrier.state) == ("loopback", "up")
+    assert "QPSK 1/2, 2 Msps, awgn" in carrier.detail
+    assert counters["pdus_bad"] == counters["headers_bad"] == counters["overflows"] == 0
+    assert counters["pdus_good"] == snapshot.link.rx.pdus_heard
+    assert carrier.realtime_ratio > 1
+    with node.control() as control:
+        assert control.ask("check")["problems"] == []
+
+
+def test_stopping_sends_what_is_queued_first(start_daemon):
+    node = start_daemon("drain_s = 10.0\n" + LOOPBACK)
+    with Publisher(node.directory) as out:
+        for payload in payloads(30):
+            out.send("/robot_1/odom", payload)
+        out.flush()
+    node.process.terminate()
+    assert node.process.wait(20) == 0
+    assert "out 30/30 sent, 0 queued, 0 dropped" in node.log()
+
+
+def test_a_receiver_too_slow_for_its_rate_says_so_and_stays_small(start_daemon):
+    node = start_daemon('backend = "loopback"\n[modem]\nrate_hz = 2e8\nmax_cfo_hz = 1e5\n')
+    wait_for(lambda: node.snapshot().carrier.counters["overflows"] > 1, timeout_s=40)
+    snapshot = node.snapshot()
+    (notice,) = [text for text in snapshot.notices if "fell behind" in text]
+    assert "of real time at 200 Msps" in notice
+    assert "lower modem.rate_hz" in notice
+    counters = snapshot.carrier.counters
+    assert counters["gaps"] > 0
+    assert counters["samples_lost"] > 1e7
+    status = Path(f"/proc/{node.process.pid}/status").read_text()
+    resident_kb = int(re.search(r"VmRSS:\s*(\d+) kB", status)[1])
+    assert resident_kb < 1_500_000
+
+
+def test_a_node_that_only_plays_says_why_nothing_leaves(start_daemon, tmp_path):
+    (tmp_path / "noise.cf32").write_bytes(bytes(8 * 200_000))
+    node = start_daemon(
+        f'backend = "iqfile"\n[iqfile]\nreceive = "{tmp_path}/noise.cf32"\npaced = false\n'
+    )
+    wait_for(lambda: node.snapshot().carrier.state == "ended")
+    snapshot = node.snapshot()
+    assert snapshot.carrier.counters["samples"] == 200_000
+    assert any("only receives" in text for text in snapshot.notices)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[modem]\nmcs = 7", "modem.mcs: got 7; allowed: a whole number from 0 to 6"),
+        ("[modem]\nrate_hz = 10", "modem.rate_hz: got 10; allowed: a number from"),
+        ("[modem]\nrate_hz = 2e5", "modem.max_cfo_hz: got 100000; allowed: at most a quarter"),
+        ("[modem]\nrate_hz = 1e4\nmcs = 0\nmax_cfo_hz = 0", "raise modem.rate_hz or modem.mcs"),
+        ("[link]\npdu_size = 5000", "link.pdu_size: got 5000; allowed"),
+        ('[channel]\nprofile = "vacuum"', 'got "vacuum"; allowed: one of "awgn"'),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(write_config, tmp_path, text, says):
+    config = write_config(tmp_path, f'backend = "loopback"\n{text}\n')
+    done = subprocess.run(
+        [sys.executable, "-m", "sdrlinkd", "--config", str(config)],
+        capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert says in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_recording_of_another_rate_is_refused_in_one_line(write_config, tmp_path):
+    (tmp_path / "rec.sigmf-data").write_bytes(bytes(100))
+    general = {"core:datatype": "ci8", "core:sample_rate": 1e6}
+    (tmp_path / "rec.sigmf-meta").write_text(json.dumps({"global": general}))
+    config = write_config(tmp_path, 'backend = "iqfile"\n[iqfile]\nreceive = "rec"\n')
+    done = subprocess.run(
+        [sys.executable, "-m", "sdrlinkd", "--config", str(config)],
+        capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "is sampled at 1e+06 Hz; the modem is set to 5e+06 Hz" in done.stderr
+    assert done.stderr.count("\n") == 1

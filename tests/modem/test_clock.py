@@ -1,0 +1,45 @@
+"""The received stream as the clock."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sdrlinkd.modem.clock import StreamClock
+
+
+def test_time_is_the_index_over_the_rate():
+    clock = StreamClock(1e6, paced=True, host_s=100.0)
+    clock.observe(2_000_000, 103.0)
+    assert clock.now(103.0) == 2.0
+    assert clock.end == 2_000_000
+
+
+def test_a_paced_stream_goes_on_between_blocks_and_when_they_stop():
+    clock = StreamClock(1e6, paced=True, host_s=100.0)
+    clock.observe(1000, 100.001)
+    assert clock.now(100.0015) == pytest.approx(0.0015)
+    assert clock.now(105.0) == pytest.approx(5.0)
+
+
+def test_an_unpaced_stream_stands_still_between_blocks_and_goes_on_when_they_stop():
+    clock = StreamClock(1e6, paced=False, host_s=100.0)
+    clock.observe(1000, 100.0)
+    assert clock.now(100.05) == 0.001
+    assert clock.now(100.0 + StreamClock.QUIET_S + 2) == pytest.approx(2.001)
+
+
+@given(
+    st.booleans(),
+    st.lists(st.tuples(st.integers(0, 10_000), st.floats(0, 0.3), st.booleans()), max_size=40),
+)
+def test_it_never_goes_back(paced, steps):
+    clock = StreamClock(1e5, paced, host_s=0.0)
+    host_s, end, latest = 0.0, 0, 0.0
+    for n, pause_s, is_block in steps:
+        host_s += pause_s
+        if is_block:
+            end += n
+            clock.observe(end, host_s)
+        now = clock.now(host_s)
+        assert now >= max(latest, end / 1e5)
+        latest = now

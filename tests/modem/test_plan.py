@@ -1,0 +1,43 @@
+"""When bursts may leave: never more committed than the lead and one burst."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sdrlinkd.modem.load import LoadMeter
+from sdrlinkd.modem.plan import AirPlan
+
+
+def test_an_idle_air_takes_a_burst_after_the_lead():
+    plan = AirPlan(lead=100)
+    assert plan.wait(now=5000) == 0
+    assert plan.start(now=5000) == 5100
+
+
+def test_a_busy_air_is_waited_for_until_the_lead_before_its_end():
+    plan = AirPlan(lead=100)
+    plan.commit(1000, 4000)
+    free = 5000 + AirPlan.GAP
+    assert plan.wait(now=1000) == free - 1100
+    assert plan.wait(now=free - 100) == 0
+    assert plan.start(now=free - 100) == free
+
+
+@given(st.integers(0, 500), st.lists(st.tuples(st.integers(1, 3000), st.integers(0, 3000))))
+def test_bursts_follow_each_other_and_never_more_than_one_is_ahead(lead, bursts):
+    plan, now, end = AirPlan(lead), 0, 0
+    for n_samples, idle in bursts:
+        now += idle
+        now += plan.wait(now)
+        start = plan.start(now)
+        assert start >= end
+        assert start - now <= lead
+        plan.commit(start, n_samples)
+        end = start + n_samples
+
+
+def test_the_load_is_a_mean_over_about_a_second():
+    load = LoadMeter()
+    assert load.realtime_ratio == 0
+    for _ in range(5000):
+        load.add(cpu_s=0.00025, stream_s=0.001)
+    assert abs(load.realtime_ratio - 4) < 0.1
