@@ -11,7 +11,7 @@ import numpy as np
 
 import phy
 from benchmarks.report import Row, main
-from sdrlinkd.client import Publisher, Subscriber
+from sdrlinkd.client import ControlClient, Publisher, Subscriber
 
 RATE_HZ = 5e6
 MCS = 1
@@ -101,10 +101,17 @@ def _latencies(seed: int, messages: int, backend: str) -> list[float]:
                 Subscriber("/rx_robot_1/odom", directory=folder, timeout_s=120) as subscriber,
                 Publisher(folder) as publisher,
             ):
+                _wait_until_up(directory)
                 return _paced(publisher, subscriber, messages)
         finally:
             daemon.terminate()
             daemon.wait()
+
+
+def _wait_until_up(directory: Path) -> None:
+    with ControlClient(directory) as control:
+        while control.ask("status")["carrier"]["state"] != "up":
+            time.sleep(0.05)
 
 
 def _paced(publisher: Publisher, subscriber: Subscriber, messages: int) -> list[float]:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
-from scipy import signal
 
 from phy.channel.profiles import PROFILES
 from phy.channel.resampling import N_TAPS, echo_filter, stretch
@@ -57,7 +56,7 @@ class Path:
         offset += whole
         echoes = PROFILES[params.profile]
         if echoes is not None:
-            x = signal.fftconvolve(x, self._fading(echoes)).astype(np.complex64)
+            x = np.convolve(x, self._fading(echoes))
             offset -= N_TAPS // 2 - 1
         turn = np.exp(2j * np.pi * self._rng.random()) * 10 ** (-params.loss_db / 20)
         frequency = params.carrier_hz * error / params.rate_hz

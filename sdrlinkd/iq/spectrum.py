@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, signal
+from scipy import fft
 
 from sdrlinkd.iq.recording import IqRecording, Progress
 
@@ -30,7 +30,7 @@ def spectrum_of(recording: IqRecording, progress: Progress) -> Spectrum:
     n_samples = recording.info.n_samples
     n_columns = max(1, min(MAX_COLUMNS, n_samples // N_BINS))
     step = n_samples / n_columns
-    window = signal.get_window("hann", N_BINS).astype(np.float32)
+    window = np.hanning(N_BINS + 1)[:-1].astype(np.float32)
     window /= window.sum()
     rows = np.zeros((n_columns, N_BINS))
     peak = np.zeros(N_BINS)

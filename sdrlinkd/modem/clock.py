@@ -2,7 +2,7 @@
 
 
 class StreamClock:
-    """Seconds since index 0. `host_s` is the monotonic clock at the moment of each call.
+    """Seconds since index 0; 0 until the first block. `host_s` is the monotonic clock at each call.
 
     In a paced stream, time goes on between blocks with the monotonic clock; so it does when blocks
     stop coming, until they return. It never goes back.
@@ -11,10 +11,10 @@ class StreamClock:
     QUIET_S = 0.1
     """An unpaced stream without a block for so long has stopped."""
 
-    def __init__(self, rate_hz: float, paced: bool, host_s: float) -> None:
+    def __init__(self, rate_hz: float, paced: bool) -> None:
         self._rate_hz = rate_hz
         self._paced = paced
-        self._host_s = host_s
+        self._host_s: float | None = None
         self._latest = 0.0
         self.end = 0
         """Index after the last sample received."""
@@ -26,6 +26,8 @@ class StreamClock:
 
     def now(self, host_s: float) -> float:
         """Seconds on the stream."""
+        if self._host_s is None:
+            return 0.0
         since_s = host_s - self._host_s
         if not self._paced:
             since_s -= self.QUIET_S

@@ -23,6 +23,9 @@ OUTCOMES = {
     TxOutcome.LOST: Outcome.LOST,
 }
 
+TIMER_S = 0.001
+"""The event loop's timers count in this; shorter waits would be busy ones."""
+
 
 class ModemLink:
     """A PDU link over a radio: the PHY in two threads, everything else on the event loop."""
@@ -39,9 +42,9 @@ class ModemLink:
             phy.OFDM_64_16, params.mcs, pdu_size, round(params.max_burst_s * params.rate_hz)
         )
         paced = radio.capabilities.paced
-        self._clock = StreamClock(params.rate_hz, paced, time.monotonic())
+        self._clock = StreamClock(params.rate_hz, paced)
         lead_s = max(params.tx_lead_s, radio.capabilities.lead_s)
-        self._plan = AirPlan(round(lead_s * params.rate_hz))
+        self._plan = AirPlan(round(lead_s * params.rate_hz), round(TIMER_S * params.rate_hz))
         self._planned_start = 0
         self._rx: ReceiverThread | None = None
         self._tx_thread = ThreadPoolExecutor(1, "phy-tx")
@@ -67,7 +70,6 @@ class ModemLink:
             await self._radio.open(tuning)
         except BackendError as error:
             raise UserError(str(error)) from None
-        self._clock.observe(0, time.monotonic())
         self._rx = ReceiverThread(
             self._receiver,
             self._params.rate_hz,
@@ -98,7 +100,7 @@ class ModemLink:
         while wait := self._plan.wait(self._clock.index(time.monotonic())):
             self._moved.clear()
             if self._radio.capabilities.paced:
-                await asyncio.sleep(wait / rate)
+                await asyncio.sleep(max(TIMER_S, wait / rate))
             else:
                 await self._moved.wait()
         self._planned_start = self._plan.start(self._clock.index(time.monotonic()))

@@ -8,24 +8,31 @@ from sdrlinkd.modem.clock import StreamClock
 
 
 def test_time_is_the_index_over_the_rate():
-    clock = StreamClock(1e6, paced=True, host_s=100.0)
+    clock = StreamClock(1e6, paced=True)
     clock.observe(2_000_000, 103.0)
     assert clock.now(103.0) == 2.0
     assert clock.end == 2_000_000
 
 
 def test_a_paced_stream_goes_on_between_blocks_and_when_they_stop():
-    clock = StreamClock(1e6, paced=True, host_s=100.0)
+    clock = StreamClock(1e6, paced=True)
     clock.observe(1000, 100.001)
     assert clock.now(100.0015) == pytest.approx(0.0015)
     assert clock.now(105.0) == pytest.approx(5.0)
 
 
 def test_an_unpaced_stream_stands_still_between_blocks_and_goes_on_when_they_stop():
-    clock = StreamClock(1e6, paced=False, host_s=100.0)
+    clock = StreamClock(1e6, paced=False)
     clock.observe(1000, 100.0)
     assert clock.now(100.05) == 0.001
     assert clock.now(100.0 + StreamClock.QUIET_S + 2) == pytest.approx(2.001)
+
+
+def test_before_the_first_block_no_time_passes():
+    clock = StreamClock(1e6, paced=True)
+    assert clock.now(500.0) == 0
+    clock.observe(5000, 600.0)
+    assert clock.now(600.0) == 0.005
 
 
 @given(
@@ -33,7 +40,7 @@ def test_an_unpaced_stream_stands_still_between_blocks_and_goes_on_when_they_sto
     st.lists(st.tuples(st.integers(0, 10_000), st.floats(0, 0.3), st.booleans()), max_size=40),
 )
 def test_it_never_goes_back(paced, steps):
-    clock = StreamClock(1e5, paced, host_s=0.0)
+    clock = StreamClock(1e5, paced)
     host_s, end, latest = 0.0, 0, 0.0
     for n, pause_s, is_block in steps:
         host_s += pause_s

@@ -22,6 +22,14 @@ def test_a_busy_air_is_waited_for_until_the_lead_before_its_end():
     assert plan.start(now=free - 100) == free
 
 
+def test_who_waits_may_wake_up_late_by_the_slack():
+    plan = AirPlan(lead=100, slack=50)
+    plan.commit(1000, 4000)
+    free = 5000 + AirPlan.GAP
+    assert plan.wait(now=free - 150) == 0
+    assert plan.start(now=free - 150) == plan.start(now=free - 100) == free
+
+
 @given(st.integers(0, 500), st.lists(st.tuples(st.integers(1, 3000), st.integers(0, 3000))))
 def test_bursts_follow_each_other_and_never_more_than_one_is_ahead(lead, bursts):
     plan, now, end = AirPlan(lead), 0, 0
