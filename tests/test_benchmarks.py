@@ -10,21 +10,33 @@ import pytest
 ROOT = Path(__file__).parents[1]
 
 
-@pytest.mark.slow
-def test_the_bus_benchmark_prints_its_rows():
-    done = subprocess.run(
-        [sys.executable, "-m", "benchmarks.bus", "--quick", "--json"],
-        cwd=ROOT, capture_output=True, text=True, timeout=110,
-    )  # fmt: skip
-    report = json.loads(done.stdout)
-    assert report["benchmark"] == "bus"
-    rows = {row["name"]: row for row in report["rows"]}
-    assert set(rows) == {
+ROWS = {
+    "bus": {
         "ingress_msgs_per_cpu_s_700B",
         "path_cost_over_crc_and_join_1024B",
         "path_latency_ms_p50",
         "queue_cost_ratio_10_to_10000",
-    }
+    },
+    "modem_path": {
+        "odom_30hz_latency_ms_p50",
+        "odom_30hz_latency_ms_p99",
+        "rx_realtime_ratio_5msps",
+        "tx_realtime_ratio_5msps",
+    },
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ROWS)
+def test_a_benchmark_prints_its_rows(name):
+    done = subprocess.run(
+        [sys.executable, "-m", f"benchmarks.{name}", "--quick", "--json"],
+        cwd=ROOT, capture_output=True, text=True, timeout=110,
+    )  # fmt: skip
+    report = json.loads(done.stdout)
+    assert report["benchmark"] == name
+    rows = {row["name"]: row for row in report["rows"]}
+    assert set(rows) == ROWS[name]
     for row in rows.values():
         assert {"value", "unit", "target", "ok", "peers", "paper", "trials"} <= row.keys()
         assert row["value"] > 0

@@ -210,7 +210,7 @@ def test_a_demo_that_is_ended_leaves_nothing_behind(tmp_path, number):
         [sys.executable, "-m", "sdrlinkd.cli", "demo", "--out", str(tmp_path / "out")],
         env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
-    wait_for(lambda: list(tmp_path.glob("sdrlink-*/ctl.sock")))
+    wait_for(lambda: list(tmp_path.glob("sdrlink-*/*/ctl.sock")))
     demo.send_signal(number)
     assert demo.wait(20) != 0
     assert "Traceback" not in demo.stderr.read()
