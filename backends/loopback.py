@@ -9,7 +9,8 @@ from backends.feed import BlockFeed
 from backends.outstanding import Outstanding
 from backends.pace import Pace
 
-MAX_BEHIND_S = 0.5
+# A reader further behind than this misses what was on the air; until then nothing is lost.
+MAX_BEHIND_S = 2.0
 # A reader that is late gets fewer, larger blocks.
 MAX_LATE_BLOCKS = 8
 

@@ -162,6 +162,11 @@ def _summary(result: RunResult) -> str:
             f"; {heard.pdus_good} of {result.pdus_sent} PDUs good in {heard.bursts} bursts, "
             f"{heard.pdus_bad} bad"
         )
+        if heard.samples_lost:
+            text += (
+                f"; this machine was too slow for {heard.rate_hz / 1e6:g} Msps and lost "
+                f"{heard.samples_lost} samples: try a lower --rate"
+            )
     return text
 
 

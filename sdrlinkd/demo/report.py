@@ -38,6 +38,8 @@ class PhyResult(Struct, frozen=True, kw_only=True):
     pdus_good: int
     pdus_bad: int
     headers_bad: int
+    samples_lost: int
+    """On a machine too slow for the rate."""
     snr_db_measured: float | None
     realtime_ratio: float | None
 
@@ -164,6 +166,7 @@ def phy_result(options: Options, receiver: Snapshot) -> PhyResult:
         pdus_good=counters["pdus_good"],
         pdus_bad=counters["pdus_bad"],
         headers_bad=counters["headers_bad"],
+        samples_lost=counters.get("samples_lost", 0),
         snr_db_measured=snr[0] if snr else None,
         realtime_ratio=receiver.carrier.realtime_ratio,
     )
