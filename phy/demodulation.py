@@ -18,6 +18,8 @@ from phy.sequences import polarity, whitening
 # Frequency error of the preamble's estimate, in carrier spacings: at 0 dB, and at best.
 _FREQUENCY_ERROR_0_DB = 0.006
 _FREQUENCY_ERROR_MIN = 0.0005
+# However strong a signal, echoes and converters leave so much on a carrier.
+_LEAST_NOISE = 1e-4
 # Sampling clocks differ by up to this (one standard deviation).
 _CLOCK_ERROR = 40e-6
 
@@ -66,7 +68,7 @@ class Demodulator:
         demap(
             bins,
             self._h_bins,
-            channel.no,
+            max(channel.no, _LEAST_NOISE * channel.gain),
             self._data_bins,
             self._data_carriers,
             self._pilot_bins,
@@ -99,6 +101,9 @@ class PduDecoder:
         """The next `n_pdus` PDUs, whose last symbols' LLRs are `llr`; None where a check fails."""
         plan = self.layout
         bits = np.concatenate((self._rest, llr))
+        if not n_pdus:
+            self._rest = bits
+            return []
         n_bits = n_pdus * plan.coded_bits
         self._rest = bits[n_bits:]
         size = plan.block_bytes

@@ -27,13 +27,15 @@ def to_bins(
     frequency: float,
     dc: complex,
     grid: Numerology,
+    origin: int = 0,
 ) -> NDArray[np.complex64]:
     """FFT bins `[n, n_fft]` of the windows that begin at `starts`.
 
     Before, `dc` is taken off and the samples are turned back by `frequency` cycles a sample, with
-    phase 0 at `samples[0]`. A carrier sent as 1 arrives as 1 through a channel of gain 1.
+    phase 0 `origin` samples before `samples[0]`. A carrier sent as 1 arrives as 1 through a channel
+    of gain 1.
     """
     windows = np.empty((len(starts), grid.n_fft), np.complex64)
-    gather(samples, starts, frequency, dc, 1 / grid.scale, windows)
+    gather(samples, starts, frequency, origin, dc, 1 / grid.scale, windows)
     bins: NDArray[np.complex64] = fft.fft(windows, axis=-1, overwrite_x=True)
     return bins

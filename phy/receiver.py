@@ -19,7 +19,8 @@ from phy.constellation import Modulation
 from phy.convolutional import N_TAIL, ViterbiWorkspace
 from phy.crc import CRC32_SIZE
 from phy.demodulation import Demodulator, PduDecoder
-from phy.header import MAX_PDU_BYTES, N_SYMBOLS
+from phy.header import MAX_PDU_BYTES, N_NETWORKS, N_SYMBOLS
+from phy.kernels.demapper import SLOPE
 from phy.kernels.detector import HISTORY, search, strongest
 from phy.layout import layout
 from phy.numerology import OFDM_64_16, Numerology
@@ -36,6 +37,8 @@ PIECE = 1 << 15
 _KEPT = BEFORE + preamble.SHORT + HISTORY
 # A PDU fails with less than this share of the burst's power above the noise: the burst is gone.
 _FADED = 0.25
+# Every so many payload symbols, the FFT windows follow the sender's clock.
+SLIP_EVERY = 256
 
 
 @dataclass
@@ -45,8 +48,22 @@ class _Burst:
     acquired: Acquired
     decoder: PduDecoder
     demodulator: Demodulator
+    n_symbol: int
     n_symbols_in: int = 0
     n_good: int = 0
+    n_bad: int = 0
+    slipped: int = 0
+
+    def window(self, symbol: int) -> int:
+        """Absolute index at which the FFT of a payload symbol begins."""
+        return self.acquired.window + symbol * self.n_symbol + self.slipped
+
+    def slip(self, grid: Numerology) -> None:
+        """Follow the sender's clock by whole samples, as the slope over carriers tells."""
+        slope = self.acquired.tracking[SLOPE]
+        early = round(slope[0] * grid.n_fft / (2 * math.pi))
+        self.slipped -= early
+        slope[0] -= early * 2 * math.pi / grid.n_fft
 
 
 class Receiver:
@@ -65,6 +82,8 @@ class Receiver:
         start: int = 0,
         on_points: Callable[[NDArray[np.complex64], Modulation], None] | None = None,
     ) -> None:
+        if network is not None and not 0 <= network < N_NETWORKS:
+            raise ValueError(f"network: got {network}; allowed: 0 to {N_NETWORKS - 1}")
         self._network = network
         self._grid = grid
         self._on_points = on_points
@@ -100,11 +119,16 @@ class Receiver:
 
     def gap(self, n: int) -> list[Event]:
         """`n` samples are missing here: a burst they cut is over, the search begins behind them."""
-        events: list[Event] = []
+        if n < 0:
+            raise ValueError(f"gap: got {n} samples; allowed: 0 or more")
         self.counters["gaps"] += 1
+        end = self._stream.end
+        events: list[Event] = []
         if self._burst is not None:
             self._end(self._burst, events, "cut")
-        self._begin(self._stream.end + n)
+        else:
+            events = self.flush()
+        self._begin(end + n)
         return events
 
     def flush(self) -> list[Event]:
@@ -177,10 +201,13 @@ class Receiver:
         told = found.header
         plan = layout(self._grid, told.mcs, told.n_pdus, told.pdu_bytes)
         self._burst = _Burst(
-            found, PduDecoder(plan, self._workspace), self._demodulators[plan.mcs.modulation]
+            found,
+            PduDecoder(plan, self._workspace),
+            self._demodulators[plan.mcs.modulation],
+            self._grid.n_symbol,
         )
         if self._network is not None and told.network != self._network:
-            self._burst.n_symbols_in = plan.n_symbols
+            # Searched on, not skipped: a header that lies must not make us deaf.
             self._end(self._burst, events, "foreign")
         else:
             self.counters["bursts"] += 1
@@ -188,58 +215,62 @@ class Receiver:
         return True
 
     def _payload(self, burst: _Burst, events: list[Event]) -> bool:
-        """The PDUs whose symbols are all in, one or more."""
+        """The symbols that complete PDUs, or those up to where the windows may slip."""
         plan, found = burst.decoder.layout, burst.acquired
-        first_pdu = burst.decoder.n_decoded
-        n_pdus = self._complete_pdus(burst)
-        if not n_pdus:
+        first_symbol = burst.n_symbols_in
+        last, n_pdus = self._complete(burst)
+        if last == first_symbol:
             return False
-        last = plan.symbols_through(first_pdu + n_pdus)
-        n = last - burst.n_symbols_in
-        first = found.window + burst.n_symbols_in * self._grid.n_symbol
-        x = self._stream.view(first, self._end_of_symbol(found, last) if n else first)
-        starts = self._grid.n_symbol * np.arange(n)
-        bins = ofdm.to_bins(x, starts, found.frequency, self._dc_value, self._grid)
-        # Bins are turned back from the first window on, the channel estimate from its own.
-        bins *= np.complex64(cmath.exp(-2j * math.pi * found.frequency * self._since(burst, first)))
-        llr, points = burst.demodulator.demap(
-            bins, found.channel, found.tracking, N_SYMBOLS + burst.n_symbols_in
+        first = burst.window(first_symbol)
+        starts = self._grid.n_symbol * np.arange(last - first_symbol)
+        bins = ofdm.to_bins(
+            self._stream.view(first, burst.window(last) - self._grid.n_cp),
+            starts,
+            found.frequency,
+            self._dc_value,
+            self._grid,
+            self._since(burst, first),
         )
-        if self._on_points is not None and n:
+        llr, points = burst.demodulator.demap(
+            bins, found.channel, found.tracking, N_SYMBOLS + first_symbol
+        )
+        if self._on_points is not None:
             self._on_points(points, plan.mcs.modulation)
-        decoded = burst.decoder.decode(llr, n_pdus)
-        for number, data in enumerate(decoded, start=first_pdu):
+        for data in burst.decoder.decode(llr, n_pdus):
+            number = burst.n_good + burst.n_bad
             through = plan.symbols_through(number + 1)
-            before = burst.n_symbols_in
+            own = bins[max(0, burst.n_symbols_in - first_symbol) : through - first_symbol]
             burst.n_symbols_in = through
             if data is not None:
                 burst.n_good += 1
                 self.counters["pdus_good"] += 1
-                end = self._end_of_symbol(found, through)
+                end = burst.window(through) - self._grid.n_cp
                 events.append(PduHeard(data, number, end, found.quality))
                 continue
+            burst.n_bad += 1
             self.counters["pdus_bad"] += 1
-            own = bins[len(bins) - (last - before) : len(bins) - (last - through)]
             if number + 1 < plan.n_pdus and self._is_gone(own, found):
                 self._end(burst, events, "faded")
                 return True
-        self._at = self._end_of_symbol(found, burst.n_symbols_in)
-        if first_pdu + n_pdus == plan.n_pdus:
+        burst.n_symbols_in = last
+        self._at = burst.window(last) - self._grid.n_cp
+        if burst.n_good + burst.n_bad == plan.n_pdus:
             self._end(burst, events, "whole")
+        elif last % SLIP_EVERY == 0:
+            burst.slip(self._grid)
         return True
 
-    def _complete_pdus(self, burst: _Burst) -> int:
-        """How many PDUs can be decoded with the samples that are there."""
-        plan, found = burst.decoder.layout, burst.acquired
-        number = burst.decoder.n_decoded
-        n_symbols = (self._stream.end - found.window + self._grid.n_cp) // self._grid.n_symbol
-        n_symbols = min(n_symbols, plan.n_symbols)
-        by_symbols = n_symbols * plan.symbol_bits // plan.coded_bits - number
-        return max(0, min(by_symbols, plan.n_pdus - number))
-
-    def _end_of_symbol(self, found: Acquired, n_symbols: int) -> int:
-        """Absolute index after the window of the `n_symbols`-th payload symbol."""
-        return found.window + n_symbols * self._grid.n_symbol - self._grid.n_cp
+    def _complete(self, burst: _Burst) -> tuple[int, int]:
+        """(symbols to take in all, PDUs they complete), with the samples that are there."""
+        plan, grid = burst.decoder.layout, self._grid
+        here = (self._stream.end - burst.window(0) + grid.n_cp) // grid.n_symbol
+        here = min(here, plan.n_symbols)
+        limit = (burst.n_symbols_in // SLIP_EVERY + 1) * SLIP_EVERY
+        done = burst.n_good + burst.n_bad
+        n_pdus = min(min(here, limit) * plan.symbol_bits // plan.coded_bits, plan.n_pdus) - done
+        if here >= limit:
+            return limit, n_pdus
+        return (plan.symbols_through(done + n_pdus), n_pdus) if n_pdus else (burst.n_symbols_in, 0)
 
     def _since(self, burst: _Burst, index: int) -> int:
         """Samples from the channel estimate's window to `index`."""
@@ -259,8 +290,7 @@ class Receiver:
         if ending != "whole":
             self.counters[f"bursts_{ending}"] += 1
         events.append(BurstOver(burst.acquired.quality, burst.n_good, ending))
-        grid = self._grid
-        self._at = burst.acquired.window + burst.n_symbols_in * grid.n_symbol - grid.n_cp
+        self._at = burst.window(burst.n_symbols_in) - self._grid.n_cp
 
     @property
     def _dc_value(self) -> complex:

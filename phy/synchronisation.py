@@ -34,6 +34,8 @@ FIRST_ECHO = 0.1
 MAX_SPREAD = 12
 
 _AMBIGUITY = 1 / preamble.SEGMENT
+# What noise may add to the offset that the peak tells.
+_COARSE_ERROR = 0.008
 # Samples of a short segment that echoes of the one before hardly reach.
 _FIRST_CLEAN = BACKOFF + 4
 _N_CLEAN = preamble.SEGMENT - 4
@@ -50,7 +52,7 @@ class Timing(NamedTuple):
 
 def n_aliases(max_frequency: float) -> int:
     """Multiples of 1/16 to try on either side for offsets up to `max_frequency`."""
-    return max(0, math.ceil((max_frequency - _AMBIGUITY / 2) / _AMBIGUITY))
+    return max(0, math.ceil((max_frequency + _COARSE_ERROR - _AMBIGUITY / 2) / _AMBIGUITY))
 
 
 def locate(

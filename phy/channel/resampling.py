@@ -22,13 +22,13 @@ def _filters() -> NDArray[np.float32]:
 
 
 def stretch(x: NDArray[np.complex64], delay: float, clock_error: float) -> NDArray[np.complex64]:
-    """`x` delayed by `delay` ≥ 0 samples, as a clock sees it that is fast by `clock_error`.
+    """`x` delayed by `delay` ≥ 0 samples, from a sender whose clock is fast by `clock_error`.
 
-    Sample n of the result is x at n / (1 + clock_error) − delay; it is long enough for all of `x`.
+    Sample n of the result is x at (1 + clock_error) n − delay; it is long enough for all of `x`.
     """
-    n = int(np.ceil((len(x) + delay) * (1 + clock_error))) + N_TAPS // 2
+    n = int(np.ceil((len(x) + delay) / (1 + clock_error))) + N_TAPS // 2
     out = np.empty(n, np.complex64)
-    interpolate(x, _filters(), -delay, 1 / (1 + clock_error), out)
+    interpolate(x, _filters(), -delay, 1 + clock_error, out)
     return out
 
 

@@ -14,6 +14,9 @@ PHASE, SLOPE = 0, 1
 PHASE_NOISE = np.array([5e-5, 1e-10])
 SLOPE_NOISE = np.array([1e-10, 1e-15])
 
+# Times the noise of the preamble at which a symbol's pilots are no longer believed.
+SURPRISE = 6.0
+
 LLR_SCALE = 8.0
 """Quantised LLRs are 1/8 each."""
 
@@ -69,6 +72,16 @@ def _track(
     if size == 0.0:
         return
     common = total / size
+    # Interference that the preamble has not seen: trust these pilots as far as they agree.
+    residual = 0.0
+    for p in range(n):
+        h = complex(h_hat[pilot_bins[p]])
+        power = h.real * h.real + h.imag * h.imag
+        if power > 0.0:
+            error = turned[p] * common.conjugate() - power
+            residual += (error.real * error.real + error.imag * error.imag) / power
+    if residual > SURPRISE * n * no:
+        no = residual / n
     # Weighted least squares of the pilots' phases: w (θ − a − b k)², small angles.
     s0 = s1 = s2 = t0 = t1 = 0.0
     for p in range(n):

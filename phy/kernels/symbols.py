@@ -12,11 +12,15 @@ def gather(
     samples: NDArray[np.complex64],
     starts: NDArray[np.int64],
     frequency: float,
+    origin: int,
     dc: complex,
     gain: float,
     out: NDArray[np.complex64],
 ) -> None:
-    """Cut windows `[n, n_fft]` out, less `dc`, turned back by `frequency`, times `gain`."""
+    """Cut windows `[n, n_fft]` out, less `dc`, turned back by `frequency`, times `gain`.
+
+    Phase 0 is `origin` samples before `samples[0]`.
+    """
     n_fft = out.shape[1]
     turn = np.empty(n_fft, np.complex64)
     step = -2 * math.pi * frequency
@@ -25,7 +29,7 @@ def gather(
     offset = np.complex64(dc)
     for row in range(starts.size):
         first = starts[row]
-        phase = step * first
+        phase = step * (first + origin)
         begin = np.complex64(complex(math.cos(phase), math.sin(phase)))
         window = samples[first : first + n_fft]
         for m in range(n_fft):

@@ -1,0 +1,162 @@
+"""The receiver's law: how a stream is cut into chunks changes nothing."""
+
+from itertools import cycle
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from phy import BurstOver, PduHeard, Receiver, Transmitter, preamble
+from tests.phy.signals import endings, heard, noise, payloads, silence, turned
+
+
+def make_stream(seed):
+    """(samples, a place for a gap, its length, PDUs of the bursts that are not spoilt).
+
+    Own and foreign bursts of any MCS with their own carriers and strengths, close to one another or
+    not, false starts, samples that are no numbers, DC, noise.
+    """
+    rng = np.random.default_rng(seed)
+    parts, sent = [silence(int(rng.integers(0, 1500)))], []
+    for _ in range(int(rng.integers(2, 6))):
+        kind = rng.choice(["own", "own", "foreign", "false start", "cut short"])
+        pdus = payloads(rng, int(rng.integers(1, 9)), int(rng.integers(1, 60)))
+        network = int(kind == "foreign")
+        burst = Transmitter(network).modulate(pdus, int(rng.integers(0, 7)))
+        if kind == "own":
+            sent += pdus
+        if kind == "false start":
+            burst = preamble.preamble()[: int(rng.integers(100, 353))]
+        if kind == "cut short":
+            burst = burst[: int(rng.integers(353, len(burst)))]
+        strength = rng.uniform(0.5, 2)
+        pause = 4000 if kind == "cut short" else int(rng.choice([0, 3, 600]))
+        parts += [strength * turned(burst, rng.uniform(-0.015, 0.015), rng.random())]
+        parts += [silence(pause)]
+    x = np.concatenate(parts)
+    x = x + noise(rng, len(x), 0.002) + np.complex64(0.05 * rng.standard_normal())
+    gap_at = int(rng.integers(0, len(x)))
+    if rng.random() < 0.3:
+        x[rng.integers(0, len(x), 5)] = np.nan
+    return x, gap_at, int(rng.integers(0, 5000)), sent
+
+
+def push_all(receiver, x, sizes):
+    """Events of `x` in chunks of `sizes`, over and over."""
+    events, at, size = [], 0, cycle(sizes)
+    while at < len(x):
+        n = next(size)
+        events += receiver.push(x[at : at + n])
+        at += n
+    return events
+
+
+def receive(x, gap_at, gap, sizes, **settings):
+    """(events, counters) of `x` in chunks; `gap` samples are missing at `gap_at`, if any."""
+    receiver = Receiver(**settings)
+    events = push_all(receiver, x[:gap_at], sizes)
+    if gap_at is not None:
+        events += receiver.gap(gap) + push_all(receiver, x[gap_at:], sizes)
+    return events + receiver.flush(), receiver.counters
+
+
+chunk_sizes = st.lists(
+    st.one_of(
+        st.integers(1, 5000),
+        st.sampled_from([1, 2, 15, 16, 63, 64, 79, 80, 81, 191, 192, 511, 512, 513, 32768]),
+    ),
+    min_size=1,
+    max_size=12,
+)
+
+
+@settings(derandomize=True, deadline=None, max_examples=150)
+@given(st.integers(0, 2**32), chunk_sizes, st.booleans())
+def test_any_chunking_yields_the_same_events_and_counts(seed, sizes, with_gap):
+    x, gap_at, gap, _ = make_stream(seed)
+    where = gap_at if with_gap else None
+    whole, counted = receive(x, where, gap, [len(x)])
+    events, counters = receive(x, where, gap, sizes)
+    assert events == whole
+    assert counters == counted
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("settings", [{}, {"network": None, "max_frequency": 0.1}])
+def test_sample_by_sample_yields_the_same(seed, settings):
+    x, gap_at, gap, _ = make_stream(seed)
+    where = gap_at if seed % 2 else None
+    whole, counted = receive(x, where, gap, [len(x)], **settings)
+    events, counters = receive(x, where, gap, [1], **settings)
+    assert events == whole
+    assert counters == counted
+
+
+def test_one_cut_anywhere_yields_the_same():
+    """Around a burst's start, its header and its end, and the ends of its PDUs."""
+    rng = np.random.default_rng(2)
+    pdus = payloads(rng, 3, 30)
+    burst = Transmitter().modulate(pdus, 3)
+    x = np.concatenate((silence(530), burst, burst))
+    x += noise(rng, len(x), 0.01)
+    whole, counted = receive(x, None, 0, [len(x)])
+    assert heard(whole) == pdus * 2
+    for cut in range(1, len(x), 2):
+        events, counters = receive(x, None, 0, [cut, len(x)])
+        assert events == whole, cut
+        assert counters == counted, cut
+
+
+@pytest.mark.parametrize("size", [301, 100_000])
+def test_a_stream_far_longer_than_what_is_kept(size):
+    """What is kept moves to the buffer's beginning again and again, also in a burst's middle."""
+    rng = np.random.default_rng(3)
+    pdus = payloads(rng, 2, 20)
+    period = np.concatenate((Transmitter().modulate(pdus, 3), silence(int(rng.integers(150, 250)))))
+    n = 1_200_000 // len(period)
+    x = np.tile(period, n) + noise(rng, n * len(period), 0.01)
+    events, counters = receive(x, None, 0, [size])
+    assert heard(events) == pdus * n
+    assert counters["samples"] == len(x)
+    starts = [event.burst.start for event in events if isinstance(event, BurstOver)]
+    assert np.abs(starts - len(period) * np.arange(n)).max() <= 2
+
+
+def test_the_streams_hold_what_they_are_meant_to():
+    """The positive control: without gaps, every whole burst of ours is heard, in order."""
+    all_endings, n_sent, n_heard, n_odd = set(), 0, 0, 0
+    for seed in range(60):
+        x, gap_at, gap, sent = make_stream(seed)
+        events, counters = receive(x, None, 0, [1000])
+        got = heard(events)
+        n_sent += len(sent)
+        n_heard += len([pdu for pdu in sent if pdu in got])
+        n_odd += counters["headers_bad"] + counters["samples_bad"]
+        all_endings |= set(endings(events))
+        cut_events, _ = receive(x, gap_at, gap, [1000])
+        all_endings |= set(endings(cut_events))
+        assert all(isinstance(event, (PduHeard, BurstOver)) for event in events)
+    assert n_sent > 300
+    assert n_heard > 0.98 * n_sent
+    assert n_odd > 20
+    assert all_endings == {"whole", "faded", "cut", "foreign"}
+
+
+def test_a_pushed_array_is_left_alone_and_may_be_used_again():
+    sent = b"that is mine"
+    burst = Transmitter().modulate([sent], 0)
+    mine = burst[:900].copy()
+    mine[300] = np.nan
+    before = mine.copy()
+    receiver = Receiver()
+    receiver.push(mine)
+    assert np.array_equal(mine, before, equal_nan=True)
+    mine[:] = 0
+    assert heard(receiver.push(burst[900:])) == [sent]
+
+
+def test_no_samples_are_no_event():
+    receiver = Receiver()
+    assert receiver.push(silence(0)) == []
+    assert receiver.next_index == 0

@@ -1,0 +1,215 @@
+"""Kernels against the formulas of their docstrings, written plainly in numpy."""
+
+import numpy as np
+import pytest
+
+from phy import OFDM_64_16, Modulation, points
+from phy.interleaver import order
+from phy.kernels.detector import HISTORY, detector_sums, sanitise, search
+from phy.kernels.resampler import interpolate
+from phy.kernels.symbols import gather, map_bits
+from phy.kernels.training import (
+    correlate,
+    energy,
+    lag_product,
+    least_squares,
+    likelihood,
+    match_blocks,
+    transform,
+)
+from phy.preamble import BARKER, preamble
+from phy.stream import SampleStream
+from tests.phy.signals import noise, silence, turned
+
+SEED = 47
+
+
+def rng():
+    return np.random.default_rng(SEED)
+
+
+def plain_sums(x, dc, n):
+    """P and E of `detector_sums` for the last sample of each 192, term by term."""
+    x = x.astype(np.complex128) - dc
+    p, e = np.zeros(n, np.complex128), np.zeros(n)
+    for i in range(n):
+        at = HISTORY + i
+        for k, sign in enumerate(BARKER):
+            for m in range(16):
+                p[i] += sign * x[at - 16 * (10 - k) - m] * np.conj(x[at - 16 * (11 - k) - m])
+        e[i] = 11 / 12 * np.sum(np.abs(x[at - 191 : at + 1]) ** 2)
+    return p, e
+
+
+def sums(x, dc, n):
+    work = np.full((7, HISTORY + n), np.nan, np.float32)
+    detector_sums(x, dc, work, n)
+    return work[0, :n] + 1j * work[1, :n], work[2, :n].copy()
+
+
+@pytest.mark.parametrize("n", [1, 5, 192])
+@pytest.mark.parametrize("dc", [0j, 0.3 - 0.2j])
+def test_the_detectors_sums_are_their_formula(n, dc):
+    x = noise(rng(), HISTORY + n)
+    x[20 : 20 + 192] += preamble()[: len(x[20 : 20 + 192])]
+    p, e = sums(x, dc, n)
+    wanted_p, wanted_e = plain_sums(x, dc, n)
+    assert p == pytest.approx(wanted_p, abs=2e-4)
+    assert e == pytest.approx(wanted_e, rel=1e-5)
+
+
+def test_the_metric_is_1_at_the_last_sample_of_the_short_training_and_nowhere_else():
+    x = np.concatenate((silence(HISTORY + 100), turned(preamble(), 0.02), silence(200)))
+    p, e = sums(x, 0j, len(x) - HISTORY)
+    metric = np.abs(p) / np.where(e > 0, e, 1)
+    assert metric.max() == pytest.approx(1, abs=1e-5)
+    peak = int(metric.argmax())
+    assert peak == 100 + 191
+    assert np.angle(p[peak]) / (2 * np.pi * 16) == pytest.approx(0.02, abs=1e-6)
+    away = np.abs(np.arange(len(metric)) - peak) > 16
+    assert metric[away].max() < 0.6
+
+
+def searched(x, threshold=0.25, hop=512, dc=(0.0, 0.0, 0.0)):
+    state, work = np.array(dc), np.zeros((7, HISTORY + hop), np.float32)
+    n_hops = (len(x) - HISTORY) // hop
+    return search(x, n_hops, hop, threshold, state, work), state
+
+
+@pytest.mark.parametrize("lead", [HISTORY, 700, 703, 1500])
+def test_search_finds_the_first_sample_over_the_threshold(lead):
+    x = 0.1 * noise(rng(), HISTORY + 5 * 512)
+    x[lead : lead + 352] += preamble()
+    found, _ = searched(x)
+    p, e = sums(x, 0j, len(x) - HISTORY)
+    assert found == HISTORY + int(np.argmax(np.abs(p) > 0.25 * e))
+    assert lead < found <= lead + 191
+
+
+def test_search_finds_nothing_in_noise_and_learns_its_mean():
+    x = 0.1 * noise(rng(), HISTORY + 40 * 512) + np.complex64(0.5 - 0.25j)
+    found, state = searched(x, threshold=0.5)
+    assert found == -1
+    assert state == pytest.approx([0.5, -0.25, 40], abs=0.01)
+
+
+def test_numbers_too_large_or_none_become_0_and_are_counted():
+    x = np.array(
+        [1, np.nan, 2j, np.inf, complex(0, -np.inf), complex(np.nan, 1), 99, 101, -101j, 1e38],
+        np.complex64,
+    )
+    assert sanitise(x, 100) == 7
+    assert list(x) == [1, 0, 2j, 0, 0, 0, 99, 0, 0, 0]
+
+
+@pytest.mark.parametrize("frequency", [0.0, 0.0173, -0.09])
+def test_gather_cuts_and_turns(frequency):
+    x = noise(rng(), 5000)
+    starts = np.array([0, 80, 777, 4936])
+    out = np.empty((4, 64), np.complex64)
+    gather(x, starts, frequency, 7, 0.1 + 0.2j, 0.5, out)
+    at = starts[:, None] + np.arange(64)
+    wanted = 0.5 * (x[at] - (0.1 + 0.2j)) * np.exp(-2j * np.pi * frequency * (at + 7))
+    assert out == pytest.approx(wanted, abs=2e-6)
+
+
+@pytest.mark.parametrize("modulation", Modulation)
+def test_map_bits_puts_every_bit_where_the_interleaver_says(modulation):
+    grid, bits = OFDM_64_16, modulation.bits
+    coded = rng().integers(0, 2, 3 * 48 * bits, np.uint8)
+    table = order(48 * bits, bits)
+    signs = np.array([1, -1, 1], np.float32)
+    data, pilots = grid.bins[grid.data_at], grid.bins[grid.pilots_at]
+    out = np.zeros((3, 64), np.complex64)
+    map_bits(coded, table, points(modulation), data, pilots, grid.pilot_values, signs, out)
+    for row, block in enumerate(coded.reshape(3, -1)):
+        sent = np.empty_like(block)
+        sent[table] = block
+        numbers = sent.reshape(48, bits) @ (1 << np.arange(bits)[::-1])
+        assert np.array_equal(out[row, data], points(modulation)[numbers])
+        assert np.array_equal(out[row, pilots], [signs[row], signs[row], signs[row], -signs[row]])
+    assert np.count_nonzero(out) == 3 * 52
+
+
+def test_interpolate_is_a_sum_of_its_filters_taps():
+    x = noise(rng(), 50)
+    filters = rng().standard_normal((9, 4)).astype(np.float32)
+    out = np.empty(70, np.complex64)
+    interpolate(x, filters, -3.3, 0.9, out)
+    padded = np.concatenate((silence(20), x, silence(40)))
+    for n, got in enumerate(out):
+        t = -3.3 + 0.9 * n
+        whole = int(np.floor(t))
+        taps = filters[int((t - whole) * 8 + 0.5)]
+        wanted = sum(taps[k] * padded[20 + whole - 1 + k] for k in range(4))
+        assert got == pytest.approx(wanted, abs=1e-5)
+
+
+def test_correlation_with_two_templates_in_a_row():
+    x, templates = noise(rng(), 2 * 16 + 8), noise(rng(), 3 * 16).reshape(3, 16)
+    out = np.empty((3, 8), np.float32)
+    correlate(x, 0.03, templates, out)
+    z = x * np.exp(-2j * np.pi * 0.03 * np.arange(len(x)))
+    wanted = [
+        [np.abs(np.vdot(t, z[o : o + 16]) + np.vdot(t, z[o + 16 : o + 32])) ** 2 for o in range(8)]
+        for t in templates
+    ]
+    assert out == pytest.approx(np.array(wanted), rel=1e-4)
+
+
+def test_small_sums():
+    x, y = noise(rng(), 100), noise(rng(), 40)
+    assert energy(x) == pytest.approx(np.sum(np.abs(x) ** 2), rel=1e-5)
+    assert lag_product(x, 32) == pytest.approx(np.vdot(x[:32], x[32:64]), abs=1e-4)
+    matrix = noise(rng(), 400).reshape(10, 40)
+    assert transform(matrix, y) == pytest.approx(matrix @ y, abs=1e-4)
+    out = np.empty(10)
+    likelihood(matrix.astype(np.complex128), y.astype(np.complex128), out)
+    assert out == pytest.approx(np.abs(matrix @ y) ** 2, rel=1e-4)
+
+
+def test_least_squares_tells_gains_and_noise():
+    draws = rng()
+    used = np.array([1, 5, 6, 60])
+    sent = draws.choice([-1, 1, 1j], (4000, 4)).astype(np.complex64)
+    h = np.array([1, 2j, -0.5, 0.1 + 0.1j])
+    bins = noise(draws, 4000 * 64, 0.3).reshape(4000, 64)
+    bins[:, used] += h * sent
+    out = np.empty(4, np.complex64)
+    no, power = least_squares(bins, used, sent, out)
+    assert out == pytest.approx(h, abs=0.03)
+    assert no == pytest.approx(0.3, rel=0.03)
+    assert power == pytest.approx(np.mean(np.abs(h) ** 2), rel=0.03)
+
+
+def test_blocks_match_their_templates():
+    x, short, long = noise(rng(), 2 * 16 + 4 + 2 * 8), noise(rng(), 16), noise(rng(), 8)
+    cover = np.array([1, -1], np.float32)
+    out = np.empty(2 + 4, np.complex128)
+    match_blocks(x, 0.01, short, cover, 3, 10, long, 36, 4, out)
+    z = x * np.exp(-2j * np.pi * 0.01 * np.arange(len(x)))
+    clean = (3 + np.arange(10)) % 16
+    wanted = [
+        sign * np.vdot(short[clean], z[16 * s + 3 : 16 * s + 13]) for s, sign in enumerate(cover)
+    ]
+    wanted += [np.vdot(np.tile(long, 2)[4 * b :][:4], z[36 + 4 * b :][:4]) for b in range(4)]
+    assert out == pytest.approx(np.array(wanted), abs=1e-4)
+
+
+def test_a_stream_keeps_what_is_not_forgotten_by_absolute_index():
+    """However it is filled and emptied; the model is the whole stream."""
+    draws = rng()
+    everything = noise(draws, 30_000)
+    stream, start, end = SampleStream(1000, 64), 0, 0
+    while end < len(everything):
+        n = int(draws.integers(0, 300))
+        stream.append(everything[end : end + n])
+        end = min(end + n, len(everything))
+        if draws.random() < 0.5:
+            start = max(start, int(draws.integers(start, end + 50)))
+            stream.forget_before(1000 + start)
+            start = min(start, end)
+        assert (stream.start, stream.end) == (1000 + start, 1000 + end)
+        assert np.array_equal(stream.view(1000 + start, 1000 + end), everything[start:end])
+    stream.restart(-5)
+    assert (stream.start, stream.end) == (-5, -5)

@@ -1,0 +1,139 @@
+"""Packet error rates in white noise, and how often nothing is taken for something.
+
+SNR is the burst's mean power over the noise power of a complex sample.
+"""
+
+from pathlib import Path
+from time import monotonic
+
+import numpy as np
+import pytest
+
+from phy import BurstOver, Receiver, Transmitter
+from tests.phy.signals import heard, noise, noisy, silence, turned
+
+SEED = 41
+RECORDINGS = Path(__file__).parents[2].parent / "shared/data/iq"
+
+
+def n_lost(n, mcs, size, snr_db, max_frequency=0.02, **settings):
+    """Of `n` bursts of one PDU, each with a carrier of its own, how many are not heard."""
+    rng = np.random.default_rng(SEED)
+    transmitter, receiver = Transmitter(), Receiver(max_frequency=max_frequency, **settings)
+    sent, events = [], []
+    for _ in range(n):
+        sent.append(rng.bytes(size))
+        burst = transmitter.modulate(sent[-1:], mcs)
+        pause = silence(int(rng.integers(0, 600)))
+        x = turned(burst, rng.uniform(-max_frequency, max_frequency), rng.random())
+        events += receiver.push(noisy(rng, np.concatenate((pause, x)), snr_db))
+    got = heard(events + receiver.flush())
+    assert len(got) == len(set(got))
+    assert set(got) <= set(sent)
+    return n - len(got)
+
+
+def test_qpsk_half_of_220_bytes_at_6_db_loses_one_in_a_hundred_at_most():
+    assert n_lost(1000, mcs=1, size=220, snr_db=6) <= 10
+
+
+@pytest.mark.parametrize(
+    ("mcs", "size", "snr_db", "most"),
+    [
+        (0, 64, 0.0, 18),
+        (0, 220, 1.0, 6),
+        (1, 220, 3.5, 14),
+        (1, 220, 4.2, 9),
+        (2, 220, 6.5, 9),
+        (3, 220, 9.0, 14),
+        (3, 220, 10.0, 6),
+        (4, 220, 12.5, 12),
+        (5, 220, 16.5, 14),
+        (6, 220, 18.0, 12),
+        (6, 220, 19.5, 6),
+    ],
+)
+def test_of_300_bursts_near_the_knee_few_are_lost(mcs, size, snr_db, most):
+    """At the lower SNR of each, a percent or two are lost, and 1 dB less would be over `most`."""
+    assert n_lost(300, mcs, size, snr_db) <= most
+
+
+@pytest.mark.parametrize(("mcs", "size", "snr_db"), [(0, 64, -4.0), (1, 220, 1.5), (6, 220, 15.0)])
+def test_the_yardstick_tells_noise_from_signal(mcs, size, snr_db):
+    """The control: 3 dB below the knee, most bursts are lost."""
+    assert n_lost(50, mcs, size, snr_db) > 25
+
+
+def test_a_wide_search_for_the_carrier_costs_little():
+    """±96 kHz at 1 Msps: five times as many hypotheses."""
+    assert n_lost(300, mcs=1, size=220, snr_db=4.2, max_frequency=0.096) <= 9
+
+
+def test_preambles_are_found_below_the_noise():
+    """Headers at -2 dB: what all else stands on must be the last to fail."""
+    rng = np.random.default_rng(SEED)
+    receiver, n_found = Receiver(), 0
+    for _ in range(200):
+        burst = turned(Transmitter().modulate([bytes(9)], 0), rng.uniform(-0.02, 0.02))
+        events = receiver.push(noisy(rng, np.concatenate((silence(500), burst)), -2))
+        n_found += sum(isinstance(event, BurstOver) for event in events)
+    assert n_found > 0.9 * 200
+
+
+def quiet(samples, network, max_frequency=0.1):
+    """Counters of a receiver that must not hear a PDU in `samples`, nor take long to see it."""
+    receiver = Receiver(network, max_frequency)
+    begin = monotonic()
+    assert heard(receiver.push(samples) + receiver.flush()) == []
+    assert monotonic() - begin < 1 + 5e-6 * len(samples)
+    return receiver.counters
+
+
+networks = pytest.mark.parametrize("network", [0, None])
+
+
+@networks
+def test_nothing_is_heard_in_noise(network):
+    rng = np.random.default_rng(SEED)
+    counters = quiet(noise(rng, 2_000_000), network)
+    assert counters["samples"] == 2_000_000
+    assert counters["triggers"] < 100
+    assert counters["preambles"] == counters["bursts"] == 0
+
+
+@networks
+def test_nothing_is_heard_in_silence(network):
+    counters = quiet(silence(2_000_000), network)
+    assert counters["triggers"] == 0
+
+
+def recorded(name):
+    """A recording as complex samples at full scale 1."""
+    path = RECORDINGS / name
+    if not path.exists():
+        pytest.skip("recordings are not here")
+    if path.suffix == ".cf32":
+        return np.fromfile(path, np.complex64)
+    if path.suffix == ".i16":
+        return (np.fromfile(path, "<i2").astype(np.float32) / 32768).view(np.complex64)
+    return ((np.fromfile(path, np.uint8).astype(np.float32) - 127.5) / 127.5).view(np.complex64)
+
+
+@networks
+@pytest.mark.parametrize(
+    ("name", "wifi"),
+    [
+        ("adsb_modes1_2M.u8", False),
+        ("gps_l1_noise_4M.cf32", False),
+        ("futuresdr_wlan_bpsk_1-2_15db.cf32", True),
+        ("wifi_11a_6mbps_conducted_20M.i16", True),
+        ("wifi_11a_24mbps_conducted_20M.i16", True),
+        ("wifi_11n_26mbps_radiated_20M.i16", True),
+    ],
+)
+def test_nothing_of_ours_is_heard_in_recordings_of_others(name, wifi, network):
+    """Wi-Fi's long training is ours too, so that is found; its SIGNAL field is no header."""
+    counters = quiet(recorded(name), network)
+    assert (counters["preambles"] > 0) == wifi
+    assert counters["headers_bad"] == counters["preambles"]
+    assert counters["bursts"] == counters["bursts_foreign"] == 0
