@@ -32,7 +32,7 @@ ALIGN_SPAN = preamble.SHORT
 THRESHOLD = 0.25
 # After a false alarm, the search goes on so many samples later.
 RETRY_AFTER = 16
-PIECE = 1 << 15
+PIECE = 1 << 13
 # Kept for acquisition before the sample at which the search stands.
 _KEPT = BEFORE + preamble.SHORT + HISTORY
 # A PDU fails with less than this share of the burst's power above the noise: the burst is gone.
@@ -92,7 +92,7 @@ class Receiver:
         self._workspace = ViterbiWorkspace(8 * (MAX_PDU_BYTES + CRC32_SIZE) + N_TAIL)
         self._work = np.zeros((7, HISTORY + HOP), np.float32)
         self._dc = np.zeros(3)
-        self._stream = SampleStream(start, 1 << 18)
+        self._stream = SampleStream(start, 1 << 16)
         self._burst: _Burst | None = None
         self._crossing: int | None = None
         self._peak: tuple[int, float] | None = None
