@@ -3,8 +3,11 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# What runs; and with what tests and checks need besides.
 STAMP := $(VENV)/.installed
-SOURCES := sdrlinkd backends phy benchmarks
+DEV_STAMP := $(VENV)/.installed-dev
+# Bytecode is made when a module is first used: most of a library never is.
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt
 
 .PHONY: setup demo test check format bench system-packages clean
 
@@ -15,28 +18,32 @@ $(STAMP): pyproject.toml constraints.txt sdrlinkd/__init__.py
 		{ echo "sdrlinkd needs Python 3.11 or newer; name one: make PYTHON=python3.12"; exit 1; }
 	@$(PYTHON) -m venv $(VENV) || \
 		{ echo "python3 has no venv module; on Debian: apt-get install python3-venv"; exit 1; }
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[plots,dev]'
+	$(PIP) -e '.[plots]'
 	@echo "compiling the modem (once)"
 	@$(BIN)/python -c 'import phy; phy.warm_up()'
+	@touch $@
+
+$(DEV_STAMP): $(STAMP)
+	$(PIP) -e '.[plots,dev]'
 	@touch $@
 
 demo: setup
 	$(BIN)/sdrlinkctl demo
 
-test: setup system-packages
+test: $(DEV_STAMP) system-packages
 	$(BIN)/python -m pytest
 
-check: setup
+check: $(DEV_STAMP)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-format: setup
+format: $(DEV_STAMP)
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-bench: setup
+bench: $(DEV_STAMP)
 	$(BIN)/python -m benchmarks.bus
 	$(BIN)/python -m benchmarks.modem_path
 

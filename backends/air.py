@@ -39,19 +39,21 @@ class Timeline:
         self._path = path
         self._sent: list[tuple[int, Samples]] = []
         self._arriving: list[tuple[int, Samples]] = []
-        self._silence = np.zeros(0, np.complex64)
 
     def add(self, start: int, samples: Samples) -> None:
         """Send `samples` at `start`; what overlaps adds up."""
         self._sent.append((start, samples))
 
-    def take(self, index: int, n: int) -> Samples:
-        """What arrives in `index … index + n`, not to be written to; earlier is forgotten."""
+    @property
+    def early(self) -> int:
+        """How long before its own index a burst may begin to arrive."""
+        return self._path.early
+
+    def take(self, index: int, n: int) -> Samples | None:
+        """What arrives in `index … index + n`, None for silence; earlier is forgotten."""
         self._carry(index + n)
         if not self._arriving:
-            if len(self._silence) < n:
-                self._silence = np.zeros(n, np.complex64)
-            return self._silence[:n]
+            return None
         out = np.zeros(n, np.complex64)
         kept = []
         for start, samples in self._arriving:
@@ -64,9 +66,8 @@ class Timeline:
         return out
 
     def _carry(self, before: int) -> None:
-        due = [each for each in self._sent if each[0] < before]
-        for each in due:
-            self._sent.remove(each)
-            start, samples = each
+        due = [each for each in self._sent if each[0] - self._path.early < before]
+        self._sent = [each for each in self._sent if each[0] - self._path.early >= before]
+        for start, samples in sorted(due, key=lambda each: each[0]):
             offset, arriving = self._path.carry(samples)
             self._arriving.append((start + offset, arriving))

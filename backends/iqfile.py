@@ -1,10 +1,11 @@
 """A radio that is a recording: it receives from one, transmits into one, or both."""
 
+import contextlib
 import threading
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-from backends.air import Channel
+from backends.air import Channel, Timeline
 from backends.base import (
     BackendError,
     Capabilities,
@@ -18,7 +19,7 @@ from backends.base import (
 from backends.feed import BlockFeed
 from backends.outstanding import Outstanding
 from backends.pace import Pace
-from backends.recording import RecordingReader, RecordingWriter, describe
+from backends.recording import RecordingReader, RecordingWriter, describe, refuse_same
 
 
 class IqFileRadio:
@@ -40,13 +41,12 @@ class IqFileRadio:
     ) -> None:
         self._receive, self._transmit = receive, transmit
         self._receive_type, self._type_name = receive_type, type_name
-        self._path = channel.make_path()
+        self._timeline = Timeline(channel.make_path())
         self._front_end = channel.make_front_end()
         self._block_s = block_s
         self._paced = paced
         self._reader: RecordingReader | None = None
         self._writer: RecordingWriter | None = None
-        self._to_record: list[TxBurst] = []
         self._outstanding = Outstanding()
         self._feed = BlockFeed(self._next_block, "iqfile")
         # The next block's index and the bursts to record belong together.
@@ -86,6 +86,8 @@ class IqFileRadio:
 
     async def open(self, tuning: Tuning) -> None:
         """Open the files. Raises BackendError, also when a recording is of another rate."""
+        if self._receive is not None and self._transmit is not None:
+            refuse_same(self._receive, self._transmit)
         if self._receive is not None:
             info = describe(self._receive, self._receive_type)
             if info.rate_hz is not None and abs(info.rate_hz / tuning.rate_hz - 1) > 1e-6:
@@ -106,21 +108,23 @@ class IqFileRadio:
     async def blocks(self) -> AsyncIterator[RxBlock]:
         """The recording from its beginning to its end; without one, gaps without end."""
         self._pace.restart()
-        async for block in self._feed.blocks():
-            self._outstanding.settle(block.index + block.n)
-            yield block
-        self._outstanding.lose()
+        try:
+            async for block in self._feed.blocks():
+                self._outstanding.settle(block.index + block.n)
+                yield block
+        finally:
+            self._outstanding.lose()
 
     async def send(self, burst: TxBurst) -> TxReport:
         """Record a burst; blocks() raises BackendError when the disk will not take it."""
         if not self._is_open or self._writer is None:
             return TxReport(TxOutcome.LOST, burst.start, burst.start)
         with self._lock:
-            start = self._outstanding.place(burst, self._next)
+            start = self._outstanding.place(burst, self._next + self._timeline.early)
             if start is None:
                 self._late += 1
                 return TxReport(TxOutcome.LATE, burst.start, burst.start)
-            self._to_record.append(burst._replace(start=start))
+            self._timeline.add(start, burst.samples)
         return await self._outstanding.left(start, len(burst.samples))
 
     async def close(self) -> None:
@@ -133,7 +137,9 @@ class IqFileRadio:
         if self._reader is not None:
             self._reader.close()
         if self._writer is not None:
-            self._writer.extend_to(self._next)
+            # On a disk that is full, the recording just ends with its last burst.
+            with contextlib.suppress(BackendError):
+                self._writer.extend_to(self._next)
             self._writer.close()
 
     def _next_block(self) -> RxBlock | None:
@@ -148,18 +154,9 @@ class IqFileRadio:
             samples = self._front_end.receive(samples)
         self._pace.wait_for(first + n)
         with self._lock:
+            leaving = self._timeline.take(first, n)
             self._next += n
-            leaving = [each for each in self._to_record if each.start < self._next]
-            self._to_record = [each for each in self._to_record if each.start >= self._next]
-        for burst in leaving:
-            self._record(burst)
+        if self._writer is not None and leaving is not None:
+            self._writer.write(first, leaving)
         reason = "" if samples is not None else "nothing to receive"
         return RxBlock(first, n, samples, reason, self._pace.host_ns(first + n))
-
-    def _record(self, burst: TxBurst) -> None:
-        if self._writer is None:
-            return
-        offset, samples = self._path.carry(burst.samples)
-        start = burst.start + offset
-        cut = max(0, -start)
-        self._writer.write(start + cut, samples[cut:])

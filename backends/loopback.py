@@ -3,6 +3,8 @@
 import threading
 from collections.abc import AsyncIterator
 
+import numpy as np
+
 from backends.air import Channel, Timeline
 from backends.base import Capabilities, RxBlock, Samples, Tuning, TxBurst, TxOutcome, TxReport
 from backends.feed import BlockFeed
@@ -60,16 +62,19 @@ class LoopbackRadio:
     async def blocks(self) -> AsyncIterator[RxBlock]:
         """What the antenna hears; when the reader is far behind, what it missed is a gap."""
         self._pace.restart()
-        async for block in self._feed.blocks():
-            self._outstanding.settle(block.index + block.n)
-            yield block
+        try:
+            async for block in self._feed.blocks():
+                self._outstanding.settle(block.index + block.n)
+                yield block
+        finally:
+            self._outstanding.lose()
 
     async def send(self, burst: TxBurst) -> TxReport:
         """Put a burst on the air."""
         if not self._is_open:
             return TxReport(TxOutcome.LOST, burst.start, burst.start)
         with self._lock:
-            start = self._outstanding.place(burst, self._next)
+            start = self._outstanding.place(burst, self._next + self._timeline.early)
             if start is None:
                 self.counters["late"] += 1
                 return TxReport(TxOutcome.LATE, burst.start, burst.start)
@@ -102,5 +107,5 @@ class LoopbackRadio:
             heard = self._timeline.take(first, n)
             self._next += n
         if not reason:
-            samples = self._front_end.receive(heard)
+            samples = self._front_end.receive(np.zeros(n, np.complex64) if heard is None else heard)
         return RxBlock(first, n, samples, reason, self._pace.host_ns(first + n))

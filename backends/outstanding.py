@@ -14,6 +14,7 @@ class Outstanding:
     def __init__(self) -> None:
         self._waiting: list[tuple[TxReport, asyncio.Future[TxReport]]] = []
         self._free_from = 0
+        self._is_over = False
 
     def place(self, burst: TxBurst, earliest: int) -> int | None:
         """Where a burst begins when `earliest` is the first index possible; None: too late."""
@@ -26,6 +27,8 @@ class Outstanding:
     async def left(self, start: int, n_samples: int) -> TxReport:
         """Wait until the last sample has left, or all is lost."""
         report = TxReport(TxOutcome.SENT, start, start + n_samples)
+        if self._is_over:
+            return report._replace(outcome=TxOutcome.LOST)
         answer: asyncio.Future[TxReport] = asyncio.get_running_loop().create_future()
         self._waiting.append((report, answer))
         return await answer
@@ -39,7 +42,8 @@ class Outstanding:
                 answer.set_result(report)
 
     def lose(self) -> None:
-        """Nothing more will leave."""
+        """Nothing more will leave, now or later."""
+        self._is_over = True
         waiting, self._waiting = self._waiting, []
         for report, answer in waiting:
             if not answer.done():

@@ -1,12 +1,12 @@
 """Recordings of samples: a data file and what SigMF's metadata says of it (sigmf.org)."""
 
+import contextlib
 import datetime
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from backends.base import BackendError, Samples
 from backends.samples import SampleType, sample_type
@@ -85,31 +85,48 @@ class RecordingWriter:
             "annotations": [],
         }
         try:
-            self._file = data_path.open("wb", buffering=0)
             self._meta_path.write_text(json.dumps(self._description, indent=2) + "\n")
-        except OSError as error:
-            raise BackendError(f"{error.filename}: cannot be written ({error.strerror})") from None
+            self._file = data_path.open("wb", buffering=0)
+        except (OSError, ValueError) as error:
+            named = getattr(error, "filename", None) or path
+            raise BackendError(f"{named}: cannot be written ({_reason(error)})") from None
         self.clipped = 0
 
     def write(self, first: int, samples: Samples) -> None:
         """Put samples at index `first`. Raises BackendError when the disk will not take them."""
         data, clipped = self._type.encode(samples)
         self.clipped += clipped
+        rest = memoryview(data)
         try:
             self._file.seek(first * self._type.size)
-            self._file.write(data)
+            while rest:
+                # An unbuffered file may take a part only.
+                rest = rest[self._file.write(rest) or 0 :]
         except OSError as error:
-            raise BackendError(f"{self._file.name}: cannot be written ({error.strerror})") from None
+            raise BackendError(f"{self._file.name}: cannot be written ({_reason(error)})") from None
 
     def extend_to(self, end: int) -> None:
-        """Make the recording `end` samples long, with silence."""
+        """Make the recording `end` samples long, with silence. Raises BackendError."""
+        if self._file.closed:
+            return
         size = end * self._type.size
-        if not self._file.closed and self._file.seek(0, 2) < size:
-            self._file.truncate(size)
+        try:
+            if self._file.seek(0, 2) < size:
+                self._file.truncate(size)
+        except OSError as error:
+            raise BackendError(f"{self._file.name}: cannot be written ({_reason(error)})") from None
 
     def close(self) -> None:
-        """Close the files; closing twice is fine."""
+        """Close the file; closing twice is fine."""
         self._file.close()
+
+
+def refuse_same(receive: Path, transmit: Path) -> None:
+    """Raises BackendError when both name one recording: writing would empty it."""
+    if sigmf_paths(receive)[1].resolve() == sigmf_paths(transmit)[1].resolve():
+        raise BackendError(
+            f"{transmit}: is played and cannot be written to; name another recording"
+        )
 
 
 def sigmf_paths(path: Path) -> tuple[Path, Path]:
@@ -127,19 +144,24 @@ def describe(path: Path, type_name: str = "", rate_hz: float | None = None) -> R
     ending that tells it.
     """
     meta_path, data_path = sigmf_paths(path)
-    if meta_path.is_file():
-        return _from_sigmf(meta_path, data_path, type_name, rate_hz)
-    if path.suffix in (META_SUFFIX, DATA_SUFFIX):
-        raise BackendError(f"{meta_path}: no such file; SigMF needs both {meta_path} and its data")
-    if not path.is_file():
-        raise BackendError(f"{path}: no such recording")
-    type_name = type_name or RAW_TYPES.get(path.suffix, "")
-    if not type_name:
-        raise BackendError(
-            f"{path}: its sample type is not known; name one, or use a SigMF recording or one of "
-            f"the endings {', '.join(RAW_TYPES)}"
-        )
-    return _described(path, sample_type(type_name, str(path)), rate_hz, None, [])
+    try:
+        if meta_path.is_file():
+            return _from_sigmf(meta_path, data_path, type_name, rate_hz)
+        if path.suffix in (META_SUFFIX, DATA_SUFFIX):
+            raise BackendError(
+                f"{meta_path}: no such file; SigMF needs both {meta_path} and its data"
+            )
+        if not path.is_file():
+            raise BackendError(f"{path}: no such recording")
+        type_name = type_name or RAW_TYPES.get(path.suffix, "")
+        if not type_name:
+            raise BackendError(
+                f"{path}: its sample type is not known; name one, or use a SigMF recording or one "
+                f"of the endings {', '.join(RAW_TYPES)}"
+            )
+        return _described(path, sample_type(type_name, str(path)), rate_hz, None, [])
+    except (OSError, ValueError) as error:
+        raise BackendError(f"{path}: cannot be read ({_reason(error)})") from None
 
 
 def _from_sigmf(
@@ -149,36 +171,62 @@ def _from_sigmf(
         meta: Any = json.loads(meta_path.read_text())
         general = meta["global"]
         captures = meta.get("captures", [])
-        stated_type = general["core:datatype"]
-        stated_rate = general.get("core:sample_rate")
-        starts = [int(capture.get("core:sample_start", 0)) for capture in captures]
-        frequency = captures[0].get("core:frequency") if captures else None
+        stated_type = str(general["core:datatype"])
         channels = general.get("core:num_channels", 1)
+        starts = [capture.get("core:sample_start", 0) for capture in captures]
+        frequency = captures[0].get("core:frequency") if captures else None
+        framed = [
+            key
+            for part in (general, *captures)
+            for key in ("core:header_bytes", "core:trailing_bytes")
+            if part.get(key)
+        ]
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise BackendError(
             f"{meta_path}: not SigMF metadata ({type(error).__name__}: {error})"
         ) from None
+    if framed:
+        raise BackendError(f"{meta_path}: {framed[0]}: only data without headers can be read")
     if channels != 1:
         raise BackendError(f"{meta_path}: core:num_channels: got {channels}; allowed: 1")
-    for given, stated, key in (
-        (type_name or None, stated_type, "core:datatype"),
-        (rate_hz, stated_rate, "core:sample_rate"),
-    ):
-        if given is not None and stated is not None and given != stated:
-            raise BackendError(f"{meta_path}: {key} is {stated}, but {given} was asked for")
-    if stated_rate is not None and not (
-        isinstance(stated_rate, int | float) and 0 < stated_rate < np.inf
-    ):
-        raise BackendError(f"{meta_path}: core:sample_rate: got {stated_rate}; allowed: above 0")
+    given_rate = general.get("core:sample_rate")
+    stated_rate = _number(given_rate, f"{meta_path}: core:sample_rate", "above 0")
+    if stated_rate is not None and stated_rate <= 0:
+        raise BackendError(f"{meta_path}: core:sample_rate: got {given_rate}; allowed: above 0")
+    if type_name and type_name != stated_type:
+        raise BackendError(
+            f"{meta_path}: core:datatype is {stated_type}, but {type_name} was asked for"
+        )
+    if rate_hz is not None and stated_rate is not None and rate_hz != stated_rate:
+        raise BackendError(
+            f"{meta_path}: core:sample_rate is {stated_rate}, but {rate_hz} was asked for"
+        )
     if not data_path.is_file():
         raise BackendError(f"{data_path}: no such file; {meta_path.name} describes it")
-    kind = sample_type(str(stated_type), f"{meta_path}: core:datatype")
-    carrier = float(frequency) if isinstance(frequency, int | float) else None
-    return _described(data_path, kind, stated_rate or rate_hz, carrier, starts)
+    kind = sample_type(stated_type, f"{meta_path}: core:datatype")
+    carrier = _number(frequency, f"{meta_path}: core:frequency")
+    begins = [_number(each, f"{meta_path}: core:sample_start") or 0.0 for each in starts]
+    return _described(data_path, kind, stated_rate or rate_hz, carrier, begins)
+
+
+def _number(value: object, where: str, allowed: str = "a number") -> float | None:
+    """A finite number of the metadata; None where there is none."""
+    if value is None:
+        return None
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        with contextlib.suppress(OverflowError):
+            number = float(value)
+            if math.isfinite(number):
+                return number
+    raise BackendError(f"{where}: got {str(value)[:40]}; allowed: {allowed}")
+
+
+def _reason(error: OSError | ValueError) -> str:
+    return error.strerror or str(error) if isinstance(error, OSError) else str(error)
 
 
 def _described(
-    path: Path, kind: SampleType, rate: float | None, frequency: float | None, starts: list[int]
+    path: Path, kind: SampleType, rate: float | None, frequency: float | None, starts: list[float]
 ) -> RecordingInfo:
     n_samples, rest = divmod(path.stat().st_size, kind.size)
     damage = []
@@ -186,6 +234,7 @@ def _described(
         damage.append(f"{path}: ends with {rest} bytes that are no whole {kind.name} sample")
     if any(start > n_samples for start in starts):
         damage.append(
-            f"{path}: holds {n_samples} samples, but a capture begins at {max(starts)}; it was cut"
+            f"{path}: holds {n_samples} samples, but a capture begins at "
+            f"{max(starts):.0f}; it was cut"
         )
     return RecordingInfo(path, kind, n_samples, rate, frequency, "; ".join(damage))

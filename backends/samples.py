@@ -37,7 +37,7 @@ class SampleType:
         parts: NDArray[np.float32] = np.ascontiguousarray(samples, np.complex64).view(np.float32)
         if self.dtype.kind == "f":
             return parts.astype(self.dtype).tobytes(), 0
-        scaled = np.round(parts * np.float32(self.full_scale) + np.float32(self.offset))
+        scaled = np.round(np.nan_to_num(parts) * np.float32(self.full_scale) + self.offset)
         low = -self.full_scale + self.offset
         clipped = np.clip(scaled, np.ceil(low), low + 2 * self.full_scale - 1)
         return clipped.astype(self.dtype).tobytes(), int(np.count_nonzero(clipped != scaled))
@@ -60,6 +60,7 @@ def sample_type(name: str, where: str) -> SampleType:
     known = SAMPLE_TYPES.get(name)
     if known is None:
         raise BackendError(
-            f'{where}: sample type: got "{name}"; allowed: {", ".join(SAMPLE_TYPES)}'
+            f'{where}: sample type: got "{name.encode("ascii", "backslashreplace").decode()}"; '
+            f"allowed: {', '.join(SAMPLE_TYPES)}"
         )
     return known

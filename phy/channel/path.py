@@ -40,6 +40,11 @@ class Path:
         self._params = params
         self._rng = rng
 
+    @property
+    def early(self) -> int:
+        """Samples by which a burst may arrive before its own index: the echo filter's skirt."""
+        return 0 if PROFILES[self._params.profile] is None else N_TAPS // 2 - 1
+
     def carry(self, burst: NDArray[np.complex64]) -> tuple[int, NDArray[np.complex64]]:
         """(index relative to the burst's own, samples) of a burst as it arrives, mean gain −loss.
 

@@ -1,0 +1,175 @@
+"""Every radio there is, made for a folder, and short ways to run one."""
+
+import asyncio
+from collections.abc import Callable
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from backends import (
+    Channel,
+    IqFileRadio,
+    LoopbackRadio,
+    Radio,
+    RecordingReader,
+    RecordingWriter,
+    Tuning,
+    TxBurst,
+    describe,
+)
+from phy import PathParams
+
+RATE = 100_000.0
+BLOCK_S = 0.002
+N = 200
+"""Samples of an ordinary block."""
+TUNING = Tuning(RATE, 868e6)
+AIR = Channel(PathParams(rate_hz=RATE), seed=5)
+"""Nothing but the carrier's phase."""
+SEED = 20
+
+
+def noise(n, seed=SEED, scale=0.2):
+    """White noise `[n]`, well below full scale."""
+    parts = np.random.default_rng(seed).standard_normal(2 * n, np.float32)
+    return parts.view(np.complex64) * np.float32(scale)
+
+
+PLAYED = noise(40_017)
+"""What a radio that receives from a recording plays; no whole number of blocks."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A radio under test."""
+
+    name: str
+    make: Callable[[Path], Radio]
+    receives: bool = True
+    transmits: bool = True
+    paced: bool = False
+    hears_self: bool = False
+
+    def __str__(self):
+        return self.name
+
+    def recorded(self, folder, blocks):
+        """What became of the bursts sent: the closed radio's recording, or what it heard."""
+        if self.hears_self:
+            return heard(blocks)
+        return read(folder / "sent")
+
+
+def loopback(name, paced):
+    return Case(name, lambda _: LoopbackRadio(AIR, BLOCK_S, paced), paced=paced, hears_self=True)
+
+
+def iqfile(name, receives, transmits, paced=False):
+    def make(folder):
+        if receives:
+            record(folder / "played", PLAYED)
+        return IqFileRadio(
+            folder / "played" if receives else None,
+            folder / "sent" if transmits else None,
+            AIR,
+            BLOCK_S,
+            paced,
+            type_name="cf32_le",
+        )
+
+    return Case(name, make, receives, transmits, paced)
+
+
+RADIOS = (
+    loopback("loopback", paced=True),
+    loopback("loopback-unpaced", paced=False),
+    iqfile("iqfile-receives", receives=True, transmits=False),
+    iqfile("iqfile-transmits", receives=False, transmits=True),
+    iqfile("iqfile-both", receives=True, transmits=True),
+    iqfile("iqfile-both-paced", receives=True, transmits=True, paced=True),
+)
+
+
+def record(path, samples, type_name="cf32_le", rate_hz=RATE):
+    """Write a recording that begins with `samples`; how many values were clipped."""
+    writer = RecordingWriter(path, type_name, rate_hz, TUNING.frequency_hz)
+    writer.write(0, samples)
+    writer.close()
+    return writer.clipped
+
+
+def read(path, type_name=""):
+    """All samples of a recording."""
+    info = describe(path, type_name)
+    reader = RecordingReader(info)
+    samples = reader.read(0, info.n_samples)
+    reader.close()
+    return samples
+
+
+def heard(blocks):
+    """The samples of blocks that hold no gap."""
+    return np.concatenate([np.zeros(0, np.complex64), *(block.samples for block in blocks)])
+
+
+def bursts(seed, n=8):
+    """Bursts in any order, many of which would overlap."""
+    rng = np.random.default_rng(seed)
+    return [
+        TxBurst(int(rng.integers(6000)), noise(int(rng.integers(1, 900)), seed + i))
+        for i in range(n)
+    ]
+
+
+@asynccontextmanager
+async def opened(radio, tuning=TUNING):
+    """The radio, open; closed at the end."""
+    try:
+        await radio.open(tuning)
+        yield radio
+    finally:
+        await radio.close()
+
+
+async def turn():
+    """Let the event loop run what is due."""
+    for _ in range(3):
+        await asyncio.sleep(0)
+
+
+async def hand_over(radio, wanted):
+    """Tasks that send `wanted`, in order, each begun."""
+    sends = [asyncio.ensure_future(radio.send(burst)) for burst in wanted]
+    await turn()
+    return sends
+
+
+async def take(blocks, until=np.inf):
+    """Blocks up to the one that holds the sample before `until`."""
+    taken = []
+    async for block in blocks:
+        taken.append(block)
+        await turn()
+        if block.index + block.n >= until:
+            break
+    return taken
+
+
+async def send(radio, blocks, wanted):
+    """(reports, blocks taken until the last of them)."""
+    sends = await hand_over(radio, wanted)
+    taken = []
+    while not all(each.done() for each in sends):
+        more = await take(blocks, 1)
+        await turn()
+        assert more or all(each.done() for each in sends), "the stream ended without an answer"
+        taken += more
+    return [await each for each in sends], taken
+
+
+async def stream(radio, until=None):
+    """What a radio hears up to `until`, or its end."""
+    async with opened(radio):
+        return heard(await take(radio.blocks(), until or np.inf))[:until]
