@@ -14,10 +14,12 @@ from backends.base import (
 )
 from backends.iqfile import IqFileRadio
 from backends.loopback import LoopbackRadio
+from backends.outstanding import GAP
 from backends.recording import RecordingInfo, RecordingReader, RecordingWriter, describe
 from backends.samples import SAMPLE_TYPES
 
 __all__ = [
+    "GAP",
     "SAMPLE_TYPES",
     "BackendError",
     "Capabilities",

@@ -2,7 +2,6 @@
 
 from enum import Enum
 from functools import cache
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,11 +36,6 @@ class Modulation(Enum):
     def axis_bits(self) -> int:
         """Coded bits on one axis; BPSK has the real one only."""
         return max(1, self.bits // 2)
-
-    @classmethod
-    def of(cls, bits: int) -> Self:
-        """The modulation with `bits` a carrier."""
-        return cls(bits)
 
 
 @cache

@@ -30,11 +30,6 @@ class ChannelEstimate(NamedTuple):
     no: float
     gain: float
 
-    @property
-    def snr_db(self) -> float:
-        """Carrier SNR in dB."""
-        return 10 * math.log10(self.gain / self.no)
-
 
 def estimate(
     bins: NDArray[np.complex64], sent: NDArray[np.complex64], grid: Numerology

@@ -34,23 +34,23 @@ def latency_cdf(runs: dict[str, Trace], path: Path, caption: str) -> None:
 
 
 def paths(runs: dict[str, Trace], path: Path, caption: str) -> None:
-    """Figure 7: the path sent and the path received; a row a run, a column an odometry topic."""
+    """Figure 7: the path sent and the path received; a column a run, a row an odometry topic."""
     topics = next(iter(runs.values())).odometry_topics()
-    n_columns = max(1, len(topics))
+    n_rows = max(1, len(topics))
     figure, panels = plt.subplots(
-        len(runs), n_columns, figsize=(5.2 * n_columns, 4.4 * len(runs)),
+        n_rows, len(runs), figsize=(4.4 * len(runs), 4.2 * n_rows),
         layout="constrained", squeeze=False,
     )  # fmt: skip
-    for row, (run, trace) in zip(panels, runs.items(), strict=True):
+    for column, (run, trace) in zip(panels.T, runs.items(), strict=True):
         pairs, _ = trace.matches()
-        for axes, name in zip(row, topics, strict=False):
+        for axes, name in zip(column, topics, strict=False):
             sent = trace.path(trace.sent[name])
             got = trace.path([sample for _, sample in pairs.get(name, [])])
             _draw_path(axes, sent, got)
             axes.set_title(f"{run}: /{name}")
         if not topics:
-            row[0].text(0.5, 0.5, "no odometry was sent", ha="center", va="center")
-            row[0].set_axis_off()
+            column[0].text(0.5, 0.5, "no odometry was sent", ha="center", va="center")
+            column[0].set_axis_off()
     _save(figure, path, caption)
 
 

@@ -1,14 +1,13 @@
 """When the next burst may leave, in samples."""
 
+from backends import GAP
+
 
 class AirPlan:
     """Keeps what is committed to the air below the lead plus one burst.
 
     `slack` is how much too late the one who waits may wake up, without a pause on the air.
     """
-
-    GAP = 32
-    """Samples of silence between bursts."""
 
     def __init__(self, lead: int, slack: int = 0) -> None:
         self._lead = lead
@@ -25,4 +24,4 @@ class AirPlan:
 
     def commit(self, start: int, n_samples: int) -> None:
         """A burst of `n_samples` will leave at `start`."""
-        self._free_at = max(self._free_at, start + n_samples + self.GAP)
+        self._free_at = max(self._free_at, start + n_samples + GAP)

@@ -3,6 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
+from backends import GAP
 from sdrlinkd.modem.load import LoadMeter
 from sdrlinkd.modem.plan import AirPlan
 
@@ -16,7 +17,7 @@ def test_an_idle_air_takes_a_burst_after_the_lead():
 def test_a_busy_air_is_waited_for_until_the_lead_before_its_end():
     plan = AirPlan(lead=100)
     plan.commit(1000, 4000)
-    free = 5000 + AirPlan.GAP
+    free = 5000 + GAP
     assert plan.wait(now=1000) == free - 1100
     assert plan.wait(now=free - 100) == 0
     assert plan.start(now=free - 100) == free
@@ -25,7 +26,7 @@ def test_a_busy_air_is_waited_for_until_the_lead_before_its_end():
 def test_who_waits_may_wake_up_late_by_the_slack():
     plan = AirPlan(lead=100, slack=50)
     plan.commit(1000, 4000)
-    free = 5000 + AirPlan.GAP
+    free = 5000 + GAP
     assert plan.wait(now=free - 150) == 0
     assert plan.start(now=free - 150) == plan.start(now=free - 100) == free
 
