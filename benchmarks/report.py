@@ -51,7 +51,9 @@ def main(benchmark: str, measure: Callable[[int, bool], list[Row]]) -> int:
         }
         sys.stdout.write(json.dumps(report, indent=2) + "\n")
     else:
-        Console().print(_table(benchmark, rows))
+        # In a file, rows are not cut short at the 80 columns of a terminal that is not there.
+        console = Console() if sys.stdout.isatty() else Console(width=110)
+        console.print(_table(benchmark, rows))
     return 0 if all(row.ok for row in rows) else 1
 
 

@@ -73,7 +73,8 @@ class Node:
 
     async def carry(self) -> None:
         """Let the PDU link run; for ever."""
-        if self._setup.config.iqfile.wait_for_consumer:
+        config = self._setup.config
+        if config.backend == "iqfile" and config.iqfile.wait_for_consumer:
             await self.bus.has_consumer.wait()
         await self._pdu_link.run()
 

@@ -1,5 +1,6 @@
 """`demo`: the paper's experiment on this machine, in one command."""
 
+import sys
 from enum import StrEnum
 from pathlib import Path
 from types import ModuleType
@@ -100,7 +101,8 @@ def demo(
     ),
 ) -> None:
     """Send a robot's messages through daemons and radios; measure what the paper measured."""
-    console = Console()
+    # In a file, names are not cut short at the 80 columns of a terminal that is not there.
+    console = Console() if sys.stdout.isatty() else Console(width=110)
     pictures = _load_pictures()
     _make_folder(out)
     results: list[RunResult] = []

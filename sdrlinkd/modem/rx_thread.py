@@ -32,16 +32,20 @@ class ReceiverThread:
         self._blocks: queue.SimpleQueue[RxBlock | None] = queue.SimpleQueue()
         self._loop = asyncio.get_running_loop()
         self._has_room = asyncio.Event()
+        self._is_waited_for = False
         self._ended = asyncio.Event()
+        self.load = LoadMeter()
         self._thread = threading.Thread(target=self._work, name="phy-rx", daemon=True)
         self._thread.start()
-        self.load = LoadMeter()
 
     async def put(self, block: RxBlock) -> None:
         """Hand over a block; waits while too many are waiting already."""
         while self._blocks.qsize() >= MAX_BLOCKS:
             self._has_room.clear()
-            await self._has_room.wait()
+            self._is_waited_for = True
+            # The thread may have been faster than that.
+            if self._blocks.qsize() > MAX_BLOCKS // 2:
+                await self._has_room.wait()
         self._blocks.put(block)
 
     async def finish(self) -> None:
@@ -64,7 +68,8 @@ class ReceiverThread:
                 self.load.add(time.thread_time() - began, block.n / self._rate_hz)
             if events or self._every_block:
                 self._call(self._deliver, events, block.index + block.n)
-            if self._blocks.qsize() == MAX_BLOCKS // 2:
+            if self._is_waited_for and self._blocks.qsize() <= MAX_BLOCKS // 2:
+                self._is_waited_for = False
                 self._call(self._has_room.set)
         end = self._receiver.next_index
         self._call(self._deliver, self._receiver.flush(), end)
