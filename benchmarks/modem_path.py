@@ -27,7 +27,7 @@ def measure(seed: int, quick: bool) -> list[Row]:
     """All rows; `quick` takes about a quarter of the trials."""
     phy.warm_up()
     return [
-        *latency_rows(seed, 150 if quick else 600),
+        *latency_rows(seed, 100 if quick else 600),
         rx_row(seed, 40 if quick else 150),
         tx_row(seed, 40 if quick else 150),
     ]

@@ -203,11 +203,14 @@ def test_what_has_arrived_before_sigterm_is_in_the_ledger(start_daemon):
     assert "/300 sent" in daemon.log()
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
-def test_a_demo_that_is_ended_leaves_nothing_behind(tmp_path, number):
+@pytest.mark.parametrize(
+    ("number", "link"),
+    [(signal.SIGTERM, "direct"), (signal.SIGHUP, "direct"), (signal.SIGINT, "ofdm")],
+)
+def test_a_demo_that_is_ended_leaves_nothing_behind(tmp_path, number, link):
     environment = {**os.environ, "TMPDIR": str(tmp_path)}
     demo = subprocess.Popen(
-        [sys.executable, "-m", "sdrlinkd.cli", "demo", "--out", str(tmp_path / "out")],
+        [sys.executable, "-m", "sdrlinkd.cli", "demo", "--link", link, "--out", tmp_path / "out"],
         env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     wait_for(lambda: list(tmp_path.glob("sdrlink-*/*/ctl.sock")))

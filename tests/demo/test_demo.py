@@ -52,7 +52,7 @@ def test_the_whole_of_table_6(tmp_path, capsys):
 
 @pytest.mark.parametrize(
     ("link", "pdu_size", "speed"),
-    [("direct", 64, 4.0), ("direct", 1024, 4.0), ("ofdm", 1024, 1.0), ("iqfile", 220, 1.0)],
+    [("direct", 64, 4.0), ("direct", 1024, 4.0), ("ofdm", 1024, 1.0)],
 )
 def test_a_run_adds_up(link, pdu_size, speed):
     seen = []
