@@ -38,8 +38,9 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Bursts of other networks are skipped."""
     max_burst_s: Annotated[float, Meta(gt=0, le=1)] = 0.005
     """Longest burst of several PDUs: how long an urgent message may have to wait."""
-    tx_lead_s: Annotated[float, Meta(ge=0, le=1)] = 0.001
-    """How long before it leaves a burst is composed."""
+    tx_lead_s: Annotated[float, Meta(ge=0, le=1)] = 0.005
+    """How long before the air is free the next burst is composed: time to compose and modulate it,
+    and what an urgent message may have to wait besides a burst."""
     backoff_db: Annotated[float, Meta(ge=0, le=60)] = 12.0
     """Mean power of a burst below full scale: room for its peaks."""
     max_cfo_hz: Annotated[float, Meta(ge=0, le=1e6)] = 1e5

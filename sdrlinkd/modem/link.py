@@ -25,6 +25,8 @@ OUTCOMES = {
 
 TIMER_S = 0.001
 """The event loop's timers count in this; shorter waits would be busy ones."""
+HANDOVER_S = 0.001
+"""A burst composed for a free air begins so much later: time to modulate it."""
 
 
 class ModemLink:
@@ -43,8 +45,10 @@ class ModemLink:
         )
         paced = radio.capabilities.paced
         self._clock = StreamClock(params.rate_hz, paced)
-        lead_s = max(params.tx_lead_s, radio.capabilities.lead_s)
-        self._plan = AirPlan(round(lead_s * params.rate_hz), round(TIMER_S * params.rate_hz))
+        self._plan = AirPlan(
+            round((HANDOVER_S + radio.capabilities.lead_s) * params.rate_hz),
+            round(params.tx_lead_s * params.rate_hz),
+        )
         self._planned_start = 0
         self._rx: ReceiverThread | None = None
         self._tx_thread = ThreadPoolExecutor(1, "phy-tx")

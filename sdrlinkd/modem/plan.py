@@ -4,19 +4,20 @@ from backends import GAP
 
 
 class AirPlan:
-    """Keeps what is committed to the air below the lead plus one burst.
+    """Keeps what is committed to the air below `lead + ahead` plus one burst.
 
-    `slack` is how much too late the one who waits may wake up, without a pause on the air.
+    A burst begins at the earliest `lead` after it is composed, and is composed at the earliest
+    `lead + ahead` before the one before it has left.
     """
 
-    def __init__(self, lead: int, slack: int = 0) -> None:
+    def __init__(self, lead: int, ahead: int = 0) -> None:
         self._lead = lead
-        self._slack = slack
+        self._ahead = ahead
         self._free_at = 0
 
     def wait(self, now: int) -> int:
         """Samples until the next burst may be composed; 0: at once."""
-        return max(0, self._free_at - now - self._lead - self._slack)
+        return max(0, self._free_at - now - self._lead - self._ahead)
 
     def start(self, now: int) -> int:
         """Where a burst composed now begins."""

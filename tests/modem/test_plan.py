@@ -23,8 +23,8 @@ def test_a_busy_air_is_waited_for_until_the_lead_before_its_end():
     assert plan.start(now=free - 100) == free
 
 
-def test_who_waits_may_wake_up_late_by_the_slack():
-    plan = AirPlan(lead=100, slack=50)
+def test_the_next_burst_is_composed_ahead_without_a_pause_on_the_air():
+    plan = AirPlan(lead=100, ahead=50)
     plan.commit(1000, 4000)
     free = 5000 + GAP
     assert plan.wait(now=free - 150) == 0
