@@ -52,13 +52,13 @@ def _track(
     pilots: NDArray[np.float32],
     polarity: float,
     tracking: NDArray[np.float64],
+    turned: NDArray[np.complex128],
 ) -> None:
     """Advance phase and slope over carriers to this symbol, and correct them by its pilots."""
     phase, slope = tracking[PHASE], tracking[SLOPE]
     _predict(phase, PHASE_NOISE)
     _predict(slope, SLOPE_NOISE)
     n = pilot_bins.size
-    turned = np.empty(n, np.complex128)
     total = 0j
     for p in range(n):
         at = pilot_bins[p]
@@ -192,9 +192,12 @@ def demap(
     u, v = np.empty(n_data, np.float32), np.empty(n_data, np.float32)
     planes = np.empty(gather.size, np.int16)
     turns = np.empty(2 * edge + 1, np.complex64)
+    turned = np.empty(pilot_bins.size, np.complex128)
     per_unit = np.float32(1 / unit)
     for row in range(y.shape[0]):
-        _track(y[row], h_hat, no, pilot_bins, pilot_carriers, pilots, polarity[row], tracking)
+        _track(
+            y[row], h_hat, no, pilot_bins, pilot_carriers, pilots, polarity[row], tracking, turned
+        )
         _turns(tracking[PHASE, 0], tracking[SLOPE, 0], edge, turns)
         for d in range(n_data):
             value = y[row, data_bins[d]] * equaliser[d] * turns[data_carriers[d] + edge]

@@ -125,7 +125,8 @@ def match_blocks(
         out[cover.size + b] = total
 
 
-@njit(nogil=True, cache=True)
+# Sums in any order, so that they are vectorised; the order is the same at every call.
+@njit(nogil=True, cache=True, fastmath={"reassoc", "contract"})
 def transform(matrix: NDArray[np.complex64], x: NDArray[np.complex64]) -> NDArray[np.complex64]:
     """matrix · x, without BLAS: its threads cost more than so small a product."""
     out = np.empty(matrix.shape[0], np.complex64)
