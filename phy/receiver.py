@@ -1,7 +1,7 @@
 """The streaming receiver: samples in, PDUs out.
 
-SEARCH → ALIGN → ACQUIRE → PAYLOAD. Every step waits until the samples it needs are there and then
-takes exactly those, so any chunking of the same samples yields the same events.
+SEARCH → ALIGN → ACQUIRE → PAYLOAD. Every step waits until the samples it needs are there, and what
+it makes of a sample does not depend on how many came with it: any chunking yields the same events.
 """
 
 import cmath
@@ -70,7 +70,7 @@ class Receiver:
     """Finds bursts in a stream and decodes them. Not for several threads at once.
 
     `max_frequency` is the largest carrier offset expected, in cycles a sample. Bursts of other
-    networks than `network` are skipped; None takes all. `on_points` gets the equalised points
+    networks than `network` are told but not decoded; None takes all. `on_points` gets the equalised points
     `[n, n_data]` of payload symbols, for pictures.
     """
 
@@ -126,7 +126,7 @@ class Receiver:
         events: list[Event] = []
         if self._burst is not None:
             self._end(self._burst, events, "cut")
-        else:
+        elif end > self._at:
             events = self.flush()
         self._begin(end + n)
         return events
