@@ -70,8 +70,8 @@ class Receiver:
     """Finds bursts in a stream and decodes them. Not for several threads at once.
 
     `max_frequency` is the largest carrier offset expected, in cycles a sample. Bursts of other
-    networks than `network` are told but not decoded; None takes all. `on_points` gets the equalised points
-    `[n, n_data]` of payload symbols, for pictures.
+    networks than `network` are told but not decoded; None takes all. `on_points` gets the
+    equalised points `[n, n_data]` of payload symbols, for pictures.
     """
 
     def __init__(
