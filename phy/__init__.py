@@ -2,12 +2,15 @@
 
 from phy.channel import PROFILES, FrontEnd, FrontEndParams, Path, PathParams
 from phy.constellation import Modulation, points
+from phy.error_rate import burst_found_rate, needed_snr_db, pdu_error_rate
 from phy.header import MAX_PDU_BYTES, MAX_PDUS, N_NETWORKS
 from phy.layout import BurstLayout, layout, most_pdus
 from phy.mcs import MCS_TABLE, Mcs
 from phy.numerology import OFDM_64_8, OFDM_64_16, Numerology
 from phy.quality import COUNTERS, BurstOver, BurstQuality, Event, PduHeard
 from phy.receiver import Receiver
+from phy.sensing import WINDOW as SENSE_WINDOW
+from phy.sensing import CarrierSense
 from phy.transmitter import Transmitter
 from phy.warmup import warm_up
 
@@ -20,9 +23,11 @@ __all__ = [
     "OFDM_64_8",
     "OFDM_64_16",
     "PROFILES",
+    "SENSE_WINDOW",
     "BurstLayout",
     "BurstOver",
     "BurstQuality",
+    "CarrierSense",
     "Event",
     "FrontEnd",
     "FrontEndParams",
@@ -34,8 +39,11 @@ __all__ = [
     "PduHeard",
     "Receiver",
     "Transmitter",
+    "burst_found_rate",
     "layout",
     "most_pdus",
+    "needed_snr_db",
+    "pdu_error_rate",
     "points",
     "warm_up",
 ]

@@ -8,7 +8,6 @@ import cmath
 import math
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,7 @@ from phy.convolutional import N_TAIL, ViterbiWorkspace
 from phy.crc import CRC32_SIZE
 from phy.demodulation import Demodulator, PduDecoder
 from phy.header import MAX_PDU_BYTES, N_NETWORKS, N_SYMBOLS
-from phy.kernels.demapper import SLOPE
+from phy.incoming import IncomingBurst
 from phy.kernels.detector import HISTORY, search, strongest
 from phy.layout import layout
 from phy.numerology import OFDM_64_16, Numerology
@@ -39,31 +38,6 @@ _KEPT = BEFORE + preamble.SHORT + HISTORY
 _FADED = 0.25
 # Every so many payload symbols, the FFT windows follow the sender's clock.
 SLIP_EVERY = 256
-
-
-@dataclass
-class _Burst:
-    """A burst being received."""
-
-    acquired: Acquired
-    decoder: PduDecoder
-    demodulator: Demodulator
-    n_symbol: int
-    n_symbols_in: int = 0
-    n_good: int = 0
-    n_bad: int = 0
-    slipped: int = 0
-
-    def window(self, symbol: int) -> int:
-        """Absolute index at which the FFT of a payload symbol begins."""
-        return self.acquired.window + symbol * self.n_symbol + self.slipped
-
-    def slip(self, grid: Numerology) -> None:
-        """Follow the sender's clock by whole samples, as the slope over carriers tells."""
-        slope = self.acquired.tracking[SLOPE]
-        early = round(slope[0] * grid.n_fft / (2 * math.pi))
-        self.slipped -= early
-        slope[0] -= early * 2 * math.pi / grid.n_fft
 
 
 class Receiver:
@@ -93,10 +67,12 @@ class Receiver:
         self._work = np.zeros((7, HISTORY + HOP), np.float32)
         self._dc = np.zeros(3)
         self._stream = SampleStream(start, 1 << 16)
-        self._burst: _Burst | None = None
+        self._burst: IncomingBurst | None = None
         self._crossing: int | None = None
         self._peak: tuple[int, float] | None = None
         self._at = start
+        self.carrier = (start, start)
+        """Where the last burst of which the header was read begins, and where it should end."""
         self.counters: Counter[str] = Counter()
         self._begin(start)
 
@@ -106,7 +82,7 @@ class Receiver:
         return self._stream.end
 
     def push(self, samples: NDArray[np.complex64]) -> list[Event]:
-        """Take the next samples `[n]`, complex64; what they complete, in order."""
+        """Take the next samples `[n]`, complex64; what they complete."""
         events: list[Event] = []
         for first in range(0, len(samples), PIECE):
             piece = samples[first : first + PIECE]
@@ -200,12 +176,14 @@ class Receiver:
         self.counters["preambles"] += 1
         told = found.header
         plan = layout(self._grid, told.mcs, told.n_pdus, told.pdu_bytes)
-        self._burst = _Burst(
+        self._burst = IncomingBurst(
             found,
             PduDecoder(plan, self._workspace),
             self._demodulators[plan.mcs.modulation],
             self._grid.n_symbol,
         )
+        end = self._burst.window(plan.n_symbols) - self._grid.n_cp
+        self.carrier = (found.quality.start, end)
         if self._network is not None and told.network != self._network:
             # Searched on, not skipped: a header that lies must not make us deaf.
             self._end(self._burst, events, "foreign")
@@ -214,7 +192,7 @@ class Receiver:
             self._at = found.window
         return True
 
-    def _payload(self, burst: _Burst, events: list[Event]) -> bool:
+    def _payload(self, burst: IncomingBurst, events: list[Event]) -> bool:
         """The symbols that complete PDUs, or those up to where the windows may slip."""
         plan, found = burst.decoder.layout, burst.acquired
         first_symbol = burst.n_symbols_in
@@ -260,7 +238,7 @@ class Receiver:
             burst.slip(self._grid)
         return True
 
-    def _complete(self, burst: _Burst) -> tuple[int, int]:
+    def _complete(self, burst: IncomingBurst) -> tuple[int, int]:
         """(symbols to take in all, PDUs they complete), with the samples that are there."""
         plan, grid = burst.decoder.layout, self._grid
         here = (self._stream.end - burst.window(0) + grid.n_cp) // grid.n_symbol
@@ -272,7 +250,7 @@ class Receiver:
             return limit, n_pdus
         return (plan.symbols_through(done + n_pdus), n_pdus) if n_pdus else (burst.n_symbols_in, 0)
 
-    def _since(self, burst: _Burst, index: int) -> int:
+    def _since(self, burst: IncomingBurst, index: int) -> int:
         """Samples from the channel estimate's window to `index`."""
         grid = self._grid
         head = preamble.N_LONG * grid.n_fft + N_SYMBOLS * grid.n_symbol + grid.n_cp
@@ -285,7 +263,7 @@ class Receiver:
         power = float(np.mean(used.real**2 + used.imag**2))
         return power < found.channel.no + _FADED * found.channel.gain
 
-    def _end(self, burst: _Burst, events: list[Event], ending: str) -> None:
+    def _end(self, burst: IncomingBurst, events: list[Event], ending: str) -> None:
         self._burst = None
         if ending != "whole":
             self.counters[f"bursts_{ending}"] += 1

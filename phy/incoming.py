@@ -1,0 +1,34 @@
+"""A burst while it is being received."""
+
+import math
+from dataclasses import dataclass
+
+from phy.acquisition import Acquired
+from phy.demodulation import Demodulator, PduDecoder
+from phy.kernels.demapper import SLOPE
+from phy.numerology import Numerology
+
+
+@dataclass
+class IncomingBurst:
+    """Where its symbols are, and what has become of its PDUs so far."""
+
+    acquired: Acquired
+    decoder: PduDecoder
+    demodulator: Demodulator
+    n_symbol: int
+    n_symbols_in: int = 0
+    n_good: int = 0
+    n_bad: int = 0
+    slipped: int = 0
+
+    def window(self, symbol: int) -> int:
+        """Absolute index at which the FFT of a payload symbol begins."""
+        return self.acquired.window + symbol * self.n_symbol + self.slipped
+
+    def slip(self, grid: Numerology) -> None:
+        """Follow the sender's clock by whole samples, as the slope over carriers tells."""
+        slope = self.acquired.tracking[SLOPE]
+        early = round(slope[0] * grid.n_fft / (2 * math.pi))
+        self.slipped -= early
+        slope[0] -= early * 2 * math.pi / grid.n_fft

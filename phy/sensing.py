@@ -1,0 +1,69 @@
+"""Carrier sense: whether anybody is on the air, also those whose bursts cannot be read."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phy.kernels.sensing import (
+    BUSY_UNTIL,
+    FILLED,
+    FLOOR,
+    LEAST_FLOOR,
+    N_STATE,
+    NEXT,
+    WINDOW,
+    sense,
+)
+from phy.stream import LARGEST_SAMPLE
+
+__all__ = ["WINDOW", "CarrierSense"]
+
+
+class CarrierSense:
+    """Whether there is a carrier: energy above the noise floor, in windows of WINDOW samples.
+
+    The floor begins as the first window's power, follows quiet windows (down to less than a half
+    at once, else by 1/64 of the difference), and doubles in 2^17 busy windows, so that a carrier
+    that never ends becomes noise. Windows follow one another from `start` on.
+    """
+
+    def __init__(self, threshold_db: float = 6.0, start: int = 0) -> None:
+        if not 0 < threshold_db < math.inf:
+            raise ValueError(f"threshold in dB: got {threshold_db}; allowed: more than 0")
+        self._threshold = 10 ** (threshold_db / 10)
+        self._state = np.zeros(N_STATE)
+        self._state[[BUSY_UNTIL, NEXT]] = start
+
+    @property
+    def next_index(self) -> int:
+        """Absolute index of the next sample to push."""
+        return int(self._state[NEXT])
+
+    @property
+    def busy_until(self) -> int:
+        """Absolute index after the last window with a carrier; `start` if there was none."""
+        return int(self._state[BUSY_UNTIL])
+
+    @property
+    def noise_dbfs(self) -> float:
+        """The noise floor in dB below full scale; before the first window, the least there is."""
+        return 10 * math.log10(max(float(self._state[FLOOR]), LEAST_FLOOR))
+
+    def push(self, samples: NDArray[np.complex64]) -> None:
+        """Take the next samples `[n]`, complex64."""
+        # Read-only and in one piece, whatever came: else numba compiles anew for every kind.
+        x = np.ascontiguousarray(samples, np.complex64).view()
+        x.setflags(write=False)
+        sense(x, self._threshold, LARGEST_SAMPLE, self._state)
+
+    def gap(self, n: int) -> None:
+        """`n` samples are missing here. The floor is kept, a window that they cut is given up.
+
+        The next window begins right behind them, not at a multiple of WINDOW: so it always is
+        WINDOW samples that were heard, and those behind a gap count at once.
+        """
+        if n < 0:
+            raise ValueError(f"gap: got {n} samples; allowed: 0 or more")
+        self._state[NEXT] += n
+        self._state[FILLED] = 0
