@@ -2,6 +2,7 @@
 
 from backends.air import Channel
 from backends.base import (
+    SENDING,
     BackendError,
     Capabilities,
     Radio,
@@ -12,6 +13,24 @@ from backends.base import (
     TxOutcome,
     TxReport,
 )
+from backends.ether import (
+    AirParams,
+    AirSense,
+    Answer,
+    BurstMedium,
+    BurstShape,
+    EtherHub,
+    EtherRadio,
+    Flight,
+    HubWatch,
+    LinkOverride,
+    LocalEther,
+    Outage,
+    RadioParams,
+    Track,
+    World,
+    burst_shape,
+)
 from backends.iqfile import IqFileRadio
 from backends.loopback import LoopbackRadio
 from backends.outstanding import GAP
@@ -21,20 +40,37 @@ from backends.samples import SAMPLE_TYPES
 __all__ = [
     "GAP",
     "SAMPLE_TYPES",
+    "SENDING",
+    "AirParams",
+    "AirSense",
+    "Answer",
     "BackendError",
+    "BurstMedium",
+    "BurstShape",
     "Capabilities",
     "Channel",
+    "EtherHub",
+    "EtherRadio",
+    "Flight",
+    "HubWatch",
     "IqFileRadio",
+    "LinkOverride",
+    "LocalEther",
     "LoopbackRadio",
+    "Outage",
     "Radio",
+    "RadioParams",
     "RecordingInfo",
     "RecordingReader",
     "RecordingWriter",
     "RxBlock",
     "Samples",
+    "Track",
     "Tuning",
     "TxBurst",
     "TxOutcome",
     "TxReport",
+    "World",
+    "burst_shape",
     "describe",
 ]

@@ -35,19 +35,13 @@ class Timeline:
     A burst goes through its path when its first sample is read.
     """
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._sent: list[tuple[int, Samples]] = []
+    def __init__(self) -> None:
+        self._sent: list[tuple[int, Samples, Path]] = []
         self._arriving: list[tuple[int, Samples]] = []
 
-    def add(self, start: int, samples: Samples) -> None:
-        """Send `samples` at `start`; what overlaps adds up."""
-        self._sent.append((start, samples))
-
-    @property
-    def early(self) -> int:
-        """How long before its own index a burst may begin to arrive."""
-        return self._path.early
+    def add(self, start: int, samples: Samples, path: Path) -> None:
+        """Send `samples` at `start` through `path`; what overlaps adds up."""
+        self._sent.append((start, samples, path))
 
     def take(self, index: int, n: int) -> Samples | None:
         """What arrives in `index … index + n`, None for silence; earlier is forgotten."""
@@ -66,8 +60,10 @@ class Timeline:
         return out
 
     def _carry(self, before: int) -> None:
-        due = [each for each in self._sent if each[0] - self._path.early < before]
-        self._sent = [each for each in self._sent if each[0] - self._path.early >= before]
-        for start, samples in sorted(due, key=lambda each: each[0]):
-            offset, arriving = self._path.carry(samples)
+        if not self._sent:
+            return
+        due = [each for each in self._sent if each[0] - each[2].early < before]
+        self._sent = [each for each in self._sent if each[0] - each[2].early >= before]
+        for start, samples, path in sorted(due, key=lambda each: each[0]):
+            offset, arriving = path.carry(samples)
             self._arriving.append((start + offset, arriving))

@@ -1,9 +1,6 @@
-"""What every radio is to those above it: blocks of samples in, bursts out.
+"""What every radio is to those above it: blocks of samples in, bursts out."""
 
-Provisional until a half-duplex radio has passed the contract test.
-"""
-
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable
 from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple, Protocol
@@ -14,6 +11,10 @@ from numpy.typing import NDArray
 Samples = NDArray[np.complex64]
 
 
+SENDING = "sending"
+"""Why a half-duplex radio's gap is one."""
+
+
 class BackendError(Exception):
     """A radio or recording that cannot be used; the message says what to do about it."""
 
@@ -22,8 +23,12 @@ class BackendError(Exception):
 class Capabilities:
     """What a radio can do.
 
-    `paced`: blocks come in real time; else as fast as they are taken. `lead_s`: how long before its
-    start a burst must be handed over.
+    `paced`: blocks come in real time; else as fast as they are taken. `lockstep`: time waits for
+    everybody on the same air, so one block is asked for only when all that follows from the one
+    before has been done. `block_s`: samples come in pieces of this length. `lead_s`: how long
+    before its start a burst must be handed over. `turnaround_s`: for so long before and after a
+    burst a half-duplex radio hears nothing. `index_error_s`: how wrong indices may be after a gap,
+    where there are no `timestamps`.
     """
 
     receives: bool
@@ -33,6 +38,9 @@ class Capabilities:
     paced: bool
     lead_s: float = 0.0
     turnaround_s: float = 0.0
+    lockstep: bool = False
+    index_error_s: float = 0.0
+    block_s: float = 0.001
 
 
 @dataclass(frozen=True)
@@ -63,7 +71,8 @@ class TxBurst(NamedTuple):
     """Samples whose first leaves at absolute index `start` of the received stream.
 
     A burst that comes too late, or overlaps the one before, begins as soon as it can; one that is
-    `exact` does not leave at all.
+    `exact` does not leave at all, nor do exact ones that were handed over behind it before its
+    report was there: nothing overtakes.
     """
 
     start: int
@@ -93,7 +102,7 @@ class Radio(Protocol):
 
     @property
     def capabilities(self) -> Capabilities:
-        """What it can do; known before it is opened."""
+        """What it can do; known once it is open."""
 
     @property
     def counters(self) -> dict[str, int]:
@@ -109,8 +118,8 @@ class Radio(Protocol):
     def blocks(self) -> AsyncIterator[RxBlock]:
         """Contiguous blocks from index 0 on; gaps are blocks too. Ends with the recording."""
 
-    async def send(self, burst: TxBurst) -> TxReport:
-        """Take a burst at once, in the order of the calls; returns when its last sample left."""
+    def send(self, burst: TxBurst) -> Awaitable[TxReport]:
+        """Take a burst at once; the report comes when its last sample has left, or it cannot."""
 
     async def close(self) -> None:
         """Stop; bursts on their way are lost. Closing twice is fine."""

@@ -2,7 +2,7 @@
 
 import contextlib
 import threading
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable
 from pathlib import Path
 
 from backends.air import Channel, Timeline
@@ -17,7 +17,7 @@ from backends.base import (
     TxReport,
 )
 from backends.feed import BlockFeed
-from backends.outstanding import Outstanding
+from backends.outstanding import Outstanding, answered
 from backends.pace import Pace
 from backends.recording import RecordingReader, RecordingWriter, describe, refuse_same
 
@@ -41,7 +41,8 @@ class IqFileRadio:
     ) -> None:
         self._receive, self._transmit = receive, transmit
         self._receive_type, self._type_name = receive_type, type_name
-        self._timeline = Timeline(channel.make_path())
+        self._path = channel.make_path()
+        self._timeline = Timeline()
         self._front_end = channel.make_front_end()
         self._block_s = block_s
         self._paced = paced
@@ -65,6 +66,7 @@ class IqFileRadio:
             full_duplex=True,
             timestamps=True,
             paced=self._paced,
+            block_s=self._block_s,
         )
 
     @property
@@ -115,17 +117,17 @@ class IqFileRadio:
         finally:
             self._outstanding.lose()
 
-    async def send(self, burst: TxBurst) -> TxReport:
+    def send(self, burst: TxBurst) -> Awaitable[TxReport]:
         """Record a burst; blocks() raises BackendError when the disk will not take it."""
         if not self._is_open or self._writer is None:
-            return TxReport(TxOutcome.LOST, burst.start, burst.start)
+            return answered(TxReport(TxOutcome.LOST, burst.start, burst.start))
         with self._lock:
-            start = self._outstanding.place(burst, self._next + self._timeline.early)
+            start = self._outstanding.place(burst, self._next + self._path.early)
             if start is None:
                 self._late += 1
-                return TxReport(TxOutcome.LATE, burst.start, burst.start)
-            self._timeline.add(start, burst.samples)
-        return await self._outstanding.left(start, len(burst.samples))
+                return answered(TxReport(TxOutcome.LATE, burst.start, burst.start))
+            self._timeline.add(start, burst.samples, self._path)
+        return self._outstanding.left(start, len(burst.samples))
 
     async def close(self) -> None:
         """Close the files; a recording lasts until now."""

@@ -1,14 +1,14 @@
 """A radio whose antenna hears itself, through a simulated channel."""
 
 import threading
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable
 
 import numpy as np
 
 from backends.air import Channel, Timeline
 from backends.base import Capabilities, RxBlock, Samples, Tuning, TxBurst, TxOutcome, TxReport
 from backends.feed import BlockFeed
-from backends.outstanding import Outstanding
+from backends.outstanding import Outstanding, answered
 from backends.pace import Pace
 
 # A reader further behind than this misses what was on the air; until then nothing is lost.
@@ -26,7 +26,8 @@ class LoopbackRadio:
     def __init__(
         self, channel: Channel, block_s: float, paced: bool = True, hear_self: bool = True
     ) -> None:
-        self._timeline = Timeline(channel.make_path())
+        self._path = channel.make_path()
+        self._timeline = Timeline()
         self._front_end = channel.make_front_end()
         self._profile = channel.path.profile
         self._block_s = block_s
@@ -44,7 +45,12 @@ class LoopbackRadio:
     def capabilities(self) -> Capabilities:
         """Both directions at once, indices exact."""
         return Capabilities(
-            receives=True, transmits=True, full_duplex=True, timestamps=True, paced=self._paced
+            receives=True,
+            transmits=True,
+            full_duplex=True,
+            timestamps=True,
+            paced=self._paced,
+            block_s=self._block_s,
         )
 
     @property
@@ -69,18 +75,18 @@ class LoopbackRadio:
         finally:
             self._outstanding.lose()
 
-    async def send(self, burst: TxBurst) -> TxReport:
+    def send(self, burst: TxBurst) -> Awaitable[TxReport]:
         """Put a burst on the air."""
         if not self._is_open:
-            return TxReport(TxOutcome.LOST, burst.start, burst.start)
+            return answered(TxReport(TxOutcome.LOST, burst.start, burst.start))
         with self._lock:
-            start = self._outstanding.place(burst, self._next + self._timeline.early)
+            start = self._outstanding.place(burst, self._next + self._path.early)
             if start is None:
                 self.counters["late"] += 1
-                return TxReport(TxOutcome.LATE, burst.start, burst.start)
+                return answered(TxReport(TxOutcome.LATE, burst.start, burst.start))
             if self._hear_self:
-                self._timeline.add(start, burst.samples)
-        return await self._outstanding.left(start, len(burst.samples))
+                self._timeline.add(start, burst.samples, self._path)
+        return self._outstanding.left(start, len(burst.samples))
 
     async def close(self) -> None:
         """Stop."""

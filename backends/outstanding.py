@@ -8,6 +8,13 @@ GAP = 32
 """Samples of silence after a burst, for its echoes."""
 
 
+def answered(report: TxReport) -> asyncio.Future[TxReport]:
+    """A report that is there already."""
+    answer: asyncio.Future[TxReport] = asyncio.get_running_loop().create_future()
+    answer.set_result(report)
+    return answer
+
+
 class Outstanding:
     """Places bursts one after another, and answers each when the stream has passed its end."""
 
@@ -24,14 +31,14 @@ class Outstanding:
         self._free_from = start + len(burst.samples) + GAP
         return start
 
-    async def left(self, start: int, n_samples: int) -> TxReport:
-        """Wait until the last sample has left, or all is lost."""
+    def left(self, start: int, n_samples: int) -> asyncio.Future[TxReport]:
+        """The report that comes when the last sample has left, or all is lost."""
         report = TxReport(TxOutcome.SENT, start, start + n_samples)
         if self._is_over:
-            return report._replace(outcome=TxOutcome.LOST)
+            return answered(report._replace(outcome=TxOutcome.LOST))
         answer: asyncio.Future[TxReport] = asyncio.get_running_loop().create_future()
         self._waiting.append((report, answer))
-        return await answer
+        return answer
 
     def settle(self, index: int) -> None:
         """Every sample before `index` has left."""

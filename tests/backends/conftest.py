@@ -1,10 +1,18 @@
-"""What an ordinary user may do."""
+"""What an ordinary user may do, and how patient radios are here."""
 
 import os
 
 import pytest
 
+from phy import warm_up
+
 NOBODY = 65534
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _warm():
+    """Compiling takes longer on a fresh machine than a hub may be late."""
+    warm_up()
 
 
 @pytest.fixture
@@ -20,3 +28,13 @@ def own_rights(tmp_path, monkeypatch):
     os.seteuid(was)
     for path in tmp_path.iterdir():
         path.chmod(0o700)
+
+
+@pytest.fixture
+def at_ease(monkeypatch):
+    """Radios that a slow machine does not make gaps in; radios and hubs that end soon."""
+    # Gaps have tests of their own.
+    monkeypatch.setattr("backends.loopback.MAX_BEHIND_S", 1e6)
+    # Who waits in vain looks up so often.
+    monkeypatch.setattr("backends.ether.hub.LOOK_AFTER_MS", 20)
+    monkeypatch.setattr("backends.ether.radio.QUIET_MS", 50)

@@ -1,18 +1,12 @@
-"""Every radio there is, made for a folder, and short ways to run one."""
+"""Short ways to run a radio, and to read and write recordings."""
 
 import asyncio
-from collections.abc import Callable
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from backends import (
     Channel,
-    IqFileRadio,
-    LoopbackRadio,
-    Radio,
     RecordingReader,
     RecordingWriter,
     Tuning,
@@ -39,57 +33,6 @@ def noise(n, seed=SEED, scale=0.2):
 
 PLAYED = noise(40_017)
 """What a radio that receives from a recording plays; no whole number of blocks."""
-
-
-@dataclass(frozen=True)
-class Case:
-    """A radio under test."""
-
-    name: str
-    make: Callable[[Path], Radio]
-    receives: bool = True
-    transmits: bool = True
-    paced: bool = False
-    hears_self: bool = False
-
-    def __str__(self):
-        return self.name
-
-    def recorded(self, folder, blocks):
-        """What became of the bursts sent: the closed radio's recording, or what it heard."""
-        if self.hears_self:
-            return heard(blocks)
-        return read(folder / "sent")
-
-
-def loopback(name, paced):
-    return Case(name, lambda _: LoopbackRadio(AIR, BLOCK_S, paced), paced=paced, hears_self=True)
-
-
-def iqfile(name, receives, transmits, paced=False):
-    def make(folder):
-        if receives:
-            record(folder / "played", PLAYED)
-        return IqFileRadio(
-            folder / "played" if receives else None,
-            folder / "sent" if transmits else None,
-            AIR,
-            BLOCK_S,
-            paced,
-            type_name="cf32_le",
-        )
-
-    return Case(name, make, receives, transmits, paced)
-
-
-RADIOS = (
-    loopback("loopback", paced=True),
-    loopback("loopback-unpaced", paced=False),
-    iqfile("iqfile-receives", receives=True, transmits=False),
-    iqfile("iqfile-transmits", receives=False, transmits=True),
-    iqfile("iqfile-both", receives=True, transmits=True),
-    iqfile("iqfile-both-paced", receives=True, transmits=True, paced=True),
-)
 
 
 def record(path, samples, type_name="cf32_le", rate_hz=RATE):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from backends import BackendError, Channel
 from backends.air import Timeline
 from backends.pace import Pace
-from phy import PROFILES, FrontEndParams, PathParams, warm_up
+from phy import PROFILES, FrontEndParams, PathParams
 from tests.backends.radios import AIR, RATE, noise
 
 END = 2500
@@ -32,9 +32,9 @@ def taken(timeline, index, n):
 
 def line(channel, bursts, sizes):
     """What arrives of bursts, (start, length) each, read in pieces of these sizes."""
-    timeline = Timeline(channel.make_path())
+    timeline, path = Timeline(), channel.make_path()
     for start, n in bursts:
-        timeline.add(start, noise(n, seed=start))
+        timeline.add(start, noise(n, seed=start), path)
     pieces, index = [], 0
     for n in sizes:
         pieces.append(taken(timeline, index, n))
@@ -69,7 +69,6 @@ def test_any_pieces_are_the_line_of_all_bursts_added_up(bursts, sizes, delay):
 
 @pytest.mark.parametrize("profile", PROFILES)
 def test_echoes_arrive_on_the_line_as_the_path_carries_them(profile):
-    warm_up()
     channel = air(profile=profile, delay_spread_s=2e-6, delay_s=3.3e-6, clock_ppm=10)
     bursts = [(100, 300), (350, 100), (900, 10)]
     wanted = carried(channel, bursts)
@@ -90,10 +89,22 @@ def test_bursts_may_be_added_in_any_order():
     assert np.array_equal(line(air(), bursts, [500]), line(air(), bursts, []))
 
 
+def test_each_burst_goes_through_its_own_path():
+    """Also where one path has echoes, which arrive before their burst, and the other has none."""
+    one, other = air(loss_db=6), air(seed=2, profile="tdl-a", delay_s=5e-6)
+    first, second = [(100, 300)], [(250, 300)]
+    both, paths = Timeline(), (one.make_path(), other.make_path())
+    for (start, n), path in zip(first + second, paths, strict=True):
+        both.add(start, noise(n, seed=start), path)
+    wanted = line(one, first, []) + line(other, second, [])
+    assert np.count_nonzero(wanted[250:400]) == 150, "they overlap"
+    assert np.abs(taken(both, 0, END) - wanted).max() < 1e-6
+
+
 def test_what_has_been_read_is_forgotten():
-    timeline = Timeline(AIR.make_path())
-    timeline.add(10, noise(20))
-    timeline.add(50, noise(100))
+    timeline, path = Timeline(), AIR.make_path()
+    timeline.add(10, noise(20), path)
+    timeline.add(50, noise(100), path)
     timeline.take(0, 100)
     assert len(timeline._arriving) == 1
     timeline.take(100, 100)
@@ -102,11 +113,11 @@ def test_what_has_been_read_is_forgotten():
 
 
 def test_a_burst_whose_time_has_passed_is_not_heard():
-    timeline = Timeline(AIR.make_path())
+    timeline, path = Timeline(), AIR.make_path()
     timeline.take(0, 500)
-    timeline.add(100, noise(200))
+    timeline.add(100, noise(200), path)
     assert not taken(timeline, 500, 500).any()
-    timeline.add(900, noise(200))
+    timeline.add(900, noise(200), path)
     assert np.count_nonzero(timeline.take(1000, 500)) == 100
 
 

@@ -1,0 +1,138 @@
+"""One node's radio on a simulated air: what it makes of what arrives, and of its own bursts."""
+
+import asyncio
+
+import numpy as np
+
+from backends.base import SENDING, Capabilities, RxBlock, TxOutcome, TxReport
+from backends.ether.medium import NOISE_DBFS, Piece
+from backends.ether.world import RadioParams
+from phy import FrontEnd, FrontEndParams
+
+NOTHING_DB = 300.0
+
+
+class Antenna:
+    """Front end, sample count and outstanding bursts; all indices told are the radio's own.
+
+    Without time stamps, its count is a little off after each gap: all later indices with it.
+    """
+
+    def __init__(self, radio: RadioParams, seed: int, rate_hz: float) -> None:
+        self._radio = radio
+        self._index_error = 0 if radio.timestamps else round(radio.index_error_s * rate_hz)
+        self._rng = np.random.Generator(np.random.SFC64(seed))
+        front_end = FrontEndParams(
+            noise_dbfs=NOISE_DBFS,
+            image_db=np.inf if radio.image_db >= NOTHING_DB else radio.image_db,
+            dc_dbfs=-np.inf if radio.dc_dbfs <= -NOTHING_DB else radio.dc_dbfs,
+            bits=radio.adc_bits,
+        )
+        self._front_end = FrontEnd(front_end, self._rng)
+        self._zeros = np.zeros(0, np.complex64)
+        self._shift = 0
+        self._is_unsure = False
+        self._was_deaf = False
+        self.next_index = 0
+        self.end = 0
+        self._waiting: dict[int, tuple[TxReport | None, asyncio.Future[TxReport]]] = {}
+
+    def capabilities(self, paced: bool, lead_s: float, block_s: float) -> Capabilities:
+        """What the radio can do on an air that is paced, or in lock-step."""
+        radio = self._radio
+        return Capabilities(
+            receives=True,
+            transmits=True,
+            full_duplex=radio.full_duplex,
+            timestamps=radio.timestamps,
+            paced=paced,
+            lockstep=not paced,
+            lead_s=lead_s,
+            block_s=block_s,
+            turnaround_s=0.0 if radio.full_duplex else radio.turnaround_s,
+            index_error_s=0.0 if radio.timestamps else radio.index_error_s,
+        )
+
+    def on_air(self, index: int) -> int:
+        """Where an index of ours is by the air's count."""
+        return index - self._shift
+
+    def receive(self, piece: Piece, host_ns: int) -> RxBlock:
+        """What the radio delivers of the next piece."""
+        n, first = piece.n, self.next_index
+        samples = None
+        if piece.is_deaf:
+            n += 0 if self._was_deaf else self._slip(n)
+        else:
+            if piece.samples is None and len(self._zeros) < n:
+                self._zeros = np.zeros(n, np.complex64)
+            heard = self._zeros[:n] if piece.samples is None else piece.samples
+            samples = self._front_end.receive(heard)
+        self._was_deaf = piece.is_deaf
+        self.next_index = first + n
+        return RxBlock(
+            first,
+            n,
+            samples,
+            "" if samples is not None else SENDING,
+            host_ns,
+            self._index_error if self._is_unsure else 0,
+        )
+
+    def miss(self, n: int, reason: str, host_ns: int) -> RxBlock:
+        """`n` samples that were on the air and did not get here."""
+        first = self.next_index
+        self.next_index += n
+        uncertainty = self._index_error if self._is_unsure else 0
+        return RxBlock(first, n, None, reason, host_ns, uncertainty)
+
+    def rejoin(self, n: int, reason: str, host_ns: int) -> RxBlock:
+        """After about `n` samples of nothing, the air's count begins anew at 0."""
+        block = self.miss(n, reason, host_ns)
+        self._shift = self.next_index
+        return block
+
+    def sent(self, number: int) -> asyncio.Future[TxReport]:
+        """Burst `number` is on its way to the air."""
+        answer: asyncio.Future[TxReport] = asyncio.get_running_loop().create_future()
+        self._waiting[number] = (None, answer)
+        return answer
+
+    def placed(self, number: int, start: int | None, n_samples: int) -> None:
+        """The air has taken it at `start` by its own count; None: it came too late."""
+        _, answer = self._waiting.get(number, (None, None))
+        if answer is None:
+            return
+        if start is None:
+            del self._waiting[number]
+            if not answer.done():
+                answer.set_result(TxReport(TxOutcome.LATE, self.end, self.end))
+            return
+        own = start + self._shift
+        self._waiting[number] = (TxReport(TxOutcome.SENT, own, own + n_samples), answer)
+
+    def settle(self, index: int) -> None:
+        """All before `index` has left."""
+        self.end = index
+        for number, (report, answer) in list(self._waiting.items()):
+            if report is not None and report.end <= index:
+                del self._waiting[number]
+                if not answer.done():
+                    answer.set_result(report)
+
+    def lose(self) -> None:
+        """Nothing that waits will leave."""
+        waiting, self._waiting = self._waiting, {}
+        for report, answer in waiting.values():
+            if not answer.done():
+                start, end = (self.end, self.end) if report is None else report[1:]
+                answer.set_result(TxReport(TxOutcome.LOST, start, end))
+
+    def _slip(self, n: int) -> int:
+        if not self._index_error:
+            return 0
+        self._is_unsure = True
+        slip = int(self._rng.integers(-self._index_error, self._index_error + 1))
+        slip = max(slip, 1 - n)
+        self._shift += slip
+        return slip

@@ -1,0 +1,280 @@
+"""The hub: N radios of other processes on one simulated air, paced or in lock-step."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from random import Random
+
+import msgspec
+
+from backends.base import Samples, TxBurst
+from backends.ether import protocol
+from backends.ether.medium import Medium, Piece
+from backends.ether.sockets import HubSockets
+from backends.ether.world import AirParams, RadioParams, World
+
+# A hub that is late makes fewer, longer stretches.
+MAX_LATE_BLOCKS = 8
+# In lock-step, a radio that says nothing for so long is looked for.
+LOOK_AFTER_MS = 500
+
+
+@dataclass
+class _Member:
+    """One radio."""
+
+    node: int
+    identity: bytes
+    who: str
+    token: int
+    done: int = 0
+    late: int = 0
+    lost: int = 0
+    placed: list[protocol.Placed] = field(default_factory=list)
+    notice: str = ""
+
+
+class EtherHub:
+    """Sockets in `directory`. `radios` are those expected; others get a default one.
+
+    Paced by the clock; or in lock-step: it begins when all expected are there, each step waits for
+    everybody, and it stops at `until_s`.
+    """
+
+    def __init__(
+        self,
+        directory: Path,
+        air: AirParams,
+        world: World,
+        radios: Mapping[int, RadioParams],
+        *,
+        paced: bool = True,
+        until_s: float = float("inf"),
+        seed: int = 0,
+    ) -> None:
+        self._air = air
+        self._radios = radios
+        self._expected = set(radios)
+        self._paced = paced
+        self._until_s = until_s
+        self._seed = seed
+        self._medium = Medium(air, world, seed)
+        self._members: dict[int, _Member] = {}
+        self._by_token: dict[int, _Member] = {}
+        self._tokens = Random()
+        # In lock-step, the order in which bursts come in is chance.
+        self._bursts: list[tuple[int, int, TxBurst, int]] = []
+        self._now = 0.0
+        self._step = 0
+        self._looked = 0.0
+        self._began = 0.0
+        self._samples_lost = 0
+        self._is_stopped = False
+        self._sockets = HubSockets(directory)
+
+    def stop(self) -> None:
+        """End `run`; may be called from a signal handler."""
+        self._is_stopped = True
+
+    def run(self, ready: Callable[[], None] = lambda: None) -> None:
+        """Serve until stopped."""
+        ready()
+        try:
+            if self._paced:
+                self._run_paced()
+            else:
+                self._run_in_lockstep()
+        finally:
+            self._sockets.close()
+
+    def _run_paced(self) -> None:
+        block_s = self._air.block_s
+        self._began = began = time.monotonic() - self._now
+        while not self._is_stopped:
+            due = began + self._now + block_s
+            ahead_s = due - time.monotonic()
+            if ahead_s > 0:
+                time.sleep(ahead_s)
+            # What comes in between is in time when it is taken before the block that it is in.
+            self._sockets.take(self._take_from_radio, self._take_request)
+            late = time.monotonic() - due
+            blocks = 1 + min(int(late / block_s), MAX_LATE_BLOCKS)
+            self._now += blocks * block_s
+            self._hand_out(round(1e9 * (began + self._now)))
+
+    def _run_in_lockstep(self) -> None:
+        while not self._is_stopped:
+            behind = [member for member in self._members.values() if member.done < self._step]
+            is_complete = self._members.keys() >= self._expected
+            if behind or not is_complete or not self._members or self._is_over:
+                self._sockets.wait(LOOK_AFTER_MS)
+                if time.monotonic() - self._looked > 1e-3 * LOOK_AFTER_MS:
+                    self._looked = time.monotonic()
+                    self._look_for(behind)
+                self._sockets.take(self._take_from_radio, self._take_request)
+                continue
+            for bursts in sorted(self._bursts, key=lambda each: each[:2]):
+                self._send(*bursts)
+            self._bursts.clear()
+            self._step += 1
+            self._looked = time.monotonic()
+            self._now = min(self._step * self._air.block_s, self._until_s)
+            self._hand_out(0)
+
+    @property
+    def _is_over(self) -> bool:
+        return self._now >= self._until_s
+
+    def _take_request(self, frames: list[bytes]) -> None:
+        identity, data = frames[0], frames[-1]
+        message = protocol.to_hub(data)
+        if isinstance(message, protocol.Question):
+            self._reply(identity, self._answer())
+        else:
+            self._reply(identity, self._admit(identity, message))
+
+    def _admit(self, identity: bytes, hello: protocol.Hello) -> msgspec.Struct:
+        reason = self._refusal(identity, hello)
+        if reason:
+            return protocol.Refused(reason=reason)
+        gone = self._members.pop(hello.node, None)
+        if gone is not None:
+            self._by_token.pop(gone.token)
+        token = self._tokens.getrandbits(53)
+        member = _Member(hello.node, identity, hello.who, token, self._step or -1)
+        self._members[hello.node] = self._by_token[token] = member
+        radio = self._radios.get(hello.node, RadioParams())
+        self._medium.leave(hello.node)
+        self._medium.join(hello.node, radio, self._now)
+        return protocol.Welcome(
+            token=token,
+            radio=radio,
+            seed=self._seed * 256 + hello.node,
+            block_s=self._air.block_s,
+            host_ns=round(1e9 * (self._began + self._now)),
+            paced=self._paced,
+            air=f"{self._air.profile} air of {self._air.rate_hz / 1e6:g} Msps"
+            + ("" if self._paced else ", lock-step"),
+        )
+
+    def _refusal(self, identity: bytes, hello: protocol.Hello) -> str:
+        if hello.version != protocol.VERSION:
+            return (
+                f"this hub speaks version {protocol.VERSION} of the ether's protocol, the radio "
+                f"version {hello.version}; run hub and daemons from one version of sdrlinkd"
+            )
+        for name, theirs, ours in (
+            ("rate_hz", hello.rate_hz, self._air.rate_hz),
+            ("frequency_hz", hello.frequency_hz, self._air.frequency_hz),
+        ):
+            if not abs(theirs - ours) <= 1e-6 * ours:
+                return f"modem.{name}: got {theirs:g}; allowed: {ours:g}, that of this air"
+        there = self._members.get(hello.node)
+        if there is not None and there.identity != identity and self._is_alive(there):
+            there.notice = (
+                f"another daemon asked for our id {hello.node} on this air and was refused: "
+                f"{hello.who}; give it another robot_id"
+            )
+            return (
+                f"robot {hello.node} is on this air already: {there.who}; give one of the two "
+                "another robot_id"
+            )
+        if not self._paced and self._step and there is None:
+            return f"robot {hello.node} came too late: an air in lock-step begins with all robots"
+        return ""
+
+    def _take_from_radio(self, frames: list[bytes]) -> None:
+        message = protocol.from_radio(frames[0])
+        member = self._by_token.get(message.token)
+        if member is None:
+            return
+        if isinstance(message, protocol.Done):
+            member.done = max(member.done, message.step)
+        elif isinstance(message, protocol.Bye):
+            # It may be waiting for something to read.
+            self._reply(member.identity, self._answer())
+            self._remove(member)
+        else:
+            samples = protocol.samples_in(frames)
+            if samples is None or not len(samples):
+                return
+            burst = TxBurst(message.start, samples, message.exact)
+            if self._paced:
+                self._send(member.node, message.number, burst, message.late_seen)
+            else:
+                late_seen = message.late_seen
+                self._bursts.append((member.node, message.number, burst, late_seen))
+
+    def _send(self, node: int, number: int, burst: TxBurst, late_seen: int) -> None:
+        member = self._members.get(node)
+        if member is not None:
+            start = None
+            # Else it would overtake the one that was late and has to go again.
+            if not burst.exact or late_seen == member.late:
+                start = self._medium.send(node, burst)
+            member.late += start is None
+            member.placed.append(protocol.Placed(number, start, len(burst.samples)))
+
+    def _hand_out(self, host_ns: int) -> None:
+        pieces = {node: self._medium.take(node, self._now) for node in self._members}
+        for member in list(self._members.values()):
+            each = pieces[member.node] or [Piece(0, None, is_deaf=False)]
+            for i, piece in enumerate(each):
+                is_last = i == len(each) - 1
+                self._hand_to(member, piece, host_ns, self._step if is_last else 0)
+
+    def _hand_to(self, member: _Member, piece: Piece, host_ns: int, step: int) -> None:
+        stretch = protocol.Stretch(
+            n=piece.n,
+            is_deaf=piece.is_deaf,
+            host_ns=host_ns,
+            step=step,
+            lost=member.lost,
+            placed=member.placed,
+            notice=member.notice,
+        )
+        if self._reply(member.identity, stretch, piece.samples):
+            member.lost, member.placed, member.notice = 0, [], ""
+        else:
+            member.lost += piece.n
+            self._samples_lost += piece.n
+
+    def _reply(
+        self, identity: bytes, message: msgspec.Struct, samples: Samples | None = None
+    ) -> bool:
+        """Send without waiting; False when there was no room for it."""
+        try:
+            return self._sockets.reply(identity, message, samples)
+        except ConnectionError:
+            for member in list(self._members.values()):
+                if member.identity == identity:
+                    self._remove(member)
+            return True
+
+    def _look_for(self, behind: list[_Member]) -> None:
+        """A daemon that was killed says no Bye, but its connection is gone."""
+        for member in behind:
+            self._is_alive(member)
+
+    def _is_alive(self, member: _Member) -> bool:
+        self._reply(member.identity, self._answer())
+        return self._members.get(member.node) is member
+
+    def _remove(self, member: _Member) -> None:
+        if self._members.get(member.node) is member:
+            del self._members[member.node]
+            self._medium.leave(member.node)
+        self._by_token.pop(member.token, None)
+        # An air in lock-step does not wait for who is gone.
+        self._expected.discard(member.node)
+
+    def _answer(self) -> protocol.Answer:
+        return protocol.Answer(
+            now_s=self._now,
+            nodes={node: member.who for node, member in sorted(self._members.items())},
+            is_over=self._is_over,
+            bursts=self._medium.bursts,
+            bursts_late=self._medium.bursts_late,
+            samples_lost=self._samples_lost,
+        )

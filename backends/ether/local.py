@@ -1,0 +1,112 @@
+"""A simulated air inside one process, in lock-step: for tests, simulations and benchmarks."""
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Mapping
+
+from backends.base import BackendError, Capabilities, RxBlock, Tuning, TxBurst, TxOutcome, TxReport
+from backends.ether.antenna import Antenna
+from backends.ether.medium import LEAD, Medium
+from backends.ether.world import AirParams, RadioParams, World
+from backends.outstanding import answered
+
+
+class LocalEther:
+    """Radios on one air. Time goes on by a block when all of them have done with the one before."""
+
+    def __init__(
+        self, air: AirParams, radios: Mapping[int, RadioParams], world: World, seed: int
+    ) -> None:
+        self.air = air
+        self.medium = Medium(air, world, seed)
+        self.now = 0.0
+        self._steps = 0
+        self.radios = {
+            node_id: LocalRadio(self, node_id, radio, seed)
+            for node_id, radio in sorted(radios.items())
+        }
+        for node_id, radio in sorted(radios.items()):
+            self.medium.join(node_id, radio, 0.0)
+
+    async def run(self, until_s: float) -> None:
+        """Let time pass up to `until_s`."""
+        while self.now < until_s:
+            self._steps += 1
+            self.now = self._steps * self.air.block_s
+            pieces = [(radio, self.medium.take(i, self.now)) for i, radio in self.radios.items()]
+            for radio, each in pieces:
+                for piece in each:
+                    radio.queue.put_nowait(radio.antenna.receive(piece, 0))
+            for radio in list(self.radios.values()):
+                await radio.queue.join()
+
+    def leave(self, node_id: int) -> None:
+        """Nobody waits for a radio that is closed."""
+        del self.radios[node_id]
+        self.medium.leave(node_id)
+
+
+class LocalRadio:
+    """One node's radio in a LocalEther."""
+
+    def __init__(self, ether: LocalEther, node_id: int, radio: RadioParams, seed: int) -> None:
+        self._ether = ether
+        self._node_id = node_id
+        self.antenna = Antenna(radio, seed * 256 + node_id, ether.air.rate_hz)
+        self.queue: asyncio.Queue[RxBlock | None] = asyncio.Queue()
+        self._number = 0
+        self._is_open = False
+        self.counters: dict[str, int] = {"late": 0}
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """As its parameters say."""
+        return self.antenna.capabilities(
+            paced=False, lead_s=LEAD / self._ether.air.rate_hz, block_s=self._ether.air.block_s
+        )
+
+    @property
+    def detail(self) -> str:
+        """For people."""
+        return "simulated air in this process"
+
+    async def open(self, tuning: Tuning) -> None:
+        """Begin. Raises BackendError when it is set to another air."""
+        if tuning.rate_hz != self._ether.air.rate_hz:
+            raise BackendError(
+                f"rate_hz: got {tuning.rate_hz:g}; allowed: {self._ether.air.rate_hz:g}"
+            )
+        self._is_open = True
+
+    async def blocks(self) -> AsyncIterator[RxBlock]:
+        """What is received, a step at a time."""
+        while (block := await self.queue.get()) is not None:
+            self.antenna.settle(block.index + block.n)
+            try:
+                yield block
+            finally:
+                # Who asks for the next has done with this one.
+                self.queue.task_done()
+        self.queue.task_done()
+
+    def send(self, burst: TxBurst) -> Awaitable[TxReport]:
+        """Put a burst on the air."""
+        if not self._is_open:
+            return answered(TxReport(TxOutcome.LOST, burst.start, burst.start))
+        self._number += 1
+        answer = self.antenna.sent(self._number)
+        placed = burst._replace(start=self.antenna.on_air(burst.start))
+        start = self._ether.medium.send(self._node_id, placed)
+        self.counters["late"] += start is None
+        self.antenna.placed(self._number, start, len(burst.samples))
+        return answer
+
+    async def close(self) -> None:
+        """Stop."""
+        if self._is_open:
+            self._is_open = False
+            self._ether.leave(self._node_id)
+            while not self.queue.empty():
+                self.queue.get_nowait()
+                self.queue.task_done()
+            self.queue.put_nowait(None)
+        self.antenna.lose()

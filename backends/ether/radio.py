@@ -1,0 +1,279 @@
+"""A radio on the simulated air of a hub."""
+
+import asyncio
+import contextlib
+import threading
+from collections import deque
+from collections.abc import AsyncIterator, Awaitable
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+import zmq
+
+from backends.base import (
+    BackendError,
+    Capabilities,
+    RxBlock,
+    Samples,
+    Tuning,
+    TxBurst,
+    TxOutcome,
+    TxReport,
+)
+from backends.ether import protocol
+from backends.ether.antenna import Antenna
+from backends.ether.downlink import Downlink
+from backends.ether.medium import LEAD, Piece
+from backends.ether.sockets import AIR, SKY, WAITING
+from backends.feed import BlockFeed
+from backends.outstanding import answered
+
+# From the event loop to the hub, on a busy machine.
+LEAD_S = 0.002
+ANSWER_MS = 5000
+# A paced hub that says nothing for so long is gone; it is asked again that often.
+QUIET_MS = 500
+
+
+class _Beside(NamedTuple):
+    """What came with a block: read on the event loop, when the block is."""
+
+    placed: list[protocol.Placed]
+    step: int
+    welcome: protocol.Welcome | None = None
+
+
+class EtherRadio:
+    """Joins the hub whose sockets are in `directory` as robot `node`; `who` names it to people.
+
+    When the hub goes away, the stream stands still until it is back; then what it missed is a gap.
+    """
+
+    def __init__(self, directory: Path, node: int, who: str) -> None:
+        self._directory = directory
+        self._node = node
+        self._who = who
+        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._feed = BlockFeed(self._next_block, "ether")
+        self._closing = threading.Event()
+        self._readable = asyncio.Event()
+        self._antenna: Antenna | None = None
+        self._beside: deque[_Beside] = deque()
+        self._number = 0
+        self._late_seen = 0
+        self._is_over = False
+        self._has_asked = False
+        self._last_host_ns = 0
+        self._is_away = False
+        self._notice = ""
+        self.counters = {"overflows": 0, "samples_lost": 0, "late": 0, "hub_outages": 0}
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """As the hub says."""
+        paced = self._welcome.paced
+        lead_s = LEAD_S if paced else LEAD / self._tuning.rate_hz
+        return self._joined.capabilities(paced, lead_s, self._welcome.block_s)
+
+    @property
+    def detail(self) -> str:
+        """For people."""
+        if self._antenna is None:
+            return "no hub yet"
+        parts = [self._welcome.air, "the hub is away" if self._is_away else "", self._notice]
+        return ", ".join(part for part in parts if part)
+
+    async def open(self, tuning: Tuning) -> None:
+        """Join. Raises BackendError, also when the hub refuses."""
+        self._tuning = tuning
+        self._down = self._socket(zmq.DEALER, AIR)
+        self._downlink = Downlink(self._down)
+        self._up = self._socket(zmq.PUSH, SKY)
+        welcome = await asyncio.to_thread(self._ask)
+        self._welcome = welcome
+        self._down.setsockopt(zmq.RCVTIMEO, QUIET_MS)
+        self._antenna = Antenna(welcome.radio, welcome.seed, tuning.rate_hz)
+
+    async def blocks(self) -> AsyncIterator[RxBlock]:
+        """What the hub hands out. Raises BackendError when it will not have us any more."""
+        antenna = self._joined
+        # In lock-step everybody waits anyway, and a thread would only cost.
+        blocks = self._feed.blocks() if self._welcome.paced else self._blocks_here()
+        if not self._welcome.paced:
+            self._say(protocol.Done(token=self._welcome.token, step=0))
+        try:
+            async for block in blocks:
+                beside = self._beside.popleft()
+                if beside.welcome is not None:
+                    # From here on, bursts are for the new hub.
+                    antenna.lose()
+                    self._welcome, self._late_seen = beside.welcome, 0
+                for placed in beside.placed:
+                    self.counters["late"] += placed.start is None
+                    self._late_seen += placed.start is None
+                    antenna.placed(placed.number, placed.start, placed.n_samples)
+                antenna.settle(block.index + block.n)
+                if block.n:
+                    yield block
+                if beside.step:
+                    self._say(protocol.Done(token=self._welcome.token, step=beside.step))
+        finally:
+            self._is_over = True
+            antenna.lose()
+
+    def send(self, burst: TxBurst) -> Awaitable[TxReport]:
+        """Hand a burst to the hub; while there is none, it is lost when the hub is back."""
+        if self._antenna is None or self._is_over or self._closing.is_set():
+            return answered(TxReport(TxOutcome.LOST, burst.start, burst.start))
+        self._number += 1
+        message = protocol.Sent(
+            token=self._welcome.token,
+            number=self._number,
+            start=self._antenna.on_air(burst.start),
+            exact=burst.exact,
+            late_seen=self._late_seen,
+        )
+        answer = self._antenna.sent(self._number)
+        samples = np.ascontiguousarray(burst.samples, np.complex64)
+        self._say(message, samples.data.cast("B"))
+        return answer
+
+    async def close(self) -> None:
+        """Leave the air."""
+        if self._closing.is_set():
+            return
+        self._closing.set()
+        if self._antenna is not None:
+            self._say(protocol.Bye(token=self._welcome.token))
+            self._feed.stop()
+            self._readable.set()
+            asyncio.get_running_loop().remove_reader(int(self._down.fd))
+            self._antenna.lose()
+        self._context.destroy(linger=100)
+
+    @property
+    def _joined(self) -> Antenna:
+        if self._antenna is None:
+            raise RuntimeError("not open")
+        return self._antenna
+
+    def _say(self, message: msgspec.Struct, *more: memoryview) -> None:
+        """To the hub; without one, into the void."""
+        with contextlib.suppress(zmq.Again):
+            self._up.send_multipart([protocol.encode(message), *more], zmq.NOBLOCK)
+
+    def _hello(self) -> None:
+        hello = protocol.Hello(
+            version=protocol.VERSION,
+            node=self._node,
+            who=self._who,
+            rate_hz=self._tuning.rate_hz,
+            frequency_hz=self._tuning.frequency_hz,
+        )
+        with contextlib.suppress(zmq.Again):
+            self._down.send(protocol.encode(hello), zmq.NOBLOCK)
+
+    def _ask(self) -> protocol.Welcome:
+        """The first time, before there are blocks; in a thread."""
+        self._hello()
+        while not self._closing.is_set() and self._down.poll(ANSWER_MS):
+            answer = protocol.from_hub(self._down.recv_multipart()[0])
+            if isinstance(answer, protocol.Welcome):
+                return answer
+            if isinstance(answer, protocol.Refused):
+                raise BackendError(answer.reason)
+        raise BackendError(
+            f"{self._directory}: no hub answers there; start one: sdrlink-ether --dir "
+            f"{self._directory}"
+        )
+
+    def _next_block(self) -> RxBlock | None:
+        """In the feed's thread."""
+        while not self._closing.is_set():
+            try:
+                message, samples = self._downlink.next()
+            except zmq.Again:
+                self._look_for_hub()
+                continue
+            if isinstance(message, protocol.Stretch):
+                self._is_away = False
+                return self._receive(*self._downlink.with_more(message, samples))
+            if isinstance(message, protocol.Refused):
+                raise BackendError(message.reason)
+            if isinstance(message, protocol.Welcome):
+                return self._rejoin(message)
+            if self._is_away and not self._has_asked and self._node not in message.nodes:
+                self._has_asked = True
+                self._hello()
+        return None
+
+    async def _blocks_here(self) -> AsyncIterator[RxBlock]:
+        """In lock-step: read on the event loop itself."""
+        loop, readable = asyncio.get_running_loop(), self._readable
+        fd = int(self._down.fd)
+        loop.add_reader(fd, readable.set)
+        try:
+            while not self._closing.is_set():
+                readable.clear()
+                try:
+                    message, samples = self._downlink.read(zmq.NOBLOCK)
+                except zmq.Again:
+                    # The socket tells only once that it has become readable; so read first.
+                    with contextlib.suppress(TimeoutError):
+                        await asyncio.wait_for(readable.wait(), QUIET_MS * 1e-3)
+                    continue
+                if isinstance(message, protocol.Refused):
+                    raise BackendError(message.reason)
+                if isinstance(message, protocol.Stretch):
+                    yield self._receive(message, samples)
+        finally:
+            if not self._down.closed:
+                loop.remove_reader(fd)
+
+    def _receive(self, message: protocol.Stretch, samples: Samples | None) -> RxBlock:
+        antenna = self._joined
+        self._last_host_ns = message.host_ns
+        self._notice = message.notice or self._notice
+        if message.lost:
+            self.counters["overflows"] += 1
+            # The samples at hand go with those before them.
+            lost = message.lost + message.n
+            self.counters["samples_lost"] += lost
+            self._beside.append(_Beside(message.placed, message.step))
+            return antenna.miss(lost, "the daemon was too slow", message.host_ns)
+        piece = Piece(message.n, samples, message.is_deaf)
+        self._beside.append(_Beside(message.placed, message.step))
+        return antenna.receive(piece, message.host_ns)
+
+    def _look_for_hub(self) -> None:
+        """Nothing came for a while: in lock-step others may be slow, else the hub is gone."""
+        if self._welcome.paced and not self._is_away:
+            self._is_away = True
+            self.counters["hub_outages"] += 1
+        self._has_asked = False
+        with contextlib.suppress(zmq.Again):
+            self._down.send(protocol.encode(protocol.Question()), zmq.NOBLOCK)
+
+    def _rejoin(self, welcome: protocol.Welcome) -> RxBlock:
+        """A hub that knows nothing of before: its count begins anew."""
+        self._is_away = False
+        now_ns = welcome.host_ns
+        away_s = (now_ns - self._last_host_ns) * 1e-9 if welcome.paced else 0.0
+        self._beside.append(_Beside([], 0, welcome))
+        self._last_host_ns = now_ns
+        n = max(1, round(away_s * self._tuning.rate_hz))
+        return self._joined.rejoin(n, "the hub was away", now_ns)
+
+    def _socket(self, kind: int, name: str) -> "zmq.Socket[bytes]":
+        socket = self._context.socket(kind)
+        socket.setsockopt(zmq.LINGER, 100)
+        socket.setsockopt(zmq.RCVHWM, WAITING)
+        socket.setsockopt(zmq.RECONNECT_IVL_MAX, QUIET_MS)
+        path = self._directory / name
+        try:
+            socket.connect(f"ipc://{path}")
+        except zmq.ZMQError as error:
+            raise BackendError(f"{path}: cannot be reached ({error.strerror})") from None
+        return socket

@@ -1,0 +1,117 @@
+"""The hub's sockets in a folder that it has for itself."""
+
+import fcntl
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO
+
+import msgspec
+import numpy as np
+import zmq
+
+from backends.base import BackendError, Samples
+from backends.ether import protocol
+
+AIR, SKY = "air.sock", "sky.sock"
+# Stretches that may wait for a radio; half a second of blocks.
+WAITING = 500
+
+
+class HubSockets:
+    """`air` (ROUTER) answers and hands out, `sky` (PULL) takes what radios send.
+
+    Raises BackendError when the folder cannot be had.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
+        self._lock = _locked(directory)
+        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._air = self._bind(zmq.ROUTER, AIR)
+        self._sky = self._bind(zmq.PULL, SKY)
+        self._poller = zmq.Poller()
+        for each in (self._air, self._sky):
+            self._poller.register(each, zmq.POLLIN)
+
+    def wait(self, wait_ms: int) -> bool:
+        """Until there is something to take, for at most `wait_ms`; whether there is."""
+        return bool(self._poller.poll(wait_ms))
+
+    def take(
+        self,
+        from_radio: Callable[[list[bytes]], None],
+        request: Callable[[list[bytes]], None],
+    ) -> None:
+        """All that is there."""
+        _drain(self._sky, from_radio)
+        _drain(self._air, request)
+
+    def reply(self, identity: bytes, message: msgspec.Struct, samples: Samples | None) -> bool:
+        """Send without waiting; False when there is no room for it.
+
+        Raises ConnectionError when nobody of that identity is there.
+        """
+        frames: list[bytes | memoryview] = [identity, protocol.encode(message)]
+        if samples is not None:
+            frames.append(np.ascontiguousarray(samples).data.cast("B"))
+        try:
+            self._air.send_multipart(frames, zmq.NOBLOCK)
+        except zmq.Again:
+            return False
+        except zmq.ZMQError as error:
+            if error.errno == zmq.EHOSTUNREACH:
+                raise ConnectionError from None
+            raise
+        return True
+
+    def close(self) -> None:
+        """Close; the folder is free."""
+        self._context.destroy(linger=100)
+        for name in (AIR, SKY):
+            (self._directory / name).unlink(missing_ok=True)
+        self._lock.close()
+
+    def _bind(self, kind: int, name: str) -> "zmq.Socket[bytes]":
+        socket = self._context.socket(kind)
+        if kind == zmq.ROUTER:
+            socket.setsockopt(zmq.ROUTER_MANDATORY, 1)
+        socket.setsockopt(zmq.SNDHWM, WAITING)
+        socket.setsockopt(zmq.LINGER, 0)
+        path = self._directory / name
+        try:
+            socket.bind(f"ipc://{path}")
+        except zmq.ZMQError as error:
+            self.close()
+            raise BackendError(f"{path}: the hub's socket cannot be opened ({error})") from None
+        return socket
+
+
+def _drain(socket: "zmq.Socket[bytes]", take: Callable[[list[bytes]], None]) -> None:
+    while True:
+        try:
+            frames = socket.recv_multipart(zmq.NOBLOCK)
+        except zmq.Again:
+            return
+        try:
+            take(frames)
+        except (msgspec.DecodeError, ValueError, RecursionError):
+            # Not one of ours; whoever it is gets no answer.
+            continue
+
+
+def _locked(directory: Path) -> IO[str]:
+    """A second bind would take a living hub's sockets away."""
+    path = directory / "ether.lock"
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        lock = path.open("w")
+    except OSError as error:
+        raise BackendError(f"{path}: cannot be opened ({error.strerror})") from None
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        lock.close()
+        raise BackendError(
+            f"{directory}: another hub serves this folder; stop it, or name another one"
+        ) from None
+    return lock

@@ -1,0 +1,299 @@
+"""The medium once more, in bursts instead of samples: who hears what, by the tables of errors.
+
+White noise only. What others send meanwhile is noise too: their powers add up. The errors in a PDU
+are the sum over its parts, each for as long as it lasts at its own SINR. So its worst part decides,
+as the code cannot bridge even one bad symbol, but a graze of a sample or two does no harm.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+import phy
+from backends.base import Capabilities
+from backends.ether.antenna import Antenna
+from backends.ether.medium import LEAD
+from backends.ether.world import AirParams, Hop, RadioParams, World
+from backends.outstanding import GAP
+
+NEVER = -1.0
+TAIL = 2 * phy.SENSE_WINDOW
+"""Energy may seem to end so many samples later than a header tells."""
+KEEP_S = 1.0
+"""A burst is forgotten so long after it is over at the latest."""
+
+
+class BurstShape(NamedTuple):
+    """Times in s from a burst's first sample.
+
+    At `head_s` preamble and header are over; `pdus`: where each PDU's symbols begin and end.
+    """
+
+    mcs: int
+    pdu_bytes: int
+    airtime_s: float
+    head_s: float
+    pdus: tuple[tuple[float, float], ...]
+
+
+class AirSense(NamedTuple):
+    """A receiver has listened up to `until`; the last carrier it knows of ended at `idle_since`.
+
+    One that goes on ends later than `until`. `burst_at`: when that carrier's first sample arrived;
+    None when its header was not read, negative before the first.
+    """
+
+    until: float
+    idle_since: float
+    burst_at: float | None
+
+
+@dataclass(slots=True, eq=False)
+class Flight:
+    """A burst on the air; by node that it reaches: when, how, and what chance has for it."""
+
+    sender: int
+    start_s: float
+    over_s: float
+    """When it has passed all."""
+    shape: BurstShape
+    hops: dict[int, Hop]
+    arrives: dict[int, float]
+    draws: dict[int, list[float]]
+    near: list["Flight"] = field(default_factory=list)
+    """Others that are on the air somewhere at the same time."""
+    found: dict[int, bool] = field(default_factory=dict)
+
+    @property
+    def end_s(self) -> float:
+        """When its last sample has left."""
+        return self.start_s + self.shape.airtime_s
+
+
+@dataclass(slots=True)
+class _Node:
+    radio: RadioParams
+    deaf: list[tuple[float, float]] = field(default_factory=list)
+    free_from: float = NEVER
+    energy_end: float = 0.0
+    burst: tuple[float, float] = (NEVER, 0.0)
+    """Begin and end of the last one whose header was read."""
+
+
+class BurstMedium:
+    """N nodes on one air, all by the same clock in s. `carrier_db`: so much above noise is noticed.
+
+    A pair's SNR and delay are kept for `keep_s`, inf: for ever; outages hold at once. Raises
+    ValueError for an air that fades: there are no tables.
+    """
+
+    def __init__(
+        self, air: AirParams, world: World, seed: int, carrier_db: float = 6.0, keep_s: float = 0.0
+    ) -> None:
+        if air.profile != "awgn":
+            raise ValueError(f'air.profile: got "{air.profile}"; allowed in bursts: "awgn"')
+        self._air = air
+        self._world = world
+        self._keep_s = keep_s
+        self._loud_db = _decibel(10 ** (carrier_db / 10) - 1)
+        self._rng = np.random.default_rng(seed)
+        self._nodes: dict[int, _Node] = {}
+        self._hops: dict[int, tuple[float, dict[int, Hop]]] = {}
+        self._live: list[Flight] = []
+
+    def join(self, node: int, radio: RadioParams) -> Capabilities:
+        """A node is there from now on; what its radio can do."""
+        self._nodes[node] = _Node(radio)
+        self._hops.clear()
+        rate_hz = self._air.rate_hz
+        return Antenna(radio, 0, rate_hz).capabilities(False, LEAD / rate_hz, self._air.block_s)
+
+    def send(self, node: int, start_s: float, mcs: int, n_pdus: int, pdu_bytes: int) -> Flight:
+        """Put a burst on the air, ahead of `start_s` by the turnaround or more.
+
+        Raises ValueError when the node's last one is not over by then.
+        """
+        sender = self._nodes[node]
+        if start_s < sender.free_from - 1e-9:
+            raise ValueError(f"start: got {start_s:.6f} s; allowed: from {sender.free_from:.6f} on")
+        shape = burst_shape(self._air.rate_hz, mcs, n_pdus, pdu_bytes)
+        hops = self._hops_of(node, start_s)
+        arrives = {other: start_s + hop.delay_s for other, hop in hops.items()}
+        draws = dict(zip(hops, self._rng.random((len(hops), 1 + n_pdus)).tolist(), strict=True))
+        over_s = max(arrives.values(), default=start_s) + shape.airtime_s
+        flight = Flight(node, start_s, over_s, shape, hops, arrives, draws)
+        for other in list(self._live):
+            if other.over_s + KEEP_S < start_s:
+                self.settle(other)
+            elif other.start_s < over_s and start_s < other.over_s:
+                flight.near.append(other)
+                other.near.append(flight)
+        self._live.append(flight)
+        sender.free_from = flight.end_s + GAP / self._air.rate_hz
+        if not sender.radio.full_duplex:
+            turn_s, oldest_s = sender.radio.turnaround_s, min(each.start_s for each in self._live)
+            sender.deaf = [each for each in sender.deaf if each[1] > oldest_s]
+            sender.deaf.append((start_s - turn_s, flight.end_s + turn_s))
+        return flight
+
+    def readers(self, flight: Flight, number: int, nodes: Sequence[int]) -> list[tuple[int, float]]:
+        """Which of `nodes` read a PDU, and the SNR in dB that their receivers tell.
+
+        To be asked when all of it has arrived at these, and before the flight is settled.
+        """
+        shape, (begin_s, end_s), read = flight.shape, flight.shape.pdus[number], []
+        for node in nodes:
+            at, snr_db = flight.arrives[node], flight.hops[node].snr_db
+            if not self._finds(flight, node, at) or self._is_deaf(node, at, at + end_s):
+                continue
+            if flight.near:
+                errors = _byte_errors_in(flight, node, at + begin_s, at + end_s)
+                snr_db = _head_snr_db(flight, node, at)
+            else:
+                errors = byte_errors(shape.mcs, snr_db)
+            if flight.draws[node][1 + number] < math.exp(-shape.pdu_bytes * errors):
+                read.append((node, snr_db))
+        return read
+
+    def settle(self, flight: Flight) -> None:
+        """It has passed all: what remains of it is what each node knows."""
+        for node, at in flight.arrives.items():
+            one = self._nodes[node]
+            if self._finds(flight, node, at) and at > one.burst[0]:
+                one.burst = (at, at + flight.shape.airtime_s)
+            else:
+                one.energy_end = max(one.energy_end, self._energy_end(flight, node, at, math.inf))
+        if flight in self._live:
+            self._live.remove(flight)
+        # Those that it met may still ask for it, but not on and on for those it met in turn.
+        flight.near = []
+
+    def sensed(self, node: int, t: float) -> AirSense:
+        """What the node's receiver knows of the air at `t`, which is not later than now."""
+        energy_end, (begin, end) = self._nodes[node].energy_end, self._nodes[node].burst
+        for flight in self._live:
+            at = flight.arrives.get(node, t)
+            if at < t:
+                energy_end = max(energy_end, self._energy_end(flight, node, at, t))
+                if begin < at <= t - flight.shape.head_s and self._finds(flight, node, at):
+                    begin, end = at, at + flight.shape.airtime_s
+        if energy_end <= end + TAIL / self._air.rate_hz:
+            return AirSense(t, end, begin)
+        is_over = energy_end + TAIL / self._air.rate_hz <= t
+        return AirSense(t, energy_end if is_over else t + 1 / self._air.rate_hz, None)
+
+    def _hops_of(self, sender: int, t: float) -> dict[int, Hop]:
+        if self._world.is_out(t):
+            return {}
+        until, hops = self._hops.get(sender, (-math.inf, {}))
+        if t > until:
+            there = {node: self._world.hop(sender, node, t) for node in self._nodes}
+            hops = {node: hop for node, hop in there.items() if hop and node != sender}
+            self._hops[sender] = (t + self._keep_s, hops)
+        return hops
+
+    def _finds(self, flight: Flight, node: int, at: float) -> bool:
+        """Whether the header is read; not to be asked before it is over."""
+        found = flight.found.get(node)
+        if found is None:
+            found = flight.found[node] = (
+                flight.draws[node][0] < found_rate(_head_snr_db(flight, node, at))
+                and not self._is_deaf(node, at, at + flight.shape.head_s)
+                and not self._is_taken(flight, node, at)
+            )
+        return found
+
+    def _is_taken(self, flight: Flight, node: int, at: float) -> bool:
+        """Whether the receiver is in another burst that it has found, and not been deaf since."""
+        return any(
+            ((begin := other.arrives.get(node, math.inf)), other.sender) < (at, flight.sender)
+            and at < begin + other.shape.airtime_s
+            and not self._is_deaf(node, begin, at)
+            and self._finds(other, node, begin)
+            for other in flight.near
+        )
+
+    def _is_deaf(self, node: int, begin: float, end: float) -> bool:
+        deaf = self._nodes[node].deaf
+        is_late = bool(deaf) and begin < deaf[-1][1]
+        return is_late and any(first < end and begin < last for first, last in deaf)
+
+    def _energy_end(self, flight: Flight, node: int, at: float, t: float) -> float:
+        """Up to when its power was noticed, by `t`."""
+        if flight.hops[node].snr_db <= self._loud_db:
+            return NEVER
+        begin, end = at, min(t, at + flight.shape.airtime_s)
+        for first, last in self._nodes[node].deaf:
+            if first < end and begin < last:
+                begin, end = (last, end) if last < end else (begin, first)
+        return end if end - begin >= phy.SENSE_WINDOW / self._air.rate_hz else NEVER
+
+
+@lru_cache(maxsize=256)
+def burst_shape(rate_hz: float, mcs: int, n_pdus: int, pdu_bytes: int) -> BurstShape:
+    """Times of a burst as the modem sends it. Raises ValueError for what no header can tell."""
+    plan = phy.layout(phy.OFDM_64_16, mcs, n_pdus, pdu_bytes)
+    symbol, head = plan.grid.n_symbol, plan.n_samples - plan.n_symbols * plan.grid.n_symbol
+    firsts = [i * plan.coded_bits // plan.symbol_bits for i in range(n_pdus)]
+    lasts = [plan.symbols_through(i + 1) for i in range(n_pdus)]
+    pdus = tuple(
+        ((head + symbol * first) / rate_hz, (head + symbol * last) / rate_hz)
+        for first, last in zip(firsts, lasts, strict=True)
+    )
+    return BurstShape(mcs, pdu_bytes, plan.n_samples / rate_hz, head / rate_hz, pdus)
+
+
+@lru_cache(maxsize=4096)
+def byte_errors(mcs: int, snr_db: float) -> float:
+    """Errors expected in each byte of a PDU whose burst is found: PER = 1 − exp(−bytes · that)."""
+    good, found = 1 - phy.pdu_error_rate(mcs, snr_db, 1), phy.burst_found_rate(snr_db)
+    return max(0.0, math.log(found / good)) if good > 0 else math.inf
+
+
+found_rate = lru_cache(maxsize=4096)(phy.burst_found_rate)
+
+
+def _parts(flight: Flight, node: int, begin: float, end: float) -> list[tuple[float, float]]:
+    """(share, power of all noise over the receiver's own) of the parts between two times."""
+    others = []
+    for each in flight.near:
+        at = each.arrives.get(node, math.inf)
+        over = at + each.shape.airtime_s
+        if at < end and begin < over:
+            others.append((at, over, 10 ** (each.hops[node].snr_db / 10)))
+    cuts = {begin, end, *(t for each in others for t in each[:2] if begin < t < end)}
+    return [
+        (
+            (last - first) / (end - begin),
+            1 + sum(power for at, over, power in others if at <= first and last <= over),
+        )
+        for first, last in pairwise(sorted(cuts))
+    ]
+
+
+def _head_snr_db(flight: Flight, node: int, at: float) -> float:
+    """By the mean noise until the header is over."""
+    snr_db = flight.hops[node].snr_db
+    if not flight.near:
+        return snr_db
+    parts = _parts(flight, node, at, at + flight.shape.head_s)
+    return snr_db - _decibel(sum(share * noise for share, noise in parts))
+
+
+def _byte_errors_in(flight: Flight, node: int, begin: float, end: float) -> float:
+    """Mean over all parts between two times."""
+    snr_db = flight.hops[node].snr_db
+    return sum(
+        share * byte_errors(flight.shape.mcs, snr_db - _decibel(noise))
+        for share, noise in _parts(flight, node, begin, end)
+    )
+
+
+def _decibel(ratio: float) -> float:
+    """Rounded: a table of errors need not be long."""
+    return round(10 * math.log10(ratio), 2)

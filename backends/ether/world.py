@@ -1,0 +1,157 @@
+"""Where the nodes of a simulated air are, and how well they hear each other."""
+
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+from typing import Annotated, Literal, NamedTuple
+
+import msgspec
+from msgspec import Meta
+
+SPEED_OF_LIGHT = 299_792_458.0
+LEAST_DISTANCE_M = 1.0
+
+Decibel = Annotated[float, Meta(ge=-300, le=300)]
+
+
+class AirParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The air that all share. SNR is mean burst power over the receiver's noise in the band."""
+
+    rate_hz: Annotated[float, Meta(ge=1e4, le=2e8)] = 5e6
+    frequency_hz: Annotated[float, Meta(ge=0, le=1e11)] = 2.45e9
+    profile: Literal["awgn", "rayleigh", "tdl-a", "tdl-c"] = "awgn"
+    """One path, or echoes that fade anew for each burst."""
+    delay_spread_s: Annotated[float, Meta(ge=0, le=1e-3)] = 1e-7
+    snr_db: Decibel = 20.0
+    """Between nodes without positions, where no link says otherwise."""
+    snr_db_at_1m: Decibel = 60.0
+    """Between nodes with positions."""
+    path_loss_exponent: Annotated[float, Meta(ge=0, le=8)] = 2.0
+    block_s: Annotated[float, Meta(ge=1e-5, le=0.1)] = 0.001
+    """Samples are handed out in pieces of this length."""
+
+
+class RadioParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One node's radio."""
+
+    full_duplex: bool = True
+    turnaround_s: Annotated[float, Meta(ge=0, le=1)] = 0.0
+    """Deaf so long before and after each burst; of half-duplex radios."""
+    timestamps: bool = True
+    index_error_s: Annotated[float, Meta(ge=0, le=0.1)] = 0.0
+    """Without time stamps: how wrong the sample count may be after each burst."""
+    clock_ppm: Annotated[float, Meta(ge=-200, le=200)] = 0.0
+    """Error of its crystal: carrier and sampling clock."""
+    image_db: Decibel = 300.0
+    dc_dbfs: Annotated[float, Meta(ge=-300, le=0)] = -300.0
+    adc_bits: Annotated[int, Meta(ge=0, le=24)] = 0
+
+
+class LinkOverride(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """How one node hears another, whatever their places; both ways unless `one_way`."""
+
+    sender: Annotated[int, Meta(ge=0, le=254)]
+    receiver: Annotated[int, Meta(ge=0, le=254)]
+    snr_db: Decibel | None = None
+    """Absent: from the places. -300: nothing at all."""
+    delay_s: Annotated[float, Meta(ge=0, le=1)] = 0.0
+    one_way: bool = False
+
+
+class Outage(NamedTuple):
+    """Nothing gets through from `begin_s` to `end_s`."""
+
+    begin_s: float
+    end_s: float
+
+
+class Hop(NamedTuple):
+    """How a burst gets from one node to another."""
+
+    snr_db: float
+    delay_s: float
+    doppler_ppm: float
+
+
+class Track:
+    """Where a node is: straight lines between waypoints (t in s, x and y in m), then it stays."""
+
+    def __init__(self, waypoints: Sequence[tuple[float, float, float]]) -> None:
+        self._times = [t for t, _, _ in waypoints]
+        self._places = [(x, y) for _, x, y in waypoints]
+
+    def at(self, t: float) -> tuple[float, float]:
+        """Position in m."""
+        after = bisect_right(self._times, t)
+        if after == 0:
+            return self._places[0]
+        if after == len(self._times):
+            return self._places[-1]
+        t0, t1 = self._times[after - 1], self._times[after]
+        share = (t - t0) / (t1 - t0)
+        (x0, y0), (x1, y1) = self._places[after - 1], self._places[after]
+        return x0 + share * (x1 - x0), y0 + share * (y1 - y0)
+
+
+class World:
+    """All pairs, at any time."""
+
+    def __init__(
+        self,
+        air: AirParams,
+        tracks: dict[int, Track],
+        links: Sequence[LinkOverride] = (),
+        outages: Sequence[Outage] = (),
+    ) -> None:
+        self._air = air
+        self._tracks = tracks
+        self._outages = _merged(outages)
+        self._ends = [outage.end_s for outage in self._outages]
+        self._links: dict[tuple[int, int], LinkOverride] = {}
+        for link in links:
+            self._links[link.sender, link.receiver] = link
+            if not link.one_way:
+                self._links.setdefault((link.receiver, link.sender), link)
+
+    def hop(self, sender: int, receiver: int, t: float) -> Hop | None:
+        """At `t`; None when nothing gets through."""
+        if self.is_out(t):
+            return None
+        link = self._links.get((sender, receiver))
+        distance_m, speed = self._distance(sender, receiver, t)
+        delay_s = distance_m / SPEED_OF_LIGHT + (link.delay_s if link else 0.0)
+        snr_db = link.snr_db if link else None
+        if snr_db is None:
+            snr_db = self._air.snr_db
+            if sender in self._tracks and receiver in self._tracks:
+                away = max(distance_m, LEAST_DISTANCE_M)
+                loss_db = 10 * self._air.path_loss_exponent * math.log10(away)
+                snr_db = self._air.snr_db_at_1m - loss_db
+        if snr_db <= -300:
+            return None
+        return Hop(snr_db, delay_s, -1e6 * speed / SPEED_OF_LIGHT)
+
+    def is_out(self, t: float) -> bool:
+        """Whether there is an outage at `t`."""
+        i = bisect_right(self._ends, t)
+        return i < len(self._outages) and self._outages[i].begin_s <= t
+
+    def _distance(self, sender: int, receiver: int, t: float) -> tuple[float, float]:
+        """(distance in m, how fast it grows in m/s); 0 where places are not known."""
+        one, other = self._tracks.get(sender), self._tracks.get(receiver)
+        if one is None or other is None:
+            return 0.0, 0.0
+        step_s = 0.01
+        now, then = (math.dist(one.at(each), other.at(each)) for each in (t, t + step_s))
+        return now, (then - now) / step_s
+
+
+def _merged(outages: Sequence[Outage]) -> list[Outage]:
+    """In order, none within or over another."""
+    apart: list[Outage] = []
+    for outage in sorted(outages):
+        if apart and outage.begin_s <= apart[-1].end_s:
+            apart[-1] = Outage(apart[-1].begin_s, max(apart[-1].end_s, outage.end_s))
+        else:
+            apart.append(outage)
+    return apart

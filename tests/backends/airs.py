@@ -1,0 +1,89 @@
+"""Simulated airs that nodes share, and short ways to look at what arrives there."""
+
+import numpy as np
+
+from backends import AirParams, RadioParams, TxBurst, World
+from backends.ether import Medium
+from tests.backends.radios import noise
+
+RATE = 1e6
+CARRIER_HZ = 2.4e9
+SEED = 31
+PLAIN = RadioParams()
+
+
+def half_duplex(turnaround_s=0.0, **more):
+    return RadioParams(full_duplex=False, turnaround_s=turnaround_s, **more)
+
+
+def air(**params):
+    """An air of this rate and carrier."""
+    return AirParams(**{"rate_hz": RATE, "frequency_hz": CARRIER_HZ, **params})
+
+
+def medium(radios, seed=SEED, tracks=(), links=(), outages=(), **params):
+    """Nodes on an air, all there from time 0 on; `radios`: how many, or each one's own."""
+    if isinstance(radios, int):
+        radios = dict.fromkeys(range(radios), PLAIN)
+    shared = air(**params)
+    made = Medium(shared, World(shared, dict(tracks), links, outages), seed)
+    for node, radio in radios.items():
+        made.join(node, radio, 0.0)
+    return made
+
+
+def line(pieces):
+    """All that arrives, `[n]`; zeros where there is silence, and where the node is deaf."""
+    parts = [
+        np.zeros(piece.n, np.complex64) if piece.samples is None else piece.samples
+        for piece in pieces
+    ]
+    return np.concatenate([np.zeros(0, np.complex64), *parts])
+
+
+def deafness(pieces):
+    """For each sample, whether the node is deaf there `[n]`."""
+    return np.repeat([piece.is_deaf for piece in pieces], [piece.n for piece in pieces])
+
+
+def heard(made, node, until_s):
+    """All that arrives at a node up to then."""
+    return line(made.take(node, until_s))
+
+
+def loud(x):
+    """Where there is anything at all."""
+    return np.flatnonzero(np.abs(x) > 1e-9).tolist()
+
+
+def burst(start, n, seed=SEED, exact=False):
+    """White noise from `start` on."""
+    return TxBurst(start, noise(n, seed), exact)
+
+
+def power_db(x):
+    return 10 * np.log10(np.mean(np.abs(x) ** 2))
+
+
+def smooth(n, seed=SEED):
+    """Noise without its upper half of frequencies `[n]`, which interpolates well."""
+    spectrum = np.fft.fft(noise(n, seed))
+    spectrum[n // 4 : -n // 4] = 0
+    x = np.fft.ifft(spectrum) * np.hanning(n)
+    return x.astype(np.complex64)
+
+
+def delay_of(x, reference, finer=64):
+    """Where in `x` `reference` begins, in samples: the peak of the correlation, interpolated."""
+    n = len(x) + len(reference)
+    spectrum = np.fft.fft(x, n) * np.conj(np.fft.fft(reference, n))
+    fine = np.zeros(n * finer, complex)
+    fine[: n // 2], fine[-(n // 2) :] = spectrum[: n // 2], spectrum[-(n // 2) :]
+    peak = int(np.argmax(np.abs(np.fft.ifft(fine))))
+    return peak / finer
+
+
+def frequency_of(x):
+    """Of a tone, in cycles a sample: the slope of its phase."""
+    phase = np.unwrap(np.angle(x.astype(complex)))
+    return np.polyfit(np.arange(len(x)), phase, 1)[0] / (2 * np.pi)

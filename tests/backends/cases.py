@@ -1,0 +1,129 @@
+"""Every radio there is, made for a folder."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from backends import IqFileRadio, LoopbackRadio, Radio, RadioParams
+from backends.ether.medium import NOISE_DBFS
+from tests.backends.hubs import SNR_DB, RadioOnHub
+from tests.backends.radios import AIR, BLOCK_S, PLAYED, heard, read, record
+
+TURNAROUND_S = 0.001
+
+
+@dataclass(frozen=True)
+class Case:
+    """A radio under test."""
+
+    name: str
+    make: Callable[[Path], Radio]
+    receives: bool = True
+    transmits: bool = True
+    paced: bool = False
+    hears_self: bool = False
+    plays: bool = False
+    lockstep: bool = False
+    full_duplex: bool = True
+    turnaround_s: float = 0.0
+    begin: int = 0
+    """Bursts handed over when the radio has been opened are in time from here on."""
+    snr_db: float | None = None
+    """At which bursts arrive, whatever their own power; None: as they are, without noise."""
+
+    def __str__(self):
+        return self.name
+
+    @property
+    def noise(self):
+        """What no sample of noise alone exceeds."""
+        return 0.0 if self.snr_db is None else 7 * 10 ** (NOISE_DBFS / 20)
+
+    def gain(self, burst):
+        """How much larger a burst arrives."""
+        if self.snr_db is None:
+            return 1.0
+        return 10 ** ((NOISE_DBFS + self.snr_db) / 20) / np.sqrt(
+            np.mean(np.abs(burst.samples) ** 2)
+        )
+
+    def recorded(self, folder, blocks):
+        """What became of the bursts sent: the closed radio's recording, or what it heard."""
+        if self.hears_self:
+            return heard(blocks)
+        return read(folder / "sent")
+
+
+def loopback(name, paced):
+    return Case(name, lambda _: LoopbackRadio(AIR, BLOCK_S, paced), paced=paced, hears_self=True)
+
+
+def iqfile(name, receives, transmits, paced=False):
+    def make(folder):
+        if receives:
+            record(folder / "played", PLAYED)
+        return IqFileRadio(
+            folder / "played" if receives else None,
+            folder / "sent" if transmits else None,
+            AIR,
+            BLOCK_S,
+            paced,
+            type_name="cf32_le",
+        )
+
+    return Case(name, make, receives, transmits, paced, plays=receives)
+
+
+def ether(name, paced, full_duplex):
+    turnaround_s = 0.0 if full_duplex else TURNAROUND_S
+    params = RadioParams(full_duplex=full_duplex, turnaround_s=turnaround_s)
+    return Case(
+        name,
+        lambda folder: RadioOnHub(folder, params, paced),
+        paced=paced,
+        lockstep=not paced,
+        full_duplex=full_duplex,
+        turnaround_s=turnaround_s,
+        begin=10_000 if paced else 1000,
+        snr_db=SNR_DB,
+    )
+
+
+RADIOS = (
+    loopback("loopback", paced=True),
+    loopback("loopback-unpaced", paced=False),
+    iqfile("iqfile-receives", receives=True, transmits=False),
+    iqfile("iqfile-transmits", receives=False, transmits=True),
+    iqfile("iqfile-both", receives=True, transmits=True),
+    iqfile("iqfile-both-paced", receives=True, transmits=True, paced=True),
+    ether("ether", paced=True, full_duplex=True),
+    ether("ether-half-duplex", paced=True, full_duplex=False),
+    ether("ether-lockstep", paced=False, full_duplex=True),
+    ether("ether-lockstep-half-duplex", paced=False, full_duplex=False),
+)
+
+
+def _those(applies):
+    return pytest.mark.parametrize("case", [case for case in RADIOS if applies(case)], ids=str)
+
+
+every_radio = _those(lambda _: True)
+players = _those(lambda case: case.plays)
+transmitters = _those(lambda case: case.transmits)
+transceivers = _those(lambda case: case.transmits and case.receives)
+not_in_lockstep = _those(lambda case: not case.lockstep)
+
+
+def assert_only(case, recorded, sent):
+    """`recorded` holds each (burst, report) once, turned and scaled at most, and nothing else."""
+    rest = recorded.copy()
+    for burst, report in sent:
+        got = recorded[report.start : report.end]
+        gain = np.vdot(burst.samples, got) / np.vdot(burst.samples, burst.samples)
+        assert np.abs(gain) == pytest.approx(case.gain(burst), rel=1e-5 + 10 * case.noise)
+        assert np.abs(got - gain * burst.samples).max() < 1e-5 + case.noise
+        rest[report.start : report.end] = 0
+    assert np.abs(rest).max(initial=0) <= case.noise

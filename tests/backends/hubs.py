@@ -1,0 +1,187 @@
+"""Hubs in threads of this process, and robots that listen there."""
+
+import asyncio
+import contextlib
+import threading
+
+import msgspec
+import numpy as np
+import zmq
+
+from backends import AirParams, EtherHub, EtherRadio, HubWatch, RadioParams, Tuning, World
+from backends.ether import protocol
+from backends.ether.sockets import AIR, SKY
+from tests.backends.radios import BLOCK_S, RATE, TUNING, opened, record
+from tests.waiting import wait_for
+
+SNR_DB = 60.0
+NODE, LISTENER = 1, 2
+TIMEOUT_S = 20
+
+
+def hub_air(**params):
+    """An air for the radios of these tests."""
+    given = {"rate_hz": RATE, "frequency_hz": TUNING.frequency_hz, "block_s": BLOCK_S}
+    return AirParams(**{"snr_db": SNR_DB, **given, **params})
+
+
+@contextlib.contextmanager
+def serving(folder, radios=(), paced=True, seed=0, until_s=np.inf, **air):
+    """A hub that serves the folder; stopped at the end."""
+    shared = hub_air(**air)
+    hub = EtherHub(
+        folder, shared, World(shared, {}), dict(radios), paced=paced, seed=seed, until_s=until_s
+    )
+    ready = threading.Event()
+    thread = threading.Thread(target=hub.run, args=(ready.set,), name="hub", daemon=True)
+    thread.start()
+    assert ready.wait(TIMEOUT_S)
+    try:
+        yield hub
+    finally:
+        hub.stop()
+        with RawRadio(folder) as raw:
+            # In lock-step it may be waiting for somebody to say something.
+            raw.ask(protocol.Question())
+            thread.join(TIMEOUT_S)
+        assert not thread.is_alive()
+
+
+def ask(folder):
+    """The state of the hub."""
+    with HubWatch(folder) as watch:
+        return watch.ask()
+
+
+async def until(condition):
+    """Waits for what another thread does."""
+    await asyncio.to_thread(wait_for, condition)
+
+
+class RawRadio:
+    """Speaks the protocol by hand: whatever a radio could say, and what none should."""
+
+    def __init__(self, folder):
+        self._context = zmq.Context()
+        self._down = self._connected(zmq.DEALER, folder / AIR)
+        self._up = self._connected(zmq.PUSH, folder / SKY)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.vanish()
+
+    def ask(self, *frames):
+        """To the hub's `air`; messages are encoded."""
+        self._down.send_multipart(_encoded(frames))
+
+    def push(self, *frames):
+        """To the hub's `sky`."""
+        self._up.send_multipart(_encoded(frames))
+
+    def hear(self, kind=msgspec.Struct):
+        """The next message of that kind."""
+        while self._down.poll(1000 * TIMEOUT_S):
+            message = protocol.from_hub(self._down.recv_multipart()[0])
+            if isinstance(message, kind):
+                return message
+        raise AssertionError("the hub says nothing")
+
+    def join(self, node, who="made by hand"):
+        """Joins as a radio would; its token."""
+        hello = protocol.Hello(
+            version=protocol.VERSION,
+            node=node,
+            who=who,
+            rate_hz=RATE,
+            frequency_hz=TUNING.frequency_hz,
+        )
+        self.ask(hello)
+        return self.hear(protocol.Welcome).token
+
+    def vanish(self):
+        """As when its process is killed: no Bye."""
+        self._context.destroy(linger=0)
+
+    def _connected(self, kind, path):
+        socket = self._context.socket(kind)
+        socket.connect(f"ipc://{path}")
+        return socket
+
+
+def _encoded(frames):
+    return [protocol.encode(each) if isinstance(each, msgspec.Struct) else each for each in frames]
+
+
+class Listener:
+    """Another robot on the same air: hears all from its index 0 on, in a thread of its own."""
+
+    def __init__(self, folder, rate_hz=RATE):
+        self._folder = folder
+        self._tuning = Tuning(rate_hz, TUNING.frequency_hz)
+        self._moved = threading.Condition()
+        self._joined = threading.Event()
+        self._parts = []
+        self._end = 0
+        self._is_over = False
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._listen()), daemon=True)
+        self._thread.start()
+        assert self._joined.wait(TIMEOUT_S)
+
+    def wait_until(self, end):
+        """Until it has heard all samples before `end`."""
+        with self._moved:
+            assert self._moved.wait_for(lambda: self._end >= end, TIMEOUT_S)
+
+    def stop(self):
+        """All it has heard; ends with the next block."""
+        self._is_over = True
+        self._thread.join(TIMEOUT_S)
+        assert not self._thread.is_alive()
+        return np.concatenate(self._parts)
+
+    async def _listen(self):
+        async with opened(
+            EtherRadio(self._folder, LISTENER, "the listener"), self._tuning
+        ) as radio:
+            self._joined.set()
+            async for block in radio.blocks():
+                with self._moved:
+                    self._parts.append(block.samples)
+                    self._end = block.index + block.n
+                    self._moved.notify_all()
+                if self._is_over:
+                    return
+
+
+class RadioOnHub(EtherRadio):
+    """Brings a hub of its own when it is opened; what has left is recorded in the file `sent`."""
+
+    def __init__(self, folder, params, paced):
+        super().__init__(folder / "air", NODE, "the radio under test")
+        self._sent = folder / "sent"
+        self._stack = contextlib.ExitStack()
+        self._listener = None
+        self._first = 0
+        self._params, self._paced = params, paced
+
+    async def open(self, tuning):
+        """The hub, the listener, the radio."""
+        radios = {NODE: self._params, LISTENER: RadioParams()}
+        hub = self._stack.enter_context(serving(self._directory, radios, self._paced))
+        self._listener = Listener(self._directory)
+        await super().open(tuning)
+        began_s, listens_s = (hub._medium.time(node, 0) for node in (NODE, LISTENER))
+        self._first = round((began_s - listens_s) * tuning.rate_hz)
+
+    async def close(self):
+        """The recording lasts as long as what the radio has heard."""
+        listener, self._listener = self._listener, None
+        end = self._first + (0 if self._antenna is None else self._antenna.end)
+        if listener is not None:
+            listener.wait_until(end)
+        await super().close()
+        if listener is not None:
+            record(self._sent, listener.stop()[self._first : end])
+        self._stack.close()

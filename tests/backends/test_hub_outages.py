@@ -1,0 +1,211 @@
+"""Hubs that stop and come back, and radios that do not keep up."""
+
+import asyncio
+import contextlib
+import itertools
+
+import numpy as np
+import pytest
+
+from backends import BackendError, EtherRadio, RadioParams, Tuning, TxBurst, TxOutcome
+from tests.backends.hubs import Listener, ask, serving, until
+from tests.backends.radios import BLOCK_S, RATE, TUNING, N, noise, opened, send, take
+
+pytestmark = pytest.mark.usefixtures("at_ease")
+FAR = 10**9
+
+
+def assert_contiguous(blocks):
+    for one, other in itertools.pairwise(blocks):
+        assert other.index == one.index + one.n
+        assert other.host_ns >= one.host_ns
+
+
+def gaps_in(blocks):
+    return [block for block in blocks if block.samples is None]
+
+
+@contextlib.asynccontextmanager
+async def closing(radio):
+    """The radio is closed at the end."""
+    try:
+        yield
+    finally:
+        await radio.close()
+
+
+async def take_gap(blocks):
+    """Blocks up to the next gap, with it."""
+    taken = await take(blocks, 1)
+    while taken[-1].samples is not None:
+        taken += await take(blocks, 1)
+    return taken
+
+
+async def test_when_a_hub_comes_back_its_radios_go_on_behind_one_gap(tmp_path, monkeypatch):
+    radio = EtherRadio(tmp_path, 1, "the radio")
+    async with asyncio.timeout(20), closing(radio):
+        with serving(tmp_path):
+            await radio.open(TUNING)
+            blocks = radio.blocks()
+            taken = await take(blocks, 20 * N)
+        coming = asyncio.ensure_future(take_gap(blocks))
+        await until(lambda: radio.counters["hub_outages"] == 1)
+        assert "the hub is away" in radio.detail
+        asked, ask_again = [], radio._look_for_hub
+        monkeypatch.setattr(radio, "_look_for_hub", lambda: asked.append(ask_again()))
+        await until(lambda: len(asked) > 5)
+        with serving(tmp_path):
+            taken += await coming
+            taken += await take(blocks, taken[-1].index + taken[-1].n + 20 * N)
+            assert "the hub is away" not in radio.detail
+            assert ask(tmp_path).nodes == {1: "the radio"}
+        counted = {"overflows": 0, "samples_lost": 0, "late": 0, "hub_outages": 1}
+        assert radio.counters == counted
+    assert_contiguous(taken)
+    (gap,) = gaps_in(taken)
+    assert gap.gap_reason == "the hub was away"
+    # It is as long as the hub was away, so that time went on.
+    before = taken[taken.index(gap) - 1]
+    apart_s = (taken[-1].host_ns - before.host_ns) * 1e-9
+    n = taken[-1].index + taken[-1].n - before.index - before.n
+    assert n / RATE == pytest.approx(apart_s, abs=10 * BLOCK_S)
+    assert gap.n > 0.2 * RATE
+
+
+@pytest.mark.parametrize("params", [RadioParams(), RadioParams(full_duplex=False)])
+async def test_bursts_for_a_hub_that_went_away_are_lost_and_those_after_it_leave(tmp_path, params):
+    radio = EtherRadio(tmp_path, 1, "the radio")
+    async with asyncio.timeout(20), closing(radio):
+        with serving(tmp_path, {1: params}):
+            await radio.open(TUNING)
+            blocks = radio.blocks()
+            # One is too late, so that hub and radio have something to count.
+            late = TxBurst(0, noise(10), exact=True)
+            reports, _ = await send(radio, blocks, [late, TxBurst(N, noise(20))])
+            assert [each.outcome for each in reports] == [TxOutcome.LATE, TxOutcome.SENT]
+            lost = [radio.send(TxBurst(FAR, noise(10)))]
+            await take(blocks, 1)
+        coming = asyncio.ensure_future(take(blocks, FAR))
+        await until(lambda: radio.counters["hub_outages"] == 1)
+        lost.append(radio.send(TxBurst(0, noise(10))))
+        with serving(tmp_path, {1: params}):
+            assert {(await each).outcome for each in lost} == {TxOutcome.LOST}
+            assert ask(tmp_path).bursts == 0, "what was sent in vain stays where it is"
+            begin = radio._antenna.end + 50 * N
+            report = await radio.send(TxBurst(begin, noise(300), exact=True))
+            assert report == (TxOutcome.SENT, begin, begin + 300)
+            assert ask(tmp_path).bursts == 1
+        coming.cancel()
+        await asyncio.wait([coming])
+
+
+async def test_a_hub_that_comes_back_may_refuse(tmp_path):
+    radio = EtherRadio(tmp_path, 1, "the radio")
+    async with asyncio.timeout(20), closing(radio):
+        with serving(tmp_path):
+            await radio.open(TUNING)
+            blocks = radio.blocks()
+            await take(blocks, N)
+            sending = radio.send(TxBurst(FAR, noise(10)))
+        with (
+            serving(tmp_path, rate_hz=2 * RATE),
+            pytest.raises(BackendError, match=r"modem\.rate_hz: got 100000; allowed: 200000"),
+        ):
+            await take(blocks)
+        assert (await sending).outcome is TxOutcome.LOST
+
+
+async def test_a_hub_that_is_slow_has_not_been_away(tmp_path, monkeypatch):
+    """Radios are still known when they ask."""
+    monkeypatch.setattr("backends.ether.hub.MAX_LATE_BLOCKS", 10**6)
+    with serving(tmp_path) as hub:
+        async with opened(EtherRadio(tmp_path, 1, "the radio")) as radio:
+            blocks = radio.blocks()
+            taken = await take(blocks, 10 * N)
+            hand_out, go_on = hub._hand_out, asyncio.Event()
+            loop = asyncio.get_running_loop()
+
+            def stall(host_ns):
+                hub._hand_out = hand_out
+                asyncio.run_coroutine_threadsafe(go_on.wait(), loop).result()
+                hand_out(host_ns)
+
+            hub._hand_out = stall
+            coming = asyncio.ensure_future(take(blocks, 1000 * N))
+            await until(lambda: radio.counters["hub_outages"] == 1)
+            go_on.set()
+            coming.cancel()
+            await asyncio.wait([coming])
+            assert radio.counters["hub_outages"] == 1
+            assert ask(tmp_path).nodes == {1: "the radio"}
+    assert not gaps_in(taken)
+
+
+async def test_a_radio_that_does_not_read_loses_samples_and_hinders_nobody(tmp_path, monkeypatch):
+    for module in ("sockets", "radio"):
+        monkeypatch.setattr(f"backends.ether.{module}.WAITING", 20)
+    with serving(tmp_path, rate_hz=10 * RATE):
+        listener = Listener(tmp_path, rate_hz=10 * RATE)
+        async with opened(
+            EtherRadio(tmp_path, 1, ""), Tuning(10 * RATE, TUNING.frequency_hz)
+        ) as radio:
+            blocks = radio.blocks()
+            taken = await take(blocks, 1)
+            began_s = ask(tmp_path).now_s
+            # It does not ask for more, until the hub has no room.
+            await until(lambda: ask(tmp_path).samples_lost > 30 * N)
+            taken += await take_gap(blocks)
+            lost = ask(tmp_path).samples_lost
+            taken += await take(blocks, taken[-1].index + 500 * N)
+            reports, more = await send(radio, blocks, [TxBurst(0, noise(100))])
+            gone_s = ask(tmp_path).now_s - began_s
+            counters = dict(radio.counters)
+        others = listener.stop()
+    taken += more
+    assert_contiguous(taken)
+    assert reports[0].outcome is TxOutcome.SENT
+    gaps = gaps_in(taken)
+    assert gaps[0].n > 30 * N
+    assert lost >= 30 * N
+    assert {block.gap_reason for block in gaps} == {"the daemon was too slow"}
+    assert counters["overflows"] == len(gaps)
+    assert counters["samples_lost"] == sum(block.n for block in gaps)
+    # All the while, the other one has heard everything.
+    assert len(others) >= gone_s * 10 * RATE
+    assert np.abs(others).all()
+
+
+async def test_a_radio_a_little_behind_gets_larger_blocks_and_loses_nothing(tmp_path):
+    """Its gaps and what others send stay where they are."""
+    turnaround = 100
+    params = RadioParams(full_duplex=False, turnaround_s=turnaround / RATE)
+    begins, mark = (6000, 12_000), TxBurst(9000, noise(300))
+    with serving(tmp_path, {1: params}) as hub:
+        async with (
+            opened(EtherRadio(tmp_path, 2, "")) as other,
+            opened(EtherRadio(tmp_path, 1, "")) as radio,
+        ):
+            apart_s = hub._medium.time(1, 0) - hub._medium.time(2, 0)
+            other.send(mark._replace(start=9000 + round(apart_s * RATE), exact=True))
+            blocks = radio.blocks()
+            sends = [radio.send(TxBurst(begin, noise(700), exact=True)) for begin in begins]
+            taken = await take(blocks, 1)
+            # It does not ask for more, until all of it is long over.
+            await until(lambda: ask(tmp_path).now_s - hub._medium.time(1, 0) > 16_000 / RATE)
+            taken += await take(blocks, 16_000)
+            reports = [await each for each in sends]
+            assert radio.counters["samples_lost"] == 0
+    assert reports == [(TxOutcome.SENT, begin, begin + 700) for begin in begins]
+    assert_contiguous(taken)
+    assert max(block.n for block in taken) > 4 * N
+    missing = [i for b in gaps_in(taken) for i in range(b.index, b.index + b.n)]
+    assert missing == [
+        i for begin in begins for i in range(begin - turnaround, begin + 700 + turnaround)
+    ]
+    line = np.concatenate(
+        [np.zeros(block.n) if block.samples is None else block.samples for block in taken]
+    )
+    where = np.flatnonzero(np.abs(line) > 1e-3)
+    assert 9000 <= where[0] < where[-1] < 9300
+    assert len(where) > 290

@@ -1,0 +1,28 @@
+"""Bursts that have been handed over and have not left."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from backends import TxBurst
+from backends.outstanding import GAP, Outstanding
+
+
+@settings(derandomize=True, deadline=None, max_examples=100)
+@given(
+    st.lists(
+        st.tuples(st.integers(-10, 3000), st.integers(0, 400), st.booleans(), st.integers(0, 300)),
+        max_size=30,
+    )
+)
+def test_any_bursts_are_placed_one_after_another(asked):
+    outstanding = Outstanding()
+    now, free_from = 0, 0
+    for start, n, exact, later in asked:
+        now += later
+        placed = outstanding.place(TxBurst(start, np.zeros(n, np.complex64), exact), now)
+        if exact and start < max(now, free_from):
+            assert placed is None
+            continue
+        assert placed == max(start, now, free_from)
+        free_from = placed + n + GAP
