@@ -6,7 +6,7 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from random import Random
@@ -21,7 +21,7 @@ from sdrlinkd.config import Config, Setup
 from sdrlinkd.control import Control, Verb
 from sdrlinkd.errors import UserError
 from sdrlinkd.link import Link
-from sdrlinkd.node import Node
+from sdrlinkd.node import Due, Node
 from sdrlinkd.pdulink import DirectLink, PduLink
 from sdrlinkd.sdnotify import Notifier
 
@@ -51,7 +51,6 @@ async def run(setup: Setup, reload: Reload) -> None:
         async with asyncio.TaskGroup() as tasks:
             running = [
                 tasks.create_task(node.carry(), name="carry"),
-                tasks.create_task(node.transmit(), name="transmit"),
                 tasks.create_task(node.tick(), name="tick"),
                 tasks.create_task(_notify(notifier, node, control), name="notify"),
             ]
@@ -84,7 +83,7 @@ async def _open(
         hears_self=config.hears_self,
     )
     link.set_policies(setup.policies)
-    pdu_link = _make_pdu_link(config, rng)
+    pdu_link = _make_pdu_link(setup, rng)
     context = zmq.Context()
     # Closes what a part that failed half-way left open; term() would wait for it for ever.
     stack.callback(context.destroy)
@@ -94,7 +93,9 @@ async def _open(
     stack.callback(control.close)
     control.serve(_verbs(setup, node, control, reload))
     stack.push_async_callback(pdu_link.close)
-    await pdu_link.open(node)
+    await node.open_carrier()
+    if config.play.duration_s:
+        node.play(_own_traffic(setup, stack))
     log.info(
         "sdrlinkd %s: robot %d on %s, %d topics, sockets in %s",
         __version__, setup.node_id, config.backend, len(setup.topics_in), directory.path,
@@ -104,7 +105,8 @@ async def _open(
     return node, control
 
 
-def _make_pdu_link(config: Config, rng: Random) -> PduLink:
+def _make_pdu_link(setup: Setup, rng: Random) -> PduLink:
+    config = setup.config
     if config.backend == "direct":
         return DirectLink(config.direct, config.link.pdu_size, rng)
     # Else a busy event loop keeps the modem's threads from the interpreter for 5 ms at a time.
@@ -112,7 +114,21 @@ def _make_pdu_link(config: Config, rng: Random) -> PduLink:
     # The modem brings numba and scipy, which take their time to load.
     from sdrlinkd.modem import make_modem
 
-    return make_modem(config, rng)
+    return make_modem(config, setup.node_id, rng)
+
+
+def _own_traffic(setup: Setup, stack: contextlib.AsyncExitStack) -> Iterator[Due]:
+    # Recordings bring much that a daemon of a real robot never needs.
+    from sdrlinkd.adapters import BuiltInRobot, due_messages, open_bag
+
+    config, play = setup.config, setup.config.play
+    recording = (
+        open_bag(Path(play.bag))
+        if play.bag
+        else BuiltInRobot(config.namespace, play.duration_s, config.seed or 0)
+    )
+    stack.callback(recording.close)
+    return due_messages(recording, play.duration_s, play.begin_s, setup.topics_in)
 
 
 def _runtime_directory(config: Config) -> Path:

@@ -2,7 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from sdrlinkd import __version__
 from sdrlinkd.bus import Bus, Ingress
@@ -11,6 +11,7 @@ from sdrlinkd.link import (
     AS_CONFIGURED,
     Burst,
     Link,
+    Opportunity,
     Outcome,
     Overrides,
     TopicPolicy,
@@ -23,6 +24,10 @@ from sdrlinkd.reports import Snapshot
 TICK_S = 0.05
 
 
+# A message of our own to send: seconds after the link's clock began, topic id, payload.
+Due = tuple[float, int, bytes]
+
+
 class Node:
     """Asks the link what to do and does it. Holds no queue and no decision of its own."""
 
@@ -32,7 +37,11 @@ class Node:
         self._setup = setup
         self._link = link
         self._pdu_link = pdu_link
-        self._work = asyncio.Event()
+        self._traffic: Iterator[Due] = iter(())
+        self._upcoming: Due | None = None
+        self._began_at = 0.0
+        self._ticked_at = float("-inf")
+        self._is_lockstep = False
         self._queue_moved = asyncio.Event()
         self._started_at = time.monotonic()
         self._loop_lag_s = 0.0
@@ -45,7 +54,7 @@ class Node:
         """A message from a producer."""
         now = self._pdu_link.now()
         self._link.submit(topic_id, payload, now, overrides)
-        self._work.set()
+        self._pdu_link.wake()
 
     def refuse(self, reason: str, topic_id: int | None = None) -> None:
         """A message that the bus could not take."""
@@ -64,6 +73,29 @@ class Node:
                 received_ns = time.time_ns() - round((now - message.heard_at) * 1e9)
                 self.bus.publish(message, age_s, received_ns)
 
+    def advance(self, now: float) -> None:
+        """Time has come so far: traffic of our own that is due, and the link's timers."""
+        while self._upcoming is not None and self._began_at + self._upcoming[0] <= now:
+            at, topic_id, payload = self._upcoming
+            self._link.submit(topic_id, payload, self._began_at + at)
+            self._upcoming = next(self._traffic, None)
+        if now - self._ticked_at >= TICK_S:
+            self._ticked_at = now
+            self._link.handle_timers(now)
+            self._queue_moved.set()  # messages may have expired
+
+    def next_burst(self, opportunity: Opportunity) -> Burst | None:
+        """The next burst, decided now."""
+        burst = self._link.next_burst(opportunity)
+        if burst is not None and self.bus.is_tapped:
+            for data in burst.pdus:
+                self.bus.tap("tx", data)
+        return burst
+
+    def next_wakeup(self, now: float) -> float:
+        """When there may be something to send."""
+        return self._link.next_wakeup(now)
+
     def settled(self, burst: Burst, outcome: Outcome, at: float) -> None:
         """A burst has left, or not."""
         self._link.confirm(burst, outcome, at)
@@ -71,25 +103,26 @@ class Node:
 
     # The daemon's tasks.
 
+    async def open_carrier(self) -> None:
+        """Open the PDU link, and fit the link to it. Raises UserError."""
+        config = self._setup.config
+        traits = await self._pdu_link.open(self)
+        self._link.attach(traits, config.access, config.rate)
+        self._is_lockstep = traits.is_lockstep
+
+    def play(self, traffic: Iterator[Due]) -> None:
+        """Send messages of our own at their time."""
+        self._traffic = traffic
+        self._upcoming = next(traffic, None)
+        self._began_at = self._pdu_link.now()
+
     async def carry(self) -> None:
         """Let the PDU link run; for ever."""
         config = self._setup.config
-        if config.backend == "iqfile" and config.iqfile.wait_for_consumer:
+        waits = config.backend == "iqfile" and config.iqfile.wait_for_consumer
+        if waits or config.play.duration_s:
             await self.bus.has_consumer.wait()
         await self._pdu_link.run()
-
-    async def transmit(self) -> None:
-        """Compose a burst whenever the carrier can take one; for ever."""
-        while True:
-            opportunity = await self._pdu_link.opportunity()
-            burst = self._link.compose(opportunity.start, opportunity.max_pdus)
-            if burst is None:
-                await self._wait_for_work()
-                continue
-            if self.bus.is_tapped:
-                for data in burst.pdus:
-                    self.bus.tap("tx", data)
-            self._pdu_link.send(burst)
 
     async def tick(self) -> None:
         """Let the link's time pass, and measure how late the event loop is; for ever."""
@@ -97,18 +130,18 @@ class Node:
             due = time.monotonic() + TICK_S
             await asyncio.sleep(TICK_S)
             self._loop_lag_s = max(time.monotonic() - due, 0.9 * self._loop_lag_s)
-            self._link.handle_timers(self._pdu_link.now())
-            self._queue_moved.set()  # messages may have expired
+            if not self._is_lockstep:
+                self.advance(self._pdu_link.now())
 
     async def drain(self, at_most_s: float) -> None:
         """Take nothing more, send what is queued for at most `at_most_s`, drop the rest by name."""
         self._draining = True
         await self.bus.stop_ingress()
         self._link.drain()
-        self._work.set()
+        self._pdu_link.wake()
         try:
             async with asyncio.timeout(at_most_s):
-                while self._link.sender.outbox:
+                while self._link.has_work:
                     self._queue_moved.clear()
                     await self._queue_moved.wait()
                 await self._pdu_link.idle()
@@ -146,14 +179,3 @@ class Node:
     def audit(self) -> list[str]:
         """Where the ledger does not add up; empty when it does."""
         return self._link.audit()
-
-    async def _wait_for_work(self) -> None:
-        """Until something was submitted, or the link's own time comes."""
-        self._work.clear()
-        now = self._pdu_link.now()
-        wait_s = max(0.0, self._link.next_wakeup(now) - now)
-        try:
-            async with asyncio.timeout(None if wait_s == float("inf") else wait_s):
-                await self._work.wait()
-        except TimeoutError:
-            return

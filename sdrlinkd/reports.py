@@ -58,6 +58,11 @@ class NeighborReport(msgspec.Struct, frozen=True, kw_only=True):
     snr_db: float | None = None
     registry: str = "unknown"
     """same | differs | unknown"""
+    snr_there_db: float | None = None
+    """How this neighbor hears us, by its own report; `per_there` likewise."""
+    per_there: float | None = None
+    mcs: int = 0
+    """What we send to it with."""
 
 
 class TxReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -99,6 +104,14 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """Everything the link knows."""
 
     pdu_size: int
+    access: str
+    airtime_s: float
+    """Time on the air, all bursts together."""
+    bursts_by_mcs: dict[int, int]
+    bursts_late: int
+    """Bursts that came too late for their slot and were sent again."""
+    mcs_changes: list[tuple[float, int, int]]
+    """(when by the link's clock, neighbor, MCS from then on), the last ones."""
     control_channel: bool
     registry_digest: str
     tx: TxReport

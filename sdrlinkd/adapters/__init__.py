@@ -1,6 +1,7 @@
 """The world outside: recordings, message types, a robot for demonstrations."""
 
 from sdrlinkd.adapters.bags import Bag, BagMessage, BagTopic, open_bag
+from sdrlinkd.adapters.due import Due, due_messages
 from sdrlinkd.adapters.pacing import first_seconds, paced
 from sdrlinkd.adapters.robot import BuiltInRobot
 from sdrlinkd.adapters.typestore import empty, from_cdr, knows, to_cdr
@@ -10,6 +11,8 @@ __all__ = [
     "BagMessage",
     "BagTopic",
     "BuiltInRobot",
+    "Due",
+    "due_messages",
     "empty",
     "first_seconds",
     "from_cdr",

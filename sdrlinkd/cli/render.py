@@ -5,7 +5,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from sdrlinkd.reports import NeighborReport, ReceivedTopicReport, Snapshot, TopicReport
+from sdrlinkd.reports import LinkReport, NeighborReport, ReceivedTopicReport, Snapshot, TopicReport
 
 NOTHING = "–"
 
@@ -52,8 +52,16 @@ def queue(snapshot: Snapshot) -> Text:
         f"+ {sum(tx.dropped.values())} dropped;  queue: {waiting or 'empty'}"
         f" ({size(tx.queued_bytes)})\n"
         f"in:  {rx.pdus_heard} PDUs heard, {rx.started} messages begun = {rx.delivered} delivered "
-        f"+ {rx.held} incomplete + {sum(rx.dropped.values())} lost"
+        f"+ {rx.held} incomplete + {sum(rx.dropped.values())} lost" + _air(snapshot.link)
     )
+
+
+def _air(link: LinkReport) -> str:
+    """How the air is shared; nothing where it is not."""
+    if link.access == "none":
+        return ""
+    late = f"; {link.bursts_late} bursts came too late and went again" if link.bursts_late else ""
+    return f"\nair: {link.access}; {link.airtime_s:.2f} s sent{late}"
 
 
 def sent_topics(topics: list[TopicReport]) -> Table:
@@ -108,7 +116,8 @@ def neighbors(reports: list[NeighborReport]) -> Table:
     table = _table("robots heard")
     for column, justify in (
         ("robot", "left"), ("heard", "right"), ("PDUs", "right"), ("lost", "right"),
-        ("PER", "right"), ("twice", "right"), ("SNR", "right"), ("registry", "left"),
+        ("PER", "right"), ("twice", "right"), ("SNR", "right"), ("hears us", "right"),
+        ("MCS", "right"), ("registry", "left"),
     ):  # fmt: skip
         table.add_column(column, justify=justify, no_wrap=True)  # type: ignore[arg-type]
     for report in reports:
@@ -120,6 +129,8 @@ def neighbors(reports: list[NeighborReport]) -> Table:
             f"{100 * report.per:.2f} %",
             str(report.duplicates),
             NOTHING if report.snr_db is None else f"{report.snr_db:.1f} dB",
+            NOTHING if report.snr_there_db is None else f"{report.snr_there_db:.1f} dB",
+            str(report.mcs),
             Text(report.registry, style="bold red" if report.registry == "differs" else ""),
         )
     return table

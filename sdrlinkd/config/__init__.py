@@ -3,11 +3,13 @@
 from sdrlinkd.config.carriers import (
     ChannelParams,
     DirectParams,
+    EtherParams,
     IqFileParams,
     LoopbackParams,
     ModemParams,
+    PlayParams,
 )
-from sdrlinkd.config.load import load_config, parse_config
+from sdrlinkd.config.load import load_config, parse_config, parse_toml
 from sdrlinkd.config.schema import BusParams, Config
 from sdrlinkd.config.setup import Setup, load_registry, make_setup
 
@@ -16,12 +18,15 @@ __all__ = [
     "ChannelParams",
     "Config",
     "DirectParams",
+    "EtherParams",
     "IqFileParams",
     "LoopbackParams",
     "ModemParams",
+    "PlayParams",
     "Setup",
     "load_config",
     "load_registry",
     "make_setup",
     "parse_config",
+    "parse_toml",
 ]

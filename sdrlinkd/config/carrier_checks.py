@@ -10,6 +10,7 @@ from sdrlinkd.errors import ConfigError
 
 def check_carrier(config: Config, source: str) -> None:
     """Raises ConfigError, citing key, given and allowed."""
+    _check_sharing(config, source)
     if config.backend == "direct":
         return
     modem, iqfile = config.modem, config.iqfile
@@ -18,6 +19,10 @@ def check_carrier(config: Config, source: str) -> None:
             f"{source}: modem.max_cfo_hz: got {modem.max_cfo_hz:g}; allowed: at most a quarter of "
             f"modem.rate_hz, {modem.rate_hz / 4:g}"
         )
+    if config.backend == "ether" and not config.ether.dir:
+        raise ConfigError(
+            f'{source}: ether.dir: got ""; allowed: the folder of a hub: sdrlink-ether --dir FOLDER'
+        )
     if config.backend == "iqfile" and not (iqfile.receive or iqfile.transmit):
         raise ConfigError(
             f'{source}: iqfile.receive, iqfile.transmit: both are ""; allowed: name a recording to '
@@ -25,11 +30,31 @@ def check_carrier(config: Config, source: str) -> None:
         )
 
 
+def _check_sharing(config: Config, source: str) -> None:
+    policy = config.access.policy
+    if policy != "none" and config.backend == "direct":
+        raise ConfigError(
+            f'{source}: access.policy: got "{policy}", but the backend "direct" has no air; '
+            'allowed: "none", or a backend with a radio'
+        )
+    if config.rate.min_mcs > config.rate.max_mcs:
+        raise ConfigError(
+            f"{source}: rate.min_mcs: got {config.rate.min_mcs}; allowed: at most rate.max_mcs, "
+            f"{config.rate.max_mcs}"
+        )
+
+
 def with_paths(config: Config, base: Path) -> Config:
-    """`config` with the recordings' names relative to `base` made whole."""
+    """`config` with file names relative to `base` made whole."""
     iqfile = config.iqfile
     whole = {
         key: str(base / getattr(iqfile, key)) if getattr(iqfile, key) else ""
         for key in ("receive", "transmit")
     }
-    return msgspec.structs.replace(config, iqfile=msgspec.structs.replace(iqfile, **whole))
+    ether, play = config.ether, config.play
+    return msgspec.structs.replace(
+        config,
+        iqfile=msgspec.structs.replace(iqfile, **whole),
+        ether=msgspec.structs.replace(ether, dir=str(base / ether.dir) if ether.dir else ""),
+        play=msgspec.structs.replace(play, bag=str(base / play.bag) if play.bag else ""),
+    )

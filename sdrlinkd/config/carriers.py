@@ -45,6 +45,8 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Mean power of a burst below full scale: room for its peaks."""
     max_cfo_hz: Annotated[float, Meta(ge=0, le=1e6)] = 1e5
     """Largest carrier offset between two radios."""
+    carrier_db: Annotated[float, Meta(ge=3, le=40)] = 6.0
+    """So much energy above the noise is a carrier; for access policies that listen."""
     block_s: Annotated[float, Meta(ge=1e-4, le=0.1)] = 0.001
     """Samples are received in pieces of this length."""
 
@@ -73,6 +75,24 @@ class IqFileParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     hear_self: bool = True
     wait_for_consumer: bool = False
     """Begin to play when the first consumer subscribes."""
+
+
+class EtherParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A radio on the simulated air of an `sdrlink-ether` hub."""
+
+    dir: str = ""
+    """Folder of the hub's sockets."""
+
+
+class PlayParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Messages that the daemon itself sends, by its radio's time: for simulations in lock-step."""
+
+    bag: str = ""
+    """Recording to play; empty, with `duration_s`: a built-in robot."""
+    duration_s: Annotated[float, Meta(ge=0, le=1e6)] = 0.0
+    """So much of it; 0: nothing."""
+    begin_s: Annotated[float, Meta(ge=0, le=1e6)] = 0.0
+    """When the first message goes."""
 
 
 class ChannelParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

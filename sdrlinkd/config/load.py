@@ -4,6 +4,7 @@ import re
 import tomllib
 from difflib import get_close_matches
 from pathlib import Path
+from typing import TypeVar
 
 import msgspec
 from msgspec import inspect
@@ -11,6 +12,8 @@ from msgspec import inspect
 from sdrlinkd.config import describe
 from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError
+
+S = TypeVar("S", bound=msgspec.Struct)
 
 _AT = re.compile(r" - at `\$\.?(.*)`$")
 
@@ -30,15 +33,20 @@ def load_config(path: Path) -> Config:
 
 def parse_config(text: str, source: str = "config") -> Config:
     """The configuration in TOML `text`. Raises ConfigError that cites `source`."""
+    return parse_toml(text, source, Config)
+
+
+def parse_toml(text: str, source: str, kind: type[S]) -> S:
+    """TOML `text` as a struct. Raises ConfigError that cites `source`, key, given and allowed."""
     try:
         raw = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise ConfigError(f"{source}: not TOML: {error}") from None
-    _refuse_unknown(raw, describe.type_of(Config), [], text, source)
+    _refuse_unknown(raw, describe.type_of(kind), [], text, source)
     try:
-        return msgspec.convert(raw, Config)
+        return msgspec.convert(raw, kind)
     except msgspec.ValidationError as error:
-        raise _explain(error, raw, text, source) from None
+        raise _explain(error, raw, text, source, describe.type_of(kind)) from None
 
 
 def cite(source: str, text: str, path: list[str]) -> str:
@@ -60,17 +68,24 @@ def _refuse_unknown(
                 f"{cite(source, text, here)}: unknown key; {hint}allowed: {', '.join(known)}"
             )
         inner = describe.child(kind, key)
-        if isinstance(value, dict) and inner is not None:
-            _refuse_unknown(value, inner, here, text, source)
+        tables = value if isinstance(value, list) else [value]
+        if isinstance(inner, inspect.ListType):
+            inner = inner.item_type
+        for each in tables:
+            if isinstance(each, dict) and inner is not None:
+                _refuse_unknown(each, inner, here, text, source)
 
 
 def _explain(
-    error: msgspec.ValidationError, raw: dict[str, object], text: str, source: str
+    error: msgspec.ValidationError,
+    raw: dict[str, object],
+    text: str,
+    source: str,
+    kind: inspect.Type | None,
 ) -> ConfigError:
     found = _AT.search(str(error))
     # msgspec writes `[...]` for the values of a dict, `[3]` for those of a list.
     path = re.findall(r"[^.\[\]]+", found[1].replace("[...]", ".*")) if found else []
-    kind: inspect.Type | None = describe.type_of(Config)
     value: object = raw
     named: list[str] = []
     for step in path:
@@ -83,6 +98,13 @@ def _explain(
             named.append(key)
             value = value.get(key)
             kind = describe.child(kind, key) if kind is not None else None
+    missing = re.search(r"missing required field `(.*)`", str(error).split(" - at ")[0])
+    if missing:
+        named.append(missing[1])
+        inner = describe.child(kind, missing[1]) if kind is not None else None
+        what = describe.allowed(inner) if inner is not None else "a value"
+        where = cite(source, text, named[:-1] or named)
+        return ConfigError(f"{where}: has no {missing[1]}; allowed: {what}")
     what = describe.allowed(kind) if kind is not None else str(error)
     return ConfigError(f"{cite(source, text, named)}: got {describe.given(value)}; allowed: {what}")
 
@@ -104,7 +126,7 @@ def _line_of(text: str, path: list[str]) -> int | None:
     section: list[str] = []
     best = None
     for number, line in enumerate(text.splitlines(), start=1):
-        header = re.match(r"\s*\[([^\[\]]+)\]", line)
+        header = re.match(r"\s*\[{1,2}([^\[\]]+)\]", line)
         if header:
             section = [part.strip().strip("\"'") for part in header[1].split(".")]
             if section == path[: len(section)]:

@@ -8,11 +8,20 @@ from msgspec import Meta
 from sdrlinkd.config.carriers import (
     ChannelParams,
     DirectParams,
+    EtherParams,
     IqFileParams,
     LoopbackParams,
     ModemParams,
+    PlayParams,
 )
-from sdrlinkd.link import LinkParams, QueueParams, ReassemblyParams, TopicPolicy
+from sdrlinkd.link import (
+    AccessParams,
+    LinkParams,
+    QueueParams,
+    RateParams,
+    ReassemblyParams,
+    TopicPolicy,
+)
 
 
 class BusParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -38,7 +47,7 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """Namespace under which another robot's topics are republished."""
     rx_depth: Annotated[int, Meta(ge=0)] = 256
     """Messages kept for a consumer that does not read; 0: without bound."""
-    backend: Literal["direct", "loopback", "iqfile"] = "direct"
+    backend: Literal["direct", "loopback", "iqfile", "ether"] = "direct"
     drain_s: Annotated[float, Meta(ge=0, le=60)] = 1.0
     """Time to send what is queued when the daemon is stopped."""
     seed: int | None = None
@@ -46,12 +55,16 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     link: LinkParams = LinkParams()
     queue: QueueParams = QueueParams()
     reassembly: ReassemblyParams = ReassemblyParams()
+    access: AccessParams = AccessParams()
+    rate: RateParams = RateParams()
     bus: BusParams = BusParams()
     direct: DirectParams = DirectParams()
     modem: ModemParams = ModemParams()
     loopback: LoopbackParams = LoopbackParams()
     iqfile: IqFileParams = IqFileParams()
+    ether: EtherParams = EtherParams()
     channel: ChannelParams = ChannelParams()
+    play: PlayParams = PlayParams()
     topic: dict[str, TopicPolicy] = {}
     """Policies by registry name: `[topic.odom]`."""
 
@@ -62,4 +75,5 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             "direct": self.direct.hear_self,
             "loopback": self.loopback.hear_self,
             "iqfile": self.iqfile.hear_self,
+            "ether": False,
         }[self.backend]

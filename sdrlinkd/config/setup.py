@@ -7,7 +7,7 @@ from pathlib import Path
 from sdrlinkd.config.carrier_checks import check_carrier, with_paths
 from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError, RegistryError
-from sdrlinkd.link import TopicPolicy
+from sdrlinkd.link import TopicPolicy, check_access
 from sdrlinkd.wire import Registry, equal_payload, max_message_size, parse_registry
 
 MAX_ID_DIGITS = 3
@@ -68,10 +68,20 @@ def make_setup(config: Config, base: Path, source: str = "config") -> Setup:
     _check_texts(config, source)
     check_carrier(config, source)
     config = with_paths(config, base)
+    node_id = _node_id(config, source)
+    try:
+        check_access(config.access, node_id)
+    except ConfigError as error:
+        raise ConfigError(f"{source}: {error}") from None
+    if config.rate.adapt and not (registry.has_control and config.link.beacon_s):
+        raise ConfigError(
+            f"{source}: rate.adapt: got true; it needs beacons (link.beacon_s) and a control "
+            "channel, a registry of at most 15 topics; allowed here: false"
+        )
     return Setup(
         config=config,
         registry=registry,
-        node_id=_node_id(config, source),
+        node_id=node_id,
         topics_in=_topics_in(config, registry, source),
         policies=_policies(config, registry, source),
         warnings=_warnings(config, registry),

@@ -1,21 +1,30 @@
 """The paper's experiment with real daemons: send a robot's messages across, see what arrives."""
 
 from sdrlinkd.demo.links import LINKS, Options
-from sdrlinkd.demo.report import DemoReport, RunResult
+from sdrlinkd.demo.nodes import Process, problems_of, snapshot_of, start_daemon, wait_until_up
+from sdrlinkd.demo.report import DemoReport, RunResult, latency_ms
 from sdrlinkd.demo.run import run_demo
 from sdrlinkd.demo.source import Source, open_source
 from sdrlinkd.demo.table import table_6, topic_table
-from sdrlinkd.demo.trace import Trace
+from sdrlinkd.demo.trace import Pair, Sample, Trace
 
 __all__ = [
     "LINKS",
     "DemoReport",
     "Options",
+    "Pair",
+    "Process",
     "RunResult",
+    "Sample",
     "Source",
     "Trace",
+    "latency_ms",
     "open_source",
+    "problems_of",
     "run_demo",
+    "snapshot_of",
+    "start_daemon",
     "table_6",
     "topic_table",
+    "wait_until_up",
 ]

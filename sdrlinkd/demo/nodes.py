@@ -5,7 +5,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Self
 
@@ -22,27 +22,53 @@ START_TIMEOUT_S = 120.0
 STOP_TIMEOUT_S = 20.0
 
 
+class Process:
+    """A process of ours, started; its log is shown only when it fails."""
+
+    def __init__(self, module: str, arguments: Sequence[str], log_path: Path) -> None:
+        self._log_path = log_path
+        with log_path.open("w") as log_file:
+            # In a session of its own: Ctrl-C is ours to pass on, in the right order.
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", module, *arguments],
+                stdout=log_file,
+                stderr=log_file,
+                start_new_session=True,
+            )
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it has not ended."""
+        return self._process.poll() is None
+
+    def log(self) -> str:
+        """What it has said."""
+        return self._log_path.read_text().strip()
+
+    def stop(self) -> None:
+        """Ask it to end, and make sure."""
+        self._process.terminate()
+        try:
+            self._process.wait(timeout=STOP_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+
+def start_daemon(config: Path) -> Process:
+    """A daemon that is about to run."""
+    return Process("sdrlinkd", ["--config", str(config)], config.parent / "log")
+
+
 @contextlib.contextmanager
 def daemon(config: Path) -> Iterator[None]:
-    """A running daemon; its log is shown only when it fails."""
-    directory = config.parent
-    log_path = directory / "log"
-    with log_path.open("w") as log_file:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "sdrlinkd", "--config", str(config)],
-            stdout=log_file,
-            stderr=log_file,
-        )
+    """A running daemon."""
+    process = start_daemon(config)
     try:
-        _wait_until_up(process, directory, log_path)
+        wait_until_up(process, config.parent)
         yield
     finally:
-        process.terminate()
-        try:
-            process.wait(timeout=STOP_TIMEOUT_S)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+        process.stop()
 
 
 def snapshot_of(directory: Path) -> Snapshot:
@@ -58,15 +84,16 @@ def problems_of(directory: Path) -> list[str]:
         return problems
 
 
-def _wait_until_up(process: subprocess.Popen[bytes], directory: Path, log_path: Path) -> None:
+def wait_until_up(process: Process, directory: Path) -> None:
+    """Until it has its carrier. Raises UserError with its log when it does not start."""
     deadline = time.monotonic() + START_TIMEOUT_S
-    while process.poll() is None and time.monotonic() < deadline:
+    while process.is_running and time.monotonic() < deadline:
         # It answers before its modem is ready.
         with contextlib.suppress(NoDaemonError):
             if snapshot_of(directory).carrier.state != "down":
                 return
         time.sleep(0.02)
-    raise UserError(f"the daemon did not start:\n{log_path.read_text().strip()}")
+    raise UserError(f"the daemon did not start:\n{process.log()}")
 
 
 class Consumer(threading.Thread):

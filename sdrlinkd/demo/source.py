@@ -74,10 +74,11 @@ def open_source(
     topics: list[str],
     duration_s: float | None,
     seed: int,
+    namespace: str = NAMESPACE,
 ) -> Source:
-    """The source that the options of `sdrlinkctl demo` describe. Raises UserError."""
+    """A recording, or a built-in robot in `namespace`, and what of it. Raises UserError."""
     if bag is None:
-        source = _built_in(registry_path, duration_s or BUILT_IN_DURATION_S, seed)
+        source = _built_in(registry_path, duration_s or BUILT_IN_DURATION_S, seed, namespace)
     else:
         source = _from_bag(bag, registry_path, duration_s or float("inf"))
     if topics:
@@ -87,12 +88,12 @@ def open_source(
     return source
 
 
-def _built_in(registry_path: Path | None, duration_s: float, seed: int) -> Source:
-    robot = BuiltInRobot(NAMESPACE, duration_s, seed)
+def _built_in(registry_path: Path | None, duration_s: float, seed: int, namespace: str) -> Source:
+    robot = BuiltInRobot(namespace, duration_s, seed)
     registry = load_registry(registry_path) if registry_path else make_registry(BUILT_IN_REGISTRY)
     # The robot ends by itself.
     endless = float("inf")
-    source = Source("built-in robot", robot, registry, NAMESPACE, endless, robot.topics())
+    source = Source("built-in robot", robot, registry, namespace, endless, robot.topics())
     _match(source)
     return source
 

@@ -1,5 +1,7 @@
 """The link: queues, packing, duplicates, ages and the ledger, as a calculator over `now`."""
 
+from sdrlinkd.link.access import AccessParams, check_access
+from sdrlinkd.link.carrier import CarrierTraits, Opportunity, Sensed
 from sdrlinkd.link.inbox import CDR_HEADER_SIZE, Delivered
 from sdrlinkd.link.ledger import RX_PDU_REASONS, RX_REASONS, TX_REASONS
 from sdrlinkd.link.link import Link
@@ -13,6 +15,7 @@ from sdrlinkd.link.qos import (
     Qos,
     TopicPolicy,
 )
+from sdrlinkd.link.rate import RateChange, RateParams
 from sdrlinkd.link.report import link_notices, link_report
 from sdrlinkd.link.sender import Burst, Outcome
 
@@ -24,18 +27,25 @@ __all__ = [
     "RX_PDU_REASONS",
     "RX_REASONS",
     "TX_REASONS",
+    "AccessParams",
     "Burst",
+    "CarrierTraits",
     "Delivered",
     "Link",
     "LinkParams",
+    "Opportunity",
     "Outbox",
     "Outcome",
     "Outgoing",
     "Overrides",
     "Qos",
     "QueueParams",
+    "RateChange",
+    "RateParams",
     "ReassemblyParams",
+    "Sensed",
     "TopicPolicy",
+    "check_access",
     "link_notices",
     "link_report",
 ]

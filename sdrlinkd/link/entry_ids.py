@@ -35,6 +35,14 @@ class EntryIds:
         """The last fragment under the id went at `now`."""
         self._resting.append((now + self._rest_s, entry_id))
 
+    def hold(self, entry_id: int) -> bool:
+        """Its last fragment has not left after all; whether it was at rest. See `rest`."""
+        for i, (_, resting) in enumerate(self._resting):
+            if resting == entry_id:
+                del self._resting[i]
+                return True
+        return False
+
     def next_free(self) -> float:
         """When `take` will succeed: −inf at once, +inf never until an id comes back."""
         if self._idle:

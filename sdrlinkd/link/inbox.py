@@ -1,7 +1,7 @@
 """The receive half of the link: from PDUs heard to messages delivered."""
 
 from collections import Counter
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from sdrlinkd.errors import PduError
 from sdrlinkd.link.ages import Ages
@@ -46,6 +46,16 @@ class Delivered(NamedTuple):
     snr_db: float | None
 
 
+class Ear(Protocol):
+    """Who wants to know more of what is heard than messages."""
+
+    def pdu_from(self, src: int, at: float) -> None:
+        """A good PDU of another robot, for whomever; its burst's preamble came at `at`."""
+
+    def record_from(self, src: int, record: Record, at: float) -> None:
+        """A control record."""
+
+
 class Inbox:
     """Checks, duplicate suppression, reassembly and the RX ledger of one node."""
 
@@ -56,11 +66,13 @@ class Inbox:
         registry: Registry,
         own_id: int,
         hears_self: bool,
+        ear: Ear,
     ) -> None:
         self._pdu_size = params.pdu_size
         self._n_topics = len(registry)
         self._own_id = own_id
         self._hears_self = hears_self
+        self._ear = ear
         self._has_control = registry.has_control
         limits = ReassemblyLimits(
             reassembly.timeout_s, reassembly.source_bytes, reassembly.total_bytes
@@ -78,6 +90,8 @@ class Inbox:
         self.pdus_heard += 1
         try:
             pdu = parse(data, self._pdu_size)
+            if pdu.src != self._own_id:
+                self._ear.pdu_from(pdu.src, at)
             reason = self._refusal(pdu)
             records = self._control_records(pdu) if reason is None else None
         except PduError as error:
@@ -94,7 +108,7 @@ class Inbox:
             return []
         neighbor.heard += 1
         neighbor.hops_left = pdu.hop
-        neighbor.snr_db = snr_db
+        neighbor.note_snr(snr_db)
         for record in records or ():
             if isinstance(record, Stamp):
                 self._ages.stamp(pdu.src, record.topic_id, record.entry_id, record.age_us, at)
@@ -103,6 +117,8 @@ class Inbox:
                     neighbor.track.restart(seq, crc)
             elif isinstance(record, RegistryDigest):
                 neighbor.digest = record
+            else:
+                self._ear.record_from(pdu.src, record, at)
         if records is not None and len(pdu.entries) == 1:
             self.pdus_dropped["rx_control"] += 1
             return []

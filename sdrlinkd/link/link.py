@@ -1,21 +1,26 @@
 """The link: one node's whole traffic, as a calculator over bytes and `now`."""
 
+from collections import Counter
 from collections.abc import Hashable, Mapping
+from itertools import chain
 from random import Random
 
+from sdrlinkd.link.access import Access, AccessParams, Free, Wish, make_access
+from sdrlinkd.link.beacons import Beacons
+from sdrlinkd.link.carrier import CarrierTraits, Opportunity
 from sdrlinkd.link.inbox import Delivered, Inbox
 from sdrlinkd.link.meters import RateMeter, RecentAges
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
-from sdrlinkd.link.qos import AS_CONFIGURED, Overrides, TopicPolicy
+from sdrlinkd.link.qos import AS_CONFIGURED, Overrides, Qos, TopicPolicy
+from sdrlinkd.link.rate import RateControl, RateParams
+from sdrlinkd.link.returned import Returned
 from sdrlinkd.link.sender import Burst, Outcome, Sender
 from sdrlinkd.reports import RATE_WINDOW_S
-from sdrlinkd.wire import Beacon, Record, Registry, build_records, equal_payload
-
-INFINITE = float("inf")
+from sdrlinkd.wire import Frame, LinkReport, Record, Registry
 
 
 class Link:
-    """Joins sender and inbox; holds the beacons. Never waits, never reads a clock.
+    """Joins sender and inbox, access and rate. Never waits, never reads a clock.
 
     `now`, `start` and `at` are seconds on one clock of the caller's choice; `rng` is the only
     chance. `hears_self` is the paper's loopback experiment.
@@ -36,18 +41,25 @@ class Link:
         self.registry = registry
         self.own_id = own_id
         self.digest = registry.digest()
-        self._beacon_digest = self.digest
-        if len(build_records([self.digest])) > equal_payload(params.pdu_size, 1):
-            self._beacon_digest = self.digest.shortened()
+        self._rng = rng
         self.sender = Sender(params, queue, registry, own_id, rng, reassembly.timeout_s)
-        self.inbox = Inbox(params, reassembly, registry, own_id, hears_self)
+        self.inbox = Inbox(params, reassembly, registry, own_id, hears_self, self)
         self.rates = RateMeter(RATE_WINDOW_S)
         self.ages: dict[tuple[int, int], RecentAges] = {}
-        self._boot_id = rng.randrange(1 << 16)
-        self._beacon_number = 0
-        self._beacon_at = INFINITE
-        if params.beacon_s > 0 and registry.has_control:
-            self._beacon_at = 0.0
+        period_s = params.beacon_s if registry.has_control else 0.0
+        self._beacons = Beacons(period_s, params.pdu_size, self.digest, rng, own_id)
+        self._number = 0
+        self._returned = Returned(registry.has_control)
+        self.airtime_s = 0.0
+        self.bursts_by_mcs: Counter[int] = Counter()
+        self.access: Access = Free()
+        self.rate = RateControl(RateParams(), (0.0,), 0)
+
+    def attach(self, carrier: CarrierTraits, access: AccessParams, rate: RateParams) -> None:
+        """Settle access and rate for the radio that is there. Raises ConfigError."""
+        self.rate = RateControl(rate, carrier.needed_snr_db, carrier.mcs)
+        longest_s = max(carrier.longest_burst_s[mcs] for mcs in self.rate.usable)
+        self.access = make_access(access, self.own_id, carrier, longest_s, self._rng)
 
     def set_policies(self, policies: Mapping[int, TopicPolicy]) -> None:
         """Apply per-topic policies by topic id; the others get the defaults."""
@@ -63,23 +75,86 @@ class Link:
         """Queue a message; None, or the ledger's reason for refusing it."""
         return self.sender.submit(topic_id, payload, now, overrides)
 
+    def next_burst(self, opportunity: Opportunity) -> Burst | None:
+        """The burst that should leave next, decided now; None: nothing to send, or not yet."""
+        earliest, airtime_s, most_pdus, sensed = opportunity
+        if self._returned:
+            return self._again(opportunity)
+        head = self.sender.outbox.head()
+        if head is not None:
+            qos, destinations = head
+            mcs = self.rate.mcs(destinations, qos, earliest)
+        elif earliest >= self._beacons.due_at or self.sender.packetizer.offered:
+            qos, mcs = Qos.DEFAULT, self.rate.lowest
+        else:
+            return None
+        slot = self.access.slot(Wish(earliest, qos, airtime_s(mcs, 1), sensed))
+        if slot is None:
+            return None
+        n_pdus = most_pdus(mcs, slot.end - slot.start)
+        burst = self.compose(slot.start, n_pdus) if n_pdus else None
+        if burst is None:
+            return None
+        if not any(burst.carried) and airtime_s(self.rate.lowest, 1) <= slot.end - slot.start:
+            # Beacons are for everybody.
+            mcs = self.rate.lowest
+        length_s = airtime_s(mcs, len(burst.pdus))
+        self.access.sent(slot.start + length_s)
+        self._number += 1
+        return burst._replace(
+            mcs=mcs,
+            qos=qos,
+            start=slot.start,
+            exact=slot.exact,
+            airtime_s=length_s,
+            number=self._number,
+            first_start=slot.start,
+        )
+
+    def _again(self, opportunity: Opportunity) -> Burst | None:
+        """A burst that came too late for its slot, in another one."""
+        again = self._returned.head
+        airtime_s = opportunity.airtime_s(again.mcs, len(again.pdus))
+        slot = self.access.slot(
+            Wish(opportunity.earliest, again.qos, airtime_s, opportunity.sensed)
+        )
+        if slot is None or slot.start + airtime_s > slot.end:
+            return None
+        self.access.sent(slot.start + airtime_s)
+        burst = self._returned.take(slot.start)
+        self.sender.packetizer.left(chain.from_iterable(burst.carried), slot.start)
+        return burst._replace(exact=slot.exact)
+
     def compose(self, start: float, max_pdus: int) -> Burst | None:
         """The burst that should leave at `start`, decided now; None when there is nothing.
 
         A beacon that is due rides in spare room; when traffic leaves none for a whole period, or
         there is no traffic, it gets a PDU of its own.
         """
+        packetizer = self.sender.packetizer
         overdue = False
-        if start >= self._beacon_at:
-            overdue = self.sender.packetizer.offered
-            self._offer_beacon(start)
+        if start >= self._beacons.due_at:
+            overdue = packetizer.offered
+            packetizer.offer(self._beacon_records(start))
+        elif packetizer.offered and (frame := self.access.frame(start)):
+            packetizer.renew(frame)
+            # Clocks do not wait for spare room.
+            overdue = True
         burst = self.sender.compose_records() if overdue else self.sender.compose(start, max_pdus)
-        if burst is None and self.sender.packetizer.offered:
+        if burst is None and packetizer.offered:
             burst = self.sender.compose_records()
         return burst
 
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
         """What the radio says became of a burst."""
+        if outcome is not Outcome.SENT:
+            self.access.not_sent(burst.start)
+        if outcome is Outcome.LATE and self._returned.give_back(burst):
+            self.sender.packetizer.not_left(chain.from_iterable(burst.carried))
+            return
+        if outcome is Outcome.SENT:
+            self.airtime_s += burst.airtime_s
+            self.bursts_by_mcs[burst.mcs] += 1
         self.sender.confirm(burst, outcome, now)
 
     def hear(self, data: bytes, at: float, snr_db: float | None = None) -> list[Delivered]:
@@ -105,17 +180,25 @@ class Link:
         if self.rates.is_due(now):
             self.rates.sample(self.rate_counters(), now)
 
+    @property
+    def has_work(self) -> bool:
+        """Whether messages wait to be sent."""
+        return bool(self.sender.outbox) or bool(self._returned)
+
     def next_wakeup(self, now: float) -> float:
-        """When `compose` may next return a burst; not after `now`: at once."""
-        return min(self._beacon_at, self.sender.packetizer.next_wakeup(now))
+        """When there may next be something to send; not after `now`: at once."""
+        if self._returned:
+            return now
+        return min(self._beacons.due_at, self.sender.packetizer.next_wakeup(now))
 
     def drain(self) -> None:
         """Nothing more will come: partial PDUs go at once, beacons end."""
-        self._beacon_at = INFINITE
+        self._beacons.end()
         self.sender.packetizer.flush()
 
     def shut_down(self) -> None:
         """Drop what could not be sent any more, by name."""
+        self._returned.clear()
         self.sender.shut_down()
 
     def audit(self) -> list[str]:
@@ -132,8 +215,27 @@ class Link:
         }
         return {**tx, **rx}
 
-    def _offer_beacon(self, start: float) -> None:
-        records: list[Record] = [Beacon(self._boot_id, self._beacon_number), self._beacon_digest]
-        self.sender.packetizer.offer(records)
-        self._beacon_number = (self._beacon_number + 1) & 0xFFFF
-        self._beacon_at = start + self.params.beacon_s
+    @property
+    def bursts_late(self) -> int:
+        """Bursts that came too late for their slot and were sent again."""
+        return self._returned.count
+
+    # The inbox's ear.
+
+    def pdu_from(self, src: int, at: float) -> None:
+        """A good PDU of another robot."""
+        self.access.heard(src, at)
+        self.rate.heard(src, at)
+
+    def record_from(self, src: int, record: Record, at: float) -> None:
+        """A control record that is not about messages."""
+        if isinstance(record, LinkReport):
+            if record.node == self.own_id:
+                self.rate.take(src, record, at)
+        elif isinstance(record, Frame):
+            self.access.take_frame(src, record, at)
+
+    def _beacon_records(self, start: float) -> list[Record]:
+        records = self._beacons.take(start, self.inbox.neighbors.values(), self.rate)
+        frame = self.access.frame(start)
+        return records if frame is None else [*records, frame]

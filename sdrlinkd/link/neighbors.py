@@ -5,6 +5,9 @@ from dataclasses import dataclass, field
 from sdrlinkd.link.duplicates import SequenceTrack
 from sdrlinkd.wire import Beacon, Registry, RegistryDigest
 
+# Weight of the newest PDU in the mean SNR.
+SNR_WEIGHT = 0.2
+
 
 @dataclass(slots=True)
 class Neighbor:
@@ -17,9 +20,28 @@ class Neighbor:
     last_heard_at: float = 0.0
     hops_left: int = 0
     snr_db: float | None = None
+    mean_snr_db: float | None = None
     boot_id: int | None = None
     reboots: int = 0
     digest: RegistryDigest | None = None
+    _reported: tuple[int, int] = (0, 0)
+
+    def note_snr(self, snr_db: float | None) -> None:
+        """SNR of one more PDU."""
+        self.snr_db = snr_db
+        if snr_db is None or self.mean_snr_db is None:
+            self.mean_snr_db = snr_db
+        else:
+            self.mean_snr_db += SNR_WEIGHT * (snr_db - self.mean_snr_db)
+
+    def take_quality(self) -> tuple[float, float] | None:
+        """(mean SNR in dB, share of PDUs lost since the last call); None: nothing was heard."""
+        heard = self.heard - self._reported[0]
+        lost = max(0, self.track.lost - self._reported[1])
+        if not heard or self.mean_snr_db is None:
+            return None
+        self._reported = (self.heard, self.track.lost)
+        return self.mean_snr_db, lost / (heard + lost)
 
     def take_beacon(self, beacon: Beacon) -> bool:
         """Note who it is; True when it has started anew since we last heard a beacon."""

@@ -29,7 +29,7 @@ class Outgoing:
     """One message on its way out."""
 
     __slots__ = (
-        "arrived_at", "dst", "entry_id", "expires_at", "fate", "k", "lane", "next_index",
+        "arrived_at", "dst", "entry_id", "expires_at", "fate", "is_held", "k", "lane", "next_index",
         "payload", "priority", "qos", "rests_id", "stamped", "tally", "topic_id", "total",
         "unconfirmed",
     )  # fmt: skip
@@ -63,6 +63,7 @@ class Outgoing:
         self.total = 0
         self.next_index = 0
         self.rests_id = False
+        self.is_held = False
         self.unconfirmed = 0
 
 
@@ -175,6 +176,13 @@ class Outbox:
         while self.levels:
             yield self.withdraw_head(self.levels[0].lanes[0])
 
+    def head(self) -> tuple[Qos, set[int]] | None:
+        """(class of what goes next, destinations of all that waits); None when nothing does."""
+        if not self.levels:
+            return None
+        destinations = {dst for level in self.levels for dst in level.per_dst}
+        return Qos(self.levels[0].key[0]), destinations
+
     def oldest_arrival(self) -> float:
         """When the longest waiting head arrived; infinity when nothing waits."""
         return min(
@@ -247,6 +255,8 @@ class Outbox:
         level = lane.level
         del level.lanes[bisect_left(level.lanes, lane.order, key=_order)]
         level.per_dst[lane.dst] -= 1
+        if not level.per_dst[lane.dst]:
+            del level.per_dst[lane.dst]
         if not level.lanes:
             del self._level_by_key[level.key]
             del self.levels[bisect_left(self.levels, level.key, key=lambda each: each.key)]

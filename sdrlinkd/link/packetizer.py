@@ -74,6 +74,13 @@ class Packetizer:
         """Records to send in spare room of the PDUs to come (replaces what was offered)."""
         self._spare_records = [build_records([record]) for record in records]
 
+    def renew(self, record: Record) -> None:
+        """Where a record of its type still waits, this one goes in its place."""
+        built = build_records([record])
+        self._spare_records = [
+            built if each[0] == built[0] else each for each in self._spare_records
+        ]
+
     @property
     def offered(self) -> bool:
         """Whether offered records still wait for a PDU with room."""
@@ -93,6 +100,18 @@ class Packetizer:
     def abandon(self, lane: Lane, now: float) -> None:
         """Send no more of the message the lane is in the middle of."""
         self._retire(self._outbox.withdraw_head(lane), now)
+
+    def not_left(self, messages: Iterable[Outgoing]) -> None:
+        """Fragments of these will leave later than they were made for: their ids must wait, too."""
+        for message in messages:
+            message.is_held = message.is_held or self._ids(message.topic_id).hold(message.entry_id)
+
+    def left(self, messages: Iterable[Outgoing], start: float) -> None:
+        """Now they do."""
+        for message in messages:
+            if message.is_held:
+                message.is_held = False
+                self._ids(message.topic_id).rest(message.entry_id, start)
 
     def flush(self) -> None:
         """From now on partial PDUs do not wait."""

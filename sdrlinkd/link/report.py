@@ -23,6 +23,11 @@ def link_report(
     """
     return LinkReport(
         pdu_size=link.params.pdu_size,
+        access=link.access.state,
+        airtime_s=link.airtime_s,
+        bursts_by_mcs=dict(sorted(link.bursts_by_mcs.items())),
+        bursts_late=link.bursts_late,
+        mcs_changes=list(link.rate.changes),
         control_channel=link.registry.has_control,
         registry_digest=link.digest.overall.hex(),
         tx=_tx(link),
@@ -124,6 +129,7 @@ def _neighbors(link: Link, now: float) -> list[NeighborReport]:
     for src, neighbor in sorted(link.inbox.neighbors.items()):
         lost = neighbor.track.lost
         registry = "unknown"
+        told = link.rate.told(src)
         if neighbor.digest is not None:
             registry = "same" if neighbor.digest.overall == link.digest.overall else "differs"
         reports.append(
@@ -139,6 +145,9 @@ def _neighbors(link: Link, now: float) -> list[NeighborReport]:
                 reboots=neighbor.reboots,
                 snr_db=neighbor.snr_db,
                 registry=registry,
+                snr_there_db=told[0] if told else None,
+                per_there=told[1] if told else None,
+                mcs=link.rate.chosen(src),
             )
         )
     return reports
@@ -159,6 +168,7 @@ def link_notices(link: Link) -> list[str]:
             "256 in 1.25 reassembly timeouts; give all robots a larger link.pdu_size or a shorter "
             "reassembly.timeout_s"
         )
+    notices += link.access.notices()
     for _, neighbor in sorted(link.inbox.neighbors.items()):
         disagreement = neighbor.disagreement(link.registry, link.digest)
         if disagreement:

@@ -14,10 +14,22 @@ from sdrlinkd.wire import Registry, max_message_size
 
 
 class Burst(NamedTuple):
-    """PDUs that leave together, and the messages each carries an entry of."""
+    """PDUs that leave together, and the messages each carries an entry of.
+
+    They leave at `start`, in s on the link's clock; when they are `exact`, then or not at all.
+    """
 
     pdus: list[bytes]
     carried: list[list[Outgoing]]
+    mcs: int = 0
+    qos: Qos = Qos.DEFAULT
+    start: float = 0.0
+    exact: bool = False
+    airtime_s: float = 0.0
+    number: int = 0
+    """In the order in which they were composed."""
+    first_start: float = 0.0
+    """Where it was to leave at first; later than that when it came too late."""
 
 
 class Outcome(Enum):

@@ -1,129 +1,137 @@
 """The modem: PDUs to bursts at the last moment, samples to PDUs, off the event loop."""
 
 import asyncio
+import contextlib
+import math
 import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import phy
-from backends import BackendError, Radio, Samples, Tuning, TxBurst, TxOutcome
+from backends import GAP, BackendError, Radio, Tuning
 from sdrlinkd.config import ModemParams
 from sdrlinkd.errors import UserError
-from sdrlinkd.link import Burst, Outcome
+from sdrlinkd.link import Burst, CarrierTraits, Opportunity, Outcome
+from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.clock import StreamClock
+from sdrlinkd.modem.ear import Ear
 from sdrlinkd.modem.plan import AirPlan
-from sdrlinkd.modem.rx_thread import ReceiverThread
-from sdrlinkd.pdulink import Heard, Opportunity, PduListener
+from sdrlinkd.modem.rx_thread import Demodulation, ReceiverHere, ReceiverThread
+from sdrlinkd.modem.transmission import BurstReport, Transmission
+from sdrlinkd.pdulink import Heard, PduListener
 from sdrlinkd.reports import CarrierReport
-
-OUTCOMES = {
-    TxOutcome.SENT: Outcome.SENT,
-    TxOutcome.LATE: Outcome.LATE,
-    TxOutcome.UNDERFLOW: Outcome.UNDERFLOW,
-    TxOutcome.LOST: Outcome.LOST,
-}
 
 TIMER_S = 0.001
 """The event loop's timers count in this; shorter waits would be busy ones."""
 HANDOVER_S = 0.001
 """A burst composed for a free air begins so much later: time to modulate it."""
+REACTION_S = 0.002
+"""From the last sample of a block to a decision, beyond the block itself."""
+INFINITE = float("inf")
 
 
 class ModemLink:
-    """A PDU link over a radio: the PHY in two threads, everything else on the event loop."""
+    """A PDU link over a radio: the PHY in two threads, everything else on the event loop.
 
-    def __init__(self, params: ModemParams, pdu_size: int, radio: Radio, kind: str) -> None:
+    In lock-step all of it is done within the block that brought it. `listens`: someone wants to
+    know whether there is a carrier on the air. `lead_grows`: bursts that must leave at a given
+    moment are handed over earlier when the machine proves to be slow.
+    """
+
+    def __init__(
+        self,
+        params: ModemParams,
+        pdu_size: int,
+        radio: Radio,
+        kind: str,
+        listens: bool = False,
+        lead_grows: bool = False,
+    ) -> None:
         self._params = params
         self._pdu_size = pdu_size
         self._radio = radio
         self._kind = kind
-        self._transmitter = phy.Transmitter(params.network)
+        self._airtimes = Airtimes(params, pdu_size)
         self._receiver = phy.Receiver(params.network, params.max_cfo_hz / params.rate_hz)
-        self._amplitude = 10 ** (-params.backoff_db / 20)
-        self._max_pdus = phy.most_pdus(
-            phy.OFDM_64_16, params.mcs, pdu_size, round(params.max_burst_s * params.rate_hz)
-        )
-        paced = radio.capabilities.paced
-        self._clock = StreamClock(params.rate_hz, paced)
-        self._plan = AirPlan(
-            round((HANDOVER_S + radio.capabilities.lead_s) * params.rate_hz),
-            round(params.tx_lead_s * params.rate_hz),
-        )
-        self._planned_start = 0
-        self._rx: ReceiverThread | None = None
-        self._tx_thread = ThreadPoolExecutor(1, "phy-tx")
+        sense = phy.CarrierSense(params.carrier_db) if listens else None
+        self._ear = Ear(self._receiver, sense, params.rate_hz)
+        self._lead_grows = lead_grows
+        self._clock = StreamClock(params.rate_hz, paced=True)
+        self._plan = AirPlan(0)
+        self._rx: Demodulation | None = None
+        self._tx = Transmission(params, radio)
         self._listener: PduListener | None = None
-        self._tasks: asyncio.TaskGroup | None = None
-        self._on_air: list[Burst] = []
         self._moved = asyncio.Event()
         self._state = "down"
         self._problem = ""
-        self._bursts_slipped = 0
-        self._samples_sent = 0
+        self._is_stalled = False
 
     def now(self) -> float:
         """Seconds on the received stream."""
         return self._clock.now(time.monotonic())
 
-    async def open(self, listener: PduListener) -> None:
+    async def open(self, listener: PduListener) -> CarrierTraits:
         """Load the compiled code and open the radio."""
-        loop = asyncio.get_running_loop()
-        await loop.run_in_executor(self._tx_thread, phy.warm_up)
-        tuning = Tuning(self._params.rate_hz, self._params.frequency_hz)
+        params = self._params
+        await self._tx.warm_up()
+        tuning = Tuning(params.rate_hz, params.frequency_hz)
         try:
             await self._radio.open(tuning)
         except BackendError as error:
             raise UserError(str(error)) from None
-        self._rx = ReceiverThread(
-            self._receiver,
-            self._params.rate_hz,
-            self._deliver,
-            every_block=not self._radio.capabilities.paced,
-        )
+        can = self._radio.capabilities
+        lead_s = can.lead_s + can.turnaround_s + (HANDOVER_S if can.paced else 0.0)
+        self._can = can
+        self._clock = StreamClock(params.rate_hz, can.paced, can.lockstep)
+        # In lock-step composing takes no time, but it happens only when there is a block.
+        ahead_s = can.block_s if can.lockstep else params.tx_lead_s
+        self._plan = AirPlan(math.ceil(lead_s * params.rate_hz), round(ahead_s * params.rate_hz))
+        if can.lockstep:
+            self._rx = ReceiverHere(self._ear, params.rate_hz, self._step)
+        else:
+            self._rx = ReceiverThread(self._ear, params.rate_hz, self._deliver, wakes=not can.paced)
         self._listener = listener
         self._state = "up"
+        return CarrierTraits(
+            kind=self._kind,
+            is_lockstep=can.lockstep,
+            transmits=can.transmits,
+            senses=can.receives,
+            turnaround_s=can.turnaround_s,
+            index_error_s=can.index_error_s,
+            lead_s=lead_s,
+            react_s=can.block_s + (REACTION_S if can.paced else 0.0),
+            detect_s=2 * phy.SENSE_WINDOW / params.rate_hz,
+            overhead_s=self._airtimes.overhead_s,
+            gap_s=GAP / params.rate_hz,
+            ahead_s=ahead_s,
+            longest_burst_s=self._airtimes.longest_s(),
+            mcs=params.mcs,
+            needed_snr_db=tuple(
+                phy.needed_snr_db(mcs, self._pdu_size) for mcs in range(len(phy.MCS_TABLE))
+            ),
+        )
 
     async def run(self) -> None:
-        """Receive, and send what is handed over, until cancelled."""
+        """Receive, and send what is to be sent, until cancelled."""
         if self._rx is None:
             raise RuntimeError("run before open")
-        async with asyncio.TaskGroup() as self._tasks:
+        async with asyncio.TaskGroup() as tasks:
+            self._tx.start(tasks, self._left)
+            if not self._can.lockstep:
+                tasks.create_task(self._send_when_due())
             try:
                 await self._receive(self._rx)
             except BackendError as error:
                 self._state, self._problem = "down", str(error)
             await asyncio.Event().wait()
 
-    async def opportunity(self) -> Opportunity:
-        """When what is committed to the air is less than the lead."""
-        await asyncio.sleep(0)
-        while not self._can_send():
-            self._moved.clear()
-            await self._moved.wait()
-        rate = self._params.rate_hz
-        while wait := self._plan.wait(self._clock.index(time.monotonic())):
-            self._moved.clear()
-            if self._radio.capabilities.paced:
-                await asyncio.sleep(max(TIMER_S, wait / rate))
-            else:
-                await self._moved.wait()
-        self._planned_start = self._plan.start(self._clock.index(time.monotonic()))
-        return Opportunity(self._planned_start / rate, self._max_pdus)
-
-    def send(self, burst: Burst) -> None:
-        """Take a burst for the opportunity just given."""
-        if self._tasks is None or self._listener is None:
-            return
-        n_samples = phy.layout(
-            phy.OFDM_64_16, self._params.mcs, len(burst.pdus), self._pdu_size
-        ).n_samples
-        self._plan.commit(self._planned_start, n_samples)
-        self._on_air.append(burst)
-        self._tasks.create_task(self._transmit(burst, self._planned_start))
+    def wake(self) -> None:
+        """There may be something to send."""
+        self._moved.set()
 
     async def idle(self) -> None:
         """Wait until every burst taken is settled."""
-        while self._on_air:
+        while self._tx.on_air:
             self._moved.clear()
             await self._moved.wait()
 
@@ -132,13 +140,11 @@ class ModemLink:
         await self._radio.close()
         listener, self._listener = self._listener, None
         if listener is not None:
-            for burst in self._on_air:
-                listener.settled(burst, Outcome.LOST, self.now())
-        self._on_air.clear()
+            self._tx.lose(listener, self.now())
         self._state = "down"
         if self._rx is not None:
             self._rx.stop()
-        self._tx_thread.shutdown(wait=True, cancel_futures=True)
+        self._tx.close()
 
     def report(self) -> CarrierReport:
         """State, counters of radio and receiver, and whether the PHY keeps up."""
@@ -147,13 +153,12 @@ class ModemLink:
         ratio = self._realtime_ratio
         return CarrierReport(
             kind=self._kind,
-            state=self._state,
+            state="down" if self._is_gone else self._state,
             detail=f"{phy.MCS_TABLE[params.mcs].name}, {params.rate_hz / 1e6:g} Msps, "
             f"{self._radio.detail}",
             counters={
                 **self._radio.counters,
-                "bursts_slipped": self._bursts_slipped,
-                "samples_sent": self._samples_sent,
+                **self._tx.counters,
                 **{name: counted[name] for name in phy.COUNTERS},
             },
             realtime_ratio=round(ratio, 2) if ratio else None,
@@ -162,9 +167,12 @@ class ModemLink:
 
     def _notices(self) -> list[str]:
         notices = [self._problem] if self._problem else []
+        if self._is_gone:
+            notices.append(f"the radio delivers nothing ({self._radio.detail}); what is to be sent "
+                           "waits")  # fmt: skip
         if self._radio.counters.get("overflows"):
             notices.append(self._overflow_notice())
-        if self._state != "down" and not self._radio.capabilities.transmits:
+        if self._state != "down" and not self._can.transmits:
             notices.append("this radio only receives: what is to be sent stays in the queue")
         return notices
 
@@ -182,18 +190,20 @@ class ModemLink:
     def _realtime_ratio(self) -> float:
         return self._rx.load.realtime_ratio if self._rx is not None else 0.0
 
-    def _can_send(self) -> bool:
-        return (
-            self._tasks is not None and self._state == "up" and self._radio.capabilities.transmits
-        )
+    @property
+    def _is_gone(self) -> bool:
+        return self._state == "up" and self._can.paced and self._clock.is_gone(time.monotonic())
 
-    async def _receive(self, receiver: ReceiverThread) -> None:
+    async def _receive(self, receiver: Demodulation) -> None:
         """Take blocks from the radio; when the receiver is far behind, the radio has to wait."""
+        paced = self._can.paced
         self._moved.set()
         async for block in self._radio.blocks():
-            if self._radio.capabilities.paced:
+            if paced:
                 self._clock.observe(block.index + block.n, block.host_ns * 1e-9)
-                self._moved.set()
+                if self._is_stalled:
+                    self._is_stalled = False
+                    self._moved.set()
             await receiver.put(block)
         await receiver.finish()
         self._state = "ended"
@@ -201,10 +211,22 @@ class ModemLink:
 
     def _deliver(self, events: Sequence[phy.Event], end: int) -> None:
         """Events that the samples before index `end` completed."""
-        if not self._radio.capabilities.paced:
+        if not self._can.paced:
             # Blocks wait for the receiver, and the clock with them.
             self._clock.observe(end, time.monotonic())
+        if self._rx is not None and self._rx.wakes:
             self._moved.set()
+        self._tell(events)
+
+    def _step(self, events: Sequence[phy.Event], end: int) -> None:
+        """In lock-step: everything that follows from a block."""
+        self._deliver(events, end)
+        if self._listener is not None:
+            self._listener.advance(self.now())
+            while self._turn() == 0:
+                pass
+
+    def _tell(self, events: Sequence[phy.Event]) -> None:
         rate = self._params.rate_hz
         heard = [
             Heard(event.data, event.burst.start / rate, event.burst.snr_db)
@@ -214,25 +236,63 @@ class ModemLink:
         if heard and self._listener is not None:
             self._listener.heard(heard)
 
-    async def _transmit(self, burst: Burst, planned: int) -> None:
-        if self._listener is None:
-            return
-        loop = asyncio.get_running_loop()
-        try:
-            samples = await loop.run_in_executor(self._tx_thread, self._modulate, burst.pdus)
-            self._samples_sent += len(samples)
-            report = await self._radio.send(TxBurst(planned, samples))
-            self._bursts_slipped += report.start > planned
-            outcome, end = OUTCOMES[report.outcome], report.end
-        except BackendError as error:
-            outcome, end = Outcome.LOST, planned
-            self._problem = str(error)
-        if self._listener is not None:
-            self._on_air.remove(burst)
-            self._listener.settled(burst, outcome, end / self._params.rate_hz)
-        self._moved.set()
+    async def _send_when_due(self) -> None:
+        """One burst at a time, each decided at the last moment."""
+        paced = self._can.paced
+        while True:
+            self._moved.clear()
+            wait_s = self._turn()
+            if not wait_s:
+                await asyncio.sleep(0)
+                continue
+            limit_s = max(TIMER_S, wait_s) if paced and wait_s != INFINITE else None
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(limit_s):
+                    await self._moved.wait()
 
-    def _modulate(self, pdus: Sequence[bytes]) -> Samples:
-        """In the transmitter's thread: the burst, with room for its peaks."""
-        samples: Samples = self._transmitter.modulate(pdus, self._params.mcs) * self._amplitude
-        return samples
+    def _turn(self) -> float:
+        """Send the next burst if it may go; 0 when one went, else how long nothing will, in s."""
+        listener, rate = self._listener, self._params.rate_hz
+        can_send = self._state == "up" and self._can.transmits
+        if listener is None or self._rx is None or not can_send:
+            return INFINITE
+        self._is_stalled = self._is_gone
+        if self._is_stalled:
+            return INFINITE
+        now = self.now()
+        wait_s = listener.next_wakeup(now) - now
+        if wait_s > 0:
+            return wait_s
+        index = round(now * rate)
+        wait = self._plan.wait(index)
+        if wait:
+            return wait / rate
+        earliest = self._plan.start(index) / rate
+        burst = listener.next_burst(
+            Opportunity(
+                earliest, self._airtimes.airtime_s, self._airtimes.most_pdus, self._ear.sensed
+            )
+        )
+        if self._can.paced:
+            self._rx.wakes = burst is None
+        if burst is None:
+            # What waits and may not go yet is looked at again with the next block; but a partial
+            # PDU may have begun to wait for more.
+            wait_s = listener.next_wakeup(now) - now
+            return wait_s if wait_s > 0 else INFINITE
+        start = round(burst.start * rate)
+        self._plan.commit(start, self._airtimes.samples(burst.mcs, len(burst.pdus)))
+        self._tx.send(burst, start)
+        return 0.0
+
+    def _left(self, burst: Burst, report: BurstReport) -> None:
+        """A burst has left, or has not."""
+        if self._lead_grows and report.outcome is Outcome.LATE:
+            self._plan.was_late()
+        elif self._lead_grows:
+            self._plan.was_in_time()
+        if self._listener is not None:
+            if report.problem:
+                self._problem = report.problem
+            self._listener.settled(burst, report.outcome, report.end / self._params.rate_hz)
+        self._moved.set()

@@ -2,6 +2,9 @@
 
 from backends import GAP
 
+EASE = 64
+"""After so many bursts in time, most of what was added to the lead is gone."""
+
 
 class AirPlan:
     """Keeps what is committed to the air below `lead + ahead` plus one burst.
@@ -11,7 +14,7 @@ class AirPlan:
     """
 
     def __init__(self, lead: int, ahead: int = 0) -> None:
-        self._lead = lead
+        self._lead = self._least = lead
         self._ahead = ahead
         self._free_at = 0
 
@@ -22,6 +25,15 @@ class AirPlan:
     def start(self, now: int) -> int:
         """Where a burst composed now begins."""
         return max(now + self._lead, self._free_at)
+
+    def was_late(self) -> None:
+        """A burst came too late: begin earlier from now on, up to so much as `ahead` allows."""
+        added = self._lead - self._least
+        self._lead += max(0, min(self._lead, self._ahead - added)) // 2
+
+    def was_in_time(self) -> None:
+        """It did not; now and then, see whether less will do."""
+        self._lead -= (self._lead - self._least + EASE - 1) // EASE
 
     def commit(self, start: int, n_samples: int) -> None:
         """A burst of `n_samples` will leave at `start`."""

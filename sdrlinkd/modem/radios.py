@@ -1,26 +1,39 @@
 """From the configuration to a modem with its radio."""
 
+import os
+import socket
 from pathlib import Path
 from random import Random
 
 import phy
-from backends import BackendError, Channel, IqFileRadio, LoopbackRadio, Radio
+from backends import BackendError, Channel, EtherRadio, IqFileRadio, LoopbackRadio, Radio
 from sdrlinkd.config import Config
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.modem.link import ModemLink
 
 
-def make_modem(config: Config, rng: Random) -> ModemLink:
+def make_modem(config: Config, node_id: int, rng: Random) -> ModemLink:
     """The modem on the radio that `config.backend` names. Raises UserError."""
     _check_airtime(config)
     try:
-        radio = _make_radio(config, rng)
+        radio = _make_radio(config, node_id, rng)
     except BackendError as error:
         raise UserError(str(error)) from None
-    return ModemLink(config.modem, config.link.pdu_size, radio, config.backend)
+    policy = config.access.policy
+    return ModemLink(
+        config.modem,
+        config.link.pdu_size,
+        radio,
+        config.backend,
+        listens=policy != "none",
+        lead_grows=policy == "tdma",
+    )
 
 
-def _make_radio(config: Config, rng: Random) -> Radio:
+def _make_radio(config: Config, node_id: int, rng: Random) -> Radio:
+    if config.backend == "ether":
+        who = f"process {os.getpid()} on {socket.gethostname()}"
+        return EtherRadio(Path(config.ether.dir), node_id, who)
     channel = _channel(config, rng.getrandbits(32))
     modem, loopback, iqfile = config.modem, config.loopback, config.iqfile
     if config.backend == "iqfile":

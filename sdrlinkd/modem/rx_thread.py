@@ -1,13 +1,15 @@
-"""The receiver on a thread of its own."""
+"""The receiver on a thread of its own, or, in lock-step, where it stands."""
 
 import asyncio
 import queue
 import threading
 import time
 from collections.abc import Callable, Sequence
+from typing import Protocol
 
 import phy
 from backends import RxBlock
+from sdrlinkd.modem.ear import Ear
 from sdrlinkd.modem.load import LoadMeter
 
 # Blocks that may wait for the receiver.
@@ -16,19 +18,60 @@ MAX_BLOCKS = 16
 Deliver = Callable[[Sequence[phy.Event], int], None]
 
 
-class ReceiverThread:
-    """Blocks in; events and the index they stand at out, by `deliver` on the event loop.
+class Demodulation(Protocol):
+    """Blocks in; events and the index they stand at out, by `deliver`."""
 
-    The loop is woken only when there are events, or for `every_block`.
-    """
+    load: LoadMeter
+    wakes: bool
+    """Deliver after every block, also when it brought no events."""
 
-    def __init__(
-        self, receiver: phy.Receiver, rate_hz: float, deliver: Deliver, every_block: bool
-    ) -> None:
-        self._receiver = receiver
+    async def put(self, block: RxBlock) -> None:
+        """Hand over a block; may wait while too many are waiting already."""
+
+    async def finish(self) -> None:
+        """The stream is over: deliver what its last samples hold."""
+
+    def stop(self) -> None:
+        """End, whatever waits."""
+
+
+class ReceiverHere:
+    """Demodulates in `put`: in lock-step nothing goes on until it has."""
+
+    def __init__(self, ear: Ear, rate_hz: float, deliver: Deliver) -> None:
+        self._ear = ear
         self._rate_hz = rate_hz
         self._deliver = deliver
-        self._every_block = every_block
+        self.load = LoadMeter()
+        self.wakes = True
+
+    async def put(self, block: RxBlock) -> None:
+        """Everything that follows from a block."""
+        began = time.thread_time()
+        events = self._ear.hear(block)
+        self.load.add(time.thread_time() - began, block.n / self._rate_hz)
+        self._deliver(events, block.index + block.n)
+
+    async def finish(self) -> None:
+        """The last samples."""
+        end = self._ear.next_index
+        self._deliver(self._ear.flush(), end)
+
+    def stop(self) -> None:
+        """Nothing to end."""
+
+
+class ReceiverThread:
+    """On a thread; `deliver` is called on the event loop.
+
+    The loop is woken only when there are events, or while `wakes` is set.
+    """
+
+    def __init__(self, ear: Ear, rate_hz: float, deliver: Deliver, wakes: bool) -> None:
+        self._ear = ear
+        self._rate_hz = rate_hz
+        self._deliver = deliver
+        self.wakes = wakes
         self._blocks: queue.SimpleQueue[RxBlock | None] = queue.SimpleQueue()
         self._loop = asyncio.get_running_loop()
         self._has_room = asyncio.Event()
@@ -61,18 +104,16 @@ class ReceiverThread:
     def _work(self) -> None:
         while (block := self._blocks.get()) is not None:
             began = time.thread_time()
-            if block.samples is None:
-                events = self._receiver.gap(block.n)
-            else:
-                events = self._receiver.push(block.samples)
+            events = self._ear.hear(block)
+            if block.samples is not None:
                 self.load.add(time.thread_time() - began, block.n / self._rate_hz)
-            if events or self._every_block:
+            if events or self.wakes:
                 self._call(self._deliver, events, block.index + block.n)
             if self._is_waited_for and self._blocks.qsize() <= MAX_BLOCKS // 2:
                 self._is_waited_for = False
                 self._call(self._has_room.set)
-        end = self._receiver.next_index
-        self._call(self._deliver, self._receiver.flush(), end)
+        end = self._ear.next_index
+        self._call(self._deliver, self._ear.flush(), end)
         self._call(self._ended.set)
 
     def _call(self, what: Callable[..., None], *arguments: object) -> None:

@@ -1,6 +1,6 @@
 """PDU links: what carries PDUs between nodes, behind one seam; and the one without a radio."""
 
-from sdrlinkd.pdulink.base import Heard, Opportunity, PduLink, PduListener
+from sdrlinkd.pdulink.base import Heard, PduLink, PduListener
 from sdrlinkd.pdulink.direct import DirectLink
 from sdrlinkd.pdulink.impairment import Arrival, Impairment
 
@@ -9,7 +9,6 @@ __all__ = [
     "DirectLink",
     "Heard",
     "Impairment",
-    "Opportunity",
     "PduLink",
     "PduListener",
 ]

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
-from sdrlinkd.link import Burst, Outcome
+from sdrlinkd.link import Burst, CarrierTraits, Opportunity, Outcome
 from sdrlinkd.reports import CarrierReport
 
 
@@ -15,18 +15,20 @@ class Heard(NamedTuple):
     snr_db: float | None = None
 
 
-class Opportunity(NamedTuple):
-    """The carrier can take a burst of at most `max_pdus` whose preamble would leave at `start`."""
-
-    start: float
-    max_pdus: int
-
-
 class PduListener(Protocol):
-    """Whom a PDU link tells. Called on the event loop; must not wait."""
+    """Whom a PDU link tells and asks. Called on the event loop; must not wait."""
 
     def heard(self, pdus: Sequence[Heard]) -> None:
         """PDUs arrived."""
+
+    def advance(self, now: float) -> None:
+        """Time has come so far; called where time is that of the samples and nobody's clock."""
+
+    def next_burst(self, opportunity: Opportunity) -> Burst | None:
+        """What the carrier shall send now; None: nothing, or not yet."""
+
+    def next_wakeup(self, now: float) -> float:
+        """When there may next be something to send; not after `now`: already."""
 
     def settled(self, burst: Burst, outcome: Outcome, at: float) -> None:
         """A burst's last bit left, or did not."""
@@ -35,23 +37,20 @@ class PduListener(Protocol):
 class PduLink(Protocol):
     """Carries PDUs: the direct link, a modem with a radio, a GNU Radio flowgraph.
 
-    The next burst is composed only when `opportunity` has returned, never before.
+    It asks for a burst only at the moment that it can take one, never before.
     """
 
     def now(self) -> float:
         """Seconds on the link's clock."""
 
-    async def open(self, listener: PduListener) -> None:
-        """Begin to listen. Raises UserError when the carrier cannot be had."""
+    async def open(self, listener: PduListener) -> CarrierTraits:
+        """Begin to listen; what there is. Raises UserError when the carrier cannot be had."""
 
     async def run(self) -> None:
         """Carry PDUs until cancelled, in the daemon's task group."""
 
-    async def opportunity(self) -> Opportunity:
-        """Wait until the carrier can take the next burst."""
-
-    def send(self, burst: Burst) -> None:
-        """Take a burst at the opportunity just given; `settled` tells what became of it."""
+    def wake(self) -> None:
+        """There may be something to send."""
 
     async def idle(self) -> None:
         """Wait until every burst taken is settled."""

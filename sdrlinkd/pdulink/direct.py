@@ -1,14 +1,15 @@
 """The direct link: PDUs come straight back, as in the paper's loopback without a PHY."""
 
 import asyncio
+import contextlib
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from random import Random
 
 from sdrlinkd.config import DirectParams
-from sdrlinkd.link import Burst, Outcome
-from sdrlinkd.pdulink.base import Heard, Opportunity, PduListener
+from sdrlinkd.link import Burst, CarrierTraits, Opportunity, Outcome
+from sdrlinkd.pdulink.base import Heard, PduListener
 from sdrlinkd.pdulink.impairment import Impairment
 from sdrlinkd.reports import CarrierReport
 
@@ -27,6 +28,7 @@ class DirectLink:
         self._on_air: list[Burst] = []
         self._timers: set[asyncio.TimerHandle] = set()
         self._pdus = 0
+        self._woken = asyncio.Event()
         self._all_settled = asyncio.Event()
         self._all_settled.set()
 
@@ -34,24 +36,44 @@ class DirectLink:
         """The monotonic clock: there are no samples to count."""
         return time.monotonic()
 
-    async def open(self, listener: PduListener) -> None:
+    async def open(self, listener: PduListener) -> CarrierTraits:
         """Begin to listen."""
         self._listener = listener
+        return CarrierTraits()
 
     async def run(self) -> None:
-        """Nothing to do: a burst is delivered by timers."""
-        await asyncio.Event().wait()
+        """Ask for a burst when the one before has left, but never without a turn of the loop."""
+        listener = self._listener
+        if listener is None:
+            raise RuntimeError("run before open")
+        while True:
+            await asyncio.sleep(max(0.0, self._free_at - self.now()))
+            self._woken.clear()
+            start = self.now()
+            burst = listener.next_burst(Opportunity(start, self._airtime_s, self._most_pdus))
+            if burst is not None:
+                self._send(burst, start)
+                continue
+            wait_s = max(0.0, listener.next_wakeup(start) - start)
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(None if wait_s == float("inf") else wait_s):
+                    await self._woken.wait()
 
-    async def opportunity(self) -> Opportunity:
-        """When the burst before has left; at once, but never without a turn of the loop."""
-        await asyncio.sleep(max(0.0, self._free_at - self.now()))
-        return Opportunity(self.now(), self._params.max_pdus_per_burst)
+    def wake(self) -> None:
+        """There may be something to send."""
+        self._woken.set()
 
-    def send(self, burst: Burst) -> None:
-        """Take a burst; its PDUs arrive when the last of them has left."""
-        if self._listener is None:
-            return
-        start = self.now()
+    def _airtime_s(self, _: int, n_pdus: int) -> float:
+        return self._airtime_per_pdu_s * n_pdus
+
+    def _most_pdus(self, _: int, airtime_s: float) -> int:
+        most = self._params.max_pdus_per_burst
+        if not self._airtime_per_pdu_s:
+            return most
+        return int(min(most, airtime_s / self._airtime_per_pdu_s))
+
+    def _send(self, burst: Burst, start: float) -> None:
+        """Its PDUs arrive when the last of them has left."""
         airtime_s = self._airtime_per_pdu_s * len(burst.pdus)
         self._free_at = start + airtime_s
         self._pdus += len(burst.pdus)

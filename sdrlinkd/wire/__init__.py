@@ -22,6 +22,7 @@ from sdrlinkd.wire.control import (
     MAX_AGE_US,
     STAMP_SIZE,
     Beacon,
+    Frame,
     LinkReport,
     Receipt,
     Record,
@@ -31,6 +32,7 @@ from sdrlinkd.wire.control import (
     build_stamp,
     parse_records,
 )
+from sdrlinkd.wire.later import postponed
 from sdrlinkd.wire.pdu import BROADCAST, Entry, Pdu, build, flags, identity, parse
 from sdrlinkd.wire.reassembly import Lost, Reassembly, ReassemblyLimits
 from sdrlinkd.wire.registry import (
@@ -59,6 +61,7 @@ __all__ = [
     "VERSION",
     "Beacon",
     "Entry",
+    "Frame",
     "LinkReport",
     "Lost",
     "Pdu",
@@ -86,4 +89,5 @@ __all__ = [
     "parse",
     "parse_records",
     "parse_registry",
+    "postponed",
 ]

@@ -52,6 +52,17 @@ class LinkReport(NamedTuple):
     mcs: int
 
 
+class Frame(NamedTuple):
+    """The sender's TDMA schedule: whose it is, over how many hops it came, which, and where it
+    stands: µs since the frame began, at this burst's preamble.
+    """
+
+    root: int
+    level: int
+    schedule: int
+    phase_us: int
+
+
 class Receipt(NamedTuple):
     """What became of a message at the far end."""
 
@@ -60,7 +71,7 @@ class Receipt(NamedTuple):
     status: int
 
 
-FixedRecord = Stamp | Beacon | LinkReport | Receipt
+FixedRecord = Stamp | Beacon | LinkReport | Receipt | Frame
 Record = FixedRecord | RegistryDigest
 
 _TYPES: dict[type[FixedRecord], RecordType] = {
@@ -68,12 +79,14 @@ _TYPES: dict[type[FixedRecord], RecordType] = {
     Beacon: RecordType.BEACON,
     LinkReport: RecordType.LINK_REPORT,
     Receipt: RecordType.RECEIPT,
+    Frame: RecordType.FRAME,
 }
 _FORMATS = {
     RecordType.STAMP: struct.Struct(">BBI"),
     RecordType.BEACON: struct.Struct(">HH"),
     RecordType.LINK_REPORT: struct.Struct(">BbBB"),
     RecordType.RECEIPT: struct.Struct(">BBB"),
+    RecordType.FRAME: struct.Struct(">BBHI"),
 }
 # What the parser needs of a type, by its number: the fields' class and format.
 _KNOWN = {int(number): (kind, _FORMATS[number]) for kind, number in _TYPES.items()}

@@ -39,6 +39,11 @@ SNAPSHOT = Snapshot(
     ),
     link=LinkReport(
         pdu_size=64,
+        access="csma: PERSIST 0.05; 7 backoffs",
+        airtime_s=12.3456,
+        bursts_by_mcs={1: 50, 3: 10},
+        bursts_late=2,
+        mcs_changes=[(3.5, 2, 3)],
         control_channel=True,
         registry_digest="8c29071360508ee6",
         tx=TxReport(
@@ -82,7 +87,8 @@ SNAPSHOT = Snapshot(
             ),
             NeighborReport(
                 src=2, is_self=False, last_heard_s_ago=75.0, pdus_heard=680, pdus_lost=75,
-                per=75 / 755, duplicates=4, hops_left=1, reboots=0, snr_db=17.25,
+                per=75 / 755, duplicates=4, hops_left=1, reboots=0, snr_db=17.25, snr_there_db=15.5,
+                per_there=0.02, mcs=3,
                 registry="differs",
             ),
         ],

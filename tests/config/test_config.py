@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from sdrlinkd.config import Config, load_config, make_setup, parse_config
@@ -17,23 +18,12 @@ def test_shipped_file_equals_the_defaults():
 
 def test_shipped_file_shows_every_key():
     text = (ETC / "sdrlinkd.toml").read_text()
-    for struct in (
-        Config,
-        *(
-            type(getattr(Config(), name))
-            for name in (
-                "link",
-                "queue",
-                "reassembly",
-                "bus",
-                "direct",
-                "modem",
-                "loopback",
-                "iqfile",
-                "channel",
-            )
-        ),
-    ):
+    sections = [
+        type(value)
+        for value in msgspec.structs.asdict(Config()).values()
+        if isinstance(value, msgspec.Struct)
+    ]
+    for struct in (Config, *sections):
         for key in struct.__struct_fields__:
             assert f"\n{key} = " in text or f"\n# {key} = " in text or f"[{key}" in text, key
 
@@ -61,7 +51,7 @@ def test_shipped_registry_is_the_papers_table_4():
         ("link = 3", ["link", "got 3", "a table"]),
         ("[link]\nflush_s = nan", ["link.flush_s", "nan"]),
         ("[link]\ngreedy = 1", ["link.greedy", "got 1", "true or false"]),
-        ('backend = "usrp"', ["backend", '"usrp"', 'one of "direct", "iqfile", "loopback"']),
+        ('backend = "usrp"', ["backend", '"usrp"', 'one of "direct", "ether", "iqfile"']),
         ("[modem]\nmcs = 9", ["f.toml:2", "modem.mcs", "got 9", "from 0 to 6"]),
         ("[modem]\nrate_hz = 0", ["modem.rate_hz", "got 0"]),
         ('backend = "iqfile"', ["iqfile.receive, iqfile.transmit", "name a recording"]),
@@ -94,6 +84,33 @@ def test_shipped_registry_is_the_papers_table_4():
         ('[topic.odom]\n[topic."/odom"]', ["stands twice"]),
         ("[link]\nbeacon_s = 1e-9", ["link.beacon_s", "at least 0.01"]),
         ("[direct]\nloss = 1.5", ["direct.loss", "1.5", "from 0 to 1"]),
+        ('[access]\npolicy = "aloha"', ["f.toml:2", "access.policy", '"aloha"', '"minislot"']),
+        ("[access]\npersist = 0", ["access.persist", "got 0", "above 0"]),
+        ("[access]\nnodes = [1, 255]", ["access.nodes", "255", "from 0 to 254"]),
+        (
+            '[access]\npolicy = "csma"',
+            ["f.toml: access.policy", '"csma"', '"direct" has no air', '"none", or a backend'],
+        ),
+        (
+            'backend = "loopback"\n[access]\npolicy = "tdma"\nnodes = [2, 3]',
+            ["f.toml: access.nodes", "[2, 3]", "this robot's 1 among them"],
+        ),
+        (
+            'backend = "loopback"\n[access]\npolicy = "minislot"\nnodes = [1, 2, 1]',
+            ["f.toml: access.nodes", "[1, 2, 1]", "each robot once"],
+        ),
+        (
+            "[rate]\nmin_mcs = 3\nmax_mcs = 2",
+            ["f.toml: rate.min_mcs", "got 3", "at most rate.max_mcs, 2"],
+        ),
+        ("[rate]\nmax_mcs = 10", ["f.toml:2: rate.max_mcs", "got 10", "from 0 to 9"]),
+        (
+            "[link]\nbeacon_s = 0\n[rate]\nadapt = true",
+            ["f.toml: rate.adapt", "got true", "link.beacon_s", "allowed here: false"],
+        ),
+        ('backend = "ether"', ["f.toml: ether.dir", 'got ""', "sdrlink-ether --dir"]),
+        ("[play]\nduration_s = -1", ["f.toml:2: play.duration_s", "got -1", "from 0 to"]),
+        ("[modem]\ncarrier_db = 1", ["modem.carrier_db", "got 1", "from 3 to 40"]),
     ],
 )  # fmt: skip
 def test_an_error_cites_key_given_and_allowed(text, parts):
@@ -142,3 +159,26 @@ def test_a_missing_or_binary_file_is_a_user_error(tmp_path):
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(UserError, match="not a text file"):
         load_config(tmp_path / "binary.toml")
+
+
+def test_file_names_are_relative_to_the_configuration(tmp_path):
+    (tmp_path / "registry.csv").write_text("odom,nav_msgs/Odometry\n")
+    text = 'backend = "ether"\n[ether]\ndir = "hub"\n[play]\nbag = "a.mcap"'
+    setup = make_setup(parse_config(text), tmp_path)
+    assert setup.config.ether.dir == str(tmp_path / "hub")
+    assert setup.config.play.bag == str(tmp_path / "a.mcap")
+    assert make_setup(Config(), ETC).config.play.bag == ""
+
+
+def test_a_whole_radio_configuration_is_taken():
+    text = """
+backend = "loopback"
+[access]
+policy = "minislot"
+nodes = [1, 2, 3]
+[rate]
+adapt = true
+min_mcs = 1
+"""
+    config = make_setup(parse_config(text), ETC).config
+    assert (config.access.nodes, config.rate.min_mcs) == ([1, 2, 3], 1)

@@ -2,9 +2,10 @@
 
 from random import Random
 
-from sdrlinkd.link import Link, LinkParams, Outcome, QueueParams, ReassemblyParams
-from sdrlinkd.wire import make_registry, parse
+from sdrlinkd.link import Link, LinkParams, Opportunity, Outcome, QueueParams, ReassemblyParams
+from sdrlinkd.wire import CONTROL_TOPIC_ID, make_registry, parse, parse_records
 
+PDU_S = 0.001
 TOPICS = (
     ("odom", "nav_msgs/Odometry"),
     ("scan", "sensor_msgs/LaserScan"),
@@ -53,3 +54,25 @@ def layouts(pdus, pdu_size):
         ]
         for pdu in pdus
     ]
+
+
+def airtime_s(_mcs, n_pdus):
+    """As of a carrier without preambles."""
+    return PDU_S * n_pdus
+
+
+def most_pdus(_mcs, longest_s):
+    """At most 8."""
+    return int(min(8, longest_s / PDU_S + 1e-6))
+
+
+def next_burst(link, now):
+    """What the link sends when it is asked at `now`."""
+    return link.next_burst(Opportunity(now, airtime_s, most_pdus))
+
+
+def records_in(pdu, pdu_size):
+    """All control records in a PDU."""
+    entries = parse(pdu, pdu_size).entries
+    controls = [e.payload for e in entries if e.topic_id == CONTROL_TOPIC_ID]
+    return [record for payload in controls for record in parse_records(payload)]

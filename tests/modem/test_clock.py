@@ -28,6 +28,33 @@ def test_an_unpaced_stream_stands_still_between_blocks_and_goes_on_when_they_sto
     assert clock.now(100.0 + StreamClock.QUIET_S + 2) == pytest.approx(2.001)
 
 
+def test_in_lock_step_time_is_the_blocks_and_nobody_elses():
+    clock = StreamClock(1e6, paced=False, lockstep=True)
+    assert clock.now(100.0) == 0
+    clock.observe(1000, 100.0)
+    assert clock.now(100.0) == clock.now(160.0) == 0.001
+    clock.observe(3000, 50.0)
+    assert clock.now(1e6) == 0.003
+    assert clock.index(2e6) == 3000
+
+
+def test_a_paced_stream_is_gone_when_no_block_comes_for_a_quarter_of_a_second():
+    clock = StreamClock(1e6, paced=True)
+    assert not clock.is_gone(1e6), "it has not begun"
+    clock.observe(1000, 100.0)
+    assert not clock.is_gone(100.0 + StreamClock.GONE_S - 0.01)
+    assert clock.is_gone(100.0 + StreamClock.GONE_S + 0.01)
+    clock.observe(2000, 101.0)
+    assert not clock.is_gone(101.1)
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_a_stream_at_no_pace_is_never_gone(lockstep):
+    clock = StreamClock(1e6, paced=False, lockstep=lockstep)
+    clock.observe(1000, 100.0)
+    assert not clock.is_gone(1e6)
+
+
 def test_before_the_first_block_no_time_passes():
     clock = StreamClock(1e6, paced=True)
     assert clock.now(500.0) == 0
@@ -36,11 +63,11 @@ def test_before_the_first_block_no_time_passes():
 
 
 @given(
-    st.booleans(),
+    st.sampled_from([(True, False), (False, False), (False, True)]),
     st.lists(st.tuples(st.integers(0, 10_000), st.floats(0, 0.3), st.booleans()), max_size=40),
 )
-def test_it_never_goes_back(paced, steps):
-    clock = StreamClock(1e5, paced)
+def test_it_never_goes_back(kind, steps):
+    clock = StreamClock(1e5, *kind)
     host_s, end, latest = 0.0, 0, 0.0
     for n, pause_s, is_block in steps:
         host_s += pause_s

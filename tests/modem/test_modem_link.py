@@ -2,10 +2,12 @@
 
 import asyncio
 import contextlib
+from collections import deque
 from random import Random
 
 import pytest
 
+import phy
 from sdrlinkd.config import (
     ChannelParams,
     Config,
@@ -21,15 +23,32 @@ SIZE = 64
 
 
 class Listener:
-    """Keeps what it is told."""
+    """Hands out bursts in their order, and keeps what it is asked and told."""
 
     def __init__(self):
+        self.queue, self.asked, self.taken = deque(), [], []
         self.pdus, self.settled_bursts = [], []
         self.moved = asyncio.Event()
+        self.now = float
 
     def heard(self, pdus):
         self.pdus += pdus
         self.moved.set()
+
+    def advance(self, now):
+        raise AssertionError("only in lock-step does the modem drive the clock")
+
+    def next_wakeup(self, now):
+        return now if self.queue else float("inf")
+
+    def next_burst(self, opportunity):
+        self.asked.append((self.now(), opportunity))
+        if not self.queue:
+            return None
+        burst = self.queue.popleft()._replace(start=opportunity.earliest)
+        self.taken.append(burst)
+        self.moved.set()
+        return burst
 
     def settled(self, burst, outcome, at):
         self.settled_bursts.append((burst, outcome, at))
@@ -41,10 +60,16 @@ class Listener:
             await self.moved.wait()
 
 
+def send(modem, listener, bursts):
+    listener.queue += bursts
+    modem.wake()
+
+
 @contextlib.asynccontextmanager
 async def running(config):
-    modem, listener = make_modem(config, Random(1)), Listener()
-    await modem.open(listener)
+    modem, listener = make_modem(config, 1, Random(1)), Listener()
+    listener.now = modem.now
+    listener.traits = await modem.open(listener)
     task = asyncio.ensure_future(modem.run())
     try:
         yield modem, listener
@@ -76,43 +101,79 @@ def bursts(seed, n):
 async def test_every_pdu_comes_back_and_every_burst_is_settled(paced):
     sent = list(bursts(3, 12))
     async with running(config(paced)) as (modem, listener):
-        for burst in sent:
-            opportunity = await modem.opportunity()
-            assert opportunity.start >= modem.now() - 1e-9 or not paced
-            assert len(burst.pdus) <= opportunity.max_pdus
-            modem.send(burst)
+        send(modem, listener, sent)
+        await listener.until(lambda: len(listener.settled_bursts) == len(sent))
         await modem.idle()
         pdus = [pdu for burst in sent for pdu in burst.pdus]
         await listener.until(lambda: len(listener.pdus) == len(pdus))
         assert [heard.data for heard in listener.pdus] == pdus
-        assert [burst for burst, _, _ in listener.settled_bursts] == sent
+        assert [burst for burst, _, _ in listener.settled_bursts] == listener.taken
         assert {outcome for _, outcome, _ in listener.settled_bursts} == {Outcome.SENT}
         for heard in listener.pdus:
             assert 10 < heard.snr_db < 20
             assert 0 <= heard.at <= modem.now()
+        starts = [burst.start for burst in listener.taken for _ in burst.pdus]
+        for heard, start in zip(listener.pdus, starts, strict=True):
+            # Later where the radio could not any sooner, earlier never.
+            assert heard.at > start - 5e-6
         report = modem.report()
         assert (report.state, report.kind, report.notices) == ("up", "loopback", [])
         assert report.counters["pdus_good"] == len(pdus)
         assert report.realtime_ratio > 0
 
 
+async def test_each_burst_leaves_with_its_own_mcs():
+    sent = [burst._replace(mcs=mcs) for mcs, burst in enumerate(bursts(4, 7))]
+    async with running(config(False, channel=ChannelParams(snr_db=35))) as (modem, listener):
+        send(modem, listener, sent)
+        await listener.until(lambda: len(listener.settled_bursts) == len(sent))
+        n_pdus = sum(len(burst.pdus) for burst in sent)
+        await listener.until(lambda: len(listener.pdus) == n_pdus)
+        heard_at = {heard.data: heard.at for heard in listener.pdus}
+        for burst, _, end in listener.settled_bursts:
+            samples = phy.layout(phy.OFDM_64_16, burst.mcs, len(burst.pdus), SIZE).n_samples
+            assert end - heard_at[burst.pdus[0]] == pytest.approx(samples / 1e6, abs=5e-6)
+
+
 async def test_the_next_burst_is_asked_for_only_when_the_one_before_is_nearly_out():
-    async with running(config(True)) as (modem, _):
+    async with running(config(True)) as (modem, listener):
+        send(modem, listener, bursts(5, 6))
+        await listener.until(lambda: len(listener.settled_bursts) == 6)
         last_end = 0.0
-        for burst in bursts(5, 6):
-            opportunity = await modem.opportunity()
-            assert opportunity.start >= last_end
-            assert opportunity.start - modem.now() < 0.005 + 0.001 + 0.001
-            modem.send(burst)
-            n_symbols = -(-len(burst.pdus) * 1100 // 96)
-            last_end = opportunity.start + (512 + 80 * n_symbols) / 1e6
+        for (now, opportunity), burst in zip(listener.asked, listener.taken, strict=True):
+            assert opportunity.earliest >= last_end
+            assert opportunity.earliest - now < 0.005 + 0.001 + 0.001
+            last_end = opportunity.earliest + opportunity.airtime_s(burst.mcs, len(burst.pdus))
+
+
+async def test_nobody_is_asked_while_there_is_nothing_to_send():
+    async with running(config(False)) as (modem, listener):
+        for n in range(1, 4):
+            for _ in range(20):
+                modem.wake()
+                await asyncio.sleep(0)
+            assert len(listener.asked) == n - 1
+            send(modem, listener, bursts(8, 1))
+            await listener.until(lambda n=n: len(listener.settled_bursts) == n)
+
+
+async def test_a_carrier_tells_what_it_is():
+    async with running(config(True, mcs=3)) as (modem, listener):
+        traits = listener.traits
+        assert (traits.kind, traits.mcs, traits.is_lockstep) == ("loopback", 3, False)
+        assert (traits.senses, traits.transmits) == (True, True)
+        assert traits.lead_s == pytest.approx(0.001)
+        assert traits.react_s > ModemParams().block_s
+        assert traits.detect_s == 2 * phy.SENSE_WINDOW / 1e6
+        assert len(traits.needed_snr_db) == len(traits.longest_burst_s) == len(phy.MCS_TABLE)
+        assert list(traits.needed_snr_db) == sorted(traits.needed_snr_db)
+        assert modem.now() >= 0
 
 
 async def test_closing_settles_what_has_not_left():
     async with running(config(True)) as (modem, listener):
-        await modem.opportunity()
-        (burst,) = bursts(6, 1)
-        modem.send(burst)
+        send(modem, listener, bursts(6, 1))
+        await listener.until(lambda: listener.taken)
         await modem.close()
         assert [outcome for _, outcome, _ in listener.settled_bursts] == [Outcome.LOST]
         await modem.idle()
@@ -128,11 +189,8 @@ async def test_without_hear_self_nothing_is_heard():
         modem=ModemParams(rate_hz=1e6),
     )
     async with running(deaf) as (modem, listener):
-        for burst in bursts(2, 3):
-            await modem.opportunity()
-            modem.send(burst)
-        await modem.idle()
-        assert len(listener.settled_bursts) == 3
+        send(modem, listener, bursts(2, 3))
+        await listener.until(lambda: len(listener.settled_bursts) == 3)
         assert listener.pdus == []
 
 
@@ -146,20 +204,20 @@ async def test_a_recording_is_written_and_played(tmp_path):
         iqfile=IqFileParams(transmit=recording, format="ci8", paced=False),
     )  # fmt: skip
     async with running(writing) as (link_out, listener):
-        for burst in sent:
-            await link_out.opportunity()
-            link_out.send(burst)
-        await link_out.idle()
+        send(link_out, listener, sent)
+        await listener.until(lambda: len(listener.settled_bursts) == len(sent))
         assert {outcome for _, outcome, _ in listener.settled_bursts} == {Outcome.SENT}
     playing = Config(
         backend="iqfile", link=link, modem=modem, channel=ChannelParams(snr_db=15),
         iqfile=IqFileParams(receive=recording, paced=False),
     )  # fmt: skip
     async with running(playing) as (link_in, listener):
+        send(link_in, listener, bursts(10, 1))
         pdus = [pdu for burst in sent for pdu in burst.pdus]
         await listener.until(lambda: len(listener.pdus) == len(pdus))
         assert [heard.data for heard in listener.pdus] == pdus
         assert "only receives" in " ".join(link_in.report().notices)
+        assert listener.asked == []
 
 
 def test_what_cannot_be_is_refused_in_words(tmp_path):
@@ -169,14 +227,14 @@ def test_what_cannot_be_is_refused_in_words(tmp_path):
         link=LinkParams(pdu_size=2047),
     )
     with pytest.raises(UserError, match=r"modem.rate_hz: got 10000; a PDU of 2047 B takes 5.5 s"):
-        make_modem(slow, Random(1))
+        make_modem(slow, 1, Random(1))
     fast = Config(
         backend="loopback",
         modem=ModemParams(rate_hz=1e4, mcs=6, max_cfo_hz=1e3),
         link=LinkParams(pdu_size=64),
         reassembly=ReassemblyParams(timeout_s=1.0),
     )
-    make_modem(fast, Random(1))
+    make_modem(fast, 1, Random(1))
 
 
 @pytest.mark.parametrize(
@@ -198,7 +256,7 @@ async def test_a_recording_that_cannot_be_played_is_refused_in_words(tmp_path, f
         modem=ModemParams(rate_hz=1e6),
         iqfile=IqFileParams(receive=str(tmp_path / "rec")),
     )
-    modem = make_modem(wanted, Random(1))
+    modem = make_modem(wanted, 1, Random(1))
     with pytest.raises(UserError) as error:
         await modem.open(Listener())
     assert says in str(error.value)

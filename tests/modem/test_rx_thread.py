@@ -1,4 +1,4 @@
-"""The receiver on its thread."""
+"""The receiver on its thread, and where it stands."""
 
 import asyncio
 
@@ -7,7 +7,13 @@ import pytest
 
 import phy
 from backends import RxBlock
-from sdrlinkd.modem.rx_thread import MAX_BLOCKS, ReceiverThread
+from sdrlinkd.link import Sensed
+from sdrlinkd.modem.ear import Ear
+from sdrlinkd.modem.rx_thread import MAX_BLOCKS, ReceiverHere, ReceiverThread
+
+
+def make_ear(senses=False):
+    return Ear(phy.Receiver(), phy.CarrierSense() if senses else None, 1e6)
 
 
 def blocks(samples, size):
@@ -16,20 +22,31 @@ def blocks(samples, size):
         yield RxBlock(index, len(piece), piece, "", 0)
 
 
-@pytest.mark.parametrize("size", [64, 700])
-async def test_every_event_comes_in_order_however_fast_blocks_come(size):
-    rng = np.random.default_rng(1)
-    sent = [rng.bytes(40) for _ in range(12)]
+def make_air(seed, n):
+    """(samples, PDUs): bursts of one PDU, half a thousand samples apart."""
+    rng = np.random.default_rng(seed)
+    sent = [rng.bytes(40) for _ in range(n)]
     parts = [phy.Transmitter().modulate([pdu], 3) for pdu in sent]
     gap = np.zeros(500, np.complex64)
-    samples = np.concatenate([gap, *(piece for part in parts for piece in (part, gap))])
-    heard, ends = [], []
+    return np.concatenate([gap, *(piece for part in parts for piece in (part, gap))]), sent
 
-    def deliver(events, end):
-        heard.extend(event.data for event in events if isinstance(event, phy.PduHeard))
-        ends.append(end)
 
-    receiver = ReceiverThread(phy.Receiver(), 1e6, deliver, every_block=True)
+class Told:
+    """Keeps what it is told."""
+
+    def __init__(self):
+        self.heard, self.ends = [], []
+
+    def __call__(self, events, end):
+        self.heard += [event.data for event in events if isinstance(event, phy.PduHeard)]
+        self.ends.append(end)
+
+
+@pytest.mark.parametrize("size", [64, 700])
+async def test_every_event_comes_in_order_however_fast_blocks_come(size):
+    samples, sent = make_air(1, 12)
+    told = Told()
+    receiver = ReceiverThread(make_ear(), 1e6, told, wakes=True)
     for _ in range(3):
         pending = list(blocks(samples, size))
         for block in pending:
@@ -37,14 +54,74 @@ async def test_every_event_comes_in_order_however_fast_blocks_come(size):
             assert receiver._blocks.qsize() <= MAX_BLOCKS
     await receiver.finish()
     receiver.stop()
-    assert heard == 3 * sent
-    assert len(ends) == 3 * len(pending) + 1
+    assert told.heard == 3 * sent
+    assert len(told.ends) == 3 * len(pending) + 1
     assert receiver.load.realtime_ratio > 0
 
 
+async def test_only_blocks_with_events_wake_the_loop_unless_all_shall():
+    samples, sent = make_air(2, 3)
+    told = Told()
+    receiver = ReceiverThread(make_ear(), 1e6, told, wakes=False)
+    for block in blocks(samples, 100):
+        await receiver.put(block)
+    await receiver.finish()
+    receiver.stop()
+    assert told.heard == sent
+    assert len(told.ends) <= 2 * len(sent) + 1
+
+
 async def test_it_stops_with_blocks_waiting():
-    receiver = ReceiverThread(phy.Receiver(), 1e6, lambda *_: None, every_block=False)
+    receiver = ReceiverThread(make_ear(), 1e6, lambda *_: None, wakes=False)
     for block in blocks(np.zeros(8 * 4096, np.complex64), 4096):
         await receiver.put(block)
     receiver.stop()
     await asyncio.sleep(0)
+
+
+@pytest.mark.parametrize("size", [64, 700])
+async def test_in_lock_step_all_is_told_before_put_returns(size):
+    samples, sent = make_air(3, 4)
+    told, ear = Told(), make_ear(senses=True)
+    receiver = ReceiverHere(ear, 1e6, told)
+    pending = list(blocks(samples, size))
+    for n, block in enumerate(pending, start=1):
+        await receiver.put(block)
+        assert told.ends == [each.index + each.n for each in pending[:n]]
+        assert told.ends[-1] / 1e6 - 64e-6 < ear.sensed.until <= told.ends[-1] / 1e6
+    assert told.heard == sent
+    await receiver.finish()
+    assert receiver.load.realtime_ratio > 0
+    receiver.stop()
+
+
+@pytest.mark.parametrize("is_threaded", [True, False])
+async def test_what_the_last_samples_hold_is_told_at_the_end_of_the_stream(is_threaded):
+    samples, sent = make_air(5, 2)
+    told, ear = Told(), make_ear()
+    receiver = (
+        ReceiverThread(ear, 1e6, told, wakes=False) if is_threaded else ReceiverHere(ear, 1e6, told)
+    )
+    samples = samples[:-500]
+    for block in blocks(samples, 300):
+        await receiver.put(block)
+    await receiver.finish()
+    receiver.stop()
+    assert told.heard == sent
+    assert told.ends[-1] == len(samples)
+
+
+async def test_thread_and_lock_step_tell_the_same():
+    samples, _ = make_air(4, 4)
+    threaded, here = Told(), Told()
+    ears = make_ear(senses=True), make_ear(senses=True)
+    on_thread = ReceiverThread(ears[0], 1e6, threaded, wakes=True)
+    in_place = ReceiverHere(ears[1], 1e6, here)
+    for block in blocks(samples, 333):
+        await on_thread.put(block)
+        await in_place.put(block)
+    for receiver in (on_thread, in_place):
+        await receiver.finish()
+        receiver.stop()
+    assert (threaded.heard, threaded.ends[:-1]) == (here.heard, here.ends[:-1])
+    assert ears[0].sensed == ears[1].sensed != Sensed()

@@ -8,6 +8,7 @@ from sdrlinkd.errors import PduError
 from sdrlinkd.wire import (
     Beacon,
     Entry,
+    Frame,
     LinkReport,
     Pdu,
     Receipt,
@@ -41,6 +42,7 @@ RECORD_CLASSES = {
     "DIGEST": RegistryDigest,
     "LINK_REPORT": LinkReport,
     "RECEIPT": Receipt,
+    "FRAME": Frame,
 }
 
 each_pdu = pytest.mark.parametrize("vector", PDUS, ids=lambda v: v.name)

@@ -302,7 +302,13 @@ RECEIPT = RecordsVector(
     bytes([5, 3, 3, 0x99, 1]),
     (("RECEIPT", (3, 0x99, 1)),),
 )
-RECORDS = (STAMP, STAMP_OLD, BEACON_DIGEST, LINK_REPORT, RECEIPT)
+# FRAME: root 3, level 2, schedule 0xC0DE, 70 123 µs = 0x000111EB into the frame.
+FRAME = RecordsVector(
+    "frame",
+    bytes([7, 8, 3, 2, 0xC0, 0xDE, 0x00, 0x01, 0x11, 0xEB]),
+    (("FRAME", (3, 2, 0xC0DE, 70_123)),),
+)
+RECORDS = (STAMP, STAMP_OLD, BEACON_DIGEST, LINK_REPORT, RECEIPT, FRAME)
 
 _stamped = PduVector(
     "message_and_stamp",
@@ -352,6 +358,45 @@ _report = PduVector(
     ])),
 )  # fmt: skip
 
+# What a PDU says of time: STAMP and FRAME.
+_timed = PduVector(
+    "message_stamp_and_frame",
+    48, DEFAULT, 1, EVERYONE, 2, 1,
+    (EntryFields(1, 0x2A, 0, 1, HI), EntryFields(CONTROL, 7, 0, 1, STAMP.payload + FRAME.payload)),
+    with_crc(bytes([
+        0x00, 1, 0xFF, 2, 0x12,
+        0x1F,
+        0x2A, 0, 1, 0x00, 0x06, 0x00, 0x01, 0x00, 0x00, 0x68, 0x69,
+        0x07, 0, 1, 0x00, 0x12,
+        1, 6, 1, 0x2A, 0x00, 0x12, 0xD6, 0x87,
+        7, 8, 3, 2, 0xC0, 0xDE, 0x00, 0x01, 0x11, 0xEB,
+        0, 0, 0, 0, 0, 0,  # 48 - 8 - 11 - 23 = 6
+    ])),
+)  # fmt: skip
+
+# The same as it leaves 1 000 000 µs = 0x000F4240 later: 0x0012D687 + that = 0x002218C7,
+# 0x000111EB + that = 0x0010542B.
+_timed_later = _timed._replace(
+    name="message_stamp_and_frame_a_second_later",
+    entries=(
+        EntryFields(1, 0x2A, 0, 1, HI),
+        EntryFields(
+            CONTROL, 7, 0, 1,
+            bytes([1, 6, 1, 0x2A, 0x00, 0x22, 0x18, 0xC7])
+            + bytes([7, 8, 3, 2, 0xC0, 0xDE, 0x00, 0x10, 0x54, 0x2B]),
+        ),
+    ),
+    octets=with_crc(bytes([
+        0x00, 1, 0xFF, 2, 0x12,
+        0x1F,
+        0x2A, 0, 1, 0x00, 0x06, 0x00, 0x01, 0x00, 0x00, 0x68, 0x69,
+        0x07, 0, 1, 0x00, 0x12,
+        1, 6, 1, 0x2A, 0x00, 0x22, 0x18, 0xC7,
+        7, 8, 3, 2, 0xC0, 0xDE, 0x00, 0x10, 0x54, 0x2B,
+        0, 0, 0, 0, 0, 0,
+    ])),
+)  # fmt: skip
+
 PDUS = (
     _single,
     _single_full,
@@ -366,6 +411,8 @@ PDUS = (
     _stamp_alone,
     _beacon,
     _report,
+    _timed,
+    _timed_later,
 )
 BY_NAME = {vector.name: vector for vector in PDUS}
 

@@ -1,0 +1,8 @@
+"""Medium access: when a node may send on an air that it shares."""
+
+from sdrlinkd.link.access.base import Access, Slot, Wish
+from sdrlinkd.link.access.choice import check_access, make_access
+from sdrlinkd.link.access.free import Free
+from sdrlinkd.link.access.params import AccessParams
+
+__all__ = ["Access", "AccessParams", "Free", "Slot", "Wish", "check_access", "make_access"]

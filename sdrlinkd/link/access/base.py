@@ -1,0 +1,117 @@
+"""The one interface of all access policies."""
+
+import math
+from typing import NamedTuple, Protocol
+
+from sdrlinkd.link.carrier import Sensed
+from sdrlinkd.link.qos import Qos
+from sdrlinkd.wire import Frame
+
+INFINITE = float("inf")
+NEVER = -1.0
+MOST_ON_THEIR_WAY = 8
+
+
+class Slot(NamedTuple):
+    """A burst may leave at `start` and must be over at `end`; `exact`: not any later."""
+
+    start: float
+    end: float = INFINITE
+    exact: bool = False
+
+
+class Wish(NamedTuple):
+    """A burst of class `qos` that takes `need_s` or more wants to leave at `earliest` or later."""
+
+    earliest: float
+    qos: Qos
+    need_s: float
+    sensed: Sensed
+
+
+class Access(Protocol):
+    """Says when; a state machine over the link's clock, asked again with every block received."""
+
+    @property
+    def state(self) -> str:
+        """For people: what it is doing and with which times."""
+
+    @property
+    def round_s(self) -> float:
+        """So long at most until everybody had a turn; 0 where there are no turns."""
+
+    def slot(self, wish: Wish) -> Slot | None:
+        """Where it may leave; None: not now."""
+
+    def sent(self, end: float) -> None:
+        """A burst of our own will be on the air until `end`."""
+
+    def not_sent(self, start: float) -> None:
+        """It was not."""
+
+    def heard(self, src: int, at: float) -> None:
+        """A PDU of `src` came in a burst whose preamble was at `at`."""
+
+    def frame(self, start: float) -> Frame | None:
+        """What to tell others of the schedule in a burst that leaves at `start`."""
+
+    def take_frame(self, src: int, frame: Frame, at: float) -> None:
+        """What `src` tells of the schedule, in a burst whose preamble was at `at`."""
+
+    def notices(self) -> list[str]:
+        """What a person should know."""
+
+
+class Carriers:
+    """What policies have in common: the last carrier on the air, another's or our own."""
+
+    def __init__(self) -> None:
+        self._own_ends = [NEVER]
+        """Of the last bursts, ascending: some may be on their way to the radio still."""
+
+    @property
+    def round_s(self) -> float:
+        """No turns."""
+        return 0.0
+
+    def sent(self, end: float) -> None:
+        """A burst of our own will be on the air until `end`."""
+        self._own_ends = [*self._own_ends[-MOST_ON_THEIR_WAY:], end]
+
+    def not_sent(self, start: float) -> None:
+        """It was not."""
+        for end in self._own_ends:
+            if end > start:
+                self._own_ends.remove(end)
+                break
+        if not self._own_ends:
+            self._own_ends = [NEVER]
+
+    def heard(self, src: int, at: float) -> None:
+        """Whose it was does not matter."""
+
+    def frame(self, start: float) -> Frame | None:
+        """No schedule."""
+
+    def take_frame(self, src: int, frame: Frame, at: float) -> None:
+        """No schedule."""
+
+    def notices(self) -> list[str]:
+        """Nothing."""
+        return []
+
+    @property
+    def own_end(self) -> float:
+        """When our own last burst ends."""
+        return self._own_ends[-1]
+
+    def idle_since(self, sensed: Sensed) -> float | None:
+        """When the last carrier ended; None while there is one."""
+        end = max(sensed.idle_since, self.own_end)
+        return end if end <= sensed.until else None
+
+
+def next_on_grid(origin: float, period: float, earliest: float) -> float:
+    """The first of `origin`, `origin + period`, … that is not before `earliest`."""
+    steps = max(0, math.ceil((earliest - origin) / period - 1e-6))
+    return origin + steps * period

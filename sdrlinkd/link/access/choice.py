@@ -1,0 +1,121 @@
+"""From what is wanted and what the radio can do to a policy, or to a refusal that says why."""
+
+import math
+from random import Random
+
+from sdrlinkd.errors import ConfigError
+from sdrlinkd.link.access.base import Access
+from sdrlinkd.link.access.csma import Csma
+from sdrlinkd.link.access.free import Free
+from sdrlinkd.link.access.minislot import SECTIONS, MiniSlots
+from sdrlinkd.link.access.params import AccessParams
+from sdrlinkd.link.access.tdma import Tdma
+from sdrlinkd.link.carrier import CarrierTraits
+
+GUARD_SHARE = 0.1
+"""A tdma slot is so long that its guard takes no more than this."""
+CLOCK_ERROR_S = 1.5e-4
+"""Clocks of two robots in tdma: 40 ppm for as long as one follows another unheard (FORGET_S)."""
+MARGIN_S = 5e-6
+"""Echoes and paths of a kilometre or so."""
+LONGEST_ROUND_S = 1.0
+
+
+def check_access(params: AccessParams, own_id: int) -> None:
+    """What can be told without a radio. Raises ConfigError."""
+    if params.policy in ("minislot", "tdma"):
+        if own_id not in params.nodes:
+            raise ConfigError(
+                f"access.nodes: got {params.nodes}; allowed with access.policy = "
+                f'"{params.policy}": the ids of all robots that share the air, in the same order '
+                f"at each of them, this robot's {own_id} among them"
+            )
+        if len(set(params.nodes)) != len(params.nodes):
+            raise ConfigError(f"access.nodes: got {params.nodes}; allowed: each robot once")
+
+
+def make_access(
+    params: AccessParams, own_id: int, traits: CarrierTraits, longest_burst_s: float, rng: Random
+) -> Access:
+    """The policy, for bursts of at most `longest_burst_s`.
+
+    Raises ConfigError when the radio cannot carry it.
+    """
+    check_access(params, own_id)
+    if params.policy == "none":
+        return Free()
+    _refuse_deaf(params, traits)
+    # So far apart must two begin that the second can hear the first and still hold back.
+    detect_s = traits.detect_s + MARGIN_S
+    apart_s = traits.lead_s + traits.react_s + detect_s
+    if params.policy == "csma":
+        slottime_s = params.slottime_s or apart_s
+        dwait_s = params.dwait_s or slottime_s
+        return Csma(dwait_s, slottime_s, params.persist, detect_s, rng)
+    minislot_s = params.minislot_s or apart_s
+    if params.policy == "minislot":
+        _refuse_short("minislot_s", minislot_s, apart_s, traits)
+        round_s = SECTIONS * len(params.nodes) * minislot_s
+        if round_s > LONGEST_ROUND_S:
+            raise ConfigError(
+                f'access.policy: got "minislot"; with {len(params.nodes)} robots and a radio that '
+                f"needs {minislot_s * 1e3:.3g} ms for each, a round takes {round_s:.3g} s; "
+                f"allowed: at most {LONGEST_ROUND_S:g} s: use tdma, or fewer robots"
+            )
+        return MiniSlots(own_id, params.nodes, minislot_s, detect_s)
+    return _make_tdma(params, own_id, traits, longest_burst_s, apart_s)
+
+
+def _make_tdma(
+    params: AccessParams, own_id: int, traits: CarrierTraits, longest_burst_s: float, apart_s: float
+) -> Tdma:
+    # Here two do not count from the same carrier, but each from its own clock.
+    apart_s += CLOCK_ERROR_S
+    minislot_s = params.minislot_s or apart_s
+    least_s = traits.turnaround_s + CLOCK_ERROR_S + MARGIN_S + 2 * traits.index_error_s
+    guard_s = params.guard_s or least_s
+    _refuse_short("guard_s", guard_s, least_s - CLOCK_ERROR_S, traits)
+    # In two bursts, so that an urgent message may come between.
+    longest_s = longest_burst_s + traits.overhead_s + 2 * traits.gap_s
+    bursts = max(1, math.ceil(guard_s * (1 / GUARD_SHARE - 1) / longest_s))
+    slot_s = params.slot_s or 1e-5 * math.ceil(1e5 * (bursts * longest_s + guard_s))
+    if slot_s < longest_s + guard_s:
+        raise ConfigError(
+            f"access.slot_s: got {slot_s:g}; allowed: at least {longest_s + guard_s:.4g} s, room "
+            f"for the longest burst ({longest_s * 1e3:.3g} ms) and a guard of "
+            f"{guard_s * 1e3:.3g} ms"
+        )
+    return Tdma(
+        own_id,
+        params.nodes,
+        slot_s,
+        guard_s,
+        minislot_s,
+        params.reuse and minislot_s >= apart_s,
+        look_s=traits.react_s + traits.ahead_s,
+        detect_s=traits.detect_s + MARGIN_S + CLOCK_ERROR_S,
+        gap_s=traits.gap_s,
+    )
+
+
+def _refuse_deaf(params: AccessParams, traits: CarrierTraits) -> None:
+    if not traits.senses:
+        raise ConfigError(
+            f'access.policy: got "{params.policy}", but the backend "{traits.kind}" does not hear '
+            'the air; allowed: "none"'
+        )
+    if not traits.transmits:
+        raise ConfigError(
+            f'access.policy: got "{params.policy}", but the backend "{traits.kind}" only '
+            'receives here; allowed: "none"'
+        )
+
+
+def _refuse_short(key: str, given_s: float, least_s: float, traits: CarrierTraits) -> None:
+    if given_s < least_s * (1 - 1e-6):
+        raise ConfigError(
+            f"access.{key}: got {given_s:g}; this radio ({traits.kind}: turnaround "
+            f"{traits.turnaround_s * 1e3:.3g} ms, lead {traits.lead_s * 1e3:.3g} ms, reaction "
+            f"{traits.react_s * 1e3:.3g} ms) needs at least {least_s:.4g} s; allowed: that or more "
+            "at all robots, or 0 (made from the radio)"
+        )

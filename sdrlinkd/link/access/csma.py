@@ -1,0 +1,72 @@
+"""`csma`: listen before talk, p-persistent."""
+
+import math
+from random import Random
+
+from sdrlinkd.link.access.base import Carriers, Slot, Wish, next_on_grid
+from sdrlinkd.link.qos import Qos
+
+# Slots that a class lets pass after a carrier, and how much more eager than PERSIST it is.
+WINDOWS = {
+    Qos.URGENT: (0, 8.0),
+    Qos.LATENCY: (1, 4.0),
+    Qos.DEFAULT: (2, 1.0),
+    Qos.BULK: (3, 0.5),
+}
+
+
+class Csma(Carriers):
+    """After a carrier: DWAIT, the class's own wait, then in each SLOTTIME a chance of PERSIST.
+
+    Two that choose the same slot collide; nothing tells them.
+    """
+
+    def __init__(
+        self, dwait_s: float, slottime_s: float, persist: float, detect_s: float, rng: Random
+    ) -> None:
+        super().__init__()
+        self._dwait_s = dwait_s
+        self._slottime_s = slottime_s
+        self._persist = persist
+        self._detect_s = detect_s
+        self._rng = rng
+        self._drawn: tuple[float, Qos, float] | None = None
+        """(end of the carrier it follows, class, start)."""
+        self._backoffs = 0
+
+    @property
+    def state(self) -> str:
+        """For people."""
+        return (
+            f"csma: DWAIT {self._dwait_s * 1e3:.3g} ms, SLOTTIME {self._slottime_s * 1e3:.3g} ms, "
+            f"PERSIST {self._persist:g}; {self._backoffs} backoffs"
+        )
+
+    def slot(self, wish: Wish) -> Slot | None:
+        """The slot drawn, once all before it were heard to be idle."""
+        earliest, qos, _, sensed = wish
+        idle_since = self.idle_since(sensed)
+        if idle_since is None:
+            return None
+        drawn = self._drawn
+        if drawn is None or drawn[:2] != (idle_since, qos) or drawn[2] < earliest:
+            start = self._draw(idle_since, earliest, qos)
+            self._drawn = (idle_since, qos, start)
+        else:
+            start = drawn[2]
+        if start > sensed.until + self._slottime_s - self._detect_s:
+            return None
+        self._drawn = None
+        return Slot(start, exact=True)
+
+    def _draw(self, idle_since: float, earliest: float, qos: Qos) -> float:
+        waits, eagerness = WINDOWS[qos]
+        first = next_on_grid(
+            idle_since + self._dwait_s + waits * self._slottime_s, self._slottime_s, earliest
+        )
+        chance = min(1.0, eagerness * self._persist)
+        passed = 0
+        if chance < 1:
+            passed = int(math.log(1 - self._rng.random()) / math.log(1 - chance))
+        self._backoffs += passed > 0
+        return first + passed * self._slottime_s

@@ -1,0 +1,180 @@
+"""`tdma`: each node has slots of its own, and clocks from what it hears."""
+
+import math
+from binascii import crc_hqx
+from collections.abc import Sequence
+from struct import pack
+
+from sdrlinkd.link.access.base import Carriers, Slot, Wish, next_on_grid
+from sdrlinkd.link.carrier import Sensed
+from sdrlinkd.wire import Frame
+
+LISTEN_S = 2.5
+"""Who hears no schedule for so long, and a second more for each robot before it, begins one."""
+QUIET_S = 0.05
+"""The lowest robot begins one when it has heard nobody for so long, and a frame at least."""
+FORGET_S = 3.0
+"""A schedule not heard of for so long has lost its root; for twice as long, it is believed only
+from those as near to it as we were."""
+MAX_LEVEL = 255
+PAUSE_AFTER = 2 / 3
+
+
+class Tdma(Carriers):
+    """Slots in the order of `nodes`, over and over; the last `guard_s` of each is silent.
+
+    No burst goes on over two thirds of a slot: an urgent message that comes while its robot has the
+    slot need not wait for the next.
+
+    The schedule is that of the lowest robot heard of, directly or through others (its root); each
+    tells it on with its own count of hops (level). With `reuse`, a slot whose owner is silent, or
+    silent again, is open to the others in order, one `minislot_s` after another.
+    """
+
+    def __init__(
+        self,
+        own_id: int,
+        nodes: Sequence[int],
+        slot_s: float,
+        guard_s: float,
+        minislot_s: float,
+        reuse: bool,
+        *,
+        look_s: float,
+        detect_s: float,
+        gap_s: float,
+    ) -> None:
+        super().__init__()
+        self._own_id = own_id
+        self._nodes = list(nodes)
+        self._rank = self._nodes.index(own_id)
+        self._slot_s = slot_s
+        self._guard_s = guard_s
+        self._minislot_s = minislot_s
+        self._reuse = reuse
+        self._look_s = look_s
+        self._detect_s = detect_s
+        self._gap_s = gap_s
+        self._frame_s = slot_s * len(nodes)
+        # Micro-seconds are what travels.
+        times = (round(1e6 * slot_s), round(1e6 * guard_s), round(1e6 * minislot_s) * reuse)
+        self._schedule = crc_hqx(pack(">III", *times) + bytes(nodes), 0)
+        self._origin = 0.0
+        self._root, self._level, self._parent = own_id, 0, own_id
+        self._lost = (-1, 0, 0.0)
+        """(root, level at which we followed it, until when it is not believed)."""
+        self._is_running = False
+        self._told_at = 0.0
+        self._begins_at = LISTEN_S + sum(node < own_id for node in nodes)
+        self._strangers: dict[int, int] = {}
+
+    @property
+    def state(self) -> str:
+        """For people."""
+        doing = "listening for a schedule"
+        if self._is_running:
+            doing = f"schedule of robot {self._root}"
+            if self._level:
+                doing += f", {self._level} hops away"
+        return (
+            f"tdma: {len(self._nodes)} slots of {self._slot_s * 1e3:.3g} ms, guard "
+            f"{self._guard_s * 1e3:.3g} ms; {doing}"
+        )
+
+    @property
+    def round_s(self) -> float:
+        """A frame."""
+        return self._frame_s
+
+    def slot(self, wish: Wish) -> Slot | None:
+        """In our own slot, or in one that nobody uses."""
+        earliest, _, need_s, sensed = wish
+        if not self._is_running:
+            if earliest < self._begins_at and not self._is_first(earliest, sensed):
+                return None
+            self._is_running, self._origin = True, earliest
+        self._forget(earliest)
+        number = math.floor((earliest - self._origin) / self._slot_s)
+        for each in (number, number + 1):
+            begin = self._origin + each * self._slot_s
+            end = begin + self._slot_s - self._guard_s
+            turn = (self._rank - each) % len(self._nodes)
+            start = self._start(begin, turn, earliest, sensed)
+            if start is not None and start + need_s <= end:
+                if start >= earliest + self._look_s:
+                    # Decided at the last look before.
+                    return None
+                pause = begin + PAUSE_AFTER * (self._slot_s - self._guard_s)
+                if start + need_s <= pause:
+                    end = pause
+                return Slot(start, end, exact=True)
+        return None
+
+    def frame(self, start: float) -> Frame | None:
+        """The schedule as we keep it."""
+        if not self._is_running:
+            return None
+        self._forget(start)
+        phase_s = (start - self._origin) % self._frame_s
+        return Frame(self._root, self._level, self._schedule, round(1e6 * phase_s))
+
+    def take_frame(self, src: int, frame: Frame, at: float) -> None:
+        """Follow the lowest root, by the fewest hops."""
+        if frame.schedule != self._schedule:
+            self._strangers[src] = frame.schedule
+            return
+        self._strangers.pop(src, None)
+        self._forget(at)
+        origin = at - 1e-6 * frame.phase_us
+        told = (frame.root, frame.level + 1)
+        if frame.root >= self._own_id:
+            # They will follow us; until then we go on where they are.
+            if not self._is_running:
+                self._origin, self._is_running = origin, True
+        elif frame.root == self._lost[0] and told[1] > self._lost[1] and at < self._lost[2]:
+            # Somebody who has not forgotten it yet.
+            return
+        elif frame.level < MAX_LEVEL and (
+            src == self._parent or told < (self._root, self._level) or not self._is_running
+        ):
+            self._root, self._level, self._parent = *told, src
+            self._origin, self._is_running = origin, True
+            self._told_at = at
+
+    def notices(self) -> list[str]:
+        """Who keeps another schedule."""
+        return [
+            f"robot {src} keeps another tdma schedule; give both the same nodes, slot_s, guard_s "
+            f"and minislot_s in [access] (ours: {self.state})"
+            for src in sorted(self._strangers)
+        ]
+
+    def _is_first(self, earliest: float, sensed: Sensed) -> bool:
+        """Whether we are the lowest, and nobody seems to be there."""
+        lowest = self._own_id == min(self._nodes)
+        return lowest and earliest >= max(QUIET_S, self._frame_s) and sensed.idle_since <= 0
+
+    def _forget(self, now: float) -> None:
+        """A root that nobody has heard for long is gone: go on by our own clock."""
+        if self._level and now - self._told_at > FORGET_S:
+            self._lost = (self._root, self._level, now + 2 * FORGET_S)
+            self._root, self._level, self._parent = self._own_id, 0, self._own_id
+
+    def _start(self, begin: float, turn: int, earliest: float, sensed: Sensed) -> float | None:
+        """Where we may begin in the slot that begins at `begin`, `turn` robots after its owner."""
+        if turn == 0 and (earliest <= begin or not self._reuse):
+            return max(begin, earliest)
+        if turn == 0 and begin < self.own_end and earliest <= self.own_end + 2 * self._gap_s:
+            return earliest
+        if not self._reuse or earliest < begin:
+            return None
+        idle_since = self.idle_since(sensed)
+        if idle_since is None:
+            return None
+        n = len(self._nodes)
+        if idle_since <= begin:
+            first = begin + turn * self._minislot_s
+        else:
+            first = idle_since + (turn + 1) * self._minislot_s
+        start = next_on_grid(first, n * self._minislot_s, earliest)
+        return start if start <= sensed.until + self._minislot_s - self._detect_s else None

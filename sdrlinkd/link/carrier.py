@@ -1,0 +1,63 @@
+"""What the link must know of that which carries its PDUs."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+INFINITE = float("inf")
+
+
+class CarrierTraits(NamedTuple):
+    """A radio as access policies and rate control see it; times in s.
+
+    `lead_s`: a burst decided now leaves so much later at the earliest. `react_s`: so long after a
+    sample was on the air can a decision follow from it. `detect_s`: so long must a carrier last to
+    be noticed. `gap_s` stays free between two bursts of one node. `needed_snr_db` and
+    `longest_burst_s` are those of each MCS.
+    """
+
+    kind: str = "direct"
+    is_lockstep: bool = False
+    """Time is that of the samples, and waits for everybody."""
+    transmits: bool = True
+    senses: bool = False
+    turnaround_s: float = 0.0
+    index_error_s: float = 0.0
+    """How wrong times may be after a gap."""
+    lead_s: float = 0.0
+    react_s: float = 0.0
+    detect_s: float = 0.0
+    overhead_s: float = 0.0
+    """What a burst takes besides its PDUs."""
+    gap_s: float = 0.0
+    ahead_s: float = 0.0
+    """A burst whose time is fixed may be decided so much before it has to be."""
+    longest_burst_s: tuple[float, ...] = (0.0,)
+    """By MCS."""
+    mcs: int = 0
+    """The fixed one."""
+    needed_snr_db: tuple[float, ...] = (0.0,)
+
+
+class Sensed(NamedTuple):
+    """What the receiver knows of the air: it has listened up to `until`.
+
+    The last carrier ended at `idle_since`; one that goes on ends later than `until`. `burst_at` is
+    when its preamble came, None when only its energy was noticed.
+    """
+
+    until: float = INFINITE
+    idle_since: float = 0.0
+    burst_at: float | None = None
+
+
+class Opportunity(NamedTuple):
+    """The carrier can take a burst that leaves at `earliest` or later.
+
+    `airtime_s(mcs, n_pdus)` is a burst's length; `most_pdus(mcs, airtime_s)` how many PDUs fit, 0
+    when not even one does; the carrier's own limit is heeded.
+    """
+
+    earliest: float
+    airtime_s: Callable[[int, int], float]
+    most_pdus: Callable[[int, float], int]
+    sensed: Sensed = Sensed()

@@ -1,0 +1,45 @@
+"""How long bursts are, and what fits into one."""
+
+import phy
+from sdrlinkd.config import ModemParams
+
+# Samples by which a time may be off in floating point.
+ROUNDING = 1e-2
+
+
+class Airtimes:
+    """For PDUs of one size; bursts of several PDUs are at most `max_burst_s` long."""
+
+    def __init__(self, params: ModemParams, pdu_size: int) -> None:
+        self._rate_hz = params.rate_hz
+        self._longest = round(params.max_burst_s * params.rate_hz)
+        self._pdu_size = pdu_size
+
+    def samples(self, mcs: int, n_pdus: int) -> int:
+        """Length of a burst."""
+        return phy.layout(phy.OFDM_64_16, mcs, n_pdus, self._pdu_size).n_samples
+
+    def airtime_s(self, mcs: int, n_pdus: int) -> float:
+        """Length of a burst in s."""
+        return self.samples(mcs, n_pdus) / self._rate_hz
+
+    @property
+    def overhead_s(self) -> float:
+        """Preamble, header, and the last symbol that is not full."""
+        one = phy.layout(phy.OFDM_64_16, 0, 1, self._pdu_size)
+        return (one.n_samples - (one.n_symbols - 1) * one.grid.n_symbol) / self._rate_hz
+
+    def most_pdus(self, mcs: int, airtime_s: float) -> int:
+        """How many PDUs fit into a burst of at most `airtime_s`; 0 when not even one does."""
+        given = airtime_s * self._rate_hz + ROUNDING
+        if self.samples(mcs, 1) > given:
+            return 0
+        room = int(min(given, self._longest))
+        return phy.most_pdus(phy.OFDM_64_16, mcs, self._pdu_size, room)
+
+    def longest_s(self) -> tuple[float, ...]:
+        """The longest burst of each MCS."""
+        return tuple(
+            self.airtime_s(mcs, self.most_pdus(mcs, float("inf")))
+            for mcs in range(len(phy.MCS_TABLE))
+        )

@@ -1,0 +1,64 @@
+"""The receiver and what it senses, a block at a time."""
+
+from collections.abc import Sequence
+
+import phy
+from backends import SENDING, RxBlock
+from sdrlinkd.link import Sensed
+
+# The energy of a burst whose header was read may seem to end this much later than it says.
+TAIL = 2 * phy.SENSE_WINDOW
+
+
+class Ear:
+    """Samples in; events and the state of the air out. Hears in one thread."""
+
+    def __init__(
+        self, receiver: phy.Receiver, sense: phy.CarrierSense | None, rate_hz: float
+    ) -> None:
+        self._receiver = receiver
+        self._sense = sense
+        self._rate_hz = rate_hz
+        self._unheard_until = 0
+        self.sensed = Sensed() if sense is None else Sensed(until=0.0)
+        """The state of the air after the last block; may be read from any thread."""
+
+    def hear(self, block: RxBlock) -> Sequence[phy.Event]:
+        """What a block completes."""
+        if block.samples is None:
+            events = self._receiver.gap(block.n)
+            if self._sense is not None:
+                self._sense.gap(block.n)
+                if block.gap_reason != SENDING:
+                    # Whoever began in it may be on the air still.
+                    self._unheard_until = block.index + block.n
+        else:
+            events = self._receiver.push(block.samples)
+            if self._sense is not None:
+                self._sense.push(block.samples)
+        if self._sense is not None:
+            self.sensed = self._sense_air(self._sense)
+        return events
+
+    def flush(self) -> Sequence[phy.Event]:
+        """What the last samples hold."""
+        return self._receiver.flush()
+
+    @property
+    def next_index(self) -> int:
+        """The index after the last sample heard."""
+        return self._receiver.next_index
+
+    def _sense_air(self, sense: phy.CarrierSense) -> Sensed:
+        rate = self._rate_hz
+        until, energy_end = sense.next_index, sense.busy_until
+        begin, end = self._receiver.carrier
+        burst_at: float | None = begin / rate
+        if self._unheard_until > max(end, energy_end):
+            return Sensed(until / rate, (self._unheard_until + 1) / rate)
+        if energy_end > end + TAIL:
+            end, burst_at = energy_end, None
+            if energy_end + TAIL > until:
+                # It may well go on.
+                end = until + 1
+        return Sensed(until / rate, end / rate, burst_at)

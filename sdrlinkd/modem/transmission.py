@@ -1,0 +1,111 @@
+"""Bursts on their way to the radio: modulated off the event loop, settled when they have left."""
+
+import asyncio
+from collections.abc import Awaitable, Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+import phy
+from backends import BackendError, Radio, Samples, TxBurst, TxOutcome, TxReport
+from sdrlinkd.config import ModemParams
+from sdrlinkd.link import Burst, Outcome
+from sdrlinkd.pdulink import PduListener
+
+OUTCOMES = {
+    TxOutcome.SENT: Outcome.SENT,
+    TxOutcome.LATE: Outcome.LATE,
+    TxOutcome.UNDERFLOW: Outcome.UNDERFLOW,
+    TxOutcome.LOST: Outcome.LOST,
+}
+
+
+class BurstReport(NamedTuple):
+    """What became of a burst, up to which index, and, in words, what went wrong."""
+
+    outcome: Outcome
+    end: int
+    problem: str = ""
+
+
+class Transmission:
+    """The sending half of the modem."""
+
+    def __init__(self, params: ModemParams, radio: Radio) -> None:
+        self._radio = radio
+        self._transmitter = phy.Transmitter(params.network)
+        self._amplitude = 10 ** (-params.backoff_db / 20)
+        self._thread = ThreadPoolExecutor(1, "phy-tx")
+        self._tasks: asyncio.TaskGroup | None = None
+        self._left: Callable[[Burst, BurstReport], None]
+        self._at_once = False
+        self._late = 0
+        self.on_air: list[Burst] = []
+        self.counters = {"bursts_slipped": 0, "samples_sent": 0}
+
+    async def warm_up(self) -> None:
+        """Load the compiled code."""
+        await asyncio.get_running_loop().run_in_executor(self._thread, phy.warm_up)
+
+    def start(self, tasks: asyncio.TaskGroup, left: Callable[[Burst, BurstReport], None]) -> None:
+        """From now on bursts may be sent; `left` is told of each."""
+        self._tasks, self._left = tasks, left
+        self._at_once = self._radio.capabilities.lockstep
+
+    def send(self, burst: Burst, start: int) -> None:
+        """Send a burst that begins at index `start`."""
+        if self._tasks is None:
+            raise RuntimeError("send before start")
+        self.on_air.append(burst)
+        if self._at_once:
+            answer = self._hand_over(burst, start, self._modulate(burst.pdus, burst.mcs))
+            self._tasks.create_task(self._settle(burst, start, answer))
+        else:
+            self._tasks.create_task(self._transmit(burst, start))
+
+    def lose(self, listener: PduListener, now: float) -> None:
+        """The radio is closed: what is on its way is lost."""
+        for burst in self.on_air:
+            listener.settled(burst, Outcome.LOST, now)
+        self.on_air.clear()
+
+    def close(self) -> None:
+        """End the thread."""
+        self._thread.shutdown(wait=True, cancel_futures=True)
+
+    async def _transmit(self, burst: Burst, start: int) -> None:
+        loop = asyncio.get_running_loop()
+        if burst not in self.on_air:
+            # Lost already: the radio is closed.
+            return
+        late_before = self._late
+        samples = await loop.run_in_executor(self._thread, self._modulate, burst.pdus, burst.mcs)
+        if burst.exact and self._late != late_before:
+            # One before it was late and has to go again; this one must not overtake it.
+            self._end(burst, BurstReport(Outcome.LATE, start))
+            return
+        await self._settle(burst, start, self._hand_over(burst, start, samples))
+
+    def _hand_over(self, burst: Burst, start: int, samples: Samples) -> Awaitable[TxReport]:
+        self.counters["samples_sent"] += len(samples)
+        return self._radio.send(TxBurst(start, samples, burst.exact))
+
+    async def _settle(self, burst: Burst, start: int, answer: Awaitable[TxReport]) -> None:
+        try:
+            report = await answer
+        except BackendError as error:
+            told = BurstReport(Outcome.LOST, start, str(error))
+        else:
+            self.counters["bursts_slipped"] += report.start > start
+            told = BurstReport(OUTCOMES[report.outcome], report.end)
+        self._end(burst, told)
+
+    def _end(self, burst: Burst, told: BurstReport) -> None:
+        self._late += told.outcome is Outcome.LATE
+        if burst in self.on_air:
+            self.on_air.remove(burst)
+            self._left(burst, told)
+
+    def _modulate(self, pdus: Sequence[bytes], mcs: int) -> Samples:
+        """The burst, with room for its peaks."""
+        samples: Samples = self._transmitter.modulate(pdus, mcs) * self._amplitude
+        return samples

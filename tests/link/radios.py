@@ -1,0 +1,26 @@
+"""Radios as access policies see them."""
+
+from sdrlinkd.link import AccessParams, CarrierTraits
+
+RATE = 5e6
+LOOK_S = 0.001
+"""A block."""
+DETECT_S = 128 / RATE
+AHEAD_S = 0.005
+"""A node's next burst is asked for so long before its last one is over."""
+
+_SHARED = CarrierTraits(
+    kind="ether",
+    senses=True,
+    turnaround_s=50e-6,
+    detect_s=DETECT_S,
+    gap_s=32 / RATE,
+    overhead_s=0.0002,
+)
+LOCKSTEP = _SHARED._replace(is_lockstep=True, lead_s=50e-6 + 17 / RATE, react_s=LOOK_S)
+PACED = _SHARED._replace(lead_s=50e-6 + 0.003, react_s=LOOK_S + 0.002, ahead_s=AHEAD_S)
+
+
+def params(policy, nodes, **more):
+    """Access parameters."""
+    return AccessParams(policy=policy, nodes=list(nodes), **more)

@@ -1,0 +1,164 @@
+"""`tdma`: bursts stay in slots, nobody clashes, and urgent messages keep time."""
+
+from collections import Counter
+from random import Random
+
+import pytest
+
+from sdrlinkd.link import Qos, Sensed
+from sdrlinkd.link.access import Wish, make_access
+from sdrlinkd.link.access.choice import CLOCK_ERROR_S
+from tests.link.radios import LOCKSTEP, PACED, params
+from tests.link.slots import LONGEST_S, SETTLED_S, lengths_s, make_air, places
+
+radios = pytest.mark.parametrize("traits", [LOCKSTEP, PACED], ids=["lockstep", "paced"])
+sizes = pytest.mark.parametrize("n", [2, 4])
+
+
+def make(own_id, traits=LOCKSTEP, longest_s=LONGEST_S, nodes=(1, 2, 3)):
+    return make_access(params("tdma", nodes), own_id, traits, longest_s, Random(1))
+
+
+def assert_in_slots(air):
+    """Begins in a slot and is over before its guard, but for the error of clocks; how often in
+    another's.
+    """
+    slot_s, guard_s = lengths_s(air)
+    foreign = 0
+    for owner, begin, burst in places(air, root=1):
+        foreign += burst.src != owner
+        end = begin + burst.end - burst.begin
+        assert begin >= -CLOCK_ERROR_S, f"seed {air.seed}"
+        assert end <= slot_s - guard_s + CLOCK_ERROR_S, f"seed {air.seed}"
+    return foreign
+
+
+@radios
+@sizes
+def test_bursts_stay_in_slots_of_their_own(traits, n):
+    """Also while clocks part, from the first burst on."""
+    for seed in range(2):
+        air = make_air(n, traits, seed)
+        air.offer_randomly(SETTLED_S + 1.2, per_s=8, begin_s=SETTLED_S)
+        assert len(air.run(SETTLED_S + 2)) > 20 * n
+        air.assert_nobody_clashes()
+        assert assert_in_slots(air) == 0
+
+
+@radios
+@sizes
+@pytest.mark.parametrize("is_full", [False, True], ids=["some", "much"])
+def test_slots_of_the_silent_are_used_by_others_and_nobody_clashes(traits, n, is_full):
+    foreign = 0
+    for seed in range(3):
+        air = make_air(n, traits, seed, reuse=True)
+        air.offer_randomly(SETTLED_S + 1, per_s=10, begin_s=SETTLED_S)
+        if is_full:
+            for _ in range(150):
+                air.offer(air.rng.randint(1, n), SETTLED_S)
+        air.run(SETTLED_S + 1.5)
+        air.assert_nobody_clashes()
+        foreign += assert_in_slots(air)
+    # A slot here is shorter than the mini-slots of a radio that takes its time.
+    assert foreign > 20 or not traits.is_lockstep
+
+
+@sizes
+def test_reuse_makes_the_air_of_one_robot_nearly_whole(n):
+    """The control: it is worth something."""
+    sent = {}
+    for reuse in (False, True):
+        air = make_air(n, LOCKSTEP, 1, reuse=reuse)
+        for _ in range(400):
+            air.offer(1, SETTLED_S)
+        sent[reuse] = sum(burst.src == 1 for burst in air.run(SETTLED_S + 0.6))
+    assert sent[True] > 1.4 * sent[False]
+
+
+@radios
+@sizes
+def test_all_get_the_same_when_all_have_too_much(traits, n):
+    air = make_air(n, traits, 2, reuse=True, ppm=0.0)
+    air.saturate(120, SETTLED_S)
+    bursts = air.run(SETTLED_S + 0.8)
+    shares = Counter(burst.src for burst in bursts if burst.begin > SETTLED_S)
+    assert len(shares) == n
+    assert max(shares.values()) < 1.2 * min(shares.values())
+    air.assert_nobody_clashes()
+
+
+@radios
+@pytest.mark.parametrize("reuse", [False, True])
+def test_an_urgent_message_waits_a_frame_at_most(traits, reuse):
+    """However much else waits, at whichever robot; and here no slot is ever empty."""
+    for seed in range(2):
+        air = make_air(4, traits, seed, reuse=reuse, ppm=0.0)
+        air.saturate(80, SETTLED_S)
+        air.offer_randomly(SETTLED_S + 1, per_s=8, classes=(Qos.URGENT,), begin_s=SETTLED_S)
+        bursts = [each for each in air.run(SETTLED_S + 1.5) if each.qos is Qos.URGENT]
+        assert len(bursts) > 10
+        longest_s = air.nodes[1].access.round_s + traits.lead_s + traits.react_s + traits.ahead_s
+        for burst in bursts:
+            assert burst.begin - burst.arrived_at < longest_s, f"seed {seed}"
+
+
+@pytest.mark.parametrize("longest_s", [0.0003, 0.0005, 0.001, 0.004, 0.02])
+@pytest.mark.parametrize("turnaround_s", [0.0, 50e-6, 500e-6])
+def test_a_slot_is_made_so_long_that_its_guard_takes_a_tenth_at_most(longest_s, turnaround_s):
+    access = make(1, LOCKSTEP._replace(turnaround_s=turnaround_s), longest_s, nodes=(1,))
+    slot_s, guard_s = access._slot_s, access._guard_s
+    times = (9.0 + 1e-4 * step for step in range(int(2e4 * slot_s)))
+    slots = [access.slot(Wish(at, Qos.URGENT, longest_s, Sensed(at))) for at in times]
+    rooms = [slot.end - slot.start for slot in slots if slot is not None]
+    assert longest_s <= max(rooms) <= slot_s - guard_s + 1e-9
+    assert guard_s == pytest.approx(turnaround_s + CLOCK_ERROR_S + 5e-6)
+    assert guard_s <= 0.1 * slot_s * (1 + 1e-9)
+    assert slot_s * 1e5 == pytest.approx(round(slot_s * 1e5)), "whole tens of micro-seconds"
+
+
+def test_what_is_given_is_kept_to():
+    given = params("tdma", (1, 2), slot_s=0.03, guard_s=0.002)
+    access = make_access(given, 1, LOCKSTEP, LONGEST_S, Random(1))
+    assert (access._slot_s, access._guard_s, access.round_s) == (0.03, 0.002, 0.06)
+    assert access.state.startswith("tdma: 2 slots of 30 ms, guard 2 ms; ")
+
+
+def assert_alike(one, other, begin):
+    """Both say the same at any moment from `begin` on."""
+    granted = 0
+    for step in range(300):
+        until = begin + step * 1e-4
+        wish = Wish(until + LOCKSTEP.lead_s, Qos.DEFAULT, 0.001, Sensed(until, begin - 0.01))
+        slots = one.slot(wish), other.slot(wish)
+        assert slots[0] == slots[1], step
+        granted += slots[0] is not None
+    assert granted
+
+
+def two_of_robot_2():
+    """(the same twice, where its slot begins)"""
+    pair = make(2), make(2)
+    slot_s = pair[0]._slot_s
+    begin = 10.0 + 3 * slot_s
+    for each in pair:
+        root = make(1)
+        root.slot(Wish(10.0, Qos.URGENT, 0.001, Sensed(10.0)))
+        each.take_frame(1, root.frame(10.0)._replace(phase_us=0), 10.0 - slot_s)
+    return *pair, begin
+
+
+def test_a_burst_that_did_not_leave_was_never_there():
+    one, twin, begin = two_of_robot_2()
+    one.sent(begin + 0.002)
+    one.not_sent(begin)
+    assert_alike(one, twin, begin)
+
+
+def test_a_burst_that_did_not_leave_takes_nothing_from_the_one_behind_it():
+    """Two may be on their way to the radio when it says that the first came too late."""
+    one, twin, begin = two_of_robot_2()
+    one.sent(begin + 0.001)
+    for each in (one, twin):
+        each.sent(begin + 0.002)
+    one.not_sent(begin)
+    assert_alike(one, twin, begin)

@@ -1,0 +1,157 @@
+"""A PDU that leaves later: its ages and phases move, all else stays."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sdrlinkd.wire import (
+    CONTROL_TOPIC_ID,
+    MAX_AGE_US,
+    Beacon,
+    Entry,
+    Frame,
+    LinkReport,
+    PduBuilder,
+    Receipt,
+    RegistryDigest,
+    Stamp,
+    build,
+    build_records,
+    parse,
+    parse_records,
+    postponed,
+)
+from tests.wire.test_pdu import sized_pdus
+from tests.wire.vectors import BY_NAME, crc16_xmodem, reseal
+
+octet = st.integers(0, 255)
+times_us = st.integers(0, MAX_AGE_US) | st.integers(0, 10_000_000)
+records = st.one_of(
+    st.builds(Stamp, octet, octet, times_us),
+    st.builds(Frame, octet, octet, st.integers(0, 0xFFFF), times_us),
+    st.builds(Beacon, st.integers(0, 0xFFFF), st.integers(0, 0xFFFF)),
+    st.builds(LinkReport, octet, st.integers(-128, 127), octet, octet),
+    st.builds(Receipt, octet, octet, octet),
+    st.builds(RegistryDigest, st.binary(min_size=8, max_size=8), st.binary(max_size=15)),
+)
+steps_us = st.sampled_from([0, 1, 255, 256, 65_536, MAX_AGE_US]) | times_us
+
+
+def moved(record, by_us):
+    if isinstance(record, Stamp):
+        return record._replace(age_us=min(record.age_us + by_us, MAX_AGE_US))
+    if isinstance(record, Frame):
+        return record._replace(phase_us=min(record.phase_us + by_us, MAX_AGE_US))
+    return record
+
+
+@st.composite
+def built(draw):
+    """(PDU as the link builds it, its size, its entries, its records)"""
+    pdu_size = draw(st.sampled_from([32, 64, 220, 2047]))
+    builder = PduBuilder(pdu_size)
+    entries = []
+    for _ in range(draw(st.integers(0, 14))):
+        payload = draw(st.binary(max_size=min(max(builder.room, 0), 40)))
+        if builder.room < len(payload):
+            break
+        entry = Entry(draw(st.integers(0, 14)), draw(octet), 0, 1, payload)
+        builder.add(*entry)
+        entries.append(entry)
+    told = [each for each in draw(st.lists(records)) if builder.add_record(build_records([each]))]
+    if builder.is_empty:
+        builder.add_record(build_records([Stamp(1, 2, 3)]))
+        told = [Stamp(1, 2, 3)]
+    return builder.build(0, 1, 255, draw(octet), 1, draw(octet)), pdu_size, entries, told
+
+
+@settings(derandomize=True, deadline=None, max_examples=120)
+@given(built(), steps_us)
+def test_ages_and_phases_move_and_nothing_else(case, by_us):
+    pdu, pdu_size, entries, told = case
+    after = postponed(pdu, by_us)
+    before, now = parse(pdu, pdu_size), parse(after, pdu_size)
+    assert crc16_xmodem(after[:-2]) == int.from_bytes(after[-2:], "big")
+    assert now._replace(entries=before.entries) == before
+    assert now.entries[: len(entries)] == entries
+    if told:
+        *_, control = now.entries
+        assert control._replace(payload=b"") == before.entries[-1]._replace(payload=b"")
+        assert parse_records(control.payload) == [moved(record, by_us) for record in told]
+    else:
+        assert after == pdu
+
+
+@settings(derandomize=True, deadline=None, max_examples=40)
+@given(built())
+def test_a_pdu_that_leaves_in_time_stays_as_it_is(case):
+    assert postponed(case[0], 0) == case[0]
+
+
+@settings(derandomize=True, deadline=None, max_examples=40)
+@given(built(), times_us, times_us)
+def test_two_delays_are_one(case, first_us, second_us):
+    assert postponed(postponed(case[0], first_us), second_us) == postponed(
+        case[0], first_us + second_us
+    )
+
+
+@settings(derandomize=True, deadline=None, max_examples=40)
+@given(sized_pdus(), steps_us)
+def test_messages_are_never_touched_whatever_they_look_like(case, by_us):
+    """Payloads here are any octets; those under topic id 0xF would be records."""
+    pdu, pdu_size = case
+    kept = [entry._replace(topic_id=entry.topic_id % CONTROL_TOPIC_ID) for entry in pdu.entries]
+    octets = build(pdu._replace(entries=kept), pdu_size)
+    assert postponed(octets, by_us) == octets
+
+
+@pytest.mark.parametrize("topic_id", range(CONTROL_TOPIC_ID))
+def test_a_message_that_reads_like_records_is_a_message(topic_id):
+    payload = build_records([Stamp(1, 2, 3), Frame(1, 0, 2, 3)])
+    entries = [Entry(topic_id, 0, 0, 1, payload), Entry(topic_id, 1, 0, 1, payload)]
+    pdu = parse(BY_NAME["three_odd_nibble"].octets, 48)._replace(entries=entries)
+    assert postponed(build(pdu, 96), 1000) == build(pdu, 96)
+
+
+def test_the_golden_vectors_a_second_apart():
+    before = BY_NAME["message_stamp_and_frame"].octets
+    after = BY_NAME["message_stamp_and_frame_a_second_later"].octets
+    assert postponed(before, 1_000_000).hex(" ") == after.hex(" ")
+
+
+@pytest.mark.parametrize("by_us", [1, 4_293_732_729, MAX_AGE_US])
+def test_ages_end_at_the_largest(by_us):
+    record = parse_records(
+        parse(postponed(BY_NAME["stamp_alone"].octets, by_us), 32).entries[0].payload
+    )
+    assert record == [Stamp(14, 255, MAX_AGE_US)]
+
+
+def test_every_control_entry_moves_and_unknown_records_are_stepped_over():
+    payload = (
+        bytes([200, 3, 1, 6, 9])
+        + build_records([Stamp(1, 2, 100)])
+        # A longer STAMP, as later versions may send: 2 octets more.
+        + bytes([1, 8, 3, 4, 0, 0, 0, 50, 7, 7])
+    )
+    entries = [
+        Entry(CONTROL_TOPIC_ID, 0, 0, 1, payload),
+        Entry(0, 5, 0, 1, b"abcd"),
+        Entry(CONTROL_TOPIC_ID, 1, 0, 1, build_records([Frame(1, 0, 7, 10)])),
+    ]
+    pdu = parse(BY_NAME["three_odd_nibble"].octets, 48)._replace(entries=entries)
+    first, message, last = parse(postponed(build(pdu, 96), 5), 96).entries
+    assert first.payload[:5] == payload[:5]
+    assert parse_records(first.payload) == [Stamp(1, 2, 105), Stamp(3, 4, 55)]
+    assert first.payload[-2:] == bytes([7, 7])
+    assert message == entries[1]
+    assert parse_records(last.payload) == [Frame(1, 0, 7, 15)]
+
+
+def test_the_yardstick_sees_a_wrong_crc():
+    """The control: a PDU whose CRC was not made anew is refused."""
+    pdu = bytearray(postponed(BY_NAME["message_stamp_and_frame"].octets, 5))
+    assert reseal(bytes(pdu)) == bytes(pdu)
+    pdu[-1] ^= 1
+    assert reseal(bytes(pdu)) != bytes(pdu)
