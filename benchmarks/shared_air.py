@@ -1,0 +1,149 @@
+"""Robots in one process on a simulated air in lock-step: link, modem and radio of a daemon, without
+its bus.
+"""
+
+import asyncio
+from collections.abc import Iterator, Sequence
+from random import Random
+from typing import NamedTuple
+
+import numpy as np
+
+from backends import AirParams, LocalEther, Radio, RadioParams, World
+from sdrlinkd.config import ModemParams
+from sdrlinkd.link import (
+    AccessParams,
+    Burst,
+    Link,
+    LinkParams,
+    Opportunity,
+    Outcome,
+    Overrides,
+    Qos,
+    QueueParams,
+    RateParams,
+    ReassemblyParams,
+)
+from sdrlinkd.modem import ModemLink
+from sdrlinkd.pdulink import Heard
+from sdrlinkd.wire import make_registry
+
+TOPICS = (("data", "std_msgs/msg/ByteMultiArray"), ("stop", "std_msgs/msg/Empty"))
+DATA, STOP = 0, 1
+TICK_S = 0.05
+
+
+class Arrival(NamedTuple):
+    """A message that a robot has to send."""
+
+    at: float
+    topic_id: int
+    payload: bytes
+
+
+class Got(NamedTuple):
+    """A message that arrived, and how old it was then."""
+
+    src: int
+    topic_id: int
+    age_s: float
+
+
+class Station:
+    """One robot: asks its link what to do, as a daemon does."""
+
+    def __init__(
+        self, own_id: int, radio: Radio, access: AccessParams, modem: ModemParams, pdu_size: int,
+        arrivals: Sequence[Arrival], seed: int,
+    ) -> None:  # fmt: skip
+        self.link = Link(
+            LinkParams(pdu_size=pdu_size), QueueParams(), ReassemblyParams(),
+            make_registry(TOPICS), own_id, Random(seed),
+        )  # fmt: skip
+        self.modem = ModemLink(modem, pdu_size, radio, "ether", access.policy != "none")
+        self._access = access
+        self._arrivals = iter(arrivals)
+        self._next = next(self._arrivals, None)
+        self._ticked_at = 0.0
+        self.sent = 0
+        self.got: list[Got] = []
+        self.bursts = 0
+
+    async def open(self) -> None:
+        """Open the radio."""
+        self.link.attach(await self.modem.open(self), self._access, RateParams())
+
+    def advance(self, now: float) -> None:
+        """Messages that have come up to now."""
+        while self._next is not None and self._next.at <= now:
+            at, topic_id, payload = self._next
+            urgent = Overrides(qos=Qos.URGENT) if topic_id == STOP else Overrides()
+            self.link.submit(topic_id, payload, at, urgent)
+            self.sent += 1
+            self._next = next(self._arrivals, None)
+        if now - self._ticked_at >= TICK_S:
+            self._ticked_at = now
+            self.link.handle_timers(now)
+
+    def heard(self, pdus: Sequence[Heard]) -> None:
+        """PDUs from the air."""
+        for data, at, snr_db in pdus:
+            for message in self.link.hear(data, at, snr_db):
+                age_s = self.link.delivered(message, self.modem.now())
+                if age_s is not None:
+                    self.got.append(Got(message.src, message.topic_id, age_s))
+
+    def next_burst(self, opportunity: Opportunity) -> Burst | None:
+        """What goes next."""
+        return self.link.next_burst(opportunity)
+
+    def next_wakeup(self, now: float) -> float:
+        """When there may be something."""
+        return self.link.next_wakeup(now)
+
+    def settled(self, burst: Burst, outcome: Outcome, at: float) -> None:
+        """What became of a burst."""
+        self.bursts += 1
+        self.link.confirm(burst, outcome, at)
+
+
+def poisson(
+    rng: np.random.Generator, topic_id: int, per_s: float, size: int, duration_s: float
+) -> Iterator[Arrival]:
+    """Messages of `size` bytes that come at random times."""
+    at = 0.0
+    while per_s:
+        at += rng.exponential(1 / per_s)
+        if at >= duration_s:
+            return
+        yield Arrival(at, topic_id, b"\0\1\0\0" + rng.bytes(size - 4))
+
+
+async def run(
+    air: AirParams,
+    radios: dict[int, RadioParams],
+    access: AccessParams,
+    modem: ModemParams,
+    pdu_size: int,
+    arrivals: dict[int, list[Arrival]],
+    until_s: float,
+    seed: int,
+) -> list[Station]:
+    """All of it, up to `until_s`."""
+    ether = LocalEther(air, radios, World(air, {}), seed)
+    stations = [
+        Station(
+            each, ether.radios[each], access, modem, pdu_size, arrivals[each], 100 * seed + each
+        )
+        for each in radios
+    ]
+    for station in stations:
+        await station.open()
+    async with asyncio.TaskGroup() as tasks:
+        running = [tasks.create_task(station.modem.run()) for station in stations]
+        await ether.run(until_s)
+        for station in stations:
+            await station.modem.close()
+        for task in running:
+            task.cancel()
+    return stations

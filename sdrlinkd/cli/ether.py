@@ -1,0 +1,61 @@
+"""`sdrlink-ether`: the hub of a simulated air."""
+
+import signal
+import sys
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+
+from sdrlinkd import __version__
+from sdrlinkd.cli.pace import Pace
+from sdrlinkd.errors import UserError
+from sdrlinkd.lab import load_scenario, make_hub
+
+DEFAULT_DIRECTORY = Path(tempfile.gettempdir()) / "sdrlink-ether"
+
+app = typer.Typer(name="sdrlink-ether", pretty_exceptions_enable=False, add_completion=True)
+
+
+@app.command()
+def ether(
+    scenario: Annotated[
+        Path | None, typer.Argument(help="Robots and air; without one, all hear all at 20 dB.")
+    ] = None,
+    directory: Annotated[
+        Path, typer.Option("--dir", help="Folder for the hub's sockets; daemons name it, too.")
+    ] = DEFAULT_DIRECTORY,
+    traces: Annotated[
+        Path | None, typer.Option(help="Folder of the logs that a scenario replays.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Of all chance on the air.")] = None,
+    duration: Annotated[float | None, typer.Option(min=0.1, help="Of a lock-step run.")] = None,
+    pace: Annotated[Pace | None, typer.Option(help="By the clock, or in lock-step.")] = None,
+) -> None:
+    """Serve one simulated air to daemons with `backend = "ether"`, until Ctrl-C."""
+    chosen = None
+    if scenario is not None:
+        changes = {"seed": seed, "duration_s": duration, "pace": pace.value if pace else None}
+        chosen = msgspec.structs.replace(
+            load_scenario(scenario), **{k: v for k, v in changes.items() if v is not None}
+        )
+    hub = make_hub(chosen, directory, traces)
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: hub.stop())
+    title = chosen.title if chosen else "all hear all at 20 dB"
+    hub.run(lambda: typer.echo(f"sdrlink-ether {__version__}: {title}; sockets in {directory}"))
+
+
+def main() -> None:
+    """Run the hub; exit code 2 for what a person can mend."""
+    try:
+        app(prog_name="sdrlink-ether")
+    except UserError as error:
+        sys.stderr.write(f"sdrlink-ether: {error}\n")
+        sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()

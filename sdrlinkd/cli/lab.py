@@ -1,0 +1,156 @@
+"""`lab`: a scenario with real daemons on one simulated air, in one command."""
+
+import sys
+import time
+from enum import StrEnum
+from pathlib import Path
+from types import ModuleType
+from typing import Annotated
+
+import msgspec
+import typer
+from rich.console import Console
+from rich.live import Live
+
+from sdrlinkd.cli.app import app
+from sdrlinkd.cli.pace import Pace
+from sdrlinkd.errors import UserError
+from sdrlinkd.lab import (
+    LabOptions,
+    LabReport,
+    LabState,
+    live_table,
+    load_scenario,
+    pair_table,
+    run_lab,
+)
+
+PICTURE = "lab.png"
+
+
+class Policy(StrEnum):
+    """How robots share the air."""
+
+    NONE = "none"
+    CSMA = "csma"
+    MINISLOT = "minislot"
+    TDMA = "tdma"
+
+
+@app.command()
+def lab(
+    scenario: Annotated[
+        Path, typer.Argument(help="Robots and air, such as etc/scenarios/two-robots.toml.")
+    ],
+    bag: Annotated[
+        Path | None, typer.Option(help="What the robots send; by default a built-in robot's.")
+    ] = None,
+    traces: Annotated[
+        Path | None, typer.Option(help="Folder of the logs whose outages a scenario replays.")
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(min=0.5, max=1e5, help="Seconds that the robots send.")
+    ] = None,
+    pace: Annotated[
+        Pace | None, typer.Option(help="By the clock; or in lock-step, the same for each seed.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Of all chance.")] = None,
+    access: Annotated[
+        Policy | None, typer.Option(help="Another access policy than the scenario's.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder for report.json and lab.png.")] = Path(
+        "build/lab"
+    ),
+) -> None:
+    """Run several robots' daemons on one simulated air; measure who got what of whom."""
+    console = Console() if sys.stdout.isatty() else Console(width=110)
+    chosen = load_scenario(scenario)
+    changes = {"seed": seed, "duration_s": duration, "pace": pace.value if pace else None}
+    chosen = msgspec.structs.replace(
+        chosen, **{key: value for key, value in changes.items() if value is not None}
+    )
+    if access is not None:
+        section = {**chosen.daemon.get("access", {}), "policy": access.value}
+        chosen = msgspec.structs.replace(chosen, daemon={**chosen.daemon, "access": section})
+    if bag is None and chosen.bag:
+        bag = scenario.parent / chosen.bag
+    pictures = _load_pictures()
+    _make_folder(out)
+    options = LabOptions(scenario, chosen, bag, traces)
+    title = chosen.title or scenario.stem
+    began = time.monotonic()
+    with Live(console=console, auto_refresh=False, transient=True) as live:
+
+        def watch(state: LabState) -> None:
+            if console.is_terminal:
+                live.update(live_table(title, state), refresh=True)
+
+        report = run_lab(options, watch)
+    _write(out, report)
+    wall_s = time.monotonic() - began
+    pictures.draw(report, out / PICTURE, _caption(report, scenario))
+    console.print(pair_table(report))
+    for line in _summary(report, wall_s):
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+    console.print(f"wrote {out}/report.json, {PICTURE}", highlight=False, markup=False)
+    if not all(robot.ledger_adds_up for robot in report.robots):
+        raise typer.Exit(1)
+
+
+def _summary(report: LabReport, wall_s: float) -> list[str]:
+    pace = "in real time" if report.pace == "realtime" else "in lock-step"
+    lines = [
+        f"PDR {report.pdr:.4f} in all, {report.worst_pdr:.4f} at worst; {pace}, took {wall_s:.0f} s"
+    ]
+    if report.out_of_reach:
+        pairs = ", ".join(f"{sender} → {receiver}" for sender, receiver in report.out_of_reach)
+        lines.append(f"never in reach of each other, and in no figure: {pairs}")
+    for robot in report.robots:
+        text = (
+            f"robot {robot.id}: {robot.access}; {100 * robot.airtime_share:.1f} % of the air, "
+            f"{robot.bursts_sent} bursts, {robot.bursts_failed} failed, {robot.bursts_late} late "
+            f"and sent again; {robot.pdus_bad} PDUs and {robot.headers_bad} headers bad; "
+            f"dropped: {robot.dropped or 'nothing'}"
+        )
+        if robot.left:
+            text += f"; {robot.left} messages were left"
+        if robot.samples_lost:
+            text += f"; this machine was too slow: {robot.samples_lost} samples lost"
+        if not robot.ledger_adds_up:
+            text += "; THE LEDGER DOES NOT ADD UP"
+        lines.append(text)
+    return lines
+
+
+def _caption(report: LabReport, scenario: Path) -> str:
+    return (
+        f"sdrlinkctl lab {scenario.name}, {report.source}, {report.duration_s:g} s, "
+        f"{report.pace}, seed {report.seed}; {report.robots[0].access}"
+    )
+
+
+def _load_pictures() -> ModuleType:
+    """Matplotlib is an extra, and slow to load: only here, and before a run rather than after."""
+    try:
+        from sdrlinkd.lab import pictures
+    except ImportError:
+        raise UserError(
+            "the pictures need matplotlib; install it with: pip install 'sdrlinkd[plots]'"
+        ) from None
+    return pictures
+
+
+def _make_folder(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"{error.filename} cannot be written ({error.strerror})") from None
+
+
+def _write(out: Path, report: LabReport) -> None:
+    path = out / "report.json"
+    text = msgspec.json.format(msgspec.json.encode(report), indent=2)
+    try:
+        path.write_bytes(text + b"\n")
+    except OSError as error:
+        raise UserError(f"{path} cannot be written ({error.strerror})") from None

@@ -1,0 +1,27 @@
+"""Many robots on one simulated air: scenarios, their hub, and a run with real daemons."""
+
+from sdrlinkd.lab.hub import make_hub
+from sdrlinkd.lab.report import LabReport, PairResult, RobotResult
+from sdrlinkd.lab.run import LabOptions, LabState, run_lab
+from sdrlinkd.lab.scenario import Scenario, load_scenario
+from sdrlinkd.lab.simulation import Arrival, Pair, Simulation, Station, carrier_traits
+from sdrlinkd.lab.table import live_table, pair_table
+
+__all__ = [
+    "Arrival",
+    "LabOptions",
+    "LabReport",
+    "LabState",
+    "Pair",
+    "PairResult",
+    "RobotResult",
+    "Scenario",
+    "Simulation",
+    "Station",
+    "carrier_traits",
+    "live_table",
+    "load_scenario",
+    "make_hub",
+    "pair_table",
+    "run_lab",
+]

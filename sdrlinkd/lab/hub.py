@@ -1,0 +1,32 @@
+"""The hub of a scenario."""
+
+from pathlib import Path
+
+import phy
+from backends import AirParams, BackendError, EtherHub, World
+from sdrlinkd.errors import UserError
+from sdrlinkd.lab.scenario import Scenario, outages_of
+
+
+def make_hub(scenario: Scenario | None, directory: Path, traces: Path | None) -> EtherHub:
+    """For `scenario`, or an air of which nothing is known but that all hear each other.
+
+    Raises UserError when the folder cannot be had.
+    """
+    # Else the first burst that is delayed would have the air wait for compiled code.
+    phy.warm_up()
+    try:
+        if scenario is None:
+            air = AirParams()
+            return EtherHub(directory, air, World(air, {}), {})
+        return EtherHub(
+            directory,
+            scenario.air,
+            scenario.world(outages_of(scenario, traces)),
+            scenario.radios,
+            paced=scenario.pace == "realtime",
+            until_s=scenario.until_s,
+            seed=scenario.seed,
+        )
+    except BackendError as error:
+        raise UserError(str(error)) from None

@@ -1,0 +1,243 @@
+"""One run: a hub, a daemon for each robot, who sends and who listens; all stopped at the end."""
+
+import contextlib
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from backends import Answer, BackendError, HubWatch
+from sdrlinkd.demo import (
+    Process,
+    Sample,
+    Source,
+    problems_of,
+    snapshot_of,
+    start_daemon,
+    wait_until_up,
+)
+from sdrlinkd.errors import UserError
+from sdrlinkd.lab.report import LabReport, pair_result, robot_result
+from sdrlinkd.lab.robots import open_sources, write_daemon_config
+from sdrlinkd.lab.scenario import Scenario
+from sdrlinkd.lab.traffic import Listener, Player, plan, trace_of
+from sdrlinkd.reports import Snapshot
+
+POLL_S = 0.5
+# When the hub's time has come, what is in the daemons and on the buses comes within this.
+CATCH_UP_S = 20.0
+SETTLED_S = 0.3
+
+
+@dataclass(frozen=True)
+class LabOptions:
+    """A scenario and where its parts lie."""
+
+    path: Path
+    scenario: Scenario
+    bag: Path | None
+    traces: Path | None
+
+
+@dataclass
+class LabState:
+    """A moment of a run, for the screen."""
+
+    now_s: float
+    until_s: float
+    snapshots: list[Snapshot] = field(default_factory=list)
+
+
+@dataclass
+class _Robot:
+    id: int
+    directory: Path
+    source: Source
+    process: Process
+    listener: Listener
+    player: Player | None = None
+
+
+Watch = Callable[[LabState], None]
+
+
+def run_lab(options: LabOptions, watch: Watch) -> LabReport:
+    """Run a scenario to its end. Raises UserError; whatever happens, nothing is left running."""
+    scenario = options.scenario
+    with contextlib.ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sdrlink-")))
+        sources = open_sources(scenario, options.bag)
+        for source in sources.values():
+            stack.callback(source.recording.close)
+        hub = _start_hub(stack, folder / "hub", options)
+        robots = _start_robots(stack, folder, options, sources)
+        watcher = stack.enter_context(HubWatch(folder / "hub"))
+        began_at = _begin(stack, robots, scenario)
+        _wait_until_over(hub, watcher, robots, scenario, began_at, watch)
+        snapshots = _settled(robots)
+        watch(LabState(scenario.until_s, scenario.until_s, snapshots))
+        problems = {robot.id: problems_of(robot.directory) for robot in robots}
+        return _report(options, robots, snapshots, problems, began_at)
+
+
+def _start_hub(stack: contextlib.ExitStack, directory: Path, options: LabOptions) -> Process:
+    scenario = options.scenario
+    directory.mkdir()
+    arguments = [str(options.path), "--dir", str(directory), "--seed", str(scenario.seed)]
+    arguments += ["--duration", str(scenario.duration_s), "--pace", scenario.pace]
+    if options.traces is not None:
+        arguments += ["--traces", str(options.traces)]
+    hub = Process("sdrlinkd.cli.ether", arguments, directory / "log")
+    stack.callback(hub.stop)
+    return hub
+
+
+def _start_robots(
+    stack: contextlib.ExitStack, folder: Path, options: LabOptions, sources: dict[int, Source]
+) -> list[_Robot]:
+    """All daemons at once: each takes a while."""
+    started = []
+    for robot in options.scenario.robot:
+        source = sources[robot.id]
+        config = write_daemon_config(
+            folder / f"robot_{robot.id}", options.scenario, robot, source, options.bag,
+            folder / "hub", options.path.name,
+        )  # fmt: skip
+        process = start_daemon(config)
+        stack.callback(process.stop)
+        started.append((robot.id, config.parent, source, process))
+    by_age = options.scenario.pace == "lockstep"
+    robots = []
+    for robot_id, directory, source, process in started:
+        wait_until_up(process, directory)
+        listener = stack.enter_context(Listener(directory, by_age))
+        robots.append(_Robot(robot_id, directory, source, process, listener))
+    return robots
+
+
+def _begin(stack: contextlib.ExitStack, robots: list[_Robot], scenario: Scenario) -> float:
+    """Have them send; when that began, on the clock of the samples sent."""
+    sending = {robot.id for robot in scenario.robot if robot.sends}
+    if scenario.pace == "lockstep":
+        return 0.0
+    for robot in robots:
+        if robot.id in sending:
+            robot.player = stack.enter_context(Player(robot.source, robot.directory))
+    return time.monotonic()
+
+
+def _wait_until_over(
+    hub: Process,
+    watcher: HubWatch,
+    robots: list[_Robot],
+    scenario: Scenario,
+    began_at: float,
+    watch: Watch,
+) -> None:
+    while True:
+        for name, process in [("the hub", hub), *((f"robot {r.id}", r.process) for r in robots)]:
+            if not process.is_running:
+                raise UserError(f"{name} has ended:\n{process.log()}")
+        for robot in robots:
+            if robot.player is not None and robot.player.problem:
+                raise UserError(f"robot {robot.id}: {robot.player.problem}")
+        answer = _ask(watcher)
+        if scenario.pace == "lockstep":
+            now_s, is_over = answer.now_s, answer.is_over
+        else:
+            now_s = time.monotonic() - began_at
+            playing = any(each.player and each.player.is_alive() for each in robots)
+            is_over = now_s >= scenario.duration_s and not playing
+        snapshots = [snapshot_of(robot.directory) for robot in robots]
+        watch(LabState(min(now_s, scenario.until_s), scenario.until_s, snapshots))
+        if is_over:
+            return
+        time.sleep(POLL_S)
+
+
+def _ask(watcher: HubWatch) -> Answer:
+    try:
+        return watcher.ask()
+    except BackendError as error:
+        raise UserError(str(error)) from None
+
+
+def _settled(robots: list[_Robot]) -> list[Snapshot]:
+    """The snapshots when nothing is on its way any more, or has moved for a while."""
+    deadline = time.monotonic() + CATCH_UP_S
+    seen: object = None
+    still_since = time.monotonic()
+    while True:
+        snapshots = [snapshot_of(robot.directory) for robot in robots]
+        busy = any(at.link.tx.queued or at.link.tx.in_flight or at.link.rx.held for at in snapshots)
+        missing = any(
+            at.bus.published != robot.listener.count
+            for at, robot in zip(snapshots, robots, strict=True)
+        )
+        moving = [(at.link.tx.sent, at.link.rx.pdus_heard, at.bus.published) for at in snapshots]
+        now = time.monotonic()
+        if (moving, missing) != seen:
+            seen, still_since = (moving, missing), now
+        settled = now - still_since > (SETTLED_S if not (busy or missing) else 3.0)
+        if settled or now > deadline:
+            return snapshots
+        time.sleep(0.05)
+
+
+def _report(
+    options: LabOptions,
+    robots: list[_Robot],
+    snapshots: list[Snapshot],
+    problems: dict[int, list[str]],
+    began_at: float,
+) -> LabReport:
+    scenario = options.scenario
+    sent = _sent(robots, scenario)
+    pairs = [
+        pair_result(
+            sender.id,
+            receiver.id,
+            trace_of(sender.source, sent[sender.id], receiver.listener.received[sender.id]),
+            began_at,
+            scenario.duration_s,
+        )
+        for sender in robots
+        for receiver in robots
+        if sender is not receiver and sent[sender.id] and scenario.in_reach(sender.id, receiver.id)
+    ]
+    out_of_reach = [
+        (sender.id, receiver.id)
+        for sender in robots
+        for receiver in robots
+        if sender is not receiver and not scenario.in_reach(sender.id, receiver.id)
+    ]
+    n_sent = sum(pair.sent for pair in pairs)
+    return LabReport(
+        scenario=options.path.stem,
+        title=scenario.title,
+        pace=scenario.pace,
+        seed=scenario.seed,
+        duration_s=scenario.duration_s,
+        source=robots[0].source.title,
+        pdr=sum(pair.received for pair in pairs) / n_sent if n_sent else 1.0,
+        worst_pdr=min((pair.pdr for pair in pairs), default=1.0),
+        robots=[
+            robot_result(snapshot, problems[snapshot.node], scenario.until_s)
+            for snapshot in snapshots
+        ],
+        pairs=pairs,
+        out_of_reach=out_of_reach,
+        damage=robots[0].source.recording.damage,
+    )
+
+
+def _sent(robots: list[_Robot], scenario: Scenario) -> dict[int, dict[str, list[Sample]]]:
+    """By robot and registry name."""
+    if scenario.pace == "lockstep":
+        sending = {robot.id for robot in scenario.robot if robot.sends}
+        return {
+            robot.id: plan(robot.source, scenario.duration_s) if robot.id in sending else {}
+            for robot in robots
+        }
+    return {robot.id: robot.player.sent if robot.player else {} for robot in robots}

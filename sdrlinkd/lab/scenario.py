@@ -1,0 +1,165 @@
+"""A scenario: the air, the robots on it and what they send, as TOML."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta
+
+from backends import AirParams, LinkOverride, Outage, RadioParams, Track, World
+from sdrlinkd.config import parse_toml
+from sdrlinkd.errors import ConfigError, UserError
+from sdrlinkd.lab.traces import read_outages
+
+MAX_ROBOTS = 64
+# Nobody drives faster.
+MAX_SPEED_M_S = 1e4
+# Not even a preamble is found below this.
+LEAST_SNR_DB = -6.0
+REACH_STEPS = 200
+
+Waypoint = Annotated[list[float], Meta(min_length=3, max_length=3)]
+
+
+class RobotParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One robot: where it is, what radio it has and what it sends."""
+
+    id: Annotated[int, Meta(ge=0, le=254)]
+    path: list[Waypoint] = []
+    """[t in s, x in m, y in m]: it drives straight from one to the next, and stays at the last."""
+    topics: list[str] = []
+    """What it sends of the recording, or of what the built-in robot has; []: all."""
+    sends: bool = True
+    radio: RadioParams = RadioParams()
+
+
+class OutageParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Times at which nothing gets through."""
+
+    trace: str = ""
+    """A log of received messages with sequence numbers, one JSON object a line, found by --traces:
+    where messages are missing in it, the air is dead."""
+    period_s: Annotated[float, Meta(gt=0)] = 0.5
+    """Time between two messages of the log."""
+    from_s: Annotated[float, Meta(ge=0)] = 0.0
+    """Where in the log the run begins."""
+    times: list[Annotated[list[float], Meta(min_length=2, max_length=2)]] = []
+    """[begin, end] in s, besides."""
+
+
+class Scenario(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A whole experiment."""
+
+    title: str = ""
+    pace: Literal["realtime", "lockstep"] = "realtime"
+    """By the clock; or as fast as the slowest goes, the same result for the same seed."""
+    duration_s: Annotated[float, Meta(gt=0, le=1e5)] = 20.0
+    """How long the robots send."""
+    settle_s: Annotated[float, Meta(ge=0, le=100)] = 2.0
+    """How long what was sent may be on its way after that."""
+    seed: int = 1
+    bag: str = ""
+    """Recording that the robots send from; "": the built-in robot. --bag goes before it."""
+    air: AirParams = AirParams()
+    robot: Annotated[list[RobotParams], Meta(min_length=1, max_length=MAX_ROBOTS)]
+    link: list[LinkOverride] = []
+    outages: OutageParams = OutageParams()
+    daemon: dict[str, Any] = {}
+    """Keys of sdrlinkd.toml for all daemons."""
+
+    @property
+    def radios(self) -> dict[int, RadioParams]:
+        """Radio of each robot."""
+        return {robot.id: robot.radio for robot in self.robot}
+
+    @property
+    def until_s(self) -> float:
+        """When it is over."""
+        return self.duration_s + self.settle_s
+
+    def in_reach(self, sender: int, receiver: int) -> bool:
+        """Whether `receiver` can ever hear `sender`."""
+        world = self.world([])
+        times = [self.duration_s * i / REACH_STEPS for i in range(REACH_STEPS + 1)]
+        hops = [world.hop(sender, receiver, t) for t in times]
+        return any(hop is not None and hop.snr_db > LEAST_SNR_DB for hop in hops)
+
+    def world(self, outages: list[Outage]) -> World:
+        """Where everything is."""
+        tracks = {
+            robot.id: Track([(t, x, y) for t, x, y in robot.path])
+            for robot in self.robot
+            if robot.path
+        }
+        return World(self.air, tracks, self.link, outages)
+
+
+def load_scenario(path: Path) -> Scenario:
+    """The scenario in `path`. Raises ConfigError that cites key, given and allowed."""
+    try:
+        text = path.read_text()
+    except (OSError, ValueError) as error:
+        raise UserError(
+            f"{path}: cannot be read ({error}); scenarios are TOML files such as those in "
+            "etc/scenarios"
+        ) from None
+    scenario = parse_toml(text, str(path), Scenario)
+    _check(scenario, str(path))
+    return scenario
+
+
+def outages_of(scenario: Scenario, traces: Path | None) -> list[Outage]:
+    """All outages of a run. Raises UserError when the log cannot be found."""
+    params = scenario.outages
+    outages = [Outage(begin, end) for begin, end in params.times]
+    if params.trace:
+        if traces is None:
+            raise UserError(
+                f"the scenario replays the outages of {params.trace}; name the folder it lies in "
+                "with --traces"
+            )
+        outages += read_outages(traces / params.trace, params.period_s, params.from_s)
+    return outages
+
+
+def _check(scenario: Scenario, source: str) -> None:
+    ids = [robot.id for robot in scenario.robot]
+    for robot_id in ids:
+        if ids.count(robot_id) > 1:
+            raise ConfigError(
+                f"{source}: robot.id: got {robot_id} twice; allowed: each robot an id of its own"
+            )
+    for robot in scenario.robot:
+        _check_path(robot, source)
+    for link in scenario.link:
+        for key, robot_id in (("sender", link.sender), ("receiver", link.receiver)):
+            if robot_id not in ids:
+                raise ConfigError(
+                    f"{source}: link.{key}: got {robot_id}; allowed: a robot of this scenario: "
+                    f"{', '.join(map(str, ids))}"
+                )
+        if link.sender == link.receiver:
+            raise ConfigError(
+                f"{source}: link: got robot {link.sender} to itself; allowed: two robots"
+            )
+    for begin, end in scenario.outages.times:
+        if end <= begin:
+            raise ConfigError(
+                f"{source}: outages.times: got [{begin:g}, {end:g}]; allowed: an end after its "
+                "begin"
+            )
+
+
+def _check_path(robot: RobotParams, source: str) -> None:
+    for (t0, x0, y0), (t1, x1, y1) in zip(robot.path, robot.path[1:], strict=False):
+        if t1 <= t0:
+            raise ConfigError(
+                f"{source}: robot.path of robot {robot.id}: got t = {t1:g} s after {t0:g} s; "
+                "allowed: times that grow"
+            )
+        speed = ((x1 - x0) ** 2 + (y1 - y0) ** 2) ** 0.5 / (t1 - t0)
+        if speed > MAX_SPEED_M_S:
+            raise ConfigError(
+                f"{source}: robot.path of robot {robot.id}: got {speed:.3g} m/s from {t0:g} s to "
+                f"{t1:g} s; allowed: at most {MAX_SPEED_M_S:g} m/s"
+            )

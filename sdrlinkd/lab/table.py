@@ -1,0 +1,122 @@
+"""A run on the screen: all robots while it goes on, all pairs when it is over."""
+
+from rich import box
+from rich.console import Group
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+from phy import MCS_TABLE
+from sdrlinkd.lab.report import LabReport, PairResult
+from sdrlinkd.lab.run import LabState
+from sdrlinkd.reports import Snapshot
+
+NOTHING = "–"
+MOST_ROWS = 20
+
+
+def live_table(title: str, state: LabState) -> Group:
+    """A row a robot."""
+    table = _table(title)
+    table.add_column("robot", no_wrap=True)
+    table.add_column("state", no_wrap=True)
+    for column in ("MCS", "air %", "out", "queued", "dropped", "in", "PER %", "age p50 ms"):
+        table.add_column(column, justify="right", no_wrap=True)
+    table.add_column("hears (SNR dB)")
+    for snapshot in state.snapshots:
+        table.add_row(*_live_row(snapshot, state.now_s))
+    line = Text(f"{state.now_s:.1f} of {state.until_s:g} s ")
+    return Group(table, line, ProgressBar(total=state.until_s, completed=state.now_s, width=60))
+
+
+def pair_table(report: LabReport) -> Table:
+    """A row a direction; where there are many, a row a receiver."""
+    if len(report.pairs) > MOST_ROWS:
+        return _receiver_table(report)
+    table = _table(f"{report.title or report.scenario}: who got what of whom")
+    table.add_column("from", no_wrap=True)
+    table.add_column("to", no_wrap=True)
+    for column in ("sent", "received", "PDR", "p50 ms", "p99 ms"):
+        table.add_column(column, justify="right", no_wrap=True)
+    table.add_column("PDR in each tenth", no_wrap=True)
+    for pair in report.pairs:
+        latency = pair.latency_ms
+        table.add_row(
+            str(pair.sender),
+            str(pair.receiver),
+            str(pair.sent),
+            str(pair.received),
+            f"{pair.pdr:.4f}",
+            f"{latency['p50']:.2f}" if latency else NOTHING,
+            f"{latency['p99']:.2f}" if latency else NOTHING,
+            _bars(pair),
+        )
+    return table
+
+
+def _receiver_table(report: LabReport) -> Table:
+    table = _table(f"{report.title or report.scenario}: who got what of all others")
+    for column in ("robot", "sent to it", "received", "PDR", "worst from", "p50 ms", "p99 ms"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for robot in report.robots:
+        pairs = [pair for pair in report.pairs if pair.receiver == robot.id]
+        if not pairs:
+            continue
+        sent, received = (sum(getattr(p, key) for p in pairs) for key in ("sent", "received"))
+        worst = min(pairs, key=lambda pair: pair.pdr)
+        slowest = [pair.latency_ms for pair in pairs if pair.latency_ms]
+        table.add_row(
+            str(robot.id),
+            str(sent),
+            str(received),
+            f"{received / sent:.4f}" if sent else NOTHING,
+            f"{worst.sender} ({worst.pdr:.4f})",
+            f"{max(each['p50'] for each in slowest):.2f}" if slowest else NOTHING,
+            f"{max(each['p99'] for each in slowest):.2f}" if slowest else NOTHING,
+        )
+    return table
+
+
+def _bars(pair: PairResult) -> str:
+    """Ten little columns."""
+    shades = "▁▁▂▃▄▅▆▇█"
+    return "".join(
+        "·" if share is None else " " if not share else shades[min(8, int(share * 8 + 0.5))]
+        for share in pair.pdr_tenths
+    )
+
+
+def _live_row(snapshot: Snapshot, now_s: float) -> tuple[str, ...]:
+    link = snapshot.link
+    tx, rx = link.tx, link.rx
+    ages = [each.age_ms_p50 for each in link.received if each.age_ms_p50 is not None]
+    lost = sum(each.pdus_lost for each in link.neighbors)
+    heard = sum(each.pdus_heard for each in link.neighbors)
+    used = {each.mcs for each in link.neighbors}
+    mcs = "/".join(MCS_TABLE[each].name for each in sorted(used)) or NOTHING
+    hears = ", ".join(
+        f"{each.src} ({each.snr_db:.0f})" for each in link.neighbors if each.snr_db is not None
+    )
+    return (
+        str(snapshot.node),
+        snapshot.carrier.state,
+        mcs,
+        f"{100 * link.airtime_s / now_s:.1f}" if now_s else NOTHING,
+        f"{tx.sent}/{tx.accepted}",
+        str(tx.queued),
+        str(sum(tx.dropped.values())),
+        str(rx.delivered),
+        f"{100 * lost / (heard + lost):.1f}" if heard + lost else NOTHING,
+        f"{sorted(ages)[len(ages) // 2]:.1f}" if ages else NOTHING,
+        hears or NOTHING,
+    )
+
+
+def _table(title: str) -> Table:
+    return Table(
+        title=title,
+        title_justify="left",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        collapse_padding=True,
+    )

@@ -1,0 +1,50 @@
+"""Outages as they were measured: from logs of what arrived."""
+
+import json
+from itertools import pairwise
+from pathlib import Path
+
+from backends import Outage
+from sdrlinkd.errors import UserError
+
+
+def read_outages(path: Path, period_s: float, from_s: float) -> list[Outage]:
+    """Where messages are missing in a log of one a `period_s`; 0 is `from_s` into the log.
+
+    Each line is JSON with `seqnum`, at the top or in `payload`. Raises UserError.
+    """
+    numbers = sorted(set(_numbers(path)))
+    if len(numbers) < 2:
+        raise UserError(
+            f"{path}: holds no two lines with a seqnum; allowed: a log of received messages, one "
+            "JSON object a line"
+        )
+    first = numbers[0]
+    outages = []
+    for before, after in pairwise(numbers):
+        if after - before > 1:
+            begin_s = (before + 1 - first) * period_s - from_s
+            end_s = (after - first) * period_s - from_s
+            if end_s > 0:
+                outages.append(Outage(max(0.0, begin_s), end_s))
+    return outages
+
+
+def _numbers(path: Path) -> list[int]:
+    try:
+        lines = path.read_text(errors="replace").splitlines()
+    except OSError as error:
+        raise UserError(
+            f"{path}: cannot be read ({error.strerror}); --traces names the folder of the logs"
+        ) from None
+    numbers = []
+    for line in lines:
+        try:
+            found = json.loads(line)
+            number = found.get("seqnum", found.get("payload", {}).get("seqnum"))
+        except (ValueError, AttributeError):
+            # A damaged line tells nothing.
+            continue
+        if isinstance(number, int):
+            numbers.append(number)
+    return numbers

@@ -1,0 +1,112 @@
+"""Producers and consumers of a run: what each robot sends, and what each got of whom."""
+
+import contextlib
+import threading
+import time
+from collections import defaultdict
+from pathlib import Path
+from typing import Self
+
+from sdrlinkd.adapters import due_messages, paced
+from sdrlinkd.client import NoDaemonError, Publisher, Subscriber
+from sdrlinkd.demo import Sample, Source, Trace
+
+FOREVER = float("inf")
+POLL_S = 0.1
+
+
+def plan(source: Source, duration_s: float) -> dict[str, list[Sample]]:
+    """What a robot sends in lock-step, by registry name, at times of the air."""
+    prefix = f"/{source.namespace}/" if source.namespace else "/"
+    names = [topic.name for topic in source.topics]
+    ids = {name: i for i, name in enumerate(names)}
+    sent: dict[str, list[Sample]] = defaultdict(list)
+    for due in due_messages(source.recording, duration_s, 0.0, ids):
+        sent[names[due.topic_id].removeprefix(prefix)].append(Sample(due.at, due.payload))
+    return sent
+
+
+class Player(threading.Thread):
+    """Publishes what a robot sends on its daemon's bus, by the clock, on a thread of its own."""
+
+    def __init__(self, source: Source, directory: Path) -> None:
+        super().__init__(name="player", daemon=True)
+        self._source = source
+        self._directory = directory
+        self._stopped = threading.Event()
+        self.began_at = 0.0
+        self.sent: dict[str, list[Sample]] = defaultdict(list)
+        self.problem = ""
+
+    def run(self) -> None:
+        """Until all is sent, or told to stop."""
+        prefix = f"/{self._source.namespace}/" if self._source.namespace else "/"
+        self.began_at = time.monotonic()
+        try:
+            with Publisher(self._directory) as publisher:
+                messages = paced(self._source.messages(), 1.0, sleep=self._wait)
+                for message in messages:
+                    if self._stopped.is_set():
+                        return
+                    name = message.topic.removeprefix(prefix)
+                    self.sent[name].append(Sample(time.monotonic(), message.cdr))
+                    publisher.send(message.topic, message.cdr, type=message.type)
+        except NoDaemonError as error:
+            self.problem = str(error)
+
+    def _wait(self, seconds: float) -> None:
+        self._stopped.wait(seconds)
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stopped.set()
+        self.join()
+
+
+class Listener(threading.Thread):
+    """Takes everything that a daemon republishes.
+
+    `by_age`: the air has a time of its own, so only a message's age tells how long it took.
+    """
+
+    def __init__(self, directory: Path, by_age: bool) -> None:
+        super().__init__(name="listener", daemon=True)
+        self._by_age = by_age
+        self._subscriber = Subscriber(directory=directory, depth=0)
+        self._done = threading.Event()
+        self.count = 0
+        self.received: dict[int, dict[str, list[Sample]]] = defaultdict(lambda: defaultdict(list))
+        """By source and registry name."""
+
+    def run(self) -> None:
+        """Receive until told to end."""
+        while not self._done.is_set():
+            message = self._subscriber.receive(timeout_s=POLL_S)
+            if message is None:
+                continue
+            at, age_s = time.monotonic(), None
+            if self._by_age:
+                at = FOREVER
+                age_s = FOREVER if message.age_us is None else message.age_us * 1e-6
+            name = message.topic.removeprefix(f"/rx_robot_{message.source}/")
+            self.received[message.source][name].append(Sample(at, message.payload, age_s))
+            self.count += 1
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._done.set()
+        self.join()
+        with contextlib.suppress(NoDaemonError):
+            self._subscriber.close()
+
+
+def trace_of(source: Source, sent: dict[str, list[Sample]], got: dict[str, list[Sample]]) -> Trace:
+    """One robot's messages at another."""
+    types = {topic.name: topic.type for topic in source.registry.topics}
+    return Trace(types, sent, got)
