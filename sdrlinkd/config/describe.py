@@ -19,7 +19,13 @@ def allowed(kind: inspect.Type) -> str:
     if isinstance(kind, inspect.LiteralType):
         return "one of " + ", ".join(f'"{value}"' for value in kind.values)
     if isinstance(kind, inspect.ListType):
-        return f"a list, each of it {allowed(kind.item_type)}"
+        few, most = kind.min_length, kind.max_length
+        length = ""
+        if few is not None and few == most:
+            length = f" of {few}"
+        elif few is not None:
+            length = f" of at least {few}" + (f" and at most {most}" if most is not None else "")
+        return f"a list{length}, each of it {allowed(kind.item_type)}"
     if isinstance(kind, inspect.StructType | inspect.DictType):
         return "a table"
     if isinstance(kind, inspect.UnionType):

@@ -2,6 +2,7 @@
 
 import re
 import tomllib
+from collections import Counter
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TypeVar
@@ -49,14 +50,19 @@ def parse_toml(text: str, source: str, kind: type[S]) -> S:
         raise _explain(error, raw, text, source, describe.type_of(kind)) from None
 
 
-def cite(source: str, text: str, path: list[str]) -> str:
+# Keys and, inside lists, places.
+KeyPath = list[str | int]
+
+
+def cite(source: str, text: str, path: KeyPath) -> str:
     """`file:line: section.key`, as far as the line can be found."""
     line = _line_of(text, path)
-    return f"{source}:{line}: {'.'.join(path)}" if line else f"{source}: {'.'.join(path)}"
+    name = ".".join(step for step in path if isinstance(step, str))
+    return f"{source}:{line}: {name}" if line else f"{source}: {name}"
 
 
 def _refuse_unknown(
-    table: dict[str, object], kind: inspect.Type, path: list[str], text: str, source: str
+    table: dict[str, object], kind: inspect.Type, path: KeyPath, text: str, source: str
 ) -> None:
     known = describe.keys_of(kind)
     for key, value in table.items():
@@ -68,12 +74,12 @@ def _refuse_unknown(
                 f"{cite(source, text, here)}: unknown key; {hint}allowed: {', '.join(known)}"
             )
         inner = describe.child(kind, key)
-        tables = value if isinstance(value, list) else [value]
-        if isinstance(inner, inspect.ListType):
-            inner = inner.item_type
-        for each in tables:
-            if isinstance(each, dict) and inner is not None:
-                _refuse_unknown(each, inner, here, text, source)
+        if isinstance(value, dict) and inner is not None:
+            _refuse_unknown(value, inner, here, text, source)
+        elif isinstance(value, list) and isinstance(inner, inspect.ListType):
+            for i, each in enumerate(value):
+                if isinstance(each, dict):
+                    _refuse_unknown(each, inner.item_type, [*here, i], text, source)
 
 
 def _explain(
@@ -87,11 +93,12 @@ def _explain(
     # msgspec writes `[...]` for the values of a dict, `[3]` for those of a list.
     path = re.findall(r"[^.\[\]]+", found[1].replace("[...]", ".*")) if found else []
     value: object = raw
-    named: list[str] = []
+    named: KeyPath = []
     for step in path:
         if isinstance(value, list):
             index = int(step) if step.isdigit() else 0
             value = value[index]
+            named.append(index)
             kind = kind.item_type if isinstance(kind, inspect.ListType) else None
         elif isinstance(value, dict):
             key = _first_bad_key(value, kind) if step == "*" else step
@@ -121,14 +128,17 @@ def _first_bad_key(table: dict[str, object], kind: inspect.Type | None) -> str:
     return "*"
 
 
-def _line_of(text: str, path: list[str]) -> int | None:
+def _line_of(text: str, path: KeyPath) -> int | None:
     """Line of `path` in the TOML text; the section's line when the key is not spelled plainly."""
-    section: list[str] = []
+    section: KeyPath = []
+    tables: Counter[str] = Counter()
     best = None
     for number, line in enumerate(text.splitlines(), start=1):
-        header = re.match(r"\s*\[{1,2}([^\[\]]+)\]", line)
+        header = re.match(r"\s*(\[{1,2})([^\[\]]+)\]", line)
         if header:
-            section = [part.strip().strip("\"'") for part in header[1].split(".")]
+            parts = [part.strip().strip("\"'") for part in header[2].split(".")]
+            tables[".".join(parts)] += header[1] == "[["
+            section = _section(parts, tables)
             if section == path[: len(section)]:
                 best = number
             continue
@@ -138,3 +148,14 @@ def _line_of(text: str, path: list[str]) -> int | None:
             if dotted == path[: len(dotted)]:
                 return number
     return best
+
+
+def _section(parts: list[str], tables: Counter[str]) -> KeyPath:
+    """A header's path, with the place of each array of tables that it is in."""
+    section: KeyPath = []
+    for i, part in enumerate(parts):
+        section.append(part)
+        n = tables[".".join(parts[: i + 1])]
+        if n:
+            section.append(n - 1)
+    return section

@@ -75,14 +75,18 @@ def open_source(
     duration_s: float | None,
     seed: int,
     namespace: str = NAMESPACE,
+    topics_key: str = "--topics",
 ) -> Source:
-    """A recording, or a built-in robot in `namespace`, and what of it. Raises UserError."""
+    """A recording, or a built-in robot in `namespace`, and what of it. Raises UserError.
+
+    `topics_key` is where a person has named the topics.
+    """
     if bag is None:
         source = _built_in(registry_path, duration_s or BUILT_IN_DURATION_S, seed, namespace)
     else:
         source = _from_bag(bag, registry_path, duration_s or float("inf"))
     if topics:
-        _select(source, topics)
+        _select(source, topics, topics_key)
     if not source.topics:
         raise UserError(f"{source.title}: no topic is left to send")
     return source
@@ -134,7 +138,7 @@ def _match(source: Source) -> None:
     source.topics = kept
 
 
-def _select(source: Source, names: list[str]) -> None:
+def _select(source: Source, names: list[str], key: str) -> None:
     wanted = {name if name.startswith("/") else f"/{name}" for name in names}
     with_namespace = (
         {f"/{source.namespace}{name}" for name in wanted} if source.namespace else set()
@@ -143,6 +147,6 @@ def _select(source: Source, names: list[str]) -> None:
     unknown = [n for n in wanted if n not in known and f"/{source.namespace}{n}" not in known]
     if unknown:
         raise UserError(
-            f"--topics: got {', '.join(sorted(unknown))}; allowed: {', '.join(sorted(known))}"
+            f"{key}: got {', '.join(sorted(unknown))}; allowed: {', '.join(sorted(known))}"
         )
     source.topics = [t for t in source.topics if t.name in wanted | with_namespace]

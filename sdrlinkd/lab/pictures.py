@@ -23,8 +23,8 @@ def draw(report: LabReport, path: Path, caption: str) -> None:
     _latency(panels[1], report)
     if adaptive:
         _mcs(panels[2], report)
-    figure.suptitle(report.title or report.scenario)
-    figure.text(0.01, -0.02, caption, fontsize=7, color="0.35", va="top")
+    figure.suptitle(report.title or report.scenario, parse_math=False)
+    figure.text(0.01, -0.02, caption, fontsize=7, color="0.35", va="top", parse_math=False)
     figure.savefig(path, dpi=120, bbox_inches="tight")
     plt.close(figure)
 
@@ -37,7 +37,7 @@ def _pdr(axes: Axes, report: LabReport) -> None:
         axes.plot(middles, shares, "o-", markersize=3, label=f"{pair.sender} → {pair.receiver}")
     axes.set(xlabel="sent at, in s", ylabel="PDR", ylim=(-0.03, 1.05))
     axes.grid(visible=True, alpha=0.25)
-    if len(report.pairs) <= 12:
+    if 0 < len(report.pairs) <= 12:
         axes.legend(loc="lower left", ncols=3, fontsize=8)
 
 

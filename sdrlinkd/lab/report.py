@@ -1,5 +1,6 @@
 """report.json of a lab run: who got what of whom, and what it cost."""
 
+import math
 from collections.abc import Mapping, Sequence
 
 from msgspec import Struct
@@ -79,6 +80,7 @@ def pair_result(
     pairs, foreign = trace.matches()
     flat = [pair for found in pairs.values() for pair in found]
     received, sent = len(flat), trace.n_sent
+    told = [pair for pair in flat if math.isfinite(pair[1].at)]
     return PairResult(
         sender=sender,
         receiver=receiver,
@@ -86,7 +88,7 @@ def pair_result(
         received=received,
         pdr=received / sent if sent else 1.0,
         pdr_tenths=_tenths(trace.sent, flat, began_at, duration_s),
-        latency_ms={name: round(value, 4) for name, value in latency_ms(flat).items()},
+        latency_ms={name: round(value, 4) for name, value in latency_ms(told).items()},
         bytes_identical=foreign == 0 and received == trace.n_received,
         topics={
             name: [len(samples), len(pairs.get(name, []))]

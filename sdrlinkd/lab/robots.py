@@ -1,5 +1,7 @@
 """What each robot of a scenario sends, and the configuration of its daemon."""
 
+import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,12 @@ from sdrlinkd.errors import ConfigError
 from sdrlinkd.lab.scenario import RobotParams, Scenario
 
 SEED_STEP = 1000
+# Keys of the daemons that follow from the rest of a scenario.
+OURS = (
+    "namespace", "robot_id", "seed", "registry", "topics", "rx_format", "rx_depth", "backend",
+    "play", "bus.runtime_dir", "ether.dir",
+)  # fmt: skip
+TABLES = ("modem", "access", "bus", "ether")
 
 
 def open_sources(scenario: Scenario, bag: Path | None) -> dict[int, Source]:
@@ -24,6 +32,7 @@ def open_sources(scenario: Scenario, bag: Path | None) -> dict[int, Source]:
             scenario.duration_s,
             seed_of(scenario, robot),
             namespace=f"robot_{robot.id}",
+            topics_key=f"robot.topics of robot {robot.id}",
         )
         for robot in scenario.robot
     }
@@ -68,18 +77,41 @@ def write_daemon_config(
             "bag": str(bag.absolute()) if bag else "",
             "duration_s": scenario.duration_s,
         }
+    _refuse_ours(given, scenario.daemon, name)
     merged = _merged(given, scenario.daemon)
-    for section, key in (("modem", "rate_hz"), ("modem", "frequency_hz")):
-        if merged[section][key] != given[section][key]:
-            raise ConfigError(
-                f"{name}: daemon.{section}.{key}: got {merged[section][key]:g}; allowed: that of "
-                f"[air], {given[section][key]:g}"
-            )
     text = tomli_w.dumps(merged)
-    parse_config(text, f"{name}: [daemon]")
+    try:
+        parse_config(text, f"{name}: [daemon]")
+    except ConfigError as error:
+        # The line would be one of a file that nobody has seen.
+        raise ConfigError(re.sub(r"(\[daemon\]):\d+", r"\1", str(error))) from None
     path = folder / "sdrlinkd.toml"
     path.write_text(text)
     return path
+
+
+def _refuse_ours(given: Mapping[str, Any], wanted: Mapping[str, Any], name: str) -> None:
+    """Of some keys only the lab can know what they must be. Raises ConfigError."""
+    for section in TABLES:
+        if not isinstance(wanted.get(section, {}), dict):
+            raise ConfigError(
+                f"{name}: daemon.{section}: got {json.dumps(wanted[section])}; allowed: a table"
+            )
+    for key in OURS:
+        section, _, inner = key.partition(".")
+        if section in wanted and (not inner or inner in wanted[section]):
+            raise ConfigError(
+                f"{name}: daemon.{key}: the lab itself says what it is, by [[robot]] and [air]; "
+                "allowed: other keys of sdrlinkd.toml"
+            )
+    for key, value in wanted.get("modem", {}).items():
+        ours = given["modem"].get(key)
+        if ours is not None and value != ours:
+            is_number = isinstance(value, int | float)
+            got = f"{value:g}" if is_number else json.dumps(value, default=str)
+            raise ConfigError(
+                f"{name}: daemon.modem.{key}: got {got}; allowed: that of [air], {ours:g}"
+            )
 
 
 def _merged(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """A scenario: the air, the robots on it and what they send, as TOML."""
 
+import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -57,7 +58,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     """How long the robots send."""
     settle_s: Annotated[float, Meta(ge=0, le=100)] = 2.0
     """How long what was sent may be on its way after that."""
-    seed: int = 1
+    seed: Annotated[int, Meta(ge=0, lt=1 << 31)] = 1
     bag: str = ""
     """Recording that the robots send from; "": the built-in robot. --bag goes before it."""
     air: AirParams = AirParams()
@@ -123,6 +124,7 @@ def outages_of(scenario: Scenario, traces: Path | None) -> list[Outage]:
 
 
 def _check(scenario: Scenario, source: str) -> None:
+    _check_numbers(scenario, source)
     ids = [robot.id for robot in scenario.robot]
     for robot_id in ids:
         if ids.count(robot_id) > 1:
@@ -148,6 +150,14 @@ def _check(scenario: Scenario, source: str) -> None:
                 f"{source}: outages.times: got [{begin:g}, {end:g}]; allowed: an end after its "
                 "begin"
             )
+
+
+def _check_numbers(scenario: Scenario, source: str) -> None:
+    lists = [("outages.times", times) for times in scenario.outages.times]
+    lists += [("robot.path", place) for robot in scenario.robot for place in robot.path]
+    for key, numbers in lists:
+        if not all(map(math.isfinite, numbers)):
+            raise ConfigError(f"{source}: {key}: got {numbers}; allowed: finite numbers")
 
 
 def _check_path(robot: RobotParams, source: str) -> None:

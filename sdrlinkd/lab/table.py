@@ -114,7 +114,7 @@ def _live_row(snapshot: Snapshot, now_s: float) -> tuple[str, ...]:
 
 def _table(title: str) -> Table:
     return Table(
-        title=title,
+        title=Text(title),
         title_justify="left",
         box=box.SIMPLE_HEAD,
         pad_edge=False,

@@ -7,6 +7,8 @@ from pathlib import Path
 from backends import Outage
 from sdrlinkd.errors import UserError
 
+LARGEST = 1 << 62
+
 
 def read_outages(path: Path, period_s: float, from_s: float) -> list[Outage]:
     """Where messages are missing in a log of one a `period_s`; 0 is `from_s` into the log.
@@ -41,10 +43,10 @@ def _numbers(path: Path) -> list[int]:
     for line in lines:
         try:
             found = json.loads(line)
-            number = found.get("seqnum", found.get("payload", {}).get("seqnum"))
-        except (ValueError, AttributeError):
+            number = found["seqnum"] if "seqnum" in found else found["payload"]["seqnum"]
+        except (ValueError, KeyError, TypeError, RecursionError):
             # A damaged line tells nothing.
             continue
-        if isinstance(number, int):
+        if type(number) is int and 0 <= number <= LARGEST:
             numbers.append(number)
     return numbers

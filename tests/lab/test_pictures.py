@@ -1,0 +1,58 @@
+"""A run as a picture and as tables, whatever came of it."""
+
+import pytest
+from rich.console import Console
+
+from sdrlinkd.lab import LabState, live_table, pair_table, pictures
+from tests.lab.reports import lost, pair, report, robot
+
+STRANGE = "50 $_$ of [/b] robots [bold"
+"""Signs that Matplotlib and Rich take for their own."""
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"pairs": [], "robots": [robot(1)]},
+        {"pairs": [lost(1, 2), lost(2, 1)], "title": ""},
+        {"pairs": [pair(1, 2), lost(2, 1)], "out_of_reach": [(1, 3)]},
+        {"robots": [robot(1, mcs_changes=[(0.5, 2, 4), (1.5, 2, 3), (1.0, 3, 0)]), robot(2)]},
+        {"pairs": [pair(i, j) for i in range(9) for j in range(9) if i != j]},
+    ],
+)
+def test_any_run_can_be_drawn_and_shown(tmp_path, given):
+    check(report(**given), tmp_path / "lab.png", "sdrlinkctl lab small.toml")
+
+
+def test_a_title_is_shown_as_it_is(tmp_path):
+    check(report(title=STRANGE), tmp_path / "lab.png", f"sdrlinkctl lab {STRANGE}")
+
+
+def check(made, path, caption):
+    """It can be drawn and shown."""
+    pictures.draw(made, path, caption)
+    picture = path.read_bytes()
+    assert picture.startswith(b"\x89PNG")
+    assert len(picture) > 5000
+    assert (made.title or made.scenario) in printed(pair_table(made))
+
+
+def printed(what):
+    console = Console(width=160)
+    with console.capture() as capture:
+        console.print(what)
+    return capture.get()
+
+
+def test_the_table_has_a_row_a_direction():
+    shown = printed(pair_table(report(pairs=[pair(1, 2), lost(2, 1)])))
+    rows = [line.split() for line in shown.splitlines() if line.split()[:1] in (["1"], ["2"])]
+    assert rows[0] == ["1", "2", "30", "30", "1.0000", "20.00", "30.00", "█" * 10]
+    assert rows[1] == ["2", "1", "30", "0", "0.0000", "–", "–", "·" * 5]
+
+
+@pytest.mark.parametrize("title", ["Two robots", STRANGE])
+def test_the_screen_is_there_before_the_first_robot_is(title):
+    shown = printed(live_table(title, LabState(0.0, 3.5)))
+    assert title in shown
+    assert "0.0 of 3.5 s" in shown
