@@ -120,7 +120,7 @@ class Node:
         """Let the PDU link run; for ever."""
         config = self._setup.config
         waits = config.backend == "iqfile" and config.iqfile.wait_for_consumer
-        if waits or config.play.duration_s:
+        if waits or config.play.wait_for_consumer:
             await self.bus.has_consumer.wait()
         await self._pdu_link.run()
 

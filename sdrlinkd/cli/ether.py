@@ -10,7 +10,7 @@ import msgspec
 import typer
 
 from sdrlinkd import __version__
-from sdrlinkd.cli.pace import Pace
+from sdrlinkd.cli.pace import MAX_SEED, Pace
 from sdrlinkd.errors import UserError
 from sdrlinkd.lab import load_scenario, make_hub
 
@@ -30,8 +30,12 @@ def ether(
     traces: Annotated[
         Path | None, typer.Option(help="Folder of the logs that a scenario replays.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Of all chance on the air.")] = None,
-    duration: Annotated[float | None, typer.Option(min=0.1, help="Of a lock-step run.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, max=MAX_SEED, help="Of all chance on the air.")
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(min=1e-3, max=1e5, help="Of a lock-step run.")
+    ] = None,
     pace: Annotated[Pace | None, typer.Option(help="By the clock, or in lock-step.")] = None,
 ) -> None:
     """Serve one simulated air to daemons with `backend = "ether"`, until Ctrl-C."""
@@ -44,7 +48,9 @@ def ether(
     hub = make_hub(chosen, directory, traces)
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: hub.stop())
-    title = chosen.title if chosen else "all hear all at 20 dB"
+    title = "all hear all at 20 dB"
+    if chosen is not None and scenario is not None:
+        title = chosen.title or scenario.stem
     hub.run(lambda: typer.echo(f"sdrlink-ether {__version__}: {title}; sockets in {directory}"))
 
 

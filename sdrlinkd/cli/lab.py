@@ -1,5 +1,6 @@
 """`lab`: a scenario with real daemons on one simulated air, in one command."""
 
+import math
 import sys
 import time
 from enum import StrEnum
@@ -13,7 +14,7 @@ from rich.console import Console
 from rich.live import Live
 
 from sdrlinkd.cli.app import app
-from sdrlinkd.cli.pace import Pace
+from sdrlinkd.cli.pace import MAX_SEED, Pace
 from sdrlinkd.errors import UserError
 from sdrlinkd.lab import (
     LabOptions,
@@ -54,7 +55,7 @@ def lab(
     pace: Annotated[
         Pace | None, typer.Option(help="By the clock; or in lock-step, the same for each seed.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Of all chance.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, max=MAX_SEED, help="Of all chance.")] = None,
     access: Annotated[
         Policy | None, typer.Option(help="Another access policy than the scenario's.")
     ] = None,
@@ -65,6 +66,8 @@ def lab(
     """Run several robots' daemons on one simulated air; measure who got what of whom."""
     console = Console() if sys.stdout.isatty() else Console(width=110)
     chosen = load_scenario(scenario)
+    if duration is not None and not math.isfinite(duration):
+        raise UserError(f"--duration: got {duration}; allowed: a number of seconds")
     changes = {"seed": seed, "duration_s": duration, "pace": pace.value if pace else None}
     chosen = msgspec.structs.replace(
         chosen, **{key: value for key, value in changes.items() if value is not None}

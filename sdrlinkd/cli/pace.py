@@ -1,6 +1,8 @@
-"""An option that two commands share."""
+"""Options that two commands share."""
 
 from enum import StrEnum
+
+MAX_SEED = (1 << 31) - 1
 
 
 class Pace(StrEnum):

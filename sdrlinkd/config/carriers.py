@@ -93,6 +93,8 @@ class PlayParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     """So much of it; 0: nothing."""
     begin_s: Annotated[float, Meta(ge=0, le=1e6)] = 0.0
     """When the first message goes."""
+    wait_for_consumer: bool = False
+    """The radio's time begins when the first consumer subscribes."""
 
 
 class ChannelParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -72,10 +72,11 @@ def write_daemon_config(
         "modem": {"rate_hz": scenario.air.rate_hz, "frequency_hz": scenario.air.frequency_hz},
         "access": {"nodes": [each.id for each in scenario.robot]},
     }
-    if scenario.pace == "lockstep" and robot.sends:
+    if scenario.pace == "lockstep":
         given["play"] = {
             "bag": str(bag.absolute()) if bag else "",
-            "duration_s": scenario.duration_s,
+            "duration_s": scenario.duration_s if robot.sends else 0.0,
+            "wait_for_consumer": True,
         }
     _refuse_ours(given, scenario.daemon, name)
     merged = _merged(given, scenario.daemon)

@@ -1,0 +1,188 @@
+"""`sdrlinkctl lab`: one command runs a scenario; report and picture lie in a folder."""
+
+import time
+
+import msgspec
+import pytest
+
+from backends import HubWatch
+from sdrlinkd.cli import run
+from sdrlinkd.lab import LabReport
+from sdrlinkd.lab import run as run_module
+from tests.lab.reports import report, robot
+from tests.lab.scenarios import write_scenario
+
+LISTENING_ROBOT = """
+[[robot]]
+id = 1
+topics = ["cmd_vel"]
+
+[[robot]]
+id = 2
+topics = ["cmd_vel"]
+sends = false
+"""
+# Whole tenths, with a while before each border for what is on its way.
+OUTAGE = "[outages]\ntimes = [[0.76, 1.16]]\n"
+
+
+class LateListener(run_module.Listener):
+    """Of robot 2, the lab listens late: the air has to wait for it."""
+
+    def __init__(self, directory, by_age):
+        if directory.name == "robot_2":
+            give_up_at = time.monotonic() + 1.0
+            with HubWatch(directory.parent / "hub") as watch:
+                # In vain, when the air waits.
+                while watch.ask().now_s < 0.5 and time.monotonic() < give_up_at:
+                    pass
+        super().__init__(directory, by_age)
+
+
+@pytest.fixture
+def lab(capsys, tmp_path):
+    """Runs `sdrlinkctl lab`; (exit code, stdout, stderr). No traceback, ever."""
+
+    def call(*arguments):
+        code = run(["lab", *(str(each) for each in arguments), "--out", str(tmp_path / "out")])
+        out, err = capsys.readouterr()
+        assert "Traceback" not in out + err
+        return code, out, err
+
+    return call
+
+
+@pytest.fixture
+def come_to(monkeypatch):
+    """Runs that do not take place come to the report given; what they were asked for."""
+    seen = []
+
+    def come_to(made):
+        def pretend(options, watch):
+            seen.append(options)
+            return made
+
+        monkeypatch.setattr("sdrlinkd.cli.lab.run_lab", pretend)
+        # Takes a second, and has tests of its own.
+        monkeypatch.setattr("sdrlinkd.lab.pictures.draw", lambda *_: None)
+        return seen
+
+    return come_to
+
+
+@pytest.fixture
+def asked(come_to):
+    """What a run was asked for; none takes place."""
+    return come_to(report())
+
+
+@pytest.mark.slow
+def test_a_run_is_told_drawn_and_written(lab, tmp_path, monkeypatch):
+    monkeypatch.setattr(run_module, "Listener", LateListener)
+    path = write_scenario(tmp_path, robots=LISTENING_ROBOT, extra=OUTAGE)
+    code, out, _ = lab(path, "--duration", 2, "--seed", 5)
+    assert code == 0
+    made = msgspec.json.decode((tmp_path / "out/report.json").read_bytes(), type=LabReport)
+    assert (made.scenario, made.pace, made.duration_s, made.seed) == ("small", "lockstep", 2.0, 5)
+    picture = (tmp_path / "out/lab.png").read_bytes()
+    assert picture.startswith(b"\x89PNG")
+    assert len(picture) > 5000
+    # Robot 2 only listens, and hears all but what is sent in the outage.
+    (pair,) = made.pairs
+    assert (pair.sender, pair.receiver, pair.sent) == (1, 2, 20)
+    assert pair.pdr_tenths == [1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]
+    assert pair.bytes_identical
+    sender, listener = made.robots
+    assert sender.ledger_adds_up
+    assert listener.ledger_adds_up
+    # It tells only that it is there.
+    assert 0 < listener.bursts_sent < 6 < sender.bursts_sent
+    assert "Two small robots: who got what of whom" in out
+    assert "PDR 0.8000 in all, 0.8000 at worst; in lock-step" in out
+    assert "robot 2: tdma: 2 slots" in out
+    assert "out/report.json, lab.png" in out
+
+
+def test_options_go_before_the_scenario(lab, asked, tmp_path):
+    path = write_scenario(tmp_path)
+    arguments = ("--duration", "1.5", "--seed", 9, "--pace", "realtime", "--access", "csma")
+    code, _, _ = lab(path, *arguments, "--bag", tmp_path / "bag", "--traces", tmp_path)
+    assert code == 0
+    (options,) = asked
+    scenario = options.scenario
+    assert (scenario.duration_s, scenario.seed, scenario.pace) == (1.5, 9, "realtime")
+    assert scenario.daemon == {"modem": {"mcs": 2}, "access": {"policy": "csma"}}
+    assert (options.path, options.bag, options.traces) == (path, tmp_path / "bag", tmp_path)
+
+
+def test_without_options_the_scenario_is_as_written(lab, asked, tmp_path):
+    path = write_scenario(tmp_path, top='seed = 4\nbag = "recordings/a"\n', extra="slot_s = 0.1\n")
+    assert lab(path)[0] == 0
+    assert lab(path, "--access", "none")[0] == 0
+    plain, changed = asked
+    assert (plain.scenario.duration_s, plain.scenario.seed) == (3.0, 4)
+    assert (plain.scenario.pace, plain.traces) == ("lockstep", None)
+    assert plain.bag == tmp_path / "recordings/a"
+    assert plain.scenario.daemon["access"] == {"policy": "tdma", "slot_s": 0.1}
+    assert changed.scenario.daemon["access"] == {"policy": "none", "slot_s": 0.1}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (("--access", "aloha"), ["--access", "aloha", "none", "csma", "minislot", "tdma"]),
+        (("--pace", "fast"), ["--pace", "fast", "realtime", "lockstep"]),
+        (("--duration", "0"), ["--duration", "0.5"]),
+        (("--duration", "nan"), ["--duration"]),
+        (("--seed", "-1"), ["--seed"]),
+        (("--seed", "99999999999999999999"), ["--seed"]),
+    ],
+)
+def test_an_option_that_cannot_be_says_what_is_allowed(lab, asked, tmp_path, arguments, parts):
+    code, _, err = lab(write_scenario(tmp_path), *arguments)
+    assert code == 2
+    assert asked == []
+    for part in parts:
+        assert part in err
+
+
+def test_what_cannot_be_read_or_written_is_told_before_the_run(lab, asked, tmp_path):
+    (tmp_path / "bad.toml").write_text("[[robot]]\nid = 999\n")
+    for name, says in (("none.toml", "cannot be read"), ("bad.toml", "robot.id: got 999")):
+        code, _, err = lab(tmp_path / name)
+        assert (code, says in err) == (2, True), err
+        assert err.count("\n") == 1
+    path = write_scenario(tmp_path)
+    (tmp_path / "out").write_text("")
+    code, _, err = lab(path)
+    assert (code, "out cannot be written" in err) == (2, True), err
+    assert asked == []
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ({"pdr": 0.91239, "worst_pdr": 0.5}, "PDR 0.9124 in all, 0.5000 at worst; in lock-step"),
+        ({"pace": "realtime"}, "at worst; in real time, took 0 s"),
+        ({"out_of_reach": [(1, 3), (3, 1)]}, "in no figure: 1 → 3, 3 → 1"),
+        ({"robots": [robot(1, dropped={"tx_expired": 3})]}, "dropped: {'tx_expired': 3}"),
+        ({"robots": [robot(1, left=4)]}, "; 4 messages were left"),
+        ({"robots": [robot(1, samples_lost=77)]}, "too slow: 77 samples lost"),
+        ({"robots": [robot(1, bursts_failed=5, bursts_late=6)]}, "30 bursts, 5 failed, 6 late"),
+        ({"title": "50 [/b] robots"}, "50 [/b] robots: who got what"),
+    ],
+)
+def test_what_a_run_came_to_is_said(lab, come_to, tmp_path, given, says):
+    come_to(report(**given))
+    code, out, err = lab(write_scenario(tmp_path))
+    assert (code, err) == (0, "")
+    assert says in out
+
+
+def test_a_ledger_that_does_not_add_up_is_a_failure(lab, come_to, tmp_path):
+    come_to(report(robots=[robot(1), robot(2, ledger_adds_up=False)]))
+    code, out, _ = lab(write_scenario(tmp_path))
+    assert code == 1
+    (line,) = [each for each in out.splitlines() if "THE LEDGER DOES NOT ADD UP" in each]
+    assert line.startswith("robot 2: ")
+    assert (tmp_path / "out/report.json").exists()
