@@ -70,14 +70,14 @@ class RxBlock:
 class TxBurst(NamedTuple):
     """Samples whose first leaves at absolute index `start` of the received stream.
 
-    A burst that comes too late, or overlaps the one before, begins as soon as it can; one that is
-    `exact` does not leave at all, nor do exact ones that were handed over behind it before its
-    report was there: nothing overtakes.
+    A burst that comes too late, or overlaps the one before, begins as soon as it can. When that is
+    after `latest` it does not leave at all, nor do others that have a `latest` and were handed over
+    behind it before its report was there: nothing overtakes. None: whenever.
     """
 
     start: int
     samples: Samples
-    exact: bool = False
+    latest: int | None = None
 
 
 class TxOutcome(Enum):

@@ -26,7 +26,7 @@ class Outstanding:
     def place(self, burst: TxBurst, earliest: int) -> int | None:
         """Where a burst begins when `earliest` is the first index possible; None: too late."""
         start = max(burst.start, earliest, self._free_from)
-        if burst.exact and start > burst.start:
+        if burst.latest is not None and start > burst.latest:
             return None
         self._free_from = start + len(burst.samples) + GAP
         return start

@@ -98,18 +98,23 @@ class Antenna:
         self._waiting[number] = (None, answer)
         return answer
 
-    def placed(self, number: int, start: int | None, n_samples: int) -> None:
-        """The air has taken it at `start` by its own count; None: it came too late."""
+    def placed(self, number: int, start: int | None, n_samples: int) -> bool:
+        """The air has taken it at `start` by its own count; None: it came too late.
+
+        Whether that was told now.
+        """
         _, answer = self._waiting.get(number, (None, None))
         if answer is None:
-            return
+            return False
         if start is None:
             del self._waiting[number]
-            if not answer.done():
-                answer.set_result(TxReport(TxOutcome.LATE, self.end, self.end))
-            return
+            if answer.done():
+                return False
+            answer.set_result(TxReport(TxOutcome.LATE, self.end, self.end))
+            return True
         own = start + self._shift
         self._waiting[number] = (TxReport(TxOutcome.SENT, own, own + n_samples), answer)
+        return False
 
     def settle(self, index: int) -> None:
         """All before `index` has left."""

@@ -199,7 +199,7 @@ class EtherHub:
             samples = protocol.samples_in(frames)
             if samples is None or not len(samples):
                 return
-            burst = TxBurst(message.start, samples, message.exact)
+            burst = TxBurst(message.start, samples, message.latest)
             if self._paced:
                 self._send(member.node, message.number, burst, message.late_seen)
             else:
@@ -211,7 +211,7 @@ class EtherHub:
         if member is not None:
             start = None
             # Else it would overtake the one that was late and has to go again.
-            if not burst.exact or late_seen == member.late:
+            if burst.latest is None or late_seen == member.late:
                 start = self._medium.send(node, burst)
             member.late += start is None
             member.placed.append(protocol.Placed(number, start, len(burst.samples)))

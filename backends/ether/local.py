@@ -96,8 +96,7 @@ class LocalRadio:
         answer = self.antenna.sent(self._number)
         placed = burst._replace(start=self.antenna.on_air(burst.start))
         start = self._ether.medium.send(self._node_id, placed)
-        self.counters["late"] += start is None
-        self.antenna.placed(self._number, start, len(burst.samples))
+        self.counters["late"] += self.antenna.placed(self._number, start, len(burst.samples))
         return answer
 
     async def close(self) -> None:

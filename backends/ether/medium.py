@@ -88,7 +88,7 @@ class Medium:
             turnaround = math.ceil(node.radio.turnaround_s * node.rate_hz)
         earliest = max(node.next_index + turnaround + MARGIN, node.free_from)
         start = max(burst.start, earliest)
-        if burst.exact and start > burst.start:
+        if burst.latest is not None and start > burst.latest:
             self.bursts_late += 1
             return None
         self.bursts += 1

@@ -70,12 +70,12 @@ class Stretch(msgspec.Struct, tag=True, frozen=True, kw_only=True):
 
 
 class Sent(msgspec.Struct, tag=True, frozen=True, kw_only=True):
-    """A burst, from `start` on by the air's count of this node."""
+    """A burst, from `start` on, or up to `latest`, by the air's count of this node."""
 
     token: int
     number: int
     start: int
-    exact: bool
+    latest: int | None
     late_seen: int
     """How many of its bursts the radio knows to have been late."""
 

@@ -111,9 +111,9 @@ class EtherRadio:
                     antenna.lose()
                     self._welcome, self._late_seen = beside.welcome, 0
                 for placed in beside.placed:
-                    self.counters["late"] += placed.start is None
                     self._late_seen += placed.start is None
-                    antenna.placed(placed.number, placed.start, placed.n_samples)
+                    is_late = antenna.placed(placed.number, placed.start, placed.n_samples)
+                    self.counters["late"] += is_late
                 antenna.settle(block.index + block.n)
                 if block.n:
                     yield block
@@ -132,7 +132,7 @@ class EtherRadio:
             token=self._welcome.token,
             number=self._number,
             start=self._antenna.on_air(burst.start),
-            exact=burst.exact,
+            latest=None if burst.latest is None else self._antenna.on_air(burst.latest),
             late_seen=self._late_seen,
         )
         answer = self._antenna.sent(self._number)

@@ -6,6 +6,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from phy.kernels.noise import CHUNK, add_noise
+
 
 @dataclass(frozen=True)
 class FrontEndParams:
@@ -25,8 +27,11 @@ class FrontEnd:
 
     def __init__(self, params: FrontEndParams, rng: Generator) -> None:
         self._params = params
-        self._rng = rng
         self._noise = np.float32(np.sqrt(10 ** (params.noise_dbfs / 10) / 2))
+        self._key = int(rng.integers(2**63))
+        self._next_index = 0
+        self._bits = np.empty(CHUNK, np.uint32)
+        self._radii = np.empty(CHUNK, np.float32)
         self._image = np.float32(10 ** (-params.image_db / 20))
         self._dc = np.complex64(10 ** (params.dc_dbfs / 20))
 
@@ -36,11 +41,7 @@ class FrontEnd:
         Any chunking of the same stream gives the same samples.
         """
         if self._noise:
-            noise = self._rng.standard_normal(2 * len(x), np.float32)
-            noise *= self._noise
-            noisy = noise.view(np.complex64)
-            noisy += x
-            x = noisy
+            x = self._noisy(np.ascontiguousarray(x))
         if self._image:
             x = x + self._image * x.conj()
         if self._dc:
@@ -48,6 +49,20 @@ class FrontEnd:
         if self._params.bits:
             x = _quantised(x, self._params.bits)
         return x
+
+    def _noisy(self, x: NDArray[np.complex64]) -> NDArray[np.complex64]:
+        noisy = np.empty_like(x)
+        first, self._next_index = self._next_index, self._next_index + len(x)
+        add_noise(
+            x.view(np.float32),
+            self._key,
+            first,
+            float(self._noise),
+            self._bits,
+            self._radii,
+            noisy.view(np.float32),
+        )
+        return noisy
 
 
 def _quantised(x: NDArray[np.complex64], bits: int) -> NDArray[np.complex64]:

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from phy.channel.profiles import PROFILES
 from phy.channel.resampling import N_TAPS, echo_filter, stretch
 
+SPIN = 128
+
 
 @dataclass(frozen=True)
 class PathParams:
@@ -66,8 +68,7 @@ class Path:
         turn = np.exp(2j * np.pi * self._rng.random()) * 10 ** (-params.loss_db / 20)
         frequency = params.carrier_hz * error / params.rate_hz
         if frequency:
-            phase = 2j * np.pi * frequency * np.arange(len(x))
-            return offset, (x * (turn * np.exp(phase))).astype(np.complex64)
+            return offset, x * _spin(frequency, turn, len(x))
         return offset, x * np.complex64(turn)
 
     def _fading(self, echoes: tuple[tuple[float, float], ...]) -> NDArray[np.complex64]:
@@ -78,6 +79,13 @@ class Path:
         gains = (draws[0] + 1j * draws[1]) * np.sqrt(power / power.sum() / 2)
         samples = (delay - delay.min()) * self._params.delay_spread_s * self._params.rate_hz
         return echo_filter(samples, gains)
+
+
+def _spin(frequency: float, first: complex, n: int) -> NDArray[np.complex64]:
+    """`first` · exp(2πi `frequency` k) for k = 0 … n − 1, as products of two angles."""
+    fine = first * np.exp(2j * np.pi * frequency * np.arange(SPIN))
+    coarse = np.exp(2j * np.pi * frequency * SPIN * np.arange(-(-n // SPIN)))
+    return np.outer(coarse, fine).astype(np.complex64).ravel()[:n]
 
 
 def _imperfect(

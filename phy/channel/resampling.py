@@ -28,7 +28,8 @@ def stretch(x: NDArray[np.complex64], delay: float, clock_error: float) -> NDArr
     """
     n = int(np.ceil((len(x) + delay) / (1 + clock_error))) + N_TAPS // 2
     out = np.empty(n, np.complex64)
-    interpolate(x, _filters(), -delay, 1 + clock_error, out)
+    parts = np.stack((x.real, x.imag))
+    interpolate(parts, _filters(), -delay, 1 + clock_error, out)
     return out
 
 

@@ -9,26 +9,39 @@ from numpy.typing import NDArray
 
 @njit(nogil=True, cache=True)
 def interpolate(
-    x: NDArray[np.complex64],
+    parts: NDArray[np.float32],
     filters: NDArray[np.float32],
     start: float,
     step: float,
     out: NDArray[np.complex64],
 ) -> None:
-    """out[n] = x(start + n · step), 0 outside. `filters` `[phases + 1, taps]`, nearest phase.
+    """out[n] = x(start + n · step), 0 outside; real and imaginary part of x are `parts` `[2, x]`.
 
-    filters[p, k] weighs x[floor(t) − taps / 2 + 1 + k] for t − floor(t) = p / phases.
+    `filters` `[phases + 1, taps]`, nearest phase: filters[p, k] weighs
+    x[floor(t) − taps / 2 + 1 + k] for t − floor(t) = p / phases.
     """
     n_phases, n_taps = filters.shape[0] - 1, filters.shape[1]
+    size = parts.shape[1]
     for n in range(out.size):
         t = start + n * step
         whole = math.floor(t)
         phase = int((t - whole) * n_phases + 0.5)
         first = int(whole) - n_taps // 2 + 1
-        low, high = max(0, -first), min(n_taps, x.size - first)
-        re, im = np.float32(0), np.float32(0)
-        for k in range(low, high):
-            value = x[first + k]
-            re += filters[phase, k] * value.real
-            im += filters[phase, k] * value.imag
+        low, high = max(0, -first), min(n_taps, size - first)
+        if low >= high:
+            out[n] = 0
+            continue
+        weights = filters[phase, low:high]
+        at = first + low
+        re = _dot(weights, parts[0, at:])
+        im = _dot(weights, parts[1, at:])
         out[n] = complex(re, im)
+
+
+@njit(nogil=True, cache=True, fastmath={"reassoc", "contract", "nsz"})
+def _dot(weights: NDArray[np.float32], x: NDArray[np.float32]) -> np.float32:
+    """In whatever order is fastest."""
+    total = np.float32(0)
+    for k in range(weights.size):
+        total += weights[k] * x[k]
+    return total

@@ -92,6 +92,10 @@ class Link:
         if slot is None:
             return None
         n_pdus = most_pdus(mcs, slot.end - slot.start)
+        # A schedule's phase holds for the planned start only.
+        is_timed = self.access.frame(slot.start) is not None and (
+            slot.start >= self._beacons.due_at or self.sender.packetizer.offered
+        )
         burst = self.compose(slot.start, n_pdus) if n_pdus else None
         if burst is None:
             return None
@@ -105,7 +109,7 @@ class Link:
             mcs=mcs,
             qos=qos,
             start=slot.start,
-            exact=slot.exact,
+            latest=slot.start if is_timed else slot.latest(length_s),
             airtime_s=length_s,
             number=self._number,
             first_start=slot.start,
@@ -123,7 +127,8 @@ class Link:
         self.access.sent(slot.start + airtime_s)
         burst = self._returned.take(slot.start)
         self.sender.packetizer.left(chain.from_iterable(burst.carried), slot.start)
-        return burst._replace(exact=slot.exact)
+        is_timed = again.latest <= again.start
+        return burst._replace(latest=slot.start if is_timed else slot.latest(airtime_s))
 
     def compose(self, start: float, max_pdus: int) -> Burst | None:
         """The burst that should leave at `start`, decided now; None when there is nothing.

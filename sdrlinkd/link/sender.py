@@ -16,7 +16,7 @@ from sdrlinkd.wire import Registry, max_message_size
 class Burst(NamedTuple):
     """PDUs that leave together, and the messages each carries an entry of.
 
-    They leave at `start`, in s on the link's clock; when they are `exact`, then or not at all.
+    They leave at `start`, in s on the link's clock; at the latest at `latest`, or not at all.
     """
 
     pdus: list[bytes]
@@ -24,7 +24,7 @@ class Burst(NamedTuple):
     mcs: int = 0
     qos: Qos = Qos.DEFAULT
     start: float = 0.0
-    exact: bool = False
+    latest: float = float("inf")
     airtime_s: float = 0.0
     number: int = 0
     """In the order in which they were composed."""

@@ -1,6 +1,7 @@
 """Bursts on their way to the radio: modulated off the event loop, settled when they have left."""
 
 import asyncio
+import math
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
@@ -11,6 +12,7 @@ from sdrlinkd.config import ModemParams
 from sdrlinkd.link import Burst, Outcome
 from sdrlinkd.pdulink import PduListener
 
+INFINITE = float("inf")
 OUTCOMES = {
     TxOutcome.SENT: Outcome.SENT,
     TxOutcome.LATE: Outcome.LATE,
@@ -32,13 +34,14 @@ class Transmission:
 
     def __init__(self, params: ModemParams, radio: Radio) -> None:
         self._radio = radio
+        self._rate_hz = params.rate_hz
         self._transmitter = phy.Transmitter(params.network)
         self._amplitude = 10 ** (-params.backoff_db / 20)
         self._thread = ThreadPoolExecutor(1, "phy-tx")
         self._tasks: asyncio.TaskGroup | None = None
         self._left: Callable[[Burst, BurstReport], None]
         self._at_once = False
-        self._late = 0
+        self._late = self._late_by_radio = 0
         self.on_air: list[Burst] = []
         self.counters = {"bursts_slipped": 0, "samples_sent": 0}
 
@@ -56,11 +59,12 @@ class Transmission:
         if self._tasks is None:
             raise RuntimeError("send before start")
         self.on_air.append(burst)
+        known = (self._late, self._late_by_radio)
         if self._at_once:
-            answer = self._hand_over(burst, start, self._modulate(burst.pdus, burst.mcs))
+            answer = self._hand_over(burst, start, self._modulate(burst.pdus, burst.mcs), known)
             self._tasks.create_task(self._settle(burst, start, answer))
         else:
-            self._tasks.create_task(self._transmit(burst, start))
+            self._tasks.create_task(self._transmit(burst, start, known))
 
     def lose(self, listener: PduListener, now: float) -> None:
         """The radio is closed: what is on its way is lost."""
@@ -72,30 +76,42 @@ class Transmission:
         """End the thread."""
         self._thread.shutdown(wait=True, cancel_futures=True)
 
-    async def _transmit(self, burst: Burst, start: int) -> None:
+    async def _transmit(self, burst: Burst, start: int, known: tuple[int, int]) -> None:
         loop = asyncio.get_running_loop()
         if burst not in self.on_air:
             # Lost already: the radio is closed.
             return
-        late_before = self._late
         samples = await loop.run_in_executor(self._thread, self._modulate, burst.pdus, burst.mcs)
-        if burst.exact and self._late != late_before:
-            # One before it was late and has to go again; this one must not overtake it.
+        await self._settle(burst, start, self._hand_over(burst, start, samples, known))
+
+    def _hand_over(
+        self, burst: Burst, start: int, samples: Samples, known: tuple[int, int]
+    ) -> Awaitable[TxReport] | None:
+        """None: one before it, not `known` of when it was composed, was late and has to go again.
+
+        This one must not overtake it. The radio may have told already what has not been settled.
+        """
+        is_bound = burst.latest != INFINITE
+        if is_bound and known != (self._late, self._radio.counters["late"]):
+            return None
+        self.counters["samples_sent"] += len(samples)
+        latest = None
+        if burst.latest != INFINITE:
+            # `start` is where it was rounded to; between it and `latest` there may be no sample.
+            latest = start + math.floor((burst.latest - burst.start) * self._rate_hz)
+        return self._radio.send(TxBurst(start, samples, latest))
+
+    async def _settle(self, burst: Burst, start: int, answer: Awaitable[TxReport] | None) -> None:
+        if answer is None:
             self._end(burst, BurstReport(Outcome.LATE, start))
             return
-        await self._settle(burst, start, self._hand_over(burst, start, samples))
-
-    def _hand_over(self, burst: Burst, start: int, samples: Samples) -> Awaitable[TxReport]:
-        self.counters["samples_sent"] += len(samples)
-        return self._radio.send(TxBurst(start, samples, burst.exact))
-
-    async def _settle(self, burst: Burst, start: int, answer: Awaitable[TxReport]) -> None:
         try:
             report = await answer
         except BackendError as error:
             told = BurstReport(Outcome.LOST, start, str(error))
         else:
             self.counters["bursts_slipped"] += report.start > start
+            self._late_by_radio += report.outcome is TxOutcome.LATE
             told = BurstReport(OUTCOMES[report.outcome], report.end)
         self._end(burst, told)
 

@@ -58,7 +58,7 @@ def loud(x):
 
 def burst(start, n, seed=SEED, exact=False):
     """White noise from `start` on."""
-    return TxBurst(start, noise(n, seed), exact)
+    return TxBurst(start, noise(n, seed), start if exact else None)
 
 
 def power_db(x):

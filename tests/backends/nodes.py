@@ -69,7 +69,7 @@ def above_noise(x):
 
 
 def tone(start, n, exact=False):
-    return TxBurst(start, np.full(n, 0.5, np.complex64), exact)
+    return TxBurst(start, np.full(n, 0.5, np.complex64), start if exact else None)
 
 
 def assert_contiguous(blocks):

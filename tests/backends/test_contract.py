@@ -109,18 +109,24 @@ async def test_a_burst_too_late_leaves_as_soon_as_it_can(case, tmp_path):
 
 
 @transmitters
-async def test_an_exact_burst_leaves_when_asked_or_not_at_all(case, tmp_path):
+async def test_a_burst_leaves_in_its_time_or_not_at_all(case, tmp_path):
     begin, n = 30_000, 400
     end = begin + n
+    free_at = begin + 3 * (n + GAP)
     # Behind a late one, the next are handed over when its report is there.
     asked = [
-        [(TxBurst(0, noise(n), exact=True), None)],
-        [(TxBurst(begin, noise(n), exact=True), begin)],
-        [(TxBurst(begin + 100, noise(n), exact=True), None)],
-        [(TxBurst(end + GAP - 1, noise(n), exact=True), None)],
+        [(TxBurst(0, noise(n), latest=0), None)],
+        [(TxBurst(begin, noise(n), latest=begin), begin)],
+        [(TxBurst(begin + 100, noise(n), latest=begin + 100), None)],
+        [(TxBurst(end + GAP - 1, noise(n), latest=end + GAP - 1), None)],
         [
-            (TxBurst(end + GAP, noise(n), exact=True), end + GAP),
+            (TxBurst(end + GAP, noise(n), latest=end + GAP), end + GAP),
             (TxBurst(begin + 100, noise(n)), end + GAP + n + GAP),
+            (TxBurst(end, noise(n), latest=free_at), free_at),
+        ],
+        [(TxBurst(end, noise(n), latest=free_at), None)],
+        [
+            (TxBurst(free_at + n + GAP, noise(n), latest=free_at + 2 * n), free_at + n + GAP),
         ],
     ]
     sends = []
@@ -134,7 +140,7 @@ async def test_an_exact_burst_leaves_when_asked_or_not_at_all(case, tmp_path):
                 taken += await take(blocks, 1)
         while not all(each.done() for each, _ in sends):
             taken += await take(blocks, 1)
-        assert radio.counters["late"] == 3
+        assert radio.counters["late"] == 4
     sent = []
     for each, (burst, start) in sends:
         report = await each

@@ -215,7 +215,7 @@ def test_a_watch_whose_folder_has_too_long_a_name_says_so(tmp_path):
 async def test_whoever_watches_is_told_how_it_goes(tmp_path):
     with serving(tmp_path):
         async with opened(EtherRadio(tmp_path, 3, "robot three")) as radio:
-            late = TxBurst(0, noise(10), exact=True)
+            late = TxBurst(0, noise(10), latest=0)
             await send(radio, radio.blocks(), [TxBurst(0, noise(10))] * 2 + [late])
             with HubWatch(tmp_path) as watch:
                 first = watch.ask()

@@ -17,7 +17,7 @@ GOOD = [
     protocol.Hello(
         version=protocol.VERSION, node=9, who="x", rate_hz=RATE, frequency_hz=TUNING.frequency_hz
     ),
-    protocol.Sent(token=5, number=1, start=0, exact=False, late_seen=0),
+    protocol.Sent(token=5, number=1, start=0, latest=None, late_seen=0),
     protocol.Done(token=5, step=2**40),
     protocol.Bye(token=5),
 ]
@@ -97,7 +97,7 @@ async def test_without_its_token_nobody_speaks_for_a_radio(tmp_path):
             mine = raw.join(2)
             for message in (
                 protocol.Bye(token=token + 1),
-                protocol.Sent(token=token + 1, number=1, start=0, exact=False, late_seen=0),
+                protocol.Sent(token=token + 1, number=1, start=0, latest=None, late_seen=0),
             ):
                 raw.push(message, noise(100).tobytes())
             raw.push(protocol.Bye(token=mine))
@@ -141,7 +141,7 @@ async def test_whatever_a_robot_sends_the_others_go_on(tmp_path, paced, samples)
             token = raw.join(2)
             for number, start in enumerate((-(2**63), 0, 2**31, 2**63 - 1, 2**64 - 1)):
                 sent = protocol.Sent(
-                    token=token, number=number, start=start, exact=False, late_seen=0
+                    token=token, number=number, start=start, latest=None, late_seen=0
                 )
                 raw.push(sent, samples)
             blocks = radio.blocks()

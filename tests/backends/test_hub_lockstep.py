@@ -68,7 +68,9 @@ def hear_a_run(folder, seed, dawdling):
         for _ in range(chance.choice([0, 0, 0, 1, 2])):
             burst = TxBurst(end + chance.randrange(3 * N), noise(chance.randrange(1, 500), end))
             await asyncio.sleep(idle.choice([0, 0.002]))
-            reports[node].append(radio.send(burst._replace(exact=chance.random() < 0.3)))
+            reports[node].append(
+                radio.send(burst._replace(latest=burst.start if chance.random() < 0.3 else None))
+            )
         await asyncio.sleep(idle.choice([0, 0, 0.001]))
 
     with lockstep(folder, radios, seed=seed, profile="rayleigh"):
@@ -249,7 +251,7 @@ async def test_in_whatever_order_bursts_come_in_they_sound_the_same(tmp_path):
             tokens = {node: raw.join(node) for node, raw in raws.items()}
             for i, node in enumerate(order):
                 sent = protocol.Sent(
-                    token=tokens[node], number=1, start=3 * N, exact=True, late_seen=0
+                    token=tokens[node], number=1, start=3 * N, latest=3 * N, late_seen=0
                 )
                 raws[node].push(sent, noise(150, node).tobytes())
                 await until(lambda hub=hub, n=i + 1: len(hub._bursts) == n)
@@ -269,13 +271,15 @@ async def test_nothing_overtakes_a_burst_that_was_late(tmp_path, exact):
         async with opened(EtherRadio(tmp_path, 1, "")) as radio:
             blocks = radio.blocks()
             await take(blocks, N)
-            late = TxBurst(0, noise(10), exact=True)
-            behind = [TxBurst(start, noise(10), exact) for start in (5 * N, 6 * N)]
+            late = TxBurst(0, noise(10), latest=0)
+            behind = [
+                TxBurst(start, noise(10), start if exact else None) for start in (5 * N, 6 * N)
+            ]
             reports, _ = await send(radio, blocks, [late, *behind])
             expected = TxOutcome.LATE if exact else TxOutcome.SENT
             outcomes = [report.outcome for report in reports]
             assert outcomes == [TxOutcome.LATE, expected, expected]
-            again = TxBurst(20 * N, noise(10), exact=True)
+            again = TxBurst(20 * N, noise(10), latest=20 * N)
             (report,), _ = await send(radio, blocks, [again])
             assert (report.outcome, report.start) == (TxOutcome.SENT, 20 * N)
             assert radio.counters["late"] == (3 if exact else 1)

@@ -81,7 +81,7 @@ async def test_bursts_for_a_hub_that_went_away_are_lost_and_those_after_it_leave
             await radio.open(TUNING)
             blocks = radio.blocks()
             # One is too late, so that hub and radio have something to count.
-            late = TxBurst(0, noise(10), exact=True)
+            late = TxBurst(0, noise(10), latest=0)
             reports, _ = await send(radio, blocks, [late, TxBurst(N, noise(20))])
             assert [each.outcome for each in reports] == [TxOutcome.LATE, TxOutcome.SENT]
             lost = [radio.send(TxBurst(FAR, noise(10)))]
@@ -93,7 +93,7 @@ async def test_bursts_for_a_hub_that_went_away_are_lost_and_those_after_it_leave
             assert {(await each).outcome for each in lost} == {TxOutcome.LOST}
             assert ask(tmp_path).bursts == 0, "what was sent in vain stays where it is"
             begin = radio._antenna.end + 50 * N
-            report = await radio.send(TxBurst(begin, noise(300), exact=True))
+            report = await radio.send(TxBurst(begin, noise(300), latest=begin))
             assert report == (TxOutcome.SENT, begin, begin + 300)
             assert ask(tmp_path).bursts == 1
         coming.cancel()
@@ -187,9 +187,10 @@ async def test_a_radio_a_little_behind_gets_larger_blocks_and_loses_nothing(tmp_
             opened(EtherRadio(tmp_path, 1, "")) as radio,
         ):
             apart_s = hub._medium.time(1, 0) - hub._medium.time(2, 0)
-            other.send(mark._replace(start=9000 + round(apart_s * RATE), exact=True))
+            at = 9000 + round(apart_s * RATE)
+            other.send(mark._replace(start=at, latest=at))
             blocks = radio.blocks()
-            sends = [radio.send(TxBurst(begin, noise(700), exact=True)) for begin in begins]
+            sends = [radio.send(TxBurst(begin, noise(700), latest=begin)) for begin in begins]
             taken = await take(blocks, 1)
             # It does not ask for more, until all of it is long over.
             await until(lambda: ask(tmp_path).now_s - hub._medium.time(1, 0) > 16_000 / RATE)

@@ -38,7 +38,7 @@ async def gaps_and_marks(burst_n, seed, **radio):
     # By the air's count; node 0 hands its own over at whatever it takes for now.
     marks = [BEGIN + i * EVERY for i in range(N_GAPS + 1)]
     reports = []
-    wanted = [(at - 2 * N, TxBurst(at, MARK, exact=True)) for at in marks]
+    wanted = [(at - 2 * N, TxBurst(at, MARK, latest=at)) for at in marks]
     gaps = [(at + 2 * N, TxBurst(at + 4 * N, noise(burst_n))) for at in marks[:-1]]
     taken = await run(
         ether,
@@ -70,7 +70,7 @@ async def test_a_burst_leaves_where_the_radio_takes_its_index_to_be():
     ether = ether_of({0: unsure(), 1: PLAIN}, snr_db=30.0)
     mark_at, begin = 15_000, 20_000
     mine, others = [], []
-    wanted = [(N, TxBurst(5000, noise(300))), (16_000, TxBurst(begin, MARK, exact=True))]
+    wanted = [(N, TxBurst(5000, noise(300))), (16_000, TxBurst(begin, MARK, latest=begin))]
     taken = await run(
         ether,
         0.03,

@@ -11,17 +11,24 @@ from backends.outstanding import GAP, Outstanding
 @settings(derandomize=True, deadline=None, max_examples=100)
 @given(
     st.lists(
-        st.tuples(st.integers(-10, 3000), st.integers(0, 400), st.booleans(), st.integers(0, 300)),
+        st.tuples(
+            st.integers(-10, 3000),
+            st.integers(0, 400),
+            st.none() | st.integers(0, 300),
+            st.integers(0, 300),
+        ),
         max_size=30,
     )
 )
 def test_any_bursts_are_placed_one_after_another(asked):
     outstanding = Outstanding()
     now, free_from = 0, 0
-    for start, n, exact, later in asked:
+    for start, n, slack, later in asked:
         now += later
-        placed = outstanding.place(TxBurst(start, np.zeros(n, np.complex64), exact), now)
-        if exact and start < max(now, free_from):
+        placed = outstanding.place(
+            TxBurst(start, np.zeros(n, np.complex64), None if slack is None else start + slack), now
+        )
+        if slack is not None and start + slack < max(now, free_from):
             assert placed is None
             continue
         assert placed == max(start, now, free_from)

@@ -132,10 +132,19 @@ def test_too_long_a_round_is_refused_and_tdma_named_instead():
     make(params("tdma", many), traits=PACED)
 
 
+def test_a_slot_that_is_over_before_it_is_known_to_be_unused_is_not_reused():
+    """Then its owner may begin late in it: nobody counts on hearing it by then."""
+    never = make(params("tdma", [1, 2], minislot_s=0.1, slot_s=0.02))
+    assert not never._reuse
+    slots = [never.slot(Wish(1e-3 * i, Qos.BULK, 0.001, Sensed())) for i in range(600)]
+    begun = [slot for slot in slots if slot is not None]
+    assert {round(slot.latest(0.001) - slot.start, 3) for slot in begun} >= {0.001, 0.005, 0.015}
+
+
 def test_minislots_too_short_to_hear_each_other_are_not_reused_in_tdma():
     """They are refused nowhere: without reuse nobody needs them."""
     tight = make(params("tdma", [1, 2], minislot_s=1e-4))
-    wide = make(params("tdma", [1, 2], minislot_s=0.1))
+    wide = make(params("tdma", [1, 2], minislot_s=0.01, slot_s=0.02))
     assert (tight._reuse, wide._reuse) == (False, True)
     assert make(params("tdma", [1, 2], reuse=False))._schedule == tight._schedule
 

@@ -138,14 +138,14 @@ def test_it_waits_for_a_slot_that_it_fits_into_and_nothing_overtakes_it():
     assert len(burst.pdus) == 6
     link.confirm(burst, Outcome.LATE, 0.1)
     link.access = door = Doorkeeper(
-        None, Slot(0.3, 0.3 + length_s / 2, exact=True), Slot(0.5, 0.5 + length_s, exact=True)
+        None, Slot.exact(0.3, 0.3 + length_s / 2), Slot.exact(0.5, 0.5 + length_s)
     )
     link.submit(1, bytes(8), 0.1, Overrides(qos=Qos.URGENT))
     assert next_burst(link, 0.2) is None
     assert next_burst(link, 0.3) is None
     assert link.next_wakeup(0.3) <= 0.3
     again = next_burst(link, 0.5)
-    assert (again.start, again.exact, len(again.pdus)) == (0.5, True, 6)
+    assert (again.start, again.latest, len(again.pdus)) == (0.5, 0.5, 6)
     assert door.told == [("sent", 0.5 + length_s)]
     link.confirm(again, Outcome.LATE, 0.5)
     assert door.told[1:] == [("not sent", 0.5)]

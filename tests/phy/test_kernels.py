@@ -135,7 +135,7 @@ def test_interpolate_is_a_sum_of_its_filters_taps():
     x = noise(rng(), 50)
     filters = rng().standard_normal((9, 4)).astype(np.float32)
     out = np.empty(70, np.complex64)
-    interpolate(x, filters, -3.3, 0.9, out)
+    interpolate(np.stack((x.real, x.imag)), filters, -3.3, 0.9, out)
     padded = np.concatenate((silence(20), x, silence(40)))
     for n, got in enumerate(out):
         t = -3.3 + 0.9 * n

@@ -1,7 +1,7 @@
 """The one interface of all access policies."""
 
 import math
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, Self
 
 from sdrlinkd.link.carrier import Sensed
 from sdrlinkd.link.qos import Qos
@@ -13,11 +13,23 @@ MOST_ON_THEIR_WAY = 8
 
 
 class Slot(NamedTuple):
-    """A burst may leave at `start` and must be over at `end`; `exact`: not any later."""
+    """A burst may leave at `start` and must be over at `end`.
+
+    Where it comes too late for `start`, it may still leave if it is over at `late_end`.
+    """
 
     start: float
     end: float = INFINITE
-    exact: bool = False
+    late_end: float = INFINITE
+
+    @classmethod
+    def exact(cls, start: float, end: float = INFINITE) -> Self:
+        """At `start` or not at all."""
+        return cls(start, end, start)
+
+    def latest(self, airtime_s: float) -> float:
+        """When a burst of that length begins at the latest."""
+        return max(self.start, self.late_end - airtime_s)
 
 
 class Wish(NamedTuple):

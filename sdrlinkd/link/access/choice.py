@@ -91,7 +91,8 @@ def _make_tdma(
         slot_s,
         guard_s,
         minislot_s,
-        params.reuse and minislot_s >= apart_s,
+        # Where a slot would be over before anybody could know it unused, its owner need not hurry.
+        params.reuse and apart_s <= minislot_s < slot_s - guard_s - traits.overhead_s,
         look_s=traits.react_s + traits.ahead_s,
         detect_s=traits.detect_s + MARGIN_S + CLOCK_ERROR_S,
         gap_s=traits.gap_s,

@@ -57,7 +57,7 @@ class Csma(Carriers):
         if start > sensed.until + self._slottime_s - self._detect_s:
             return None
         self._drawn = None
-        return Slot(start, exact=True)
+        return Slot.exact(start)
 
     def _draw(self, idle_since: float, earliest: float, qos: Qos) -> float:
         waits, eagerness = WINDOWS[qos]

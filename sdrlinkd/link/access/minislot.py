@@ -68,7 +68,7 @@ class MiniSlots(Carriers):
         self._round = (idle_since, begin)
         if start > sensed.until + width_s - drift_s - self._detect_s:
             return None
-        return Slot(max(start, earliest), exact=True)
+        return Slot.exact(max(start, earliest))
 
     def heard(self, src: int, at: float) -> None:
         """The order in a level follows from who sent last."""

@@ -105,9 +105,11 @@ class Tdma(Carriers):
                     # Decided at the last look before.
                     return None
                 pause = begin + PAUSE_AFTER * (self._slot_s - self._guard_s)
-                if start + need_s <= pause:
-                    end = pause
-                return Slot(start, end, exact=True)
+                planned_end = pause if start + need_s <= pause else end
+                if self._reuse:
+                    # The others count on it.
+                    return Slot.exact(start, planned_end)
+                return Slot(start, planned_end, end)
         return None
 
     def frame(self, start: float) -> Frame | None:

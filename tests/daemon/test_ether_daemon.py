@@ -1,0 +1,156 @@
+"""Real daemons on a simulated air: whom its hub takes, and what they play by its time."""
+
+import subprocess
+import sys
+import time
+
+import pytest
+
+from backends import RadioParams
+from backends.ether import protocol
+from sdrlinkd.adapters import BuiltInRobot, due_messages
+from sdrlinkd.client import Subscriber
+from tests.adapters.recordings import STORAGES, noisy_messages, ros2_bag
+from tests.backends.hubs import RawRadio, ask, serving
+from tests.waiting import wait_for
+
+AIR = {"rate_hz": 1e6, "frequency_hz": 2.45e9, "block_s": 0.001}
+BLOCK_S = AIR["block_s"]
+HASTY = "import sys, backends.ether.radio as radio; radio.ANSWER_MS = 100; "
+MAIN = "from sdrlinkd.__main__ import main; sys.exit(main(sys.argv[1:]))"
+
+
+def on_ether(hub, robot=1, more=""):
+    """The configuration of a robot on the air of `hub`."""
+    return (
+        f'namespace = "robot_{robot}"\nbackend = "ether"\n{more}'
+        f'[ether]\ndir = "{hub}"\n[modem]\nrate_hz = 1e6\n[link]\nbeacon_s = 0\n'
+    )
+
+
+def start(config, code="import sys; "):
+    """A daemon that is to fail."""
+    return subprocess.Popen(
+        [sys.executable, "-c", code + MAIN, "--config", str(config)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+
+
+def test_without_a_hub_a_daemon_says_what_to_start(write_config, tmp_path):
+    hub = tmp_path / "hub"
+    daemon = start(write_config(tmp_path, on_ether(hub)), HASTY)
+    _, err = daemon.communicate(timeout=60)
+    assert daemon.returncode == 2
+    assert f"sdrlinkd: {hub}: no hub answers there; start one: sdrlink-ether --dir {hub}" in err
+    assert err.count("\n") == 1
+    assert not list(tmp_path.glob("*.sock"))
+
+
+def test_a_second_robot_of_one_id_is_refused_and_the_first_is_told(
+    start_daemon, write_config, tmp_path, tmp_path_factory
+):
+    hub = tmp_path_factory.mktemp("hub")
+    with serving(hub, **AIR):
+        first = start_daemon(on_ether(hub))
+        wait_for(lambda: first.snapshot().carrier.state == "up", 60)
+        second = start(write_config(tmp_path, on_ether(hub)))
+        _, err = second.communicate(timeout=60)
+        assert second.returncode == 2
+        assert f"robot 1 is on this air already: process {first.process.pid} on " in err
+        assert "another robot_id" in err
+        assert err.count("\n") == 1
+        told = f"asked for our id 1 on this air and was refused: process {second.pid} on "
+        wait_for(lambda: told in first.snapshot().carrier.detail)
+        assert first.snapshot().carrier.state == "up"
+        assert list(ask(hub).nodes) == [1]
+        first.process.terminate()
+        assert first.process.wait(20) == 0
+        # The air is free for another.
+        wait_for(lambda: not ask(hub).nodes)
+
+
+class Conductor(RawRadio):
+    """A third robot, without which time does not go on; notes when the air is in use."""
+
+    def __init__(self, folder):
+        super().__init__(folder)
+        self.ask(
+            protocol.Hello(
+                version=protocol.VERSION, node=3, who="the conductor",
+                rate_hz=AIR["rate_hz"], frequency_hz=AIR["frequency_hz"],
+            )
+        )  # fmt: skip
+        self._token = self.hear(protocol.Welcome).token
+        self.busy = []
+        """Steps at which somebody began to send."""
+
+    def play(self, until_s, pause):
+        """Let time go on; `pause` is called whenever somebody has begun to send."""
+        step, was_busy = 0, False
+        while step * BLOCK_S < until_s:
+            assert self._down.poll(60_000)
+            data, *samples = self._down.recv_multipart()
+            message = protocol.from_hub(data)
+            if not isinstance(message, protocol.Stretch):
+                continue
+            if samples and not was_busy:
+                self.busy.append(message.step)
+                pause()
+            step, was_busy = message.step, bool(samples)
+            self.push(protocol.Done(token=self._token, step=step))
+
+
+def test_what_is_planned_leaves_at_its_time_by_the_airs_clock(start_daemon, tmp_path_factory):
+    hub = tmp_path_factory.mktemp("hub")
+    plan = list(due_messages(BuiltInRobot("robot_1", 0.5, 1), 0.5, 0.3, {"/robot_1/cmd_vel": 3}))
+    radios = dict.fromkeys((1, 2, 3), RadioParams())
+    play = "[play]\nduration_s = 0.5\nbegin_s = 0.3\n"
+    with serving(hub, radios, paced=False, until_s=1.0, **AIR), Conductor(hub) as conductor:
+        sender = start_daemon(on_ether(hub, 1, 'topics = ["cmd_vel"]\n') + play)
+        receiver = start_daemon(on_ether(hub, 2))
+        wait_for(lambda: set(ask(hub).nodes) == {1, 2, 3}, 60)
+        with Subscriber("/rx_robot_1/*", directory=receiver.directory) as heard:
+            # Whoever plays waits for its first consumer, and the air for whoever plays.
+            with Subscriber(directory=sender.directory):
+                # An air that stands still for longer than a burst takes makes nobody older.
+                conductor.play(0.9, lambda: time.sleep(0.05))
+                got = [heard.receive(20) for _ in plan]
+            tx = sender.snapshot().link.tx
+            assert heard.receive(0) is None
+    assert [message.payload for message in got] == [due.payload for due in plan]
+    assert [message.topic for message in got] == ["/rx_robot_1/cmd_vel"] * 5
+    assert (tx.accepted, tx.sent, tx.dropped) == (5, 5, {})
+    began = [step * BLOCK_S for step in conductor.busy]
+    assert [due.at for due in plan] == [pytest.approx(0.3 + i / 10) for i in range(5)]
+    for due, at in zip(plan, began, strict=True):
+        assert 0 < at - due.at < 0.005
+    ages_ms = [message.age_us * 1e-3 for message in got]
+    # A burst takes 12 ms; what happens is noticed with the block that it is in.
+    assert all(10 < age_ms < 20 for age_ms in ages_ms), ages_ms
+    assert max(ages_ms) - min(ages_ms) <= 1.01, ages_ms
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_a_daemon_plays_the_topics_of_a_bag_that_it_knows(start_daemon, tmp_path, storage):
+    written = noisy_messages(5, 30)
+    bag = ros2_bag(tmp_path / "bag", STORAGES[storage], written)
+    registry = tmp_path / "odom.csv"
+    registry.write_text("odom,nav_msgs/Odometry\n")
+    node = start_daemon(
+        f'namespace = ""\nrobot_id = 1\nregistry = "{registry}"\n'
+        f'[play]\nbag = "{bag}"\nduration_s = 10.0\n'
+    )
+    expected = [cdr for topic, _, _, cdr in written if topic == "/odom"]
+    with Subscriber(directory=node.directory) as heard:
+        got = [heard.receive(20) for _ in expected]
+        assert [message.payload for message in got] == expected
+    assert node.snapshot().link.tx.accepted == len(expected) == 20
+
+
+def test_a_bag_that_cannot_be_played_is_refused_in_one_line(write_config, tmp_path):
+    config = write_config(tmp_path, '[play]\nbag = "none.mcap"\nduration_s = 1.0\n')
+    daemon = start(config)
+    _, err = daemon.communicate(timeout=60)
+    assert daemon.returncode == 2
+    assert "none.mcap: no such file" in err
+    assert err.count("\n") == 1
