@@ -222,7 +222,8 @@ class EtherRadio:
                 except zmq.Again:
                     # The socket tells only once that it has become readable; so read first.
                     with contextlib.suppress(TimeoutError):
-                        await asyncio.wait_for(readable.wait(), QUIET_MS * 1e-3)
+                        async with asyncio.timeout(QUIET_MS * 1e-3):
+                            await readable.wait()
                     continue
                 if isinstance(message, protocol.Refused):
                     raise BackendError(message.reason)

@@ -283,3 +283,18 @@ async def test_nothing_overtakes_a_burst_that_was_late(tmp_path, exact):
             (report,), _ = await send(radio, blocks, [again])
             assert (report.outcome, report.start) == (TxOutcome.SENT, 20 * N)
             assert radio.counters["late"] == (3 if exact else 1)
+
+
+@pytest.mark.parametrize("turns", range(5))
+async def test_who_is_cancelled_just_when_something_comes_stops(tmp_path, turns):
+    """Another robot is waited for, so nothing does come."""
+    with lockstep(tmp_path, dict.fromkeys((1, 2), RadioParams())):
+        async with opened(EtherRadio(tmp_path, 1, "")) as radio:
+            taking = asyncio.ensure_future(take(radio.blocks()))
+            await asyncio.sleep(0.02)
+            radio._readable.set()
+            for _ in range(turns):
+                await asyncio.sleep(0)
+            taking.cancel()
+            await asyncio.wait({taking}, timeout=5)
+            assert taking.cancelled()
