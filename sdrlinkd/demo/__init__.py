@@ -1,7 +1,8 @@
 """The paper's experiment with real daemons: send a robot's messages across, see what arrives."""
 
 from sdrlinkd.demo.links import LINKS, Options
-from sdrlinkd.demo.nodes import Process, problems_of, snapshot_of, start_daemon, wait_until_up
+from sdrlinkd.demo.nodes import daemon_process, problems_of, snapshot_of, wait_until_up
+from sdrlinkd.demo.processes import Process
 from sdrlinkd.demo.report import DemoReport, RunResult, latency_ms
 from sdrlinkd.demo.run import run_demo
 from sdrlinkd.demo.source import Source, open_source
@@ -18,12 +19,12 @@ __all__ = [
     "Sample",
     "Source",
     "Trace",
+    "daemon_process",
     "latency_ms",
     "open_source",
     "problems_of",
     "run_demo",
     "snapshot_of",
-    "start_daemon",
     "table_6",
     "topic_table",
     "wait_until_up",

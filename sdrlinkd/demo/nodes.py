@@ -1,11 +1,9 @@
 """Daemons of their own process, and the consumer that listens to one."""
 
 import contextlib
-import subprocess
-import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Self
 
@@ -13,58 +11,26 @@ import msgspec
 
 from sdrlinkd.client import ControlClient, NoDaemonError, Subscriber
 from sdrlinkd.demo.links import NODE_ID
+from sdrlinkd.demo.processes import Process
 from sdrlinkd.demo.trace import Sample, Trace
 from sdrlinkd.errors import UserError
 from sdrlinkd.reports import Snapshot
 
 # Compiling the modem from nothing takes a while on a small machine.
 START_TIMEOUT_S = 120.0
-STOP_TIMEOUT_S = 20.0
 
 
-class Process:
-    """A process of ours, started; its log is shown only when it fails."""
-
-    def __init__(self, module: str, arguments: Sequence[str], log_path: Path) -> None:
-        self._log_path = log_path
-        with log_path.open("w") as log_file:
-            # In a session of its own: Ctrl-C is ours to pass on, in the right order.
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", module, *arguments],
-                stdout=log_file,
-                stderr=log_file,
-                start_new_session=True,
-            )
-
-    @property
-    def is_running(self) -> bool:
-        """Whether it has not ended."""
-        return self._process.poll() is None
-
-    def log(self) -> str:
-        """What it has said."""
-        return self._log_path.read_text().strip()
-
-    def stop(self) -> None:
-        """Ask it to end, and make sure."""
-        self._process.terminate()
-        try:
-            self._process.wait(timeout=STOP_TIMEOUT_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-
-
-def start_daemon(config: Path) -> Process:
-    """A daemon that is about to run."""
+def daemon_process(config: Path) -> Process:
+    """A daemon that is yet to be started."""
     return Process("sdrlinkd", ["--config", str(config)], config.parent / "log")
 
 
 @contextlib.contextmanager
 def daemon(config: Path) -> Iterator[None]:
     """A running daemon."""
-    process = start_daemon(config)
+    process = daemon_process(config)
     try:
+        process.start()
         wait_until_up(process, config.parent)
         yield
     finally:

@@ -12,15 +12,15 @@ from sdrlinkd.demo import (
     Process,
     Sample,
     Source,
+    daemon_process,
     problems_of,
     snapshot_of,
-    start_daemon,
     wait_until_up,
 )
 from sdrlinkd.errors import UserError
 from sdrlinkd.lab.report import LabReport, pair_result, robot_result
 from sdrlinkd.lab.robots import open_sources, write_daemon_config
-from sdrlinkd.lab.scenario import Scenario
+from sdrlinkd.lab.scenario import Scenario, outages_of
 from sdrlinkd.lab.traffic import Listener, Player, plan, trace_of
 from sdrlinkd.reports import Snapshot
 
@@ -28,6 +28,8 @@ POLL_S = 0.5
 # When the hub's time has come, what is in the daemons and on the buses comes within this.
 CATCH_UP_S = 20.0
 SETTLED_S = 0.3
+# A hub loads compiled code first.
+START_TIMEOUT_S = 120.0
 
 
 @dataclass(frozen=True)
@@ -67,11 +69,19 @@ def run_lab(options: LabOptions, watch: Watch) -> LabReport:
     scenario = options.scenario
     with contextlib.ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sdrlink-")))
+        outages_of(scenario, options.traces)
         sources = open_sources(scenario, options.bag)
         for source in sources.values():
             stack.callback(source.recording.close)
+        configs = {
+            robot.id: write_daemon_config(
+                folder / f"robot_{robot.id}", scenario, robot, sources[robot.id], options.bag,
+                folder / "hub", options.path.name,
+            )
+            for robot in scenario.robot
+        }  # fmt: skip
         hub = _start_hub(stack, folder / "hub", options)
-        robots = _start_robots(stack, folder, options, sources)
+        robots = _start_robots(stack, configs, sources, by_age=scenario.pace == "lockstep")
         watcher = stack.enter_context(HubWatch(folder / "hub"))
         began_at = _begin(stack, robots, scenario)
         _wait_until_over(hub, watcher, robots, scenario, began_at, watch)
@@ -90,29 +100,31 @@ def _start_hub(stack: contextlib.ExitStack, directory: Path, options: LabOptions
         arguments += ["--traces", str(options.traces)]
     hub = Process("sdrlinkd.cli.ether", arguments, directory / "log")
     stack.callback(hub.stop)
-    return hub
+    hub.start()
+    deadline = time.monotonic() + START_TIMEOUT_S
+    with HubWatch(directory, timeout_s=POLL_S) as watcher:
+        while hub.is_running and time.monotonic() < deadline:
+            with contextlib.suppress(BackendError):
+                watcher.ask()
+                return hub
+    raise UserError(f"the hub did not start:\n{hub.log()}")
 
 
 def _start_robots(
-    stack: contextlib.ExitStack, folder: Path, options: LabOptions, sources: dict[int, Source]
+    stack: contextlib.ExitStack, configs: dict[int, Path], sources: dict[int, Source], by_age: bool
 ) -> list[_Robot]:
     """All daemons at once: each takes a while."""
-    started = []
-    for robot in options.scenario.robot:
-        source = sources[robot.id]
-        config = write_daemon_config(
-            folder / f"robot_{robot.id}", options.scenario, robot, source, options.bag,
-            folder / "hub", options.path.name,
-        )  # fmt: skip
-        process = start_daemon(config)
+    processes = {}
+    for robot_id, config in configs.items():
+        processes[robot_id] = process = daemon_process(config)
         stack.callback(process.stop)
-        started.append((robot.id, config.parent, source, process))
-    by_age = options.scenario.pace == "lockstep"
+        process.start()
     robots = []
-    for robot_id, directory, source, process in started:
+    for robot_id, process in processes.items():
+        directory = configs[robot_id].parent
         wait_until_up(process, directory)
         listener = stack.enter_context(Listener(directory, by_age))
-        robots.append(_Robot(robot_id, directory, source, process, listener))
+        robots.append(_Robot(robot_id, directory, sources[robot_id], process, listener))
     return robots
 
 

@@ -81,7 +81,7 @@ def test_a_hub_tells_where_it_is_and_serves_its_folder_alone(start_hub, refused,
         (("--dir", "bad.toml"), ["bad.toml/ether.lock: cannot be opened"]),
         (("--dir", "d" * 120), ["air.sock: the hub's socket cannot be opened"]),
         (("--pace", "fast"), ["--pace", "fast", "realtime", "lockstep"]),
-        (("good.toml", "--duration", "0"), ["--duration", "0.1"]),
+        (("good.toml", "--duration", "0"), ["--duration", "0.001"]),
         (("good.toml", "--seed", "-1"), ["seed"]),
     ],
 )

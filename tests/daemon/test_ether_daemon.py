@@ -87,6 +87,7 @@ class Conductor(RawRadio):
     def play(self, until_s, pause):
         """Let time go on; `pause` is called whenever somebody has begun to send."""
         step, was_busy = 0, False
+        self.push(protocol.Done(token=self._token, step=0))
         while step * BLOCK_S < until_s:
             assert self._down.poll(60_000)
             data, *samples = self._down.recv_multipart()
@@ -104,7 +105,7 @@ def test_what_is_planned_leaves_at_its_time_by_the_airs_clock(start_daemon, tmp_
     hub = tmp_path_factory.mktemp("hub")
     plan = list(due_messages(BuiltInRobot("robot_1", 0.5, 1), 0.5, 0.3, {"/robot_1/cmd_vel": 3}))
     radios = dict.fromkeys((1, 2, 3), RadioParams())
-    play = "[play]\nduration_s = 0.5\nbegin_s = 0.3\n"
+    play = "[play]\nduration_s = 0.5\nbegin_s = 0.3\nwait_for_consumer = true\n"
     with serving(hub, radios, paced=False, until_s=1.0, **AIR), Conductor(hub) as conductor:
         sender = start_daemon(on_ether(hub, 1, 'topics = ["cmd_vel"]\n') + play)
         receiver = start_daemon(on_ether(hub, 2))

@@ -145,7 +145,7 @@ def test_an_interrupt_while_a_process_starts_leaves_none(run_small, nothing_left
         return started[-1]
 
     stand_in = SimpleNamespace(Popen=start, TimeoutExpired=subprocess.TimeoutExpired)
-    monkeypatch.setattr("sdrlinkd.demo.nodes.subprocess", stand_in)
+    monkeypatch.setattr("sdrlinkd.demo.processes.subprocess", stand_in)
     try:
         with pytest.raises(KeyboardInterrupt):
             run_small()
