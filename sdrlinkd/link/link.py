@@ -96,7 +96,7 @@ class Link:
         is_timed = self.access.frame(slot.start) is not None and (
             slot.start >= self._beacons.due_at or self.sender.packetizer.offered
         )
-        burst = self.compose(slot.start, n_pdus) if n_pdus else None
+        burst = self.compose(slot.start, n_pdus, slot.least) if n_pdus else None
         if burst is None:
             return None
         if not any(burst.carried) and airtime_s(self.rate.lowest, 1) <= slot.end - slot.start:
@@ -130,7 +130,7 @@ class Link:
         is_timed = again.latest <= again.start
         return burst._replace(latest=slot.start if is_timed else slot.latest(airtime_s))
 
-    def compose(self, start: float, max_pdus: int) -> Burst | None:
+    def compose(self, start: float, max_pdus: int, least: Qos = Qos.BULK) -> Burst | None:
         """The burst that should leave at `start`, decided now; None when there is nothing.
 
         A beacon that is due rides in spare room; when traffic leaves none for a whole period, or
@@ -145,7 +145,11 @@ class Link:
             packetizer.renew(frame)
             # Clocks do not wait for spare room.
             overdue = True
-        burst = self.sender.compose_records() if overdue else self.sender.compose(start, max_pdus)
+        burst = (
+            self.sender.compose_records()
+            if overdue
+            else self.sender.compose(start, max_pdus, least)
+        )
         if burst is None and packetizer.offered:
             burst = self.sender.compose_records()
         return burst

@@ -133,11 +133,16 @@ class Sender:
         tally.accepted += 1
         tally.drop(reason)
 
-    def compose(self, start: float, max_pdus: int) -> Burst | None:
-        """The next burst, whose preamble leaves at `start`; None when nothing is to be sent."""
+    def compose(self, start: float, max_pdus: int, least: Qos = Qos.BULK) -> Burst | None:
+        """The next burst, whose preamble leaves at `start`; None when nothing is to be sent.
+
+        No PDU behind the first begins with a class less urgent than `least`.
+        """
         pdus: list[bytes] = []
         carried: list[list[Outgoing]] = []
         while len(pdus) < max_pdus:
+            if pdus and self.outbox.levels and self.outbox.levels[0].key[0] > least:
+                break
             built = self.packetizer.next_pdu(start)
             if built is None:
                 break

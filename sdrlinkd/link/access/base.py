@@ -15,17 +15,19 @@ MOST_ON_THEIR_WAY = 8
 class Slot(NamedTuple):
     """A burst may leave at `start` and must be over at `end`.
 
-    Where it comes too late for `start`, it may still leave if it is over at `late_end`.
+    Where it comes too late for `start`, it may still leave if it is over at `late_end`. Behind its
+    first PDU, it holds none of a class less urgent than `least`.
     """
 
     start: float
     end: float = INFINITE
     late_end: float = INFINITE
+    least: Qos = Qos.BULK
 
     @classmethod
-    def exact(cls, start: float, end: float = INFINITE) -> Self:
+    def exact(cls, start: float, end: float = INFINITE, least: Qos = Qos.BULK) -> Self:
         """At `start` or not at all."""
-        return cls(start, end, start)
+        return cls(start, end, start, least)
 
     def latest(self, airtime_s: float) -> float:
         """When a burst of that length begins at the latest."""

@@ -68,7 +68,9 @@ class MiniSlots(Carriers):
         self._round = (idle_since, begin)
         if start > sensed.until + width_s - drift_s - self._detect_s:
             return None
-        return Slot.exact(max(start, earliest))
+        # Who came first because it was urgent does not keep the air for what is not.
+        least = Qos.LATENCY if qos <= Qos.LATENCY else Qos.BULK
+        return Slot.exact(max(start, earliest), least=least)
 
     def heard(self, src: int, at: float) -> None:
         """The order in a level follows from who sent last."""

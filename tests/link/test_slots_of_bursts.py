@@ -1,0 +1,69 @@
+"""What a slot allows, the burst in it keeps to: its last moment, and who may ride along."""
+
+import pytest
+
+from sdrlinkd.link import Outcome, Overrides, Qos, RateParams
+from sdrlinkd.link.access import Slot
+from sdrlinkd.wire import Frame
+from tests.link.radios import LOCKSTEP, params
+from tests.link.test_returned import Doorkeeper
+from tests.link.world import make_link, most_pdus, next_burst, records_in
+
+SIZE = 64
+
+
+def test_a_burst_may_begin_late_as_long_as_it_is_over_in_time():
+    link = make_link(pdu_size=SIZE, greedy=False)
+    for i in range(4):
+        link.submit(0, bytes([i]) * 20, 0.0)
+    link.access = Doorkeeper(*[Slot(0.5, 0.502, 0.6), Slot(0.7, 0.702, 0.7015), Slot(0.9)])
+    first = next_burst(link, 0.5)
+    assert (len(first.pdus), first.latest) == (2, pytest.approx(0.598))
+    link.confirm(first, Outcome.LATE, 0.6)
+    # Where it cannot be over in time if it is late, its moment is the only one.
+    again = next_burst(link, 0.7)
+    assert (again.number, again.latest) == (first.number, 0.7)
+    link.confirm(again, Outcome.SENT, 0.7)
+    assert next_burst(link, 0.9).latest == float("inf")
+
+
+def test_a_burst_that_tells_the_schedule_leaves_at_its_moment():
+    """Else who hears it would set its clock wrong."""
+    link = make_link(pdu_size=SIZE, beacon_s=0.5)
+    # Nobody could reuse so short a slot, so its owner may begin late.
+    tdma = params("tdma", [1], slot_s=0.02, minislot_s=0.02)
+    link.attach(LOCKSTEP._replace(longest_burst_s=(0.01,)), tdma, RateParams())
+    told = []
+    for i in range(4000):
+        now = 5 + 1e-3 * i
+        if i % 7 == 0:
+            link.submit(0, bytes(20), now)
+        burst = next_burst(link, now)
+        if burst is None:
+            continue
+        link.confirm(burst, Outcome.SENT, now)
+        tells = any(isinstance(r, Frame) for pdu in burst.pdus for r in records_in(pdu, SIZE))
+        told.append((tells, burst.latest > burst.start))
+    assert (True, True) not in told
+    assert {(True, False), (False, True)} <= set(told)
+
+
+@pytest.mark.parametrize("least", Qos)
+def test_who_has_the_air_for_being_urgent_keeps_it_for_nothing_less(least):
+    link = make_link(pdu_size=SIZE, greedy=False)
+    for i in range(4):
+        for qos in reversed(Qos):
+            link.submit(0, bytes([i]) * 30, 0.0, Overrides(qos=qos))
+    link.access = Doorkeeper(Slot.exact(0.5, 0.54, least))
+    burst = next_burst(link, 0.5)
+    assert [message.qos for (message,) in burst.carried] == sorted(
+        [qos for qos in Qos if qos <= least] * 4
+    )[: most_pdus(0, 0.04)]
+
+
+def test_the_first_is_always_taken():
+    link = make_link(pdu_size=SIZE, greedy=False)
+    for _ in range(3):
+        link.submit(0, bytes(40), 0.0, Overrides(qos=Qos.BULK))
+    link.access = Doorkeeper(Slot.exact(0.5, least=Qos.URGENT))
+    assert len(next_burst(link, 0.5).pdus) == 1
