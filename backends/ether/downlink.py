@@ -9,6 +9,7 @@ import zmq
 
 from backends.base import Samples
 from backends.ether import protocol
+from backends.ether.sockets import NOBLOCK, is_readable
 
 MOST_AT_ONCE = 8
 
@@ -25,6 +26,10 @@ class Downlink:
         frames = self._socket.recv_multipart(flags)
         return protocol.from_hub(frames[0]), protocol.samples_in(frames)
 
+    def has_more(self) -> bool:
+        """Whether `read` would have something, without the cost of finding out in vain."""
+        return is_readable(self._socket)
+
     def next(self) -> tuple[protocol.FromHub, Samples | None]:
         """The next message; waits as long as the socket's time limit says. Raises zmq.Again."""
         return self._waiting.popleft() if self._waiting else self.read(0)
@@ -36,8 +41,8 @@ class Downlink:
         parts = [(first.n, samples)]
         last, placed, notice = first, list(first.placed), first.notice
         with contextlib.suppress(zmq.Again):
-            while len(parts) < MOST_AT_ONCE and not last.step:
-                each, more = self.read(zmq.NOBLOCK)
+            while len(parts) < MOST_AT_ONCE and not last.step and self.has_more():
+                each, more = self.read(NOBLOCK)
                 if (
                     not isinstance(each, protocol.Stretch)
                     or each.lost

@@ -26,7 +26,7 @@ from backends.ether import protocol
 from backends.ether.antenna import Antenna
 from backends.ether.downlink import Downlink
 from backends.ether.medium import LEAD, Piece
-from backends.ether.sockets import AIR, SKY, WAITING
+from backends.ether.sockets import AIR, NOBLOCK, SKY, WAITING
 from backends.feed import BlockFeed
 from backends.outstanding import answered
 
@@ -162,7 +162,7 @@ class EtherRadio:
     def _say(self, message: msgspec.Struct, *more: memoryview) -> None:
         """To the hub; without one, into the void."""
         with contextlib.suppress(zmq.Again):
-            self._up.send_multipart([protocol.encode(message), *more], zmq.NOBLOCK)
+            self._up.send_multipart([protocol.encode(message), *more], NOBLOCK)
 
     def _hello(self) -> None:
         hello = protocol.Hello(
@@ -173,7 +173,7 @@ class EtherRadio:
             frequency_hz=self._tuning.frequency_hz,
         )
         with contextlib.suppress(zmq.Again):
-            self._down.send(protocol.encode(hello), zmq.NOBLOCK)
+            self._down.send(protocol.encode(hello), NOBLOCK)
 
     def _ask(self) -> protocol.Welcome:
         """The first time, before there are blocks; in a thread."""
@@ -217,14 +217,11 @@ class EtherRadio:
         try:
             while not self._closing.is_set():
                 readable.clear()
-                try:
-                    message, samples = self._downlink.read(zmq.NOBLOCK)
-                except zmq.Again:
-                    # The socket tells only once that it has become readable; so read first.
-                    with contextlib.suppress(TimeoutError):
-                        async with asyncio.timeout(QUIET_MS * 1e-3):
-                            await readable.wait()
+                # The socket tells only once that it has become readable; so look first.
+                if not self._downlink.has_more():
+                    await readable.wait()
                     continue
+                message, samples = self._downlink.read(NOBLOCK)
                 if isinstance(message, protocol.Refused):
                     raise BackendError(message.reason)
                 if isinstance(message, protocol.Stretch):
@@ -255,7 +252,7 @@ class EtherRadio:
             self.counters["hub_outages"] += 1
         self._has_asked = False
         with contextlib.suppress(zmq.Again):
-            self._down.send(protocol.encode(protocol.Question()), zmq.NOBLOCK)
+            self._down.send(protocol.encode(protocol.Question()), NOBLOCK)
 
     def _rejoin(self, welcome: protocol.Welcome) -> RxBlock:
         """A hub that knows nothing of before: its count begins anew."""

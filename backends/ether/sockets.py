@@ -12,6 +12,10 @@ import zmq
 from backends.base import BackendError, Samples
 from backends.ether import protocol
 
+# As numbers: as enumerations, they cost as much as a short message.
+NOBLOCK, MORE, _EVENTS, _POLLIN = (
+    int(zmq.NOBLOCK), int(zmq.SNDMORE), int(zmq.EVENTS), int(zmq.POLLIN),
+)  # fmt: skip
 AIR, SKY = "air.sock", "sky.sock"
 # Stretches that may wait for a radio; half a second of blocks.
 WAITING = 500
@@ -51,11 +55,14 @@ class HubSockets:
 
         Raises ConnectionError when nobody of that identity is there.
         """
-        frames: list[bytes | memoryview] = [identity, protocol.encode(message)]
-        if samples is not None:
-            frames.append(np.ascontiguousarray(samples).data.cast("B"))
+        data, air = protocol.encode(message), self._air
         try:
-            self._air.send_multipart(frames, zmq.NOBLOCK)
+            air.send(identity, NOBLOCK | MORE)
+            if samples is None:
+                air.send(data, NOBLOCK)
+            else:
+                air.send(data, NOBLOCK | MORE)
+                air.send(np.ascontiguousarray(samples).data.cast("B"), NOBLOCK)
         except zmq.Again:
             return False
         except zmq.ZMQError as error:
@@ -86,12 +93,14 @@ class HubSockets:
         return socket
 
 
+def is_readable(socket: "zmq.Socket[bytes]") -> bool:
+    """Whether a message is there."""
+    return bool(int(socket.getsockopt(_EVENTS)) & _POLLIN)
+
+
 def _drain(socket: "zmq.Socket[bytes]", take: Callable[[list[bytes]], None]) -> None:
-    while True:
-        try:
-            frames = socket.recv_multipart(zmq.NOBLOCK)
-        except zmq.Again:
-            return
+    while is_readable(socket):
+        frames = socket.recv_multipart(NOBLOCK)
         try:
             take(frames)
         except (msgspec.DecodeError, ValueError, RecursionError):
