@@ -4,7 +4,7 @@ import asyncio
 
 import numpy as np
 
-from backends.base import SENDING, Capabilities, RxBlock, TxOutcome, TxReport
+from backends.base import SENDING, Capabilities, RxBlock, TxBurst, TxOutcome, TxReport
 from backends.ether.medium import NOISE_DBFS, Piece
 from backends.ether.world import RadioParams
 from phy import FrontEnd, FrontEndParams
@@ -53,9 +53,10 @@ class Antenna:
             index_error_s=0.0 if radio.timestamps else radio.index_error_s,
         )
 
-    def on_air(self, index: int) -> int:
-        """Where an index of ours is by the air's count."""
-        return index - self._shift
+    def on_air(self, burst: TxBurst) -> TxBurst:
+        """A burst of ours by the air's count."""
+        latest = None if burst.latest is None else burst.latest - self._shift
+        return TxBurst(burst.start - self._shift, burst.samples, latest)
 
     def receive(self, piece: Piece, host_ns: int) -> RxBlock:
         """What the radio delivers of the next piece."""

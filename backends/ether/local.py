@@ -94,8 +94,7 @@ class LocalRadio:
             return answered(TxReport(TxOutcome.LOST, burst.start, burst.start))
         self._number += 1
         answer = self.antenna.sent(self._number)
-        placed = burst._replace(start=self.antenna.on_air(burst.start))
-        start = self._ether.medium.send(self._node_id, placed)
+        start = self._ether.medium.send(self._node_id, self.antenna.on_air(burst))
         self.counters["late"] += self.antenna.placed(self._number, start, len(burst.samples))
         return answer
 

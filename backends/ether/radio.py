@@ -128,11 +128,12 @@ class EtherRadio:
         if self._antenna is None or self._is_over or self._closing.is_set():
             return answered(TxReport(TxOutcome.LOST, burst.start, burst.start))
         self._number += 1
+        placed = self._antenna.on_air(burst)
         message = protocol.Sent(
             token=self._welcome.token,
             number=self._number,
-            start=self._antenna.on_air(burst.start),
-            latest=None if burst.latest is None else self._antenna.on_air(burst.latest),
+            start=placed.start,
+            latest=placed.latest,
             late_seen=self._late_seen,
         )
         answer = self._antenna.sent(self._number)

@@ -14,6 +14,7 @@ CHUNK = 1024
 """Samples under one pair of keys; also what the working space holds."""
 _U32, _U64, _F32, _I32 = np.uint32, np.uint64, np.float32, np.int32
 _LN_2 = math.log(2)
+_TINY = _F32(2.0**-24)  # what u near 1 is rounded by: no sample is 0
 _FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
 # ln(1 + t) / t³ - 1 / t² + 1 / 2t for t from sqrt(1/2) - 1 to sqrt(2) - 1; sin and cos up to π/4
 # (Cephes' logf, sinf, cosf).
@@ -100,7 +101,7 @@ def _make_radii(
             tail = tail * t + _LN[k]
         ln = t + t * t * (tail * t - _F32(0.5))
         minus_ln_u = (_F32(31) - _F32(_I32(bits[i]))) * _F32(_LN_2) - ln
-        radii[i] = factor * math.sqrt(_F32(2) * max(_F32(0), minus_ln_u))
+        radii[i] = factor * math.sqrt(_F32(2) * max(_TINY, minus_ln_u))
 
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=_FASTMATH)

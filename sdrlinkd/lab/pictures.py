@@ -8,6 +8,7 @@ import numpy as np
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.ticker import LogFormatter
 
 from phy import MCS_TABLE
 from sdrlinkd.lab.report import LabReport
@@ -49,10 +50,12 @@ def _latency(axes: Axes, report: LabReport) -> None:
     labels = [f"{pair.sender} → {pair.receiver}" for pair in pairs]
     axes.set_xticks(at, labels, rotation=60 if len(pairs) > 6 else 0, fontsize=8)
     axes.set_yscale("log")
-    axes.set(ylabel="publish to reception, in ms")
+    for ticks in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
+        ticks(LogFormatter(labelOnlyBase=False, minor_thresholds=(2, 0.5)))
+    axes.set(ylabel="publish to reception, in ms", xlim=(-0.5, max(1, len(pairs)) - 0.5))
     axes.grid(visible=True, which="both", alpha=0.25)
     if pairs:
-        axes.legend(loc="upper right", fontsize=8)
+        axes.legend(loc="upper center", ncols=3, fontsize=8)
 
 
 def _mcs(axes: Axes, report: LabReport) -> None:
@@ -65,4 +68,4 @@ def _mcs(axes: Axes, report: LabReport) -> None:
     axes.set_yticks(range(len(MCS_TABLE)), [mcs.name for mcs in MCS_TABLE], fontsize=8)
     axes.set(xlabel="time in s", xlim=(0, report.duration_s))
     axes.grid(visible=True, alpha=0.25)
-    axes.legend(loc="upper right", fontsize=8)
+    axes.legend(loc="upper center", fontsize=8)
