@@ -28,6 +28,7 @@ POLL_S = 0.5
 # When the hub's time has come, what is in the daemons and on the buses comes within this.
 CATCH_UP_S = 20.0
 SETTLED_S = 0.3
+ACQUAINTED_S = 5.0
 # A hub loads compiled code first.
 START_TIMEOUT_S = 120.0
 
@@ -133,10 +134,30 @@ def _begin(stack: contextlib.ExitStack, robots: list[_Robot], scenario: Scenario
     sending = {robot.id for robot in scenario.robot if robot.sends}
     if scenario.pace == "lockstep":
         return 0.0
+    _acquainted(robots, scenario)
     for robot in robots:
         if robot.id in sending:
             robot.player = stack.enter_context(Player(robot.source, robot.directory))
     return time.monotonic()
+
+
+def _acquainted(robots: list[_Robot], scenario: Scenario) -> None:
+    """When all have heard of those in their reach, or for as long as that should take.
+
+    A robot that has no schedule yet would have its first messages wait for one.
+    """
+    deadline = time.monotonic() + ACQUAINTED_S
+    wanted = {
+        robot.id: {each.id for each in robots if scenario.in_reach(each.id, robot.id)} - {robot.id}
+        for robot in robots
+    }
+    while time.monotonic() < deadline:
+        if all(
+            wanted[robot.id] <= {each.src for each in snapshot_of(robot.directory).link.neighbors}
+            for robot in robots
+        ):
+            return
+        time.sleep(0.05)
 
 
 def _wait_until_over(

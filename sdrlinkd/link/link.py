@@ -241,6 +241,8 @@ class Link:
         if isinstance(record, LinkReport):
             if record.node == self.own_id:
                 self.rate.take(src, record, at)
+            else:
+                self.access.told_of(record.node, at)
         elif isinstance(record, Frame):
             self.access.take_frame(src, record, at)
 

@@ -1,6 +1,7 @@
 """`tdma`: bursts stay in slots, nobody clashes, and urgent messages keep time."""
 
 from collections import Counter
+from math import floor
 from random import Random
 
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from sdrlinkd.link import Qos, Sensed
 from sdrlinkd.link.access import Wish, make_access
 from sdrlinkd.link.access.choice import CLOCK_ERROR_S
+from sdrlinkd.link.access.tdma import FORGET_S
 from tests.link.radios import LOCKSTEP, PACED, params
 from tests.link.slots import LONGEST_S, SETTLED_S, lengths_s, make_air, places
 
@@ -162,3 +164,30 @@ def test_a_burst_that_did_not_leave_takes_nothing_from_the_one_behind_it():
         each.sent(begin + 0.002)
     one.not_sent(begin)
     assert_alike(one, twin, begin)
+
+
+def begun(access, since, for_s=0.2):
+    """Whose slots a robot begins in that looks every 50 µs, while nobody is heard."""
+    looks = (since + 5e-5 * i for i in range(int(for_s / 5e-5)))
+    slots = (access.slot(Wish(at, Qos.BULK, 0.001, Sensed(at))) for at in looks)
+    numbers = ((slot.start - access._origin) / access._slot_s for slot in slots if slot)
+    return {access._nodes[floor(number + 1e-6) % 3] for number in numbers}
+
+
+def test_who_knows_of_a_robot_it_does_not_hear_uses_its_own_slots_only():
+    """That one may be sending, and the robot between them would hear neither."""
+    access = make(3, LOCKSTEP, 0.004, nodes=(1, 2, 3))
+    begun(access, 10.0)
+    assert begun(access, 11.0) == {1, 2, 3}
+    # Robot 2 hears robot 1, and so do we.
+    access.heard(2, 12.0)
+    access.heard(1, 12.0)
+    access.told_of(1, 12.0)
+    access.told_of(3, 12.0)
+    assert begun(access, 12.1) == {1, 2, 3}
+    # Now we do not any more.
+    access.told_of(1, 15.0)
+    access.heard(2, 15.0)
+    assert begun(access, 15.1) == {3}
+    # Nobody does.
+    assert begun(access, 15.0 + FORGET_S + 0.1) == {1, 2, 3}

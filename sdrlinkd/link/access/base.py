@@ -66,6 +66,9 @@ class Access(Protocol):
     def heard(self, src: int, at: float) -> None:
         """A PDU of `src` came in a burst whose preamble was at `at`."""
 
+    def told_of(self, node: int, at: float) -> None:
+        """At `at` another robot told that it hears `node`."""
+
     def frame(self, start: float) -> Frame | None:
         """What to tell others of the schedule in a burst that leaves at `start`."""
 
@@ -103,6 +106,9 @@ class Carriers:
 
     def heard(self, src: int, at: float) -> None:
         """Whose it was does not matter."""
+
+    def told_of(self, node: int, at: float) -> None:
+        """Who hears whom does not matter."""
 
     def frame(self, start: float) -> Frame | None:
         """No schedule."""

@@ -5,7 +5,7 @@ from binascii import crc_hqx
 from collections.abc import Sequence
 from struct import pack
 
-from sdrlinkd.link.access.base import Carriers, Slot, Wish, next_on_grid
+from sdrlinkd.link.access.base import INFINITE, Carriers, Slot, Wish, next_on_grid
 from sdrlinkd.link.carrier import Sensed
 from sdrlinkd.wire import Frame
 
@@ -28,7 +28,8 @@ class Tdma(Carriers):
 
     The schedule is that of the lowest robot heard of, directly or through others (its root); each
     tells it on with its own count of hops (level). With `reuse`, a slot whose owner is silent, or
-    silent again, is open to the others in order, one `minislot_s` after another.
+    silent again, is open to the others in order, one `minislot_s` after another; but not to who
+    knows of a robot it does not hear: that one may well be sending.
     """
 
     def __init__(
@@ -67,6 +68,8 @@ class Tdma(Carriers):
         self._told_at = 0.0
         self._begins_at = LISTEN_S + sum(node < own_id for node in nodes)
         self._strangers: dict[int, int] = {}
+        self._heard_at: dict[int, float] = {}
+        self._told_of_at: dict[int, float] = {}
 
     @property
     def state(self) -> str:
@@ -111,6 +114,15 @@ class Tdma(Carriers):
                     return Slot.exact(start, planned_end)
                 return Slot(start, planned_end, end)
         return None
+
+    def heard(self, src: int, at: float) -> None:
+        """It is not hidden from us."""
+        self._heard_at[src] = at
+
+    def told_of(self, node: int, at: float) -> None:
+        """It is there, whether we hear it or not."""
+        if node != self._own_id:
+            self._told_of_at[node] = at
 
     def frame(self, start: float) -> Frame | None:
         """The schedule as we keep it."""
@@ -162,13 +174,20 @@ class Tdma(Carriers):
             self._lost = (self._root, self._level, now + 2 * FORGET_S)
             self._root, self._level, self._parent = self._own_id, 0, self._own_id
 
+    def _knows_of_hidden(self, now: float) -> bool:
+        """Whether others hear somebody whom we do not."""
+        return any(
+            now - told_at < FORGET_S and now - self._heard_at.get(node, -INFINITE) >= FORGET_S
+            for node, told_at in self._told_of_at.items()
+        )
+
     def _start(self, begin: float, turn: int, earliest: float, sensed: Sensed) -> float | None:
         """Where we may begin in the slot that begins at `begin`, `turn` robots after its owner."""
         if turn == 0 and (earliest <= begin or not self._reuse):
             return max(begin, earliest)
         if turn == 0 and begin < self.own_end and earliest <= self.own_end + 2 * self._gap_s:
             return earliest
-        if not self._reuse or earliest < begin:
+        if not self._reuse or earliest < begin or self._knows_of_hidden(earliest):
             return None
         idle_since = self.idle_since(sensed)
         if idle_since is None:
