@@ -2,7 +2,12 @@
 
 from phy.channel import PROFILES, FrontEnd, FrontEndParams, Path, PathParams
 from phy.constellation import Modulation, points
-from phy.error_rate import burst_found_rate, needed_snr_db, pdu_error_rate
+from phy.error_rate import (
+    burst_found_rate,
+    needed_snr_db,
+    pdu_error_rate,
+    pdu_lost_rate,
+)
 from phy.header import MAX_PDU_BYTES, MAX_PDUS, N_NETWORKS
 from phy.layout import BurstLayout, layout, most_pdus
 from phy.mcs import MCS_TABLE, Mcs
@@ -44,6 +49,7 @@ __all__ = [
     "most_pdus",
     "needed_snr_db",
     "pdu_error_rate",
+    "pdu_lost_rate",
     "points",
     "warm_up",
 ]

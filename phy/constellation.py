@@ -14,6 +14,7 @@ class Modulation(Enum):
     QPSK = 2
     QAM16 = 4
     QAM64 = 6
+    QAM256 = 8
 
     @property
     def bits(self) -> int:

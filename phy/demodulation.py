@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phy.constellation import Modulation
-from phy.convolutional import ViterbiWorkspace, decode
 from phy.crc import checked
 from phy.estimation import ChannelEstimate
 from phy.kernels.demapper import demap
 from phy.layout import BurstLayout
+from phy.ldpc import LdpcWorkspace, decode
 from phy.mapping import mapping
 from phy.numerology import Numerology
 from phy.sequences import polarity, whitening
@@ -91,7 +91,7 @@ class PduDecoder:
     """Collects LLRs of a burst and decodes each PDU when its symbols are in."""
 
     layout: BurstLayout
-    workspace: ViterbiWorkspace
+    workspace: LdpcWorkspace
 
     def __post_init__(self) -> None:
         self.n_decoded = 0
@@ -107,9 +107,8 @@ class PduDecoder:
         n_bits = n_pdus * plan.coded_bits
         self._rest = bits[n_bits:]
         size = plan.block_bytes
-        white = decode(
-            bits[:n_bits].reshape(n_pdus, -1), size, plan.mcs.code, self.workspace
-        ).reshape(-1)
+        decoded = decode(bits[:n_bits].reshape(n_pdus, -1), plan.form, self.workspace)
+        white = np.packbits(decoded, axis=1).reshape(-1)
         blocks = (white ^ whitening(len(white), self.n_decoded * size)).tobytes()
         self.n_decoded += n_pdus
         return [checked(blocks[at : at + size]) for at in range(0, len(blocks), size)]

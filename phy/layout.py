@@ -5,6 +5,7 @@ from functools import cached_property, lru_cache
 
 from phy import header, preamble
 from phy.crc import CRC32_SIZE
+from phy.ldpc import Segmentation, least_coded, segmentation
 from phy.mcs import MCS_TABLE, Mcs
 from phy.numerology import Numerology
 
@@ -24,9 +25,21 @@ class BurstLayout:
         return self.pdu_bytes + CRC32_SIZE
 
     @cached_property
+    def form(self) -> Segmentation:
+        """How a PDU is coded: with all the parity that the burst's symbols have room for."""
+        n_bits = 8 * self.block_bytes
+        room = self.n_symbols * self.symbol_bits // self.n_pdus
+        return segmentation(n_bits, self.mcs.rate, room)
+
+    @property
     def coded_bits(self) -> int:
         """Coded bits of a PDU."""
-        return self.mcs.code.n_coded(8 * self.block_bytes)
+        return self.form.n_coded
+
+    @property
+    def least_bits(self) -> int:
+        """What they would be at the code's rate."""
+        return least_coded(8 * self.block_bytes, self.mcs.rate)
 
     @property
     def symbol_bits(self) -> int:
@@ -36,7 +49,7 @@ class BurstLayout:
     @property
     def n_symbols(self) -> int:
         """Payload symbols of the burst."""
-        return self.symbols_through(self.n_pdus)
+        return -(-self.n_pdus * self.least_bits // self.symbol_bits)
 
     @property
     def n_samples(self) -> int:
@@ -66,4 +79,4 @@ def most_pdus(grid: Numerology, mcs: int, pdu_bytes: int, n_samples: int) -> int
     one = layout(grid, mcs, 1, pdu_bytes)
     fixed = preamble.LENGTH + header.N_SYMBOLS * grid.n_symbol
     symbols = max(0, n_samples - fixed) // grid.n_symbol
-    return max(1, min(header.MAX_PDUS, symbols * one.symbol_bits // one.coded_bits))
+    return max(1, min(header.MAX_PDUS, symbols * one.symbol_bits // one.least_bits))

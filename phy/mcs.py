@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from phy.constellation import Modulation
-from phy.convolutional import HALF, THREE_QUARTERS, TWO_THIRDS, CodeRate
 
 HEADER_MCS = 0
 
@@ -15,30 +14,33 @@ class Mcs:
 
     index: int
     modulation: Modulation
-    code: CodeRate
+    rate: Fraction
 
     @property
     def name(self) -> str:
         """As people say it: `QPSK 1/2`."""
-        return f"{self.modulation.label} {self.code.name}"
+        return f"{self.modulation.label} {self.rate}"
 
     @property
     def bits_per_carrier(self) -> Fraction:
         """Information bits on one data carrier."""
-        return self.modulation.bits * self.code.rate
+        return self.modulation.bits * self.rate
 
 
 MCS_TABLE = tuple(
-    Mcs(index, modulation, code)
-    for index, (modulation, code) in enumerate(
+    Mcs(index, modulation, rate)
+    for index, (modulation, rate) in enumerate(
         (
-            (Modulation.BPSK, HALF),
-            (Modulation.QPSK, HALF),
-            (Modulation.QPSK, THREE_QUARTERS),
-            (Modulation.QAM16, HALF),
-            (Modulation.QAM16, THREE_QUARTERS),
-            (Modulation.QAM64, TWO_THIRDS),
-            (Modulation.QAM64, THREE_QUARTERS),
+            (Modulation.BPSK, Fraction(1, 2)),
+            (Modulation.QPSK, Fraction(1, 2)),
+            (Modulation.QPSK, Fraction(3, 4)),
+            (Modulation.QAM16, Fraction(1, 2)),
+            (Modulation.QAM16, Fraction(3, 4)),
+            (Modulation.QAM64, Fraction(2, 3)),
+            (Modulation.QAM64, Fraction(3, 4)),
+            (Modulation.QAM64, Fraction(5, 6)),
+            (Modulation.QAM256, Fraction(3, 4)),
+            (Modulation.QAM256, Fraction(5, 6)),
         )
     )
 )

@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from phy import ofdm, preamble
 from phy.acquisition import BEFORE, Acquired, Acquisition, Missed, needed_after
 from phy.constellation import Modulation
-from phy.convolutional import N_TAIL, ViterbiWorkspace
-from phy.crc import CRC32_SIZE
 from phy.demodulation import Demodulator, PduDecoder
-from phy.header import MAX_PDU_BYTES, N_NETWORKS, N_SYMBOLS
+from phy.header import N_NETWORKS, N_SYMBOLS
 from phy.incoming import IncomingBurst
 from phy.kernels.detector import HISTORY, search, strongest
 from phy.layout import layout
+from phy.ldpc import LdpcWorkspace
 from phy.numerology import OFDM_64_16, Numerology
 from phy.quality import BurstOver, Event, PduHeard
 from phy.stream import SampleStream
@@ -63,7 +62,7 @@ class Receiver:
         self._on_points = on_points
         self._acquisition = Acquisition(grid, max_frequency)
         self._demodulators = {each: Demodulator(each, grid) for each in Modulation}
-        self._workspace = ViterbiWorkspace(8 * (MAX_PDU_BYTES + CRC32_SIZE) + N_TAIL)
+        self._workspace = LdpcWorkspace()
         self._work = np.zeros((7, HISTORY + HOP), np.float32)
         self._dc = np.zeros(3)
         self._stream = SampleStream(start, 1 << 16)

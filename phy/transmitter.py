@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from phy import header, ofdm, preamble
 from phy.constellation import Modulation
-from phy.convolutional import encode
 from phy.crc import with_crc32
 from phy.header import N_NETWORKS, BurstHeader, header_bits
 from phy.layout import layout
+from phy.ldpc import encode
 from phy.mapping import mapping
 from phy.numerology import OFDM_64_16, Numerology
 from phy.sequences import PADDING, whitening
@@ -37,7 +37,7 @@ class Transmitter:
             raise ValueError(f"bytes of a PDU: got {sizes}; allowed: one size in a burst")
         blocks = np.frombuffer(b"".join(map(with_crc32, pdus)), np.uint8)
         white = (blocks ^ whitening(len(blocks))).reshape(plan.n_pdus, plan.block_bytes)
-        coded = encode(white, plan.mcs.code).reshape(-1)
+        coded = encode(np.unpackbits(white, axis=1), plan.form).reshape(-1)
         n_padding = plan.n_symbols * plan.symbol_bits - len(coded)
         coded = np.concatenate((coded, PADDING[:n_padding]))
         spectrum = mapping(plan.mcs.modulation, self._grid).to_spectrum(coded, header.N_SYMBOLS)

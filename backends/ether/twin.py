@@ -152,11 +152,11 @@ class BurstMedium:
             if not self._finds(flight, node, at) or self._is_deaf(node, at, at + end_s):
                 continue
             if flight.near:
-                errors = _byte_errors_in(flight, node, at + begin_s, at + end_s)
+                lost = _lost_rate_in(flight, node, at + begin_s, at + end_s)
                 snr_db = _head_snr_db(flight, node, at)
             else:
-                errors = byte_errors(shape.mcs, snr_db)
-            if flight.draws[node][1 + number] < math.exp(-shape.pdu_bytes * errors):
+                lost = lost_rate(shape.mcs, snr_db, shape.pdu_bytes)
+            if flight.draws[node][1 + number] >= lost:
                 read.append((node, snr_db))
         return read
 
@@ -248,13 +248,9 @@ def burst_shape(rate_hz: float, mcs: int, n_pdus: int, pdu_bytes: int) -> BurstS
     return BurstShape(mcs, pdu_bytes, plan.n_samples / rate_hz, head / rate_hz, pdus)
 
 
-@lru_cache(maxsize=4096)
-def byte_errors(mcs: int, snr_db: float) -> float:
-    """Errors expected in each byte of a PDU whose burst is found: PER = 1 − exp(−bytes · that)."""
-    good, found = 1 - phy.pdu_error_rate(mcs, snr_db, 1), phy.burst_found_rate(snr_db)
-    return max(0.0, math.log(found / good)) if good > 0 else math.inf
-
-
+# Of a PDU that is drowned as a whole; a symbol is some fiftieth of it.
+MOST_ERRORS = 300.0
+lost_rate = lru_cache(maxsize=4096)(phy.pdu_lost_rate)
 found_rate = lru_cache(maxsize=4096)(phy.burst_found_rate)
 
 
@@ -285,13 +281,17 @@ def _head_snr_db(flight: Flight, node: int, at: float) -> float:
     return snr_db - _decibel(sum(share * noise for share, noise in parts))
 
 
-def _byte_errors_in(flight: Flight, node: int, begin: float, end: float) -> float:
-    """Mean over all parts between two times."""
-    snr_db = flight.hops[node].snr_db
-    return sum(
-        share * byte_errors(flight.shape.mcs, snr_db - _decibel(noise))
-        for share, noise in _parts(flight, node, begin, end)
-    )
+def _lost_rate_in(flight: Flight, node: int, begin: float, end: float) -> float:
+    """Of a PDU between two times: its parts fail one by one, and a drowned symbol spoils it.
+
+    The receiver knows the noise of the preamble only, and believes what a louder one says.
+    """
+    shape, snr_db = flight.shape, flight.hops[node].snr_db
+    errors = 0.0
+    for share, noise in _parts(flight, node, begin, end):
+        lost = lost_rate(shape.mcs, snr_db - _decibel(noise), shape.pdu_bytes)
+        errors += share * (MOST_ERRORS if lost == 1 else min(-math.log1p(-lost), MOST_ERRORS))
+    return -math.expm1(-errors)
 
 
 def _decibel(ratio: float) -> float:

@@ -143,6 +143,35 @@ def _axis_llrs(
 
 
 @njit(nogil=True, cache=True)
+def _folded_llrs(
+    u: NDArray[np.float32],
+    weight: NDArray[np.float32],
+    axis_bits: int,
+    out: NDArray[np.int16],
+) -> None:
+    """The same for any number of bits: each bit but the first is the first of a folded axis.
+
+    The first bit's LLR of an axis of 2 m levels is ±max over k ≤ m of 4 k |u| − 4 k (k − 1).
+    """
+    n = u.size
+    most = np.float32(MAX_LLR)
+    folded, outer = u.copy(), np.empty(n, np.float32)
+    for bit in range(axis_bits):
+        half = 1 << (axis_bits - 1 - bit)
+        outer[:] = 0
+        for k in range(1, half + 1):
+            slope, offset = np.float32(4 * k), np.float32(4 * k * (k - 1))
+            for d in range(n):
+                outer[d] = max(outer[d], slope * abs(folded[d]) - offset)
+        row = out[bit * n : (bit + 1) * n]
+        toward = np.float32(-1 if bit == 0 else 1)
+        for d in range(n):
+            value = toward * outer[d] if folded[d] > 0 else -toward * outer[d]
+            row[d] = np.int16(min(max(weight[d] * value, -most), most))
+            folded[d] = abs(folded[d]) - np.float32(half)
+
+
+@njit(nogil=True, cache=True)
 def _turns(phase: float, slope: float, edge: int, out: NDArray[np.complex64]) -> None:
     """exp(−j (phase + slope · k)) for the carriers k = −edge … edge `[2 edge + 1]`."""
     common = complex(math.cos(phase), -math.sin(phase))
@@ -204,9 +233,14 @@ def demap(
             equalised[row, d] = value
             u[d] = value.real * per_unit
             v[d] = value.imag * per_unit
-        _axis_llrs(u, weight, axis_bits, planes)
-        if bits > 1:
-            _axis_llrs(v, weight, axis_bits, planes[axis_bits * n_data :])
+        other = planes[axis_bits * n_data :]
+        if axis_bits > 3:
+            _folded_llrs(u, weight, axis_bits, planes)
+            _folded_llrs(v, weight, axis_bits, other)
+        else:
+            _axis_llrs(u, weight, axis_bits, planes)
+            if bits > 1:
+                _axis_llrs(v, weight, axis_bits, other)
         sorted_llr = llr[row * gather.size : (row + 1) * gather.size]
         for k in range(gather.size):
             sorted_llr[k] = planes[gather[k]]

@@ -32,7 +32,7 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     rate_hz: Annotated[float, Meta(ge=1e4, le=2e8)] = 5e6
     """Samples a second, and the width of the channel; the same at all nodes."""
     frequency_hz: Annotated[float, Meta(ge=0, le=1e11)] = 2.45e9
-    mcs: Annotated[int, Meta(ge=0, le=6)] = 1
+    mcs: Annotated[int, Meta(ge=0, le=9)] = 1
     """Modulation and code rate; `sdrlinkctl phy info` lists them."""
     network: Annotated[int, Meta(ge=0, le=7)] = 0
     """Bursts of other networks are skipped."""

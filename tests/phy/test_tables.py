@@ -73,8 +73,14 @@ AXIS = {
     "0": -1, "1": 1,
     "00": -3, "01": -1, "11": 1, "10": 3,
     "000": -7, "001": -5, "011": -3, "010": -1, "110": 1, "111": 3, "101": 5, "100": 7,
+    "0000": -15, "0001": -13, "0011": -11, "0010": -9, "0110": -7, "0111": -5, "0101": -3,
+    "0100": -1, "1100": 1, "1101": 3, "1111": 5, "1110": 7, "1010": 9, "1011": 11, "1001": 13,
+    "1000": 15,
 }  # fmt: skip
-NORM = {Modulation.BPSK: 1, Modulation.QPSK: 2, Modulation.QAM16: 10, Modulation.QAM64: 42}
+NORM = {
+    Modulation.BPSK: 1, Modulation.QPSK: 2, Modulation.QAM16: 10, Modulation.QAM64: 42,
+    Modulation.QAM256: 170,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("modulation", Modulation)
@@ -93,7 +99,7 @@ def test_points_have_power_1_and_neighbours_differ_in_one_bit(modulation):
     assert np.mean(np.abs(table) ** 2) == pytest.approx(1, abs=1e-6)
     apart = np.abs(table[:, None] - table[None, :])
     near = np.argwhere(np.triu(np.isclose(apart, 2 * modulation.unit)))
-    assert len(near) == {1: 1, 2: 4, 4: 24, 6: 112}[modulation.bits]
+    assert len(near) == {1: 1, 2: 4, 4: 24, 6: 112, 8: 480}[modulation.bits]
     assert apart[apart > 0].min() == pytest.approx(2 * modulation.unit)
     for one, other in near:
         assert int(one ^ other).bit_count() == 1
@@ -108,6 +114,9 @@ def test_the_mcs_table():
         (4, "16QAM 3/4", 3),
         (5, "64QAM 2/3", 4),
         (6, "64QAM 3/4", 4.5),
+        (7, "64QAM 5/6", 5),
+        (8, "256QAM 3/4", 6),
+        (9, "256QAM 5/6", pytest.approx(20 / 3)),
     ]
 
 
@@ -157,7 +166,7 @@ def test_either_copy_of_a_headers_first_bits_will_do(lost):
 
 
 @pytest.mark.parametrize(
-    "header", [BurstHeader(7, 1, 1, 0), BurstHeader(0, 0, 1, 0), BurstHeader(0, 1, 0, 0)]
+    "header", [BurstHeader(10, 1, 1, 0), BurstHeader(0, 0, 1, 0), BurstHeader(0, 1, 0, 0)]
 )
 def test_a_header_that_makes_no_sense_is_none(header):
     llr = llr_of(header_bits(header, 96))

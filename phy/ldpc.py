@@ -1,0 +1,170 @@
+"""Block codes for PDUs of any size: the LDPC codes of IEEE 802.11, shortened and punctured."""
+
+import math
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cache, cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phy.kernels.ldpc import (
+    N_COLUMNS,
+    LdpcWorkspace,
+    decode_blocks,
+    encode_blocks,
+)
+from phy.ldpc_80211n import BASE
+
+LIFTINGS = (27, 54, 81)
+MAX_ITERATIONS = 20
+
+__all__ = [
+    "LdpcWorkspace",
+    "QuasiCyclic",
+    "Segmentation",
+    "decode",
+    "encode",
+    "least_coded",
+    "segmentation",
+]
+
+
+@dataclass(frozen=True)
+class QuasiCyclic:
+    """A code of 24 Z bits, given by its base matrix; see `phy.kernels.ldpc` for the terms."""
+
+    z: int
+    rate: Fraction
+
+    @cached_property
+    def base(self) -> NDArray[np.int32]:
+        """Shifts `[rows, 24]`, −1 where there is no block."""
+        rows = BASE[self.z, f"{self.rate.numerator}/{self.rate.denominator}"].split("\n")
+        shifts = [[-1 if each == "." else int(each) for each in row.split()] for row in rows]
+        return np.array([row for row in shifts if row], np.int32)
+
+    @property
+    def n(self) -> int:
+        """Bits of a codeword."""
+        return N_COLUMNS * self.z
+
+    @property
+    def k(self) -> int:
+        """Its bits of information, which come first."""
+        return self.n - len(self.base) * self.z
+
+    @cached_property
+    def row_ends(self) -> NDArray[np.int32]:
+        """Where the edges of each block row begin, and after the last row `[rows + 1]`."""
+        per_row = np.count_nonzero(self.base >= 0, axis=1)
+        return np.concatenate(([0], np.cumsum(per_row))).astype(np.int32)
+
+    @cached_property
+    def columns(self) -> NDArray[np.int32]:
+        """Block column of each edge `[edges]`, row by row."""
+        return np.nonzero(self.base >= 0)[1].astype(np.int32)
+
+    @cached_property
+    def shifts(self) -> NDArray[np.int32]:
+        """Shift of each edge `[edges]`."""
+        found: NDArray[np.int32] = self.base[self.base >= 0]
+        return found
+
+    @cached_property
+    def middle(self) -> int:
+        """The row in which the first parity column has its block between the outer two."""
+        return int(np.flatnonzero(self.base[:, N_COLUMNS - len(self.base)] >= 0)[1])
+
+    def parity_check(self) -> NDArray[np.uint8]:
+        """The whole matrix `[n − k, n]`: what every codeword is orthogonal to."""
+        matrix = np.zeros((self.n - self.k, self.n), np.uint8)
+        lanes = np.arange(self.z)
+        for row, column in zip(*np.nonzero(self.base >= 0), strict=True):
+            shift = self.base[row, column]
+            matrix[row * self.z + lanes, column * self.z + (lanes + shift) % self.z] = 1
+        return matrix
+
+
+@dataclass(frozen=True)
+class Segmentation:
+    """How a block of `n_bits` becomes codewords of `code`.
+
+    Each carries an almost equal share of the block; the rest of its information is 0 and not sent
+    (shortened). Of the parity, as many bits at the end are not sent (punctured) as there is no
+    room for in `n_coded`.
+    """
+
+    code: QuasiCyclic
+    n_bits: int
+    n_codewords: int
+    n_coded: int
+
+    @cached_property
+    def shares(self) -> NDArray[np.int32]:
+        """Bits of the block in each codeword `[codewords]`."""
+        return _shares(self.n_bits, self.n_codewords)
+
+    @cached_property
+    def ends(self) -> NDArray[np.int32]:
+        """Where the bits of each codeword begin, and after the last `[codewords + 1]`."""
+        parity = _shares(self.n_coded - self.n_bits, self.n_codewords)
+        return np.concatenate(([0], np.cumsum(self.shares + parity))).astype(np.int32)
+
+
+def least_coded(n_bits: int, rate: Fraction) -> int:
+    """Bits that a block of `n_bits` takes at `rate`."""
+    return math.ceil(n_bits / rate)
+
+
+@lru_cache(maxsize=256)
+def segmentation(n_bits: int, rate: Fraction, room: int) -> Segmentation:
+    """A block of `n_bits` in as much of `room` coded bits as the code can use.
+
+    The fewest codewords, and of those the shortest. `room` is at least `least_coded`.
+    """
+    n_codewords = -(-n_bits // _code(LIFTINGS[-1], rate).k)
+    code = next(each for z in LIFTINGS if n_codewords * (each := _code(z, rate)).k >= n_bits)
+    most = n_bits + n_codewords * (code.n - code.k)
+    return Segmentation(code, n_bits, n_codewords, min(room, most))
+
+
+@cache
+def _code(z: int, rate: Fraction) -> QuasiCyclic:
+    return QuasiCyclic(z, rate)
+
+
+def _shares(n: int, n_codewords: int) -> NDArray[np.int32]:
+    share, more = divmod(n, n_codewords)
+    return np.array([share + (i < more) for i in range(n_codewords)], np.int32)
+
+
+def encode(bits: NDArray[np.uint8], form: Segmentation) -> NDArray[np.uint8]:
+    """Coded bits `[blocks, n_coded]` of blocks of bits `[blocks, n_bits]`."""
+    code = form.code
+    out = np.empty((len(bits), form.n_coded), np.uint8)
+    encode_blocks(
+        bits, code.z, code.row_ends, code.columns, code.shifts, code.middle,
+        form.shares, form.ends, out,
+    )  # fmt: skip
+    return out
+
+
+def decode(
+    llr: NDArray[np.int16],
+    form: Segmentation,
+    work: LdpcWorkspace,
+    max_iterations: int = MAX_ITERATIONS,
+) -> NDArray[np.uint8]:
+    """The likeliest bits `[blocks, n_bits]` behind LLRs `[blocks, n_coded]`, positive for 0.
+
+    A block whose checks do not hold after `max_iterations` is given as it stands then.
+    """
+    code = form.code
+    out = np.empty((len(llr), form.n_bits), np.uint8)
+    decode_blocks(
+        llr, code.z, code.row_ends, code.columns, code.shifts,
+        form.shares, form.ends, max_iterations,
+        work.llr, work.posteriors, work.messages, work.scratch, out,
+    )  # fmt: skip
+    return out

@@ -1,0 +1,146 @@
+"""LDPC codes: the standard's codewords, blocks of any size, and how much noise they bear."""
+
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from phy.kernels.ldpc import LdpcWorkspace, decode_codeword, encode_codeword
+from phy.kernels.ldpc_plain import decode_codeword_plain
+from phy.kernels.ldpc_rows import MAX_POSTERIOR
+from phy.ldpc import LIFTINGS, QuasiCyclic, decode, encode, least_coded, segmentation
+
+GOLDEN = Path(__file__).parents[3] / "shared" / "data" / "golden" / "ldpc_80211n_codewords.json"
+RATES = [Fraction(1, 2), Fraction(2, 3), Fraction(3, 4), Fraction(5, 6)]
+CODES = [QuasiCyclic(z, rate) for z in LIFTINGS for rate in RATES]
+SEED = 5
+
+codes = pytest.mark.parametrize("code", CODES, ids=lambda code: f"{code.n}-{code.rate}")
+
+
+def random_bits(rng, *shape):
+    return rng.integers(0, 2, shape).astype(np.uint8)
+
+
+def encoded(code, bits):
+    out = np.empty(code.n, np.uint8)
+    encode_codeword(bits, code.z, code.row_ends, code.columns, code.shifts, code.middle, out)
+    return out
+
+
+def noisy(rng, coded, ebn0_db, rate, scale=8):
+    """LLRs of antipodal bits, as the demapper makes them."""
+    variance = 10 ** (-ebn0_db / 10) / (2 * float(rate))
+    y = 1 - 2.0 * coded + np.sqrt(variance) * rng.standard_normal(coded.shape)
+    return np.clip(np.round(2 * scale * y / variance), -511, 511).astype(np.int16)
+
+
+@pytest.mark.skipif(not GOLDEN.exists(), reason="the codewords are not here")
+def test_codewords_made_elsewhere_are_ours():
+    seen = set()
+    for each in json.loads(GOLDEN.read_text()):
+        code = QuasiCyclic(each["n"] // 24, Fraction(each["k"], each["n"]))
+        word = np.unpackbits(np.frombuffer(bytes.fromhex(each["codeword_hex"]), np.uint8))[: code.n]
+        assert np.array_equal(encoded(code, word[: code.k].copy()), word)
+        seen.add((code.n, code.rate))
+    assert len(seen) == len(CODES)
+
+
+@codes
+def test_every_check_holds_for_every_codeword(code):
+    rng = np.random.default_rng(SEED)
+    matrix = code.parity_check().astype(np.int64)
+    words = np.array([encoded(code, random_bits(rng, code.k)) for _ in range(20)])
+    assert not np.any(words @ matrix.T % 2)
+    # Each bit is in at least one check, and each check in as many as its row has edges.
+    assert np.all(matrix.sum(axis=0) >= 1)
+    assert np.array_equal(matrix.sum(axis=1), np.repeat(np.diff(code.row_ends), code.z))
+
+
+@codes
+def test_the_vectors_do_what_the_plain_decoder_says_bit_for_bit(code):
+    """In noise from little to hopeless, and with values at the edges of the range."""
+    rng = np.random.default_rng(SEED)
+    work = LdpcWorkspace()
+    outcomes = set()
+    for ebn0_db, at_edges in ((9.0, 0), (6.0, 0), (3.0, 0), (2.0, 20), (-3.0, 5)):
+        word = encoded(code, random_bits(rng, code.k))
+        llr = noisy(rng, word, ebn0_db, code.rate)
+        edges = rng.choice([-511, 0, MAX_POSTERIOR, -MAX_POSTERIOR, 1, -1], at_edges)
+        llr[rng.integers(0, code.n, at_edges)] = edges
+        for n in (1, 2, 12):
+            given = (llr, code.z, code.row_ends, code.columns, code.shifts, n)
+            took = decode_codeword(*given, work.posteriors, work.messages, work.scratch)
+            expected, posteriors = decode_codeword_plain(*given)
+            assert took == expected, (SEED, ebn0_db, n)
+            assert np.array_equal(work.posteriors[:, : code.z], posteriors), (SEED, ebn0_db, n)
+            outcomes.add(took > 0)
+    assert outcomes == {True, False}
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(st.integers(1, 2047 + 4), st.sampled_from(RATES), st.floats(0, 1), st.integers(0, 2**32 - 1))
+def test_blocks_of_any_size_come_back(n_bytes, rate, more, seed):
+    rng = np.random.default_rng(seed)
+    least = least_coded(8 * n_bytes, rate)
+    room = round(least * (1 + more))
+    form = segmentation(8 * n_bytes, rate, room)
+    n_blocks = 2
+    bits = random_bits(rng, n_blocks, form.n_bits)
+    coded = encode(bits, form)
+    assert coded.shape == (n_blocks, form.n_coded)
+    # The code's own rate is the lowest there is.
+    parity = np.diff(form.ends) - form.shares
+    assert form.n_coded == room or np.all(parity == form.code.n - form.code.k)
+    assert form.n_coded >= least
+    assert form.shares.sum() == form.n_bits
+    assert np.ptp(form.shares) <= 1
+    llr = (100 - 200 * coded.astype(np.int16)).astype(np.int16)
+    assert np.array_equal(decode(llr, form, LdpcWorkspace()), bits), seed
+
+
+def test_the_fewest_and_shortest_codewords_are_taken():
+    found = {n: segmentation(n, RATES[0], 2 * n) for n in (8, 324, 325, 648, 649, 972, 973, 1945)}
+    assert {n: (form.n_codewords, form.code.z) for n, form in found.items()} == {
+        8: (1, 27), 324: (1, 27), 325: (1, 54), 648: (1, 54), 649: (1, 81), 972: (1, 81),
+        973: (2, 54), 1945: (3, 54 + 27),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("n_bytes", "rate", "ebn0_db"),
+    [
+        (64, RATES[0], 2.3),
+        (220, RATES[0], 2.1),
+        (220, RATES[1], 2.8),
+        (220, RATES[2], 3.5),
+        (220, RATES[3], 4.5),
+        (1500, RATES[0], 2.2),
+    ],
+)
+def test_it_bears_noise_near_its_threshold(n_bytes, rate, ebn0_db):
+    """At most 1 % of blocks lost; two decibels less and nearly all are."""
+    form = segmentation(8 * (n_bytes + 4), rate, least_coded(8 * (n_bytes + 4), rate))
+    rng = np.random.default_rng(SEED)
+    bits = random_bits(rng, 1000 if n_bytes < 1000 else 300, form.n_bits)
+    work = LdpcWorkspace()
+    lost = []
+    for at_db in (ebn0_db, ebn0_db - 2):
+        llr = noisy(rng, encode(bits, form), at_db, rate)
+        lost.append(np.any(decode(llr, form, work) != bits, axis=1).mean())
+    assert lost[0] <= 0.01, SEED
+    assert lost[1] > 0.9, SEED
+
+
+def test_what_cannot_be_decoded_ends_in_time_and_harms_nothing_after_it():
+    form = segmentation(1792, RATES[0], 3584)
+    rng, work = np.random.default_rng(SEED), LdpcWorkspace()
+    bits = random_bits(rng, 1, form.n_bits)
+    llr = noisy(rng, encode(bits, form), 4.0, RATES[0])
+    for wrong in (np.zeros_like(llr), -llr, np.full_like(llr, -511), np.full_like(llr, -32768)):
+        decode(wrong, form, work)
+        assert np.array_equal(decode(llr, form, work), bits)
