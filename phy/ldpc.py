@@ -76,15 +76,6 @@ class QuasiCyclic:
         """The row in which the first parity column has its block between the outer two."""
         return int(np.flatnonzero(self.base[:, N_COLUMNS - len(self.base)] >= 0)[1])
 
-    def parity_check(self) -> NDArray[np.uint8]:
-        """The whole matrix `[n − k, n]`: what every codeword is orthogonal to."""
-        matrix = np.zeros((self.n - self.k, self.n), np.uint8)
-        lanes = np.arange(self.z)
-        for row, column in zip(*np.nonzero(self.base >= 0), strict=True):
-            shift = self.base[row, column]
-            matrix[row * self.z + lanes, column * self.z + (lanes + shift) % self.z] = 1
-        return matrix
-
 
 @dataclass(frozen=True)
 class Segmentation:

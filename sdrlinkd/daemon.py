@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from random import Random
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import zmq
 
@@ -21,9 +21,13 @@ from sdrlinkd.config import Config, Setup
 from sdrlinkd.control import Control, Verb
 from sdrlinkd.errors import UserError
 from sdrlinkd.link import Link
-from sdrlinkd.node import Due, Node
+from sdrlinkd.node import Node
 from sdrlinkd.pdulink import DirectLink, PduLink
 from sdrlinkd.sdnotify import Notifier
+
+if TYPE_CHECKING:
+    # Loading it brings recordings, of which a daemon of a real robot has none.
+    from sdrlinkd.adapters import Due
 
 log = logging.getLogger("sdrlinkd")
 
@@ -117,7 +121,7 @@ def _make_pdu_link(setup: Setup, rng: Random) -> PduLink:
     return make_modem(config, setup.node_id, rng)
 
 
-def _own_traffic(setup: Setup, stack: contextlib.AsyncExitStack) -> Iterator[Due]:
+def _own_traffic(setup: Setup, stack: contextlib.AsyncExitStack) -> Iterator["Due"]:
     # Recordings bring much that a daemon of a real robot never needs.
     from sdrlinkd.adapters import BuiltInRobot, due_messages, open_bag
 

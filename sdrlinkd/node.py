@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from sdrlinkd import __version__
 from sdrlinkd.bus import Bus, Ingress
@@ -21,11 +22,11 @@ from sdrlinkd.link import (
 from sdrlinkd.pdulink import Heard, PduLink
 from sdrlinkd.reports import Snapshot
 
+if TYPE_CHECKING:
+    # Loading it brings recordings, of which a daemon of a real robot has none.
+    from sdrlinkd.adapters import Due
+
 TICK_S = 0.05
-
-
-# A message of our own to send: seconds after the link's clock began, topic id, payload.
-Due = tuple[float, int, bytes]
 
 
 class Node:
@@ -110,7 +111,7 @@ class Node:
         self._link.attach(traits, config.access, config.rate)
         self._is_lockstep = traits.is_lockstep
 
-    def play(self, traffic: Iterator[Due]) -> None:
+    def play(self, traffic: Iterator["Due"]) -> None:
         """Send messages of our own at their time."""
         self._traffic = traffic
         self._upcoming = next(traffic, None)

@@ -2,7 +2,7 @@
 
 White noise only. What others send meanwhile is noise too: their powers add up. The errors in a PDU
 are the sum over its parts, each for as long as it lasts at its own SINR. So its worst part decides,
-as the code cannot bridge even one bad symbol, but a graze of a sample or two does no harm.
+as the receiver believes even one bad symbol, but a graze of a sample or two does no harm.
 """
 
 import math

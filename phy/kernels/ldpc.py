@@ -12,8 +12,8 @@ knows (Hocevar 2004).
 *Min-sum.* A check sends to each of its bits the product of the signs and the least magnitude of all
 its other bits. That is the least magnitude of all, and for the bit that has it the second least:
 two minima and one product of signs serve all edges. The minimum is an overestimate, so messages
-are taken times 13/16 (Chen and Fossorier 2002); at rate 1/2, 3/4 would lose 0.1 dB, and so would
-rounding them up.
+are taken times 13/16 (Chen and Fossorier 2002), to the nearest: at rate 1/2 both 3/4 and rounding
+up lose more blocks.
 
 *Rotation.* Each block column of posteriors is stored as a periodic sequence that goes on for a
 vector or more beyond Z. Then Z lanes from any shift on are contiguous in memory; lanes past Z hold

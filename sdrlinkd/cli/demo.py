@@ -3,16 +3,15 @@
 import sys
 from enum import StrEnum
 from pathlib import Path
-from types import ModuleType
 from typing import Annotated
 
-import msgspec
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from sdrlinkd import __version__
 from sdrlinkd.cli.app import app
+from sdrlinkd.cli.output import REPORT, load_pictures, make_folder, write_report
 from sdrlinkd.demo import (
     DemoReport,
     Options,
@@ -24,7 +23,6 @@ from sdrlinkd.demo import (
     table_6,
     topic_table,
 )
-from sdrlinkd.errors import UserError
 from sdrlinkd.wire import MAX_PDU_SIZE, MIN_PDU_SIZE
 
 
@@ -103,8 +101,8 @@ def demo(
     """Send a robot's messages through daemons and radios; measure what the paper measured."""
     # In a file, names are not cut short at the 80 columns of a terminal that is not there.
     console = Console() if sys.stdout.isatty() else Console(width=110)
-    pictures = _load_pictures()
-    _make_folder(out)
+    pictures = load_pictures("sdrlinkd.demo")
+    make_folder(out, PICTURES)
     results: list[RunResult] = []
     traces: dict[str, Trace] = {}
     for kind in dict.fromkeys(link or list(LinkKind)):
@@ -119,7 +117,10 @@ def demo(
         result, traces[kind.value] = _run(console, source, options)
         results.append(result)
         source.recording.close()
-    _write(out, json_file, DemoReport(version=__version__, runs=results))
+    told = DemoReport(version=__version__, runs=results)
+    for path in (out / REPORT, json_file):
+        if path is not None:
+            write_report(path, told)
     caption = _caption(results[0])
     pictures.latency_cdf(traces, out / PICTURES[0], caption)
     pictures.paths(traces, out / PICTURES[1], caption)
@@ -128,7 +129,7 @@ def demo(
     console.print(table_6(results))
     for result in results:
         _say(console, _summary(result))
-    _say(console, f"wrote {out}/report.json, {', '.join(PICTURES)}")
+    _say(console, f"wrote {out}/{REPORT}, {', '.join(PICTURES)}")
     if results[0].damage:
         _say(console, f"warning: {results[0].damage}", style="yellow")
 
@@ -185,34 +186,3 @@ def _caption(result: RunResult) -> str:
 
 def _say(console: Console, text: str, style: str | None = None) -> None:
     console.print(text, style=style, highlight=False, markup=False, soft_wrap=True)
-
-
-def _load_pictures() -> ModuleType:
-    """Matplotlib is an extra, and slow to load: only here, and before a run rather than after."""
-    try:
-        from sdrlinkd.demo import pictures
-    except ImportError:
-        raise UserError(
-            "the pictures need matplotlib; install it with: pip install 'sdrlinkd[plots]'"
-        ) from None
-    return pictures
-
-
-def _make_folder(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        for name in ("report.json", *PICTURES):
-            (out / name).open("ab").close()
-    except OSError as error:
-        raise UserError(f"{error.filename} cannot be written ({error.strerror})") from None
-
-
-def _write(out: Path, json_file: Path | None, report: DemoReport) -> None:
-    text = msgspec.json.format(msgspec.json.encode(report), indent=2)
-    for path in (out / "report.json", json_file):
-        if path is not None:
-            try:
-                path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_bytes(text + b"\n")
-            except OSError as error:
-                raise UserError(f"{path} cannot be written ({error.strerror})") from None

@@ -6,13 +6,12 @@ import tempfile
 from pathlib import Path
 from typing import Annotated
 
-import msgspec
 import typer
 
 from sdrlinkd import __version__
-from sdrlinkd.cli.pace import MAX_SEED, Pace
+from sdrlinkd.cli.pace import MAX_SEED, Pace, chosen_scenario
 from sdrlinkd.errors import UserError
-from sdrlinkd.lab import load_scenario, make_hub
+from sdrlinkd.lab import make_hub
 
 DEFAULT_DIRECTORY = Path(tempfile.gettempdir()) / "sdrlink-ether"
 
@@ -41,10 +40,7 @@ def ether(
     """Serve one simulated air to daemons with `backend = "ether"`, until Ctrl-C."""
     chosen = None
     if scenario is not None:
-        changes = {"seed": seed, "duration_s": duration, "pace": pace.value if pace else None}
-        chosen = msgspec.structs.replace(
-            load_scenario(scenario), **{k: v for k, v in changes.items() if v is not None}
-        )
+        chosen = chosen_scenario(scenario, seed, duration, pace)
     hub = make_hub(chosen, directory, traces)
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: hub.stop())

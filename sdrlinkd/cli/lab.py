@@ -1,11 +1,9 @@
 """`lab`: a scenario with real daemons on one simulated air, in one command."""
 
-import math
 import sys
 import time
 from enum import StrEnum
 from pathlib import Path
-from types import ModuleType
 from typing import Annotated
 
 import msgspec
@@ -14,14 +12,13 @@ from rich.console import Console
 from rich.live import Live
 
 from sdrlinkd.cli.app import app
-from sdrlinkd.cli.pace import MAX_SEED, Pace
-from sdrlinkd.errors import UserError
+from sdrlinkd.cli.output import REPORT, load_pictures, make_folder, write_report
+from sdrlinkd.cli.pace import MAX_SEED, Pace, chosen_scenario
 from sdrlinkd.lab import (
     LabOptions,
     LabReport,
     LabState,
     live_table,
-    load_scenario,
     pair_table,
     run_lab,
 )
@@ -65,20 +62,14 @@ def lab(
 ) -> None:
     """Run several robots' daemons on one simulated air; measure who got what of whom."""
     console = Console() if sys.stdout.isatty() else Console(width=110)
-    chosen = load_scenario(scenario)
-    if duration is not None and not math.isfinite(duration):
-        raise UserError(f"--duration: got {duration}; allowed: a number of seconds")
-    changes = {"seed": seed, "duration_s": duration, "pace": pace.value if pace else None}
-    chosen = msgspec.structs.replace(
-        chosen, **{key: value for key, value in changes.items() if value is not None}
-    )
+    chosen = chosen_scenario(scenario, seed, duration, pace)
     if access is not None:
         section = {**chosen.daemon.get("access", {}), "policy": access.value}
         chosen = msgspec.structs.replace(chosen, daemon={**chosen.daemon, "access": section})
     if bag is None and chosen.bag:
         bag = scenario.parent / chosen.bag
-    pictures = _load_pictures()
-    _make_folder(out)
+    pictures = load_pictures("sdrlinkd.lab")
+    make_folder(out, [PICTURE])
     options = LabOptions(scenario, chosen, bag, traces)
     title = chosen.title or scenario.stem
     began = time.monotonic()
@@ -89,13 +80,13 @@ def lab(
                 live.update(live_table(title, state), refresh=True)
 
         report = run_lab(options, watch)
-    _write(out, report)
+    write_report(out / REPORT, report)
     wall_s = time.monotonic() - began
     pictures.draw(report, out / PICTURE, _caption(report, scenario))
     console.print(pair_table(report))
     for line in _summary(report, wall_s):
         console.print(line, highlight=False, markup=False, soft_wrap=True)
-    console.print(f"wrote {out}/report.json, {PICTURE}", highlight=False, markup=False)
+    console.print(f"wrote {out}/{REPORT}, {PICTURE}", highlight=False, markup=False)
     if not all(robot.ledger_adds_up for robot in report.robots):
         raise typer.Exit(1)
 
@@ -130,30 +121,3 @@ def _caption(report: LabReport, scenario: Path) -> str:
         f"sdrlinkctl lab {scenario.name}, {report.source}, {report.duration_s:g} s, "
         f"{report.pace}, seed {report.seed}; {report.robots[0].access}"
     )
-
-
-def _load_pictures() -> ModuleType:
-    """Matplotlib is an extra, and slow to load: only here, and before a run rather than after."""
-    try:
-        from sdrlinkd.lab import pictures
-    except ImportError:
-        raise UserError(
-            "the pictures need matplotlib; install it with: pip install 'sdrlinkd[plots]'"
-        ) from None
-    return pictures
-
-
-def _make_folder(out: Path) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"{error.filename} cannot be written ({error.strerror})") from None
-
-
-def _write(out: Path, report: LabReport) -> None:
-    path = out / "report.json"
-    text = msgspec.json.format(msgspec.json.encode(report), indent=2)
-    try:
-        path.write_bytes(text + b"\n")
-    except OSError as error:
-        raise UserError(f"{path} cannot be written ({error.strerror})") from None

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Annotated
 
 import msgspec
@@ -14,6 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from sdrlinkd.cli.app import AsJson, app
+from sdrlinkd.cli.output import load_pictures
 from sdrlinkd.cli.pdu import one_line
 from sdrlinkd.config import load_registry
 from sdrlinkd.errors import UserError
@@ -128,7 +128,7 @@ def spectrum(
     """Draw power over frequency and time."""
     from sdrlinkd.iq import spectrum_of
 
-    pictures = _load_pictures()
+    pictures = load_pictures("sdrlinkd.iq")
     console = Console()
     with (
         _open(file, type_name, rate) as recording,
@@ -149,7 +149,7 @@ def constellation(
     out: Out = None,
 ) -> None:
     """Draw the equalised points of the bursts in a recording."""
-    pictures = _load_pictures()
+    pictures = load_pictures("sdrlinkd.iq")
     console = Console()
     with (
         _open(file, type_name, rate) as recording,
@@ -235,14 +235,3 @@ def _print_counters(console: Console, counters: dict[str, int], recording: "IqRe
 
 def _stem(file: Path) -> str:
     return str(file).removesuffix(".sigmf-meta").removesuffix(".sigmf-data")
-
-
-def _load_pictures() -> ModuleType:
-    """Matplotlib is an extra, and slow to load: only here."""
-    try:
-        from sdrlinkd.iq import pictures
-    except ImportError:
-        raise UserError(
-            "the pictures need matplotlib; install it with: pip install 'sdrlinkd[plots]'"
-        ) from None
-    return pictures

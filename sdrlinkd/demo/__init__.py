@@ -1,5 +1,6 @@
 """The paper's experiment with real daemons: send a robot's messages across, see what arrives."""
 
+from sdrlinkd.demo.hearing import Hearing
 from sdrlinkd.demo.links import LINKS, Options
 from sdrlinkd.demo.nodes import daemon_process, problems_of, snapshot_of, wait_until_up
 from sdrlinkd.demo.processes import Process
@@ -12,6 +13,7 @@ from sdrlinkd.demo.trace import Pair, Sample, Trace
 __all__ = [
     "LINKS",
     "DemoReport",
+    "Hearing",
     "Options",
     "Pair",
     "Process",

@@ -1,15 +1,14 @@
 """Daemons of their own process, and the consumer that listens to one."""
 
 import contextlib
-import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Self
 
 import msgspec
 
-from sdrlinkd.client import ControlClient, NoDaemonError, Subscriber
+from sdrlinkd.client import ControlClient, Message, NoDaemonError
+from sdrlinkd.demo.hearing import Hearing
 from sdrlinkd.demo.links import NODE_ID
 from sdrlinkd.demo.processes import Process
 from sdrlinkd.demo.trace import Sample, Trace
@@ -62,39 +61,20 @@ def wait_until_up(process: Process, directory: Path) -> None:
     raise UserError(f"the daemon did not start:\n{process.log()}")
 
 
-class Consumer(threading.Thread):
-    """Takes what a daemon republishes, on a thread of its own.
+class Consumer(Hearing):
+    """Takes what a daemon republishes into a trace.
 
     `by_age`: the messages were recorded before, so that only their age tells how long they took.
     """
 
     def __init__(self, directory: Path, trace: Trace, by_age: bool = False) -> None:
-        super().__init__(name="consumer", daemon=True)
         self._prefix = f"/rx_robot_{NODE_ID}/"
         self._trace = trace
         self._by_age = by_age
-        self._subscriber = Subscriber(self._prefix + "*", directory=directory, depth=0)
-        self._done = threading.Event()
-        self.count = 0
-        self.last_at = 0.0
+        super().__init__(directory, self._note, self._prefix + "*")
 
-    def run(self) -> None:
-        """Receive until told to end."""
-        while not self._done.is_set():
-            message = self._subscriber.receive(timeout_s=0.1)
-            if message is not None:
-                self.last_at = time.monotonic()
-                name = message.topic.removeprefix(self._prefix)
-                age_us = message.age_us if self._by_age else None
-                age_s = None if age_us is None else age_us * 1e-6
-                self._trace.received[name].append(Sample(self.last_at, message.payload, age_s))
-                self.count += 1
-
-    def __enter__(self) -> Self:
-        self.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._done.set()
-        self.join()
-        self._subscriber.close()
+    def _note(self, message: Message, at: float) -> None:
+        name = message.topic.removeprefix(self._prefix)
+        age_us = message.age_us if self._by_age else None
+        age_s = None if age_us is None else age_us * 1e-6
+        self._trace.received[name].append(Sample(at, message.payload, age_s))

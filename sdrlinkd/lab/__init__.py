@@ -4,7 +4,7 @@ from sdrlinkd.lab.hub import make_hub
 from sdrlinkd.lab.report import LabReport, PairResult, RobotResult
 from sdrlinkd.lab.run import LabOptions, LabState, run_lab
 from sdrlinkd.lab.scenario import Scenario, load_scenario
-from sdrlinkd.lab.simulation import Arrival, Pair, Simulation, Station, carrier_traits
+from sdrlinkd.lab.simulation import Arrival, Pair, Simulation, Station
 from sdrlinkd.lab.table import live_table, pair_table
 
 __all__ = [
@@ -18,7 +18,6 @@ __all__ = [
     "Scenario",
     "Simulation",
     "Station",
-    "carrier_traits",
     "live_table",
     "load_scenario",
     "make_hub",

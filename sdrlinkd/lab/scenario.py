@@ -1,6 +1,7 @@
 """A scenario: the air, the robots on it and what they send, as TOML."""
 
 import math
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -161,7 +162,7 @@ def _check_numbers(scenario: Scenario, source: str) -> None:
 
 
 def _check_path(robot: RobotParams, source: str) -> None:
-    for (t0, x0, y0), (t1, x1, y1) in zip(robot.path, robot.path[1:], strict=False):
+    for (t0, x0, y0), (t1, x1, y1) in pairwise(robot.path):
         if t1 <= t0:
             raise ConfigError(
                 f"{source}: robot.path of robot {robot.id}: got t = {t1:g} s after {t0:g} s; "

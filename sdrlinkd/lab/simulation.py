@@ -6,10 +6,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 from itertools import count
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
-import phy
-from backends import GAP, AirParams, BurstMedium, Capabilities, Flight, RadioParams, World
+from backends import AirParams, BurstMedium, Flight, RadioParams, World
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import (
     AS_CONFIGURED,
@@ -23,6 +22,7 @@ from sdrlinkd.link import (
     RateParams,
     Sensed,
 )
+from sdrlinkd.modem import Airtimes, carrier_traits
 
 INFINITE = float("inf")
 TICK_S = 0.05
@@ -32,23 +32,6 @@ IDLE_TICK_S = 1.0
 KEPT_AGES = 1000
 ROUNDING = 1e-3
 """So much of a block is nothing: clocks are not quite the same."""
-
-
-class BurstTimes(Protocol):
-    """How long bursts are; the modem's Airtimes."""
-
-    @property
-    def overhead_s(self) -> float:
-        """Of a burst, besides its PDUs."""
-
-    def airtime_s(self, mcs: int, n_pdus: int) -> float:
-        """Length of a burst."""
-
-    def most_pdus(self, mcs: int, airtime_s: float) -> int:
-        """How many PDUs fit."""
-
-    def longest_s(self) -> tuple[float, ...]:
-        """The longest burst of each MCS."""
 
 
 class Arrival(NamedTuple):
@@ -115,7 +98,7 @@ class Simulation:
         radios: Mapping[int, RadioParams],
         links: Mapping[int, Link],
         modem: ModemParams,
-        airtimes: BurstTimes,
+        airtimes: Airtimes,
         access: AccessParams,
         arrivals: Mapping[int, Iterable[Arrival]],
         *,
@@ -138,7 +121,7 @@ class Simulation:
         for node, radio in radios.items():
             link = links[node]
             can = self._medium.join(node, radio)
-            traits = carrier_traits(can, modem, airtimes, link.params.pdu_size)
+            traits = carrier_traits("ether", can, modem, airtimes)
             link.attach(traits, access, rate or RateParams())
             pace, coming = 1 + 1e-6 * radio.clock_ppm, iter(arrivals.get(node, ()))
             least_s = traits.turnaround_s + airtimes.airtime_s(max(link.rate.usable), 1)
@@ -246,28 +229,6 @@ class Simulation:
                 station.ticked_at = self.now
                 link.handle_timers(self.now * station.pace)
         self._at(self._block(self.now + TICK_S), _ARRIVE, self._tick)
-
-
-def carrier_traits(
-    can: Capabilities, modem: ModemParams, airtimes: BurstTimes, pdu_size: int
-) -> CarrierTraits:
-    """What a modem tells of itself on a radio in lock-step."""
-    return CarrierTraits(
-        kind="ether",
-        is_lockstep=True,
-        senses=True,
-        turnaround_s=can.turnaround_s,
-        index_error_s=can.index_error_s,
-        lead_s=can.lead_s + can.turnaround_s,
-        react_s=can.block_s,
-        detect_s=2 * phy.SENSE_WINDOW / modem.rate_hz,
-        overhead_s=airtimes.overhead_s,
-        gap_s=GAP / modem.rate_hz,
-        ahead_s=can.block_s,
-        longest_burst_s=airtimes.longest_s(),
-        mcs=modem.mcs,
-        needed_snr_db=tuple(phy.needed_snr_db(i, pdu_size) for i in range(len(phy.MCS_TABLE))),
-    )
 
 
 def _next_chance(station: Station, access: AccessParams, sensed: Sensed, t: float) -> float:

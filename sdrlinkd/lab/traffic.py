@@ -1,6 +1,5 @@
 """Producers and consumers of a run: what each robot sends, and what each got of whom."""
 
-import contextlib
 import threading
 import time
 from collections import defaultdict
@@ -8,11 +7,10 @@ from pathlib import Path
 from typing import Self
 
 from sdrlinkd.adapters import due_messages, paced
-from sdrlinkd.client import NoDaemonError, Publisher, Subscriber
-from sdrlinkd.demo import Sample, Source, Trace
+from sdrlinkd.client import Message, NoDaemonError, Publisher
+from sdrlinkd.demo import Hearing, Sample, Source, Trace
 
 FOREVER = float("inf")
-POLL_S = 0.1
 
 
 def plan(source: Source, duration_s: float) -> dict[str, list[Sample]]:
@@ -66,44 +64,25 @@ class Player(threading.Thread):
         self.join()
 
 
-class Listener(threading.Thread):
+class Listener(Hearing):
     """Takes everything that a daemon republishes.
 
     `by_age`: the air has a time of its own, so only a message's age tells how long it took.
     """
 
     def __init__(self, directory: Path, by_age: bool) -> None:
-        super().__init__(name="listener", daemon=True)
+        super().__init__(directory, self._note)
         self._by_age = by_age
-        self._subscriber = Subscriber(directory=directory, depth=0)
-        self._done = threading.Event()
-        self.count = 0
         self.received: dict[int, dict[str, list[Sample]]] = defaultdict(lambda: defaultdict(list))
         """By source and registry name."""
 
-    def run(self) -> None:
-        """Receive until told to end."""
-        while not self._done.is_set():
-            message = self._subscriber.receive(timeout_s=POLL_S)
-            if message is None:
-                continue
-            at, age_s = time.monotonic(), None
-            if self._by_age:
-                at = FOREVER
-                age_s = FOREVER if message.age_us is None else message.age_us * 1e-6
-            name = message.topic.removeprefix(f"/rx_robot_{message.source}/")
-            self.received[message.source][name].append(Sample(at, message.payload, age_s))
-            self.count += 1
-
-    def __enter__(self) -> Self:
-        self.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._done.set()
-        self.join()
-        with contextlib.suppress(NoDaemonError):
-            self._subscriber.close()
+    def _note(self, message: Message, at: float) -> None:
+        age_s = None
+        if self._by_age:
+            at = FOREVER
+            age_s = FOREVER if message.age_us is None else message.age_us * 1e-6
+        name = message.topic.removeprefix(f"/rx_robot_{message.source}/")
+        self.received[message.source][name].append(Sample(at, message.payload, age_s))
 
 
 def trace_of(source: Source, sent: dict[str, list[Sample]], got: dict[str, list[Sample]]) -> Trace:

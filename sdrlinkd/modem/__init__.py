@@ -1,6 +1,8 @@
 """The modem: PDUs through OFDM and a radio."""
 
+from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.link import ModemLink
 from sdrlinkd.modem.radios import make_modem
+from sdrlinkd.modem.traits import carrier_traits
 
-__all__ = ["ModemLink", "make_modem"]
+__all__ = ["Airtimes", "ModemLink", "carrier_traits", "make_modem"]

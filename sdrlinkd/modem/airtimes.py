@@ -23,6 +23,10 @@ class Airtimes:
         """Length of a burst in s."""
         return self.samples(mcs, n_pdus) / self._rate_hz
 
+    def needed_snr_db(self) -> tuple[float, ...]:
+        """What each MCS needs."""
+        return tuple(phy.needed_snr_db(mcs, self._pdu_size) for mcs in range(len(phy.MCS_TABLE)))
+
     @property
     def overhead_s(self) -> float:
         """Preamble, header, and the last symbol that is not full."""

@@ -7,7 +7,7 @@ import time
 from collections.abc import Sequence
 
 import phy
-from backends import GAP, BackendError, Radio, Tuning
+from backends import BackendError, Radio, Tuning
 from sdrlinkd.config import ModemParams
 from sdrlinkd.errors import UserError
 from sdrlinkd.link import Burst, CarrierTraits, Opportunity, Outcome
@@ -16,16 +16,13 @@ from sdrlinkd.modem.clock import StreamClock
 from sdrlinkd.modem.ear import Ear
 from sdrlinkd.modem.plan import AirPlan
 from sdrlinkd.modem.rx_thread import Demodulation, ReceiverHere, ReceiverThread
+from sdrlinkd.modem.traits import carrier_traits
 from sdrlinkd.modem.transmission import BurstReport, Transmission
 from sdrlinkd.pdulink import Heard, PduListener
 from sdrlinkd.reports import CarrierReport
 
 TIMER_S = 0.001
 """The event loop's timers count in this; shorter waits would be busy ones."""
-HANDOVER_S = 0.001
-"""A burst composed for a free air begins so much later: time to modulate it."""
-REACTION_S = 0.002
-"""From the last sample of a block to a decision, beyond the block itself."""
 INFINITE = float("inf")
 
 
@@ -47,7 +44,6 @@ class ModemLink:
         lead_grows: bool = False,
     ) -> None:
         self._params = params
-        self._pdu_size = pdu_size
         self._radio = radio
         self._kind = kind
         self._airtimes = Airtimes(params, pdu_size)
@@ -79,37 +75,18 @@ class ModemLink:
         except BackendError as error:
             raise UserError(str(error)) from None
         can = self._radio.capabilities
-        lead_s = can.lead_s + can.turnaround_s + (HANDOVER_S if can.paced else 0.0)
+        traits = carrier_traits(self._kind, can, params, self._airtimes)
         self._can = can
         self._clock = StreamClock(params.rate_hz, can.paced, can.lockstep)
-        # In lock-step composing takes no time, but it happens only when there is a block.
-        ahead_s = can.block_s if can.lockstep else params.tx_lead_s
-        self._plan = AirPlan(math.ceil(lead_s * params.rate_hz), round(ahead_s * params.rate_hz))
+        lead, ahead = traits.lead_s * params.rate_hz, traits.ahead_s * params.rate_hz
+        self._plan = AirPlan(math.ceil(lead), round(ahead))
         if can.lockstep:
             self._rx = ReceiverHere(self._ear, params.rate_hz, self._step)
         else:
             self._rx = ReceiverThread(self._ear, params.rate_hz, self._deliver, wakes=not can.paced)
         self._listener = listener
         self._state = "up"
-        return CarrierTraits(
-            kind=self._kind,
-            is_lockstep=can.lockstep,
-            transmits=can.transmits,
-            senses=can.receives,
-            turnaround_s=can.turnaround_s,
-            index_error_s=can.index_error_s,
-            lead_s=lead_s,
-            react_s=can.block_s + (REACTION_S if can.paced else 0.0),
-            detect_s=2 * phy.SENSE_WINDOW / params.rate_hz,
-            overhead_s=self._airtimes.overhead_s,
-            gap_s=GAP / params.rate_hz,
-            ahead_s=ahead_s,
-            longest_burst_s=self._airtimes.longest_s(),
-            mcs=params.mcs,
-            needed_snr_db=tuple(
-                phy.needed_snr_db(mcs, self._pdu_size) for mcs in range(len(phy.MCS_TABLE))
-            ),
-        )
+        return traits
 
     async def run(self) -> None:
         """Receive, and send what is to be sent, until cancelled."""

@@ -91,14 +91,13 @@ class Transmission:
 
         This one must not overtake it. The radio may have told already what has not been settled.
         """
-        is_bound = burst.latest != INFINITE
-        if is_bound and known != (self._late, self._radio.counters["late"]):
-            return None
-        self.counters["samples_sent"] += len(samples)
         latest = None
         if burst.latest != INFINITE:
+            if known != (self._late, self._radio.counters["late"]):
+                return None
             # `start` is where it was rounded to; between it and `latest` there may be no sample.
             latest = start + math.floor((burst.latest - burst.start) * self._rate_hz)
+        self.counters["samples_sent"] += len(samples)
         return self._radio.send(TxBurst(start, samples, latest))
 
     async def _settle(self, burst: Burst, start: int, answer: Awaitable[TxReport] | None) -> None:

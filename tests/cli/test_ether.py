@@ -218,7 +218,11 @@ def test_daemons_outlive_their_hub(start_hub, start_daemon, tmp_path_factory):
         # What is said while there is no air waits for it.
         say[1].send("/robot_1/cmd_vel", CDR + b"meanwhile")
         wait_for(lambda: nodes[1].snapshot().link.tx.queued == 1)
+        # Whoever is back first sends at once: robot 2 is, or it would not hear what waited.
+        nodes[1].process.send_signal(signal.SIGSTOP)
         start_hub(folder)
+        wait_for(lambda: carrier(nodes[2]).state == "up", 60)
+        nodes[1].process.send_signal(signal.SIGCONT)
         wait_for(lambda: all(carrier(node).state == "up" for node in nodes.values()), 60)
         for robot, node in nodes.items():
             counted = carrier(node).counters

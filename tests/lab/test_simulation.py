@@ -14,7 +14,7 @@ from benchmarks import shared_air
 from sdrlinkd.config import ModemParams
 from sdrlinkd.lab import Arrival, Simulation
 from sdrlinkd.link import AccessParams, Link, LinkParams, QueueParams, ReassemblyParams
-from sdrlinkd.modem.airtimes import Airtimes
+from sdrlinkd.modem import Airtimes
 from sdrlinkd.wire import make_registry
 
 RATE = 1e6

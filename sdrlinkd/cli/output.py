@@ -1,0 +1,42 @@
+"""Where a command's report and pictures go: checked before a long run, written after it."""
+
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+import msgspec
+
+from sdrlinkd.errors import UserError
+
+REPORT = "report.json"
+
+
+def load_pictures(package: str) -> ModuleType:
+    """`package`.pictures. Matplotlib is an extra, and slow to load: only where it is needed."""
+    try:
+        return import_module(f"{package}.pictures")
+    except ImportError:
+        raise UserError(
+            "the pictures need matplotlib; install it with: pip install 'sdrlinkd[plots]'"
+        ) from None
+
+
+def make_folder(out: Path, pictures: Sequence[str]) -> None:
+    """A folder in which the report and these pictures can be written."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for name in (REPORT, *pictures):
+            (out / name).open("ab").close()
+    except OSError as error:
+        raise UserError(f"{error.filename} cannot be written ({error.strerror})") from None
+
+
+def write_report(path: Path, report: msgspec.Struct) -> None:
+    """As JSON for people and programs."""
+    text = msgspec.json.format(msgspec.json.encode(report), indent=2)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(text + b"\n")
+    except OSError as error:
+        raise UserError(f"{path} cannot be written ({error.strerror})") from None

@@ -1,0 +1,35 @@
+"""What the link must know of a modem on a radio."""
+
+import phy
+from backends import GAP, Capabilities
+from sdrlinkd.config import ModemParams
+from sdrlinkd.link import CarrierTraits
+from sdrlinkd.modem.airtimes import Airtimes
+
+HANDOVER_S = 0.001
+"""A burst composed for a free air begins so much later: time to modulate it."""
+REACTION_S = 0.002
+"""From the last sample of a block to a decision, beyond the block itself."""
+
+
+def carrier_traits(
+    kind: str, can: Capabilities, params: ModemParams, airtimes: Airtimes
+) -> CarrierTraits:
+    """In lock-step composing takes no time, but it happens only when there is a block."""
+    return CarrierTraits(
+        kind=kind,
+        is_lockstep=can.lockstep,
+        transmits=can.transmits,
+        senses=can.receives,
+        turnaround_s=can.turnaround_s,
+        index_error_s=can.index_error_s,
+        lead_s=can.lead_s + can.turnaround_s + (HANDOVER_S if can.paced else 0.0),
+        react_s=can.block_s + (REACTION_S if can.paced else 0.0),
+        detect_s=2 * phy.SENSE_WINDOW / params.rate_hz,
+        overhead_s=airtimes.overhead_s,
+        gap_s=GAP / params.rate_hz,
+        ahead_s=can.block_s if can.lockstep else params.tx_lead_s,
+        longest_burst_s=airtimes.longest_s(),
+        mcs=params.mcs,
+        needed_snr_db=airtimes.needed_snr_db(),
+    )
