@@ -67,7 +67,8 @@ def decode_in(frames: Sequence[bytes]) -> Message | None:
 
 def topic_filter(topic: str) -> bytes:
     """The subscription for `topic`: exact, or a prefix when it ends with `*`."""
-    return topic[:-1].encode() if topic.endswith("*") else topic.encode() + b"\0"
+    # Of everything, only topics: the daemon has announcements of its own.
+    return (topic[:-1] or "/").encode() if topic.endswith("*") else topic.encode() + b"\0"
 
 
 def new_ack_topic() -> bytes:

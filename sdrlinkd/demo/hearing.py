@@ -19,7 +19,7 @@ class Hearing(threading.Thread):
     """
 
     def __init__(
-        self, directory: Path, take: Callable[[Message, float], None], topic: str = "*"
+        self, directory: Path, take: Callable[[Message, float], None], topic: str = "/*"
     ) -> None:
         super().__init__(name="hearing", daemon=True)
         self._take = take

@@ -17,6 +17,7 @@ from sdrlinkd.client import (
     Publisher,
     Subscriber,
 )
+from sdrlinkd.client.messages import topic_filter
 
 CDR = b"\0\1\0\0"
 
@@ -50,13 +51,20 @@ def test_a_prefix_takes_all_and_a_name_only_itself(start_daemon):
     with (
         Subscriber("/rx_robot_1/imu", directory=daemon.directory) as one,
         Subscriber("/rx_robot_1/*", directory=daemon.directory) as both,
+        Subscriber("*", directory=daemon.directory) as all_of_it,
         Publisher(daemon.directory) as out,
     ):
         out.send("/robot_1/imu2", CDR + b"2")
         out.send("/robot_1/imu", CDR + b"1")
         assert [both.receive(5).payload[-1:] for _ in range(2)] == [b"2", b"1"]
+        assert [all_of_it.receive(5).payload[-1:] for _ in range(2)] == [b"2", b"1"]
         assert one.receive(5).payload[-1:] == b"1"
         assert one.receive(0) is None
+
+
+def test_everything_is_every_topic_and_nothing_else():
+    """A daemon that waits for its first consumer takes notice of filters of topics only."""
+    assert topic_filter("*") == topic_filter("/*") == b"/"
 
 
 def test_a_burst_and_an_immediate_exit_arrive_whole(start_daemon):
