@@ -11,7 +11,7 @@ from phy.error_rate import (
 from phy.header import MAX_PDU_BYTES, MAX_PDUS, N_NETWORKS
 from phy.layout import BurstLayout, layout, most_pdus
 from phy.mcs import MCS_TABLE, Mcs
-from phy.numerology import OFDM_64_8, OFDM_64_16, Numerology
+from phy.numerology import GRIDS, OFDM_64_8, OFDM_64_16, Numerology
 from phy.quality import COUNTERS, BurstOver, BurstQuality, Event, PduHeard
 from phy.receiver import Receiver
 from phy.sensing import WINDOW as SENSE_WINDOW
@@ -21,6 +21,7 @@ from phy.warmup import warm_up
 
 __all__ = [
     "COUNTERS",
+    "GRIDS",
     "MAX_PDUS",
     "MAX_PDU_BYTES",
     "MCS_TABLE",

@@ -1,6 +1,5 @@
 """From a detector's peak to a burst whose header is read and whose channel is known."""
 
-import cmath
 import math
 from functools import lru_cache
 from typing import NamedTuple
@@ -8,35 +7,50 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from phy import estimation, header, ofdm, preamble, synchronisation
-from phy.convolutional import N_TAIL, ViterbiWorkspace
-from phy.demodulation import Demodulator, new_tracking
-from phy.estimation import BACKOFF, ChannelEstimate
+from phy import header, preamble
+from phy.constellation import Modulation
+from phy.convolutional import N_TAIL
+from phy.estimation import new_channel, tones
 from phy.header import BurstHeader, parse_header
-from phy.kernels.training import energy
-from phy.mcs import HEADER_MCS, MCS_TABLE
+from phy.kernels import acquisition as kernel
+from phy.kernels.acquisition import AMBIGUITY, BACKOFF, SEARCH, Room, Training
+from phy.kernels.burst import Channel
+from phy.kernels.tracking import PHASE
+from phy.kernels.training import learn
+from phy.mapping import axes
 from phy.numerology import Numerology
 from phy.quality import BurstQuality
+from phy.sequences import polarity
 from phy.transmitter import header_spectrum
 
-BEFORE = preamble.SHORT + preamble.GUARD + synchronisation.SEARCH + BACKOFF
-"""Samples that acquisition needs before the nominal start of the first long symbol."""
+# What noise may add to the offset that the peak tells, in cycles a sample.
+_COARSE_ERROR = 0.008
+_FREQUENCIES = np.linspace(-0.12, 0.12, 25) / 64
+
+
+def before(grid: Numerology) -> int:
+    """Samples that acquisition needs before the nominal start of the first long symbol."""
+    return preamble.long_start(grid) + SEARCH + BACKOFF
 
 
 def needed_after(grid: Numerology) -> int:
     """Samples that it needs from there on."""
-    return synchronisation.SEARCH + preamble.N_LONG * grid.n_fft + header.N_SYMBOLS * grid.n_symbol
+    n_header = header.n_symbols(grid) * grid.n_symbol
+    return SEARCH + preamble.N_LONG * grid.n_fft + n_header
 
 
 class Acquired(NamedTuple):
-    """A burst that can be decoded. `window` is where the first payload symbol's FFT begins."""
+    """A burst that can be decoded. `window` is where the first payload symbol's FFT begins.
+
+    The samples before have turned by `frequency` since `origin`, and `channel` is as it was there.
+    """
 
     header: BurstHeader
     quality: BurstQuality
+    origin: int
     window: int
     frequency: float
-    channel: ChannelEstimate
-    tracking: NDArray[np.float64]
+    channel: Channel
 
 
 class Missed(NamedTuple):
@@ -46,98 +60,117 @@ class Missed(NamedTuple):
 
 
 class Acquisition:
-    """Tables and settings of acquisition on one grid."""
+    """Tables and room of acquisition on one grid. Not for several threads at once."""
 
-    def __init__(self, grid: Numerology, max_frequency: float) -> None:
+    def __init__(self, grid: Numerology, max_frequency: float, carrier_cycles: float = 0.0) -> None:
         self._grid = grid
-        self._aliases = synchronisation.n_aliases(max_frequency)
-        self._demodulator = Demodulator(MCS_TABLE[HEADER_MCS].modulation, grid)
-        self._workspace = ViterbiWorkspace(header.N_BITS + N_TAIL)
-        long_starts = grid.n_fft * np.arange(preamble.N_LONG)
-        header_starts = grid.n_cp + grid.n_symbol * np.arange(header.N_SYMBOLS)
-        self._starts = np.concatenate((long_starts, preamble.N_LONG * grid.n_fft + header_starts))
+        self._carrier_cycles = carrier_cycles
+        self._training = _training(grid, n_aliases(max_frequency))
+        # Spectra here hold the tones alone, in their order.
+        self._tones = tones(grid)._replace(bins=np.arange(grid.n_used))
+        self._axes = axes(Modulation.BPSK, grid)
+        n, n_steps = header.n_symbols(grid), header.N_BITS + N_TAIL
+        self._room = Room(
+            planes=np.empty((2, before(grid) + needed_after(grid)), np.float32),
+            bins=np.empty((preamble.N_LONG + n, grid.n_used), np.complex64),
+            points=np.empty((n, grid.n_data), np.complex64),
+            llr=np.empty(n * grid.n_data, np.int16),
+            folded=np.empty(2 * n_steps, np.int16),
+            decisions=np.empty(n_steps, np.uint64),
+            octets=np.empty(header.N_BITS // 8, np.uint8),
+        )
 
     def acquire(
         self, x: NDArray[np.complex64], base: int, coarse: float, dc: complex
     ) -> Acquired | Missed:
-        """Read the burst whose first long symbol is nominally at `x[BEFORE]`.
+        """Read the burst whose first long symbol is nominally at `x[before(grid)]`.
 
         `base` is the absolute index of `x[0]`; `coarse` the frequency that the peak tells.
         """
-        grid = self._grid
-        x = x - np.complex64(dc)
-        timing = synchronisation.locate(x, BEFORE, coarse, self._aliases, grid)
-        if timing is None:
+        grid, room = self._grid, self._room
+        channel = new_channel(grid)
+        start, frequency = kernel.acquire(
+            x, before(grid), coarse, dc, self._carrier_cycles,
+            self._training, self._tones, self._axes, channel, room,
+        )  # fmt: skip
+        if start < 0:
             return Missed("preamble")
-        window = timing.long_start - BACKOFF
-        training = self._bins(x, window, timing.frequency, preamble.N_LONG)
-        rough = estimation.estimate(training, preamble.LONG_TRAINING, grid)
-        frequency = synchronisation.refine(x, timing, rough.h_hat, grid)
-        bins = self._bins(x, window, frequency, preamble.N_LONG + header.N_SYMBOLS)
-        channel = estimation.estimate(bins[: preamble.N_LONG], preamble.LONG_TRAINING, grid)
-        tracking = new_tracking(channel, grid)
-        llr, points = self._demodulator.demap(
-            bins[preamble.N_LONG :], channel, tracking, first_symbol=0
-        )
-        told = parse_header(llr, self._workspace)
+        told = parse_header(room.octets, room.folded)
         if told is None:
             return Missed("header")
-        sent = _header_carriers(told, grid)
-        channel = self._with_header(bins, sent, tracking)
-        error = points - sent[:, grid.data_at]
-        quality = self._quality(x, timing, told, channel, error, base, frequency)
-        payload = window + preamble.N_LONG * grid.n_fft + header.N_SYMBOLS * grid.n_symbol
-        return Acquired(told, quality, base + payload + grid.n_cp, frequency, channel, tracking)
-
-    def _bins(
-        self, x: NDArray[np.complex64], window: int, frequency: float, n: int
-    ) -> NDArray[np.complex64]:
-        """The first `n` of two long symbols and two of the header, phase 0 at `window`."""
-        return ofdm.to_bins(x[window:], self._starts[:n], frequency, 0j, self._grid)
-
-    def _with_header(
-        self,
-        bins: NDArray[np.complex64],
-        sent: NDArray[np.complex64],
-        tracking: NDArray[np.float64],
-    ) -> ChannelEstimate:
-        """The estimate anew, with the header, now known, as further training."""
-        for back in range(header.N_SYMBOLS):
-            phase = tracking[0, 0] - back * tracking[0, 1]
-            bins[-1 - back] *= np.complex64(cmath.exp(-1j * phase))
-        return estimation.estimate(bins, np.concatenate((preamble.LONG_TRAINING, sent)), self._grid)
-
-    def _quality(
-        self,
-        x: NDArray[np.complex64],
-        timing: synchronisation.Timing,
-        told: BurstHeader,
-        channel: ChannelEstimate,
-        error: NDArray[np.complex64],
-        base: int,
-        frequency: float,
-    ) -> BurstQuality:
-        grid = self._grid
-        start = timing.long_start - preamble.GUARD - preamble.SHORT
-        body = x[timing.long_start : timing.long_start + preamble.N_LONG * grid.n_fft]
-        occupied = grid.n_used / grid.n_fft
-        return BurstQuality(
+        sent = _sent(told, grid)
+        # By the long training alone: what a transmitter cuts off of later peaks is no noise.
+        no = channel.no
+        phase, rate = channel.tracking[PHASE, :2]
+        learn(room.bins, sent, preamble.N_LONG, phase, rate, self._tones, channel)
+        long = room.planes[:, preamble.long_start(grid) : preamble.length(grid)].reshape(-1)
+        error = (room.points - sent[preamble.N_LONG :, : grid.n_data]).reshape(-1)
+        quality = BurstQuality(
             start=base + start,
             mcs=told.mcs,
             n_pdus=told.n_pdus,
             pdu_bytes=told.pdu_bytes,
             network=told.network,
-            snr_db=_decibel(channel.gain * occupied / channel.no),
-            rssi_dbfs=_decibel(energy(body) / len(body)),
-            evm_db=_decibel(energy(error.reshape(-1)) / error.size),
+            snr_db=_decibel(channel.gain * grid.n_used / grid.n_fft / no),
+            rssi_dbfs=_decibel(2 * float(np.dot(long, long)) / len(long)),
+            evm_db=_decibel(float(np.vdot(error, error).real) / len(error)),
             cfo=frequency,
         )
+        origin = base + start - BACKOFF
+        window = origin + int(self._training.windows[-1]) + grid.n_symbol
+        return Acquired(told, quality, origin, window, frequency, channel)
+
+
+def n_aliases(max_frequency: float) -> int:
+    """Multiples of 1/16 to try on either side for offsets up to `max_frequency`."""
+    return max(0, math.ceil((max_frequency + _COARSE_ERROR - AMBIGUITY / 2) / AMBIGUITY))
+
+
+@lru_cache(maxsize=8)
+def _training(grid: Numerology, aliases: int) -> Training:
+    n_fft, n_header = grid.n_fft, header.n_symbols(grid)
+    time, carriers = np.arange(n_fft)[:, None], tones(grid).carriers
+    shift = np.exp(2j * np.pi * AMBIGUITY * np.arange(-aliases, aliases + 1)[:, None] * time[:, 0])
+    angle = 2 * np.pi * carriers * time / n_fft
+    inverse = np.exp(1j * angle) * (grid.scale / n_fft)
+    long_tones = preamble.long_carriers(grid)[grid.tones].astype(np.complex64)
+    short_tones = preamble.short_carriers(grid)[grid.tones]
+    long_start = preamble.long_start(grid)
+    header_start = preamble.length(grid) + grid.n_cp
+    segments = preamble.SEGMENT * np.arange(preamble.N_SEGMENTS)
+    parts = kernel.PART * np.arange(preamble.N_LONG * n_fft // kernel.PART)
+    centres = np.concatenate(
+        (
+            segments + kernel.FIRST_CLEAN + (kernel.N_CLEAN - 1) / 2,
+            parts + long_start + (kernel.PART - 1) / 2,
+        )
+    )
+    windows = (
+        long_start + n_fft * np.arange(preamble.N_LONG),
+        header_start + grid.n_symbol * np.arange(n_header),
+    )
+    return Training(
+        templates=(preamble.long_symbol(grid) * shift).astype(np.complex64),
+        dft=np.stack((np.cos(angle), -np.sin(angle))).astype(np.float32) / np.float32(grid.scale),
+        long_tones=np.tile(long_tones, (preamble.N_LONG, 1)),
+        short_wave=(inverse[: preamble.SEGMENT] * short_tones).astype(np.complex64),
+        long_wave=(inverse * long_tones).astype(np.complex64),
+        cover=preamble.COVER,
+        frequencies=_FREQUENCIES,
+        turns=np.exp(-2j * np.pi * _FREQUENCIES[:, None] * centres).astype(np.complex64),
+        windows=np.concatenate(windows),
+        polarity=polarity(n_header),
+        n_symbol=grid.n_symbol,
+    )
 
 
 @lru_cache(maxsize=64)
-def _header_carriers(told: BurstHeader, grid: Numerology) -> NDArray[np.complex64]:
-    """The header as sent `[2, n_used]`."""
-    return header_spectrum(told, grid)[:, grid.bins]
+def _sent(told: BurstHeader, grid: Numerology) -> NDArray[np.complex64]:
+    """Long training and header as sent, in the order of tones `[2 + n_header, n_used]`."""
+    table = tones(grid)
+    long = preamble.long_carriers(grid)[grid.tones].astype(np.complex64)
+    spectrum = header_spectrum(told, grid)[:, table.bins]
+    return np.concatenate((np.tile(long, (preamble.N_LONG, 1)), spectrum))
 
 
 def _decibel(ratio: float) -> float:

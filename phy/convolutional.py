@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phy.kernels.convolution import convolve
+from phy.kernels.list_viterbi import list_decode
 from phy.kernels.viterbi import MAX_LLR, ViterbiWorkspace, decode_terminated
 
 N_TAIL = 6
@@ -20,6 +21,7 @@ __all__ = [
     "CodeRate",
     "ViterbiWorkspace",
     "decode",
+    "decode_list",
     "encode",
 ]
 
@@ -70,3 +72,10 @@ def decode(
 ) -> NDArray[np.uint8]:
     """The likeliest bytes `[n, n_bytes]` behind LLRs `[n, n_coded]`, positive for 0, ±MAX_LLR."""
     return decode_terminated(llr, code.kept(8 * n_bytes), n_bytes, workspace)
+
+
+def decode_list(llr: NDArray[np.int16], n_bytes: int, n_list: int) -> NDArray[np.uint8]:
+    """The `n_list` likeliest blocks `[n_list, n_bytes]`, best first, at rate 1/2; `llr` of one."""
+    bits = np.empty((n_list, 8 * n_bytes + N_TAIL), np.uint8)
+    list_decode(llr, bits)
+    return np.packbits(bits[:, : 8 * n_bytes], axis=1)

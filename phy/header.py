@@ -1,7 +1,7 @@
-"""The burst header: what follows, in 38 bits on two BPSK symbols.
+"""The burst header: what follows, in 38 bits on BPSK symbols, two of them on 64 carriers.
 
-mcs 4, PDUs 6, PDU length 11, network 3, CRC-8, 6 tail zeros; K=7 rate 1/2; the first 20 of the 76
-coded bits once more make 96.
+mcs 4, PDUs 6, PDU length 11, network 3, CRC-8, 6 tail zeros; K=7 rate 1/2; the 76 coded bits are
+repeated from the first on until the symbols are full.
 """
 
 from typing import NamedTuple
@@ -9,17 +9,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from phy.convolutional import HALF, CodeRate, ViterbiWorkspace, decode, encode
+from phy.convolutional import HALF, CodeRate, decode_list, encode
 from phy.crc import crc8
 from phy.mcs import MCS_TABLE
+from phy.numerology import Numerology
 
-N_SYMBOLS = 2
 N_BITS = 32
+N_CODED = 96
+"""Coded bits it takes at least."""
 MAX_PDUS = 63
 MAX_PDU_BYTES = 2047
 N_NETWORKS = 8
 
 CODE: CodeRate = HALF
+N_CANDIDATES = 8
+"""So many code words are tried when the likeliest fails its check."""
 
 
 class BurstHeader(NamedTuple):
@@ -31,6 +35,11 @@ class BurstHeader(NamedTuple):
     network: int
 
 
+def n_symbols(grid: Numerology) -> int:
+    """Symbols that a header takes."""
+    return -(-N_CODED // grid.n_data)
+
+
 def header_bits(header: BurstHeader, n_coded: int) -> NDArray[np.uint8]:
     """The coded bits of a header `[n_coded]`."""
     mcs, n_pdus, pdu_bytes, network = header
@@ -39,12 +48,18 @@ def header_bits(header: BurstHeader, n_coded: int) -> NDArray[np.uint8]:
     return np.resize(encode(data[None, :], CODE)[0], n_coded)
 
 
-def parse_header(llr: NDArray[np.int16], workspace: ViterbiWorkspace) -> BurstHeader | None:
-    """The header that LLRs `[n_coded]` tell; None when its check fails or it makes no sense."""
-    n = CODE.n_coded(N_BITS)
-    folded = llr[:n] // 2
-    folded[: len(llr) - n] += llr[n:] // 2
-    data = decode(folded[None, :], N_BITS // 8, CODE, workspace).tobytes()
+def parse_header(likeliest: NDArray[np.uint8], llr: NDArray[np.int16]) -> BurstHeader | None:
+    """The header in `likeliest` `[4]`, or in other likely words of its LLRs `[76]`; or None."""
+    header = _checked(likeliest)
+    if header is not None:
+        return header
+    candidates = map(_checked, decode_list(llr, N_BITS // 8, N_CANDIDATES))
+    return next((header for header in candidates if header is not None), None)
+
+
+def _checked(octets: NDArray[np.uint8]) -> BurstHeader | None:
+    """The header in `octets` `[4]`; None when its check fails or it makes no sense."""
+    data = octets.tobytes()
     if crc8(data[:3]) != data[3]:
         return None
     fields = int.from_bytes(data[:3], "big")

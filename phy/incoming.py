@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 from phy.acquisition import Acquired
 from phy.demodulation import Demodulator, PduDecoder
-from phy.kernels.demapper import SLOPE
+from phy.kernels.burst import SLOPE_USED
+from phy.kernels.tracking import SLOPE
 from phy.numerology import Numerology
 
 
@@ -28,7 +29,9 @@ class IncomingBurst:
 
     def slip(self, grid: Numerology) -> None:
         """Follow the sender's clock by whole samples, as the slope over carriers tells."""
-        slope = self.acquired.tracking[SLOPE]
+        channel = self.acquired.channel
+        slope = channel.tracking[SLOPE]
         early = round(slope[0] * grid.n_fft / (2 * math.pi))
         self.slipped -= early
-        slope[0] -= early * 2 * math.pi / grid.n_fft
+        for angle in (slope[:1], channel.figures[SLOPE_USED : SLOPE_USED + 1]):
+            angle -= early * 2 * math.pi / grid.n_fft

@@ -19,7 +19,7 @@ class BurstLayout:
     n_pdus: int
     pdu_bytes: int
 
-    @property
+    @cached_property
     def block_bytes(self) -> int:
         """A PDU with its CRC-32."""
         return self.pdu_bytes + CRC32_SIZE
@@ -31,30 +31,31 @@ class BurstLayout:
         room = self.n_symbols * self.symbol_bits // self.n_pdus
         return segmentation(n_bits, self.mcs.rate, room)
 
-    @property
+    @cached_property
     def coded_bits(self) -> int:
         """Coded bits of a PDU."""
         return self.form.n_coded
 
-    @property
+    @cached_property
     def least_bits(self) -> int:
         """What they would be at the code's rate."""
         return least_coded(8 * self.block_bytes, self.mcs.rate)
 
-    @property
+    @cached_property
     def symbol_bits(self) -> int:
         """Coded bits of an OFDM symbol."""
         return self.grid.n_data * self.mcs.modulation.bits
 
-    @property
+    @cached_property
     def n_symbols(self) -> int:
         """Payload symbols of the burst."""
         return -(-self.n_pdus * self.least_bits // self.symbol_bits)
 
-    @property
+    @cached_property
     def n_samples(self) -> int:
         """Samples of the whole burst, preamble and header included."""
-        return preamble.LENGTH + (header.N_SYMBOLS + self.n_symbols) * self.grid.n_symbol
+        n_symbols = header.n_symbols(self.grid) + self.n_symbols
+        return preamble.length(self.grid) + n_symbols * self.grid.n_symbol
 
     def symbols_through(self, n_pdus: int) -> int:
         """Payload symbols that must be in before the first `n_pdus` PDUs can be decoded."""
@@ -77,6 +78,6 @@ def layout(grid: Numerology, mcs: int, n_pdus: int, pdu_bytes: int) -> BurstLayo
 def most_pdus(grid: Numerology, mcs: int, pdu_bytes: int, n_samples: int) -> int:
     """How many PDUs a burst of at most `n_samples` holds; at least 1, at most 63."""
     one = layout(grid, mcs, 1, pdu_bytes)
-    fixed = preamble.LENGTH + header.N_SYMBOLS * grid.n_symbol
+    fixed = preamble.length(grid) + header.n_symbols(grid) * grid.n_symbol
     symbols = max(0, n_samples - fixed) // grid.n_symbol
     return max(1, min(header.MAX_PDUS, symbols * one.symbol_bits // one.least_bits))

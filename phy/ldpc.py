@@ -8,12 +8,8 @@ from functools import cache, cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from phy.kernels.ldpc import (
-    N_COLUMNS,
-    LdpcWorkspace,
-    decode_blocks,
-    encode_blocks,
-)
+from phy.kernels.ldpc import N_COLUMNS, LdpcWorkspace, decode_blocks
+from phy.kernels.ldpc_encoder import encode_blocks
 from phy.ldpc_80211n import BASE
 
 LIFTINGS = (27, 54, 81)
@@ -147,12 +143,12 @@ def decode(
     work: LdpcWorkspace,
     max_iterations: int = MAX_ITERATIONS,
 ) -> NDArray[np.uint8]:
-    """The likeliest bits `[blocks, n_bits]` behind LLRs `[blocks, n_coded]`, positive for 0.
+    """The likeliest bytes `[blocks, n_bits / 8]` behind LLRs `[blocks, n_coded]`, positive for 0.
 
     A block whose checks do not hold after `max_iterations` is given as it stands then.
     """
     code = form.code
-    out = np.empty((len(llr), form.n_bits), np.uint8)
+    out = np.empty((len(llr), form.n_bits // 8), np.uint8)
     decode_blocks(
         llr, code.z, code.row_ends, code.columns, code.shifts,
         form.shares, form.ends, max_iterations,

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from phy import interleaver
 from phy.constellation import Modulation, points
+from phy.kernels.burst import Axes
 from phy.kernels.symbols import map_bits
 from phy.numerology import Numerology
 from phy.sequences import polarity
@@ -45,3 +46,13 @@ class Mapping:
 def mapping(modulation: Modulation, grid: Numerology) -> Mapping:
     """The tables, made once."""
     return Mapping(modulation, grid)
+
+
+@cache
+def axes(modulation: Modulation, grid: Numerology) -> Axes:
+    """The way back, as the equaliser wants it."""
+    order = mapping(modulation, grid).order
+    plane, carrier = order % modulation.bits, order // modulation.bits
+    gather = (plane * grid.n_data + carrier).astype(np.int32)
+    imag_bits = modulation.bits - modulation.axis_bits
+    return Axes(modulation.axis_bits, imag_bits, modulation.unit, gather)

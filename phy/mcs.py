@@ -22,10 +22,23 @@ class Mcs:
         return f"{self.modulation.label} {self.rate}"
 
     @property
+    def peak_db(self) -> float:
+        """Peaks over the mean power that are sent; what is cut off errs less than noise does."""
+        return _PEAKS_DB[self.modulation]
+
+    @property
     def bits_per_carrier(self) -> Fraction:
         """Information bits on one data carrier."""
         return self.modulation.bits * self.rate
 
+
+_PEAKS_DB = {
+    Modulation.BPSK: 7.0,
+    Modulation.QPSK: 7.0,
+    Modulation.QAM16: 7.5,
+    Modulation.QAM64: 8.0,
+    Modulation.QAM256: 10.0,
+}
 
 MCS_TABLE = tuple(
     Mcs(index, modulation, rate)

@@ -1,4 +1,4 @@
-"""Which carriers an OFDM symbol has, and what each is for (IEEE 802.11-2020, 17.3.5.10)."""
+"""Which carriers an OFDM symbol has, and what each is for (64: IEEE 802.11-2020, 17.3.5.10)."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -56,6 +56,11 @@ class Numerology:
         return np.flatnonzero(np.isin(self.used, self.pilots))
 
     @cached_property
+    def tones(self) -> Carriers:
+        """Positions in `used` of the data carriers, then of the pilots `[n_used]`."""
+        return np.concatenate((self.data_at, self.pilots_at))
+
+    @cached_property
     def pilot_values(self) -> NDArray[np.float32]:
         """Pilots of a symbol with polarity +1 `[n_pilots]`."""
         return np.array(self.pilot_signs, np.float32)
@@ -74,3 +79,18 @@ OFDM_64_16 = _map_of_802_11(16)
 """The default: 48 data carriers and 4 pilots, a quarter of the time for echoes."""
 OFDM_64_8 = _map_of_802_11(8)
 """For rates of a few Msps, where echoes last less than 8 samples."""
+OFDM_128_16 = Numerology(
+    128, 16, 52, (-45, -32, -19, -6, 6, 19, 32, 45), (1, 1, -1, 1, 1, 1, 1, -1)
+)
+"""As long echoes at half the price, for who moves slowly."""
+OFDM_256_32 = Numerology(
+    256, 32, 104,
+    (-97, -84, -71, -58, -45, -32, -19, -6, 6, 19, 32, 45, 58, 71, 84, 97),
+    (1, 1, 1, -1, -1, 1, -1, 1, 1, 1, -1, 1, 1, -1, 1, 1),
+)  # fmt: skip
+"""For long echoes: tunnels at many Msps."""
+
+GRIDS = {
+    f"{grid.n_fft}/{grid.n_cp}": grid for grid in (OFDM_64_16, OFDM_64_8, OFDM_128_16, OFDM_256_32)
+}
+"""Every grid that exists, by FFT size and samples of prefix."""

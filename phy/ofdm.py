@@ -1,24 +1,30 @@
 """Carriers to samples and back: one FFT a symbol."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from phy.kernels.symbols import gather
+from phy.kernels.symbols import gather, with_prefix
 from phy.numerology import Numerology
 
 
-def to_samples(spectrum: NDArray[np.complex64], grid: Numerology) -> NDArray[np.complex64]:
+def to_samples(
+    spectrum: NDArray[np.complex64],
+    grid: Numerology,
+    peak: float = math.inf,
+    out: NDArray[np.complex64] | None = None,
+) -> NDArray[np.complex64]:
     """FFT bins `[n, n_fft]` as samples with cyclic prefix `[n (n_cp + n_fft)]`, mean power 1.
 
-    `spectrum` is used up.
+    No sample's magnitude is beyond `peak`. They go to `out` if there is one. `spectrum` is used up.
     """
-    spectrum *= np.float32(grid.scale)
     body = fft.ifft(spectrum, axis=-1, overwrite_x=True)
-    samples = np.empty((len(body), grid.n_symbol), np.complex64)
-    samples[:, : grid.n_cp] = body[:, -grid.n_cp :]
-    samples[:, grid.n_cp :] = body
-    return samples.reshape(-1)
+    if out is None:
+        out = np.empty(len(body) * grid.n_symbol, np.complex64)
+    with_prefix(body, grid.scale, peak, out.reshape(len(body), grid.n_symbol))
+    return out
 
 
 def to_bins(

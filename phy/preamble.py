@@ -1,14 +1,17 @@
-"""What every burst begins with: 352 samples that a receiver knows.
+"""What every burst begins with, which a receiver knows: 352 samples on a grid of 64 carriers.
 
 Twelve short segments of 16 samples, each the one before times ±1 by the Barker code of length 11
-(the cover): DC, a carrier and the plain repetition of 802.11 do not look like it. Then a prefix of
-32 samples and twice the long training symbol of 802.11 (IEEE 802.11-2020, 17.3.3).
+(the cover): DC, a carrier and the plain repetition of 802.11 do not look like it. Then a prefix and
+twice the long training symbol: on 64 carriers that of 802.11 (IEEE 802.11-2020, 17.3.3).
 """
+
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from phy.numerology import OFDM_64_16, Numerology
+from phy.sequences import lfsr
 
 BARKER = np.array([1, 1, 1, -1, -1, -1, 1, -1, -1, 1, -1], np.float32)
 """Sign of a short segment relative to the one before."""
@@ -18,9 +21,7 @@ COVER = np.cumprod(np.concatenate(([1], BARKER))).astype(np.float32)
 N_SEGMENTS = len(COVER)
 SEGMENT = 16
 SHORT = N_SEGMENTS * SEGMENT
-GUARD = 32
 N_LONG = 2
-LENGTH = SHORT + GUARD + N_LONG * 64
 
 _LONG_NEGATIVE = (
     1, 1, -1, -1, 1, 1, -1, 1, -1, 1, 1, 1, 1, 1, 1, -1, -1, 1, 1, -1, 1, -1, 1, 1, 1, 1,
@@ -28,26 +29,48 @@ _LONG_NEGATIVE = (
 _LONG_POSITIVE = (
     1, -1, -1, 1, 1, -1, 1, -1, 1, -1, -1, -1, -1, -1, 1, 1, -1, -1, 1, -1, 1, -1, 1, 1, 1, 1,
 )  # fmt: skip
-LONG_CARRIERS = np.array(_LONG_NEGATIVE + _LONG_POSITIVE, np.float32)
-"""The long training symbol on the carriers in use `[52]`."""
+# Where the register of x^9 + x^5 + 1 begins: of all, those with the lowest peaks.
+_LONG_SEEDS = {128: 293, 256: 246}
 
-# Signs of (1 + j) on the carriers that are multiples of 4.
+# Signs of (1 + j) on the carriers that are multiples of 4, of 64.
 _SHORT_SIGNS = {
     -24: 1, -20: -1, -16: 1, -12: -1, -8: -1, -4: 1,
     4: -1, 8: -1, 12: 1, 16: 1, 20: 1, 24: 1,
 }  # fmt: skip
 
 
-LONG_TRAINING = np.tile(LONG_CARRIERS.astype(np.complex64), (N_LONG, 1))
-"""Both long training symbols as sent `[2, 52]`."""
+def guard(grid: Numerology = OFDM_64_16) -> int:
+    """Samples of the prefix before the long training."""
+    return max(32, 2 * grid.n_cp)
+
+
+def long_start(grid: Numerology = OFDM_64_16) -> int:
+    """Samples before the first long training symbol."""
+    return SHORT + guard(grid)
+
+
+def length(grid: Numerology = OFDM_64_16) -> int:
+    """Samples of the whole preamble."""
+    return long_start(grid) + N_LONG * grid.n_fft
+
+
+@cache
+def long_carriers(grid: Numerology = OFDM_64_16) -> NDArray[np.float32]:
+    """The long training symbol on the carriers in use, ±1 `[n_used]`."""
+    if grid.n_fft == OFDM_64_16.n_fft:
+        return np.array(_LONG_NEGATIVE + _LONG_POSITIVE, np.float32)
+    return 1 - 2 * lfsr((5, 9), _LONG_SEEDS[grid.n_fft], grid.n_used).astype(np.float32)
 
 
 def short_carriers(grid: Numerology = OFDM_64_16) -> NDArray[np.complex64]:
-    """A short segment on the carriers in use, at mean power 1 in time `[n_used]`."""
+    """A short segment on the carriers in use, at mean power 1 in time `[n_used]`.
+
+    In time it is the same on every grid.
+    """
     values = np.zeros(grid.n_used, np.complex64)
     level = np.sqrt(grid.n_used / len(_SHORT_SIGNS) / 2)
     for k, sign in _SHORT_SIGNS.items():
-        values[np.searchsorted(grid.used, k)] = sign * level * (1 + 1j)
+        values[np.searchsorted(grid.used, k * grid.n_fft // 64)] = sign * level * (1 + 1j)
     return values
 
 
@@ -59,13 +82,13 @@ def in_time(carriers: NDArray[np.complex64], grid: Numerology) -> NDArray[np.com
 
 
 def long_symbol(grid: Numerology = OFDM_64_16) -> NDArray[np.complex64]:
-    """The long training symbol `[64]`."""
-    return in_time(LONG_CARRIERS.astype(np.complex64), grid)
+    """The long training symbol `[n_fft]`."""
+    return in_time(long_carriers(grid).astype(np.complex64), grid)
 
 
 def preamble(grid: Numerology = OFDM_64_16) -> NDArray[np.complex64]:
-    """The whole preamble at mean power 1 `[352]`."""
+    """The whole preamble at mean power 1 `[length(grid)]`."""
     segment = in_time(short_carriers(grid), grid)[:SEGMENT]
     long = long_symbol(grid)
     short = (COVER[:, None] * segment).reshape(-1)
-    return np.concatenate((short, long[-GUARD:], long, long)).astype(np.complex64)
+    return np.concatenate((short, long[-guard(grid) :], long, long)).astype(np.complex64)

@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phy import ofdm, preamble
-from phy.acquisition import BEFORE, Acquired, Acquisition, Missed, needed_after
+from phy.acquisition import Acquired, Acquisition, Missed, before, needed_after
 from phy.constellation import Modulation
 from phy.demodulation import Demodulator, PduDecoder
-from phy.header import N_NETWORKS, N_SYMBOLS
+from phy.header import N_NETWORKS, n_symbols
 from phy.incoming import IncomingBurst
-from phy.kernels.detector import HISTORY, search, strongest
+from phy.kernels.acquisition import BACKOFF
+from phy.kernels.detector import FORGETS, HISTORY, search, strongest
 from phy.layout import layout
 from phy.ldpc import LdpcWorkspace
 from phy.numerology import OFDM_64_16, Numerology
@@ -28,11 +29,15 @@ from phy.stream import SampleStream
 HOP = 512
 ALIGN_SPAN = preamble.SHORT
 THRESHOLD = 0.25
+MOST = 0.5
+"""False alarms raise the threshold at most up to here: to bursts as strong as all else together."""
+PLAINEST = 0.7
+"""A peak that is so strong without the preamble's code is none of it."""
+# By so much each of them does.
+_WARIER = 0.1
 # After a false alarm, the search goes on so many samples later.
 RETRY_AFTER = 16
 PIECE = 1 << 13
-# Kept for acquisition before the sample at which the search stands.
-_KEPT = BEFORE + preamble.SHORT + HISTORY
 # A PDU fails with less than this share of the burst's power above the noise: the burst is gone.
 _FADED = 0.25
 # Every so many payload symbols, the FFT windows follow the sender's clock.
@@ -43,8 +48,10 @@ class Receiver:
     """Finds bursts in a stream and decodes them. Not for several threads at once.
 
     `max_frequency` is the largest carrier offset expected, in cycles a sample. Bursts of other
-    networks than `network` are told but not decoded; None takes all. `on_points` gets the
-    equalised points `[n, n_data]` of payload symbols, for pictures.
+    networks than `network` are told but not decoded; None takes all. `carrier_cycles` is how many
+    cycles the carrier makes in a sample, for senders whose carrier and samples come from one
+    crystal: then the carrier's offset tells that of the sampling clock; 0: nothing is known of it.
+    `on_points` gets the equalised points `[n, n_data]` of payload symbols, for pictures.
     """
 
     def __init__(
@@ -53,6 +60,7 @@ class Receiver:
         max_frequency: float = 0.02,
         grid: Numerology = OFDM_64_16,
         start: int = 0,
+        carrier_cycles: float = 0.0,
         on_points: Callable[[NDArray[np.complex64], Modulation], None] | None = None,
     ) -> None:
         if network is not None and not 0 <= network < N_NETWORKS:
@@ -60,15 +68,19 @@ class Receiver:
         self._network = network
         self._grid = grid
         self._on_points = on_points
-        self._acquisition = Acquisition(grid, max_frequency)
+        self._acquisition = Acquisition(grid, max_frequency, carrier_cycles)
         self._demodulators = {each: Demodulator(each, grid) for each in Modulation}
         self._workspace = LdpcWorkspace()
         self._work = np.zeros((7, HISTORY + HOP), np.float32)
+        self._n_header = n_symbols(grid)
         self._dc = np.zeros(3)
+        # For acquisition, before the sample at which the search stands.
+        self._kept = before(grid) + preamble.SHORT + HISTORY
         self._stream = SampleStream(start, 1 << 16)
         self._burst: IncomingBurst | None = None
         self._crossing: int | None = None
         self._peak: tuple[int, float] | None = None
+        self._excess, self._raised_at, self._began = 0.0, start, start
         self._at = start
         self.carrier = (start, start)
         """Where the last burst of which the header was read begins, and where it should end."""
@@ -89,7 +101,7 @@ class Receiver:
             self.counters["samples"] += len(piece)
             while self._step(events):
                 pass
-            self._stream.forget_before(self._at - _KEPT)
+            self._stream.forget_before(self._at - self._kept)
         return events
 
     def gap(self, n: int) -> list[Event]:
@@ -109,7 +121,7 @@ class Receiver:
     def flush(self) -> list[Event]:
         """The stream has ended: what its last samples hold, as if silence followed."""
         n = self._grid.n_symbol + HOP + ALIGN_SPAN + needed_after(self._grid)
-        samples = self.counters["samples"]
+        samples, self._began = self.counters["samples"], self._stream.end + n
         events = self.push(np.zeros(n, np.complex64))
         self.counters["samples"] = samples
         if self._burst is not None:
@@ -119,9 +131,9 @@ class Receiver:
     def _begin(self, index: int) -> None:
         """Search from `index`, with silence before it."""
         self._crossing = self._peak = None
-        self._stream.restart(index - _KEPT)
-        self._stream.append(np.zeros(_KEPT, np.complex64))
-        self._at = index
+        self._stream.restart(index - self._kept)
+        self._stream.append(np.zeros(self._kept, np.complex64))
+        self._at = self._began = index
 
     def _step(self, events: list[Event]) -> bool:
         """Go one step on; False when samples are missing for it."""
@@ -139,7 +151,8 @@ class Receiver:
             return False
         first = self._at - HISTORY
         x = self._stream.view(first, self._at + n_hops * HOP)
-        found = search(x, n_hops, HOP, THRESHOLD, self._dc, self._work)
+        age = self._at - self._raised_at
+        found = search(x, n_hops, HOP, THRESHOLD, self._excess, age, self._dc, self._work)
         if found < 0:
             self._at += n_hops * HOP
         else:
@@ -152,25 +165,39 @@ class Receiver:
         if self._stream.end < crossing + ALIGN_SPAN:
             return False
         x = self._stream.view(crossing - HISTORY, crossing + ALIGN_SPAN)
-        peak, p = strongest(x, ALIGN_SPAN, self._dc_value, self._work)
-        turn = cmath.phase(p) / (2 * math.pi * preamble.SEGMENT)
-        self._at = crossing + peak
-        self._crossing, self._peak = None, (crossing + peak, turn)
+        offset, p, plain = strongest(x, ALIGN_SPAN, self._dc_value, self._work)
+        peak = self._at = crossing + offset
+        self._crossing = None
+        if plain > PLAINEST:
+            self._was_nothing(peak)
+        else:
+            self._peak = (peak, cmath.phase(p) / (2 * math.pi * preamble.SEGMENT))
         return True
 
+    def _was_nothing(self, peak: int) -> None:
+        """Whoever makes such peaks and sends no preamble must do better to be looked at again."""
+        self._at = peak + RETRY_AFTER
+        # Where noise begins, its first samples resemble anything.
+        if peak >= self._began + preamble.SHORT:
+            left = self._excess * math.exp((self._raised_at - peak) / FORGETS)
+            self._excess = min(left + _WARIER, MOST - THRESHOLD)
+            self._raised_at = peak
+
     def _acquire(self, peak: int, coarse: float, events: list[Event]) -> bool:
-        nominal = peak + 1 + preamble.GUARD
+        nominal = peak + 1 + preamble.guard(self._grid)
         if self._stream.end < nominal + needed_after(self._grid):
             return False
-        base = nominal - BEFORE
+        base = nominal - before(self._grid)
         x = self._stream.view(base, nominal + needed_after(self._grid))
         found = self._acquisition.acquire(x, base, coarse, self._dc_value)
         self._peak = None
         if isinstance(found, Missed):
+            if found.stage == "preamble":
+                self._was_nothing(peak)
+                return True
             self._at = peak + RETRY_AFTER
-            if found.stage == "header":
-                self.counters["preambles"] += 1
-                self.counters["headers_bad"] += 1
+            self.counters["preambles"] += 1
+            self.counters["headers_bad"] += 1
             return True
         self.counters["preambles"] += 1
         told = found.header
@@ -181,7 +208,7 @@ class Receiver:
             self._demodulators[plan.mcs.modulation],
             self._grid.n_symbol,
         )
-        end = self._burst.window(plan.n_symbols) - self._grid.n_cp
+        end = self._burst.window(plan.n_symbols) - self._grid.n_cp + BACKOFF
         self.carrier = (found.quality.start, end)
         if self._network is not None and told.network != self._network:
             # Searched on, not skipped: a header that lies must not make us deaf.
@@ -206,14 +233,16 @@ class Receiver:
             found.frequency,
             self._dc_value,
             self._grid,
-            self._since(burst, first),
+            first - found.origin,
         )
-        llr, points = burst.demodulator.demap(
-            bins, found.channel, found.tracking, N_SYMBOLS + first_symbol
-        )
+        number, n = self._n_header + first_symbol, last - first_symbol
+        points = None
         if self._on_points is not None:
+            points = np.empty((n, self._grid.n_data), np.complex64)
+        burst.demodulator.demap(bins, found.channel, number, burst.decoder.room(n), points)
+        if self._on_points is not None and points is not None:
             self._on_points(points, plan.mcs.modulation)
-        for data in burst.decoder.decode(llr, n_pdus):
+        for data in burst.decoder.decode(n_pdus):
             number = burst.n_good + burst.n_bad
             through = plan.symbols_through(number + 1)
             own = bins[max(0, burst.n_symbols_in - first_symbol) : through - first_symbol]
@@ -221,7 +250,7 @@ class Receiver:
             if data is not None:
                 burst.n_good += 1
                 self.counters["pdus_good"] += 1
-                end = burst.window(through) - self._grid.n_cp
+                end = burst.window(through) - self._grid.n_cp + BACKOFF
                 events.append(PduHeard(data, number, end, found.quality))
                 continue
             burst.n_bad += 1
@@ -248,12 +277,6 @@ class Receiver:
         if here >= limit:
             return limit, n_pdus
         return (plan.symbols_through(done + n_pdus), n_pdus) if n_pdus else (burst.n_symbols_in, 0)
-
-    def _since(self, burst: IncomingBurst, index: int) -> int:
-        """Samples from the channel estimate's window to `index`."""
-        grid = self._grid
-        head = preamble.N_LONG * grid.n_fft + N_SYMBOLS * grid.n_symbol + grid.n_cp
-        return index - (burst.acquired.window - head)
 
     def _is_gone(self, bins: NDArray[np.complex64], found: Acquired) -> bool:
         used = bins[:, self._grid.bins]

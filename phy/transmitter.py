@@ -1,7 +1,7 @@
 """PDUs to the samples of one burst."""
 
 from collections.abc import Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,26 +10,44 @@ from phy import header, ofdm, preamble
 from phy.constellation import Modulation
 from phy.crc import with_crc32
 from phy.header import N_NETWORKS, BurstHeader, header_bits
+from phy.kernels.acquisition import BACKOFF
 from phy.layout import layout
 from phy.ldpc import encode
 from phy.mapping import mapping
+from phy.mcs import HEADER_MCS, MCS_TABLE
 from phy.numerology import OFDM_64_16, Numerology
 from phy.sequences import PADDING, whitening
 
+# Samples over which a burst begins and ends: at its end, what no FFT window holds.
+_RISE, _FALL = 8, BACKOFF
+MAX_BOOST_DB = 3.0
+
 
 class Transmitter:
-    """Makes bursts of one network on one grid. Holds tables only: any thread may use it."""
+    """Makes bursts of one network on one grid. Holds tables only: any thread may use it.
 
-    def __init__(self, network: int = 0, grid: Numerology = OFDM_64_16) -> None:
+    The preamble has lower peaks than the rest; an amplifier that peaks limit can send it stronger,
+    by `preamble_boost_db`, and the burst is found farther away. Receivers find out by themselves.
+    """
+
+    def __init__(
+        self, network: int = 0, grid: Numerology = OFDM_64_16, preamble_boost_db: float = 0.0
+    ) -> None:
         if not 0 <= network < N_NETWORKS:
             raise ValueError(f"network: got {network}; allowed: 0 to {N_NETWORKS - 1}")
+        if not 0 <= preamble_boost_db <= MAX_BOOST_DB:
+            raise ValueError(
+                f"preamble boost: got {preamble_boost_db} dB; allowed: 0 to {MAX_BOOST_DB:g}"
+            )
         self._network = network
         self._grid = grid
+        self._boost = 10 ** (preamble_boost_db / 20)
 
     def modulate(self, pdus: Sequence[bytes], mcs: int) -> NDArray[np.complex64]:
-        """The burst of 1 to 63 PDUs of equal size `[n_samples]`, at mean power 1.
+        """The burst of 1 to 63 PDUs of equal size `[n_samples]`, at mean power 1 but for the boost.
 
-        Raises ValueError for an MCS, number or size that no header can tell.
+        No sample is beyond the MCS's peak, or what the preamble's 3.2 dB are with its boost. Raises
+        ValueError for an MCS, number or size that no header can tell.
         """
         sizes = sorted({len(pdu) for pdu in pdus})
         plan = layout(self._grid, mcs, len(pdus), sizes[-1] if sizes else 0)
@@ -40,19 +58,35 @@ class Transmitter:
         coded = encode(np.unpackbits(white, axis=1), plan.form).reshape(-1)
         n_padding = plan.n_symbols * plan.symbol_bits - len(coded)
         coded = np.concatenate((coded, PADDING[:n_padding]))
-        spectrum = mapping(plan.mcs.modulation, self._grid).to_spectrum(coded, header.N_SYMBOLS)
+        first = header.n_symbols(self._grid)
+        spectrum = mapping(plan.mcs.modulation, self._grid).to_spectrum(coded, first)
         told = BurstHeader(mcs, plan.n_pdus, plan.pdu_bytes, self._network)
-        return np.concatenate((_opening(told, self._grid), ofdm.to_samples(spectrum, self._grid)))
+        burst = np.empty(plan.n_samples, np.complex64)
+        opening = _opening(told, self._grid, self._boost)
+        burst[: len(opening)] = opening
+        payload = burst[len(opening) :]
+        ofdm.to_samples(spectrum, self._grid, 10 ** (plan.mcs.peak_db / 20), payload)
+        payload[-_FALL:] *= _ramp(_FALL)[::-1]
+        return burst
 
 
 @lru_cache(maxsize=64)
-def _opening(told: BurstHeader, grid: Numerology) -> NDArray[np.complex64]:
+def _opening(told: BurstHeader, grid: Numerology, boost: float) -> NDArray[np.complex64]:
     """Preamble and header of a burst; most bursts resemble one before."""
     spectrum = header_spectrum(told, grid)
-    return np.concatenate((preamble.preamble(grid), ofdm.to_samples(spectrum, grid)))
+    head = ofdm.to_samples(spectrum, grid, 10 ** (MCS_TABLE[HEADER_MCS].peak_db / 20))
+    start = preamble.preamble(grid) * np.float32(boost)
+    start[:_RISE] *= _ramp(_RISE)
+    return np.concatenate((start, head))
+
+
+@cache
+def _ramp(n: int) -> NDArray[np.float32]:
+    """From 0 to 1 without a step."""
+    return (np.sin(np.pi / 2 * (np.arange(n) + 0.5) / n) ** 2).astype(np.float32)
 
 
 def header_spectrum(told: BurstHeader, grid: Numerology) -> NDArray[np.complex64]:
-    """FFT bins of the header's symbols `[2, n_fft]`."""
-    coded = header_bits(told, header.N_SYMBOLS * grid.n_data)
+    """FFT bins of the header's symbols `[n, n_fft]`."""
+    coded = header_bits(told, header.n_symbols(grid) * grid.n_data)
     return mapping(Modulation.BPSK, grid).to_spectrum(coded, 0)

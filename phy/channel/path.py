@@ -6,8 +6,9 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
+from phy.channel.fading import BLOCK, jakes, moving_filter
 from phy.channel.profiles import PROFILES
-from phy.channel.resampling import N_TAPS, echo_filter, stretch
+from phy.channel.resampling import N_TAPS, echo_filters, stretch
 
 SPIN = 128
 
@@ -17,7 +18,10 @@ class PathParams:
     """Frequencies in Hz, times in s, `clock_ppm` the sender's crystal against the receiver's.
 
     One crystal makes carrier and samples: at `carrier_hz` it moves both. `image_db` and `leak_db`
-    are the transmitter's IQ imbalance and LO leakage below the signal (inf: none).
+    are the transmitter's IQ imbalance and LO leakage below the signal (inf: none). `doppler_hz` is
+    the largest shift of an echo, v / c times the carrier, on channels that fade.
+    `phase_noise_dbc_hz` is that of both oscillators 10 kHz from the carrier, falling as 1 / f²
+    (-inf: none).
     """
 
     rate_hz: float
@@ -29,6 +33,8 @@ class PathParams:
     clock_ppm: float = 0.0
     image_db: float = np.inf
     leak_db: float = np.inf
+    doppler_hz: float = 0.0
+    phase_noise_dbc_hz: float = -np.inf
 
 
 class Path:
@@ -63,22 +69,39 @@ class Path:
         offset += whole
         echoes = PROFILES[params.profile]
         if echoes is not None:
-            x = np.convolve(x, self._fading(echoes))
+            x = self._faded(x, echoes)
             offset -= N_TAPS // 2 - 1
         turn = np.exp(2j * np.pi * self._rng.random()) * 10 ** (-params.loss_db / 20)
+        if params.phase_noise_dbc_hz > -np.inf:
+            x = x * self._phase_noise(len(x))
         frequency = params.carrier_hz * error / params.rate_hz
         if frequency:
             return offset, x * _spin(frequency, turn, len(x))
         return offset, x * np.complex64(turn)
 
-    def _fading(self, echoes: tuple[tuple[float, float], ...]) -> NDArray[np.complex64]:
+    def _faded(
+        self, x: NDArray[np.complex64], echoes: tuple[tuple[float, float], ...]
+    ) -> NDArray[np.complex64]:
+        params = self._params
         delay, power_db = np.array(echoes).T
         power = 10 ** (power_db / 10)
-        n = len(echoes)
-        draws = self._rng.standard_normal(2 * n).reshape(2, n)
-        gains = (draws[0] + 1j * draws[1]) * np.sqrt(power / power.sum() / 2)
-        samples = (delay - delay.min()) * self._params.delay_spread_s * self._params.rate_hz
-        return echo_filter(samples, gains)
+        scale = np.sqrt(power / power.sum())
+        samples = (delay - delay.min()) * params.delay_spread_s * params.rate_hz
+        if params.doppler_hz:
+            n_blocks = -(-len(x) // BLOCK)
+            at = (np.arange(n_blocks, dtype=np.float64) + 0.5) * (BLOCK / params.rate_hz)
+            gains = scale * jakes(len(scale), params.doppler_hz, at, self._rng)
+            return moving_filter(x, echo_filters(samples, gains))
+        draws = self._rng.standard_normal(2 * len(scale)).reshape(2, -1)
+        gains = (draws[0] + 1j * draws[1]) * scale / np.sqrt(2)
+        return np.convolve(x, echo_filters(samples, gains[None, :])[0])
+
+    def _phase_noise(self, n: int) -> NDArray[np.complex64]:
+        """A random walk with the spectrum L(f) = step² · rate / (2 π f)²."""
+        level = 10 ** (self._params.phase_noise_dbc_hz / 10)
+        step = 2 * np.pi * 1e4 * np.sqrt(level / self._params.rate_hz)
+        walk = np.cumsum(step * self._rng.standard_normal(n))
+        return np.exp(1j * walk).astype(np.complex64)
 
 
 def _spin(frequency: float, first: complex, n: int) -> NDArray[np.complex64]:

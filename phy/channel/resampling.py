@@ -33,16 +33,19 @@ def stretch(x: NDArray[np.complex64], delay: float, clock_error: float) -> NDArr
     return out
 
 
-def echo_filter(
+def echo_filters(
     delays: NDArray[np.float64], gains: NDArray[np.complex128]
 ) -> NDArray[np.complex64]:
-    """FIR filter of echoes at `delays` samples with `gains`, its own delay N_TAPS / 2 − 1."""
-    n = int(np.ceil(delays.max())) + N_TAPS
-    taps = np.zeros(n, np.complex128)
+    """FIR filters `[n, n_taps]` of echoes at `delays` samples `[e]` with `gains` `[n, e]`.
+
+    Their own delay is N_TAPS / 2 − 1.
+    """
+    echoes = np.zeros((len(delays), int(np.ceil(delays.max())) + N_TAPS), np.float32)
     filters = _filters()
-    for delay, gain in zip(delays, gains, strict=True):
+    for echo, delay in zip(echoes, delays, strict=True):
         whole = int(delay)
         phase = round((1 - (delay - whole)) * N_PHASES)
         # A filter looks ahead by its phase from one sample back; reversed, it is a response.
-        taps[whole : whole + N_TAPS] += gain * filters[phase][::-1]
-    return taps.astype(np.complex64)
+        echo[whole : whole + N_TAPS] = filters[phase][::-1]
+    taps: NDArray[np.complex64] = (gains @ echoes).astype(np.complex64)
+    return taps

@@ -4,6 +4,8 @@ No running sum is carried from sample to sample, so there is nothing to drift, e
 vectorised, and the result does not depend on how the stream was cut into chunks.
 """
 
+import math
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -12,6 +14,9 @@ SEGMENT = 16
 SHORT = 192
 HISTORY = SHORT - 1
 """Samples before a sample that its metric needs."""
+
+FORGETS = 4096.0
+"""Samples in which a raised threshold sinks by a factor e."""
 
 # E is over 192 samples, P over the 176 products of neighbours 16 apart.
 _SHARE = np.float32((SHORT - SEGMENT) / SHORT)
@@ -91,16 +96,20 @@ def search(
     n_hops: int,
     hop: int,
     threshold: float,
+    excess: float,
+    age: int,
     dc_state: NDArray[np.float64],
     work: NDArray[np.float32],
 ) -> int:
     """Index in `x` of the first sample with |P| > threshold · E, or -1 after `n_hops` hops.
 
-    `x` begins HISTORY samples before the first hop. DC (`dc_state`: real, imaginary, hops seen)
-    follows the mean slowly, hop by hop; a hop with a crossing leaves it as it is.
+    `x` begins HISTORY samples before the first hop. The threshold was raised by `excess`, `age`
+    samples before the first hop, and sinks back hop by hop. DC (`dc_state`: real, imaginary, hops
+    seen) follows the mean slowly; a hop with a crossing leaves it as it is.
     """
-    limit = np.float32(threshold * threshold)
     for h in range(n_hops):
+        level = threshold + excess * math.exp(-(age + h * hop) / FORGETS)
+        limit = np.float32(level * level)
         begin = h * hop
         dc = complex(dc_state[0], dc_state[1])
         detector_sums(x[begin : begin + HISTORY + hop], dc, work, hop)
@@ -121,8 +130,12 @@ def search(
 @njit(nogil=True, cache=True)
 def strongest(
     x: NDArray[np.complex64], n: int, dc: complex, work: NDArray[np.float32]
-) -> tuple[int, complex]:
-    """(offset of the largest |P| / E among the `n` samples after HISTORY of `x`, its P)."""
+) -> tuple[int, complex, float]:
+    """The largest |P| / E among the `n` samples after HISTORY of `x`.
+
+    (its offset, P, |Q| / |P|), where Q is P without the code: small for our preamble, large for
+    whatever repeats itself every 16 samples or turns evenly.
+    """
     detector_sums(x, dc, work, n)
     p_re, p_im, energy = work[0], work[1], work[2]
     best, best_metric = 0, -1.0
@@ -132,7 +145,13 @@ def strongest(
             metric = power / (float(energy[i]) * energy[i])
             if metric > best_metric:
                 best, best_metric = i, metric
-    return best, complex(p_re[best], p_im[best])
+    p = complex(p_re[best], p_im[best])
+    if best_metric <= 0:
+        return best, p, 1.0
+    plain = 0j
+    for i in range(best + SEGMENT, best + SHORT):
+        plain += (complex(x[i]) - dc) * (complex(x[i - SEGMENT]) - dc).conjugate()
+    return best, p, abs(plain) / abs(p)
 
 
 @njit(nogil=True, cache=True)
@@ -150,8 +169,13 @@ def _follow_dc(x: NDArray[np.complex64], dc_state: NDArray[np.float64]) -> None:
 @njit(nogil=True, cache=True)
 def sanitise(x: NDArray[np.complex64], limit: float) -> int:
     """Set samples that are not finite or beyond `limit` to 0. How many were."""
+    most, n_good = np.float32(limit), 0
+    parts = x.view(np.float32)
+    for i in range(parts.size):
+        n_good += abs(parts[i]) < most
+    if n_good == parts.size:
+        return 0
     bad = 0
-    most = np.float32(limit)
     for i in range(x.size):
         good = (abs(x[i].real) < most) & (abs(x[i].imag) < most)
         bad += not good

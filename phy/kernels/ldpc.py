@@ -1,4 +1,4 @@
-"""Encoder and layered min-sum decoder of quasi-cyclic LDPC codes.
+"""Layered min-sum decoder of quasi-cyclic LDPC codes.
 
 The parity-check matrix is made of Z x Z blocks, each zero or a shifted identity. So the Z checks of
 a block row are independent, and each takes one bit of every block column it touches: from block
@@ -85,87 +85,6 @@ def decode_codeword(
 
 
 @njit(nogil=True, cache=True)
-def encode_codeword(
-    bits: NDArray[np.uint8],
-    z: int,
-    row_ends: NDArray[np.int32],
-    columns: NDArray[np.int32],
-    shifts: NDArray[np.int32],
-    middle: int,
-    out: NDArray[np.uint8],
-) -> None:
-    """out `[24 z]`: the information `[K z]`, then parity.
-
-    Parity columns 1, 2, … are a staircase; column 0 has three blocks, in the first and last row
-    with shift 1 and in row `middle` with 0. In the sum of all rows only the latter remains.
-    """
-    n_rows = row_ends.size - 1
-    n_info = N_COLUMNS - n_rows
-    parity = n_info * z
-    out[:parity] = bits
-    out[parity:] = 0
-    first = out[parity : parity + z]
-    # Row r's sum is kept where its staircase bits will stand.
-    for row in range(n_rows):
-        at = parity + row * z
-        total = out[at : at + z] if row else first
-        for edge in range(row_ends[row], row_ends[row + 1]):
-            column, shift = columns[edge], shifts[edge]
-            if column < n_info:
-                source = bits[column * z : (column + 1) * z]
-                for i in range(z - shift):
-                    total[i] = np.uint8(total[i] ^ source[i + shift])
-                for i in range(z - shift, z):
-                    total[i] = np.uint8(total[i] ^ source[i + shift - z])
-    top = first.copy()
-    for row in range(1, n_rows):
-        for i in range(z):
-            first[i] ^= out[parity + row * z + i]
-    # From row 0 down: bit column r + 1 is what row r lacks; its sum makes place for that of r - 1.
-    turn = 1 % z
-    before = top
-    for i in range(z):
-        before[i] ^= first[i + turn if i + turn < z else i + turn - z]
-    for row in range(1, n_rows):
-        at = parity + row * z
-        for i in range(z):
-            mine = out[at + i]
-            out[at + i] = before[i]
-            before[i] ^= mine
-            if row == middle:
-                before[i] ^= first[i]
-
-
-@njit(nogil=True, cache=True)
-def encode_blocks(
-    blocks: NDArray[np.uint8],
-    z: int,
-    row_ends: NDArray[np.int32],
-    columns: NDArray[np.int32],
-    shifts: NDArray[np.int32],
-    middle: int,
-    shares: NDArray[np.int32],
-    ends: NDArray[np.int32],
-    out: NDArray[np.uint8],
-) -> None:
-    """Each block in codewords of `shares` bits; with parity, each goes up to its of `ends`."""
-    n_info = (N_COLUMNS - (row_ends.size - 1)) * z
-    bits, codeword = np.zeros(n_info, np.uint8), np.empty(N_COLUMNS * z, np.uint8)
-    for block in range(blocks.shape[0]):
-        at = 0
-        for number in range(shares.size):
-            share = shares[number]
-            bits[:share] = blocks[block, at : at + share]
-            bits[share:] = 0
-            at += share
-            encode_codeword(bits, z, row_ends, columns, shifts, middle, codeword)
-            middle_at = ends[number] + share
-            out[block, ends[number] : middle_at] = codeword[:share]
-            n_parity = ends[number + 1] - middle_at
-            out[block, middle_at : ends[number + 1]] = codeword[n_info : n_info + n_parity]
-
-
-@njit(nogil=True, cache=True)
 def decode_blocks(
     llr: NDArray[np.int16],
     z: int,
@@ -181,9 +100,13 @@ def decode_blocks(
     scratch: NDArray[np.int16],
     out: NDArray[np.uint8],
 ) -> None:
-    """The other way round: what was not sent is known to be 0 (information) or not at all."""
+    """The other way round, packed in bytes: `out` `[blocks, n_bits / 8]`.
+
+    What was not sent is known to be 0 (information) or not at all.
+    """
     n_info = (N_COLUMNS - (row_ends.size - 1)) * z
     codeword = whole[: N_COLUMNS * z]
+    decided = np.empty(8 * out.shape[1], np.uint8)
     for block in range(llr.shape[0]):
         at = 0
         for number in range(shares.size):
@@ -198,6 +121,20 @@ def decode_blocks(
                 codeword, z, row_ends, columns, shifts, max_iterations,
                 posteriors, messages, scratch,
             )  # fmt: skip
-            for i in range(share):
-                out[block, at + i] = posteriors[i // z, i % z] < 0
+            for column in range(-(-share // z)):
+                first = column * z
+                bits = decided[at + first : at + min(first + z, share)]
+                for i in range(bits.size):
+                    bits[i] = posteriors[column, i] < 0
             at += share
+        _pack(decided, out[block])
+
+
+@njit(nogil=True, cache=True)
+def _pack(bits: NDArray[np.uint8], out: NDArray[np.uint8]) -> None:
+    """As `np.packbits`."""
+    for i in range(out.size):
+        octet = np.uint32(0)
+        for b in range(8):
+            octet |= np.uint32(bits[8 * i + b]) << np.uint32(7 - b)
+        out[i] = np.uint8(octet)

@@ -60,3 +60,26 @@ def map_bits(
             out[row, data_bins[d]] = points[number]
         for p in range(pilot_bins.size):
             out[row, pilot_bins[p]] = pilots[p] * polarity[row]
+
+
+@njit(nogil=True, cache=True)
+def with_prefix(
+    body: NDArray[np.complex64], scale: float, most: float, out: NDArray[np.complex64]
+) -> None:
+    """Symbols `[n, n_fft]` times `scale` with their last samples before them `[n, n_symbol]`.
+
+    Samples beyond the magnitude `most` are shortened to it.
+    """
+    n_fft, n_cp = body.shape[1], out.shape[1] - body.shape[1]
+    scale_32 = np.float32(scale)
+    square, most_32 = np.float32(most * most), np.float32(most)
+    for row in range(body.shape[0]):
+        symbol = out[row, n_cp:]
+        for m in range(n_fft):
+            symbol[m] = body[row, m] * scale_32
+        for m in range(n_fft):
+            power = symbol[m].real * symbol[m].real + symbol[m].imag * symbol[m].imag
+            if power > square:
+                symbol[m] *= most_32 / np.sqrt(power)
+        for m in range(n_cp):
+            out[row, m] = out[row, n_fft + m]

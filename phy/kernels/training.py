@@ -1,4 +1,4 @@
-"""Known symbols against received ones: correlation, least squares, frequency."""
+"""Known symbols against received ones, tone by tone."""
 
 import math
 
@@ -6,147 +6,155 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from phy.kernels.burst import DELAY, GAIN, NO, Channel, Tones
+from phy.kernels.smoothing import mean_delay, smooth
+
+Planes = NDArray[np.float32]
+
+# Standard deviations at which a difference in strength is no chance.
+_SURELY = 4.0
+_LARGEST_BOOST = 3.0
+
 
 @njit(nogil=True, cache=True)
-def correlate(
-    x: NDArray[np.complex64],
-    frequency: float,
-    templates: NDArray[np.complex64],
-    out: NDArray[np.float32],
-) -> None:
-    """Strength of two templates in a row at each offset of `x` turned back by `frequency`.
-
-    out[a, o] = |Σ_m z[o + m] t*[a, m] + Σ_m z[o + n + m] t*[a, m]|², `templates` `[aliases, n]`.
-    """
-    n_template = templates.shape[1]
-    n_out = out.shape[1]
-    n = n_out + n_template
-    re, im = np.empty(x.size, np.float32), np.empty(x.size, np.float32)
+def turn_back(x: NDArray[np.complex64], dc: complex, frequency: float, out: Planes) -> None:
+    """Samples `x` `[n]` less `dc`, turned back by `frequency` cycles a sample; `out` `[2, ≥ n]`."""
+    span = 32
+    fine_re, fine_im = np.empty(span, np.float32), np.empty(span, np.float32)
     step = -2 * math.pi * frequency
-    for i in range(x.size):
-        turned = complex(x[i]) * complex(math.cos(step * i), math.sin(step * i))
-        re[i] = np.float32(turned.real)
-        im[i] = np.float32(turned.imag)
-    for a in range(templates.shape[0]):
-        c_re, c_im = np.zeros(n, np.float32), np.zeros(n, np.float32)
-        for m in range(n_template):
-            t_re, t_im = templates[a, m].real, templates[a, m].imag
-            x_re, x_im = re[m : m + n], im[m : m + n]
-            for o in range(n):
-                c_re[o] += x_re[o] * t_re + x_im[o] * t_im
-                c_im[o] += x_im[o] * t_re - x_re[o] * t_im
-        second_re, second_im = c_re[n_template:], c_im[n_template:]
-        for o in range(n_out):
-            both_re = c_re[o] + second_re[o]
-            both_im = c_im[o] + second_im[o]
-            out[a, o] = both_re * both_re + both_im * both_im
+    for m in range(span):
+        fine_re[m], fine_im[m] = math.cos(step * m), math.sin(step * m)
+    dc_re, dc_im = np.float32(dc.real), np.float32(dc.imag)
+    for begin in range(0, x.size, span):
+        c, s = np.float32(math.cos(step * begin)), np.float32(math.sin(step * begin))
+        for m in range(min(span, x.size - begin)):
+            re = c * fine_re[m] - s * fine_im[m]
+            im = c * fine_im[m] + s * fine_re[m]
+            a, b = x[begin + m].real - dc_re, x[begin + m].imag - dc_im
+            out[0, begin + m] = a * re - b * im
+            out[1, begin + m] = a * im + b * re
 
 
 @njit(nogil=True, cache=True)
-def energy(x: NDArray[np.complex64]) -> float:
-    """Σ |x|²."""
-    total = 0.0
-    for i in range(x.size):
-        total += float(x[i].real) * x[i].real + float(x[i].imag) * x[i].imag
-    return total
+def spectrum(planes: Planes, first: int, dft: Planes, out: NDArray[np.complex64]) -> None:
+    """The tones of the window of `planes` at `first`: a DFT by its definition.
+
+    `dft` `[2, n_fft, n_used]`. For the few symbols of an acquisition that is fast enough.
+    """
+    n_fft, n = dft.shape[1], dft.shape[2]
+    re, im = np.zeros(n, np.float32), np.zeros(n, np.float32)
+    for m in range(n_fft):
+        a, b = planes[0, first + m], planes[1, first + m]
+        c, s = dft[0, m], dft[1, m]
+        for k in range(n):
+            re[k] += a * c[k] - b * s[k]
+            im[k] += a * s[k] + b * c[k]
+    for k in range(n):
+        out[k] = complex(re[k], im[k])
 
 
-@njit(nogil=True, cache=True)
-def lag_product(x: NDArray[np.complex64], lag: int) -> complex:
-    """Σ x[i + lag] x*[i] over the first `lag` samples."""
-    total = 0j
-    for i in range(lag):
-        total += complex(x[i + lag]) * complex(x[i]).conjugate()
-    return total
+# Sums in any order, so that they are vectorised; the order is the same at every call.
+@njit(nogil=True, cache=True, fastmath={"reassoc", "contract"})
+def wave(
+    matrix: NDArray[np.complex64], h_hat: NDArray[np.complex64], out: NDArray[np.complex64]
+) -> None:
+    """matrix · h_hat, without BLAS: its threads cost more than so small a product."""
+    for i in range(matrix.shape[0]):
+        re, im = np.float32(0), np.float32(0)
+        for j in range(matrix.shape[1]):
+            a, b = matrix[i, j], h_hat[j]
+            re += a.real * b.real - a.imag * b.imag
+            im += a.real * b.imag + a.imag * b.real
+        out[i] = complex(re, im)
 
 
 @njit(nogil=True, cache=True)
 def least_squares(
     bins: NDArray[np.complex64],
-    used: NDArray[np.int64],
+    amplitude: NDArray[np.float32],
     sent: NDArray[np.complex64],
+    tones: NDArray[np.int64],
     out: NDArray[np.complex64],
 ) -> tuple[float, float]:
-    """Mean gain of each carrier in use over `n` symbols; (noise power on a carrier, mean |h|²).
+    """Gain of each tone over `n` ≥ 2 symbols; (noise power on a tone, mean |h|²).
 
-    `bins` `[n, n_fft]`, `sent` `[n, n_used]` of magnitude 1.
+    `sent` `[n, n_used]` of magnitude 1 went out times `amplitude` `[n]`, and came on `tones`
+    `[n_used]` of `bins` `[n, …]`.
     """
     n = bins.shape[0]
-    noise, power = 0.0, 0.0
-    for c in range(used.size):
-        mean, square = 0j, 0.0
+    mass, noise, power = 0.0, 0.0, 0.0
+    for s in range(n):
+        mass += amplitude[s] * amplitude[s]
+    for k in range(tones.size):
+        total, square = 0j, 0.0
         for s in range(n):
-            gain = complex(bins[s, used[c]]) * complex(sent[s, c]).conjugate()
-            mean += gain
+            gain = complex(bins[s, tones[k]]) * complex(sent[s, k]).conjugate()
+            total += gain * amplitude[s]
             square += gain.real * gain.real + gain.imag * gain.imag
-        mean /= n
-        size = mean.real * mean.real + mean.imag * mean.imag
-        noise += square - n * size
+        h = total / mass
+        size = h.real * h.real + h.imag * h.imag
+        noise += square - mass * size
         power += size
-        out[c] = np.complex64(mean)
-    return noise / ((n - 1) * used.size), power / used.size
+        out[k] = np.complex64(h)
+    return noise / ((n - 1) * tones.size), power / tones.size
 
 
 @njit(nogil=True, cache=True)
-def match_blocks(
-    x: NDArray[np.complex64],
-    frequency: float,
-    short_template: NDArray[np.complex64],
-    cover: NDArray[np.float32],
-    first_clean: int,
-    n_clean: int,
-    long_template: NDArray[np.complex64],
-    long_start: int,
-    block: int,
-    out: NDArray[np.complex128],
+def estimate(
+    bins: NDArray[np.complex64],
+    amplitude: NDArray[np.float32],
+    sent: NDArray[np.complex64],
+    tones: Tones,
+    channel: Channel,
 ) -> None:
-    """How each part of the preamble matches its template, turned back by `frequency`.
+    """The channel from known symbols, as of `least_squares`, less what must be noise."""
+    rough = np.empty(tones.bins.size, np.complex64)
+    no, power = least_squares(bins, amplitude, sent, tones.bins, rough)
+    mass = 0.0
+    for a in amplitude:
+        mass += a * a
+    no = max(no, 1e-20)
+    delay = mean_delay(rough, tones.neighbours)
+    channel.figures[NO] = no
+    channel.figures[GAIN] = max(power - no / mass, 1e-3 * power, 1e-20)
+    channel.figures[DELAY] = delay
+    smooth(
+        rough, no / mass, delay, tones.carriers, tones.basis, tones.ends,
+        channel.unknown, channel.power, channel.h_hat,
+    )  # fmt: skip
 
-    `x` begins with the short training. One sum for each short segment's clean samples, then one for
-    each `block` samples of the long training at `long_start`. Phase 0 at `x[0]`.
+
+@njit(nogil=True, cache=True)
+def learn(
+    bins: NDArray[np.complex64],
+    sent: NDArray[np.complex64],
+    n_training: int,
+    phase: float,
+    rate: float,
+    tones: Tones,
+    channel: Channel,
+) -> None:
+    """The channel anew with the header, now known, as further training; `bins` are used up.
+
+    `phase` is the last symbol's, `rate` how it grows a symbol. The preamble may have been sent
+    stronger than the rest: if so is what the header tells.
     """
-    step = -2 * math.pi * frequency
-    segment = short_template.size
-    for s in range(cover.size):
-        total = 0j
-        for m in range(first_clean, first_clean + n_clean):
-            at = segment * s + m
-            turn = complex(math.cos(step * at), math.sin(step * at))
-            total += complex(x[at]) * complex(short_template[m % segment]).conjugate() * turn
-        out[s] = total * cover[s]
-    n_long = out.size - cover.size
-    for b in range(n_long):
-        total = 0j
-        for m in range(block):
-            at = long_start + block * b + m
-            turn = complex(math.cos(step * at), math.sin(step * at))
-            known = complex(long_template[(block * b + m) % long_template.size])
-            total += complex(x[at]) * known.conjugate() * turn
-        out[cover.size + b] = total
-
-
-# Sums in any order, so that they are vectorised; the order is the same at every call.
-@njit(nogil=True, cache=True, fastmath={"reassoc", "contract"})
-def transform(matrix: NDArray[np.complex64], x: NDArray[np.complex64]) -> NDArray[np.complex64]:
-    """matrix · x, without BLAS: its threads cost more than so small a product."""
-    out = np.empty(matrix.shape[0], np.complex64)
-    for i in range(matrix.shape[0]):
-        re, im = np.float32(0), np.float32(0)
-        for j in range(matrix.shape[1]):
-            a, b = matrix[i, j], x[j]
-            re += a.real * b.real - a.imag * b.imag
-            im += a.real * b.imag + a.imag * b.real
-        out[i] = complex(re, im)
-    return out
-
-
-@njit(nogil=True, cache=True)
-def likelihood(
-    turns: NDArray[np.complex128], blocks: NDArray[np.complex128], out: NDArray[np.float64]
-) -> None:
-    """|turns · blocks|² for each row."""
-    for i in range(turns.shape[0]):
-        total = 0j
-        for j in range(blocks.size):
-            total += turns[i, j] * blocks[j]
-        out[i] = total.real * total.real + total.imag * total.imag
+    n, n_used = sent.shape
+    seen, expected = 0.0, 0.0
+    for s in range(n_training, n):
+        angle = phase - (n - 1 - s) * rate
+        back = np.complex64(complex(math.cos(angle), -math.sin(angle)))
+        for k in range(n_used):
+            at = tones.bins[k]
+            bins[s, at] *= back
+            h = channel.h_hat[k]
+            product = bins[s, at] * np.conj(sent[s, k]) * np.conj(h)
+            seen += product.real
+            expected += h.real * h.real + h.imag * h.imag
+    amplitude = np.ones(n, np.float32)
+    if seen > 0.0:
+        ratio = expected / seen
+        if abs(1 / ratio - 1) > _SURELY * math.sqrt(0.5 * channel.figures[NO] / expected):
+            for s in range(n_training):
+                amplitude[s] = min(max(ratio, 1 / _LARGEST_BOOST), _LARGEST_BOOST)
+    estimate(bins, amplitude, sent, tones, channel)

@@ -130,6 +130,22 @@ def _emit_steps(builder: Any, llr: Any, decisions: Any, n_steps: Any) -> None:
 
 
 @njit(nogil=True, cache=True)
+def decode_block(
+    llr: NDArray[np.int16], decisions: NDArray[np.uint64], out: NDArray[np.uint8]
+) -> None:
+    """LLRs of the mother code `[2 t]` to the likeliest bytes, the tail left out."""
+    out[:] = 0
+    n_bits = 8 * out.size
+    _forward(llr, decisions)
+    state = 0
+    for t in range(decisions.size - 1, -1, -1):
+        if t < n_bits:
+            out[t >> 3] |= np.uint8((state >> 5) << (7 - (t & 7)))
+        won_by_odd = int(decisions[t] >> np.uint64(state)) & 1
+        state = (state & 31) << 1 | won_by_odd
+
+
+@njit(nogil=True, cache=True)
 def _decode(
     llr: NDArray[np.int16],
     kept: NDArray[np.int32],
@@ -138,15 +154,7 @@ def _decode(
     out: NDArray[np.uint8],
 ) -> None:
     mother[:] = 0
-    out[:] = 0
-    n_bits = 8 * out.shape[1]
     for block in range(llr.shape[0]):
         for i in range(kept.size):
             mother[kept[i]] = llr[block, i]
-        _forward(mother, decisions)
-        state = 0
-        for t in range(decisions.size - 1, -1, -1):
-            if t < n_bits:
-                out[block, t >> 3] |= np.uint8((state >> 5) << (7 - (t & 7)))
-            won_by_odd = int(decisions[t] >> np.uint64(state)) & 1
-            state = (state & 31) << 1 | won_by_odd
+        decode_block(mother, decisions, out[block])

@@ -1,6 +1,6 @@
 """sdrlinkctl."""
 
-from sdrlinkd.cli import bag, demo, lab, messages, pdu, phy, status
+from sdrlinkd.cli import bag, demo, lab, messages, pdu, phy, status, wifi
 from sdrlinkd.cli.app import main, run
 
-__all__ = ["bag", "demo", "lab", "main", "messages", "pdu", "phy", "run", "status"]
+__all__ = ["bag", "demo", "lab", "main", "messages", "pdu", "phy", "run", "status", "wifi"]

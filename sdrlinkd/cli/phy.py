@@ -100,8 +100,8 @@ def decode(
     console = Console(soft_wrap=True)
     counters: dict[str, int] = {}
     with (
-        _open(file, type_name, rate) as recording,
-        _progress(f"decode {file.name}", recording) as progress,
+        open_recording(file, type_name, rate) as recording,
+        show_progress(f"decode {file.name}", recording) as progress,
     ):
         pdus: list[tuple[int, bytes]] = []
         for event, receiver in recording.decode(None if network < 0 else network, progress):
@@ -131,8 +131,8 @@ def spectrum(
     pictures = load_pictures("sdrlinkd.iq")
     console = Console()
     with (
-        _open(file, type_name, rate) as recording,
-        _progress(f"spectrum of {file.name}", recording) as progress,
+        open_recording(file, type_name, rate) as recording,
+        show_progress(f"spectrum of {file.name}", recording) as progress,
     ):
         measured = spectrum_of(recording, progress)
     path = out or Path(f"{_stem(file)}.spectrum.png")
@@ -152,8 +152,8 @@ def constellation(
     pictures = load_pictures("sdrlinkd.iq")
     console = Console()
     with (
-        _open(file, type_name, rate) as recording,
-        _progress(f"points in {file.name}", recording) as progress,
+        open_recording(file, type_name, rate) as recording,
+        show_progress(f"points in {file.name}", recording) as progress,
     ):
         points = recording.points(None if network < 0 else network, progress)
     if not points.by_modulation:
@@ -167,7 +167,8 @@ def constellation(
     console.print(f"wrote {path}", highlight=False, markup=False, soft_wrap=True)
 
 
-def _open(file: Path, type_name: str, rate: float | None) -> "IqRecording":
+def open_recording(file: Path, type_name: str, rate: float | None) -> "IqRecording":
+    """A recording, with a word about what is wrong with it."""
     from sdrlinkd.iq import IqRecording
 
     recording = IqRecording(file, type_name, rate)
@@ -180,7 +181,8 @@ def _open(file: Path, type_name: str, rate: float | None) -> "IqRecording":
 
 
 @contextmanager
-def _progress(what: str, recording: "IqRecording") -> Iterator["OnProgress"]:
+def show_progress(what: str, recording: "IqRecording") -> Iterator["OnProgress"]:
+    """A bar while it is read."""
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
     hidden = not console.is_terminal

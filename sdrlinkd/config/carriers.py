@@ -34,6 +34,8 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     frequency_hz: Annotated[float, Meta(ge=0, le=1e11)] = 2.45e9
     mcs: Annotated[int, Meta(ge=0, le=9)] = 1
     """Modulation and code rate; `sdrlinkctl phy info` lists them."""
+    grid: Literal["64/16", "64/8", "128/16", "256/32"] = "64/16"
+    """FFT size and samples of prefix; the same at all nodes."""
     network: Annotated[int, Meta(ge=0, le=7)] = 0
     """Bursts of other networks are skipped."""
     max_burst_s: Annotated[float, Meta(gt=0, le=1)] = 0.005
@@ -43,8 +45,14 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     and what an urgent message may have to wait besides a burst."""
     backoff_db: Annotated[float, Meta(ge=0, le=60)] = 12.0
     """Mean power of a burst below full scale: room for its peaks."""
+    preamble_boost_db: Annotated[float, Meta(ge=0, le=3)] = 0.0
+    """The preamble is sent so much stronger than the rest: where peaks limit an amplifier, bursts
+    are found farther away."""
     max_cfo_hz: Annotated[float, Meta(ge=0, le=1e6)] = 1e5
     """Largest carrier offset between two radios."""
+    one_crystal: bool = True
+    """Carrier and samples of every radio come from the same crystal: the offset of the one tells
+    that of the other."""
     carrier_db: Annotated[float, Meta(ge=3, le=40)] = 6.0
     """So much energy above the noise is a carrier; for access policies that listen."""
     block_s: Annotated[float, Meta(ge=1e-4, le=0.1)] = 0.001

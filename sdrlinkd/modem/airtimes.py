@@ -12,12 +12,13 @@ class Airtimes:
 
     def __init__(self, params: ModemParams, pdu_size: int) -> None:
         self._rate_hz = params.rate_hz
+        self._grid = phy.GRIDS[params.grid]
         self._longest = round(params.max_burst_s * params.rate_hz)
         self._pdu_size = pdu_size
 
     def samples(self, mcs: int, n_pdus: int) -> int:
         """Length of a burst."""
-        return phy.layout(phy.OFDM_64_16, mcs, n_pdus, self._pdu_size).n_samples
+        return phy.layout(self._grid, mcs, n_pdus, self._pdu_size).n_samples
 
     def airtime_s(self, mcs: int, n_pdus: int) -> float:
         """Length of a burst in s."""
@@ -30,7 +31,7 @@ class Airtimes:
     @property
     def overhead_s(self) -> float:
         """Preamble, header, and the last symbol that is not full."""
-        one = phy.layout(phy.OFDM_64_16, 0, 1, self._pdu_size)
+        one = phy.layout(self._grid, 0, 1, self._pdu_size)
         return (one.n_samples - (one.n_symbols - 1) * one.grid.n_symbol) / self._rate_hz
 
     def most_pdus(self, mcs: int, airtime_s: float) -> int:
@@ -39,7 +40,7 @@ class Airtimes:
         if self.samples(mcs, 1) > given:
             return 0
         room = int(min(given, self._longest))
-        return phy.most_pdus(phy.OFDM_64_16, mcs, self._pdu_size, room)
+        return phy.most_pdus(self._grid, mcs, self._pdu_size, room)
 
     def longest_s(self) -> tuple[float, ...]:
         """The longest burst of each MCS."""

@@ -47,7 +47,12 @@ class ModemLink:
         self._radio = radio
         self._kind = kind
         self._airtimes = Airtimes(params, pdu_size)
-        self._receiver = phy.Receiver(params.network, params.max_cfo_hz / params.rate_hz)
+        self._receiver = phy.Receiver(
+            params.network,
+            params.max_cfo_hz / params.rate_hz,
+            phy.GRIDS[params.grid],
+            carrier_cycles=params.frequency_hz / params.rate_hz if params.one_crystal else 0.0,
+        )
         sense = phy.CarrierSense(params.carrier_db) if listens else None
         self._ear = Ear(self._receiver, sense, params.rate_hz)
         self._lead_grows = lead_grows

@@ -51,7 +51,7 @@ def _make_radio(config: Config, node_id: int, rng: Random) -> Radio:
 
 def _check_airtime(config: Config) -> None:
     modem, size = config.modem, config.link.pdu_size
-    airtime_s = phy.layout(phy.OFDM_64_16, modem.mcs, 1, size).n_samples / modem.rate_hz
+    airtime_s = phy.layout(phy.GRIDS[modem.grid], modem.mcs, 1, size).n_samples / modem.rate_hz
     if airtime_s > config.reassembly.timeout_s / 2:
         raise ConfigError(
             f"modem.rate_hz: got {modem.rate_hz:g}; a PDU of {size} B takes {airtime_s:.2g} s on "

@@ -35,7 +35,8 @@ class Transmission:
     def __init__(self, params: ModemParams, radio: Radio) -> None:
         self._radio = radio
         self._rate_hz = params.rate_hz
-        self._transmitter = phy.Transmitter(params.network)
+        grid = phy.GRIDS[params.grid]
+        self._transmitter = phy.Transmitter(params.network, grid, params.preamble_boost_db)
         self._amplitude = 10 ** (-params.backoff_db / 20)
         self._thread = ThreadPoolExecutor(1, "phy-tx")
         self._tasks: asyncio.TaskGroup | None = None

@@ -8,7 +8,7 @@ from phy.interleaver import order
 from phy.kernels.convolution import convolve
 from phy.mapping import mapping
 from phy.ofdm import to_bins, to_samples
-from phy.preamble import BARKER, LENGTH, SEGMENT, SHORT, long_symbol, preamble, short_carriers
+from phy.preamble import BARKER, SEGMENT, SHORT, length, long_symbol, preamble, short_carriers
 
 # The standard's samples carry the inverse FFT's 1/64; ours have mean power 1.
 OURS = OFDM_64_16.scale
@@ -119,7 +119,7 @@ def test_the_short_training_is_the_standards_under_a_cover():
 
 def test_the_preamble_is_short_training_a_guard_and_two_long_symbols_at_power_1():
     samples = preamble()
-    assert len(samples) == LENGTH == 352
+    assert len(samples) == length() == 352
     long = long_symbol()
     assert np.array_equal(samples[SHORT:], np.concatenate((long[32:], long, long)))
     for part in (samples, samples[:SHORT], samples[SHORT:]):

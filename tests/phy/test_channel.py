@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.special import j0
 
 from phy.channel import PROFILES, FrontEnd, FrontEndParams, Path, PathParams
-from phy.channel.resampling import N_TAPS, echo_filter, stretch
+from phy.channel.fading import BLOCK, jakes, moving_filter
+from phy.channel.resampling import N_TAPS, echo_filters, stretch
 from tests.phy.signals import noise, silence, turned
 
 SEED = 43
@@ -169,7 +171,7 @@ def test_leak_and_image_of_the_transmitter():
 
 @pytest.mark.parametrize("delay", [0.0, 0.25, 1.0, 2.6])
 def test_an_echo_comes_when_it_should(delay):
-    taps = echo_filter(np.array([delay]), np.array([1 + 0j]))
+    taps = echo_filters(np.array([delay]), np.array([[1 + 0j]]))[0]
     t = np.arange(600)
     y = np.convolve(band_limited(t), taps)
     inner = np.arange(100, 500)
@@ -179,9 +181,9 @@ def test_an_echo_comes_when_it_should(delay):
 
 def test_echoes_add_up():
     delays, gains = np.array([0.0, 0.4, 7.3]), np.array([1, 0.5j, -0.2])
-    both = echo_filter(delays, gains)
+    both = echo_filters(delays, gains[None, :])[0]
     for delay, gain in zip(delays, gains, strict=True):
-        one = echo_filter(np.array([delay]), np.array([gain]))
+        one = echo_filters(np.array([delay]), np.array([[gain]]))[0]
         both[: len(one)] -= one
     assert np.abs(both).max() < 1e-6
 
@@ -228,3 +230,41 @@ def test_echoes_have_the_delays_and_powers_of_the_profile(profile):
     for until in (0.8, 2, 5):
         came = power[delay <= 20 * until + 2].sum()
         assert came == pytest.approx(share[listed[:, 0] <= until].sum(), abs=0.05)
+
+
+def test_moving_echoes_change_as_jakes_said():
+    """Mean gain 1, and from t to t + τ the correlation J0(2π f τ)."""
+    doppler_hz, tau_s = 40.0, np.array([0.0, 0.002, 0.006, 0.0096])
+    gains = np.stack([jakes(50, doppler_hz, tau_s, np.random.default_rng(i)) for i in range(60)])
+    got = np.mean(gains * gains[:, :1].conj(), axis=(0, 2))
+    assert got == pytest.approx(j0(2 * np.pi * doppler_hz * tau_s), abs=0.06)
+
+
+def test_a_filter_that_does_not_move_is_a_convolution():
+    x, taps = noise(rng(), 1000), noise(rng(), 40)
+    moved = moving_filter(x, np.tile(taps, (-(-1000 // BLOCK), 1)))
+    assert moved == pytest.approx(np.convolve(x, taps), abs=1e-4)
+
+
+def test_a_fast_path_fades_within_a_burst_and_a_slow_one_does_not():
+    x = np.ones(100_000, np.complex64)
+    swing = {}
+    for doppler_hz in (1e-5, 100.0):
+        params = PathParams(rate_hz=1e6, profile="rayleigh", doppler_hz=doppler_hz)
+        _, y = Path(params, rng()).carry(x)
+        inner = np.abs(y[100:99_900])
+        swing[doppler_hz] = inner.max() / inner.min()
+    assert swing[1e-5] < 1.001
+    assert swing[100.0] > 2
+
+
+def test_phase_noise_has_its_spectrum():
+    params = PathParams(rate_hz=1e6, phase_noise_dbc_hz=-80)
+    n, spectra = 1 << 14, []
+    for seed in range(100):
+        _, y = Path(params, np.random.default_rng(seed)).carry(np.ones(n, np.complex64))
+        phase = np.unwrap(np.angle(y))
+        spectra.append(np.abs(np.fft.fft(np.diff(phase))[1:]) ** 2 / n)
+    # Steps of a random walk are white: S(f) (2π f)² / rate.
+    step = np.mean(spectra) * 1e6 / (2 * np.pi * 1e4) ** 2
+    assert 10 * np.log10(step) == pytest.approx(-80, abs=0.3)

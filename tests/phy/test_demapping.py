@@ -5,22 +5,38 @@ import pytest
 
 from phy import OFDM_64_16, Modulation, points
 from phy.convolutional import MAX_LLR
-from phy.demodulation import Demodulator, new_tracking
-from phy.estimation import ChannelEstimate
+from phy.demodulation import Demodulator
+from phy.estimation import new_channel
 from phy.interleaver import order
+from phy.kernels.burst import GAIN, NO
+from phy.kernels.equaliser import BLOCK, start_tracking
 from phy.mapping import mapping
 from phy.sequences import polarity
 
 SEED = 17
 GRID = OFDM_64_16
-N_SYMBOLS = 20
+N_SYMBOLS = BLOCK  # After so many, the channel is corrected by what was decided.
 SCALE = 8  # LLRs are in eighths
 
 every_modulation = pytest.mark.parametrize("modulation", Modulation)
 
 
 def channel_of(h, no):
-    return ChannelEstimate(h.astype(np.complex64), no, float(np.mean(np.abs(h) ** 2)))
+    """A channel known exactly: gains of the carriers in use, noise power."""
+    channel = new_channel(GRID)
+    channel.h_hat[:] = h[GRID.tones]
+    channel.figures[[NO, GAIN]] = no, np.mean(np.abs(h) ** 2)
+    channel.power[:] = channel.gain
+    start_tracking(channel, GRID.n_symbol / GRID.n_fft, 0.0, False)
+    return channel
+
+
+def demap(modulation, bins, channel, first_symbol=2):
+    """(LLRs, points)."""
+    llr = np.empty(len(bins) * GRID.n_data * modulation.bits, np.int16)
+    equalised = np.empty((len(bins), GRID.n_data), np.complex64)
+    Demodulator(modulation, GRID).demap(bins, channel, first_symbol, llr, equalised)
+    return llr, equalised
 
 
 def flat():
@@ -70,9 +86,7 @@ def test_llrs_are_max_log_within_their_quantisation(modulation, no, kind):
     # As complex64, for near the steps of the quantiser single precision decides.
     data = (h[GRID.data_at] * (points(modulation)[at] + noise)).astype(np.complex64)
     channel = channel_of(h, no)
-    llr, _ = Demodulator(modulation, GRID).demap(
-        with_pilots(data, h), channel, new_tracking(channel, GRID), 2
-    )
+    llr, _ = demap(modulation, with_pilots(data, h), channel)
     wanted = np.clip(SCALE * exact_llrs(data, h, no, modulation), -MAX_LLR, MAX_LLR)
     assert llr == pytest.approx(wanted, abs=1.01)
     assert np.abs(llr).max() <= MAX_LLR
@@ -87,11 +101,9 @@ def test_clean_symbols_give_back_their_bits(modulation):
     bins = mapping(modulation, GRID).to_spectrum(coded, 5)
     bins[:, GRID.bins] *= h
     channel = channel_of(h, 0.001)
-    llr, equalised = Demodulator(modulation, GRID).demap(
-        bins, channel, new_tracking(channel, GRID), 5
-    )
-    # On a carrier that hardly arrives, the finest points tell nothing.
-    assert np.count_nonzero(llr) > 0.95 * len(llr)
+    llr, equalised = demap(modulation, bins, channel, 5)
+    # On carriers that hardly arrive, the finest points tell nothing.
+    assert np.count_nonzero(llr) > 0.85 * len(llr)
     assert np.array_equal(llr[llr != 0] < 0, coded[llr != 0])
     nearest = np.abs(equalised[..., None] - points(modulation)).min(-1)
     assert nearest.max() < 1e-4
@@ -101,15 +113,12 @@ def test_clean_symbols_give_back_their_bits(modulation):
 def test_symbols_one_by_one_are_the_same_as_together(modulation):
     rng = np.random.default_rng(SEED)
     h = selective(rng)
-    bins = with_pilots(rng.standard_normal((N_SYMBOLS, 48)) * h[GRID.data_at], h)
-    bins[:, GRID.bins] *= np.exp(0.05j * rng.standard_normal((N_SYMBOLS, 1)))
+    n = 3 * BLOCK + 1
+    bins = with_pilots(rng.standard_normal((n, 48)) * h[GRID.data_at], h)
+    bins[:, GRID.bins] *= np.exp(0.05j * rng.standard_normal((n, 1)))
+    together, _ = demap(modulation, bins, channel_of(h, 0.01))
     channel = channel_of(h, 0.01)
-    demodulator = Demodulator(modulation, GRID)
-    together, _ = demodulator.demap(bins, channel, new_tracking(channel, GRID), 2)
-    tracking = new_tracking(channel, GRID)
-    one_by_one = [
-        demodulator.demap(bins[i : i + 1], channel, tracking, 2 + i)[0] for i in range(N_SYMBOLS)
-    ]
+    one_by_one = [demap(modulation, bins[i : i + 1], channel, 2 + i)[0] for i in range(len(bins))]
     assert np.array_equal(together, np.concatenate(one_by_one))
 
 
@@ -127,9 +136,7 @@ def error_after_tracking(n, phase, slope):
     """Errors of the equalised points by symbol, rms `[n]`."""
     channel = channel_of(np.ones(GRID.n_used), 0.01)
     sent, bins = turned_symbols(n, phase, slope)
-    _, equalised = Demodulator(Modulation.QPSK, GRID).demap(
-        bins, channel, new_tracking(channel, GRID), 2
-    )
+    _, equalised = demap(Modulation.QPSK, bins, channel)
     return np.sqrt(np.mean(np.abs(equalised - sent) ** 2, axis=1))
 
 
@@ -152,11 +159,70 @@ def test_a_carrier_that_does_not_arrive_tells_nothing():
     h = np.ones(GRID.n_used, np.complex128)
     h[GRID.data_at[7]] = 0
     channel = channel_of(h, 0.1)
-    llr, equalised = Demodulator(Modulation.QAM64, GRID).demap(
-        with_pilots(np.ones((1, 48)), h), channel, new_tracking(channel, GRID), 2
-    )
+    llr, equalised = demap(Modulation.QAM64, with_pilots(np.ones((1, 48)), h), channel)
     as_sent = np.empty_like(llr)
     as_sent[order(288, 6)] = llr
     tells = as_sent.reshape(48, 6).any(axis=1)
     assert list(np.flatnonzero(~tells)) == [7]
     assert equalised[0, 7] == 0
+
+
+def faded_symbols(modulation, h, no, rng):
+    """(coded bits, bins) of symbols through gains `h` `[n, n_used]` and noise."""
+    n = len(h)
+    coded = rng.integers(0, 2, n * GRID.n_data * modulation.bits, np.uint8)
+    bins = mapping(modulation, GRID).to_spectrum(coded, 2)
+    bins[:, GRID.bins] *= h
+    noise = rng.standard_normal((n, GRID.n_fft, 2)) @ [1, 1j] * np.sqrt(no / 2)
+    return coded, (bins + noise).astype(np.complex64)
+
+
+@every_modulation
+def test_a_channel_that_fades_is_followed(modulation):
+    """Echoes turn against each other: the band moves through its fades, as at 40 Hz and 5 Msps."""
+    rng = np.random.default_rng(SEED)
+    n, no = 1500, 1e-4
+    turn = 2 * np.pi * np.arange(n)[:, None] / n
+    h = 1 + 0.5 * np.exp(1j * (turn + 2 * np.pi * 3 * GRID.used / GRID.n_fft))
+    coded, bins = faded_symbols(modulation, h, no, rng)
+    llr, _ = demap(modulation, bins, channel_of(h[0], no))
+    # The densest points lose track in the deepest fades.
+    assert np.mean((llr < 0) != coded) < (0.01 if modulation.bits < 8 else 0.2)
+    # The control: by the first symbols' channel alone, as if it stood still.
+    stale = [demap(modulation, bins[i : i + 1], channel_of(h[0], no), 2 + i)[0] for i in range(n)]
+    wrong = np.mean((np.concatenate(stale) < 0) != coded)
+    assert wrong > 0.05 or modulation is Modulation.BPSK
+
+
+def error_of(channel, h):
+    """Mean square, whatever phase and slope: those the pilots follow."""
+    carriers = GRID.used[GRID.tones]
+    leaning = channel.h_hat * np.exp(1j * np.linspace(-0.05, 0.05, 101)[:, None] * carriers)
+    match = np.abs(leaning @ h[GRID.tones].conj()).max()
+    power = np.sum(np.abs(channel.h_hat) ** 2) + np.sum(np.abs(h) ** 2)
+    return (power - 2 * match) / len(carriers)
+
+
+@pytest.mark.parametrize(
+    ("modulation", "no"), [(Modulation.BPSK, 1.2), (Modulation.QPSK, 0.6), (Modulation.QAM16, 0.17)]
+)
+def test_a_channel_that_stands_still_becomes_known_better(modulation, no):
+    """Where the code of rate 1/2 just holds, and every tenth bit and more is decided wrongly."""
+    rng = np.random.default_rng(SEED)
+    h = flat() / abs(flat()[0])
+    _, bins = faded_symbols(modulation, np.repeat(h[None, :], 200, axis=0), no, rng)
+    noise = rng.standard_normal((GRID.n_used, 2)) @ [1, 1j]
+    channel = channel_of(h + noise * np.sqrt(no / 8), no)
+    channel.unknown[:] = no / 4
+    before = error_of(channel, h)
+    demap(modulation, bins, channel)
+    assert error_of(channel, h) < before / 2
+
+
+def test_a_symbol_drowned_by_another_sender_tells_little():
+    rng = np.random.default_rng(SEED)
+    _, bins = faded_symbols(Modulation.QPSK, np.ones((6, GRID.n_used)), 0.01, rng)
+    bins[3] += (rng.standard_normal((GRID.n_fft, 2)) @ [1, 1j]) * 2
+    llr, _ = demap(Modulation.QPSK, bins, channel_of(np.ones(GRID.n_used), 0.01))
+    certainty = np.abs(llr.reshape(6, -1)).mean(axis=1)
+    assert certainty[3] < 0.05 * np.delete(certainty, 3).min()

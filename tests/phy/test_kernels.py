@@ -5,18 +5,9 @@ import pytest
 
 from phy import OFDM_64_16, Modulation, points
 from phy.interleaver import order
-from phy.kernels.detector import HISTORY, detector_sums, sanitise, search
+from phy.kernels.detector import FORGETS, HISTORY, detector_sums, sanitise, search
 from phy.kernels.resampler import interpolate
 from phy.kernels.symbols import gather, map_bits
-from phy.kernels.training import (
-    correlate,
-    energy,
-    lag_product,
-    least_squares,
-    likelihood,
-    match_blocks,
-    transform,
-)
 from phy.preamble import BARKER, preamble
 from phy.stream import SampleStream
 from tests.phy.signals import noise, silence, turned
@@ -70,10 +61,10 @@ def test_the_metric_is_1_at_the_last_sample_of_the_short_training_and_nowhere_el
     assert metric[away].max() < 0.6
 
 
-def searched(x, threshold=0.25, hop=512, dc=(0.0, 0.0, 0.0)):
+def searched(x, threshold=0.25, hop=512, dc=(0.0, 0.0, 0.0), excess=0.0, age=0):
     state, work = np.array(dc), np.zeros((7, HISTORY + hop), np.float32)
     n_hops = (len(x) - HISTORY) // hop
-    return search(x, n_hops, hop, threshold, state, work), state
+    return search(x, n_hops, hop, threshold, excess, age, state, work), state
 
 
 @pytest.mark.parametrize("lead", [HISTORY, 700, 703, 1500])
@@ -84,6 +75,18 @@ def test_search_finds_the_first_sample_over_the_threshold(lead):
     p, e = sums(x, 0j, len(x) - HISTORY)
     assert found == HISTORY + int(np.argmax(np.abs(p) > 0.25 * e))
     assert lead < found <= lead + 191
+
+
+def test_a_raised_threshold_sinks_again():
+    """A peak of about 0.6 each 2048 samples: the first that the threshold has sunk below."""
+    x = 0.75 * noise(rng(), HISTORY + 10 * 2048)
+    for begin in range(300, len(x) - 352, 2048):
+        x[begin : begin + 352] += preamble()
+    p, e = sums(x, 0j, len(x) - HISTORY)
+    level = 0.25 + 4 * np.exp(-(np.arange(len(p)) // 512 * 512 + 1000) / FORGETS)
+    wanted = HISTORY + int(np.argmax(np.abs(p) > level * e))
+    found, _ = searched(x, excess=4.0, age=1000)
+    assert found == wanted > 4 * 2048
 
 
 def test_search_finds_nothing_in_noise_and_learns_its_mean():
@@ -143,57 +146,6 @@ def test_interpolate_is_a_sum_of_its_filters_taps():
         taps = filters[int((t - whole) * 8 + 0.5)]
         wanted = sum(taps[k] * padded[20 + whole - 1 + k] for k in range(4))
         assert got == pytest.approx(wanted, abs=1e-5)
-
-
-def test_correlation_with_two_templates_in_a_row():
-    x, templates = noise(rng(), 2 * 16 + 8), noise(rng(), 3 * 16).reshape(3, 16)
-    out = np.empty((3, 8), np.float32)
-    correlate(x, 0.03, templates, out)
-    z = x * np.exp(-2j * np.pi * 0.03 * np.arange(len(x)))
-    wanted = [
-        [np.abs(np.vdot(t, z[o : o + 16]) + np.vdot(t, z[o + 16 : o + 32])) ** 2 for o in range(8)]
-        for t in templates
-    ]
-    assert out == pytest.approx(np.array(wanted), rel=1e-4)
-
-
-def test_small_sums():
-    x, y = noise(rng(), 100), noise(rng(), 40)
-    assert energy(x) == pytest.approx(np.sum(np.abs(x) ** 2), rel=1e-5)
-    assert lag_product(x, 32) == pytest.approx(np.vdot(x[:32], x[32:64]), abs=1e-4)
-    matrix = noise(rng(), 400).reshape(10, 40)
-    assert transform(matrix, y) == pytest.approx(matrix @ y, abs=1e-4)
-    out = np.empty(10)
-    likelihood(matrix.astype(np.complex128), y.astype(np.complex128), out)
-    assert out == pytest.approx(np.abs(matrix @ y) ** 2, rel=1e-4)
-
-
-def test_least_squares_tells_gains_and_noise():
-    draws = rng()
-    used = np.array([1, 5, 6, 60])
-    sent = draws.choice([-1, 1, 1j], (4000, 4)).astype(np.complex64)
-    h = np.array([1, 2j, -0.5, 0.1 + 0.1j])
-    bins = noise(draws, 4000 * 64, 0.3).reshape(4000, 64)
-    bins[:, used] += h * sent
-    out = np.empty(4, np.complex64)
-    no, power = least_squares(bins, used, sent, out)
-    assert out == pytest.approx(h, abs=0.03)
-    assert no == pytest.approx(0.3, rel=0.03)
-    assert power == pytest.approx(np.mean(np.abs(h) ** 2), rel=0.03)
-
-
-def test_blocks_match_their_templates():
-    x, short, long = noise(rng(), 2 * 16 + 4 + 2 * 8), noise(rng(), 16), noise(rng(), 8)
-    cover = np.array([1, -1], np.float32)
-    out = np.empty(2 + 4, np.complex128)
-    match_blocks(x, 0.01, short, cover, 3, 10, long, 36, 4, out)
-    z = x * np.exp(-2j * np.pi * 0.01 * np.arange(len(x)))
-    clean = (3 + np.arange(10)) % 16
-    wanted = [
-        sign * np.vdot(short[clean], z[16 * s + 3 : 16 * s + 13]) for s, sign in enumerate(cover)
-    ]
-    wanted += [np.vdot(np.tile(long, 2)[4 * b :][:4], z[36 + 4 * b :][:4]) for b in range(4)]
-    assert out == pytest.approx(np.array(wanted), abs=1e-4)
 
 
 def test_a_stream_keeps_what_is_not_forgotten_by_absolute_index():

@@ -40,17 +40,18 @@ def test_qpsk_half_of_220_bytes_at_6_db_loses_one_in_a_hundred_at_most():
 @pytest.mark.parametrize(
     ("mcs", "size", "snr_db", "most"),
     [
-        (0, 64, 0.0, 18),
-        (0, 220, 1.0, 6),
-        (1, 220, 3.5, 14),
-        (1, 220, 4.2, 9),
-        (2, 220, 6.5, 9),
-        (3, 220, 9.0, 14),
-        (3, 220, 10.0, 6),
-        (4, 220, 12.5, 12),
-        (5, 220, 16.5, 14),
-        (6, 220, 18.0, 12),
-        (6, 220, 19.5, 6),
+        (0, 64, -1.6, 12),
+        (0, 220, -1.6, 9),
+        (1, 220, 1.1, 9),
+        (1, 220, 1.7, 3),
+        (2, 220, 4.3, 9),
+        (3, 220, 6.5, 9),
+        (3, 220, 7.2, 3),
+        (4, 220, 10.4, 9),
+        (5, 220, 14.5, 9),
+        (6, 220, 15.9, 9),
+        (6, 220, 16.8, 3),
+        (9, 220, 23.3, 9),
     ],
 )
 def test_of_300_bursts_near_the_knee_few_are_lost(mcs, size, snr_db, most):
@@ -58,7 +59,7 @@ def test_of_300_bursts_near_the_knee_few_are_lost(mcs, size, snr_db, most):
     assert n_lost(300, mcs, size, snr_db) <= most
 
 
-@pytest.mark.parametrize(("mcs", "size", "snr_db"), [(0, 64, -4.0), (1, 220, 0.0), (6, 220, 14.0)])
+@pytest.mark.parametrize(("mcs", "size", "snr_db"), [(0, 64, -4.0), (1, 220, -1.5), (6, 220, 13.0)])
 def test_the_yardstick_tells_noise_from_signal(mcs, size, snr_db):
     """The control: 3 dB below the knee, most bursts are lost."""
     assert n_lost(50, mcs, size, snr_db) > 25
@@ -66,7 +67,7 @@ def test_the_yardstick_tells_noise_from_signal(mcs, size, snr_db):
 
 def test_a_wide_search_for_the_carrier_costs_little():
     """±96 kHz at 1 Msps: five times as many hypotheses."""
-    assert n_lost(300, mcs=1, size=220, snr_db=4.2, max_frequency=0.096) <= 9
+    assert n_lost(300, mcs=1, size=220, snr_db=1.5, max_frequency=0.096) <= 9
 
 
 def test_preambles_are_found_below_the_noise():
@@ -132,8 +133,8 @@ def recorded(name):
     ],
 )
 def test_nothing_of_ours_is_heard_in_recordings_of_others(name, wifi, network):
-    """Wi-Fi's long training is ours too, so that is found; its SIGNAL field is no header."""
+    """Wi-Fi's long training is ours too, but its short training lacks our code."""
     counters = quiet(recorded(name), network)
-    assert (counters["preambles"] > 0) == wifi
-    assert counters["headers_bad"] == counters["preambles"]
+    assert counters["triggers"] > (0 if wifi else -1)
+    assert counters["preambles"] == counters["headers_bad"] == 0
     assert counters["bursts"] == counters["bursts_foreign"] == 0

@@ -1,0 +1,133 @@
+"""Bursts through a radio's imperfections and noise: how many of them are not heard."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import beta
+
+from phy import FrontEnd, FrontEndParams, Path, PathParams, PduHeard, Receiver, Transmitter
+
+LEAD_IN = 300
+LEVEL_DBFS = -15.0
+"""Mean burst power at the converter."""
+PPM = 40.0
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Air:
+    """What is between a transmitter and a receiver of bursts of one PDU.
+
+    `flawed`: crystals ±40 ppm apart, moving carrier and samples; image -36 dB and leak -35 dBc of
+    the transmitter, image -34 dB and DC -25 dBc of the receiver, 8 bits with bursts at -15 dBFS,
+    oscillators of -90 dBc/Hz at 10 kHz. Else only the carrier is off, by up to 0.02 of the rate.
+    """
+
+    rate_hz: float = 5e6
+    carrier_hz: float = 2.4e9
+    profile: str = "awgn"
+    doppler_hz: float = 0.0
+    flawed: bool = True
+
+
+def bursts(
+    air: Air, mcs: int, n_bytes: int, snr_db: float, seed: int
+) -> Iterator[tuple[bytes, NDArray[np.complex64]]]:
+    """PDUs and, each after some noise, their bursts as a receiver samples them, without end.
+
+    SNR is the burst's mean power over that of the noise in the sample band. A fading channel is
+    drawn anew for each, its mean power counts.
+    """
+    rng = np.random.default_rng(seed)
+    transmitter = Transmitter()
+    level = 10 ** (LEVEL_DBFS / 20)
+    front = FrontEndParams(noise_dbfs=LEVEL_DBFS - snr_db)
+    if air.flawed:
+        front = replace(front, image_db=34.0, dc_dbfs=LEVEL_DBFS - 25.0, bits=8)
+    front_end = FrontEnd(front, rng)
+    while True:
+        pdu = rng.bytes(n_bytes)
+        params = PathParams(
+            rate_hz=air.rate_hz,
+            carrier_hz=air.carrier_hz,
+            profile=air.profile,
+            doppler_hz=air.doppler_hz,
+            clock_ppm=rng.uniform(-PPM, PPM),
+            loss_db=-20 * math.log10(level),
+        )
+        if air.flawed:
+            params = replace(params, image_db=36.0, leak_db=35.0, phase_noise_dbc_hz=-90.0)
+        _, x = Path(params, rng).carry(transmitter.modulate([pdu], mcs))
+        lead = np.zeros(LEAD_IN + int(rng.integers(64)), np.complex64)
+        yield pdu, front_end.receive(np.concatenate((lead, x.astype(np.complex64))))
+
+
+@dataclass(frozen=True)
+class ErrorRate:
+    """Of `n` trials, `errors` failed."""
+
+    n: int
+    errors: int
+
+    @property
+    def share(self) -> float:
+        """The rate that was seen."""
+        return self.errors / self.n
+
+    @property
+    def bound(self) -> float:
+        """What it is below of, with 95 % confidence (Clopper and Pearson)."""
+        if self.errors == self.n:
+            return 1.0
+        return float(beta.ppf(CONFIDENCE, self.errors + 1, self.n - self.errors))
+
+
+def error_rate(
+    air: Air, mcs: int, n_bytes: int, snr_db: float, seed: int, n: int, enough: int
+) -> ErrorRate:
+    """Trials until `enough` errors, at most `n`."""
+    receiver = Receiver(max_frequency=PPM * 1e-6 * air.carrier_hz / air.rate_hz)
+    tried, errors, missing = 0, 0, b""
+    for pdu, x in bursts(air, mcs, n_bytes, snr_db, seed):
+        heard = {event.data for event in receiver.push(x) if isinstance(event, PduHeard)}
+        # What is not there yet may be told with the first samples of the next.
+        errors += missing not in heard | {b""}
+        missing = b"" if pdu in heard else pdu
+        tried += 1
+        if tried == n or errors >= enough:
+            break
+    heard = {event.data for event in receiver.flush() if isinstance(event, PduHeard)}
+    return ErrorRate(tried, errors + (missing not in heard | {b""}))
+
+
+def needed_snr_db(
+    rate_at: Callable[[float, int, int], ErrorRate], guess_db: float, error_rate: float, n: int
+) -> tuple[float, int]:
+    """(SNR in dB from which on the error rate is surely below `error_rate`, trials).
+
+    `rate_at(snr_db, n, enough)` measures. Steps of a quarter dB until the 95 % bounds enclose the
+    rate, then a straight line between their logarithms.
+    """
+    enough, trials = max(10, round(n * error_rate)), 0
+    step, known = 0.25, dict[float, float]()
+
+    def bound(snr_db: float) -> float:
+        nonlocal trials
+        if snr_db not in known:
+            measured = rate_at(snr_db, n, 2 * enough)
+            trials += measured.n
+            known[snr_db] = measured.bound
+        return known[snr_db]
+
+    low = high = step * round(guess_db / step)
+    while bound(high) > error_rate:
+        high += step
+    low = high - step
+    while bound(low) <= error_rate:
+        low -= step
+    high = low + step
+    above, below = math.log(bound(low)), math.log(bound(high))
+    return low + step * (above - math.log(error_rate)) / (above - below), trials

@@ -1,0 +1,55 @@
+"""The `n_list` likeliest code words of the K=7 code, not the likeliest alone.
+
+The Viterbi algorithm with a list in every state (Seshadri and Sundberg 1994). A check sum then
+finds the right one among them. Slow beside `phy.kernels.viterbi`: for when that has failed.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from phy.kernels.convolution import N_STATES, PARITY_A, PARITY_B
+
+_UNREACHED = -(1 << 30)
+
+
+@njit(nogil=True, cache=True)
+def list_decode(llr: NDArray[np.int16], out: NDArray[np.uint8]) -> None:
+    """Bits `[n_list, t]` of the paths from state 0 to state 0, likeliest first; LLRs `[2 t]`."""
+    n_list, n_steps = out.shape
+    metrics = np.full((N_STATES, n_list), _UNREACHED, np.int64)
+    grown = np.empty_like(metrics)
+    metrics[0, 0] = 0
+    # Which of its two predecessors, and which of that one's paths: 2 · rank + predecessor.
+    came_from = np.empty((n_steps, N_STATES, n_list), np.uint8)
+    for t in range(n_steps):
+        a, b = int(llr[2 * t]), int(llr[2 * t + 1])
+        for state in range(N_STATES):
+            even, odd = 2 * state, 2 * state + 1
+            gain_even = _agreement(a, b, even)
+            gain_odd = _agreement(a, b, odd)
+            rank_even, rank_odd = 0, 0
+            for rank in range(n_list):
+                by_even = metrics[even % N_STATES, rank_even] + gain_even
+                by_odd = metrics[odd % N_STATES, rank_odd] + gain_odd
+                if by_even >= by_odd:
+                    grown[state, rank] = by_even
+                    came_from[t, state, rank] = 2 * rank_even
+                    rank_even += 1
+                else:
+                    grown[state, rank] = by_odd
+                    came_from[t, state, rank] = 2 * rank_odd + 1
+                    rank_odd += 1
+        metrics, grown = grown, metrics
+    for number in range(n_list):
+        state, rank = 0, number
+        for t in range(n_steps - 1, -1, -1):
+            out[number, t] = state >> 5
+            origin = int(came_from[t, state, rank])
+            state, rank = (2 * state + (origin & 1)) % N_STATES, origin >> 1
+
+
+@njit(nogil=True, cache=True)
+def _agreement(a: int, b: int, register: int) -> int:
+    """How well LLRs agree with what the encoder sends from `register`."""
+    return (-a if PARITY_A[register] else a) + (-b if PARITY_B[register] else b)

@@ -1,0 +1,96 @@
+"""Two Kalman filters on the pilots: the phase common to all carriers, and its slope over them.
+
+The phase turns with what is left of the carrier's offset and with the oscillators' noise; the slope
+grows as the sender's sampling clock runs away from ours.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+# Rows of the state: [value, rate, var(value), cov, var(rate)], rates a symbol.
+PHASE, SLOPE = 0, 1
+# Process noise a symbol: phase noise of the oscillators, and what the models leave out.
+PHASE_NOISE = np.array([5e-5, 1e-10])
+SLOPE_NOISE = np.array([1e-10, 1e-15])
+
+SURPRISE = 6.0
+"""Times the preamble's noise at which a symbol's pilots, and with them its data, are doubted."""
+
+
+@njit(nogil=True, cache=True)
+def predict(tracking: NDArray[np.float64]) -> None:
+    """One symbol on: values move by their rates."""
+    _predict(tracking[PHASE], PHASE_NOISE)
+    _predict(tracking[SLOPE], SLOPE_NOISE)
+
+
+@njit(nogil=True, cache=True)
+def _predict(state: NDArray[np.float64], noise: NDArray[np.float64]) -> None:
+    state[0] += state[1]
+    state[2] += 2 * state[3] + state[4] + noise[0]
+    state[3] += state[4]
+    state[4] += noise[1]
+
+
+@njit(nogil=True, cache=True)
+def _correct(state: NDArray[np.float64], innovation: float, variance: float) -> None:
+    """A measurement that differs from the prediction by `innovation`."""
+    total = state[2] + variance
+    gain, rate_gain = state[2] / total, state[3] / total
+    state[0] += gain * innovation
+    state[1] += rate_gain * innovation
+    state[4] -= rate_gain * state[3]
+    state[3] -= gain * state[3]
+    state[2] -= gain * state[2]
+
+
+@njit(nogil=True, cache=True)
+def correct(
+    turned: NDArray[np.complex128],
+    power: NDArray[np.float64],
+    carriers: NDArray[np.int64],
+    no: float,
+    tracking: NDArray[np.float64],
+) -> float:
+    """Correct phase and slope by pilots; the noise power on a carrier, as far as they show it.
+
+    `turned` `[n]`: what came, turned back as predicted, times the conjugate of what should have
+    come, of which `power` is the squared magnitude. Where pilots disagree by more than `no`
+    explains, their own noise counts, here and for the data around them: interference that the
+    preamble has not seen.
+    """
+    n = turned.size
+    total = 0j
+    for p in range(n):
+        total += turned[p]
+    size = abs(total)
+    if size == 0.0:
+        return no
+    common = (total / size).conjugate()
+    residual = 0.0
+    # Weighted least squares of the pilots' phases: w (θ − a − b k)², small angles.
+    s0 = s1 = s2 = t0 = t1 = 0.0
+    for p in range(n):
+        k, weight = carriers[p], power[p]
+        aligned = turned[p] * common
+        theta = aligned.imag
+        s0 += weight
+        s1 += weight * k
+        s2 += weight * k * k
+        t0 += theta
+        t1 += theta * k
+        if weight > 0.0:
+            error = aligned - weight
+            residual += (error.real * error.real + error.imag * error.imag) / weight
+    if residual > SURPRISE * n * no:
+        no = residual / n
+    det = s0 * s2 - s1 * s1
+    if not det > 0.0:
+        return no
+    offset = math.atan2(total.imag, total.real)
+    _correct(tracking[PHASE], offset + (s2 * t0 - s1 * t1) / det, 0.5 * no * s2 / det)
+    _correct(tracking[SLOPE], (s0 * t1 - s1 * t0) / det, 0.5 * no * s0 / det)
+    return no

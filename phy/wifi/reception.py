@@ -1,0 +1,163 @@
+"""Finds 802.11a frames in samples at 20 Msps and reads them."""
+
+import cmath
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phy import ofdm, preamble
+from phy.constellation import Modulation
+from phy.demodulation import Demodulator
+from phy.estimation import new_channel, tones
+from phy.kernels.acquisition import BACKOFF
+from phy.kernels.burst import Channel
+from phy.kernels.equaliser import start_tracking
+from phy.kernels.training import estimate
+from phy.numerology import OFDM_64_16
+from phy.wifi.bits import Rate, Signal, has_right_fcs, parse_data, parse_signal
+
+RATE_HZ = 20e6
+
+_GRID = OFDM_64_16
+_SEGMENT = preamble.SEGMENT
+_WINDOW = 96
+"""Samples over which the short training's repetition is looked for."""
+_ALIKE = 0.6
+"""|Σ x[n + 16] x*[n]| / Σ |x|² that a repetition has at least."""
+_AFTER_SHORT = 320
+"""Where the repetition begins, the long training ends within so many samples."""
+_MATCH = 0.35
+"""Share of a window's power that a long symbol has at least."""
+
+
+class WifiFrame(NamedTuple):
+    """A frame whose SIGNAL field made sense. `start` is the sample of its first long symbol."""
+
+    start: int
+    rate: Rate
+    psdu: bytes
+    is_right: bool
+    """Whether its FCS is."""
+    snr_db: float
+    cfo_hz: float
+
+
+def receive(samples: NDArray[np.complex64]) -> Iterator[WifiFrame]:
+    """The frames in `samples`, complex64 at 20 Msps, in order."""
+    at = 0
+    for begin in map(int, _repetitions(samples)):
+        if begin < at:
+            continue
+        frame = _read(samples, begin)
+        if frame is not None:
+            yield frame
+            n_symbols = 1 + frame.rate.n_symbols(len(frame.psdu))
+            at = frame.start + 2 * _GRID.n_fft + n_symbols * _GRID.n_symbol
+
+
+def _repetitions(x: NDArray[np.complex64]) -> NDArray[np.int64]:
+    """Where something begins to repeat itself every 16 samples, and keeps to it for a while."""
+    wide = x.astype(np.complex128)
+    product = wide[_SEGMENT:] * wide[:-_SEGMENT].conj()
+    power = np.abs(wide[_SEGMENT:]) ** 2
+    sums = [np.cumsum(np.concatenate(([0], each))) for each in (product, power)]
+    alike, whole = (each[_WINDOW:] - each[:-_WINDOW] for each in sums)
+    high = np.abs(alike) > _ALIKE * np.maximum(whole.real, 1e-12)
+    edges = np.flatnonzero(np.diff(high.astype(np.int8), prepend=0, append=0))
+    begins, ends = edges[::2], edges[1::2]
+    found: NDArray[np.int64] = begins[ends - begins >= _SEGMENT]
+    return found
+
+
+def _read(samples: NDArray[np.complex64], begin: int) -> WifiFrame | None:
+    training = samples[begin : begin + _WINDOW + _SEGMENT]
+    lag = np.vdot(training[:-_SEGMENT], training[_SEGMENT:])
+    coarse = cmath.phase(lag) / (2 * math.pi * _SEGMENT)
+    found = _long_training(samples, begin, coarse)
+    if found is None:
+        return None
+    start, frequency = found
+    window = start - BACKOFF
+    channel = _channel(samples, window, frequency)
+    signal_window = window + 2 * _GRID.n_fft + _GRID.n_cp
+    llr = _llrs(samples, window, signal_window, 1, frequency, channel, Modulation.BPSK, 0)
+    signal = parse_signal(llr) if llr is not None else None
+    if signal is None:
+        return None
+    # As measured on the training: what follows teaches the channel, not the noise.
+    snr_db = 10 * math.log10(channel.gain * _GRID.n_used / _GRID.n_fft / channel.no)
+    psdu = _psdu(samples, window, signal_window + _GRID.n_symbol, frequency, channel, signal)
+    if psdu is None:
+        return None
+    right = has_right_fcs(psdu)
+    return WifiFrame(start, signal.rate, psdu, right, snr_db, frequency * RATE_HZ)
+
+
+def _long_training(
+    samples: NDArray[np.complex64], begin: int, coarse: float
+) -> tuple[int, float] | None:
+    """(first sample of the first long symbol's first echo, frequency in cycles a sample)."""
+    n = _GRID.n_fft
+    span = samples[begin : begin + _AFTER_SHORT + 2 * n]
+    if len(span) < 4 * n:
+        return None
+    x = span * np.exp(-2j * np.pi * coarse * np.arange(len(span)))
+    known = preamble.long_symbol(_GRID)
+    match = np.abs(np.correlate(x, known, "valid")) ** 2
+    both = match[:-n] + match[n:]
+    peak = int(both.argmax())
+    power = np.sum(np.abs(x[peak : peak + 2 * n]) ** 2)
+    if both[peak] < _MATCH * n * power / 2:
+        return None
+    nearby = both[max(0, peak - 12) : peak + 1]
+    start = peak + 1 - len(nearby) + int(np.argmax(nearby >= 0.1 * both[peak]))
+    lag = np.vdot(x[peak : peak + n], x[peak + n : peak + 2 * n])
+    return begin + start, coarse + cmath.phase(lag) / (2 * math.pi * n)
+
+
+def _channel(samples: NDArray[np.complex64], window: int, frequency: float) -> Channel:
+    starts = _GRID.n_fft * np.arange(preamble.N_LONG)
+    bins = ofdm.to_bins(samples[window:], starts, frequency, 0j, _GRID)
+    sent = preamble.long_carriers(_GRID)[_GRID.tones].astype(np.complex64)
+    channel = new_channel(_GRID)
+    amplitude = np.ones(preamble.N_LONG, np.float32)
+    estimate(bins, amplitude, np.tile(sent, (preamble.N_LONG, 1)), tones(_GRID), channel)
+    start_tracking(channel, _GRID.n_symbol / _GRID.n_fft, 0.0, False)
+    return channel
+
+
+def _llrs(
+    samples: NDArray[np.complex64],
+    origin: int,
+    window: int,
+    n_symbols: int,
+    frequency: float,
+    channel: Channel,
+    modulation: Modulation,
+    first_symbol: int,
+) -> NDArray[np.int16] | None:
+    """LLRs of `n_symbols` from the FFT window at `window` on; None when samples are missing."""
+    last = window + (n_symbols - 1) * _GRID.n_symbol + _GRID.n_fft
+    if last > len(samples):
+        return None
+    starts = _GRID.n_symbol * np.arange(n_symbols)
+    bins = ofdm.to_bins(samples[window:last], starts, frequency, 0j, _GRID, window - origin)
+    llr = np.empty(n_symbols * _GRID.n_data * modulation.bits, np.int16)
+    Demodulator(modulation, _GRID).demap(bins, channel, first_symbol, llr)
+    return llr
+
+
+def _psdu(
+    samples: NDArray[np.complex64],
+    origin: int,
+    window: int,
+    frequency: float,
+    channel: Channel,
+    signal: Signal,
+) -> bytes | None:
+    rate, n_symbols = signal.rate, signal.rate.n_symbols(signal.n_bytes)
+    llr = _llrs(samples, origin, window, n_symbols, frequency, channel, rate.modulation, 1)
+    return None if llr is None else parse_data(llr, signal)

@@ -1,0 +1,99 @@
+"""`phy decode-wifi`: 802.11a frames in a recording, to try the modem's parts on foreign signals."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated
+
+import msgspec
+import typer
+from rich.console import Console
+
+from sdrlinkd.cli.phy import RecordingFile, SampleType, open_recording, phys, show_progress
+
+if TYPE_CHECKING:
+    from phy.wifi import WifiFrame
+    from sdrlinkd.iq import IqRecording
+    from sdrlinkd.iq.recording import Progress as OnProgress
+
+PIECE = 1 << 22
+LONGEST_FRAME = 1 << 17
+"""4095 octets at 6 Mbit/s are 109 920 samples."""
+
+_KINDS = {
+    0b0000: "association request", 0b0001: "association response", 0b0100: "probe request",
+    0b0101: "probe response", 0b1000: "beacon", 0b1011: "authentication",
+    0b1100: "deauthentication", 0b1101: "action",
+    0b01_1000: "block ack request", 0b01_1001: "block ack", 0b01_1011: "RTS", 0b01_1100: "CTS",
+    0b01_1101: "ack", 0b10_0000: "data", 0b10_0100: "null", 0b10_1000: "QoS data",
+    0b10_1100: "QoS null",
+}  # fmt: skip
+
+
+@phys.command("decode-wifi")
+def decode_wifi(
+    file: RecordingFile,
+    type_name: SampleType = "",
+    json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
+) -> None:
+    """802.11a frames in a recording at 20 Msps."""
+    console = Console(soft_wrap=True)
+    n, n_right = 0, 0
+    with (
+        open_recording(file, type_name, 20e6) as recording,
+        show_progress(f"decode {file.name}", recording) as progress,
+    ):
+        for at, frame in _frames(recording, progress):
+            n, n_right = n + 1, n_right + frame.is_right
+            if json:
+                typer.echo(msgspec.json.encode(_as_record(at, frame)))
+            else:
+                console.print(_line(at, frame), highlight=False, markup=False)
+        n_samples = recording.info.n_samples
+    if not json:
+        told = f"{n} frames, {n_right} with right FCS, in {n_samples} samples"
+        console.print(told, highlight=False)
+
+
+def _frames(recording: "IqRecording", progress: "OnProgress") -> Iterator[tuple[int, "WifiFrame"]]:
+    """(sample at which it begins, frame)."""
+    from phy.wifi import receive
+
+    total, first = recording.info.n_samples, 0
+    while first < total:
+        is_last = first + PIECE >= total
+        end = PIECE if is_last else PIECE - LONGEST_FRAME
+        for frame in receive(recording.read(first, PIECE)):
+            if frame.start < end:
+                yield first + frame.start, frame
+        first += end
+        progress(min(first, total))
+
+
+def _line(at: int, frame: "WifiFrame") -> str:
+    fcs = "right" if frame.is_right else "wrong"
+    told = (
+        f"{at / 20e6:.6f} s  {frame.rate.mbps} Mbit/s {frame.rate.name}  {len(frame.psdu)} B  "
+        f"FCS {fcs}  SNR {frame.snr_db:.1f} dB  CFO {frame.cfo_hz / 1e3:+.2f} kHz"
+    )
+    return f"{told}  {_kind(frame.psdu)} {_addresses(frame.psdu)}" if frame.is_right else told
+
+
+def _as_record(at: int, frame: "WifiFrame") -> dict[str, object]:
+    return {
+        "sample": at,
+        "mbps": frame.rate.mbps,
+        "fcs": frame.is_right,
+        "snr_db": round(frame.snr_db, 2),
+        "cfo_hz": round(frame.cfo_hz, 1),
+        "psdu": frame.psdu.hex(),
+    }
+
+
+def _kind(psdu: bytes) -> str:
+    kind = (psdu[0] >> 2 & 3) << 4 | psdu[0] >> 4
+    return _KINDS.get(kind, f"type {kind >> 4}, subtype {kind & 15}")
+
+
+def _addresses(psdu: bytes) -> str:
+    """Who to whom; acknowledgements tell the receiver alone."""
+    to, by = psdu[4:10].hex(":"), psdu[10:16].hex(":")
+    return f"{by} → {to}" if len(psdu) >= 20 else f"→ {to}"

@@ -1,0 +1,116 @@
+"""An 802.11a transmitter written from the standard's text, of nothing that the modem uses."""
+
+import zlib
+
+import numpy as np
+
+
+def signs(carriers, text):
+    """±1 by carrier, 0 left out."""
+    values = [1 if sign == "+" else -1 for sign in text]
+    return dict(zip([k for k in carriers if k], values, strict=True))
+
+
+# Signs of (1 + j) on carriers -24, -20, … 24 but 0, and the long training on -26 … 26 (17.3.3).
+SHORT_SIGNS = "+-+--+--++++"
+LONG_SIGNS = "++--++-+-++++++--++-+-++++" + "+--++-+-+-----++--+-+-++++"
+SHORT = signs(range(-24, 25, 4), SHORT_SIGNS)
+LONG = signs(range(-26, 27), LONG_SIGNS)
+# SIGNAL's bits, bits a carrier, puncturing of A and B (table 17-6).
+RATES = {
+    6: (0b1101, 1, "11"), 9: (0b1111, 1, "111001"), 12: (0b0101, 2, "11"),
+    18: (0b0111, 2, "111001"), 24: (0b1001, 4, "11"), 36: (0b1011, 4, "111001"),
+    48: (0b0001, 6, "1110"), 54: (0b0011, 6, "111001"),
+}  # fmt: skip
+PILOTS = {-21: 1, -7: 1, 7: 1, 21: -1}
+DATA = [k for k in range(-26, 27) if k and k not in PILOTS]
+
+
+def register(state, n):
+    """x^7 + x^4 + 1 from the seven bits of `state`, the last of them newest."""
+    out = []
+    for _ in range(n):
+        bit = state[-7] ^ state[-4]
+        out.append(bit)
+        state = [*state[1:], bit]
+    return out
+
+
+def coded(bits, pattern):
+    """K=7, 133 and 171, punctured."""
+    out, past = [], [0] * 6
+    for bit in bits:
+        window = [bit, *past]
+        out.append(sum(window[i] for i in (0, 2, 3, 5, 6)) % 2)
+        out.append(sum(window[i] for i in (0, 1, 2, 3, 6)) % 2)
+        past = window[:6]
+    return [bit for i, bit in enumerate(out) if pattern[i % len(pattern)] == "1"]
+
+
+def interleaved(bits, per_carrier):
+    """Two permutations of a symbol's bits (17.3.5.7)."""
+    n, s = len(bits), max(per_carrier // 2, 1)
+    out = [0] * n
+    for k, bit in enumerate(bits):
+        i = (n // 16) * (k % 16) + k // 16
+        out[s * (i // s) + (i + n - 16 * i // n) % s] = bit
+    return out
+
+
+def point(bits):
+    """Gray-coded levels on both axes (17.3.5.8)."""
+    levels = {1: [-1, 1], 2: [-3, -1, 3, 1], 3: [-7, -5, -1, -3, 7, 5, 1, 3]}
+    if len(bits) == 1:
+        return 2 * bits[0] - 1
+    half = len(bits) // 2
+    scale = {1: 2, 2: 10, 3: 42}[half] ** -0.5
+    number = [int("".join(map(str, part)), 2) for part in (bits[:half], bits[half:])]
+    return scale * complex(*(levels[half][each] for each in number))
+
+
+def in_time(carriers):
+    """64 samples, of the standard's scale."""
+    bins = np.zeros(64, complex)
+    for k, value in carriers.items():
+        bins[k] = value
+    return np.fft.ifft(bins)
+
+
+def symbol(bits, per_carrier, number):
+    """One OFDM symbol with its prefix; SIGNAL is number 0."""
+    spread = interleaved(bits, per_carrier)
+    groups = [spread[i : i + per_carrier] for i in range(0, len(spread), per_carrier)]
+    carriers = {k: point(group) for k, group in zip(DATA, groups, strict=True)}
+    polarity = 1 - 2 * register([1] * 7, 127)[number % 127]
+    carriers |= {k: polarity * sign for k, sign in PILOTS.items()}
+    body = in_time(carriers)
+    return np.concatenate((body[-16:], body))
+
+
+def with_fcs(body):
+    return body + zlib.crc32(body).to_bytes(4, "little")
+
+
+def frame(psdu, mbps, seed=(1, 0, 1, 1, 1, 0, 1)):
+    """Samples of a whole frame, at mean power 1."""
+    code, per_carrier, pattern = RATES[mbps]
+    short = in_time({k: (13 / 6) ** 0.5 * (1 + 1j) * sign for k, sign in SHORT.items()})
+    long = in_time(LONG)
+    head = [int(bit) for bit in f"{code:04b}0"] + [len(psdu) >> i & 1 for i in range(12)]
+    head += [sum(head) % 2] + [0] * 6
+    parts = [np.tile(short, 3)[:160], long[32:], long, long, symbol(coded(head, "11"), 1, 0)]
+    data = [0] * 16 + [octet >> i & 1 for octet in psdu for i in range(8)]
+    n_coded = 48 * per_carrier
+    n_data = n_coded * len(pattern) // (2 * pattern.count("1"))
+    n_symbols = -(-(len(data) + 6) // n_data)
+    n_bits = n_symbols * n_data
+    scrambler = register(list(seed), n_bits)
+    padded = data + [0] * (n_bits - len(data))
+    mixed = [bit ^ white for bit, white in zip(padded, scrambler, strict=True)]
+    mixed[len(data) : len(data) + 6] = [0] * 6
+    sent = coded(mixed, pattern)
+    for number in range(n_symbols):
+        bits = sent[number * n_coded : (number + 1) * n_coded]
+        parts.append(symbol(bits, per_carrier, number + 1))
+    samples = np.concatenate(parts) * 64 / np.sqrt(52)
+    return samples.astype(np.complex64)
