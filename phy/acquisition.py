@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from phy import header, preamble
+from phy import header, ofdm, preamble
 from phy.constellation import Modulation
 from phy.convolutional import N_TAIL
 from phy.estimation import new_channel, tones
@@ -21,7 +21,7 @@ from phy.mapping import axes
 from phy.numerology import Numerology
 from phy.quality import BurstQuality
 from phy.sequences import polarity
-from phy.transmitter import header_spectrum
+from phy.transmitter import header_samples
 
 # What noise may add to the offset that the peak tells, in cycles a sample.
 _COARSE_ERROR = 0.008
@@ -99,19 +99,17 @@ class Acquisition:
         if told is None:
             return Missed("header")
         sent = _sent(told, grid)
-        # By the long training alone: what a transmitter cuts off of later peaks is no noise.
-        no = channel.no
         phase, rate = channel.tracking[PHASE, :2]
         learn(room.bins, sent, preamble.N_LONG, phase, rate, self._tones, channel)
         long = room.planes[:, preamble.long_start(grid) : preamble.length(grid)].reshape(-1)
-        error = (room.points - sent[preamble.N_LONG :, : grid.n_data]).reshape(-1)
+        error = (room.points - 1 / sent[preamble.N_LONG :, : grid.n_data].conj()).reshape(-1)
         quality = BurstQuality(
             start=base + start,
             mcs=told.mcs,
             n_pdus=told.n_pdus,
             pdu_bytes=told.pdu_bytes,
             network=told.network,
-            snr_db=_decibel(channel.gain * grid.n_used / grid.n_fft / no),
+            snr_db=_decibel(channel.gain * grid.n_used / grid.n_fft / channel.no),
             rssi_dbfs=_decibel(2 * float(np.dot(long, long)) / len(long)),
             evm_db=_decibel(float(np.vdot(error, error).real) / len(error)),
             cfo=frequency,
@@ -166,11 +164,17 @@ def _training(grid: Numerology, aliases: int) -> Training:
 
 @lru_cache(maxsize=64)
 def _sent(told: BurstHeader, grid: Numerology) -> NDArray[np.complex64]:
-    """Long training and header as sent, in the order of tones `[2 + n_header, n_used]`."""
+    """Long training and header as sent, in the order of tones `[2 + n_header, n_used]`.
+
+    Each is 1 / x* of a tone x, so that what is divided by x is multiplied by its conjugate: where
+    the header's peaks were cut off, no x is exactly ±1.
+    """
     table = tones(grid)
     long = preamble.long_carriers(grid)[grid.tones].astype(np.complex64)
-    spectrum = header_spectrum(told, grid)[:, table.bins]
-    return np.concatenate((np.tile(long, (preamble.N_LONG, 1)), spectrum))
+    samples = header_samples(told, grid)
+    starts = grid.n_cp + grid.n_symbol * np.arange(header.n_symbols(grid))
+    bins = ofdm.to_bins(samples, starts, 0.0, 0j, grid)[:, table.bins]
+    return np.concatenate((np.tile(long, (preamble.N_LONG, 1)), 1 / bins.conj()))
 
 
 def _decibel(ratio: float) -> float:

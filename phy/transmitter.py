@@ -73,17 +73,21 @@ class Transmitter:
 @lru_cache(maxsize=64)
 def _opening(told: BurstHeader, grid: Numerology, boost: float) -> NDArray[np.complex64]:
     """Preamble and header of a burst; most bursts resemble one before."""
-    spectrum = header_spectrum(told, grid)
-    head = ofdm.to_samples(spectrum, grid, 10 ** (MCS_TABLE[HEADER_MCS].peak_db / 20))
     start = preamble.preamble(grid) * np.float32(boost)
     start[:_RISE] *= _ramp(_RISE)
-    return np.concatenate((start, head))
+    return np.concatenate((start, header_samples(told, grid)))
 
 
 @cache
 def _ramp(n: int) -> NDArray[np.float32]:
     """From 0 to 1 without a step."""
     return (np.sin(np.pi / 2 * (np.arange(n) + 0.5) / n) ** 2).astype(np.float32)
+
+
+def header_samples(told: BurstHeader, grid: Numerology) -> NDArray[np.complex64]:
+    """The header as it leaves, its peaks cut off `[n · n_symbol]`."""
+    spectrum = header_spectrum(told, grid)
+    return ofdm.to_samples(spectrum, grid, 10 ** (MCS_TABLE[HEADER_MCS].peak_db / 20))
 
 
 def header_spectrum(told: BurstHeader, grid: Numerology) -> NDArray[np.complex64]:

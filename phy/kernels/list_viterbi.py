@@ -21,7 +21,7 @@ def list_decode(llr: NDArray[np.int16], out: NDArray[np.uint8]) -> None:
     grown = np.empty_like(metrics)
     metrics[0, 0] = 0
     # Which of its two predecessors, and which of that one's paths: 2 · rank + predecessor.
-    came_from = np.empty((n_steps, N_STATES, n_list), np.uint8)
+    came_from = np.empty((n_steps, N_STATES, n_list), np.int16)
     for t in range(n_steps):
         a, b = int(llr[2 * t]), int(llr[2 * t + 1])
         for state in range(N_STATES):
