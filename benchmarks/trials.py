@@ -104,13 +104,19 @@ def error_rate(
 
 
 def needed_snr_db(
-    rate_at: Callable[[float, int, int], ErrorRate], guess_db: float, error_rate: float, n: int
+    rate_at: Callable[[float, int, int], ErrorRate],
+    guess_db: float,
+    error_rate: float,
+    n: int,
+    surely: bool = True,
 ) -> tuple[float, int]:
-    """(SNR in dB from which on the error rate is surely below `error_rate`, trials).
+    """(SNR in dB from which on the error rate is `surely` below `error_rate`, trials).
 
-    `rate_at(snr_db, n, enough)` measures. Steps of a quarter dB until the 95 % bounds enclose the
-    rate, then a straight line between their logarithms.
+    `rate_at(snr_db, n, enough)` measures. Steps of a quarter dB until the 95 % bounds (else the
+    rates seen) enclose the rate, then a straight line between their logarithms.
     """
+    if surely and error_rate < 3 / n:
+        raise ValueError(f"{n} trials cannot show an error rate of {error_rate}")
     enough, trials = max(10, round(n * error_rate)), 0
     step, known = 0.25, dict[float, float]()
 
@@ -119,7 +125,8 @@ def needed_snr_db(
         if snr_db not in known:
             measured = rate_at(snr_db, n, 2 * enough)
             trials += measured.n
-            known[snr_db] = measured.bound
+            seen = max(measured.share, 0.3 / measured.n)
+            known[snr_db] = measured.bound if surely else seen
         return known[snr_db]
 
     low = high = step * round(guess_db / step)

@@ -13,7 +13,7 @@ from phy.kernels.ldpc_encoder import encode_blocks
 from phy.ldpc_80211n import BASE
 
 LIFTINGS = (27, 54, 81)
-MAX_ITERATIONS = 20
+MAX_ITERATIONS = 60
 
 __all__ = [
     "LdpcWorkspace",
