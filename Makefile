@@ -46,6 +46,8 @@ format: $(DEV_STAMP)
 bench: $(DEV_STAMP)
 	$(BIN)/python -m benchmarks.bus
 	$(BIN)/python -m benchmarks.modem_path
+	$(BIN)/python -m benchmarks.phy_per
+	$(BIN)/python -m benchmarks.phy_speed
 	$(BIN)/python -m benchmarks.access
 	$(BIN)/python -m benchmarks.ether
 

@@ -42,4 +42,4 @@ def _moments(mcs: Mcs, es_n0_db: float) -> tuple[float, float]:
         density = math.log2(len(sent)) - np.log2(np.exp(-distance).sum(axis=1))
         mean += float(weight @ density) / len(sent)
         square += float(weight @ density**2) / len(sent)
-    return mean, square - mean * mean
+    return mean, max(0.0, square - mean * mean)

@@ -6,7 +6,7 @@ missing=""
 what=""
 while read -r package command reason; do
     case "$package" in ''|'#'*) continue ;; esac
-    command -v "$command" >/dev/null 2>&1 && continue
+    { command -v "$command" >/dev/null 2>&1 || [ -e "$command" ]; } && continue
     missing="$missing $package"
     what="${what:+$what, }$reason"
 done < "$(dirname "$0")/apt-packages.txt"

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from sdrlinkd.iq.recording import Progress as OnProgress
 
 PIECE = 1 << 22
+SHORT_TRAINING = 320
 LONGEST_FRAME = 1 << 17
 """4095 octets at 6 Mbit/s are 109 920 samples."""
 
@@ -58,14 +59,16 @@ def _frames(recording: "IqRecording", progress: "OnProgress") -> Iterator[tuple[
     from phy.wifi import receive
 
     total, first = recording.info.n_samples, 0
-    while first < total:
+    told_to = 0
+    while told_to < total:
         is_last = first + PIECE >= total
-        end = PIECE if is_last else PIECE - LONGEST_FRAME
+        told_from, told_to = told_to, total if is_last else first + PIECE - LONGEST_FRAME
         for frame in receive(recording.read(first, PIECE)):
-            if frame.start < end:
+            if told_from <= first + frame.start < told_to:
                 yield first + frame.start, frame
-        first += end
-        progress(min(first, total))
+        # The next piece needs the short training before the first that it tells.
+        first = told_to - SHORT_TRAINING
+        progress(told_to)
 
 
 def _line(at: int, frame: "WifiFrame") -> str:

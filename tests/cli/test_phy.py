@@ -8,6 +8,8 @@ import pytest
 
 from sdrlinkd.cli import run
 from tests.iq.recordings import RATE_HZ, write_bursts
+from tests.phy.signals import noisy, silence
+from tests.phy.wifi_frames import frame, with_fcs
 
 
 @pytest.fixture
@@ -104,3 +106,59 @@ def test_bad_input_is_refused_in_one_line(ctl, tmp_path):
         assert (code, out) == (2, ""), arguments
         assert says in err, arguments
         assert err.count("\n") == 1, err
+
+
+@pytest.fixture
+def wifi_file(tmp_path):
+    """A recording of three 802.11a frames, the second with a wrong octet; what was sent."""
+    rng = np.random.default_rng(3)
+    beacon = with_fcs(bytes([0x80, 0, 0, 0]) + bytes(6 * [255]) + bytes(range(12)) + rng.bytes(40))
+    broken = bytearray(with_fcs(rng.bytes(60)))
+    broken[30] ^= 1
+    ack = with_fcs(bytes([0xD4, 0, 0, 0]) + bytes([2, 4, 6, 8, 10, 12]))
+    sent = [(beacon, 12), (bytes(broken), 6), (ack, 54)]
+    parts = [silence(400)]
+    for psdu, mbps in sent:
+        parts += [frame(psdu, mbps), silence(600)]
+    path = tmp_path / "air.cf32"
+    noisy(rng, np.concatenate(parts), 28).astype(np.complex64).tofile(path)
+    return path, sent
+
+
+def test_wifi_frames_for_people_and_programs(ctl, wifi_file):
+    path, sent = wifi_file
+    code, out, _ = ctl("decode-wifi", path)
+    assert code == 0
+    beacon, broken, ack, summary = out.strip().split("\n")
+    assert "12 Mbit/s QPSK 1/2  66 B  FCS right" in beacon
+    assert beacon.endswith("beacon 00:01:02:03:04:05 → ff:ff:ff:ff:ff:ff")
+    assert "6 Mbit/s BPSK 1/2  64 B  FCS wrong" in broken
+    assert ack.endswith("ack → 02:04:06:08:0a:0c")
+    assert summary == f"3 frames, 2 with right FCS, in {path.stat().st_size // 8} samples"
+    code, out, _ = ctl("decode-wifi", path, "--json")
+    told = [json.loads(line) for line in out.strip().split("\n")]
+    assert [(bytes.fromhex(each["psdu"]), each["mbps"]) for each in told] == sent
+    assert [each["fcs"] for each in told] == [True, False, True]
+
+
+@pytest.mark.parametrize("piece", [3000, 4000, 4500])
+def test_wifi_frames_across_the_pieces_that_are_read_are_told_once(
+    ctl, wifi_file, monkeypatch, piece
+):
+    path, sent = wifi_file
+    monkeypatch.setattr("sdrlinkd.cli.wifi.PIECE", piece)
+    monkeypatch.setattr("sdrlinkd.cli.wifi.LONGEST_FRAME", 2500)
+    _, out, _ = ctl("decode-wifi", path, "--json")
+    told = [json.loads(line) for line in out.strip().split("\n")]
+    assert [bytes.fromhex(each["psdu"]) for each in told] == [psdu for psdu, _ in sent]
+    assert [each["sample"] for each in told] == sorted(each["sample"] for each in told)
+
+
+def test_a_recording_without_wifi_frames_is_said_to_have_none(ctl, tmp_path):
+    path = tmp_path / "quiet.cf32"
+    np.zeros(5000, np.complex64).tofile(path)
+    code, out, _ = ctl("decode-wifi", path)
+    assert (code, out.strip()) == (0, "0 frames, 0 with right FCS, in 5000 samples")
+    code, _, err = ctl("decode-wifi", tmp_path / "missing.cf32")
+    assert code != 0
+    assert "missing.cf32" in err

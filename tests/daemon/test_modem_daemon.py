@@ -53,6 +53,19 @@ def test_messages_go_over_the_air_unchanged_with_ages_and_snr(start_daemon):
         assert control.ask("check")["problems"] == []
 
 
+@pytest.mark.parametrize("grid", ["64/8", "128/16", "256/32"])
+def test_messages_go_over_the_air_on_any_grid_with_a_stronger_preamble(start_daemon, grid):
+    keys = f'rate_hz = 2e6\ngrid = "{grid}"\npreamble_boost_db = 3\none_crystal = false'
+    node = start_daemon(LOOPBACK.replace("rate_hz = 2e6", keys))
+    with (
+        Subscriber("/rx_robot_1/odom", directory=node.directory) as heard,
+        Publisher(node.directory) as out,
+    ):
+        for payload in payloads(10):
+            out.send("/robot_1/odom", payload)
+        assert [heard.receive(20).payload for _ in range(10)] == payloads(10)
+
+
 def test_stopping_sends_what_is_queued_first(start_daemon):
     node = start_daemon("drain_s = 10.0\n" + LOOPBACK)
     with Publisher(node.directory) as out:
