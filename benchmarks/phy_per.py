@@ -14,15 +14,7 @@ from benchmarks.bound import needed_es_n0_db
 from benchmarks.peers import GnuRadio, Liquid
 from benchmarks.report import Row, main
 from benchmarks.trials import Air, ErrorRate, bursts, error_rate, needed_snr_db
-from phy import (
-    MCS_TABLE,
-    OFDM_64_16,
-    FrontEnd,
-    FrontEndParams,
-    PduHeard,
-    Receiver,
-    layout,
-)
+from phy import MCS_TABLE, OFDM_64_16, FrontEnd, FrontEndParams, PduHeard, Receiver, layout
 from phy.ldpc import LdpcWorkspace, decode, encode
 
 PER_CARRIER_DB = 10 * np.log10(OFDM_64_16.n_fft / OFDM_64_16.n_used)
@@ -66,7 +58,7 @@ def _knee(name: str, mcs: int, n_bytes: int, target_db: float, seed: int, n: int
 
 
 def _bound_db(mcs: int, n_bytes: int, rate: float) -> float:
-    """SNR that a PDU and its CRC need in the carriers of its burst, whatever the code."""
+    """SNR that a PDU needs in the data carriers of its burst, whatever the code."""
     plan = layout(OFDM_64_16, mcs, 1, n_bytes)
     n_carriers = plan.n_symbols * OFDM_64_16.n_data
     es_n0_db = needed_es_n0_db(MCS_TABLE[mcs], 8 * n_bytes, n_carriers, rate)

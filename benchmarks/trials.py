@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,16 +21,15 @@ CONFIDENCE = 0.95
 class Air:
     """What is between a transmitter and a receiver of bursts of one PDU.
 
-    `flawed`: crystals ±40 ppm apart, moving carrier and samples; image -36 dB and leak -35 dBc of
-    the transmitter, image -34 dB and DC -25 dBc of the receiver, 8 bits with bursts at -15 dBFS,
-    oscillators of -90 dBc/Hz at 10 kHz. Else only the carrier is off, by up to 0.02 of the rate.
+    Crystals ±40 ppm apart, moving carrier and samples; image -36 dB and leak -35 dBc of the
+    transmitter, image -34 dB and DC -25 dBc of the receiver, 8 bits with bursts at -15 dBFS,
+    oscillators of -90 dBc/Hz at 10 kHz.
     """
 
     rate_hz: float = 5e6
     carrier_hz: float = 2.4e9
     profile: str = "awgn"
     doppler_hz: float = 0.0
-    flawed: bool = True
 
 
 def bursts(
@@ -43,10 +42,9 @@ def bursts(
     """
     rng = np.random.default_rng(seed)
     transmitter = Transmitter()
-    level = 10 ** (LEVEL_DBFS / 20)
-    front = FrontEndParams(noise_dbfs=LEVEL_DBFS - snr_db)
-    if air.flawed:
-        front = replace(front, image_db=34.0, dc_dbfs=LEVEL_DBFS - 25.0, bits=8)
+    front = FrontEndParams(
+        noise_dbfs=LEVEL_DBFS - snr_db, image_db=34.0, dc_dbfs=LEVEL_DBFS - 25.0, bits=8
+    )
     front_end = FrontEnd(front, rng)
     while True:
         pdu = rng.bytes(n_bytes)
@@ -56,10 +54,11 @@ def bursts(
             profile=air.profile,
             doppler_hz=air.doppler_hz,
             clock_ppm=rng.uniform(-PPM, PPM),
-            loss_db=-20 * math.log10(level),
+            loss_db=-LEVEL_DBFS,
+            image_db=36.0,
+            leak_db=35.0,
+            phase_noise_dbc_hz=-90.0,
         )
-        if air.flawed:
-            params = replace(params, image_db=36.0, leak_db=35.0, phase_noise_dbc_hz=-90.0)
         _, x = Path(params, rng).carry(transmitter.modulate([pdu], mcs))
         lead = np.zeros(LEAD_IN + int(rng.integers(64)), np.complex64)
         yield pdu, front_end.receive(np.concatenate((lead, x.astype(np.complex64))))

@@ -1,8 +1,8 @@
 """The medium once more, in bursts instead of samples: who hears what, by the tables of errors.
 
-White noise only. What others send meanwhile is noise too: their powers add up. The errors in a PDU
-are the sum over its parts, each for as long as it lasts at its own SINR. So its worst part decides,
-as the receiver believes even one bad symbol, but a graze of a sample or two does no harm.
+White noise only. What others send meanwhile is noise too: their powers add up. A codeword has of
+each of its parts the information that a carrier gives at that part's SINR, and fails as often as at
+the one SNR that gives as much on average; a PDU fails with any of its codewords.
 """
 
 import math
@@ -31,11 +31,13 @@ KEEP_S = 1.0
 class BurstShape(NamedTuple):
     """Times in s from a burst's first sample.
 
-    At `head_s` preamble and header are over; `pdus`: where each PDU's symbols begin and end.
+    At `head_s` preamble and header are over; `pdus`: where each PDU's symbols begin and end, in
+    which `n_codewords` follow one another.
     """
 
     mcs: int
     pdu_bytes: int
+    n_codewords: int
     airtime_s: float
     head_s: float
     pdus: tuple[tuple[float, float], ...]
@@ -89,15 +91,23 @@ class BurstMedium:
     """N nodes on one air, all by the same clock in s. `carrier_db`: so much above noise is noticed.
 
     A pair's SNR and delay are kept for `keep_s`, inf: for ever; outages hold at once. Raises
-    ValueError for an air that fades: there are no tables.
+    ValueError for an air that fades: there are no tables. Those of errors are of the usual grid,
+    which others come close to.
     """
 
     def __init__(
-        self, air: AirParams, world: World, seed: int, carrier_db: float = 6.0, keep_s: float = 0.0
+        self,
+        air: AirParams,
+        world: World,
+        seed: int,
+        carrier_db: float = 6.0,
+        keep_s: float = 0.0,
+        grid: phy.Numerology = phy.OFDM_64_16,
     ) -> None:
         if air.profile != "awgn":
             raise ValueError(f'air.profile: got "{air.profile}"; allowed in bursts: "awgn"')
         self._air = air
+        self._grid = grid
         self._world = world
         self._keep_s = keep_s
         self._loud_db = _decibel(10 ** (carrier_db / 10) - 1)
@@ -121,7 +131,7 @@ class BurstMedium:
         sender = self._nodes[node]
         if start_s < sender.free_from - 1e-9:
             raise ValueError(f"start: got {start_s:.6f} s; allowed: from {sender.free_from:.6f} on")
-        shape = burst_shape(self._air.rate_hz, mcs, n_pdus, pdu_bytes)
+        shape = burst_shape(self._air.rate_hz, mcs, n_pdus, pdu_bytes, self._grid)
         hops = self._hops_of(node, start_s)
         arrives = {other: start_s + hop.delay_s for other, hop in hops.items()}
         draws = dict(zip(hops, self._rng.random((len(hops), 1 + n_pdus)).tolist(), strict=True))
@@ -235,9 +245,15 @@ class BurstMedium:
 
 
 @lru_cache(maxsize=256)
-def burst_shape(rate_hz: float, mcs: int, n_pdus: int, pdu_bytes: int) -> BurstShape:
+def burst_shape(
+    rate_hz: float,
+    mcs: int,
+    n_pdus: int,
+    pdu_bytes: int,
+    grid: phy.Numerology = phy.OFDM_64_16,
+) -> BurstShape:
     """Times of a burst as the modem sends it. Raises ValueError for what no header can tell."""
-    plan = phy.layout(phy.OFDM_64_16, mcs, n_pdus, pdu_bytes)
+    plan = phy.layout(grid, mcs, n_pdus, pdu_bytes)
     symbol, head = plan.grid.n_symbol, plan.n_samples - plan.n_symbols * plan.grid.n_symbol
     firsts = [i * plan.coded_bits // plan.symbol_bits for i in range(n_pdus)]
     lasts = [plan.symbols_through(i + 1) for i in range(n_pdus)]
@@ -245,11 +261,10 @@ def burst_shape(rate_hz: float, mcs: int, n_pdus: int, pdu_bytes: int) -> BurstS
         ((head + symbol * first) / rate_hz, (head + symbol * last) / rate_hz)
         for first, last in zip(firsts, lasts, strict=True)
     )
-    return BurstShape(mcs, pdu_bytes, plan.n_samples / rate_hz, head / rate_hz, pdus)
+    airtime_s, head_s = plan.n_samples / rate_hz, head / rate_hz
+    return BurstShape(mcs, pdu_bytes, plan.form.n_codewords, airtime_s, head_s, pdus)
 
 
-# Of a PDU that is drowned as a whole; a symbol is some fiftieth of it.
-MOST_ERRORS = 300.0
 lost_rate = lru_cache(maxsize=4096)(phy.pdu_lost_rate)
 found_rate = lru_cache(maxsize=4096)(phy.burst_found_rate)
 
@@ -282,16 +297,25 @@ def _head_snr_db(flight: Flight, node: int, at: float) -> float:
 
 
 def _lost_rate_in(flight: Flight, node: int, begin: float, end: float) -> float:
-    """Of a PDU between two times: its parts fail one by one, and a drowned symbol spoils it.
+    """Of a PDU between two times, whose codewords others may meet one by one."""
+    shape, kept = flight.shape, 1.0
+    n = shape.n_codewords
+    for number in range(n):
+        first = begin + (end - begin) * number / n
+        parts = _parts(flight, node, first, first + (end - begin) / n)
+        lost = lost_rate(shape.mcs, _mean_snr_db(flight, node, parts), shape.pdu_bytes)
+        kept *= (1 - lost) ** (1 / n)
+    return 1 - kept
 
-    The receiver knows the noise of the preamble only, and believes what a louder one says.
-    """
-    shape, snr_db = flight.shape, flight.hops[node].snr_db
-    errors = 0.0
-    for share, noise in _parts(flight, node, begin, end):
-        lost = lost_rate(shape.mcs, snr_db - _decibel(noise), shape.pdu_bytes)
-        errors += share * (MOST_ERRORS if lost == 1 else min(-math.log1p(-lost), MOST_ERRORS))
-    return -math.expm1(-errors)
+
+def _mean_snr_db(flight: Flight, node: int, parts: list[tuple[float, float]]) -> float:
+    """The one SNR at which a carrier gives as much information as in all parts, by their shares."""
+    snr_db = flight.hops[node].snr_db
+    if len(parts) == 1:
+        return snr_db - _decibel(parts[0][1])
+    snr, most = 10 ** (snr_db / 10), phy.MCS_TABLE[flight.shape.mcs].modulation.bits
+    information = sum(share * min(math.log2(1 + snr / noise), most) for share, noise in parts)
+    return _decibel(math.expm1(information * math.log(2)))
 
 
 def _decibel(ratio: float) -> float:

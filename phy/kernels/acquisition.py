@@ -16,12 +16,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.burst import Axes, Channel, Tones
+from phy.kernels.burst import Axes, Channel, Planes, Tones
 from phy.kernels.equaliser import demap, start_tracking
 from phy.kernels.training import estimate, spectrum, turn_back, wave
 from phy.kernels.viterbi import MAX_LLR, decode_block
-
-Planes = NDArray[np.float32]
 
 SEARCH = 24
 """The first long symbol is looked for this many samples around where the peak puts it."""

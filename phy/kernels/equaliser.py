@@ -19,7 +19,7 @@ from phy.kernels.burst import (
     Planes,
     Row,
     Tones,
-)  # fmt: skip
+)
 from phy.kernels.decisions import expected_levels
 from phy.kernels.demapper import LLR_SCALE, axis_llrs
 from phy.kernels.rotation import lean

@@ -6,10 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.burst import DELAY, GAIN, NO, Channel, Tones
+from phy.kernels.burst import DELAY, GAIN, NO, Channel, Planes, Tones
 from phy.kernels.smoothing import mean_delay, smooth
-
-Planes = NDArray[np.float32]
 
 # Standard deviations at which a difference in strength is no chance.
 _SURELY = 4.0

@@ -37,6 +37,9 @@ Rate = Annotated[
     float | None, typer.Option(min=1, help="Samples a second, where the file does not tell.")
 ]
 Network = Annotated[int, typer.Option(min=-1, max=7, help="Only bursts of this network; -1: all.")]
+Grid = Annotated[
+    str, typer.Option(help="FFT size/prefix: 64/16, 64/8, 128/16 or 256/32, as in modem.grid.")
+]
 Out = Annotated[Path | None, typer.Option(help="PNG to write; by default named like FILE.")]
 
 
@@ -47,12 +50,13 @@ def info(
         int, typer.Option(min=MIN_PDU_SIZE, max=MAX_PDU_SIZE, help="Octets of a PDU.")
     ] = 1024,
     max_burst: Annotated[float, typer.Option(min=1e-6, max=1, help="Longest burst in s.")] = 0.005,
+    grid: Grid = "64/16",
     json: AsJson = False,
 ) -> None:
     """Carriers, rates and airtimes of every MCS."""
     from sdrlinkd.iq import modem_info
 
-    told = modem_info(rate, pdu_size, max_burst)
+    told = modem_info(rate, pdu_size, max_burst, _grid(grid))
     if json:
         typer.echo(msgspec.json.encode(told))
         return
@@ -92,6 +96,7 @@ def decode(
     type_name: SampleType = "",
     rate: Rate = None,
     network: Network = -1,
+    grid: Grid = "64/16",
     registry: Annotated[Path | None, typer.Option(help="Names the topics.")] = None,
     json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
 ) -> None:
@@ -104,7 +109,9 @@ def decode(
         show_progress(f"decode {file.name}", recording) as progress,
     ):
         pdus: list[tuple[int, bytes]] = []
-        for event, receiver in recording.decode(None if network < 0 else network, progress):
+        for event, receiver in recording.decode(
+            None if network < 0 else network, progress, _grid(grid)
+        ):
             counters = dict(receiver.counters)
             ending = getattr(event, "ending", None)
             if ending is None:
@@ -146,6 +153,7 @@ def constellation(
     type_name: SampleType = "",
     rate: Rate = None,
     network: Network = -1,
+    grid: Grid = "64/16",
     out: Out = None,
 ) -> None:
     """Draw the equalised points of the bursts in a recording."""
@@ -155,7 +163,7 @@ def constellation(
         open_recording(file, type_name, rate) as recording,
         show_progress(f"points in {file.name}", recording) as progress,
     ):
-        points = recording.points(None if network < 0 else network, progress)
+        points = recording.points(None if network < 0 else network, progress, _grid(grid))
     if not points.by_modulation:
         raise UserError(
             f"{file}: no burst was found in {recording.info.n_samples} samples; "
@@ -165,6 +173,14 @@ def constellation(
     title = f"{file.name}, {len(points.bursts)} bursts"
     pictures.draw_constellation(points, title, path)
     console.print(f"wrote {path}", highlight=False, markup=False, soft_wrap=True)
+
+
+def _grid(name: str) -> "phy.Numerology":
+    import phy
+
+    if name not in phy.GRIDS:
+        raise UserError(f"--grid: got {name}; allowed: one of {', '.join(phy.GRIDS)}")
+    return phy.GRIDS[name]
 
 
 def open_recording(file: Path, type_name: str, rate: float | None) -> "IqRecording":

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from sdrlinkd.iq import IqRecording
     from sdrlinkd.iq.recording import Progress as OnProgress
 
-PIECE = 1 << 22
+PIECE = 1 << 20
 SHORT_TRAINING = 320
 LONGEST_FRAME = 1 << 17
 """4095 octets at 6 Mbit/s are 109 920 samples."""

@@ -44,7 +44,8 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """How long before the air is free the next burst is composed: time to compose and modulate it,
     and what an urgent message may have to wait besides a burst."""
     backoff_db: Annotated[float, Meta(ge=0, le=60)] = 12.0
-    """Mean power of a burst below full scale: room for its peaks."""
+    """Mean power of a burst below full scale: room for its peaks, which are 7 dB (BPSK, QPSK) to
+    10 dB (256QAM) over it."""
     preamble_boost_db: Annotated[float, Meta(ge=0, le=3)] = 0.0
     """The preamble is sent so much stronger than the rest: where peaks limit an amplifier, bursts
     are found farther away."""

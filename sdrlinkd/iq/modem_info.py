@@ -39,9 +39,10 @@ class ModemInfo(msgspec.Struct, frozen=True, kw_only=True):
     mcs: list[McsInfo]
 
 
-def modem_info(rate_hz: float, pdu_size: int, max_burst_s: float) -> ModemInfo:
+def modem_info(
+    rate_hz: float, pdu_size: int, max_burst_s: float, grid: phy.Numerology = phy.OFDM_64_16
+) -> ModemInfo:
     """Everything that follows from rate, PDU size and longest burst. Raises UserError."""
-    grid = phy.OFDM_64_16
     try:
         rows = [_mcs_info(grid, each, rate_hz, pdu_size, max_burst_s) for each in phy.MCS_TABLE]
     except ValueError as error:

@@ -44,12 +44,15 @@ class IqRecording:
         return self._reader.read(first, n)
 
     def decode(
-        self, network: int | None, progress: Progress
+        self, network: int | None, progress: Progress, grid: phy.Numerology = phy.OFDM_64_16
     ) -> Iterator[tuple[phy.Event, phy.Receiver]]:
         """What a receiver of `network` (None: any) finds; `progress(samples read)` on the way."""
-        yield from self._decode(phy.Receiver(network, self._max_frequency()), progress)
+        receiver = phy.Receiver(network, self._max_frequency(), grid)
+        yield from self._decode(receiver, progress)
 
-    def points(self, network: int | None, progress: Progress) -> Points:
+    def points(
+        self, network: int | None, progress: Progress, grid: phy.Numerology = phy.OFDM_64_16
+    ) -> Points:
         """The equalised points of all bursts."""
         kept: dict[phy.Modulation, list[NDArray[np.complex64]]] = defaultdict(list)
 
@@ -59,7 +62,7 @@ class IqRecording:
             while len(pieces) > 1 and sum(map(len, pieces[1:])) >= MAX_POINTS:
                 del pieces[0]
 
-        receiver = phy.Receiver(network, self._max_frequency(), on_points=keep)
+        receiver = phy.Receiver(network, self._max_frequency(), grid, on_points=keep)
         bursts = [
             event.burst
             for event, _ in self._decode(receiver, progress)

@@ -8,6 +8,7 @@ from heapq import heappop, heappush
 from itertools import count
 from typing import NamedTuple
 
+import phy
 from backends import AirParams, BurstMedium, Flight, RadioParams, World
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import (
@@ -114,7 +115,8 @@ class Simulation:
         self._airtimes = airtimes
         self._access = access
         self._watch = watch
-        self._medium = BurstMedium(air, world, seed, modem.carrier_db, keep_s)
+        grid = phy.GRIDS[modem.grid]
+        self._medium = BurstMedium(air, world, seed, modem.carrier_db, keep_s, grid)
         self._events: list[_Event] = []
         self._numbers = count()
         self.stations: dict[int, Station] = {}

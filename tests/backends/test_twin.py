@@ -4,6 +4,7 @@ import gc
 import math
 from random import Random
 
+import numpy as np
 import pytest
 
 import phy
@@ -118,12 +119,38 @@ def test_only_the_pdus_that_are_hit_are_lost():
         assert got(made, flight, 2) == kept
 
 
-def test_a_symbol_spoils_a_pdu_and_a_graze_does_not():
-    for overlap_s, reads in ((80e-6, []), (1e-9, [0])):
-        made = medium(3)
-        flight = send(made, 0, 0.0)
-        send(made, 1, flight.end_s - overlap_s)
-        assert got(made, flight, 2) == reads
+def shares_lost(mcs, size, share, n):
+    """Of `n` PDUs whose last `share` another burst of equal power meets: in samples, in bursts."""
+    rng = np.random.default_rng(5)
+    transmitter, receiver = phy.Transmitter(), phy.Receiver()
+    front_end = phy.FrontEnd(phy.FrontEndParams(noise_dbfs=-25), rng)
+    plan = phy.layout(phy.OFDM_64_16, mcs, 1, size)
+    n_met = 80 * round(share * plan.n_symbols)
+    n_read = 0
+    for _ in range(n):
+        pdu = rng.bytes(size)
+        x = np.concatenate((np.zeros(500, np.complex64), transmitter.modulate([pdu], mcs)))
+        other = transmitter.modulate([rng.bytes(2047)], mcs)[512 : 512 + n_met]
+        x[len(x) - n_met :] += other * np.exp(2j * np.pi * rng.random())
+        events = receiver.push(front_end.receive(x)) + receiver.flush()
+        n_read += any(isinstance(each, phy.PduHeard) and each.data == pdu for each in events)
+    n_got = 0
+    for seed in range(n):
+        made = medium(3, seed=seed)
+        flight = made.send(0, 0.0, mcs, 1, size)
+        made.send(1, flight.end_s - n_met * A_SAMPLE, mcs, 3, size)
+        n_got += got(made, flight, 2) == [0]
+    return 1 - n_read / n, 1 - n_got / n
+
+
+@pytest.mark.parametrize(
+    ("mcs", "size", "bears", "fails"),
+    [(1, 220, 0.15, 0.65), (3, 1024, 0.025, 0.09), (2, 220, 0.08, 0.3), (6, 1024, 0.025, 0.12)],
+)
+def test_what_another_burst_meets_is_lost_as_in_the_modem(mcs, size, bears, fails):
+    """A code bears a share of drowned symbols; of short codewords in a row, less of the whole."""
+    assert max(shares_lost(mcs, size, bears, 30)) < 0.2
+    assert min(shares_lost(mcs, size, fails, 30)) > 0.8
 
 
 def test_many_weak_ones_add_up():

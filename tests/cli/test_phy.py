@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 
+import phy
 from sdrlinkd.cli import run
 from tests.iq.recordings import RATE_HZ, write_bursts
 from tests.phy.signals import noisy, silence
@@ -162,3 +163,21 @@ def test_a_recording_without_wifi_frames_is_said_to_have_none(ctl, tmp_path):
     code, _, err = ctl("decode-wifi", tmp_path / "missing.cf32")
     assert code != 0
     assert "missing.cf32" in err
+
+
+@pytest.mark.parametrize("grid", ["64/16", "128/16"])
+def test_recordings_on_any_grid(ctl, tmp_path, grid):
+    rng = np.random.default_rng(4)
+    burst = phy.Transmitter(grid=phy.GRIDS[grid]).modulate([bytes(64)], 1)
+    path = tmp_path / "air.cf32"
+    noisy(rng, np.concatenate((silence(500), burst, silence(500))), 20).tofile(path)
+    _, out, _ = ctl("decode", path, "--grid", grid)
+    assert "1 of 1 PDUs of 64 B good" in out
+    code, _, _ = ctl("constellation", path, "--grid", grid, "--out", tmp_path / "points.png")
+    assert (code, (tmp_path / "points.png").exists()) == (0, True)
+    _, out, _ = ctl("info", "--grid", grid)
+    assert f"{grid.split('/')[0]} carriers" in out
+    code, _, err = ctl("decode", path, "--grid", "64/4")
+    assert code != 0
+    for part in ("--grid: got 64/4", "64/16, 64/8, 128/16, 256/32"):
+        assert part in err

@@ -100,10 +100,10 @@ def test_clean_symbols_give_back_their_bits(modulation):
     h = selective(rng)
     bins = mapping(modulation, GRID).to_spectrum(coded, 5)
     bins[:, GRID.bins] *= h
-    channel = channel_of(h, 0.001)
+    channel = channel_of(h, 1e-4)
     llr, equalised = demap(modulation, bins, channel, 5)
-    # On carriers that hardly arrive, the finest points tell nothing.
-    assert np.count_nonzero(llr) > 0.85 * len(llr)
+    # On a carrier that hardly arrives, the finest points tell nothing.
+    assert np.count_nonzero(llr) > 0.95 * len(llr)
     assert np.array_equal(llr[llr != 0] < 0, coded[llr != 0])
     nearest = np.abs(equalised[..., None] - points(modulation)).min(-1)
     assert nearest.max() < 1e-4
@@ -179,15 +179,17 @@ def faded_symbols(modulation, h, no, rng):
 
 @every_modulation
 def test_a_channel_that_fades_is_followed(modulation):
-    """Echoes turn against each other: the band moves through its fades, as at 40 Hz and 5 Msps."""
+    """Echoes turn against each other: the band moves through its fades, as at 40 Hz and 5 Msps.
+
+    The densest points bear a quarter of that: they lose track in the deepest fades.
+    """
     rng = np.random.default_rng(SEED)
-    n, no = 1500, 1e-4
+    n, no = 6000 if modulation is Modulation.QAM256 else 1500, 1e-4
     turn = 2 * np.pi * np.arange(n)[:, None] / n
     h = 1 + 0.5 * np.exp(1j * (turn + 2 * np.pi * 3 * GRID.used / GRID.n_fft))
     coded, bins = faded_symbols(modulation, h, no, rng)
     llr, _ = demap(modulation, bins, channel_of(h[0], no))
-    # The densest points lose track in the deepest fades.
-    assert np.mean((llr < 0) != coded) < (0.01 if modulation.bits < 8 else 0.2)
+    assert np.mean((llr < 0) != coded) < 0.01
     # The control: by the first symbols' channel alone, as if it stood still.
     stale = [demap(modulation, bins[i : i + 1], channel_of(h[0], no), 2 + i)[0] for i in range(n)]
     wrong = np.mean((np.concatenate(stale) < 0) != coded)

@@ -135,6 +135,6 @@ def recorded(name):
 def test_nothing_of_ours_is_heard_in_recordings_of_others(name, wifi, network):
     """Wi-Fi's long training is ours too, but its short training lacks our code."""
     counters = quiet(recorded(name), network)
-    assert counters["triggers"] > (0 if wifi else -1)
+    assert counters["triggers"] > 0 or not wifi
     assert counters["preambles"] == counters["headers_bad"] == 0
     assert counters["bursts"] == counters["bursts_foreign"] == 0
