@@ -8,8 +8,9 @@ from functools import cache, cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from phy.kernels.ldpc import N_COLUMNS, LdpcWorkspace, decode_blocks
+from phy.kernels.ldpc import LdpcWorkspace, decode_blocks
 from phy.kernels.ldpc_encoder import encode_blocks
+from phy.kernels.ldpc_rows import N_COLUMNS
 from phy.ldpc_80211n import BASE
 
 LIFTINGS = (27, 54, 81)
@@ -150,7 +151,7 @@ def decode(
     code = form.code
     out = np.empty((len(llr), form.n_bits // 8), np.uint8)
     decode_blocks(
-        llr, code.z, code.row_ends, code.columns, code.shifts,
+        llr, code.z, code.row_ends, code.columns, code.shifts, code.middle,
         form.shares, form.ends, max_iterations,
         work.llr, work.posteriors, work.messages, work.scratch, out,
     )  # fmt: skip

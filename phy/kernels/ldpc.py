@@ -20,6 +20,9 @@ vector or more beyond Z. Then Z lanes from any shift on are contiguous in memory
 exact copies of the first, and compute the same. After a row, what it has written is copied to the
 places Z before and behind.
 
+*Nothing to do.* On a good link the signs of a codeword's LLRs are a codeword already, the likeliest
+there is. So its information is encoded first, which is cheap, and the parity compared.
+
 *Vectors.* A row is written as LLVM vector instructions (`ldpc_rows.py`, which says why).
 """
 
@@ -27,9 +30,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.ldpc_rows import LANES, ldpc_row
+from phy.kernels.bits import Words, get, low_ones, put, put_signs, to_octets
+from phy.kernels.ldpc_encoder import parity_of
+from phy.kernels.ldpc_rows import LANES, N_COLUMNS, ldpc_row
 
-N_COLUMNS = 24
 SURE = 4000
 """LLR of a bit that is known to be 0."""
 
@@ -91,6 +95,7 @@ def decode_blocks(
     row_ends: NDArray[np.int32],
     columns: NDArray[np.int32],
     shifts: NDArray[np.int32],
+    middle: int,
     shares: NDArray[np.int32],
     ends: NDArray[np.int32],
     max_iterations: int,
@@ -104,37 +109,52 @@ def decode_blocks(
 
     What was not sent is known to be 0 (information) or not at all.
     """
-    n_info = (N_COLUMNS - (row_ends.size - 1)) * z
+    n_rows = row_ends.size - 1
+    n_info = (N_COLUMNS - n_rows) * z
     codeword = whole[: N_COLUMNS * z]
-    decided = np.empty(8 * out.shape[1], np.uint8)
+    bits, sent = np.empty(n_info // 64 + 2, np.uint64), np.empty(n_rows * z // 64 + 2, np.uint64)
+    parity = np.empty((n_rows, 2), np.uint64)
+    decided = np.empty(out.shape[1] // 8 + 2, np.uint64)
     for block in range(llr.shape[0]):
-        at = 0
+        at, row = 0, llr[block]
+        decided[:] = 0
         for number in range(shares.size):
-            share = shares[number]
-            middle_at = ends[number] + share
-            n_parity = ends[number + 1] - middle_at
-            codeword[:share] = llr[block, ends[number] : middle_at]
-            codeword[share:n_info] = SURE
-            codeword[n_info : n_info + n_parity] = llr[block, middle_at : ends[number + 1]]
-            codeword[n_info + n_parity :] = 0
-            decode_codeword(
-                codeword, z, row_ends, columns, shifts, max_iterations,
-                posteriors, messages, scratch,
-            )  # fmt: skip
-            for column in range(-(-share // z)):
-                first = column * z
-                bits = decided[at + first : at + min(first + z, share)]
-                for i in range(bits.size):
-                    bits[i] = posteriors[column, i] < 0
+            share, begin, end = shares[number], ends[number], ends[number + 1]
+            middle_at = begin + share
+            bits[:] = 0
+            put_signs(row, begin, share, bits, 0)
+            sent[:] = 0
+            put_signs(row, middle_at, end - middle_at, sent, 0)
+            parity_of(bits, z, row_ends, columns, shifts, middle, parity)
+            if not _begins_with(parity, sent, z, end - middle_at):
+                codeword[:share] = row[begin:middle_at]
+                codeword[share:n_info] = SURE
+                codeword[n_info : n_info + end - middle_at] = row[middle_at:end]
+                codeword[n_info + end - middle_at :] = 0
+                decode_codeword(
+                    codeword, z, row_ends, columns, shifts, max_iterations,
+                    posteriors, messages, scratch,
+                )  # fmt: skip
+                bits[:] = 0
+                for column in range(-(-share // z)):
+                    first = column * z
+                    put_signs(posteriors[column], 0, min(z, share - first), bits, first)
+            for i in range(0, share, 64):
+                put(decided, at + i, bits[i >> 6], min(64, share - i))
             at += share
-        _pack(decided, out[block])
+        to_octets(decided, out[block])
 
 
 @njit(nogil=True, cache=True)
-def _pack(bits: NDArray[np.uint8], out: NDArray[np.uint8]) -> None:
-    """As `np.packbits`."""
-    for i in range(out.size):
-        octet = np.uint32(0)
-        for b in range(8):
-            octet |= np.uint32(bits[8 * i + b]) << np.uint32(7 - b)
-        out[i] = np.uint8(octet)
+def _begins_with(parity: Words, sent: Words, z: int, n: int) -> bool:
+    """Whether the parity `[rows, 2]`, block after block, begins with the `n` bits sent."""
+    different = np.uint64(0)
+    for row in range(parity.shape[0]):
+        first = row * z
+        low = max(0, min(z, 64, n - first))
+        high = max(0, min(z - 64, n - first - 64))
+        if low:
+            different |= (parity[row, 0] & low_ones(low)) ^ get(sent, first, low)
+        if high:
+            different |= (parity[row, 1] & low_ones(high)) ^ get(sent, first + 64, high)
+    return different == 0

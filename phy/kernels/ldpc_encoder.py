@@ -8,99 +8,82 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.ldpc import N_COLUMNS
+from phy.kernels.bits import ONE, Words, get, low_ones
+from phy.kernels.ldpc_rows import N_COLUMNS
 
-Words = NDArray[np.uint64]
-
-_ONE, _63, _64 = np.uint64(1), np.uint64(63), np.uint64(64)
+_63 = np.uint64(63)
 
 
 @njit(nogil=True, cache=True)
 def _repeat(low: np.uint64, high: np.uint64, z: int, out: Words) -> None:
     """The `z` bits of `low` and `high`, and after them the same again; `out` `[5]`."""
-    out[:] = 0
-    out[0], out[1] = low, high
     word, bit = z >> 6, np.uint64(z & 63)
-    for i in range(2):
-        value = low if i == 0 else high
-        out[word + i] |= value << bit
-        if bit:
-            out[word + i + 1] |= value >> (_64 - bit)
+    rest = _63 - bit
+    for i in range(2, 5):
+        out[i] = 0
+    out[0], out[1] = low, high
+    out[word] |= low << bit
+    # Shifted in two steps, as by 64 it would be undefined.
+    out[word + 1] |= low >> ONE >> rest
+    out[word + 1] |= high << bit
+    out[word + 2] |= high >> ONE >> rest
 
 
 @njit(nogil=True, cache=True)
-def _mask(z: int) -> tuple[np.uint64, np.uint64]:
-    """Ones in the `z` lowest places."""
-    full = ~np.uint64(0)
-    if z >= 64:
-        return full, (_ONE << np.uint64(z - 64)) - _ONE
-    return (_ONE << np.uint64(z)) - _ONE, np.uint64(0)
+def _part(repeated: Words, first: int) -> np.uint64:
+    """The 64 bits from `first` on."""
+    word, bit = first >> 6, np.uint64(first & 63)
+    return (repeated[word] >> bit) | (repeated[word + 1] << ONE << (_63 - bit))
 
 
 @njit(nogil=True, cache=True)
-def _part(repeated: Words, first: int, i: int) -> np.uint64:
-    """The `i`-th word of the bits from `first` on."""
-    word, bit = (first >> 6) + i, np.uint64(first & 63)
-    low: np.uint64 = repeated[word] >> bit
-    if bit:
-        low |= repeated[word + 1] << (_64 - bit)
-    return low
-
-
-@njit(nogil=True, cache=True)
-def _read(bits: NDArray[np.uint8], first: int, n: int) -> np.uint64:
-    """Up to 64 bits as a word."""
-    word = np.uint64(0)
-    for i in range(n):
-        word |= np.uint64(bits[first + i]) << np.uint64(i)
-    return word
-
-
-@njit(nogil=True, cache=True)
-def encode_codeword(
-    bits: NDArray[np.uint8],
+def parity_of(
+    bits: Words,
     z: int,
     row_ends: NDArray[np.int32],
     columns: NDArray[np.int32],
     shifts: NDArray[np.int32],
     middle: int,
-    out: NDArray[np.uint8],
+    parity: Words,
 ) -> None:
-    """The parity `out` `[rows · z]` of the information `bits` `[K z]`.
+    """The parity `[rows, 2]` of the information `bits` `[K z / 64 + 1]`, a row for each block.
 
     Parity columns 1, 2, … are a staircase; column 0 has three blocks, in the first and last row
     with shift 1 and in row `middle` with 0. In the sum of all rows only the latter remains.
     """
-    n_rows, n_info = row_ends.size - 1, bits.size // z
-    low_mask, high_mask = _mask(z)
-    repeated = np.empty((n_info, 5), np.uint64)
+    n_rows = parity.shape[0]
+    n_info = N_COLUMNS - n_rows
+    low_mask, high_mask = low_ones(min(z, 64)), low_ones(max(z - 64, 0))
+    repeated, sums = np.empty((n_info + 1, 5), np.uint64), np.empty((n_rows, 2), np.uint64)
     for column in range(n_info):
-        low = _read(bits, column * z, min(z, 64))
-        high = _read(bits, column * z + 64, z - 64) if z > 64 else np.uint64(0)
+        low = get(bits, column * z, min(z, 64))
+        high = get(bits, column * z + 64, z - 64) if z > 64 else np.uint64(0)
         _repeat(low, high, z, repeated[column])
-    sums, parity = np.zeros((n_rows, 2), np.uint64), np.zeros((n_rows, 2), np.uint64)
+    first_low = first_high = np.uint64(0)
     for row in range(n_rows):
+        low = high = np.uint64(0)
         for edge in range(row_ends[row], row_ends[row + 1]):
-            if columns[edge] < n_info:
-                for i in range(2):
-                    sums[row, i] ^= _part(repeated[columns[edge]], shifts[edge], i)
-        sums[row, 0] &= low_mask
-        sums[row, 1] &= high_mask
-        parity[0] ^= sums[row]
-    turned = np.empty(5, np.uint64)
-    _repeat(parity[0, 0], parity[0, 1], z, turned)
+            column = columns[edge]
+            # Parity columns come last in a row.
+            if column >= n_info:
+                break
+            low ^= _part(repeated[column], shifts[edge])
+            high ^= _part(repeated[column], shifts[edge] + 64)
+        sums[row, 0], sums[row, 1] = low & low_mask, high & high_mask
+        first_low ^= sums[row, 0]
+        first_high ^= sums[row, 1]
+    parity[0, 0], parity[0, 1] = first_low, first_high
+    _repeat(first_low, first_high, z, repeated[n_info])
     # From row 0 down: bit column r + 1 is what row r lacks.
-    lacks = np.empty(2, np.uint64)
-    lacks[0] = sums[0, 0] ^ (_part(turned, 1 % z, 0) & low_mask)
-    lacks[1] = sums[0, 1] ^ (_part(turned, 1 % z, 1) & high_mask)
+    low = sums[0, 0] ^ (_part(repeated[n_info], 1) & low_mask)
+    high = sums[0, 1] ^ (_part(repeated[n_info], 65) & high_mask)
     for row in range(1, n_rows):
-        parity[row] = lacks
-        lacks ^= sums[row]
+        parity[row, 0], parity[row, 1] = low, high
+        low ^= sums[row, 0]
+        high ^= sums[row, 1]
         if row == middle:
-            lacks ^= parity[0]
-    for row in range(n_rows):
-        for i in range(z):
-            out[row * z + i] = parity[row, i >> 6] >> np.uint64(i & 63) & _ONE
+            low ^= first_low
+            high ^= first_high
 
 
 @njit(nogil=True, cache=True)
@@ -117,16 +100,21 @@ def encode_blocks(
 ) -> None:
     """Each block in codewords of `shares` bits; with parity, each goes up to its of `ends`."""
     n_rows = row_ends.size - 1
-    bits = np.zeros((N_COLUMNS - n_rows) * z, np.uint8)
-    parity = np.empty(n_rows * z, np.uint8)
+    bits = np.empty((N_COLUMNS - n_rows) * z // 64 + 2, np.uint64)
+    parity = np.empty((n_rows, 2), np.uint64)
     for block in range(blocks.shape[0]):
         at = 0
         for number in range(shares.size):
-            share = shares[number]
-            bits[:share] = blocks[block, at : at + share]
-            bits[share:] = 0
-            at += share
-            encode_codeword(bits, z, row_ends, columns, shifts, middle, parity)
+            share, end = shares[number], ends[number + 1]
             middle_at = ends[number] + share
-            out[block, ends[number] : middle_at] = bits[:share]
-            out[block, middle_at : ends[number + 1]] = parity[: ends[number + 1] - middle_at]
+            bits[:] = 0
+            for i in range(share):
+                bit = blocks[block, at + i]
+                bits[i >> 6] |= np.uint64(bit) << np.uint64(i & 63)
+                out[block, ends[number] + i] = bit
+            at += share
+            parity_of(bits, z, row_ends, columns, shifts, middle, parity)
+            for row in range(n_rows):
+                first = middle_at + row * z
+                for i in range(min(z, end - first)):
+                    out[block, first + i] = parity[row, i >> 6] >> np.uint64(i & 63) & ONE

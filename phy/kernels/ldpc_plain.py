@@ -5,8 +5,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from phy.kernels.ldpc import N_COLUMNS
-from phy.kernels.ldpc_rows import MAX_MAGNITUDE, MAX_POSTERIOR, WEIGHT
+from phy.kernels.ldpc_rows import MAX_MAGNITUDE, MAX_POSTERIOR, N_COLUMNS, WEIGHT
 
 
 def decode_codeword_plain(

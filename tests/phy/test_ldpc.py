@@ -11,11 +11,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phy.kernels.ldpc import LdpcWorkspace, decode_codeword
-from phy.kernels.ldpc_encoder import encode_codeword
+from phy.kernels.bits import get, put, put_signs, to_octets
+from phy.kernels.ldpc import SURE, LdpcWorkspace, decode_codeword
 from phy.kernels.ldpc_plain import decode_codeword_plain
 from phy.kernels.ldpc_rows import MAX_POSTERIOR
-from phy.ldpc import LIFTINGS, QuasiCyclic, decode, encode, least_coded, segmentation
+from phy.ldpc import (
+    LIFTINGS,
+    QuasiCyclic,
+    Segmentation,
+    decode,
+    encode,
+    least_coded,
+    segmentation,
+)
 
 GOLDEN = Path(__file__).parents[3] / "shared" / "data" / "golden" / "ldpc_80211n_codewords.json"
 RATES = [Fraction(1, 2), Fraction(2, 3), Fraction(3, 4), Fraction(5, 6)]
@@ -61,9 +69,7 @@ def random_bits(rng, *shape):
 
 
 def encoded(code, bits):
-    parity = np.empty(code.n - code.k, np.uint8)
-    encode_codeword(bits, code.z, code.row_ends, code.columns, code.shifts, code.middle, parity)
-    return np.concatenate((bits, parity))
+    return encode(bits[None], Segmentation(code, code.k, 1, code.n))[0]
 
 
 def noisy(rng, coded, ebn0_db, rate, scale=8):
@@ -145,6 +151,59 @@ def test_blocks_of_any_size_come_back(n_bytes, rate, more, seed):
     assert np.ptp(form.shares) <= 1
     llr = (100 - 200 * coded.astype(np.int16)).astype(np.int16)
     assert np.array_equal(decoded(llr, form, LdpcWorkspace()), bits), seed
+
+
+@settings(derandomize=True, deadline=None, max_examples=40)
+@given(
+    st.integers(1, 500),
+    st.sampled_from(RATES),
+    st.floats(0, 1),
+    st.floats(0, 12),
+    st.integers(0, 2**32 - 1),
+)
+def test_blocks_are_decoded_as_the_plain_decoder_does_codeword_by_codeword(
+    n_bytes, rate, more, ebn0_db, seed
+):
+    """Those too whose signs are a codeword, which are not decoded at all."""
+    rng = np.random.default_rng(seed)
+    form = segmentation(8 * n_bytes, rate, round(least_coded(8 * n_bytes, rate) * (1 + more)))
+    code, most = form.code, 12
+    llr = noisy(rng, encode(random_bits(rng, 1, form.n_bits), form), ebn0_db, rate)
+    expected = []
+    for share, begin, end in zip(form.shares, form.ends, form.ends[1:], strict=False):
+        whole = np.zeros(code.n, np.int16)
+        whole[share : code.k] = SURE
+        whole[:share] = llr[0, begin : begin + share]
+        whole[code.k : code.k + end - begin - share] = llr[0, begin + share : end]
+        _, posteriors = decode_codeword_plain(
+            whole, code.z, code.row_ends, code.columns, code.shifts, most
+        )
+        expected.append((posteriors.reshape(-1) < 0)[:share])
+    bits = np.unpackbits(decode(llr, form, LdpcWorkspace(), most), axis=1)[0]
+    assert np.array_equal(bits, np.concatenate(expected)), seed
+
+
+@settings(derandomize=True, deadline=None)
+@given(st.lists(st.integers(0, 100), max_size=20), st.integers(0, 2**32 - 1))
+def test_signs_become_words_and_words_octets(sizes, seed):
+    rng = np.random.default_rng(seed)
+    values = rng.integers(-3, 4, sum(sizes)).astype(np.int16)
+    words = np.zeros(sum(sizes) // 64 + 2, np.uint64)
+    at = 0
+    for n in sizes:
+        put_signs(values, at, n, words, at)
+        at += n
+    octets = np.empty(-(-at // 8), np.uint8)
+    to_octets(words, octets)
+    assert np.array_equal(octets, np.packbits(values < 0))
+    copied = np.zeros_like(words)
+    at = 0
+    for n in (min(n, 64) for n in sizes):
+        put(copied, at, np.uint64(get(words, at, n)), n)
+        at += n
+    assert np.array_equal(
+        np.unpackbits(copied.view(np.uint8), bitorder="little")[:at], values[:at] < 0
+    )
 
 
 def test_the_fewest_and_shortest_codewords_are_taken():

@@ -1,0 +1,83 @@
+"""Bits in words of 64, the first one lowest."""
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+Words = NDArray[np.uint64]
+
+ONE = np.uint64(1)
+_63, _64 = np.uint64(63), np.uint64(64)
+_LANES = 32
+_I16, _I32 = ir.IntType(16), ir.IntType(32)
+_VECTOR = ir.VectorType(_I16, _LANES)
+# Halves, quarters and eighths of a byte that change places when it is turned round.
+_TURNS = ((4, 0x0F0F0F0F0F0F0F0F), (2, 0x3333333333333333), (1, 0x5555555555555555))
+
+
+def _signs_generator(_context: Any, array: Any, at: Any) -> Any:
+    """Bit i is 1 where `array[at + i]` is negative, for 32 int16."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        data = context.make_array(signature.args[0])(context, builder, args[0]).data
+        where = builder.bitcast(builder.gep(data, [args[1]]), _VECTOR.as_pointer())
+        values = builder.load(where)
+        values.align = 2
+        zero = ir.Constant(_VECTOR, [ir.Constant(_I16, 0)] * _LANES)
+        return builder.bitcast(builder.icmp_signed("<", values, zero), _I32)
+
+    return types.uint32(array, at), generate
+
+
+_signs: Any = intrinsic(_signs_generator)
+
+
+@njit(nogil=True, cache=True)
+def put(out: Words, at: int, word: np.uint64, n: int) -> None:
+    """Write the `n` bits of `word` from `at` on, where nothing was written."""
+    i, bit = at >> 6, np.uint64(at & 63)
+    out[i] |= word << bit
+    if bit + np.uint64(n) > _64:
+        out[i + 1] |= word >> (_64 - bit)
+
+
+@njit(nogil=True, cache=True)
+def get(words: Words, at: int, n: int) -> np.uint64:
+    """The `n` ≤ 64 bits from `at` on."""
+    i, bit = at >> 6, np.uint64(at & 63)
+    word = words[i] >> bit
+    if bit + np.uint64(n) > _64:
+        word |= words[i + 1] << (_64 - bit)
+    return word & low_ones(n)
+
+
+@njit(nogil=True, cache=True)
+def low_ones(n: int) -> np.uint64:
+    """Ones in the `n` ≤ 64 lowest places."""
+    return ~np.uint64(0) if n >= 64 else (ONE << np.uint64(n)) - ONE
+
+
+@njit(nogil=True, cache=True)
+def put_signs(values: NDArray[np.int16], first: int, n: int, out: Words, at: int) -> None:
+    """Write from `at` on: 1 where one of `n` values from `first` on is negative."""
+    whole = n - n % _LANES
+    for i in range(0, whole, _LANES):
+        put(out, at + i, np.uint64(_signs(values, first + i)), _LANES)
+    for i in range(whole, n):
+        put(out, at + i, np.uint64(values[first + i] < 0), 1)
+
+
+@njit(nogil=True, cache=True)
+def to_octets(words: Words, out: NDArray[np.uint8]) -> None:
+    """As bytes, of which the first bit is the highest."""
+    for i in range(words.size):
+        word = words[i]
+        for step, mask in _TURNS:
+            kept = np.uint64(mask)
+            word = (word >> np.uint64(step)) & kept | (word & kept) << np.uint64(step)
+        for b in range(min(8, out.size - 8 * i)):
+            out[8 * i + b] = np.uint8(word >> np.uint64(8 * b) & np.uint64(255))
