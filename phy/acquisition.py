@@ -15,6 +15,7 @@ from phy.header import BurstHeader, parse_header
 from phy.kernels import acquisition as kernel
 from phy.kernels.acquisition import AMBIGUITY, BACKOFF, SEARCH, Room, Training
 from phy.kernels.burst import Channel
+from phy.kernels.lanes import whole_lanes
 from phy.kernels.tracking import PHASE
 from phy.kernels.training import learn
 from phy.mapping import axes
@@ -66,13 +67,12 @@ class Acquisition:
         self._grid = grid
         self._carrier_cycles = carrier_cycles
         self._training = _training(grid, n_aliases(max_frequency))
-        # Spectra here hold the tones alone, in their order.
-        self._tones = tones(grid)._replace(bins=np.arange(grid.n_used))
+        self._tones = tones(grid)
         self._axes = axes(Modulation.BPSK, grid)
         n, n_steps = header.n_symbols(grid), header.N_BITS + N_TAIL
         self._room = Room(
             planes=np.empty((2, before(grid) + needed_after(grid)), np.float32),
-            bins=np.empty((preamble.N_LONG + n, grid.n_used), np.complex64),
+            y=np.empty((preamble.N_LONG + n, 2, whole_lanes(grid.n_used)), np.float32),
             points=np.empty((n, grid.n_data), np.complex64),
             llr=np.empty(n * grid.n_data, np.int16),
             folded=np.empty(2 * n_steps, np.int16),
@@ -100,7 +100,7 @@ class Acquisition:
             return Missed("header")
         sent = _sent(told, grid)
         phase, rate = channel.tracking[PHASE, :2]
-        learn(room.bins, sent, preamble.N_LONG, phase, rate, self._tones, channel)
+        learn(room.y, sent, preamble.N_LONG, phase, rate, self._tones, channel)
         long = room.planes[:, preamble.long_start(grid) : preamble.length(grid)].reshape(-1)
         error = (room.points - 1 / sent[preamble.N_LONG :, : grid.n_data].conj()).reshape(-1)
         quality = BurstQuality(
@@ -149,7 +149,7 @@ def _training(grid: Numerology, aliases: int) -> Training:
     )
     return Training(
         templates=(preamble.long_symbol(grid) * shift).astype(np.complex64),
-        dft=np.stack((np.cos(angle), -np.sin(angle))).astype(np.float32) / np.float32(grid.scale),
+        gain=1 / grid.scale,
         long_tones=np.tile(long_tones, (preamble.N_LONG, 1)),
         short_wave=(inverse[: preamble.SEGMENT] * short_tones).astype(np.complex64),
         long_wave=(inverse * long_tones).astype(np.complex64),
@@ -169,12 +169,11 @@ def _sent(told: BurstHeader, grid: Numerology) -> NDArray[np.complex64]:
     Each is 1 / x* of a tone x, so that what is divided by x is multiplied by its conjugate: where
     the header's peaks were cut off, no x is exactly ±1.
     """
-    table = tones(grid)
     long = preamble.long_carriers(grid)[grid.tones].astype(np.complex64)
     samples = header_samples(told, grid)
     starts = grid.n_cp + grid.n_symbol * np.arange(header.n_symbols(grid))
-    bins = ofdm.to_bins(samples, starts, 0.0, 0j, grid)[:, table.bins]
-    return np.concatenate((np.tile(long, (preamble.N_LONG, 1)), 1 / bins.conj()))
+    re, im = ofdm.to_tones(samples, starts, 0.0, 0j, grid)[:, :, : grid.n_used].swapaxes(0, 1)
+    return np.concatenate((np.tile(long, (preamble.N_LONG, 1)), 1 / (re - 1j * im)))
 
 
 def _decibel(ratio: float) -> float:

@@ -28,20 +28,20 @@ class Demodulator:
 
     def demap(
         self,
-        bins: NDArray[np.complex64],
+        y: NDArray[np.float32],
         channel: Channel,
         first_symbol: int,
         llr: NDArray[np.int16],
         points: NDArray[np.complex64] | None = None,
     ) -> None:
-        """LLRs of FFT bins in the code's order to `llr` `[n · n_data · bits]`.
+        """LLRs of tones `y` `[n, 2, ≥ n_used]` in the code's order to `llr` `[n · n_data · bits]`.
 
         `points` `[n, n_data]` gets the equalised points, if they are wanted. `channel` moves on.
         The header's first symbol is number 0.
         """
-        white = polarity(len(bins), first_symbol)
+        white = polarity(len(y), first_symbol)
         to = self._no_points if points is None else points
-        demap(bins, white, self._tones, self._axes, channel, to, llr)
+        demap(y, white, self._tones, self._axes, channel, to, llr)
 
 
 class PduDecoder:

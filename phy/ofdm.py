@@ -6,7 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from phy.kernels.symbols import gather, with_prefix
+from phy.estimation import tones
+from phy.kernels import fft as kernel
+from phy.kernels.lanes import whole_lanes
+from phy.kernels.symbols import with_prefix
 from phy.numerology import Numerology
 
 
@@ -27,21 +30,23 @@ def to_samples(
     return out
 
 
-def to_bins(
+def to_tones(
     samples: NDArray[np.complex64],
     starts: NDArray[np.int64],
     frequency: float,
     dc: complex,
     grid: Numerology,
     origin: int = 0,
-) -> NDArray[np.complex64]:
-    """FFT bins `[n, n_fft]` of the windows that begin at `starts`.
+) -> NDArray[np.float32]:
+    """Tones `[n, 2, ≥ n_used]`, real and imaginary parts, of the windows that begin at `starts`.
 
     Before, `dc` is taken off and the samples are turned back by `frequency` cycles a sample, with
     phase 0 `origin` samples before `samples[0]`. A carrier sent as 1 arrives as 1 through a channel
     of gain 1.
     """
-    windows = np.empty((len(starts), grid.n_fft), np.complex64)
-    gather(samples, starts, frequency, origin, dc, 1 / grid.scale, windows)
-    bins: NDArray[np.complex64] = fft.fft(windows, axis=-1, overwrite_x=True)
-    return bins
+    table = tones(grid)
+    out = np.empty((len(starts), 2, whole_lanes(grid.n_used)), np.float32)
+    kernel.to_tones(
+        samples, starts, frequency, origin, dc, 1 / grid.scale, grid.n_fft, table.bins, out
+    )
+    return out

@@ -227,7 +227,7 @@ class Receiver:
             return False
         first = burst.window(first_symbol)
         starts = self._grid.n_symbol * np.arange(last - first_symbol)
-        bins = ofdm.to_bins(
+        y = ofdm.to_tones(
             self._stream.view(first, burst.window(last) - self._grid.n_cp),
             starts,
             found.frequency,
@@ -239,13 +239,13 @@ class Receiver:
         points = None
         if self._on_points is not None:
             points = np.empty((n, self._grid.n_data), np.complex64)
-        burst.demodulator.demap(bins, found.channel, number, burst.decoder.room(n), points)
+        burst.demodulator.demap(y, found.channel, number, burst.decoder.room(n), points)
         if self._on_points is not None and points is not None:
             self._on_points(points, plan.mcs.modulation)
         for data in burst.decoder.decode(n_pdus):
             number = burst.n_good + burst.n_bad
             through = plan.symbols_through(number + 1)
-            own = bins[max(0, burst.n_symbols_in - first_symbol) : through - first_symbol]
+            own = y[max(0, burst.n_symbols_in - first_symbol) : through - first_symbol]
             burst.n_symbols_in = through
             if data is not None:
                 burst.n_good += 1
@@ -278,11 +278,11 @@ class Receiver:
             return limit, n_pdus
         return (plan.symbols_through(done + n_pdus), n_pdus) if n_pdus else (burst.n_symbols_in, 0)
 
-    def _is_gone(self, bins: NDArray[np.complex64], found: Acquired) -> bool:
-        used = bins[:, self._grid.bins]
-        if not len(used):
+    def _is_gone(self, y: NDArray[np.float32], found: Acquired) -> bool:
+        if not len(y):
             return False
-        power = float(np.mean(used.real**2 + used.imag**2))
+        used = y[:, :, : self._grid.n_used]
+        power = 2 * float(np.mean(used * used))
         return power < found.channel.no + _FADED * found.channel.gain
 
     def _end(self, burst: IncomingBurst, events: list[Event], ending: str) -> None:

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from phy.kernels.burst import Axes, Channel, Planes, Tones
 from phy.kernels.equaliser import demap, start_tracking
-from phy.kernels.training import estimate, spectrum, turn_back, wave
+from phy.kernels.fft import to_tones
+from phy.kernels.training import estimate, turn_back, wave
 from phy.kernels.viterbi import MAX_LLR, decode_block
 
 SEARCH = 24
@@ -44,8 +45,8 @@ class Training(NamedTuple):
 
     templates: NDArray[np.complex64]
     """The long symbol, shifted by each multiple of 1/16 that is tried `[2 aliases + 1, n_fft]`."""
-    dft: Planes
-    """Samples to gains of the tones, real and imaginary part `[2, n_fft, n_used]`."""
+    gain: float
+    """What carriers of samples of mean power 1 are taken times."""
     long_tones: NDArray[np.complex64]
     """The long training as sent, in the order of tones `[2, n_used]`."""
     short_wave: NDArray[np.complex64]
@@ -134,7 +135,7 @@ def refine(planes: Planes, training: Training, h_hat: NDArray[np.complex64]) -> 
     `planes` begin BACKOFF samples before the preamble.
     """
     re, im = planes[0], planes[1]
-    n_fft, n_segments = training.dft.shape[1], training.cover.size
+    n_fft, n_segments = training.templates.shape[1], training.cover.size
     short, long = np.empty(_SEGMENT, np.complex64), np.empty(n_fft, np.complex64)
     wave(training.short_wave, h_hat, short)
     wave(training.long_wave, h_hat, long)
@@ -177,8 +178,8 @@ class Room(NamedTuple):
 
     planes: Planes
     """The burst's samples up to the end of its header, turned back."""
-    bins: NDArray[np.complex64]
-    """Long training and header `[2 + n_header, n_used]`, in the order of tones."""
+    y: NDArray[np.float32]
+    """Long training and header `[2 + n_header, 2, ≥ n_used]`, in the order of tones."""
     points: NDArray[np.complex64]
     """Of the header `[n_header, n_data]`."""
     llr: NDArray[np.int16]
@@ -208,7 +209,7 @@ def acquire(
     The first long symbol is nominally at `nominal`; `coarse` is the frequency modulo 1/16, and
     `carrier_cycles` those of the carrier in a sample, if one crystal makes both, or 0.
     """
-    n_fft, planes, bins = training.templates.shape[1], room.planes, room.bins
+    n_fft, planes, y = training.templates.shape[1], room.planes, room.y
     first = nominal - SEARCH
     span = 2 * SEARCH + 2 * n_fft
     turn_back(x[first : first + span], dc, coarse, planes)
@@ -219,18 +220,16 @@ def acquire(
     n = training.windows[-1] + n_fft
     frequency = coarse + correction
     turn_back(x[begin : begin + n], dc, frequency, planes)
-    for i in range(2):
-        spectrum(planes, training.windows[i], training.dft, bins[i])
+    burst, windows, gain = x[begin : begin + n], training.windows, training.gain
+    to_tones(burst, windows[:2], frequency, 0, dc, gain, n_fft, tones.bins, y[:2])
     amplitude = np.ones(2, np.float32)
-    estimate(bins[:2], amplitude, training.long_tones, tones, channel)
+    estimate(y[:2], amplitude, training.long_tones, tones, channel)
     frequency += refine(planes, training, channel.h_hat)
-    turn_back(x[begin : begin + n], dc, frequency, planes)
-    for i in range(bins.shape[0]):
-        spectrum(planes, training.windows[i], training.dft, bins[i])
-    estimate(bins[:2], amplitude, training.long_tones, tones, channel)
+    to_tones(burst, windows, frequency, 0, dc, gain, n_fft, tones.bins, y)
+    estimate(y[:2], amplitude, training.long_tones, tones, channel)
     clock_error = frequency / carrier_cycles if carrier_cycles else 0.0
     start_tracking(channel, training.n_symbol / n_fft, clock_error, carrier_cycles > 0)
-    demap(bins[2:], training.polarity, tones, axes, channel, room.points, room.llr)
+    demap(y[2:], training.polarity, tones, axes, channel, room.points, room.llr)
     fold(room.llr, room.folded)
     decode_block(room.folded, room.decisions, room.octets)
     return begin + BACKOFF, frequency

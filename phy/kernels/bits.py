@@ -49,10 +49,11 @@ def put(out: Words, at: int, word: np.uint64, n: int) -> None:
 def get(words: Words, at: int, n: int) -> np.uint64:
     """The `n` ≤ 64 bits from `at` on."""
     i, bit = at >> 6, np.uint64(at & 63)
-    word = words[i] >> bit
+    word: np.uint64 = words[i] >> bit
     if bit + np.uint64(n) > _64:
         word |= words[i + 1] << (_64 - bit)
-    return word & low_ones(n)
+    word &= low_ones(n)
+    return word
 
 
 @njit(nogil=True, cache=True)

@@ -8,37 +8,30 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from phy.kernels.demapper import LLR_SCALE
+from phy.kernels.lanes import Lanes, least, load, most, splat
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def expected_levels(
-    planes: NDArray[np.int16],
-    axis_bits: int,
-    llr_scale: float,
-    mean: NDArray[np.float32],
-    square: NDArray[np.float32],
-) -> None:
-    """Mean and mean square of levels `[n]`, LLRs `planes` `[axis_bits · n]` bit by bit.
 
-    LLRs are `llr_scale` a unit, levels odd numbers.
-    """
-    n = mean.size
-    scale, two = np.float32(0.5 / llr_scale), np.float32(2)
-    mean[:] = 1
-    square[:] = 1
+@njit(nogil=True, forceinline=True)
+def expected_level(
+    llr: NDArray[np.float32], axis_bits: int, at: int, stride: int
+) -> tuple[Lanes, Lanes]:
+    """(mean, mean square) of eight levels, odd numbers, whose bit b's LLRs are `at + b stride`."""
+    scale = splat(0.5 / LLR_SCALE)
+    mean: Lanes = splat(1)
+    square: Lanes = splat(1)
     for bit in range(axis_bits - 1, 0, -1):
-        half = np.float32(1 << (axis_bits - bit))
-        row = planes[bit * n : (bit + 1) * n]
-        for d in range(n):
-            signed = _tanh(np.float32(row[d]) * scale) * mean[d]
-            square[d] += half * half + two * half * signed
-            mean[d] = half + signed
-    for d in range(n):
-        mean[d] *= -_tanh(np.float32(planes[d]) * scale)
+        half = splat(1 << (axis_bits - bit))
+        signed = _tanh(load(llr, at + bit * stride) * scale) * mean
+        square = square + half * half + (half + half) * signed
+        mean = half + signed
+    return -_tanh(load(llr, at) * scale) * mean, square
 
 
-@njit(nogil=True, cache=True, error_model="numpy")
-def _tanh(x: np.float32) -> np.float32:
+@njit(nogil=True, forceinline=True)
+def _tanh(x: Lanes) -> Lanes:
     """To 2 %."""
-    x = min(max(x, np.float32(-3)), np.float32(3))
+    x = least(most(x, splat(-3)), splat(3))
     square = x * x
-    return x * (np.float32(27) + square) / (np.float32(27) + np.float32(9) * square)
+    value: Lanes = x * (splat(27) + square) / (splat(27) + splat(9) * square)
+    return value

@@ -1,4 +1,4 @@
-"""FFT bins to LLRs: follow phase, timing and channel, equalise, demap, de-interleave."""
+"""Carriers to LLRs: follow phase, timing and channel, equalise, demap, de-interleave."""
 
 import math
 
@@ -20,8 +20,9 @@ from phy.kernels.burst import (
     Row,
     Tones,
 )
-from phy.kernels.decisions import expected_levels
+from phy.kernels.decisions import expected_level
 from phy.kernels.demapper import LLR_SCALE, axis_llrs
+from phy.kernels.lanes import N_LANES, load, splat, store, store_int16, total
 from phy.kernels.rotation import lean
 from phy.kernels.smoothing import follow
 from phy.kernels.tracking import PHASE, SLOPE, correct, predict
@@ -87,50 +88,9 @@ def _renew(
 
 
 @njit(nogil=True, cache=True)
-def _multiply(re: Row, im: Row, by_re: Row, by_im: Row, out_re: Row, out_im: Row) -> None:
-    for k in range(out_re.size):
-        a, b = re[k], im[k]
-        out_re[k] = a * by_re[k] - b * by_im[k]
-        out_im[k] = a * by_im[k] + b * by_re[k]
-
-
-@njit(nogil=True, cache=True)
-def _turn(re: Row, im: Row, c: np.float32, s: np.float32, out_re: Row, out_im: Row) -> None:
-    for k in range(out_re.size):
-        a, b = re[k], im[k]
-        out_re[k] = a * c - b * s
-        out_im[k] = a * s + b * c
-
-
-@njit(nogil=True, cache=True)
-def _learn(re: Row, im: Row, mean: Planes, by: np.float32, sums: Planes) -> None:
-    """Add what carriers with points of such a mean say of their gains."""
-    mean_re, mean_im, sums_re, sums_im = mean[0], mean[1], sums[0], sums[1]
-    for d in range(mean_re.size):
-        sums_re[d] += (re[d] * mean_re[d] + im[d] * mean_im[d]) * by
-    for d in range(mean_re.size):
-        sums_im[d] += (im[d] * mean_re[d] - re[d] * mean_im[d]) * by
-
-
-@njit(nogil=True, cache=True)
-def _add(square: Planes, by: np.float32, masses: Row) -> None:
-    re, im = square[0], square[1]
-    for d in range(re.size):
-        masses[d] += (re[d] + im[d]) * by
-
-
-# Sums in any order, so that they are vectorised; the order is the same at every call.
-@njit(nogil=True, cache=True, fastmath={"reassoc", "contract"})
-def _squares(x: Row) -> np.float32:
-    total = np.float32(0)
-    for d in range(x.size):
-        total += x[d] * x[d]
-    return total
-
-
-@njit(nogil=True, cache=True)
 def _pilots(
-    z: Planes,
+    re: Row,
+    im: Row,
     channel: Channel,
     tones: Tones,
     turns: Planes,
@@ -150,10 +110,33 @@ def _pilots(
         late = behind * tones.carriers[at]
         expected = h.conjugate() * complex(turns[0, at], turns[1, at]) * complex(1.0, late)
         sign = tones.pilots[p] * polarity
-        turned[p] = complex(z[0, at], z[1, at]) * expected * back * sign
+        turned[p] = complex(re[at], im[at]) * expected * back * sign
         power[p] = h.real * h.real + h.imag * h.imag
     carriers = tones.carriers[tones.n_data :]
     return correct(turned, power, carriers, _noise(channel), tracking)
+
+
+@njit(nogil=True, cache=True)
+def _learn_pilots(
+    re: Row,
+    im: Row,
+    phase: float,
+    trust: float,
+    tones: Tones,
+    turns: Planes,
+    polarity: float,
+    sums: Planes,
+    masses: Row,
+) -> None:
+    """What the pilots say of their carriers' gains."""
+    back = complex(math.cos(phase), -math.sin(phase))
+    for p in range(tones.pilots.size):
+        at = tones.n_data + p
+        z = complex(re[at], im[at]) * back * complex(turns[0, at], turns[1, at])
+        sign = tones.pilots[p] * polarity * trust
+        sums[0, at] += z.real * sign
+        sums[1, at] += z.imag * sign
+        masses[at] += trust
 
 
 @njit(nogil=True, cache=True)
@@ -182,8 +165,63 @@ def _correct_channel(channel: Channel, tones: Tones) -> None:
 
 
 @njit(nogil=True, cache=True)
+def _data(
+    re: Row,
+    im: Row,
+    phase: float,
+    trust: float,
+    turns: Planes,
+    inverse: Planes,
+    weight: Row,
+    unit: float,
+    real_bits: int,
+    imag_bits: int,
+    llr: Row,
+    planes: NDArray[np.int16],
+    level: Planes,
+    sums: Planes,
+    masses: Row,
+) -> float:
+    """The data carriers of a symbol: `level` and LLRs bit by bit, `llr` and `planes` `[bits · n]`.
+
+    Turned by `phase` and `turns`, they and what they probably are go to `sums` and `masses`, times
+    `trust`. What is certain of them is returned.
+    """
+    n, n_used = weight.size, masses.size
+    c, s = splat(math.cos(phase)), splat(-math.sin(phase))
+    trusted, by = splat(trust), splat(unit * trust)
+    per_mass = splat(unit * unit * trust)
+    certain, none = splat(0), splat(0)
+    imag_at = real_bits * n
+    for d in range(0, n, N_LANES):
+        a, b = load(re, d), load(im, d)
+        a, b = a * c - b * s, a * s + b * c
+        turn_re, turn_im = load(turns, d), load(turns, n_used + d)
+        a, b = a * turn_re - b * turn_im, a * turn_im + b * turn_re
+        by_re, by_im = load(inverse, d), load(inverse, n + d)
+        level_re, level_im = a * by_re - b * by_im, a * by_im + b * by_re
+        store(level, d, level_re)
+        store(level, n + d, level_im)
+        sure = load(weight, d) * trusted
+        axis_llrs(level_re, sure, real_bits, llr, d, n)
+        mean_re, square = expected_level(llr, real_bits, d, n)
+        mean_im = none
+        if imag_bits:
+            axis_llrs(level_im, sure, imag_bits, llr, imag_at + d, n)
+            mean_im, square_im = expected_level(llr, imag_bits, imag_at + d, n)
+            square = square + square_im
+        store(sums, d, load(sums, d) + (a * mean_re + b * mean_im) * by)
+        store(sums, n_used + d, load(sums, n_used + d) + (b * mean_re - a * mean_im) * by)
+        store(masses, d, load(masses, d) + square * per_mass)
+        certain = certain + (mean_re * mean_re + mean_im * mean_im)
+    for i in range(0, planes.size, N_LANES):
+        store_int16(planes, i, load(llr, i))
+    return float(total(certain)) * unit * unit * trust
+
+
+@njit(nogil=True, cache=True)
 def demap(
-    y: NDArray[np.complex64],
+    y: NDArray[np.float32],
     polarity: NDArray[np.float32],
     tones: Tones,
     axes: Axes,
@@ -191,63 +229,40 @@ def demap(
     points: NDArray[np.complex64],
     llr: NDArray[np.int16],
 ) -> None:
-    """Symbols `y` `[n, n_fft]` to LLRs `[n · n_data · bits]` in the code's order, positive for 0.
+    """Symbols to LLRs `[n · n_data · bits]` in the code's order, positive for 0.
 
-    `channel` goes on from call to call. `points` `[n, n_data]` gets the equalised points, if it has
-    any rows.
+    `y` `[n, 2, ≥ n_used]`: real and imaginary parts, in the order of tones. `channel` goes on from
+    call to call. `points` `[n, n_data]` gets the equalised points, if it has any rows.
     """
-    n_data, n_used = tones.n_data, tones.bins.size
-    real_bits, imag_bits = axes.real_bits, axes.imag_bits
-    n_bits, unit = axes.gather.size, np.float32(axes.unit)
-    turns, z = np.empty((2, n_used), np.float32), np.empty((2, n_used), np.float32)
-    half = np.empty((2, n_used), np.float32)
-    inverse, level = np.empty((2, n_data), np.float32), np.empty((2, n_data), np.float32)
-    usual, weight = np.empty(n_data, np.float32), np.empty(n_data, np.float32)
-    mean, square = np.zeros((2, n_data), np.float32), np.zeros((2, n_data), np.float32)
-    room, bits = np.empty(n_data, np.float32), np.empty(n_bits, np.int16)
-    turned = np.empty(n_used - n_data, np.complex128)
-    power = np.empty(n_used - n_data)
-    lower = bits[real_bits * n_data :]
+    n_data, n_used, n_bits = tones.n_data, tones.bins.size, axes.gather.size
+    gather, unit = axes.gather, axes.unit
+    turns, inverse = np.empty((2, n_used), np.float32), np.empty((2, n_data), np.float32)
+    level, weight = np.empty((2, n_data), np.float32), np.empty(n_data, np.float32)
+    certainty, planes = np.empty(n_bits, np.float32), np.empty(n_bits, np.int16)
+    turned, power = np.empty(n_used - n_data, np.complex128), np.empty(n_used - n_data)
     sums, masses, figures = channel.sums, channel.masses, channel.figures
     most_lag = _LAG / np.abs(tones.carriers).max()
-    _renew(channel, tones, axes.unit, turns, inverse, usual)
+    _renew(channel, tones, unit, turns, inverse, weight)
     for row in range(y.shape[0]):
-        for k in range(n_used):
-            value = y[row, tones.bins[k]]
-            z[0, k], z[1, k] = value.real, value.imag
-        no = _pilots(z, channel, tones, turns, polarity[row], turned, power)
+        re, im = y[row, 0], y[row, 1]
+        no = _pilots(re, im, channel, tones, turns, polarity[row], turned, power)
         if abs(channel.tracking[SLOPE, 0] - figures[SLOPE_USED]) > most_lag:
             figures[SLOPE_USED] = channel.tracking[SLOPE, 0]
-            _renew(channel, tones, axes.unit, turns, inverse, usual)
-        phase, trust = channel.tracking[PHASE, 0], np.float32(_noise(channel) / no)
-        c, s = np.float32(math.cos(phase)), np.float32(-math.sin(phase))
-        _turn(z[0], z[1], c, s, half[0], half[1])
-        _multiply(half[0], half[1], turns[0], turns[1], z[0], z[1])
-        _multiply(z[0], z[1], inverse[0], inverse[1], level[0], level[1])
+            _renew(channel, tones, unit, turns, inverse, weight)
+        phase, trust = channel.tracking[PHASE, 0], _noise(channel) / no
+        certain = _data(
+            re, im, phase, trust, turns, inverse, weight, unit, axes.real_bits, axes.imag_bits,
+            certainty, planes, level, sums, masses,
+        )  # fmt: skip
         if points.shape[0]:
             for d in range(n_data):
                 points[row, d] = complex(level[0, d] * unit, level[1, d] * unit)
-        for d in range(n_data):
-            weight[d] = usual[d] * trust
-        axis_llrs(level[0], weight, real_bits, room, bits)
-        expected_levels(bits, real_bits, LLR_SCALE, mean[0], square[0])
-        if imag_bits:
-            axis_llrs(level[1], weight, imag_bits, room, lower)
-            expected_levels(lower, imag_bits, LLR_SCALE, mean[1], square[1])
-        sorted_llr = llr[row * n_bits : (row + 1) * n_bits]
+        first = row * n_bits
         for k in range(n_bits):
-            sorted_llr[k] = bits[axes.gather[k]]
-        _learn(z[0], z[1], mean, unit * trust, sums)
-        _add(square, unit * unit * trust, masses)
-        for p in range(n_used - n_data):
-            at = n_data + p
-            sign = tones.pilots[p] * polarity[row] * trust
-            sums[0, at] += z[0, at] * sign
-            sums[1, at] += z[1, at] * sign
-            masses[at] += trust
-        certain = (_squares(mean[0]) + _squares(mean[1])) * unit * unit + (n_used - n_data)
-        figures[CERTAIN] += certain * trust
+            llr[first + k] = planes[gather[k]]
+        _learn_pilots(re, im, phase, trust, tones, turns, polarity[row], sums, masses)
+        figures[CERTAIN] += certain + (n_used - n_data) * trust
         figures[N_HEARD] += 1
         if figures[N_HEARD] == BLOCK:
             _correct_channel(channel, tones)
-            _renew(channel, tones, axes.unit, turns, inverse, usual)
+            _renew(channel, tones, unit, turns, inverse, weight)

@@ -157,4 +157,4 @@ def _begins_with(parity: Words, sent: Words, z: int, n: int) -> bool:
             different |= (parity[row, 0] & low_ones(low)) ^ get(sent, first, low)
         if high:
             different |= (parity[row, 1] & low_ones(high)) ^ get(sent, first + 64, high)
-    return different == 0
+    return bool(different == 0)

@@ -33,7 +33,8 @@ def _repeat(low: np.uint64, high: np.uint64, z: int, out: Words) -> None:
 def _part(repeated: Words, first: int) -> np.uint64:
     """The 64 bits from `first` on."""
     word, bit = first >> 6, np.uint64(first & 63)
-    return (repeated[word] >> bit) | (repeated[word + 1] << ONE << (_63 - bit))
+    part: np.uint64 = (repeated[word] >> bit) | (repeated[word + 1] << ONE << (_63 - bit))
+    return part
 
 
 @njit(nogil=True, cache=True)

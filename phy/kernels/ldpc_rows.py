@@ -139,7 +139,7 @@ class _Row:
         return self.builder.sdiv(self.builder.add(n, _long(LANES - 1)), _long(LANES))
 
     def variable(self, value: int) -> Any:
-        variable = cgutils.alloca_once(self.builder, _VECTOR)  # type: ignore[no-untyped-call]
+        variable = cgutils.alloca_once(self.builder, _VECTOR)
         self.builder.store(_splat(value), variable)
         return variable
 

@@ -1,39 +1,8 @@
-"""Samples of a burst to FFT windows, and coded bits to carriers."""
-
-import math
+"""Coded bits to carriers, and symbols to samples with their prefix."""
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-
-
-@njit(nogil=True, cache=True)
-def gather(
-    samples: NDArray[np.complex64],
-    starts: NDArray[np.int64],
-    frequency: float,
-    origin: int,
-    dc: complex,
-    gain: float,
-    out: NDArray[np.complex64],
-) -> None:
-    """Cut windows `[n, n_fft]` out, less `dc`, turned back by `frequency`, times `gain`.
-
-    Phase 0 is `origin` samples before `samples[0]`.
-    """
-    n_fft = out.shape[1]
-    turn = np.empty(n_fft, np.complex64)
-    step = -2 * math.pi * frequency
-    for m in range(n_fft):
-        turn[m] = np.complex64(gain * complex(math.cos(step * m), math.sin(step * m)))
-    offset = np.complex64(dc)
-    for row in range(starts.size):
-        first = starts[row]
-        phase = step * (first + origin)
-        begin = np.complex64(complex(math.cos(phase), math.sin(phase)))
-        window = samples[first : first + n_fft]
-        for m in range(n_fft):
-            out[row, m] = (window[m] - offset) * (turn[m] * begin)
 
 
 @njit(nogil=True, cache=True)

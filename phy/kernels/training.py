@@ -33,24 +33,6 @@ def turn_back(x: NDArray[np.complex64], dc: complex, frequency: float, out: Plan
             out[1, begin + m] = a * im + b * re
 
 
-@njit(nogil=True, cache=True)
-def spectrum(planes: Planes, first: int, dft: Planes, out: NDArray[np.complex64]) -> None:
-    """The tones of the window of `planes` at `first`: a DFT by its definition.
-
-    `dft` `[2, n_fft, n_used]`. For the few symbols of an acquisition that is fast enough.
-    """
-    n_fft, n = dft.shape[1], dft.shape[2]
-    re, im = np.zeros(n, np.float32), np.zeros(n, np.float32)
-    for m in range(n_fft):
-        a, b = planes[0, first + m], planes[1, first + m]
-        c, s = dft[0, m], dft[1, m]
-        for k in range(n):
-            re[k] += a * c[k] - b * s[k]
-            im[k] += a * s[k] + b * c[k]
-    for k in range(n):
-        out[k] = complex(re[k], im[k])
-
-
 # Sums in any order, so that they are vectorised; the order is the same at every call.
 @njit(nogil=True, cache=True, fastmath={"reassoc", "contract"})
 def wave(
@@ -68,25 +50,24 @@ def wave(
 
 @njit(nogil=True, cache=True)
 def least_squares(
-    bins: NDArray[np.complex64],
+    y: NDArray[np.float32],
     amplitude: NDArray[np.float32],
     sent: NDArray[np.complex64],
-    tones: NDArray[np.int64],
     out: NDArray[np.complex64],
 ) -> tuple[float, float]:
     """Gain of each tone over `n` ≥ 2 symbols; (noise power on a tone, mean |h|²).
 
-    `sent` `[n, n_used]` of magnitude 1 went out times `amplitude` `[n]`, and came on `tones`
-    `[n_used]` of `bins` `[n, …]`.
+    `sent` `[n, n_used]` of magnitude 1 went out times `amplitude` `[n]`, and came as `y`
+    `[n, 2, ≥ n_used]`.
     """
-    n = bins.shape[0]
+    n, n_used = sent.shape
     mass, noise, power = 0.0, 0.0, 0.0
     for s in range(n):
         mass += amplitude[s] * amplitude[s]
-    for k in range(tones.size):
+    for k in range(n_used):
         total, square = 0j, 0.0
         for s in range(n):
-            gain = complex(bins[s, tones[k]]) * complex(sent[s, k]).conjugate()
+            gain = complex(y[s, 0, k], y[s, 1, k]) * complex(sent[s, k]).conjugate()
             total += gain * amplitude[s]
             square += gain.real * gain.real + gain.imag * gain.imag
         h = total / mass
@@ -94,12 +75,12 @@ def least_squares(
         noise += square - mass * size
         power += size
         out[k] = np.complex64(h)
-    return noise / ((n - 1) * tones.size), power / tones.size
+    return noise / ((n - 1) * n_used), power / n_used
 
 
 @njit(nogil=True, cache=True)
 def estimate(
-    bins: NDArray[np.complex64],
+    y: NDArray[np.float32],
     amplitude: NDArray[np.float32],
     sent: NDArray[np.complex64],
     tones: Tones,
@@ -107,7 +88,7 @@ def estimate(
 ) -> None:
     """The channel from known symbols, as of `least_squares`, less what must be noise."""
     rough = np.empty(tones.bins.size, np.complex64)
-    no, power = least_squares(bins, amplitude, sent, tones.bins, rough)
+    no, power = least_squares(y, amplitude, sent, rough)
     mass = 0.0
     for a in amplitude:
         mass += a * a
@@ -124,7 +105,7 @@ def estimate(
 
 @njit(nogil=True, cache=True)
 def learn(
-    bins: NDArray[np.complex64],
+    y: NDArray[np.float32],
     sent: NDArray[np.complex64],
     n_training: int,
     phase: float,
@@ -132,7 +113,7 @@ def learn(
     tones: Tones,
     channel: Channel,
 ) -> None:
-    """The channel anew with the header, now known, as further training; `bins` are used up.
+    """The channel anew with the header, now known, as further training; `y` is used up.
 
     `phase` is the last symbol's, `rate` how it grows a symbol. The preamble may have been sent
     stronger than the rest: if so is what the header tells.
@@ -143,10 +124,10 @@ def learn(
         angle = phase - (n - 1 - s) * rate
         back = np.complex64(complex(math.cos(angle), -math.sin(angle)))
         for k in range(n_used):
-            at = tones.bins[k]
-            bins[s, at] *= back
+            turned = np.complex64(complex(y[s, 0, k], y[s, 1, k])) * back
+            y[s, 0, k], y[s, 1, k] = turned.real, turned.imag
             h = channel.h_hat[k]
-            product = bins[s, at] * np.conj(sent[s, k]) * np.conj(h)
+            product = turned * np.conj(sent[s, k]) * np.conj(h)
             seen += product.real
             expected += h.real * h.real + h.imag * h.imag
     amplitude = np.ones(n, np.float32)
@@ -155,4 +136,4 @@ def learn(
         if abs(1 / ratio - 1) > _SURELY * math.sqrt(0.5 * channel.figures[NO] / expected):
             for s in range(n_training):
                 amplitude[s] = min(max(ratio, 1 / _LARGEST_BOOST), _LARGEST_BOOST)
-    estimate(bins, amplitude, sent, tones, channel)
+    estimate(y, amplitude, sent, tones, channel)

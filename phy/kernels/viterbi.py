@@ -69,7 +69,7 @@ def _constant(values: list[int]) -> ir.Constant:
 
 
 def _variable(builder: Any, values: list[int]) -> Any:
-    variable = cgutils.alloca_once(builder, _VECTOR)  # type: ignore[no-untyped-call]
+    variable = cgutils.alloca_once(builder, _VECTOR)
     builder.store(_constant(values), variable)
     return variable
 

@@ -120,11 +120,11 @@ def _long_training(
 
 def _channel(samples: NDArray[np.complex64], window: int, frequency: float) -> Channel:
     starts = _GRID.n_fft * np.arange(preamble.N_LONG)
-    bins = ofdm.to_bins(samples[window:], starts, frequency, 0j, _GRID)
+    y = ofdm.to_tones(samples[window:], starts, frequency, 0j, _GRID)
     sent = preamble.long_carriers(_GRID)[_GRID.tones].astype(np.complex64)
     channel = new_channel(_GRID)
     amplitude = np.ones(preamble.N_LONG, np.float32)
-    estimate(bins, amplitude, np.tile(sent, (preamble.N_LONG, 1)), tones(_GRID), channel)
+    estimate(y, amplitude, np.tile(sent, (preamble.N_LONG, 1)), tones(_GRID), channel)
     start_tracking(channel, _GRID.n_symbol / _GRID.n_fft, 0.0, False)
     return channel
 
@@ -144,9 +144,9 @@ def _llrs(
     if last > len(samples):
         return None
     starts = _GRID.n_symbol * np.arange(n_symbols)
-    bins = ofdm.to_bins(samples[window:last], starts, frequency, 0j, _GRID, window - origin)
+    y = ofdm.to_tones(samples[window:last], starts, frequency, 0j, _GRID, window - origin)
     llr = np.empty(n_symbols * _GRID.n_data * modulation.bits, np.int16)
-    Demodulator(modulation, _GRID).demap(bins, channel, first_symbol, llr)
+    Demodulator(modulation, _GRID).demap(y, channel, first_symbol, llr)
     return llr
 
 

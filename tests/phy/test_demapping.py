@@ -12,6 +12,7 @@ from phy.kernels.burst import GAIN, NO
 from phy.kernels.equaliser import BLOCK, start_tracking
 from phy.mapping import mapping
 from phy.sequences import polarity
+from tests.phy.signals import tone_planes
 
 SEED = 17
 GRID = OFDM_64_16
@@ -35,7 +36,8 @@ def demap(modulation, bins, channel, first_symbol=2):
     """(LLRs, points)."""
     llr = np.empty(len(bins) * GRID.n_data * modulation.bits, np.int16)
     equalised = np.empty((len(bins), GRID.n_data), np.complex64)
-    Demodulator(modulation, GRID).demap(bins, channel, first_symbol, llr, equalised)
+    y = tone_planes(bins[:, GRID.bins[GRID.tones]])
+    Demodulator(modulation, GRID).demap(y, channel, first_symbol, llr, equalised)
     return llr, equalised
 
 

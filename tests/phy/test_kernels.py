@@ -7,7 +7,7 @@ from phy import OFDM_64_16, Modulation, points
 from phy.interleaver import order
 from phy.kernels.detector import FORGETS, HISTORY, detector_sums, sanitise, search
 from phy.kernels.resampler import interpolate
-from phy.kernels.symbols import gather, map_bits
+from phy.kernels.symbols import map_bits
 from phy.preamble import BARKER, preamble
 from phy.stream import SampleStream
 from tests.phy.signals import noise, silence, turned
@@ -103,17 +103,6 @@ def test_numbers_too_large_or_none_become_0_and_are_counted():
     )
     assert sanitise(x, 100) == 7
     assert list(x) == [1, 0, 2j, 0, 0, 0, 99, 0, 0, 0]
-
-
-@pytest.mark.parametrize("frequency", [0.0, 0.0173, -0.09])
-def test_gather_cuts_and_turns(frequency):
-    x = noise(rng(), 5000)
-    starts = np.array([0, 80, 777, 4936])
-    out = np.empty((4, 64), np.complex64)
-    gather(x, starts, frequency, 7, 0.1 + 0.2j, 0.5, out)
-    at = starts[:, None] + np.arange(64)
-    wanted = 0.5 * (x[at] - (0.1 + 0.2j)) * np.exp(-2j * np.pi * frequency * (at + 7))
-    assert out == pytest.approx(wanted, abs=2e-6)
 
 
 @pytest.mark.parametrize("modulation", Modulation)
