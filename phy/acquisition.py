@@ -10,18 +10,16 @@ from numpy.typing import NDArray
 from phy import header, ofdm, preamble
 from phy.constellation import Modulation
 from phy.convolutional import N_TAIL
-from phy.estimation import new_channel, tones
+from phy.estimation import in_planes, new_channel, new_scratch, tones
 from phy.header import BurstHeader, parse_header
 from phy.kernels import acquisition as kernel
 from phy.kernels.acquisition import AMBIGUITY, BACKOFF, SEARCH, Room, Training
 from phy.kernels.burst import Channel
 from phy.kernels.lanes import whole_lanes
-from phy.kernels.tracking import PHASE
-from phy.kernels.training import learn
+from phy.kernels.parcel import Parcel
 from phy.mapping import axes
 from phy.numerology import Numerology
 from phy.quality import BurstQuality
-from phy.sequences import polarity
 from phy.transmitter import header_samples
 
 # What noise may add to the offset that the peak tells, in cycles a sample.
@@ -43,7 +41,8 @@ def needed_after(grid: Numerology) -> int:
 class Acquired(NamedTuple):
     """A burst that can be decoded. `window` is where the first payload symbol's FFT begins.
 
-    The samples before have turned by `frequency` since `origin`, and `channel` is as it was there.
+    The samples before have turned by `frequency` since `origin`, and `channel` is as it was there;
+    it is the receiver's only one, until the next burst.
     """
 
     header: BurstHeader
@@ -51,7 +50,7 @@ class Acquired(NamedTuple):
     origin: int
     window: int
     frequency: float
-    channel: Channel
+    channel: Parcel[Channel]
 
 
 class Missed(NamedTuple):
@@ -66,19 +65,13 @@ class Acquisition:
     def __init__(self, grid: Numerology, max_frequency: float, carrier_cycles: float = 0.0) -> None:
         self._grid = grid
         self._carrier_cycles = carrier_cycles
+        self._nominal = before(grid)
         self._training = _training(grid, n_aliases(max_frequency))
-        self._tones = tones(grid)
+        self._payload_at = int(self._training.content.windows[-1]) + grid.n_symbol
         self._axes = axes(Modulation.BPSK, grid)
-        n, n_steps = header.n_symbols(grid), header.N_BITS + N_TAIL
-        self._room = Room(
-            planes=np.empty((2, before(grid) + needed_after(grid)), np.float32),
-            y=np.empty((preamble.N_LONG + n, 2, whole_lanes(grid.n_used)), np.float32),
-            points=np.empty((n, grid.n_data), np.complex64),
-            llr=np.empty(n * grid.n_data, np.int16),
-            folded=np.empty(2 * n_steps, np.int16),
-            decisions=np.empty(n_steps, np.uint64),
-            octets=np.empty(header.N_BITS // 8, np.uint8),
-        )
+        self._channel = new_channel(grid)
+        self._scratch = new_scratch(grid)
+        self._room = _new_room(grid)
 
     def acquire(
         self, x: NDArray[np.complex64], base: int, coarse: float, dc: complex
@@ -87,36 +80,34 @@ class Acquisition:
 
         `base` is the absolute index of `x[0]`; `coarse` the frequency that the peak tells.
         """
-        grid, room = self._grid, self._room
-        channel = new_channel(grid)
+        grid, room, channel = self._grid, self._room.content, self._channel.content
         start, frequency = kernel.acquire(
-            x, before(grid), coarse, dc, self._carrier_cycles,
-            self._training, self._tones, self._axes, channel, room,
+            x, self._nominal, coarse, dc, self._carrier_cycles,
+            self._training.words, tones(grid).words, self._axes.words,
+            self._channel.words, self._scratch.words, self._room.words,
         )  # fmt: skip
         if start < 0:
             return Missed("preamble")
         told = parse_header(room.octets, room.folded)
         if told is None:
             return Missed("header")
-        sent = _sent(told, grid)
-        phase, rate = channel.tracking[PHASE, :2]
-        learn(room.y, sent, preamble.N_LONG, phase, rate, self._tones, channel)
-        long = room.planes[:, preamble.long_start(grid) : preamble.length(grid)].reshape(-1)
-        error = (room.points - 1 / sent[preamble.N_LONG :, : grid.n_data].conj()).reshape(-1)
+        power, error = kernel.settle(
+            _sent(told, grid), self._training.words, tones(grid).words,
+            self._channel.words, self._scratch.words, self._room.words,
+        )  # fmt: skip
         quality = BurstQuality(
-            start=base + start,
-            mcs=told.mcs,
-            n_pdus=told.n_pdus,
-            pdu_bytes=told.pdu_bytes,
-            network=told.network,
-            snr_db=_decibel(channel.gain * grid.n_used / grid.n_fft / channel.no),
-            rssi_dbfs=_decibel(2 * float(np.dot(long, long)) / len(long)),
-            evm_db=_decibel(float(np.vdot(error, error).real) / len(error)),
-            cfo=frequency,
+            base + start,
+            told.mcs,
+            told.n_pdus,
+            told.pdu_bytes,
+            told.network,
+            _decibel(channel.gain * grid.n_used / grid.n_fft / channel.no),
+            _decibel(power),
+            _decibel(error),
+            frequency,
         )
         origin = base + start - BACKOFF
-        window = origin + int(self._training.windows[-1]) + grid.n_symbol
-        return Acquired(told, quality, origin, window, frequency, channel)
+        return Acquired(told, quality, origin, origin + self._payload_at, frequency, self._channel)
 
 
 def n_aliases(max_frequency: float) -> int:
@@ -125,14 +116,15 @@ def n_aliases(max_frequency: float) -> int:
 
 
 @lru_cache(maxsize=8)
-def _training(grid: Numerology, aliases: int) -> Training:
+def _training(grid: Numerology, aliases: int) -> Parcel[Training]:
     n_fft, n_header = grid.n_fft, header.n_symbols(grid)
-    time, carriers = np.arange(n_fft)[:, None], tones(grid).carriers
+    time, carriers = np.arange(n_fft)[:, None], tones(grid).content.carriers
     shift = np.exp(2j * np.pi * AMBIGUITY * np.arange(-aliases, aliases + 1)[:, None] * time[:, 0])
-    angle = 2 * np.pi * carriers * time / n_fft
-    inverse = np.exp(1j * angle) * (grid.scale / n_fft)
-    long_tones = preamble.long_carriers(grid)[grid.tones].astype(np.complex64)
-    short_tones = preamble.short_carriers(grid)[grid.tones]
+    inverse = np.exp(2j * np.pi * carriers * time / n_fft) * (grid.scale / n_fft)
+    short_wave = inverse[: preamble.SEGMENT] * preamble.short_carriers(grid)[grid.tones]
+    clean = np.roll(short_wave, -kernel.FIRST_CLEAN, axis=0)
+    clean[kernel.N_CLEAN :] = 0
+    long = preamble.long_carriers(grid)[grid.tones].astype(np.complex64)
     long_start = preamble.long_start(grid)
     header_start = preamble.length(grid) + grid.n_cp
     segments = preamble.SEGMENT * np.arange(preamble.N_SEGMENTS)
@@ -147,24 +139,45 @@ def _training(grid: Numerology, aliases: int) -> Training:
         long_start + n_fft * np.arange(preamble.N_LONG),
         header_start + grid.n_symbol * np.arange(n_header),
     )
-    return Training(
-        templates=(preamble.long_symbol(grid) * shift).astype(np.complex64),
-        gain=1 / grid.scale,
-        long_tones=np.tile(long_tones, (preamble.N_LONG, 1)),
-        short_wave=(inverse[: preamble.SEGMENT] * short_tones).astype(np.complex64),
-        long_wave=(inverse * long_tones).astype(np.complex64),
-        cover=preamble.COVER,
-        frequencies=_FREQUENCIES,
-        turns=np.exp(-2j * np.pi * _FREQUENCIES[:, None] * centres).astype(np.complex64),
-        windows=np.concatenate(windows),
-        polarity=polarity(n_header),
-        n_symbol=grid.n_symbol,
+    return Parcel(
+        Training(
+            templates=(preamble.long_symbol(grid) * shift).astype(np.complex64),
+            long=in_planes(np.tile(long, (preamble.N_LONG, 1))),
+            waves=_parts_of(np.concatenate((clean, inverse * long)).T),
+            cover=preamble.COVER,
+            frequencies=_FREQUENCIES,
+            turns=_parts_of(np.exp(-2j * np.pi * centres[:, None] * _FREQUENCIES)),
+            windows=np.concatenate(windows),
+        )
+    )
+
+
+def _parts_of(x: NDArray[np.complex128]) -> NDArray[np.float32]:
+    """Real and imaginary parts `[n, 2, m]` of `[n, m]`."""
+    return np.ascontiguousarray(np.stack((x.real, x.imag), axis=1), np.float32)
+
+
+def _new_room(grid: Numerology) -> Parcel[Room]:
+    n, n_steps = header.n_symbols(grid), header.N_BITS + N_TAIL
+    training = _training(grid, 0).content
+    return Parcel(
+        Room(
+            planes=np.empty((2, before(grid) + needed_after(grid)), np.float32),
+            wave=np.empty(training.waves.shape[1:], np.float32),
+            parts=np.empty((2, len(training.turns)), np.float32),
+            y=np.empty((preamble.N_LONG + n, 2, whole_lanes(grid.n_used)), np.float32),
+            points=np.empty((n, grid.n_data), np.complex64),
+            llr=np.empty(n * grid.n_data, np.int16),
+            folded=np.empty(2 * n_steps, np.int16),
+            decisions=np.empty(n_steps, np.uint64),
+            octets=np.empty(header.N_BITS // 8, np.uint8),
+        )
     )
 
 
 @lru_cache(maxsize=64)
-def _sent(told: BurstHeader, grid: Numerology) -> NDArray[np.complex64]:
-    """Long training and header as sent, in the order of tones `[2 + n_header, n_used]`.
+def _sent(told: BurstHeader, grid: Numerology) -> NDArray[np.float32]:
+    """Long training and header as sent `[2 + n_header, 2, width]`.
 
     Each is 1 / x* of a tone x, so that what is divided by x is multiplied by its conjugate: where
     the header's peaks were cut off, no x is exactly ±1.
@@ -173,7 +186,7 @@ def _sent(told: BurstHeader, grid: Numerology) -> NDArray[np.complex64]:
     samples = header_samples(told, grid)
     starts = grid.n_cp + grid.n_symbol * np.arange(header.n_symbols(grid))
     re, im = ofdm.to_tones(samples, starts, 0.0, 0j, grid)[:, :, : grid.n_used].swapaxes(0, 1)
-    return np.concatenate((np.tile(long, (preamble.N_LONG, 1)), 1 / (re - 1j * im)))
+    return in_planes(np.concatenate((np.tile(long, (preamble.N_LONG, 1)), 1 / (re - 1j * im))))
 
 
 def _decibel(ratio: float) -> float:

@@ -5,43 +5,74 @@ from numpy.typing import NDArray
 
 from phy.constellation import Modulation
 from phy.crc import checked
-from phy.estimation import tones
+from phy.estimation import new_scratch, tones
+from phy.kernels import demodulator as kernel
 from phy.kernels.burst import Channel
-from phy.kernels.equaliser import demap
+from phy.kernels.parcel import Parcel
 from phy.layout import BurstLayout
 from phy.ldpc import LdpcWorkspace, decode
 from phy.mapping import axes
 from phy.numerology import Numerology
-from phy.sequences import polarity, whitening
+from phy.sequences import whitening
 
 # LLRs for which there is room at first: some ten PDUs of usual size.
 _ROOM = 1 << 14
 
 
 class Demodulator:
-    """Equaliser and demapper of one modulation on one grid."""
+    """Samples to LLRs on one grid. Not for several threads at once."""
 
-    def __init__(self, modulation: Modulation, grid: Numerology) -> None:
-        self._tones = tones(grid)
-        self._axes = axes(modulation, grid)
+    def __init__(self, grid: Numerology) -> None:
+        self._grid = grid
+        self._scratch = new_scratch(grid)
         self._no_points = np.empty((0, grid.n_data), np.complex64)
+
+    def demodulate(
+        self,
+        samples: NDArray[np.complex64],
+        frequency: float,
+        dc: complex,
+        origin: int,
+        modulation: Modulation,
+        channel: Parcel[Channel],
+        first_symbol: int,
+        llr: NDArray[np.int16],
+        powers: NDArray[np.float32],
+        points: NDArray[np.complex64] | None = None,
+    ) -> None:
+        """LLRs of symbols in the code's order to `llr` `[n · n_data · bits]`.
+
+        The first one's FFT window begins with `samples`, which have turned by `frequency` cycles a
+        sample since `origin` samples before. The header's first symbol is number 0. `channel` moves
+        on. `powers` `[≥ n]` gets the mean power on a carrier of each symbol, `points` `[n, n_data]`
+        the equalised points, if they are wanted.
+        """
+        grid = self._grid
+        n = (len(samples) - grid.n_fft) // grid.n_symbol + 1
+        to = self._no_points if points is None else points
+        kernel.demodulate(
+            samples, n, frequency, dc, origin, first_symbol,
+            tones(grid).words, axes(modulation, grid).words, channel.words, self._scratch.words,
+            to, llr, powers,
+        )  # fmt: skip
 
     def demap(
         self,
         y: NDArray[np.float32],
-        channel: Channel,
+        modulation: Modulation,
+        channel: Parcel[Channel],
         first_symbol: int,
         llr: NDArray[np.int16],
         points: NDArray[np.complex64] | None = None,
     ) -> None:
-        """LLRs of tones `y` `[n, 2, ≥ n_used]` in the code's order to `llr` `[n · n_data · bits]`.
-
-        `points` `[n, n_data]` gets the equalised points, if they are wanted. `channel` moves on.
-        The header's first symbol is number 0.
-        """
-        white = polarity(len(y), first_symbol)
+        """The same from tones `y` `[n, 2, width]`."""
+        grid = self._grid
         to = self._no_points if points is None else points
-        demap(y, white, self._tones, self._axes, channel, to, llr)
+        kernel.demap(
+            y, first_symbol,
+            tones(grid).words, axes(modulation, grid).words, channel.words, self._scratch.words,
+            to, llr,
+        )  # fmt: skip
 
 
 class PduDecoder:

@@ -9,50 +9,102 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from phy.kernels.burst import N_FIGURES, Channel, Tones
+from phy.constellation import Modulation
+from phy.kernels.burst import N_FIGURES, Channel, Scratch, Tones
+from phy.kernels.lanes import N_LANES, whole_lanes
+from phy.kernels.parcel import Parcel
 from phy.numerology import Numerology
+from phy.sequences import POLARITY
 
 # Groups of the smoother, by how many samples their echoes are from the mean delay; beyond, up to a
 # prefix, the last.
 _GROUPS = ((0,), (1,), (2, 3), (4, 5, 6, 7, 8))
 
 
-def new_channel(grid: Numerology) -> Channel:
+def new_channel(grid: Numerology) -> Parcel[Channel]:
     """Room for a channel of which nothing is known."""
-    n_groups = len(tones(grid).ends) + 1
-    return Channel(
-        h_hat=np.zeros(grid.n_used, np.complex64),
-        unknown=np.zeros(n_groups),
-        power=np.zeros(n_groups),
-        sums=np.zeros((2, grid.n_used), np.float32),
-        masses=np.zeros(grid.n_used, np.float32),
-        figures=np.zeros(N_FIGURES),
-        tracking=np.zeros((2, 5)),
+    n_groups, width = len(tones(grid).content.ends) + 1, whole_lanes(grid.n_used)
+    h, centre, turns, inverse, sums = np.zeros((5, 2, width), np.float32)
+    return Parcel(
+        Channel(
+            h=h,
+            centre=centre,
+            turns=turns,
+            inverse=inverse,
+            certainty=np.zeros(width, np.float32),
+            sums=sums,
+            masses=np.zeros(width, np.float32),
+            unknown=np.zeros(n_groups),
+            power=np.zeros(n_groups),
+            figures=np.zeros(N_FIGURES),
+            tracking=np.zeros((2, 5)),
+        )
     )
 
 
+def new_scratch(grid: Numerology) -> Parcel[Scratch]:
+    """Room to work in: one for each thread."""
+    table, width = tones(grid).content, whole_lanes(grid.n_used)
+    n_bits, n_groups = max(each.bits for each in Modulation), len(table.ends) + 1
+    return Parcel(
+        Scratch(
+            windows=np.empty((4, N_LANES * grid.n_fft), np.float32),
+            square=np.empty(N_LANES * N_LANES, np.float32),
+            y=np.empty((N_LANES, 2, width), np.float32),
+            level=np.empty((2, width), np.float32),
+            llr=np.empty(n_bits * grid.n_data, np.float32),
+            planes=np.empty(n_bits * grid.n_data, np.int16),
+            turned=np.empty(len(table.pilots), np.complex128),
+            pilot_power=np.empty(len(table.pilots)),
+            rest=np.empty((2, width), np.float32),
+            coefficients=np.empty((2, len(table.basis)), np.float32),
+            energies=np.empty(n_groups),
+            weights=np.empty(n_groups),
+        )
+    )
+
+
+def in_planes(y: NDArray[np.complex64]) -> NDArray[np.float32]:
+    """Tones `[n, n_used]` as kernels take them: `[n, 2, width]`."""
+    n, n_used = y.shape
+    out = np.zeros((n, 2, whole_lanes(n_used)), np.float32)
+    out[:, 0, :n_used], out[:, 1, :n_used] = y.real, y.imag
+    return out
+
+
 @cache
-def tones(grid: Numerology) -> Tones:
-    """The tables of a grid's carriers."""
+def tones(grid: Numerology) -> Parcel[Tones]:
+    """The tables of a grid and its carriers."""
     carriers = grid.used[grid.tones]
     basis, ends = _basis(carriers, grid)
     position = {int(k): i for i, k in enumerate(carriers)}
     pairs = [(i, position[k + 1]) for k, i in position.items() if k + 1 in position]
-    return Tones(
-        carriers % grid.n_fft,
-        carriers,
-        grid.n_data,
-        grid.pilot_values,
-        basis,
-        ends,
-        np.array(pairs, np.int64).T.copy(),
+    numbers = np.zeros(whole_lanes(grid.n_used), np.float32)
+    numbers[: grid.n_used] = carriers
+    circle = np.exp(-2j * np.pi * np.arange(grid.n_fft) / grid.n_fft)
+    return Parcel(
+        Tones(
+            n_fft=grid.n_fft,
+            n_symbol=grid.n_symbol,
+            gain=1 / grid.scale,
+            n_data=grid.n_data,
+            bins=carriers % grid.n_fft,
+            carriers=carriers,
+            numbers=numbers,
+            pilots=grid.pilot_values,
+            polarity=POLARITY,
+            basis=basis,
+            ends=ends,
+            neighbours=np.array(pairs, np.int64).T.copy(),
+            twiddles=np.stack((circle.real, circle.imag)).astype(np.float32),
+        )
     )
 
 
 def _basis(
     carriers: NDArray[np.int64], grid: Numerology
 ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """Orthonormal rows `[n, n_used]` in groups, and where each group ends."""
+    """Orthonormal rows `[n, width]` in groups, and where each group ends."""
     rows: list[NDArray[np.float64]] = []
     ends = []
     outermost = tuple(range(_GROUPS[-1][-1] + 1, grid.n_cp + 1))
@@ -62,4 +114,6 @@ def _basis(
             rows += [np.cos(angle), np.sin(angle)] if delay else [np.ones(len(carriers))]
         ends.append(len(rows))
     orthonormal, _ = np.linalg.qr(np.array(rows).T)
-    return np.ascontiguousarray(orthonormal.T, np.float32), np.array(ends, np.int64)
+    out = np.zeros((len(rows), whole_lanes(grid.n_used)), np.float32)
+    out[:, : grid.n_used] = orthonormal.T
+    return out, np.array(ends, np.int64)

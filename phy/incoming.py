@@ -4,19 +4,19 @@ import math
 from dataclasses import dataclass
 
 from phy.acquisition import Acquired
-from phy.demodulation import Demodulator, PduDecoder
-from phy.kernels.burst import SLOPE_USED
+from phy.demodulation import PduDecoder
+from phy.estimation import tones
+from phy.kernels.demodulator import slip
 from phy.kernels.tracking import SLOPE
 from phy.numerology import Numerology
 
 
-@dataclass
+@dataclass(slots=True)
 class IncomingBurst:
     """Where its symbols are, and what has become of its PDUs so far."""
 
     acquired: Acquired
     decoder: PduDecoder
-    demodulator: Demodulator
     n_symbol: int
     n_symbols_in: int = 0
     n_good: int = 0
@@ -30,8 +30,8 @@ class IncomingBurst:
     def slip(self, grid: Numerology) -> None:
         """Follow the sender's clock by whole samples, as the slope over carriers tells."""
         channel = self.acquired.channel
-        slope = channel.tracking[SLOPE]
-        early = round(slope[0] * grid.n_fft / (2 * math.pi))
-        self.slipped -= early
-        for angle in (slope[:1], channel.figures[SLOPE_USED : SLOPE_USED + 1]):
-            angle -= early * 2 * math.pi / grid.n_fft
+        slope = float(channel.content.tracking[SLOPE, 0])
+        early = round(slope * grid.n_fft / (2 * math.pi))
+        if early:
+            self.slipped -= early
+            slip(early, tones(grid).words, channel.words)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from phy import interleaver
 from phy.constellation import Modulation, points
 from phy.kernels.burst import Axes
+from phy.kernels.parcel import Parcel
 from phy.kernels.symbols import map_bits
 from phy.numerology import Numerology
 from phy.sequences import polarity
@@ -49,10 +50,10 @@ def mapping(modulation: Modulation, grid: Numerology) -> Mapping:
 
 
 @cache
-def axes(modulation: Modulation, grid: Numerology) -> Axes:
+def axes(modulation: Modulation, grid: Numerology) -> Parcel[Axes]:
     """The way back, as the equaliser wants it."""
     order = mapping(modulation, grid).order
     plane, carrier = order % modulation.bits, order // modulation.bits
-    gather = (plane * grid.n_data + carrier).astype(np.int32)
+    gather = (plane * grid.n_data + carrier).astype(np.uint32)
     imag_bits = modulation.bits - modulation.axis_bits
-    return Axes(modulation.axis_bits, imag_bits, modulation.unit, gather)
+    return Parcel(Axes(modulation.axis_bits, imag_bits, modulation.unit, gather))

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 Carriers = NDArray[np.int64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Numerology:
-    """An OFDM grid. Carriers are numbered from -n_fft/2; 0 is DC and carries nothing."""
+    """An OFDM grid, one object each. Carriers are numbered from -n_fft/2; 0 is DC: nothing."""
 
     n_fft: int
     n_cp: int

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from phy.estimation import tones
-from phy.kernels import fft as kernel
+from phy.estimation import new_scratch, tones
+from phy.kernels import demodulator as kernel
 from phy.kernels.lanes import whole_lanes
 from phy.kernels.symbols import with_prefix
 from phy.numerology import Numerology
@@ -38,15 +38,13 @@ def to_tones(
     grid: Numerology,
     origin: int = 0,
 ) -> NDArray[np.float32]:
-    """Tones `[n, 2, ≥ n_used]`, real and imaginary parts, of the windows that begin at `starts`.
+    """Tones `[n, 2, width]`, real and imaginary parts, of the windows that begin at `starts`.
 
     Before, `dc` is taken off and the samples are turned back by `frequency` cycles a sample, with
     phase 0 `origin` samples before `samples[0]`. A carrier sent as 1 arrives as 1 through a channel
     of gain 1.
     """
-    table = tones(grid)
     out = np.empty((len(starts), 2, whole_lanes(grid.n_used)), np.float32)
-    kernel.to_tones(
-        samples, starts, frequency, origin, dc, 1 / grid.scale, grid.n_fft, table.bins, out
-    )
+    scratch = new_scratch(grid)
+    kernel.to_tones(samples, starts, frequency, dc, origin, tones(grid).words, scratch.words, out)
     return out

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from phy import ofdm, preamble
+from phy import preamble
 from phy.acquisition import Acquired, Acquisition, Missed, before, needed_after
 from phy.constellation import Modulation
 from phy.demodulation import Demodulator, PduDecoder
@@ -69,7 +69,8 @@ class Receiver:
         self._grid = grid
         self._on_points = on_points
         self._acquisition = Acquisition(grid, max_frequency, carrier_cycles)
-        self._demodulators = {each: Demodulator(each, grid) for each in Modulation}
+        self._demodulator = Demodulator(grid)
+        self._powers = np.empty(SLIP_EVERY, np.float32)
         self._workspace = LdpcWorkspace()
         self._work = np.zeros((7, HISTORY + HOP), np.float32)
         self._n_header = n_symbols(grid)
@@ -205,7 +206,6 @@ class Receiver:
         self._burst = IncomingBurst(
             found,
             PduDecoder(plan, self._workspace),
-            self._demodulators[plan.mcs.modulation],
             self._grid.n_symbol,
         )
         end = self._burst.window(plan.n_symbols) - self._grid.n_cp + BACKOFF
@@ -225,27 +225,28 @@ class Receiver:
         last, n_pdus = self._complete(burst)
         if last == first_symbol:
             return False
-        first = burst.window(first_symbol)
-        starts = self._grid.n_symbol * np.arange(last - first_symbol)
-        y = ofdm.to_tones(
-            self._stream.view(first, burst.window(last) - self._grid.n_cp),
-            starts,
-            found.frequency,
-            self._dc_value,
-            self._grid,
-            first - found.origin,
-        )
-        number, n = self._n_header + first_symbol, last - first_symbol
+        first, n = burst.window(first_symbol), last - first_symbol
         points = None
         if self._on_points is not None:
             points = np.empty((n, self._grid.n_data), np.complex64)
-        burst.demodulator.demap(y, found.channel, number, burst.decoder.room(n), points)
+        self._demodulator.demodulate(
+            self._stream.view(first, burst.window(last) - self._grid.n_cp),
+            found.frequency,
+            self._dc_value,
+            first - found.origin,
+            plan.mcs.modulation,
+            found.channel,
+            self._n_header + first_symbol,
+            burst.decoder.room(n),
+            self._powers,
+            points,
+        )
         if self._on_points is not None and points is not None:
             self._on_points(points, plan.mcs.modulation)
         for data in burst.decoder.decode(n_pdus):
             number = burst.n_good + burst.n_bad
             through = plan.symbols_through(number + 1)
-            own = y[max(0, burst.n_symbols_in - first_symbol) : through - first_symbol]
+            own = slice(max(0, burst.n_symbols_in - first_symbol), through - first_symbol)
             burst.n_symbols_in = through
             if data is not None:
                 burst.n_good += 1
@@ -255,7 +256,7 @@ class Receiver:
                 continue
             burst.n_bad += 1
             self.counters["pdus_bad"] += 1
-            if number + 1 < plan.n_pdus and self._is_gone(own, found):
+            if number + 1 < plan.n_pdus and self._is_gone(self._powers[own], found):
                 self._end(burst, events, "faded")
                 return True
         burst.n_symbols_in = last
@@ -278,12 +279,9 @@ class Receiver:
             return limit, n_pdus
         return (plan.symbols_through(done + n_pdus), n_pdus) if n_pdus else (burst.n_symbols_in, 0)
 
-    def _is_gone(self, y: NDArray[np.float32], found: Acquired) -> bool:
-        if not len(y):
-            return False
-        used = y[:, :, : self._grid.n_used]
-        power = 2 * float(np.mean(used * used))
-        return power < found.channel.no + _FADED * found.channel.gain
+    def _is_gone(self, powers: NDArray[np.float32], found: Acquired) -> bool:
+        channel = found.channel.content
+        return len(powers) > 0 and bool(powers.mean() < channel.no + _FADED * channel.gain)
 
     def _end(self, burst: IncomingBurst, events: list[Event], ending: str) -> None:
         self._burst = None

@@ -18,12 +18,13 @@ def lfsr(taps: tuple[int, ...], state: int, n_bits: int) -> NDArray[np.uint8]:
 
 
 _MAX_SYMBOLS = 1 << 17
-_POLARITY = np.resize(1 - 2 * lfsr((4, 7), 0b1111111, 127).astype(np.float32), _MAX_SYMBOLS)
+POLARITY = np.resize(1 - 2 * lfsr((4, 7), 0b1111111, 127).astype(np.float32), _MAX_SYMBOLS)
+"""Sign of the pilots of each symbol, the header's first being 0 (802.11, 17.3.5.10)."""
 
 
 def polarity(n_symbols: int, start: int = 0) -> NDArray[np.float32]:
-    """Sign of the pilots from symbol `start`, the header's first being 0 (802.11, 17.3.5.10)."""
-    return _POLARITY[start : start + n_symbols]
+    """Sign of the pilots from symbol `start`."""
+    return POLARITY[start : start + n_symbols]
 
 
 # x^15 + x^14 + 1 has 32767 bits; 8 and 32767 share no factor, so its bytes repeat as late.

@@ -16,11 +16,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.burst import Axes, Channel, Planes, Tones
-from phy.kernels.equaliser import demap, start_tracking
-from phy.kernels.fft import to_tones
-from phy.kernels.training import estimate, turn_back, wave
+from phy.kernels.burst import Planes, Row, open_axes, open_channel, open_scratch, open_tones
+from phy.kernels.equaliser import equalise, renew, start_tracking
+from phy.kernels.fft import windows_to_tones
+from phy.kernels.lanes import N_LANES, Lanes, load, splat, store, total
+from phy.kernels.parcel import opener
+from phy.kernels.tracking import PHASE
+from phy.kernels.training import estimate, learn, turn_back
 from phy.kernels.viterbi import MAX_LLR, decode_block
+
+Words = NDArray[np.int64]
 
 SEARCH = 24
 """The first long symbol is looked for this many samples around where the peak puts it."""
@@ -38,6 +43,8 @@ FIRST_CLEAN = BACKOFF + 4
 N_CLEAN = _SEGMENT - 4
 PART = 16
 """Samples of the long training whose phase is looked at as one."""
+N_LONG = 2
+"""Symbols of the long training."""
 
 
 class Training(NamedTuple):
@@ -45,24 +52,46 @@ class Training(NamedTuple):
 
     templates: NDArray[np.complex64]
     """The long symbol, shifted by each multiple of 1/16 that is tried `[2 aliases + 1, n_fft]`."""
-    gain: float
-    """What carriers of samples of mean power 1 are taken times."""
-    long_tones: NDArray[np.complex64]
-    """The long training as sent, in the order of tones `[2, n_used]`."""
-    short_wave: NDArray[np.complex64]
-    """Gains to a short segment in time `[16, n_used]`."""
-    long_wave: NDArray[np.complex64]
-    """Gains to a long symbol in time `[n_fft, n_used]`."""
-    cover: NDArray[np.float32]
+    long: NDArray[np.float32]
+    """The long training as sent `[2, 2, width]`."""
+    waves: NDArray[np.float32]
+    """What a gain of 1 on each tone is in time, `[n_used, 2, 16 + n_fft]`: of a short segment what
+    is clean, then zeros; then the long symbol."""
+    cover: Row
     frequencies: NDArray[np.float64]
     """Corrections of the frequency that are tried, in cycles a sample, evenly spaced."""
-    turns: NDArray[np.complex64]
-    """The preamble's parts turned back by each of them `[n_frequencies, n_parts]`."""
+    turns: NDArray[np.float32]
+    """The preamble's parts turned back by each of them `[n_parts, 2, n_frequencies]`."""
     windows: NDArray[np.int64]
     """First samples of the FFT windows of the long training and the header."""
-    polarity: NDArray[np.float32]
-    """Of the header's pilots `[n_header]`."""
-    n_symbol: int
+
+
+open_training = opener(Training, "c8[2] f4[3] f4[3] f4[1] f8[1] f4[3] i8[1]")
+
+
+class Room(NamedTuple):
+    """What acquisition needs besides its input, and leaves: one for each thread."""
+
+    planes: Planes
+    """The burst's samples up to the end of its header, turned back."""
+    wave: Planes
+    """The preamble as the channel makes it, as of `Training.waves`."""
+    parts: Planes
+    """How the preamble's parts agree with it."""
+    y: NDArray[np.float32]
+    """Long training and header `[2 + n_header, 2, width]`."""
+    points: NDArray[np.complex64]
+    """Of the header `[n_header, n_data]`."""
+    llr: NDArray[np.int16]
+    """Of the header's coded bits, as often as they were repeated `[n_header · n_data]`."""
+    folded: NDArray[np.int16]
+    """The same, of each bit once `[2 (32 + 6)]`."""
+    decisions: NDArray[np.uint64]
+    octets: NDArray[np.uint8]
+    """The likeliest header, with its check `[4]`."""
+
+
+open_room = opener(Room, "f4[2] f4[2] f4[2] f4[3] c8[2] i2[1] i2[1] u8[1] u1[1]")
 
 
 @njit(nogil=True, cache=True)
@@ -129,38 +158,62 @@ def locate(planes: Planes, templates: NDArray[np.complex64]) -> tuple[int, float
 
 
 @njit(nogil=True, cache=True)
-def refine(planes: Planes, training: Training, h_hat: NDArray[np.complex64]) -> float:
+def refine(training: Training, h: Planes, room: Room) -> float:
     """The most likely correction of the frequency, over all of the preamble, cycles a sample.
 
-    `planes` begin BACKOFF samples before the preamble.
+    `room.planes` begin BACKOFF samples before the preamble.
     """
-    re, im = planes[0], planes[1]
-    n_fft, n_segments = training.templates.shape[1], training.cover.size
-    short, long = np.empty(_SEGMENT, np.complex64), np.empty(n_fft, np.complex64)
-    wave(training.short_wave, h_hat, short)
-    wave(training.long_wave, h_hat, long)
-    n_parts = training.turns.shape[1]
-    parts = np.empty(n_parts, np.complex64)
+    _make_wave(training.waves, h, room.wave)
+    n_segments, begin = training.cover.size, training.windows[0]
+    n_parts, n_fft = training.turns.shape[0], training.templates.shape[1]
     for s in range(n_segments):
-        total = np.complex64(0)
-        for m in range(FIRST_CLEAN, FIRST_CLEAN + N_CLEAN):
-            at = _SEGMENT * s + m
-            total += np.complex64(complex(re[at], im[at])) * np.conj(short[m % _SEGMENT])
-        parts[s] = total * training.cover[s]
-    begin = training.windows[0]
+        _agree(room, _SEGMENT * s + FIRST_CLEAN, 0, training.cover[s], s)
     for part in range(n_parts - n_segments):
-        total = np.complex64(0)
-        for m in range(part * PART, (part + 1) * PART):
-            at = begin + m
-            total += np.complex64(complex(re[at], im[at])) * np.conj(long[m % n_fft])
-        parts[n_segments + part] = total
-    likely = np.empty(training.frequencies.size)
-    for i in range(likely.size):
-        total = np.complex64(0)
+        at = part * PART
+        _agree(room, begin + at, _SEGMENT + at % n_fft, np.float32(1), n_segments + part)
+    n = training.frequencies.size
+    likely = np.empty(n)
+    for i in range(n):
+        re = im = np.float32(0)
         for part in range(n_parts):
-            total += training.turns[i, part] * parts[part]
-        likely[i] = total.real * total.real + total.imag * total.imag
+            a, b = room.parts[0, part], room.parts[1, part]
+            c, d = training.turns[part, 0, i], training.turns[part, 1, i]
+            re += a * c - b * d
+            im += a * d + b * c
+        likely[i] = re * re + im * im
     return _peak_of_parabola(training.frequencies, likely)
+
+
+@njit(nogil=True, cache=True)
+def _make_wave(waves: NDArray[np.float32], h: Planes, out: Planes) -> None:
+    """The sum of `waves` `[n_used, 2, n]` times their gains."""
+    n = waves.shape[2]
+    for m in range(0, n, N_LANES):
+        re: Lanes = splat(0)
+        im: Lanes = splat(0)
+        for k in range(waves.shape[0]):
+            at = 2 * n * k + m
+            a, b = load(waves, at), load(waves, at + n)
+            c, d = splat(h[0, k]), splat(h[1, k])
+            re = re + (a * c - b * d)
+            im = im + (a * d + b * c)
+        store(out, m, re)
+        store(out, n + m, im)
+
+
+@njit(nogil=True, cache=True)
+def _agree(room: Room, at: int, wave_at: int, sign: np.float32, part: int) -> None:
+    """Σ z w* over the PART samples from `at` on and those of the wave from `wave_at` on."""
+    z, w = room.planes, room.wave
+    size, wave_size = z.shape[1], w.shape[1]
+    re: Lanes = splat(0)
+    im: Lanes = splat(0)
+    for m in range(0, PART, N_LANES):
+        a, b = load(z, at + m), load(z, size + at + m)
+        c, d = load(w, wave_at + m), load(w, wave_size + wave_at + m)
+        re = re + (a * c + b * d)
+        im = im + (b * c - a * d)
+    room.parts[0, part], room.parts[1, part] = total(re) * sign, total(im) * sign
 
 
 @njit(nogil=True, cache=True)
@@ -173,24 +226,6 @@ def _peak_of_parabola(places: NDArray[np.float64], values: NDArray[np.float64]) 
     return float(places[i] + min(max(shift, -1.0), 1.0) * (places[1] - places[0]))
 
 
-class Room(NamedTuple):
-    """What acquisition needs besides its input, and leaves: one for each thread."""
-
-    planes: Planes
-    """The burst's samples up to the end of its header, turned back."""
-    y: NDArray[np.float32]
-    """Long training and header `[2 + n_header, 2, ≥ n_used]`, in the order of tones."""
-    points: NDArray[np.complex64]
-    """Of the header `[n_header, n_data]`."""
-    llr: NDArray[np.int16]
-    """Of the header's coded bits, as often as they were repeated `[n_header · n_data]`."""
-    folded: NDArray[np.int16]
-    """The same, of each bit once `[2 (32 + 6)]`."""
-    decisions: NDArray[np.uint64]
-    octets: NDArray[np.uint8]
-    """The likeliest header, with its check `[4]`."""
-
-
 @njit(nogil=True, cache=True)
 def acquire(
     x: NDArray[np.complex64],
@@ -198,41 +233,75 @@ def acquire(
     coarse: float,
     dc: complex,
     carrier_cycles: float,
-    training: Training,
-    tones: Tones,
-    axes: Axes,
-    channel: Channel,
-    room: Room,
+    training_in: Words,
+    tones_in: Words,
+    axes_in: Words,
+    channel_in: Words,
+    scratch_in: Words,
+    room_in: Words,
 ) -> tuple[int, float]:
-    """(first sample of the burst or −1, its frequency) of the burst in `x`; its header to `room`.
+    """(first sample of the burst or −1, its frequency) of the burst in `x`; its header to the room.
 
     The first long symbol is nominally at `nominal`; `coarse` is the frequency modulo 1/16, and
     `carrier_cycles` those of the carrier in a sample, if one crystal makes both, or 0.
     """
-    n_fft, planes, y = training.templates.shape[1], room.planes, room.y
+    training, tones, axes = open_training(training_in), open_tones(tones_in), open_axes(axes_in)
+    channel, scratch, room = open_channel(channel_in), open_scratch(scratch_in), open_room(room_in)
+    planes, y, windows = room.planes, room.y, training.windows
     first = nominal - SEARCH
-    span = 2 * SEARCH + 2 * n_fft
+    span = 2 * SEARCH + 2 * tones.n_fft
     turn_back(x[first : first + span], dc, coarse, planes)
     early, correction = locate(planes[:, :span], training.templates)
     if early < 0:
         return -1, 0.0
-    begin = first + early - training.windows[0] - BACKOFF
-    n = training.windows[-1] + n_fft
+    begin = first + early - windows[0] - BACKOFF
     frequency = coarse + correction
-    turn_back(x[begin : begin + n], dc, frequency, planes)
-    burst, windows, gain = x[begin : begin + n], training.windows, training.gain
-    to_tones(burst, windows[:2], frequency, 0, dc, gain, n_fft, tones.bins, y[:2])
+    burst = x[begin : begin + windows[-1] + tones.n_fft]
+    turn_back(burst[: windows[1] + tones.n_fft], dc, frequency, planes)
     amplitude = np.ones(2, np.float32)
-    estimate(y[:2], amplitude, training.long_tones, tones, channel)
-    frequency += refine(planes, training, channel.h_hat)
-    to_tones(burst, windows, frequency, 0, dc, gain, n_fft, tones.bins, y)
-    estimate(y[:2], amplitude, training.long_tones, tones, channel)
+    windows_to_tones(burst, windows[:2], frequency, dc, 0, tones, scratch, y)
+    estimate(y, amplitude, training.long, tones, channel, scratch)
+    frequency += refine(training, channel.h, room)
+    windows_to_tones(burst, windows, frequency, dc, 0, tones, scratch, y)
+    estimate(y, amplitude, training.long, tones, channel, scratch)
     clock_error = frequency / carrier_cycles if carrier_cycles else 0.0
-    start_tracking(channel, training.n_symbol / n_fft, clock_error, carrier_cycles > 0)
-    demap(y[2:], training.polarity, tones, axes, channel, room.points, room.llr)
+    start_tracking(tones, channel, clock_error, carrier_cycles > 0)
+    n_header = room.points.shape[0]
+    equalise(y[2:], n_header, 0, tones, axes, channel, scratch, room.points, room.llr, 0)
     fold(room.llr, room.folded)
     decode_block(room.folded, room.decisions, room.octets)
     return begin + BACKOFF, frequency
+
+
+@njit(nogil=True, cache=True)
+def settle(
+    sent: NDArray[np.float32],
+    training_in: Words,
+    tones_in: Words,
+    channel_in: Words,
+    scratch_in: Words,
+    room_in: Words,
+) -> tuple[float, float]:
+    """Learn from a header that was read: what was `sent`, long training and header.
+
+    (mean power of the long training's samples, mean square error of the header's points)
+    """
+    training, tones, room = open_training(training_in), open_tones(tones_in), open_room(room_in)
+    channel, scratch = open_channel(channel_in), open_scratch(scratch_in)
+    phase, rate = channel.tracking[PHASE, 0], channel.tracking[PHASE, 1]
+    learn(room.y, sent, N_LONG, phase, rate, tones, channel, scratch)
+    renew(channel)
+    error, n_header = 0.0, room.points.shape[0]
+    for s in range(n_header):
+        for d in range(tones.n_data):
+            x = complex(sent[N_LONG + s, 0, d], sent[N_LONG + s, 1, d])
+            off = complex(room.points[s, d]) - 1 / x.conjugate()
+            error += off.real * off.real + off.imag * off.imag
+    power, first = 0.0, training.windows[0]
+    for m in range(first, first + N_LONG * tones.n_fft):
+        re, im = float(room.planes[0, m]), float(room.planes[1, m])
+        power += re * re + im * im
+    return power / (N_LONG * tones.n_fft), error / (n_header * tones.n_data)
 
 
 @njit(nogil=True, cache=True)

@@ -11,71 +11,85 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from phy.kernels.burst import Planes, Row, Scratch, Tones
 from phy.kernels.lanes import N_LANES, first_halves, load, second_halves, splat, store
 
-Row = NDArray[np.float32]
-
 
 @njit(nogil=True, cache=True)
-def to_tones(
-    samples: NDArray[np.complex64],
-    starts: NDArray[np.int64],
-    frequency: float,
-    origin: int,
-    dc: complex,
-    gain: float,
-    n_fft: int,
-    bins: NDArray[np.int64],
-    out: NDArray[np.float32],
-) -> None:
-    """FFT `bins` `[n_used]` of windows of `n_fft` samples, real and imaginary parts.
-
-    `out` is `[n, 2, width]`, n_used up to whole lanes. Samples are taken less `dc`, turned back by
-    `frequency` cycles a sample, times `gain`; phase 0 is `origin` samples before `samples[0]`.
-    """
-    flat = samples.view(np.float32)
-    parts = np.empty((4, N_LANES * n_fft), np.float32)
-    turn, twiddles = np.empty((2, n_fft), np.float32), np.empty((2, n_fft), np.float32)
-    _circle(-frequency, gain, turn)
-    _circle(-1 / n_fft, 1.0, twiddles)
-    begin, places = np.empty((2, N_LANES), np.float32), np.empty(N_LANES, np.int64)
-    square = np.empty(N_LANES * N_LANES, np.float32)
-    offset_re, offset_im = splat(dc.real), splat(dc.imag)
-    re, im, to_re, to_im = parts[0], parts[1], parts[2], parts[3]
-    n = starts.size
-    for row in range(0, n, N_LANES):
-        for lane in range(N_LANES):
-            place = starts[min(row + lane, n - 1)]
-            phase = -2 * math.pi * frequency * (place + origin)
-            begin[0, lane], begin[1, lane] = math.cos(phase), math.sin(phase)
-            places[lane] = 2 * place
-        begin_re, begin_im = load(begin, 0), load(begin, N_LANES)
-        for m in range(0, n_fft, N_LANES // 2):
-            for lane in range(N_LANES):
-                store(square, N_LANES * lane, load(flat, places[lane] + 2 * m))
-            _transpose(square)
-            for i in range(N_LANES // 2):
-                a = load(square, 2 * N_LANES * i) - offset_re
-                b = load(square, 2 * N_LANES * i + N_LANES) - offset_im
-                c, s = splat(turn[0, m + i]), splat(turn[1, m + i])
-                by_re, by_im = c * begin_re - s * begin_im, c * begin_im + s * begin_re
-                store(re, N_LANES * (m + i), a * by_re - b * by_im)
-                store(im, N_LANES * (m + i), a * by_im + b * by_re)
-        swapped = _transform(re, im, to_re, to_im, n_fft, twiddles)
-        if swapped:
-            _sort(to_re, to_im, bins, out[row:], square)
-        else:
-            _sort(re, im, bins, out[row:], square)
-
-
-@njit(nogil=True, cache=True)
-def _circle(frequency: float, size: float, out: NDArray[np.float32]) -> None:
-    """size · exp(j 2π · frequency · m)."""
+def circle(frequency: float, size: float, out: Planes) -> None:
+    """size · exp(j 2π · frequency · m) `[2, n]`."""
     step = complex(math.cos(2 * math.pi * frequency), math.sin(2 * math.pi * frequency))
     value = complex(size)
     for m in range(out.shape[1]):
         out[0, m], out[1, m] = value.real, value.imag
         value *= step
+
+
+@njit(nogil=True, cache=True)
+def eight_windows(
+    samples: NDArray[np.complex64],
+    places: NDArray[np.int64],
+    phases: NDArray[np.float64],
+    turn: Planes,
+    dc: complex,
+    n: int,
+    tones: Tones,
+    scratch: Scratch,
+    out: NDArray[np.float32],
+) -> None:
+    """Tones `[n, 2, width]` of the `n` ≤ 8 windows that begin at `places` `[8]`.
+
+    Samples are taken less `dc`, turned by `turn` `[2, n_fft]` from the window's beginning on and
+    by `phases` `[8]`.
+    """
+    n_fft, parts, square = tones.n_fft, scratch.windows, scratch.square
+    flat = samples.view(np.float32)
+    re, im, to_re, to_im = parts[0], parts[1], parts[2], parts[3]
+    for lane in range(N_LANES):
+        square[lane], square[N_LANES + lane] = math.cos(phases[lane]), math.sin(phases[lane])
+    begin_re, begin_im = load(square, 0), load(square, N_LANES)
+    offset_re, offset_im = splat(dc.real), splat(dc.imag)
+    for m in range(0, n_fft, N_LANES // 2):
+        for lane in range(N_LANES):
+            store(square, N_LANES * lane, load(flat, 2 * (places[lane] + m)))
+        _transpose(square)
+        for i in range(N_LANES // 2):
+            a = load(square, 2 * N_LANES * i) - offset_re
+            b = load(square, 2 * N_LANES * i + N_LANES) - offset_im
+            c, s = splat(turn[0, m + i]), splat(turn[1, m + i])
+            by_re, by_im = c * begin_re - s * begin_im, c * begin_im + s * begin_re
+            store(re, N_LANES * (m + i), a * by_re - b * by_im)
+            store(im, N_LANES * (m + i), a * by_im + b * by_re)
+    if _transform(re, im, to_re, to_im, n_fft, tones.twiddles):
+        re, im = to_re, to_im
+    _sort(re, im, n, tones.bins, square, out)
+
+
+@njit(nogil=True, cache=True)
+def windows_to_tones(
+    samples: NDArray[np.complex64],
+    starts: NDArray[np.int64],
+    frequency: float,
+    dc: complex,
+    origin: int,
+    tones: Tones,
+    scratch: Scratch,
+    out: NDArray[np.float32],
+) -> None:
+    """Tones `[n, 2, width]` of windows that begin at `starts` `[n]`.
+
+    Samples are taken less `dc` and turned back by `frequency` cycles a sample; phase 0 is `origin`
+    samples before `samples[0]`.
+    """
+    turn, n = np.empty((2, tones.n_fft), np.float32), starts.size
+    circle(-frequency, tones.gain, turn)
+    places, phases = np.empty(N_LANES, np.int64), np.empty(N_LANES)
+    for row in range(0, n, N_LANES):
+        for lane in range(N_LANES):
+            places[lane] = starts[min(row + lane, n - 1)]
+            phases[lane] = -2 * math.pi * frequency * (places[lane] + origin)
+        rows = min(n - row, N_LANES)
+        eight_windows(samples, places, phases, turn, dc, rows, tones, scratch, out[row:])
 
 
 @njit(nogil=True, forceinline=True)
@@ -99,9 +113,11 @@ def _transpose(square: Row) -> None:
 
 
 @njit(nogil=True, cache=True)
-def _sort(re: Row, im: Row, bins: NDArray[np.int64], out: NDArray[np.float32], square: Row) -> None:
-    """Lanes to rows of `out` `[≤ 8 …, 2, width]`, bins to the order of `bins`."""
-    n_rows, width = min(N_LANES, out.shape[0]), out.shape[2]
+def _sort(
+    re: Row, im: Row, n: int, bins: NDArray[np.int64], square: Row, out: NDArray[np.float32]
+) -> None:
+    """Lanes to the first `n` rows of `out` `[…, 2, width]`, bins to the order of `bins`."""
+    width = out.shape[2]
     for part in range(2):
         of = im if part else re
         for first in range(0, width, N_LANES):
@@ -110,7 +126,7 @@ def _sort(re: Row, im: Row, bins: NDArray[np.int64], out: NDArray[np.float32], s
                 value = load(of, N_LANES * bins[first + i]) if inside else splat(0.0)
                 store(square, N_LANES * i, value)
             _transpose(square)
-            for lane in range(n_rows):
+            for lane in range(n):
                 store(out, (2 * lane + part) * width + first, load(square, N_LANES * lane))
 
 

@@ -15,6 +15,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from phy.kernels.burst import DELAY, DRIFT, Channel, Planes, Scratch, Tones
+from phy.kernels.lanes import N_LANES, Lanes, load, splat, store, total
 from phy.kernels.rotation import lean
 
 # How fast the guess of a channel's drift follows what is seen of it.
@@ -22,51 +24,100 @@ _DRIFT_RISE, _DRIFT_FALL = 0.5, 0.1
 
 
 @njit(nogil=True, cache=True)
-def mean_delay(h: NDArray[np.complex64], neighbours: NDArray[np.int64]) -> float:
+def mean_delay(h: Planes, neighbours: NDArray[np.int64]) -> float:
     """Phase from a carrier to the next, radians; `neighbours` `[2, n]` are positions in `h`."""
-    total = 0j
+    turn = 0j
     for i in range(neighbours.shape[1]):
-        total += complex(h[neighbours[1, i]]) * complex(h[neighbours[0, i]]).conjugate()
-    return math.atan2(total.imag, total.real)
+        first, second = neighbours[0, i], neighbours[1, i]
+        turn += complex(h[0, second], h[1, second]) * complex(h[0, first], -h[1, first])
+    return math.atan2(turn.imag, turn.real)
 
 
-# Sums in any order, so that they are vectorised; the order is the same at every call.
-@njit(nogil=True, cache=True, fastmath={"reassoc", "contract"})
-def _take(
-    re: NDArray[np.float32],
-    im: NDArray[np.float32],
-    rows: NDArray[np.float32],
-    c_re: NDArray[np.float32],
-    c_im: NDArray[np.float32],
-) -> float:
-    """Move what is along `rows` from `re`, `im` to coefficients; its energy."""
-    energy = np.float32(0)
-    for d in range(rows.shape[0]):
-        a, b = np.float32(0), np.float32(0)
-        for k in range(re.size):
-            a += rows[d, k] * re[k]
-            b += rows[d, k] * im[k]
-        c_re[d], c_im[d] = a, b
-        energy += a * a + b * b
-    for d in range(rows.shape[0]):
-        _give(re, im, rows[d], -c_re[d], -c_im[d])
-    return float(energy)
+@njit(nogil=True, forceinline=True)
+def multiply(x: Planes, by: Planes, conjugate: bool, out: Planes) -> None:
+    """x · by or x · by*, over all of a row."""
+    width, sign = x.shape[1], splat(-1.0 if conjugate else 1.0)
+    for k in range(0, width, N_LANES):
+        a, b = load(x, k), load(x, width + k)
+        c, d = load(by, k), load(by, width + k) * sign
+        store(out, k, a * c - b * d)
+        store(out, width + k, a * d + b * c)
 
 
-@njit(nogil=True, cache=True)
-def _give(
-    re: NDArray[np.float32],
-    im: NDArray[np.float32],
-    row: NDArray[np.float32],
-    a: np.float32,
-    b: np.float32,
-) -> None:
-    for k in range(re.size):
-        re[k] += a * row[k]
-        im[k] += b * row[k]
+@njit(nogil=True, forceinline=True)
+def _take(rest: Planes, basis: NDArray[np.float32], d: int, coefficients: Planes) -> float:
+    """Move what is along row `d` from `rest` to its coefficient; the energy of that."""
+    width = rest.shape[1]
+    row = d * width
+    re: Lanes = splat(0)
+    im: Lanes = splat(0)
+    for k in range(0, width, N_LANES):
+        along = load(basis, row + k)
+        re = re + along * load(rest, k)
+        im = im + along * load(rest, width + k)
+    a, b = total(re), total(im)
+    coefficients[0, d], coefficients[1, d] = a, b
+    _give(rest, basis, d, -a, -b)
+    return float(a * a + b * b)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, forceinline=True)
+def _give(rest: Planes, basis: NDArray[np.float32], d: int, a: np.float32, b: np.float32) -> None:
+    width = rest.shape[1]
+    row, re, im = d * width, splat(a), splat(b)
+    for k in range(0, width, N_LANES):
+        along = load(basis, row + k)
+        store(rest, k, load(rest, k) + along * re)
+        store(rest, width + k, load(rest, width + k) + along * im)
+
+
+@njit(nogil=True, forceinline=True)
+def _split(tones: Tones, wanted: NDArray[np.float64], scratch: Scratch) -> None:
+    """What is in `rest`, as coefficients of the groups that are `wanted` and what is left of it.
+
+    `energies` are those of each group.
+    """
+    rest, energies, width = scratch.rest, scratch.energies, scratch.rest.shape[1]
+    first = 0
+    for group in range(tones.ends.size):
+        last = tones.ends[group]
+        energies[group] = 0.0
+        if wanted[group] > 0:
+            for d in range(first, last):
+                energies[group] += _take(rest, tones.basis, d, scratch.coefficients)
+        first = last
+    left: Lanes = splat(0)
+    for k in range(0, width, N_LANES):
+        re, im = load(rest, k), load(rest, width + k)
+        left = left + (re * re + im * im)
+    energies[tones.ends.size] = total(left)
+
+
+@njit(nogil=True, forceinline=True)
+def _join(tones: Tones, scratch: Scratch) -> None:
+    """The way back to `rest`, each group times its weight."""
+    rest, weights, width = scratch.rest, scratch.weights, scratch.rest.shape[1]
+    share = splat(weights[tones.ends.size])
+    for k in range(0, 2 * width, N_LANES):
+        store(rest, k, load(rest, k) * share)
+    first = 0
+    for group in range(tones.ends.size):
+        weight = np.float32(weights[group])
+        if weight != 0:
+            for d in range(first, tones.ends[group]):
+                a, b = scratch.coefficients[0, d], scratch.coefficients[1, d]
+                _give(rest, tones.basis, d, weight * a, weight * b)
+        first = tones.ends[group]
+
+
+@njit(nogil=True, forceinline=True)
+def _size(group: int, tones: Tones) -> int:
+    """Dimensions of a group."""
+    first = tones.ends[group - 1] if group else 0
+    return (tones.ends[group] if group < tones.ends.size else tones.bins.size) - first
+
+
+@njit(nogil=True, forceinline=True)
 def _kept(energy: float, size: int, variance: float) -> float:
     """Share of a group of `size` dimensions that is no noise, erring towards noise."""
     expected = size * variance
@@ -76,146 +127,64 @@ def _kept(energy: float, size: int, variance: float) -> float:
 
 
 @njit(nogil=True, cache=True)
-def _centre(
-    h: NDArray[np.complex64],
-    turn: NDArray[np.complex64],
-    basis: NDArray[np.float32],
-    ends: NDArray[np.int64],
-    wanted: NDArray[np.bool_],
-    planes: NDArray[np.float32],
-    coefficients: NDArray[np.float32],
-    energies: NDArray[np.float64],
-) -> None:
-    """`h` turned by `turn`, as `coefficients` of the basis and, in `planes`, what is left.
+def smooth(variance: float, tones: Tones, channel: Channel, scratch: Scratch) -> None:
+    """The gains `h`, measured with noise of `variance`, without most of that noise.
 
-    Of the groups that are `wanted`; `energies` `[groups + 1]` of each.
+    `unknown` gets the variance a dimension that is left, `power` what is in it, both of each group.
     """
-    n = h.size
-    re, im = planes[0], planes[1]
-    for k in range(n):
-        centred = h[k] * turn[k]
-        re[k], im[k] = centred.real, centred.imag
-    first = 0
-    for group in range(ends.size):
-        last = ends[group]
-        if wanted[group]:
-            c_re, c_im = coefficients[0, first:last], coefficients[1, first:last]
-            energies[group] = _take(re, im, basis[first:last], c_re, c_im)
-        else:
-            energies[group] = 0.0
-        first = last
-    rest = np.float32(0)
-    for k in range(n):
-        rest += re[k] * re[k] + im[k] * im[k]
-    energies[ends.size] = rest
+    channel.figures[DELAY] = mean_delay(channel.h, tones.neighbours)
+    lean(-channel.figures[DELAY], tones.carriers, channel.centre)
+    multiply(channel.h, channel.centre, False, scratch.rest)
+    channel.power[:] = 1
+    _split(tones, channel.power, scratch)
+    for group in range(channel.power.size):
+        size, energy = _size(group, tones), scratch.energies[group]
+        weight = _kept(energy, size, variance)
+        scratch.weights[group] = weight
+        channel.unknown[group] = weight * variance
+        channel.power[group] = weight * energy / size
+    _join(tones, scratch)
+    multiply(scratch.rest, channel.centre, True, channel.h)
 
 
-@njit(nogil=True, cache=True)
-def _weigh(
-    weights: NDArray[np.float64],
-    turn: NDArray[np.complex64],
-    basis: NDArray[np.float32],
-    ends: NDArray[np.int64],
-    planes: NDArray[np.float32],
-    coefficients: NDArray[np.float32],
-    out: NDArray[np.complex64],
-) -> None:
-    """The way back, each group times its weight."""
-    re, im = planes[0], planes[1]
-    share = np.float32(weights[ends.size])
-    for k in range(re.size):
-        re[k] *= share
-        im[k] *= share
-    first = 0
-    for group in range(ends.size):
-        share = np.float32(weights[group])
-        if share != 0:
-            for d in range(first, ends[group]):
-                _give(re, im, basis[d], share * coefficients[0, d], share * coefficients[1, d])
-        first = ends[group]
-    for k in range(re.size):
-        out[k] = complex(re[k], im[k]) * np.conj(turn[k])
-
-
-@njit(nogil=True, cache=True)
-def _size(group: int, ends: NDArray[np.int64], n: int) -> int:
-    """Dimensions of a group."""
-    first = ends[group - 1] if group else 0
-    return (ends[group] if group < ends.size else n) - first
-
-
-@njit(nogil=True, cache=True)
-def smooth(
-    h: NDArray[np.complex64],
-    variance: float,
-    delay: float,
-    carriers: NDArray[np.int64],
-    basis: NDArray[np.float32],
-    ends: NDArray[np.int64],
-    unknown: NDArray[np.float64],
-    power: NDArray[np.float64],
-    out: NDArray[np.complex64],
-) -> None:
-    """The gains `h` `[n_used]`, measured with noise of `variance`, without most of that noise.
-
-    `delay` as of `mean_delay`; rows of `basis` `[n, n_used]` are a group up to each of `ends`.
-    `unknown` `[groups + 1]` gets the variance a dimension that is left, `power` what is in it.
-    """
-    n = h.size
-    turn, planes = np.empty(n, np.complex64), np.empty((2, n), np.float32)
-    coefficients = np.empty((2, basis.shape[0]), np.float32)
-    lean(-delay, carriers, turn)
-    wanted = np.ones(ends.size, np.bool_)
-    _centre(h, turn, basis, ends, wanted, planes, coefficients, power)
-    weights = np.empty(power.size)
-    for group in range(power.size):
-        size = _size(group, ends, n)
-        weights[group] = _kept(power[group], size, variance)
-        unknown[group] = weights[group] * variance
-        power[group] *= weights[group] / size
-    _weigh(weights, turn, basis, ends, planes, coefficients, out)
-
-
-@njit(nogil=True, cache=True)
+@njit(nogil=True, cache=True, error_model="numpy")
 def follow(
-    error: NDArray[np.complex64],
-    variance: float,
-    delay: float,
-    drift: float,
-    carriers: NDArray[np.int64],
-    basis: NDArray[np.float32],
-    ends: NDArray[np.int64],
-    power: NDArray[np.float64],
-    unknown: NDArray[np.float64],
-    out: NDArray[np.complex64],
-) -> float:
-    """By how much to correct gains that later symbols contradict by `error` `[n_used]`.
+    error: Planes, variance: float, tones: Tones, channel: Channel, scratch: Scratch
+) -> None:
+    """Correct gains that later symbols contradict by `error` `[2, width]`, which is used up.
 
     A Kalman filter a group: `unknown` is the variance of what is not known of it. The channel moves
-    by `drift` times its `power`; returned is that drift, corrected by how much the errors exceed
-    what noise and ignorance explain.
+    by the drift times its `power`; the drift follows how much the errors exceed what noise and
+    ignorance explain.
     """
-    n = error.size
-    turn, planes = np.empty(n, np.complex64), np.empty((2, n), np.float32)
-    coefficients = np.empty((2, basis.shape[0]), np.float32)
-    energies, weights = np.empty(power.size), np.empty(power.size)
-    lean(-delay, carriers, turn)
+    power, unknown, energies = channel.power, channel.unknown, scratch.energies
+    multiply(error, channel.centre, False, scratch.rest)
     # Groups in which nothing was found count as noise, all together.
-    wanted = power[: ends.size] > 0
-    _centre(error, turn, basis, ends, wanted, planes, coefficients, energies)
-    excess, chance, total = 0.0, 0.0, 0.0
+    _split(tones, power, scratch)
+    excess, chance, whole = 0.0, 0.0, 0.0
     for group in range(power.size):
-        size = _size(group, ends, n)
+        size = _size(group, tones)
         expected = variance + unknown[group]
         excess += energies[group] - size * expected
         chance += size * expected * expected
-        total += size * power[group]
-    if total > 0:
-        seen = max(0.0, (excess - 2 * math.sqrt(chance)) / total)
+        whole += size * power[group]
+    drift = channel.figures[DRIFT]
+    if whole > 0:
+        seen = max(0.0, (excess - 2 * math.sqrt(chance)) / whole)
         drift += (_DRIFT_RISE if seen > drift else _DRIFT_FALL) * (seen - drift)
+        channel.figures[DRIFT] = drift
     for group in range(power.size):
         before = unknown[group] + drift * power[group]
-        weights[group] = before / (before + variance)
-        unknown[group] = before * (1 - weights[group])
-    _weigh(weights, turn, basis, ends, planes, coefficients, out)
-    return drift
+        weight = before / (before + variance)
+        scratch.weights[group] = weight
+        unknown[group] = before * (1 - weight)
+    _join(tones, scratch)
+    multiply(scratch.rest, channel.centre, True, error)
+    add(channel.h, error)
+
+
+@njit(nogil=True, forceinline=True)
+def add(x: Planes, more: Planes) -> None:
+    """x + more, in place."""
+    for k in range(0, x.size, N_LANES):
+        store(x, k, load(x, k) + load(more, k))

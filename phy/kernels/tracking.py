@@ -20,14 +20,14 @@ SURPRISE = 6.0
 """Times the preamble's noise at which a symbol's pilots, and with them its data, are doubted."""
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, forceinline=True)
 def predict(tracking: NDArray[np.float64]) -> None:
     """One symbol on: values move by their rates."""
     _predict(tracking[PHASE], PHASE_NOISE)
     _predict(tracking[SLOPE], SLOPE_NOISE)
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, forceinline=True)
 def _predict(state: NDArray[np.float64], noise: NDArray[np.float64]) -> None:
     state[0] += state[1]
     state[2] += 2 * state[3] + state[4] + noise[0]
@@ -35,7 +35,7 @@ def _predict(state: NDArray[np.float64], noise: NDArray[np.float64]) -> None:
     state[4] += noise[1]
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, forceinline=True)
 def _correct(state: NDArray[np.float64], innovation: float, variance: float) -> None:
     """A measurement that differs from the prediction by `innovation`."""
     total = state[2] + variance
@@ -47,7 +47,7 @@ def _correct(state: NDArray[np.float64], innovation: float, variance: float) -> 
     state[2] -= gain * state[2]
 
 
-@njit(nogil=True, cache=True)
+@njit(nogil=True, forceinline=True)
 def correct(
     turned: NDArray[np.complex128],
     power: NDArray[np.float64],
@@ -66,7 +66,7 @@ def correct(
     total = 0j
     for p in range(n):
         total += turned[p]
-    size = abs(total)
+    size = math.sqrt(total.real * total.real + total.imag * total.imag)
     if size == 0.0:
         return no
     common = (total / size).conjugate()

@@ -6,8 +6,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.burst import DELAY, GAIN, NO, Channel, Planes, Tones
-from phy.kernels.smoothing import mean_delay, smooth
+from phy.kernels.burst import GAIN, NO, Channel, Planes, Row, Scratch, Tones
+from phy.kernels.lanes import N_LANES, Lanes, load, splat, store, total
+from phy.kernels.smoothing import smooth
 
 # Standard deviations at which a difference in strength is no chance.
 _SURELY = 4.0
@@ -33,107 +34,110 @@ def turn_back(x: NDArray[np.complex64], dc: complex, frequency: float, out: Plan
             out[1, begin + m] = a * im + b * re
 
 
-# Sums in any order, so that they are vectorised; the order is the same at every call.
-@njit(nogil=True, cache=True, fastmath={"reassoc", "contract"})
-def wave(
-    matrix: NDArray[np.complex64], h_hat: NDArray[np.complex64], out: NDArray[np.complex64]
-) -> None:
-    """matrix · h_hat, without BLAS: its threads cost more than so small a product."""
-    for i in range(matrix.shape[0]):
-        re, im = np.float32(0), np.float32(0)
-        for j in range(matrix.shape[1]):
-            a, b = matrix[i, j], h_hat[j]
-            re += a.real * b.real - a.imag * b.imag
-            im += a.real * b.imag + a.imag * b.real
-        out[i] = complex(re, im)
-
-
 @njit(nogil=True, cache=True)
 def least_squares(
-    y: NDArray[np.float32],
-    amplitude: NDArray[np.float32],
-    sent: NDArray[np.complex64],
-    out: NDArray[np.complex64],
+    y: NDArray[np.float32], amplitude: Row, sent: NDArray[np.float32], h: Planes
 ) -> tuple[float, float]:
-    """Gain of each tone over `n` ≥ 2 symbols; (noise power on a tone, mean |h|²).
+    """Gain of each tone over `n` ≥ 2 symbols to `h` `[2, width]`; (noise on a tone, Σ |h|²).
 
-    `sent` `[n, n_used]` of magnitude 1 went out times `amplitude` `[n]`, and came as `y`
-    `[n, 2, ≥ n_used]`.
+    `sent` `[n, 2, width]`, 1 / x* of tones x, went out times `amplitude` `[n]`, and came as `y`.
+    The noise is summed over tones, too.
     """
-    n, n_used = sent.shape
-    mass, noise, power = 0.0, 0.0, 0.0
+    n, width = sent.shape[0], sent.shape[2]
+    mass = np.float32(0)
     for s in range(n):
         mass += amplitude[s] * amplitude[s]
-    for k in range(n_used):
-        total, square = 0j, 0.0
+    share = splat(1 / mass)
+    noise: Lanes = splat(0)
+    power: Lanes = splat(0)
+    for k in range(0, width, N_LANES):
+        re: Lanes = splat(0)
+        im: Lanes = splat(0)
         for s in range(n):
-            gain = complex(y[s, 0, k], y[s, 1, k]) * complex(sent[s, k]).conjugate()
-            total += gain * amplitude[s]
-            square += gain.real * gain.real + gain.imag * gain.imag
-        h = total / mass
-        size = h.real * h.real + h.imag * h.imag
-        noise += square - mass * size
-        power += size
-        out[k] = np.complex64(h)
-    return noise / ((n - 1) * n_used), power / n_used
+            a, b, c, d = _pair(y, sent, s, k)
+            strength = splat(amplitude[s])
+            re = re + (a * c + b * d) * strength
+            im = im + (b * c - a * d) * strength
+        re, im = re * share, im * share
+        store(h, k, re)
+        store(h, width + k, im)
+        power = power + (re * re + im * im)
+        for s in range(n):
+            a, b, c, d = _pair(y, sent, s, k)
+            strength = splat(amplitude[s])
+            re_off = a * c + b * d - re * strength
+            im_off = b * c - a * d - im * strength
+            noise = noise + (re_off * re_off + im_off * im_off)
+    return float(total(noise)) / (n - 1), float(total(power))
+
+
+@njit(nogil=True, forceinline=True)
+def _pair(
+    y: NDArray[np.float32], sent: NDArray[np.float32], s: int, k: int
+) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+    """Eight tones from `k` on of symbol `s`: as they came, and as they were sent."""
+    width = sent.shape[2]
+    at = 2 * width * s + k
+    return load(y, at), load(y, at + width), load(sent, at), load(sent, at + width)
 
 
 @njit(nogil=True, cache=True)
 def estimate(
     y: NDArray[np.float32],
-    amplitude: NDArray[np.float32],
-    sent: NDArray[np.complex64],
+    amplitude: Row,
+    sent: NDArray[np.float32],
     tones: Tones,
     channel: Channel,
+    scratch: Scratch,
 ) -> None:
     """The channel from known symbols, as of `least_squares`, less what must be noise."""
-    rough = np.empty(tones.bins.size, np.complex64)
-    no, power = least_squares(y, amplitude, sent, rough)
+    n_used = tones.bins.size
+    noise, power = least_squares(y, amplitude, sent, channel.h)
+    no, power = max(noise / n_used, 1e-20), power / n_used
     mass = 0.0
     for a in amplitude:
         mass += a * a
-    no = max(no, 1e-20)
-    delay = mean_delay(rough, tones.neighbours)
     channel.figures[NO] = no
     channel.figures[GAIN] = max(power - no / mass, 1e-3 * power, 1e-20)
-    channel.figures[DELAY] = delay
-    smooth(
-        rough, no / mass, delay, tones.carriers, tones.basis, tones.ends,
-        channel.unknown, channel.power, channel.h_hat,
-    )  # fmt: skip
+    smooth(no / mass, tones, channel, scratch)
 
 
 @njit(nogil=True, cache=True)
 def learn(
     y: NDArray[np.float32],
-    sent: NDArray[np.complex64],
+    sent: NDArray[np.float32],
     n_training: int,
     phase: float,
     rate: float,
     tones: Tones,
     channel: Channel,
+    scratch: Scratch,
 ) -> None:
     """The channel anew with the header, now known, as further training; `y` is used up.
 
     `phase` is the last symbol's, `rate` how it grows a symbol. The preamble may have been sent
     stronger than the rest: if so is what the header tells.
     """
-    n, n_used = sent.shape
-    seen, expected = 0.0, 0.0
+    n, width = sent.shape[0], sent.shape[2]
+    seen: Lanes = splat(0)
+    expected: Lanes = splat(0)
     for s in range(n_training, n):
         angle = phase - (n - 1 - s) * rate
-        back = np.complex64(complex(math.cos(angle), -math.sin(angle)))
-        for k in range(n_used):
-            turned = np.complex64(complex(y[s, 0, k], y[s, 1, k])) * back
-            y[s, 0, k], y[s, 1, k] = turned.real, turned.imag
-            h = channel.h_hat[k]
-            product = turned * np.conj(sent[s, k]) * np.conj(h)
-            seen += product.real
-            expected += h.real * h.real + h.imag * h.imag
+        cos, sin = splat(math.cos(angle)), splat(math.sin(angle))
+        for k in range(0, width, N_LANES):
+            a, b, c, d = _pair(y, sent, s, k)
+            a, b = a * cos + b * sin, b * cos - a * sin
+            at = 2 * width * s + k
+            store(y, at, a)
+            store(y, at + width, b)
+            h_re, h_im = load(channel.h, k), load(channel.h, width + k)
+            seen = seen + (a * (h_re * c - h_im * d) + b * (h_re * d + h_im * c))
+            expected = expected + (h_re * h_re + h_im * h_im)
     amplitude = np.ones(n, np.float32)
-    if seen > 0.0:
-        ratio = expected / seen
-        if abs(1 / ratio - 1) > _SURELY * math.sqrt(0.5 * channel.figures[NO] / expected):
+    match, power = float(total(seen)), float(total(expected))
+    if match > 0.0:
+        ratio = power / match
+        if abs(1 / ratio - 1) > _SURELY * math.sqrt(0.5 * channel.figures[NO] / power):
             for s in range(n_training):
                 amplitude[s] = min(max(ratio, 1 / _LARGEST_BOOST), _LARGEST_BOOST)
-    estimate(y, amplitude, sent, tones, channel)
+    estimate(y, amplitude, sent, tones, channel, scratch)

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from phy import ofdm, preamble
 from phy.constellation import Modulation
 from phy.demodulation import Demodulator
-from phy.estimation import new_channel, tones
+from phy.estimation import in_planes, new_channel, new_scratch, tones
 from phy.kernels.acquisition import BACKOFF
 from phy.kernels.burst import Channel
-from phy.kernels.equaliser import start_tracking
-from phy.kernels.training import estimate
+from phy.kernels.demodulator import learn_channel
+from phy.kernels.parcel import Parcel
 from phy.numerology import OFDM_64_16
 from phy.wifi.bits import Rate, Signal, has_right_fcs, parse_data, parse_signal
 
@@ -88,7 +88,8 @@ def _read(samples: NDArray[np.complex64], begin: int) -> WifiFrame | None:
     if signal is None:
         return None
     # As measured on the training: what follows teaches the channel, not the noise.
-    snr_db = 10 * math.log10(channel.gain * _GRID.n_used / _GRID.n_fft / channel.no)
+    ratio = channel.content.gain / channel.content.no
+    snr_db = 10 * math.log10(ratio * _GRID.n_used / _GRID.n_fft)
     psdu = _psdu(samples, window, signal_window + _GRID.n_symbol, frequency, channel, signal)
     if psdu is None:
         return None
@@ -118,14 +119,12 @@ def _long_training(
     return begin + start, coarse + cmath.phase(lag) / (2 * math.pi * n)
 
 
-def _channel(samples: NDArray[np.complex64], window: int, frequency: float) -> Channel:
+def _channel(samples: NDArray[np.complex64], window: int, frequency: float) -> Parcel[Channel]:
     starts = _GRID.n_fft * np.arange(preamble.N_LONG)
     y = ofdm.to_tones(samples[window:], starts, frequency, 0j, _GRID)
     sent = preamble.long_carriers(_GRID)[_GRID.tones].astype(np.complex64)
-    channel = new_channel(_GRID)
-    amplitude = np.ones(preamble.N_LONG, np.float32)
-    estimate(y, amplitude, np.tile(sent, (preamble.N_LONG, 1)), tones(_GRID), channel)
-    start_tracking(channel, _GRID.n_symbol / _GRID.n_fft, 0.0, False)
+    channel, known = new_channel(_GRID), in_planes(np.tile(sent, (preamble.N_LONG, 1)))
+    learn_channel(y, known, tones(_GRID).words, channel.words, new_scratch(_GRID).words)
     return channel
 
 
@@ -135,7 +134,7 @@ def _llrs(
     window: int,
     n_symbols: int,
     frequency: float,
-    channel: Channel,
+    channel: Parcel[Channel],
     modulation: Modulation,
     first_symbol: int,
 ) -> NDArray[np.int16] | None:
@@ -143,10 +142,12 @@ def _llrs(
     last = window + (n_symbols - 1) * _GRID.n_symbol + _GRID.n_fft
     if last > len(samples):
         return None
-    starts = _GRID.n_symbol * np.arange(n_symbols)
-    y = ofdm.to_tones(samples[window:last], starts, frequency, 0j, _GRID, window - origin)
     llr = np.empty(n_symbols * _GRID.n_data * modulation.bits, np.int16)
-    Demodulator(modulation, _GRID).demap(y, channel, first_symbol, llr)
+    powers = np.empty(n_symbols, np.float32)
+    Demodulator(_GRID).demodulate(
+        samples[window:last], frequency, 0j, window - origin, modulation, channel, first_symbol,
+        llr, powers,
+    )  # fmt: skip
     return llr
 
 
@@ -155,7 +156,7 @@ def _psdu(
     origin: int,
     window: int,
     frequency: float,
-    channel: Channel,
+    channel: Parcel[Channel],
     signal: Signal,
 ) -> bytes | None:
     rate, n_symbols = signal.rate, signal.rate.n_symbols(signal.n_bytes)

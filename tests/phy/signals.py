@@ -3,7 +3,6 @@
 import numpy as np
 
 from phy import BurstOver, PduHeard, Receiver
-from phy.kernels.lanes import whole_lanes
 
 
 def silence(n):
@@ -20,13 +19,6 @@ def noise(rng, n, power=1.0):
 def noisy(rng, x, snr_db):
     """`x` in noise that far below a mean power of 1."""
     return x + noise(rng, len(x), 10 ** (-snr_db / 10))
-
-
-def tone_planes(y):
-    """Tones `[n, n_used]` as kernels take them: `[n, 2, ≥ n_used]`."""
-    out = np.zeros((len(y), 2, whole_lanes(y.shape[1])), np.float32)
-    out[:, 0, : y.shape[1]], out[:, 1, : y.shape[1]] = y.real, y.imag
-    return out
 
 
 def turned(x, frequency, phase=0.0):

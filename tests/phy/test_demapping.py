@@ -6,13 +6,12 @@ import pytest
 from phy import OFDM_64_16, Modulation, points
 from phy.convolutional import MAX_LLR
 from phy.demodulation import Demodulator
-from phy.estimation import new_channel
+from phy.estimation import in_planes, new_channel, tones
 from phy.interleaver import order
 from phy.kernels.burst import GAIN, NO
 from phy.kernels.equaliser import BLOCK, start_tracking
 from phy.mapping import mapping
 from phy.sequences import polarity
-from tests.phy.signals import tone_planes
 
 SEED = 17
 GRID = OFDM_64_16
@@ -24,20 +23,22 @@ every_modulation = pytest.mark.parametrize("modulation", Modulation)
 
 def channel_of(h, no):
     """A channel known exactly: gains of the carriers in use, noise power."""
-    channel = new_channel(GRID)
-    channel.h_hat[:] = h[GRID.tones]
+    parcel = new_channel(GRID)
+    channel = parcel.content
+    channel.h[:, : GRID.n_used] = h[GRID.tones].real, h[GRID.tones].imag
+    channel.centre[0] = 1
     channel.figures[[NO, GAIN]] = no, np.mean(np.abs(h) ** 2)
     channel.power[:] = channel.gain
-    start_tracking(channel, GRID.n_symbol / GRID.n_fft, 0.0, False)
-    return channel
+    start_tracking(tones(GRID).content, channel, 0.0, False)
+    return parcel
 
 
 def demap(modulation, bins, channel, first_symbol=2):
     """(LLRs, points)."""
     llr = np.empty(len(bins) * GRID.n_data * modulation.bits, np.int16)
     equalised = np.empty((len(bins), GRID.n_data), np.complex64)
-    y = tone_planes(bins[:, GRID.bins[GRID.tones]])
-    Demodulator(modulation, GRID).demap(y, channel, first_symbol, llr, equalised)
+    y = in_planes(bins[:, GRID.bins[GRID.tones]])
+    Demodulator(GRID).demap(y, modulation, channel, first_symbol, llr, equalised)
     return llr, equalised
 
 
@@ -201,9 +202,10 @@ def test_a_channel_that_fades_is_followed(modulation):
 def error_of(channel, h):
     """Mean square, whatever phase and slope: those the pilots follow."""
     carriers = GRID.used[GRID.tones]
-    leaning = channel.h_hat * np.exp(1j * np.linspace(-0.05, 0.05, 101)[:, None] * carriers)
+    h_hat = (channel.content.h[0] + 1j * channel.content.h[1])[: GRID.n_used]
+    leaning = h_hat * np.exp(1j * np.linspace(-0.05, 0.05, 101)[:, None] * carriers)
     match = np.abs(leaning @ h[GRID.tones].conj()).max()
-    power = np.sum(np.abs(channel.h_hat) ** 2) + np.sum(np.abs(h) ** 2)
+    power = np.sum(np.abs(h_hat) ** 2) + np.sum(np.abs(h) ** 2)
     return (power - 2 * match) / len(carriers)
 
 
@@ -217,7 +219,7 @@ def test_a_channel_that_stands_still_becomes_known_better(modulation, no):
     _, bins = faded_symbols(modulation, np.repeat(h[None, :], 200, axis=0), no, rng)
     noise = rng.standard_normal((GRID.n_used, 2)) @ [1, 1j]
     channel = channel_of(h + noise * np.sqrt(no / 8), no)
-    channel.unknown[:] = no / 4
+    channel.content.unknown[:] = no / 4
     before = error_of(channel, h)
     demap(modulation, bins, channel)
     assert error_of(channel, h) < before / 2

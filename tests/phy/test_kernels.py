@@ -7,6 +7,7 @@ from phy import OFDM_64_16, Modulation, points
 from phy.interleaver import order
 from phy.kernels.detector import FORGETS, HISTORY, detector_sums, sanitise, search
 from phy.kernels.resampler import interpolate
+from phy.kernels.rotation import lean, lean_more
 from phy.kernels.symbols import map_bits
 from phy.preamble import BARKER, preamble
 from phy.stream import SampleStream
@@ -154,3 +155,18 @@ def test_a_stream_keeps_what_is_not_forgotten_by_absolute_index():
         assert np.array_equal(stream.view(1000 + start, 1000 + end), everything[start:end])
     stream.restart(-5)
     assert (stream.start, stream.end) == (-5, -5)
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.003, -0.0031])
+def test_leaning_more_adds_up(slope):
+    """A hundred small steps are one large one."""
+    numbers = np.zeros(56, np.float32)
+    carriers = OFDM_64_16.used[OFDM_64_16.tones]
+    numbers[:52] = carriers
+    turns, at_once = np.zeros((2, 2, 56), np.float32)
+    lean(0.2, carriers, turns)
+    for _ in range(100):
+        lean_more(slope, numbers, turns)
+    lean(0.2 + 100 * slope, carriers, at_once)
+    assert at_once[0, :52] == pytest.approx(np.cos((0.2 + 100 * slope) * carriers), abs=1e-6)
+    assert turns[:, :52] == pytest.approx(at_once[:, :52], abs=2e-5)

@@ -4,20 +4,24 @@ import numpy as np
 import pytest
 
 from phy import OFDM_64_16
-from phy.estimation import new_channel, tones
+from phy.estimation import in_planes, new_channel, new_scratch, tones
 from phy.kernels.acquisition import correlate
 from phy.kernels.convolution import convolve
 from phy.kernels.list_viterbi import list_decode
-from phy.kernels.smoothing import mean_delay, smooth
-from phy.kernels.training import estimate, learn, least_squares, turn_back, wave
+from phy.kernels.smoothing import smooth
+from phy.kernels.training import estimate, learn, least_squares, turn_back
 from phy.numerology import GRIDS
-from tests.phy.signals import noise, tone_planes
+from tests.phy.signals import noise
 
 SEED = 48
 
 
 def rng():
     return np.random.default_rng(SEED)
+
+
+def gains(channel, n):
+    return (channel.h[0] + 1j * channel.h[1])[:n]
 
 
 def planes_of(x):
@@ -44,13 +48,6 @@ def test_samples_are_turned_back(frequency):
     assert out[0, :679] + 1j * out[1, :679] == pytest.approx(wanted, abs=1e-5)
 
 
-def test_a_wave_is_a_product():
-    matrix, h = noise(rng(), 400).reshape(10, 40), noise(rng(), 40)
-    out = np.empty(10, np.complex64)
-    wave(matrix, h, out)
-    assert out == pytest.approx(matrix @ h, abs=1e-4)
-
-
 def test_least_squares_tells_gains_and_noise():
     """Of symbols of which some went out stronger."""
     draws = rng()
@@ -58,45 +55,43 @@ def test_least_squares_tells_gains_and_noise():
     amplitude = np.resize([1, 1.4], 4000).astype(np.float32)
     h = np.array([1, 2j, -0.5, 0.1 + 0.1j])
     y = noise(draws, 4000 * 4, 0.3).reshape(4000, 4) + amplitude[:, None] * h * sent
-    out = np.empty(4, np.complex64)
-    no, power = least_squares(tone_planes(y), amplitude, sent, out)
-    assert out == pytest.approx(h, abs=0.03)
-    assert no == pytest.approx(0.3, rel=0.03)
-    assert power == pytest.approx(np.mean(np.abs(h) ** 2), rel=0.03)
+    found = np.empty((2, 8), np.float32)
+    noise_power, power = least_squares(in_planes(y), amplitude, in_planes(sent), found)
+    assert found[0, :4] + 1j * found[1, :4] == pytest.approx(h, abs=0.03)
+    assert noise_power == pytest.approx(4 * 0.3, rel=0.03)
+    assert power == pytest.approx(np.sum(np.abs(h) ** 2), rel=0.03)
 
 
 @pytest.mark.parametrize("boost", [0.7, 1.0, 1.41])
 def test_a_header_tells_how_much_stronger_the_preamble_was(boost):
     """The channel is that of the header, with all four symbols' help."""
     draws, grid = rng(), OFDM_64_16
-    table = tones(grid)
+    table, scratch = tones(grid).content, new_scratch(grid).content
     h = np.exp(-2j * np.pi * 3 * table.carriers / 64) * (1 + 0.3j)
     sent = draws.choice([-1, 1], (4, 52)).astype(np.complex64)
     amplitude = np.array([boost, boost, 1, 1], np.float32)
     y = noise(draws, 4 * 52, 0.01).reshape(4, 52) + amplitude[:, None] * h * sent
-    channel = new_channel(grid)
-    estimate(tone_planes(y[:2]), np.ones(2, np.float32), sent[:2], table, channel)
-    assert channel.h_hat == pytest.approx(boost * h, abs=0.1)
-    learn(tone_planes(y), sent, 2, 0.0, 0.0, table, channel)
-    assert np.mean(np.abs(channel.h_hat - h) ** 2) < 0.2 * 0.01
+    channel, known = new_channel(grid).content, in_planes(sent)
+    estimate(in_planes(y[:2]), np.ones(2, np.float32), known[:2], table, channel, scratch)
+    assert gains(channel, 52) == pytest.approx(boost * h, abs=0.1)
+    learn(in_planes(y), known, 2, 0.0, 0.0, table, channel, scratch)
+    assert np.mean(np.abs(gains(channel, 52) - h) ** 2) < 0.2 * 0.01
     assert channel.no == pytest.approx(0.01, rel=0.3)
 
 
 def smoothed(h, no, grid=OFDM_64_16):
     """(estimate, variance left) of gains in the order of tones, measured with noise `no`."""
-    table = tones(grid)
-    rough = (h + noise(np.random.default_rng(SEED), len(h), no)).astype(np.complex64)
-    out = np.empty(len(h), np.complex64)
-    unknown, power = np.zeros(len(table.ends) + 1), np.zeros(len(table.ends) + 1)
-    delay = mean_delay(rough, table.neighbours)
-    smooth(rough, no, delay, table.carriers, table.basis, table.ends, unknown, power, out)
-    return out, unknown
+    rough = h + noise(np.random.default_rng(SEED), len(h), no)
+    channel = new_channel(grid).content
+    channel.h[:] = in_planes(rough[None])[0]
+    smooth(no, tones(grid).content, channel, new_scratch(grid).content)
+    return gains(channel, len(h)), channel.unknown
 
 
 @pytest.mark.parametrize("delay", [0.0, 3.0, 3.4, -7.5])
 @pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS)
 def test_of_one_path_hardly_any_noise_is_left(grid, delay):
-    carriers = tones(grid).carriers
+    carriers = tones(grid).content.carriers
     h = 0.8 * np.exp(-2j * np.pi * delay * carriers / grid.n_fft)
     for no in (0.5, 0.01, 1e-4):
         error = np.mean(np.abs(smoothed(h, no, grid)[0] - h) ** 2)
@@ -105,7 +100,7 @@ def test_of_one_path_hardly_any_noise_is_left(grid, delay):
 
 def test_of_many_echoes_no_more_is_lost_than_smoothing_is_worth():
     """However the gains vary, even as no channel's do, it never does harm."""
-    draws, carriers = rng(), tones(OFDM_64_16).carriers
+    draws, carriers = rng(), tones(OFDM_64_16).content.carriers
     for echoes in (2, 8, 16, 60):
         taps = noise(draws, echoes)
         h = np.exp(-2j * np.pi * carriers[:, None] * np.arange(echoes) / 64) @ taps
@@ -117,7 +112,7 @@ def test_of_many_echoes_no_more_is_lost_than_smoothing_is_worth():
 
 def test_a_basis_is_orthonormal():
     for grid in GRIDS.values():
-        basis = tones(grid).basis
+        basis = tones(grid).content.basis
         assert basis @ basis.T == pytest.approx(np.eye(len(basis)), abs=1e-5)
 
 

@@ -1,0 +1,96 @@
+"""Many arrays as one argument of a kernel.
+
+numba looks at every array that crosses from the interpreter, and at every field of a tuple: half a
+microsecond each, where a short burst takes fifty. What stays the same from call to call is packed
+once instead: a `Parcel` holds the addresses, and the kernel opens it into the tuple that it was.
+"""
+
+import ctypes
+import itertools
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from llvmlite import ir
+from numba import typeof, types
+from numba.extending import intrinsic
+from numba.np import numpy_support
+from numba.np.arrayobj import populate_array
+from numpy.typing import NDArray
+
+_I64 = ir.IntType(64)
+
+
+_Content = TypeVar("_Content", bound=tuple[Any, ...])
+_FIELDS: dict[type[Any], list[Any]] = {}
+
+
+class Parcel(Generic[_Content]):
+    """A named tuple of arrays and numbers; `words` is what kernels are given.
+
+    TypeError when a field is not as its opener expects it: kernels would not notice.
+    """
+
+    def __init__(self, content: _Content) -> None:
+        self.content = content
+        words: list[int] = []
+        for value, kind in zip(content, _FIELDS[type(content)], strict=True):
+            found = typeof(value)
+            if isinstance(value, np.ndarray):
+                found = found.copy(readonly=False)
+                words += [value.ctypes.data, *value.shape]
+            else:
+                words.append(int(np.array(value).view(np.int64)))
+            if found != kind:
+                raise TypeError(f"{type(content).__name__}: got {found}; allowed: {kind}")
+        # Who has the words keeps alive what they point to.
+        buffer: Any = (ctypes.c_int64 * len(words))(*words)
+        buffer.content = content
+        self.words: NDArray[np.int64] = np.frombuffer(buffer, np.int64)
+
+
+def opener(kind: type[Any], fields: str) -> Any:
+    """For kernels: the words of a parcel to the tuple `kind` again.
+
+    `fields` tells in order what each is: a scalar's dtype, and for an array its dimensions in
+    brackets, as in "i8 f4[2] c8[1]".
+    """
+    found = [_numba_type(field) for field in fields.split()]
+    result = types.NamedTuple(found, kind)
+    _FIELDS[kind] = found
+
+    def typed(_context: Any, words: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            data = context.make_array(signature.args[0])(context, builder, args[0]).data
+            places = itertools.count()
+
+            def word() -> Any:
+                return builder.load(builder.gep(data, [_I64(next(places))]))
+
+            values = [_open(context, builder, each, word) for each in found]
+            return context.make_tuple(builder, result, values)
+
+        return result(words), generate
+
+    typed.__doc__ = f"The `{kind.__name__}` in a parcel."
+    return intrinsic(typed)
+
+
+def _numba_type(field: str) -> Any:
+    name, _, rest = field.partition("[")
+    scalar = numpy_support.from_dtype(np.dtype(name))
+    return types.Array(scalar, int(rest.rstrip("]")), "C") if rest else scalar
+
+
+def _open(context: Any, builder: Any, kind: Any, word: Callable[[], Any]) -> Any:
+    if not isinstance(kind, types.Array):
+        return builder.bitcast(word(), context.get_value_type(kind))
+    array = context.make_array(kind)(context, builder)
+    item = context.get_abi_sizeof(context.get_data_type(kind.dtype))
+    address = builder.inttoptr(word(), context.get_data_type(kind.dtype).as_pointer())
+    shape = [word() for _ in range(kind.ndim)]
+    strides = [_I64(item)]
+    for size in reversed(shape[1:]):
+        strides.insert(0, builder.mul(strides[0], size))
+    populate_array(array, address, shape, strides, _I64(item), meminfo=None)
+    return array._getvalue()  # noqa: SLF001
