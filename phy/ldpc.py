@@ -153,6 +153,6 @@ def decode(
     decode_blocks(
         llr, code.z, code.row_ends, code.columns, code.shifts, code.middle,
         form.shares, form.ends, max_iterations,
-        work.llr, work.posteriors, work.messages, work.scratch, out,
+        work.llr, work.posteriors, work.messages, work.told, work.scratch, out,
     )  # fmt: skip
     return out

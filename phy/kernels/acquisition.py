@@ -96,63 +96,70 @@ open_room = opener(Room, "f4[2] f4[2] f4[2] f4[3] c8[2] i2[1] i2[1] u8[1] u1[1]"
 
 @njit(nogil=True, cache=True)
 def correlate(planes: Planes, templates: NDArray[np.complex64], out: NDArray[np.float32]) -> None:
-    """Strength of two templates in a row at each offset of `planes` `[2, n]`.
+    """Strength of two templates in a row at each offset of `planes` `[2, …]`.
 
     With c[o] = Σ_m z[o + m] t*[a, m], out[a, o] = |c[o] + c[o + n]|²; for templates so long that
     the frequency is not known well enough to add them up, 2 |c[o]|² + 2 |c[o + n]|². `templates`
-    are `[aliases, n]`.
+    are `[aliases, n]`; `out` is `[aliases, offsets]`, whole lanes of them.
     """
-    re, im = planes[0], planes[1]
-    n_template, n_out = templates.shape[1], out.shape[1]
-    n = n_out + n_template
+    n, n_out = templates.shape[1], out.shape[1]
     for a in range(templates.shape[0]):
-        c_re, c_im = np.zeros(n, np.float32), np.zeros(n, np.float32)
-        for m in range(n_template):
-            t_re, t_im = templates[a, m].real, templates[a, m].imag
-            x_re, x_im = re[m : m + n], im[m : m + n]
-            for o in range(n):
-                c_re[o] += x_re[o] * t_re + x_im[o] * t_im
-                c_im[o] += x_im[o] * t_re - x_re[o] * t_im
-        second_re, second_im = c_re[n_template:], c_im[n_template:]
-        for o in range(n_out):
-            re_sum, im_sum = c_re[o] + second_re[o], c_im[o] + second_im[o]
-            out[a, o] = re_sum * re_sum + im_sum * im_sum
-        if n_template > _COHERENT:
-            for o in range(n_out):
-                re_rest, im_rest = c_re[o] - second_re[o], c_im[o] - second_im[o]
-                out[a, o] += re_rest * re_rest + im_rest * im_rest
+        for o in range(0, n_out, N_LANES):
+            re, im = _match(planes, o, templates[a])
+            later_re, later_im = _match(planes, o + n, templates[a])
+            sum_re, sum_im = re + later_re, im + later_im
+            strength = sum_re * sum_re + sum_im * sum_im
+            if n > _COHERENT:
+                less_re, less_im = re - later_re, im - later_im
+                strength = strength + (less_re * less_re + less_im * less_im)
+            store(out, a * n_out + o, strength)
+
+
+@njit(nogil=True, forceinline=True)
+def _match(planes: Planes, at: int, template: NDArray[np.complex64]) -> tuple[Lanes, Lanes]:
+    """Σ_m z[o + m] t*[m] for the eight offsets from `at` on."""
+    size = planes.shape[1]
+    re: Lanes = splat(0)
+    im: Lanes = splat(0)
+    for m in range(template.size):
+        a, b = load(planes, at + m), load(planes, size + at + m)
+        c, d = splat(template[m].real), splat(template[m].imag)
+        re = re + (a * c + b * d)
+        im = im + (b * c - a * d)
+    return re, im
 
 
 @njit(nogil=True, cache=True)
 def locate(planes: Planes, templates: NDArray[np.complex64]) -> tuple[int, float]:
     """(first sample of the long training's first echo or −1, frequency in cycles a sample).
 
-    It is looked for at the first 2 SEARCH samples of `planes` `[2, 2 SEARCH + 2 n_fft]`.
+    It is looked for at the first 2 SEARCH samples of `planes` `[2, ≥ 2 SEARCH + 2 n_fft]`.
     """
     n_aliases, n = templates.shape
     strength = np.empty((n_aliases, 2 * SEARCH), np.float32)
     correlate(planes, templates, strength)
-    alias, peak, most = 0, 0, np.float32(-1)
+    alias, peak, strongest = 0, 0, np.float32(-1)
     for a in range(n_aliases):
         for o in range(2 * SEARCH):
-            if strength[a, o] > most:
-                alias, peak, most = a, o, strength[a, o]
-    re, im = planes[0, peak:], planes[1, peak:]
-    power = np.float32(0)
-    for m in range(2 * n):
-        power += re[m] * re[m] + im[m] * im[m]
-    if not most > MIN_MATCH * 2 * n * power:
+            if strength[a, o] > strongest:
+                alias, peak, strongest = a, o, strength[a, o]
+    size, energy = planes.shape[1], splat(0)
+    for m in range(peak, peak + 2 * n, N_LANES):
+        a, b = load(planes, m), load(planes, size + m)
+        energy = energy + (a * a + b * b)
+    if not strongest > MIN_MATCH * 2 * n * total(energy):
         return -1, 0.0
     early = max(0, peak - MAX_SPREAD)
-    while strength[alias, early] < FIRST_ECHO * most:
+    while strength[alias, early] < FIRST_ECHO * strongest:
         early += 1
     turn, before = 0j, 0j
     for begin in range(0, 2 * n, _LAG):
-        total = 0j
+        seen = 0j
         for m in range(begin, begin + _LAG):
-            total += complex(re[m], im[m]) * complex(templates[alias, m % n]).conjugate()
-        turn += total * before.conjugate()
-        before = total
+            z = complex(planes[0, peak + m], planes[1, peak + m])
+            seen += z * complex(templates[alias, m % n]).conjugate()
+        turn += seen * before.conjugate()
+        before = seen
     rest = math.atan2(turn.imag, turn.real) / (2 * math.pi * _LAG)
     return early, (alias - n_aliases // 2) * AMBIGUITY + rest
 
@@ -251,7 +258,7 @@ def acquire(
     first = nominal - SEARCH
     span = 2 * SEARCH + 2 * tones.n_fft
     turn_back(x[first : first + span], dc, coarse, planes)
-    early, correction = locate(planes[:, :span], training.templates)
+    early, correction = locate(planes, training.templates)
     if early < 0:
         return -1, 0.0
     begin = first + early - windows[0] - BACKOFF

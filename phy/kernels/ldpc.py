@@ -12,8 +12,11 @@ knows (Hocevar 2004).
 *Min-sum.* A check sends to each of its bits the product of the signs and the least magnitude of all
 its other bits. That is the least magnitude of all, and for the bit that has it the second least:
 two minima and one product of signs serve all edges. The minimum is an overestimate, so messages
-are taken times 13/16 (Chen and Fossorier 2002), to the nearest: at rate 1/2 both 3/4 and rounding
-up lose more blocks.
+are taken times 14/16 (Chen and Fossorier 2002), to the nearest.
+
+*Doubts.* A bit that tells a check the contrary of what it told it last is not believed this time:
+it counts as 0 (Savin 2008). Blocks that would go astray for long take half the iterations, and of
+those that would not be decoded at all, a third and more are.
 
 *Rotation.* Each block column of posteriors is stored as a periodic sequence that goes on for a
 vector or more beyond Z. Then Z lanes from any shift on are contiguous in memory; lanes past Z hold
@@ -44,7 +47,7 @@ class LdpcWorkspace:
     def __init__(self, max_z: int = 81, max_edges: int = 96) -> None:
         lanes = padded(max_z)
         self.posteriors = np.zeros((N_COLUMNS, 3 * lanes + 2 * LANES), np.int16)
-        self.messages = np.zeros((max_edges, lanes), np.int16)
+        self.messages, self.told = np.zeros((2, max_edges, lanes), np.int16)
         self.scratch = np.zeros((N_COLUMNS, LANES), np.int16)
         self.llr = np.zeros(N_COLUMNS * max_z, np.int16)
 
@@ -64,6 +67,7 @@ def decode_codeword(
     max_iterations: int,
     posteriors: NDArray[np.int16],
     messages: NDArray[np.int16],
+    told: NDArray[np.int16],
     scratch: NDArray[np.int16],
 ) -> int:
     """Iterations until all checks held, 0 if they never did; the bits are posteriors' signs.
@@ -78,11 +82,14 @@ def decode_codeword(
         for i in range(z, 2 * lanes):
             posteriors[column, i] = posteriors[column, i - z]
     messages[:] = 0
+    told[:] = 0
     for iteration in range(max_iterations):
         odd = 0
         for row in range(row_ends.size - 1):
             first, last = np.int64(row_ends[row]), np.int64(row_ends[row + 1])
-            odd |= ldpc_row(posteriors, messages, scratch, columns, shifts, first, last, z)
+            odd |= ldpc_row(
+                posteriors, messages, told, scratch, columns, shifts, first, last, z
+            )  # fmt: skip
         if odd == 0:
             return iteration + 1
     return 0
@@ -102,6 +109,7 @@ def decode_blocks(
     whole: NDArray[np.int16],
     posteriors: NDArray[np.int16],
     messages: NDArray[np.int16],
+    told: NDArray[np.int16],
     scratch: NDArray[np.int16],
     out: NDArray[np.uint8],
 ) -> None:
@@ -133,7 +141,7 @@ def decode_blocks(
                 codeword[n_info + end - middle_at :] = 0
                 decode_codeword(
                     codeword, z, row_ends, columns, shifts, max_iterations,
-                    posteriors, messages, scratch,
+                    posteriors, messages, told, scratch,
                 )  # fmt: skip
                 bits[:] = 0
                 for column in range(-(-share // z)):

@@ -18,7 +18,7 @@ def decode_codeword_plain(
 ) -> tuple[int, NDArray[np.int32]]:
     """(iterations until all checks held or 0, posteriors `[24, z]`)."""
     posteriors = llr.reshape(N_COLUMNS, z).astype(np.int32)
-    messages = np.zeros((len(columns), z), np.int32)
+    messages, told = np.zeros((2, len(columns), z), np.int32)
     # Check z of a row takes bit (z + shift) mod Z of each block column.
     takes = (np.arange(z) + shifts[:, None]) % z
     for iteration in range(max_iterations):
@@ -28,7 +28,9 @@ def decode_codeword_plain(
             bits = (columns[row, None], takes[row])
             all_hold &= not np.any(np.logical_xor.reduce(posteriors[bits] < 0))
             rest = posteriors[bits] - messages[row]
-            messages[row] = _messages(rest)
+            # What a check is told with another sign than last time counts as 0.
+            told[row] = np.where(rest * np.sign(told[row]) < 0, 0, rest)
+            messages[row] = _messages(told[row])
             posteriors[bits] = np.clip(rest + messages[row], -MAX_POSTERIOR, MAX_POSTERIOR)
         if all_hold:
             return iteration + 1, posteriors
@@ -36,7 +38,10 @@ def decode_codeword_plain(
 
 
 def _messages(rest: NDArray[np.int32]) -> NDArray[np.int32]:
-    """What each check sends to each of its bits `[bits, checks]`, from what the bits say."""
+    """What each check sends to each of its bits `[bits, checks]`, from what the bits say.
+
+    A bit that says 0 is taken for a positive one.
+    """
     size = np.abs(rest)
     least, second = np.sort(size, axis=0)[:2]
     others_least = np.where(size == least, second, least)

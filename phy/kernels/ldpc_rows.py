@@ -16,7 +16,7 @@ N_COLUMNS = 24
 """Block columns of a code."""
 LANES = 32
 MAX_POSTERIOR = 8000
-WEIGHT = 13
+WEIGHT = 14
 """What messages are taken times, in sixteenths."""
 MAX_MAGNITUDE = 2000
 """Magnitudes beyond count as this; times WEIGHT, it fits 16 bits."""
@@ -27,19 +27,19 @@ _VECTOR = ir.VectorType(_I16, LANES)
 
 
 def _row_generator(
-    _context: Any, posteriors: Any, messages: Any, scratch: Any, columns: Any, shifts: Any,
-    first: Any, last: Any, z: Any,
+    _context: Any, posteriors: Any, messages: Any, told: Any, scratch: Any, columns: Any,
+    shifts: Any, first: Any, last: Any, z: Any,
 ) -> Any:  # fmt: skip
     """One block row, whose edges are `first` … `last` − 1; 0 when its checks held before it."""
-    arrays = (posteriors, messages, scratch, columns, shifts)
+    arrays = (posteriors, messages, told, scratch, columns, shifts)
     signature = types.int64(*arrays, first, last, z)
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         made = [
             context.make_array(kind)(context, builder, value)
-            for kind, value in zip(signature.args[:5], args[:5], strict=True)
+            for kind, value in zip(signature.args[:6], args[:6], strict=True)
         ]
-        row = _Row(builder, made, *args[5:])
+        row = _Row(builder, made, *args[6:])
         return row.emit()
 
     return signature, generate
@@ -53,8 +53,8 @@ class _Row:
 
     def __init__(self, builder: Any, arrays: list[Any], first: Any, last: Any, z: Any) -> None:
         self.builder = builder
-        posteriors, messages, scratch, columns, shifts = arrays
-        self.posteriors, self.messages = posteriors.data, messages.data
+        posteriors, messages, told, scratch, columns, shifts = arrays
+        self.posteriors, self.messages, self.told = posteriors.data, messages.data, told.data
         self.scratch, self.columns, self.shifts = scratch.data, columns.data, shifts.data
         self.stride = builder.extract_value(posteriors.shape, 1)
         self.message_stride = builder.extract_value(messages.shape, 1)
@@ -83,6 +83,7 @@ class _Row:
             message = self.load(self.messages, self.message_place(edge, at))
             rest = builder.sub(posterior, message)
             self.store(rest, self.scratch, builder.mul(number, _long(LANES)))
+            rest = self.unless_turned(rest, self.message_place(edge, at))
             size = self.magnitude(rest)
             larger = self.larger(size, builder.load(least))
             builder.store(self.smaller(builder.load(second), larger), second)
@@ -93,15 +94,28 @@ class _Row:
         smallest, signs = builder.load(least), builder.load(sign)
         usual, for_smallest = self.weighted(smallest), self.weighted(builder.load(second))
         with self.edges() as (edge, number):
-            rest = self.load(self.scratch, builder.mul(number, _long(LANES)))
-            is_smallest = builder.icmp_signed("==", self.magnitude(rest), smallest)
+            told = self.load(self.told, self.message_place(edge, at))
+            is_smallest = builder.icmp_signed("==", self.magnitude(told), smallest)
             size = builder.select(is_smallest, for_smallest, usual)
-            is_negative = builder.icmp_signed("<", builder.xor(signs, rest), _splat(0))
+            is_negative = builder.icmp_signed("<", builder.xor(signs, told), _splat(0))
             message = builder.select(is_negative, builder.neg(size), size)
             self.store(message, self.messages, self.message_place(edge, at))
+            rest = self.load(self.scratch, builder.mul(number, _long(LANES)))
             posterior = self.smaller(builder.add(rest, message), _splat(MAX_POSTERIOR))
             posterior = self.larger(posterior, _splat(-MAX_POSTERIOR))
             self.store(posterior, self.posteriors, self.place(edge, at))
+
+    def unless_turned(self, rest: Any, place: Any) -> Any:
+        """`rest`, or 0 where its sign is another than the check was told last; told now."""
+        builder = self.builder
+        before = self.load(self.told, place)
+        turned = builder.and_(
+            builder.icmp_signed("<", builder.xor(rest, before), _splat(0)),
+            builder.icmp_signed("!=", before, _splat(0)),
+        )
+        now = builder.select(turned, _splat(0), rest)
+        self.store(now, self.told, place)
+        return now
 
     def mend(self, edge: Any) -> None:
         """Make a block column periodic again: what is at `shift` … belongs Z before and behind."""

@@ -45,68 +45,55 @@ def multiply(x: Planes, by: Planes, conjugate: bool, out: Planes) -> None:
 
 
 @njit(nogil=True, forceinline=True)
-def _take(rest: Planes, basis: NDArray[np.float32], d: int, coefficients: Planes) -> float:
-    """Move what is along row `d` from `rest` to its coefficient; the energy of that."""
-    width = rest.shape[1]
-    row = d * width
-    re: Lanes = splat(0)
-    im: Lanes = splat(0)
-    for k in range(0, width, N_LANES):
-        along = load(basis, row + k)
-        re = re + along * load(rest, k)
-        im = im + along * load(rest, width + k)
-    a, b = total(re), total(im)
-    coefficients[0, d], coefficients[1, d] = a, b
-    _give(rest, basis, d, -a, -b)
-    return float(a * a + b * b)
-
-
-@njit(nogil=True, forceinline=True)
-def _give(rest: Planes, basis: NDArray[np.float32], d: int, a: np.float32, b: np.float32) -> None:
-    width = rest.shape[1]
-    row, re, im = d * width, splat(a), splat(b)
-    for k in range(0, width, N_LANES):
-        along = load(basis, row + k)
-        store(rest, k, load(rest, k) + along * re)
-        store(rest, width + k, load(rest, width + k) + along * im)
-
-
-@njit(nogil=True, forceinline=True)
 def _split(tones: Tones, wanted: NDArray[np.float64], scratch: Scratch) -> None:
-    """What is in `rest`, as coefficients of the groups that are `wanted` and what is left of it.
+    """What of `rest` is in the groups that are `wanted`: coefficients and energies.
 
-    `energies` are those of each group.
+    What is in none, or in unwanted ones, is the last group.
     """
-    rest, energies, width = scratch.rest, scratch.energies, scratch.rest.shape[1]
-    first = 0
+    rest, basis, coefficients = scratch.rest, tones.basis, scratch.coefficients
+    energies, width = scratch.energies, scratch.rest.shape[1]
+    power: Lanes = splat(0)
+    for k in range(0, width, N_LANES):
+        a, b = load(rest, k), load(rest, width + k)
+        power = power + (a * a + b * b)
+    left, first = float(total(power)), 0
     for group in range(tones.ends.size):
         last = tones.ends[group]
-        energies[group] = 0.0
+        energy = 0.0
         if wanted[group] > 0:
             for d in range(first, last):
-                energies[group] += _take(rest, tones.basis, d, scratch.coefficients)
+                re: Lanes = splat(0)
+                im: Lanes = splat(0)
+                for k in range(0, width, N_LANES):
+                    along = load(basis, d * width + k)
+                    re = re + along * load(rest, k)
+                    im = im + along * load(rest, width + k)
+                a, b = total(re), total(im)
+                coefficients[0, d], coefficients[1, d] = a, b
+                energy += float(a * a + b * b)
+        energies[group] = energy
+        left -= energy
         first = last
-    left: Lanes = splat(0)
-    for k in range(0, width, N_LANES):
-        re, im = load(rest, k), load(rest, width + k)
-        left = left + (re * re + im * im)
-    energies[tones.ends.size] = total(left)
+    energies[tones.ends.size] = max(left, 0.0)
 
 
 @njit(nogil=True, forceinline=True)
 def _join(tones: Tones, scratch: Scratch) -> None:
     """The way back to `rest`, each group times its weight."""
-    rest, weights, width = scratch.rest, scratch.weights, scratch.rest.shape[1]
-    share = splat(weights[tones.ends.size])
+    rest, basis, coefficients = scratch.rest, tones.basis, scratch.coefficients
+    weights, width = scratch.weights, scratch.rest.shape[1]
+    usual, first = weights[tones.ends.size], 0
     for k in range(0, 2 * width, N_LANES):
-        store(rest, k, load(rest, k) * share)
-    first = 0
+        store(rest, k, load(rest, k) * splat(usual))
     for group in range(tones.ends.size):
-        weight = np.float32(weights[group])
-        if weight != 0:
+        more = np.float32(weights[group] - usual)
+        if scratch.energies[group] > 0 and more != 0:
             for d in range(first, tones.ends[group]):
-                a, b = scratch.coefficients[0, d], scratch.coefficients[1, d]
-                _give(rest, tones.basis, d, weight * a, weight * b)
+                re, im = splat(more * coefficients[0, d]), splat(more * coefficients[1, d])
+                for k in range(0, width, N_LANES):
+                    along = load(basis, d * width + k)
+                    store(rest, k, load(rest, k) + along * re)
+                    store(rest, width + k, load(rest, width + k) + along * im)
         first = tones.ends[group]
 
 

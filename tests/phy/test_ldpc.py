@@ -124,7 +124,7 @@ def test_the_vectors_do_what_the_plain_decoder_says_bit_for_bit(code):
         llr[rng.integers(0, code.n, at_edges)] = edges
         for n in (1, 2, 12):
             given = (llr, code.z, code.row_ends, code.columns, code.shifts, n)
-            took = decode_codeword(*given, work.posteriors, work.messages, work.scratch)
+            took = decode_codeword(*given, work.posteriors, work.messages, work.told, work.scratch)
             expected, posteriors = decode_codeword_plain(*given)
             assert took == expected, (SEED, ebn0_db, n)
             assert np.array_equal(work.posteriors[:, : code.z], posteriors), (SEED, ebn0_db, n)
