@@ -15,7 +15,7 @@ from benchmarks.peers import GnuRadio, Liquid
 from benchmarks.report import Row, main
 from benchmarks.trials import Air, ErrorRate, bursts, error_rate, needed_snr_db
 from phy import MCS_TABLE, OFDM_64_16, FrontEnd, FrontEndParams, PduHeard, Receiver, layout
-from phy.ldpc import LdpcWorkspace, decode, encode
+from phy.ldpc import decode, encode, new_workspace
 
 PER_CARRIER_DB = 10 * np.log10(OFDM_64_16.n_fft / OFDM_64_16.n_used)
 """Es/N0 of a carrier over the SNR in the sample band."""
@@ -100,7 +100,7 @@ def _tdl_a(seed: int, n: int) -> Row:
 def _gap_to_bound(seed: int, n: int) -> Row:
     """The code alone: bits over a channel that is known exactly."""
     plan = layout(OFDM_64_16, QPSK34, 1, 220)
-    rng, work = np.random.default_rng(seed), LdpcWorkspace()
+    rng, work = np.random.default_rng(seed), new_workspace()
     n_carriers = plan.coded_bits / plan.mcs.modulation.bits
 
     def rate_at(es_n0_db: float, most: int, enough: int) -> ErrorRate:

@@ -10,7 +10,7 @@ from phy.kernels import demodulator as kernel
 from phy.kernels.burst import Channel
 from phy.kernels.parcel import Parcel
 from phy.layout import BurstLayout
-from phy.ldpc import LdpcWorkspace, decode
+from phy.ldpc import decode, new_workspace
 from phy.mapping import axes
 from phy.numerology import Numerology
 from phy.sequences import whitening
@@ -76,19 +76,23 @@ class Demodulator:
 
 
 class PduDecoder:
-    """Collects LLRs of a burst and decodes each PDU when its symbols are in."""
+    """Collects LLRs of bursts and decodes each PDU when its symbols are in. One for each thread."""
 
-    def __init__(self, plan: BurstLayout, workspace: LdpcWorkspace) -> None:
-        self.layout = plan
-        self._workspace = workspace
+    def __init__(self) -> None:
+        self._workspace = new_workspace()
         self._llr = np.empty(_ROOM, np.int16)
         self._n_kept = 0
         self._n_filled = 0
         self._n_decoded = 0
 
+    def start(self, plan: BurstLayout) -> None:
+        """A new burst."""
+        self._plan = plan
+        self._n_kept = self._n_filled = self._n_decoded = 0
+
     def room(self, n_symbols: int) -> NDArray[np.int16]:
         """Where the LLRs of the next `n_symbols` symbols belong; decode them before the next."""
-        n = self._n_kept + n_symbols * self.layout.symbol_bits
+        n = self._n_kept + n_symbols * self._plan.symbol_bits
         if n > len(self._llr):
             larger = np.empty(2 * n, np.int16)
             larger[: self._n_kept] = self._llr[: self._n_kept]
@@ -98,15 +102,15 @@ class PduDecoder:
 
     def decode(self, n_pdus: int) -> list[bytes | None]:
         """The next `n_pdus` PDUs, whose symbols are all in; None where a check fails."""
-        plan = self.layout
+        plan, found = self._plan, list[bytes | None]()
         size, n_bits = plan.block_bytes, n_pdus * plan.coded_bits
-        blocks = b""
         if n_pdus:
-            llr = self._llr[:n_bits].reshape(n_pdus, -1)
-            white = decode(llr, plan.form, self._workspace).reshape(-1)
-            blocks = (white ^ whitening(len(white), self._n_decoded * size)).tobytes()
+            white = whitening(n_pdus * size, self._n_decoded * size)
+            out = decode(self._llr[:n_bits], plan.form, self._workspace, white=white)
+            blocks = out.tobytes()
+            found = [checked(blocks[at : at + size]) for at in range(0, len(blocks), size)]
             self._n_decoded += n_pdus
-        rest = self._llr[n_bits : self._n_filled]
-        self._llr[: len(rest)] = rest.copy()
-        self._n_kept = len(rest)
-        return [checked(blocks[at : at + size]) for at in range(0, len(blocks), size)]
+        self._n_kept = self._n_filled - n_bits
+        if self._n_kept:
+            self._llr[: self._n_kept] = self._llr[n_bits : self._n_filled].copy()
+        return found

@@ -4,6 +4,7 @@ mcs 4, PDUs 6, PDU length 11, network 3, CRC-8, 6 tail zeros; K=7 rate 1/2; the 
 repeated from the first on until the symbols are full.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -50,16 +51,17 @@ def header_bits(header: BurstHeader, n_coded: int) -> NDArray[np.uint8]:
 
 def parse_header(likeliest: NDArray[np.uint8], llr: NDArray[np.int16]) -> BurstHeader | None:
     """The header in `likeliest` `[4]`, or in other likely words of its LLRs `[76]`; or None."""
-    header = _checked(likeliest)
+    header = _checked(likeliest.tobytes())
     if header is not None:
         return header
-    candidates = map(_checked, decode_list(llr, N_BITS // 8, N_CANDIDATES))
+    words = decode_list(llr, N_BITS // 8, N_CANDIDATES)
+    candidates = (_checked(octets.tobytes()) for octets in words)
     return next((header for header in candidates if header is not None), None)
 
 
-def _checked(octets: NDArray[np.uint8]) -> BurstHeader | None:
-    """The header in `octets` `[4]`; None when its check fails or it makes no sense."""
-    data = octets.tobytes()
+@lru_cache(maxsize=256)
+def _checked(data: bytes) -> BurstHeader | None:
+    """The header in four octets; None when its check fails or it makes no sense."""
     if crc8(data[:3]) != data[3]:
         return None
     fields = int.from_bytes(data[:3], "big")

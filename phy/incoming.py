@@ -1,37 +1,64 @@
 """A burst while it is being received."""
 
 import math
-from dataclasses import dataclass
 
 from phy.acquisition import Acquired
-from phy.demodulation import PduDecoder
 from phy.estimation import tones
 from phy.kernels.demodulator import slip
 from phy.kernels.tracking import SLOPE
+from phy.layout import BurstLayout
 from phy.numerology import Numerology
 
+SLIP_EVERY = 256
+"""Every so many payload symbols, the FFT windows follow the sender's clock."""
 
-@dataclass(slots=True)
+
 class IncomingBurst:
     """Where its symbols are, and what has become of its PDUs so far."""
 
-    acquired: Acquired
-    decoder: PduDecoder
-    n_symbol: int
-    n_symbols_in: int = 0
-    n_good: int = 0
-    n_bad: int = 0
-    slipped: int = 0
+    def __init__(self, acquired: Acquired, plan: BurstLayout, grid: Numerology) -> None:
+        self.acquired = acquired
+        self.plan = plan
+        self.n_symbols_in = self.n_good = self.n_bad = 0
+        self._grid = grid
+        self._n_symbol, self._n_cp = grid.n_symbol, grid.n_cp
+        self._window = acquired.window
+        self._limit = SLIP_EVERY
+        self.next_end = 0
+        """What is there before this sample completes nothing."""
+        self._look_ahead()
 
     def window(self, symbol: int) -> int:
         """Absolute index at which the FFT of a payload symbol begins."""
-        return self.acquired.window + symbol * self.n_symbol + self.slipped
+        return self._window + symbol * self._n_symbol
 
-    def slip(self, grid: Numerology) -> None:
+    def end_of(self, n: int) -> int:
+        """Absolute index after the FFTs of the first `n` payload symbols."""
+        return self._window + n * self._n_symbol - self._n_cp
+
+    def complete(self, end: int) -> tuple[int, int]:
+        """(symbols to take in all, PDUs that they complete) when samples are there up to `end`."""
+        plan, done = self.plan, self.n_good + self.n_bad
+        here = min((end - self.end_of(0)) // self._n_symbol, plan.n_symbols, self._limit)
+        n_pdus = min(here * plan.symbol_bits // plan.coded_bits, plan.n_pdus) - done
+        return (here if here == self._limit else plan.symbols_through(done + n_pdus)), n_pdus
+
+    def go_on(self) -> None:
+        """What there was is taken in."""
+        if self.n_symbols_in == self._limit:
+            self._limit += SLIP_EVERY
+            self._slip()
+        self._look_ahead()
+
+    def _look_ahead(self) -> None:
+        through = self.plan.symbols_through(self.n_good + self.n_bad + 1)
+        self.next_end = self.end_of(min(through, self._limit))
+
+    def _slip(self) -> None:
         """Follow the sender's clock by whole samples, as the slope over carriers tells."""
-        channel = self.acquired.channel
+        channel, grid = self.acquired.channel, self._grid
         slope = float(channel.content.tracking[SLOPE, 0])
         early = round(slope * grid.n_fft / (2 * math.pi))
         if early:
-            self.slipped -= early
+            self._window -= early
             slip(early, tones(grid).words, channel.words)

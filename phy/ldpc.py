@@ -8,21 +8,23 @@ from functools import cache, cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from phy.kernels.ldpc import LdpcWorkspace, decode_blocks
+from phy.kernels.ldpc import Workspace, decode_blocks, new_workspace
 from phy.kernels.ldpc_encoder import encode_blocks
-from phy.kernels.ldpc_rows import N_COLUMNS
+from phy.kernels.ldpc_form import N_COLUMNS, Form
+from phy.kernels.parcel import Parcel
 from phy.ldpc_80211n import BASE
 
 LIFTINGS = (27, 54, 81)
 MAX_ITERATIONS = 60
 
 __all__ = [
-    "LdpcWorkspace",
     "QuasiCyclic",
     "Segmentation",
+    "Workspace",
     "decode",
     "encode",
     "least_coded",
+    "new_workspace",
     "segmentation",
 ]
 
@@ -99,6 +101,22 @@ class Segmentation:
         parity = _shares(self.n_coded - self.n_bits, self.n_codewords)
         return np.concatenate(([0], np.cumsum(self.shares + parity))).astype(np.int32)
 
+    @cached_property
+    def parcel(self) -> Parcel[Form]:
+        """The same for the kernels."""
+        code = self.code
+        return Parcel(
+            Form(
+                z=code.z,
+                middle=code.middle,
+                row_ends=code.row_ends,
+                columns=code.columns,
+                shifts=code.shifts,
+                shares=self.shares,
+                ends=self.ends,
+            )
+        )
+
 
 def least_coded(n_bits: int, rate: Fraction) -> int:
     """Bits that a block of `n_bits` takes at `rate`."""
@@ -129,30 +147,25 @@ def _shares(n: int, n_codewords: int) -> NDArray[np.int32]:
 
 def encode(bits: NDArray[np.uint8], form: Segmentation) -> NDArray[np.uint8]:
     """Coded bits `[blocks, n_coded]` of blocks of bits `[blocks, n_bits]`."""
-    code = form.code
     out = np.empty((len(bits), form.n_coded), np.uint8)
-    encode_blocks(
-        bits, code.z, code.row_ends, code.columns, code.shifts, code.middle,
-        form.shares, form.ends, out,
-    )  # fmt: skip
+    encode_blocks(bits, form.parcel.words, out)
     return out
 
 
 def decode(
     llr: NDArray[np.int16],
     form: Segmentation,
-    work: LdpcWorkspace,
+    work: Parcel[Workspace],
     max_iterations: int = MAX_ITERATIONS,
+    white: NDArray[np.uint8] | None = None,
 ) -> NDArray[np.uint8]:
-    """The likeliest bytes `[blocks, n_bits / 8]` behind LLRs `[blocks, n_coded]`, positive for 0.
+    """The likeliest bytes `[blocks, n_bits / 8]` behind LLRs `[blocks · n_coded]`, positive for 0.
 
-    A block whose checks do not hold after `max_iterations` is given as it stands then.
+    A block whose checks do not hold after `max_iterations` is given as it stands then. The bytes of
+    all are XORed with `white`.
     """
-    code = form.code
-    out = np.empty((len(llr), form.n_bits // 8), np.uint8)
-    decode_blocks(
-        llr, code.z, code.row_ends, code.columns, code.shifts, code.middle,
-        form.shares, form.ends, max_iterations,
-        work.llr, work.posteriors, work.messages, work.told, work.scratch, out,
-    )  # fmt: skip
+    out = np.empty((llr.size // form.n_coded, form.n_bits // 8), np.uint8)
+    if white is None:
+        white = np.zeros(out.size, np.uint8)
+    decode_blocks(llr.reshape(-1), max_iterations, form.parcel.words, work.words, white, out)
     return out

@@ -1,4 +1,4 @@
-"""Coded bits to the carriers of OFDM symbols: interleaver, constellation, pilots."""
+"""Coded bits to the carriers of OFDM symbols: interleaver, constellation, pilots, FFT."""
 
 from functools import cache
 
@@ -7,40 +7,64 @@ from numpy.typing import NDArray
 
 from phy import interleaver
 from phy.constellation import Modulation, points
+from phy.estimation import tones
+from phy.kernels import modulator as kernel
 from phy.kernels.burst import Axes
+from phy.kernels.lanes import whole_lanes
+from phy.kernels.ldpc_form import Form
+from phy.kernels.modulator import Map
 from phy.kernels.parcel import Parcel
-from phy.kernels.symbols import map_bits
 from phy.numerology import Numerology
-from phy.sequences import polarity
+from phy.sequences import PADDING
 
 
 class Mapping:
     """The tables of one modulation on one grid."""
 
     def __init__(self, modulation: Modulation, grid: Numerology) -> None:
-        self.modulation = modulation
         self.grid = grid
         self.symbol_bits = grid.n_data * modulation.bits
         self.order = interleaver.order(self.symbol_bits, modulation.bits)
-        self._points = points(modulation)
-        self._data_bins = grid.bins[grid.data_at]
-        self._pilot_bins = grid.bins[grid.pilots_at]
-
-    def to_spectrum(self, coded: NDArray[np.uint8], first_symbol: int) -> NDArray[np.complex64]:
-        """FFT bins `[n, n_fft]` of coded bits `[n · symbol_bits]`, the header's symbol being 0."""
-        n_symbols = len(coded) // self.symbol_bits
-        spectrum = np.zeros((n_symbols, self.grid.n_fft), np.complex64)
-        map_bits(
-            coded,
-            self.order,
-            self._points,
-            self._data_bins,
-            self._pilot_bins,
-            self.grid.pilot_values,
-            polarity(n_symbols, first_symbol),
-            spectrum,
+        table = points(modulation)
+        self._map = Parcel(
+            Map(
+                bits=modulation.bits,
+                source=np.argsort(self.order).astype(np.uint32),
+                real=table.real.copy(),
+                imag=table.imag.copy(),
+            )
         )
-        return spectrum
+
+    def to_tones(self, coded: NDArray[np.uint8], first_symbol: int) -> NDArray[np.float32]:
+        """Tones `[n, 2, width]` of coded bits `[n · symbol_bits]`, the header's symbol being 0."""
+        n_symbols, width = len(coded) // self.symbol_bits, whole_lanes(self.grid.n_used)
+        out = np.empty((n_symbols, 2, width), np.float32)
+        kernel.map_bits(coded, first_symbol, tones(self.grid).words, self._map.words, out)
+        return out
+
+    def to_samples(
+        self, coded: NDArray[np.uint8], first_symbol: int, peak: float
+    ) -> NDArray[np.complex64]:
+        """Samples `[n · n_symbol]` of the same, at mean power 1, none beyond `peak`."""
+        grid = self.grid
+        out = np.empty(len(coded) // self.symbol_bits * grid.n_symbol, np.complex64)
+        kernel.modulate_bits(coded, first_symbol, peak, tones(grid).words, self._map.words, out)
+        return out
+
+    def modulate(
+        self,
+        blocks: NDArray[np.uint8],
+        n_blocks: int,
+        form: Parcel[Form],
+        first_symbol: int,
+        peak: float,
+        out: NDArray[np.complex64],
+    ) -> None:
+        """The same of `n_blocks` blocks of bytes, coded by `form`; `out` are whole symbols."""
+        kernel.modulate(
+            blocks, n_blocks, PADDING, first_symbol, peak,
+            form.words, tones(self.grid).words, self._map.words, out,
+        )  # fmt: skip
 
 
 @cache

@@ -27,6 +27,11 @@ class Mcs:
         return _PEAKS_DB[self.modulation]
 
     @property
+    def peak(self) -> float:
+        """The same as a factor of the mean amplitude."""
+        return float(10 ** (self.peak_db / 20))
+
+    @property
     def bits_per_carrier(self) -> Fraction:
         """Information bits on one data carrier."""
         return self.modulation.bits * self.rate

@@ -17,11 +17,10 @@ from phy.acquisition import Acquired, Acquisition, Missed, before, needed_after
 from phy.constellation import Modulation
 from phy.demodulation import Demodulator, PduDecoder
 from phy.header import N_NETWORKS, n_symbols
-from phy.incoming import IncomingBurst
+from phy.incoming import SLIP_EVERY, IncomingBurst
 from phy.kernels.acquisition import BACKOFF
 from phy.kernels.detector import FORGETS, HISTORY, search, strongest
 from phy.layout import layout
-from phy.ldpc import LdpcWorkspace
 from phy.numerology import OFDM_64_16, Numerology
 from phy.quality import BurstOver, Event, PduHeard
 from phy.stream import SampleStream
@@ -40,8 +39,6 @@ RETRY_AFTER = 16
 PIECE = 1 << 13
 # A PDU fails with less than this share of the burst's power above the noise: the burst is gone.
 _FADED = 0.25
-# Every so many payload symbols, the FFT windows follow the sender's clock.
-SLIP_EVERY = 256
 
 
 class Receiver:
@@ -71,7 +68,7 @@ class Receiver:
         self._acquisition = Acquisition(grid, max_frequency, carrier_cycles)
         self._demodulator = Demodulator(grid)
         self._powers = np.empty(SLIP_EVERY, np.float32)
-        self._workspace = LdpcWorkspace()
+        self._decoder = PduDecoder()
         self._work = np.zeros((7, HISTORY + HOP), np.float32)
         self._n_header = n_symbols(grid)
         self._dc = np.zeros(3)
@@ -203,16 +200,12 @@ class Receiver:
         self.counters["preambles"] += 1
         told = found.header
         plan = layout(self._grid, told.mcs, told.n_pdus, told.pdu_bytes)
-        self._burst = IncomingBurst(
-            found,
-            PduDecoder(plan, self._workspace),
-            self._grid.n_symbol,
-        )
-        end = self._burst.window(plan.n_symbols) - self._grid.n_cp + BACKOFF
-        self.carrier = (found.quality.start, end)
+        burst = self._burst = IncomingBurst(found, plan, self._grid)
+        self._decoder.start(plan)
+        self.carrier = (found.quality.start, burst.end_of(plan.n_symbols) + BACKOFF)
         if self._network is not None and told.network != self._network:
             # Searched on, not skipped: a header that lies must not make us deaf.
-            self._end(self._burst, events, "foreign")
+            self._end(burst, events, "foreign")
         else:
             self.counters["bursts"] += 1
             self._at = found.window
@@ -220,64 +213,52 @@ class Receiver:
 
     def _payload(self, burst: IncomingBurst, events: list[Event]) -> bool:
         """The symbols that complete PDUs, or those up to where the windows may slip."""
-        plan, found = burst.decoder.layout, burst.acquired
-        first_symbol = burst.n_symbols_in
-        last, n_pdus = self._complete(burst)
-        if last == first_symbol:
+        if self._stream.end < burst.next_end:
             return False
-        first, n = burst.window(first_symbol), last - first_symbol
+        plan, found, first = burst.plan, burst.acquired, burst.n_symbols_in
+        last, n_pdus = burst.complete(self._stream.end)
+        begin, n = burst.window(first), last - first
         points = None
         if self._on_points is not None:
             points = np.empty((n, self._grid.n_data), np.complex64)
         self._demodulator.demodulate(
-            self._stream.view(first, burst.window(last) - self._grid.n_cp),
+            self._stream.view(begin, burst.end_of(last)),
             found.frequency,
             self._dc_value,
-            first - found.origin,
+            begin - found.origin,
             plan.mcs.modulation,
             found.channel,
-            self._n_header + first_symbol,
-            burst.decoder.room(n),
+            self._n_header + first,
+            self._decoder.room(n),
             self._powers,
             points,
         )
         if self._on_points is not None and points is not None:
             self._on_points(points, plan.mcs.modulation)
-        for data in burst.decoder.decode(n_pdus):
+        for data in self._decoder.decode(n_pdus):
             number = burst.n_good + burst.n_bad
             through = plan.symbols_through(number + 1)
-            own = slice(max(0, burst.n_symbols_in - first_symbol), through - first_symbol)
-            burst.n_symbols_in = through
             if data is not None:
                 burst.n_good += 1
                 self.counters["pdus_good"] += 1
-                end = burst.window(through) - self._grid.n_cp + BACKOFF
-                events.append(PduHeard(data, number, end, found.quality))
-                continue
-            burst.n_bad += 1
-            self.counters["pdus_bad"] += 1
-            if number + 1 < plan.n_pdus and self._is_gone(self._powers[own], found):
-                self._end(burst, events, "faded")
-                return True
+                at = burst.end_of(through) + BACKOFF
+                events.append(PduHeard(data, number, at, found.quality))
+            else:
+                burst.n_bad += 1
+                self.counters["pdus_bad"] += 1
+                own = self._powers[max(0, burst.n_symbols_in - first) : through - first]
+                if number + 1 < plan.n_pdus and self._is_gone(own, found):
+                    burst.n_symbols_in = through
+                    self._end(burst, events, "faded")
+                    return True
+            burst.n_symbols_in = through
         burst.n_symbols_in = last
-        self._at = burst.window(last) - self._grid.n_cp
+        self._at = burst.end_of(last)
         if burst.n_good + burst.n_bad == plan.n_pdus:
             self._end(burst, events, "whole")
-        elif last % SLIP_EVERY == 0:
-            burst.slip(self._grid)
+        else:
+            burst.go_on()
         return True
-
-    def _complete(self, burst: IncomingBurst) -> tuple[int, int]:
-        """(symbols to take in all, PDUs they complete), with the samples that are there."""
-        plan, grid = burst.decoder.layout, self._grid
-        here = (self._stream.end - burst.window(0) + grid.n_cp) // grid.n_symbol
-        here = min(here, plan.n_symbols)
-        limit = (burst.n_symbols_in // SLIP_EVERY + 1) * SLIP_EVERY
-        done = burst.n_good + burst.n_bad
-        n_pdus = min(min(here, limit) * plan.symbol_bits // plan.coded_bits, plan.n_pdus) - done
-        if here >= limit:
-            return limit, n_pdus
-        return (plan.symbols_through(done + n_pdus), n_pdus) if n_pdus else (burst.n_symbols_in, 0)
 
     def _is_gone(self, powers: NDArray[np.float32], found: Acquired) -> bool:
         channel = found.channel.content
@@ -288,7 +269,7 @@ class Receiver:
         if ending != "whole":
             self.counters[f"bursts_{ending}"] += 1
         events.append(BurstOver(burst.acquired.quality, burst.n_good, ending))
-        self._at = burst.window(burst.n_symbols_in) - self._grid.n_cp
+        self._at = burst.end_of(burst.n_symbols_in)
 
     @property
     def _dc_value(self) -> complex:

@@ -6,17 +6,16 @@ from functools import cache, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from phy import header, ofdm, preamble
+from phy import header, preamble
 from phy.constellation import Modulation
 from phy.crc import with_crc32
 from phy.header import N_NETWORKS, BurstHeader, header_bits
 from phy.kernels.acquisition import BACKOFF
 from phy.layout import layout
-from phy.ldpc import encode
 from phy.mapping import mapping
 from phy.mcs import HEADER_MCS, MCS_TABLE
 from phy.numerology import OFDM_64_16, Numerology
-from phy.sequences import PADDING, whitening
+from phy.sequences import whitening
 
 # Samples over which a burst begins and ends: at its end, what no FFT window holds.
 _RISE, _FALL = 8, BACKOFF
@@ -54,18 +53,14 @@ class Transmitter:
         if len(sizes) > 1:
             raise ValueError(f"bytes of a PDU: got {sizes}; allowed: one size in a burst")
         blocks = np.frombuffer(b"".join(map(with_crc32, pdus)), np.uint8)
-        white = (blocks ^ whitening(len(blocks))).reshape(plan.n_pdus, plan.block_bytes)
-        coded = encode(np.unpackbits(white, axis=1), plan.form).reshape(-1)
-        n_padding = plan.n_symbols * plan.symbol_bits - len(coded)
-        coded = np.concatenate((coded, PADDING[:n_padding]))
-        first = header.n_symbols(self._grid)
-        spectrum = mapping(plan.mcs.modulation, self._grid).to_spectrum(coded, first)
         told = BurstHeader(mcs, plan.n_pdus, plan.pdu_bytes, self._network)
         burst = np.empty(plan.n_samples, np.complex64)
         opening = _opening(told, self._grid, self._boost)
         burst[: len(opening)] = opening
         payload = burst[len(opening) :]
-        ofdm.to_samples(spectrum, self._grid, 10 ** (plan.mcs.peak_db / 20), payload)
+        by, first = mapping(plan.mcs.modulation, self._grid), header.n_symbols(self._grid)
+        white = blocks ^ whitening(len(blocks))
+        by.modulate(white, plan.n_pdus, plan.form.parcel, first, plan.mcs.peak, payload)
         payload[-_FALL:] *= _ramp(_FALL)[::-1]
         return burst
 
@@ -86,11 +81,5 @@ def _ramp(n: int) -> NDArray[np.float32]:
 
 def header_samples(told: BurstHeader, grid: Numerology) -> NDArray[np.complex64]:
     """The header as it leaves, its peaks cut off `[n · n_symbol]`."""
-    spectrum = header_spectrum(told, grid)
-    return ofdm.to_samples(spectrum, grid, 10 ** (MCS_TABLE[HEADER_MCS].peak_db / 20))
-
-
-def header_spectrum(told: BurstHeader, grid: Numerology) -> NDArray[np.complex64]:
-    """FFT bins of the header's symbols `[n, n_fft]`."""
     coded = header_bits(told, header.n_symbols(grid) * grid.n_data)
-    return mapping(Modulation.BPSK, grid).to_spectrum(coded, 0)
+    return mapping(Modulation.BPSK, grid).to_samples(coded, 0, MCS_TABLE[HEADER_MCS].peak)

@@ -10,7 +10,7 @@ Samples lie in two rows, real and imaginary parts, so that loops are vectorised.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from phy.kernels.burst import Planes, Row, open_axes, open_channel, open_scratch, open_tones
 from phy.kernels.equaliser import equalise, renew, start_tracking
 from phy.kernels.fft import windows_to_tones
+from phy.kernels.inline import step
 from phy.kernels.lanes import N_LANES, Lanes, load, splat, store, total
 from phy.kernels.parcel import opener
 from phy.kernels.tracking import PHASE
@@ -26,6 +27,9 @@ from phy.kernels.training import estimate, learn, turn_back
 from phy.kernels.viterbi import MAX_LLR, decode_block
 
 Words = NDArray[np.int64]
+
+# A literal would have its callee compiled for it alone.
+_0: Any = np.int64(0)
 
 SEARCH = 24
 """The first long symbol is looked for this many samples around where the peak puts it."""
@@ -115,7 +119,7 @@ def correlate(planes: Planes, templates: NDArray[np.complex64], out: NDArray[np.
             store(out, a * n_out + o, strength)
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def _match(planes: Planes, at: int, template: NDArray[np.complex64]) -> tuple[Lanes, Lanes]:
     """Σ_m z[o + m] t*[m] for the eight offsets from `at` on."""
     size = planes.shape[1]
@@ -174,7 +178,7 @@ def refine(training: Training, h: Planes, room: Room) -> float:
     n_segments, begin = training.cover.size, training.windows[0]
     n_parts, n_fft = training.turns.shape[0], training.templates.shape[1]
     for s in range(n_segments):
-        _agree(room, _SEGMENT * s + FIRST_CLEAN, 0, training.cover[s], s)
+        _agree(room, _SEGMENT * s + FIRST_CLEAN, _0, training.cover[s], s)
     for part in range(n_parts - n_segments):
         at = part * PART
         _agree(room, begin + at, _SEGMENT + at % n_fft, np.float32(1), n_segments + part)
@@ -266,15 +270,15 @@ def acquire(
     burst = x[begin : begin + windows[-1] + tones.n_fft]
     turn_back(burst[: windows[1] + tones.n_fft], dc, frequency, planes)
     amplitude = np.ones(2, np.float32)
-    windows_to_tones(burst, windows[:2], frequency, dc, 0, tones, scratch, y)
+    windows_to_tones(burst, windows[:2], frequency, dc, _0, tones, scratch, y)
     estimate(y, amplitude, training.long, tones, channel, scratch)
     frequency += refine(training, channel.h, room)
-    windows_to_tones(burst, windows, frequency, dc, 0, tones, scratch, y)
+    windows_to_tones(burst, windows, frequency, dc, _0, tones, scratch, y)
     estimate(y, amplitude, training.long, tones, channel, scratch)
     clock_error = frequency / carrier_cycles if carrier_cycles else 0.0
     start_tracking(tones, channel, clock_error, carrier_cycles > 0)
     n_header = room.points.shape[0]
-    equalise(y[2:], n_header, 0, tones, axes, channel, scratch, room.points, room.llr, 0)
+    equalise(y[2:], n_header, _0, tones, axes, channel, scratch, room.points, room.llr, _0)
     fold(room.llr, room.folded)
     decode_block(room.folded, room.decisions, room.octets)
     return begin + BACKOFF, frequency

@@ -8,6 +8,8 @@ from numba import njit, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from phy.kernels.inline import step
+
 Words = NDArray[np.uint64]
 
 ONE = np.uint64(1)
@@ -72,13 +74,29 @@ def put_signs(values: NDArray[np.int16], first: int, n: int, out: Words, at: int
         put(out, at + i, np.uint64(values[first + i] < 0), 1)
 
 
+@step
+def _turned(word: np.uint64) -> np.uint64:
+    """The bits of each byte the other way round."""
+    for step_bits, mask in _TURNS:
+        kept = np.uint64(mask)
+        word = (word >> np.uint64(step_bits)) & kept | (word & kept) << np.uint64(step_bits)
+    return word
+
+
 @njit(nogil=True, cache=True)
 def to_octets(words: Words, out: NDArray[np.uint8]) -> None:
     """As bytes, of which the first bit is the highest."""
     for i in range(words.size):
-        word = words[i]
-        for step, mask in _TURNS:
-            kept = np.uint64(mask)
-            word = (word >> np.uint64(step)) & kept | (word & kept) << np.uint64(step)
+        word = _turned(words[i])
         for b in range(min(8, out.size - 8 * i)):
             out[8 * i + b] = np.uint8(word >> np.uint64(8 * b) & np.uint64(255))
+
+
+@njit(nogil=True, cache=True)
+def from_octets(octets: NDArray[np.uint8], out: Words) -> None:
+    """The other way, zeros behind."""
+    for i in range(out.size):
+        word = np.uint64(0)
+        for b in range(min(8, octets.size - 8 * i)):
+            word |= np.uint64(octets[8 * i + b]) << np.uint64(8 * b)
+        out[i] = _turned(word)

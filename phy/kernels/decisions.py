@@ -5,14 +5,14 @@ and R_m = 1. So means follow from the inside out, a bit at a time, with tanh(LLR
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from phy.kernels.demapper import LLR_SCALE
+from phy.kernels.inline import step
 from phy.kernels.lanes import Lanes, least, load, most, splat
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def expected_level(
     llr: NDArray[np.float32], axis_bits: int, at: int, stride: int
 ) -> tuple[Lanes, Lanes]:
@@ -28,7 +28,7 @@ def expected_level(
     return -_tanh(load(llr, at) * scale) * mean, square
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def _tanh(x: Lanes) -> Lanes:
     """To 2 %."""
     x = least(most(x, splat(-3)), splat(3))

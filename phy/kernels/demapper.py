@@ -1,9 +1,9 @@
 """Points to LLRs: exact max-log for Gray-coded axes of any size, eight carriers at a time."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from phy.kernels.inline import step
 from phy.kernels.lanes import Lanes, least, magnitude, most, splat, store, with_sign
 from phy.kernels.viterbi import MAX_LLR
 
@@ -11,7 +11,7 @@ LLR_SCALE = 8.0
 """Quantised LLRs are 1/8 each."""
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def axis_llrs(
     level: Lanes, weight: Lanes, axis_bits: int, out: NDArray[np.float32], at: int, stride: int
 ) -> None:

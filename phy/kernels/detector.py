@@ -10,6 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from phy.kernels.inline import step
+
 SEGMENT = 16
 SHORT = 192
 HISTORY = SHORT - 1
@@ -69,14 +71,14 @@ def detector_sums(x: NDArray[np.complex64], dc: complex, work: NDArray[np.float3
         p_re[i], p_im[i], power[i] = a[i], b[i], c[i]
 
 
-@njit(nogil=True, cache=True)
+@step
 def _double(x: NDArray[np.float32], out: NDArray[np.float32], n: int, step: int) -> None:
     later = x[step:]
     for i in range(n - step):
         out[i] = x[i] + later[i]
 
 
-@njit(nogil=True, cache=True)
+@step
 def _despread(q: NDArray[np.float32], out: NDArray[np.float32], n: int) -> None:
     """Σ b_k q[i + 16 k], b = + + + − − − + − − + −."""
     q0, q1, q2, q3 = q, q[16:], q[32:], q[48:]
@@ -154,7 +156,7 @@ def strongest(
     return best, p, abs(plain) / abs(p)
 
 
-@njit(nogil=True, cache=True)
+@step
 def _follow_dc(x: NDArray[np.complex64], dc_state: NDArray[np.float64]) -> None:
     re, im = 0.0, 0.0
     for i in range(x.size):

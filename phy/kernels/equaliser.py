@@ -21,6 +21,7 @@ from phy.kernels.burst import (
 )
 from phy.kernels.decisions import expected_level
 from phy.kernels.demapper import LLR_SCALE, axis_llrs
+from phy.kernels.inline import step
 from phy.kernels.lanes import N_LANES, Lanes, load, splat, store, store_int16, total
 from phy.kernels.rotation import lean, lean_more
 from phy.kernels.smoothing import follow
@@ -43,7 +44,7 @@ _LAG = 0.01
 _SMALL = 0.2
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def _noise(channel: Channel) -> float:
     return float(max(channel.figures[NO], _LEAST_NOISE * channel.figures[GAIN]))
 
@@ -69,7 +70,7 @@ def start_tracking(tones: Tones, channel: Channel, clock_error: float, is_known:
     renew(channel)
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def use_slope(slope: float, tones: Tones, channel: Channel) -> None:
     """Turn carriers back by `slope` from now on."""
     more = channel.figures[SLOPE_USED] - slope
@@ -80,7 +81,7 @@ def use_slope(slope: float, tones: Tones, channel: Channel) -> None:
         lean(-slope, tones.carriers, channel.turns)
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def renew(channel: Channel) -> None:
     """What equalising needs, for the gains as they are."""
     h, inverse, width = channel.h, channel.inverse, channel.certainty.size
@@ -95,7 +96,7 @@ def renew(channel: Channel) -> None:
         store(inverse, width + k, -im * share)
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def _pilots(
     re: Row, im: Row, polarity: float, tones: Tones, channel: Channel, scratch: Scratch
 ) -> float:
@@ -115,7 +116,7 @@ def _pilots(
     return correct(turned, power, carriers, _noise(channel), tracking)
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def _data(
     re: Row, im: Row, c: float, s: float, trust: float, axes: Axes, channel: Channel,
     scratch: Scratch, n: int,
@@ -157,7 +158,7 @@ def _data(
     return float(total(certain)) * unit * unit * trust
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def _learn_pilots(
     re: Row, im: Row, turned_by: complex, trust: float, polarity: float, tones: Tones,
     channel: Channel,
@@ -173,7 +174,7 @@ def _learn_pilots(
         channel.masses[at] += trust
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def _correct_channel(tones: Tones, channel: Channel, scratch: Scratch) -> None:
     """Correct the gains by what the last symbols, as decided, say of them.
 

@@ -6,12 +6,14 @@ vector operations again and again, for 64, 128 and 256 samples alike.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from phy.kernels.burst import Planes, Row, Scratch, Tones
+from phy.kernels.inline import step
 from phy.kernels.lanes import N_LANES, first_halves, load, second_halves, splat, store
 
 
@@ -52,7 +54,7 @@ def eight_windows(
     for m in range(0, n_fft, N_LANES // 2):
         for lane in range(N_LANES):
             store(square, N_LANES * lane, load(flat, 2 * (places[lane] + m)))
-        _transpose(square)
+        transpose(square)
         for i in range(N_LANES // 2):
             a = load(square, 2 * N_LANES * i) - offset_re
             b = load(square, 2 * N_LANES * i + N_LANES) - offset_im
@@ -60,7 +62,7 @@ def eight_windows(
             by_re, by_im = c * begin_re - s * begin_im, c * begin_im + s * begin_re
             store(re, N_LANES * (m + i), a * by_re - b * by_im)
             store(im, N_LANES * (m + i), a * by_im + b * by_re)
-    if _transform(re, im, to_re, to_im, n_fft, tones.twiddles):
+    if transform(re, im, to_re, to_im, n_fft, tones.twiddles):
         re, im = to_re, to_im
     _sort(re, im, n, tones.bins, square, out)
 
@@ -92,8 +94,8 @@ def windows_to_tones(
         eight_windows(samples, places, phases, turn, dc, rows, tones, scratch, out[row:])
 
 
-@njit(nogil=True, forceinline=True)
-def _transpose(square: Row) -> None:
+@step
+def transpose(square: Row) -> None:
     """Eight rows of eight: rows become columns, as cards are shuffled three times."""
     a, b, c, d = load(square, 0), load(square, 8), load(square, 16), load(square, 24)
     e, f, g, h = load(square, 32), load(square, 40), load(square, 48), load(square, 56)
@@ -125,17 +127,18 @@ def _sort(
                 inside = first + i < bins.size
                 value = load(of, N_LANES * bins[first + i]) if inside else splat(0.0)
                 store(square, N_LANES * i, value)
-            _transpose(square)
+            transpose(square)
             for lane in range(n):
                 store(out, (2 * lane + part) * width + first, load(square, N_LANES * lane))
 
 
 @njit(nogil=True, cache=True)
-def _transform(
+def transform(
     re: Row, im: Row, to_re: Row, to_im: Row, n: int, twiddles: NDArray[np.float32]
 ) -> bool:
     """The FFT of lanes `[n · 8]`; True when it is in `to_re`, `to_im`, else in `re`, `im`."""
-    left, stride, swapped = n, 1, False
+    left, swapped = n, False
+    stride: Any = np.int64(1)
     while left >= 4:
         left //= 4
         if swapped:

@@ -153,6 +153,15 @@ def _magnitude(_typing: Any, value: Any) -> Any:
     return LANES(value), generate
 
 
+def _root(_typing: Any, value: Any) -> Any:
+    """The square root in each lane."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
+        return _call(builder, "llvm.sqrt", [args[0]])
+
+    return LANES(value), generate
+
+
 def _with_sign(_typing: Any, value: Any, sign: Any) -> Any:
     """The magnitude of `value` with the sign of `sign`."""
 
@@ -201,6 +210,7 @@ store_int16: Any = intrinsic(_store_int16)
 splat: Any = intrinsic(_splat)
 total: Any = intrinsic(_total)
 magnitude: Any = intrinsic(_magnitude)
+root: Any = intrinsic(_root)
 with_sign: Any = intrinsic(_with_sign)
 least: Any = _extreme("<", "The smaller in each lane.")
 most: Any = _extreme(">", "The larger in each lane.")

@@ -29,66 +29,74 @@ there is. So its information is encoded first, which is cheap, and the parity co
 *Vectors.* A row is written as LLVM vector instructions (`ldpc_rows.py`, which says why).
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from phy.kernels.bits import Words, get, low_ones, put, put_signs, to_octets
 from phy.kernels.ldpc_encoder import parity_of
-from phy.kernels.ldpc_rows import LANES, N_COLUMNS, ldpc_row
+from phy.kernels.ldpc_form import N_COLUMNS, Form, open_form
+from phy.kernels.ldpc_rows import LANES, ldpc_row
+from phy.kernels.parcel import Parcel, opener
 
 SURE = 4000
 """LLR of a bit that is known to be 0."""
 
 
-class LdpcWorkspace:
+class Workspace(NamedTuple):
     """What decoding needs besides its input. One for each thread: the kernels hold no lock."""
 
-    def __init__(self, max_z: int = 81, max_edges: int = 96) -> None:
-        lanes = padded(max_z)
-        self.posteriors = np.zeros((N_COLUMNS, 3 * lanes + 2 * LANES), np.int16)
-        self.messages, self.told = np.zeros((2, max_edges, lanes), np.int16)
-        self.scratch = np.zeros((N_COLUMNS, LANES), np.int16)
-        self.llr = np.zeros(N_COLUMNS * max_z, np.int16)
+    llr: NDArray[np.int16]
+    """Of a whole codeword `[24 Z]`."""
+    posteriors: NDArray[np.int16]
+    messages: NDArray[np.int16]
+    told: NDArray[np.int16]
+    """What checks sent and were told last `[edges, Z up to whole vectors]`."""
+    scratch: NDArray[np.int16]
 
 
-def padded(z: int) -> int:
-    """Z, up to whole vectors."""
-    return -(-z // LANES) * LANES
+open_workspace = opener(Workspace, "i2[1] i2[2] i2[2] i2[2] i2[2]")
+
+
+def new_workspace(max_z: int = 81, max_edges: int = 96) -> Parcel[Workspace]:
+    """Room for codes up to that size."""
+    lanes = -(-max_z // LANES) * LANES
+    return Parcel(
+        Workspace(
+            llr=np.zeros(N_COLUMNS * max_z, np.int16),
+            posteriors=np.zeros((N_COLUMNS, 3 * lanes + 2 * LANES), np.int16),
+            messages=np.zeros((max_edges, lanes), np.int16),
+            told=np.zeros((max_edges, lanes), np.int16),
+            scratch=np.zeros((N_COLUMNS, LANES), np.int16),
+        )
+    )
 
 
 @njit(nogil=True, cache=True)
 def decode_codeword(
-    llr: NDArray[np.int16],
-    z: int,
-    row_ends: NDArray[np.int32],
-    columns: NDArray[np.int32],
-    shifts: NDArray[np.int32],
-    max_iterations: int,
-    posteriors: NDArray[np.int16],
-    messages: NDArray[np.int16],
-    told: NDArray[np.int16],
-    scratch: NDArray[np.int16],
+    llr: NDArray[np.int16], form: Form, max_iterations: int, work: Workspace
 ) -> int:
     """Iterations until all checks held, 0 if they never did; the bits are posteriors' signs.
 
-    `llr` `[24 z]`, positive for 0; edges `columns`, `shifts` `[edges]`, of row r up to
-    `row_ends[r + 1]`.
+    `llr` `[24 z]`, positive for 0.
     """
+    z, row_ends, posteriors = form.z, form.row_ends, work.posteriors
     lanes = -(-z // LANES) * LANES
     for column in range(N_COLUMNS):
         for i in range(z):
             posteriors[column, i] = llr[column * z + i]
         for i in range(z, 2 * lanes):
             posteriors[column, i] = posteriors[column, i - z]
-    messages[:] = 0
-    told[:] = 0
+    work.messages[:] = 0
+    work.told[:] = 0
     for iteration in range(max_iterations):
         odd = 0
         for row in range(row_ends.size - 1):
-            first, last = np.int64(row_ends[row]), np.int64(row_ends[row + 1])
             odd |= ldpc_row(
-                posteriors, messages, told, scratch, columns, shifts, first, last, z
+                posteriors, work.messages, work.told, work.scratch, form.columns, form.shifts,
+                np.int64(row_ends[row]), np.int64(row_ends[row + 1]), z,
             )  # fmt: skip
         if odd == 0:
             return iteration + 1
@@ -98,59 +106,51 @@ def decode_codeword(
 @njit(nogil=True, cache=True)
 def decode_blocks(
     llr: NDArray[np.int16],
-    z: int,
-    row_ends: NDArray[np.int32],
-    columns: NDArray[np.int32],
-    shifts: NDArray[np.int32],
-    middle: int,
-    shares: NDArray[np.int32],
-    ends: NDArray[np.int32],
     max_iterations: int,
-    whole: NDArray[np.int16],
-    posteriors: NDArray[np.int16],
-    messages: NDArray[np.int16],
-    told: NDArray[np.int16],
-    scratch: NDArray[np.int16],
+    form_in: NDArray[np.int64],
+    work_in: NDArray[np.int64],
+    white: NDArray[np.uint8],
     out: NDArray[np.uint8],
 ) -> None:
-    """The other way round, packed in bytes: `out` `[blocks, n_bits / 8]`.
+    """LLRs of blocks, one after another, to their bytes, less `white`: `out` `[blocks, bytes]`.
 
     What was not sent is known to be 0 (information) or not at all.
     """
-    n_rows = row_ends.size - 1
+    form, work = open_form(form_in), open_workspace(work_in)
+    z, shares, ends = form.z, form.shares, form.ends
+    n_rows = form.row_ends.size - 1
     n_info = (N_COLUMNS - n_rows) * z
-    codeword = whole[: N_COLUMNS * z]
+    codeword = work.llr[: N_COLUMNS * z]
     bits, sent = np.empty(n_info // 64 + 2, np.uint64), np.empty(n_rows * z // 64 + 2, np.uint64)
     parity = np.empty((n_rows, 2), np.uint64)
     decided = np.empty(out.shape[1] // 8 + 2, np.uint64)
-    for block in range(llr.shape[0]):
-        at, row = 0, llr[block]
+    for block in range(out.shape[0]):
+        at, first_llr = 0, block * ends[-1]
         decided[:] = 0
         for number in range(shares.size):
-            share, begin, end = shares[number], ends[number], ends[number + 1]
-            middle_at = begin + share
+            share, begin, end = shares[number], first_llr + ends[number], ends[number + 1]
+            middle, end = begin + share, first_llr + end
             bits[:] = 0
-            put_signs(row, begin, share, bits, 0)
+            put_signs(llr, begin, share, bits, 0)
             sent[:] = 0
-            put_signs(row, middle_at, end - middle_at, sent, 0)
-            parity_of(bits, z, row_ends, columns, shifts, middle, parity)
-            if not _begins_with(parity, sent, z, end - middle_at):
-                codeword[:share] = row[begin:middle_at]
+            put_signs(llr, middle, end - middle, sent, 0)
+            parity_of(bits, form, parity)
+            if not _begins_with(parity, sent, z, end - middle):
+                codeword[:share] = llr[begin:middle]
                 codeword[share:n_info] = SURE
-                codeword[n_info : n_info + end - middle_at] = row[middle_at:end]
-                codeword[n_info + end - middle_at :] = 0
-                decode_codeword(
-                    codeword, z, row_ends, columns, shifts, max_iterations,
-                    posteriors, messages, told, scratch,
-                )  # fmt: skip
+                codeword[n_info : n_info + end - middle] = llr[middle:end]
+                codeword[n_info + end - middle :] = 0
+                decode_codeword(codeword, form, max_iterations, work)
                 bits[:] = 0
                 for column in range(-(-share // z)):
                     first = column * z
-                    put_signs(posteriors[column], 0, min(z, share - first), bits, first)
+                    put_signs(work.posteriors[column], 0, min(z, share - first), bits, first)
             for i in range(0, share, 64):
                 put(decided, at + i, bits[i >> 6], min(64, share - i))
             at += share
         to_octets(decided, out[block])
+        for i in range(out.shape[1]):
+            out[block, i] ^= white[block * out.shape[1] + i]
 
 
 @njit(nogil=True, cache=True)

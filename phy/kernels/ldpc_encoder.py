@@ -8,13 +8,14 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.bits import ONE, Words, get, low_ones
-from phy.kernels.ldpc_rows import N_COLUMNS
+from phy.kernels.bits import ONE, Words, from_octets, get, low_ones
+from phy.kernels.inline import step
+from phy.kernels.ldpc_form import N_COLUMNS, Form, open_form
 
 _63 = np.uint64(63)
 
 
-@njit(nogil=True, cache=True)
+@step
 def _repeat(low: np.uint64, high: np.uint64, z: int, out: Words) -> None:
     """The `z` bits of `low` and `high`, and after them the same again; `out` `[5]`."""
     word, bit = z >> 6, np.uint64(z & 63)
@@ -29,7 +30,7 @@ def _repeat(low: np.uint64, high: np.uint64, z: int, out: Words) -> None:
     out[word + 2] |= high >> ONE >> rest
 
 
-@njit(nogil=True, cache=True)
+@step
 def _part(repeated: Words, first: int) -> np.uint64:
     """The 64 bits from `first` on."""
     word, bit = first >> 6, np.uint64(first & 63)
@@ -38,20 +39,13 @@ def _part(repeated: Words, first: int) -> np.uint64:
 
 
 @njit(nogil=True, cache=True)
-def parity_of(
-    bits: Words,
-    z: int,
-    row_ends: NDArray[np.int32],
-    columns: NDArray[np.int32],
-    shifts: NDArray[np.int32],
-    middle: int,
-    parity: Words,
-) -> None:
+def parity_of(bits: Words, form: Form, parity: Words) -> None:
     """The parity `[rows, 2]` of the information `bits` `[K z / 64 + 1]`, a row for each block.
 
     Parity columns 1, 2, … are a staircase; column 0 has three blocks, in the first and last row
     with shift 1 and in row `middle` with 0. In the sum of all rows only the latter remains.
     """
+    z, row_ends, columns, shifts = form.z, form.row_ends, form.columns, form.shifts
     n_rows = parity.shape[0]
     n_info = N_COLUMNS - n_rows
     low_mask, high_mask = low_ones(min(z, 64)), low_ones(max(z - 64, 0))
@@ -82,40 +76,71 @@ def parity_of(
         parity[row, 0], parity[row, 1] = low, high
         low ^= sums[row, 0]
         high ^= sums[row, 1]
-        if row == middle:
+        if row == form.middle:
             low ^= first_low
             high ^= first_high
 
 
+@step
+def unpack(words: Words, n: int, out: NDArray[np.uint8], at: int) -> None:
+    """The first `n` bits of `words`, one in each of `out` from `at` on."""
+    for i in range(n):
+        out[at + i] = words[i >> 6] >> np.uint64(i & 63) & ONE
+
+
+@njit(nogil=True, cache=True)
+def encode_codeword(
+    bits: Words, number: int, form: Form, parity: Words, out: NDArray[np.uint8], at: int
+) -> None:
+    """Coded bits of the `number`-th codeword of a block from `out[at]` on: `bits`, then parity.
+
+    `bits` are zero beyond its share of the block, `parity` `[rows, 2]` is room.
+    """
+    z, share = form.z, form.shares[number]
+    n_parity = form.ends[number + 1] - form.ends[number] - share
+    unpack(bits, share, out, at)
+    parity_of(bits, form, parity)
+    for row in range(parity.shape[0]):
+        first = row * z
+        unpack(parity[row], min(z, n_parity - first), out, at + share + first)
+
+
 @njit(nogil=True, cache=True)
 def encode_blocks(
-    blocks: NDArray[np.uint8],
-    z: int,
-    row_ends: NDArray[np.int32],
-    columns: NDArray[np.int32],
-    shifts: NDArray[np.int32],
-    middle: int,
-    shares: NDArray[np.int32],
-    ends: NDArray[np.int32],
-    out: NDArray[np.uint8],
+    blocks: NDArray[np.uint8], form_in: NDArray[np.int64], out: NDArray[np.uint8]
 ) -> None:
-    """Each block in codewords of `shares` bits; with parity, each goes up to its of `ends`."""
-    n_rows = row_ends.size - 1
-    bits = np.empty((N_COLUMNS - n_rows) * z // 64 + 2, np.uint64)
+    """Coded bits `[blocks, n_coded]` of `blocks` of bits `[blocks, n_bits]`."""
+    form = open_form(form_in)
+    n_rows = form.row_ends.size - 1
+    bits = np.empty((N_COLUMNS - n_rows) * form.z // 64 + 2, np.uint64)
     parity = np.empty((n_rows, 2), np.uint64)
     for block in range(blocks.shape[0]):
         at = 0
-        for number in range(shares.size):
-            share, end = shares[number], ends[number + 1]
-            middle_at = ends[number] + share
+        for number in range(form.shares.size):
+            share = form.shares[number]
             bits[:] = 0
             for i in range(share):
-                bit = blocks[block, at + i]
-                bits[i >> 6] |= np.uint64(bit) << np.uint64(i & 63)
-                out[block, ends[number] + i] = bit
+                bits[i >> 6] |= np.uint64(blocks[block, at + i]) << np.uint64(i & 63)
             at += share
-            parity_of(bits, z, row_ends, columns, shifts, middle, parity)
-            for row in range(n_rows):
-                first = middle_at + row * z
-                for i in range(min(z, end - first)):
-                    out[block, first + i] = parity[row, i >> 6] >> np.uint64(i & 63) & ONE
+            encode_codeword(bits, number, form, parity, out[block], int(form.ends[number]))
+
+
+@njit(nogil=True, cache=True)
+def encode_octets(
+    octets: NDArray[np.uint8], n_blocks: int, form: Form, out: NDArray[np.uint8]
+) -> None:
+    """Coded bits of blocks of bytes, one after another."""
+    n_rows, n_octets = form.row_ends.size - 1, octets.size // n_blocks
+    whole = np.empty(n_octets // 8 + 2, np.uint64)
+    bits = np.empty((N_COLUMNS - n_rows) * form.z // 64 + 2, np.uint64)
+    parity = np.empty((n_rows, 2), np.uint64)
+    for block in range(n_blocks):
+        at, to = 0, block * form.ends[-1]
+        from_octets(octets[block * n_octets : (block + 1) * n_octets], whole)
+        for number in range(form.shares.size):
+            share = form.shares[number]
+            bits[:] = 0
+            for i in range(0, share, 64):
+                bits[i >> 6] = get(whole, at + i, min(64, share - i))
+            at += share
+            encode_codeword(bits, number, form, parity, out, int(to + form.ends[number]))

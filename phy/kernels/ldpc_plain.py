@@ -5,25 +5,22 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from phy.kernels.ldpc_rows import MAX_MAGNITUDE, MAX_POSTERIOR, N_COLUMNS, WEIGHT
+from phy.kernels.ldpc_form import N_COLUMNS, Form
+from phy.kernels.ldpc_rows import MAX_MAGNITUDE, MAX_POSTERIOR, WEIGHT
 
 
 def decode_codeword_plain(
-    llr: NDArray[np.int16],
-    z: int,
-    row_ends: NDArray[np.int32],
-    columns: NDArray[np.int32],
-    shifts: NDArray[np.int32],
-    max_iterations: int,
+    llr: NDArray[np.int16], form: Form, max_iterations: int
 ) -> tuple[int, NDArray[np.int32]]:
     """(iterations until all checks held or 0, posteriors `[24, z]`)."""
+    z, columns, shifts = form.z, form.columns, form.shifts
     posteriors = llr.reshape(N_COLUMNS, z).astype(np.int32)
     messages, told = np.zeros((2, len(columns), z), np.int32)
     # Check z of a row takes bit (z + shift) mod Z of each block column.
     takes = (np.arange(z) + shifts[:, None]) % z
     for iteration in range(max_iterations):
         all_hold = True
-        for first, last in pairwise(row_ends):
+        for first, last in pairwise(form.row_ends):
             row = slice(first, last)
             bits = (columns[row, None], takes[row])
             all_hold &= not np.any(np.logical_xor.reduce(posteriors[bits] < 0))

@@ -12,8 +12,6 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-N_COLUMNS = 24
-"""Block columns of a code."""
 LANES = 32
 MAX_POSTERIOR = 8000
 WEIGHT = 14

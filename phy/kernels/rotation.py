@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from phy.kernels.inline import step
 from phy.kernels.lanes import N_LANES, load, splat, store
 
 
@@ -27,7 +28,7 @@ def lean(slope: float, carriers: NDArray[np.int64], out: NDArray[np.float32]) ->
         out[1, i] = turns[abs(k)].imag if k >= 0 else -turns[-k].imag
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def lean_more(slope: float, numbers: NDArray[np.float32], turns: NDArray[np.float32]) -> None:
     """Turn `turns` `[2, width]` by slope · `numbers`, by a series: to 1e-7 up to a tenth."""
     by, one, width = splat(slope), splat(1), numbers.size

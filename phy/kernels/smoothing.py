@@ -16,6 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from phy.kernels.burst import DELAY, DRIFT, Channel, Planes, Scratch, Tones
+from phy.kernels.inline import step
 from phy.kernels.lanes import N_LANES, Lanes, load, splat, store, total
 from phy.kernels.rotation import lean
 
@@ -33,7 +34,7 @@ def mean_delay(h: Planes, neighbours: NDArray[np.int64]) -> float:
     return math.atan2(turn.imag, turn.real)
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def multiply(x: Planes, by: Planes, conjugate: bool, out: Planes) -> None:
     """x · by or x · by*, over all of a row."""
     width, sign = x.shape[1], splat(-1.0 if conjugate else 1.0)
@@ -44,7 +45,7 @@ def multiply(x: Planes, by: Planes, conjugate: bool, out: Planes) -> None:
         store(out, width + k, a * d + b * c)
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def _split(tones: Tones, wanted: NDArray[np.float64], scratch: Scratch) -> None:
     """What of `rest` is in the groups that are `wanted`: coefficients and energies.
 
@@ -77,7 +78,7 @@ def _split(tones: Tones, wanted: NDArray[np.float64], scratch: Scratch) -> None:
     energies[tones.ends.size] = max(left, 0.0)
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def _join(tones: Tones, scratch: Scratch) -> None:
     """The way back to `rest`, each group times its weight."""
     rest, basis, coefficients = scratch.rest, tones.basis, scratch.coefficients
@@ -97,14 +98,14 @@ def _join(tones: Tones, scratch: Scratch) -> None:
         first = tones.ends[group]
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def _size(group: int, tones: Tones) -> int:
     """Dimensions of a group."""
     first = tones.ends[group - 1] if group else 0
     return (tones.ends[group] if group < tones.ends.size else tones.bins.size) - first
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def _kept(energy: float, size: int, variance: float) -> float:
     """Share of a group of `size` dimensions that is no noise, erring towards noise."""
     expected = size * variance
@@ -170,7 +171,7 @@ def follow(
     add(channel.h, error)
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def add(x: Planes, more: Planes) -> None:
     """x + more, in place."""
     for k in range(0, x.size, N_LANES):

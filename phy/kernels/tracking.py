@@ -7,8 +7,9 @@ grows as the sender's sampling clock runs away from ours.
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from phy.kernels.inline import step
 
 # Rows of the state: [value, rate, var(value), cov, var(rate)], rates a symbol.
 PHASE, SLOPE = 0, 1
@@ -20,14 +21,14 @@ SURPRISE = 6.0
 """Times the preamble's noise at which a symbol's pilots, and with them its data, are doubted."""
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def predict(tracking: NDArray[np.float64]) -> None:
     """One symbol on: values move by their rates."""
     _predict(tracking[PHASE], PHASE_NOISE)
     _predict(tracking[SLOPE], SLOPE_NOISE)
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def _predict(state: NDArray[np.float64], noise: NDArray[np.float64]) -> None:
     state[0] += state[1]
     state[2] += 2 * state[3] + state[4] + noise[0]
@@ -35,7 +36,7 @@ def _predict(state: NDArray[np.float64], noise: NDArray[np.float64]) -> None:
     state[4] += noise[1]
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def _correct(state: NDArray[np.float64], innovation: float, variance: float) -> None:
     """A measurement that differs from the prediction by `innovation`."""
     total = state[2] + variance
@@ -47,7 +48,7 @@ def _correct(state: NDArray[np.float64], innovation: float, variance: float) -> 
     state[2] -= gain * state[2]
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def correct(
     turned: NDArray[np.complex128],
     power: NDArray[np.float64],

@@ -7,6 +7,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from phy.kernels.burst import GAIN, NO, Channel, Planes, Row, Scratch, Tones
+from phy.kernels.fft import circle
+from phy.kernels.inline import step
 from phy.kernels.lanes import N_LANES, Lanes, load, splat, store, total
 from phy.kernels.smoothing import smooth
 
@@ -18,17 +20,16 @@ _LARGEST_BOOST = 3.0
 @njit(nogil=True, cache=True)
 def turn_back(x: NDArray[np.complex64], dc: complex, frequency: float, out: Planes) -> None:
     """Samples `x` `[n]` less `dc`, turned back by `frequency` cycles a sample; `out` `[2, ≥ n]`."""
-    span = 32
-    fine_re, fine_im = np.empty(span, np.float32), np.empty(span, np.float32)
-    step = -2 * math.pi * frequency
-    for m in range(span):
-        fine_re[m], fine_im[m] = math.cos(step * m), math.sin(step * m)
+    span, n = 32, x.size
+    fine, coarse = np.empty((2, span), np.float32), np.empty((2, -(-n // span)), np.float32)
+    circle(-frequency, 1.0, fine)
+    circle(-frequency * span, 1.0, coarse)
     dc_re, dc_im = np.float32(dc.real), np.float32(dc.imag)
-    for begin in range(0, x.size, span):
-        c, s = np.float32(math.cos(step * begin)), np.float32(math.sin(step * begin))
-        for m in range(min(span, x.size - begin)):
-            re = c * fine_re[m] - s * fine_im[m]
-            im = c * fine_im[m] + s * fine_re[m]
+    for block in range(coarse.shape[1]):
+        begin, c, s = block * span, coarse[0, block], coarse[1, block]
+        for m in range(min(span, n - begin)):
+            re = c * fine[0, m] - s * fine[1, m]
+            im = c * fine[1, m] + s * fine[0, m]
             a, b = x[begin + m].real - dc_re, x[begin + m].imag - dc_im
             out[0, begin + m] = a * re - b * im
             out[1, begin + m] = a * im + b * re
@@ -71,7 +72,7 @@ def least_squares(
     return float(total(noise)) / (n - 1), float(total(power))
 
 
-@njit(nogil=True, forceinline=True)
+@step
 def _pair(
     y: NDArray[np.float32], sent: NDArray[np.float32], s: int, k: int
 ) -> tuple[Lanes, Lanes, Lanes, Lanes]:

@@ -64,6 +64,14 @@ def with_pilots(data, h, first_symbol=2):
     return bins
 
 
+def bins_of(coded, modulation, first_symbol):
+    """Symbols as sent `[n, 64]`."""
+    y = mapping(modulation, GRID).to_tones(coded, first_symbol)[:, :, : GRID.n_used]
+    bins = np.zeros((len(y), GRID.n_fft), np.complex64)
+    bins[:, GRID.bins[GRID.tones]] = y[:, 0] + 1j * y[:, 1]
+    return bins
+
+
 def exact_llrs(data, h, no, modulation):
     """Max-log by trying every point, then back into the code's order `[n · 48 · bits]`."""
     bits = modulation.bits
@@ -101,7 +109,7 @@ def test_clean_symbols_give_back_their_bits(modulation):
     rng = np.random.default_rng(SEED)
     coded = rng.integers(0, 2, N_SYMBOLS * 48 * modulation.bits, np.uint8)
     h = selective(rng)
-    bins = mapping(modulation, GRID).to_spectrum(coded, 5)
+    bins = bins_of(coded, modulation, 5)
     bins[:, GRID.bins] *= h
     channel = channel_of(h, 1e-4)
     llr, equalised = demap(modulation, bins, channel, 5)
@@ -174,7 +182,7 @@ def faded_symbols(modulation, h, no, rng):
     """(coded bits, bins) of symbols through gains `h` `[n, n_used]` and noise."""
     n = len(h)
     coded = rng.integers(0, 2, n * GRID.n_data * modulation.bits, np.uint8)
-    bins = mapping(modulation, GRID).to_spectrum(coded, 2)
+    bins = bins_of(coded, modulation, 2)
     bins[:, GRID.bins] *= h
     noise = rng.standard_normal((n, GRID.n_fft, 2)) @ [1, 1j] * np.sqrt(no / 2)
     return coded, (bins + noise).astype(np.complex64)

@@ -2,14 +2,17 @@
 
 import numpy as np
 import pytest
+from numba import njit
 
 from phy import OFDM_64_16, Modulation, points
 from phy.interleaver import order
 from phy.kernels.detector import FORGETS, HISTORY, detector_sums, sanitise, search
 from phy.kernels.resampler import interpolate
 from phy.kernels.rotation import lean, lean_more
-from phy.kernels.symbols import map_bits
+from phy.mapping import mapping
+from phy.numerology import GRIDS
 from phy.preamble import BARKER, preamble
+from phy.sequences import polarity
 from phy.stream import SampleStream
 from tests.phy.signals import noise, silence, turned
 
@@ -107,21 +110,33 @@ def test_numbers_too_large_or_none_become_0_and_are_counted():
 
 
 @pytest.mark.parametrize("modulation", Modulation)
-def test_map_bits_puts_every_bit_where_the_interleaver_says(modulation):
+def test_every_bit_is_where_the_interleaver_says(modulation):
     grid, bits = OFDM_64_16, modulation.bits
     coded = rng().integers(0, 2, 3 * 48 * bits, np.uint8)
-    table = order(48 * bits, bits)
-    signs = np.array([1, -1, 1], np.float32)
-    data, pilots = grid.bins[grid.data_at], grid.bins[grid.pilots_at]
-    out = np.zeros((3, 64), np.complex64)
-    map_bits(coded, table, points(modulation), data, pilots, grid.pilot_values, signs, out)
+    signs = polarity(3, 7)
+    y = mapping(modulation, grid).to_tones(coded, 7)
     for row, block in enumerate(coded.reshape(3, -1)):
         sent = np.empty_like(block)
-        sent[table] = block
+        sent[order(48 * bits, bits)] = block
         numbers = sent.reshape(48, bits) @ (1 << np.arange(bits)[::-1])
-        assert np.array_equal(out[row, data], points(modulation)[numbers])
-        assert np.array_equal(out[row, pilots], [signs[row], signs[row], signs[row], -signs[row]])
-    assert np.count_nonzero(out) == 3 * 52
+        assert np.array_equal(y[row, 0, :48] + 1j * y[row, 1, :48], points(modulation)[numbers])
+        assert np.array_equal(y[row, 0, 48:52], [signs[row], signs[row], signs[row], -signs[row]])
+    assert not np.any(y[:, :, 52:])
+
+
+@pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS)
+@pytest.mark.parametrize("n", [1, 7, 8, 19])
+def test_symbols_are_inverse_ffts_with_prefix_and_cut_peaks(grid, n):
+    by = mapping(Modulation.QAM16, grid)
+    coded = rng().integers(0, 2, n * by.symbol_bits, np.uint8)
+    y = by.to_tones(coded, 2)[:, :, : grid.n_used]
+    spectrum = np.zeros((n, grid.n_fft), np.complex128)
+    spectrum[:, grid.bins[grid.tones]] = y[:, 0] + 1j * y[:, 1]
+    body = np.fft.ifft(spectrum) * grid.scale
+    for peak in (np.inf, 1.5):
+        cut = body * np.minimum(1, peak / np.maximum(np.abs(body), 1e-9))
+        wanted = np.concatenate((cut[:, -grid.n_cp :], cut), axis=1).reshape(-1)
+        assert by.to_samples(coded, 2, peak) == pytest.approx(wanted, abs=3e-6)
 
 
 def test_interpolate_is_a_sum_of_its_filters_taps():
@@ -157,6 +172,11 @@ def test_a_stream_keeps_what_is_not_forgotten_by_absolute_index():
     assert (stream.start, stream.end) == (-5, -5)
 
 
+@njit
+def _lean_more(slope, numbers, turns):
+    lean_more(slope, numbers, turns)
+
+
 @pytest.mark.parametrize("slope", [0.0, 0.003, -0.0031])
 def test_leaning_more_adds_up(slope):
     """A hundred small steps are one large one."""
@@ -166,7 +186,7 @@ def test_leaning_more_adds_up(slope):
     turns, at_once = np.zeros((2, 2, 56), np.float32)
     lean(0.2, carriers, turns)
     for _ in range(100):
-        lean_more(slope, numbers, turns)
+        _lean_more(slope, numbers, turns)
     lean(0.2 + 100 * slope, carriers, at_once)
     assert at_once[0, :52] == pytest.approx(np.cos((0.2 + 100 * slope) * carriers), abs=1e-6)
     assert turns[:, :52] == pytest.approx(at_once[:, :52], abs=2e-5)

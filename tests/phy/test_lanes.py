@@ -37,19 +37,20 @@ def _operations(a, b, out):
     store(out, 80, lanes.second_halves(x, y))
     store(out, 88, splat(b[3]))
     store(out, 96, splat(lanes.total(x)))
+    store(out, 104, lanes.root(lanes.magnitude(x)))
 
 
 def test_every_operation_is_that_of_float32():
     a, b = rng().standard_normal((2, N_LANES)).astype(np.float32)
     a[0], b[1] = 0, np.inf
-    out = np.empty((13, N_LANES), np.float32)
+    out = np.empty((14, N_LANES), np.float32)
     _operations(a, b, out.reshape(-1))
     halves = [np.stack((a[at], b[at]), axis=1).reshape(-1) for at in (slice(4), slice(4, 8))]
     four = a[:4] + a[4:]
     total = (four[0] + four[2]) + (four[1] + four[3])
     expected = [
         a + b, a - b, a * b, a / b, -a, abs(a), np.copysign(a, b), np.minimum(a, b),
-        np.maximum(a, b), *halves, np.full(8, b[3]), np.full(8, total),
+        np.maximum(a, b), *halves, np.full(8, b[3]), np.full(8, total), np.sqrt(abs(a)),
     ]  # fmt: skip
     assert out.tobytes() == np.array(expected, np.float32).tobytes()
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phy.kernels.bits import get, put, put_signs, to_octets
-from phy.kernels.ldpc import SURE, LdpcWorkspace, decode_codeword
+from phy.kernels.ldpc import SURE, decode_codeword
 from phy.kernels.ldpc_plain import decode_codeword_plain
 from phy.kernels.ldpc_rows import MAX_POSTERIOR
 from phy.ldpc import (
@@ -22,6 +22,7 @@ from phy.ldpc import (
     decode,
     encode,
     least_coded,
+    new_workspace,
     segmentation,
 )
 
@@ -68,8 +69,13 @@ def random_bits(rng, *shape):
     return rng.integers(0, 2, shape).astype(np.uint8)
 
 
+def whole(code):
+    """Blocks that are codewords."""
+    return Segmentation(code, code.k, 1, code.n)
+
+
 def encoded(code, bits):
-    return encode(bits[None], Segmentation(code, code.k, 1, code.n))[0]
+    return encode(bits[None], whole(code))[0]
 
 
 def noisy(rng, coded, ebn0_db, rate, scale=8):
@@ -115,7 +121,7 @@ def test_every_check_holds_for_every_codeword(code):
 def test_the_vectors_do_what_the_plain_decoder_says_bit_for_bit(code):
     """In noise from little to hopeless, and with values at the edges of the range."""
     rng = np.random.default_rng(SEED)
-    work = LdpcWorkspace()
+    work, form = new_workspace().content, whole(code).parcel.content
     outcomes = set()
     for ebn0_db, at_edges in ((9.0, 0), (6.0, 0), (3.0, 0), (2.0, 20), (-3.0, 5)):
         word = encoded(code, random_bits(rng, code.k))
@@ -123,9 +129,8 @@ def test_the_vectors_do_what_the_plain_decoder_says_bit_for_bit(code):
         edges = rng.choice([-511, 0, MAX_POSTERIOR, -MAX_POSTERIOR, 1, -1], at_edges)
         llr[rng.integers(0, code.n, at_edges)] = edges
         for n in (1, 2, 12):
-            given = (llr, code.z, code.row_ends, code.columns, code.shifts, n)
-            took = decode_codeword(*given, work.posteriors, work.messages, work.told, work.scratch)
-            expected, posteriors = decode_codeword_plain(*given)
+            took = decode_codeword(llr, form, n, work)
+            expected, posteriors = decode_codeword_plain(llr, form, n)
             assert took == expected, (SEED, ebn0_db, n)
             assert np.array_equal(work.posteriors[:, : code.z], posteriors), (SEED, ebn0_db, n)
             outcomes.add(took > 0)
@@ -150,7 +155,7 @@ def test_blocks_of_any_size_come_back(n_bytes, rate, more, seed):
     assert form.shares.sum() == form.n_bits
     assert np.ptp(form.shares) <= 1
     llr = (100 - 200 * coded.astype(np.int16)).astype(np.int16)
-    assert np.array_equal(decoded(llr, form, LdpcWorkspace()), bits), seed
+    assert np.array_equal(decoded(llr, form, new_workspace()), bits), seed
 
 
 @settings(derandomize=True, deadline=None, max_examples=40)
@@ -171,15 +176,13 @@ def test_blocks_are_decoded_as_the_plain_decoder_does_codeword_by_codeword(
     llr = noisy(rng, encode(random_bits(rng, 1, form.n_bits), form), ebn0_db, rate)
     expected = []
     for share, begin, end in zip(form.shares, form.ends, form.ends[1:], strict=False):
-        whole = np.zeros(code.n, np.int16)
-        whole[share : code.k] = SURE
-        whole[:share] = llr[0, begin : begin + share]
-        whole[code.k : code.k + end - begin - share] = llr[0, begin + share : end]
-        _, posteriors = decode_codeword_plain(
-            whole, code.z, code.row_ends, code.columns, code.shifts, most
-        )
+        word = np.zeros(code.n, np.int16)
+        word[share : code.k] = SURE
+        word[:share] = llr[0, begin : begin + share]
+        word[code.k : code.k + end - begin - share] = llr[0, begin + share : end]
+        _, posteriors = decode_codeword_plain(word, form.parcel.content, most)
         expected.append((posteriors.reshape(-1) < 0)[:share])
-    bits = np.unpackbits(decode(llr, form, LdpcWorkspace(), most), axis=1)[0]
+    bits = np.unpackbits(decode(llr, form, new_workspace(), most), axis=1)[0]
     assert np.array_equal(bits, np.concatenate(expected)), seed
 
 
@@ -230,7 +233,7 @@ def test_it_bears_noise_near_its_threshold(n_bytes, rate, ebn0_db):
     form = segmentation(8 * (n_bytes + 4), rate, least_coded(8 * (n_bytes + 4), rate))
     rng = np.random.default_rng(SEED)
     bits = random_bits(rng, 1000 if n_bytes < 1000 else 300, form.n_bits)
-    work = LdpcWorkspace()
+    work = new_workspace()
     lost = []
     for at_db in (ebn0_db, ebn0_db - 2):
         llr = noisy(rng, encode(bits, form), at_db, rate)
@@ -241,7 +244,7 @@ def test_it_bears_noise_near_its_threshold(n_bytes, rate, ebn0_db):
 
 def test_what_cannot_be_decoded_ends_in_time_and_harms_nothing_after_it():
     form = segmentation(1792, RATES[0], 3584)
-    rng, work = np.random.default_rng(SEED), LdpcWorkspace()
+    rng, work = np.random.default_rng(SEED), new_workspace()
     bits = random_bits(rng, 1, form.n_bits)
     llr = noisy(rng, encode(bits, form), 4.0, RATES[0])
     for wrong in (np.zeros_like(llr), -llr, np.full_like(llr, -511), np.full_like(llr, -32768)):

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from phy import OFDM_64_16, Receiver, Transmitter, layout, ofdm, preamble
+from phy import OFDM_64_16, Receiver, Transmitter, layout, preamble
 from phy.channel import Path, PathParams
 from phy.header import BurstHeader
-from phy.transmitter import header_spectrum
+from phy.transmitter import header_samples
 from tests.phy.signals import hear, heard, noise, noisy, payloads, silence, turned
 
 
@@ -74,8 +74,8 @@ def test_interference_during_one_pdu_costs_that_pdu_only(mcs, power):
 @pytest.mark.parametrize("network", [0, 3])
 def test_a_header_with_nothing_behind_it_does_not_make_deaf_for_seconds(network):
     rng = np.random.default_rng(3)
-    spectrum = header_spectrum(BurstHeader(0, 63, 2047, network), OFDM_64_16)
-    lie = np.concatenate((preamble.preamble(), ofdm.to_samples(spectrum, OFDM_64_16)))
+    sent = header_samples(BurstHeader(0, 63, 2047, network), OFDM_64_16)
+    lie = np.concatenate((preamble.preamble(), sent))
     pdus = payloads(rng, 2, 60)
     x = np.concatenate((silence(700), lie, silence(60_000), Transmitter().modulate(pdus, 1)))
     assert heard(hear(noisy(rng, x, 20))[0]) == pdus

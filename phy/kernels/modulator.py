@@ -1,0 +1,159 @@
+"""From PDUs to samples, eight OFDM symbols at a time."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from phy.kernels.burst import Row, Tones, open_tones
+from phy.kernels.fft import transform, transpose
+from phy.kernels.inline import step
+from phy.kernels.lanes import N_LANES, least, load, root, splat, store
+from phy.kernels.ldpc_encoder import encode_octets
+from phy.kernels.ldpc_form import open_form
+from phy.kernels.parcel import opener
+
+Words = NDArray[np.int64]
+
+
+class Map(NamedTuple):
+    """A modulation on a grid."""
+
+    bits: int
+    source: NDArray[np.uint32]
+    """Which coded bit of a symbol each carrier's bits are, highest first `[n_data · bits]`."""
+    real: Row
+    imag: Row
+    """Of the points, by number."""
+
+
+open_map = opener(Map, "i8 u4[1] f4[1] f4[1]")
+
+
+@step
+def map_symbol(
+    coded: NDArray[np.uint8],
+    at: int,
+    polarity: float,
+    tones: Tones,
+    by: Map,
+    y: NDArray[np.float32],
+) -> None:
+    """The tones `y` `[2, width]` of the symbol whose coded bits are at `coded[at]` and after."""
+    for d in range(tones.n_data):
+        number = 0
+        for b in range(by.bits):
+            number = number << 1 | coded[at + by.source[d * by.bits + b]]
+        y[0, d], y[1, d] = by.real[number], by.imag[number]
+    for p in range(tones.pilots.size):
+        y[0, tones.n_data + p], y[1, tones.n_data + p] = tones.pilots[p] * polarity, 0
+    for k in range(tones.bins.size, y.shape[1]):
+        y[0, k] = y[1, k] = 0
+
+
+@njit(nogil=True, cache=True)
+def eight_symbols(
+    y: NDArray[np.float32],
+    n: int,
+    peak: float,
+    tones: Tones,
+    windows: NDArray[np.float32],
+    out: NDArray[np.complex64],
+) -> None:
+    """Tones `y` `[8, 2, width]` of `n` ≤ 8 symbols to samples `[n · n_symbol]`, mean power 1.
+
+    Samples beyond the magnitude `peak` are shortened to it. `windows` `[4, 8 n_fft]` is room.
+    """
+    n_fft, n_symbol, width = tones.n_fft, tones.n_symbol, y.shape[2]
+    n_cp, flat, square = n_symbol - n_fft, out.view(np.float32), np.empty(64, np.float32)
+    re, im, to_re, to_im = windows[0], windows[1], windows[2], windows[3]
+    re[:] = 0
+    im[:] = 0
+    for part in range(2):
+        to = im if part else re
+        for first in range(0, width, N_LANES):
+            for lane in range(N_LANES):
+                at = (2 * min(lane, n - 1) + part) * width + first
+                store(square, N_LANES * lane, load(y, at))
+            transpose(square)
+            for i in range(min(N_LANES, tones.bins.size - first)):
+                store(to, N_LANES * tones.bins[first + i], load(square, N_LANES * i))
+    # The inverse: real and imaginary parts change places, before and after.
+    if transform(im, re, to_im, to_re, n_fft, tones.twiddles):
+        re, im = to_re, to_im
+    scale, most, one = splat(1 / (tones.gain * n_fft)), splat(peak), splat(1)
+    for m in range(0, n_fft, N_LANES // 2):
+        for i in range(N_LANES // 2):
+            at = N_LANES * (m + i)
+            a, b = load(re, at) * scale, load(im, at) * scale
+            share = least(most / root(a * a + b * b), one)
+            store(square, 2 * N_LANES * i, a * share)
+            store(square, 2 * N_LANES * i + N_LANES, b * share)
+        transpose(square)
+        for lane in range(n):
+            store(flat, 2 * (lane * n_symbol + n_cp + m), load(square, N_LANES * lane))
+    for lane in range(n):
+        first = lane * n_symbol
+        for m in range(first, first + n_cp):
+            out[m] = out[m + n_fft]
+
+
+@njit(nogil=True, cache=True)
+def modulate(
+    octets: NDArray[np.uint8],
+    n_blocks: int,
+    padding: NDArray[np.uint8],
+    number: int,
+    peak: float,
+    form_in: Words,
+    tones_in: Words,
+    map_in: Words,
+    out: NDArray[np.complex64],
+) -> None:
+    """Blocks of bytes, whitened, to samples of whole symbols; the first is symbol `number`.
+
+    Symbols are filled up with `padding`.
+    """
+    form, tones = open_form(form_in), open_tones(tones_in)
+    n_symbols = out.size // tones.n_symbol
+    n_coded = n_blocks * form.ends[-1]
+    coded = np.empty(n_symbols * tones.n_data * open_map(map_in).bits, np.uint8)
+    encode_octets(octets, n_blocks, form, coded)
+    for i in range(coded.size - n_coded):
+        coded[n_coded + i] = padding[i]
+    modulate_bits(coded, number, peak, tones_in, map_in, out)
+
+
+@njit(nogil=True, cache=True)
+def modulate_bits(
+    coded: NDArray[np.uint8],
+    number: int,
+    peak: float,
+    tones_in: Words,
+    map_in: Words,
+    out: NDArray[np.complex64],
+) -> None:
+    """The same of coded bits, as many as whole symbols hold."""
+    tones, by = open_tones(tones_in), open_map(map_in)
+    n_bits, n_symbol = tones.n_data * by.bits, tones.n_symbol
+    windows = np.empty((4, N_LANES * tones.n_fft), np.float32)
+    y = np.empty((N_LANES, 2, -(-tones.bins.size // N_LANES) * N_LANES), np.float32)
+    for first in range(0, coded.size // n_bits, N_LANES):
+        n = min(N_LANES, coded.size // n_bits - first)
+        for i in range(n):
+            polarity = tones.polarity[number + first + i]
+            map_symbol(coded, (first + i) * n_bits, polarity, tones, by, y[i])
+        end = (first + n) * n_symbol
+        eight_symbols(y, n, peak, tones, windows, out[first * n_symbol : end])
+
+
+@njit(nogil=True, cache=True)
+def map_bits(
+    coded: NDArray[np.uint8], number: int, tones_in: Words, map_in: Words, out: NDArray[np.float32]
+) -> None:
+    """Tones `[n, 2, width]` of coded bits."""
+    tones, by = open_tones(tones_in), open_map(map_in)
+    n_bits = tones.n_data * by.bits
+    for i in range(out.shape[0]):
+        map_symbol(coded, i * n_bits, tones.polarity[number + i], tones, by, out[i])
