@@ -4,12 +4,16 @@ SNR is a burst's mean power over the noise power in the sample band. "impaired":
 `benchmarks.trials`. Rows in dB are where the error rate is surely below what their name says.
 """
 
+import argparse
 import sys
 from collections.abc import Callable
+from contextlib import closing
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
+from backends import RecordingReader, describe
 from benchmarks.bound import needed_es_n0_db
 from benchmarks.peers import GnuRadio, Liquid
 from benchmarks.report import Row, main
@@ -22,6 +26,7 @@ PER_CARRIER_DB = 10 * np.log10(OFDM_64_16.n_fft / OFDM_64_16.n_used)
 
 BPSK12, QPSK12, QPSK34, QAM16_12, QAM64_34 = 0, 1, 2, 3, 6
 
+_TYPES = {".cf32": "cf32_le", ".i16": "ci16_le", ".u8": "cu8"}
 # Row, MCS, bytes, target in dB.
 _KNEES = (
     ("64B_qpsk12", QPSK12, 64, 1.7),
@@ -32,8 +37,8 @@ _KNEES = (
 )
 
 
-def measure(seed: int, quick: bool) -> list[Row]:
-    """All rows."""
+def measure(seed: int, quick: bool, recordings: Path | None = None) -> list[Row]:
+    """All rows; that of recordings where there are any."""
     n = 1000 if quick else 10_000
     rows = [_knee(*knee, seed, n) for knee in _KNEES]
     rows[0].peers |= _peers_at_64_bytes(seed, 300 if quick else 1000)
@@ -44,6 +49,7 @@ def measure(seed: int, quick: bool) -> list[Row]:
         _headers(seed, n),
         _doppler(seed, n // 10),
         _false_pdus(seed, 10**7 if quick else 10**9),
+        *([false_pdus_in(recordings)] if recordings else []),
     ]
 
 
@@ -157,5 +163,28 @@ def _false_pdus(seed: int, n_samples: int) -> Row:
     return Row("false_pdus_1e9_noise", told, "PDUs", 0, "less", n, note=note)
 
 
+def false_pdus_in(recordings: Path) -> Row:
+    """In signals of others, at whatever rate they were recorded."""
+    told, n, names = 0, 0, []
+    for path in sorted(recordings.iterdir()):
+        if path.suffix not in _TYPES:
+            continue
+        info = describe(path, _TYPES[path.suffix], None)
+        names.append(path.name)
+        receiver = Receiver(None, 0.1)
+        with closing(RecordingReader(info)) as reader:
+            for first in range(0, info.n_samples, 1 << 18):
+                events = receiver.push(reader.read(first, 1 << 18))
+                told += sum(isinstance(event, PduHeard) for event in events)
+        n += info.n_samples
+    return Row("false_pdus_recordings", told, "PDUs", 0, "less", n, note=", ".join(names))
+
+
 if __name__ == "__main__":
-    sys.exit(main("phy_per", measure))
+    own = argparse.ArgumentParser(add_help=False)
+    own.add_argument(
+        "--recordings", type=Path, metavar="DIR",
+        help="also look for PDUs in recordings of others: .cf32, .i16, .u8",
+    )  # fmt: skip
+    given, _ = own.parse_known_args()
+    sys.exit(main("phy_per", partial(measure, recordings=given.recordings), own))

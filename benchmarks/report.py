@@ -38,9 +38,18 @@ class Row:
         return min(values) <= self.target
 
 
-def main(benchmark: str, measure: Callable[[int, bool], list[Row]]) -> int:
-    """Parse the options all benchmarks share, measure, print; 1 when a row misses its target."""
-    parser = argparse.ArgumentParser(prog=f"python -m benchmarks.{benchmark}")
+def main(
+    benchmark: str,
+    measure: Callable[[int, bool], list[Row]],
+    own: argparse.ArgumentParser | None = None,
+) -> int:
+    """Parse the options all benchmarks share, measure, print; 1 when a row misses its target.
+
+    `own` has those that the benchmark itself has parsed, for the help.
+    """
+    parser = argparse.ArgumentParser(
+        prog=f"python -m benchmarks.{benchmark}", parents=[own] if own else []
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--quick", action="store_true", help="fewer trials, the same rows")
     parser.add_argument("--seed", type=int, default=1)

@@ -68,6 +68,7 @@ class Acquisition:
         self._nominal = before(grid)
         self._training = _training(grid, n_aliases(max_frequency))
         self._payload_at = int(self._training.content.windows[-1]) + grid.n_symbol
+        self._tones = tones(grid)
         self._axes = axes(Modulation.BPSK, grid)
         self._channel = new_channel(grid)
         self._scratch = new_scratch(grid)
@@ -80,10 +81,10 @@ class Acquisition:
 
         `base` is the absolute index of `x[0]`; `coarse` the frequency that the peak tells.
         """
-        grid, room, channel = self._grid, self._room.content, self._channel.content
+        grid, room = self._grid, self._room.content
         start, frequency = kernel.acquire(
             x, self._nominal, coarse, dc, self._carrier_cycles,
-            self._training.words, tones(grid).words, self._axes.words,
+            self._training.words, self._tones.words, self._axes.words,
             self._channel.words, self._scratch.words, self._room.words,
         )  # fmt: skip
         if start < 0:
@@ -91,20 +92,12 @@ class Acquisition:
         told = parse_header(room.octets, room.folded)
         if told is None:
             return Missed("header")
-        power, error = kernel.settle(
-            _sent(told, grid), self._training.words, tones(grid).words,
+        snr_db, rssi_dbfs, evm_db = kernel.settle(
+            _sent(told, grid), self._training.words, self._tones.words,
             self._channel.words, self._scratch.words, self._room.words,
         )  # fmt: skip
         quality = BurstQuality(
-            base + start,
-            told.mcs,
-            told.n_pdus,
-            told.pdu_bytes,
-            told.network,
-            _decibel(channel.gain * grid.n_used / grid.n_fft / channel.no),
-            _decibel(power),
-            _decibel(error),
-            frequency,
+            base + start, *told, snr_db=snr_db, rssi_dbfs=rssi_dbfs, evm_db=evm_db, cfo=frequency
         )
         origin = base + start - BACKOFF
         return Acquired(told, quality, origin, origin + self._payload_at, frequency, self._channel)
@@ -187,7 +180,3 @@ def _sent(told: BurstHeader, grid: Numerology) -> NDArray[np.float32]:
     starts = grid.n_cp + grid.n_symbol * np.arange(header.n_symbols(grid))
     re, im = ofdm.to_tones(samples, starts, 0.0, 0j, grid)[:, :, : grid.n_used].swapaxes(0, 1)
     return in_planes(np.concatenate((np.tile(long, (preamble.N_LONG, 1)), 1 / (re - 1j * im))))
-
-
-def _decibel(ratio: float) -> float:
-    return round(10 * math.log10(max(ratio, 1e-30)), 3)

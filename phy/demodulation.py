@@ -102,7 +102,8 @@ class PduDecoder:
 
     def decode(self, n_pdus: int) -> list[bytes | None]:
         """The next `n_pdus` PDUs, whose symbols are all in; None where a check fails."""
-        plan, found = self._plan, list[bytes | None]()
+        plan = self._plan
+        found: list[bytes | None] = []
         size, n_bits = plan.block_bytes, n_pdus * plan.coded_bits
         if n_pdus:
             white = whitening(n_pdus * size, self._n_decoded * size)

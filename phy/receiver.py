@@ -72,6 +72,9 @@ class Receiver:
         self._work = np.zeros((7, HISTORY + HOP), np.float32)
         self._n_header = n_symbols(grid)
         self._dc = np.zeros(3)
+        # What acquisition needs: from so many samples before the peak on, so many.
+        self._before = before(grid) - 1 - preamble.guard(grid)
+        self._span = before(grid) + needed_after(grid)
         # For acquisition, before the sample at which the search stands.
         self._kept = before(grid) + preamble.SHORT + HISTORY
         self._stream = SampleStream(start, 1 << 16)
@@ -182,11 +185,10 @@ class Receiver:
             self._raised_at = peak
 
     def _acquire(self, peak: int, coarse: float, events: list[Event]) -> bool:
-        nominal = peak + 1 + preamble.guard(self._grid)
-        if self._stream.end < nominal + needed_after(self._grid):
+        base = peak - self._before
+        if self._stream.end < base + self._span:
             return False
-        base = nominal - before(self._grid)
-        x = self._stream.view(base, nominal + needed_after(self._grid))
+        x = self._stream.view(base, base + self._span)
         found = self._acquisition.acquire(x, base, coarse, self._dc_value)
         self._peak = None
         if isinstance(found, Missed):

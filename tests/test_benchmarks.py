@@ -5,7 +5,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from benchmarks.phy_per import false_pdus_in
+from phy import Transmitter
 
 ROOT = Path(__file__).parents[1]
 
@@ -78,3 +82,18 @@ def test_a_benchmark_prints_its_rows(name):
         # What is to be small may be nothing at all.
         assert row["value"] > 0 or row["better"] == "less" or row["unit"] == "dB"
     assert done.returncode == (0 if all(row["ok"] for row in rows.values()) else 1)
+
+
+def test_pdus_in_recordings_of_others_are_counted(tmp_path):
+    rng = np.random.default_rng(3)
+    noise = 0.01 * (rng.standard_normal((200_000, 2)) @ [1, 1j])
+    noise.astype(np.complex64).tofile(tmp_path / "noise.cf32")
+    (tmp_path / "notes.txt").write_text("no samples\n")
+    row = false_pdus_in(tmp_path)
+    assert (row.value, row.trials, row.note, row.ok) == (0, 200_000, "noise.cf32", True)
+    # The control: one of ours would be told.
+    burst = Transmitter().modulate([bytes(64)], 1)
+    noise[50_000 : 50_000 + len(burst)] += 0.3 * burst
+    noise.astype(np.complex64).tofile(tmp_path / "ours.cf32")
+    row = false_pdus_in(tmp_path)
+    assert (row.value, row.ok) == (1, False)

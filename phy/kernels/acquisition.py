@@ -16,7 +16,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.burst import Planes, Row, open_axes, open_channel, open_scratch, open_tones
+from phy.kernels.burst import (
+    GAIN,
+    NO,
+    Planes,
+    Row,
+    open_axes,
+    open_channel,
+    open_scratch,
+    open_tones,
+)
 from phy.kernels.equaliser import equalise, renew, start_tracking
 from phy.kernels.fft import windows_to_tones
 from phy.kernels.inline import step
@@ -292,10 +301,11 @@ def settle(
     channel_in: Words,
     scratch_in: Words,
     room_in: Words,
-) -> tuple[float, float]:
+) -> tuple[float, float, float]:
     """Learn from a header that was read: what was `sent`, long training and header.
 
-    (mean power of the long training's samples, mean square error of the header's points)
+    In dB: SNR over the band, mean power of the long training's samples, error of the header's
+    points.
     """
     training, tones, room = open_training(training_in), open_tones(tones_in), open_room(room_in)
     channel, scratch = open_channel(channel_in), open_scratch(scratch_in)
@@ -312,7 +322,16 @@ def settle(
     for m in range(first, first + N_LONG * tones.n_fft):
         re, im = float(room.planes[0, m]), float(room.planes[1, m])
         power += re * re + im * im
-    return power / (N_LONG * tones.n_fft), error / (n_header * tones.n_data)
+    figures = channel.figures
+    snr = figures[GAIN] / figures[NO] * tones.bins.size / tones.n_fft
+    power /= N_LONG * tones.n_fft
+    return _decibel(snr), _decibel(power), _decibel(error / (n_header * tones.n_data))
+
+
+@step
+def _decibel(ratio: float) -> float:
+    """To three places."""
+    return math.floor(1e4 * math.log10(max(ratio, 1e-30)) + 0.5) / 1e3
 
 
 @njit(nogil=True, cache=True)
