@@ -29,8 +29,8 @@ def best_s(work):
 
 def yardstick_s(n):
     """For `n` samples."""
-    x = noise(np.random.default_rng(SEED), 1 << 18).reshape(-1, 64)
-    return best_s(lambda: np.fft.fft(x) * x) * n / x.size
+    x = noise(np.random.default_rng(SEED), 1 << 13).reshape(-1, 64)
+    return best_s(lambda: [np.fft.fft(x) * x for _ in range(16)]) * n / (16 * x.size)
 
 
 def hear(receiver, x):
@@ -48,11 +48,11 @@ def stream(mcs, n_pdus, size, n_bursts):
 
 def test_searching_costs_little():
     x, receiver = noise(np.random.default_rng(SEED), 1 << 18), Receiver()
-    assert best_s(lambda: hear(receiver, x)) < 0.8 * yardstick_s(len(x))
+    assert best_s(lambda: hear(receiver, x)) < 2 * yardstick_s(len(x))
 
 
 @pytest.mark.parametrize(
-    ("mcs", "n_pdus", "size", "most"), [(1, 16, 220, 6), (6, 16, 220, 12), (1, 1, 64, 24)]
+    ("mcs", "n_pdus", "size", "most"), [(1, 16, 220, 6), (6, 16, 220, 11), (1, 1, 64, 20)]
 )
 def test_hearing_costs_little(mcs, n_pdus, size, most):
     x, receiver = stream(mcs, n_pdus, size, 64 // n_pdus), Receiver()
@@ -65,4 +65,4 @@ def test_sending_costs_little():
     rng, transmitter = np.random.default_rng(SEED), Transmitter()
     pdus = payloads(rng, 64, 220)
     n = sum(len(transmitter.modulate([pdu], 1)) for pdu in pdus)
-    assert best_s(lambda: [transmitter.modulate([p], 1) for p in pdus]) < 3 * yardstick_s(n)
+    assert best_s(lambda: [transmitter.modulate([p], 1) for p in pdus]) < 4 * yardstick_s(n)
