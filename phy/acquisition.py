@@ -13,10 +13,11 @@ from phy.convolutional import N_TAIL
 from phy.estimation import in_planes, new_channel, new_scratch, tones
 from phy.header import BurstHeader, parse_header
 from phy.kernels import acquisition as kernel
-from phy.kernels.acquisition import AMBIGUITY, BACKOFF, SEARCH, Room, Training
+from phy.kernels.acquisition import BACKOFF, Room, Training
 from phy.kernels.burst import Channel
 from phy.kernels.lanes import whole_lanes
 from phy.kernels.parcel import Parcel
+from phy.kernels.timing import AMBIGUITY, SEARCH
 from phy.mapping import axes
 from phy.numerology import Numerology
 from phy.quality import BurstQuality

@@ -1,11 +1,12 @@
 """A simulated air that many nodes share: its world, its medium, a hub process, its radios."""
 
+from backends.ether.flight import BurstShape, Flight, burst_shape
 from backends.ether.hub import EtherHub
 from backends.ether.local import LocalEther, LocalRadio
 from backends.ether.medium import Medium, Piece
 from backends.ether.protocol import Answer
 from backends.ether.radio import EtherRadio
-from backends.ether.twin import AirSense, BurstMedium, BurstShape, Flight, burst_shape
+from backends.ether.twin import AirSense, BurstMedium
 from backends.ether.watch import HubWatch
 from backends.ether.world import (
     AirParams,

@@ -1,15 +1,8 @@
-"""The medium once more, in bursts instead of samples: who hears what, by the tables of errors.
-
-White noise only. What others send meanwhile is noise too: their powers add up. A codeword has of
-each of its parts the information that a carrier gives at that part's SINR, and fails as often as at
-the one SNR that gives as much on average; a PDU fails with any of its codewords.
-"""
+"""The medium once more, in bursts instead of samples: who hears what, by the tables of errors."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +10,15 @@ import numpy as np
 import phy
 from backends.base import Capabilities
 from backends.ether.antenna import Antenna
+from backends.ether.flight import (
+    Flight,
+    burst_shape,
+    decibel,
+    found_rate,
+    head_snr_db,
+    lost_rate,
+    lost_rate_in,
+)
 from backends.ether.medium import LEAD
 from backends.ether.world import AirParams, Hop, RadioParams, World
 from backends.outstanding import GAP
@@ -26,21 +28,6 @@ TAIL = 2 * phy.SENSE_WINDOW
 """Energy may seem to end so many samples later than a header tells."""
 KEEP_S = 1.0
 """A burst is forgotten so long after it is over at the latest."""
-
-
-class BurstShape(NamedTuple):
-    """Times in s from a burst's first sample.
-
-    At `head_s` preamble and header are over; `pdus`: where each PDU's symbols begin and end, in
-    which `n_codewords` follow one another.
-    """
-
-    mcs: int
-    pdu_bytes: int
-    n_codewords: int
-    airtime_s: float
-    head_s: float
-    pdus: tuple[tuple[float, float], ...]
 
 
 class AirSense(NamedTuple):
@@ -53,28 +40,6 @@ class AirSense(NamedTuple):
     until: float
     idle_since: float
     burst_at: float | None
-
-
-@dataclass(slots=True, eq=False)
-class Flight:
-    """A burst on the air; by node that it reaches: when, how, and what chance has for it."""
-
-    sender: int
-    start_s: float
-    over_s: float
-    """When it has passed all."""
-    shape: BurstShape
-    hops: dict[int, Hop]
-    arrives: dict[int, float]
-    draws: dict[int, list[float]]
-    near: list["Flight"] = field(default_factory=list)
-    """Others that are on the air somewhere at the same time."""
-    found: dict[int, bool] = field(default_factory=dict)
-
-    @property
-    def end_s(self) -> float:
-        """When its last sample has left."""
-        return self.start_s + self.shape.airtime_s
 
 
 @dataclass(slots=True)
@@ -110,7 +75,7 @@ class BurstMedium:
         self._grid = grid
         self._world = world
         self._keep_s = keep_s
-        self._loud_db = _decibel(10 ** (carrier_db / 10) - 1)
+        self._loud_db = decibel(10 ** (carrier_db / 10) - 1)
         self._rng = np.random.default_rng(seed)
         self._nodes: dict[int, _Node] = {}
         self._hops: dict[int, tuple[float, dict[int, Hop]]] = {}
@@ -162,8 +127,8 @@ class BurstMedium:
             if not self._finds(flight, node, at) or self._is_deaf(node, at, at + end_s):
                 continue
             if flight.near:
-                lost = _lost_rate_in(flight, node, at + begin_s, at + end_s)
-                snr_db = _head_snr_db(flight, node, at)
+                lost = lost_rate_in(flight, node, at + begin_s, at + end_s)
+                snr_db = head_snr_db(flight, node, at)
             else:
                 lost = lost_rate(shape.mcs, snr_db, shape.pdu_bytes)
             if flight.draws[node][1 + number] >= lost:
@@ -212,7 +177,7 @@ class BurstMedium:
         found = flight.found.get(node)
         if found is None:
             found = flight.found[node] = (
-                flight.draws[node][0] < found_rate(_head_snr_db(flight, node, at))
+                flight.draws[node][0] < found_rate(head_snr_db(flight, node, at))
                 and not self._is_deaf(node, at, at + flight.shape.head_s)
                 and not self._is_taken(flight, node, at)
             )
@@ -242,82 +207,3 @@ class BurstMedium:
             if first < end and begin < last:
                 begin, end = (last, end) if last < end else (begin, first)
         return end if end - begin >= phy.SENSE_WINDOW / self._air.rate_hz else NEVER
-
-
-@lru_cache(maxsize=256)
-def burst_shape(
-    rate_hz: float,
-    mcs: int,
-    n_pdus: int,
-    pdu_bytes: int,
-    grid: phy.Numerology = phy.OFDM_64_16,
-) -> BurstShape:
-    """Times of a burst as the modem sends it. Raises ValueError for what no header can tell."""
-    plan = phy.layout(grid, mcs, n_pdus, pdu_bytes)
-    symbol, head = plan.grid.n_symbol, plan.n_samples - plan.n_symbols * plan.grid.n_symbol
-    firsts = [i * plan.coded_bits // plan.symbol_bits for i in range(n_pdus)]
-    lasts = [plan.symbols_through(i + 1) for i in range(n_pdus)]
-    pdus = tuple(
-        ((head + symbol * first) / rate_hz, (head + symbol * last) / rate_hz)
-        for first, last in zip(firsts, lasts, strict=True)
-    )
-    airtime_s, head_s = plan.n_samples / rate_hz, head / rate_hz
-    return BurstShape(mcs, pdu_bytes, plan.form.n_codewords, airtime_s, head_s, pdus)
-
-
-lost_rate = lru_cache(maxsize=4096)(phy.pdu_lost_rate)
-found_rate = lru_cache(maxsize=4096)(phy.burst_found_rate)
-
-
-def _parts(flight: Flight, node: int, begin: float, end: float) -> list[tuple[float, float]]:
-    """(share, power of all noise over the receiver's own) of the parts between two times."""
-    others = []
-    for each in flight.near:
-        at = each.arrives.get(node, math.inf)
-        over = at + each.shape.airtime_s
-        if at < end and begin < over:
-            others.append((at, over, 10 ** (each.hops[node].snr_db / 10)))
-    cuts = {begin, end, *(t for each in others for t in each[:2] if begin < t < end)}
-    return [
-        (
-            (last - first) / (end - begin),
-            1 + sum(power for at, over, power in others if at <= first and last <= over),
-        )
-        for first, last in pairwise(sorted(cuts))
-    ]
-
-
-def _head_snr_db(flight: Flight, node: int, at: float) -> float:
-    """By the mean noise until the header is over."""
-    snr_db = flight.hops[node].snr_db
-    if not flight.near:
-        return snr_db
-    parts = _parts(flight, node, at, at + flight.shape.head_s)
-    return snr_db - _decibel(sum(share * noise for share, noise in parts))
-
-
-def _lost_rate_in(flight: Flight, node: int, begin: float, end: float) -> float:
-    """Of a PDU between two times, whose codewords others may meet one by one."""
-    shape, kept = flight.shape, 1.0
-    n = shape.n_codewords
-    for number in range(n):
-        first = begin + (end - begin) * number / n
-        parts = _parts(flight, node, first, first + (end - begin) / n)
-        lost = lost_rate(shape.mcs, _mean_snr_db(flight, node, parts), shape.pdu_bytes)
-        kept *= (1 - lost) ** (1 / n)
-    return 1 - kept
-
-
-def _mean_snr_db(flight: Flight, node: int, parts: list[tuple[float, float]]) -> float:
-    """The one SNR at which a carrier gives as much information as in all parts, by their shares."""
-    snr_db = flight.hops[node].snr_db
-    if len(parts) == 1:
-        return snr_db - _decibel(parts[0][1])
-    snr, most = 10 ** (snr_db / 10), phy.MCS_TABLE[flight.shape.mcs].modulation.bits
-    information = sum(share * min(math.log2(1 + snr / noise), most) for share, noise in parts)
-    return _decibel(math.expm1(information * math.log(2)))
-
-
-def _decibel(ratio: float) -> float:
-    """Rounded: a table of errors need not be long."""
-    return round(10 * math.log10(ratio), 2)

@@ -5,10 +5,10 @@ import pytest
 
 from phy import OFDM_64_16
 from phy.estimation import in_planes, new_channel, new_scratch, tones
-from phy.kernels.acquisition import correlate
 from phy.kernels.convolution import convolve
 from phy.kernels.list_viterbi import list_decode
 from phy.kernels.smoothing import smooth
+from phy.kernels.timing import correlate
 from phy.kernels.training import estimate, learn, least_squares, turn_back
 from phy.numerology import GRIDS
 from tests.phy.signals import noise

@@ -1,0 +1,131 @@
+"""A burst on its way, and how likely its parts are lost where it arrives.
+
+White noise only. What others send meanwhile is noise too: their powers add up. A codeword has of
+each of its parts the information that a carrier gives at that part's SINR, and fails as often as at
+the one SNR that gives as much on average; a PDU fails with any of its codewords.
+"""
+
+import math
+from dataclasses import dataclass, field
+from functools import lru_cache
+from itertools import pairwise
+from typing import NamedTuple
+
+import phy
+from backends.ether.world import Hop
+
+
+class BurstShape(NamedTuple):
+    """Times in s from a burst's first sample.
+
+    At `head_s` preamble and header are over; `pdus`: where each PDU's symbols begin and end, in
+    which `n_codewords` follow one another.
+    """
+
+    mcs: int
+    pdu_bytes: int
+    n_codewords: int
+    airtime_s: float
+    head_s: float
+    pdus: tuple[tuple[float, float], ...]
+
+
+@dataclass(slots=True, eq=False)
+class Flight:
+    """A burst on the air; by node that it reaches: when, how, and what chance has for it."""
+
+    sender: int
+    start_s: float
+    over_s: float
+    """When it has passed all."""
+    shape: BurstShape
+    hops: dict[int, Hop]
+    arrives: dict[int, float]
+    draws: dict[int, list[float]]
+    near: list["Flight"] = field(default_factory=list)
+    """Others that are on the air somewhere at the same time."""
+    found: dict[int, bool] = field(default_factory=dict)
+
+    @property
+    def end_s(self) -> float:
+        """When its last sample has left."""
+        return self.start_s + self.shape.airtime_s
+
+
+@lru_cache(maxsize=256)
+def burst_shape(
+    rate_hz: float,
+    mcs: int,
+    n_pdus: int,
+    pdu_bytes: int,
+    grid: phy.Numerology = phy.OFDM_64_16,
+) -> BurstShape:
+    """Times of a burst as the modem sends it. Raises ValueError for what no header can tell."""
+    plan = phy.layout(grid, mcs, n_pdus, pdu_bytes)
+    symbol, head = plan.grid.n_symbol, plan.n_samples - plan.n_symbols * plan.grid.n_symbol
+    firsts = [i * plan.coded_bits // plan.symbol_bits for i in range(n_pdus)]
+    lasts = [plan.symbols_through(i + 1) for i in range(n_pdus)]
+    pdus = tuple(
+        ((head + symbol * first) / rate_hz, (head + symbol * last) / rate_hz)
+        for first, last in zip(firsts, lasts, strict=True)
+    )
+    airtime_s, head_s = plan.n_samples / rate_hz, head / rate_hz
+    return BurstShape(mcs, pdu_bytes, plan.form.n_codewords, airtime_s, head_s, pdus)
+
+
+lost_rate = lru_cache(maxsize=4096)(phy.pdu_lost_rate)
+found_rate = lru_cache(maxsize=4096)(phy.burst_found_rate)
+
+
+def _parts(flight: Flight, node: int, begin: float, end: float) -> list[tuple[float, float]]:
+    """(share, power of all noise over the receiver's own) of the parts between two times."""
+    others = []
+    for each in flight.near:
+        at = each.arrives.get(node, math.inf)
+        over = at + each.shape.airtime_s
+        if at < end and begin < over:
+            others.append((at, over, 10 ** (each.hops[node].snr_db / 10)))
+    cuts = {begin, end, *(t for each in others for t in each[:2] if begin < t < end)}
+    return [
+        (
+            (last - first) / (end - begin),
+            1 + sum(power for at, over, power in others if at <= first and last <= over),
+        )
+        for first, last in pairwise(sorted(cuts))
+    ]
+
+
+def head_snr_db(flight: Flight, node: int, at: float) -> float:
+    """By the mean noise until the header is over."""
+    snr_db = flight.hops[node].snr_db
+    if not flight.near:
+        return snr_db
+    parts = _parts(flight, node, at, at + flight.shape.head_s)
+    return snr_db - decibel(sum(share * noise for share, noise in parts))
+
+
+def lost_rate_in(flight: Flight, node: int, begin: float, end: float) -> float:
+    """Of a PDU between two times, whose codewords others may meet one by one."""
+    shape, kept = flight.shape, 1.0
+    n = shape.n_codewords
+    for number in range(n):
+        first = begin + (end - begin) * number / n
+        parts = _parts(flight, node, first, first + (end - begin) / n)
+        lost = lost_rate(shape.mcs, _mean_snr_db(flight, node, parts), shape.pdu_bytes)
+        kept *= (1 - lost) ** (1 / n)
+    return 1 - kept
+
+
+def _mean_snr_db(flight: Flight, node: int, parts: list[tuple[float, float]]) -> float:
+    """The one SNR at which a carrier gives as much information as in all parts, by their shares."""
+    snr_db = flight.hops[node].snr_db
+    if len(parts) == 1:
+        return snr_db - decibel(parts[0][1])
+    snr, most = 10 ** (snr_db / 10), phy.MCS_TABLE[flight.shape.mcs].modulation.bits
+    information = sum(share * min(math.log2(1 + snr / noise), most) for share, noise in parts)
+    return decibel(math.expm1(information * math.log(2)))
+
+
+def decibel(ratio: float) -> float:
+    """Rounded: a table of errors need not be long."""
+    return round(10 * math.log10(ratio), 2)

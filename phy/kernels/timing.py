@@ -1,0 +1,90 @@
+"""Where the long training is, and at what frequency: correlation with what was sent."""
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from phy.kernels.burst import Planes
+from phy.kernels.inline import step
+from phy.kernels.lanes import N_LANES, Lanes, load, splat, store, total
+
+SEARCH = 24
+"""The first long symbol is looked for this many samples around where the peak puts it."""
+MIN_MATCH = 0.12
+FIRST_ECHO = 0.1
+MAX_SPREAD = 12
+AMBIGUITY = 1 / 16
+_COHERENT = 64
+_LAG = 64
+
+
+@njit(nogil=True, cache=True)
+def correlate(planes: Planes, templates: NDArray[np.complex64], out: NDArray[np.float32]) -> None:
+    """Strength of two templates in a row at each offset of `planes` `[2, …]`.
+
+    With c[o] = Σ_m z[o + m] t*[a, m], out[a, o] = |c[o] + c[o + n]|²; for templates so long that
+    the frequency is not known well enough to add them up, 2 |c[o]|² + 2 |c[o + n]|². `templates`
+    are `[aliases, n]`; `out` is `[aliases, offsets]`, whole lanes of them.
+    """
+    n, n_out = templates.shape[1], out.shape[1]
+    for a in range(templates.shape[0]):
+        for o in range(0, n_out, N_LANES):
+            re, im = _match(planes, o, templates[a])
+            later_re, later_im = _match(planes, o + n, templates[a])
+            sum_re, sum_im = re + later_re, im + later_im
+            strength = sum_re * sum_re + sum_im * sum_im
+            if n > _COHERENT:
+                less_re, less_im = re - later_re, im - later_im
+                strength = strength + (less_re * less_re + less_im * less_im)
+            store(out, a * n_out + o, strength)
+
+
+@step
+def _match(planes: Planes, at: int, template: NDArray[np.complex64]) -> tuple[Lanes, Lanes]:
+    """Σ_m z[o + m] t*[m] for the eight offsets from `at` on."""
+    size = planes.shape[1]
+    re: Lanes = splat(0)
+    im: Lanes = splat(0)
+    for m in range(template.size):
+        a, b = load(planes, at + m), load(planes, size + at + m)
+        c, d = splat(template[m].real), splat(template[m].imag)
+        re = re + (a * c + b * d)
+        im = im + (b * c - a * d)
+    return re, im
+
+
+@njit(nogil=True, cache=True)
+def locate(planes: Planes, templates: NDArray[np.complex64]) -> tuple[int, float]:
+    """(first sample of the long training's first echo or −1, frequency in cycles a sample).
+
+    It is looked for at the first 2 SEARCH samples of `planes` `[2, ≥ 2 SEARCH + 2 n_fft]`.
+    """
+    n_aliases, n = templates.shape
+    strength = np.empty((n_aliases, 2 * SEARCH), np.float32)
+    correlate(planes, templates, strength)
+    alias, peak, strongest = 0, 0, np.float32(-1)
+    for a in range(n_aliases):
+        for o in range(2 * SEARCH):
+            if strength[a, o] > strongest:
+                alias, peak, strongest = a, o, strength[a, o]
+    size, energy = planes.shape[1], splat(0)
+    for m in range(peak, peak + 2 * n, N_LANES):
+        a, b = load(planes, m), load(planes, size + m)
+        energy = energy + (a * a + b * b)
+    if not strongest > MIN_MATCH * 2 * n * total(energy):
+        return -1, 0.0
+    early = max(0, peak - MAX_SPREAD)
+    while strength[alias, early] < FIRST_ECHO * strongest:
+        early += 1
+    turn, before = 0j, 0j
+    for begin in range(0, 2 * n, _LAG):
+        seen = 0j
+        for m in range(begin, begin + _LAG):
+            z = complex(planes[0, peak + m], planes[1, peak + m])
+            seen += z * complex(templates[alias, m % n]).conjugate()
+        turn += seen * before.conjugate()
+        before = seen
+    rest = math.atan2(turn.imag, turn.real) / (2 * math.pi * _LAG)
+    return early, (alias - n_aliases // 2) * AMBIGUITY + rest
