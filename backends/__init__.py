@@ -34,6 +34,7 @@ from backends.ether import (
 from backends.iqfile import IqFileRadio
 from backends.loopback import LoopbackRadio
 from backends.outstanding import GAP
+from backends.oversampled import OversampledRadio
 from backends.recording import RecordingInfo, RecordingReader, RecordingWriter, describe
 from backends.samples import SAMPLE_TYPES
 
@@ -58,6 +59,7 @@ __all__ = [
     "LocalEther",
     "LoopbackRadio",
     "Outage",
+    "OversampledRadio",
     "Radio",
     "RadioParams",
     "RecordingInfo",

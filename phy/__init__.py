@@ -14,6 +14,7 @@ from phy.mcs import MCS_TABLE, Mcs
 from phy.numerology import GRIDS, OFDM_64_8, OFDM_64_16, Numerology
 from phy.quality import COUNTERS, BurstOver, BurstQuality, Event, PduHeard
 from phy.receiver import Receiver
+from phy.resampling import REACH, Downsampler, upsample
 from phy.sensing import WINDOW as SENSE_WINDOW
 from phy.sensing import CarrierSense
 from phy.transmitter import Transmitter
@@ -29,11 +30,13 @@ __all__ = [
     "OFDM_64_8",
     "OFDM_64_16",
     "PROFILES",
+    "REACH",
     "SENSE_WINDOW",
     "BurstLayout",
     "BurstOver",
     "BurstQuality",
     "CarrierSense",
+    "Downsampler",
     "Event",
     "FrontEnd",
     "FrontEndParams",
@@ -52,5 +55,6 @@ __all__ = [
     "pdu_error_rate",
     "pdu_lost_rate",
     "points",
+    "upsample",
     "warm_up",
 ]

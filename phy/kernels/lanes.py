@@ -144,6 +144,21 @@ def _total(_typing: Any, value: Any) -> Any:
     return types.float32(value), generate
 
 
+def _pairs(_typing: Any, value: Any) -> Any:
+    """The sums of even and of odd lanes, as real and imaginary part."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        lanes = [builder.extract_element(args[0], _lane(i)) for i in range(N_LANES)]
+        while len(lanes) > 2:
+            half = len(lanes) // 2
+            lanes = [builder.fadd(lanes[i], lanes[i + half]) for i in range(half)]
+        made = context.make_complex(builder, signature.return_type)
+        made.real, made.imag = lanes
+        return made._getvalue()  # noqa: SLF001
+
+    return types.complex64(value), generate
+
+
 def _magnitude(_typing: Any, value: Any) -> Any:
     """|x| in each lane."""
 
@@ -209,6 +224,7 @@ store: Any = intrinsic(_store)
 store_int16: Any = intrinsic(_store_int16)
 splat: Any = intrinsic(_splat)
 total: Any = intrinsic(_total)
+pairs: Any = intrinsic(_pairs)
 magnitude: Any = intrinsic(_magnitude)
 root: Any = intrinsic(_root)
 with_sign: Any = intrinsic(_with_sign)

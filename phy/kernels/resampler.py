@@ -6,6 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from phy.kernels.lanes import N_LANES, Lanes, load, pairs, splat
+
 
 @njit(nogil=True, cache=True)
 def interpolate(
@@ -45,3 +47,26 @@ def _dot(weights: NDArray[np.float32], x: NDArray[np.float32]) -> np.float32:
     for k in range(weights.size):
         total += weights[k] * x[k]
     return total
+
+
+@njit(nogil=True, cache=True)
+def filter_strided(
+    x: NDArray[np.complex64],
+    first: int,
+    stride: int,
+    taps: NDArray[np.float32],
+    out: NDArray[np.complex64],
+    out_stride: int,
+    n: int,
+) -> None:
+    """out[i · out_stride] = Σ_k taps[2 k] x[first + i · stride + k] for `n` outputs.
+
+    `taps` are each there twice, then zeros up to whole lanes: `x` must be as long.
+    """
+    flat = x.view(np.float32)
+    for i in range(n):
+        at = 2 * (first + i * stride)
+        both: Lanes = splat(0)
+        for k in range(0, taps.size, N_LANES):
+            both = both + load(flat, at + k) * load(taps, k)
+        out[i * out_stride] = pairs(both)

@@ -58,6 +58,8 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """So much energy above the noise is a carrier; for access policies that listen."""
     block_s: Annotated[float, Meta(ge=1e-4, le=0.1)] = 0.001
     """Samples are received in pieces of this length."""
+    oversampling: Literal[1, 2, 4] = 1
+    """The radio runs at so many times `rate_hz`: for those that are not made for slow rates."""
 
 
 class LoopbackParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

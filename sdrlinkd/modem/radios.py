@@ -1,12 +1,21 @@
 """From the configuration to a modem with its radio."""
 
+import math
 import os
 import socket
 from pathlib import Path
 from random import Random
 
 import phy
-from backends import BackendError, Channel, EtherRadio, IqFileRadio, LoopbackRadio, Radio
+from backends import (
+    BackendError,
+    Channel,
+    EtherRadio,
+    IqFileRadio,
+    LoopbackRadio,
+    OversampledRadio,
+    Radio,
+)
 from sdrlinkd.config import Config
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.modem.link import ModemLink
@@ -19,6 +28,8 @@ def make_modem(config: Config, node_id: int, rng: Random) -> ModemLink:
         radio = _make_radio(config, node_id, rng)
     except BackendError as error:
         raise UserError(str(error)) from None
+    if config.modem.oversampling > 1:
+        radio = OversampledRadio(radio, config.modem.oversampling)
     policy = config.access.policy
     return ModemLink(
         config.modem,
@@ -62,11 +73,15 @@ def _check_airtime(config: Config) -> None:
 
 
 def _channel(config: Config, seed: int) -> Channel:
-    """The simulated air; its noise is `snr_db` below bursts of the modem's own power."""
+    """The simulated air; its noise is `snr_db` below bursts of the modem's own power.
+
+    In the modem's band: a faster radio hears more of it.
+    """
     modem, air = config.modem, config.channel
+    more_db = 10 * math.log10(modem.oversampling)
     return Channel(
         phy.PathParams(
-            rate_hz=modem.rate_hz,
+            rate_hz=modem.rate_hz * modem.oversampling,
             carrier_hz=modem.frequency_hz,
             profile=air.profile,
             delay_spread_s=air.delay_spread_s,
@@ -77,7 +92,7 @@ def _channel(config: Config, seed: int) -> Channel:
             leak_db=air.tx_leak_db,
         ),
         phy.FrontEndParams(
-            noise_dbfs=-modem.backoff_db - air.snr_db,
+            noise_dbfs=-modem.backoff_db - air.snr_db + more_db,
             image_db=air.rx_image_db,
             dc_dbfs=air.rx_dc_dbfs,
             bits=air.adc_bits,

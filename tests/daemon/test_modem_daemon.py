@@ -66,6 +66,24 @@ def test_messages_go_over_the_air_on_any_grid_with_a_stronger_preamble(start_dae
         assert [heard.receive(20).payload for _ in range(10)] == payloads(10)
 
 
+@pytest.mark.parametrize("factor", [2, 4])
+def test_a_radio_may_be_faster_than_the_modem(start_daemon, factor):
+    """The noise in the modem's band is as at its own rate."""
+    keys = f"rate_hz = 5e5\noversampling = {factor}"
+    node = start_daemon(LOOPBACK.replace("rate_hz = 2e6", keys))
+    with (
+        Subscriber("/rx_robot_1/odom", directory=node.directory) as heard,
+        Publisher(node.directory) as out,
+    ):
+        for payload in payloads(10):
+            out.send("/robot_1/odom", payload)
+        got = [heard.receive(20) for _ in range(10)]
+    assert [message.payload for message in got] == payloads(10)
+    for message in got:
+        assert 12 < message.snr_db < 18
+    assert f"{factor} times oversampled" in node.snapshot().carrier.detail
+
+
 def test_stopping_sends_what_is_queued_first(start_daemon):
     node = start_daemon("drain_s = 10.0\n" + LOOPBACK)
     with Publisher(node.directory) as out:

@@ -1,0 +1,85 @@
+"""A radio at twice or four times the modem's rate: for those that are not made for slow ones."""
+
+from collections.abc import AsyncIterator, Awaitable
+from dataclasses import replace
+
+from backends.base import Capabilities, Radio, RxBlock, Samples, Tuning, TxBurst, TxReport
+from phy import REACH, Downsampler, upsample
+
+
+class OversampledRadio:
+    """`radio` at `factor` times the rate that others see; indices are theirs."""
+
+    def __init__(self, radio: Radio, factor: int) -> None:
+        self._radio = radio
+        self._factor = factor
+        self._down = Downsampler(factor)
+        self._tuning: Tuning | None = None
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """Bursts are longer by the filter, at both ends."""
+        found = self._radio.capabilities
+        return replace(found, lead_s=found.lead_s + self._reach_s)
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """The radio's."""
+        return self._radio.counters
+
+    @property
+    def detail(self) -> str:
+        """The radio's, and how much faster it is."""
+        return f"{self._radio.detail}, {self._factor} times oversampled"
+
+    async def open(self, tuning: Tuning) -> None:
+        """Begin. Raises BackendError."""
+        self._tuning = tuning
+        await self._radio.open(replace(tuning, rate_hz=tuning.rate_hz * self._factor))
+
+    async def blocks(self) -> AsyncIterator[RxBlock]:
+        """Blocks REACH samples late; what lies before a gap is told as if silence followed."""
+        late_ns, last_ns = round(self._reach_s * 1e9), 0
+        async for block in self._radio.blocks():
+            last_ns = block.host_ns
+            if block.samples is not None:
+                samples = self._down.push(block.samples)
+                if len(samples):
+                    yield self._told(samples, block, block.host_ns - late_ns)
+                continue
+            if len(rest := self._down.flush()):
+                yield self._told(rest, block, block.host_ns)
+            begin = self._down.next_index
+            self._down.restart(block.index + block.n)
+            n = self._down.next_index - begin
+            yield RxBlock(begin, n, None, block.gap_reason, block.host_ns, self._unsure(block))
+        if len(rest := self._down.flush()):
+            yield RxBlock(self._down.next_index - len(rest), len(rest), rest, "", last_ns)
+
+    def send(self, burst: TxBurst) -> Awaitable[TxReport]:
+        """The burst with the filter's rise before and fall behind it."""
+        factor = self._factor
+        latest = None if burst.latest is None else (burst.latest - REACH) * factor
+        start = (burst.start - REACH) * factor
+        answer = self._radio.send(TxBurst(start, upsample(burst.samples, factor), latest))
+        return self._report(answer)
+
+    async def _report(self, answer: Awaitable[TxReport]) -> TxReport:
+        report = await answer
+        start = report.start // self._factor + REACH
+        return TxReport(report.outcome, start, max(start, report.end // self._factor - REACH))
+
+    async def close(self) -> None:
+        """Stop."""
+        await self._radio.close()
+
+    @property
+    def _reach_s(self) -> float:
+        return REACH / self._tuning.rate_hz if self._tuning else 0.0
+
+    def _told(self, samples: Samples, block: RxBlock, host_ns: int) -> RxBlock:
+        index = self._down.next_index - len(samples)
+        return RxBlock(index, len(samples), samples, "", host_ns, self._unsure(block))
+
+    def _unsure(self, block: RxBlock) -> int:
+        return -(-block.index_uncertainty // self._factor)

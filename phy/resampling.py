@@ -1,0 +1,84 @@
+"""To twice or four times the rate and back, for radios that are faster than the modem.
+
+A linear-phase low-pass (Kaiser, 60 dB) that passes the carriers in use and takes off their images:
+802.11's outermost carrier is at 0.41 of the modem's rate, its first image at 0.59.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phy.kernels.resampler import filter_strided
+
+REACH = 16
+"""Samples of the slow side before and after one that have a part in it."""
+# Of the slow side's rate: half way between outermost carrier and first image.
+_CUTOFF = 0.5
+_KAISER_BETA = 5.65
+# Behind samples that are filtered, for the last lanes.
+_REST = np.zeros(4, np.complex64)
+
+
+def low_pass(factor: int) -> NDArray[np.float32]:
+    """The filter's taps on the fast side `[2 factor REACH + 1]`, their sum 1."""
+    n = np.arange(-factor * REACH, factor * REACH + 1)
+    taps = np.sinc(2 * _CUTOFF * n / factor) * np.kaiser(len(n), _KAISER_BETA)
+    unit: NDArray[np.float32] = (taps / taps.sum()).astype(np.float32)
+    return unit
+
+
+def upsample(burst: NDArray[np.complex64], factor: int) -> NDArray[np.complex64]:
+    """A burst `[n]` at `factor` times its rate, with the filter's rise and fall around it.
+
+    Sample `i` of it is at `(i + REACH) · factor`; `[(n + 2 REACH) · factor]`.
+    """
+    n = len(burst) + 2 * REACH
+    padded = np.zeros(len(burst) + 4 * REACH + len(_REST), np.complex64)
+    padded[2 * REACH : 2 * REACH + len(burst)] = burst
+    out = np.empty(n * factor, np.complex64)
+    taps = low_pass(factor) * np.float32(factor)
+    for phase in range(factor):
+        # Of every `factor` samples all but one are zero: so many taps do nothing.
+        own = _twice(taps[-phase % factor :: factor])
+        filter_strided(padded, min(phase, 1), 1, own, out[phase:], factor, n)
+    return out
+
+
+class Downsampler:
+    """A stream at `factor` times the modem's rate to the modem's. Any chunking gives the same."""
+
+    def __init__(self, factor: int) -> None:
+        self._factor = factor
+        self._taps = _twice(low_pass(factor))
+        self._kept = np.zeros(0, np.complex64)
+        self.restart(0)
+
+    def restart(self, index: int) -> None:
+        """The next sample to be pushed has this index on the fast side; silence came before it."""
+        reach = self._factor * REACH
+        self.next_index = -(-index // self._factor)
+        """Index on the slow side of the next sample to come out."""
+        self._end = index
+        self._kept = np.zeros(index - self.next_index * self._factor + reach, np.complex64)
+
+    def push(self, samples: NDArray[np.complex64]) -> NDArray[np.complex64]:
+        """The next samples `[n]`; what can be told of the slow side, REACH samples behind."""
+        factor, reach = self._factor, self._factor * REACH
+        x = np.concatenate((self._kept, samples, _REST))
+        self._end += len(samples)
+        n = max(0, (self._end - reach - 1) // factor + 1 - self.next_index)
+        out = np.empty(n, np.complex64)
+        filter_strided(x, 0, factor, self._taps, out, 1, n)
+        self.next_index += n
+        self._kept = x[n * factor : -len(_REST)]
+        return out
+
+    def flush(self) -> NDArray[np.complex64]:
+        """The last samples, as if silence followed."""
+        return self.push(np.zeros(self._factor * REACH, np.complex64))
+
+
+def _twice(taps: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Each tap for real and imaginary part, up to whole lanes."""
+    out = np.zeros(-(-2 * len(taps) // 8) * 8, np.float32)
+    out[: 2 * len(taps)] = np.repeat(taps, 2)
+    return out

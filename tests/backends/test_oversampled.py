@@ -1,0 +1,67 @@
+"""A radio at twice or four times the rate: others see theirs, bursts and gaps where they were."""
+
+import numpy as np
+import pytest
+
+from backends import LoopbackRadio, OversampledRadio, RadioParams, Tuning, TxBurst, TxOutcome
+from phy import REACH, Transmitter
+from tests.backends.hubs import NODE, EtherRadio, serving
+from tests.backends.radios import AIR, BLOCK_S, RATE, TUNING, heard, opened, send, take
+
+pytestmark = pytest.mark.usefixtures("at_ease")
+factors = pytest.mark.parametrize("factor", [2, 4])
+
+
+def two_bursts(first):
+    """What a modem sends, the second with a last moment that it will keep."""
+    rng = np.random.default_rng(6)
+    samples = [0.2 * Transmitter().modulate([rng.bytes(60)], 1) for _ in range(2)]
+    second = first + len(samples[0]) + 500
+    return [TxBurst(first, samples[0]), TxBurst(second, samples[1], second)]
+
+
+def assert_heard(stream, sent, reports, gain_db=0.0):
+    """Each where its report says, with nothing but the filter's error."""
+    for burst, report in zip(sent, reports, strict=True):
+        assert report.outcome is TxOutcome.SENT
+        assert (report.start, report.end) == (burst.start, burst.start + len(burst.samples))
+        got = stream[report.start + REACH : report.end - REACH]
+        expected = burst.samples[REACH:-REACH]
+        gain = np.vdot(expected, got) / np.vdot(expected, expected)
+        assert 20 * np.log10(abs(gain)) == pytest.approx(gain_db, abs=0.05)
+        error = np.mean(np.abs(got - gain * expected) ** 2)
+        assert error < 1e-3 * np.mean(np.abs(gain * expected) ** 2)
+
+
+@factors
+async def test_bursts_are_heard_at_their_index_whatever_the_factor(factor):
+    radio = OversampledRadio(LoopbackRadio(AIR, BLOCK_S, paced=False), factor)
+    async with opened(radio):
+        assert f"{factor} times oversampled" in radio.detail
+        assert radio.capabilities.lead_s >= REACH / RATE
+        blocks = radio.blocks()
+        reports, taken = await send(radio, blocks, sent := two_bursts(700))
+        taken += await take(blocks, reports[-1].end + 500)
+    assert [block.index for block in taken[1:]] == [block.index + block.n for block in taken[:-1]]
+    assert taken[0].index == 0
+    assert_heard(heard(taken), sent, reports)
+
+
+@factors
+async def test_gaps_are_as_long_as_they_were_and_the_time_goes_on(factor, tmp_path):
+    """A half-duplex radio hears nothing around its bursts."""
+    params = {NODE: RadioParams(full_duplex=False, turnaround_s=0.001)}
+    with serving(tmp_path, params, paced=False, rate_hz=factor * RATE):
+        radio = OversampledRadio(EtherRadio(tmp_path, NODE, "under test"), factor)
+        async with opened(radio, Tuning(RATE, TUNING.frequency_hz)):
+            blocks = radio.blocks()
+            (report,), taken = await send(radio, blocks, two_bursts(2000)[:1])
+            taken += await take(blocks, report.end + 1000)
+    at = 0
+    for block in taken:
+        assert block.index == at
+        at += block.n
+    gap = [block for block in taken if block.samples is None]
+    begin, end = gap[0].index, gap[-1].index + gap[-1].n
+    assert report.start - begin == pytest.approx(0.001 * RATE + REACH, abs=2)
+    assert end - report.end == pytest.approx(0.001 * RATE + REACH, abs=2)
