@@ -73,7 +73,8 @@ def main(
 
 def _table(benchmark: str, rows: list[Row]) -> Table:
     table = Table(title=f"benchmarks.{benchmark}", title_justify="left")
-    for column in ("row", "value", "target", "peers in the same run", "trials"):
+    table.add_column("row", no_wrap=True)
+    for column in ("value", "target", "peers in the same run", "trials"):
         table.add_column(column)
     for row in rows:
         here = f"{row.value:,.4g} {row.unit}"
