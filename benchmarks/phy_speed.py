@@ -52,7 +52,7 @@ def measure(seed: int, quick: bool) -> list[Row]:
     peers = _measure_peers(seed)
     return [
         _search("search_msps_noise", 200.0, _noise(seed), rounds, peers),
-        _search("search_msps_gfsk_+20db", 40.0, _gfsk(seed), rounds, peers),
+        _search("search_msps_gfsk_+20db", 40.0, _neighbours(seed), rounds, peers),
         _receive("rx_msps_16x220B_qpsk12", QPSK12, 16, 220, 80.0, seed, rounds, peers),
         _receive("rx_msps_16x220B_64qam34", QAM64_34, 16, 220, 35.0, seed, rounds, peers),
         _receive("rx_msps_1x64B_qpsk12", QPSK12, 1, 64, 30.0, seed, rounds, peers),
@@ -95,18 +95,23 @@ def _noise(seed: int) -> list[NDArray[np.complex64]]:
     return [front_end.receive(np.zeros(1 << 20, np.complex64))]
 
 
-def _gfsk(seed: int) -> list[NDArray[np.complex64]]:
+def _neighbours(seed: int) -> list[NDArray[np.complex64]]:
     """Neighbours that send all the time, 20 dB over the noise: 20 and 4 samples a bit."""
     signals = []
     for n_samples in (20, 4):
         rng = np.random.default_rng(seed)
-        bits = rng.choice([-1.0, 1.0], (1 << 19) // n_samples)
-        pulse = np.exp(-((np.arange(-2 * n_samples, 2 * n_samples + 1) / n_samples / 0.53) ** 2))
-        wave = np.convolve(np.repeat(bits, n_samples), pulse / pulse.sum(), "same")
-        x = 10 * np.exp(2j * np.pi * np.cumsum(wave) * 0.25 / n_samples)
         front_end = FrontEnd(FrontEndParams(noise_dbfs=0.0), rng)
-        signals.append(front_end.receive(x.astype(np.complex64)))
+        signals.append(front_end.receive(10 * gfsk(rng, 1 << 19, n_samples)))
     return signals
+
+
+def gfsk(rng: np.random.Generator, n: int, samples_a_bit: int) -> NDArray[np.complex64]:
+    """A neighbour `[n]` as Bluetooth is: shifts by Gaussian pulses, index 0.5; mean power 1."""
+    bits = rng.choice([-1.0, 1.0], -(-n // samples_a_bit) + 1)
+    t = np.arange(-2 * samples_a_bit, 2 * samples_a_bit + 1) / samples_a_bit
+    pulse = np.exp(-((t / 0.53) ** 2))
+    wave = np.convolve(np.repeat(bits, samples_a_bit), pulse / pulse.sum(), "same")[:n]
+    return np.exp(2j * np.pi * np.cumsum(wave) * 0.25 / samples_a_bit).astype(np.complex64)
 
 
 def _search(

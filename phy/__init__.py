@@ -12,9 +12,9 @@ from phy.header import MAX_PDU_BYTES, MAX_PDUS, N_NETWORKS
 from phy.layout import BurstLayout, layout, most_pdus
 from phy.mcs import MCS_TABLE, Mcs
 from phy.numerology import GRIDS, OFDM_64_8, OFDM_64_16, Numerology
+from phy.oversampling import REACH, Downsampler, upsample
 from phy.quality import COUNTERS, BurstOver, BurstQuality, Event, PduHeard
 from phy.receiver import Receiver
-from phy.resampling import REACH, Downsampler, upsample
 from phy.sensing import WINDOW as SENSE_WINDOW
 from phy.sensing import CarrierSense
 from phy.transmitter import Transmitter

@@ -56,24 +56,6 @@ class Demodulator:
             to, llr, powers,
         )  # fmt: skip
 
-    def demap(
-        self,
-        y: NDArray[np.float32],
-        modulation: Modulation,
-        channel: Parcel[Channel],
-        first_symbol: int,
-        llr: NDArray[np.int16],
-        points: NDArray[np.complex64] | None = None,
-    ) -> None:
-        """The same from tones `y` `[n, 2, width]`."""
-        grid = self._grid
-        to = self._no_points if points is None else points
-        kernel.demap(
-            y, first_symbol,
-            tones(grid).words, axes(modulation, grid).words, channel.words, self._scratch.words,
-            to, llr,
-        )  # fmt: skip
-
 
 class PduDecoder:
     """Collects LLRs of bursts and decodes each PDU when its symbols are in. One for each thread."""

@@ -49,6 +49,8 @@ def new_scratch(grid: Numerology) -> Parcel[Scratch]:
     return Parcel(
         Scratch(
             windows=np.empty((4, N_LANES * grid.n_fft), np.float32),
+            starts=np.empty(N_LANES, np.int64),
+            turn=np.empty((2, grid.n_fft), np.float32),
             square=np.empty(N_LANES * N_LANES, np.float32),
             y=np.empty((N_LANES, 2, width), np.float32),
             level=np.empty((2, width), np.float32),

@@ -10,7 +10,6 @@ from phy.constellation import Modulation, points
 from phy.estimation import tones
 from phy.kernels import modulator as kernel
 from phy.kernels.burst import Axes
-from phy.kernels.lanes import whole_lanes
 from phy.kernels.ldpc_form import Form
 from phy.kernels.modulator import Map
 from phy.kernels.parcel import Parcel
@@ -35,17 +34,13 @@ class Mapping:
             )
         )
 
-    def to_tones(self, coded: NDArray[np.uint8], first_symbol: int) -> NDArray[np.float32]:
-        """Tones `[n, 2, width]` of coded bits `[n · symbol_bits]`, the header's symbol being 0."""
-        n_symbols, width = len(coded) // self.symbol_bits, whole_lanes(self.grid.n_used)
-        out = np.empty((n_symbols, 2, width), np.float32)
-        kernel.map_bits(coded, first_symbol, tones(self.grid).words, self._map.words, out)
-        return out
-
     def to_samples(
         self, coded: NDArray[np.uint8], first_symbol: int, peak: float
     ) -> NDArray[np.complex64]:
-        """Samples `[n · n_symbol]` of the same, at mean power 1, none beyond `peak`."""
+        """Samples `[n · n_symbol]` of coded bits `[n · symbol_bits]`, the header's symbol being 0.
+
+        At mean power 1, none beyond `peak`.
+        """
         grid = self.grid
         out = np.empty(len(coded) // self.symbol_bits * grid.n_symbol, np.complex64)
         kernel.modulate_bits(coded, first_symbol, peak, tones(grid).words, self._map.words, out)

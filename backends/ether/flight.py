@@ -73,6 +73,9 @@ def burst_shape(
     return BurstShape(mcs, pdu_bytes, plan.form.n_codewords, airtime_s, head_s, pdus)
 
 
+# As measured with the modem (tests/backends/test_twin.py).
+_STRANGE = 1.5
+
 lost_rate = lru_cache(maxsize=4096)(phy.pdu_lost_rate)
 found_rate = lru_cache(maxsize=4096)(phy.burst_found_rate)
 
@@ -117,12 +120,19 @@ def lost_rate_in(flight: Flight, node: int, begin: float, end: float) -> float:
 
 
 def _mean_snr_db(flight: Flight, node: int, parts: list[tuple[float, float]]) -> float:
-    """The one SNR at which a carrier gives as much information as in all parts, by their shares."""
+    """The one SNR at which a carrier gives as much information as in all parts, by their shares.
+
+    Others' power counts as more than the same of white noise: a receiver has four pilots in a
+    symbol to tell it by.
+    """
     snr_db = flight.hops[node].snr_db
-    if len(parts) == 1:
-        return snr_db - decibel(parts[0][1])
+    if parts == [(1.0, 1.0)]:
+        return snr_db
     snr, most = 10 ** (snr_db / 10), phy.MCS_TABLE[flight.shape.mcs].modulation.bits
-    information = sum(share * min(math.log2(1 + snr / noise), most) for share, noise in parts)
+    information = sum(
+        share * min(math.log2(1 + snr / (1 + _STRANGE * (noise - 1))), most)
+        for share, noise in parts
+    )
     return decibel(math.expm1(information * math.log(2)))
 
 

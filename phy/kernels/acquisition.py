@@ -30,13 +30,11 @@ from phy.kernels.equaliser import equalise, renew, start_tracking
 from phy.kernels.fft import windows_to_tones
 from phy.kernels.inline import step
 from phy.kernels.lanes import N_LANES, Lanes, load, splat, store, total
-from phy.kernels.parcel import opener
+from phy.kernels.parcel import Packed, opener
 from phy.kernels.timing import SEARCH, locate
 from phy.kernels.tracking import PHASE
 from phy.kernels.training import estimate, learn, turn_back
 from phy.kernels.viterbi import MAX_LLR, decode_block
-
-Words = NDArray[np.int64]
 
 # A literal would have its callee compiled for it alone.
 _0: Any = np.int64(0)
@@ -176,12 +174,12 @@ def acquire(
     coarse: float,
     dc: complex,
     carrier_cycles: float,
-    training_in: Words,
-    tones_in: Words,
-    axes_in: Words,
-    channel_in: Words,
-    scratch_in: Words,
-    room_in: Words,
+    training_in: Packed,
+    tones_in: Packed,
+    axes_in: Packed,
+    channel_in: Packed,
+    scratch_in: Packed,
+    room_in: Packed,
 ) -> tuple[int, float]:
     """(first sample of the burst or −1, its frequency) of the burst in `x`; its header to the room.
 
@@ -219,11 +217,11 @@ def acquire(
 @njit(nogil=True, cache=True)
 def settle(
     sent: NDArray[np.float32],
-    training_in: Words,
-    tones_in: Words,
-    channel_in: Words,
-    scratch_in: Words,
-    room_in: Words,
+    training_in: Packed,
+    tones_in: Packed,
+    channel_in: Packed,
+    scratch_in: Packed,
+    room_in: Packed,
 ) -> tuple[float, float, float]:
     """Learn from a header that was read: what was `sent`, long training and header.
 

@@ -9,11 +9,12 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from phy.kernels.inline import step
+from phy.kernels.lanes import place
 
 Words = NDArray[np.uint64]
 
 ONE = np.uint64(1)
-_63, _64 = np.uint64(63), np.uint64(64)
+_64 = np.uint64(64)
 _LANES = 32
 _I16, _I32 = ir.IntType(16), ir.IntType(32)
 _VECTOR = ir.VectorType(_I16, _LANES)
@@ -25,9 +26,7 @@ def _signs_generator(_context: Any, array: Any, at: Any) -> Any:
     """Bit i is 1 where `array[at + i]` is negative, for 32 int16."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        data = context.make_array(signature.args[0])(context, builder, args[0]).data
-        where = builder.bitcast(builder.gep(data, [args[1]]), _VECTOR.as_pointer())
-        values = builder.load(where)
+        values = builder.load(place(context, builder, signature, args, _VECTOR))
         values.align = 2
         zero = ir.Constant(_VECTOR, [ir.Constant(_I16, 0)] * _LANES)
         return builder.bitcast(builder.icmp_signed("<", values, zero), _I32)

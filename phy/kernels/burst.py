@@ -102,7 +102,10 @@ class Scratch(NamedTuple):
     """Room to work in: one for each thread."""
 
     windows: NDArray[np.float32]
-    """Of the FFT `[4, 8 n_fft]`."""
+    starts: NDArray[np.int64]
+    turn: Planes
+    """Of the FFT: eight windows, twice `[4, 8 n_fft]`, where they begin `[8]`, and what turns them
+    back `[2, n_fft]`."""
     square: Row
     """Eight by eight."""
     y: NDArray[np.float32]
@@ -122,5 +125,5 @@ class Scratch(NamedTuple):
 
 
 open_scratch = opener(
-    Scratch, "f4[2] f4[1] f4[3] f4[2] f4[1] i2[1] c16[1] f8[1] f4[2] f4[2] f8[1] f8[1]"
+    Scratch, "f4[2] i8[1] f4[2] f4[1] f4[3] f4[2] f4[1] i2[1] c16[1] f8[1] f4[2] f4[2] f8[1] f8[1]"
 )

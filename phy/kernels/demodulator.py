@@ -10,10 +10,9 @@ from phy.kernels.burst import SLOPE_USED, open_axes, open_channel, open_scratch,
 from phy.kernels.equaliser import equalise, start_tracking, use_slope
 from phy.kernels.fft import circle, eight_windows, windows_to_tones
 from phy.kernels.lanes import N_LANES, Lanes, load, splat, total
+from phy.kernels.parcel import Packed
 from phy.kernels.tracking import SLOPE
 from phy.kernels.training import estimate
-
-Words = NDArray[np.int64]
 
 
 @njit(nogil=True, cache=True)
@@ -24,10 +23,10 @@ def demodulate(
     dc: complex,
     origin: int,
     number: int,
-    tones_in: Words,
-    axes_in: Words,
-    channel_in: Words,
-    scratch_in: Words,
+    tones_in: Packed,
+    axes_in: Packed,
+    channel_in: Packed,
+    scratch_in: Packed,
     points: NDArray[np.complex64],
     llr: NDArray[np.int16],
     powers: NDArray[np.float32],
@@ -39,16 +38,13 @@ def demodulate(
     """
     tones, axes = open_tones(tones_in), open_axes(axes_in)
     channel, scratch = open_channel(channel_in), open_scratch(scratch_in)
-    turn, step = np.empty((2, tones.n_fft), np.float32), -2 * math.pi * frequency
-    circle(-frequency, tones.gain, turn)
-    places, phases = np.empty(N_LANES, np.int64), np.empty(N_LANES)
-    width, y = scratch.y.shape[2], scratch.y
+    starts, width, y = scratch.starts, scratch.y.shape[2], scratch.y
+    circle(-frequency, tones.gain, scratch.turn)
     for row in range(0, n, N_LANES):
-        for lane in range(N_LANES):
-            places[lane] = min(row + lane, n - 1) * tones.n_symbol
-            phases[lane] = step * (places[lane] + origin)
         rows = min(n - row, N_LANES)
-        eight_windows(samples, places, phases, turn, dc, rows, tones, scratch, y)
+        for i in range(rows):
+            starts[i] = (row + i) * tones.n_symbol
+        eight_windows(samples, starts, rows, frequency, dc, origin, tones, scratch, y)
         for i in range(rows):
             power: Lanes = splat(0)
             for k in range(2 * width * i, 2 * width * (i + 1), N_LANES):
@@ -58,32 +54,14 @@ def demodulate(
 
 
 @njit(nogil=True, cache=True)
-def demap(
-    y: NDArray[np.float32],
-    number: int,
-    tones_in: Words,
-    axes_in: Words,
-    channel_in: Words,
-    scratch_in: Words,
-    points: NDArray[np.complex64],
-    llr: NDArray[np.int16],
-) -> None:
-    """`equalise` of tones `y` `[n, 2, width]`."""
-    equalise(
-        y, y.shape[0], number, open_tones(tones_in), open_axes(axes_in),
-        open_channel(channel_in), open_scratch(scratch_in), points, llr, 0,
-    )  # fmt: skip
-
-
-@njit(nogil=True, cache=True)
 def to_tones(
     samples: NDArray[np.complex64],
     starts: NDArray[np.int64],
     frequency: float,
     dc: complex,
     origin: int,
-    tones_in: Words,
-    scratch_in: Words,
+    tones_in: Packed,
+    scratch_in: Packed,
     out: NDArray[np.float32],
 ) -> None:
     """As `windows_to_tones`."""
@@ -92,7 +70,7 @@ def to_tones(
 
 
 @njit(nogil=True, cache=True)
-def slip(early: int, tones_in: Words, channel_in: Words) -> None:
+def slip(early: int, tones_in: Packed, channel_in: Packed) -> None:
     """Let windows begin `early` samples earlier: carriers lean less by that."""
     tones, channel = open_tones(tones_in), open_channel(channel_in)
     lean = early * 2 * math.pi / tones.n_fft
@@ -104,9 +82,9 @@ def slip(early: int, tones_in: Words, channel_in: Words) -> None:
 def learn_channel(
     y: NDArray[np.float32],
     sent: NDArray[np.float32],
-    tones_in: Words,
-    channel_in: Words,
-    scratch_in: Words,
+    tones_in: Packed,
+    channel_in: Packed,
+    scratch_in: Packed,
 ) -> None:
     """A channel from known symbols, as of `estimate`, ready to be followed."""
     tones, channel = open_tones(tones_in), open_channel(channel_in)

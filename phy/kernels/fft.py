@@ -30,30 +30,27 @@ def circle(frequency: float, size: float, out: Planes) -> None:
 @njit(nogil=True, cache=True)
 def eight_windows(
     samples: NDArray[np.complex64],
-    places: NDArray[np.int64],
-    phases: NDArray[np.float64],
-    turn: Planes,
-    dc: complex,
+    starts: NDArray[np.int64],
     n: int,
+    frequency: float,
+    dc: complex,
+    origin: int,
     tones: Tones,
     scratch: Scratch,
     out: NDArray[np.float32],
 ) -> None:
-    """Tones `[n, 2, width]` of the `n` ≤ 8 windows that begin at `places` `[8]`.
-
-    Samples are taken less `dc`, turned by `turn` `[2, n_fft]` from the window's beginning on and
-    by `phases` `[8]`.
-    """
-    n_fft, parts, square = tones.n_fft, scratch.windows, scratch.square
-    flat = samples.view(np.float32)
+    """`windows_to_tones` of the first `n` ≤ 8 windows; `scratch.turn` is that of `frequency`."""
+    n_fft, parts, square, turn = tones.n_fft, scratch.windows, scratch.square, scratch.turn
+    flat, step = samples.view(np.float32), -2 * math.pi * frequency
     re, im, to_re, to_im = parts[0], parts[1], parts[2], parts[3]
     for lane in range(N_LANES):
-        square[lane], square[N_LANES + lane] = math.cos(phases[lane]), math.sin(phases[lane])
+        phase = step * (starts[min(lane, n - 1)] + origin)
+        square[lane], square[N_LANES + lane] = math.cos(phase), math.sin(phase)
     begin_re, begin_im = load(square, 0), load(square, N_LANES)
     offset_re, offset_im = splat(dc.real), splat(dc.imag)
     for m in range(0, n_fft, N_LANES // 2):
         for lane in range(N_LANES):
-            store(square, N_LANES * lane, load(flat, 2 * (places[lane] + m)))
+            store(square, N_LANES * lane, load(flat, 2 * (starts[min(lane, n - 1)] + m)))
         transpose(square)
         for i in range(N_LANES // 2):
             a = load(square, 2 * N_LANES * i) - offset_re
@@ -83,15 +80,10 @@ def windows_to_tones(
     Samples are taken less `dc` and turned back by `frequency` cycles a sample; phase 0 is `origin`
     samples before `samples[0]`.
     """
-    turn, n = np.empty((2, tones.n_fft), np.float32), starts.size
-    circle(-frequency, tones.gain, turn)
-    places, phases = np.empty(N_LANES, np.int64), np.empty(N_LANES)
-    for row in range(0, n, N_LANES):
-        for lane in range(N_LANES):
-            places[lane] = starts[min(row + lane, n - 1)]
-            phases[lane] = -2 * math.pi * frequency * (places[lane] + origin)
-        rows = min(n - row, N_LANES)
-        eight_windows(samples, places, phases, turn, dc, rows, tones, scratch, out[row:])
+    circle(-frequency, tones.gain, scratch.turn)
+    for row in range(0, starts.size, N_LANES):
+        n = min(starts.size - row, N_LANES)
+        eight_windows(samples, starts[row:], n, frequency, dc, origin, tones, scratch, out[row:])
 
 
 @step

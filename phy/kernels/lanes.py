@@ -79,7 +79,8 @@ def _negate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
     return builder.fneg(args[0])
 
 
-def _place(context: Any, builder: Any, signature: Any, args: Any, vector: Any) -> Any:
+def place(context: Any, builder: Any, signature: Any, args: Any, vector: Any) -> Any:
+    """For intrinsics: where in an array, their first argument, is `vector` from an index on."""
     data = context.make_array(signature.args[0])(context, builder, args[0]).data
     return builder.bitcast(builder.gep(data, [args[1]]), vector.as_pointer())
 
@@ -88,7 +89,7 @@ def _load(_typing: Any, array: Any, at: Any) -> Any:
     """The eight from `at` on, of an array without gaps, counted from its beginning."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        value = builder.load(_place(context, builder, signature, args, _VECTOR))
+        value = builder.load(place(context, builder, signature, args, _VECTOR))
         value.align = 4
         return value
 
@@ -99,8 +100,8 @@ def _store(_typing: Any, array: Any, at: Any, value: Any) -> Any:
     """Write eight from `at` on."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        place = _place(context, builder, signature, args, _VECTOR)
-        builder.store(args[2], place).align = 4
+        where = place(context, builder, signature, args, _VECTOR)
+        builder.store(args[2], where).align = 4
         return context.get_dummy_value()
 
     return types.void(array, at, value), generate
@@ -111,9 +112,9 @@ def _store_int16(_typing: Any, array: Any, at: Any, value: Any) -> Any:
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         kind = ir.VectorType(_I16, N_LANES)
-        place = _place(context, builder, signature, args, kind)
+        where = place(context, builder, signature, args, kind)
         whole = builder.fptosi(args[2], ir.VectorType(_I32, N_LANES))
-        builder.store(builder.trunc(whole, kind), place).align = 2
+        builder.store(builder.trunc(whole, kind), where).align = 2
         return context.get_dummy_value()
 
     return types.void(array, at, value), generate

@@ -15,8 +15,7 @@ two minima and one product of signs serve all edges. The minimum is an overestim
 are taken times 14/16 (Chen and Fossorier 2002), to the nearest.
 
 *Doubts.* A bit that tells a check the contrary of what it told it last is not believed this time:
-it counts as 0 (Savin 2008). Blocks that would go astray for long take half the iterations, and of
-those that would not be decoded at all, a third and more are.
+it counts as 0 (Savin 2008). Fewer blocks go astray, and those that do come back sooner.
 
 *Rotation.* Each block column of posteriors is stored as a periodic sequence that goes on for a
 vector or more beyond Z. Then Z lanes from any shift on are contiguous in memory; lanes past Z hold
@@ -39,7 +38,7 @@ from phy.kernels.bits import Words, get, low_ones, put, put_signs, to_octets
 from phy.kernels.ldpc_encoder import parity_of
 from phy.kernels.ldpc_form import N_COLUMNS, Form, open_form
 from phy.kernels.ldpc_rows import LANES, ldpc_row
-from phy.kernels.parcel import Parcel, opener
+from phy.kernels.parcel import Packed, Parcel, opener
 
 SURE = 4000
 """LLR of a bit that is known to be 0."""
@@ -107,8 +106,8 @@ def decode_codeword(
 def decode_blocks(
     llr: NDArray[np.int16],
     max_iterations: int,
-    form_in: NDArray[np.int64],
-    work_in: NDArray[np.int64],
+    form_in: Packed,
+    work_in: Packed,
     white: NDArray[np.uint8],
     out: NDArray[np.uint8],
 ) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from phy.kernels.bits import ONE, Words, from_octets, get, low_ones
 from phy.kernels.inline import step
 from phy.kernels.ldpc_form import N_COLUMNS, Form, open_form
+from phy.kernels.parcel import Packed
 
 _63 = np.uint64(63)
 
@@ -106,9 +107,7 @@ def encode_codeword(
 
 
 @njit(nogil=True, cache=True)
-def encode_blocks(
-    blocks: NDArray[np.uint8], form_in: NDArray[np.int64], out: NDArray[np.uint8]
-) -> None:
+def encode_blocks(blocks: NDArray[np.uint8], form_in: Packed, out: NDArray[np.uint8]) -> None:
     """Coded bits `[blocks, n_coded]` of `blocks` of bits `[blocks, n_bits]`."""
     form = open_form(form_in)
     n_rows = form.row_ends.size - 1

@@ -12,9 +12,7 @@ from phy.kernels.inline import step
 from phy.kernels.lanes import N_LANES, least, load, root, splat, store
 from phy.kernels.ldpc_encoder import encode_octets
 from phy.kernels.ldpc_form import open_form
-from phy.kernels.parcel import opener
-
-Words = NDArray[np.int64]
+from phy.kernels.parcel import Packed, opener
 
 
 class Map(NamedTuple):
@@ -59,14 +57,16 @@ def eight_symbols(
     peak: float,
     tones: Tones,
     windows: NDArray[np.float32],
+    square: Row,
     out: NDArray[np.complex64],
 ) -> None:
     """Tones `y` `[8, 2, width]` of `n` ≤ 8 symbols to samples `[n · n_symbol]`, mean power 1.
 
-    Samples beyond the magnitude `peak` are shortened to it. `windows` `[4, 8 n_fft]` is room.
+    Samples beyond the magnitude `peak` are shortened to it. `windows` `[4, 8 n_fft]` and
+    `square` `[64]` are room.
     """
     n_fft, n_symbol, width = tones.n_fft, tones.n_symbol, y.shape[2]
-    n_cp, flat, square = n_symbol - n_fft, out.view(np.float32), np.empty(64, np.float32)
+    n_cp, flat = n_symbol - n_fft, out.view(np.float32)
     re, im, to_re, to_im = windows[0], windows[1], windows[2], windows[3]
     re[:] = 0
     im[:] = 0
@@ -106,9 +106,9 @@ def modulate(
     padding: NDArray[np.uint8],
     number: int,
     peak: float,
-    form_in: Words,
-    tones_in: Words,
-    map_in: Words,
+    form_in: Packed,
+    tones_in: Packed,
+    map_in: Packed,
     out: NDArray[np.complex64],
 ) -> None:
     """Blocks of bytes, whitened, to samples of whole symbols; the first is symbol `number`.
@@ -130,14 +130,15 @@ def modulate_bits(
     coded: NDArray[np.uint8],
     number: int,
     peak: float,
-    tones_in: Words,
-    map_in: Words,
+    tones_in: Packed,
+    map_in: Packed,
     out: NDArray[np.complex64],
 ) -> None:
     """The same of coded bits, as many as whole symbols hold."""
     tones, by = open_tones(tones_in), open_map(map_in)
     n_bits, n_symbol = tones.n_data * by.bits, tones.n_symbol
     windows = np.empty((4, N_LANES * tones.n_fft), np.float32)
+    square = np.empty(N_LANES * N_LANES, np.float32)
     y = np.empty((N_LANES, 2, -(-tones.bins.size // N_LANES) * N_LANES), np.float32)
     for first in range(0, coded.size // n_bits, N_LANES):
         n = min(N_LANES, coded.size // n_bits - first)
@@ -145,15 +146,4 @@ def modulate_bits(
             polarity = tones.polarity[number + first + i]
             map_symbol(coded, (first + i) * n_bits, polarity, tones, by, y[i])
         end = (first + n) * n_symbol
-        eight_symbols(y, n, peak, tones, windows, out[first * n_symbol : end])
-
-
-@njit(nogil=True, cache=True)
-def map_bits(
-    coded: NDArray[np.uint8], number: int, tones_in: Words, map_in: Words, out: NDArray[np.float32]
-) -> None:
-    """Tones `[n, 2, width]` of coded bits."""
-    tones, by = open_tones(tones_in), open_map(map_in)
-    n_bits = tones.n_data * by.bits
-    for i in range(out.shape[0]):
-        map_symbol(coded, i * n_bits, tones.polarity[number + i], tones, by, out[i])
+        eight_symbols(y, n, peak, tones, windows, square, out[first * n_symbol : end])

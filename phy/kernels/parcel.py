@@ -1,8 +1,8 @@
 """Many arrays as one argument of a kernel.
 
-numba looks at every array that crosses from the interpreter, and at every field of a tuple: half a
-microsecond each, where a short burst takes fifty. What stays the same from call to call is packed
-once instead: a `Parcel` holds the addresses, and the kernel opens it into the tuple that it was.
+numba looks at every array that crosses from the interpreter, and at every field of a tuple; a short
+burst takes hardly longer than that. What stays the same from call to call is packed once instead: a
+`Parcel` holds the addresses, and the kernel opens it into the tuple that it was.
 """
 
 import ctypes
@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 
 _I64 = ir.IntType(64)
 
+Packed = NDArray[np.int64]
+"""A parcel as kernels are given it."""
 
 _Content = TypeVar("_Content", bound=tuple[Any, ...])
 _FIELDS: dict[type[Any], list[Any]] = {}
@@ -46,7 +48,7 @@ class Parcel(Generic[_Content]):
         # Who has the words keeps alive what they point to.
         buffer: Any = (ctypes.c_int64 * len(words))(*words)
         buffer.content = content
-        self.words: NDArray[np.int64] = np.frombuffer(buffer, np.int64)
+        self.words: Packed = np.frombuffer(buffer, np.int64)
 
 
 def opener(kind: type[Any], fields: str) -> Any:

@@ -145,15 +145,12 @@ def shares_lost(mcs, size, share, n):
 
 @pytest.mark.parametrize(
     ("mcs", "size", "bears", "fails"),
-    [(1, 220, 0.15, 0.9), (3, 1024, 0.025, 0.09), (2, 220, 0.08, 0.3), (6, 1024, 0.025, 0.12)],
+    [(1, 220, 0.15, 0.55), (3, 1024, 0.025, 0.09), (2, 220, 0.08, 0.3), (6, 1024, 0.025, 0.12)],
 )
 def test_what_another_burst_meets_is_lost_as_in_the_modem(mcs, size, bears, fails):
-    """A code bears a share of drowned symbols; of short codewords in a row, less of the whole.
-
-    Equal bursts drown QPSK 1/2 not wholly: the tables tell one in five that the modem loses.
-    """
+    """A code bears a share of drowned symbols; of short codewords in a row, less of the whole."""
     assert max(shares_lost(mcs, size, bears, 30)) < 0.2
-    assert min(shares_lost(mcs, size, fails, 30)) > 0.7
+    assert min(shares_lost(mcs, size, fails, 30)) > 0.8
 
 
 def test_many_weak_ones_add_up():

@@ -29,16 +29,22 @@ def payloads(n):
     return [CDR + i.to_bytes(2, "big") * (20 + 3 * i) for i in range(n)]
 
 
-def test_messages_go_over_the_air_unchanged_with_ages_and_snr(start_daemon):
-    node = start_daemon(LOOPBACK)
+def sent_and_heard(node, n):
+    """`n` messages through the daemon's own air, unchanged and in order."""
     with (
         Subscriber("/rx_robot_1/odom", directory=node.directory) as heard,
         Publisher(node.directory) as out,
     ):
-        for payload in payloads(40):
+        for payload in payloads(n):
             out.send("/robot_1/odom", payload)
-        got = [heard.receive(20) for _ in range(40)]
-    assert [message.payload for message in got] == payloads(40)
+        got = [heard.receive(20) for _ in range(n)]
+    assert [message.payload for message in got] == payloads(n)
+    return got
+
+
+def test_messages_go_over_the_air_unchanged_with_ages_and_snr(start_daemon):
+    node = start_daemon(LOOPBACK)
+    got = sent_and_heard(node, 40)
     for message in got:
         assert 1_000 < message.age_us < 10_000_000
         assert 12 < message.snr_db < 18
@@ -57,13 +63,7 @@ def test_messages_go_over_the_air_unchanged_with_ages_and_snr(start_daemon):
 def test_messages_go_over_the_air_on_any_grid_with_a_stronger_preamble(start_daemon, grid):
     keys = f'rate_hz = 2e6\ngrid = "{grid}"\npreamble_boost_db = 3\none_crystal = false'
     node = start_daemon(LOOPBACK.replace("rate_hz = 2e6", keys))
-    with (
-        Subscriber("/rx_robot_1/odom", directory=node.directory) as heard,
-        Publisher(node.directory) as out,
-    ):
-        for payload in payloads(10):
-            out.send("/robot_1/odom", payload)
-        assert [heard.receive(20).payload for _ in range(10)] == payloads(10)
+    sent_and_heard(node, 10)
 
 
 @pytest.mark.parametrize("factor", [2, 4])
@@ -71,15 +71,7 @@ def test_a_radio_may_be_faster_than_the_modem(start_daemon, factor):
     """The noise in the modem's band is as at its own rate."""
     keys = f"rate_hz = 5e5\noversampling = {factor}"
     node = start_daemon(LOOPBACK.replace("rate_hz = 2e6", keys))
-    with (
-        Subscriber("/rx_robot_1/odom", directory=node.directory) as heard,
-        Publisher(node.directory) as out,
-    ):
-        for payload in payloads(10):
-            out.send("/robot_1/odom", payload)
-        got = [heard.receive(20) for _ in range(10)]
-    assert [message.payload for message in got] == payloads(10)
-    for message in got:
+    for message in sent_and_heard(node, 10):
         assert 12 < message.snr_db < 18
     assert f"{factor} times oversampled" in node.snapshot().carrier.detail
 

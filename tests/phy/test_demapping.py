@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from phy import OFDM_64_16, Modulation, points
+from phy import OFDM_64_16, Modulation, ofdm, points
 from phy.convolutional import MAX_LLR
-from phy.demodulation import Demodulator
-from phy.estimation import in_planes, new_channel, tones
+from phy.estimation import in_planes, new_channel, new_scratch, tones
 from phy.interleaver import order
 from phy.kernels.burst import GAIN, NO
-from phy.kernels.equaliser import BLOCK, start_tracking
-from phy.mapping import mapping
+from phy.kernels.equaliser import BLOCK, equalise, start_tracking
+from phy.mapping import axes, mapping
 from phy.sequences import polarity
 
 SEED = 17
@@ -38,7 +37,10 @@ def demap(modulation, bins, channel, first_symbol=2):
     llr = np.empty(len(bins) * GRID.n_data * modulation.bits, np.int16)
     equalised = np.empty((len(bins), GRID.n_data), np.complex64)
     y = in_planes(bins[:, GRID.bins[GRID.tones]])
-    Demodulator(GRID).demap(y, modulation, channel, first_symbol, llr, equalised)
+    how = tones(GRID).content, axes(modulation, GRID).content
+    equalise(
+        y, len(y), first_symbol, *how, channel.content, new_scratch(GRID).content, equalised, llr, 0
+    )
     return llr, equalised
 
 
@@ -66,7 +68,9 @@ def with_pilots(data, h, first_symbol=2):
 
 def bins_of(coded, modulation, first_symbol):
     """Symbols as sent `[n, 64]`."""
-    y = mapping(modulation, GRID).to_tones(coded, first_symbol)[:, :, : GRID.n_used]
+    samples = mapping(modulation, GRID).to_samples(coded, first_symbol, np.inf)
+    starts = np.arange(GRID.n_cp, len(samples), GRID.n_symbol)
+    y = ofdm.to_tones(samples, starts, 0.0, 0j, GRID)[:, :, : GRID.n_used]
     bins = np.zeros((len(y), GRID.n_fft), np.complex64)
     bins[:, GRID.bins[GRID.tones]] = y[:, 0] + 1j * y[:, 1]
     return bins

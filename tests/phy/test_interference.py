@@ -3,19 +3,11 @@
 import numpy as np
 import pytest
 
+from benchmarks.phy_speed import gfsk
 from phy import Path, PathParams, Receiver, Transmitter
 from tests.phy.signals import heard, noise, noisy, payloads, silence, turned
 
 SEED = 71
-
-
-def gfsk(rng, n, samples_a_bit):
-    """A neighbour as Bluetooth is: shifts by Gaussian pulses, index 0.5; mean power 1."""
-    bits = rng.choice([-1.0, 1.0], -(-n // samples_a_bit) + 1)
-    t = np.arange(-2 * samples_a_bit, 2 * samples_a_bit + 1) / samples_a_bit
-    pulse = np.exp(-((t / 0.53) ** 2))
-    wave = np.convolve(np.repeat(bits, samples_a_bit), pulse / pulse.sum(), "same")[:n]
-    return np.exp(2j * np.pi * np.cumsum(wave) * 0.25 / samples_a_bit).astype(np.complex64)
 
 
 @pytest.mark.parametrize("samples_a_bit", [4, 8, 20])

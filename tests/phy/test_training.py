@@ -75,7 +75,7 @@ def test_a_header_tells_how_much_stronger_the_preamble_was(boost):
     estimate(in_planes(y[:2]), np.ones(2, np.float32), known[:2], table, channel, scratch)
     assert gains(channel, 52) == pytest.approx(boost * h, abs=0.1)
     learn(in_planes(y), known, 2, 0.0, 0.0, table, channel, scratch)
-    assert np.mean(np.abs(gains(channel, 52) - h) ** 2) < 0.2 * 0.01
+    assert np.mean(np.abs(gains(channel, 52) - h) ** 2) < 0.1 * 0.01
     assert channel.no == pytest.approx(0.01, rel=0.3)
 
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phy import REACH, Downsampler, Transmitter, upsample
-from phy.resampling import low_pass
+from phy.oversampling import low_pass
 from tests.phy.signals import hear, heard, noise, noisy, payloads, silence
 
 SEED = 91
