@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.report import Row
 from sdrlinkd.adapters import BuiltInRobot, empty, to_cdr
-from sdrlinkd.link import Link, LinkParams, Outcome, QueueParams, ReassemblyParams
+from sdrlinkd.link import Allowance, Link, LinkParams, Outcome, QueueParams, ReassemblyParams
 from sdrlinkd.wire import make_registry
 
 PDU_SIZE = 1024
@@ -70,7 +70,7 @@ def _round(messages: list[bytes], seed: int) -> float:
     heard: list[bytes] = []
     start = time.process_time()
     now = 0.0
-    while burst := link.compose(now, 16):
+    while burst := link.compose(now, Allowance.of(16)):
         pdus += burst.pdus
         link.confirm(burst, Outcome.SENT, now)
         now += BURST_S

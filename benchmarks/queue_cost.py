@@ -6,7 +6,15 @@ import time
 from random import Random
 
 from benchmarks.report import Row
-from sdrlinkd.link import Link, LinkParams, Outcome, Overrides, QueueParams, ReassemblyParams
+from sdrlinkd.link import (
+    Allowance,
+    Link,
+    LinkParams,
+    Outcome,
+    Overrides,
+    QueueParams,
+    ReassemblyParams,
+)
 from sdrlinkd.wire import make_registry
 
 OPERATIONS = 1000
@@ -41,7 +49,7 @@ def _cost(depth: int, seed: int) -> float:
     start = time.process_time()
     for topic in topics[depth:]:
         link.submit(topic, payload, 0.0, wishes[topic])
-        burst = link.compose(0.0, 1)
+        burst = link.compose(0.0, Allowance.of(1))
         if burst is not None:
             link.confirm(burst, Outcome.SENT, 0.0)
     return time.process_time() - start

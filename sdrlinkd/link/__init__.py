@@ -5,7 +5,8 @@ from sdrlinkd.link.carrier import CarrierTraits, Opportunity, Sensed
 from sdrlinkd.link.inbox import CDR_HEADER_SIZE, Delivered
 from sdrlinkd.link.ledger import RX_PDU_REASONS, RX_REASONS, TX_REASONS
 from sdrlinkd.link.link import Link
-from sdrlinkd.link.outbox import Outbox, Outgoing
+from sdrlinkd.link.message import Outgoing
+from sdrlinkd.link.outbox import Outbox
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
 from sdrlinkd.link.qos import (
     AS_CONFIGURED,
@@ -17,6 +18,7 @@ from sdrlinkd.link.qos import (
 )
 from sdrlinkd.link.rate import RateChange, RateParams
 from sdrlinkd.link.report import link_notices, link_report
+from sdrlinkd.link.schedule import Allowance, ClassesParams, ClassParams
 from sdrlinkd.link.sender import Burst, Outcome
 
 __all__ = [
@@ -28,8 +30,11 @@ __all__ = [
     "RX_REASONS",
     "TX_REASONS",
     "AccessParams",
+    "Allowance",
     "Burst",
     "CarrierTraits",
+    "ClassParams",
+    "ClassesParams",
     "Delivered",
     "Link",
     "LinkParams",

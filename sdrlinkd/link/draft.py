@@ -1,6 +1,6 @@
 """One PDU while it is being filled."""
 
-from sdrlinkd.link.outbox import Outgoing
+from sdrlinkd.link.message import Outgoing
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.wire import PduBuilder
 

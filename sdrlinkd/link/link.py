@@ -2,10 +2,12 @@
 
 from collections import Counter
 from collections.abc import Hashable, Mapping
+from functools import partial
 from itertools import chain
 from random import Random
+from typing import NamedTuple
 
-from sdrlinkd.link.access import Access, AccessParams, Free, Wish, make_access
+from sdrlinkd.link.access import Access, AccessParams, Free, Slot, Wish, make_access
 from sdrlinkd.link.beacons import Beacons
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity
 from sdrlinkd.link.inbox import Delivered, Inbox
@@ -14,9 +16,24 @@ from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
 from sdrlinkd.link.qos import AS_CONFIGURED, Overrides, Qos, TopicPolicy
 from sdrlinkd.link.rate import RateControl, RateParams
 from sdrlinkd.link.returned import Returned
+from sdrlinkd.link.schedule import Allowance, ClassesParams, Forecasts, Limits, Shares
 from sdrlinkd.link.sender import Burst, Outcome, Sender
 from sdrlinkd.reports import RATE_WINDOW_S
 from sdrlinkd.wire import Frame, LinkReport, Record, Registry
+
+INFINITE = float("inf")
+DEFAULT_CLASSES = ClassesParams()
+
+
+class _Held(NamedTuple):
+    """The air is kept free from `since` to `until`; settled while nothing new has come."""
+
+    since: float
+    until: float
+    is_settled: bool
+
+
+_NOT_HELD = _Held(INFINITE, -INFINITE, is_settled=False)
 
 
 class Link:
@@ -35,6 +52,7 @@ class Link:
         own_id: int,
         rng: Random,
         *,
+        classes: ClassesParams = DEFAULT_CLASSES,
         hears_self: bool = False,
     ) -> None:
         self.params = params
@@ -52,6 +70,11 @@ class Link:
         self._returned = Returned(registry.has_control)
         self.airtime_s = 0.0
         self.bursts_by_mcs: Counter[int] = Counter()
+        self.forecasts = Forecasts()
+        self.shares = Shares(classes)
+        self._limits = Limits(classes, self.forecasts)
+        self._lead_s = 0.0
+        self._held = _NOT_HELD
         self.access: Access = Free()
         self.rate = RateControl(RateParams(), (0.0,), 0)
 
@@ -60,6 +83,7 @@ class Link:
         self.rate = RateControl(rate, carrier.needed_snr_db, carrier.mcs)
         longest_s = max(carrier.longest_burst_s[mcs] for mcs in self.rate.usable)
         self.access = make_access(access, self.own_id, carrier, longest_s, self._rng)
+        self._lead_s = carrier.lead_s
 
     def set_policies(self, policies: Mapping[int, TopicPolicy]) -> None:
         """Apply per-topic policies by topic id; the others get the defaults."""
@@ -73,11 +97,16 @@ class Link:
         overrides: Overrides = AS_CONFIGURED,
     ) -> str | None:
         """Queue a message; None, or the ledger's reason for refusing it."""
-        return self.sender.submit(topic_id, payload, now, overrides)
+        refused = self.sender.submit(topic_id, payload, now, overrides)
+        if refused is None:
+            qos = self.sender.treatment(topic_id)[0] if overrides.qos is None else overrides.qos
+            self.forecasts.note((self.own_id, topic_id), qos, now)
+            self._held = self._held._replace(is_settled=False)
+        return refused
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
         """The burst that should leave next, decided now; None: nothing to send, or not yet."""
-        earliest, airtime_s, most_pdus, sensed = opportunity
+        earliest, airtime_s, _, sensed = opportunity
         if self._returned:
             return self._again(opportunity)
         head = self.sender.outbox.head()
@@ -91,18 +120,23 @@ class Link:
         slot = self.access.slot(Wish(earliest, qos, airtime_s(mcs, 1), sensed))
         if slot is None:
             return None
-        n_pdus = most_pdus(mcs, slot.end - slot.start)
+        allowance = self._allowance(slot, mcs, opportunity)
         # A schedule's phase holds for the planned start only.
         is_timed = self.access.frame(slot.start) is not None and (
             slot.start >= self._beacons.due_at or self.sender.packetizer.offered
         )
-        burst = self.compose(slot.start, n_pdus, slot.least) if n_pdus else None
+        burst = self.compose(slot.start, allowance)
         if burst is None:
+            if head is not None and allowance.until < INFINITE:
+                since = min(self._held.since, slot.start)
+                self._held = _Held(since, allowance.until, is_settled=True)
             return None
+        self._kept_free(slot.start)
         if not any(burst.carried) and airtime_s(self.rate.lowest, 1) <= slot.end - slot.start:
             # Beacons are for everybody.
             mcs = self.rate.lowest
         length_s = airtime_s(mcs, len(burst.pdus))
+        self.shares.spend(length_s, burst.classes, self.sender.outbox.waiting_classes())
         self.access.sent(slot.start + length_s)
         self._number += 1
         return burst._replace(
@@ -130,14 +164,14 @@ class Link:
         is_timed = again.latest <= again.start
         return burst._replace(latest=slot.start if is_timed else slot.latest(airtime_s))
 
-    def compose(self, start: float, max_pdus: int, least: Qos = Qos.BULK) -> Burst | None:
+    def compose(self, start: float, allowance: Allowance) -> Burst | None:
         """The burst that should leave at `start`, decided now; None when there is nothing.
 
         A beacon that is due rides in spare room; when traffic leaves none for a whole period, or
         there is no traffic, it gets a PDU of its own.
         """
         packetizer = self.sender.packetizer
-        overdue = False
+        overdue, may_tell = False, allowance.most[Qos.DEFAULT] > 0
         if start >= self._beacons.due_at:
             overdue = packetizer.offered
             packetizer.offer(self._beacon_records(start))
@@ -147,10 +181,10 @@ class Link:
             overdue = True
         burst = (
             self.sender.compose_records()
-            if overdue
-            else self.sender.compose(start, max_pdus, least)
+            if overdue and may_tell
+            else self.sender.compose(start, allowance)
         )
-        if burst is None and packetizer.offered:
+        if burst is None and packetizer.offered and may_tell:
             burst = self.sender.compose_records()
         return burst
 
@@ -198,7 +232,10 @@ class Link:
         """When there may next be something to send; not after `now`: at once."""
         if self._returned:
             return now
-        return min(self._beacons.due_at, self.sender.packetizer.next_wakeup(now))
+        wakes_at = self.sender.packetizer.next_wakeup(now)
+        if wakes_at <= now and self._held.is_settled:
+            wakes_at = self._held.until
+        return min(self._beacons.due_at, wakes_at)
 
     def drain(self) -> None:
         """Nothing more will come: partial PDUs go at once, beacons end."""
@@ -245,6 +282,31 @@ class Link:
                 self.access.told_of(record.node, at)
         elif isinstance(record, Frame):
             self.access.take_frame(src, record, at)
+
+    def _allowance(self, slot: Slot, mcs: int, opportunity: Opportunity) -> Allowance:
+        """For a burst in `slot`."""
+        _, airtime_s, most_pdus, _ = opportunity
+        longest_s = slot.end - slot.start
+        one_s, two_s = airtime_s(mcs, 1), airtime_s(mcs, 2)
+        allowance = self._limits.allow(
+            slot.start,
+            longest_s,
+            partial(airtime_s, mcs),
+            partial(most_pdus, mcs),
+            self._lead_s - self.access.pause_s,
+        ).least(slot.least)
+        owed = self.shares.owed(two_s - one_s) if one_s <= longest_s else None
+        if owed not in self.sender.outbox.waiting_classes():
+            owed = None
+        return allowance._replace(owed=owed)
+
+    def _kept_free(self, start: float) -> None:
+        """Settle what was not sent so that something more urgent could be."""
+        held, self._held = self._held, _NOT_HELD
+        passed_s = min(start, held.until) - held.since
+        if passed_s > 0:
+            self._limits.kept_free(passed_s)
+            self.shares.idle(passed_s, self.sender.outbox.waiting_classes())
 
     def _beacon_records(self, start: float) -> list[Record]:
         records = self._beacons.take(start, self.inbox.neighbors.values(), self.rate)

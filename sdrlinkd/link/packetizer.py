@@ -7,13 +7,14 @@ Lower classes fill what is left over.
 """
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from random import Random
 from typing import NamedTuple
 
 from sdrlinkd.link.draft import NO_DST, Draft
 from sdrlinkd.link.entry_ids import REST_FACTOR, EntryIds
-from sdrlinkd.link.outbox import Lane, Level, Outbox, Outgoing
+from sdrlinkd.link.message import Lane, Level, Outgoing
+from sdrlinkd.link.outbox import Outbox
 from sdrlinkd.link.params import LinkParams
 from sdrlinkd.link.qos import WIRE_BITS, Qos
 from sdrlinkd.wire import (
@@ -39,10 +40,11 @@ MIN_ROOM_FOR_STAMP = STAMP_SIZE - ENTRY_HEADER_SIZE - 1
 
 
 class BuiltPdu(NamedTuple):
-    """A PDU and the messages it carries an entry of."""
+    """A PDU, the messages it carries an entry of, and the highest class inside."""
 
     data: bytes
     carried: list[Outgoing]
+    qos: Qos
 
 
 class Packetizer:
@@ -117,17 +119,19 @@ class Packetizer:
         """From now on partial PDUs do not wait."""
         self._may_wait = False
 
-    def next_pdu(self, start: float) -> BuiltPdu | None:
+    def next_pdu(self, start: float, first: Qos | None = None) -> BuiltPdu | None:
         """The next PDU of a burst whose preamble leaves at `start`, or None.
 
-        Messages found expired are withdrawn on the way; see `take_expired`.
+        The most urgent comes first, or class `first`. Messages found expired are withdrawn on the
+        way; see `take_expired`.
         """
         levels = self._outbox.levels
         if not levels or (self._may_wait and self._must_wait(start)):
             return None
         draft = Draft(self._pdu_size)
         looked_at = 0
-        for level in tuple(levels):
+        order = levels if first is None else _with_first(levels, first)
+        for level in tuple(order):
             looked_at += len(level.lanes)
             if self._may_fit(level, draft.room):
                 self._fill_from(level, draft, start)
@@ -172,7 +176,7 @@ class Packetizer:
         )  # fmt: skip
         self._seq = (self._seq + 1) & 0xFF
         self._control_entry_id = (self._control_entry_id + 1) & 0xFF
-        return BuiltPdu(data, draft.carried)
+        return BuiltPdu(data, draft.carried, draft.qos)
 
     def _may_fit(self, level: Level, room: int) -> bool:
         """Whether some lane's next entry may fit: a quick no spares the look at each.
@@ -298,3 +302,8 @@ class Packetizer:
         if now >= self._outbox.oldest_arrival() + self._params.flush_s:
             return False
         return self._outbox.pending_bytes(self._k_single) < self._k_single
+
+
+def _with_first(levels: Sequence[Level], first: Qos) -> list[Level]:
+    """In service order, but those of class `first` before all others."""
+    return sorted(levels, key=lambda level: (level.key[0] != first, level.key))

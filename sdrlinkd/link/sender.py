@@ -6,11 +6,16 @@ from random import Random
 from typing import NamedTuple
 
 from sdrlinkd.link.ledger import TxTally, balance
-from sdrlinkd.link.outbox import Fate, Outbox, Outgoing
+from sdrlinkd.link.message import Fate, Outgoing
+from sdrlinkd.link.outbox import Outbox
 from sdrlinkd.link.packetizer import Packetizer
 from sdrlinkd.link.params import LinkParams, QueueParams
 from sdrlinkd.link.qos import AS_CONFIGURED, QOS_BY_LABEL, Overrides, Qos, TopicPolicy
+from sdrlinkd.link.schedule import Allowance
 from sdrlinkd.wire import Registry, max_message_size
+
+MAX_PDUS = 63
+"""Of a burst, whatever carries it."""
 
 
 class Burst(NamedTuple):
@@ -21,6 +26,8 @@ class Burst(NamedTuple):
 
     pdus: list[bytes]
     carried: list[list[Outgoing]]
+    classes: list[Qos]
+    """Of each PDU, the highest inside."""
     mcs: int = 0
     qos: Qos = Qos.DEFAULT
     start: float = 0.0
@@ -133,23 +140,25 @@ class Sender:
         tally.accepted += 1
         tally.drop(reason)
 
-    def compose(self, start: float, max_pdus: int, least: Qos = Qos.BULK) -> Burst | None:
-        """The next burst, whose preamble leaves at `start`; None when nothing is to be sent.
-
-        No PDU behind the first begins with a class less urgent than `least`.
-        """
-        pdus: list[bytes] = []
-        carried: list[list[Outgoing]] = []
-        while len(pdus) < max_pdus:
-            if pdus and self.outbox.levels and self.outbox.levels[0].key[0] > least:
+    def compose(self, start: float, allowance: Allowance) -> Burst | None:
+        """The next burst, whose preamble leaves at `start`; None when nothing is to be sent."""
+        burst = Burst([], [], [])
+        owed = allowance.owed
+        while (levels := self.outbox.levels) and len(burst.pdus) < MAX_PDUS:
+            n, most = len(burst.pdus), allowance.most[levels[0].key[0]]
+            first = None
+            if owed is not None and n + 1 >= most:
+                first, owed = owed, None
+            elif n >= most:
                 break
-            built = self.packetizer.next_pdu(start)
+            built = self.packetizer.next_pdu(start, first)
             if built is None:
                 break
-            pdus.append(built.data)
-            carried.append(built.carried)
+            burst.pdus.append(built.data)
+            burst.carried.append(built.carried)
+            burst.classes.append(built.qos)
         self._settle_expired()
-        return self._burst(pdus, carried)
+        return self._counted(burst)
 
     def expire(self, now: float) -> None:
         """Drop heads whose lifespan ended while no burst could go."""
@@ -159,7 +168,7 @@ class Sender:
     def compose_records(self) -> Burst | None:
         """A burst of one PDU for control records that found no spare room."""
         built = self.packetizer.records_pdu()
-        return None if built is None else self._burst([built.data], [[]])
+        return None if built is None else self._counted(Burst([built.data], [[]], [built.qos]))
 
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
         """The radio's word on a burst: its messages are sent, or dropped by name."""
@@ -213,10 +222,10 @@ class Sender:
             },
         )
 
-    def _burst(self, pdus: list[bytes], carried: list[list[Outgoing]]) -> Burst | None:
-        self.pdus_composed += len(pdus)
-        self.entries_composed += sum(map(len, carried))
-        return Burst(pdus, carried) if pdus else None
+    def _counted(self, burst: Burst) -> Burst | None:
+        self.pdus_composed += len(burst.pdus)
+        self.entries_composed += sum(map(len, burst.carried))
+        return burst if burst.pdus else None
 
     def _settle_expired(self) -> None:
         for message in self.packetizer.take_expired():

@@ -41,6 +41,8 @@ class Doorkeeper:
     def __init__(self, *slots):
         self.slots, self.told = list(slots), []
 
+    pause_s = 0.0
+
     def slot(self, wish):
         return self.slots.pop(0)
 

@@ -2,7 +2,15 @@
 
 from random import Random
 
-from sdrlinkd.link import Link, LinkParams, Opportunity, Outcome, QueueParams, ReassemblyParams
+from sdrlinkd.link import (
+    Allowance,
+    Link,
+    LinkParams,
+    Opportunity,
+    Outcome,
+    QueueParams,
+    ReassemblyParams,
+)
 from sdrlinkd.wire import CONTROL_TOPIC_ID, make_registry, parse, parse_records
 
 PDU_S = 0.001
@@ -38,7 +46,7 @@ def make_link(
 def send_all(link, now=0.0, max_pdus=63):
     """Compose and confirm until nothing is left that may go at `now`; the PDUs."""
     pdus = []
-    while burst := link.compose(now, max_pdus):
+    while burst := link.compose(now, Allowance.of(max_pdus)):
         pdus += burst.pdus
         link.confirm(burst, Outcome.SENT, now)
     return pdus

@@ -54,6 +54,10 @@ class Access(Protocol):
     def round_s(self) -> float:
         """So long at most until everybody had a turn; 0 where there are no turns."""
 
+    @property
+    def pause_s(self) -> float:
+        """After every carrier the air stays free for so long at least."""
+
     def slot(self, wish: Wish) -> Slot | None:
         """Where it may leave; None: not now."""
 
@@ -89,6 +93,11 @@ class Carriers:
     @property
     def round_s(self) -> float:
         """No turns."""
+        return 0.0
+
+    @property
+    def pause_s(self) -> float:
+        """None."""
         return 0.0
 
     def sent(self, end: float) -> None:

@@ -42,6 +42,11 @@ class Csma(Carriers):
             f"PERSIST {self._persist:g}; {self._backoffs} backoffs"
         )
 
+    @property
+    def pause_s(self) -> float:
+        """DWAIT."""
+        return self._dwait_s
+
     def slot(self, wish: Wish) -> Slot | None:
         """The slot drawn, once all before it were heard to be idle."""
         earliest, qos, _, sensed = wish

@@ -50,6 +50,11 @@ class MiniSlots(Carriers):
         """All mini-slots."""
         return self._n_slots * self._minislot_s
 
+    @property
+    def pause_s(self) -> float:
+        """Up to the first mini-slot."""
+        return self._minislot_s
+
     def slot(self, wish: Wish) -> Slot | None:
         """Our next mini-slot, once all before it were heard to be idle."""
         earliest, qos, _, sensed = wish

@@ -1,0 +1,102 @@
+"""How many PDUs the next burst may hold, by the class of what goes next."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from sdrlinkd.link.qos import Qos
+from sdrlinkd.link.schedule.forecast import Forecast, Forecasts
+from sdrlinkd.link.schedule.params import ClassesParams
+
+INFINITE = float("inf")
+ALIVE_S = 1.0
+"""A class has something alive for so long after its last message."""
+OVERRUN = 0.4
+"""A burst may last beyond the time that a message is due by this share of a PDU, rather than leave
+more than that unused."""
+IDLE_SHARE = 0.1
+"""No more of the air is kept free for what is due."""
+MOST_IDLE_S = 0.02
+
+
+class Allowance(NamedTuple):
+    """`most[qos]`: a PDU that begins with that class may join a burst of fewer.
+
+    `owed`: a class that is to have a PDU of the burst, even if others could fill it. `until`: where
+    the most urgent class that waits gets none, it is to be asked again then.
+    """
+
+    most: tuple[int, ...]
+    owed: Qos | None = None
+    until: float = INFINITE
+
+    @classmethod
+    def of(cls, n_pdus: int) -> "Allowance":
+        """The same for all."""
+        return cls((n_pdus,) * len(Qos))
+
+    def least(self, least: Qos) -> "Allowance":
+        """Classes less urgent than `least` may begin a burst, but not join one."""
+        most = (n if qos <= least else min(n, 1) for qos, n in zip(Qos, self.most, strict=True))
+        return self._replace(most=tuple(most))
+
+
+class Limits:
+    """Caps by class, and gaps for what is due."""
+
+    def __init__(self, params: ClassesParams, forecasts: Forecasts) -> None:
+        self._cap_s = {qos: params.of(qos).max_burst_s or INFINITE for qos in Qos}
+        self._forecasts = forecasts
+        self._idle_s = MOST_IDLE_S
+        self._asked_at = 0.0
+
+    def allow(
+        self,
+        start: float,
+        longest_s: float,
+        airtime_s: Callable[[int], float],
+        most_pdus: Callable[[float], int],
+        ready_s: float,
+    ) -> Allowance:
+        """For a burst that leaves at `start` and is no longer than `longest_s`.
+
+        `ready_s` after a message is due, it can leave at the earliest.
+        """
+        self._idle_s = min(
+            MOST_IDLE_S, self._idle_s + IDLE_SHARE * max(0.0, start - self._asked_at)
+        )
+        self._asked_at = max(start, self._asked_at)
+        most, until = [], INFINITE
+        for qos in Qos:
+            cap_s = longest_s
+            if self._forecasts.is_busy(start, qos, ALIVE_S):
+                cap_s = min(cap_s, max(self._cap_s[qos], airtime_s(1)))
+            n = most_pdus(cap_s)
+            due = self._forecasts.next_due(start, qos)
+            if due is not None and n:
+                n = self._before(due, start, n, airtime_s, ready_s)
+                if n == 0 and until == INFINITE:
+                    until = due.due(start) + due.spread_s
+            most.append(n)
+        return Allowance(tuple(most), until=until)
+
+    def kept_free(self, passed_s: float) -> None:
+        """The air was idle for so long because of this."""
+        self._idle_s = max(0.0, self._idle_s - passed_s)
+
+    def _before(
+        self,
+        due: Forecast,
+        start: float,
+        most: int,
+        airtime_s: Callable[[int], float],
+        ready_s: float,
+    ) -> int:
+        """PDUs that end about when the next message can leave; 0: better wait for it."""
+        free_s = due.due(start) - due.spread_s + ready_s - start
+        one_s = airtime_s(1)
+        each_s = airtime_s(2) - one_s
+        if each_s <= 0:
+            return most
+        if free_s + OVERRUN * each_s < one_s:
+            return 0 if free_s + 2 * due.spread_s < self._idle_s else 1
+        return min(most, 1 + int((free_s + OVERRUN * each_s - one_s) / each_s))

@@ -1,0 +1,111 @@
+"""When the next message of a periodic topic is due."""
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+
+from sdrlinkd.link.qos import Qos
+
+INFINITE = float("inf")
+MEMORY = 16
+"""So many messages are remembered, in effect."""
+LEARNED = 4
+"""From so many on, a period is believed."""
+STEADY = 0.2
+"""A topic is periodic when its messages come within this share of the period."""
+FASTEST_S = 0.002
+"""Faster than that, no gap is worth keeping."""
+MISSED = 3
+"""After so many periods without a message, a topic has ended."""
+AT_LEAST_S = 1e-4
+"""Nothing is more punctual than that."""
+
+
+@dataclass(slots=True, eq=False)
+class Forecast:
+    """One topic's beat: a line through its messages' times, by growing-memory α–β tracking.
+
+    `jitter_s` is the mean distance from it.
+    """
+
+    qos: Qos
+    last_at: float
+    n: int = 1
+    beat_at: float = 0.0
+    period_s: float = 0.0
+    jitter_s: float = 0.0
+
+    def note(self, at: float) -> None:
+        """A message came."""
+        step_s, self.last_at = at - self.last_at, at
+        if self.n == 1 or step_s <= 0 or step_s > 2 * MISSED * max(self.period_s, FASTEST_S):
+            # The first step, two at once, or a long pause: begin anew.
+            self.n, self.beat_at, self.jitter_s = (2 if step_s > 0 else 1), at, 0.0
+            self.period_s = step_s if self.n == 2 else 0.0
+            return
+        beats = max(1, round((at - self.beat_at) / self.period_s))
+        error_s = at - (self.beat_at + beats * self.period_s)
+        self.n = min(self.n + 1, MEMORY)
+        n = self.n
+        self.beat_at += beats * self.period_s + error_s * (4 * n - 2) / (n * (n + 1))
+        self.period_s += 6 / (n * (n + 1)) * error_s / beats
+        self.jitter_s += (abs(error_s) - self.jitter_s) / min(n, MEMORY)
+        if self.period_s < FASTEST_S / 2:
+            self.n = 1
+
+    @property
+    def is_periodic(self) -> bool:
+        """Whether the next one's time is known."""
+        return (
+            self.n >= LEARNED
+            and self.period_s >= FASTEST_S
+            and self.jitter_s <= STEADY * self.period_s
+        )
+
+    def is_alive(self, now: float) -> bool:
+        """Whether more is to be expected."""
+        return now - self.last_at <= MISSED * self.period_s
+
+    @property
+    def spread_s(self) -> float:
+        """So long before or after its time a message may well come."""
+        return 2 * self.jitter_s + AT_LEAST_S
+
+    def due(self, now: float) -> float:
+        """When the next one should come; one that is late is waited for, for a while."""
+        next_at = self.beat_at + self.period_s
+        while next_at + self.spread_s < now:
+            next_at += self.period_s
+        return next_at
+
+
+class Forecasts:
+    """The periodic topics of this node, and of those whom it hears."""
+
+    def __init__(self) -> None:
+        self._by_key: dict[Hashable, Forecast] = {}
+
+    def note(self, key: Hashable, qos: Qos, at: float) -> None:
+        """A message of that class was submitted, here or elsewhere, at `at` of our time."""
+        found = self._by_key.get(key)
+        if found is None:
+            self._by_key[key] = Forecast(qos, at)
+        elif at > found.last_at:
+            found.qos = qos
+            found.note(at)
+
+    def next_due(self, now: float, below: Qos) -> Forecast | None:
+        """The topic more urgent than `below` that is due first; None when none is periodic."""
+        first, first_at = None, INFINITE
+        for each in self._by_key.values():
+            if each.qos < below and each.is_periodic and each.is_alive(now):
+                at = each.due(now) - each.spread_s
+                if at < first_at:
+                    first, first_at = each, at
+        return first
+
+    def is_busy(self, now: float, below: Qos, alive_s: float) -> bool:
+        """Whether any topic more urgent than `below` is alive."""
+        return any(
+            each.qos < below and now - each.last_at < max(alive_s, MISSED * each.period_s)
+            for each in self._by_key.values()
+        )

@@ -1,0 +1,45 @@
+"""Guaranteed shares of the air, so that no class starves."""
+
+from collections.abc import Collection, Iterable
+
+from sdrlinkd.link.qos import Qos
+from sdrlinkd.link.schedule.params import ClassesParams
+
+
+class Shares:
+    """What each class is owed, in s on the air.
+
+    While something of a class waits, it earns its share of every burst and pays for what it gets;
+    one that gets more than its share owes nothing later.
+    """
+
+    def __init__(self, params: ClassesParams) -> None:
+        self._share = {qos: params.of(qos).share for qos in Qos}
+        self._credit_s = dict.fromkeys(Qos, 0.0)
+        self.used_s = dict.fromkeys(Qos, 0.0)
+        """On the air so far, by class."""
+
+    def spend(self, airtime_s: float, used: Iterable[Qos], waiting: Collection[Qos]) -> None:
+        """A burst of that length was composed: the class of each PDU, and what still waits."""
+        classes = list(used)
+        each_s = airtime_s / max(1, len(classes))
+        for qos in classes:
+            self.used_s[qos] += each_s
+        for qos, share in self._share.items():
+            if qos not in waiting:
+                self._credit_s[qos] = 0.0
+                continue
+            earned_s = share * airtime_s - each_s * classes.count(qos)
+            self._credit_s[qos] = max(0.0, self._credit_s[qos] + earned_s)
+
+    def idle(self, passed_s: float, waiting: Collection[Qos]) -> None:
+        """The air was kept free for so long, while these waited."""
+        for qos in waiting:
+            self._credit_s[qos] += self._share[qos] * passed_s
+
+    def owed(self, pdu_s: float) -> Qos | None:
+        """The most urgent class that has earned a PDU of that length and did not get it."""
+        for qos, credit_s in self._credit_s.items():
+            if credit_s >= pdu_s > 0:
+                return qos
+        return None
