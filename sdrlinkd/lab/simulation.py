@@ -16,6 +16,7 @@ from sdrlinkd.link import (
     AccessParams,
     Burst,
     CarrierTraits,
+    Delivered,
     Link,
     Opportunity,
     Outcome,
@@ -88,7 +89,8 @@ class Simulation:
     """One BurstMedium and a real link for each of `radios`; `arrivals` come in order of time.
 
     Decisions fall at the ends of blocks of `air.block_s`, as in a simulation of samples in
-    lock-step. `watch` is told of every burst. `keep_s`: see BurstMedium. Raises ConfigError where
+    lock-step. `watch` is told of every burst, `listen` of what
+    a node gets, and when. `keep_s`: see BurstMedium. Raises ConfigError where
     the radios cannot carry the access policy.
     """
 
@@ -107,6 +109,7 @@ class Simulation:
         seed: int = 0,
         keep_s: float = 0.0,
         watch: Callable[[Flight], None] = lambda _: None,
+        listen: Callable[[int, Delivered, float], None] = lambda *_: None,
     ) -> None:
         self.now = 0.0
         self.pairs: defaultdict[tuple[int, int, int], Pair] = defaultdict(Pair)
@@ -115,6 +118,7 @@ class Simulation:
         self._airtimes = airtimes
         self._access = access
         self._watch = watch
+        self._listen = listen
         grid = phy.GRIDS[modem.grid]
         self._medium = BurstMedium(air, world, seed, modem.carrier_db, keep_s, grid)
         self._events: list[_Event] = []
@@ -222,6 +226,7 @@ class Simulation:
                 if age_s is not None:
                     pair.age_sum_s += age_s
                     pair.ages_s.append(age_s)
+                self._listen(node, message, self.now)
 
     def _tick(self) -> None:
         for station in self.stations.values():

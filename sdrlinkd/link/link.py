@@ -22,6 +22,8 @@ from sdrlinkd.reports import RATE_WINDOW_S
 from sdrlinkd.wire import Frame, LinkReport, Record, Registry
 
 INFINITE = float("inf")
+NOTICE_S = 5e-4
+"""From a producer's clock to our queue, in real time."""
 DEFAULT_CLASSES = ClassesParams()
 
 
@@ -73,7 +75,7 @@ class Link:
         self.forecasts = Forecasts()
         self.shares = Shares(classes)
         self._limits = Limits(classes, self.forecasts)
-        self._lead_s = 0.0
+        self._lead_s, self._notice_s = 0.0, NOTICE_S
         self._held = _NOT_HELD
         self.access: Access = Free()
         self.rate = RateControl(RateParams(), (0.0,), 0)
@@ -84,6 +86,7 @@ class Link:
         longest_s = max(carrier.longest_burst_s[mcs] for mcs in self.rate.usable)
         self.access = make_access(access, self.own_id, carrier, longest_s, self._rng)
         self._lead_s = carrier.lead_s
+        self._notice_s = carrier.ahead_s if carrier.is_lockstep else NOTICE_S
 
     def set_policies(self, policies: Mapping[int, TopicPolicy]) -> None:
         """Apply per-topic policies by topic id; the others get the defaults."""
@@ -294,6 +297,7 @@ class Link:
             partial(airtime_s, mcs),
             partial(most_pdus, mcs),
             self._lead_s - self.access.pause_s,
+            self._notice_s,
         ).least(slot.least)
         owed = self.shares.owed(two_s - one_s) if one_s <= longest_s else None
         if owed not in self.sender.outbox.waiting_classes():

@@ -4,13 +4,13 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from sdrlinkd.link.qos import Qos
-from sdrlinkd.link.schedule.forecast import Forecast, Forecasts
+from sdrlinkd.link.schedule.forecast import Forecasts
 from sdrlinkd.link.schedule.params import ClassesParams
 
 INFINITE = float("inf")
 ALIVE_S = 1.0
 """A class has something alive for so long after its last message."""
-OVERRUN = 0.4
+OVERRUN = 0.25
 """A burst may last beyond the time that a message is due by this share of a PDU, rather than leave
 more than that unused."""
 IDLE_SHARE = 0.1
@@ -56,11 +56,14 @@ class Limits:
         airtime_s: Callable[[int], float],
         most_pdus: Callable[[float], int],
         ready_s: float,
+        notice_s: float,
     ) -> Allowance:
         """For a burst that leaves at `start` and is no longer than `longest_s`.
 
-        `ready_s` after a message is due, it can leave at the earliest.
+        `ready_s` after a message is due, it can leave at the earliest; up to `notice_s` after it has
+        come, nobody knows.
         """
+        known = start - notice_s
         self._idle_s = min(
             MOST_IDLE_S, self._idle_s + IDLE_SHARE * max(0.0, start - self._asked_at)
         )
@@ -68,14 +71,15 @@ class Limits:
         most, until = [], INFINITE
         for qos in Qos:
             cap_s = longest_s
-            if self._forecasts.is_busy(start, qos, ALIVE_S):
+            if self._forecasts.is_unforeseen(known, qos, ALIVE_S):
                 cap_s = min(cap_s, max(self._cap_s[qos], airtime_s(1)))
             n = most_pdus(cap_s)
-            due = self._forecasts.next_due(start, qos)
+            due = self._forecasts.next_due(known, qos)
             if due is not None and n:
-                n = self._before(due, start, n, airtime_s, ready_s)
+                free_s = due.due(known) - due.spread_s + ready_s - start
+                n = self._before(free_s, 2 * due.spread_s + notice_s, n, airtime_s)
                 if n == 0 and until == INFINITE:
-                    until = due.due(start) + due.spread_s
+                    until = due.due(known) + due.spread_s + notice_s
             most.append(n)
         return Allowance(tuple(most), until=until)
 
@@ -85,18 +89,16 @@ class Limits:
 
     def _before(
         self,
-        due: Forecast,
-        start: float,
+        free_s: float,
+        wait_s: float,
         most: int,
         airtime_s: Callable[[int], float],
-        ready_s: float,
     ) -> int:
-        """PDUs that end about when the next message can leave; 0: better wait for it."""
-        free_s = due.due(start) - due.spread_s + ready_s - start
+        """PDUs for `free_s`; 0: better wait for what comes then, or `wait_s` later."""
         one_s = airtime_s(1)
         each_s = airtime_s(2) - one_s
         if each_s <= 0:
             return most
         if free_s + OVERRUN * each_s < one_s:
-            return 0 if free_s + 2 * due.spread_s < self._idle_s else 1
+            return 0 if free_s + wait_s < self._idle_s else 1
         return min(most, 1 + int((free_s + OVERRUN * each_s - one_s) / each_s))

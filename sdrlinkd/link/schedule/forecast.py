@@ -8,12 +8,13 @@ from sdrlinkd.link.qos import Qos
 INFINITE = float("inf")
 MEMORY = 16
 """So many messages are remembered, in effect."""
-LEARNED = 4
+LEARNED = 3
 """From so many on, a period is believed."""
 STEADY = 0.2
 """A topic is periodic when its messages come within this share of the period."""
 FASTEST_S = 0.002
 """Faster than that, no gap is worth keeping."""
+SPREAD = 1.0
 MISSED = 3
 """After so many periods without a message, a topic has ended."""
 AT_LEAST_S = 1e-4
@@ -68,7 +69,12 @@ class Forecast:
     @property
     def spread_s(self) -> float:
         """So long before or after its time a message may well come."""
-        return 2 * self.jitter_s + AT_LEAST_S
+        return SPREAD * self.jitter_s + AT_LEAST_S
+
+    def is_late(self, now: float) -> bool:
+        """Whether one has not come although it was due: it may come at any time."""
+        over_s = now - self.beat_at - self.period_s
+        return self.spread_s < over_s < self.period_s / 2
 
     def due(self, now: float) -> float:
         """When the next one should come; one that is late is waited for, for a while."""
@@ -103,9 +109,11 @@ class Forecasts:
                     first, first_at = each, at
         return first
 
-    def is_busy(self, now: float, below: Qos, alive_s: float) -> bool:
-        """Whether any topic more urgent than `below` is alive."""
+    def is_unforeseen(self, now: float, below: Qos, alive_s: float) -> bool:
+        """Whether a topic more urgent than `below` is alive whose next message nobody knows."""
         return any(
-            each.qos < below and now - each.last_at < max(alive_s, MISSED * each.period_s)
+            each.qos < below
+            and now - each.last_at < alive_s
+            and (not each.is_periodic or each.is_late(now))
             for each in self._by_key.values()
         )

@@ -17,7 +17,8 @@ class ClassParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     share: Share = 0.0
     """Of the time on the air, whatever the more urgent classes want."""
     max_burst_s: Seconds = 0.0
-    """Longest burst while something more urgent is alive; 0: `modem.max_burst_s`."""
+    """Longest burst while something more urgent may come that nobody can foresee; 0: that of the
+    modem."""
 
 
 class ClassesParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

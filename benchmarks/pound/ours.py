@@ -1,0 +1,148 @@
+"""The paper's flows over our link, in lock-step on the air clock: real links, an air of bursts."""
+
+from collections.abc import Callable, Iterator, Sequence
+from random import Random
+from typing import NamedTuple
+
+import numpy as np
+
+from backends import AirParams, LinkOverride, RadioParams, World
+from benchmarks.pound.flows import Flow, Trace
+from sdrlinkd.config import ModemParams
+from sdrlinkd.lab import Arrival, Simulation
+from sdrlinkd.link import (
+    AccessParams,
+    ClassesParams,
+    ClassParams,
+    Delivered,
+    Link,
+    LinkParams,
+    QueueParams,
+    ReassemblyParams,
+    TopicPolicy,
+)
+from sdrlinkd.modem import Airtimes
+from sdrlinkd.wire import make_registry
+
+RATE_HZ = 5e6
+MCS = 3
+SNR_DB = 25.0
+BLOCK_S = 1024 / RATE_HZ
+PDU_SIZE = 1058
+"""One message of 1 KB as CDR (1032 B) with its STAMP."""
+MAX_BURST_S = 0.02
+BULK_BURST_S = 0.003
+SETTLE_S = 1.0
+CDR = b"\0\1\0\0"
+
+
+class Sent(NamedTuple):
+    """A flow, and the robots that send and receive it."""
+
+    flow: Flow
+    src: int
+    dst: int
+
+
+class Air(NamedTuple):
+    """Who is there, and how the air is shared."""
+
+    nodes: int = 2
+    policy: str = "none"
+    turnaround_s: float = 0.0
+    overrides: Sequence[LinkOverride] = ()
+    max_burst_s: float = MAX_BURST_S
+    classes: ClassesParams = ClassesParams(bulk=ClassParams(share=0.05, max_burst_s=BULK_BURST_S))
+    block_s: float = BLOCK_S
+    pdu_size: int = PDU_SIZE
+
+
+class Run(NamedTuple):
+    """What came of it."""
+
+    traces: list[Trace]
+    simulation: Simulation
+
+
+def run(sent: Sequence[Sent], air: Air, seed: int) -> Run:
+    """All flows, from producer to consumer, until everything has had time to come."""
+    rng = np.random.default_rng(seed)
+    names = [each.flow.name for each in sent]
+    registry = make_registry([(name, "std_msgs/msg/UInt8MultiArray") for name in names])
+    times = [each.flow.times(rng) for each in sent]
+    heard = [np.full(each.flow.count, np.nan) for each in sent]
+    nodes = range(1, air.nodes + 1)
+    links = {}
+    for node in nodes:
+        link = links[node] = Link(
+            LinkParams(pdu_size=air.pdu_size),
+            QueueParams(),
+            ReassemblyParams(),
+            registry,
+            node,
+            Random(100 * seed + node),
+            classes=air.classes,
+        )
+        link.set_policies(
+            {
+                i: TopicPolicy(qos=each.flow.qos, dst=each.dst)  # type: ignore[arg-type]
+                for i, each in enumerate(sent)
+            }
+        )
+    modem = ModemParams(rate_hz=RATE_HZ, mcs=MCS, max_burst_s=air.max_burst_s, block_s=air.block_s)
+    params = AirParams(rate_hz=RATE_HZ, block_s=air.block_s, snr_db=SNR_DB)
+    full_duplex = air.policy == "none"
+    radios = {
+        node: RadioParams(
+            full_duplex=full_duplex,
+            turnaround_s=air.turnaround_s,
+            clock_ppm=float(rng.uniform(-10, 10)),
+        )
+        for node in nodes
+    }
+    simulation = Simulation(
+        params,
+        World(params, {}, list(air.overrides)),
+        radios,
+        links,
+        modem,
+        Airtimes(modem, air.pdu_size),
+        AccessParams(policy=air.policy, nodes=list(nodes)),  # type: ignore[arg-type]
+        {node: _arrivals(node, sent, times) for node in nodes},
+        seed=seed,
+        listen=_note(sent, heard),
+    )
+    simulation.run(max(float(each[-1]) for each in times) + SETTLE_S)
+    return Run(
+        [Trace(each.flow, *both) for each, *both in zip(sent, times, heard, strict=True)],
+        simulation,
+    )
+
+
+def _arrivals(
+    node: int,
+    sent: Sequence[Sent],
+    times: Sequence[np.ndarray],
+) -> Iterator[Arrival]:
+    """Messages of one robot, in order of time; each begins with its number."""
+    mine = [
+        (float(at), topic_id, number)
+        for topic_id, each in enumerate(sent)
+        if each.src == node
+        for number, at in enumerate(times[topic_id])
+    ]
+    for at, topic_id, number in sorted(mine):
+        # As CDR: encapsulation and the sequence's length before the bytes.
+        payload = CDR + number.to_bytes(4, "little") + bytes(sent[topic_id].flow.size)
+        yield Arrival(at, topic_id, payload)
+
+
+def _note(
+    sent: Sequence[Sent],
+    heard: Sequence[np.ndarray],
+) -> Callable[[int, Delivered, float], None]:
+    def note(node: int, message: Delivered, now: float) -> None:
+        if node == sent[message.topic_id].dst:
+            heard[message.topic_id][int.from_bytes(message.payload[4:8], "little")] = now
+
+    return note
