@@ -73,6 +73,8 @@ class Node:
                 age_s = self._link.delivered(message, now)
                 received_ns = time.time_ns() - round((now - message.heard_at) * 1e9)
                 self.bus.publish(message, age_s, received_ns)
+        if self._link.relay.is_on:
+            self._pdu_link.wake()
 
     def advance(self, now: float) -> None:
         """Time has come so far: traffic of our own that is due, and the link's timers."""

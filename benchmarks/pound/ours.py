@@ -1,6 +1,6 @@
 """The paper's flows over our link, in lock-step on the air clock: real links, an air of bursts."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from random import Random
 from typing import NamedTuple
 
@@ -19,6 +19,7 @@ from sdrlinkd.link import (
     LinkParams,
     QueueParams,
     ReassemblyParams,
+    RelayParams,
     TopicPolicy,
 )
 from sdrlinkd.modem import Airtimes
@@ -55,6 +56,8 @@ class Air(NamedTuple):
     classes: ClassesParams = ClassesParams(bulk=ClassParams(share=0.05, max_burst_s=BULK_BURST_S))
     block_s: float = BLOCK_S
     pdu_size: int = PDU_SIZE
+    routes: Mapping[int, Sequence[str]] = {}
+    """What each relay forwards."""
 
 
 class Run(NamedTuple):
@@ -75,13 +78,16 @@ def run(sent: Sequence[Sent], air: Air, seed: int) -> Run:
     links = {}
     for node in nodes:
         link = links[node] = Link(
-            LinkParams(pdu_size=air.pdu_size),
+            LinkParams(pdu_size=air.pdu_size, hop_limit=1 + len(air.routes)),
             QueueParams(),
             ReassemblyParams(),
             registry,
             node,
             Random(100 * seed + node),
             classes=air.classes,
+            relay=RelayParams(policy="routes", routes=list(air.routes[node]))
+            if node in air.routes
+            else RelayParams(),
         )
         link.set_policies(
             {

@@ -227,6 +227,8 @@ class Simulation:
                     pair.age_sum_s += age_s
                     pair.ages_s.append(age_s)
                 self._listen(node, message, self.now)
+            if link.relay.is_on:
+                self._look(station, self._block(self.now))
 
     def _tick(self) -> None:
         for station in self.stations.values():

@@ -17,6 +17,7 @@ from sdrlinkd.link.qos import (
     TopicPolicy,
 )
 from sdrlinkd.link.rate import RateChange, RateParams
+from sdrlinkd.link.relay import Relay, RelayParams
 from sdrlinkd.link.report import link_notices, link_report
 from sdrlinkd.link.schedule import Allowance, ClassesParams, ClassParams
 from sdrlinkd.link.sender import Burst, Outcome
@@ -48,6 +49,8 @@ __all__ = [
     "RateChange",
     "RateParams",
     "ReassemblyParams",
+    "Relay",
+    "RelayParams",
     "Sensed",
     "TopicPolicy",
     "check_access",

@@ -20,6 +20,7 @@ from sdrlinkd.wire import (
     RegistryDigest,
     Stamp,
     identity,
+    lasting_identity,
     parse,
     parse_records,
 )
@@ -49,8 +50,14 @@ class Delivered(NamedTuple):
 class Ear(Protocol):
     """Who wants to know more of what is heard than messages."""
 
-    def pdu_from(self, src: int, at: float) -> None:
-        """A good PDU of another robot, for whomever; its burst's preamble came at `at`."""
+    def pdu_from(self, pdu: Pdu, stamps: list[Stamp], at: float, is_relayed: bool) -> None:
+        """A good PDU, for whomever, that is not our own voice; its burst's preamble came at `at`.
+
+        `is_relayed`: not its source has sent it.
+        """
+
+    def sends_on(self, pdu: Pdu, data: bytes, at: float) -> bool:
+        """Whether this node forwards the PDU; heard for the first time."""
 
     def record_from(self, src: int, record: Record, at: float) -> None:
         """A control record."""
@@ -69,6 +76,7 @@ class Inbox:
         ear: Ear,
     ) -> None:
         self._pdu_size = params.pdu_size
+        self._hop_limit = params.hop_limit
         self._n_topics = len(registry)
         self._own_id = own_id
         self._hears_self = hears_self
@@ -90,25 +98,28 @@ class Inbox:
         self.pdus_heard += 1
         try:
             pdu = parse(data, self._pdu_size)
-            if pdu.src != self._own_id:
-                self._ear.pdu_from(pdu.src, at)
-            reason = self._refusal(pdu)
-            records = self._control_records(pdu) if reason is None else None
+            records = self._control_records(pdu)
         except PduError as error:
-            reason = error.reason
-        if reason is None:
-            neighbor = self.neighbors.get(pdu.src) or self._new_neighbor(pdu.src)
-            neighbor.last_heard_at = at
-            _, seq, crc = identity(data)
-            if not neighbor.track.heard(seq, crc):
-                neighbor.duplicates += 1
-                reason = "rx_dup"
-        if reason is not None:
-            self.pdus_dropped[reason] += 1
-            return []
+            return self._drop(error.reason)
+        is_relayed = pdu.hop < self._hop_limit
+        if pdu.src != self._own_id or is_relayed:
+            stamps = [record for record in records or () if isinstance(record, Stamp)]
+            self._ear.pdu_from(pdu, stamps, at, is_relayed)
+        if pdu.src == self._own_id and not self._hears_self:
+            return self._drop("rx_own")
+        neighbor = self.neighbors.get(pdu.src) or self._new_neighbor(pdu.src)
+        neighbor.last_heard_at = at
+        _, seq, crc = identity(data) if records is None else lasting_identity(data)
+        if not neighbor.track.heard(seq, crc):
+            neighbor.duplicates += 1
+            return self._drop("rx_dup")
         neighbor.heard += 1
         neighbor.hops_left = pdu.hop
-        neighbor.note_snr(snr_db)
+        if not is_relayed:
+            neighbor.note_snr(snr_db)
+        is_sent_on = self._ear.sends_on(pdu, data, at)
+        if pdu.dst not in (BROADCAST, self._own_id) and not self._hears_self:
+            return self._drop("rx_relayed" if is_sent_on else "rx_not_for_us")
         for record in records or ():
             if isinstance(record, Stamp):
                 self._ages.stamp(pdu.src, record.topic_id, record.entry_id, record.age_us, at)
@@ -117,7 +128,7 @@ class Inbox:
                     neighbor.track.restart(seq, crc)
             elif isinstance(record, RegistryDigest):
                 neighbor.digest = record
-            else:
+            elif not is_relayed:
                 self._ear.record_from(pdu.src, record, at)
         if records is not None and len(pdu.entries) == 1:
             self.pdus_dropped["rx_control"] += 1
@@ -148,14 +159,9 @@ class Inbox:
             },
         )
 
-    def _refusal(self, pdu: Pdu) -> str | None:
-        if pdu.compressed:
-            return "rx_flags"
-        if pdu.src == self._own_id and not self._hears_self:
-            return "rx_own"
-        if pdu.dst not in (BROADCAST, self._own_id) and not self._hears_self:
-            return "rx_not_for_us"
-        return None
+    def _drop(self, reason: str) -> list[Delivered]:
+        self.pdus_dropped[reason] += 1
+        return []
 
     def _control_records(self, pdu: Pdu) -> list[Record] | None:
         """The records in control entries; None when the PDU has no such entry."""

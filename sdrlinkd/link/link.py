@@ -13,17 +13,19 @@ from sdrlinkd.link.carrier import CarrierTraits, Opportunity
 from sdrlinkd.link.inbox import Delivered, Inbox
 from sdrlinkd.link.meters import RateMeter, RecentAges
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
-from sdrlinkd.link.qos import AS_CONFIGURED, Overrides, Qos, TopicPolicy
+from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, Overrides, Qos, TopicPolicy
 from sdrlinkd.link.rate import RateControl, RateParams
+from sdrlinkd.link.relay import Relay, RelayParams
 from sdrlinkd.link.returned import Returned
 from sdrlinkd.link.schedule import Allowance, ClassesParams, Forecasts, Limits, Shares
 from sdrlinkd.link.sender import Burst, Outcome, Sender
 from sdrlinkd.reports import RATE_WINDOW_S
-from sdrlinkd.wire import Frame, LinkReport, Record, Registry
+from sdrlinkd.wire import CONTROL_TOPIC_ID, Frame, LinkReport, Pdu, Record, Registry, Stamp
 
 INFINITE = float("inf")
 NOTICE_S = 5e-4
 """From a producer's clock to our queue, in real time."""
+NO_RELAY = RelayParams()
 DEFAULT_CLASSES = ClassesParams()
 
 
@@ -55,6 +57,7 @@ class Link:
         rng: Random,
         *,
         classes: ClassesParams = DEFAULT_CLASSES,
+        relay: RelayParams = NO_RELAY,
         hears_self: bool = False,
     ) -> None:
         self.params = params
@@ -72,6 +75,7 @@ class Link:
         self._returned = Returned(registry.has_control)
         self.airtime_s = 0.0
         self.bursts_by_mcs: Counter[int] = Counter()
+        self.relay = Relay(relay, own_id)
         self.forecasts = Forecasts()
         self.shares = Shares(classes)
         self._limits = Limits(classes, self.forecasts)
@@ -140,7 +144,7 @@ class Link:
             mcs = self.rate.lowest
         length_s = airtime_s(mcs, len(burst.pdus))
         self.shares.spend(length_s, burst.classes, self.sender.outbox.waiting_classes())
-        self.access.sent(slot.start + length_s)
+        self.access.sent(slot.start + length_s, _origin(burst, self.own_id))
         self._number += 1
         return burst._replace(
             mcs=mcs,
@@ -161,8 +165,8 @@ class Link:
         )
         if slot is None or slot.start + airtime_s > slot.end:
             return None
-        self.access.sent(slot.start + airtime_s)
         burst = self._returned.take(slot.start)
+        self.access.sent(slot.start + airtime_s, _origin(burst, self.own_id))
         self.sender.packetizer.left(chain.from_iterable(burst.carried), slot.start)
         is_timed = again.latest <= again.start
         return burst._replace(latest=slot.start if is_timed else slot.latest(airtime_s))
@@ -271,10 +275,30 @@ class Link:
 
     # The inbox's ear.
 
-    def pdu_from(self, src: int, at: float) -> None:
-        """A good PDU of another robot."""
-        self.access.heard(src, at)
-        self.rate.heard(src, at)
+    def pdu_from(self, pdu: Pdu, stamps: list[Stamp], at: float, is_relayed: bool) -> None:
+        """A good PDU that somebody else has sent."""
+        src = pdu.src
+        self.access.heard(src, at, is_relayed)
+        if not is_relayed:
+            self.rate.heard(src, at)
+        qos = CLASSES[pdu.qos]
+        if not self.access.others_follow or qos > Qos.LATENCY or src == self.own_id:
+            return
+        # What others send at their beat needs the air then, too.
+        ages = {} if is_relayed else {(each.topic_id, each.entry_id): each for each in stamps}
+        for entry in pdu.entries:
+            if not entry.index and not (
+                entry.topic_id == CONTROL_TOPIC_ID and self.registry.has_control
+            ):
+                stamp = ages.get((entry.topic_id, entry.entry_id))
+                origin = at if stamp is None else at - 1e-6 * stamp.age_us
+                self.forecasts.note((src, entry.topic_id), qos, origin)
+
+    def sends_on(self, pdu: Pdu, data: bytes, at: float) -> bool:
+        """Forward it, if that is our part."""
+        if not self.relay.wants(pdu):
+            return False
+        return self.sender.forward(pdu, data, at, at + self.relay.lifespan_s) is None
 
     def record_from(self, src: int, record: Record, at: float) -> None:
         """A control record that is not about messages."""
@@ -316,3 +340,9 @@ class Link:
         records = self._beacons.take(start, self.inbox.neighbors.values(), self.rate)
         frame = self.access.frame(start)
         return records if frame is None else [*records, frame]
+
+
+def _origin(burst: Burst, own_id: int) -> int | None:
+    """Whose PDUs they are, if others'."""
+    src = burst.pdus[0][1]
+    return None if src == own_id else src

@@ -29,6 +29,7 @@ from sdrlinkd.wire import (
     build_stamp,
     equal_payload,
     flags,
+    forwarded,
     fragment_count,
 )
 
@@ -51,11 +52,18 @@ class Packetizer:
     """Fills PDUs from the outbox. Chance (sequence start, entry ids) comes from `rng`."""
 
     def __init__(
-        self, params: LinkParams, src: int, outbox: Outbox, rng: Random, reassembly_timeout_s: float
+        self,
+        params: LinkParams,
+        src: int,
+        outbox: Outbox,
+        rng: Random,
+        reassembly_timeout_s: float,
+        has_control: bool,
     ) -> None:
         self._params = params
         self._pdu_size = params.pdu_size
         self._src = src
+        self._has_control = has_control
         self._outbox = outbox
         self._rng = rng
         self._seq = rng.randrange(256)
@@ -106,6 +114,8 @@ class Packetizer:
     def not_left(self, messages: Iterable[Outgoing]) -> None:
         """Fragments of these will leave later than they were made for: their ids must wait, too."""
         for message in messages:
+            if message.is_whole:
+                continue
             message.is_held = message.is_held or self._ids(message.topic_id).hold(message.entry_id)
 
     def left(self, messages: Iterable[Outgoing], start: float) -> None:
@@ -132,6 +142,8 @@ class Packetizer:
         looked_at = 0
         order = levels if first is None else _with_first(levels, first)
         for level in tuple(order):
+            if draft.is_empty and (whole := self._next_whole(level, start)):
+                return whole
             looked_at += len(level.lanes)
             if self._may_fit(level, draft.room):
                 self._fill_from(level, draft, start)
@@ -146,6 +158,15 @@ class Packetizer:
         if self._spare_records and draft.dst == BROADCAST:
             self._add_spare_records(draft)
         return self._finish(draft)
+
+    @property
+    def next_src(self) -> int:
+        """Whose PDU goes next, as far as one can tell."""
+        for level in self._outbox.levels[:1]:
+            head = level.lanes[0].head
+            if head is not None and head.is_whole:
+                return head.payload[1]
+        return self._src
 
     def records_pdu(self) -> BuiltPdu | None:
         """A PDU of its own for the offered records, when there are any."""
@@ -191,6 +212,23 @@ class Packetizer:
                 return True
         return False
 
+    def _next_whole(self, level: Level, start: float) -> BuiltPdu | None:
+        """Another robot's PDU, if it is what goes next."""
+        lane = level.lanes[0]
+        if not (lane.current or lane.waiting[0]).is_whole:
+            return None
+        head = self._live_head(lane, start)
+        if head is None:
+            return None
+        self._outbox.begin(lane)
+        head.total = head.next_index = 1
+        head.unconfirmed += 1
+        lane.current = None
+        self._outbox.served(lane)
+        held_us = max(0, round(1e6 * (start - head.arrived_at)))
+        data = forwarded(head.payload, held_us, self._has_control)
+        return BuiltPdu(data, [head], head.qos)
+
     def _fill_from(self, level: Level, draft: Draft, start: float) -> None:
         lanes = tuple(level.lanes)
         more = True
@@ -198,7 +236,7 @@ class Packetizer:
             more = False
             for lane in lanes:
                 head = self._live_head(lane, start)
-                if head is None or (draft.dst != NO_DST and head.dst != draft.dst):
+                if head is None or head.is_whole or (draft.dst != NO_DST and head.dst != draft.dst):
                     continue
                 if self._place(lane, head, level, draft, start):
                     more = self._params.greedy

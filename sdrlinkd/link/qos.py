@@ -25,6 +25,7 @@ class Qos(IntEnum):
 
 # The two Q bits of the header (wire document, section 3.1), by class.
 WIRE_BITS = {Qos.DEFAULT: 0, Qos.LATENCY: 1, Qos.BULK: 2, Qos.URGENT: 3}
+CLASSES = {bits: qos for qos, bits in WIRE_BITS.items()}
 QOS_BY_LABEL = {qos.label: qos for qos in Qos}
 
 MAX_PRIORITY = 127

@@ -10,10 +10,13 @@ from sdrlinkd.link.message import Fate, Outgoing
 from sdrlinkd.link.outbox import Outbox
 from sdrlinkd.link.packetizer import Packetizer
 from sdrlinkd.link.params import LinkParams, QueueParams
-from sdrlinkd.link.qos import AS_CONFIGURED, QOS_BY_LABEL, Overrides, Qos, TopicPolicy
+from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, QOS_BY_LABEL, Overrides, Qos, TopicPolicy
 from sdrlinkd.link.schedule import Allowance
-from sdrlinkd.wire import Registry, max_message_size
+from sdrlinkd.wire import Pdu, Registry, max_message_size
 
+RELAYED = 256
+"""Lanes of others' PDUs have this and their source in place of a topic id."""
+NOBODY = -1
 MAX_PDUS = 63
 """Of a burst, whatever carries it."""
 
@@ -82,12 +85,16 @@ class Sender:
         self._max_message_size = max_message_size(params.pdu_size)
         self._registry = registry
         self.outbox = Outbox(queue)
-        self.packetizer = Packetizer(params, src, self.outbox, rng, reassembly_timeout_s)
+        self.packetizer = Packetizer(
+            params, src, self.outbox, rng, reassembly_timeout_s, registry.has_control
+        )
         self._topics = [
             _TopicState(TopicPolicy(), params.dst, registry.has_control) for _ in registry.topics
         ]
         self.refused = TxTally()
         """Messages that never became a topic's: bad envelopes, unknown topics."""
+        self.relayed = TxTally()
+        """PDUs of others; each counts as a message."""
         self.entries_composed = 0
         self.pdus_composed = 0
         self.pdus_sent = 0
@@ -134,6 +141,23 @@ class Sender:
                 refused = reason
         return refused
 
+    def forward(self, pdu: Pdu, data: bytes, at: float, until: float) -> str | None:
+        """Queue another robot's PDU that came in a burst at `at`; None, or why it was refused."""
+        tally = self.relayed
+        tally.accepted += 1
+        known = [self._topics[e.topic_id] for e in pdu.entries if e.topic_id < len(self._topics)]
+        priority = max((topic.priority for topic in known), default=0)
+        message = Outgoing(
+            RELAYED + pdu.src, data, CLASSES[pdu.qos], priority, pdu.dst, at, until, False, tally
+        )
+        message.is_whole = True
+        refused = None
+        for shed, reason in self.outbox.put(message):
+            self._drop(shed, reason)
+            if shed is message:
+                refused = reason
+        return refused
+
     def refuse(self, reason: str, topic_id: int | None = None) -> None:
         """Count a message that the bus could not hand over."""
         tally = self.refused if topic_id is None else self._topics[topic_id].tally
@@ -143,14 +167,16 @@ class Sender:
     def compose(self, start: float, allowance: Allowance) -> Burst | None:
         """The next burst, whose preamble leaves at `start`; None when nothing is to be sent."""
         burst = Burst([], [], [])
-        owed = allowance.owed
+        owed, src = allowance.owed, NOBODY
         while (levels := self.outbox.levels) and len(burst.pdus) < MAX_PDUS:
             n, most = len(burst.pdus), allowance.most[levels[0].key[0]]
             first = None
             if owed is not None and n + 1 >= most:
                 first, owed = owed, None
-            elif n >= most:
+            elif n >= most or (n and self.packetizer.next_src != src):
+                # Who hears a burst knows by its source who may follow.
                 break
+            src = self.packetizer.next_src if first is None else src
             built = self.packetizer.next_pdu(start, first)
             if built is None:
                 break
@@ -206,7 +232,7 @@ class Sender:
 
     def audit(self) -> list[str]:
         """What does not add up in the TX ledger; empty when all does."""
-        tallies = [self.refused, *(topic.tally for topic in self._topics)]
+        tallies = [self.refused, self.relayed, *(topic.tally for topic in self._topics)]
         dropped: dict[str, int] = {}
         for each in tallies:
             for reason, count in each.dropped.items():

@@ -32,7 +32,7 @@ from sdrlinkd.wire.control import (
     build_stamp,
     parse_records,
 )
-from sdrlinkd.wire.later import postponed
+from sdrlinkd.wire.later import forwarded, lasting_identity, postponed
 from sdrlinkd.wire.pdu import BROADCAST, Entry, Pdu, build, flags, identity, parse
 from sdrlinkd.wire.reassembly import Lost, Reassembly, ReassemblyLimits
 from sdrlinkd.wire.registry import (
@@ -81,8 +81,10 @@ __all__ = [
     "entry_budget",
     "equal_payload",
     "flags",
+    "forwarded",
     "fragment_count",
     "identity",
+    "lasting_identity",
     "make_registry",
     "max_message_size",
     "pad_length",

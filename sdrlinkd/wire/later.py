@@ -1,40 +1,82 @@
-"""A PDU that leaves later than it was made for."""
+"""A PDU that leaves later than it was made for: postponed, or forwarded by a relay."""
 
 import struct
 from binascii import crc_hqx
+from collections.abc import Iterator
 
+from sdrlinkd.wire.builder import HEADER
 from sdrlinkd.wire.capacity import CRC_SIZE, ENTRY_HEADER_SIZE, HEADER_SIZE
 from sdrlinkd.wire.control import MAX_AGE_US, TLV_HEADER_SIZE, RecordType
+from sdrlinkd.wire.pdu import identity
 from sdrlinkd.wire.registry import CONTROL_TOPIC_ID
 
 # Where in a record's value the time stands that counts up to the burst's preamble.
-TIMES = {int(RecordType.STAMP): 2, int(RecordType.FRAME): 4}
+_AGE, _PHASE = 2, 4
+_POSTPONED = {int(RecordType.STAMP): _AGE, int(RecordType.FRAME): _PHASE}
+# The schedule is told by those who keep it.
+_FORWARDED = {int(RecordType.STAMP): _AGE}
 _U32 = struct.Struct(">I")
+HOP = 4
+"""Octet of hops left and number of entries."""
 
 
 def postponed(pdu: bytes, by_us: int) -> bytes:
     """A PDU of our own, with control channel, as it is when its burst leaves `by_us` µs later."""
     data = bytearray(pdu)
-    n_entries = data[4] & 0x0F
+    _move(data, by_us, _POSTPONED)
+    return _sealed(data)
+
+
+def forwarded(pdu: bytes, by_us: int, has_control: bool) -> bytes:
+    """A good PDU of another node with a hop less, in a burst `by_us` µs after the one it came in.
+
+    Raises ValueError when it has no hop to spare.
+    """
+    data = bytearray(pdu)
+    if data[HOP] >> 4 < 2:
+        raise ValueError(f"a PDU with {data[HOP] >> 4} hops left is not forwarded")
+    data[HOP] -= 1 << 4
+    if has_control:
+        _move(data, by_us, _FORWARDED)
+    return _sealed(data)
+
+
+def lasting_identity(pdu: bytes) -> tuple[int, int, int]:
+    """`identity` of a good PDU with control channel, ages in its STAMPs taken as zero.
+
+    A relay adds to them what it held the PDU for. CRC-16 is linear: the share of four octets is
+    that of the same in a body of zeros.
+    """
+    src, seq, crc = identity(pdu)
+    end = len(pdu) - CRC_SIZE
+    for at in _times(pdu, _FORWARDED):
+        crc ^= crc_hqx(pdu[at : at + _U32.size] + bytes(end - at - _U32.size), 0)
+    return src, seq, crc
+
+
+def _times(pdu: bytes | bytearray, kinds: dict[int, int]) -> Iterator[int]:
+    """Where in a good PDU the times stand of records of `kinds`."""
+    n_entries = HEADER.unpack_from(pdu)[HOP] & 0x0F
     at = HEADER_SIZE + (n_entries + 1) // 2
     for i in range(n_entries):
-        pair = data[HEADER_SIZE + i // 2]
+        pair = pdu[HEADER_SIZE + i // 2]
         topic_id = pair >> 4 if i % 2 == 0 else pair & 0x0F
-        length = int.from_bytes(data[at + 3 : at + 5], "big")
         begin = at + ENTRY_HEADER_SIZE
-        at = begin + length
+        at = begin + (pdu[at + 3] << 8 | pdu[at + 4])
         if topic_id == CONTROL_TOPIC_ID:
-            _move(data, begin, at, by_us)
+            while begin < at:
+                offset = kinds.get(pdu[begin])
+                if offset is not None:
+                    yield begin + TLV_HEADER_SIZE + offset
+                begin += TLV_HEADER_SIZE + pdu[begin + 1]
+
+
+def _move(data: bytearray, by_us: int, kinds: dict[int, int]) -> None:
+    for at in _times(data, kinds):
+        (told,) = _U32.unpack_from(data, at)
+        _U32.pack_into(data, at, min(told + by_us, MAX_AGE_US))
+
+
+def _sealed(data: bytearray) -> bytes:
     data[-CRC_SIZE:] = crc_hqx(data[:-CRC_SIZE], 0).to_bytes(CRC_SIZE, "big")
     return bytes(data)
-
-
-def _move(data: bytearray, at: int, end: int, by_us: int) -> None:
-    while at < end:
-        kind, length = data[at], data[at + 1]
-        offset = TIMES.get(kind)
-        if offset is not None:
-            where = at + TLV_HEADER_SIZE + offset
-            (told,) = _U32.unpack_from(data, where)
-            _U32.pack_into(data, where, min(told + by_us, MAX_AGE_US))
-        at += TLV_HEADER_SIZE + length

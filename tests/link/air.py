@@ -222,7 +222,7 @@ class Air:
         if node.waiting:
             node.waiting.pop(0)
         end = slot.start + length_s
-        node.access.sent(end)
+        node.access.sent(end, None)
         node.free_at = end + self.traits.gap_s
         begin, true_end = node.true(slot.start), node.true(end)
         missed_by = frozenset(to for to in self.nodes if self.rng.random() < self._miss)
@@ -287,6 +287,6 @@ class Air:
             burst = node.heard.pop(0)
             if self._reads(node, burst, burst.end):
                 at = node.clock(burst.begin)
-                node.access.heard(burst.src, at)
+                node.access.heard(burst.src, at, False)
                 if burst.frame is not None:
                     node.access.take_frame(burst.src, burst.frame, at)

@@ -159,7 +159,7 @@ def test_who_began_a_slot_earlier_a_kilometre_away_is_heard_in_time(policy, trai
         # The slot of 2, who is silent.
         access._origin, access._is_running = 10.0, True
     else:
-        access.heard(2, 9.9)
+        access.heard(2, 9.9, False)
     apart_s = access._slottime_s if policy == "csma" else access._minislot_s
     step_s = 1e-6
     for step in range(int(0.1 / step_s)):

@@ -121,7 +121,7 @@ def test_it_waits_until_the_carrier_is_over():
         assert access.slot(wish) is None
     assert first_start(access, 5.1, Qos.URGENT) >= 5.1 + DWAIT
     own = make()
-    own.sent(6.0)
+    own.sent(6.0, None)
     assert own.slot(Wish(5.8, Qos.URGENT, 0.001, Sensed(5.7, 5.0))) is None
     assert first_start(own, 5.9, Qos.URGENT) >= 6.0 + DWAIT
 
@@ -155,8 +155,8 @@ def test_a_burst_that_did_not_leave_was_never_there(sent_before):
     access, twin = make(5), make(5)
     if sent_before:
         for each in (access, twin):
-            each.sent(4.0)
-    access.sent(5.3)
+            each.sent(4.0, None)
+    access.sent(5.3, None)
     access.not_sent(5.2)
     assert first_start(access, 3.9) == first_start(twin, 3.9)
 
@@ -170,7 +170,7 @@ def test_backoffs_are_counted():
 
 def test_none_sends_at_any_time_and_keeps_no_schedule():
     free = Free()
-    free.sent(9.0)
+    free.sent(9.0, None)
     for sensed in (Sensed(), Sensed(1.0, 5.0)):
         assert free.slot(Wish(2.0, Qos.BULK, 0.5, sensed)) == Slot(2.0)
     assert free.slot(Wish(2.0, Qos.BULK, 0.5, Sensed())).latest(0.1) == float("inf")

@@ -156,9 +156,9 @@ def test_each_node_has_a_place_of_its_own_and_the_last_sender_the_last(last, qos
     for node_id in NODES:
         access = make(node_id)
         if node_id == last:
-            access.sent(5.0)
+            access.sent(5.0, None)
         else:
-            access.heard(last, 4.9)
+            access.heard(last, 4.9, False)
         starts[node_id] = first_start(access, 5.0, 4.9, qos)
     first = 5.0 + MS * (1 + len(NODES) * (qos > Qos.LATENCY))
     in_order = NODES[NODES.index(last) + 1 :] + NODES[: NODES.index(last) + 1]
@@ -171,30 +171,30 @@ def test_each_node_has_a_place_of_its_own_and_the_last_sender_the_last(last, qos
 def test_who_could_not_read_the_last_burst_stays_out_of_the_round(qos):
     """Others know who sent it; their places are not those that this node would reckon."""
     access = make(2)
-    access.heard(7, 3.0)
+    access.heard(7, 3.0, False)
     round_s = LEVELS * len(NODES) * MS
     for unread in (None, 4.9):
         assert first_start(access, 5.0, unread, qos) >= 5.0 + round_s + MS - 1e-9
-    access.heard(7, 4.9)
+    access.heard(7, 4.9, False)
     assert first_start(access, 5.0, 4.9, qos) < 5.0 + round_s
 
 
 def test_a_robot_that_is_not_of_ours_makes_nobody_first():
     access = make(2)
-    access.heard(99, 4.9)
+    access.heard(99, 4.9, False)
     assert first_start(access, 5.0, 4.9) >= 5.0 + LEVELS * len(NODES) * MS
 
 
 def test_nobody_begins_while_there_is_a_carrier_or_before_those_ahead_have_passed():
     access = make(7)
-    access.heard(5, 4.9)
+    access.heard(5, 4.9, False)
     start = 5.0 + MS
     assert first_start(access, 5.0, 4.9, Qos.URGENT) == pytest.approx(start)
     for until, idle_since in ((4.95, 5.0), (5.5, 5.6), (start - MS, 5.0)):
         wish = Wish(until + 0.0005, Qos.URGENT, 0.001, Sensed(until, idle_since, 4.9))
         assert access.slot(wish) is None
     own = make(7)
-    own.sent(6.0)
+    own.sent(6.0, None)
     assert own.slot(Wish(5.5, Qos.URGENT, 0.001, Sensed(5.5, 5.0, 4.9))) is None
 
 
@@ -203,9 +203,9 @@ def test_a_burst_that_did_not_leave_was_never_there(sent_before):
     access, twin = make(2), make(2)
     for each in (access, twin):
         if sent_before:
-            each.sent(4.0)
-        each.heard(7, 4.9)
-    access.sent(5.3)
+            each.sent(4.0, None)
+        each.heard(7, 4.9, False)
+    access.sent(5.3, None)
     access.not_sent(5.2)
     for qos in Qos:
         assert first_start(access, 5.0, 4.9, qos) == first_start(twin, 5.0, 4.9, qos)

@@ -151,7 +151,7 @@ def two_of_robot_2():
 
 def test_a_burst_that_did_not_leave_was_never_there():
     one, twin, begin = two_of_robot_2()
-    one.sent(begin + 0.002)
+    one.sent(begin + 0.002, None)
     one.not_sent(begin)
     assert_alike(one, twin, begin)
 
@@ -159,9 +159,9 @@ def test_a_burst_that_did_not_leave_was_never_there():
 def test_a_burst_that_did_not_leave_takes_nothing_from_the_one_behind_it():
     """Two may be on their way to the radio when it says that the first came too late."""
     one, twin, begin = two_of_robot_2()
-    one.sent(begin + 0.001)
+    one.sent(begin + 0.001, None)
     for each in (one, twin):
-        each.sent(begin + 0.002)
+        each.sent(begin + 0.002, None)
     one.not_sent(begin)
     assert_alike(one, twin, begin)
 
@@ -180,14 +180,14 @@ def test_who_knows_of_a_robot_it_does_not_hear_uses_its_own_slots_only():
     begun(access, 10.0)
     assert begun(access, 11.0) == {1, 2, 3}
     # Robot 2 hears robot 1, and so do we.
-    access.heard(2, 12.0)
-    access.heard(1, 12.0)
+    access.heard(2, 12.0, False)
+    access.heard(1, 12.0, False)
     access.told_of(1, 12.0)
     access.told_of(3, 12.0)
     assert begun(access, 12.1) == {1, 2, 3}
     # Now we do not any more.
     access.told_of(1, 15.0)
-    access.heard(2, 15.0)
+    access.heard(2, 15.0, False)
     assert begun(access, 15.1) == {3}
     # Nobody does.
     assert begun(access, 15.0 + FORGET_S + 0.1) == {1, 2, 3}

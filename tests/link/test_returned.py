@@ -46,7 +46,9 @@ class Doorkeeper:
     def slot(self, wish):
         return self.slots.pop(0)
 
-    def sent(self, end):
+    others_follow = False
+
+    def sent(self, end, src):
         self.told.append(("sent", end))
 
     def not_sent(self, start):

@@ -61,14 +61,18 @@ class Access(Protocol):
     def slot(self, wish: Wish) -> Slot | None:
         """Where it may leave; None: not now."""
 
-    def sent(self, end: float) -> None:
-        """A burst of our own will be on the air until `end`."""
+    @property
+    def others_follow(self) -> bool:
+        """Whether the air that we leave free can be another's."""
+
+    def sent(self, end: float, src: int | None) -> None:
+        """A burst of ours will be on the air until `end`; `src`: whose PDUs it forwards, if any."""
 
     def not_sent(self, start: float) -> None:
         """It was not."""
 
-    def heard(self, src: int, at: float) -> None:
-        """A PDU of `src` came in a burst whose preamble was at `at`."""
+    def heard(self, src: int, at: float, is_relayed: bool) -> None:
+        """A PDU of `src` came in a burst whose preamble was at `at`, perhaps from a relay."""
 
     def told_of(self, node: int, at: float) -> None:
         """At `at` another robot told that it hears `node`."""
@@ -100,8 +104,13 @@ class Carriers:
         """None."""
         return 0.0
 
-    def sent(self, end: float) -> None:
-        """A burst of our own will be on the air until `end`."""
+    @property
+    def others_follow(self) -> bool:
+        """Nobody is in our way, or has to be let in."""
+        return False
+
+    def sent(self, end: float, src: int | None) -> None:
+        """A burst of ours will be on the air until `end`."""
         self._own_ends = [*self._own_ends[-MOST_ON_THEIR_WAY:], end]
 
     def not_sent(self, start: float) -> None:
@@ -113,7 +122,7 @@ class Carriers:
         if not self._own_ends:
             self._own_ends = [NEVER]
 
-    def heard(self, src: int, at: float) -> None:
+    def heard(self, src: int, at: float, is_relayed: bool) -> None:
         """Whose it was does not matter."""
 
     def told_of(self, node: int, at: float) -> None:

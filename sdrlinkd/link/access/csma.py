@@ -47,6 +47,11 @@ class Csma(Carriers):
         """DWAIT."""
         return self._dwait_s
 
+    @property
+    def others_follow(self) -> bool:
+        """Anybody."""
+        return True
+
     def slot(self, wish: Wish) -> Slot | None:
         """The slot drawn, once all before it were heard to be idle."""
         earliest, qos, _, sensed = wish

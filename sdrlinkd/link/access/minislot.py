@@ -18,7 +18,8 @@ class MiniSlots(Carriers):
     """Collision-free among nodes that hear each other, and the more urgent class first.
 
     Mini-slot 0 begins `minislot_s` after the carrier's end. First come those of the higher level,
-    one a node, then those of the lower; in a level, the one who sent last comes last. When all are
+    one a node, then those of the lower; in a level, the one whose PDUs were sent last comes last,
+    or, when a relay has sent them, first. When all are
     passed they begin anew, a little wider the longer it is quiet: clocks part. A node begins only
     when it has heard the one before its own pass.
     """
@@ -31,8 +32,10 @@ class MiniSlots(Carriers):
         self._rank = self._nodes.index(own_id)
         self._minislot_s = minislot_s
         self._detect_s = detect_s
-        self._last = (-1, NEVER)
-        """(source, when its burst began) of the last PDU."""
+        self._last = (-1, NEVER, False)
+        """(source, when its burst began, whether it was relayed) of the last PDU."""
+        self._own_src: int | None = None
+        """Whose PDUs we sent last, if we forwarded them."""
         self._n_slots = SECTIONS * len(nodes)
         self._round = (NEVER, 0.0)
         """(end of the carrier it follows, when it began after that) of the round we are in."""
@@ -54,6 +57,11 @@ class MiniSlots(Carriers):
     def pause_s(self) -> float:
         """Up to the first mini-slot."""
         return self._minislot_s
+
+    @property
+    def others_follow(self) -> bool:
+        """In their mini-slots."""
+        return True
 
     def slot(self, wish: Wish) -> Slot | None:
         """Our next mini-slot, once all before it were heard to be idle."""
@@ -77,19 +85,28 @@ class MiniSlots(Carriers):
         least = Qos.LATENCY if qos <= Qos.LATENCY else Qos.BULK
         return Slot.exact(max(start, earliest), least=least)
 
-    def heard(self, src: int, at: float) -> None:
+    def sent(self, end: float, src: int | None) -> None:
+        """What we send ourselves, we do not hear."""
+        super().sent(end, src)
+        self._own_src = src
+
+    def heard(self, src: int, at: float, is_relayed: bool) -> None:
         """The order in a level follows from who sent last."""
-        self._last = (src, at)
+        self._last = (src, at, is_relayed)
 
     def _place(self, idle_since: float, qos: Qos, sensed: Sensed) -> int:
         """Number of our mini-slot after this carrier."""
         n = len(self._nodes)
         level = 0 if qos <= Qos.LATENCY else 1
-        src, at = self._last
+        src, at, is_relayed = self._last
         if idle_since == self.own_end:
-            turn = n - 1
-        elif sensed.burst_at == at and src in self._nodes:
-            turn = (self._rank - self._nodes.index(src) - 1) % n
-        else:
+            if self._own_src is None:
+                return level * n + n - 1
+            src, is_relayed = self._own_src, True
+        elif sensed.burst_at != at:
             return LEVELS * n + self._rank
-        return level * n + turn
+        if src not in self._nodes:
+            return LEVELS * n + self._rank
+        # Nobody else knows which relay it was: its source comes first then.
+        first = self._nodes.index(src) + (not is_relayed)
+        return level * n + (self._rank - first) % n

@@ -115,9 +115,10 @@ class Tdma(Carriers):
                 return Slot(start, planned_end, end)
         return None
 
-    def heard(self, src: int, at: float) -> None:
+    def heard(self, src: int, at: float, is_relayed: bool) -> None:
         """It is not hidden from us."""
-        self._heard_at[src] = at
+        if not is_relayed:
+            self._heard_at[src] = at
 
     def told_of(self, node: int, at: float) -> None:
         """It is there, whether we hear it or not."""

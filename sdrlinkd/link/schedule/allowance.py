@@ -60,8 +60,8 @@ class Limits:
     ) -> Allowance:
         """For a burst that leaves at `start` and is no longer than `longest_s`.
 
-        `ready_s` after a message is due, it can leave at the earliest; up to `notice_s` after it has
-        come, nobody knows.
+        `ready_s` after a message is due, it can leave at the earliest; up to `notice_s` after it
+        has come, nobody knows.
         """
         known = start - notice_s
         self._idle_s = min(
