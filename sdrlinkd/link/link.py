@@ -322,6 +322,7 @@ class Link:
             partial(most_pdus, mcs),
             self._lead_s - self.access.pause_s,
             self._notice_s,
+            self.access.others_follow,
         ).least(slot.least)
         owed = self.shares.owed(two_s - one_s) if one_s <= longest_s else None
         if owed not in self.sender.outbox.waiting_classes():

@@ -13,6 +13,9 @@ ALIVE_S = 1.0
 OVERRUN = 0.25
 """A burst may last beyond the time that a message is due by this share of a PDU, rather than leave
 more than that unused."""
+SHARED_OVERRUN = 0.9
+"""The same where others share the air: who finds it free first has to wait for his turn, and who
+finds it busy begins when it falls free."""
 IDLE_SHARE = 0.1
 """No more of the air is kept free for what is due."""
 MOST_IDLE_S = 0.02
@@ -57,12 +60,14 @@ class Limits:
         most_pdus: Callable[[float], int],
         ready_s: float,
         notice_s: float,
+        is_shared: bool = False,
     ) -> Allowance:
         """For a burst that leaves at `start` and is no longer than `longest_s`.
 
         `ready_s` after a message is due, it can leave at the earliest; up to `notice_s` after it
         has come, nobody knows.
         """
+        overrun = SHARED_OVERRUN if is_shared else OVERRUN
         known = start - notice_s
         self._idle_s = min(
             MOST_IDLE_S, self._idle_s + IDLE_SHARE * max(0.0, start - self._asked_at)
@@ -77,7 +82,7 @@ class Limits:
             due = self._forecasts.next_due(known, qos)
             if due is not None and n:
                 free_s = due.due(known) - due.spread_s + ready_s - start
-                n = self._before(free_s, 2 * due.spread_s + notice_s, n, airtime_s)
+                n = self._before(free_s, 2 * due.spread_s + notice_s, n, airtime_s, overrun)
                 if n == 0 and until == INFINITE:
                     until = due.due(known) + due.spread_s + notice_s
             most.append(n)
@@ -93,12 +98,13 @@ class Limits:
         wait_s: float,
         most: int,
         airtime_s: Callable[[int], float],
+        overrun: float,
     ) -> int:
         """PDUs for `free_s`; 0: better wait for what comes then, or `wait_s` later."""
         one_s = airtime_s(1)
         each_s = airtime_s(2) - one_s
         if each_s <= 0:
             return most
-        if free_s + OVERRUN * each_s < one_s:
+        if free_s + overrun * each_s < one_s:
             return 0 if free_s + wait_s < self._idle_s else 1
-        return min(most, 1 + int((free_s + OVERRUN * each_s - one_s) / each_s))
+        return min(most, 1 + int((free_s + overrun * each_s - one_s) / each_s))
