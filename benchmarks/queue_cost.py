@@ -49,7 +49,7 @@ def _cost(depth: int, seed: int) -> float:
     start = time.process_time()
     for topic in topics[depth:]:
         link.submit(topic, payload, 0.0, wishes[topic])
-        burst = link.compose(0.0, Allowance.of(1))
+        burst = link.departures.compose(0.0, Allowance.of(1))
         if burst is not None:
             link.confirm(burst, Outcome.SENT, 0.0)
     return time.process_time() - start

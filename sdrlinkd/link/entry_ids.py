@@ -1,7 +1,10 @@
 """Which entry id the next message of a topic gets (wire document, section 4.2)."""
 
-from collections import deque
+from collections import Counter, deque
+from collections.abc import Iterable
 from random import Random
+
+from sdrlinkd.link.message import Outgoing
 
 # A receiver may hear the last fragment late (reordering, relays), so ids rest a little longer
 # than it waits for missing ones.
@@ -48,3 +51,54 @@ class EntryIds:
         if self._idle:
             return float("-inf")
         return self._resting[0][0] if self._resting else float("inf")
+
+
+class TopicEntryIds:
+    """The ids of all topics, as messages take and leave them."""
+
+    def __init__(self, rng: Random, rest_s: float) -> None:
+        self._rng = rng
+        self._rest_s = rest_s
+        self._by_topic: dict[int, EntryIds] = {}
+        self.waits: Counter[int] = Counter()
+        """How often a topic had to wait because all its ids were at rest."""
+
+    def take(self, message: Outgoing, now: float) -> bool:
+        """Give the message an id; False while its topic has no free one."""
+        entry_id = self._of(message.topic_id).take(now)
+        if entry_id is None:
+            self.waits[message.topic_id] += 1
+            return False
+        message.entry_id = entry_id
+        return True
+
+    def retire(self, message: Outgoing, now: float) -> None:
+        """No more fragments of it will be made."""
+        ids = self._of(message.topic_id)
+        if message.rests_id:
+            ids.rest(message.entry_id, now)
+        else:
+            ids.give_back(message.entry_id)
+
+    def not_left(self, messages: Iterable[Outgoing]) -> None:
+        """Fragments of these will leave later than they were made for: their ids must wait, too."""
+        for message in messages:
+            if not message.is_whole and not message.is_held:
+                message.is_held = self._of(message.topic_id).hold(message.entry_id)
+
+    def left(self, messages: Iterable[Outgoing], start: float) -> None:
+        """Now they do."""
+        for message in messages:
+            if message.is_held:
+                message.is_held = False
+                self._of(message.topic_id).rest(message.entry_id, start)
+
+    def next_free(self, message: Outgoing) -> float:
+        """When it can have one; −inf: at once."""
+        return float("-inf") if message.is_whole else self._of(message.topic_id).next_free()
+
+    def _of(self, topic_id: int) -> EntryIds:
+        ids = self._by_topic.get(topic_id)
+        if ids is None:
+            ids = self._by_topic[topic_id] = EntryIds(self._rng, self._rest_s)
+        return ids

@@ -6,17 +6,17 @@ freezes at a message's first fragment. Greedy: further entries of the same topic
 Lower classes fill what is left over.
 """
 
-from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from random import Random
 from typing import NamedTuple
 
 from sdrlinkd.link.draft import NO_DST, Draft
-from sdrlinkd.link.entry_ids import REST_FACTOR, EntryIds
+from sdrlinkd.link.entry_ids import REST_FACTOR, TopicEntryIds
 from sdrlinkd.link.message import Lane, Level, Outgoing
 from sdrlinkd.link.outbox import Outbox
 from sdrlinkd.link.params import LinkParams
 from sdrlinkd.link.qos import WIRE_BITS, Qos
+from sdrlinkd.link.spare import SpareRecords
 from sdrlinkd.wire import (
     BROADCAST,
     ENTRY_HEADER_SIZE,
@@ -24,8 +24,6 @@ from sdrlinkd.wire import (
     MAX_ENTRIES,
     MAX_FRAGMENTS,
     STAMP_SIZE,
-    Record,
-    build_records,
     build_stamp,
     equal_payload,
     flags,
@@ -65,36 +63,16 @@ class Packetizer:
         self._src = src
         self._has_control = has_control
         self._outbox = outbox
-        self._rng = rng
         self._seq = rng.randrange(256)
         self._control_entry_id = rng.randrange(256)
-        self._rest_s = REST_FACTOR * reassembly_timeout_s
-        self._entry_ids: dict[int, EntryIds] = {}
+        self.entry_ids = TopicEntryIds(rng, REST_FACTOR * reassembly_timeout_s)
         self._k_single = equal_payload(params.pdu_size, 1)
         self._k_shared = min(
             max(equal_payload(params.pdu_size, 2), params.min_fragment), self._k_single
         )
-        self._spare_records: list[bytes] = []
+        self.spare = SpareRecords()
         self._may_wait = params.flush_s > 0
         self._expired: list[Outgoing] = []
-        # How often a topic had to wait because all its entry ids were at rest.
-        self.waits_for_entry_id: Counter[int] = Counter()
-
-    def offer(self, records: Iterable[Record]) -> None:
-        """Records to send in spare room of the PDUs to come (replaces what was offered)."""
-        self._spare_records = [build_records([record]) for record in records]
-
-    def renew(self, record: Record) -> None:
-        """Where a record of its type still waits, this one goes in its place."""
-        built = build_records([record])
-        self._spare_records = [
-            built if each[0] == built[0] else each for each in self._spare_records
-        ]
-
-    @property
-    def offered(self) -> bool:
-        """Whether offered records still wait for a PDU with room."""
-        return bool(self._spare_records)
 
     def expire(self, now: float) -> None:
         """Withdraw heads whose lifespan ended; see `take_expired`."""
@@ -109,21 +87,7 @@ class Packetizer:
 
     def abandon(self, lane: Lane, now: float) -> None:
         """Send no more of the message the lane is in the middle of."""
-        self._retire(self._outbox.withdraw_head(lane), now)
-
-    def not_left(self, messages: Iterable[Outgoing]) -> None:
-        """Fragments of these will leave later than they were made for: their ids must wait, too."""
-        for message in messages:
-            if message.is_whole:
-                continue
-            message.is_held = message.is_held or self._ids(message.topic_id).hold(message.entry_id)
-
-    def left(self, messages: Iterable[Outgoing], start: float) -> None:
-        """Now they do."""
-        for message in messages:
-            if message.is_held:
-                message.is_held = False
-                self._ids(message.topic_id).rest(message.entry_id, start)
+        self.entry_ids.retire(self._outbox.withdraw_head(lane), now)
 
     def flush(self) -> None:
         """From now on partial PDUs do not wait."""
@@ -155,8 +119,8 @@ class Packetizer:
             for message in draft.carried:
                 if not message.stamped:
                     self._stamp(draft, message, start)
-        if self._spare_records and draft.dst == BROADCAST:
-            self._add_spare_records(draft)
+        if self.spare and draft.dst == BROADCAST:
+            self.spare.ride(draft)
         return self._finish(draft)
 
     @property
@@ -171,7 +135,7 @@ class Packetizer:
     def records_pdu(self) -> BuiltPdu | None:
         """A PDU of its own for the offered records, when there are any."""
         draft = Draft(self._pdu_size)
-        self._add_spare_records(draft)
+        self.spare.ride(draft)
         if draft.is_empty:
             return None
         draft.dst = BROADCAST
@@ -185,7 +149,7 @@ class Packetizer:
         if self._may_wait and self._must_wait(now):
             return self._outbox.oldest_arrival() + self._params.flush_s
         return min(
-            self._ids(lane.topic_id).next_free() if lane.current is None else float("-inf")
+            self.entry_ids.next_free(lane.waiting[0]) if lane.current is None else float("-inf")
             for level in self._outbox.levels
             for lane in level.lanes
         )
@@ -277,7 +241,7 @@ class Packetizer:
         if is_last:
             if needs_stamp:
                 self._stamp(draft, head, start)
-            self._retire(head, start)
+            self.entry_ids.retire(head, start)
             lane.current = None
         self._outbox.served(lane)
         return True
@@ -301,37 +265,17 @@ class Packetizer:
         """Make `head` the message being fragmented; False while the topic has no free id."""
         if lane.current is not None:
             return True
-        entry_id = self._ids(head.topic_id).take(start)
-        if entry_id is None:
-            self.waits_for_entry_id[head.topic_id] += 1
+        if not self.entry_ids.take(head, start):
             return False
-        head.entry_id = entry_id
         head.k = k
         head.total = fragment_count(len(head.payload), k)
         head.rests_id = head.total > 1
         self._outbox.begin(lane)
         return True
 
-    def _retire(self, head: Outgoing, start: float) -> None:
-        ids = self._ids(head.topic_id)
-        if head.rests_id:
-            ids.rest(head.entry_id, start)
-        else:
-            ids.give_back(head.entry_id)
-
     def _stamp(self, draft: Draft, message: Outgoing, start: float) -> None:
         age_us = min(max(round((start - message.arrived_at) * 1e6), 0), MAX_AGE_US)
         message.stamped = draft.add_record(build_stamp(message.topic_id, message.entry_id, age_us))
-
-    def _add_spare_records(self, draft: Draft) -> None:
-        waiting = self._spare_records
-        self._spare_records = [record for record in waiting if not draft.add_record(record)]
-
-    def _ids(self, topic_id: int) -> EntryIds:
-        ids = self._entry_ids.get(topic_id)
-        if ids is None:
-            ids = self._entry_ids[topic_id] = EntryIds(self._rng, self._rest_s)
-        return ids
 
     def _must_wait(self, now: float) -> bool:
         """Whether what is pending should wait for more (paper section 4.3, Flush Timeout)."""

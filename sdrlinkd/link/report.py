@@ -24,9 +24,9 @@ def link_report(
     return LinkReport(
         pdu_size=link.params.pdu_size,
         access=link.access.state,
-        airtime_s=link.airtime_s,
-        bursts_by_mcs=dict(sorted(link.bursts_by_mcs.items())),
-        bursts_late=link.bursts_late,
+        airtime_s=link.departures.airtime_s,
+        bursts_by_mcs=dict(sorted(link.departures.bursts_by_mcs.items())),
+        bursts_late=link.departures.bursts_late,
         mcs_changes=list(link.rate.changes),
         control_channel=link.registry.has_control,
         registry_digest=link.digest.overall.hex(),
@@ -161,7 +161,7 @@ def link_notices(link: Link) -> list[str]:
             "the registry uses all 16 topic ids, so there is no control channel: no ages, no "
             "beacons, no registry check; drop one topic to have them"
         )
-    for topic_id in sorted(link.sender.packetizer.waits_for_entry_id):
+    for topic_id in sorted(link.sender.packetizer.entry_ids.waits):
         topic = link.registry.topics[topic_id]
         notices.append(
             f"{topic.name} had to wait for a free entry id: fragmented messages come faster than "

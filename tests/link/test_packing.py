@@ -40,7 +40,7 @@ def test_min_fragment_outweighs_the_share_of_two():
 def test_k_freezes_at_the_first_fragment():
     link = no_stamps(make_link(pdu_size=220, greedy=False))
     link.submit(0, bytes(600), 0.0)
-    link.confirm(link.compose(0.0, Allowance.of(1)), Outcome.SENT, 0.0)
+    link.confirm(link.departures.compose(0.0, Allowance.of(1)), Outcome.SENT, 0.0)
     link.submit(1, bytes(202), 0.0)
     rest = [entry for pdu in layouts(send_all(link), 220) for entry in pdu if entry[0] == 0]
     assert rest == [(0, 1, 3, 207), (0, 2, 3, 186)]
@@ -124,29 +124,29 @@ class TestFlush:
     def test_a_partial_pdu_waits_for_more(self):
         link = no_stamps(make_link(pdu_size=220, flush_s=0.2))
         link.submit(0, bytes(50), 1.0)
-        assert link.compose(1.1, Allowance.of(8)) is None
+        assert link.departures.compose(1.1, Allowance.of(8)) is None
         assert link.next_wakeup(1.1) == pytest.approx(1.2)
         link.submit(1, bytes(50), 1.15)
-        assert len(link.compose(1.2, Allowance.of(8)).pdus) == 1
+        assert len(link.departures.compose(1.2, Allowance.of(8)).pdus) == 1
 
     def test_a_full_one_does_not(self):
         link = no_stamps(make_link(pdu_size=220, flush_s=0.2))
         link.submit(0, bytes(400), 1.0)
-        assert len(link.compose(1.0, Allowance.of(1)).pdus) == 1
+        assert len(link.departures.compose(1.0, Allowance.of(1)).pdus) == 1
 
     def test_infinity_sends_only_full_ones(self):
         link = no_stamps(make_link(pdu_size=220, flush_s=INFINITE))
         link.submit(0, bytes(50), 0.0)
-        assert link.compose(1e6, Allowance.of(8)) is None
+        assert link.departures.compose(1e6, Allowance.of(8)) is None
         assert link.next_wakeup(0.0) == INFINITE
         link.drain()
-        assert len(link.compose(1e6, Allowance.of(8)).pdus) == 1
+        assert len(link.departures.compose(1e6, Allowance.of(8)).pdus) == 1
 
     @pytest.mark.parametrize("qos", [Qos.URGENT, Qos.LATENCY])
     def test_urgent_and_latency_never_wait(self, qos):
         link = make_link(pdu_size=220, flush_s=INFINITE)
         link.submit(0, bytes(50), 0.0, Overrides(qos=qos))
-        assert len(link.compose(0.0, Allowance.of(8)).pdus) == 1
+        assert len(link.departures.compose(0.0, Allowance.of(8)).pdus) == 1
 
 
 def records_of(pdu, pdu_size):
@@ -158,7 +158,7 @@ class TestStamp:
     def test_rides_in_spare_room_with_the_age_at_the_preamble(self):
         link = make_link(pdu_size=220)
         link.submit(0, bytes(100), 1.0)
-        (pdu,) = link.compose(1.25, Allowance.of(8)).pdus
+        (pdu,) = link.departures.compose(1.25, Allowance.of(8)).pdus
         assert [record.age_us for record in records_of(pdu, 220)] == [250_000]
 
     def test_of_a_fragmented_message_needs_no_pdu_more(self):
@@ -195,7 +195,7 @@ class TestBeacon:
         assert isinstance(beacon, Beacon)
         assert digest == link.digest
         assert link.next_wakeup(5.0) == pytest.approx(6.0, abs=0.1)
-        assert link.compose(5.9, Allowance.of(8)) is None
+        assert link.departures.compose(5.9, Allowance.of(8)) is None
         assert len(send_all(link, now=6.0)) == 1
 
     def test_in_spare_room_of_a_broadcast_pdu(self):

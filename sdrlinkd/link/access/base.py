@@ -109,7 +109,7 @@ class Carriers:
         """Nobody is in our way, or has to be let in."""
         return False
 
-    def sent(self, end: float, src: int | None) -> None:
+    def sent(self, end: float, src: int | None) -> None:  # noqa: ARG002  # not all ask for it
         """A burst of ours will be on the air until `end`."""
         self._own_ends = [*self._own_ends[-MOST_ON_THEIR_WAY:], end]
 

@@ -1,0 +1,230 @@
+"""The next burst: when it may leave, how long it may be, and what goes with it."""
+
+from collections import Counter
+from functools import partial
+from itertools import chain
+from random import Random
+from typing import NamedTuple
+
+from sdrlinkd.link.access import Access, AccessParams, Free, Slot, Wish, make_access
+from sdrlinkd.link.beacons import Beacons
+from sdrlinkd.link.carrier import CarrierTraits, Opportunity
+from sdrlinkd.link.inbox import Inbox
+from sdrlinkd.link.qos import Qos
+from sdrlinkd.link.rate import RateControl, RateParams
+from sdrlinkd.link.returned import Returned
+from sdrlinkd.link.schedule import Allowance, ClassesParams, Forecasts, Limits, Shares
+from sdrlinkd.link.sender import Burst, Outcome, Sender
+from sdrlinkd.wire import Record
+
+INFINITE = float("inf")
+NOTICE_S = 5e-4
+"""From a producer's clock to our queue, in real time."""
+
+
+class _Held(NamedTuple):
+    """The air is kept free from `since` to `until`; settled while nothing new has come."""
+
+    since: float
+    until: float
+    is_settled: bool
+
+
+_NOT_HELD = _Held(INFINITE, -INFINITE, is_settled=False)
+
+
+class Departures:
+    """Asks access when, limits how long, the sender what; late bursts go again."""
+
+    def __init__(
+        self, sender: Sender, inbox: Inbox, beacons: Beacons, classes: ClassesParams,
+        own_id: int, has_control: bool, rng: Random,
+    ) -> None:  # fmt: skip
+        self._sender = sender
+        self._inbox = inbox
+        self._beacons = beacons
+        self._own_id = own_id
+        self._rng = rng
+        self._number = 0
+        self._returned = Returned(has_control)
+        self.airtime_s = 0.0
+        self.bursts_by_mcs: Counter[int] = Counter()
+        self.forecasts = Forecasts()
+        self.shares = Shares(classes)
+        self._limits = Limits(classes, self.forecasts)
+        self._lead_s, self._notice_s = 0.0, NOTICE_S
+        self._held = _NOT_HELD
+        self.access: Access = Free()
+        self.rate = RateControl(RateParams(), (0.0,), 0)
+
+    def attach(self, carrier: CarrierTraits, access: AccessParams, rate: RateParams) -> None:
+        """Settle access and rate for the radio that is there. Raises ConfigError."""
+        self.rate = RateControl(rate, carrier.needed_snr_db, carrier.mcs)
+        longest_s = max(carrier.longest_burst_s[mcs] for mcs in self.rate.usable)
+        self.access = make_access(access, self._own_id, carrier, longest_s, self._rng)
+        self._lead_s = carrier.lead_s
+        self._notice_s = carrier.ahead_s if carrier.is_lockstep else NOTICE_S
+
+    def more_to_send(self) -> None:
+        """Something has come; whether to wait is to be decided anew."""
+        self._held = self._held._replace(is_settled=False)
+
+    def next_burst(self, opportunity: Opportunity) -> Burst | None:
+        """The burst that should leave next, decided now; None: nothing to send, or not yet."""
+        earliest, airtime_s, _, sensed = opportunity
+        if self._returned:
+            return self._again(opportunity)
+        head = self._sender.outbox.head()
+        if head is not None:
+            qos, destinations = head
+            mcs = self.rate.mcs(destinations, qos, earliest)
+        elif earliest >= self._beacons.due_at or self._sender.packetizer.spare:
+            qos, mcs = Qos.DEFAULT, self.rate.lowest
+        else:
+            return None
+        slot = self.access.slot(Wish(earliest, qos, airtime_s(mcs, 1), sensed))
+        if slot is None:
+            return None
+        allowance = self._allowance(slot, mcs, opportunity)
+        # A schedule's phase holds for the planned start only.
+        is_timed = self.access.frame(slot.start) is not None and (
+            slot.start >= self._beacons.due_at or bool(self._sender.packetizer.spare)
+        )
+        burst = self.compose(slot.start, allowance)
+        if burst is None:
+            if head is not None and allowance.until < INFINITE:
+                since = min(self._held.since, slot.start)
+                self._held = _Held(since, allowance.until, is_settled=True)
+            return None
+        self._kept_free(slot.start)
+        if not any(burst.carried) and airtime_s(self.rate.lowest, 1) <= slot.end - slot.start:
+            # Beacons are for everybody.
+            mcs = self.rate.lowest
+        length_s = airtime_s(mcs, len(burst.pdus))
+        self.shares.spend(length_s, burst.classes, self._sender.outbox.waiting_classes())
+        self.access.sent(slot.start + length_s, self._relayed_src(burst))
+        self._number += 1
+        return burst._replace(
+            mcs=mcs,
+            qos=qos,
+            start=slot.start,
+            latest=slot.start if is_timed else slot.latest(length_s),
+            airtime_s=length_s,
+            number=self._number,
+            first_start=slot.start,
+        )
+
+    def compose(self, start: float, allowance: Allowance) -> Burst | None:
+        """The burst that should leave at `start`, decided now; None when there is nothing.
+
+        A beacon that is due rides in spare room; when traffic leaves none for a whole period, or
+        there is no traffic, it gets a PDU of its own.
+        """
+        sender, spare = self._sender, self._sender.packetizer.spare
+        overdue, may_tell = False, allowance.most[Qos.DEFAULT] > 0
+        if start >= self._beacons.due_at:
+            overdue = bool(spare)
+            spare.offer(self._beacon_records(start))
+        elif spare and (frame := self.access.frame(start)):
+            spare.renew(frame)
+            # Clocks do not wait for spare room.
+            overdue = True
+        if overdue and may_tell:
+            burst = sender.compose_records()
+        else:
+            burst = sender.compose(start, allowance)
+        if burst is None and spare and may_tell:
+            burst = sender.compose_records()
+        return burst
+
+    def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
+        """What the radio says became of a burst."""
+        if outcome is not Outcome.SENT:
+            self.access.not_sent(burst.start)
+        if outcome is Outcome.LATE and self._returned.give_back(burst):
+            self._sender.packetizer.entry_ids.not_left(chain.from_iterable(burst.carried))
+            return
+        if outcome is Outcome.SENT:
+            self.airtime_s += burst.airtime_s
+            self.bursts_by_mcs[burst.mcs] += 1
+        self._sender.confirm(burst, outcome, now)
+
+    @property
+    def has_work(self) -> bool:
+        """Whether messages wait to be sent."""
+        return bool(self._sender.outbox) or bool(self._returned)
+
+    def next_wakeup(self, now: float) -> float:
+        """When there may next be something to send; not after `now`: at once."""
+        if self._returned:
+            return now
+        wakes_at = self._sender.packetizer.next_wakeup(now)
+        if wakes_at <= now and self._held.is_settled:
+            wakes_at = self._held.until
+        return min(self._beacons.due_at, wakes_at)
+
+    def drain(self) -> None:
+        """Nothing more will come: partial PDUs go at once, beacons end."""
+        self._beacons.end()
+        self._sender.packetizer.flush()
+
+    def clear(self) -> None:
+        """Nothing goes again."""
+        self._returned.clear()
+
+    @property
+    def bursts_late(self) -> int:
+        """Bursts that came too late for their slot and were sent again."""
+        return self._returned.count
+
+    def _again(self, opportunity: Opportunity) -> Burst | None:
+        """A burst that came too late for its slot, in another one."""
+        again = self._returned.head
+        airtime_s = opportunity.airtime_s(again.mcs, len(again.pdus))
+        slot = self.access.slot(
+            Wish(opportunity.earliest, again.qos, airtime_s, opportunity.sensed)
+        )
+        if slot is None or slot.start + airtime_s > slot.end:
+            return None
+        burst = self._returned.take(slot.start)
+        self.access.sent(slot.start + airtime_s, self._relayed_src(burst))
+        self._sender.packetizer.entry_ids.left(chain.from_iterable(burst.carried), slot.start)
+        is_timed = again.latest <= again.start
+        return burst._replace(latest=slot.start if is_timed else slot.latest(airtime_s))
+
+    def _allowance(self, slot: Slot, mcs: int, opportunity: Opportunity) -> Allowance:
+        """For a burst in `slot`."""
+        _, airtime_s, most_pdus, _ = opportunity
+        longest_s = slot.end - slot.start
+        one_s, two_s = airtime_s(mcs, 1), airtime_s(mcs, 2)
+        allowance = self._limits.allow(
+            slot.start,
+            longest_s,
+            partial(airtime_s, mcs),
+            partial(most_pdus, mcs),
+            self._lead_s - self.access.pause_s,
+            self._notice_s,
+            self.access.others_follow,
+        ).least(slot.least)
+        owed = self.shares.owed(two_s - one_s) if one_s <= longest_s else None
+        if owed not in self._sender.outbox.waiting_classes():
+            owed = None
+        return allowance._replace(owed=owed)
+
+    def _kept_free(self, start: float) -> None:
+        """Settle what was not sent so that something more urgent could be."""
+        held, self._held = self._held, _NOT_HELD
+        passed_s = min(start, held.until) - held.since
+        if passed_s > 0:
+            self._limits.kept_free(passed_s)
+            self.shares.idle(passed_s, self._sender.outbox.waiting_classes())
+
+    def _beacon_records(self, start: float) -> list[Record]:
+        records = self._beacons.take(start, self._inbox.neighbors.values(), self.rate)
+        frame = self.access.frame(start)
+        return records if frame is None else [*records, frame]
+
+    def _relayed_src(self, burst: Burst) -> int | None:
+        """Whose PDUs a burst forwards, if any."""
+        src = burst.pdus[0][1]
+        return None if src == self._own_id else src
