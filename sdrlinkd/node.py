@@ -65,11 +65,11 @@ class Node:
 
     def heard(self, pdus: Sequence[Heard]) -> None:
         """PDUs from the air."""
+        now = self._pdu_link.now()
         for data, at, snr_db in pdus:
             if self.bus.is_tapped:
                 self.bus.tap("rx", data)
-            for message in self._link.hear(data, at, snr_db):
-                now = self._pdu_link.now()
+            for message in self._link.hear(data, at, snr_db, now):
                 age_s = self._link.delivered(message, now)
                 received_ns = time.time_ns() - round((now - message.heard_at) * 1e9)
                 self.bus.publish(message, age_s, received_ns)

@@ -219,7 +219,7 @@ class Simulation:
         for node, snr_db in self._medium.readers(flight, number, nodes):
             station = self.stations[node]
             link, pace = station.link, station.pace
-            for message in link.hear(pdu, flight.arrives[node] * pace, snr_db):
+            for message in link.hear(pdu, flight.arrives[node] * pace, snr_db, self.now * pace):
                 age_s = link.delivered(message, self.now * pace)
                 pair = self.pairs[message.src, node, message.topic_id]
                 pair.received += 1

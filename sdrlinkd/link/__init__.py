@@ -8,13 +8,13 @@ from sdrlinkd.link.link import Link
 from sdrlinkd.link.message import Outgoing
 from sdrlinkd.link.outbox import Outbox
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
+from sdrlinkd.link.policy import TopicPolicy
 from sdrlinkd.link.qos import (
     AS_CONFIGURED,
     MAX_PRIORITY,
     QOS_BY_LABEL,
     Overrides,
     Qos,
-    TopicPolicy,
 )
 from sdrlinkd.link.rate import RateChange, RateParams
 from sdrlinkd.link.relay import Relay, RelayParams

@@ -197,6 +197,8 @@ class Departures:
         _, airtime_s, most_pdus, _ = opportunity
         longest_s = slot.end - slot.start
         one_s, two_s = airtime_s(mcs, 1), airtime_s(mcs, 2)
+        if two_s > one_s:
+            self._sender.outbox.bytes_per_s = self._sender.packetizer.k_single / (two_s - one_s)
         allowance = self._limits.allow(
             slot.start,
             longest_s,
@@ -206,10 +208,9 @@ class Departures:
             self._notice_s,
             self.access.others_follow,
         ).least(slot.least)
-        owed = self.shares.owed(two_s - one_s) if one_s <= longest_s else None
-        if owed not in self._sender.outbox.waiting_classes():
-            owed = None
-        return allowance._replace(owed=owed)
+        if one_s > longest_s:
+            return allowance
+        return allowance._replace(owed=tuple(self.shares.owed(two_s - one_s)))
 
     def _kept_free(self, start: float) -> None:
         """Settle what was not sent so that something more urgent could be."""

@@ -1,17 +1,23 @@
 """The receive half of the link: from PDUs heard to messages delivered."""
 
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 from sdrlinkd.errors import PduError
 from sdrlinkd.link.ages import Ages
+from sdrlinkd.link.compression import Inflated
 from sdrlinkd.link.ledger import RxTally, balance
 from sdrlinkd.link.neighbors import Neighbor
 from sdrlinkd.link.params import LinkParams, ReassemblyParams
+from sdrlinkd.link.parity import Repair
+from sdrlinkd.link.policy import TopicPolicy
 from sdrlinkd.wire import (
     BROADCAST,
     CONTROL_TOPIC_ID,
     Beacon,
+    Entry,
+    Parity,
     Pdu,
     Reassembly,
     ReassemblyLimits,
@@ -26,6 +32,7 @@ from sdrlinkd.wire import (
 )
 
 CDR_HEADER_SIZE = 4
+AS_IT_COMES = TopicPolicy()
 
 
 class Delivered(NamedTuple):
@@ -74,6 +81,8 @@ class Inbox:
         own_id: int,
         hears_self: bool,
         ear: Ear,
+        inflated: Inflated,
+        max_expanded: int,
     ) -> None:
         self._pdu_size = params.pdu_size
         self._hop_limit = params.hop_limit
@@ -81,6 +90,10 @@ class Inbox:
         self._own_id = own_id
         self._hears_self = hears_self
         self._ear = ear
+        self._inflated = inflated
+        self._max_expanded = max_expanded
+        self._repair = Repair()
+        self.policies: dict[int, TopicPolicy] = {}
         self._has_control = registry.has_control
         limits = ReassemblyLimits(
             reassembly.timeout_s, reassembly.source_bytes, reassembly.total_bytes
@@ -93,7 +106,11 @@ class Inbox:
         self.pdus_used = 0
         self.pdus_dropped: Counter[str] = Counter()
 
-    def hear(self, data: bytes, at: float, snr_db: float | None = None) -> list[Delivered]:
+    def set_policies(self, policies: Mapping[int, TopicPolicy]) -> None:
+        """Lifespans and size caps hold where messages arrive, too."""
+        self.policies = dict(policies)
+
+    def hear(self, data: bytes, at: float, snr_db: float | None, now: float) -> list[Delivered]:
         """Take a PDU whose burst's preamble arrived at `at`; the messages it completed."""
         self.pdus_heard += 1
         try:
@@ -128,13 +145,15 @@ class Inbox:
                     neighbor.track.restart(seq, crc)
             elif isinstance(record, RegistryDigest):
                 neighbor.digest = record
+            elif isinstance(record, Parity):
+                self._repair.take(pdu.src, record)
             elif not is_relayed:
                 self._ear.record_from(pdu.src, record, at)
-        if records is not None and len(pdu.entries) == 1:
-            self.pdus_dropped["rx_control"] += 1
-            return []
+        entries = [*pdu.entries, *self._repaired(pdu.src, records)] if records else pdu.entries
+        if records is not None and len(entries) == 1:
+            return self._drop("rx_control")
         self.pdus_used += 1
-        return self._take_entries(pdu, neighbor, at)
+        return self._take_entries(pdu, entries, neighbor, at, now)
 
     def expire(self, now: float) -> None:
         """Give up what has waited too long."""
@@ -178,11 +197,23 @@ class Inbox:
         neighbor = self.neighbors[src] = Neighbor(src)
         return neighbor
 
-    def _take_entries(self, pdu: Pdu, neighbor: Neighbor, at: float) -> list[Delivered]:
+    def _repaired(self, src: int, records: list[Record]) -> list[Entry]:
+        """Fragments that parity among these tells."""
+        keys = {(each.topic_id, each.entry_id) for each in records if isinstance(each, Parity)}
+        found: list[Entry] = []
+        for key in keys:
+            partial = self.reassembly.partial(src, *key)
+            if partial is not None:
+                found += self._repair.missing(src, *key, partial)
+        return found
+
+    def _take_entries(
+        self, pdu: Pdu, entries: Sequence[Entry], neighbor: Neighbor, at: float, now: float
+    ) -> list[Delivered]:
         src = pdu.src
         reassembly = self.reassembly
         delivered = []
-        for entry in pdu.entries:
+        for entry in entries:
             topic_id = entry.topic_id
             if topic_id == CONTROL_TOPIC_ID and self._has_control:
                 continue
@@ -193,15 +224,24 @@ class Inbox:
             if topic_id >= self._n_topics:
                 tally.dropped["rx_unknown_topic"] += 1
                 continue
-            if len(payload) < CDR_HEADER_SIZE:
-                tally.dropped["rx_bad_cdr"] += 1
+            self._repair.forget(src, topic_id, entry.entry_id)
+            origin_at = self._ages.origin(src, topic_id, entry.entry_id)
+            policy = self.policies.get(topic_id, AS_IT_COMES)
+            most = policy.max_bytes or self._max_expanded
+            reason = None
+            if pdu.compressed:
+                payload, reason = self._inflated.expand(payload, most)
+            if reason is None:
+                reason = _refusal(payload, policy, origin_at, now)
+            if reason is not None:
+                tally.dropped[reason] += 1
                 continue
             tally.delivered += 1
             tally.delivered_bytes += len(payload)
             delivered.append(
                 Delivered(
                     src, topic_id, payload, tally.delivered, neighbor.track.lost,
-                    self._ages.origin(src, topic_id, entry.entry_id), at, pdu.hop,
+                    origin_at, at, pdu.hop,
                     neighbor.snr_db,
                 )
             )  # fmt: skip
@@ -215,3 +255,16 @@ class Inbox:
 
     def _tally(self, src: int, topic_id: int) -> RxTally:
         return self.tallies.setdefault((src, topic_id), RxTally())
+
+
+def _refusal(
+    payload: bytes, policy: TopicPolicy, origin_at: float | None, now: float
+) -> str | None:
+    """Why a whole message is not handed over."""
+    if len(payload) < CDR_HEADER_SIZE:
+        return "rx_bad_cdr"
+    if policy.max_bytes and len(payload) > policy.max_bytes:
+        return "rx_size_cap"
+    if origin_at is not None and now - origin_at > policy.lifespan_s:
+        return "rx_expired"
+    return None

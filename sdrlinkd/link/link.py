@@ -3,14 +3,18 @@
 from collections.abc import Hashable, Mapping
 from random import Random
 
+from zstandard import ZstdCompressionDict
+
 from sdrlinkd.link.access import Access, AccessParams
 from sdrlinkd.link.beacons import Beacons
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity
+from sdrlinkd.link.compression import Inflated
 from sdrlinkd.link.departures import Departures
 from sdrlinkd.link.inbox import Delivered, Inbox
 from sdrlinkd.link.meters import RateMeter, RecentAges
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
-from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, Overrides, Qos, TopicPolicy
+from sdrlinkd.link.policy import TopicPolicy
+from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, Overrides, Qos
 from sdrlinkd.link.rate import RateControl, RateParams
 from sdrlinkd.link.relay import Relay, RelayParams
 from sdrlinkd.link.schedule import ClassesParams
@@ -18,6 +22,7 @@ from sdrlinkd.link.sender import Burst, Outcome, Sender
 from sdrlinkd.reports import RATE_WINDOW_S
 from sdrlinkd.wire import CONTROL_TOPIC_ID, Frame, LinkReport, Pdu, Record, Registry, Stamp
 
+NO_DICTIONARIES: Mapping[int, ZstdCompressionDict] = {}
 NO_RELAY = RelayParams()
 DEFAULT_CLASSES = ClassesParams()
 
@@ -26,7 +31,8 @@ class Link:
     """Joins sender and inbox, access and rate. Never waits, never reads a clock.
 
     `now`, `start` and `at` are seconds on one clock of the caller's choice; `rng` is the only
-    chance. `hears_self` is the paper's loopback experiment.
+    chance. `hears_self` is the paper's loopback experiment; a compressed message may grow to
+    `max_expanded` bytes.
     """
 
     def __init__(
@@ -40,14 +46,27 @@ class Link:
         *,
         classes: ClassesParams = DEFAULT_CLASSES,
         relay: RelayParams = NO_RELAY,
+        dictionaries: Mapping[int, ZstdCompressionDict] = NO_DICTIONARIES,
         hears_self: bool = False,
+        max_expanded: int = 1 << 20,
     ) -> None:
         self.params = params
         self.registry = registry
         self.own_id = own_id
-        self.digest = registry.digest()
-        self.sender = Sender(params, queue, registry, own_id, rng, reassembly.timeout_s)
-        self.inbox = Inbox(params, reassembly, registry, own_id, hears_self, self)
+        self.digest = registry.digest({i: each.dict_id() for i, each in dictionaries.items()})
+        self.sender = Sender(
+            params, queue, registry, own_id, rng, reassembly.timeout_s, classes, dictionaries
+        )
+        self.inbox = Inbox(
+            params,
+            reassembly,
+            registry,
+            own_id,
+            hears_self,
+            self,
+            Inflated(dictionaries),
+            max_expanded,
+        )
         self.rates = RateMeter(RATE_WINDOW_S)
         self.ages: dict[tuple[int, int], RecentAges] = {}
         period_s = params.beacon_s if registry.has_control else 0.0
@@ -74,6 +93,12 @@ class Link:
     def set_policies(self, policies: Mapping[int, TopicPolicy]) -> None:
         """Apply per-topic policies by topic id; the others get the defaults."""
         self.sender.set_policies(policies)
+        self.inbox.set_policies(policies)
+
+    def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
+        """Change one, from now on."""
+        self.sender.set_policy(topic_id, policy)
+        self.inbox.policies[topic_id] = policy
 
     def submit(
         self,
@@ -98,9 +123,14 @@ class Link:
         """What the radio says became of a burst."""
         self.departures.confirm(burst, outcome, now)
 
-    def hear(self, data: bytes, at: float, snr_db: float | None = None) -> list[Delivered]:
-        """Take a PDU whose burst's preamble arrived at `at`; the messages it completed."""
-        return self.inbox.hear(data, at, snr_db)
+    def hear(
+        self, data: bytes, at: float, snr_db: float | None = None, now: float | None = None
+    ) -> list[Delivered]:
+        """Take a PDU whose burst's preamble arrived at `at`; the messages that it completed.
+
+        Absent `now` is `at`.
+        """
+        return self.inbox.hear(data, at, snr_db, at if now is None else now)
 
     def delivered(self, message: Delivered, now: float) -> float | None:
         """The age in seconds at which `message` is handed over at `now`; None when unknown."""

@@ -24,9 +24,9 @@ class Outgoing:
     """One message on its way out."""
 
     __slots__ = (
-        "arrived_at", "dst", "entry_id", "expires_at", "fate", "is_held", "is_whole", "k", "lane",
-        "next_index", "payload", "priority", "qos", "rests_id", "stamped", "tally", "topic_id",
-        "total", "unconfirmed",
+        "arrived_at", "dst", "entry_id", "expires_at", "fate", "is_compressed", "is_held",
+        "is_whole", "k", "lane", "next_index", "parity", "payload", "priority", "qos", "rests_id",
+        "stamped", "tally", "topic_id", "total", "unconfirmed",
     )  # fmt: skip
 
     def __init__(
@@ -60,8 +60,16 @@ class Outgoing:
         self.rests_id = False
         self.is_held = False
         self.unconfirmed = 0
+        self.is_compressed = False
+        self.parity: list[bytes] = []
+        """Control records that follow its last fragment, the first one last."""
         self.is_whole = False
         """The payload is another robot's PDU, to be sent on."""
+
+    @property
+    def is_through(self) -> bool:
+        """Whether all of it is in PDUs."""
+        return self.next_index == self.total and not self.parity
 
 
 class Lane:

@@ -7,11 +7,27 @@ lane that gave an entry goes to the back.
 from bisect import bisect_left, insort
 from collections import OrderedDict
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 from sdrlinkd.link.message import Fate, Lane, Level, Outgoing
 from sdrlinkd.link.params import QueueParams
+from sdrlinkd.link.policy import TopicPolicy
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.wire import ENTRY_HEADER_SIZE
+
+INFINITE = float("inf")
+
+
+@dataclass(slots=True)
+class _Queued:
+    """One topic's messages of which nothing has been sent yet, the oldest first."""
+
+    messages: OrderedDict[Outgoing, None] = field(default_factory=OrderedDict)
+    n_bytes: int = 0
+
+    @property
+    def oldest(self) -> Outgoing:
+        return next(iter(self.messages))
 
 
 def _order(lane: Lane) -> tuple[float, int]:
@@ -29,27 +45,32 @@ class Outbox:
         self._level_by_key: dict[tuple[int, int], Level] = {}
         self._by_class: dict[Qos, OrderedDict[Outgoing, None]] = {q: OrderedDict() for q in Qos}
         self._class_bytes = dict.fromkeys(Qos, 0)
-        self._by_topic: dict[int, OrderedDict[Outgoing, None]] = {}
+        self._by_topic: dict[int, _Queued] = {}
         self._turn = 0
         self.queued = 0
         self.queued_bytes = 0
+        self.bytes_per_s = INFINITE
+        """What the air carries at the moment: bounds in seconds are by this."""
         # Begun and not yet settled; whoever settles a message takes it out.
         self.in_flight: set[Outgoing] = set()
 
     def __bool__(self) -> bool:
         return bool(self.levels)
 
-    def put(self, message: Outgoing, depth: int = 0) -> list[tuple[Outgoing, str]]:
+    def put(self, message: Outgoing, policy: TopicPolicy) -> list[tuple[Outgoing, str]]:
         """Queue `message`; what had to go for it, each with its reason (perhaps itself)."""
         if not self._can_make_room(message):
             return [(message, "tx_overflow_new")]
         shed: list[tuple[Outgoing, str]] = []
-        topic = self._by_topic.get(message.topic_id)
-        if depth and topic is not None:
-            while len(topic) >= depth:
-                shed.append((self._withdraw_waiting(next(iter(topic))), "tx_superseded"))
-        limits, size = self._limits, len(message.payload)
-        while self.queued >= limits.max_messages or self.queued_bytes + size > limits.max_bytes:
+        topic, depth, size = self._by_topic.get(message.topic_id), policy.kept, len(message.payload)
+        if topic is not None:
+            while depth and len(topic.messages) >= depth:
+                shed.append((self._withdraw_waiting(topic.oldest), "tx_superseded"))
+            most = self._bytes_of(policy.queue_bytes or INFINITE, policy.queue_s or INFINITE)
+            while topic.messages and topic.n_bytes + size > most:
+                shed.append((self._withdraw_waiting(topic.oldest), "tx_topic_full"))
+        limits, most = self._limits, self._most_bytes
+        while self.queued >= limits.max_messages or self.queued_bytes + size > most:
             victim = self._oldest_of_lowest_class()
             shed.append((self._withdraw_waiting(victim), "tx_overflow_old"))
         self._enqueue(message)
@@ -123,7 +144,7 @@ class Outbox:
             for lane in level.lanes:
                 if lane.current is not None:
                     message = lane.current
-                    total += len(message.payload) - message.next_index * message.k
+                    total += max(0, len(message.payload) - message.next_index * message.k)
                     total += ENTRY_HEADER_SIZE
                 for message in lane.waiting:
                     total += len(message.payload) + ENTRY_HEADER_SIZE
@@ -137,7 +158,8 @@ class Outbox:
 
     def queued_of_topic(self, topic_id: int) -> int:
         """Messages of one topic of which nothing has been sent yet."""
-        return len(self._by_topic.get(topic_id, ()))
+        topic = self._by_topic.get(topic_id)
+        return len(topic.messages) if topic is not None else 0
 
     def _enqueue(self, message: Outgoing) -> None:
         key = (message.qos, -message.priority, message.topic_id, message.dst)
@@ -152,8 +174,9 @@ class Outbox:
         self._by_class[message.qos][message] = None
         topic = self._by_topic.get(message.topic_id)
         if topic is None:
-            topic = self._by_topic[message.topic_id] = OrderedDict()
-        topic[message] = None
+            topic = self._by_topic[message.topic_id] = _Queued()
+        topic.messages[message] = None
+        topic.n_bytes += len(message.payload)
         self.queued += 1
         self.queued_bytes += len(message.payload)
         self._class_bytes[message.qos] += len(message.payload)
@@ -182,15 +205,23 @@ class Outbox:
             del self._level_by_key[level.key]
             del self.levels[bisect_left(self.levels, level.key, key=lambda each: each.key)]
 
+    @property
+    def _most_bytes(self) -> float:
+        return self._bytes_of(self._limits.max_bytes, self._limits.max_airtime_s)
+
+    def _bytes_of(self, n_bytes: float, seconds: float) -> float:
+        """The smaller of two bounds."""
+        return min(n_bytes, seconds * self.bytes_per_s)
+
     def _can_make_room(self, message: Outgoing) -> bool:
         """Whether it fits when all that waits in its class and below is shed."""
         limits, size = self._limits, len(message.payload)
-        if self.queued < limits.max_messages and self.queued_bytes + size <= limits.max_bytes:
+        if self.queued < limits.max_messages and self.queued_bytes + size <= self._most_bytes:
             return True
         higher = [qos for qos in Qos if qos < message.qos]
         return (
             sum(len(self._by_class[qos]) for qos in higher) < limits.max_messages
-            and sum(self._class_bytes[qos] for qos in higher) + size <= limits.max_bytes
+            and sum(self._class_bytes[qos] for qos in higher) + size <= self._most_bytes
         )
 
     def _oldest_of_lowest_class(self) -> Outgoing:
@@ -208,7 +239,9 @@ class Outbox:
 
     def _forget_queued(self, message: Outgoing) -> None:
         del self._by_class[message.qos][message]
-        del self._by_topic[message.topic_id][message]
+        topic = self._by_topic[message.topic_id]
+        del topic.messages[message]
+        topic.n_bytes -= len(message.payload)
         self.queued -= 1
         self.queued_bytes -= len(message.payload)
         self._class_bytes[message.qos] -= len(message.payload)

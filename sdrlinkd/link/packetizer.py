@@ -10,12 +10,15 @@ from collections.abc import Sequence
 from random import Random
 from typing import NamedTuple
 
-from sdrlinkd.link.draft import NO_DST, Draft
+from sdrlinkd.link.draft import Draft
 from sdrlinkd.link.entry_ids import REST_FACTOR, TopicEntryIds
+from sdrlinkd.link.heads import Heads
 from sdrlinkd.link.message import Lane, Level, Outgoing
 from sdrlinkd.link.outbox import Outbox
 from sdrlinkd.link.params import LinkParams
+from sdrlinkd.link.parity import parity_records
 from sdrlinkd.link.qos import WIRE_BITS, Qos
+from sdrlinkd.link.schedule import ClassesParams
 from sdrlinkd.link.spare import SpareRecords
 from sdrlinkd.wire import (
     BROADCAST,
@@ -57,37 +60,24 @@ class Packetizer:
         rng: Random,
         reassembly_timeout_s: float,
         has_control: bool,
+        classes: ClassesParams,
     ) -> None:
         self._params = params
         self._pdu_size = params.pdu_size
         self._src = src
         self._has_control = has_control
+        self._parity = {qos: classes.of(qos).parity for qos in Qos}
         self._outbox = outbox
         self._seq = rng.randrange(256)
         self._control_entry_id = rng.randrange(256)
         self.entry_ids = TopicEntryIds(rng, REST_FACTOR * reassembly_timeout_s)
-        self._k_single = equal_payload(params.pdu_size, 1)
+        self.k_single = equal_payload(params.pdu_size, 1)
         self._k_shared = min(
-            max(equal_payload(params.pdu_size, 2), params.min_fragment), self._k_single
+            max(equal_payload(params.pdu_size, 2), params.min_fragment), self.k_single
         )
+        self.heads = Heads(outbox, self.entry_ids)
         self.spare = SpareRecords()
         self._may_wait = params.flush_s > 0
-        self._expired: list[Outgoing] = []
-
-    def expire(self, now: float) -> None:
-        """Withdraw heads whose lifespan ended; see `take_expired`."""
-        for level in tuple(self._outbox.levels):
-            for lane in tuple(level.lanes):
-                self._live_head(lane, now)
-
-    def take_expired(self) -> list[Outgoing]:
-        """Messages withdrawn because their lifespan ended, since the last call."""
-        expired, self._expired = self._expired, []
-        return expired
-
-    def abandon(self, lane: Lane, now: float) -> None:
-        """Send no more of the message the lane is in the middle of."""
-        self.entry_ids.retire(self._outbox.withdraw_head(lane), now)
 
     def flush(self) -> None:
         """From now on partial PDUs do not wait."""
@@ -97,7 +87,7 @@ class Packetizer:
         """The next PDU of a burst whose preamble leaves at `start`, or None.
 
         The most urgent comes first, or class `first`. Messages found expired are withdrawn on the
-        way; see `take_expired`.
+        way; see `heads`.
         """
         levels = self._outbox.levels
         if not levels or (self._may_wait and self._must_wait(start)):
@@ -123,10 +113,10 @@ class Packetizer:
             self.spare.ride(draft)
         return self._finish(draft)
 
-    @property
-    def next_src(self) -> int:
-        """Whose PDU goes next, as far as one can tell."""
-        for level in self._outbox.levels[:1]:
+    def next_src(self, first: Qos | None = None) -> int:
+        """Whose PDU goes next, or next of a class, as far as one can tell."""
+        levels = self._outbox.levels
+        for level in [each for each in levels if first is None or each.key[0] == first][:1]:
             head = level.lanes[0].head
             if head is not None and head.is_whole:
                 return head.payload[1]
@@ -156,7 +146,7 @@ class Packetizer:
 
     def _finish(self, draft: Draft) -> BuiltPdu:
         data = draft.build(
-            flags(WIRE_BITS[draft.qos]), self._src, draft.dst, self._seq,
+            flags(WIRE_BITS[draft.qos], draft.is_compressed), self._src, draft.dst, self._seq,
             self._params.hop_limit, self._control_entry_id,
         )  # fmt: skip
         self._seq = (self._seq + 1) & 0xFF
@@ -181,7 +171,7 @@ class Packetizer:
         lane = level.lanes[0]
         if not (lane.current or lane.waiting[0]).is_whole:
             return None
-        head = self._live_head(lane, start)
+        head = self.heads.live(lane, start)
         if head is None:
             return None
         self._outbox.begin(lane)
@@ -199,26 +189,17 @@ class Packetizer:
         while more:
             more = False
             for lane in lanes:
-                head = self._live_head(lane, start)
-                if head is None or head.is_whole or (draft.dst != NO_DST and head.dst != draft.dst):
+                head = self.heads.live(lane, start)
+                if head is None or head.is_whole or not draft.suits(head):
                     continue
                 if self._place(lane, head, level, draft, start):
                     more = self._params.greedy
             more = more and draft.room > 0 and self._may_fit(level, draft.room)
 
-    def _live_head(self, lane: Lane, start: float) -> Outgoing | None:
-        head = lane.current or (lane.waiting[0] if lane.waiting else None)
-        while head is not None and head.expires_at <= start:
-            if lane.current is None:
-                self._outbox.withdraw_head(lane)
-            else:
-                self.abandon(lane, start)
-            self._expired.append(head)
-            head = lane.head
-        return head
-
     def _place(self, lane: Lane, head: Outgoing, level: Level, draft: Draft, start: float) -> bool:
         """Put the lane's next entry into the draft if it fits."""
+        if head.parity:
+            return self._place_parity(lane, head, draft, start)
         size = len(head.payload)
         k = head.k or self._fragment_size(size, level.per_dst[lane.dst])
         at = head.next_index * k
@@ -233,18 +214,48 @@ class Packetizer:
         payload = head.payload if length == size else head.payload[at : at + length]
         draft.add(head.topic_id, head.entry_id, head.next_index, head.total, payload)
         draft.carried.append(head)
-        draft.dst = head.dst
-        if head.qos < draft.qos:
-            draft.qos = head.qos
+        draft.join(head)
         head.next_index += 1
         head.unconfirmed += 1
         if is_last:
             if needs_stamp:
                 self._stamp(draft, head, start)
-            self.entry_ids.retire(head, start)
-            lane.current = None
+            head.parity = self._parity_of(head)
+            self._end(lane, head, start)
         self._outbox.served(lane)
         return True
+
+    def _place_parity(self, lane: Lane, head: Outgoing, draft: Draft, start: float) -> bool:
+        """Put parity of the message whose fragments have all gone into the draft, if it fits."""
+        records = head.parity
+        if head in draft.carried:
+            # One PDU must not take both with it.
+            return False
+        n = len(records)
+        while records and draft.add_record(records[-1]):
+            records.pop()
+        if len(records) == n:
+            return False
+        draft.carried.append(head)
+        draft.join(head)
+        head.unconfirmed += 1
+        self._end(lane, head, start)
+        self._outbox.served(lane)
+        return True
+
+    def _end(self, lane: Lane, head: Outgoing, start: float) -> None:
+        """The message is through, unless parity follows."""
+        if not head.parity:
+            self.entry_ids.retire(head, start)
+            lane.current = None
+
+    def _parity_of(self, head: Outgoing) -> list[bytes]:
+        """Records, the first one last."""
+        share = self._parity[head.qos] if self._has_control else 0.0
+        if not share:
+            return []
+        ids = head.topic_id, head.entry_id
+        return parity_records(head.payload, head.k, head.total, ids, share, self.k_single)[::-1]
 
     def _send_stamp_ahead(
         self, lane: Lane, head: Outgoing, k: int, draft: Draft, start: float
@@ -253,12 +264,11 @@ class Packetizer:
             return False
         self._stamp(draft, head, start)
         head.rests_id = True
-        draft.dst = head.dst
-        draft.qos = head.qos
+        draft.join(head)
         return True
 
     def _fragment_size(self, size: int, topics_pending: int) -> int:
-        k = self._k_shared if topics_pending >= 2 else self._k_single
+        k = self._k_shared if topics_pending >= 2 else self.k_single
         return max(k, fragment_count(size, MAX_FRAGMENTS)) if size > k * MAX_FRAGMENTS else k
 
     def _begin(self, lane: Lane, head: Outgoing, k: int, start: float) -> bool:
@@ -283,7 +293,7 @@ class Packetizer:
             return False
         if now >= self._outbox.oldest_arrival() + self._params.flush_s:
             return False
-        return self._outbox.pending_bytes(self._k_single) < self._k_single
+        return self._outbox.pending_bytes(self.k_single) < self.k_single
 
 
 def _with_first(levels: Sequence[Level], first: Qos) -> list[Level]:

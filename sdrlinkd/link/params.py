@@ -13,6 +13,8 @@ class QueueParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     max_messages: Annotated[int, Meta(ge=1, le=1_000_000)] = 10_000
     max_bytes: Annotated[int, Meta(ge=1)] = 16 << 20
+    max_airtime_s: Annotated[float, Meta(gt=0)] = float("inf")
+    """As many bytes as the air carries in this time."""
 
 
 class ReassemblyParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

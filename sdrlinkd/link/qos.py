@@ -1,12 +1,7 @@
-"""How a message is to be treated: its class, priority, lifespan and depth."""
+"""Traffic classes, and what a producer may ask of one message."""
 
 from enum import IntEnum
-from typing import Annotated, Literal, NamedTuple
-
-import msgspec
-from msgspec import Meta
-
-INFINITE = float("inf")
+from typing import NamedTuple
 
 
 class Qos(IntEnum):
@@ -41,19 +36,3 @@ class Overrides(NamedTuple):
 
 
 AS_CONFIGURED = Overrides()
-
-
-class TopicPolicy(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Policy of one topic; a producer may override class, priority, lifespan and destination."""
-
-    qos: Literal["urgent", "latency", "default", "bulk"] = "default"
-    priority: Annotated[int, Meta(ge=0, le=MAX_PRIORITY)] = 64
-    """127 is the most urgent."""
-    depth: Annotated[int, Meta(ge=0)] = 0
-    """Messages that may wait, latest wins; 0: as many as the queue holds."""
-    lifespan_s: Annotated[float, Meta(gt=0)] = INFINITE
-    """Seconds after which an unsent message is worthless."""
-    dst: Annotated[int, Meta(ge=0, le=255)] | None = None
-    """Destination robot; absent: `link.dst`."""
-    stamp: bool = True
-    """Send the age along, so that the far end knows how late each message is."""

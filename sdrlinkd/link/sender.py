@@ -5,18 +5,23 @@ from enum import Enum
 from random import Random
 from typing import NamedTuple
 
+from zstandard import ZstdCompressionDict
+
 from sdrlinkd.link.ledger import TxTally, balance
 from sdrlinkd.link.message import Fate, Outgoing
 from sdrlinkd.link.outbox import Outbox
 from sdrlinkd.link.packetizer import Packetizer
 from sdrlinkd.link.params import LinkParams, QueueParams
-from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, QOS_BY_LABEL, Overrides, Qos, TopicPolicy
-from sdrlinkd.link.schedule import Allowance
+from sdrlinkd.link.policy import TopicPolicy
+from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, Overrides, Qos
+from sdrlinkd.link.schedule import Allowance, ClassesParams
+from sdrlinkd.link.topic_state import TopicState
 from sdrlinkd.wire import Pdu, Registry, max_message_size
 
 RELAYED = 256
 """Lanes of others' PDUs have this and their source in place of a topic id."""
 NOBODY = -1
+AS_IT_COMES = TopicPolicy()
 MAX_PDUS = 63
 """Of a burst, whatever carries it."""
 
@@ -51,24 +56,6 @@ class Outcome(Enum):
     LOST = "lost"
 
 
-class _TopicState:
-    """A topic's policy, resolved once, and its tally."""
-
-    __slots__ = ("depth", "dst", "lifespan_s", "priority", "qos", "stamp", "tally")
-
-    def __init__(self, policy: TopicPolicy, dst: int, has_control: bool) -> None:
-        self.tally = TxTally()
-        self.apply(policy, dst, has_control)
-
-    def apply(self, policy: TopicPolicy, dst: int, has_control: bool) -> None:
-        self.qos = QOS_BY_LABEL[policy.qos]
-        self.priority = policy.priority
-        self.depth = policy.depth
-        self.lifespan_s = policy.lifespan_s
-        self.dst = dst if policy.dst is None else policy.dst
-        self.stamp = policy.stamp and has_control
-
-
 class Sender:
     """Queue, packetizer and the TX ledger of one node."""
 
@@ -80,16 +67,19 @@ class Sender:
         src: int,
         rng: Random,
         reassembly_timeout_s: float,
+        classes: ClassesParams,
+        dictionaries: Mapping[int, ZstdCompressionDict],
     ) -> None:
         self._params = params
         self._max_message_size = max_message_size(params.pdu_size)
         self._registry = registry
         self.outbox = Outbox(queue)
         self.packetizer = Packetizer(
-            params, src, self.outbox, rng, reassembly_timeout_s, registry.has_control
+            params, src, self.outbox, rng, reassembly_timeout_s, registry.has_control, classes
         )
         self._topics = [
-            _TopicState(TopicPolicy(), params.dst, registry.has_control) for _ in registry.topics
+            TopicState(params.dst, registry.has_control, dictionaries.get(topic.id))
+            for topic in registry.topics
         ]
         self.refused = TxTally()
         """Messages that never became a topic's: bad envelopes, unknown topics."""
@@ -106,7 +96,8 @@ class Sender:
         """Apply policies by topic id; topics without one get the defaults."""
         for topic_id, state in enumerate(self._topics):
             policy = policies.get(topic_id, TopicPolicy())
-            state.apply(policy, self._params.dst, self._registry.has_control)
+            if policy != state.policy:
+                state.apply(policy)
 
     def submit(
         self,
@@ -120,9 +111,15 @@ class Sender:
         topic = self._topics[topic_id]
         tally = topic.tally
         tally.accepted += 1
+        refused = topic.admission.refuse(payload, now)
+        frame = topic.deflated.shrink(payload) if topic.deflated and not refused else None
+        if frame is not None:
+            payload = frame
         if len(payload) > self._max_message_size:
-            tally.drop("tx_too_big")
-            return "tx_too_big"
+            refused = refused or "tx_too_big"
+        if refused:
+            tally.drop(refused)
+            return refused
         message = Outgoing(
             topic_id,
             payload,
@@ -130,12 +127,12 @@ class Sender:
             topic.priority if priority is None else priority,
             topic.dst if dst is None else dst,
             now,
-            now + (topic.lifespan_s if lifespan_s is None else lifespan_s),
+            now + (topic.policy.lifespan_s if lifespan_s is None else lifespan_s),
             topic.stamp,
             tally,
         )
-        refused = None
-        for shed, reason in self.outbox.put(message, topic.depth):
+        message.is_compressed = frame is not None
+        for shed, reason in self.outbox.put(message, topic.policy):
             self._drop(shed, reason)
             if shed is message:
                 refused = reason
@@ -152,7 +149,7 @@ class Sender:
         )
         message.is_whole = True
         refused = None
-        for shed, reason in self.outbox.put(message):
+        for shed, reason in self.outbox.put(message, AS_IT_COMES):
             self._drop(shed, reason)
             if shed is message:
                 refused = reason
@@ -167,16 +164,21 @@ class Sender:
     def compose(self, start: float, allowance: Allowance) -> Burst | None:
         """The next burst, whose preamble leaves at `start`; None when nothing is to be sent."""
         burst = Burst([], [], [])
-        owed, src = allowance.owed, NOBODY
+        owed, src = list(allowance.owed), NOBODY
         while (levels := self.outbox.levels) and len(burst.pdus) < MAX_PDUS:
             n, most = len(burst.pdus), allowance.most[levels[0].key[0]]
-            first = None
-            if owed is not None and n + 1 >= most:
-                first, owed = owed, None
-            elif n >= most or (n and self.packetizer.next_src != src):
+            first, next_src = None, self.packetizer.next_src
+            if owed and n + len(owed) >= most and (n or most < 2):
+                first = owed.pop(0)
+            elif owed and not n and next_src(owed[0]) != next_src():
+                # It cannot join, so it goes alone.
+                first, owed, most = owed[0], [], 0
+            elif n >= most:
+                break
+            if n and next_src(first) != src:
                 # Who hears a burst knows by its source who may follow.
                 break
-            src = self.packetizer.next_src if first is None else src
+            src = next_src(first)
             built = self.packetizer.next_pdu(start, first)
             if built is None:
                 break
@@ -188,7 +190,7 @@ class Sender:
 
     def expire(self, now: float) -> None:
         """Drop heads whose lifespan ended while no burst could go."""
-        self.packetizer.expire(now)
+        self.packetizer.heads.expire(now)
         self._settle_expired()
 
     def compose_records(self) -> Burst | None:
@@ -211,7 +213,7 @@ class Sender:
                     continue
                 if outcome is not Outcome.SENT:
                     self._fail(message, now)
-                elif message.next_index == message.total and not message.unconfirmed:
+                elif message.is_through and not message.unconfirmed:
                     self._settle_sent(message)
 
     def shut_down(self) -> None:
@@ -224,6 +226,14 @@ class Sender:
     def tally(self, topic_id: int) -> TxTally:
         """Counters of one topic."""
         return self._topics[topic_id].tally
+
+    def policy(self, topic_id: int) -> TopicPolicy:
+        """That in force."""
+        return self._topics[topic_id].policy
+
+    def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
+        """From now on."""
+        self._topics[topic_id].apply(policy)
 
     def treatment(self, topic_id: int) -> tuple[Qos, int]:
         """Class and priority that a topic's messages get by default."""
@@ -254,7 +264,7 @@ class Sender:
         return burst if burst.pdus else None
 
     def _settle_expired(self) -> None:
-        for message in self.packetizer.take_expired():
+        for message in self.packetizer.heads.take_expired():
             self._drop(message, "tx_expired")
 
     def _settle_sent(self, message: Outgoing) -> None:
@@ -266,7 +276,7 @@ class Sender:
     def _fail(self, message: Outgoing, now: float) -> None:
         self._drop(message, "tx_radio_failed")
         if message.lane.current is message:
-            self.packetizer.abandon(message.lane, now)
+            self.packetizer.heads.abandon(message.lane, now)
 
     def _drop(self, message: Outgoing, reason: str) -> None:
         message.fate = Fate.DROPPED

@@ -20,10 +20,14 @@ from sdrlinkd.wire.capacity import (
 )
 from sdrlinkd.wire.control import (
     MAX_AGE_US,
+    MAX_VALUE_SIZE,
+    PARITY_OVERHEAD,
     STAMP_SIZE,
+    TLV_HEADER_SIZE,
     Beacon,
     Frame,
     LinkReport,
+    Parity,
     Receipt,
     Record,
     RecordType,
@@ -34,7 +38,7 @@ from sdrlinkd.wire.control import (
 )
 from sdrlinkd.wire.later import forwarded, lasting_identity, postponed
 from sdrlinkd.wire.pdu import BROADCAST, Entry, Pdu, build, flags, identity, parse
-from sdrlinkd.wire.reassembly import Lost, Reassembly, ReassemblyLimits
+from sdrlinkd.wire.reassembly import Lost, Partial, Reassembly, ReassemblyLimits
 from sdrlinkd.wire.registry import (
     CONTROL_TOPIC_ID,
     MAX_TOPICS,
@@ -56,14 +60,19 @@ __all__ = [
     "MAX_FRAGMENTS",
     "MAX_PDU_SIZE",
     "MAX_TOPICS",
+    "MAX_VALUE_SIZE",
     "MIN_PDU_SIZE",
+    "PARITY_OVERHEAD",
     "STAMP_SIZE",
+    "TLV_HEADER_SIZE",
     "VERSION",
     "Beacon",
     "Entry",
     "Frame",
     "LinkReport",
     "Lost",
+    "Parity",
+    "Partial",
     "Pdu",
     "PduBuilder",
     "Reassembly",

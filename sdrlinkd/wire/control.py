@@ -71,8 +71,24 @@ class Receipt(NamedTuple):
     status: int
 
 
+class Parity(NamedTuple):
+    """Octets from `at` on of parity fragment `number` of a message of `total` fragments of `k`
+    octets; the message has `size`.
+    """
+
+    topic_id: int
+    entry_id: int
+    total: int
+    n_parity: int
+    number: int
+    at: int
+    k: int
+    size: int
+    data: bytes
+
+
 FixedRecord = Stamp | Beacon | LinkReport | Receipt | Frame
-Record = FixedRecord | RegistryDigest
+Record = FixedRecord | RegistryDigest | Parity
 
 _TYPES: dict[type[FixedRecord], RecordType] = {
     Stamp: RecordType.STAMP,
@@ -91,6 +107,9 @@ _FORMATS = {
 # What the parser needs of a type, by its number: the fields' class and format.
 _KNOWN = {int(number): (kind, _FORMATS[number]) for kind, number in _TYPES.items()}
 
+_PARITY = struct.Struct(">BBBBBHHI")
+PARITY_OVERHEAD = TLV_HEADER_SIZE + _PARITY.size
+"""Of a record, beside the octets of parity."""
 STAMP_SIZE = TLV_HEADER_SIZE + _FORMATS[RecordType.STAMP].size
 _STAMP_RECORD = struct.Struct(">BBBBI")
 
@@ -130,6 +149,11 @@ def parse_records(payload: bytes) -> list[Record]:
             if length < RegistryDigest.OVERALL_SIZE:
                 raise PduError("rx_entry", f"control record {number} has only {length} bytes")
             records.append(RegistryDigest.from_bytes(payload[at : at + length]))
+        elif number == RecordType.PARITY:
+            if length < _PARITY.size:
+                raise PduError("rx_entry", f"control record {number} has only {length} bytes")
+            data = payload[at + _PARITY.size : at + length]
+            records.append(Parity._make((*_PARITY.unpack_from(payload, at), data)))
         at += length
     return records
 
@@ -139,6 +163,14 @@ def _build(record: Record) -> bytes:
         number, value = RecordType.DIGEST, record.overall + record.per_topic
         if len(record.overall) != RegistryDigest.OVERALL_SIZE or len(value) > MAX_VALUE_SIZE:
             raise ValueError(f"a digest is 8 octets, and one a topic: {record}")
+    elif isinstance(record, Parity):
+        number = RecordType.PARITY
+        try:
+            value = _PARITY.pack(*record[:-1]) + record.data
+        except struct.error as error:
+            raise ValueError(f"{record} does not fit its record: {error}") from None
+        if len(value) > MAX_VALUE_SIZE:
+            raise ValueError(f"{len(record.data)} octets of parity do not fit a record")
     else:
         number = _TYPES[type(record)]
         try:

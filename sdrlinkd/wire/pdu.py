@@ -63,7 +63,7 @@ def parse(data: bytes, pdu_size: int) -> Pdu:
     """The fields of the PDU in `data`; only the canonical form of a PDU is accepted.
 
     Raises PduError with reason rx_short (not `pdu_size` bytes), rx_crc, rx_version, rx_flags
-    (sealed or compressed-reserved bits we do not speak), rx_entry or rx_pad.
+    (sealed, which we do not speak), rx_entry or rx_pad.
     """
     if len(data) != pdu_size:
         raise PduError("rx_short", f"{len(data)} bytes where a PDU has {pdu_size}")
@@ -74,8 +74,8 @@ def parse(data: bytes, pdu_size: int) -> Pdu:
     first, src, dst, seq, hop_count = HEADER.unpack_from(data)
     if first >> 4 != VERSION:
         raise PduError("rx_version", f"version {first >> 4}, this is version {VERSION}")
-    if first & (FLAG_SEALED | FLAG_COMPRESSED):
-        raise PduError("rx_flags", "sealed (E=1) or compressed (C=1), reserved in version 0")
+    if first & FLAG_SEALED:
+        raise PduError("rx_flags", "sealed (E=1), reserved in version 0")
     n = hop_count & 0x0F
     if n == 0:
         raise PduError("rx_entry", "no entries")
@@ -98,7 +98,9 @@ def parse(data: bytes, pdu_size: int) -> Pdu:
         raise PduError("rx_entry", "the unused topic id nibble is not zero")
     if data.count(0, at, end) != end - at:
         raise PduError("rx_pad", "PAD is not zero")
-    return Pdu((first >> 2) & 3, False, src, dst, seq, hop_count >> 4, entries)
+    return Pdu(
+        (first >> 2) & 3, bool(first & FLAG_COMPRESSED), src, dst, seq, hop_count >> 4, entries
+    )
 
 
 def identity(data: bytes) -> tuple[int, int, int]:

@@ -32,7 +32,9 @@ class Lost(NamedTuple):
 
 
 @dataclass(slots=True)
-class _Partial:
+class Partial:
+    """A message that is not complete yet: its fragments by number."""
+
     total: int
     touched_at: float
     parts: dict[int, bytes] = field(default_factory=dict)
@@ -41,7 +43,7 @@ class _Partial:
 
 @dataclass(slots=True)
 class _Source:
-    partials: OrderedDict[tuple[int, int], _Partial] = field(default_factory=OrderedDict)
+    partials: OrderedDict[tuple[int, int], Partial] = field(default_factory=OrderedDict)
     cost: int = 0
 
 
@@ -103,6 +105,11 @@ class Reassembly:
         self._keep_bounds(src, source)
         return None
 
+    def partial(self, src: int, topic_id: int, entry_id: int) -> Partial | None:
+        """What is there of a message that is not complete."""
+        source = self._sources.get(src)
+        return None if source is None else source.partials.get((topic_id, entry_id))
+
     def expire(self, now: float) -> None:
         """Give up what has been silent for the timeout."""
         if now < self._next_expiry:
@@ -128,8 +135,8 @@ class Reassembly:
         lost, self.lost = self.lost, []
         return lost
 
-    def _start(self, source: _Source, key: tuple[int, int], total: int, now: float) -> _Partial:
-        partial = source.partials[key] = _Partial(total, now)
+    def _start(self, source: _Source, key: tuple[int, int], total: int, now: float) -> Partial:
+        partial = source.partials[key] = Partial(total, now)
         source.cost += PARTIAL_OVERHEAD
         self.held_bytes += PARTIAL_OVERHEAD
         self.held += 1
@@ -137,11 +144,11 @@ class Reassembly:
         self._next_expiry = min(self._next_expiry, now + self._limits.timeout_s)
         return partial
 
-    def _is_silent(self, partial: _Partial, now: float) -> bool:
+    def _is_silent(self, partial: Partial, now: float) -> bool:
         return now >= partial.touched_at + self._limits.timeout_s
 
     @staticmethod
-    def _is_other_message(partial: _Partial, entry: Entry) -> bool:
+    def _is_other_message(partial: Partial, entry: Entry) -> bool:
         known = partial.parts.get(entry.index)
         return partial.total != entry.total or (known is not None and known != entry.payload)
 

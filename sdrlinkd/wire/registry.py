@@ -2,7 +2,7 @@
 
 import hashlib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import ClassVar
@@ -83,9 +83,17 @@ class Registry:
         hint = f"; did you mean {close[0]}?" if close else ""
         return f"the registry has {', '.join(self._by_name) or 'no topics'}{hint}"
 
-    def digest(self) -> RegistryDigest:
-        """Digest over ids, names and types (wire document, section 7.2)."""
-        lines = [f"{topic.id},{topic.name},{topic.type}\n".encode() for topic in self.topics]
+    def digest(self, dictionaries: Mapping[int, int] | None = None) -> RegistryDigest:
+        """Digest over ids, names and types (wire document, section 7.2).
+
+        `dictionaries`: ids of the zstd dictionaries of topics that have one.
+        """
+        known = dictionaries or {}
+        lines = [
+            f"{topic.id},{topic.name},{topic.type}"
+            f"{f',{known[topic.id]}' if topic.id in known else ''}\n".encode()
+            for topic in self.topics
+        ]
         return RegistryDigest(
             overall=hashlib.sha256(b"".join(lines)).digest()[: RegistryDigest.OVERALL_SIZE],
             per_topic=bytes(hashlib.sha256(line).digest()[0] for line in lines),

@@ -4,12 +4,14 @@ from random import Random
 
 from sdrlinkd.link import (
     Allowance,
+    ClassesParams,
     Link,
     LinkParams,
     Opportunity,
     Outcome,
     QueueParams,
     ReassemblyParams,
+    RelayParams,
 )
 from sdrlinkd.wire import CONTROL_TOPIC_ID, make_registry, parse, parse_records
 
@@ -28,6 +30,9 @@ def make_link(
     queue=None,
     reassembly=None,
     hears_self=False,
+    classes=None,
+    relay=None,
+    dictionaries=None,
     beacon_s=0.0,
     **params,
 ):
@@ -40,6 +45,9 @@ def make_link(
         own_id,
         Random(seed),
         hears_self=hears_self,
+        classes=classes or ClassesParams(),
+        relay=relay or RelayParams(),
+        dictionaries=dictionaries or {},
     )
 
 

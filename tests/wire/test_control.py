@@ -12,6 +12,7 @@ from sdrlinkd.wire import (
     Beacon,
     Frame,
     LinkReport,
+    Parity,
     Receipt,
     RegistryDigest,
     Stamp,
@@ -24,7 +25,9 @@ SEED = 6
 CASES = 20_000
 
 # Octets that the fields of each type need (clause 6).
-NEED = {1: 6, 2: 4, 3: 8, 4: 4, 5: 3, 7: 8}
+NEED = {1: 6, 2: 4, 3: 8, 4: 4, 5: 3, 6: 13, 7: 8}
+# What stands behind the fields of these belongs to the record.
+OPEN = (RegistryDigest, Parity)
 
 octet = st.integers(0, 255)
 records = st.one_of(
@@ -33,6 +36,18 @@ records = st.one_of(
     st.builds(LinkReport, octet, st.integers(-128, 127), octet, octet),
     st.builds(Receipt, octet, octet, octet),
     st.builds(Frame, octet, octet, st.integers(0, 0xFFFF), st.integers(0, MAX_AGE_US)),
+    st.builds(
+        Parity,
+        octet,
+        octet,
+        octet,
+        octet,
+        octet,
+        octet,
+        st.integers(0, 0xFFFF),
+        st.integers(0, 0xFFFFFFFF),
+        st.binary(max_size=242),
+    ),
     st.builds(RegistryDigest, st.binary(min_size=8, max_size=8), st.binary(max_size=247)),
 )
 unknown = st.builds(
@@ -55,14 +70,14 @@ def test_unknown_types_are_skipped(pairs, last):
     assert parse_records(payload) == [record for _, record in pairs]
 
 
-@pytest.mark.parametrize("kind", [0, 6, 8, 255])
+@pytest.mark.parametrize("kind", [0, 8, 9, 255])
 def test_reserved_types_are_skipped(kind):
     assert parse_records(bytes([kind, 2, 1, 6, 5, 3, 1, 2, 3])) == [Receipt(1, 2, 3)]
 
 
 @settings(derandomize=True, deadline=None)
 @given(
-    records.filter(lambda record: not isinstance(record, RegistryDigest)),
+    records.filter(lambda record: not isinstance(record, OPEN)),
     st.binary(max_size=200),
     st.lists(records),
 )
@@ -80,7 +95,7 @@ def test_short_known_record(kind, size):
     refused(bytes([kind, size]) + bytes(size) + bytes([200, 10]) + bytes(10))
 
 
-@pytest.mark.parametrize("kind", [*NEED, 6, 200])
+@pytest.mark.parametrize("kind", [*NEED, 8, 200])
 def test_record_that_overruns(kind):
     need = NEED.get(kind, 3)
     refused(bytes([kind]))
@@ -115,7 +130,7 @@ def test_any_bytes_are_records_or_refused():
     for case in range(CASES):
         payload = bytearray()
         for _ in range(rng.randrange(4)):
-            kind = rng.choice((1, 2, 3, 4, 5, 7, rng.randrange(256)))
+            kind = rng.choice((*NEED, rng.randrange(256)))
             size = max(0, NEED.get(kind, 2) + rng.choice((0, 0, 0, 1, -1)))
             payload += bytes([kind, size]) + rng.randbytes(size)
         if payload and rng.randrange(3) == 0:
@@ -152,6 +167,8 @@ def test_any_bytes_are_records_or_refused():
         LinkReport(0, 0, 0, 256),
         Receipt(256, 0, 0),
         Receipt(0, 256, 0),
+        Parity(0, 0, 256, 0, 0, 0, 0, 0, b""),
+        Parity(0, 0, 0, 0, 0, 0, 0, 0, bytes(243)),
         Receipt(0, 0, 256),
         Frame(256, 0, 0, 0),
         Frame(0, 256, 0, 0),

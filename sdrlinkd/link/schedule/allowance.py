@@ -24,12 +24,12 @@ MOST_IDLE_S = 0.02
 class Allowance(NamedTuple):
     """`most[qos]`: a PDU that begins with that class may join a burst of fewer.
 
-    `owed`: a class that is to have a PDU of the burst, even if others could fill it. `until`: where
-    the most urgent class that waits gets none, it is to be asked again then.
+    `owed`: classes that are to have the burst's last PDUs, even if others could fill them.
+    `until`: where the most urgent class that waits gets none, it is to be asked again then.
     """
 
     most: tuple[int, ...]
-    owed: Qos | None = None
+    owed: tuple[Qos, ...] = ()
     until: float = INFINITE
 
     @classmethod

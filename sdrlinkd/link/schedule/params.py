@@ -19,6 +19,9 @@ class ClassParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     max_burst_s: Seconds = 0.0
     """Longest burst while something more urgent may come that nobody can foresee; 0: that of the
     modem."""
+    parity: Annotated[float, Meta(ge=0, le=1)] = 0.0
+    """Fragments of parity for each one of a large message: so large a share of its PDUs may be
+    lost."""
 
 
 class ClassesParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -37,9 +37,9 @@ class Shares:
         for qos in waiting:
             self._credit_s[qos] += self._share[qos] * passed_s
 
-    def owed(self, pdu_s: float) -> Qos | None:
-        """The most urgent class that has earned a PDU of that length and did not get it."""
-        for qos, credit_s in self._credit_s.items():
-            if credit_s >= pdu_s > 0:
-                return qos
-        return None
+    def owed(self, pdu_s: float) -> list[Qos]:
+        """A class for each PDU of that length that it has earned and did not get."""
+        if pdu_s <= 0:
+            return []
+        n_pdus = ((qos, int(credit_s / pdu_s)) for qos, credit_s in self._credit_s.items())
+        return [qos for qos, n in n_pdus for _ in range(n)]

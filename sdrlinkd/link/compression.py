@@ -1,0 +1,50 @@
+"""Messages as zstd frames, and back within bounds."""
+
+from collections.abc import Mapping
+
+import zstandard
+
+LEVEL = 3
+LEAST_BYTES = 64
+"""Without a dictionary, nothing smaller is worth the try."""
+
+
+class Deflated:
+    """Compresses the messages of one topic."""
+
+    def __init__(self, dictionary: zstandard.ZstdCompressionDict | None) -> None:
+        self._least = LEAST_BYTES if dictionary is None else 1
+        self._zstd = zstandard.ZstdCompressor(
+            level=LEVEL, dict_data=dictionary, write_content_size=True, write_checksum=False
+        )
+
+    def shrink(self, payload: bytes) -> bytes | None:
+        """The frame, or None when the message is no larger as it is."""
+        if len(payload) < self._least:
+            return None
+        frame = self._zstd.compress(payload)
+        return frame if len(frame) < len(payload) else None
+
+
+class Inflated:
+    """The way back: nothing grows beyond what it may, whatever the frame says."""
+
+    def __init__(self, dictionaries: Mapping[int, zstandard.ZstdCompressionDict]) -> None:
+        self._by_id = {
+            each.dict_id(): zstandard.ZstdDecompressor(dict_data=each)
+            for each in dictionaries.values()
+        }
+        self._plain = zstandard.ZstdDecompressor()
+
+    def expand(self, frame: bytes, most: int) -> tuple[bytes, str | None]:
+        """(message, None), or (nothing, the ledger's reason)."""
+        try:
+            told = zstandard.get_frame_parameters(frame)
+            if told.content_size > most:
+                return b"", "rx_inflates"
+            zstd = self._by_id.get(told.dict_id) if told.dict_id else self._plain
+            if zstd is None:
+                return b"", "rx_no_dictionary"
+            return zstd.decompress(frame, max_output_size=most, allow_extra_data=False), None
+        except zstandard.ZstdError:
+            return b"", "rx_bad_zstd"

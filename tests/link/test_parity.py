@@ -1,0 +1,139 @@
+"""Messages whose lost PDUs are computed from the others."""
+
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sdrlinkd.link import Allowance, ClassesParams, ClassParams, Outcome, Overrides, Qos
+from sdrlinkd.link.parity import KEPT_BYTES, parity_records
+from sdrlinkd.wire import parse
+from tests.link.world import make_link
+
+TRACES = Path(__file__).parents[3] / "shared/data/traces/orbit_links_rssi.npz"
+
+
+def protected(share, own_id=1, **more):
+    classes = ClassesParams(bulk=ClassParams(parity=share))
+    return make_link(own_id, classes=classes, seed=own_id, **more)
+
+
+def pdus_of(link, payload, now=0.0, topic=0):
+    link.submit(topic, payload, now, Overrides(Qos.BULK))
+    pdus = []
+    while burst := link.departures.compose(now, Allowance.of(63)):
+        link.confirm(burst, Outcome.SENT, now)
+        pdus += burst.pdus
+    return pdus
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(
+    size=st.integers(1, 70_000), pdu_size=st.sampled_from((220, 528, 1024, 1500, 2047)),
+    share=st.floats(0.01, 0.5), seed=st.integers(0, 2**32),
+)  # fmt: skip
+def test_any_pattern_of_lost_fragments_that_parity_can_tell_is_repaired(
+    size, pdu_size, share, seed
+):
+    rng = Random(seed)
+    payload = b"\0\1\0\0" + rng.randbytes(size)
+    sender, receiver = protected(share, pdu_size=pdu_size), protected(0.0, 2, pdu_size=pdu_size)
+    pdus = pdus_of(sender, payload)
+    if not pdus:
+        assert sender.sender.tally(0).dropped["tx_too_big"]
+        return
+    data = [pdu for pdu in pdus if any(e.topic_id == 0 for e in parse(pdu, pdu_size).entries)]
+    total = parse(data[0], pdu_size).entries[0].total
+    most = min(-(-int(1e6 * share * total) // 10**6), 256 - total) if total >= 4 else 0
+    lost = set(rng.sample(data, rng.randint(0, min(most, len(data)))))
+    got = [m for pdu in pdus if pdu not in lost for m in receiver.hear(pdu, 0.0)]
+    assert [m.payload for m in got] == [payload]
+    assert receiver.audit() == sender.audit() == []
+    assert receiver.inbox.reassembly.held == 0
+
+
+def test_one_more_lost_than_there_is_parity_is_too_many():
+    sender, receiver = protected(0.1, pdu_size=1024), protected(0.0, 2, pdu_size=1024)
+    pdus = pdus_of(sender, bytes(64_000))
+    assert [m for pdu in pdus[8:] for m in receiver.hear(pdu, 0.0)] == []
+    receiver.handle_timers(1.0)
+    assert receiver.inbox.tallies[1, 0].dropped == {"rx_partial_timeout": 1}
+
+
+def test_parity_costs_what_was_asked_for_and_without_it_there_is_none():
+    pdus = [len(pdus_of(protected(share, pdu_size=1024), bytes(64_000))) for share in (0.0, 0.1)]
+    assert pdus[0] == 64
+    assert pdus[1] == pytest.approx(72, abs=1)
+
+
+def test_small_messages_have_none():
+    assert parity_records(bytes(3000), 1000, 3, (0, 0), 0.5, 1000) == []
+
+
+def test_what_is_sent_is_only_sent_when_its_parity_is():
+    sender = protected(0.5, pdu_size=64)
+    sender.submit(0, bytes(400), 0.0, Overrides(Qos.BULK))
+    bursts = []
+    while burst := sender.departures.compose(0.0, Allowance.of(1)):
+        bursts.append(burst)
+    for burst in bursts[:-1]:
+        sender.confirm(burst, Outcome.SENT, 0.0)
+    assert sender.sender.tally(0).sent == 0
+    sender.confirm(bursts[-1], Outcome.SENT, 0.0)
+    assert sender.sender.tally(0).sent == 1
+    assert sender.audit() == []
+
+
+def test_records_that_contradict_their_message_or_themselves_do_no_harm():
+    rng = Random(4)
+    sender = protected(0.3, pdu_size=220)
+    receiver = protected(0.0, 2, pdu_size=220)
+    records = parity_records(bytes(2000), 200, 10, (0, 0), 0.3, 200)
+    from sdrlinkd.wire import Entry, Pdu, build
+
+    for seq in range(2000):
+        record = bytearray(rng.choice(records))
+        for _ in range(3):
+            record[rng.randrange(2, 14)] = rng.randrange(256)
+        entries = [Entry(15, 0, 0, 1, bytes(record[:200]))]
+        if rng.random() < 0.5:
+            entries = [Entry(0, rng.randrange(4), rng.randrange(10), 10, bytes(rng.randrange(190)))]
+        receiver.hear(build(Pdu(2, False, 1, 255, seq & 255, 1, entries), 220), seq * 0.001)
+        assert receiver.audit() == []
+    assert pdus_of(sender, bytes(100))
+
+
+def test_memory_is_bounded_whatever_comes():
+    receiver = protected(0.0, 2, pdu_size=2047)
+    for src in range(3, 250):
+        sender = protected(1.0, src, pdu_size=2047)
+        pdus = pdus_of(sender, bytes(60_000))
+        for pdu in pdus[30:]:
+            receiver.hear(pdu, 0.0)
+    assert 0 < receiver.inbox._repair.held_bytes <= KEPT_BYTES
+
+
+@pytest.mark.skipif(not TRACES.exists(), reason="needs ../shared/data/traces")
+@pytest.mark.parametrize("topic_share", [0.0, 0.2])
+def test_over_recorded_links_memory_is_bounded_and_parity_helps(topic_share):
+    """PDUs are lost where a real link's signal was weak."""
+    archive = np.load(TRACES, allow_pickle=True)
+    name = max(archive.files, key=lambda each: archive[each].size)
+    rssi = np.asarray(archive[name], float).reshape(-1)[:6000]
+    lost = rssi < np.nanquantile(rssi, 0.07)
+    sender = protected(topic_share, pdu_size=1024)
+    receiver = protected(0.0, 2, pdu_size=1024)
+    at = got = 0
+    for i in range(60):
+        for pdu in pdus_of(sender, i.to_bytes(8, "big") + bytes(40_000), i * 0.3):
+            if not lost[at % len(lost)]:
+                got += len(receiver.hear(pdu, i * 0.3))
+            at += 1
+        receiver.handle_timers(i * 0.3)
+        assert receiver.inbox.reassembly.held_bytes < 2 << 20
+        assert receiver.inbox._repair.held_bytes <= KEPT_BYTES
+        assert receiver.audit() == sender.audit() == []
+    assert got >= 1 if topic_share else got < 60
