@@ -20,14 +20,15 @@ from sdrlinkd.client import runtime_dir
 from sdrlinkd.config import Config, Setup
 from sdrlinkd.control import Control, Verb
 from sdrlinkd.errors import UserError
-from sdrlinkd.link import Link
+from sdrlinkd.link import Link, Told
 from sdrlinkd.node import Node
 from sdrlinkd.pdulink import DirectLink, PduLink
+from sdrlinkd.policies import Policies
 from sdrlinkd.sdnotify import Notifier
 
 if TYPE_CHECKING:
     # Loading it brings recordings, of which a daemon of a real robot has none.
-    from sdrlinkd.adapters import Due
+    from sdrlinkd.adapters import Due, Transforms
 
 log = logging.getLogger("sdrlinkd")
 
@@ -49,8 +50,8 @@ async def run(setup: Setup, reload: Reload) -> None:
         loop.add_signal_handler(number, stop.set)
     notifier = Notifier()
     async with contextlib.AsyncExitStack() as stack:
-        node, control = await _open(setup, stack, reload)
-        loop.add_signal_handler(signal.SIGHUP, _reload_on_signal, node, setup, reload)
+        node, control, policies = await _open(setup, stack, reload)
+        loop.add_signal_handler(signal.SIGHUP, _reload_on_signal, policies, setup, reload)
         stack.callback(loop.remove_signal_handler, signal.SIGHUP)
         async with asyncio.TaskGroup() as tasks:
             running = [
@@ -72,7 +73,7 @@ async def run(setup: Setup, reload: Reload) -> None:
 
 async def _open(
     setup: Setup, stack: contextlib.AsyncExitStack, reload: Reload
-) -> tuple[Node, Control]:
+) -> tuple[Node, Control, Policies]:
     config = setup.config
     rng = Random(os.urandom(16) if config.seed is None else config.seed)
     directory = RuntimeDirectory(_runtime_directory(config))
@@ -84,18 +85,22 @@ async def _open(
         setup.registry,
         setup.node_id,
         rng,
+        classes=config.classes,
+        relay=config.relay,
+        dictionaries=setup.dictionaries,
         hears_self=config.hears_self,
+        max_expanded=config.bus.max_message_bytes,
     )
-    link.set_policies(setup.policies)
+    policies = Policies(setup, link)
     pdu_link = _make_pdu_link(setup, rng)
     context = zmq.Context()
     # Closes what a part that failed half-way left open; term() would wait for it for ever.
     stack.callback(context.destroy)
-    node = Node(setup, link, pdu_link, partial(Bus, context, directory, setup))
+    node = Node(setup, link, pdu_link, partial(Bus, context, directory, setup), _transforms(setup))
     stack.callback(node.bus.close)
     control = Control(context, directory)
     stack.callback(control.close)
-    control.serve(_verbs(setup, node, control, reload))
+    control.serve(_verbs(setup, node, control, policies, reload))
     stack.push_async_callback(pdu_link.close)
     await node.open_carrier()
     if config.play.duration_s:
@@ -106,7 +111,7 @@ async def _open(
     )  # fmt: skip
     for warning in setup.warnings:
         log.warning("%s", warning)
-    return node, control
+    return node, control, policies
 
 
 def _make_pdu_link(setup: Setup, rng: Random) -> PduLink:
@@ -119,6 +124,15 @@ def _make_pdu_link(setup: Setup, rng: Random) -> PduLink:
     from sdrlinkd.modem import make_modem
 
     return make_modem(config, setup.node_id, rng)
+
+
+def _transforms(setup: Setup) -> dict[int, "Transforms"]:
+    if not setup.transforms:
+        return {}
+    # It brings the message types.
+    from sdrlinkd.adapters import Transforms
+
+    return {topic_id: Transforms(setup.config.tf) for topic_id in setup.transforms}
 
 
 def _own_traffic(setup: Setup, stack: contextlib.AsyncExitStack) -> Iterator["Due"]:
@@ -141,7 +155,9 @@ def _runtime_directory(config: Config) -> Path:
     return runtime_dir(given or None)
 
 
-def _verbs(setup: Setup, node: Node, control: Control, reload: Reload) -> dict[str, Verb]:
+def _verbs(
+    setup: Setup, node: Node, control: Control, policies: Policies, reload: Reload
+) -> dict[str, Verb]:
     def hello(_: dict[str, Any]) -> object:
         return {
             "daemon": "sdrlinkd",
@@ -151,9 +167,20 @@ def _verbs(setup: Setup, node: Node, control: Control, reload: Reload) -> dict[s
         }
 
     def reload_policies(_: dict[str, Any]) -> object:
-        _reload_policies(node, setup, reload)
+        _reload_policies(policies, setup, reload)
         log.info("topic policies re-read on request")
         return {"reloaded": "topic policies", "unchanged": "all other keys need a restart"}
+
+    def set_policy(arguments: dict[str, Any]) -> object:
+        changes = {key: value for key, value in arguments.items() if key != "topic"}
+        if not changes:
+            raise UserError("set: nothing to change; name at least one key")
+        return policies.set(str(arguments.get("topic", "")), changes)
+
+    def why(arguments: dict[str, Any]) -> object:
+        topic_id = policies.topic_id(str(arguments.get("topic", "")))
+        told = Told(setup.source, policies.changed.get(topic_id, ()))
+        return {"why": node.why(topic_id, told)}
 
     verbs = {
         "hello": Verb(hello, "who answers, and what it can do"),
@@ -165,22 +192,24 @@ def _verbs(setup: Setup, node: Node, control: Control, reload: Reload) -> dict[s
             lambda _: {"problems": node.audit(), "ledger": node.snapshot(control.requests).link},
             "whether the ledger adds up",
         ),
+        "why": Verb(why, "what happens to a topic, in plain words"),
+        "set": Verb(set_policy, "change a topic's policy", changes=True),
         "reload": Verb(reload_policies, "read the topic policies anew", changes=True),
     }
     return verbs
 
 
-def _reload_policies(node: Node, setup: Setup, reload: Reload) -> None:
+def _reload_policies(policies: Policies, setup: Setup, reload: Reload) -> None:
     """Apply the policies of the configuration as it is now. Raises UserError, changing nothing."""
     changed = reload()
     if changed.registry.digest() != setup.registry.digest():
         raise UserError("the topic registry has changed, and topic ids with it; restart the daemon")
-    node.set_policies(changed.policies)
+    policies.reload(changed.policies)
 
 
-def _reload_on_signal(node: Node, setup: Setup, reload: Reload) -> None:
+def _reload_on_signal(policies: Policies, setup: Setup, reload: Reload) -> None:
     try:
-        _reload_policies(node, setup, reload)
+        _reload_policies(policies, setup, reload)
     except UserError as error:
         log.error("not reloaded, the old policies stay: %s", error)  # noqa: TRY400
     else:

@@ -15,7 +15,7 @@ from sdrlinkd.link import (
     Opportunity,
     Outcome,
     Overrides,
-    TopicPolicy,
+    Told,
     link_notices,
     link_report,
 )
@@ -24,7 +24,7 @@ from sdrlinkd.reports import Snapshot
 
 if TYPE_CHECKING:
     # Loading it brings recordings, of which a daemon of a real robot has none.
-    from sdrlinkd.adapters import Due
+    from sdrlinkd.adapters import Due, Transforms
 
 TICK_S = 0.05
 
@@ -33,11 +33,17 @@ class Node:
     """Asks the link what to do and does it. Holds no queue and no decision of its own."""
 
     def __init__(
-        self, setup: Setup, link: Link, pdu_link: PduLink, open_bus: Callable[[Ingress], Bus]
+        self,
+        setup: Setup,
+        link: Link,
+        pdu_link: PduLink,
+        open_bus: Callable[[Ingress], Bus],
+        transforms: Mapping[int, "Transforms"],
     ) -> None:
         self._setup = setup
         self._link = link
         self._pdu_link = pdu_link
+        self._transforms = transforms
         self._traffic: Iterator[Due] = iter(())
         self._upcoming: Due | None = None
         self._began_at = 0.0
@@ -54,6 +60,13 @@ class Node:
     def submit(self, topic_id: int, payload: bytes, overrides: Overrides = AS_CONFIGURED) -> None:
         """A message from a producer."""
         now = self._pdu_link.now()
+        transforms = self._transforms.get(topic_id)
+        if transforms is not None:
+            gathered, reason = transforms.take(payload, now)
+            if gathered is None:
+                self._link.sender.refuse(reason, topic_id)
+                return
+            payload = gathered
         self._link.submit(topic_id, payload, now, overrides)
         self._pdu_link.wake()
 
@@ -84,6 +97,10 @@ class Node:
             self._upcoming = next(self._traffic, None)
         if now - self._ticked_at >= TICK_S:
             self._ticked_at = now
+            for topic_id, transforms in self._transforms.items():
+                if (gathered := transforms.flush(now)) is not None:
+                    self._link.submit(topic_id, gathered, now)
+                    self._pdu_link.wake()
             self._link.handle_timers(now)
             self._queue_moved.set()  # messages may have expired
 
@@ -152,9 +169,9 @@ class Node:
             pass
         self._link.shut_down()
 
-    def set_policies(self, policies: Mapping[int, TopicPolicy]) -> None:
-        """Apply per-topic policies, by topic id; everything else stays."""
-        self._link.set_policies(policies)
+    def why(self, topic_id: int, told: Told) -> list[str]:
+        """What happens to a topic, in plain words."""
+        return self._link.why(topic_id, told, self._pdu_link.now())
 
     def snapshot(self, control_requests: int) -> Snapshot:
         """Everything there is to know, at this moment."""

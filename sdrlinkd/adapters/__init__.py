@@ -4,6 +4,7 @@ from sdrlinkd.adapters.bags import Bag, BagMessage, BagTopic, open_bag
 from sdrlinkd.adapters.due import Due, due_messages
 from sdrlinkd.adapters.pacing import first_seconds, paced
 from sdrlinkd.adapters.robot import BuiltInRobot
+from sdrlinkd.adapters.transforms import Transforms
 from sdrlinkd.adapters.typestore import empty, from_cdr, knows, to_cdr
 
 __all__ = [
@@ -12,6 +13,7 @@ __all__ = [
     "BagTopic",
     "BuiltInRobot",
     "Due",
+    "Transforms",
     "due_messages",
     "empty",
     "first_seconds",

@@ -8,8 +8,9 @@ from sdrlinkd.config.carriers import (
     LoopbackParams,
     ModemParams,
     PlayParams,
+    TransformParams,
 )
-from sdrlinkd.config.load import load_config, parse_config, parse_toml
+from sdrlinkd.config.load import explain_policy, load_config, parse_config, parse_toml
 from sdrlinkd.config.schema import BusParams, Config
 from sdrlinkd.config.setup import Setup, load_registry, make_setup
 
@@ -24,6 +25,8 @@ __all__ = [
     "ModemParams",
     "PlayParams",
     "Setup",
+    "TransformParams",
+    "explain_policy",
     "load_config",
     "load_registry",
     "make_setup",

@@ -95,6 +95,23 @@ class EtherParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Folder of the hub's sockets."""
 
 
+class TransformParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """/tf on a slow link."""
+
+    topics: list[str] = []
+    """Registry names of type tf2_msgs/TFMessage, such as tf and tf_static."""
+    frames: list[str] = []
+    """Child frames to send, * for any text; empty: all."""
+    drop: list[str] = []
+    """Child frames not to send."""
+    prefix: str = ""
+    """Put before all frames: two robots' base_link are two frames."""
+    shared: list[str] = msgspec.field(default_factory=lambda: ["map", "world", "earth"])
+    """Frames that all robots mean alike, without prefix."""
+    combine_s: Annotated[float, Meta(ge=0, le=10)] = 0.0
+    """Send one message in so long, with the last transform of each frame."""
+
+
 class PlayParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Messages that the daemon itself sends, by its radio's time: for simulations in lock-step."""
 

@@ -3,6 +3,7 @@
 import re
 import tomllib
 from collections import Counter
+from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TypeVar
@@ -13,6 +14,7 @@ from msgspec import inspect
 from sdrlinkd.config import describe
 from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError
+from sdrlinkd.link import TopicPolicy
 
 S = TypeVar("S", bound=msgspec.Struct)
 
@@ -48,6 +50,19 @@ def parse_toml(text: str, source: str, kind: type[S]) -> S:
         return msgspec.convert(raw, kind)
     except msgspec.ValidationError as error:
         raise _explain(error, raw, text, source, describe.type_of(kind)) from None
+
+
+def explain_policy(changes: Mapping[str, object]) -> str:
+    """Which of `changes` to a topic's policy is not allowed, and what is."""
+    kind = describe.type_of(TopicPolicy)
+    for key, value in changes.items():
+        inner = describe.child(kind, key)
+        try:
+            msgspec.convert({key: value}, TopicPolicy)
+        except msgspec.ValidationError:
+            what = describe.allowed(inner) if inner is not None else "nothing of that name"
+            return f"{key}: got {describe.given(value)}; allowed: {what}"
+    return f"{', '.join(changes)}: not allowed together"
 
 
 # Keys and, inside lists, places.

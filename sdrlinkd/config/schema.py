@@ -13,13 +13,16 @@ from sdrlinkd.config.carriers import (
     LoopbackParams,
     ModemParams,
     PlayParams,
+    TransformParams,
 )
 from sdrlinkd.link import (
     AccessParams,
+    ClassesParams,
     LinkParams,
     QueueParams,
     RateParams,
     ReassemblyParams,
+    RelayParams,
     TopicPolicy,
 )
 
@@ -55,6 +58,9 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     link: LinkParams = LinkParams()
     queue: QueueParams = QueueParams()
     reassembly: ReassemblyParams = ReassemblyParams()
+    classes: ClassesParams = ClassesParams()
+    relay: RelayParams = RelayParams()
+    tf: TransformParams = TransformParams()
     access: AccessParams = AccessParams()
     rate: RateParams = RateParams()
     bus: BusParams = BusParams()

@@ -4,7 +4,10 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from zstandard import ZstdCompressionDict
+
 from sdrlinkd.config.carrier_checks import check_carrier, with_paths
+from sdrlinkd.config.link_checks import check_relay, load_dictionaries
 from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError, RegistryError
 from sdrlinkd.link import TopicPolicy, check_access
@@ -17,6 +20,7 @@ _NAMESPACE = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _RX_NAME = re.compile(r"(/[A-Za-z_]\w*)+/?", re.ASCII)
 _PLACEHOLDER = re.compile(r"\{(src_id|src)\}")
 
+TF_TYPE = "tf2_msgs/msg/TFMessage"
 # Types whose messages have no upper size, and which a small PDU may not carry whole.
 UNBOUNDED_TYPES = {
     "nav_msgs/msg/OccupancyGrid",
@@ -38,7 +42,12 @@ class Setup:
     topics_in: dict[str, int]
     """Bus topic → topic id, of the topics taken from the bus."""
     policies: dict[int, TopicPolicy]
+    dictionaries: dict[int, ZstdCompressionDict]
+    transforms: list[int]
+    """Topics that [tf] is about."""
     warnings: list[str]
+    source: str = "config"
+    """The file that all this is from."""
 
     def republished_as(self, src: int, topic_id: int) -> str:
         """Bus topic of another robot's message."""
@@ -78,13 +87,18 @@ def make_setup(config: Config, base: Path, source: str = "config") -> Setup:
             f"{source}: rate.adapt: got true; it needs beacons (link.beacon_s) and a control "
             "channel, a registry of at most 15 topics; allowed here: false"
         )
+    check_relay(config, node_id, registry, source)
+    policies = _policies(config, registry, source)
     return Setup(
         config=config,
         registry=registry,
         node_id=node_id,
         topics_in=_topics_in(config, registry, source),
-        policies=_policies(config, registry, source),
+        policies=policies,
+        dictionaries=load_dictionaries(policies, base, source),
+        transforms=_transforms(config, registry, source),
         warnings=_warnings(config, registry),
+        source=source,
     )
 
 
@@ -154,6 +168,20 @@ def _topics_in(config: Config, registry: Registry, source: str) -> dict[str, int
         for topic in registry.topics
         if not wanted or topic.name in wanted
     }
+
+
+def _transforms(config: Config, registry: Registry, source: str) -> list[int]:
+    found = []
+    for name in config.tf.topics:
+        topic = registry.by_name(name)
+        if topic is None or topic.type != TF_TYPE:
+            fit = [each.name for each in registry.topics if each.type == TF_TYPE]
+            raise ConfigError(
+                f'{source}: tf.topics: got "{name}"; allowed: topics of the registry of type '
+                f"{TF_TYPE}: {', '.join(fit) or 'none'}"
+            )
+        found.append(topic.id)
+    return found
 
 
 def _policies(config: Config, registry: Registry, source: str) -> dict[int, TopicPolicy]:

@@ -1,6 +1,7 @@
 """The link: queues, packing, duplicates, ages and the ledger, as a calculator over `now`."""
 
 from sdrlinkd.link.access import AccessParams, check_access
+from sdrlinkd.link.burst import Burst, Outcome
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity, Sensed
 from sdrlinkd.link.inbox import CDR_HEADER_SIZE, Delivered
 from sdrlinkd.link.ledger import RX_PDU_REASONS, RX_REASONS, TX_REASONS
@@ -20,7 +21,7 @@ from sdrlinkd.link.rate import RateChange, RateParams
 from sdrlinkd.link.relay import Relay, RelayParams
 from sdrlinkd.link.report import link_notices, link_report
 from sdrlinkd.link.schedule import Allowance, ClassesParams, ClassParams
-from sdrlinkd.link.sender import Burst, Outcome
+from sdrlinkd.link.why import Told
 
 __all__ = [
     "AS_CONFIGURED",
@@ -52,6 +53,7 @@ __all__ = [
     "Relay",
     "RelayParams",
     "Sensed",
+    "Told",
     "TopicPolicy",
     "check_access",
     "link_notices",

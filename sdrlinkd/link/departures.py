@@ -8,13 +8,14 @@ from typing import NamedTuple
 
 from sdrlinkd.link.access import Access, AccessParams, Free, Slot, Wish, make_access
 from sdrlinkd.link.beacons import Beacons
+from sdrlinkd.link.burst import Burst, Outcome
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity
 from sdrlinkd.link.inbox import Inbox
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.rate import RateControl, RateParams
 from sdrlinkd.link.returned import Returned
 from sdrlinkd.link.schedule import Allowance, ClassesParams, Forecasts, Limits, Shares
-from sdrlinkd.link.sender import Burst, Outcome, Sender
+from sdrlinkd.link.sender import Sender
 from sdrlinkd.wire import Record
 
 INFINITE = float("inf")

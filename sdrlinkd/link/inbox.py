@@ -63,6 +63,9 @@ class Ear(Protocol):
         `is_relayed`: not its source has sent it.
         """
 
+    def newcomer(self, src: int, at: float) -> None:
+        """A robot is heard for the first time, or has started anew."""
+
     def sends_on(self, pdu: Pdu, data: bytes, at: float) -> bool:
         """Whether this node forwards the PDU; heard for the first time."""
 
@@ -124,7 +127,7 @@ class Inbox:
             self._ear.pdu_from(pdu, stamps, at, is_relayed)
         if pdu.src == self._own_id and not self._hears_self:
             return self._drop("rx_own")
-        neighbor = self.neighbors.get(pdu.src) or self._new_neighbor(pdu.src)
+        neighbor = self.neighbors.get(pdu.src) or self._new_neighbor(pdu.src, at)
         neighbor.last_heard_at = at
         _, seq, crc = identity(data) if records is None else lasting_identity(data)
         if not neighbor.track.heard(seq, crc):
@@ -143,6 +146,7 @@ class Inbox:
             elif isinstance(record, Beacon):
                 if neighbor.take_beacon(record):
                     neighbor.track.restart(seq, crc)
+                    self._ear.newcomer(pdu.src, at)
             elif isinstance(record, RegistryDigest):
                 neighbor.digest = record
             elif isinstance(record, Parity):
@@ -193,7 +197,8 @@ class Inbox:
                     records = (records or []) + parse_records(entry.payload)
         return records
 
-    def _new_neighbor(self, src: int) -> Neighbor:
+    def _new_neighbor(self, src: int, at: float) -> Neighbor:
+        self._ear.newcomer(src, at)
         neighbor = self.neighbors[src] = Neighbor(src)
         return neighbor
 

@@ -12,6 +12,9 @@ TX_REASONS = {
     "tx_throttled": "faster than the topic's period",
     "tx_decimated": "the topic sends one in so many",
     "tx_unchanged": "same content as the last one, and the topic sends changes only",
+    "tx_filtered": "none of its frames are among those wanted ([tf])",
+    "tx_combined": "joined with others of its topic into one message ([tf])",
+    "tx_bad_transform": "not a tf2_msgs/TFMessage ([tf])",
     "tx_superseded": "a newer message of the topic took its place (depth)",
     "tx_topic_full": "the topic's own bound; its oldest went",
     "tx_overflow_old": "shed from a full queue: oldest of the lowest class",
@@ -63,6 +66,8 @@ class TxTally:
     accepted: int = 0
     sent: int = 0
     sent_bytes: int = 0
+    reoffered: int = 0
+    """Of those accepted: sent again to robots that came late."""
     dropped: Counter[str] = field(default_factory=Counter)
 
     def drop(self, reason: str) -> None:

@@ -7,10 +7,12 @@ from zstandard import ZstdCompressionDict
 
 from sdrlinkd.link.access import Access, AccessParams
 from sdrlinkd.link.beacons import Beacons
+from sdrlinkd.link.burst import Burst, Outcome
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity
 from sdrlinkd.link.compression import Inflated
 from sdrlinkd.link.departures import Departures
 from sdrlinkd.link.inbox import Delivered, Inbox
+from sdrlinkd.link.latched import Kept, Latched
 from sdrlinkd.link.meters import RateMeter, RecentAges
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
 from sdrlinkd.link.policy import TopicPolicy
@@ -18,7 +20,8 @@ from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, Overrides, Qos
 from sdrlinkd.link.rate import RateControl, RateParams
 from sdrlinkd.link.relay import Relay, RelayParams
 from sdrlinkd.link.schedule import ClassesParams
-from sdrlinkd.link.sender import Burst, Outcome, Sender
+from sdrlinkd.link.sender import Sender
+from sdrlinkd.link.why import Told, Why
 from sdrlinkd.reports import RATE_WINDOW_S
 from sdrlinkd.wire import CONTROL_TOPIC_ID, Frame, LinkReport, Pdu, Record, Registry, Stamp
 
@@ -74,6 +77,8 @@ class Link:
         self.departures = Departures(
             self.sender, self.inbox, beacons, classes, own_id, registry.has_control, rng
         )
+        self._latched = Latched()
+        self._why = Why(self.sender, self.departures.shares)
         self.relay = Relay(relay, own_id)
 
     def attach(self, carrier: CarrierTraits, access: AccessParams, rate: RateParams) -> None:
@@ -98,7 +103,13 @@ class Link:
     def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
         """Change one, from now on."""
         self.sender.set_policy(topic_id, policy)
+        if policy.durability == "volatile":
+            self._latched.forget(topic_id)
         self.inbox.policies[topic_id] = policy
+
+    def why(self, topic_id: int, told: Told, now: float) -> list[str]:
+        """What happens to a topic, in plain words."""
+        return self._why.explain(topic_id, self.registry.topics[topic_id].name, told, now)
 
     def submit(
         self,
@@ -113,6 +124,8 @@ class Link:
             qos = self.sender.treatment(topic_id)[0] if overrides.qos is None else overrides.qos
             self.departures.forecasts.note((self.own_id, topic_id), qos, now)
             self.departures.more_to_send()
+            if self.sender.policy(topic_id).durability == "transient_local":
+                self._latched.keep(topic_id, Kept(payload, now, overrides))
         return refused
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
@@ -147,7 +160,11 @@ class Link:
     def handle_timers(self, now: float) -> None:
         """Let time pass: expiries, reassembly timeouts, rate samples."""
         self.sender.expire(now)
+        for offer in self._latched.due(now, self.sender.outbox.bytes_per_s):
+            self.sender.offer_again(offer, now)
+            self.departures.more_to_send()
         self.inbox.expire(now)
+        self._why.sample(now, len(self.registry))
         if self.rates.is_due(now):
             self.rates.sample(self.rate_counters(), now)
 
@@ -203,6 +220,11 @@ class Link:
                 stamp = ages.get((entry.topic_id, entry.entry_id))
                 origin = at if stamp is None else at - 1e-6 * stamp.age_us
                 self.departures.forecasts.note((src, entry.topic_id), qos, origin)
+
+    def newcomer(self, src: int, at: float) -> None:
+        """It does not have what was latched before."""
+        if src != self.own_id:
+            self._latched.newcomer(src, at)
 
     def sends_on(self, pdu: Pdu, data: bytes, at: float) -> bool:
         """Forward it, if that is our part."""

@@ -24,6 +24,13 @@ class RateMeter:
         """Whether the last sample is old enough for another."""
         return not self._samples or now - self._samples[-1][0] >= self._step_s
 
+    def grown(self, key: Hashable, value: int, now: float) -> int:
+        """How much `key`, whose counter stands at `value` now, has grown within the window."""
+        for at, counters in self._samples:
+            if now - at <= self._window_s:
+                return value - counters.get(key, 0)
+        return value
+
     def per_s(self, key: Hashable, value: int, now: float) -> float:
         """Rate of `key`, whose counter stands at `value` now."""
         for at, counters in self._samples:

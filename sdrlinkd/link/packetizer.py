@@ -252,10 +252,8 @@ class Packetizer:
     def _parity_of(self, head: Outgoing) -> list[bytes]:
         """Records, the first one last."""
         share = self._parity[head.qos] if self._has_control else 0.0
-        if not share:
-            return []
-        ids = head.topic_id, head.entry_id
-        return parity_records(head.payload, head.k, head.total, ids, share, self.k_single)[::-1]
+        ids, shape = (head.topic_id, head.entry_id), (head.k, head.total)
+        return parity_records(head.payload, *shape, ids, share, self.k_single)[::-1]
 
     def _send_stamp_ahead(
         self, lane: Lane, head: Outgoing, k: int, draft: Draft, start: float

@@ -2,7 +2,7 @@
 
 from bisect import insort
 
-from sdrlinkd.link.sender import Burst
+from sdrlinkd.link.burst import Burst
 from sdrlinkd.wire import postponed
 
 GIVE_UP_S = 2.0

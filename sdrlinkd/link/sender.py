@@ -1,12 +1,12 @@
 """The transmit half of the link: from submitted messages to confirmed bursts."""
 
 from collections.abc import Mapping
-from enum import Enum
 from random import Random
-from typing import NamedTuple
 
 from zstandard import ZstdCompressionDict
 
+from sdrlinkd.link.burst import Burst, Outcome
+from sdrlinkd.link.latched import Offer
 from sdrlinkd.link.ledger import TxTally, balance
 from sdrlinkd.link.message import Fate, Outgoing
 from sdrlinkd.link.outbox import Outbox
@@ -24,36 +24,6 @@ NOBODY = -1
 AS_IT_COMES = TopicPolicy()
 MAX_PDUS = 63
 """Of a burst, whatever carries it."""
-
-
-class Burst(NamedTuple):
-    """PDUs that leave together, and the messages each carries an entry of.
-
-    They leave at `start`, in s on the link's clock; at the latest at `latest`, or not at all.
-    """
-
-    pdus: list[bytes]
-    carried: list[list[Outgoing]]
-    classes: list[Qos]
-    """Of each PDU, the highest inside."""
-    mcs: int = 0
-    qos: Qos = Qos.DEFAULT
-    start: float = 0.0
-    latest: float = float("inf")
-    airtime_s: float = 0.0
-    number: int = 0
-    """In the order in which they were composed."""
-    first_start: float = 0.0
-    """Where it was to leave at first; later than that when it came too late."""
-
-
-class Outcome(Enum):
-    """What the radio says of a burst after its last sample."""
-
-    SENT = "sent"
-    LATE = "late"
-    UNDERFLOW = "underflow"
-    LOST = "lost"
 
 
 class Sender:
@@ -107,36 +77,23 @@ class Sender:
         overrides: Overrides = AS_CONFIGURED,
     ) -> str | None:
         """Queue a message; None, or the ledger's reason why it was refused."""
-        qos, priority, dst, lifespan_s = overrides
         topic = self._topics[topic_id]
-        tally = topic.tally
-        tally.accepted += 1
+        topic.tally.accepted += 1
         refused = topic.admission.refuse(payload, now)
-        frame = topic.deflated.shrink(payload) if topic.deflated and not refused else None
-        if frame is not None:
-            payload = frame
-        if len(payload) > self._max_message_size:
-            refused = refused or "tx_too_big"
         if refused:
-            tally.drop(refused)
+            topic.tally.drop(refused)
             return refused
-        message = Outgoing(
-            topic_id,
-            payload,
-            topic.qos if qos is None else qos,
-            topic.priority if priority is None else priority,
-            topic.dst if dst is None else dst,
-            now,
-            now + (topic.policy.lifespan_s if lifespan_s is None else lifespan_s),
-            topic.stamp,
-            tally,
-        )
-        message.is_compressed = frame is not None
-        for shed, reason in self.outbox.put(message, topic.policy):
-            self._drop(shed, reason)
-            if shed is message:
-                refused = reason
-        return refused
+        return self._enqueue(topic_id, payload, now, overrides)
+
+    def offer_again(self, offer: Offer, now: float) -> None:
+        """Queue a latched message for a robot that came late, as old as it is."""
+        topic_id, (payload, at, overrides), dst = offer
+        topic = self._topics[topic_id]
+        if at + topic.policy.lifespan_s <= now:
+            return
+        topic.tally.accepted += 1
+        topic.tally.reoffered += 1
+        self._enqueue(topic_id, payload, at, overrides._replace(dst=dst))
 
     def forward(self, pdu: Pdu, data: bytes, at: float, until: float) -> str | None:
         """Queue another robot's PDU that came in a burst at `at`; None, or why it was refused."""
@@ -148,8 +105,34 @@ class Sender:
             RELAYED + pdu.src, data, CLASSES[pdu.qos], priority, pdu.dst, at, until, False, tally
         )
         message.is_whole = True
+        return self._put(message, AS_IT_COMES)
+
+    def _enqueue(self, topic_id: int, payload: bytes, at: float, wishes: Overrides) -> str | None:
+        qos, priority, dst, lifespan_s = wishes
+        topic = self._topics[topic_id]
+        frame = topic.deflated.shrink(payload) if topic.deflated else None
+        if frame is not None:
+            payload = frame
+        if len(payload) > self._max_message_size:
+            topic.tally.drop("tx_too_big")
+            return "tx_too_big"
+        message = Outgoing(
+            topic_id,
+            payload,
+            topic.qos if qos is None else qos,
+            topic.priority if priority is None else priority,
+            topic.dst if dst is None else dst,
+            at,
+            at + (topic.policy.lifespan_s if lifespan_s is None else lifespan_s),
+            topic.stamp,
+            topic.tally,
+        )
+        message.is_compressed = frame is not None
+        return self._put(message, topic.policy)
+
+    def _put(self, message: Outgoing, policy: TopicPolicy) -> str | None:
         refused = None
-        for shed, reason in self.outbox.put(message, AS_IT_COMES):
+        for shed, reason in self.outbox.put(message, policy):
             self._drop(shed, reason)
             if shed is message:
                 refused = reason
@@ -234,6 +217,10 @@ class Sender:
     def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
         """From now on."""
         self._topics[topic_id].apply(policy)
+
+    def destination(self, topic_id: int) -> int:
+        """Where a topic's messages go by default."""
+        return self._topics[topic_id].dst
 
     def treatment(self, topic_id: int) -> tuple[Qos, int]:
         """Class and priority that a topic's messages get by default."""

@@ -7,6 +7,7 @@ import pytest
 
 from sdrlinkd.config import Config, load_config, make_setup, parse_config
 from sdrlinkd.errors import ConfigError, RegistryError, UserError
+from sdrlinkd.link import ClassParams, TopicPolicy
 
 ROOT = Path(__file__).parents[2]
 ETC = ROOT / "etc"
@@ -23,9 +24,10 @@ def test_shipped_file_shows_every_key():
         for value in msgspec.structs.asdict(Config()).values()
         if isinstance(value, msgspec.Struct)
     ]
-    for struct in (Config, *sections):
+    for struct in (Config, *sections, ClassParams, TopicPolicy):
         for key in struct.__struct_fields__:
-            assert f"\n{key} = " in text or f"\n# {key} = " in text or f"[{key}" in text, key
+            shown = (f"\n{key} = ", f"\n# {key} = ", f"[{key}", f".{key}]")
+            assert any(each in text for each in shown), key
 
 
 def test_shipped_registry_is_the_papers_table_4():

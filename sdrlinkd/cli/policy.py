@@ -1,0 +1,95 @@
+"""`set` and `why`: a topic's policy, changed and explained while the daemon runs."""
+
+from typing import Annotated, Any
+
+import msgspec
+import typer
+
+from sdrlinkd.cli.app import AsJson, RuntimeDir, app, connect
+from sdrlinkd.cli.units import octets, seconds
+from sdrlinkd.client import NoDaemonError, RefusedError
+from sdrlinkd.errors import UserError
+
+
+def _topic_names() -> list[str]:
+    """For the shell's completion: what the running daemon sends."""
+    try:
+        with connect(None) as control:
+            return [topic["name"] for topic in control.ask("topics")]
+    except (NoDaemonError, RefusedError, UserError, OSError):
+        return []
+
+
+Topic = Annotated[str, typer.Argument(help="Its name on the bus or in the registry.",
+                                      autocompletion=_topic_names)]  # fmt: skip
+Text = str | None
+
+
+@app.command("set")
+def set_policy(
+    topic: Topic,
+    qos: Annotated[Text, typer.Option(help="urgent, latency, default or bulk.")] = None,
+    priority: Annotated[int | None, typer.Option(help="0 to 127, the most urgent.")] = None,
+    period: Annotated[Text, typer.Option(help="Send no more often: 0.1, 100ms; 0: always.")] = None,
+    lifespan: Annotated[Text, typer.Option(help="Worthless after: 300ms, 2s, inf.")] = None,
+    depth: Annotated[int | None, typer.Option(help="Messages that may wait; 0: all.")] = None,
+    history: Annotated[Text, typer.Option(help="keep_last or keep_all.")] = None,
+    durability: Annotated[Text, typer.Option(help="volatile or transient_local.")] = None,
+    dst: Annotated[int | None, typer.Option(help="Robot that it is for; 255: everyone.")] = None,
+    decimate: Annotated[int | None, typer.Option(help="Send one in so many.")] = None,
+    on_change: Annotated[
+        bool | None, typer.Option("--on-change/--always", help="Send only what differs.")
+    ] = None,
+    compress: Annotated[Text, typer.Option(help="none or zstd.")] = None,
+    max_bytes: Annotated[Text, typer.Option(help="Refuse larger ones: 64k; 0: none.")] = None,
+    queue_bytes: Annotated[Text, typer.Option(help="Bytes that may wait; 0: no bound.")] = None,
+    queue_s: Annotated[Text, typer.Option(help="The same as time on the air.")] = None,
+    runtime_dir: RuntimeDir = None,
+    as_json: AsJson = False,
+) -> None:
+    """Change a topic's policy until the next restart or reload; shows what was and what is."""
+    given: dict[str, Any] = {
+        "qos": qos,
+        "priority": priority,
+        "period_s": None if period is None else seconds(period, "--period"),
+        "lifespan_s": None if lifespan is None else seconds(lifespan, "--lifespan"),
+        "depth": depth,
+        "history": history,
+        "durability": durability,
+        "dst": dst,
+        "decimate": decimate,
+        "on_change": on_change,
+        "compress": compress,
+        "max_bytes": None if max_bytes is None else octets(max_bytes, "--max-bytes"),
+        "queue_bytes": None if queue_bytes is None else octets(queue_bytes, "--queue-bytes"),
+        "queue_s": None if queue_s is None else seconds(queue_s, "--queue-s"),
+    }
+    changes = {key: value for key, value in given.items() if value is not None}
+    if not changes:
+        raise UserError("nothing to change; name at least one: sdrlinkctl set --help")
+    with connect(runtime_dir) as control:
+        answer = control.ask("set", {"topic": topic, **changes})
+    if as_json:
+        typer.echo(msgspec.json.encode(answer).decode())
+        return
+    typer.echo(f"{answer['topic']}:")
+    for key in changes:
+        typer.echo(f"  {key}: {_shown(answer['old'][key])} -> {_shown(answer['new'][key])}")
+
+
+@app.command()
+def why(topic: Topic, runtime_dir: RuntimeDir = None, as_json: AsJson = False) -> None:
+    """What happens to a topic, in plain words."""
+    with connect(runtime_dir) as control:
+        lines = control.ask("why", {"topic": topic})["why"]
+    if as_json:
+        typer.echo(msgspec.json.encode(lines).decode())
+        return
+    for line in lines:
+        typer.echo(line)
+
+
+def _shown(value: object) -> str:
+    if value is None:
+        return "as in [link]"
+    return f"{value:g}" if isinstance(value, float) else str(value)

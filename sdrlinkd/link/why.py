@@ -1,0 +1,132 @@
+"""What happens to a topic, in plain words."""
+
+from collections.abc import Collection, Hashable
+from typing import NamedTuple
+
+from sdrlinkd.link.ledger import TX_REASONS
+from sdrlinkd.link.meters import RateMeter
+from sdrlinkd.link.policy import INFINITE, TopicPolicy
+from sdrlinkd.link.qos import Qos
+from sdrlinkd.link.schedule import Shares
+from sdrlinkd.link.sender import Sender
+from sdrlinkd.wire import BROADCAST
+
+MINUTE_S = 60.0
+STEP_S = 2.0
+OVERFLOW = ("tx_overflow_old", "tx_overflow_new", "tx_topic_full", "tx_superseded", "tx_expired")
+"""Reasons that more air would have cured."""
+
+
+class Told(NamedTuple):
+    """Where policies come from: the file, and keys that were set since."""
+
+    source: str
+    changed: Collection[str]
+
+
+class Why:
+    """Remembers the last minute."""
+
+    def __init__(self, sender: Sender, shares: Shares) -> None:
+        self._sender = sender
+        self._shares = shares
+        self._meter = RateMeter(MINUTE_S, STEP_S)
+
+    def sample(self, now: float, n_topics: int) -> None:
+        """Now and then."""
+        if self._meter.is_due(now):
+            self._meter.sample(self._counters(n_topics), now)
+
+    def explain(self, topic_id: int, name: str, told: Told, now: float) -> list[str]:
+        """Sentences for a person."""
+        policy, tally = self._sender.policy(topic_id), self._sender.tally(topic_id)
+        came = self._lately(("accepted", topic_id), tally.accepted, now)
+        sent = self._lately(("sent", topic_id), tally.sent, now)
+        lines = [self._treatment(name, policy, told, topic_id)]
+        if not came:
+            lines.append(
+                "nothing came from a producer in the last minute"
+                if tally.accepted
+                else "no producer has sent anything yet"
+            )
+        else:
+            lines.append(f"in the last minute {came} came, {sent} were sent ({_share(sent, came)})")
+        short = False
+        for reason, total in sorted(tally.dropped.items(), key=lambda each: -each[1]):
+            n = self._lately(("drop", topic_id, reason), total, now)
+            if n:
+                short = short or reason in OVERFLOW
+                lines.append(
+                    f"{_share(n, came)} {self._said(reason, policy, told)} ({reason}, {n})"
+                )
+        waiting = self._sender.outbox.queued_of_topic(topic_id)
+        if waiting:
+            lines.append(f"{waiting} wait")
+        if short or waiting:
+            lines.append(self._air(Qos(self._sender.treatment(topic_id)[0]), now))
+        return lines
+
+    def _treatment(self, name: str, policy: TopicPolicy, told: Told, topic_id: int) -> str:
+        state_dst = self._sender.destination(topic_id)
+        to = "everyone" if state_dst == BROADCAST else f"robot {state_dst}"
+        line = f"{name}: class {policy.qos}, priority {policy.priority}, to {to}"
+        if policy.lifespan_s < INFINITE:
+            line += f", worthless after {_seconds(policy.lifespan_s)}"
+        if policy.compress != "none":
+            line += f", compressed with {policy.compress}"
+        if policy.durability == "transient_local":
+            line += ", kept for robots that come late"
+        by = f"set while running: {', '.join(sorted(told.changed))}" if told.changed else ""
+        return f"{line} ({'; '.join(each for each in (told.source, by) if each)})"
+
+    def _said(self, reason: str, policy: TopicPolicy, told: Told) -> str:
+        if reason == "tx_throttled":
+            by = "sdrlinkctl set" if "period_s" in told.changed else told.source
+            return f"throttled to {1 / policy.period_s:.3g} Hz by {by}"
+        if reason == "tx_superseded":
+            return f"gave way to newer ones: depth {policy.kept}"
+        if reason == "tx_expired":
+            return f"were older than {_seconds(policy.lifespan_s)} before their turn came"
+        if reason in ("tx_overflow_old", "tx_overflow_new", "tx_topic_full"):
+            return f"shed: {TX_REASONS[reason]}"
+        return f"dropped: {TX_REASONS[reason]}"
+
+    def _air(self, qos: Qos, now: float) -> str:
+        used = {
+            each: self._lately(("air", each), round(1e6 * used_s), now)
+            for each, used_s in self._shares.used_s.items()
+        }
+        total = sum(used.values())
+        rate = self._sender.outbox.bytes_per_s * 8e-6
+        carries = f" of {rate:.3g} Mbit/s" if rate < INFINITE else ""
+        if not total:
+            return f"nothing has left in the last minute{carries and ', ' + carries.strip()}"
+        others = ", ".join(
+            f"{each.label} {_share(n, total)}" for each, n in used.items() if n and each is not qos
+        )
+        return f"{qos.label} got {_share(used[qos], total)}{carries} airtime" + (
+            f" (the others: {others})" if others else ""
+        )
+
+    def _lately(self, key: Hashable, value: int, now: float) -> int:
+        return self._meter.grown(key, value, now)
+
+    def _counters(self, n_topics: int) -> dict[Hashable, int]:
+        counters: dict[Hashable, int] = {
+            ("air", qos): round(1e6 * used_s) for qos, used_s in self._shares.used_s.items()
+        }
+        for topic_id in range(n_topics):
+            tally = self._sender.tally(topic_id)
+            counters["accepted", topic_id] = tally.accepted
+            counters["sent", topic_id] = tally.sent
+            for reason, n in tally.dropped.items():
+                counters["drop", topic_id, reason] = n
+        return counters
+
+
+def _share(n: int, of: int) -> str:
+    return f"{100 * n / max(1, of):.3g} %"
+
+
+def _seconds(seconds: float) -> str:
+    return f"{seconds:g} s" if seconds >= 1 else f"{1e3 * seconds:g} ms"

@@ -1,0 +1,66 @@
+"""Policies in force: those of the file, and what was set since."""
+
+import logging
+from collections.abc import Mapping
+from typing import Any
+
+import msgspec
+
+from sdrlinkd.config import Setup, explain_policy
+from sdrlinkd.errors import UserError
+from sdrlinkd.link import Link, TopicPolicy
+
+log = logging.getLogger("sdrlinkd")
+
+FIXED = ("dictionary", "stamp")
+"""The other end has to know of these: they change with a restart."""
+
+
+class Policies:
+    """Changes one topic's policy while running; everything else stays."""
+
+    def __init__(self, setup: Setup, link: Link) -> None:
+        self._setup = setup
+        self._link = link
+        self.changed: dict[int, set[str]] = {}
+        """Keys by topic id that were set since the file was read."""
+        link.set_policies(setup.policies)
+
+    def reload(self, policies: Mapping[int, TopicPolicy]) -> None:
+        """Those of the file again."""
+        self.changed.clear()
+        self._link.set_policies(policies)
+
+    def topic_id(self, name: str) -> int:
+        """By its bus name or registry name. Raises UserError."""
+        registry, config = self._setup.registry, self._setup.config
+        prefix = f"/{config.namespace.strip('/')}/"
+        topic = registry.by_name(name.removeprefix(prefix)) or registry.by_name(name)
+        if topic is None:
+            raise UserError(f"topic {name}: unknown; allowed: {registry.suggest(name)}")
+        return topic.id
+
+    def set(self, name: str, changes: Mapping[str, Any]) -> dict[str, Any]:
+        """Apply `changes`; what was there and what is now. Raises UserError, changing nothing."""
+        topic_id = self.topic_id(name)
+        known = [key for key in TopicPolicy.__struct_fields__ if key not in FIXED]
+        for key in changes:
+            if key not in known:
+                raise UserError(f"{key}: cannot be set; allowed: {', '.join(known)}")
+        old = self._link.sender.policy(topic_id)
+        merged = {**msgspec.structs.asdict(old), **changes}
+        try:
+            new = msgspec.convert(merged, TopicPolicy)
+        except msgspec.ValidationError:
+            raise UserError(explain_policy(changes)) from None
+        self._link.set_policy(topic_id, new)
+        self.changed.setdefault(topic_id, set()).update(changes)
+        # As the link has it, not as we gave it.
+        new = self._link.sender.policy(topic_id)
+        told = {key: getattr(new, key) for key in changes}
+        log.info("policy of %s: %s", self._setup.registry.topics[topic_id].name, told)
+        return {
+            "topic": self._setup.registry.topics[topic_id].name,
+            "old": {key: getattr(old, key) for key in changes},
+            "new": told,
+        }
