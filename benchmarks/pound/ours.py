@@ -4,10 +4,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from random import Random
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from backends import AirParams, LinkOverride, RadioParams, World
-from benchmarks.pound.flows import Flow, Trace
+from benchmarks.pound.flows import Flow, Times, Trace
 from sdrlinkd.config import ModemParams
 from sdrlinkd.lab import Arrival, Simulation
 from sdrlinkd.link import (
@@ -67,8 +68,44 @@ class Run(NamedTuple):
     simulation: Simulation
 
 
+class Experiment(NamedTuple):
+    """Robots and their traffic, about to begin."""
+
+    sent: Sequence[Sent]
+    times: list[Times]
+    heard: list[Times]
+    simulation: Simulation
+    own_s: float
+    """Length of a burst of one PDU."""
+
+    def finish(self, until_s: float | None = None) -> list[Trace]:
+        """Let it pass, until everything has had time to come."""
+        last = max((float(each[-1]) for each in self.times if len(each)), default=0.0)
+        self.simulation.run(last + SETTLE_S if until_s is None else until_s)
+        return [
+            Trace(each.flow, *both)
+            for each, *both in zip(self.sent, self.times, self.heard, strict=True)
+        ]
+
+
+def by_class(flow: Flow) -> TopicPolicy:
+    """Every message counts."""
+    return TopicPolicy(qos=flow.qos)  # type: ignore[arg-type]
+
+
 def run(sent: Sequence[Sent], air: Air, seed: int) -> Run:
-    """All flows, from producer to consumer, until everything has had time to come."""
+    """All flows, from producer to consumer."""
+    experiment = prepare(sent, air, seed)
+    return Run(experiment.finish(), experiment.simulation)
+
+
+def prepare(
+    sent: Sequence[Sent],
+    air: Air,
+    seed: int,
+    policy: Callable[[Flow], TopicPolicy] = by_class,
+) -> Experiment:
+    """The same, before it begins."""
     rng = np.random.default_rng(seed)
     names = [each.flow.name for each in sent]
     registry = make_registry([(name, "std_msgs/msg/UInt8MultiArray") for name in names])
@@ -91,7 +128,7 @@ def run(sent: Sequence[Sent], air: Air, seed: int) -> Run:
         )
         link.set_policies(
             {
-                i: TopicPolicy(qos=each.flow.qos, dst=each.dst)  # type: ignore[arg-type]
+                i: msgspec.structs.replace(policy(each.flow), dst=each.dst)
                 for i, each in enumerate(sent)
             }
         )
@@ -118,17 +155,14 @@ def run(sent: Sequence[Sent], air: Air, seed: int) -> Run:
         seed=seed,
         listen=_note(sent, heard),
     )
-    simulation.run(max(float(each[-1]) for each in times) + SETTLE_S)
-    return Run(
-        [Trace(each.flow, *both) for each, *both in zip(sent, times, heard, strict=True)],
-        simulation,
-    )
+    airtimes = Airtimes(modem, air.pdu_size)
+    return Experiment(sent, times, heard, simulation, airtimes.airtime_s(MCS, 1))
 
 
 def _arrivals(
     node: int,
     sent: Sequence[Sent],
-    times: Sequence[np.ndarray],
+    times: Sequence[Times],
 ) -> Iterator[Arrival]:
     """Messages of one robot, in order of time; each begins with its number."""
     mine = [
@@ -145,7 +179,7 @@ def _arrivals(
 
 def _note(
     sent: Sequence[Sent],
-    heard: Sequence[np.ndarray],
+    heard: Sequence[Times],
 ) -> Callable[[int, Delivered, float], None]:
     def note(node: int, message: Delivered, now: float) -> None:
         if node == sent[message.topic_id].dst:

@@ -145,6 +145,25 @@ class Simulation:
             what(*arguments)
         self.now = until_s
 
+    def call(self, at_s: float, what: Callable[[], None]) -> None:
+        """Have `what` done at `at_s`, before that block's decisions."""
+        self._at(self._block(at_s), _ARRIVE, what)
+
+    def submit(
+        self, node: int, topic_id: int, payload: bytes, overrides: Overrides = AS_CONFIGURED
+    ) -> None:
+        """A message that has just been made."""
+        station = self.stations[node]
+        station.link.submit(topic_id, payload, self.now * station.pace, overrides)
+        station.sent[topic_id] += 1
+        self._look(station, self._block(self.now))
+
+    def silence(self, node: int, until_s: float) -> None:
+        """A radio that sends nothing until then."""
+        station = self.stations[node]
+        station.free_at = max(station.free_at, until_s * station.pace)
+        self._look(station, self._block(until_s))
+
     def _block(self, t: float) -> int:
         """That at whose end `t` is past."""
         return math.ceil(t / self._block_s - ROUNDING)

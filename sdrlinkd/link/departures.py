@@ -208,6 +208,8 @@ class Departures:
             self._lead_s - self.access.pause_s,
             self._notice_s,
             self.access.others_follow,
+            # Beacons are of the default class.
+            self._sender.outbox.waiting_classes() | {Qos.DEFAULT},
         ).least(slot.least)
         if one_s > longest_s:
             return allowance

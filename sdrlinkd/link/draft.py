@@ -1,10 +1,20 @@
 """One PDU while it is being filled."""
 
+from typing import NamedTuple
+
 from sdrlinkd.link.message import Outgoing
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.wire import PduBuilder
 
 NO_DST = -1
+
+
+class BuiltPdu(NamedTuple):
+    """A PDU, the messages it carries an entry of, and the highest class inside."""
+
+    data: bytes
+    carried: list[Outgoing]
+    qos: Qos
 
 
 class Draft(PduBuilder):

@@ -25,8 +25,8 @@ class Outgoing:
 
     __slots__ = (
         "arrived_at", "dst", "entry_id", "expires_at", "fate", "is_compressed", "is_held",
-        "is_whole", "k", "lane", "next_index", "parity", "payload", "priority", "qos", "rests_id",
-        "stamped", "tally", "topic_id", "total", "unconfirmed",
+        "is_whole", "k", "lane", "last_at", "next_index", "parity", "payload", "priority", "qos",
+        "rests_id", "stamped", "tally", "topic_id", "total", "unconfirmed",
     )  # fmt: skip
 
     def __init__(
@@ -57,6 +57,8 @@ class Outgoing:
         self.k = 0
         self.total = 0
         self.next_index = 0
+        self.last_at = 0.0
+        """When the burst with its last fragment so far was to leave."""
         self.rests_id = False
         self.is_held = False
         self.unconfirmed = 0

@@ -49,6 +49,8 @@ class Outbox:
         self._turn = 0
         self.queued = 0
         self.queued_bytes = 0
+        self.relays = False
+        """Whether other robots' PDUs have ever waited here."""
         self.bytes_per_s = INFINITE
         """What the air carries at the moment: bounds in seconds are by this."""
         # Begun and not yet settled; whoever settles a message takes it out.
@@ -171,6 +173,7 @@ class Outbox:
         else:
             lane.waiting.append(message)
         message.lane = lane
+        self.relays = self.relays or message.is_whole
         self._by_class[message.qos][message] = None
         topic = self._by_topic.get(message.topic_id)
         if topic is None:

@@ -8,9 +8,8 @@ Lower classes fill what is left over.
 
 from collections.abc import Sequence
 from random import Random
-from typing import NamedTuple
 
-from sdrlinkd.link.draft import Draft
+from sdrlinkd.link.draft import BuiltPdu, Draft
 from sdrlinkd.link.entry_ids import REST_FACTOR, TopicEntryIds
 from sdrlinkd.link.heads import Heads
 from sdrlinkd.link.message import Lane, Level, Outgoing
@@ -19,6 +18,7 @@ from sdrlinkd.link.params import LinkParams
 from sdrlinkd.link.parity import parity_records
 from sdrlinkd.link.qos import WIRE_BITS, Qos
 from sdrlinkd.link.schedule import ClassesParams
+from sdrlinkd.link.sole import Sole
 from sdrlinkd.link.spare import SpareRecords
 from sdrlinkd.wire import (
     BROADCAST,
@@ -30,7 +30,6 @@ from sdrlinkd.wire import (
     build_stamp,
     equal_payload,
     flags,
-    forwarded,
     fragment_count,
 )
 
@@ -39,14 +38,6 @@ MAX_LANES_PER_PDU = 4 * MAX_ENTRIES
 
 # Less room for one more entry than this, and a STAMP does not even fit behind other records.
 MIN_ROOM_FOR_STAMP = STAMP_SIZE - ENTRY_HEADER_SIZE - 1
-
-
-class BuiltPdu(NamedTuple):
-    """A PDU, the messages it carries an entry of, and the highest class inside."""
-
-    data: bytes
-    carried: list[Outgoing]
-    qos: Qos
 
 
 class Packetizer:
@@ -75,7 +66,8 @@ class Packetizer:
         self._k_shared = min(
             max(equal_payload(params.pdu_size, 2), params.min_fragment), self.k_single
         )
-        self.heads = Heads(outbox, self.entry_ids)
+        self.heads = Heads(outbox, self.entry_ids, reassembly_timeout_s)
+        self._sole = Sole(outbox, self.heads, params, src, has_control)
         self.spare = SpareRecords()
         self._may_wait = params.flush_s > 0
 
@@ -86,18 +78,20 @@ class Packetizer:
     def next_pdu(self, start: float, first: Qos | None = None) -> BuiltPdu | None:
         """The next PDU of a burst whose preamble leaves at `start`, or None.
 
-        The most urgent comes first, or class `first`. Messages found expired are withdrawn on the
-        way; see `heads`.
+        The most urgent comes first, or class `first`. What is in vain is withdrawn; see `heads`.
         """
         levels = self._outbox.levels
         if not levels or (self._may_wait and self._must_wait(start)):
             return None
+        if first is None and (filled := self._sole.filled(levels[0], start, self._seq)):
+            self._seq = (self._seq + 1) & 0xFF
+            return filled
         draft = Draft(self._pdu_size)
         looked_at = 0
         order = levels if first is None else _with_first(levels, first)
         for level in tuple(order):
-            if draft.is_empty and (whole := self._next_whole(level, start)):
-                return whole
+            if draft.is_empty and (relayed := self._sole.relayed(level, start)):
+                return relayed
             looked_at += len(level.lanes)
             if self._may_fit(level, draft.room):
                 self._fill_from(level, draft, start)
@@ -115,7 +109,7 @@ class Packetizer:
 
     def next_src(self, first: Qos | None = None) -> int:
         """Whose PDU goes next, or next of a class, as far as one can tell."""
-        levels = self._outbox.levels
+        levels = self._outbox.levels if self._outbox.relays else []
         for level in [each for each in levels if first is None or each.key[0] == first][:1]:
             head = level.lanes[0].head
             if head is not None and head.is_whole:
@@ -166,23 +160,6 @@ class Packetizer:
                 return True
         return False
 
-    def _next_whole(self, level: Level, start: float) -> BuiltPdu | None:
-        """Another robot's PDU, if it is what goes next."""
-        lane = level.lanes[0]
-        if not (lane.current or lane.waiting[0]).is_whole:
-            return None
-        head = self.heads.live(lane, start)
-        if head is None:
-            return None
-        self._outbox.begin(lane)
-        head.total = head.next_index = 1
-        head.unconfirmed += 1
-        lane.current = None
-        self._outbox.served(lane)
-        held_us = max(0, round(1e6 * (start - head.arrived_at)))
-        data = forwarded(head.payload, held_us, self._has_control)
-        return BuiltPdu(data, [head], head.qos)
-
     def _fill_from(self, level: Level, draft: Draft, start: float) -> None:
         lanes = tuple(level.lanes)
         more = True
@@ -216,6 +193,7 @@ class Packetizer:
         draft.carried.append(head)
         draft.join(head)
         head.next_index += 1
+        head.last_at = start
         head.unconfirmed += 1
         if is_last:
             if needs_stamp:
@@ -251,8 +229,8 @@ class Packetizer:
 
     def _parity_of(self, head: Outgoing) -> list[bytes]:
         """Records, the first one last."""
-        share = self._parity[head.qos] if self._has_control else 0.0
         ids, shape = (head.topic_id, head.entry_id), (head.k, head.total)
+        share = self._parity[head.qos] * self._has_control
         return parity_records(head.payload, *shape, ids, share, self.k_single)[::-1]
 
     def _send_stamp_ahead(
@@ -276,6 +254,7 @@ class Packetizer:
         if not self.entry_ids.take(head, start):
             return False
         head.k = k
+        head.last_at = start
         head.total = fragment_count(len(head.payload), k)
         head.rests_id = head.total > 1
         self._outbox.begin(lane)

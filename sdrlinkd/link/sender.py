@@ -146,11 +146,10 @@ class Sender:
 
     def compose(self, start: float, allowance: Allowance) -> Burst | None:
         """The next burst, whose preamble leaves at `start`; None when nothing is to be sent."""
-        burst = Burst([], [], [])
-        owed, src = list(allowance.owed), NOBODY
-        while (levels := self.outbox.levels) and len(burst.pdus) < MAX_PDUS:
-            n, most = len(burst.pdus), allowance.most[levels[0].key[0]]
-            first, next_src = None, self.packetizer.next_src
+        burst, levels, owed = Burst([], [], []), self.outbox.levels, list(allowance.owed)
+        next_src, src, n = self.packetizer.next_src, NOBODY, 0
+        while levels and n < MAX_PDUS:
+            first, most = None, allowance.most[levels[0].key[0]]
             if owed and n + len(owed) >= most and (n or most < 2):
                 first = owed.pop(0)
             elif owed and not n and next_src(owed[0]) != next_src():
@@ -158,23 +157,25 @@ class Sender:
                 first, owed, most = owed[0], [], 0
             elif n >= most:
                 break
-            if n and next_src(first) != src:
+            if self.outbox.relays:
                 # Who hears a burst knows by its source who may follow.
-                break
-            src = next_src(first)
+                if n and next_src(first) != src:
+                    break
+                src = next_src(first)
             built = self.packetizer.next_pdu(start, first)
             if built is None:
                 break
             burst.pdus.append(built.data)
             burst.carried.append(built.carried)
             burst.classes.append(built.qos)
-        self._settle_expired()
+            n += 1
+        self._settle_withdrawn()
         return self._counted(burst)
 
     def expire(self, now: float) -> None:
         """Drop heads whose lifespan ended while no burst could go."""
         self.packetizer.heads.expire(now)
-        self._settle_expired()
+        self._settle_withdrawn()
 
     def compose_records(self) -> Burst | None:
         """A burst of one PDU for control records that found no spare room."""
@@ -250,9 +251,9 @@ class Sender:
         self.entries_composed += sum(map(len, burst.carried))
         return burst if burst.pdus else None
 
-    def _settle_expired(self) -> None:
-        for message in self.packetizer.heads.take_expired():
-            self._drop(message, "tx_expired")
+    def _settle_withdrawn(self) -> None:
+        for message, reason in self.packetizer.heads.take_withdrawn():
+            self._drop(message, reason)
 
     def _settle_sent(self, message: Outgoing) -> None:
         message.fate = Fate.SENT

@@ -3,7 +3,7 @@
 Bytes in, fields out, and back. The document beside this file says what the bytes mean.
 """
 
-from sdrlinkd.wire.builder import VERSION, PduBuilder
+from sdrlinkd.wire.builder import VERSION, PduBuilder, build_full
 from sdrlinkd.wire.capacity import (
     CRC_SIZE,
     ENTRY_HEADER_SIZE,
@@ -85,6 +85,7 @@ __all__ = [
     "Stamp",
     "Topic",
     "build",
+    "build_full",
     "build_records",
     "build_stamp",
     "entry_budget",

@@ -14,6 +14,7 @@ FLAG_SEALED = 0x01
 
 HEADER = struct.Struct(">BBBBB")
 ENTRY_HEADER = struct.Struct(">BBBH")
+_SOLE = struct.Struct(">9BH")
 
 
 @lru_cache(maxsize=8)
@@ -117,3 +118,18 @@ class PduBuilder:
             nibbles = bytes(padded[i] << 4 | padded[i + 1] for i in range(0, n, 2))
         body = b"".join((header, nibbles, *self._parts)).ljust(self._pdu_size - CRC_SIZE, b"\0")
         return body + binascii.crc_hqx(body, 0).to_bytes(2, "big")
+
+
+def build_full(
+    flags: int, src: int, dst: int, seq: int, hop: int,
+    topic_id: int, entry_id: int, index: int, total: int, payload: bytes,
+) -> bytes:  # fmt: skip
+    """The octets of a PDU with one entry and no PAD, from fields that are in range."""
+    body = b"".join(
+        (
+            _SOLE.pack(flags, src, dst, seq, hop << 4 | 1, topic_id << 4, entry_id, index, total,
+                       len(payload)),
+            payload,
+        )
+    )  # fmt: skip
+    return body + binascii.crc_hqx(body, 0).to_bytes(2, "big")

@@ -1,6 +1,6 @@
 """How many PDUs the next burst may hold, by the class of what goes next."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import NamedTuple
 
 from sdrlinkd.link.qos import Qos
@@ -61,11 +61,12 @@ class Limits:
         ready_s: float,
         notice_s: float,
         is_shared: bool = False,
+        asked: Collection[Qos] = tuple(Qos),
     ) -> Allowance:
         """For a burst that leaves at `start` and is no longer than `longest_s`.
 
         `ready_s` after a message is due, it can leave at the earliest; up to `notice_s` after it
-        has come, nobody knows.
+        has come, nobody knows. Classes that nobody `asked` about get none.
         """
         overrun = SHARED_OVERRUN if is_shared else OVERRUN
         known = start - notice_s
@@ -75,6 +76,9 @@ class Limits:
         self._asked_at = max(start, self._asked_at)
         most, until = [], INFINITE
         for qos in Qos:
+            if qos not in asked:
+                most.append(0)
+                continue
             cap_s = longest_s
             if self._forecasts.is_unforeseen(known, qos, ALIVE_S):
                 cap_s = min(cap_s, max(self._cap_s[qos], airtime_s(1)))

@@ -1,0 +1,105 @@
+"""What a team would use instead, in the same run: two namespaces and a token bucket of 6 Mbit/s."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+
+from benchmarks.pound.flows import Figures, Flow
+from benchmarks.pound.peers import PEERS, unavailable
+from benchmarks.pound.peers.control import control_loop, local_loop
+from benchmarks.pound.peers.ends import PeerError
+from benchmarks.pound.peers.namespaces import NetworkError, available, network
+from benchmarks.pound.peers.runs import outage, run_peer, saturate
+from benchmarks.pound.tables import by_flow
+
+QUICK = ("tcp_nodelay", "udp", "pound_like")
+FIFO = ("tcp_nagle", "tcp_nodelay", "udp", "udp_nod", "nimbro_udp", "nimbro_udp_tcp")
+"""Those without priorities."""
+LOOP_S = 3.0
+
+T = TypeVar("T")
+
+
+class Peers(NamedTuple):
+    """Whom we measure beside, and why not the others."""
+
+    names: list[str]
+    absent: dict[str, str]
+
+
+def find(quick: bool) -> Peers:
+    """All that can run here."""
+    reason = available()
+    if reason:
+        return Peers([], dict.fromkeys(PEERS, reason))
+    wanted = QUICK if quick else tuple(PEERS)
+    absent = {name: why for name in wanted if (why := unavailable(name))}
+    return Peers([name for name in wanted if name not in absent], absent)
+
+
+def tables(
+    peers: Peers, flows: Sequence[Flow], relay: bool, seed: int
+) -> dict[str, dict[str, Figures]]:
+    """By peer and flow: Tables I to IV."""
+
+    def one(name: str) -> dict[str, Figures]:
+        with network(shared=relay, relay=relay) as on:
+            return by_flow(run_peer(name, list(flows), on, seed))
+
+    return _each(peers, f"{'two hops' if relay else 'one hop'}", one)
+
+
+def bandwidths(peers: Peers, sizes: Sequence[int], seconds: float) -> dict[str, dict[int, float]]:
+    """By peer and size, in Mbit/s: Fig. 19."""
+
+    def one(name: str) -> dict[int, float]:
+        with network() as on:
+            return {size: saturate(name, size, seconds, on) for size in sizes}
+
+    return _each(peers, "bandwidth", one)
+
+
+def recoveries(peers: Peers) -> dict[str, float]:
+    """By peer, in s, the later of two flows: Table V."""
+
+    def one(name: str) -> float:
+        with network() as on:
+            return max(each.fresh_s for each in outage(name, on))
+
+    return _each(peers, "outage", one)
+
+
+def loops(peers: Peers, phases: Sequence[float]) -> dict[str, float]:
+    """By peer, the mean RMS difference to the local run in mV: Fig. 21."""
+    local = local_loop(round(LOOP_S / 0.02))
+
+    def one(name: str) -> float:
+        with network(shared=True) as on:
+            runs = [control_loop(name, phase, LOOP_S, over=on) for phase in phases]
+        return float(np.mean([1e3 * np.sqrt(np.mean((run - local) ** 2)) for run in runs]))
+
+    return _each(peers, "control loop", one)
+
+
+def _each(peers: Peers, what: str, one: Callable[[str], T]) -> dict[str, T]:
+    found = {}
+    with _progress(what, len(peers.names)) as advance:
+        for name in peers.names:
+            try:
+                found[name] = one(name)
+            except (PeerError, NetworkError) as error:
+                peers.absent[f"{name}, {what}"] = str(error)
+            advance()
+    return found
+
+
+@contextmanager
+def _progress(what: str, total: int) -> Iterator[Callable[[], None]]:
+    console = Console(stderr=True)
+    with Progress(console=console, disable=not console.is_terminal, transient=True) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda: bar.advance(task)

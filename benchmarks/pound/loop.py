@@ -1,0 +1,137 @@
+"""Fig. 20 and 21: a control loop through our link, while 64 KB go the same way now and then.
+
+Plant at robot 1, controller at robot 2, both directions on one half-duplex channel. The circuit, the
+controller and the local run are those that the peers are measured with.
+"""
+
+import struct
+from collections.abc import Callable
+from random import Random
+
+import numpy as np
+from numpy.typing import NDArray
+
+from backends import AirParams, RadioParams, World
+from benchmarks.pound.ours import CDR, MCS, PDU_SIZE, RATE_HZ, SNR_DB
+from benchmarks.pound.peers.control import (
+    GAIN,
+    LARGE,
+    LARGE_PERIOD_S,
+    PERIOD_S,
+    SETPOINT,
+    SMALL,
+    local_loop,
+    plant,
+)
+from benchmarks.pound.tables import BLOCK_3N_S
+from sdrlinkd.config import ModemParams
+from sdrlinkd.lab import Arrival, Simulation
+from sdrlinkd.link import (
+    AccessParams,
+    ClassesParams,
+    ClassParams,
+    Delivered,
+    Link,
+    LinkParams,
+    Overrides,
+    Qos,
+    QueueParams,
+    ReassemblyParams,
+)
+from sdrlinkd.modem import Airtimes
+from sdrlinkd.wire import make_registry
+
+TOPICS = ("y", "u", "bulk")
+Y, U, BULK = range(3)
+_DOUBLE = struct.Struct("<d")
+CLASSES = ClassesParams(bulk=ClassParams(share=0.05, max_burst_s=0.003))
+FIFO = ClassesParams(latency=ClassParams(), default=ClassParams(), bulk=ClassParams())
+
+
+def rms_vs_local_mv(phase_s: float, seed: int, seconds: float, with_classes: bool = True) -> float:
+    """Root mean square of the difference to the local run, in mV."""
+    ticks = round(seconds / PERIOD_S)
+    error = run_loop(phase_s, seed, ticks, with_classes) - local_loop(ticks)
+    return float(1e3 * np.sqrt(np.mean(error**2)))
+
+
+def run_loop(
+    phase_s: float, seed: int, ticks: int, with_classes: bool = True
+) -> NDArray[np.float64]:
+    """Vc(k) in V `[ticks]`; without classes everything is one FIFO."""
+    a, b = plant()
+    x, vc = np.zeros(2), np.zeros(ticks)
+    heard_u = held_u = 0.0
+    fast = Overrides(qos=Qos.LATENCY if with_classes else Qos.DEFAULT)
+    slow = Overrides(qos=Qos.BULK if with_classes else Qos.DEFAULT)
+
+    def tick(k: int) -> None:
+        nonlocal x, held_u
+        if k:
+            x = a @ x + b * held_u
+        vc[k], held_u = x[0], heard_u
+        simulation.submit(1, Y, _message(float(vc[k])), fast)
+        if k + 1 < ticks:
+            simulation.call((k + 1) * PERIOD_S, lambda: tick(k + 1))
+
+    def listen(node: int, message: Delivered, _: float) -> None:
+        nonlocal heard_u
+        if node == 2 and message.topic_id == Y:
+            simulation.submit(2, U, _message(GAIN * (SETPOINT - _value(message.payload))), fast)
+        elif node == 1 and message.topic_id == U:
+            heard_u = _value(message.payload)
+
+    n_large = int(ticks * PERIOD_S / LARGE_PERIOD_S)
+    large = [
+        Arrival(phase_s + i * LARGE_PERIOD_S, BULK, CDR + bytes(LARGE + 4), slow)
+        for i in range(n_large)
+    ]
+    simulation = _two_robots({2: large}, seed, CLASSES if with_classes else FIFO, listen)
+    simulation.call(0.0, lambda: tick(0))
+    simulation.run(ticks * PERIOD_S)
+    return vc
+
+
+def _two_robots(
+    arrivals: dict[int, list[Arrival]],
+    seed: int,
+    classes: ClassesParams,
+    listen: Callable[[int, Delivered, float], None],
+) -> Simulation:
+    nodes = [1, 2]
+    registry = make_registry([(name, "std_msgs/msg/UInt8MultiArray") for name in TOPICS])
+    modem = ModemParams(rate_hz=RATE_HZ, mcs=MCS, max_burst_s=0.01, block_s=BLOCK_3N_S)
+    air = AirParams(rate_hz=RATE_HZ, block_s=BLOCK_3N_S, snr_db=SNR_DB)
+    return Simulation(
+        air,
+        World(air, {}),
+        {node: RadioParams(full_duplex=False, turnaround_s=1e-4) for node in nodes},
+        {
+            node: Link(
+                LinkParams(pdu_size=PDU_SIZE),
+                QueueParams(),
+                ReassemblyParams(),
+                registry,
+                node,
+                Random(100 * seed + node),
+                classes=classes,
+            )
+            for node in nodes
+        },
+        modem,
+        Airtimes(modem, PDU_SIZE),
+        AccessParams(policy="minislot", nodes=nodes),
+        arrivals,
+        seed=seed,
+        listen=listen,
+    )
+
+
+def _message(value: float) -> bytes:
+    """A float64 in a message of SMALL bytes."""
+    return CDR + _DOUBLE.pack(value) + bytes(SMALL - len(CDR) - _DOUBLE.size)
+
+
+def _value(payload: bytes) -> float:
+    value: float = _DOUBLE.unpack_from(payload, len(CDR))[0]
+    return value

@@ -1,0 +1,60 @@
+"""PDUs that hold one thing alone: another robot's PDU, or a fragment that fills one."""
+
+from sdrlinkd.link.draft import BuiltPdu
+from sdrlinkd.link.heads import Heads
+from sdrlinkd.link.message import Level
+from sdrlinkd.link.outbox import Outbox
+from sdrlinkd.link.params import LinkParams
+from sdrlinkd.link.qos import WIRE_BITS
+from sdrlinkd.wire import build_full, equal_payload, flags, forwarded
+
+
+class Sole:
+    """Where there is nothing to be packed, there is nothing to be weighed."""
+
+    def __init__(
+        self, outbox: Outbox, heads: Heads, params: LinkParams, src: int, has_control: bool
+    ) -> None:
+        self._outbox = outbox
+        self._heads = heads
+        self._k = equal_payload(params.pdu_size, 1)
+        self._hop_limit = params.hop_limit
+        self._src = src
+        self._has_control = has_control
+
+    def relayed(self, level: Level, start: float) -> BuiltPdu | None:
+        """Another robot's PDU, if that is what goes next."""
+        lane = level.lanes[0]
+        if not (lane.current or lane.waiting[0]).is_whole:
+            return None
+        head = self._heads.live(lane, start)
+        if head is None:
+            return None
+        self._outbox.begin(lane)
+        head.total = head.next_index = 1
+        head.unconfirmed += 1
+        lane.current = None
+        self._outbox.served(lane)
+        held_us = max(0, round(1e6 * (start - head.arrived_at)))
+        return BuiltPdu(forwarded(head.payload, held_us, self._has_control), [head], head.qos)
+
+    def filled(self, level: Level, start: float, seq: int) -> BuiltPdu | None:
+        """The next fragment of a message that has the PDU, and its level, to itself."""
+        lane = level.lanes[0]
+        head, k = lane.current, self._k
+        if head is None or head.k != k or len(level.lanes) > 1:
+            return None
+        at = head.next_index * k
+        if len(head.payload) - at <= k or self._heads.live(lane, start) is not head:
+            # The last one is another matter: its age may be due, and there may be room.
+            return None
+        data = build_full(
+            flags(WIRE_BITS[head.qos], head.is_compressed), self._src, head.dst, seq,
+            self._hop_limit, head.topic_id, head.entry_id, head.next_index, head.total,
+            head.payload[at : at + k],
+        )  # fmt: skip
+        head.next_index += 1
+        head.last_at = start
+        head.unconfirmed += 1
+        self._outbox.served(lane)
+        return BuiltPdu(data, [head], head.qos)
