@@ -3,6 +3,7 @@
 from sdrlinkd.link.access import AccessParams, check_access
 from sdrlinkd.link.burst import Burst, Outcome
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity, Sensed
+from sdrlinkd.link.compression import Deflated
 from sdrlinkd.link.inbox import CDR_HEADER_SIZE, Delivered
 from sdrlinkd.link.ledger import RX_PDU_REASONS, RX_REASONS, TX_REASONS
 from sdrlinkd.link.link import Link
@@ -20,16 +21,24 @@ from sdrlinkd.link.qos import (
 from sdrlinkd.link.rate import RateChange, RateParams
 from sdrlinkd.link.relay import Relay, RelayParams
 from sdrlinkd.link.report import link_notices, link_report
-from sdrlinkd.link.schedule import Allowance, ClassesParams, ClassParams
+from sdrlinkd.link.schedule import (
+    OVERRUN,
+    SHARED_OVERRUN,
+    Allowance,
+    ClassesParams,
+    ClassParams,
+)
 from sdrlinkd.link.why import Told
 
 __all__ = [
     "AS_CONFIGURED",
     "CDR_HEADER_SIZE",
     "MAX_PRIORITY",
+    "OVERRUN",
     "QOS_BY_LABEL",
     "RX_PDU_REASONS",
     "RX_REASONS",
+    "SHARED_OVERRUN",
     "TX_REASONS",
     "AccessParams",
     "Allowance",
@@ -37,6 +46,7 @@ __all__ = [
     "CarrierTraits",
     "ClassParams",
     "ClassesParams",
+    "Deflated",
     "Delivered",
     "Link",
     "LinkParams",

@@ -131,12 +131,25 @@ class Departures:
             # Clocks do not wait for spare room.
             overdue = True
         if overdue and may_tell:
-            burst = sender.compose_records()
+            burst = self._records_behind(sender.compose(start, allowance.above(Qos.DEFAULT)))
         else:
             burst = sender.compose(start, allowance)
         if burst is None and spare and may_tell:
             burst = sender.compose_records()
         return burst
+
+    def _records_behind(self, urgent: Burst | None) -> Burst | None:
+        """Records in a PDU of their own, behind what is more urgent than they are."""
+        if urgent is not None and self._relayed_src(urgent) is not None:
+            return urgent
+        records = self._sender.compose_records()
+        if urgent is None or records is None:
+            return urgent or records
+        return urgent._replace(
+            pdus=urgent.pdus + records.pdus,
+            carried=urgent.carried + records.carried,
+            classes=urgent.classes + records.classes,
+        )
 
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
         """What the radio says became of a burst."""

@@ -37,6 +37,11 @@ class Allowance(NamedTuple):
         """The same for all."""
         return cls((n_pdus,) * len(Qos))
 
+    def above(self, qos: Qos) -> "Allowance":
+        """For classes more urgent than `qos` alone, with room for one PDU behind them."""
+        most = (max(0, n - 1) if each < qos else 0 for each, n in zip(Qos, self.most, strict=True))
+        return Allowance(tuple(most))
+
     def least(self, least: Qos) -> "Allowance":
         """Classes less urgent than `least` may begin a burst, but not join one."""
         most = (n if qos <= least else min(n, 1) for qos, n in zip(Qos, self.most, strict=True))

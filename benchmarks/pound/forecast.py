@@ -1,0 +1,45 @@
+"""What `sdrlinkctl plan` says, against what happens."""
+
+import numpy as np
+
+from benchmarks.pound.ours import MAX_BURST_S, MCS, PDU_SIZE, RATE_HZ, Air, Run
+from sdrlinkd.config import ModemParams
+from sdrlinkd.link import Qos, TopicPolicy
+from sdrlinkd.modem import Airtimes
+from sdrlinkd.plan import Load, Plan, Setting, make_plan
+
+LEARNING = 10
+"""Messages of a topic until its beat is known."""
+CDR_OVERHEAD = 8
+
+
+def plan_of(run: Run, air: Air) -> Plan:
+    """For the flows of an experiment on an air of our own."""
+    modem = ModemParams(rate_hz=RATE_HZ, mcs=MCS, max_burst_s=MAX_BURST_S)
+    flows = [trace.flow for trace in run.traces]
+    loads = [
+        Load(i, flow.name, 1 / flow.period_s, flow.size + CDR_OVERHEAD, flow.size + CDR_OVERHEAD)
+        for i, flow in enumerate(flows)
+    ]
+    setting = Setting(
+        Airtimes(modem, PDU_SIZE), PDU_SIZE, MCS, air.max_burst_s, air.classes, 1, air.policy,
+        gap_s=5 / RATE_HZ, react_s=air.block_s, pause_s=dict.fromkeys(Qos, 0.0),
+    )  # fmt: skip
+    policies = {
+        i: TopicPolicy(qos=flow.qos)  # type: ignore[arg-type]
+        for i, flow in enumerate(flows)
+    }
+    return make_plan(loads, policies, setting)
+
+
+def errors_pct(run: Run, air: Air) -> dict[str, float]:
+    """Of each predicted share of the air, and each worst latency."""
+    plan, shares = plan_of(run, air), run.simulation.stations[1].link.departures.shares
+    found = {}
+    for topic, trace in zip(plan.topics, run.traces, strict=True):
+        seconds = trace.flow.count * trace.flow.period_s
+        used = shares.used_s[next(q for q in Qos if q.label == topic.qos)] / seconds
+        worst_s = float(np.nanmax((trace.heard_at - trace.sent_at)[LEARNING:]))
+        found[f"{topic.name}_air"] = 100 * (topic.air / used - 1)
+        found[f"{topic.name}_worst"] = 100 * (topic.worst_s / worst_s - 1)
+    return found

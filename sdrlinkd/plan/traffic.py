@@ -1,0 +1,78 @@
+"""What producers will send: as told, or as a recording shows."""
+
+import math
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+from sdrlinkd.errors import UserError
+from sdrlinkd.link import Deflated, TopicPolicy
+from sdrlinkd.wire import Registry
+
+_LOAD = re.compile(r"/?([\w/]+):([0-9.]+)(?:hz)?:([0-9.]+)(b|kb|kib|mb|mib)?", re.IGNORECASE)
+_UNITS = {"b": 1, "kb": 1000, "kib": 1024, "mb": 1000_000, "mib": 1 << 20}
+SAMPLES = 50
+"""Messages of a recording that are compressed to see what they become."""
+
+
+class Load(NamedTuple):
+    """One topic: messages a second, and bytes of a typical and of the largest, as on the air."""
+
+    topic_id: int
+    name: str
+    rate_hz: float
+    size: float
+    largest: float
+
+
+def parse_load(text: str, registry: Registry) -> Load:
+    """`scan:50:1KB`: topic, messages a second, bytes. Raises UserError."""
+    found = _LOAD.fullmatch(text.replace(" ", ""))
+    topic = registry.by_name(found[1]) if found else None
+    if found is None or float(found[2]) <= 0:
+        raise UserError(
+            f"--topic: got {text}; allowed: NAME:RATE:SIZE, such as scan:50:1KB (50 a second, 1 KB "
+            "each)"
+        )
+    if topic is None:
+        raise UserError(f"--topic: {found[1]}: unknown topic; {registry.suggest(found[1])}")
+    size = float(found[3]) * _UNITS[(found[4] or "b").lower()]
+    return Load(topic.id, topic.name, float(found[2]), size, size)
+
+
+def loads_from_bag(
+    messages: Iterable[tuple[str, float, bytes]],
+    registry: Registry,
+    policies: Mapping[int, TopicPolicy],
+) -> list[Load]:
+    """From (topic, time in s, payload) of a recording; compression as the policies say."""
+    times: dict[int, list[float]] = defaultdict(list)
+    sizes: dict[int, list[int]] = defaultdict(list)
+    for name, at, payload in messages:
+        topic = registry.by_name(name) or registry.by_name(name.rsplit("/", 1)[-1])
+        if topic is None:
+            continue
+        policy = policies.get(topic.id, TopicPolicy())
+        times[topic.id].append(at)
+        size = len(payload)
+        if policy.compress == "zstd" and len(sizes[topic.id]) < SAMPLES:
+            size = len(Deflated(None).shrink(payload) or payload)
+        sizes[topic.id].append(size)
+    loads = []
+    for topic_id, came in sorted(times.items()):
+        span = max(came) - min(came)
+        shrunk = policies.get(topic_id, TopicPolicy()).compress == "zstd"
+        known = sizes[topic_id][:SAMPLES] if shrunk else sizes[topic_id]
+        rate = (len(came) - 1) / span if span > 0 else 1.0
+        mean = math.fsum(known) / len(known)
+        loads.append(Load(topic_id, registry.topics[topic_id].name, rate, mean, max(known)))
+    return loads
+
+
+def after_policy(load: Load, policy: TopicPolicy) -> Load:
+    """What is left of it when throttled and decimated."""
+    rate_hz = load.rate_hz / policy.decimate
+    if policy.period_s:
+        rate_hz = min(rate_hz, 1 / policy.period_s)
+    return load._replace(rate_hz=rate_hz)
