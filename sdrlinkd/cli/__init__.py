@@ -1,18 +1,22 @@
 """sdrlinkctl."""
 
-from sdrlinkd.cli import bag, demo, lab, messages, pdu, phy, policy, status, wifi
+from sdrlinkd.cli import (
+    bag,
+    bench,
+    demo,
+    dictionary,
+    lab,
+    messages,
+    pdu,
+    phy,
+    plan,
+    policy,
+    status,
+    wifi,
+)
 from sdrlinkd.cli.app import main, run
 
 __all__ = [
-    "bag",
-    "demo",
-    "lab",
-    "main",
-    "messages",
-    "pdu",
-    "phy",
-    "policy",
-    "run",
-    "status",
-    "wifi",
-]
+    "bag", "bench", "demo", "dictionary", "lab", "main", "messages", "pdu", "phy", "plan",
+    "policy", "run", "status", "wifi",
+]  # fmt: skip

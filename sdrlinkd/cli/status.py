@@ -47,9 +47,15 @@ def status(
                 live.update(render.status(ask_status(control)), refresh=True)
 
 
-@app.command()
-def topics(runtime_dir: RuntimeDir = None, as_json: AsJson = False) -> None:
+topics_app = typer.Typer(help="Topics of the registry, and those heard from other robots.")
+app.add_typer(topics_app, name="topics")
+
+
+@topics_app.callback(invoke_without_command=True)
+def topics(context: typer.Context, runtime_dir: RuntimeDir = None, as_json: AsJson = False) -> None:
     """Topics of the registry, and those heard from other robots."""
+    if context.invoked_subcommand:
+        return
     with connect(runtime_dir) as control:
         link = ask_status(control).link
     if as_json:

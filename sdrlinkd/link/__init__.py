@@ -3,7 +3,7 @@
 from sdrlinkd.link.access import AccessParams, check_access
 from sdrlinkd.link.burst import Burst, Outcome
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity, Sensed
-from sdrlinkd.link.compression import Deflated
+from sdrlinkd.link.compression import Deflated, train_dictionary
 from sdrlinkd.link.inbox import CDR_HEADER_SIZE, Delivered
 from sdrlinkd.link.ledger import RX_PDU_REASONS, RX_REASONS, TX_REASONS
 from sdrlinkd.link.link import Link
@@ -68,4 +68,5 @@ __all__ = [
     "check_access",
     "link_notices",
     "link_report",
+    "train_dictionary",
 ]

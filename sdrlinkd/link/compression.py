@@ -26,6 +26,14 @@ class Deflated:
         return frame if len(frame) < len(payload) else None
 
 
+def train_dictionary(samples: list[bytes], size: int) -> bytes:
+    """A dictionary of at most `size` bytes. Raises ValueError where there is too little."""
+    try:
+        return zstandard.train_dictionary(size, samples).as_bytes()
+    except zstandard.ZstdError as error:
+        raise ValueError(str(error)) from None
+
+
 class Inflated:
     """The way back: nothing grows beyond what it may, whatever the frame says."""
 

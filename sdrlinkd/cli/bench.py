@@ -1,0 +1,27 @@
+"""`bench`: the project's measurements, where they are at hand."""
+
+import importlib.util
+import subprocess
+import sys
+from typing import Annotated
+
+import typer
+
+from sdrlinkd.cli.app import app
+from sdrlinkd.errors import UserError
+
+NAMES = ("pound", "access", "bus", "ether", "modem_path", "phy_per", "phy_speed")
+
+
+@app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+def bench(
+    context: typer.Context,
+    name: Annotated[str, typer.Argument(help="; ".join(NAMES), autocompletion=lambda: NAMES)],
+) -> None:
+    """Measure beside peers: `bench pound --quick`; further options are the benchmark's own."""
+    if name not in NAMES:
+        raise UserError(f"bench: got {name}; allowed: {', '.join(NAMES)}")
+    if importlib.util.find_spec("benchmarks") is None:
+        raise UserError("the benchmarks are in the source tree only; run this in a checkout of it")
+    done = subprocess.run([sys.executable, "-m", f"benchmarks.{name}", *context.args], check=False)  # noqa: S603
+    raise typer.Exit(done.returncode)

@@ -1,0 +1,52 @@
+"""`topics train-dict`: a zstd dictionary for a topic's small messages, from a recording."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from zstandard import ZstdCompressionDict
+
+from sdrlinkd.adapters import open_bag
+from sdrlinkd.cli.status import topics_app
+from sdrlinkd.cli.units import octets
+from sdrlinkd.errors import UserError
+from sdrlinkd.link import Deflated, train_dictionary
+
+
+@topics_app.command("train-dict")
+def train_dict(
+    bag: Annotated[Path, typer.Argument(help="rosbag2 folder, .mcap, .db3 or .bag")],
+    topic: Annotated[str, typer.Argument(help="As it is called in the recording.")],
+    out: Annotated[Path, typer.Option(help="File to write.")] = Path("topic.zdict"),
+    size: Annotated[str, typer.Option(help="Bytes of the dictionary.")] = "8k",
+) -> None:
+    """Train on every other message of a recording, and try it on the rest."""
+    opened = open_bag(bag)
+    try:
+        payloads = [each.cdr for each in opened.messages() if each.topic == topic]
+        names = [each.name for each in opened.topics()]
+    finally:
+        opened.close()
+    if not payloads:
+        raise UserError(f"{topic}: not in {bag}; allowed: {', '.join(names)}")
+    try:
+        made = train_dictionary(payloads[::2], octets(size, "--size"))
+    except ValueError as error:
+        raise UserError(
+            f"{topic}: no dictionary from {len(payloads)} messages ({error}); allowed: a longer "
+            "recording, or a smaller --size"
+        ) from None
+    rest = payloads[1::2] or payloads
+    raw = sum(map(len, rest))
+    with_it, without = (_total(Deflated(each), rest) for each in (ZstdCompressionDict(made), None))
+    out.write_bytes(made)
+    typer.echo(
+        f"{out}: {len(made)} B from {len(payloads[::2])} messages; {len(rest)} others take "
+        f"{100 * with_it / raw:.0f} % of their size with it, {100 * without / raw:.0f} % with zstd "
+        "alone"
+    )
+    typer.echo(f'use it with: [topic.NAME] compress = "zstd", dictionary = "{out}", at all robots')
+
+
+def _total(deflated: Deflated, payloads: list[bytes]) -> int:
+    return sum(len(deflated.shrink(each) or each) for each in payloads)

@@ -1,0 +1,80 @@
+"""`plan`: whether the traffic fits the air, and what to change."""
+
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from sdrlinkd.adapters import open_bag
+from sdrlinkd.cli.app import AsJson, app
+from sdrlinkd.cli.units import seconds
+from sdrlinkd.config import Setup, load_config, make_setup
+from sdrlinkd.errors import UserError
+from sdrlinkd.plan import Load, Plan, loads_from_bag, make_plan, parse_load, setting_of
+
+
+@app.command()
+def plan(
+    config: Annotated[Path, typer.Option("--config", help="The daemon's configuration.")],
+    topic: Annotated[
+        list[str] | None, typer.Option(help="NAME:RATE:SIZE, such as scan:50:1KB; repeatable.")
+    ] = None,
+    bag: Annotated[Path | None, typer.Option(help="Rates and sizes from a recording.")] = None,
+    robots: Annotated[int, typer.Option(min=1, max=255, help="So many send the same.")] = 1,
+    turnaround: Annotated[
+        str, typer.Option(help="Of the radio, from hearing to sending.")
+    ] = "0.1ms",
+    as_json: AsJson = False,
+) -> None:
+    """Airtime and worst-case latency by topic; exit code 1 when the air cannot carry it."""
+    setup = make_setup(load_config(config), config.parent, str(config))
+    loads = [parse_load(text, setup.registry) for text in topic or []]
+    if bag is not None:
+        told = {load.topic_id for load in loads}
+        loads += [load for load in _from_bag(bag, setup) if load.topic_id not in told]
+    if not loads:
+        raise UserError("nothing to plan; name --bag FILE, or topics with --topic NAME:RATE:SIZE")
+    setting = setting_of(setup.config, robots, seconds(turnaround, "--turnaround"))
+    made = make_plan(sorted(loads), setup.policies, setting)
+    if as_json:
+        topics = [{**each._asdict(), "is_late": each.is_late} for each in made.topics]
+        classes = [each._asdict() for each in made.classes]
+        text = {**made._asdict(), "topics": topics, "classes": classes}
+        typer.echo(msgspec.json.encode(text).decode())
+    else:
+        for line in lines(made, robots):
+            Console().print(line, highlight=False)
+    if not made.is_feasible:
+        raise typer.Exit(1)
+
+
+def lines(made: Plan, robots: int) -> list[Table | str]:
+    """What a person reads."""
+    table = Table(title="plan", title_justify="left")
+    for column in ("topic", "class", "Hz", "bytes", "PDUs", "Mbit/s", "air", "worst case"):
+        table.add_column(column, justify="left" if column in ("topic", "class") else "right")
+    for each in made.topics:
+        worst = f"{1e3 * each.worst_s:.1f} ms" if each.worst_s < float("inf") else "never ends"
+        table.add_row(
+            each.name, each.qos, f"{each.rate_hz:.3g}", f"{each.size:.0f}", str(each.pdus),
+            f"{each.rate_mbps:.3g}", f"{100 * each.air:.2g} %", worst,
+            style="bold red" if each.is_late or each.worst_s == float("inf") else "",
+        )  # fmt: skip
+    for qos in made.classes:
+        if qos.air:
+            table.add_row("", qos.qos, "", "", "", "", f"{100 * qos.air:.2g} %", "", style="dim")
+    all_of = "" if robots == 1 else f" by {robots} robots"
+    verdict = "feasible" if made.is_feasible else "NOT feasible"
+    return [table, f"{100 * made.air:.3g} % of the air{all_of}: {verdict}", *made.advice]
+
+
+def _from_bag(path: Path, setup: Setup) -> list[Load]:
+    opened = open_bag(path)
+    try:
+        messages = ((each.topic, 1e-9 * each.time_ns, each.cdr) for each in opened.messages())
+        return loads_from_bag(messages, setup.registry, setup.policies)
+    finally:
+        opened.close()

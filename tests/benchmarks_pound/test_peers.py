@@ -1,0 +1,193 @@
+"""The peers of the Pound benchmark: their framing, the control loop, and short runs."""
+
+import contextlib
+import os
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.signal import cont2discrete
+
+from benchmarks.pound.flows import Flow, Trace, figures
+from benchmarks.pound.peers import PEERS, namespaces, unavailable
+from benchmarks.pound.peers.control import local_loop, plant
+from benchmarks.pound.peers.environments import ROOT
+from benchmarks.pound.peers.job import Job, Loop, Topic
+from benchmarks.pound.peers.runs import Recovery, recovery, run_peer
+from benchmarks.pound.peers.sockets import Sockets
+from benchmarks.pound.peers.wire import (
+    HEAD,
+    NIMBRO_DATAGRAM,
+    UDPROS_DATAGRAM,
+    NimbroJoin,
+    NimbroTcpJoin,
+    PoundJoin,
+    TcpRosJoin,
+    UdpRosJoin,
+    cut_nimbro,
+    cut_nimbro_tcp,
+    cut_pound,
+    cut_tcpros,
+    cut_udpros,
+)
+
+NO_NETWORK = namespaces.available()
+in_namespaces = pytest.mark.skipif(NO_NETWORK is not None, reason=NO_NETWORK or "")
+
+messages = st.integers(8, 20_000).map(lambda size: bytes(i % 251 for i in range(size)))
+
+
+def joined(join, pieces):
+    return [message for piece in pieces for message in join.feed(piece)]
+
+
+@given(st.lists(messages, max_size=3), st.integers(1, 3000))
+def test_tcp_streams_come_back_in_any_pieces(sent, size):
+    for cut, join in (
+        (cut_tcpros, TcpRosJoin()),
+        (lambda message: cut_nimbro_tcp(message, b"image"), NimbroTcpJoin()),
+    ):
+        stream = b"".join(map(cut, sent))
+        pieces = [stream[at : at + size] for at in range(0, len(stream), size)]
+        assert joined(join, pieces) == sent
+
+
+@given(messages)
+def test_datagrams_come_back_and_keep_to_their_size(message):
+    for datagrams, join, largest in (
+        (cut_udpros(message, 3, 9), UdpRosJoin(), UDPROS_DATAGRAM),
+        (cut_nimbro(message, 9, b"image"), NimbroJoin(), NIMBRO_DATAGRAM),
+        (cut_pound(message, 9, 1, 2), PoundJoin(), 1436),
+    ):
+        assert max(map(len, datagrams)) <= largest
+        assert joined(join, datagrams) == [message]
+
+
+def test_udpros_loses_a_message_with_a_block_and_takes_the_next():
+    first, second = (cut_udpros(bytes([n]) * 9000, 1, n) for n in (1, 2))
+    assert joined(UdpRosJoin(), [*first[:2], *first[3:], *second]) == [bytes([2]) * 9000]
+
+
+def test_pound_and_nimbro_do_not_mind_the_order():
+    message = bytes(range(250)) * 40
+    for datagrams, join in (
+        (cut_pound(message, 1, 1, 2), PoundJoin()),
+        (cut_nimbro(message, 1, b"image"), NimbroJoin()),
+    ):
+        assert joined(join, reversed(datagrams)) == [message]
+
+
+def test_joins_forget_what_never_becomes_whole():
+    join = PoundJoin()
+    for number in range(100):
+        assert not joined(join, cut_pound(bytes(3000), number, 1, 2)[:2])
+    assert len(join.under_way) <= 32
+
+
+def test_a_job_comes_back_from_its_line():
+    loop = Loop(0.02, 5, [[1.0, 0.0], [0.0, 1.0]], [0.0, 1.0], 1.0, 1.0)
+    topics = [Topic(0, "y", 60, "latency", "a"), Topic(1, "u", 60, "latency", "b")]
+    job = Job("udp", "a", "10.0.0.1", "10.0.0.2", 6e6, topics, [(0.5, 0, 1)], 2.0, loop)
+    for one in (job, replace(job, loop=None)):
+        assert Job.from_json(one.to_json()) == one
+        assert "\n" not in one.to_json()
+    assert (job.out, job.into) == (topics[:1], topics[1:])
+
+
+def test_an_endpoint_needs_the_standard_library_only():
+    """It is run by interpreters that have nothing of ours."""
+    code = "import benchmarks.pound.peers.endpoint"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    subprocess.run([sys.executable, "-S", "-c", code], check=True, env=environment)
+
+
+def test_pound_sends_what_is_urgent_between_the_parts_of_what_is_not():
+    topics = [Topic(0, "image", 65536, "bulk", "a"), Topic(1, "laser", 1024, "latency", "a")]
+    heard = []
+    a = Sockets(
+        Job("pound_like", "a", "127.0.0.1", "127.0.0.2", 60e6, topics, [], 1.0),
+        PEERS["pound_like"].carriers,
+        lambda message, at: None,
+    )
+    b = Sockets(
+        Job("pound_like", "b", "127.0.0.2", "127.0.0.1", 60e6, topics, [], 1.0),
+        PEERS["pound_like"].carriers,
+        lambda message, at: heard.append(HEAD.unpack_from(message)[0]),
+    )
+    for topic in topics:
+        a.send(topic.number, HEAD.pack(topic.number, 0) + bytes(topic.size - HEAD.size))
+    deadline = time.monotonic() + 5
+    while len(heard) < 2 and time.monotonic() < deadline:
+        a.run(time.monotonic() + 0.002)
+        b.run(time.monotonic())
+    a.close()
+    b.close()
+    assert heard == [1, 0]
+
+
+def test_the_plant_is_what_scipy_makes_of_it():
+    continuous = ([[0.0, 1], [-100, -10]], [[0.0], [100]], [[1.0, 0]], [[0.0]])
+    a, b, *_ = cont2discrete([np.array(matrix) for matrix in continuous], 0.02)
+    ours_a, ours_b = plant()
+    np.testing.assert_allclose(ours_a, a, atol=1e-12)
+    np.testing.assert_allclose(ours_b, b[:, 0], atol=1e-12)
+
+
+def test_the_local_loop_settles_at_half_a_volt_and_overshoots():
+    over, under, _ = cont2discrete(([1.0], [0.01, 0.1, 1.0]), 0.02)
+    over = np.ravel(over)
+    vc = local_loop(300)
+    y, u = np.zeros(300), np.zeros(300)
+    for k in range(300):
+        y[k] = sum(over[i] * u[k - i] - under[i] * y[k - i] for i in (1, 2) if k >= i)
+        u[k] = 1 - y[k - 1] if k else 0.0
+    np.testing.assert_allclose(vc, y, atol=1e-9)
+    assert vc[-1] == pytest.approx(0.5, abs=1e-6)
+    assert vc.max() / 0.5 - 1 == pytest.approx(0.45, abs=0.01)
+
+
+def test_recovery_is_when_messages_begin_to_stay_fresh():
+    flow = Flow("x", 1024, 0.02, 500)
+    sent = np.arange(500) * 0.02
+    heard = sent + 0.002
+    heard[(sent > 2) & (sent < 7)] = np.nan
+    backlog = (sent >= 7) & (sent < 8)
+    heard[backlog] = 8.0
+    heard[420] += 0.05
+    first_s, fresh_s = recovery(Trace(flow, sent, heard), 7.0)
+    assert (first_s, fresh_s) == (pytest.approx(1.0), pytest.approx(1.002))
+    never = Trace(flow, sent, np.full(500, np.nan))
+    assert np.isnan(Recovery(*recovery(never, 7.0)).first_s)
+
+
+def test_a_peer_that_is_not_there_has_a_reason():
+    assert "no peer is called 'telepathy'" in unavailable("telepathy")
+
+
+@in_namespaces
+@pytest.mark.parametrize("peer", ["tcp_nodelay", "pound_like"])
+def test_a_second_of_laser_and_image(peer):
+    flows = [Flow("laser", 1024, 0.02, 50, "latency"), Flow("image", 65536, 0.15, 6, "bulk")]
+    with namespaces.network() as network:
+        laser, image = run_peer(peer, flows, network, 1, drain_s=0.5)
+        rooms = [network.a.namespace, network.b.namespace]
+    assert figures(laser).mdr_pct == 100
+    assert np.all(laser.heard_at > laser.sent_at)
+    # The channel's own time for 64 KB; no machine is fast enough to do it in less.
+    assert np.nanmin(image.heard_at - image.sent_at) > 0.08
+    listed = subprocess.run(["ip", "netns", "list"], capture_output=True, text=True).stdout
+    assert not [room for room in rooms if room in listed]
+
+
+@in_namespaces
+def test_a_network_goes_away_with_an_exception():
+    with contextlib.suppress(KeyboardInterrupt), namespaces.network(relay=True) as network:
+        raise KeyboardInterrupt
+    listed = subprocess.run(["ip", "netns", "list"], capture_output=True, text=True).stdout
+    assert network.hops == 2
+    assert network.relay.namespace not in listed
