@@ -186,5 +186,4 @@ if __name__ == "__main__":
         "--recordings", type=Path, metavar="DIR",
         help="also look for PDUs in recordings of others: .cf32, .i16, .u8",
     )  # fmt: skip
-    given, _ = own.parse_known_args()
-    sys.exit(main("phy_per", partial(measure, recordings=given.recordings), own))
+    sys.exit(main("phy_per", measure, own))

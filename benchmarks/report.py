@@ -40,12 +40,12 @@ class Row:
 
 def main(
     benchmark: str,
-    measure: Callable[[int, bool], list[Row]],
+    measure: Callable[..., list[Row]],
     own: argparse.ArgumentParser | None = None,
 ) -> int:
     """Parse the options all benchmarks share, measure, print; 1 when a row misses its target.
 
-    `own` has those that the benchmark itself has parsed, for the help.
+    `measure` gets seed and quick, and by name the options of `own`.
     """
     parser = argparse.ArgumentParser(
         prog=f"python -m benchmarks.{benchmark}", parents=[own] if own else []
@@ -54,7 +54,8 @@ def main(
     parser.add_argument("--quick", action="store_true", help="fewer trials, the same rows")
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    rows = measure(options.seed, options.quick)
+    ours = {key: getattr(options, key) for key in vars(own.parse_args([]))} if own else {}
+    rows = measure(options.seed, options.quick, **ours)
     machine = f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
     if options.json:
         report = {

@@ -15,6 +15,7 @@ FRESH_S = 0.01
 FRESH_IMAGE_S = 0.12
 BULK_BYTES = 10_000_000
 URGENT_BYTES = 16
+SLACK_RT_MS = 1.0
 _KINDS = {"laser": (1024, 0.02, "latency"), "image": (65536, 0.15, "bulk")}
 
 

@@ -1,7 +1,7 @@
 """Fig. 20 and 21: a control loop through our link, while 64 KB go the same way now and then.
 
-Plant at robot 1, controller at robot 2, both directions on one half-duplex channel. The circuit, the
-controller and the local run are those that the peers are measured with.
+Plant at robot 1, controller at robot 2, both directions on one half-duplex channel. The circuit,
+the controller and the local run are those that the peers are measured with.
 """
 
 import struct

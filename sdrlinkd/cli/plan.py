@@ -46,7 +46,7 @@ def plan(
         typer.echo(msgspec.json.encode(text).decode())
     else:
         for line in lines(made, robots):
-            Console().print(line, highlight=False)
+            Console(width=100).print(line, highlight=False)
     if not made.is_feasible:
         raise typer.Exit(1)
 
@@ -60,12 +60,12 @@ def lines(made: Plan, robots: int) -> list[Table | str]:
         worst = f"{1e3 * each.worst_s:.1f} ms" if each.worst_s < float("inf") else "never ends"
         table.add_row(
             each.name, each.qos, f"{each.rate_hz:.3g}", f"{each.size:.0f}", str(each.pdus),
-            f"{each.rate_mbps:.3g}", f"{100 * each.air:.2g} %", worst,
+            f"{each.rate_mbps:.3g}", f"{100 * each.air:.1f} %", worst,
             style="bold red" if each.is_late or each.worst_s == float("inf") else "",
         )  # fmt: skip
     for qos in made.classes:
         if qos.air:
-            table.add_row("", qos.qos, "", "", "", "", f"{100 * qos.air:.2g} %", "", style="dim")
+            table.add_row("", qos.qos, "", "", "", "", f"{100 * qos.air:.1f} %", "", style="dim")
     all_of = "" if robots == 1 else f" by {robots} robots"
     verdict = "feasible" if made.is_feasible else "NOT feasible"
     return [table, f"{100 * made.air:.3g} % of the air{all_of}: {verdict}", *made.advice]

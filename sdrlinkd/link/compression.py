@@ -1,6 +1,6 @@
 """Messages as zstd frames, and back within bounds."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import zstandard
 
@@ -26,10 +26,10 @@ class Deflated:
         return frame if len(frame) < len(payload) else None
 
 
-def train_dictionary(samples: list[bytes], size: int) -> bytes:
+def train_dictionary(samples: Iterable[bytes], size: int) -> bytes:
     """A dictionary of at most `size` bytes. Raises ValueError where there is too little."""
     try:
-        return zstandard.train_dictionary(size, samples).as_bytes()
+        return zstandard.train_dictionary(size, [*samples]).as_bytes()
     except zstandard.ZstdError as error:
         raise ValueError(str(error)) from None
 

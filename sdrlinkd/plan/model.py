@@ -157,6 +157,9 @@ def _worst_s(task: _Task, tasks: Sequence[_Task], setting: Setting) -> float:
         overrun = SHARED_OVERRUN if is_shared else OVERRUN
         foreseen = task.qos < max(other.qos for other in lower)
         blocked_s = overrun * each_s if foreseen else one_s
+    demand = sum(other.cost_s / other.period_s for other in (task, *before))
+    if demand * (setting.nodes if is_shared else 1) > setting.share:
+        return FOREVER
     others = 0
     if is_shared and setting.nodes > 1:
         others = setting.nodes - 1

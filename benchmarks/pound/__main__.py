@@ -1,0 +1,55 @@
+"""The Pound paper's experiments: `python -m benchmarks.pound [--quick] [--json] [--no-peers]`."""
+
+import argparse
+import sys
+
+import numpy as np
+from rich.console import Console
+
+from benchmarks.pound import beside, limits, pictures, realtime, rows, tables
+from benchmarks.report import Row, main
+
+PHASES, QUICK_PHASES = 10, 2
+
+
+def measure(seed: int, quick: bool, no_peers: bool = False, figures: bool = False) -> list[Row]:
+    """All rows."""
+    peers = beside.Peers([], {}) if no_peers else beside.find(quick)
+    n = tables.LASERS // 5 if quick else tables.LASERS
+    flows = [
+        [tables.flows(hops, tables.EXACT, seed, quick)[0]._replace(count=n),
+         tables.flows(hops, tables.EXACT, seed, quick)[1]]
+        for hops in (1, 2)
+    ]  # fmt: skip
+    rng = np.random.default_rng(seed)
+    # Not at the beat of the loop: there, who comes first is a matter of luck.
+    phases = list(rng.uniform(0.002, 0.018, QUICK_PHASES if quick else PHASES))
+    phases = [phase + 0.02 * i for i, phase in enumerate(phases)]
+    sizes = (limits.SIZES[-1],) if quick else limits.SIZES
+    one_hop = beside.tables(peers, flows[0], False, seed)
+    two_hops = beside.tables(peers, flows[1], True, seed)
+    mbps = beside.bandwidths(peers, sizes, 2.0 if quick else 4.0)
+    loops = beside.loops(peers, phases)
+    made = [
+        *rows.two_nodes(seed, quick, one_hop),
+        *rows.three_nodes(seed, quick, two_hops),
+        *rows.bandwidth(seed, quick, mbps),
+        *rows.outage(seed, quick, {} if quick else beside.recoveries(peers)),
+        *rows.control_loop(seed, phases, loops),
+        *rows.urgent(seed, quick),
+        *rows.costs(seed, quick),
+        *rows.plan(seed, quick),
+        *realtime.rows(seed, quick),
+    ]
+    if figures:
+        pictures.draw(seed, one_hop, mbps, loops, phases[len(phases) // 2])
+    for name, reason in peers.absent.items():
+        Console(stderr=True).print(f"not measured: {name}: {reason}", highlight=False)
+    return made
+
+
+if __name__ == "__main__":
+    own = argparse.ArgumentParser(add_help=False)
+    own.add_argument("--no-peers", action="store_true", help="only our own rows")
+    own.add_argument("--figures", action="store_true", help="draw docs/figures/pound_*.png")
+    sys.exit(main("pound", measure, own))
