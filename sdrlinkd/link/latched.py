@@ -42,7 +42,7 @@ class Latched:
     def __init__(self) -> None:
         self._topics: dict[int, _Topic] = {}
         self._credit_s = 0.0
-        self._looked_at = float("-inf")
+        self._looked_at: float | None = None
         self._came_at = float("-inf")
 
     def keep(self, topic_id: int, kept: Kept) -> None:
@@ -61,8 +61,8 @@ class Latched:
 
     def due(self, now: float, bytes_per_s: float) -> Iterator[Offer]:
         """What may be sent again at `now`, on an air that carries so much."""
-        passed_s = now - self._looked_at
-        self._credit_s = min(MOST_CREDIT_S, self._credit_s + SHARE * max(0.0, passed_s))
+        passed_s = 0.0 if self._looked_at is None else max(0.0, now - self._looked_at)
+        self._credit_s = min(MOST_CREDIT_S, self._credit_s + SHARE * passed_s)
         self._looked_at = now
         if now - self._came_at < WAIT_S:
             return

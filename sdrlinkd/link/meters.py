@@ -12,12 +12,14 @@ class RateMeter:
     def __init__(self, window_s: float, step_s: float = 0.5) -> None:
         self._window_s = window_s
         self._step_s = step_s
+        self._began_at = float("inf")
         self._samples: deque[tuple[float, dict[Hashable, int]]] = deque()
 
     def sample(self, counters: Mapping[Hashable, int], now: float) -> None:
         """Remember the counters' values at `now`."""
         while self._samples and now - self._samples[0][0] > self._window_s:
             self._samples.popleft()
+        self._began_at = min(self._began_at, now)
         self._samples.append((now, dict(counters)))
 
     def is_due(self, now: float) -> bool:
@@ -26,10 +28,12 @@ class RateMeter:
 
     def grown(self, key: Hashable, value: int, now: float) -> int:
         """How much `key`, whose counter stands at `value` now, has grown within the window."""
+        if not self._samples or now - self._began_at <= self._window_s:
+            return value
         for at, counters in self._samples:
             if now - at <= self._window_s:
                 return value - counters.get(key, 0)
-        return value
+        return 0
 
     def per_s(self, key: Hashable, value: int, now: float) -> float:
         """Rate of `key`, whose counter stands at `value` now."""

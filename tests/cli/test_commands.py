@@ -8,11 +8,13 @@ import threading
 
 import msgspec
 import pytest
+from rosbags.rosbag2 import StoragePlugin
 
 from sdrlinkd.adapters import BuiltInRobot, empty, to_cdr
 from sdrlinkd.cli import run
 from sdrlinkd.client import Publisher, Subscriber
 from sdrlinkd.reports import Snapshot
+from tests.adapters.recordings import ros2_bag
 from tests.waiting import wait_for
 from tests.wire.vectors import DOCUMENTED
 
@@ -341,3 +343,69 @@ def test_completion_and_help(ctl, monkeypatch):
     assert out.startswith("sdrlinkctl 0.")
     code, _, _ = ctl("explode")
     assert code == 2
+
+
+def test_a_policy_is_set_while_the_daemon_runs_and_explained(start_daemon, ctl):
+    daemon = start_daemon()
+    there = ("--runtime-dir", daemon.directory)
+    code, out, _ = ctl(
+        "set", "/robot_1/odom", "--qos", "latency", "--priority", "90", "--period", "10s",
+        "--lifespan", "300ms", "--depth", "1", "--compress", "zstd", *there,
+    )  # fmt: skip
+    assert code == 0
+    assert out.splitlines() == [
+        "odom:", "  qos: default -> latency", "  priority: 64 -> 90", "  period_s: 0 -> 10",
+        "  lifespan_s: inf -> 0.3", "  depth: 0 -> 1", "  compress: none -> zstd",
+    ]  # fmt: skip
+    publish(daemon, 10)
+    wait_for(lambda: daemon.snapshot().link.tx.accepted == 10)
+    assert daemon.snapshot().link.topics[1].priority == 90
+    code, out, _ = ctl("why", "odom", *there)
+    assert code == 0
+    assert "class latency, priority 90" in out
+    assert "90 % throttled to 0.1 Hz by sdrlinkctl set (tx_throttled, 9)" in out
+    code, out, _ = ctl("why", "odom", "--json", *there)
+    assert len(json.loads(out)) == 3
+    assert ctl("reload", *there)[0] == 0
+    assert daemon.snapshot().link.topics[1].priority == 64
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["/nothing", "--qos", "bulk"], ["topic /nothing: unknown", "the registry has"]),
+        (["odom", "--qos", "fast"], ['qos: got "fast"', 'one of "bulk", "default"']),
+        (["odom", "--priority", "128"], ["priority: got 128", "from 0 to 127"]),
+        (["odom", "--period", "1parsec"], ["--period: got 1parsec", "100ms"]),
+        (["odom", "--max-bytes", "many"], ["--max-bytes: got many", "64k"]),
+        (["odom", "--lifespan", "0"], ["lifespan_s: got 0", "allowed"]),
+        (["odom"], ["nothing to change"]),
+    ],
+)
+def test_a_policy_that_is_not_allowed_is_refused_and_changes_nothing(
+    start_daemon, ctl, arguments, parts
+):
+    daemon = start_daemon()
+    # What is right beside it is not taken, either.
+    more = ["--depth", "3"] if len(arguments) > 1 else []
+    code, _, err = ctl("set", *arguments, *more, "--runtime-dir", daemon.directory)
+    assert code == 2
+    for part in parts:
+        assert part in err
+    with daemon.control() as control:
+        told = control.ask("set", {"topic": "odom", "depth": 0})
+    assert told["old"] == {"depth": 0}
+
+
+def test_a_dictionary_is_trained_from_a_recording(ctl, tmp_path):
+    words = b"\0\1\0\0the same words over and over, but for number %d"
+    messages = [("/odom", "std_msgs/msg/String", i, words % (i % 97)) for i in range(2000)]
+    bag = ros2_bag(tmp_path / "bag", StoragePlugin.SQLITE3, messages)
+    code, out, _ = ctl(
+        "topics", "train-dict", bag, "/odom", "--out", tmp_path / "d", "--size", "2k"
+    )
+    assert code == 0
+    assert "others take" in out
+    code, _, err = ctl("topics", "train-dict", bag, "/none", "--out", tmp_path / "d")
+    assert code == 2
+    assert "/none: not in" in err

@@ -1,0 +1,93 @@
+"""transient_local: who comes late gets the last message, for little air."""
+
+import pytest
+
+from sdrlinkd.link import Allowance, Outcome, TopicPolicy
+from tests.link.world import make_link
+
+LATCHED = TopicPolicy(durability="transient_local")
+MAP = b"\0\1\0\0map"
+
+
+def exchange(links, now):
+    """Everybody sends and hears; what each got by (to, from, payload)."""
+    got = []
+    for link in links:
+        while burst := link.departures.compose(now, Allowance.of(8)):
+            link.confirm(burst, Outcome.SENT, now)
+            for pdu in burst.pdus:
+                for other in links:
+                    if other is not link:
+                        got += [(other.own_id, m.src, m.payload) for m in other.hear(pdu, now)]
+    for link in links:
+        link.handle_timers(now)
+    return got
+
+
+def run(links, begin, steps):
+    return [each for i in range(steps) for each in exchange(links, begin + 0.1 * i)]
+
+
+def team(n, **more):
+    links = [make_link(i, pdu_size=220, beacon_s=0.3, seed=i, **more) for i in range(1, n + 1)]
+    links[0].set_policies({0: LATCHED})
+    return links
+
+
+def test_a_robot_that_comes_late_gets_the_last_message_and_no_one_else_does():
+    one, two, late = team(3)
+    one.submit(0, b"\0\1\0\0old", 0.0)
+    one.submit(0, MAP, 0.0)
+    assert [each[2] for each in run([one, two], 0.0, 10)][:2] == [b"\0\1\0\0old", MAP]
+    assert run([one, two, late], 2.0, 10) == [(3, 1, MAP)]
+    assert one.sender.tally(0).reoffered == 2  # to 2, whom it had not heard, and to 3
+    assert one.audit() == late.audit() == []
+
+
+def test_a_robot_that_starts_anew_gets_it_again():
+    one, two = team(2)
+    one.submit(0, MAP, 0.0)
+    run([one, two], 0.0, 10)
+    again = make_link(2, pdu_size=220, beacon_s=0.3, seed=77)
+    assert (2, 1, MAP) in run([one, again], 2.0, 12)
+
+
+def test_several_who_come_together_are_served_at_once():
+    links = team(5)
+    links[0].submit(0, MAP, 0.0)
+    run(links[:1], 0.0, 5)
+    got = run(links, 2.0, 10)
+    assert sorted(each[0] for each in got) == [2, 3, 4, 5]
+    assert links[0].sender.tally(0).reoffered == 1
+
+
+def test_a_topic_that_is_volatile_is_not_offered_again():
+    one, late = team(2)
+    one.set_policies({})
+    one.submit(0, MAP, 0.0)
+    run([one], 0.0, 5)
+    assert run([one, late], 2.0, 10) == []
+
+
+def test_what_is_too_old_is_not_offered():
+    one, late = team(2)
+    one.set_policies({0: TopicPolicy(durability="transient_local", lifespan_s=1.0)})
+    one.submit(0, MAP, 0.0)
+    run([one], 0.0, 5)
+    assert run([one, late], 2.0, 10) == []
+
+
+def test_it_takes_two_per_cent_of_the_air_at_most():
+    """A robot comes every 300 ms; the map takes a second on the air."""
+    one = make_link(1, pdu_size=220, beacon_s=0.0)
+    one.set_policies({0: LATCHED})
+    one.sender.outbox.bytes_per_s = 10_000
+    one.submit(0, bytes(10_000), 0.0)
+    for i in range(200):
+        now = 0.3 * i
+        guest = make_link(2 + i, pdu_size=220, seed=i)
+        guest.submit(1, bytes(8), now)
+        for pdu in guest.departures.compose(now, Allowance.of(1)).pdus:
+            one.hear(pdu, now)
+        one.handle_timers(now + 0.25)
+    assert one.sender.tally(0).reoffered == pytest.approx(1 + 60 * 0.02, abs=0.5)

@@ -1,0 +1,134 @@
+"""What is planned, in numbers and in words."""
+
+from pathlib import Path
+
+import pytest
+
+from sdrlinkd.cli import run
+from sdrlinkd.config import parse_config
+from sdrlinkd.errors import UserError
+from sdrlinkd.link import TopicPolicy
+from sdrlinkd.plan import Load, loads_from_bag, make_plan, parse_load, setting_of
+from sdrlinkd.wire import make_registry
+
+REGISTRY = make_registry(
+    [("scan", "sensor_msgs/LaserScan"), ("odom", "nav_msgs/Odometry"), ("map", "nav_msgs/Path")]
+)
+CONFIG = """registry = "registry.csv"
+backend = "ether"
+[ether]
+dir = "air"
+[modem]
+mcs = 3
+[access]
+policy = "{policy}"
+nodes = [1, 2, 3]
+[topic.scan]
+qos = "latency"
+lifespan_s = 0.05
+[topic.map]
+qos = "bulk"
+"""
+GOLDEN = Path(__file__).parent / "plan.txt"
+
+
+def setting(policy="none", robots=1, mcs=3):
+    config = parse_config(CONFIG.format(policy=policy).replace("mcs = 3", f"mcs = {mcs}"))
+    return setting_of(config, robots, 1e-4)
+
+
+def planned(*loads, policies=None, **how):
+    known = {0: TopicPolicy(qos="latency"), 2: TopicPolicy(qos="bulk")}
+    return make_plan(
+        [parse_load(each, REGISTRY) for each in loads], policies or known, setting(**how)
+    )
+
+
+def test_shares_of_the_air_are_those_of_the_modem():
+    plan = planned("scan:50:1KB", "map:5:64KiB")
+    scan, image = plan.topics
+    one_s = setting().airtimes.airtime_s(3, 1)
+    assert (scan.pdus, image.pdus) == (1, 65)
+    assert scan.air == pytest.approx(50 * one_s, rel=0.01)
+    assert image.air == pytest.approx(5 * 65 * 8 * 1024 / 6e6, rel=0.08)
+    assert plan.is_feasible
+    assert plan.air == pytest.approx(scan.air + image.air)
+
+
+def test_what_is_more_urgent_waits_less_and_more_load_lets_others_wait_longer():
+    few, many = planned("scan:10:1KB", "map:5:64KiB"), planned("scan:80:1KB", "map:5:64KiB")
+    for plan in (few, many):
+        assert plan.topics[0].worst_s < 0.01 < plan.topics[1].worst_s
+    assert many.topics[1].worst_s > few.topics[1].worst_s
+
+
+def test_too_much_is_not_feasible_and_says_what_to_change():
+    plan = planned("scan:50:1KB", "map:20:64KiB")
+    assert not plan.is_feasible
+    assert plan.topics[1].worst_s == float("inf")
+    assert plan.topics[0].worst_s < 0.01
+    (advice,) = plan.advice
+    assert "map takes the most" in advice
+    assert "topic.map.period_s = 0.1" in advice
+
+
+def test_a_lifespan_that_cannot_be_met_is_told():
+    policies = {0: TopicPolicy(qos="bulk", lifespan_s=0.02), 2: TopicPolicy(qos="latency")}
+    plan = planned("scan:5:1KB", "map:5:64KiB", policies=policies)
+    assert not plan.is_feasible
+    assert "scan can take" in plan.advice[0]
+    assert "worthless after 20 ms" in plan.advice[0]
+
+
+def test_policies_count():
+    policies = {0: TopicPolicy(period_s=0.1), 1: TopicPolicy(decimate=5)}
+    plan = planned("scan:50:1KB", "odom:30:724", policies=policies)
+    assert [topic.rate_hz for topic in plan.topics] == [10, 6]
+
+
+@pytest.mark.parametrize("policy", ["csma", "minislot", "tdma"])
+def test_robots_that_share_the_air_wait_for_each_other(policy):
+    alone, three = (planned("scan:20:1KB", policy=policy, robots=robots) for robots in (1, 3))
+    assert three.air > 2.5 * alone.air
+    assert three.topics[0].worst_s > 2 * alone.topics[0].worst_s
+
+
+def test_rates_and_sizes_from_a_recording():
+    messages = [("/robot_1/odom", 0.1 * i, bytes(600 + i)) for i in range(11)]
+    messages += [("/other", 0.0, b"")]
+    (load,) = loads_from_bag(messages, REGISTRY, {})
+    assert load == Load(1, "odom", pytest.approx(10), 605, 610)
+    (small,) = loads_from_bag(messages, REGISTRY, {1: TopicPolicy(compress="zstd")})
+    assert small.size < 100
+
+
+@pytest.mark.parametrize("text", ["scan", "scan:50", "scan:0:1", "scan:fast:1KB", "scan:5:1parsec"])
+def test_a_load_that_cannot_be_read_is_refused(text):
+    with pytest.raises(UserError, match="allowed: NAME:RATE:SIZE"):
+        parse_load(text, REGISTRY)
+    with pytest.raises(UserError, match="did you mean scan"):
+        parse_load("scam:5:1KB", REGISTRY)
+
+
+def plan_text(tmp_path, capsys, *topics):
+    (tmp_path / "registry.csv").write_text(REGISTRY.csv())
+    (tmp_path / "c.toml").write_text(CONFIG.format(policy="none"))
+    options = [each for topic in topics for each in ("--topic", topic)]
+    code = run(["plan", "--config", str(tmp_path / "c.toml"), *options])
+    return code, capsys.readouterr()
+
+
+def test_the_plan_reads_like_this(tmp_path, capsys):
+    code, told = plan_text(tmp_path, capsys, "scan:50:1KB", "odom:30:724", "map:6.67:64KiB")
+    assert code == 0
+    assert told.out == GOLDEN.read_text()
+    code, told = plan_text(tmp_path, capsys, "map:20:64KiB")
+    assert code == 1
+    assert "NOT feasible" in told.out
+
+
+def test_a_plan_without_traffic_or_without_an_air_is_refused(tmp_path, capsys):
+    code, told = plan_text(tmp_path, capsys)
+    assert (code, "name --bag FILE" in told.err) == (2, True)
+    with pytest.raises(UserError, match="has no air"):
+        setting_of(parse_config(""), 1, 0.0)
