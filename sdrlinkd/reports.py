@@ -23,6 +23,8 @@ class TopicReport(msgspec.Struct, frozen=True, kw_only=True):
     sent: int = 0
     sent_bytes: int = 0
     queued: int = 0
+    reoffered: int = 0
+    """Of those accepted: sent again to robots that came late."""
     dropped: dict[str, int] = {}
 
 
@@ -100,6 +102,14 @@ class RxReport(msgspec.Struct, frozen=True, kw_only=True):
     dropped: dict[str, int]
 
 
+class RelayReport(msgspec.Struct, frozen=True, kw_only=True):
+    """PDUs of others; each also counts as a message of the transmit ledger."""
+
+    accepted: int
+    sent: int
+    dropped: dict[str, int]
+
+
 class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """Everything the link knows."""
 
@@ -107,6 +117,8 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     access: str
     airtime_s: float
     """Time on the air, all bursts together."""
+    airtime_by_class_s: dict[str, float]
+    """The same by the class of what was inside, bursts that failed included."""
     bursts_by_mcs: dict[int, int]
     bursts_late: int
     """Bursts that came too late for their slot and were sent again."""
@@ -114,6 +126,9 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """(when by the link's clock, neighbor, MCS from then on), the last ones."""
     control_channel: bool
     registry_digest: str
+    relayed: RelayReport
+    fragments_repaired: int
+    """Computed from parity."""
     tx: TxReport
     rx: RxReport
     topics: list[TopicReport]

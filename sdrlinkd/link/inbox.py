@@ -95,7 +95,7 @@ class Inbox:
         self._ear = ear
         self._inflated = inflated
         self._max_expanded = max_expanded
-        self._repair = Repair()
+        self.repair = Repair()
         self.policies: dict[int, TopicPolicy] = {}
         self._has_control = registry.has_control
         limits = ReassemblyLimits(
@@ -150,7 +150,7 @@ class Inbox:
             elif isinstance(record, RegistryDigest):
                 neighbor.digest = record
             elif isinstance(record, Parity):
-                self._repair.take(pdu.src, record)
+                self.repair.take(pdu.src, record)
             elif not is_relayed:
                 self._ear.record_from(pdu.src, record, at)
         entries = [*pdu.entries, *self._repaired(pdu.src, records)] if records else pdu.entries
@@ -209,7 +209,7 @@ class Inbox:
         for key in keys:
             partial = self.reassembly.partial(src, *key)
             if partial is not None:
-                found += self._repair.missing(src, *key, partial)
+                found += self.repair.missing(src, *key, partial)
         return found
 
     def _take_entries(
@@ -229,7 +229,7 @@ class Inbox:
             if topic_id >= self._n_topics:
                 tally.dropped["rx_unknown_topic"] += 1
                 continue
-            self._repair.forget(src, topic_id, entry.entry_id)
+            self.repair.forget(src, topic_id, entry.entry_id)
             origin_at = self._ages.origin(src, topic_id, entry.entry_id)
             policy = self.policies.get(topic_id, AS_IT_COMES)
             most = policy.max_bytes or self._max_expanded

@@ -7,6 +7,7 @@ from sdrlinkd.reports import (
     LinkReport,
     NeighborReport,
     ReceivedTopicReport,
+    RelayReport,
     RxReport,
     TopicReport,
     TxReport,
@@ -25,11 +26,20 @@ def link_report(
         pdu_size=link.params.pdu_size,
         access=link.access.state,
         airtime_s=link.departures.airtime_s,
+        airtime_by_class_s={
+            qos.label: round(used_s, 6) for qos, used_s in link.departures.shares.used_s.items()
+        },
         bursts_by_mcs=dict(sorted(link.departures.bursts_by_mcs.items())),
         bursts_late=link.departures.bursts_late,
         mcs_changes=list(link.rate.changes),
         control_channel=link.registry.has_control,
         registry_digest=link.digest.overall.hex(),
+        relayed=RelayReport(
+            accepted=link.sender.relayed.accepted,
+            sent=link.sender.relayed.sent,
+            dropped=dict(link.sender.relayed.dropped),
+        ),
+        fragments_repaired=link.inbox.repair.repaired,
         tx=_tx(link),
         rx=_rx(link),
         topics=_topics(link, now, names_in),
@@ -40,7 +50,11 @@ def link_report(
 
 def _tx(link: Link) -> TxReport:
     sender = link.sender
-    tallies = [sender.refused, *(sender.tally(topic.id) for topic in link.registry.topics)]
+    tallies = [
+        sender.refused,
+        sender.relayed,
+        *(sender.tally(topic.id) for topic in link.registry.topics),
+    ]
     return TxReport(
         accepted=sum(tally.accepted for tally in tallies),
         sent=sum(tally.sent for tally in tallies),
@@ -90,6 +104,7 @@ def _topics(link: Link, now: float, names_in: dict[int, str]) -> list[TopicRepor
                 accepted_per_s=link.rates.per_s(("tx", topic.id), tally.accepted, now),
                 sent=tally.sent,
                 sent_bytes=tally.sent_bytes,
+                reoffered=tally.reoffered,
                 queued=link.sender.outbox.queued_of_topic(topic.id),
                 dropped=dict(tally.dropped),
             )

@@ -113,7 +113,7 @@ def test_memory_is_bounded_whatever_comes():
         pdus = pdus_of(sender, bytes(60_000))
         for pdu in pdus[30:]:
             receiver.hear(pdu, 0.0)
-    assert 0 < receiver.inbox._repair.held_bytes <= KEPT_BYTES
+    assert 0 < receiver.inbox.repair.held_bytes <= KEPT_BYTES
 
 
 @pytest.mark.skipif(not TRACES.exists(), reason="needs ../shared/data/traces")
@@ -134,6 +134,6 @@ def test_over_recorded_links_memory_is_bounded_and_parity_helps(topic_share):
             at += 1
         receiver.handle_timers(i * 0.3)
         assert receiver.inbox.reassembly.held_bytes < 2 << 20
-        assert receiver.inbox._repair.held_bytes <= KEPT_BYTES
+        assert receiver.inbox.repair.held_bytes <= KEPT_BYTES
         assert receiver.audit() == sender.audit() == []
     assert got >= 1 if topic_share else got < 60

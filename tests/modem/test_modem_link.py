@@ -16,7 +16,7 @@ from sdrlinkd.config import (
     ModemParams,
 )
 from sdrlinkd.errors import UserError
-from sdrlinkd.link import Burst, LinkParams, Outcome, ReassemblyParams
+from sdrlinkd.link import Burst, LinkParams, Outcome, Qos, ReassemblyParams
 from sdrlinkd.modem import make_modem
 
 SIZE = 64
@@ -94,7 +94,7 @@ def bursts(seed, n):
     rng = Random(seed)
     for _ in range(n):
         pdus = [rng.randbytes(SIZE) for _ in range(rng.randint(1, 4))]
-        yield Burst(pdus, [[] for _ in pdus])
+        yield Burst(pdus, [[] for _ in pdus], [Qos.DEFAULT for _ in pdus])
 
 
 @pytest.mark.parametrize("paced", [True, False])

@@ -6,7 +6,7 @@ import pytest
 
 from backends import Capabilities, TxOutcome, TxReport
 from sdrlinkd.config import ModemParams
-from sdrlinkd.link import Burst, Outcome
+from sdrlinkd.link import Burst, Outcome, Qos
 from sdrlinkd.modem.transmission import Transmission
 
 
@@ -31,7 +31,9 @@ class Radio:
 
 
 def made(number, latest=1.0):
-    return Burst([bytes([number]) * 32], [[]], start=0.5, latest=latest, number=number)
+    return Burst(
+        [bytes([number]) * 32], [[]], [Qos.DEFAULT], start=0.5, latest=latest, number=number
+    )
 
 
 @pytest.mark.parametrize("lockstep", [False, True], ids=["in-a-thread", "here"])
