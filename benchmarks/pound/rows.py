@@ -40,10 +40,11 @@ def two_nodes(seed: int, quick: bool, peers: Beside) -> list[Row]:
     laser, image = ours["laser"], ours["image"]
     n, m = len(run.traces[0].sent_at), len(run.traces[1].sent_at)
     return [
-        _row("laser_2n_D_ms", laser.d_ms, 1.9, n, "laser_2n", "d_ms", peers, "; ".join(others)),
+        _row("laser_2n_D_ms", laser.d_ms, 1.9, n, "laser_2n", "d_ms", peers,
+             "; ".join([_rest(laser), *others])),
         _row("laser_2n_stdD_ms", laser.std_d_ms, 0.2, n, "laser_2n", "std_d_ms", peers),
         _row("laser_2n_stdJd_ms", laser.std_jd_ms, 0.3, n, "laser_2n", "std_jd_ms", peers),
-        _row("image_2n_D_ms", image.d_ms, 101, m, "image_2n", "d_ms", peers),
+        _row("image_2n_D_ms", image.d_ms, 101, m, "image_2n", "d_ms", peers, _rest(image)),
         _row("image_2n_stdD_ms", image.std_d_ms, 1, m, "image_2n", "std_d_ms", peers),
         _row("mdr_2n_laser_pct", laser.mdr_pct, 100, n, "laser_2n", "mdr_pct", peers),
         _row("mdr_2n_image_pct", image.mdr_pct, 100, m, "image_2n", "mdr_pct", peers),
@@ -64,11 +65,11 @@ def three_nodes(seed: int, quick: bool, peers: Beside) -> list[Row]:
         for name, of in more.items()
     )
     n, m = len(run.traces[0].sent_at), len(run.traces[1].sent_at)
-    access = f"access minislot, turnaround 0.1 ms; {note}"
+    access = f"access minislot, turnaround 0.1 ms; {_rest(laser)}; {note}"
     return [
         _row("laser_3n_D_ms", laser.d_ms, 6.0, n, "laser_3n", "d_ms", peers, access),
         _row("laser_3n_stdD_ms", laser.std_d_ms, 1.2, n, "laser_3n", "std_d_ms", peers),
-        _row("image_3n_D_ms", image.d_ms, 260, m, "image_3n", "d_ms", peers),
+        _row("image_3n_D_ms", image.d_ms, 260, m, "image_3n", "d_ms", peers, _rest(image)),
         _row("image_3n_stdD_ms", image.std_d_ms, 5, m, "image_3n", "std_d_ms", peers),
         Row("mdr_3n_pct", min(laser.mdr_pct, image.mdr_pct), "%", 99.9, "more", n + m,
             {name: min(f.mdr_pct for f in of.values()) for name, of in peers.items()},
@@ -138,6 +139,11 @@ def plan(seed: int, quick: bool) -> list[Row]:
     worst = max(abs(error) for error in errors.values())
     note = ", ".join(f"{name} {error:+.1f} %" for name, error in errors.items())
     return [Row("plan_error_pct", worst, "%", 15, "less", len(errors), note=note)]
+
+
+def _rest(of: Figures) -> str:
+    """What the tables have besides."""
+    return f"Jd {of.jd_ms:.2f} ms, std {of.std_jd_ms:.2f}, {of.mbps:.3f} Mbit/s"
 
 
 def _row(

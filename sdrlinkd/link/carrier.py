@@ -12,7 +12,7 @@ class CarrierTraits(NamedTuple):
     `lead_s`: a burst decided now leaves so much later at the earliest. `react_s`: so long after a
     sample was on the air can a decision follow from it. `detect_s`: so long must a carrier last to
     be noticed. `gap_s` stays free between two bursts of one node. `needed_snr_db` and
-    `longest_burst_s` are those of each MCS.
+    `longest_burst_s` are those of each MCS, `pdu_burst_s` is a burst of one PDU.
     """
 
     kind: str = "direct"
@@ -33,6 +33,7 @@ class CarrierTraits(NamedTuple):
     """A burst whose time is fixed may be decided so much before it has to be."""
     longest_burst_s: tuple[float, ...] = (0.0,)
     """By MCS."""
+    pdu_burst_s: tuple[float, ...] = (0.0,)
     mcs: int = 0
     """The fixed one."""
     needed_snr_db: tuple[float, ...] = (0.0,)

@@ -54,6 +54,8 @@ class Departures:
         self.shares = Shares(classes)
         self._limits = Limits(classes, self.forecasts)
         self._lead_s, self._notice_s = 0.0, NOTICE_S
+        self.least_s = 0.0
+        """No message can be younger when it arrives."""
         self._held = _NOT_HELD
         self.access: Access = Free()
         self.rate = RateControl(RateParams(), (0.0,), 0)
@@ -64,6 +66,9 @@ class Departures:
         longest_s = max(carrier.longest_burst_s[mcs] for mcs in self.rate.usable)
         self.access = make_access(access, self._own_id, carrier, longest_s, self._rng)
         self._lead_s = carrier.lead_s
+        lengths_s = enumerate(carrier.pdu_burst_s)
+        fastest_s = min((s for mcs, s in lengths_s if mcs in self.rate.usable), default=0.0)
+        self.least_s = carrier.lead_s + fastest_s
         self._notice_s = carrier.ahead_s if carrier.is_lockstep else NOTICE_S
 
     def more_to_send(self) -> None:

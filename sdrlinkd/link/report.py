@@ -183,6 +183,14 @@ def link_notices(link: Link) -> list[str]:
             "256 in 1.25 reassembly timeouts; give all robots a larger link.pdu_size or a shorter "
             "reassembly.timeout_s"
         )
+    least_s = link.departures.least_s
+    for topic in link.registry.topics:
+        lifespan_s = link.sender.policy(topic.id).lifespan_s
+        if lifespan_s < least_s:
+            notices.append(
+                f"{topic.name}: lifespan_s of {1e3 * lifespan_s:.3g} ms can never be met: composing"
+                f" and sending one PDU takes {1e3 * least_s:.3g} ms"
+            )
     notices += link.access.notices()
     for _, neighbor in sorted(link.inbox.neighbors.items()):
         disagreement = neighbor.disagreement(link.registry, link.digest)

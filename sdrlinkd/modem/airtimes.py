@@ -42,6 +42,10 @@ class Airtimes:
         room = int(min(given, self._longest))
         return phy.most_pdus(self._grid, mcs, self._pdu_size, room)
 
+    def shortest_s(self) -> tuple[float, ...]:
+        """A burst of one PDU with each MCS."""
+        return tuple(self.airtime_s(mcs, 1) for mcs in range(len(phy.MCS_TABLE)))
+
     def longest_s(self) -> tuple[float, ...]:
         """The longest burst of each MCS."""
         return tuple(

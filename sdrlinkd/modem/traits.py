@@ -30,6 +30,7 @@ def carrier_traits(
         gap_s=GAP / params.rate_hz,
         ahead_s=can.block_s if can.lockstep else params.tx_lead_s,
         longest_burst_s=airtimes.longest_s(),
+        pdu_burst_s=airtimes.shortest_s(),
         mcs=params.mcs,
         needed_snr_db=airtimes.needed_snr_db(),
     )

@@ -10,16 +10,19 @@ from hypothesis import strategies as st
 from sdrlinkd.config import DirectParams
 from sdrlinkd.link import (
     Allowance,
+    ClassesParams,
+    ClassParams,
     Outcome,
     Overrides,
     Qos,
     QueueParams,
     ReassemblyParams,
+    RelayParams,
     TopicPolicy,
 )
 from sdrlinkd.link.message import Fate
 from sdrlinkd.pdulink import Impairment
-from tests.link.world import make_link
+from tests.link.world import make_link, send_all
 
 
 def walk(outbox):
@@ -43,6 +46,20 @@ def assert_books_balance(link, seed):
     assert all(message.fate is Fate.IN_FLIGHT for message in outbox.in_flight)
 
 
+def any_policy(rng):
+    return TopicPolicy(
+        depth=rng.choice((0, 0, 1, 3)),
+        lifespan_s=rng.choice((0.2, 1e9)),
+        period_s=rng.choice((0.0, 0.0, 0.03)),
+        decimate=rng.choice((1, 1, 2)),
+        on_change=rng.random() < 0.2,
+        max_bytes=rng.choice((0, 0, 400)),
+        compress=rng.choice(("none", "zstd")),
+        durability=rng.choice(("volatile", "transient_local")),
+        queue_bytes=rng.choice((0, 0, 900)),
+    )
+
+
 @settings(derandomize=True, deadline=None, max_examples=40)
 @given(st.integers(0, 2**32))
 def test_the_ledger_holds_at_every_step_of_any_run(seed):
@@ -56,13 +73,23 @@ def test_the_ledger_holds_at_every_step_of_any_run(seed):
         flush_s=rng.choice((0.0, 0.0, 0.05, float("inf"))),
         beacon_s=rng.choice((0.0, 0.1)),
         hears_self=True,
+        classes=ClassesParams(bulk=ClassParams(parity=rng.choice((0.0, 0.3)), share=0.1)),
+        relay=RelayParams(policy=rng.choice(("none", "flood"))),
+        hop_limit=2,
     )
-    link.set_policies({0: TopicPolicy(depth=rng.randrange(4)), 1: TopicPolicy(lifespan_s=0.2)})
+    link.set_policies({i: any_policy(rng) for i in range(3)})
+    stranger = make_link(9, pdu_size=pdu_size, seed=seed + 1, hop_limit=2)
     bursts, now = [], 0.0
     for _ in range(200):
         now += rng.random() * 0.02
         action = rng.random()
-        if action < 0.5:
+        if action < 0.05:
+            stranger.submit(rng.randrange(3), bytes(rng.randrange(4, 200)), now, Overrides(dst=7))
+            for data in send_all(stranger, now):
+                link.hear(data, now)
+        elif action < 0.07:
+            link.set_policy(rng.randrange(3), any_policy(rng))
+        elif action < 0.5:
             link.submit(
                 rng.randrange(3), bytes(rng.randrange(4, 600)), now,
                 Overrides(

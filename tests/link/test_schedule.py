@@ -7,7 +7,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sdrlinkd.link import ClassesParams, ClassParams, Outcome, Overrides, Qos
+from sdrlinkd.link import (
+    AccessParams,
+    CarrierTraits,
+    ClassesParams,
+    ClassParams,
+    Outcome,
+    Overrides,
+    Qos,
+    RateParams,
+    TopicPolicy,
+    link_notices,
+)
 from sdrlinkd.link.schedule import Allowance, Forecasts, Limits, Shares
 from tests.link.world import PDU_S, airtime_s, make_link, most_pdus, next_burst
 
@@ -183,3 +194,21 @@ def test_an_urgent_message_never_waits_for_more_than_one_burst():
 def test_allowance_may_be_cut_for_less_urgent_classes():
     assert Allowance.of(8).least(Qos.LATENCY).most == (8, 8, 1, 1)
     assert most_pdus(0, 0.0) == 0
+
+
+def test_made_up_robots_are_forgotten():
+    forecasts = Forecasts()
+    for i in range(5000):
+        forecasts.note(i, Qos.LATENCY, 0.001 * i)
+    assert len(forecasts._by_key) == 128
+    assert min(each.last_at for each in forecasts._by_key.values()) > 4.8
+
+
+def test_a_lifespan_that_can_never_be_met_is_told():
+    link = make_link(pdu_size=64)
+    traits = CarrierTraits(lead_s=0.002, pdu_burst_s=(0.0015,))
+    link.attach(traits, AccessParams(), RateParams())
+    link.set_policies({0: TopicPolicy(lifespan_s=0.003), 1: TopicPolicy(lifespan_s=0.004)})
+    (notice,) = link_notices(link)
+    assert "odom: lifespan_s of 3 ms can never be met" in notice
+    assert "takes 3.5 ms" in notice

@@ -56,7 +56,8 @@ def _run(
     for i, flow in enumerate(flows):
         heard_at = np.full(flow.count, np.nan)
         for n, at in told["b"].heard[i].items():
-            heard_at[n] = at
+            if n < flow.count:  # else left over from whoever used this network before
+                heard_at[n] = at
         traces.append(Trace(flow, times[i], heard_at))
     return traces
 

@@ -17,6 +17,8 @@ FASTEST_S = 0.002
 SPREAD = 1.0
 MISSED = 3
 """After so many periods without a message, a topic has ended."""
+MOST = 128
+"""Topics that are followed, the latest heard."""
 AT_LEAST_S = 1e-4
 """Nothing is more punctual than that."""
 
@@ -94,6 +96,9 @@ class Forecasts:
         """A message of that class was submitted, here or elsewhere, at `at` of our time."""
         found = self._by_key.get(key)
         if found is None:
+            if len(self._by_key) >= MOST:
+                # Whoever makes up robots shall not keep us busy.
+                del self._by_key[min(self._by_key, key=lambda each: self._by_key[each].last_at)]
             self._by_key[key] = Forecast(qos, at)
         elif at > found.last_at:
             found.qos = qos
