@@ -13,6 +13,10 @@ from sdrlinkd.link import Burst, Outcome
 from sdrlinkd.pdulink import PduListener
 
 INFINITE = float("inf")
+SHORT = 20_000
+"""Samples of a burst that is modulated where it is composed: handing it to a thread and back takes
+longer.
+"""
 OUTCOMES = {
     TxOutcome.SENT: Outcome.SENT,
     TxOutcome.LATE: Outcome.LATE,
@@ -42,6 +46,7 @@ class Transmission:
         self._tasks: asyncio.TaskGroup | None = None
         self._left: Callable[[Burst, BurstReport], None]
         self._at_once = False
+        self._in_thread = 0
         self._late = self._late_by_radio = 0
         self.on_air: list[Burst] = []
         self.counters = {"bursts_slipped": 0, "samples_sent": 0}
@@ -61,10 +66,12 @@ class Transmission:
             raise RuntimeError("send before start")
         self.on_air.append(burst)
         known = (self._late, self._late_by_radio)
-        if self._at_once:
+        is_short = burst.airtime_s * self._rate_hz <= SHORT and not self._in_thread
+        if self._at_once or is_short:
             answer = self._hand_over(burst, start, self._modulate(burst.pdus, burst.mcs), known)
             self._tasks.create_task(self._settle(burst, start, answer))
         else:
+            self._in_thread += 1
             self._tasks.create_task(self._transmit(burst, start, known))
 
     def lose(self, listener: PduListener, now: float) -> None:
@@ -79,10 +86,15 @@ class Transmission:
 
     async def _transmit(self, burst: Burst, start: int, known: tuple[int, int]) -> None:
         loop = asyncio.get_running_loop()
-        if burst not in self.on_air:
-            # Lost already: the radio is closed.
-            return
-        samples = await loop.run_in_executor(self._thread, self._modulate, burst.pdus, burst.mcs)
+        try:
+            if burst not in self.on_air:
+                # Lost already: the radio is closed.
+                return
+            samples = await loop.run_in_executor(
+                self._thread, self._modulate, burst.pdus, burst.mcs
+            )
+        finally:
+            self._in_thread -= 1
         await self._settle(burst, start, self._hand_over(burst, start, samples, known))
 
     def _hand_over(

@@ -30,10 +30,12 @@ class Radio:
         self.taken[number][1].set_result(TxReport(outcome, start, start))
 
 
-def made(number, latest=1.0):
-    return Burst(
-        [bytes([number]) * 32], [[]], [Qos.DEFAULT], start=0.5, latest=latest, number=number
-    )
+LONG_S = 1.0
+
+
+def made(number, latest=1.0, airtime_s=0.0):
+    pdus, classes = [bytes([number]) * 32], [Qos.DEFAULT]
+    return Burst(pdus, [[]], classes, start=0.5, latest=latest, number=number, airtime_s=airtime_s)
 
 
 @pytest.mark.parametrize("lockstep", [False, True], ids=["in-a-thread", "here"])
@@ -54,10 +56,10 @@ async def test_what_was_composed_before_a_late_one_was_known_goes_back_too(locks
         transmission.send(made(1), 500_000)
         await radio.arrivals.get()
         if composed == "before" and not lockstep:
-            transmission.send(made(2), 510_000)
+            transmission.send(made(2, airtime_s=LONG_S), 510_000)
         radio.tell(0, TxOutcome.LATE, 500_000)
         if composed == "between" or lockstep:
-            transmission.send(made(2), 510_000)
+            transmission.send(made(2, airtime_s=LONG_S), 510_000)
         await settled.wait()
         assert left == [(1, Outcome.LATE), (2, Outcome.LATE)]
         assert len(radio.taken) == 1
@@ -81,4 +83,24 @@ async def test_what_may_leave_whenever_it_can_does_not_wait_for_a_late_one():
     assert left == [Outcome.LATE, Outcome.SENT]
     assert radio.taken[0][0].latest == 1_000_000
     assert radio.taken[1][0].latest is None
+    transmission.close()
+
+
+async def test_a_short_burst_does_not_overtake_a_long_one():
+    """Short ones are modulated where they are composed, long ones in a thread."""
+    radio = Radio(lockstep=False)
+    async with asyncio.TaskGroup() as tasks, asyncio.timeout(60):
+        transmission = Transmission(ModemParams(rate_hz=1e6), radio)
+        await transmission.warm_up()
+        transmission.start(tasks, lambda *_: None)
+        transmission.send(made(1), 100)
+        assert len(radio.taken) == 1
+        for number, airtime_s in ((2, LONG_S), (3, 0.0), (4, 0.0)):
+            transmission.send(made(number, airtime_s=airtime_s), 1000 * number)
+        assert len(radio.taken) == 1
+        for _ in range(4):
+            await radio.arrivals.get()
+        assert [burst.start for burst, _ in radio.taken] == [100, 2000, 3000, 4000]
+        for number in range(4):
+            radio.tell(number, TxOutcome.SENT, 0)
     transmission.close()
