@@ -105,9 +105,9 @@ class RxReport(msgspec.Struct, frozen=True, kw_only=True):
 class RelayReport(msgspec.Struct, frozen=True, kw_only=True):
     """PDUs of others; each also counts as a message of the transmit ledger."""
 
-    accepted: int
-    sent: int
-    dropped: dict[str, int]
+    accepted: int = 0
+    sent: int = 0
+    dropped: dict[str, int] = {}
 
 
 class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -117,7 +117,7 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     access: str
     airtime_s: float
     """Time on the air, all bursts together."""
-    airtime_by_class_s: dict[str, float]
+    airtime_by_class_s: dict[str, float] = {}
     """The same by the class of what was inside, bursts that failed included."""
     bursts_by_mcs: dict[int, int]
     bursts_late: int
@@ -126,8 +126,8 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """(when by the link's clock, neighbor, MCS from then on), the last ones."""
     control_channel: bool
     registry_digest: str
-    relayed: RelayReport
-    fragments_repaired: int
+    relayed: RelayReport = RelayReport()
+    fragments_repaired: int = 0
     """Computed from parity."""
     tx: TxReport
     rx: RxReport
