@@ -10,7 +10,7 @@ from sdrlinkd.link.compression import Inflated
 from sdrlinkd.link.ledger import RxTally, balance
 from sdrlinkd.link.neighbors import Neighbor
 from sdrlinkd.link.params import LinkParams, ReassemblyParams
-from sdrlinkd.link.parity import Repair
+from sdrlinkd.link.parity import is_sound, missing_fragments
 from sdrlinkd.link.policy import TopicPolicy
 from sdrlinkd.wire import (
     BROADCAST,
@@ -95,7 +95,7 @@ class Inbox:
         self._ear = ear
         self._inflated = inflated
         self._max_expanded = max_expanded
-        self.repair = Repair()
+        self.fragments_repaired = 0
         self.policies: dict[int, TopicPolicy] = {}
         self._has_control = registry.has_control
         limits = ReassemblyLimits(
@@ -149,11 +149,10 @@ class Inbox:
                     self._ear.newcomer(pdu.src, at)
             elif isinstance(record, RegistryDigest):
                 neighbor.digest = record
-            elif isinstance(record, Parity):
-                self.repair.take(pdu.src, record)
-            elif not is_relayed:
+            elif not is_relayed and not isinstance(record, Parity):
                 self._ear.record_from(pdu.src, record, at)
-        entries = [*pdu.entries, *self._repaired(pdu.src, records)] if records else pdu.entries
+        repaired = self._repaired(pdu.src, records, at) if records else []
+        entries = [*pdu.entries, *repaired] if repaired else pdu.entries
         if records is not None and len(entries) == 1:
             return self._drop("rx_control")
         self.pdus_used += 1
@@ -202,15 +201,21 @@ class Inbox:
         neighbor = self.neighbors[src] = Neighbor(src)
         return neighbor
 
-    def _repaired(self, src: int, records: list[Record]) -> list[Entry]:
-        """Fragments that parity among these tells."""
-        keys = {(each.topic_id, each.entry_id) for each in records if isinstance(each, Parity)}
-        found: list[Entry] = []
-        for key in keys:
-            partial = self.reassembly.partial(src, *key)
-            if partial is not None:
-                found += self.repair.missing(src, *key, partial)
-        return found
+    def _repaired(self, src: int, records: list[Record], at: float) -> list[Entry]:
+        """Fragments that were missing, where these records bring the parity that tells them."""
+        partials = {}
+        for record in records:
+            if isinstance(record, Parity) and is_sound(record):
+                partial = self.reassembly.hold(src, record, at)
+                if partial is not None:
+                    partials[record.topic_id, record.entry_id] = partial
+        entries = [
+            Entry(*ids, number, partial.total, part)
+            for ids, partial in partials.items()
+            for number, part in missing_fragments(partial).items()
+        ]
+        self.fragments_repaired += len(entries)
+        return entries
 
     def _take_entries(
         self, pdu: Pdu, entries: Sequence[Entry], neighbor: Neighbor, at: float, now: float
@@ -229,7 +234,6 @@ class Inbox:
             if topic_id >= self._n_topics:
                 tally.dropped["rx_unknown_topic"] += 1
                 continue
-            self.repair.forget(src, topic_id, entry.entry_id)
             origin_at = self._ages.origin(src, topic_id, entry.entry_id)
             policy = self.policies.get(topic_id, AS_IT_COMES)
             most = policy.max_bytes or self._max_expanded

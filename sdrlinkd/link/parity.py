@@ -6,8 +6,6 @@ fragments and parity fragments tell all others, for each piece apart.
 """
 
 import math
-from collections import OrderedDict
-from dataclasses import dataclass, field
 
 import zfec
 
@@ -15,7 +13,6 @@ from sdrlinkd.wire import (
     MAX_VALUE_SIZE,
     PARITY_OVERHEAD,
     TLV_HEADER_SIZE,
-    Entry,
     Parity,
     Partial,
     build_records,
@@ -25,10 +22,6 @@ MOST = 256
 """Fragments and parity fragments of a message."""
 LEAST_FRAGMENTS = 4
 """Fewer are not worth it."""
-RECORD_OVERHEAD = 128
-"""What keeping a record costs beside its octets."""
-KEPT_BYTES = 4 << 20
-"""Parity that waits for its message, all sources together."""
 
 
 def parity_records(
@@ -57,94 +50,47 @@ def parity_records(
     ]
 
 
-@dataclass(slots=True)
-class _Known:
-    """Parity of one message: by place, what is there by number."""
-
-    shape: tuple[int, int, int, int]
-    places: dict[int, dict[int, bytes]] = field(default_factory=dict)
-    n_bytes: int = 0
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether the places cover a fragment."""
-        end = 0
-        for at in sorted(self.places):
-            if at != end:
-                return False
-            end += len(next(iter(self.places[at].values())))
-        return end == self.shape[2]
+def is_sound(parity: Parity) -> bool:
+    """Whether a record does not contradict itself."""
+    k, total = parity.k, parity.total
+    return (
+        k * (total - 1) < parity.size <= k * total
+        and 0 < len(parity.data) <= k - parity.at
+        and parity.number < parity.n_parity <= MOST - total
+    )
 
 
-class Repair:
-    """Puts parity and fragments together. Keeps no more than KEPT_BYTES, the newest."""
-
-    def __init__(self) -> None:
-        self._known: OrderedDict[tuple[int, int, int], _Known] = OrderedDict()
-        self.held_bytes = 0
-        self.repaired = 0
-        """Fragments that were computed."""
-
-    def take(self, src: int, parity: Parity) -> None:
-        """Keep what a record tells; one that contradicts itself, or others, is no use."""
-        k, size, total, data = parity.k, parity.size, parity.total, parity.data
-        fits = k * (total - 1) < size <= k * total and 0 < len(data) <= k - parity.at
-        if not fits or parity.number >= parity.n_parity or total + parity.n_parity > MOST:
-            return
-        key, shape = (src, parity.topic_id, parity.entry_id), (total, parity.n_parity, k, size)
-        known = self._known.get(key)
-        if known is not None and known.shape != shape:
-            self.forget(*key)
-            known = None
-        if known is None:
-            known = self._known[key] = _Known(shape)
-        place = known.places.setdefault(parity.at, {})
-        if parity.number in place or any(len(each) != len(data) for each in place.values()):
-            return
-        place[parity.number] = data
-        known.n_bytes += len(data) + RECORD_OVERHEAD
-        self.held_bytes += len(data) + RECORD_OVERHEAD
-        while self.held_bytes > KEPT_BYTES:
-            self.forget(*next(iter(self._known)))
-
-    def missing(self, src: int, topic_id: int, entry_id: int, partial: Partial) -> list[Entry]:
-        """The fragments that `partial` lacks, if there is parity enough; else nothing."""
-        known = self._known.get((src, topic_id, entry_id))
-        if known is None or partial.total != known.shape[0]:
-            return []
-        total, n_parity, _, _ = known.shape
-        lost = [i for i in range(total) if i not in partial.parts]
-        if any(len(each) < len(lost) for each in known.places.values()) or not known.is_whole:
-            return []
-        if any(len(part) != _length(i, known.shape) for i, part in partial.parts.items()):
-            return []
-        decoder = zfec.Decoder(total, total + n_parity)
-        found: list[list[bytes]] = [[] for _ in lost]
-        for at, there in sorted(known.places.items()):
-            end = at + len(next(iter(there.values())))
-            blocks = {i: part[at:end].ljust(end - at, b"\0") for i, part in partial.parts.items()}
-            # As the library wants them: a fragment in its own place, parity in the others'.
-            parity = iter(sorted(there))
-            numbers = [i if i in blocks else total + next(parity) for i in range(total)]
-            shares = [blocks[i] if i < total else there[i - total] for i in numbers]
-            whole = decoder.decode(shares, numbers)
-            for i, number in enumerate(lost):
-                found[i].append(whole[number])
-        self.repaired += len(lost)
-        return [
-            Entry(
-                topic_id, entry_id, number, total, b"".join(parts)[: _length(number, known.shape)]
-            )
-            for number, parts in zip(lost, found, strict=True)
-        ]
-
-    def forget(self, src: int, topic_id: int, entry_id: int) -> None:
-        """Its message is complete, or given up."""
-        known = self._known.pop((src, topic_id, entry_id), None)
-        if known is not None:
-            self.held_bytes -= known.n_bytes
+def missing_fragments(partial: Partial) -> dict[int, bytes]:
+    """The fragments that `partial` lacks, by number, if its parity tells; else nothing."""
+    if partial.shape is None:
+        return {}
+    (n_parity, k, size), total, there = partial.shape, partial.total, partial.parity
+    lengths = [k] * (total - 1) + [size - k * (total - 1)]
+    lost = [i for i in range(total) if i not in partial.parts]
+    if any(len(each) < len(lost) for each in there.values()) or not _covers(there, k):
+        return {}
+    if any(len(part) != lengths[i] for i, part in partial.parts.items()):
+        return {}
+    decoder = zfec.Decoder(total, total + n_parity)
+    found: dict[int, list[bytes]] = {i: [] for i in lost}
+    for at, pieces in sorted(there.items()):
+        end = at + len(next(iter(pieces.values())))
+        blocks = {i: part[at:end].ljust(end - at, b"\0") for i, part in partial.parts.items()}
+        # As the library wants them: a fragment in its own place, parity in the others'.
+        parity = iter(sorted(pieces))
+        numbers = [i if i in blocks else total + next(parity) for i in range(total)]
+        shares = [blocks[i] if i < total else pieces[i - total] for i in numbers]
+        whole = decoder.decode(shares, numbers)
+        for i, parts in found.items():
+            parts.append(whole[i])
+    return {i: b"".join(parts)[: lengths[i]] for i, parts in found.items()}
 
 
-def _length(number: int, shape: tuple[int, int, int, int]) -> int:
-    total, _, k, size = shape
-    return k if number < total - 1 else size - k * (total - 1)
+def _covers(there: dict[int, dict[int, bytes]], k: int) -> bool:
+    """Whether pieces from these places on, one after the other, make a fragment."""
+    end = 0
+    for at in sorted(there):
+        if at != end:
+            return False
+        end += len(next(iter(there[at].values())))
+    return end == k

@@ -39,7 +39,7 @@ def link_report(
             sent=link.sender.relayed.sent,
             dropped=dict(link.sender.relayed.dropped),
         ),
-        fragments_repaired=link.inbox.repair.repaired,
+        fragments_repaired=link.inbox.fragments_repaired,
         tx=_tx(link),
         rx=_rx(link),
         topics=_topics(link, now, names_in),

@@ -4,6 +4,7 @@ from collections import OrderedDict
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from sdrlinkd.wire.control import Parity
 from sdrlinkd.wire.pdu import Entry
 
 # What a held fragment costs beside its payload, so that many tiny ones count too.
@@ -39,6 +40,10 @@ class Partial:
     touched_at: float
     parts: dict[int, bytes] = field(default_factory=dict)
     cost: int = PARTIAL_OVERHEAD
+    shape: tuple[int, int, int] | None = None
+    """(parity fragments, octets of a fragment, octets of the message), when parity came."""
+    parity: dict[int, dict[int, bytes]] = field(default_factory=dict)
+    """Pieces of parity fragments: by where they begin, by number."""
 
 
 @dataclass(slots=True)
@@ -96,19 +101,28 @@ class Reassembly:
             self._remove(source, key)
             return b"".join([partial.parts[i] for i in range(total)])
         partial.parts[index] = payload
-        partial.touched_at = now
-        source.partials.move_to_end(key)
-        cost = len(payload) + FRAGMENT_OVERHEAD
-        partial.cost += cost
-        source.cost += cost
-        self.held_bytes += cost
-        self._keep_bounds(src, source)
+        self._keep(src, source, key, len(payload), now)
         return None
 
-    def partial(self, src: int, topic_id: int, entry_id: int) -> Partial | None:
-        """What is there of a message that is not complete."""
-        source = self._sources.get(src)
-        return None if source is None else source.partials.get((topic_id, entry_id))
+    def hold(self, src: int, parity: Parity, now: float) -> Partial | None:
+        """Keep parity with the message it is of; None where nobody waits for that any more."""
+        source, key = self._sources.get(src), (parity.topic_id, parity.entry_id)
+        partial = None if source is None else source.partials.get(key)
+        if source is None or partial is None or self._is_silent(partial, now):
+            return None
+        shape = (parity.n_parity, parity.k, parity.size)
+        pieces = partial.parity.get(parity.at, {})
+        if (
+            partial.total != parity.total
+            or partial.shape not in (None, shape)
+            or parity.number in pieces
+            or any(len(each) != len(parity.data) for each in pieces.values())
+        ):
+            return None
+        partial.shape = shape
+        partial.parity.setdefault(parity.at, pieces)[parity.number] = parity.data
+        self._keep(src, source, key, len(parity.data), now)
+        return source.partials.get(key)
 
     def expire(self, now: float) -> None:
         """Give up what has been silent for the timeout."""
@@ -134,6 +148,19 @@ class Reassembly:
         """What was given up since the last call."""
         lost, self.lost = self.lost, []
         return lost
+
+    def _keep(
+        self, src: int, source: _Source, key: tuple[int, int], n_bytes: int, now: float
+    ) -> None:
+        """Something came for a message that waits."""
+        partial = source.partials[key]
+        partial.touched_at = now
+        source.partials.move_to_end(key)
+        cost = n_bytes + FRAGMENT_OVERHEAD
+        partial.cost += cost
+        source.cost += cost
+        self.held_bytes += cost
+        self._keep_bounds(src, source)
 
     def _start(self, source: _Source, key: tuple[int, int], total: int, now: float) -> Partial:
         partial = source.partials[key] = Partial(total, now)
