@@ -158,7 +158,7 @@ def _neighbors(link: Link, now: float) -> list[NeighborReport]:
                 duplicates=neighbor.duplicates,
                 hops_left=neighbor.hops_left,
                 reboots=neighbor.reboots,
-                snr_db=neighbor.snr_db,
+                snr_db=neighbor.mean_snr_db,
                 registry=registry,
                 snr_there_db=told[0] if told else None,
                 per_there=told[1] if told else None,

@@ -4,6 +4,7 @@ from random import Random
 
 import pytest
 
+from sdrlinkd.link import link_report
 from sdrlinkd.wire import Entry, Pdu, build
 from tests.link.world import TOPICS, make_link, send_all
 
@@ -58,6 +59,14 @@ def test_messages_carry_a_number_and_the_losses_before_them():
     link = make_link(2, pdu_size=64)
     messages = [m for seq in (0, 1, 4) for m in link.hear(pdu(seq=seq), 0.0)]
     assert [(m.number, m.lost_pdus) for m in messages] == [(1, 0), (2, 0), (3, 2)]
+
+
+def test_the_snr_in_the_report_is_not_that_of_one_burst_alone():
+    link = make_link(2, pdu_size=64)
+    for seq in range(30):
+        link.hear(pdu(seq=seq), 0.0, 15.0 + (-1) ** seq)
+    (neighbor,) = link_report(link, 0.0, {}, {}).neighbors
+    assert abs(neighbor.snr_db - 15) < 0.2
 
 
 def test_a_different_registry_is_named_on_both_sides():
