@@ -136,7 +136,9 @@ class Departures:
             # Clocks do not wait for spare room.
             overdue = True
         if overdue and may_tell:
-            burst = self._records_behind(sender.compose(start, allowance.above(Qos.DEFAULT)))
+            # Clocks cannot wait for the end of what is relayed, and no burst holds both.
+            urgent = sender.compose(start, allowance.above(Qos.DEFAULT), self._own_id)
+            burst = self._records_behind(urgent)
         else:
             burst = sender.compose(start, allowance)
         if burst is None and spare and may_tell:
@@ -145,8 +147,6 @@ class Departures:
 
     def _records_behind(self, urgent: Burst | None) -> Burst | None:
         """Records in a PDU of their own, behind what is more urgent than they are."""
-        if urgent is not None and self._relayed_src(urgent) is not None:
-            return urgent
         records = self._sender.compose_records()
         if urgent is None or records is None:
             return urgent or records

@@ -1,7 +1,7 @@
 """The receive half of the link: from PDUs heard to messages delivered."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 from sdrlinkd.errors import PduError
@@ -11,7 +11,7 @@ from sdrlinkd.link.ledger import RxTally, balance
 from sdrlinkd.link.neighbors import Neighbor
 from sdrlinkd.link.params import LinkParams, ReassemblyParams
 from sdrlinkd.link.parity import is_sound, missing_fragments
-from sdrlinkd.link.policy import TopicPolicy
+from sdrlinkd.link.policy import DEFAULT_POLICY, TopicPolicy
 from sdrlinkd.wire import (
     BROADCAST,
     CONTROL_TOPIC_ID,
@@ -32,7 +32,6 @@ from sdrlinkd.wire import (
 )
 
 CDR_HEADER_SIZE = 4
-AS_IT_COMES = TopicPolicy()
 
 
 class Delivered(NamedTuple):
@@ -108,10 +107,6 @@ class Inbox:
         self.pdus_heard = 0
         self.pdus_used = 0
         self.pdus_dropped: Counter[str] = Counter()
-
-    def set_policies(self, policies: Mapping[int, TopicPolicy]) -> None:
-        """Lifespans and size caps hold where messages arrive, too."""
-        self.policies = dict(policies)
 
     def hear(self, data: bytes, at: float, snr_db: float | None, now: float) -> list[Delivered]:
         """Take a PDU whose burst's preamble arrived at `at`; the messages it completed."""
@@ -235,7 +230,7 @@ class Inbox:
                 tally.dropped["rx_unknown_topic"] += 1
                 continue
             origin_at = self._ages.origin(src, topic_id, entry.entry_id)
-            policy = self.policies.get(topic_id, AS_IT_COMES)
+            policy = self.policies.get(topic_id, DEFAULT_POLICY)
             most = policy.max_bytes or self._max_expanded
             reason = None
             if pdu.compressed:

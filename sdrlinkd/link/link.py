@@ -15,7 +15,7 @@ from sdrlinkd.link.inbox import Delivered, Inbox
 from sdrlinkd.link.latched import Kept, Latched
 from sdrlinkd.link.meters import RateMeter, RecentAges
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
-from sdrlinkd.link.policy import TopicPolicy
+from sdrlinkd.link.policy import DEFAULT_POLICY, TopicPolicy
 from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, Overrides, Qos
 from sdrlinkd.link.rate import RateControl, RateParams
 from sdrlinkd.link.relay import Relay, RelayParams
@@ -97,8 +97,8 @@ class Link:
 
     def set_policies(self, policies: Mapping[int, TopicPolicy]) -> None:
         """Apply per-topic policies by topic id; the others get the defaults."""
-        self.sender.set_policies(policies)
-        self.inbox.set_policies(policies)
+        for topic in self.registry.topics:
+            self.set_policy(topic.id, policies.get(topic.id, DEFAULT_POLICY))
 
     def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
         """Change one, from now on."""

@@ -69,6 +69,11 @@ class Outgoing:
         """The payload is another robot's PDU, to be sent on."""
 
     @property
+    def src(self) -> int:
+        """Whose PDU it is, where it is whole."""
+        return self.payload[1]
+
+    @property
     def is_through(self) -> bool:
         """Whether all of it is in PDUs."""
         return self.next_index == self.total and not self.parity

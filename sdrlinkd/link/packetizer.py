@@ -75,23 +75,31 @@ class Packetizer:
         """From now on partial PDUs do not wait."""
         self._may_wait = False
 
-    def next_pdu(self, start: float, first: Qos | None = None) -> BuiltPdu | None:
+    def next_pdu(
+        self, start: float, first: Qos | None = None, src: int | None = None
+    ) -> BuiltPdu | None:
         """The next PDU of a burst whose preamble leaves at `start`, or None.
 
-        The most urgent comes first, or class `first`. What is in vain is withdrawn; see `heads`.
+        The most urgent comes first, or class `first`; None also where that is not of `src`. What
+        is in vain is withdrawn; see `heads`.
         """
         levels = self._outbox.levels
         if not levels or (self._may_wait and self._must_wait(start)):
             return None
-        if first is None and (filled := self._sole.filled(levels[0], start, self._seq)):
-            self._seq = (self._seq + 1) & 0xFF
-            return filled
+        may_be_own = src is None or src == self._src
+        if first is None and may_be_own:
+            filled = self._sole.filled(levels[0], start, self._seq)
+            if filled is not None:
+                self._seq = (self._seq + 1) & 0xFF
+                return filled
         draft = Draft(self._pdu_size)
         looked_at = 0
         order = levels if first is None else _with_first(levels, first)
         for level in tuple(order):
-            if draft.is_empty and (relayed := self._sole.relayed(level, start)):
-                return relayed
+            if draft.is_empty and (whole := self._sole.next_whole(level, start)):
+                return self._sole.relayed(whole, start) if src in (None, whole.src) else None
+            if not may_be_own:
+                return None
             looked_at += len(level.lanes)
             if self._may_fit(level, draft.room):
                 self._fill_from(level, draft, start)
@@ -113,7 +121,7 @@ class Packetizer:
         for level in [each for each in levels if first is None or each.key[0] == first][:1]:
             head = level.lanes[0].head
             if head is not None and head.is_whole:
-                return head.payload[1]
+                return head.src
         return self._src
 
     def records_pdu(self) -> BuiltPdu | None:

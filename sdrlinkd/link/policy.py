@@ -52,3 +52,6 @@ class TopicPolicy(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     def kept(self) -> int:
         """Messages that may wait; 0: as many as the queue holds."""
         return self.depth if self.history == "keep_last" else 0
+
+
+DEFAULT_POLICY = TopicPolicy()

@@ -12,7 +12,7 @@ from sdrlinkd.link.message import Fate, Outgoing
 from sdrlinkd.link.outbox import Outbox
 from sdrlinkd.link.packetizer import Packetizer
 from sdrlinkd.link.params import LinkParams, QueueParams
-from sdrlinkd.link.policy import TopicPolicy
+from sdrlinkd.link.policy import DEFAULT_POLICY, TopicPolicy
 from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, Overrides, Qos
 from sdrlinkd.link.schedule import Allowance, ClassesParams
 from sdrlinkd.link.topic_state import TopicState
@@ -20,8 +20,6 @@ from sdrlinkd.wire import Pdu, Registry, max_message_size
 
 RELAYED = 256
 """Lanes of others' PDUs have this and their source in place of a topic id."""
-NOBODY = -1
-AS_IT_COMES = TopicPolicy()
 MAX_PDUS = 63
 """Of a burst, whatever carries it."""
 
@@ -40,9 +38,7 @@ class Sender:
         classes: ClassesParams,
         dictionaries: Mapping[int, ZstdCompressionDict],
     ) -> None:
-        self._params = params
         self._max_message_size = max_message_size(params.pdu_size)
-        self._registry = registry
         self.outbox = Outbox(queue)
         self.packetizer = Packetizer(
             params, src, self.outbox, rng, reassembly_timeout_s, registry.has_control, classes
@@ -61,13 +57,6 @@ class Sender:
         self.pdus_failed = 0
         self.bursts_sent = 0
         self.bursts_failed = 0
-
-    def set_policies(self, policies: Mapping[int, TopicPolicy]) -> None:
-        """Apply policies by topic id; topics without one get the defaults."""
-        for topic_id, state in enumerate(self._topics):
-            policy = policies.get(topic_id, TopicPolicy())
-            if policy != state.policy:
-                state.apply(policy)
 
     def submit(
         self,
@@ -105,7 +94,7 @@ class Sender:
             RELAYED + pdu.src, data, CLASSES[pdu.qos], priority, pdu.dst, at, until, False, tally
         )
         message.is_whole = True
-        return self._put(message, AS_IT_COMES)
+        return self._put(message, DEFAULT_POLICY)
 
     def _enqueue(self, topic_id: int, payload: bytes, at: float, wishes: Overrides) -> str | None:
         qos, priority, dst, lifespan_s = wishes
@@ -144,10 +133,15 @@ class Sender:
         tally.accepted += 1
         tally.drop(reason)
 
-    def compose(self, start: float, allowance: Allowance) -> Burst | None:
-        """The next burst, whose preamble leaves at `start`; None when nothing is to be sent."""
-        burst, levels, owed = Burst([], [], []), self.outbox.levels, list(allowance.owed)
-        next_src, src, n = self.packetizer.next_src, NOBODY, 0
+    def compose(self, start: float, allowance: Allowance, src: int | None = None) -> Burst | None:
+        """The next burst, whose preamble leaves at `start`; None when nothing is to be sent.
+
+        All its PDUs are of one source, `src` if given: who hears it knows by that who may follow.
+        """
+        burst, levels, next_src = Burst([], [], []), self.outbox.levels, self.packetizer.next_src
+        # What is owed takes room from others; it makes no burst longer.
+        owed = list(allowance.owed[: max(1, max(allowance.most) - 1)])
+        n = 0
         while levels and n < MAX_PDUS:
             first, most = None, allowance.most[levels[0].key[0]]
             if owed and n + len(owed) >= most and (n or most < 2):
@@ -157,14 +151,10 @@ class Sender:
                 first, owed, most = owed[0], [], 0
             elif n >= most:
                 break
-            if self.outbox.relays:
-                # Who hears a burst knows by its source who may follow.
-                if n and next_src(first) != src:
-                    break
-                src = next_src(first)
-            built = self.packetizer.next_pdu(start, first)
+            built = self.packetizer.next_pdu(start, first, src)
             if built is None:
                 break
+            src = built.data[1]
             burst.pdus.append(built.data)
             burst.carried.append(built.carried)
             burst.classes.append(built.qos)
@@ -217,7 +207,9 @@ class Sender:
 
     def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
         """From now on."""
-        self._topics[topic_id].apply(policy)
+        topic = self._topics[topic_id]
+        if policy != topic.policy:
+            topic.apply(policy)
 
     def destination(self, topic_id: int) -> int:
         """Where a topic's messages go by default."""

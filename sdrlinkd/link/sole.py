@@ -2,7 +2,7 @@
 
 from sdrlinkd.link.draft import BuiltPdu
 from sdrlinkd.link.heads import Heads
-from sdrlinkd.link.message import Level
+from sdrlinkd.link.message import Level, Outgoing
 from sdrlinkd.link.outbox import Outbox
 from sdrlinkd.link.params import LinkParams
 from sdrlinkd.link.qos import WIRE_BITS
@@ -22,14 +22,14 @@ class Sole:
         self._src = src
         self._has_control = has_control
 
-    def relayed(self, level: Level, start: float) -> BuiltPdu | None:
-        """Another robot's PDU, if that is what goes next."""
+    def next_whole(self, level: Level, start: float) -> Outgoing | None:
+        """Another robot's PDU, if that is what goes next of a level."""
         lane = level.lanes[0]
-        if not (lane.current or lane.waiting[0]).is_whole:
-            return None
-        head = self._heads.live(lane, start)
-        if head is None:
-            return None
+        return self._heads.live(lane, start) if lane.head and lane.head.is_whole else None
+
+    def relayed(self, head: Outgoing, start: float) -> BuiltPdu:
+        """Another robot's PDU, which was first in its lane."""
+        lane = head.lane
         self._outbox.begin(lane)
         head.total = head.next_index = 1
         head.unconfirmed += 1

@@ -69,6 +69,14 @@ def test_a_topic_that_is_volatile_is_not_offered_again():
     assert run([one, late], 2.0, 10) == []
 
 
+def test_a_topic_that_was_made_volatile_is_not_offered_again():
+    one, late = team(2)
+    one.submit(0, MAP, 0.0)
+    run([one], 0.0, 5)
+    one.set_policies({1: LATCHED})
+    assert run([one, late], 2.0, 10) == []
+
+
 def test_what_is_too_old_is_not_offered():
     one, late = team(2)
     one.set_policies({0: TopicPolicy(durability="transient_local", lifespan_s=1.0)})

@@ -98,8 +98,12 @@ def test_the_ledger_holds_at_every_step_of_any_run(seed):
                 ),
             )  # fmt: skip
         elif action < 0.75:
-            burst = link.departures.compose(now, Allowance.of(rng.randrange(1, 6)))
+            most = tuple(rng.randrange(6) for _ in Qos)
+            owed = tuple(rng.choices(list(Qos), k=rng.choice((0, 0, 1, 3, 8))))
+            burst = link.departures.compose(now, Allowance(most, owed))
             if burst:
+                assert len(burst.pdus) <= max(1, *most), f"seed {seed}"
+                assert len({data[1] for data in burst.pdus}) == 1, f"seed {seed}"
                 bursts.append(burst)
         elif action < 0.95 and bursts:
             burst = bursts.pop(rng.randrange(len(bursts)))

@@ -114,6 +114,22 @@ def test_relayed_pdus_go_by_class_and_priority_and_never_mix_in_a_burst():
     assert [burst[0][0] for burst in bursts] == [2, 1, 2, 1]
 
 
+def test_a_relay_that_is_never_idle_still_tells_of_itself():
+    """What it forwards is more urgent than its beacons, and no burst holds both."""
+    one, two = node(1), node(2, "1>3", beacon_s=0.5)
+    sources = []
+    for i in range(300):
+        now = 0.01 * i
+        one.submit(2, bytes(30), now, Overrides(Qos.URGENT, dst=3))
+        for pdu in pass_on(one, now):
+            two.hear(pdu, now)
+        burst = two.departures.compose(now, Allowance.of(4))
+        two.confirm(burst, Outcome.SENT, now)
+        sources += [parse(pdu, 64).src for pdu in burst.pdus]
+    assert 3 <= sources.count(2) <= 12
+    assert sources.count(1) > 250
+
+
 def test_a_relay_does_not_keep_what_is_old():
     one, two = node(1), node(2, "1>3")
     one.submit(0, bytes(8), 0.0, Overrides(dst=3))

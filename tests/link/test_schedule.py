@@ -1,6 +1,5 @@
 """Bursts that end before what is due, shares that nobody loses."""
 
-import math
 from random import Random
 
 import pytest
@@ -20,7 +19,7 @@ from sdrlinkd.link import (
     link_notices,
 )
 from sdrlinkd.link.schedule import Allowance, Forecasts, Limits, Shares
-from tests.link.world import PDU_S, airtime_s, make_link, most_pdus, next_burst
+from tests.link.world import PDU_S, airtime_s, make_link, next_burst
 
 PERIOD_S = 0.02
 
@@ -187,13 +186,11 @@ def test_an_urgent_message_never_waits_for_more_than_one_burst():
         link.confirm(burst, Outcome.SENT, end)
         now = end
     assert max(waited) <= 0.004 + PDU_S
-    assert math.isfinite(now)
     assert len(waited) > 50
 
 
 def test_allowance_may_be_cut_for_less_urgent_classes():
     assert Allowance.of(8).least(Qos.LATENCY).most == (8, 8, 1, 1)
-    assert most_pdus(0, 0.0) == 0
 
 
 def test_made_up_robots_are_forgotten():

@@ -14,7 +14,6 @@ STEADY = 0.2
 """A topic is periodic when its messages come within this share of the period."""
 FASTEST_S = 0.002
 """Faster than that, no gap is worth keeping."""
-SPREAD = 1.0
 MISSED = 3
 """After so many periods without a message, a topic has ended."""
 MOST = 128
@@ -51,7 +50,7 @@ class Forecast:
         n = self.n
         self.beat_at += beats * self.period_s + error_s * (4 * n - 2) / (n * (n + 1))
         self.period_s += 6 / (n * (n + 1)) * error_s / beats
-        self.jitter_s += (abs(error_s) - self.jitter_s) / min(n, MEMORY)
+        self.jitter_s += (abs(error_s) - self.jitter_s) / n
         if self.period_s < FASTEST_S / 2:
             self.n = 1
 
@@ -71,7 +70,7 @@ class Forecast:
     @property
     def spread_s(self) -> float:
         """So long before or after its time a message may well come."""
-        return SPREAD * self.jitter_s + AT_LEAST_S
+        return self.jitter_s + AT_LEAST_S
 
     def is_late(self, now: float) -> bool:
         """Whether one has not come although it was due: it may come at any time."""
