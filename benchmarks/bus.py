@@ -15,7 +15,7 @@ def measure(seed: int, quick: bool) -> list[Row]:
         ingress_row(20_000 if quick else 60_000, 3 if quick else 5),
         path_cost_row(seed, 20 if quick else 60),
         latency_row(300 if quick else 1500),
-        queue_cost_row(seed, 15 if quick else 45),
+        queue_cost_row("queue_cost_ratio_10_to_10000", seed, 15 if quick else 45),
     ]
 
 

@@ -5,14 +5,11 @@ the controller and the local run are those that the peers are measured with.
 """
 
 import struct
-from collections.abc import Callable
-from random import Random
 
 import numpy as np
 from numpy.typing import NDArray
 
-from backends import AirParams, RadioParams, World
-from benchmarks.pound.ours import CDR, MCS, PDU_SIZE, RATE_HZ, SNR_DB
+from benchmarks.pound.ours import CDR, Air, simulate
 from benchmarks.pound.peers.control import (
     GAIN,
     LARGE,
@@ -24,28 +21,16 @@ from benchmarks.pound.peers.control import (
     plant,
 )
 from benchmarks.pound.tables import BLOCK_3N_S
-from sdrlinkd.config import ModemParams
-from sdrlinkd.lab import Arrival, Simulation
-from sdrlinkd.link import (
-    AccessParams,
-    ClassesParams,
-    ClassParams,
-    Delivered,
-    Link,
-    LinkParams,
-    Overrides,
-    Qos,
-    QueueParams,
-    ReassemblyParams,
-)
-from sdrlinkd.modem import Airtimes
+from sdrlinkd.lab import Arrival
+from sdrlinkd.link import ClassesParams, ClassParams, Delivered, Overrides, Qos
 from sdrlinkd.wire import make_registry
 
-TOPICS = ("y", "u", "bulk")
+REGISTRY = make_registry([(name, "std_msgs/msg/UInt8MultiArray") for name in ("y", "u", "bulk")])
 Y, U, BULK = range(3)
 _DOUBLE = struct.Struct("<d")
 CLASSES = ClassesParams(bulk=ClassParams(share=0.05, max_burst_s=0.003))
 FIFO = ClassesParams(latency=ClassParams(), default=ClassParams(), bulk=ClassParams())
+TWO = Air(policy="minislot", turnaround_s=1e-4, max_burst_s=0.01, block_s=BLOCK_3N_S)
 
 
 def rms_vs_local_mv(phase_s: float, seed: int, seconds: float, with_classes: bool = True) -> float:
@@ -86,45 +71,11 @@ def run_loop(
         Arrival(phase_s + i * LARGE_PERIOD_S, BULK, CDR + bytes(LARGE + 4), slow)
         for i in range(n_large)
     ]
-    simulation = _two_robots({2: large}, seed, CLASSES if with_classes else FIFO, listen)
+    air = TWO._replace(classes=CLASSES if with_classes else FIFO)
+    simulation = simulate(REGISTRY, air, {1: 0.0, 2: 0.0}, {2: large}, listen, seed)
     simulation.call(0.0, lambda: tick(0))
     simulation.run(ticks * PERIOD_S)
     return vc
-
-
-def _two_robots(
-    arrivals: dict[int, list[Arrival]],
-    seed: int,
-    classes: ClassesParams,
-    listen: Callable[[int, Delivered, float], None],
-) -> Simulation:
-    nodes = [1, 2]
-    registry = make_registry([(name, "std_msgs/msg/UInt8MultiArray") for name in TOPICS])
-    modem = ModemParams(rate_hz=RATE_HZ, mcs=MCS, max_burst_s=0.01, block_s=BLOCK_3N_S)
-    air = AirParams(rate_hz=RATE_HZ, block_s=BLOCK_3N_S, snr_db=SNR_DB)
-    return Simulation(
-        air,
-        World(air, {}),
-        {node: RadioParams(full_duplex=False, turnaround_s=1e-4) for node in nodes},
-        {
-            node: Link(
-                LinkParams(pdu_size=PDU_SIZE),
-                QueueParams(),
-                ReassemblyParams(),
-                registry,
-                node,
-                Random(100 * seed + node),
-                classes=classes,
-            )
-            for node in nodes
-        },
-        modem,
-        Airtimes(modem, PDU_SIZE),
-        AccessParams(policy="minislot", nodes=nodes),
-        arrivals,
-        seed=seed,
-        listen=listen,
-    )
 
 
 def _message(value: float) -> bytes:

@@ -1,6 +1,6 @@
 """The paper's flows over our link, in lock-step on the air clock: real links, an air of bursts."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from random import Random
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ from sdrlinkd.link import (
     TopicPolicy,
 )
 from sdrlinkd.modem import Airtimes
-from sdrlinkd.wire import make_registry
+from sdrlinkd.wire import Registry, make_registry
 
 RATE_HZ = 5e6
 MCS = 3
@@ -36,6 +36,8 @@ MAX_BURST_S = 0.02
 BULK_BURST_S = 0.003
 SETTLE_S = 1.0
 CDR = b"\0\1\0\0"
+NO_POLICIES: Mapping[int, TopicPolicy] = {}
+Listen = Callable[[int, Delivered, float], None]
 
 
 class Sent(NamedTuple):
@@ -112,9 +114,45 @@ def prepare(
     times = [each.flow.times(rng) for each in sent]
     heard = [np.full(each.flow.count, np.nan) for each in sent]
     nodes = range(1, air.nodes + 1)
+    policies = {
+        i: msgspec.structs.replace(policy(each.flow), dst=each.dst) for i, each in enumerate(sent)
+    }
+    simulation = simulate(
+        registry,
+        air,
+        {node: float(rng.uniform(-10, 10)) for node in nodes},
+        {node: _arrivals(node, sent, times) for node in nodes},
+        _note(sent, heard),
+        seed,
+        policies,
+    )
+    own_s = Airtimes(modem_on(air), air.pdu_size).airtime_s(MCS, 1)
+    return Experiment(sent, times, heard, simulation, own_s)
+
+
+def modem_on(air: Air) -> ModemParams:
+    """Every robot has it."""
+    return ModemParams(rate_hz=RATE_HZ, mcs=MCS, max_burst_s=air.max_burst_s, block_s=air.block_s)
+
+
+def simulate(
+    registry: Registry,
+    air: Air,
+    clocks_ppm: Mapping[int, float],
+    arrivals: Mapping[int, Iterable[Arrival]],
+    listen: Listen,
+    seed: int,
+    policies: Mapping[int, TopicPolicy] = NO_POLICIES,
+) -> Simulation:
+    """Robots with links of their own; `clocks_ppm` says which."""
+    params = AirParams(rate_hz=RATE_HZ, block_s=air.block_s, snr_db=SNR_DB)
+    radio = RadioParams(full_duplex=air.policy == "none", turnaround_s=air.turnaround_s)
     links = {}
-    for node in nodes:
-        link = links[node] = Link(
+    for node in clocks_ppm:
+        relay = RelayParams()
+        if node in air.routes:
+            relay = RelayParams(policy="routes", routes=list(air.routes[node]))
+        links[node] = Link(
             LinkParams(pdu_size=air.pdu_size, hop_limit=1 + len(air.routes)),
             QueueParams(),
             ReassemblyParams(),
@@ -122,41 +160,22 @@ def prepare(
             node,
             Random(100 * seed + node),
             classes=air.classes,
-            relay=RelayParams(policy="routes", routes=list(air.routes[node]))
-            if node in air.routes
-            else RelayParams(),
+            relay=relay,
         )
-        link.set_policies(
-            {
-                i: msgspec.structs.replace(policy(each.flow), dst=each.dst)
-                for i, each in enumerate(sent)
-            }
-        )
-    modem = ModemParams(rate_hz=RATE_HZ, mcs=MCS, max_burst_s=air.max_burst_s, block_s=air.block_s)
-    params = AirParams(rate_hz=RATE_HZ, block_s=air.block_s, snr_db=SNR_DB)
-    full_duplex = air.policy == "none"
-    radios = {
-        node: RadioParams(
-            full_duplex=full_duplex,
-            turnaround_s=air.turnaround_s,
-            clock_ppm=float(rng.uniform(-10, 10)),
-        )
-        for node in nodes
-    }
-    simulation = Simulation(
+        links[node].set_policies(policies)
+    modem = modem_on(air)
+    return Simulation(
         params,
         World(params, {}, list(air.overrides)),
-        radios,
+        {node: msgspec.structs.replace(radio, clock_ppm=ppm) for node, ppm in clocks_ppm.items()},
         links,
         modem,
         Airtimes(modem, air.pdu_size),
-        AccessParams(policy=air.policy, nodes=list(nodes)),  # type: ignore[arg-type]
-        {node: _arrivals(node, sent, times) for node in nodes},
+        AccessParams(policy=air.policy, nodes=list(clocks_ppm)),  # type: ignore[arg-type]
+        arrivals,
         seed=seed,
-        listen=_note(sent, heard),
+        listen=listen,
     )
-    airtimes = Airtimes(modem, air.pdu_size)
-    return Experiment(sent, times, heard, simulation, airtimes.airtime_s(MCS, 1))
 
 
 def _arrivals(
@@ -180,7 +199,7 @@ def _arrivals(
 def _note(
     sent: Sequence[Sent],
     heard: Sequence[Times],
-) -> Callable[[int, Delivered, float], None]:
+) -> Listen:
     def note(node: int, message: Delivered, now: float) -> None:
         if node == sent[message.topic_id].dst:
             heard[message.topic_id][int.from_bytes(message.payload[4:8], "little")] = now

@@ -7,7 +7,7 @@ import select
 import socket
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Protocol
 
 from benchmarks.pound.peers.job import Hear, Job, Topic
@@ -43,6 +43,9 @@ class Join(Protocol):
 class UdpTopic:
     """A socket of its own for one topic. There is nothing to meet: UDP knows no connection."""
 
+    _join: Callable[[], Join]
+    """Makes messages of datagrams."""
+
     def __init__(self, reactor: Reactor, topic: Topic, job: Job, hear: Hear) -> None:
         self._reactor, self._topic = reactor, topic
         port = PORT + topic.number
@@ -59,9 +62,6 @@ class UdpTopic:
     def meet(self, deadline: float) -> None:
         """Nothing to wait for."""
 
-    def _join(self) -> Join:
-        raise NotImplementedError
-
 
 class UdpRosTopic(UdpTopic):
     """roscpp's sender: all blocks at once, and a full socket holds up the node.
@@ -70,8 +70,7 @@ class UdpRosTopic(UdpTopic):
     its data goes out under the next number all the same, and so does all that follows.
     """
 
-    def _join(self) -> Join:
-        return UdpRosJoin()
+    _join = UdpRosJoin
 
     def send(self, message: bytes) -> None:
         """Into the socket, however long that takes."""
@@ -86,13 +85,12 @@ class UdpRosTopic(UdpTopic):
 class NimbroTopic(UdpTopic):
     """nimbro_network's: all fragments at once; only the newest message waits behind them."""
 
+    _join = NimbroJoin
+
     def __init__(self, reactor: Reactor, topic: Topic, job: Job, hear: Hear) -> None:
         super().__init__(reactor, topic, job, hear)
         self._unsent: deque[bytes] = deque()
         self._newest: bytes | None = None
-
-    def _join(self) -> Join:
-        return NimbroJoin()
 
     def send(self, message: bytes) -> None:
         """Into the socket, or into the one place before it."""
