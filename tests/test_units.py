@@ -2,8 +2,8 @@
 
 import pytest
 
-from sdrlinkd.cli.units import octets, seconds
 from sdrlinkd.errors import UserError
+from sdrlinkd.units import octets, seconds
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,9 @@ from zstandard import ZstdCompressionDict
 
 from sdrlinkd.adapters import open_bag
 from sdrlinkd.cli.status import topics_app
-from sdrlinkd.cli.units import octets
 from sdrlinkd.errors import UserError
 from sdrlinkd.link import Deflated, train_dictionary
+from sdrlinkd.units import octets
 
 
 @topics_app.command("train-dict")

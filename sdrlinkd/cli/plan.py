@@ -10,10 +10,10 @@ from rich.table import Table
 
 from sdrlinkd.adapters import open_bag
 from sdrlinkd.cli.app import AsJson, app
-from sdrlinkd.cli.units import seconds
 from sdrlinkd.config import Setup, load_config, make_setup
 from sdrlinkd.errors import UserError
 from sdrlinkd.plan import Load, Plan, loads_from_bag, make_plan, parse_load, setting_of
+from sdrlinkd.units import seconds
 
 
 @app.command()

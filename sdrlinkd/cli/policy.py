@@ -6,9 +6,9 @@ import msgspec
 import typer
 
 from sdrlinkd.cli.app import AsJson, RuntimeDir, app, connect
-from sdrlinkd.cli.units import octets, seconds
 from sdrlinkd.client import NoDaemonError, RefusedError
 from sdrlinkd.errors import UserError
+from sdrlinkd.units import octets, seconds
 
 
 def _topic_names() -> list[str]:

@@ -1,6 +1,6 @@
 """The link: queues, packing, duplicates, ages and the ledger, as a calculator over `now`."""
 
-from sdrlinkd.link.access import AccessParams, check_access
+from sdrlinkd.link.access import AccessParams, check_access, make_access
 from sdrlinkd.link.burst import Burst, Outcome
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity, Sensed
 from sdrlinkd.link.compression import Deflated, train_dictionary
@@ -10,7 +10,7 @@ from sdrlinkd.link.link import Link
 from sdrlinkd.link.message import Outgoing
 from sdrlinkd.link.outbox import Outbox
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
-from sdrlinkd.link.policy import TopicPolicy
+from sdrlinkd.link.policy import DEFAULT_POLICY, TopicPolicy
 from sdrlinkd.link.qos import (
     AS_CONFIGURED,
     MAX_PRIORITY,
@@ -33,6 +33,7 @@ from sdrlinkd.link.why import Told
 __all__ = [
     "AS_CONFIGURED",
     "CDR_HEADER_SIZE",
+    "DEFAULT_POLICY",
     "MAX_PRIORITY",
     "OVERRUN",
     "QOS_BY_LABEL",
@@ -68,5 +69,6 @@ __all__ = [
     "check_access",
     "link_notices",
     "link_report",
+    "make_access",
     "train_dictionary",
 ]

@@ -8,7 +8,15 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from sdrlinkd.link import OVERRUN, QOS_BY_LABEL, SHARED_OVERRUN, ClassesParams, Qos, TopicPolicy
+from sdrlinkd.link import (
+    DEFAULT_POLICY,
+    OVERRUN,
+    QOS_BY_LABEL,
+    SHARED_OVERRUN,
+    ClassesParams,
+    Qos,
+    TopicPolicy,
+)
 from sdrlinkd.modem import Airtimes
 from sdrlinkd.plan.traffic import Load, after_policy
 from sdrlinkd.wire import ENTRY_HEADER_SIZE, STAMP_SIZE, equal_payload, fragment_count
@@ -79,7 +87,10 @@ class Plan(NamedTuple):
 
 
 class _Task(NamedTuple):
-    """A topic as the analysis sees it: a message takes `cost_s` on the air, every `period_s`."""
+    """A topic as the analysis sees it: a message takes `cost_s` on the air, every `period_s`.
+
+    The largest takes `most_s`, in so many bursts.
+    """
 
     load: Load
     policy: TopicPolicy
@@ -87,14 +98,15 @@ class _Task(NamedTuple):
     rank: tuple[int, int]
     period_s: float
     pdus: int
-    bursts: int
     cost_s: float
+    most_s: float
+    bursts: int
 
 
 def make_plan(loads: Sequence[Load], policies: Mapping[int, TopicPolicy], setting: Setting) -> Plan:
     """For every robot that sends the same."""
-    known = [(after_policy(load, policies.get(load.topic_id, TopicPolicy())),
-              policies.get(load.topic_id, TopicPolicy())) for load in loads]  # fmt: skip
+    given = ((load, policies.get(load.topic_id, DEFAULT_POLICY)) for load in loads)
+    known = [(after_policy(load, policy), policy) for load, policy in given]
     tasks = [_task(load, policy, known, setting) for load, policy in known]
     topics = [
         TopicPlan(
@@ -128,11 +140,12 @@ def _task(
     if beats:
         busy_s = one_s + setting.gap_s
         most = max(1, min(most, round((1 / beats - busy_s) / each_s)))
-    bursts = math.ceil(pdus / most)
     overhead_s = one_s - each_s + setting.gap_s + setting.pause_s[qos]
-    cost_s = pdus * each_s + bursts * overhead_s
+    at_most = _pdus(load.largest, setting.pdu_size, policy.stamp)
+    cost_s, most_s = (n * each_s + math.ceil(n / most) * overhead_s for n in (pdus, at_most))
     rank = (qos, -policy.priority)
-    return _Task(load, policy, qos, rank, 1 / load.rate_hz, pdus, bursts, cost_s)
+    bursts = math.ceil(at_most / most)
+    return _Task(load, policy, qos, rank, 1 / load.rate_hz, pdus, cost_s, most_s, bursts)
 
 
 def _pdus(size: float, pdu_size: int, stamp: bool) -> int:
@@ -164,17 +177,15 @@ def _worst_s(task: _Task, tasks: Sequence[_Task], setting: Setting) -> float:
     if is_shared and setting.nodes > 1:
         others = setting.nodes - 1
         blocked_s += setting.longest_s if lower else one_s
-    fixed_s = blocked_s + task.cost_s + setting.react_s + setting.turn_s
-    if setting.share < 1:
-        fixed_s = blocked_s + task.cost_s / setting.share + setting.react_s + setting.turn_s
+    fixed_s = blocked_s + task.most_s / setting.share + setting.react_s + setting.turn_s
     worst_s = fixed_s
     for _ in range(ROUNDS):
         busy_s = (
             sum(
-                math.ceil(worst_s / other.period_s) * other.cost_s * (1 + others)
+                math.ceil(worst_s / other.period_s) * other.most_s * (1 + others)
                 for other in before
             )
-            + others * math.ceil(worst_s / task.period_s) * task.cost_s
+            + others * math.ceil(worst_s / task.period_s) * task.most_s
         )
         # Keeping the air free for them costs what does not fill a PDU.
         idle_s = sum(

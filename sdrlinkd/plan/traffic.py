@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from sdrlinkd.errors import UserError
-from sdrlinkd.link import Deflated, TopicPolicy
+from sdrlinkd.link import DEFAULT_POLICY, Deflated, TopicPolicy
+from sdrlinkd.units import octets
 from sdrlinkd.wire import Registry
 
-_LOAD = re.compile(r"/?([\w/]+):([0-9.]+)(?:hz)?:([0-9.]+)(b|kb|kib|mb|mib)?", re.IGNORECASE)
-_UNITS = {"b": 1, "kb": 1000, "kib": 1024, "mb": 1000_000, "mib": 1 << 20}
+_LOAD = re.compile(r"/?([\w/]+):([0-9.]+)(?:hz)?:([0-9.]+[a-z]*)", re.IGNORECASE)
 SAMPLES = 50
 """Messages of a recording that are compressed to see what they become."""
 
@@ -37,7 +37,7 @@ def parse_load(text: str, registry: Registry) -> Load:
         )
     if topic is None:
         raise UserError(f"--topic: {found[1]}: unknown topic; {registry.suggest(found[1])}")
-    size = float(found[3]) * _UNITS[(found[4] or "b").lower()]
+    size = octets(found[3], "--topic")
     return Load(topic.id, topic.name, float(found[2]), size, size)
 
 
@@ -53,7 +53,7 @@ def loads_from_bag(
         topic = registry.by_name(name) or registry.by_name(name.rsplit("/", 1)[-1])
         if topic is None:
             continue
-        policy = policies.get(topic.id, TopicPolicy())
+        policy = policies.get(topic.id, DEFAULT_POLICY)
         times[topic.id].append(at)
         size = len(payload)
         if policy.compress == "zstd" and len(sizes[topic.id]) < SAMPLES:
@@ -62,7 +62,7 @@ def loads_from_bag(
     loads = []
     for topic_id, came in sorted(times.items()):
         span = max(came) - min(came)
-        shrunk = policies.get(topic_id, TopicPolicy()).compress == "zstd"
+        shrunk = policies.get(topic_id, DEFAULT_POLICY).compress == "zstd"
         known = sizes[topic_id][:SAMPLES] if shrunk else sizes[topic_id]
         rate = (len(came) - 1) / span if span > 0 else 1.0
         mean = math.fsum(known) / len(known)

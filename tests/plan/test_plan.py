@@ -102,9 +102,16 @@ def test_rates_and_sizes_from_a_recording():
     assert small.size < 100
 
 
+def test_the_worst_case_is_that_of_the_largest_message():
+    same, larger = (Load(0, "scan", 20.0, 1000.0, most) for most in (1000.0, 20_000.0))
+    one, other = (make_plan([load], {}, setting()).topics[0] for load in (same, larger))
+    assert one.air == other.air
+    assert other.worst_s > 5 * one.worst_s
+
+
 @pytest.mark.parametrize("text", ["scan", "scan:50", "scan:0:1", "scan:fast:1KB", "scan:5:1parsec"])
 def test_a_load_that_cannot_be_read_is_refused(text):
-    with pytest.raises(UserError, match="allowed: NAME:RATE:SIZE"):
+    with pytest.raises(UserError, match=r"allowed: (NAME:RATE:SIZE|a size such as)"):
         parse_load(text, REGISTRY)
     with pytest.raises(UserError, match="did you mean scan"):
         parse_load("scam:5:1KB", REGISTRY)

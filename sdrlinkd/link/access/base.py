@@ -58,6 +58,13 @@ class Access(Protocol):
     def pause_s(self) -> float:
         """After every carrier the air stays free for so long at least."""
 
+    @property
+    def share(self) -> float:
+        """Of the air, what one robot has when all want to send, were it not for their bursts."""
+
+    def mean_wait_s(self, qos: Qos) -> float:
+        """From the end of a carrier to a burst of that class, on average."""
+
     def slot(self, wish: Wish) -> Slot | None:
         """Where it may leave; None: not now."""
 
@@ -101,6 +108,15 @@ class Carriers:
 
     @property
     def pause_s(self) -> float:
+        """None."""
+        return 0.0
+
+    @property
+    def share(self) -> float:
+        """All of it."""
+        return 1.0
+
+    def mean_wait_s(self, qos: Qos) -> float:  # noqa: ARG002  # not all ask for it
         """None."""
         return 0.0
 

@@ -47,6 +47,12 @@ class Csma(Carriers):
         """DWAIT."""
         return self._dwait_s
 
+    def mean_wait_s(self, qos: Qos) -> float:
+        """DWAIT, the class's own wait, and slots until chance has it."""
+        waits, eagerness = WINDOWS[qos]
+        passed = 1 / min(1.0, eagerness * self._persist) - 1
+        return self._dwait_s + (waits + passed) * self._slottime_s
+
     @property
     def others_follow(self) -> bool:
         """Anybody."""

@@ -58,6 +58,11 @@ class MiniSlots(Carriers):
         """Up to the first mini-slot."""
         return self._minislot_s
 
+    def mean_wait_s(self, qos: Qos) -> float:
+        """Half the robots of a level come before, and all of the higher one."""
+        n = len(self._nodes)
+        return self._minislot_s * (1 + (n - 1) / 2 + (n if qos > Qos.LATENCY else 0))
+
     @property
     def others_follow(self) -> bool:
         """In their mini-slots."""

@@ -89,6 +89,11 @@ class Tdma(Carriers):
         """A frame."""
         return self._frame_s
 
+    @property
+    def share(self) -> float:
+        """Our slot, but for its guard."""
+        return (self._slot_s - self._guard_s) / self._frame_s
+
     def slot(self, wish: Wish) -> Slot | None:
         """In our own slot, or in one that nobody uses."""
         earliest, _, need_s, sensed = wish
