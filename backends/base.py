@@ -1,6 +1,6 @@
 """What every radio is to those above it: blocks of samples in, bursts out."""
 
-from collections.abc import AsyncIterator, Awaitable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple, Protocol
@@ -67,6 +67,9 @@ class RxBlock:
     index_uncertainty: int = 0
 
 
+Hear = Callable[[RxBlock], None]
+
+
 class TxBurst(NamedTuple):
     """Samples whose first leaves at absolute index `start` of the received stream.
 
@@ -115,8 +118,12 @@ class Radio(Protocol):
     async def open(self, tuning: Tuning) -> None:
         """Begin. Raises BackendError."""
 
-    def blocks(self) -> AsyncIterator[RxBlock]:
-        """Contiguous blocks from index 0 on; gaps are blocks too. Ends with the recording."""
+    def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
+        """Contiguous blocks from index 0 on; gaps are blocks too. Ends with the recording.
+
+        A radio that makes them on a thread of its own may give them to `hear` there, at once; what
+        `hear` has had is not yielded.
+        """
 
     def send(self, burst: TxBurst) -> Awaitable[TxReport]:
         """Take a burst at once; the report comes when its last sample has left, or it cannot."""

@@ -1,38 +1,54 @@
-"""Blocks made on a thread of their own, taken on the event loop."""
+"""Blocks made on a thread of their own, heard there or taken on the event loop."""
 
 import asyncio
 import threading
 from collections.abc import AsyncIterator, Callable
+from typing import NamedTuple
 
-from backends.base import RxBlock
+from backends.base import Hear, RxBlock
 
 # Blocks that may wait for the event loop; past that the thread waits.
 MAX_WAITING = 16
 
 
+class Fed(NamedTuple):
+    """A block; whether it was heard where it was made."""
+
+    block: RxBlock
+    is_heard: bool
+
+
 class BlockFeed:
     """Calls `next_block` again and again on a thread, until it returns None or `stop` is called.
 
-    One wake-up of the event loop a block, and no turn of it while a block is made.
+    One wake-up of the event loop a block, and no turn of it while a block is made; none at all for
+    blocks that were heard, unless `is_due` says of one that something else is to be done then.
     """
 
-    def __init__(self, next_block: Callable[[], RxBlock | None], name: str) -> None:
+    def __init__(
+        self,
+        next_block: Callable[[], RxBlock | None],
+        name: str,
+        is_due: Callable[[RxBlock], bool],
+    ) -> None:
         self._next_block = next_block
+        self._is_due = is_due
         self._room = threading.Semaphore(MAX_WAITING)
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._queue: asyncio.Queue[RxBlock | BaseException | None] = asyncio.Queue()
+        self._hear: Hear | None = None
+        self._queue: asyncio.Queue[Fed | BaseException | None] = asyncio.Queue()
 
-    async def blocks(self) -> AsyncIterator[RxBlock]:
-        """The blocks in order. What `next_block` raises is raised here."""
-        self._loop = asyncio.get_running_loop()
+    async def blocks(self, hear: Hear | None) -> AsyncIterator[Fed]:
+        """The blocks in order. What `next_block` or `hear` raise is raised here."""
+        self._loop, self._hear = asyncio.get_running_loop(), hear
         self._thread.start()
-        while (block := await self._queue.get()) is not None:
-            if isinstance(block, BaseException):
-                raise block
+        while (fed := await self._queue.get()) is not None:
+            if isinstance(fed, BaseException):
+                raise fed
             self._room.release()
-            yield block
+            yield fed
 
     def stop(self) -> None:
         """End the thread and wait for it; stopping twice is fine."""
@@ -43,21 +59,32 @@ class BlockFeed:
         self._queue.put_nowait(None)
 
     def _work(self) -> None:
-        block: RxBlock | BaseException | None = None
         while not self._stopped.is_set():
             self._room.acquire()
             try:
-                block = self._next_block()
+                fed: Fed | BaseException | None = self._make()
             except Exception as error:
-                block = error
-            if self._stopped.is_set() or not self._hand_over(block):
+                fed = error
+            if self._stopped.is_set():
                 return
-            if not isinstance(block, RxBlock):
+            if isinstance(fed, Fed) and fed.is_heard and not self._is_due(fed.block):
+                self._room.release()
+                continue
+            if not self._hand_over(fed) or not isinstance(fed, Fed):
                 return
 
-    def _hand_over(self, block: RxBlock | BaseException | None) -> bool:
+    def _make(self) -> Fed | None:
+        block = self._next_block()
+        if block is None:
+            return None
+        is_heard = self._hear is not None and block.n > 0
+        if self._hear is not None and is_heard and not self._stopped.is_set():
+            self._hear(block)
+        return Fed(block, is_heard)
+
+    def _hand_over(self, fed: Fed | BaseException | None) -> bool:
         loop = self._loop
         if loop is None or loop.is_closed():
             return False
-        loop.call_soon_threadsafe(self._queue.put_nowait, block)
+        loop.call_soon_threadsafe(self._queue.put_nowait, fed)
         return True

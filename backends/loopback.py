@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator, Awaitable
 import numpy as np
 
 from backends.air import Channel, Timeline
-from backends.base import Capabilities, RxBlock, Samples, Tuning, TxBurst, TxOutcome, TxReport
+from backends.base import Capabilities, Hear, RxBlock, Samples, Tuning, TxBurst, TxOutcome, TxReport
 from backends.feed import BlockFeed
 from backends.outstanding import Outstanding, answered
 from backends.pace import Pace
@@ -34,7 +34,7 @@ class LoopbackRadio:
         self._paced = paced
         self._hear_self = hear_self
         self._outstanding = Outstanding()
-        self._feed = BlockFeed(self._next_block, "loopback")
+        self._feed = BlockFeed(self._next_block, "loopback", self._is_due)
         # The next block's index and the bursts sent belong together.
         self._lock = threading.Lock()
         self._next = 0
@@ -65,13 +65,14 @@ class LoopbackRadio:
         self._pace = Pace(tuning.rate_hz, self._paced)
         self._is_open = True
 
-    async def blocks(self) -> AsyncIterator[RxBlock]:
+    async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
         """What the antenna hears; when the reader is far behind, what it missed is a gap."""
         self._pace.restart()
         try:
-            async for block in self._feed.blocks():
+            async for block, is_heard in self._feed.blocks(hear):
                 self._outstanding.settle(block.index + block.n)
-                yield block
+                if not is_heard:
+                    yield block
         finally:
             self._outstanding.lose()
 
@@ -95,6 +96,10 @@ class LoopbackRadio:
             self._pace.end()
             self._feed.stop()
         self._outstanding.lose()
+
+    def _is_due(self, block: RxBlock) -> bool:
+        """In the feed's thread: whether a burst has left."""
+        return self._outstanding.is_due(block.index + block.n)
 
     def _next_block(self) -> RxBlock:
         """In the feed's thread."""

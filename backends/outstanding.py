@@ -4,6 +4,7 @@ import asyncio
 
 from backends.base import TxBurst, TxOutcome, TxReport
 
+NEVER = 1 << 62
 GAP = 32
 """Samples of silence after a burst, for its echoes."""
 
@@ -22,6 +23,7 @@ class Outstanding:
         self._waiting: list[tuple[TxReport, asyncio.Future[TxReport]]] = []
         self._free_from = 0
         self._is_over = False
+        self._first_end = NEVER
 
     def place(self, burst: TxBurst, earliest: int) -> int | None:
         """Where a burst begins when `earliest` is the first index possible; None: too late."""
@@ -38,12 +40,18 @@ class Outstanding:
             return answered(report._replace(outcome=TxOutcome.LOST))
         answer: asyncio.Future[TxReport] = asyncio.get_running_loop().create_future()
         self._waiting.append((report, answer))
+        self._first_end = min(self._first_end, report.end)
         return answer
+
+    def is_due(self, index: int) -> bool:
+        """Whether `settle` would have something to tell; asked from any thread."""
+        return self._first_end <= index
 
     def settle(self, index: int) -> None:
         """Every sample before `index` has left."""
         left = [each for each in self._waiting if each[0].end <= index]
         self._waiting = [each for each in self._waiting if each[0].end > index]
+        self._first_end = min((each.end for each, _ in self._waiting), default=NEVER)
         for report, answer in left:
             if not answer.done():
                 answer.set_result(report)

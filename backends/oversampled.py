@@ -3,7 +3,7 @@
 from collections.abc import AsyncIterator, Awaitable
 from dataclasses import replace
 
-from backends.base import Capabilities, Radio, RxBlock, Samples, Tuning, TxBurst, TxReport
+from backends.base import Capabilities, Hear, Radio, RxBlock, Samples, Tuning, TxBurst, TxReport
 from phy import REACH, Downsampler, upsample
 
 
@@ -37,7 +37,10 @@ class OversampledRadio:
         self._tuning = tuning
         await self._radio.open(replace(tuning, rate_hz=tuning.rate_hz * self._factor))
 
-    async def blocks(self) -> AsyncIterator[RxBlock]:
+    async def blocks(
+        self,
+        hear: Hear | None = None,  # noqa: ARG002  # filtered here, on the event loop
+    ) -> AsyncIterator[RxBlock]:
         """Blocks REACH samples late; what lies before a gap is told as if silence followed."""
         late_ns, last_ns = round(self._reach_s * 1e9), 0
         async for block in self._radio.blocks():

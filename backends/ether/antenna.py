@@ -7,6 +7,7 @@ import numpy as np
 from backends.base import SENDING, Capabilities, RxBlock, TxBurst, TxOutcome, TxReport
 from backends.ether.medium import NOISE_DBFS, Piece
 from backends.ether.world import RadioParams
+from backends.outstanding import NEVER
 from phy import FrontEnd, FrontEndParams
 
 NOTHING_DB = 300.0
@@ -36,6 +37,7 @@ class Antenna:
         self.next_index = 0
         self.end = 0
         self._waiting: dict[int, tuple[TxReport | None, asyncio.Future[TxReport]]] = {}
+        self._first_end = NEVER
 
     def capabilities(self, paced: bool, lead_s: float, block_s: float) -> Capabilities:
         """What the radio can do on an air that is paced, or in lock-step."""
@@ -115,7 +117,12 @@ class Antenna:
             return True
         own = start + self._shift
         self._waiting[number] = (TxReport(TxOutcome.SENT, own, own + n_samples), answer)
+        self._first_end = min(self._first_end, own + n_samples)
         return False
+
+    def is_due(self, index: int) -> bool:
+        """Whether `settle` would have something to tell; asked from any thread."""
+        return self._first_end <= index
 
     def settle(self, index: int) -> None:
         """All before `index` has left."""
@@ -125,6 +132,8 @@ class Antenna:
                 del self._waiting[number]
                 if not answer.done():
                     answer.set_result(report)
+        ends = (report.end for report, _ in self._waiting.values() if report is not None)
+        self._first_end = min(ends, default=NEVER)
 
     def lose(self) -> None:
         """Nothing that waits will leave."""

@@ -3,7 +3,16 @@
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Mapping
 
-from backends.base import BackendError, Capabilities, RxBlock, Tuning, TxBurst, TxOutcome, TxReport
+from backends.base import (
+    BackendError,
+    Capabilities,
+    Hear,
+    RxBlock,
+    Tuning,
+    TxBurst,
+    TxOutcome,
+    TxReport,
+)
 from backends.ether.antenna import Antenna
 from backends.ether.medium import LEAD, Medium
 from backends.ether.world import AirParams, RadioParams, World
@@ -77,7 +86,10 @@ class LocalRadio:
             )
         self._is_open = True
 
-    async def blocks(self) -> AsyncIterator[RxBlock]:
+    async def blocks(
+        self,
+        hear: Hear | None = None,  # noqa: ARG002  # there is no thread
+    ) -> AsyncIterator[RxBlock]:
         """What is received, a step at a time."""
         while (block := await self.queue.get()) is not None:
             self.antenna.settle(block.index + block.n)

@@ -15,6 +15,7 @@ import zmq
 from backends.base import (
     BackendError,
     Capabilities,
+    Hear,
     RxBlock,
     Samples,
     Tuning,
@@ -27,7 +28,7 @@ from backends.ether.antenna import Antenna
 from backends.ether.downlink import Downlink
 from backends.ether.medium import LEAD, Piece
 from backends.ether.sockets import AIR, NOBLOCK, SKY, WAITING
-from backends.feed import BlockFeed
+from backends.feed import BlockFeed, Fed
 from backends.outstanding import answered
 
 # From the event loop to the hub, on a busy machine.
@@ -56,7 +57,7 @@ class EtherRadio:
         self._node = node
         self._who = who
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._feed = BlockFeed(self._next_block, "ether")
+        self._feed = BlockFeed(self._next_block, "ether", self._is_due)
         self._closing = threading.Event()
         self._readable = asyncio.Event()
         self._antenna: Antenna | None = None
@@ -96,15 +97,15 @@ class EtherRadio:
         self._down.setsockopt(zmq.RCVTIMEO, QUIET_MS)
         self._antenna = Antenna(welcome.radio, welcome.seed, tuning.rate_hz)
 
-    async def blocks(self) -> AsyncIterator[RxBlock]:
+    async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
         """What the hub hands out. Raises BackendError when it will not have us any more."""
         antenna = self._joined
         # In lock-step everybody waits anyway, and a thread would only cost.
-        blocks = self._feed.blocks() if self._welcome.paced else self._blocks_here()
+        blocks = self._feed.blocks(hear) if self._welcome.paced else self._blocks_here()
         if not self._welcome.paced:
             self._say(protocol.Done(token=self._welcome.token, step=0))
         try:
-            async for block in blocks:
+            async for block, is_heard in blocks:
                 beside = self._beside.popleft()
                 if beside.welcome is not None:
                     # From here on, bursts are for the new hub.
@@ -115,7 +116,7 @@ class EtherRadio:
                     is_late = antenna.placed(placed.number, placed.start, placed.n_samples)
                     self.counters["late"] += is_late
                 antenna.settle(block.index + block.n)
-                if block.n:
+                if block.n and not is_heard:
                     yield block
                 if beside.step:
                     self._say(protocol.Done(token=self._welcome.token, step=beside.step))
@@ -210,7 +211,16 @@ class EtherRadio:
                 self._hello()
         return None
 
-    async def _blocks_here(self) -> AsyncIterator[RxBlock]:
+    def _is_due(self, block: RxBlock) -> bool:
+        """In the feed's thread: whether something came with a block, or a burst has left."""
+        beside, end = self._beside[-1], block.index + block.n
+        if beside.placed or beside.step or beside.welcome or self._joined.is_due(end):
+            return True
+        self._beside.pop()
+        self._joined.end = end
+        return False
+
+    async def _blocks_here(self) -> AsyncIterator[Fed]:
         """In lock-step: read on the event loop itself."""
         loop, readable = asyncio.get_running_loop(), self._readable
         fd = int(self._down.fd)
@@ -226,7 +236,7 @@ class EtherRadio:
                 if isinstance(message, protocol.Refused):
                     raise BackendError(message.reason)
                 if isinstance(message, protocol.Stretch):
-                    yield self._receive(message, samples)
+                    yield Fed(self._receive(message, samples), is_heard=False)
         finally:
             if not self._down.closed:
                 loop.remove_reader(fd)

@@ -17,26 +17,29 @@ class StreamClock:
         self._rate_hz = rate_hz
         self._paced = paced
         self._lockstep = lockstep
-        self._host_s: float | None = None
         self._latest = 0.0
-        self.end = 0
+        self._seen: tuple[int, float] | None = None
+
+    @property
+    def end(self) -> int:
         """Index after the last sample received."""
+        return 0 if self._seen is None else self._seen[0]
 
     def observe(self, end: int, host_s: float) -> None:
-        """Samples up to before `end` were there at `host_s`."""
-        self.end = end
-        self._host_s = host_s
+        """Samples up to before `end` were there at `host_s`; told from any thread."""
+        self._seen = end, host_s
 
     def now(self, host_s: float) -> float:
         """Seconds on the stream."""
-        if self._host_s is None:
+        if self._seen is None:
             return 0.0
-        since_s = host_s - self._host_s
+        end, seen_s = self._seen
+        since_s = host_s - seen_s
         if self._lockstep:
             since_s = 0.0
         elif not self._paced:
             since_s -= self.QUIET_S
-        self._latest = max(self._latest, self.end / self._rate_hz + max(0.0, since_s))
+        self._latest = max(self._latest, end / self._rate_hz + max(0.0, since_s))
         return self._latest
 
     def index(self, host_s: float) -> int:
@@ -45,4 +48,5 @@ class StreamClock:
 
     def is_gone(self, host_s: float) -> bool:
         """Whether a paced stream has begun and delivers no more."""
-        return self._paced and self._host_s is not None and host_s - self._host_s > self.GONE_S
+        seen = self._seen
+        return self._paced and seen is not None and host_s - seen[1] > self.GONE_S

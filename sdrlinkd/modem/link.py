@@ -5,9 +5,10 @@ import contextlib
 import math
 import time
 from collections.abc import Sequence
+from functools import partial
 
 import phy
-from backends import BackendError, Radio, Tuning
+from backends import BackendError, Radio, RxBlock, Tuning
 from sdrlinkd.config import ModemParams
 from sdrlinkd.errors import UserError
 from sdrlinkd.link import Burst, CarrierTraits, Opportunity, Outcome
@@ -27,7 +28,7 @@ INFINITE = float("inf")
 
 
 class ModemLink:
-    """A PDU link over a radio: the PHY in two threads, everything else on the event loop.
+    """A PDU link over a radio: the PHY off the event loop, everything else on it.
 
     In lock-step all of it is done within the block that brought it. `listens`: someone wants to
     know whether there is a carrier on the air. `lead_grows`: bursts that must leave at a given
@@ -64,7 +65,6 @@ class ModemLink:
         self._moved = asyncio.Event()
         self._state = "down"
         self._problem = ""
-        self._is_stalled = False
 
     def now(self) -> float:
         """Seconds on the received stream."""
@@ -179,13 +179,16 @@ class ModemLink:
     async def _receive(self, receiver: Demodulation) -> None:
         """Take blocks from the radio; when the receiver is far behind, the radio has to wait."""
         paced = self._can.paced
+
+        def hear(block: RxBlock) -> None:
+            """On the radio's thread."""
+            self._clock.observe(block.index + block.n, block.host_ns * 1e-9)
+            receiver.hear(block)
+
         self._moved.set()
-        async for block in self._radio.blocks():
+        async for block in self._radio.blocks(hear if paced else None):
             if paced:
                 self._clock.observe(block.index + block.n, block.host_ns * 1e-9)
-                if self._is_stalled:
-                    self._is_stalled = False
-                    self._moved.set()
             await receiver.put(block)
         await receiver.finish()
         self._state = "ended"
@@ -238,8 +241,9 @@ class ModemLink:
         can_send = self._state == "up" and self._can.transmits
         if listener is None or self._rx is None or not can_send:
             return INFINITE
-        self._is_stalled = self._is_gone
-        if self._is_stalled:
+        if self._is_gone:
+            # Until a block comes.
+            self._rx.wakes = True
             return INFINITE
         now = self.now()
         wait_s = listener.next_wakeup(now) - now
@@ -249,11 +253,13 @@ class ModemLink:
         wait = self._plan.wait(index)
         if wait:
             return wait / rate
-        earliest = self._plan.start(index) / rate
+        airtimes, start = self._airtimes, self._plan.start(index)
+        most_pdus = airtimes.most_pdus
+        if self._can.paced:
+            in_time = self._tx.tempo.samples_in((start - index) / rate)
+            most_pdus = partial(airtimes.most_in_time, in_time)
         burst = listener.next_burst(
-            Opportunity(
-                earliest, self._airtimes.airtime_s, self._airtimes.most_pdus, self._ear.sensed
-            )
+            Opportunity(start / rate, airtimes.airtime_s, most_pdus, self._ear.sensed)
         )
         if self._can.paced:
             self._rx.wakes = burst is None

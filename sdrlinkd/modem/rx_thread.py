@@ -1,4 +1,4 @@
-"""The receiver on a thread of its own, or, in lock-step, where it stands."""
+"""The receiver on the radio's thread or one of its own; in lock-step, where it stands."""
 
 import asyncio
 import queue
@@ -25,6 +25,9 @@ class Demodulation(Protocol):
     wakes: bool
     """Deliver after every block, also when it brought no events."""
 
+    def hear(self, block: RxBlock) -> None:
+        """Demodulate a block now, on whatever thread calls."""
+
     async def put(self, block: RxBlock) -> None:
         """Hand over a block; may wait while too many are waiting already."""
 
@@ -47,6 +50,10 @@ class ReceiverHere:
 
     async def put(self, block: RxBlock) -> None:
         """Everything that follows from a block."""
+        self.hear(block)
+
+    def hear(self, block: RxBlock) -> None:
+        """The same."""
         began = time.thread_time()
         events = self._ear.hear(block)
         self.load.add(time.thread_time() - began, block.n / self._rate_hz)
@@ -62,9 +69,10 @@ class ReceiverHere:
 
 
 class ReceiverThread:
-    """On a thread; `deliver` is called on the event loop.
+    """`deliver` is called on the event loop: when there are events, or while `wakes` is set.
 
-    The loop is woken only when there are events, or while `wakes` is set.
+    `hear` demodulates on the radio's thread. What a radio does not bring there is `put`, and
+    demodulated on a thread of our own. A stream is heard, or put, as a whole.
     """
 
     def __init__(self, ear: Ear, rate_hz: float, deliver: Deliver, wakes: bool) -> None:
@@ -79,10 +87,20 @@ class ReceiverThread:
         self._ended = asyncio.Event()
         self.load = LoadMeter()
         self._thread = threading.Thread(target=self._work, name="phy-rx", daemon=True)
-        self._thread.start()
+
+    def hear(self, block: RxBlock) -> None:
+        """Demodulate a block on the thread that calls."""
+        began = time.thread_time()
+        events = self._ear.hear(block)
+        if block.samples is not None:
+            self.load.add(time.thread_time() - began, block.n / self._rate_hz)
+        if events or self.wakes:
+            self._call(self._deliver, events, block.index + block.n)
 
     async def put(self, block: RxBlock) -> None:
         """Hand over a block; waits while too many are waiting already."""
+        if not self._thread.ident:
+            self._thread.start()
         while self._blocks.qsize() >= MAX_BLOCKS:
             self._has_room.clear()
             self._is_waited_for = True
@@ -93,22 +111,20 @@ class ReceiverThread:
 
     async def finish(self) -> None:
         """The stream is over: deliver what its last samples hold, and end the thread."""
+        if not self._thread.ident:
+            self._thread.start()
         self._blocks.put(None)
         await self._ended.wait()
 
     def stop(self) -> None:
         """End the thread, whatever waits."""
         self._blocks.put(None)
-        self._thread.join()
+        if self._thread.ident:
+            self._thread.join()
 
     def _work(self) -> None:
         while (block := self._blocks.get()) is not None:
-            began = time.thread_time()
-            events = self._ear.hear(block)
-            if block.samples is not None:
-                self.load.add(time.thread_time() - began, block.n / self._rate_hz)
-            if events or self.wakes:
-                self._call(self._deliver, events, block.index + block.n)
+            self.hear(block)
             if self._is_waited_for and self._blocks.qsize() <= MAX_BLOCKS // 2:
                 self._is_waited_for = False
                 self._call(self._has_room.set)

@@ -6,7 +6,7 @@ from sdrlinkd.config import ModemParams
 from sdrlinkd.link import CarrierTraits
 from sdrlinkd.modem.airtimes import Airtimes
 
-HANDOVER_S = 0.001
+HANDOVER_S = 5e-4
 """A burst composed for a free air begins so much later: time to modulate it."""
 REACTION_S = 0.002
 """From the last sample of a block to a decision, beyond the block itself."""

@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+import time
 from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
@@ -10,10 +11,11 @@ import phy
 from backends import BackendError, Radio, Samples, TxBurst, TxOutcome, TxReport
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import Burst, Outcome
+from sdrlinkd.modem.tempo import Tempo
 from sdrlinkd.pdulink import PduListener
 
 INFINITE = float("inf")
-SHORT = 20_000
+SHORT = 10_000
 """Samples of a burst that is modulated where it is composed: handing it to a thread and back takes
 longer.
 """
@@ -47,6 +49,7 @@ class Transmission:
         self._left: Callable[[Burst, BurstReport], None]
         self._at_once = False
         self._in_thread = 0
+        self.tempo = Tempo()
         self._late = self._late_by_radio = 0
         self.on_air: list[Burst] = []
         self.counters = {"bursts_slipped": 0, "samples_sent": 0}
@@ -135,5 +138,7 @@ class Transmission:
 
     def _modulate(self, pdus: Sequence[bytes], mcs: int) -> Samples:
         """The burst, with room for its peaks."""
+        began = time.perf_counter()
         samples: Samples = self._transmitter.modulate(pdus, mcs) * self._amplitude
+        self.tempo.note(len(samples), time.perf_counter() - began)
         return samples

@@ -1,14 +1,22 @@
 """What every radio keeps to: its stream, and how bursts leave."""
 
+import asyncio
 import itertools
 
 import numpy as np
 import pytest
 
-from backends import TxBurst, TxOutcome
+from backends import BackendError, TxBurst, TxOutcome
 from backends.feed import MAX_WAITING
 from backends.outstanding import GAP
-from tests.backends.cases import assert_only, every_radio, players, transceivers, transmitters
+from tests.backends.cases import (
+    assert_only,
+    every_radio,
+    not_in_lockstep,
+    players,
+    transceivers,
+    transmitters,
+)
 from tests.backends.radios import (
     PLAYED,
     RATE,
@@ -180,3 +188,45 @@ async def test_a_radio_misses_what_its_own_bursts_cover_only_when_half_duplex(ca
     deaf = [i for begin, end in spans for i in range(begin - turnaround, end + turnaround)]
     assert missing == [i for i in deaf if i < end]
     assert all(bool(block.gap_reason) == (block.samples is None) for block in taken)
+
+
+@every_radio
+async def test_what_is_heard_where_it_is_made_is_not_yielded(case, tmp_path):
+    """And reports come all the same. A radio without a thread yields everything."""
+    there, wanted = [], []
+    if case.transmits:
+        wanted = [TxBurst(case.begin + start, noise(500)) for start in (1000, 2500, 9000)]
+    async with opened(case.make(tmp_path)) as radio:
+        sends = await hand_over(radio, wanted)
+        here = []
+
+        async def listen():
+            async for block in radio.blocks(there.append):
+                here.append(block)
+                await turn()
+
+        listening = asyncio.ensure_future(listen())
+        while len(there) + len(here) < 30 or not all(each.done() for each in sends):
+            await asyncio.sleep(0)
+            if listening.done():
+                break
+        listening.cancel()
+        await asyncio.gather(listening, return_exceptions=True)
+        for burst, sent in zip(wanted, sends, strict=True):
+            assert_sent(burst, await sent)
+    assert bool(there) is not case.lockstep
+    taken = sorted([*there, *here], key=lambda block: block.index)
+    assert not (there and here)
+    assert taken[0].index == 0
+    for one, other in itertools.pairwise(taken):
+        assert other.index == one.index + one.n
+
+
+@not_in_lockstep
+async def test_what_goes_wrong_where_blocks_are_heard_is_told(case, tmp_path):
+    def hear(_):
+        raise BackendError("no more of this")
+
+    async with opened(case.make(tmp_path)) as radio:
+        with pytest.raises(BackendError, match="no more of this"):
+            await take(radio.blocks(hear))

@@ -162,7 +162,7 @@ async def test_a_carrier_tells_what_it_is():
         traits = listener.traits
         assert (traits.kind, traits.mcs, traits.is_lockstep) == ("loopback", 3, False)
         assert (traits.senses, traits.transmits) == (True, True)
-        assert traits.lead_s == pytest.approx(0.001)
+        assert traits.lead_s == pytest.approx(0.0005)
         assert traits.react_s > ModemParams().block_s
         assert traits.detect_s == 2 * phy.SENSE_WINDOW / 1e6
         assert len(traits.needed_snr_db) == len(traits.longest_burst_s) == len(phy.MCS_TABLE)
