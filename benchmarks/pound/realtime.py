@@ -4,110 +4,117 @@ One daemon whose radio hears itself; beside it two daemons and the hub of their 
 programs on the same cores.
 """
 
-import subprocess
-import sys
-import tempfile
+import statistics
 import threading
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
-from pathlib import Path
-from typing import NamedTuple
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from backends import HubWatch
 from benchmarks.pound.flows import Flow, Times, Trace, figures
-from benchmarks.pound.limits import BULK_BYTES, SLACK_RT_MS
-from benchmarks.pound.ours import CDR, MCS, PDU_SIZE, RATE_HZ, SNR_DB
+from benchmarks.pound.limits import BULK_BYTES, FRESH_IMAGE_S, FRESH_S, OUTAGE_S, SLACK_RT_MS
+from benchmarks.pound.ours import CDR
+from benchmarks.pound.programs import BULK_BURST_S, Ends, running
 from benchmarks.report import Row
-from sdrlinkd.client import ControlClient, NoDaemonError, Publisher, Subscriber
+from sdrlinkd.client import Publisher, Subscriber
 
-BLOCK_S = 1e-3
-MAX_BURST_S = 0.02
-BULK_BURST_S = 0.003
-LEAD_S = 0.001
-START_S = 90.0
+PASSES = 3
 DRAIN_S = 2.0
-SCENARIO = """pace = "realtime"
-[air]
-rate_hz = {rate}
-snr_db = {snr}
-block_s = {block}
-[[robot]]
-id = 1
-radio = {{ full_duplex = true, clock_ppm = 4.0 }}
-[[robot]]
-id = 2
-radio = {{ full_duplex = true, clock_ppm = -6.0 }}
-"""
-DAEMON = """namespace = "robot_{node}"
-registry = "registry.csv"
-rx_depth = 0
-backend = "{backend}"
-[bus]
-runtime_dir = "{folder}/{node}"
-[ether]
-dir = "{folder}/air"
-[channel]
-snr_db = {snr}
-[link]
-pdu_size = {pdu_size}
-[modem]
-rate_hz = {rate}
-mcs = {mcs}
-max_burst_s = {max_burst}
-tx_lead_s = {lead}
-block_s = {block}
-[classes.bulk]
-share = 0.05
-max_burst_s = {bulk_burst}
-[topic.laser]
-qos = "latency"
-[topic.image]
-qos = "bulk"
-[topic.stop]
-qos = "urgent"
-"""
-REGISTRY = "".join(f"{name},std_msgs/UInt8MultiArray\n" for name in ("laser", "image", "stop"))
+BETWEEN_S = 12.0
+"""From the begin of an outage to that of the next."""
+BEFORE_S = 1.5
+SLEEPS = 500
 
 
 def rows(seed: int, quick: bool) -> list[Row]:
-    """Those that have a target in real time."""
-    with _running("ether", (1, 2)) as ends:
+    """Those that have a target in real time: the median of several passes."""
+    n_passes = 1 if quick else PASSES
+    outages = [(i * BETWEEN_S, i * BETWEEN_S + OUTAGE_S) for i in range(1, 30)]
+    with running("ether", (1, 2), outages) as ends:
+        recovered = _recovery(ends, seed, outages, 1 if quick else 4)
+    with running("ether", (1, 2)) as ends:
         beside = {row.name: row.value for row in _tables(ends, seed, quick)}
-    with _running("loopback", (1,)) as ends:
-        made = [*_tables(ends, seed, quick), *_limits(ends, seed, quick)]
-    for row in made:
+    with running("loopback", (1,)) as ends:
+        passes = []
+        for i in range(n_passes):
+            lateness = _lateness()
+            made = [*_tables(ends, seed + i, quick), *_limits(ends, seed + i, quick)]
+            made[0] = replace(made[0], note=f"{made[0].note}; {lateness}")
+            passes.append(made)
+    median = [_median_of(rows) for rows in zip(*passes, strict=True)]
+    for row in median:
         if row.name in beside:
             row.peers["two daemons and a hub"] = beside[row.name]
-    return made
+    return median + recovered
 
 
-class _Ends(NamedTuple):
-    """Folders of the daemons that send and hear."""
-
-    sends: Path
-    hears: Path
-
-
-@contextmanager
-def _running(backend: str, nodes: Sequence[int]) -> Iterator[_Ends]:
-    with tempfile.TemporaryDirectory(prefix="pound-") as name, ExitStack() as stack:
-        folder = Path(name)
-        for arguments in _set_up(folder, backend, nodes):
-            stack.enter_context(_Process(arguments, folder / "log"))
-        _wait_for(folder, nodes)
-        yield _Ends(folder / "1", folder / str(nodes[-1]))
+def _median_of(rows: Sequence[Row]) -> Row:
+    """Of the same row in several passes."""
+    values = [row.value for row in rows]
+    note = "; ".join(filter(None, (row.note for row in rows)))
+    if len(rows) > 1:
+        note = f"passes {', '.join(f'{value:.4g}' for value in values)}; {note}"
+    value, trials = statistics.median(values), sum(row.trials for row in rows)
+    return replace(rows[0], value=value, trials=trials, note=note)
 
 
-def _tables(ends: _Ends, seed: int, quick: bool) -> list[Row]:
+def _lateness() -> str:
+    """How late this machine wakes who sleeps."""
+    late_ms = []
+    for _ in range(SLEEPS):
+        began = time.monotonic()
+        time.sleep(1e-3)
+        late_ms.append(1e3 * (time.monotonic() - began) - 1)
+    median, p99 = np.quantile(late_ms, [0.5, 0.99])
+    return f"a sleeper here wakes {median:.2f} ms late, p99 {p99:.1f} ms"
+
+
+def _recovery(
+    ends: Ends, seed: int, outages: Sequence[tuple[float, float]], trials: int
+) -> list[Row]:
+    """Table V on two daemons: the air is gone for 5 s, and nobody is told."""
+    rng = np.random.default_rng(seed)
+    lasers, images = [], []
+    for _ in range(trials):
+        with HubWatch(ends.air) as watch:
+            now_s = watch.ask().now_s
+        begin, end = next(each for each in outages if each[0] > now_s + BEFORE_S + 0.5)
+        time.sleep(begin - now_s - BEFORE_S)
+        seconds = BEFORE_S + OUTAGE_S + 2
+        flows = [
+            Flow("laser", 1024, 0.02, int(seconds / 0.02), phase_s=rng.uniform(0, 0.02)),
+            Flow("image", 65536, 0.15, int(seconds / 0.15), phase_s=rng.uniform(0, 0.15)),
+        ]
+        with HubWatch(ends.air) as watch:
+            origin = time.monotonic() - watch.ask().now_s
+        traces, began = _play(ends, flows, seed)
+        lasers.append(_fresh_after(traces[0], origin + end - began, FRESH_S))
+        images.append(_fresh_after(traces[1], origin + end - began, FRESH_IMAGE_S))
+    note = "two daemons and a hub, whose air is gone"
+    return [
+        Row("recovery_after_5s_outage_s_rt", max(lasers), "s", 0.2, "less", trials, note=note),
+        Row("recovery_after_5s_outage_image_s_rt", float(np.mean(images)), "s", 0.5, "less",
+            trials, note=f"{note}; at worst {max(images):.3f} s"),
+    ]  # fmt: skip
+
+
+def _fresh_after(trace: Trace, end: float, limit_s: float) -> float:
+    """From `end` until the first message that is younger than that."""
+    ages = trace.heard_at - trace.sent_at
+    fresh = trace.heard_at[(trace.heard_at > end) & (ages <= limit_s)]
+    return float(fresh.min() - end) if len(fresh) else float("inf")
+
+
+def _tables(ends: Ends, seed: int, quick: bool) -> list[Row]:
     n = 250 if quick else 1000
     rng = np.random.default_rng(seed)
     flows = [
         Flow("laser", 1024, 0.02, n, phase_s=rng.uniform(0, 0.02)),
         Flow("image", 65536, 0.15, int(n * 0.02 / 0.15), phase_s=rng.uniform(0, 0.15)),
     ]
-    traces = _play(ends, flows, seed)
+    traces, _ = _play(ends, flows, seed)
     laser, image = (figures(trace) for trace in traces)
     p99 = 1e3 * float(np.nanquantile(traces[0].heard_at - traces[0].sent_at, 0.99))
     note = f"laser p50 {1e3 * _median(traces[0]):.2f} ms, p99 {p99:.2f} ms"
@@ -122,12 +129,12 @@ def _tables(ends: _Ends, seed: int, quick: bool) -> list[Row]:
     ]
 
 
-def _limits(ends: _Ends, seed: int, quick: bool) -> list[Row]:
+def _limits(ends: Ends, seed: int, quick: bool) -> list[Row]:
     """Bandwidth, and urgent messages while 10 MB wait."""
     rng = np.random.default_rng(seed)
     seconds = 3.0 if quick else 8.0
     offered = 8e-6 * 65536 / 6.5
-    (bulk,) = _play(ends, [Flow("image", 65536, offered, int(seconds / offered))], seed)
+    (bulk,), _ = _play(ends, [Flow("image", 65536, offered, int(seconds / offered))], seed)
     heard = np.sort(bulk.heard_at[~np.isnan(bulk.heard_at)])
     heard = heard[heard < seconds]
     mbps = 8e-6 * 65536 * (len(heard) - 1) / float(heard[-1] - heard[0])
@@ -135,7 +142,7 @@ def _limits(ends: _Ends, seed: int, quick: bool) -> list[Row]:
     length_s = n / 20
     n_bulk = int(min(BULK_BYTES, length_s * 5.5e6 / 8) / 50_000)
     stop = Flow("stop", 16, length_s / n, n, jitter_s=0.02, phase_s=0.3 + rng.uniform(0, 0.01))
-    traces = _play(ends, [stop, Flow("image", 50_000, 1e-4, n_bulk)], seed)
+    traces, _ = _play(ends, [stop, Flow("image", 50_000, 1e-4, n_bulk)], seed)
     ages = 1e3 * (traces[0].heard_at - traces[0].sent_at)
     own_ms = 1e3 * 1.5264e-3
     return [
@@ -150,65 +157,8 @@ def _median(trace: Trace) -> float:
     return float(np.nanmedian(trace.heard_at - trace.sent_at))
 
 
-def _set_up(folder: Path, backend: str, nodes: Sequence[int]) -> list[list[str]]:
-    """Write the files; the programs to start."""
-    known = {"rate": RATE_HZ, "snr": SNR_DB, "block": BLOCK_S}
-    (folder / "scenario.toml").write_text(SCENARIO.format(**known))
-    (folder / "registry.csv").write_text(REGISTRY)
-    hub = ["sdrlinkd.cli.ether", str(folder / "scenario.toml"), "--dir", str(folder / "air")]
-    programs = [hub] if backend == "ether" else []
-    for node in nodes:
-        text = DAEMON.format(
-            node=node, folder=folder, backend=backend, pdu_size=PDU_SIZE, mcs=MCS,
-            max_burst=MAX_BURST_S, lead=LEAD_S, bulk_burst=BULK_BURST_S, **known,
-        )  # fmt: skip
-        path = folder / f"{node}.toml"
-        path.write_text(text)
-        programs.append(["sdrlinkd", "--config", str(path)])
-    return programs
-
-
-class _Process:
-    """A program of ours while this runs."""
-
-    def __init__(self, arguments: list[str], log: Path) -> None:
-        self._arguments = arguments
-        self._log = log
-
-    def __enter__(self) -> None:
-        with self._log.open("a") as log:
-            self._process = subprocess.Popen(
-                [sys.executable, "-m", *self._arguments], stdout=log, stderr=log
-            )
-
-    def __exit__(self, *_: object) -> None:
-        self._process.terminate()
-        try:
-            self._process.wait(timeout=10)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-
-
-def _wait_for(folder: Path, nodes: Sequence[int]) -> None:
-    """Until every daemon hears one."""
-    until = time.monotonic() + START_S
-    while time.monotonic() < until:
-        try:
-            heard = 0
-            for node in nodes:
-                with ControlClient(folder / str(node)) as control:
-                    heard += len(control.ask("peers"))
-            if heard == len(nodes):
-                return
-        except (NoDaemonError, OSError):
-            pass
-        time.sleep(0.2)
-    raise RuntimeError(f"the daemons hear nobody: {(folder / 'log').read_text()}")
-
-
-def _play(ends: _Ends, flows: list[Flow], seed: int) -> list[Trace]:
-    """Publish at robot 1 by an exact clock, listen at robot 2."""
+def _play(ends: Ends, flows: list[Flow], seed: int) -> tuple[list[Trace], float]:
+    """Publish at robot 1 by an exact clock, listen at robot 2; and when that began."""
     rng = np.random.default_rng(seed)
     times = [flow.times(rng) for flow in flows]
     heard: dict[str, Times] = {flow.name: np.full(flow.count, np.nan) for flow in flows}
@@ -241,7 +191,8 @@ def _play(ends: _Ends, flows: list[Flow], seed: int) -> list[Trace]:
         time.sleep(DRAIN_S)
     ended.set()
     listener.join()
-    return [Trace(flow, at, heard[flow.name]) for flow, at in zip(flows, sent, strict=True)]
+    traces = [Trace(flow, at, heard[flow.name]) for flow, at in zip(flows, sent, strict=True)]
+    return traces, began[0]
 
 
 def _sleep_until(at: float) -> None:
