@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import gc
 import logging
 import os
 import signal
@@ -103,6 +104,9 @@ async def _open(
     control.serve(_verbs(setup, node, control, policies, reload))
     stack.push_async_callback(pdu_link.close)
     await node.open_carrier()
+    # What is loaded stays; to look through all of it would hold up everything for 50 ms.
+    gc.collect()
+    gc.freeze()
     if config.play.duration_s:
         node.play(_own_traffic(setup, stack))
     log.info(

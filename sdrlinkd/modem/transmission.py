@@ -15,7 +15,7 @@ from sdrlinkd.modem.tempo import Tempo
 from sdrlinkd.pdulink import PduListener
 
 INFINITE = float("inf")
-SHORT = 10_000
+SHORT = 20_000
 """Samples of a burst that is modulated where it is composed: handing it to a thread and back takes
 longer.
 """
