@@ -1,4 +1,7 @@
-"""The Pound paper's experiments: `python -m benchmarks.pound [--quick] [--json] [--no-peers]`."""
+"""The Pound paper's experiments: `python -m benchmarks.pound [--quick] [--json] [--no-peers]`.
+
+A whole run draws its figures into docs/figures.
+"""
 
 import argparse
 import sys
@@ -41,7 +44,7 @@ def measure(seed: int, quick: bool, no_peers: bool = False, figures: bool = Fals
         *rows.plan(seed, quick),
         *realtime.rows(seed, quick),
     ]
-    if figures:
+    if figures or not quick:
         pictures.draw(seed, one_hop, mbps, loops, phases[len(phases) // 2])
     for name, reason in peers.absent.items():
         Console(stderr=True).print(f"not measured: {name}: {reason}", highlight=False)
@@ -51,5 +54,7 @@ def measure(seed: int, quick: bool, no_peers: bool = False, figures: bool = Fals
 if __name__ == "__main__":
     own = argparse.ArgumentParser(add_help=False)
     own.add_argument("--no-peers", action="store_true", help="only our own rows")
-    own.add_argument("--figures", action="store_true", help="draw docs/figures/pound_*.png")
+    own.add_argument(
+        "--figures", action="store_true", help="draw docs/figures/pound_*.png also when quick"
+    )
     sys.exit(main("pound", measure, own))
