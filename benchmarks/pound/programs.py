@@ -16,7 +16,7 @@ BLOCK_S = {"loopback": 2.5e-4, "ether": 5e-4}
 """Three programs on two cores have no time for more of them."""
 MAX_BURST_S = 0.02
 BULK_BURST_S = 0.003
-LEAD_S = 0.002
+LEAD_S = 0.001
 START_S = 90.0
 SCENARIO = """pace = "realtime"
 [air]

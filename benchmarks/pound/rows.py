@@ -129,7 +129,7 @@ def urgent(seed: int, quick: bool) -> list[Row]:
 
 def costs(seed: int, quick: bool) -> list[Row]:
     """What deciding costs."""
-    return cost.rows(seed, 3 if quick else 11)
+    return cost.rows(seed, 5 if quick else 25)
 
 
 def plan(seed: int, quick: bool) -> list[Row]:

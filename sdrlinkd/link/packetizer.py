@@ -87,11 +87,6 @@ class Packetizer:
         if not levels or (self._may_wait and self._must_wait(start)):
             return None
         may_be_own = src is None or src == self._src
-        if first is None and may_be_own:
-            filled = self._sole.filled(levels[0], start, self._seq)
-            if filled is not None:
-                self._seq = (self._seq + 1) & 0xFF
-                return filled
         draft = Draft(self._pdu_size)
         looked_at = 0
         order = levels if first is None else _with_first(levels, first)
@@ -114,6 +109,20 @@ class Packetizer:
         if self.spare and draft.dst == BROADCAST:
             self.spare.ride(draft)
         return self._finish(draft)
+
+    def next_full(self, start: float, most: int, src: int | None = None) -> list[BuiltPdu]:
+        """The next `most` PDUs or fewer, where they are alike: fragments that fill them.
+
+        What `next_pdu` would give one after another, without looking round after each.
+        """
+        levels = self._outbox.levels
+        if not levels or (src is not None and src != self._src):
+            return []
+        if self._may_wait and self._must_wait(start):
+            return []
+        built = self._sole.filled(levels[0], start, self._seq, most)
+        self._seq = (self._seq + len(built)) & 0xFF
+        return built
 
     def next_src(self, first: Qos | None = None) -> int:
         """Whose PDU goes next, or next of a class, as far as one can tell."""

@@ -1,11 +1,12 @@
 """The transmit half of the link: from submitted messages to confirmed bursts."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from random import Random
 
 from zstandard import ZstdCompressionDict
 
 from sdrlinkd.link.burst import Burst, Outcome
+from sdrlinkd.link.draft import BuiltPdu
 from sdrlinkd.link.latched import Offer
 from sdrlinkd.link.ledger import TxTally, balance
 from sdrlinkd.link.message import Fate, Outgoing
@@ -151,14 +152,21 @@ class Sender:
                 first, owed, most = owed[0], [], 0
             elif n >= most:
                 break
-            built = self.packetizer.next_pdu(start, first, src)
-            if built is None:
-                break
-            src = built.data[1]
-            burst.pdus.append(built.data)
-            burst.carried.append(built.carried)
-            burst.classes.append(built.qos)
-            n += 1
+            several: Sequence[BuiltPdu] = ()
+            if first is None:
+                room = min(most, MAX_PDUS) - n
+                several = self.packetizer.next_full(start, max(1, room - len(owed)), src)
+            if not several:
+                built = self.packetizer.next_pdu(start, first, src)
+                if built is None:
+                    break
+                several = (built,)
+            for data, carried, qos in several:
+                burst.pdus.append(data)
+                burst.carried.append(carried)
+                burst.classes.append(qos)
+            src = burst.pdus[0][1]
+            n += len(several)
         self._settle_withdrawn()
         return self._counted(burst)
 

@@ -38,23 +38,31 @@ class Sole:
         held_us = max(0, round(1e6 * (start - head.arrived_at)))
         return BuiltPdu(forwarded(head.payload, held_us, self._has_control), [head], head.qos)
 
-    def filled(self, level: Level, start: float, seq: int) -> BuiltPdu | None:
-        """The next fragment of a message that has the PDU, and its level, to itself."""
+    def filled(self, level: Level, start: float, seq: int, most: int) -> list[BuiltPdu]:
+        """The next fragments, `most` or fewer, of a message that has its level to itself."""
         lane = level.lanes[0]
         head, k = lane.current, self._k
         if head is None or head.k != k or len(level.lanes) > 1:
-            return None
-        at = head.next_index * k
-        if len(head.payload) - at <= k or self._heads.live(lane, start) is not head:
-            # The last one is another matter: its age may be due, and there may be room.
-            return None
-        data = build_full(
-            flags(WIRE_BITS[head.qos], head.is_compressed), self._src, head.dst, seq,
-            self._hop_limit, head.topic_id, head.entry_id, head.next_index, head.total,
-            head.payload[at : at + k],
-        )  # fmt: skip
-        head.next_index += 1
+            return []
+        payload, first = head.payload, head.next_index
+        # The last one is another matter: its age may be due, and there may be room.
+        n = min(most, (len(payload) - 1) // k - first)
+        if n < 1 or self._heads.live(lane, start) is not head:
+            return []
+        bits, qos = flags(WIRE_BITS[head.qos], head.is_compressed), head.qos
+        built = [
+            BuiltPdu(
+                build_full(
+                    bits, self._src, head.dst, (seq + i) & 0xFF, self._hop_limit, head.topic_id,
+                    head.entry_id, first + i, head.total, payload[at : at + k],
+                ),
+                [head],
+                qos,
+            )
+            for i, at in enumerate(range(first * k, (first + n) * k, k))
+        ]  # fmt: skip
+        head.next_index += n
         head.last_at = start
-        head.unconfirmed += 1
+        head.unconfirmed += n
         self._outbox.served(lane)
-        return BuiltPdu(data, [head], head.qos)
+        return built
