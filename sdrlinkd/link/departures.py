@@ -215,6 +215,10 @@ class Departures:
         """For a burst in `slot`."""
         _, airtime_s, most_pdus, _ = opportunity
         longest_s = slot.end - slot.start
+        asked = self._sender.outbox.waiting_classes()
+        if slot.start >= self._beacons.due_at or self._sender.packetizer.spare:
+            # Beacons are of the default class.
+            asked.add(Qos.DEFAULT)
         one_s, two_s = airtime_s(mcs, 1), airtime_s(mcs, 2)
         if two_s > one_s:
             self._sender.outbox.bytes_per_s = self._sender.packetizer.k_single / (two_s - one_s)
@@ -226,12 +230,14 @@ class Departures:
             self._lead_s - self.access.pause_s,
             self._notice_s,
             self.access.others_follow,
-            # Beacons are of the default class.
-            self._sender.outbox.waiting_classes() | {Qos.DEFAULT},
-        ).least(slot.least)
-        if one_s > longest_s:
+            asked,
+        )
+        if slot.least < Qos.BULK:
+            allowance = allowance.least(slot.least)
+        owed = self.shares.owed(two_s - one_s)
+        if not owed or one_s > longest_s:
             return allowance
-        return allowance._replace(owed=tuple(self.shares.owed(two_s - one_s)))
+        return allowance._replace(owed=tuple(owed))
 
     def _kept_free(self, start: float) -> None:
         """Settle what was not sent so that something more urgent could be."""

@@ -39,7 +39,7 @@ class Shares:
 
     def owed(self, pdu_s: float) -> list[Qos]:
         """A class for each PDU of that length that it has earned and did not get."""
-        if pdu_s <= 0:
+        if pdu_s <= 0 or max(self._credit_s.values()) < pdu_s:
             return []
         n_pdus = ((qos, int(credit_s / pdu_s)) for qos, credit_s in self._credit_s.items())
         return [qos for qos, n in n_pdus for _ in range(n)]
