@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("sdrlinkd")
 
 STATUS_LINE_PERIOD_S = 5.0
-SWITCH_INTERVAL_S = 0.0005
+SWITCH_INTERVAL_S = 1e-4
 
 Reload = Callable[[], Setup]
 
