@@ -59,28 +59,33 @@ class BlockFeed:
         self._queue.put_nowait(None)
 
     def _work(self) -> None:
-        while not self._stopped.is_set():
+        goes_on = True
+        while goes_on and not self._stopped.is_set():
             self._room.acquire()
             try:
-                fed: Fed | BaseException | None = self._make()
+                goes_on = self._make()
             except Exception as error:
-                fed = error
-            if self._stopped.is_set():
-                return
-            if isinstance(fed, Fed) and fed.is_heard and not self._is_due(fed.block):
-                self._room.release()
-                continue
-            if not self._hand_over(fed) or not isinstance(fed, Fed):
-                return
+                goes_on = False
+                self._hand_over(error)
 
-    def _make(self) -> Fed | None:
+    def _make(self) -> bool:
+        """The next block; False: there is none, or nobody who wants it."""
         block = self._next_block()
+        if self._stopped.is_set():
+            return False
         if block is None:
-            return None
-        is_heard = self._hear is not None and block.n > 0
-        if self._hear is not None and is_heard and not self._stopped.is_set():
-            self._hear(block)
-        return Fed(block, is_heard)
+            self._hand_over(None)
+            return False
+        if self._hear is None or not block.n:
+            return self._hand_over(Fed(block, is_heard=False))
+        # What is due comes first: who hears of the block may act on it.
+        if self._is_due(block):
+            if not self._hand_over(Fed(block, is_heard=True)):
+                return False
+        else:
+            self._room.release()
+        self._hear(block)
+        return True
 
     def _hand_over(self, fed: Fed | BaseException | None) -> bool:
         loop = self._loop
