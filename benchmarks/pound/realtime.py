@@ -22,7 +22,7 @@ from sdrlinkd.client import Publisher, Subscriber
 
 PASSES = 3
 DRAIN_S = 2.0
-BETWEEN_S = 12.0
+BETWEEN_S = 9.5
 """From the begin of an outage to that of the next."""
 BEFORE_S = 1.5
 SLEEPS = 500
