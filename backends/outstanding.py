@@ -49,6 +49,8 @@ class Outstanding:
 
     def settle(self, index: int) -> None:
         """Every sample before `index` has left."""
+        if not self.is_due(index):
+            return
         left = [each for each in self._waiting if each[0].end <= index]
         self._waiting = [each for each in self._waiting if each[0].end > index]
         self._first_end = min((each.end for each, _ in self._waiting), default=NEVER)

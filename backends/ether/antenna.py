@@ -127,6 +127,8 @@ class Antenna:
     def settle(self, index: int) -> None:
         """All before `index` has left."""
         self.end = index
+        if not self.is_due(index):
+            return
         for number, (report, answer) in list(self._waiting.items()):
             if report is not None and report.end <= index:
                 del self._waiting[number]

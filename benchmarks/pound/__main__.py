@@ -1,6 +1,6 @@
 """The Pound paper's experiments: `python -m benchmarks.pound [--quick] [--json] [--no-peers]`.
 
-A whole run draws its figures into docs/figures.
+A whole run, peers and all, draws its figures into docs/figures.
 """
 
 import argparse
@@ -44,7 +44,7 @@ def measure(seed: int, quick: bool, no_peers: bool = False, figures: bool = Fals
         *rows.plan(seed, quick),
         *realtime.rows(seed, quick),
     ]
-    if figures or not quick:
+    if figures or not (quick or no_peers):
         pictures.draw(seed, one_hop, mbps, loops, phases[len(phases) // 2])
     for name, reason in peers.absent.items():
         Console(stderr=True).print(f"not measured: {name}: {reason}", highlight=False)
@@ -55,6 +55,6 @@ if __name__ == "__main__":
     own = argparse.ArgumentParser(add_help=False)
     own.add_argument("--no-peers", action="store_true", help="only our own rows")
     own.add_argument(
-        "--figures", action="store_true", help="draw docs/figures/pound_*.png also when quick"
+        "--figures", action="store_true", help="draw docs/figures/pound_*.png in any case"
     )
     sys.exit(main("pound", measure, own))

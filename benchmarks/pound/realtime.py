@@ -15,10 +15,11 @@ import numpy as np
 from backends import HubWatch
 from benchmarks.pound.flows import Flow, Times, Trace, figures
 from benchmarks.pound.limits import BULK_BYTES, FRESH_IMAGE_S, FRESH_S, OUTAGE_S, SLACK_RT_MS
-from benchmarks.pound.ours import CDR
+from benchmarks.pound.ours import CDR, MCS, PDU_SIZE, Air, modem_on
 from benchmarks.pound.programs import BULK_BURST_S, Ends, running
 from benchmarks.report import Row
 from sdrlinkd.client import Publisher, Subscriber
+from sdrlinkd.modem import Airtimes
 
 PASSES = 3
 DRAIN_S = 2.0
@@ -80,6 +81,7 @@ def _recovery(
     for _ in range(trials):
         with HubWatch(ends.air) as watch:
             now_s = watch.ask().now_s
+        origin = time.monotonic() - now_s
         begin, end = next(each for each in outages if each[0] > now_s + BEFORE_S + 0.5)
         time.sleep(begin - now_s - BEFORE_S)
         seconds = BEFORE_S + OUTAGE_S + 2
@@ -87,8 +89,6 @@ def _recovery(
             Flow("laser", 1024, 0.02, int(seconds / 0.02), phase_s=rng.uniform(0, 0.02)),
             Flow("image", 65536, 0.15, int(seconds / 0.15), phase_s=rng.uniform(0, 0.15)),
         ]
-        with HubWatch(ends.air) as watch:
-            origin = time.monotonic() - watch.ask().now_s
         traces, began = _play(ends, flows, seed)
         lasers.append(_fresh_after(traces[0], origin + end - began, FRESH_S))
         images.append(_fresh_after(traces[1], origin + end - began, FRESH_IMAGE_S))
@@ -144,7 +144,7 @@ def _limits(ends: Ends, seed: int, quick: bool) -> list[Row]:
     stop = Flow("stop", 16, length_s / n, n, jitter_s=0.02, phase_s=0.3 + rng.uniform(0, 0.01))
     traces, _ = _play(ends, [stop, Flow("image", 50_000, 1e-4, n_bulk)], seed)
     ages = 1e3 * (traces[0].heard_at - traces[0].sent_at)
-    own_ms = 1e3 * 1.5264e-3
+    own_ms = 1e3 * Airtimes(modem_on(Air()), PDU_SIZE).airtime_s(MCS, 1)
     return [
         Row("user_mbps_64KB_of_6.0_rt", mbps, "Mbit/s", 5.5, "more", len(heard), paper=5.1),
         Row("urgent_p99_ms_rt", float(np.nanquantile(ages, 0.99)), "ms",

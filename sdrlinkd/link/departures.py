@@ -77,7 +77,11 @@ class Departures:
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
         """The burst that should leave next, decided now; None: nothing to send, or not yet."""
-        earliest, airtime_s, _, sensed = opportunity
+        earliest, airtime_s, sensed = (
+            opportunity.earliest,
+            opportunity.airtime_s,
+            opportunity.sensed,
+        )
         if self._returned:
             return self._again(opportunity)
         head = self._sender.outbox.head()
@@ -213,8 +217,7 @@ class Departures:
 
     def _allowance(self, slot: Slot, mcs: int, opportunity: Opportunity) -> Allowance:
         """For a burst in `slot`."""
-        _, airtime_s, most_pdus, _ = opportunity
-        longest_s = slot.end - slot.start
+        airtime_s, longest_s = opportunity.airtime_s, slot.end - slot.start
         asked = self._sender.outbox.waiting_classes()
         if slot.start >= self._beacons.due_at or self._sender.packetizer.spare:
             # Beacons are of the default class.
@@ -224,9 +227,9 @@ class Departures:
             self._sender.outbox.bytes_per_s = self._sender.packetizer.k_single / (two_s - one_s)
         allowance = self._limits.allow(
             slot.start,
-            longest_s,
+            min(longest_s, max(one_s, opportunity.made_by(slot.start))),
             partial(airtime_s, mcs),
-            partial(most_pdus, mcs),
+            partial(opportunity.most_pdus, mcs),
             self._lead_s - self.access.pause_s,
             self._notice_s,
             self.access.others_follow,

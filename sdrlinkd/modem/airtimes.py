@@ -42,11 +42,6 @@ class Airtimes:
         room = int(min(given, self._longest))
         return phy.most_pdus(self._grid, mcs, self._pdu_size, room)
 
-    def most_in_time(self, n_samples: int, mcs: int, airtime_s: float) -> int:
-        """The same where no more than `n_samples` can be made in time, or one PDU."""
-        most = self.most_pdus(mcs, airtime_s)
-        return min(most, max(1, self.most_pdus(mcs, n_samples / self._rate_hz)))
-
     def shortest_s(self) -> tuple[float, ...]:
         """A burst of one PDU with each MCS."""
         return tuple(self.airtime_s(mcs, 1) for mcs in range(len(phy.MCS_TABLE)))

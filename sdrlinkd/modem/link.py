@@ -5,7 +5,6 @@ import contextlib
 import math
 import time
 from collections.abc import Sequence
-from functools import partial
 
 import phy
 from backends import BackendError, Radio, RxBlock, Tuning
@@ -253,14 +252,19 @@ class ModemLink:
         wait = self._plan.wait(index)
         if wait:
             return wait / rate
-        airtimes, start = self._airtimes, self._plan.start(index)
-        most_pdus = airtimes.most_pdus
-        if self._can.paced:
-            in_time = self._tx.tempo.samples_in((start - index) / rate)
-            most_pdus = partial(airtimes.most_in_time, in_time)
-        burst = listener.next_burst(
-            Opportunity(start / rate, airtimes.airtime_s, most_pdus, self._ear.sensed)
+        airtimes = self._airtimes
+        opportunity = Opportunity(
+            self._plan.start(index) / rate,
+            airtimes.airtime_s,
+            airtimes.most_pdus,
+            self._ear.sensed,
         )
+        if self._can.paced:
+            tempo = self._tx.tempo
+            opportunity = opportunity._replace(
+                made_by=lambda start: tempo.samples_in(start - now) / rate
+            )
+        burst = listener.next_burst(opportunity)
         if self._can.paced:
             self._rx.wakes = burst is None
         if burst is None:

@@ -99,8 +99,7 @@ class ReceiverThread:
 
     async def put(self, block: RxBlock) -> None:
         """Hand over a block; waits while too many are waiting already."""
-        if not self._thread.ident:
-            self._thread.start()
+        self._begin()
         while self._blocks.qsize() >= MAX_BLOCKS:
             self._has_room.clear()
             self._is_waited_for = True
@@ -111,8 +110,7 @@ class ReceiverThread:
 
     async def finish(self) -> None:
         """The stream is over: deliver what its last samples hold, and end the thread."""
-        if not self._thread.ident:
-            self._thread.start()
+        self._begin()
         self._blocks.put(None)
         await self._ended.wait()
 
@@ -121,6 +119,10 @@ class ReceiverThread:
         self._blocks.put(None)
         if self._thread.ident:
             self._thread.join()
+
+    def _begin(self) -> None:
+        if not self._thread.ident:
+            self._thread.start()
 
     def _work(self) -> None:
         while (block := self._blocks.get()) is not None:

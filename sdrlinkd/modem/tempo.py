@@ -1,6 +1,6 @@
 """How long a burst may be to be modulated in time."""
 
-HAND_OVER_S = 3.5e-4
+OVERHEAD_S = 3.5e-4
 """From the decision to the radio, besides modulating."""
 PER_SAMPLE_S = 2e-8
 SLOWER, FASTER = 1.02, 0.94
@@ -22,4 +22,4 @@ class Tempo:
 
     def samples_in(self, seconds: float) -> int:
         """So many reach the radio within that time."""
-        return max(0, int((seconds - HAND_OVER_S) / self._per_sample_s))
+        return max(0, int((seconds - OVERHEAD_S) / self._per_sample_s))

@@ -11,6 +11,7 @@ from sdrlinkd.link import (
     CarrierTraits,
     ClassesParams,
     ClassParams,
+    Opportunity,
     Outcome,
     Overrides,
     Qos,
@@ -18,8 +19,9 @@ from sdrlinkd.link import (
     TopicPolicy,
     link_notices,
 )
+from sdrlinkd.link.access import Free, Slot
 from sdrlinkd.link.schedule import Allowance, Forecasts, Limits, Shares
-from tests.link.world import PDU_S, airtime_s, make_link, next_burst
+from tests.link.world import PDU_S, airtime_s, make_link, most_pdus, next_burst
 
 PERIOD_S = 0.02
 
@@ -187,6 +189,27 @@ def test_an_urgent_message_never_waits_for_more_than_one_burst():
         now = end
     assert max(waited) <= 0.004 + PDU_S
     assert len(waited) > 50
+
+
+class Later(Free):
+    """Half a second after it is asked for."""
+
+    def slot(self, wish):
+        return Slot(wish.earliest + 0.5)
+
+
+@pytest.mark.parametrize(("most_s", "n"), [(0.0, 1), (1.5e-3, 1), (2.9e-3, 2), (1e9, 8)])
+def test_a_burst_is_no_longer_than_what_is_made_when_its_slot_begins(most_s, n):
+    link = make_link(pdu_size=64)
+    link.departures.access = Later()
+    for _ in range(40):
+        link.submit(0, bytes(50), 0.0)
+
+    def made_by(start):
+        return most_s if start == 0.5 else 0.0
+
+    burst = link.next_burst(Opportunity(0.0, airtime_s, most_pdus, made_by=made_by))
+    assert (burst.start, len(burst.pdus)) == (0.5, n)
 
 
 def test_allowance_may_be_cut_for_less_urgent_classes():

@@ -35,14 +35,6 @@ def test_a_burst_is_as_long_as_its_samples(mcs, n_pdus):
 
 
 @settings(derandomize=True, deadline=None, max_examples=150)
-@given(airtimes, mcs_numbers, st.floats(0, 0.6), st.integers(0, 500_000))
-def test_what_can_be_made_in_time_is_no_longer_than_that_or_one_pdu(times, mcs, airtime_s, n):
-    most, in_time = times.most_pdus(mcs, airtime_s), times.most_in_time(n, mcs, airtime_s)
-    assert in_time == most or (1 <= in_time < most and times.samples(mcs, in_time + 1) > n)
-    assert in_time <= 1 or times.samples(mcs, in_time) <= n
-
-
-@settings(derandomize=True, deadline=None, max_examples=150)
 @given(airtimes, mcs_numbers, st.floats(0, 0.6))
 def test_what_is_said_to_fit_fits_and_no_more_would(times, mcs, airtime_s):
     most = times.most_pdus(mcs, airtime_s)

@@ -4,7 +4,7 @@ from random import Random
 
 import pytest
 
-from sdrlinkd.modem.tempo import HAND_OVER_S, Tempo
+from sdrlinkd.modem.tempo import OVERHEAD_S, Tempo
 
 
 @pytest.mark.parametrize("per_sample_s", [5e-9, 2e-8, 1e-6])
@@ -18,9 +18,9 @@ def test_the_machine_is_learned_and_who_holds_it_up_now_and_then_is_not(
         n = rng.randrange(5000, 100_000)
         seconds = n * per_sample_s * rng.uniform(1, 1.3)
         tempo.note(n, seconds + (0.02 if rng.random() < held_up else 0.0))
-    n = tempo.samples_in(HAND_OVER_S + 0.01)
+    n = tempo.samples_in(OVERHEAD_S + 0.01)
     assert 0.7 < n * per_sample_s / 0.01 < 1.15, f"seed {seed}"
 
 
 def test_where_there_is_no_time_there_are_no_samples():
-    assert Tempo().samples_in(HAND_OVER_S / 2) == 0
+    assert Tempo().samples_in(OVERHEAD_S / 2) == 0
