@@ -18,9 +18,12 @@ from sdrlinkd.wire.capacity import (
     max_message_size,
     pad_length,
 )
+from sdrlinkd.wire.clock import MAX_ARRIVALS, UNKNOWN_WALL, Arrival, Clock, tellable
 from sdrlinkd.wire.control import (
+    ASKING_STAMP_SIZE,
     MAX_AGE_US,
     MAX_VALUE_SIZE,
+    NO_AGE,
     PARITY_OVERHEAD,
     STAMP_SIZE,
     TLV_HEADER_SIZE,
@@ -32,14 +35,16 @@ from sdrlinkd.wire.control import (
     Record,
     RecordType,
     Stamp,
+    Waits,
     build_records,
     build_stamp,
     parse_records,
 )
 from sdrlinkd.wire.later import forwarded, lasting_identity, postponed
-from sdrlinkd.wire.pdu import BROADCAST, Entry, Pdu, build, flags, identity, parse
+from sdrlinkd.wire.pdu import Entry, Pdu, build, flags, identity, parse
 from sdrlinkd.wire.reassembly import Lost, Partial, Reassembly, ReassemblyLimits
 from sdrlinkd.wire.registry import (
+    BROADCAST,
     CONTROL_TOPIC_ID,
     MAX_TOPICS,
     Registry,
@@ -50,23 +55,29 @@ from sdrlinkd.wire.registry import (
 )
 
 __all__ = [
+    "ASKING_STAMP_SIZE",
     "BROADCAST",
     "CONTROL_TOPIC_ID",
     "CRC_SIZE",
     "ENTRY_HEADER_SIZE",
     "HEADER_SIZE",
     "MAX_AGE_US",
+    "MAX_ARRIVALS",
     "MAX_ENTRIES",
     "MAX_FRAGMENTS",
     "MAX_PDU_SIZE",
     "MAX_TOPICS",
     "MAX_VALUE_SIZE",
     "MIN_PDU_SIZE",
+    "NO_AGE",
     "PARITY_OVERHEAD",
     "STAMP_SIZE",
     "TLV_HEADER_SIZE",
+    "UNKNOWN_WALL",
     "VERSION",
+    "Arrival",
     "Beacon",
+    "Clock",
     "Entry",
     "Frame",
     "LinkReport",
@@ -84,6 +95,7 @@ __all__ = [
     "RegistryDigest",
     "Stamp",
     "Topic",
+    "Waits",
     "build",
     "build_full",
     "build_records",
@@ -102,4 +114,5 @@ __all__ = [
     "parse_records",
     "parse_registry",
     "postponed",
+    "tellable",
 ]

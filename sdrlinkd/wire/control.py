@@ -6,11 +6,13 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from sdrlinkd.errors import PduError
-from sdrlinkd.wire.registry import RegistryDigest
+from sdrlinkd.wire.clock import Clock, build_clock, parse_clock
+from sdrlinkd.wire.registry import BROADCAST, RegistryDigest
 
 TLV_HEADER_SIZE = 2
 MAX_AGE_US = 0xFFFFFFFF
 MAX_VALUE_SIZE = 255
+NO_AGE = 0xFFFF
 
 
 class RecordType(IntEnum):
@@ -23,14 +25,17 @@ class RecordType(IntEnum):
     RECEIPT = 5
     PARITY = 6
     FRAME = 7
+    CLOCK = 8
+    WAITS = 9
 
 
 class Stamp(NamedTuple):
-    """Age of a message at this burst's preamble, in µs."""
+    """Age of a message at this burst's preamble, in µs; `asks`: its sender wants a RECEIPT."""
 
     topic_id: int
     entry_id: int
     age_us: int
+    asks: bool = False
 
 
 class Beacon(NamedTuple):
@@ -64,11 +69,26 @@ class Frame(NamedTuple):
 
 
 class Receipt(NamedTuple):
-    """What became of a message at the far end."""
+    """What became of a message of `node` here (255: of whoever this PDU is for), and its age then
+    in 0.1 ms (65535: not known, or older).
+    """
 
     topic_id: int
     entry_id: int
     status: int
+    node: int = BROADCAST
+    age_100us: int = NO_AGE
+
+
+class Waits(NamedTuple):
+    """Of what messages of a topic waited at their source, the shares in 1/255: in the queue, for
+    the air, and for another chance after a burst that did not leave.
+    """
+
+    topic_id: int
+    queue: int
+    access: int
+    again: int
 
 
 class Parity(NamedTuple):
@@ -87,8 +107,8 @@ class Parity(NamedTuple):
     data: bytes
 
 
-FixedRecord = Stamp | Beacon | LinkReport | Receipt | Frame
-Record = FixedRecord | RegistryDigest | Parity
+FixedRecord = Stamp | Beacon | LinkReport | Receipt | Frame | Waits
+Record = FixedRecord | RegistryDigest | Parity | Clock
 
 _TYPES: dict[type[FixedRecord], RecordType] = {
     Stamp: RecordType.STAMP,
@@ -96,6 +116,7 @@ _TYPES: dict[type[FixedRecord], RecordType] = {
     LinkReport: RecordType.LINK_REPORT,
     Receipt: RecordType.RECEIPT,
     Frame: RecordType.FRAME,
+    Waits: RecordType.WAITS,
 }
 _FORMATS = {
     RecordType.STAMP: struct.Struct(">BBI"),
@@ -103,7 +124,11 @@ _FORMATS = {
     RecordType.LINK_REPORT: struct.Struct(">BbBB"),
     RecordType.RECEIPT: struct.Struct(">BBB"),
     RecordType.FRAME: struct.Struct(">BBHI"),
+    RecordType.WAITS: struct.Struct(">BBBB"),
 }
+# Fields behind those that a record always has.
+_ASKS = b"\x01"
+_WHOSE = struct.Struct(">BH")
 # What the parser needs of a type, by its number: the fields' class and format.
 _KNOWN = {int(number): (kind, _FORMATS[number]) for kind, number in _TYPES.items()}
 
@@ -112,6 +137,7 @@ PARITY_OVERHEAD = TLV_HEADER_SIZE + _PARITY.size
 """Of a record, beside the octets of parity."""
 STAMP_SIZE = TLV_HEADER_SIZE + _FORMATS[RecordType.STAMP].size
 _STAMP_RECORD = struct.Struct(">BBBBI")
+ASKING_STAMP_SIZE = STAMP_SIZE + len(_ASKS)
 
 
 def build_records(records: Iterable[Record]) -> bytes:
@@ -119,10 +145,11 @@ def build_records(records: Iterable[Record]) -> bytes:
     return b"".join(_build(record) for record in records)
 
 
-def build_stamp(topic_id: int, entry_id: int, age_us: int) -> bytes:
+def build_stamp(topic_id: int, entry_id: int, age_us: int, asks: bool = False) -> bytes:
     """A STAMP record: every message has one, so it is built without detours."""
-    value_size = STAMP_SIZE - TLV_HEADER_SIZE
-    return bytes(_STAMP_RECORD.pack(RecordType.STAMP, value_size, topic_id, entry_id, age_us))
+    value_size = STAMP_SIZE - TLV_HEADER_SIZE + asks
+    record = _STAMP_RECORD.pack(RecordType.STAMP, value_size, topic_id, entry_id, age_us)
+    return bytes(record + _ASKS if asks else record)
 
 
 def parse_records(payload: bytes) -> list[Record]:
@@ -144,7 +171,10 @@ def parse_records(payload: bytes) -> list[Record]:
             kind, fields = _KNOWN[number]
             if length < fields.size:
                 raise PduError("rx_entry", f"control record {number} has only {length} bytes")
-            records.append(kind(*fields.unpack_from(payload, at)))
+            record = kind(*fields.unpack_from(payload, at))
+            if length > fields.size:
+                record = _with_more(record, payload[at + fields.size : at + length])
+            records.append(record)
         elif number == RecordType.DIGEST:
             if length < RegistryDigest.OVERALL_SIZE:
                 raise PduError("rx_entry", f"control record {number} has only {length} bytes")
@@ -154,6 +184,8 @@ def parse_records(payload: bytes) -> list[Record]:
                 raise PduError("rx_entry", f"control record {number} has only {length} bytes")
             data = payload[at + _PARITY.size : at + length]
             records.append(Parity._make((*_PARITY.unpack_from(payload, at), data)))
+        elif number == RecordType.CLOCK:
+            records.append(parse_clock(payload[at : at + length]))
         at += length
     return records
 
@@ -172,9 +204,31 @@ def _build(record: Record) -> bytes:
         if len(value) > MAX_VALUE_SIZE:
             raise ValueError(f"{len(record.data)} octets of parity do not fit a record")
     else:
-        number = _TYPES[type(record)]
+        number = RecordType.CLOCK if isinstance(record, Clock) else _TYPES[type(record)]
         try:
-            value = _FORMATS[number].pack(*record)
+            value = build_clock(record) if isinstance(record, Clock) else _fixed(record, number)
         except struct.error as error:
             raise ValueError(f"{record} does not fit its record: {error}") from None
+        if len(value) > MAX_VALUE_SIZE:
+            raise ValueError(f"{record} does not fit its record")
     return bytes((number, len(value))) + value
+
+
+def _fixed(record: FixedRecord, number: RecordType) -> bytes:
+    fields = _FORMATS[number]
+    if isinstance(record, Stamp):
+        return fields.pack(*record[:3]) + _ASKS * record.asks
+    if isinstance(record, Receipt):
+        is_whole = record[3:] != (BROADCAST, NO_AGE)
+        return fields.pack(*record[:3]) + (_WHOSE.pack(*record[3:]) if is_whole else b"")
+    return fields.pack(*record)
+
+
+def _with_more(record: FixedRecord, more: bytes) -> FixedRecord:
+    """With the fields behind those that its type always has; what is not known is left out."""
+    if isinstance(record, Stamp):
+        return record._replace(asks=bool(more[0] & _ASKS[0]))
+    if isinstance(record, Receipt) and len(more) >= _WHOSE.size:
+        node, age_100us = _WHOSE.unpack_from(more)
+        return record._replace(node=node, age_100us=age_100us)
+    return record

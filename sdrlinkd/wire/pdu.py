@@ -16,8 +16,6 @@ from sdrlinkd.wire.builder import (
 )
 from sdrlinkd.wire.capacity import CRC_SIZE, ENTRY_HEADER_SIZE, HEADER_SIZE
 
-BROADCAST = 0xFF
-
 
 class Entry(NamedTuple):
     """One fragment of a message: entry `index` of `total` under (topic id, entry id)."""

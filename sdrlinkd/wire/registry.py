@@ -11,6 +11,8 @@ from sdrlinkd.errors import RegistryError
 
 MAX_TOPICS = 16
 CONTROL_TOPIC_ID = 0xF
+BROADCAST = 0xFF
+"""The robot id that means everyone."""
 
 _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _TYPE = re.compile(r"([A-Za-z]\w*)/(?:msg/)?([A-Za-z]\w*)", re.ASCII)

@@ -9,13 +9,18 @@ from hypothesis import strategies as st
 from sdrlinkd.errors import PduError
 from sdrlinkd.wire import (
     MAX_AGE_US,
+    MAX_ARRIVALS,
+    NO_AGE,
+    Arrival,
     Beacon,
+    Clock,
     Frame,
     LinkReport,
     Parity,
     Receipt,
     RegistryDigest,
     Stamp,
+    Waits,
     build_records,
     parse_records,
 )
@@ -25,16 +30,33 @@ SEED = 6
 CASES = 20_000
 
 # Octets that the fields of each type need (clause 6).
-NEED = {1: 6, 2: 4, 3: 8, 4: 4, 5: 3, 6: 13, 7: 8}
+NEED = {1: 6, 2: 4, 3: 8, 4: 4, 5: 3, 6: 13, 7: 8, 8: 24, 9: 4}
 # What stands behind the fields of these belongs to the record.
-OPEN = (RegistryDigest, Parity)
+OPEN = (RegistryDigest, Parity, Clock, Stamp, Receipt)
 
 octet = st.integers(0, 255)
+u16 = st.integers(0, 0xFFFF)
+i31 = st.integers(-(1 << 31) + 1, (1 << 31) - 1)
 records = st.one_of(
-    st.builds(Stamp, octet, octet, st.integers(0, MAX_AGE_US)),
+    st.builds(Stamp, octet, octet, st.integers(0, MAX_AGE_US), st.booleans()),
+    st.builds(Waits, octet, octet, octet, octet),
+    st.builds(
+        Clock,
+        u16,
+        u16,
+        u16,
+        st.integers(0, (1 << 64) - 1),
+        st.integers(-(1 << 63), (1 << 63) - 1),
+        u16,
+        st.lists(
+            st.builds(Arrival, octet, u16, i31.map(lambda ticks: 10 * ticks)),
+            max_size=MAX_ARRIVALS,
+        ).map(tuple),
+    ),
     st.builds(Beacon, st.integers(0, 0xFFFF), st.integers(0, 0xFFFF)),
     st.builds(LinkReport, octet, st.integers(-128, 127), octet, octet),
-    st.builds(Receipt, octet, octet, octet),
+    st.tuples(octet, octet, octet).map(lambda fields: Receipt(*fields)),
+    st.builds(Receipt, octet, octet, octet, octet, u16),
     st.builds(Frame, octet, octet, st.integers(0, 0xFFFF), st.integers(0, MAX_AGE_US)),
     st.builds(
         Parity,
@@ -70,7 +92,7 @@ def test_unknown_types_are_skipped(pairs, last):
     assert parse_records(payload) == [record for _, record in pairs]
 
 
-@pytest.mark.parametrize("kind", [0, 8, 9, 255])
+@pytest.mark.parametrize("kind", [0, 10, 11, 255])
 def test_reserved_types_are_skipped(kind):
     assert parse_records(bytes([kind, 2, 1, 6, 5, 3, 1, 2, 3])) == [Receipt(1, 2, 3)]
 
@@ -87,6 +109,22 @@ def test_longer_known_records_are_accepted(record, more, rest):
     assert parse_records(bytes(payload) + build_records(rest)) == [record, *rest]
 
 
+def test_octets_behind_the_fields_of_stamp_receipt_and_clock():
+    stamp, receipt = bytes([1, 2, 0, 0, 0, 3]), bytes([1, 2, 3])
+    clock = build_records([Clock(1, 2, 3, 4)])[2:]
+
+    def parsed(kind, value):
+        return parse_records(bytes([kind, len(value)]) + value)
+
+    assert parsed(1, stamp + b"\x01") == [Stamp(1, 2, 3, asks=True)]
+    assert parsed(1, stamp + b"\xfe\x07\x07") == [Stamp(1, 2, 3)]
+    assert parsed(5, receipt + b"\x04\x05") == [Receipt(1, 2, 3)]
+    assert parsed(5, receipt + b"\x04\x05\x06\x07") == [Receipt(1, 2, 3, 4, 0x0506)]
+    assert parsed(8, clock + bytes(6)) == [Clock(1, 2, 3, 4)]
+    told = b"\x07\x00\x08\xff\xff\xff\xfe"
+    assert parsed(8, clock + told + bytes(6)) == [Clock(1, 2, 3, 4, arrivals=(Arrival(7, 8, -20),))]
+
+
 @pytest.mark.parametrize(
     ("kind", "size"), [(kind, size) for kind, need in NEED.items() for size in range(need)]
 )
@@ -95,7 +133,7 @@ def test_short_known_record(kind, size):
     refused(bytes([kind, size]) + bytes(size) + bytes([200, 10]) + bytes(10))
 
 
-@pytest.mark.parametrize("kind", [*NEED, 8, 200])
+@pytest.mark.parametrize("kind", [*NEED, 10, 200])
 def test_record_that_overruns(kind):
     need = NEED.get(kind, 3)
     refused(bytes([kind]))
@@ -170,6 +208,17 @@ def test_any_bytes_are_records_or_refused():
         Parity(0, 0, 256, 0, 0, 0, 0, 0, b""),
         Parity(0, 0, 0, 0, 0, 0, 0, 0, bytes(243)),
         Receipt(0, 0, 256),
+        Receipt(0, 0, 0, 256, 0),
+        Receipt(0, 0, 0, 0, NO_AGE + 1),
+        Waits(0, 0, 0, 256),
+        Clock(65536, 0, 0, 0),
+        Clock(0, 65536, 0, 0),
+        Clock(0, 0, 65536, 0),
+        Clock(0, 0, 0, -1),
+        Clock(0, 0, 0, 0, 1 << 63),
+        Clock(0, 0, 0, 0, 0, 65536),
+        Clock(0, 0, 0, 0, arrivals=(Arrival(0, 0, 10 << 31),)),
+        Clock(0, 0, 0, 0, arrivals=(Arrival(0, 0, 0),) * (MAX_ARRIVALS + 1)),
         Frame(256, 0, 0, 0),
         Frame(0, 256, 0, 0),
         Frame(0, -1, 0, 0),

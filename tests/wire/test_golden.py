@@ -7,6 +7,7 @@ import pytest
 from sdrlinkd.errors import PduError
 from sdrlinkd.wire import (
     Beacon,
+    Clock,
     Entry,
     Frame,
     LinkReport,
@@ -14,6 +15,7 @@ from sdrlinkd.wire import (
     Receipt,
     RegistryDigest,
     Stamp,
+    Waits,
     build,
     build_records,
     identity,
@@ -43,6 +45,8 @@ RECORD_CLASSES = {
     "LINK_REPORT": LinkReport,
     "RECEIPT": Receipt,
     "FRAME": Frame,
+    "CLOCK": Clock,
+    "WAITS": Waits,
 }
 
 each_pdu = pytest.mark.parametrize("vector", PDUS, ids=lambda v: v.name)

@@ -31,7 +31,7 @@ records = st.one_of(
     st.builds(Frame, octet, octet, st.integers(0, 0xFFFF), times_us),
     st.builds(Beacon, st.integers(0, 0xFFFF), st.integers(0, 0xFFFF)),
     st.builds(LinkReport, octet, st.integers(-128, 127), octet, octet),
-    st.builds(Receipt, octet, octet, octet),
+    st.tuples(octet, octet, octet).map(lambda fields: Receipt(*fields)),
     st.builds(RegistryDigest, st.binary(min_size=8, max_size=8), st.binary(max_size=15)),
 )
 steps_us = st.sampled_from([0, 1, 255, 256, 65_536, MAX_AGE_US]) | times_us
@@ -143,7 +143,7 @@ def test_every_control_entry_moves_and_unknown_records_are_stepped_over():
     pdu = parse(BY_NAME["three_odd_nibble"].octets, 48)._replace(entries=entries)
     first, message, last = parse(postponed(build(pdu, 96), 5), 96).entries
     assert first.payload[:5] == payload[:5]
-    assert parse_records(first.payload) == [Stamp(1, 2, 105), Stamp(3, 4, 55)]
+    assert parse_records(first.payload) == [Stamp(1, 2, 105), Stamp(3, 4, 55, asks=True)]
     assert first.payload[-2:] == bytes([7, 7])
     assert message == entries[1]
     assert parse_records(last.payload) == [Frame(1, 0, 7, 15)]

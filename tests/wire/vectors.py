@@ -308,7 +308,31 @@ FRAME = RecordsVector(
     bytes([7, 8, 3, 2, 0xC0, 0xDE, 0x00, 0x01, 0x11, 0xEB]),
     (("FRAME", (3, 2, 0xC0DE, 70_123)),),
 )
-RECORDS = (STAMP, STAMP_OLD, BEACON_DIGEST, LINK_REPORT, RECEIPT, FRAME)
+# The octet behind the age: a RECEIPT is wanted.
+ASKING_STAMP = RecordsVector(
+    "asking_stamp",
+    bytes([1, 7, 3, 0x10, 0x00, 0x00, 0x00, 0x05, 1]),
+    (("STAMP", (3, 0x10, 5, True)),),
+)
+# To robot 4, after 12.3 ms.
+FULL_RECEIPT = RecordsVector(
+    "full_receipt",
+    bytes([5, 6, 3, 0x99, 1, 4, 0, 123]),
+    (("RECEIPT", (3, 0x99, 1, 4, 123)),),
+)
+# Boot id 0xBEEF, number 0x0102; 0x0101 left at 2**32 + 1 ns; wall 2**40 ns, ± 300 µs = 0x012C.
+# Robot 9's CLOCK 0x0102 came 1 µs before that: -100 * 10 ns = 0xFFFFFF9C.
+CLOCK = RecordsVector(
+    "clock",
+    bytes([8, 31, 0xBE, 0xEF, 1, 2, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 0, 0])
+    + bytes([0x01, 0x2C, 9, 1, 2, 0xFF, 0xFF, 0xFF, 0x9C]),
+    (("CLOCK", (0xBEEF, 0x0102, 0x0101, 4_294_967_297, 1 << 40, 300, ((9, 0x0102, -1000),))),),
+)
+WAITS = RecordsVector("waits", bytes([9, 4, 3, 255, 0, 7]), (("WAITS", (3, 255, 0, 7)),))
+RECORDS = (
+    STAMP, STAMP_OLD, BEACON_DIGEST, LINK_REPORT, RECEIPT, FRAME,
+    ASKING_STAMP, FULL_RECEIPT, CLOCK, WAITS,
+)  # fmt: skip
 
 _stamped = PduVector(
     "message_and_stamp",

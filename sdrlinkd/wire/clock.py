@@ -1,0 +1,63 @@
+"""The CLOCK record: two steps, so that the time of sending is the true one (section 6.6)."""
+
+import struct
+from typing import NamedTuple
+
+from sdrlinkd.errors import PduError
+
+UNKNOWN_WALL = -(1 << 63)
+MAX_WALL_ERROR_US = 0xFFFF
+TICK_NS = 10
+"""Arrivals are told in this unit."""
+_FIXED = struct.Struct(">HHHQqH")
+_ARRIVAL = struct.Struct(">BHi")
+MAX_ARRIVALS = (255 - _FIXED.size) // _ARRIVAL.size
+_FARTHEST = (1 << 31) - 1
+
+
+class Arrival(NamedTuple):
+    """CLOCK `number` of `node` came so many ns after the sender's own CLOCK `stamped` had left."""
+
+    node: int
+    number: int
+    after_ns: int
+
+
+class Clock(NamedTuple):
+    """Times by the sender's own clock, at preambles.
+
+    This is its CLOCK `number`; its CLOCK `stamped` left at `left_ns` (none has left yet: the number
+    is its own). Its host's time since 1970 is `wall_ns` more than its own clock, plus or minus
+    `wall_error_us`; UNKNOWN_WALL: not known.
+    """
+
+    boot_id: int
+    number: int
+    stamped: int
+    left_ns: int
+    wall_ns: int = UNKNOWN_WALL
+    wall_error_us: int = 0
+    arrivals: tuple[Arrival, ...] = ()
+
+
+def tellable(arrival: Arrival) -> bool:
+    """Whether it is near enough for its field."""
+    return abs(arrival.after_ns) <= _FARTHEST * TICK_NS
+
+
+def build_clock(clock: Clock) -> bytes:
+    """The record's value. Raises struct.error when a field is out of range."""
+    told = [_ARRIVAL.pack(node, n, round(ns / TICK_NS)) for node, n, ns in clock.arrivals]
+    return b"".join((_FIXED.pack(*clock[:-1]), *told))
+
+
+def parse_clock(value: bytes) -> Clock:
+    """The fields; octets that are no whole arrival are ignored. Raises PduError (rx_entry)."""
+    if len(value) < _FIXED.size:
+        raise PduError("rx_entry", f"a CLOCK record has only {len(value)} bytes")
+    n = (len(value) - _FIXED.size) // _ARRIVAL.size
+    told = value[_FIXED.size : _FIXED.size + n * _ARRIVAL.size]
+    arrivals = tuple(
+        Arrival(node, number, TICK_NS * ticks) for node, number, ticks in _ARRIVAL.iter_unpack(told)
+    )
+    return Clock._make((*_FIXED.unpack_from(value), arrivals))
