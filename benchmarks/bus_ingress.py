@@ -40,9 +40,9 @@ class _Counted:
         if self.count == self._expected:
             self.done.set()
 
-    def refuse(self, reason: str, topic_id: int | None = None) -> None:
+    def refuse(self, reason: str, topic_id: int | None = None, receipt: str = "") -> None:
         """No message of this benchmark may be refused."""
-        raise RuntimeError(f"topic {topic_id}: {reason}")
+        raise RuntimeError(f"topic {topic_id}: {reason} {receipt}")
 
 
 def ingress_row(messages: int, runs: int) -> Row:

@@ -25,6 +25,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         setup = _read(options.config)
         if options.check:
+            daemon.check(setup)
             sys.stdout.write("\n".join([*setup.summary(), "the configuration is good", ""]))
             return 0
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:

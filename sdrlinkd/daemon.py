@@ -88,6 +88,7 @@ async def _open(
         rng,
         classes=config.classes,
         relay=config.relay,
+        clock=config.clock,
         dictionaries=setup.dictionaries,
         hears_self=config.hears_self,
         max_expanded=config.bus.max_message_bytes,
@@ -97,7 +98,9 @@ async def _open(
     context = zmq.Context()
     # Closes what a part that failed half-way left open; term() would wait for it for ever.
     stack.callback(context.destroy)
-    node = Node(setup, link, pdu_link, partial(Bus, context, directory, setup), _transforms(setup))
+    headers, stops = _types_of(setup)
+    open_bus = partial(Bus, context, directory, setup)
+    node = Node(setup, link, pdu_link, open_bus, _transforms(setup), headers, stops)
     stack.callback(node.bus.close)
     control = Control(context, directory)
     stack.callback(control.close)
@@ -128,6 +131,19 @@ def _make_pdu_link(setup: Setup, rng: Random) -> PduLink:
     from sdrlinkd.modem import make_modem
 
     return make_modem(config, setup.node_id, rng)
+
+
+def _types_of(setup: Setup) -> tuple[frozenset[int], dict[int, bytes]]:
+    """(topics with a header, stop messages by topic id)."""
+    # They bring the message types.
+    from sdrlinkd.adapters import header_topics, stop_messages
+
+    return header_topics(setup), stop_messages(setup)
+
+
+def check(setup: Setup) -> None:
+    """What only the message types can tell. Raises ConfigError."""
+    _types_of(setup)
 
 
 def _transforms(setup: Setup) -> dict[int, "Transforms"]:

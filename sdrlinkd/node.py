@@ -1,8 +1,9 @@
 """One node at work: the link between its bus and its PDU link."""
 
 import asyncio
+import logging
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from sdrlinkd import __version__
@@ -16,9 +17,11 @@ from sdrlinkd.link import (
     Outcome,
     Overrides,
     Told,
+    Wall,
     link_notices,
     link_report,
 )
+from sdrlinkd.localtime import UNKNOWN, local_times
 from sdrlinkd.pdulink import Heard, PduLink
 from sdrlinkd.reports import Snapshot
 
@@ -27,10 +30,21 @@ if TYPE_CHECKING:
     from sdrlinkd.adapters import Due, Transforms
 
 TICK_S = 0.05
+SHORTEST_TICK_S = 0.001
+SET_S = 0.1
+"""By more than this a host's clock does not move unless it is set."""
+LEAST_ERROR_S = 5e-5
+NO_STOPS: Mapping[int, bytes] = {}
+
+log = logging.getLogger("sdrlinkd")
 
 
 class Node:
-    """Asks the link what to do and does it. Holds no queue and no decision of its own."""
+    """Asks the link what to do and does it. Holds no queue and no decision of its own.
+
+    Messages of the topics in `headers` begin with a std_msgs/Header; `stops` are the messages to
+    hand over, by topic id, when a command topic falls silent.
+    """
 
     def __init__(
         self,
@@ -39,11 +53,17 @@ class Node:
         pdu_link: PduLink,
         open_bus: Callable[[Ingress], Bus],
         transforms: Mapping[int, "Transforms"],
+        headers: Collection[int] = (),
+        stops: Mapping[int, bytes] = NO_STOPS,
     ) -> None:
         self._setup = setup
         self._link = link
         self._pdu_link = pdu_link
         self._transforms = transforms
+        self._headers = headers
+        self._stops = stops
+        self._wall_ns: int | None = None
+        self._wall_error_s = 0.0
         self._traffic: Iterator[Due] = iter(())
         self._upcoming: Due | None = None
         self._began_at = 0.0
@@ -64,28 +84,41 @@ class Node:
         if transforms is not None:
             gathered, reason = transforms.take(payload, now)
             if gathered is None:
-                self._link.sender.refuse(reason, topic_id)
+                self.refuse(reason, topic_id, overrides.receipt)
                 return
             payload = gathered
+        if overrides.age_s and self._is_lockstep:
+            # The air's time is not that of producers.
+            overrides = overrides._replace(age_s=0.0)
         self._link.submit(topic_id, payload, now, overrides)
+        if overrides.receipt:
+            self._tell_verdicts()
         self._pdu_link.wake()
 
-    def refuse(self, reason: str, topic_id: int | None = None) -> None:
+    def refuse(self, reason: str, topic_id: int | None = None, receipt: str = "") -> None:
         """A message that the bus could not take."""
-        self._link.sender.refuse(reason, topic_id)
+        self._link.outcomes.refuse(reason, topic_id, receipt)
+        if receipt:
+            self._tell_verdicts()
 
     # The PDU link's listener.
 
     def heard(self, pdus: Sequence[Heard]) -> None:
         """PDUs from the air."""
         now = self._pdu_link.now()
-        for data, at, snr_db in pdus:
+        link = self._link
+        for data, at, snr_db, ended_at in pdus:
             if self.bus.is_tapped:
                 self.bus.tap("rx", data)
-            for message in self._link.hear(data, at, snr_db, now):
-                age_s = self._link.delivered(message, now)
-                received_ns = time.time_ns() - round((now - message.heard_at) * 1e9)
-                self.bus.publish(message, age_s, received_ns)
+            for message in link.hear(data, at, snr_db, now, ended_at):
+                now_ns = time.time_ns()
+                times, age_s = UNKNOWN, link.delivered(message, now)
+                if age_s is not None:
+                    times = local_times(link, message, age_s, now, now_ns, self._headers)
+                received_ns = now_ns - round((now - message.heard_at) * 1e9)
+                self.bus.publish(message, age_s, received_ns, times)
+        if link.outcomes.receipts.verdicts:
+            self._tell_verdicts()
         if self._link.relay.is_on:
             self._pdu_link.wake()
 
@@ -102,7 +135,10 @@ class Node:
                     self._link.submit(topic_id, gathered, now)
                     self._pdu_link.wake()
             self._link.handle_timers(now)
+            self._tell_verdicts()
             self._queue_moved.set()  # messages may have expired
+        if now >= self._link.outcomes.deadman.next_at:
+            self._stop_silent(now)
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
         """The next burst, decided now."""
@@ -119,6 +155,8 @@ class Node:
     def settled(self, burst: Burst, outcome: Outcome, at: float) -> None:
         """A burst has left, or not."""
         self._link.confirm(burst, outcome, at)
+        if self._link.outcomes.receipts.verdicts:
+            self._tell_verdicts()
         self._queue_moved.set()
 
     # The daemon's tasks.
@@ -147,10 +185,13 @@ class Node:
     async def tick(self) -> None:
         """Let the link's time pass, and measure how late the event loop is; for ever."""
         while True:
-            due = time.monotonic() + TICK_S
-            await asyncio.sleep(TICK_S)
+            silent_s = self._link.outcomes.deadman.next_at - self._pdu_link.now()
+            tick_s = TICK_S if self._is_lockstep else min(TICK_S, max(silent_s, SHORTEST_TICK_S))
+            due = time.monotonic() + tick_s
+            await asyncio.sleep(tick_s)
             self._loop_lag_s = max(time.monotonic() - due, 0.9 * self._loop_lag_s)
             if not self._is_lockstep:
+                self._look_at_clock()
                 self.advance(self._pdu_link.now())
 
     async def drain(self, at_most_s: float) -> None:
@@ -168,6 +209,7 @@ class Node:
         except TimeoutError:
             pass
         self._link.shut_down()
+        self._tell_verdicts()
 
     def why(self, topic_id: int, told: Told) -> list[str]:
         """What happens to a topic, in plain words."""
@@ -195,6 +237,30 @@ class Node:
             ),
             notices=[*self._setup.warnings, *carrier.notices, *link_notices(self._link)],
         )
+
+    def _tell_verdicts(self) -> None:
+        for verdict in self._link.outcomes.receipts.take():
+            self.bus.tell(verdict)
+
+    def _stop_silent(self, now: float) -> None:
+        """Whoever obeys a command topic that fell silent is told to stop, once."""
+        for src, topic_id in self._link.outcomes.deadman.take_due(now):
+            name = self._setup.republished_as(src, topic_id)
+            stop = self._stops.get(topic_id)
+            if stop is not None:
+                log.warning("%s: silent, so the stop message was published", name)
+                self.bus.publish_stop(src, topic_id, stop)
+
+    def _look_at_clock(self) -> None:
+        """What the host's clock is ahead of the link's, and how steadily."""
+        wall_ns = time.time_ns() - round(1e9 * self._pdu_link.now())
+        if self._wall_ns is not None:
+            moved_s = 1e-9 * abs(wall_ns - self._wall_ns)
+            # A clock that was set is no less exact for it.
+            if moved_s < SET_S:
+                self._wall_error_s = max(moved_s, 0.95 * self._wall_error_s)
+        self._wall_ns = wall_ns
+        self._link.clocks.wall = Wall(wall_ns, self._wall_error_s + LEAST_ERROR_S)
 
     def audit(self) -> list[str]:
         """Where the ledger does not add up; empty when it does."""

@@ -12,8 +12,8 @@ from sdrlinkd.link import Link, TopicPolicy
 
 log = logging.getLogger("sdrlinkd")
 
-FIXED = ("dictionary", "stamp")
-"""The other end has to know of these: they change with a restart."""
+FIXED = ("dictionary", "stamp", "stop")
+"""The other end has to know of the first two, and the third is made at the start."""
 
 
 class Policies:

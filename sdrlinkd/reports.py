@@ -26,6 +26,55 @@ class TopicReport(msgspec.Struct, frozen=True, kw_only=True):
     reoffered: int = 0
     """Of those accepted: sent again to robots that came late."""
     dropped: dict[str, int] = {}
+    queue_ms: float | None = None
+    """Of what they waited, lately: for others before them; for the air; for another chance."""
+    access_ms: float | None = None
+    again_ms: float | None = None
+
+
+class LatencyReport(msgspec.Struct, frozen=True, kw_only=True):
+    """How late messages of one topic of one source come: means over the last ones, all in ms.
+
+    Their age = wait + reassembly + air + handover; wait = queue + access + again, as far as the
+    source told (null: it did not). `period` is the time between two messages, `jitter` its standard
+    deviation (the Pound paper's Jd); `percentiles` are of all ages since the start.
+    """
+
+    wait_ms: float
+    queue_ms: float | None = None
+    access_ms: float | None = None
+    again_ms: float | None = None
+    reassembly_ms: float
+    air_ms: float
+    handover_ms: float
+    period_ms: float | None = None
+    jitter_ms: float | None = None
+    percentiles_ms: dict[str, float] = {}
+
+
+class ClockReport(msgspec.Struct, frozen=True, kw_only=True):
+    """Another robot's clock. `offset_ms`: its link's clock behind ours, ± `bound_us`; `wall_*` the
+    same of the hosts' clocks since 1970. `skew_ppm`: what we gain on it.
+    """
+
+    state: str
+    """unsynced | coarse | synced | holdover"""
+    offset_ms: float | None = None
+    bound_us: float | None = None
+    skew_ppm: float | None = None
+    wall_offset_ms: float | None = None
+    wall_bound_us: float | None = None
+    period_s: float = 0.0
+    """Between its CLOCK records."""
+    samples: int = 0
+    steps: int = 0
+    """Times that it jumped."""
+    contradicted: int = 0
+    """Stamps that did not fit the others."""
+    refused: int = 0
+    """Records of another boot, or not newer than the last one."""
+    resets: int = 0
+    """It started anew, with another clock."""
 
 
 class ReceivedTopicReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -43,6 +92,9 @@ class ReceivedTopicReport(msgspec.Struct, frozen=True, kw_only=True):
     age_ms_last: float | None = None
     age_ms_p50: float | None = None
     age_ms_p99: float | None = None
+    latency: LatencyReport | None = None
+    stops: int = 0
+    """Stop messages published because nothing came."""
 
 
 class NeighborReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -65,6 +117,7 @@ class NeighborReport(msgspec.Struct, frozen=True, kw_only=True):
     per_there: float | None = None
     mcs: int = 0
     """What we send to it with."""
+    clock: ClockReport | None = None
 
 
 class TxReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -119,6 +172,10 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """Time on the air, all bursts together."""
     airtime_by_class_s: dict[str, float] = {}
     """The same by the class of what was inside, bursts that failed included."""
+    control_airtime_s: float = 0.0
+    """Of bursts, PDUs with nothing but records."""
+    control_period_s: float = 0.0
+    """Between PDUs with nothing but CLOCK and RECEIPT records, at the most."""
     bursts_by_mcs: dict[int, int]
     bursts_late: int
     """Bursts that came too late for their slot and were sent again."""

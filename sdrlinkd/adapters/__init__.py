@@ -4,6 +4,7 @@ from sdrlinkd.adapters.bags import Bag, BagMessage, BagTopic, open_bag
 from sdrlinkd.adapters.due import Due, due_messages
 from sdrlinkd.adapters.pacing import first_seconds, paced
 from sdrlinkd.adapters.robot import BuiltInRobot
+from sdrlinkd.adapters.stops import header_topics, stop_messages
 from sdrlinkd.adapters.transforms import Transforms
 from sdrlinkd.adapters.typestore import empty, from_cdr, knows, to_cdr
 
@@ -18,8 +19,10 @@ __all__ = [
     "empty",
     "first_seconds",
     "from_cdr",
+    "header_topics",
     "knows",
     "open_bag",
     "paced",
+    "stop_messages",
     "to_cdr",
 ]

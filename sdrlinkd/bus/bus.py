@@ -11,7 +11,14 @@ from sdrlinkd import __version__
 from sdrlinkd.bus import envelope
 from sdrlinkd.bus.reader import SocketReader
 from sdrlinkd.bus.sockets import RuntimeDirectory
-from sdrlinkd.client import ACK_PREFIX, IN_PUB_SOCKET, IN_SOCKET, OUT_SOCKET, SYNC_PREFIX
+from sdrlinkd.client import (
+    ACK_PREFIX,
+    IN_PUB_SOCKET,
+    IN_SOCKET,
+    OUT_SOCKET,
+    RECEIPT_PREFIX,
+    SYNC_PREFIX,
+)
 from sdrlinkd.config import Setup
 from sdrlinkd.errors import EnvelopeError
 from sdrlinkd.link import (
@@ -20,7 +27,9 @@ from sdrlinkd.link import (
     QOS_BY_LABEL,
     Delivered,
     Overrides,
+    Verdict,
 )
+from sdrlinkd.localtime import UNKNOWN, LocalTimes
 from sdrlinkd.reports import BusReport
 
 # ZeroMQ hardly queues for us: what arrives is taken at once, so that every drop is ours and named.
@@ -33,6 +42,8 @@ QUIET_S = 0.01
 QUIET_ROUNDS = 3
 LAST_MESSAGES_S = 0.3
 PDU_TAP = b"\0pdu\0"
+OLDEST_S = 10.0
+"""A message that was published so long before it came was published by another clock."""
 
 
 class Ingress(Protocol):
@@ -41,8 +52,8 @@ class Ingress(Protocol):
     def submit(self, topic_id: int, payload: bytes, overrides: Overrides = AS_CONFIGURED) -> None:
         """A good message."""
 
-    def refuse(self, reason: str, topic_id: int | None = None) -> None:
-        """A message that cannot be taken, and the ledger's reason."""
+    def refuse(self, reason: str, topic_id: int | None = None, receipt: str = "") -> None:
+        """A message that cannot be taken, and the ledger's reason; `receipt`: as in Overrides."""
 
 
 class Bus:
@@ -58,6 +69,7 @@ class Bus:
         self._context = context
         self._directory = directory
         self._topic_ids = {name.encode() + b"\0": id_ for name, id_ in setup.topics_in.items()}
+        self._names_in = {id_: name for name, id_ in setup.topics_in.items()}
         self._types = {topic.id: topic.type for topic in setup.registry.topics}
         self._republished_as = setup.republished_as
         self._max_message_bytes = setup.config.bus.max_message_bytes
@@ -94,12 +106,11 @@ class Bus:
         """Whether someone watches PDUs."""
         return self._taps > 0
 
-    def publish(self, message: Delivered, age_s: float | None, received_ns: int) -> None:
+    def publish(
+        self, message: Delivered, age_s: float | None, received_ns: int, times: LocalTimes = UNKNOWN
+    ) -> None:
         """Hand a message from the air to its consumers."""
-        key = (message.src, message.topic_id)
-        topic = self._frames_out.get(key)
-        if topic is None:
-            topic = self._frames_out[key] = self._republished_as(*key).encode() + b"\0"
+        topic = self._topic_out(message.src, message.topic_id)
         header = envelope.OutHeader(
             s=message.src,
             n=message.number,
@@ -109,9 +120,33 @@ class Bus:
             h=message.hops_left,
             age=None if age_s is None else round(age_s * 1e6),
             sn=message.snr_db,
+            tl=times.published_ns,
+            eb=times.published_error_us,
+            ts=times.sampled_ns,
+            es=times.sampled_error_us,
         )
+        if age_s is not None:
+            wait_s, reassembly_s, air_s, _ = message.parts(0.0)
+            header.dw, header.dr = round(1e6 * wait_s), round(1e6 * reassembly_s)
+            header.da = round(1e6 * air_s)
         self._published += 1
         self._out.send_multipart(envelope.encode(topic, header, message.payload))
+        self._out_reader.recheck()
+
+    def publish_stop(self, src: int, topic_id: int, payload: bytes) -> None:
+        """In place of a message that did not come."""
+        header = envelope.OutHeader(
+            s=src, n=0, tr=time.time_ns(), ty=self._types[topic_id], stop=True
+        )
+        self._out.send_multipart(envelope.encode(self._topic_out(src, topic_id), header, payload))
+        self._out_reader.recheck()
+
+    def tell(self, verdict: Verdict) -> None:
+        """What became of a message whose producer wants to know."""
+        receipt, topic_id, dst, fate, reason, took_s = verdict
+        told = envelope.Receipt(receipt, self._names_in[topic_id], dst, fate, reason, took_s)
+        frame = envelope.VERSION_BYTE + msgspec.msgpack.encode(told)
+        self._out.send_multipart([RECEIPT_PREFIX + receipt.encode() + b"\0", frame])
         self._out_reader.recheck()
 
     def tap(self, direction: str, data: bytes) -> None:
@@ -119,6 +154,13 @@ class Bus:
         header = msgspec.msgpack.encode({"dir": direction, "t": time.time_ns()})
         self._out.send_multipart([PDU_TAP, envelope.VERSION_BYTE + header, data])
         self._out_reader.recheck()
+
+    def _topic_out(self, src: int, topic_id: int) -> bytes:
+        topic = self._frames_out.get((src, topic_id))
+        if topic is None:
+            topic = self._republished_as(src, topic_id).encode() + b"\0"
+            self._frames_out[src, topic_id] = topic
+        return topic
 
     def names_out(self) -> dict[tuple[int, int], str]:
         """Bus topics published so far, by (source, topic id)."""
@@ -173,6 +215,7 @@ class Bus:
         except EnvelopeError as error:
             self._bad(str(error))
             return
+        receipt = header.id or "" if header is not None else ""
         topic_id = self._topic_ids.get(topic)
         if topic_id is None:
             self._ingress.refuse("tx_unknown_topic")
@@ -180,28 +223,32 @@ class Bus:
             return
         size = len(payload)
         if size < CDR_HEADER_SIZE:
-            self._bad(f"payload of {size} bytes has no room for the CDR header", topic_id)
+            self._bad(f"payload of {size} bytes has no room for the CDR header", topic_id, receipt)
         elif size > self._max_message_bytes:
-            self._ingress.refuse("tx_too_big", topic_id)
+            self._ingress.refuse("tx_too_big", topic_id, receipt)
             self._bad_last = (
                 f"message of {size} B; bus.max_message_bytes allows {self._max_message_bytes}"
             )
         elif header is None:
             self._ingress.submit(topic_id, payload)
         elif header.ty is not None and header.ty != self._types[topic_id]:
-            self._bad(f"type {header.ty}; the registry has {self._types[topic_id]}", topic_id)
+            self._bad(
+                f"type {header.ty}; the registry has {self._types[topic_id]}", topic_id, receipt
+            )
         else:
             overrides = Overrides(
                 None if header.q is None else QOS_BY_LABEL[header.q],
                 header.p,
                 header.d,
                 None if header.ls is None else header.ls * 1e-3,
+                0.0 if header.t is None else _age_s(header.t),
+                receipt,
             )
             self._ingress.submit(topic_id, payload, overrides)
 
-    def _bad(self, what: str, topic_id: int | None = None) -> None:
+    def _bad(self, what: str, topic_id: int | None = None, receipt: str = "") -> None:
         self._bad_last = what
-        self._ingress.refuse("tx_bad_envelope", topic_id)
+        self._ingress.refuse("tx_bad_envelope", topic_id, receipt)
 
     def _take_subscription(self, frames: list[bytes]) -> None:
         subscribed, topic = frames[0][:1] == b"\x01", frames[0][1:]
@@ -216,3 +263,9 @@ class Bus:
     def _acknowledge(self, topic: bytes) -> None:
         self._out.send_multipart([topic, self._welcome])
         self._out_reader.recheck()
+
+
+def _age_s(published_ns: int) -> float:
+    """Since a producer published; a clock that was set in between cannot say."""
+    age_s = 1e-9 * (time.time_ns() - published_ns)
+    return age_s if 0 <= age_s <= OLDEST_S else 0.0

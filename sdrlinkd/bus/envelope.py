@@ -35,6 +35,25 @@ class OutHeader(msgspec.Struct, omit_defaults=True, gc=False):
     h: int = 0
     age: int | None = None
     sn: float | None = None
+    tl: int | None = None
+    eb: int | None = None
+    ts: int | None = None
+    es: int | None = None
+    dw: int | None = None
+    dr: int | None = None
+    da: int | None = None
+    stop: bool = False
+
+
+class Receipt(msgspec.Struct, frozen=True, omit_defaults=True):
+    """What became of a message at robot `d`; `took` is its age there in s."""
+
+    id: str
+    topic: str
+    d: int
+    fate: str
+    reason: str = ""
+    took: float | None = None
 
 
 class Welcome(msgspec.Struct, frozen=True):

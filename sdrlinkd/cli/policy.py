@@ -32,6 +32,9 @@ def set_policy(
     priority: Annotated[int | None, typer.Option(help="0 to 127, the most urgent.")] = None,
     period: Annotated[Text, typer.Option(help="Send no more often: 0.1, 100ms; 0: always.")] = None,
     lifespan: Annotated[Text, typer.Option(help="Worthless after: 300ms, 2s, inf.")] = None,
+    deadman: Annotated[
+        Text, typer.Option(help="Silent for so long, and the stop message is published here.")
+    ] = None,
     depth: Annotated[int | None, typer.Option(help="Messages that may wait; 0: all.")] = None,
     history: Annotated[Text, typer.Option(help="keep_last or keep_all.")] = None,
     durability: Annotated[Text, typer.Option(help="volatile or transient_local.")] = None,
@@ -53,6 +56,7 @@ def set_policy(
         "priority": priority,
         "period_s": None if period is None else seconds(period, "--period"),
         "lifespan_s": None if lifespan is None else seconds(lifespan, "--lifespan"),
+        "deadman_s": None if deadman is None else seconds(deadman, "--deadman"),
         "depth": depth,
         "history": history,
         "durability": durability,

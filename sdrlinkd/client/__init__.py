@@ -6,6 +6,10 @@ with Publisher() as out:
 with Subscriber("/rx_robot_2/odom") as heard:
     for message in heard:
         print(message.source, message.age_us, len(message.payload))
+
+with Publisher() as out:
+    out.send("/robot_1/cmd_vel", cdr_bytes, receipt=True)
+    print(out.receipt(timeout_s=5.0))
 """
 
 from sdrlinkd.client.aio import AsyncPublisher, AsyncSubscriber
@@ -15,9 +19,11 @@ from sdrlinkd.client.flatmap import pack_map, unpack
 from sdrlinkd.client.messages import (
     ACK_PREFIX,
     ENVELOPE_VERSION,
+    RECEIPT_PREFIX,
     SYNC_PREFIX,
     EnvelopeMismatchError,
     Message,
+    Receipt,
 )
 from sdrlinkd.client.paths import (
     CONTROL_SOCKET,
@@ -35,6 +41,7 @@ __all__ = [
     "IN_PUB_SOCKET",
     "IN_SOCKET",
     "OUT_SOCKET",
+    "RECEIPT_PREFIX",
     "SYNC_PREFIX",
     "AsyncPublisher",
     "AsyncSubscriber",
@@ -43,6 +50,7 @@ __all__ = [
     "Message",
     "NoDaemonError",
     "Publisher",
+    "Receipt",
     "RefusedError",
     "Subscriber",
     "endpoint",

@@ -2,6 +2,7 @@
 
 import asyncio
 import os
+import time
 from collections.abc import AsyncIterator
 from types import TracebackType
 from typing import Self
@@ -73,7 +74,9 @@ class AsyncPublisher(_AsyncSocket):
         type: str | None = None,  # noqa: A002
     ) -> None:
         """Publish `cdr` under `topic`. Raises NoDaemonError after the timeout."""
-        fields = {"q": qos, "p": priority, "d": dst, "ls": lifespan_ms, "ty": type}
+        fields = {
+            "q": qos, "p": priority, "d": dst, "ls": lifespan_ms, "ty": type, "t": time.time_ns()
+        }  # fmt: skip
         try:
             async with asyncio.timeout(self._timeout_s):
                 await self._socket.send_multipart(encode_out(topic, cdr, fields))

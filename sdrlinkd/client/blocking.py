@@ -2,6 +2,7 @@
 
 import math
 import os
+import secrets
 import time
 from collections.abc import Iterator
 from types import TracebackType
@@ -10,8 +11,11 @@ from typing import Self
 import zmq
 
 from sdrlinkd.client.messages import (
+    RECEIPT_PREFIX,
     Message,
+    Receipt,
     decode_in,
+    decode_receipt,
     encode_out,
     new_ack_topic,
     sync_frames,
@@ -86,6 +90,9 @@ class Publisher(Endpoint):
         self._socket.immediate = True
         self._socket.sndtimeo = int(timeout_s * 1000)
         self._sent = False
+        self._asked = 0
+        self._token = secrets.token_hex(4)
+        self._receipts: zmq.Socket[bytes] | None = None
         self._connect(IN_SOCKET)
 
     def send(
@@ -98,14 +105,57 @@ class Publisher(Endpoint):
         dst: int | None = None,
         lifespan_ms: float | None = None,
         type: str | None = None,  # noqa: A002
-    ) -> None:
-        """Publish `cdr` under `topic`. What is left out comes from the daemon's configuration."""
-        fields = {"q": qos, "p": priority, "d": dst, "ls": lifespan_ms, "ty": type}
+        receipt: bool = False,
+    ) -> str | None:
+        """Publish `cdr` under `topic`. What is left out comes from the daemon's configuration.
+
+        With `receipt`, each robot that it is for answers what became of it, under the name that is
+        returned; see the method `receipt`.
+        """
+        fields = {
+            "q": qos, "p": priority, "d": dst, "ls": lifespan_ms, "ty": type, "t": time.time_ns()
+        }  # fmt: skip
+        name = None
+        if receipt:
+            if self._receipts is None:
+                self._receipts = self._subscribed(RECEIPT_PREFIX + self._token.encode())
+            self._asked += 1
+            name = fields["id"] = f"{self._token}.{self._asked}"
         try:
             self._socket.send_multipart(encode_out(topic, cdr, fields))
             self._sent = True
         except zmq.Again:
             raise no_daemon(self.directory) from None
+        return name
+
+    def receipt(self, timeout_s: float | None = None) -> Receipt | None:
+        """The next answer to messages sent with `receipt`; None when `timeout_s` passed first."""
+        if self._receipts is None:
+            return None
+        timeout_ms = None if timeout_s is None else math.ceil(timeout_s * 1000)
+        if not self._receipts.poll(timeout_ms):
+            return None
+        return decode_receipt(self._receipts.recv_multipart())
+
+    def close(self) -> None:
+        """Close the sockets; what was sent has 200 ms to leave."""
+        if self._receipts is not None:
+            self._receipts.close()
+        super().close()
+
+    def _subscribed(self, prefix: bytes, timeout_s: float = 5.0) -> zmq.Socket[bytes]:
+        """A socket that misses nothing from now on. Raises NoDaemonError."""
+        socket = self._context.socket(zmq.SUB)
+        socket.connect(endpoint(self.directory, OUT_SOCKET))
+        ack_topic = new_ack_topic()
+        socket.subscribe(prefix)
+        socket.subscribe(ack_topic)
+        if not socket.poll(math.ceil(timeout_s * 1000)):
+            socket.close()
+            raise no_daemon(self.directory)
+        socket.recv_multipart()
+        socket.unsubscribe(ack_topic)
+        return socket
 
     def flush(self, timeout_s: float = 5.0) -> None:
         """Wait until the daemon has taken everything sent. Raises NoDaemonError.

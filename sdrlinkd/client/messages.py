@@ -11,6 +11,7 @@ ENVELOPE_VERSION = b"\x01"
 # and again when a message under SYNC_PREFIX with the same token has been taken.
 ACK_PREFIX = b"\0ack\0"
 SYNC_PREFIX = b"\0sync\0"
+RECEIPT_PREFIX = b"\0receipt\0"
 
 
 class EnvelopeMismatchError(ValueError):
@@ -23,7 +24,12 @@ class Message:
 
     `number` runs per (source, topic): a step of more than one is what this consumer missed on the
     bus. `lost_pdus` is how many PDUs of the source are known lost on the air so far. `age_us` is
-    how old the message was when it was handed over, None when unknown.
+    how old the message was when it was handed over, None when unknown; of that it waited at its
+    source, its fragments came one after another, and the last one was on the air.
+
+    `published_ns` and `sampled_ns` (of messages with a std_msgs/Header) are when it was published
+    and measured, in ns since 1970 by this host's clock, and how wrong that may be; None when
+    unknown. `is_stop`: nothing came for too long, and this is the stop message of a command topic.
     """
 
     topic: str
@@ -36,6 +42,44 @@ class Message:
     received_ns: int
     hops_left: int
     snr_db: float | None
+    published_ns: int | None = None
+    published_error_us: int | None = None
+    sampled_ns: int | None = None
+    sampled_error_us: int | None = None
+    waited_us: int | None = None
+    reassembly_us: int | None = None
+    on_air_us: int | None = None
+    is_stop: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Receipt:
+    """What became of a message at robot `dst`: `fate` is delivered, expired, dropped or unknown.
+
+    `reason` is one of the ledger's; `took_s` the message's age when it was delivered there.
+    """
+
+    id: str
+    topic: str
+    dst: int
+    fate: str
+    reason: str = ""
+    took_s: float | None = None
+
+
+def decode_receipt(frames: Sequence[bytes]) -> Receipt | None:
+    """A receipt from the daemon's frames; None for anything else."""
+    if len(frames) != 2 or not frames[0].startswith(RECEIPT_PREFIX):
+        return None
+    fields = unpack(frames[1][1:])
+    return Receipt(
+        id=fields["id"],
+        topic=fields["topic"],
+        dst=fields["d"],
+        fate=fields["fate"],
+        reason=fields.get("reason", ""),
+        took_s=fields.get("took"),
+    )
 
 
 def encode_out(topic: str, payload: bytes, fields: Mapping[str, Value]) -> list[bytes]:
@@ -62,6 +106,14 @@ def decode_in(frames: Sequence[bytes]) -> Message | None:
         received_ns=fields.get("tr", 0),
         hops_left=fields.get("h", 0),
         snr_db=fields.get("sn"),
+        published_ns=fields.get("tl"),
+        published_error_us=fields.get("eb"),
+        sampled_ns=fields.get("ts"),
+        sampled_error_us=fields.get("es"),
+        waited_us=fields.get("dw"),
+        reassembly_us=fields.get("dr"),
+        on_air_us=fields.get("da"),
+        is_stop=fields.get("stop", False),
     )
 
 

@@ -18,6 +18,7 @@ from sdrlinkd.config.carriers import (
 from sdrlinkd.link import (
     AccessParams,
     ClassesParams,
+    ClockParams,
     LinkParams,
     QueueParams,
     RateParams,
@@ -60,6 +61,7 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     reassembly: ReassemblyParams = ReassemblyParams()
     classes: ClassesParams = ClassesParams()
     relay: RelayParams = RelayParams()
+    clock: ClockParams = ClockParams()
     tf: TransformParams = TransformParams()
     access: AccessParams = AccessParams()
     rate: RateParams = RateParams()

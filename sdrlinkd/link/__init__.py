@@ -4,7 +4,7 @@ from sdrlinkd.link.access import AccessParams, check_access, make_access
 from sdrlinkd.link.burst import Burst, Outcome
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity, Sensed
 from sdrlinkd.link.compression import Deflated, train_dictionary
-from sdrlinkd.link.inbox import CDR_HEADER_SIZE, Delivered
+from sdrlinkd.link.delivered import CDR_HEADER_SIZE, Delivered
 from sdrlinkd.link.ledger import RX_PDU_REASONS, RX_REASONS, TX_REASONS
 from sdrlinkd.link.link import Link
 from sdrlinkd.link.message import Outgoing
@@ -19,6 +19,7 @@ from sdrlinkd.link.qos import (
     Qos,
 )
 from sdrlinkd.link.rate import RateChange, RateParams
+from sdrlinkd.link.receipts import Verdict
 from sdrlinkd.link.relay import Relay, RelayParams
 from sdrlinkd.link.report import link_notices, link_report
 from sdrlinkd.link.schedule import (
@@ -28,6 +29,7 @@ from sdrlinkd.link.schedule import (
     ClassesParams,
     ClassParams,
 )
+from sdrlinkd.link.timesync import ClockParams, DualEnvelope, Estimate, PaperFilter, State, Wall
 from sdrlinkd.link.why import Told
 
 __all__ = [
@@ -47,8 +49,11 @@ __all__ = [
     "CarrierTraits",
     "ClassParams",
     "ClassesParams",
+    "ClockParams",
     "Deflated",
     "Delivered",
+    "DualEnvelope",
+    "Estimate",
     "Link",
     "LinkParams",
     "Opportunity",
@@ -56,6 +61,7 @@ __all__ = [
     "Outcome",
     "Outgoing",
     "Overrides",
+    "PaperFilter",
     "Qos",
     "QueueParams",
     "RateChange",
@@ -64,8 +70,11 @@ __all__ = [
     "Relay",
     "RelayParams",
     "Sensed",
+    "State",
     "Told",
     "TopicPolicy",
+    "Verdict",
+    "Wall",
     "check_access",
     "link_notices",
     "link_report",

@@ -2,6 +2,9 @@
 
 from sdrlinkd.link.policy import TopicPolicy
 
+NOT_TAKEN = frozenset({"tx_size_cap", "tx_unchanged", "tx_decimated", "tx_throttled", "tx_too_big"})
+"""Reasons for which a message never was in the queue."""
+
 
 class Admission:
     """Size cap, throttle, decimation and change detection of one topic."""

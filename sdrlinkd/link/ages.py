@@ -1,8 +1,25 @@
 """How old messages are: STAMP records meet the messages they speak of."""
 
 from collections import OrderedDict
+from typing import NamedTuple
+
+from sdrlinkd.wire import Stamp
 
 MAX_WAITING = 1024
+
+
+class Origin(NamedTuple):
+    """When a message was submitted, in the receiver's own time, and when its stamp's burst came.
+
+    `asks`: its sender wants a RECEIPT.
+    """
+
+    at: float | None
+    stamped_at: float
+    asks: bool = False
+
+
+UNKNOWN = Origin(None, 0.0)
 
 
 class Ages:
@@ -13,27 +30,31 @@ class Ages:
 
     def __init__(self, timeout_s: float) -> None:
         self._timeout_s = timeout_s
-        self._origins: OrderedDict[tuple[int, int, int], tuple[float, float]] = OrderedDict()
+        self._origins: OrderedDict[tuple[int, int, int], Origin] = OrderedDict()
 
-    def stamp(self, src: int, topic_id: int, entry_id: int, age_us: int, at: float) -> None:
+    def stamp(self, src: int, stamp: Stamp, at: float) -> None:
         """A STAMP record arrived in a burst whose preamble was at `at`."""
+        topic_id, entry_id, age_us, asks = stamp
         key = (src, topic_id, entry_id)
-        self._origins[key] = (at - age_us * 1e-6, at)
+        self._origins[key] = Origin(at - age_us * 1e-6, at, asks)
         self._origins.move_to_end(key)
         if len(self._origins) > MAX_WAITING:
             self._origins.popitem(last=False)
 
-    def origin(self, src: int, topic_id: int, entry_id: int) -> float | None:
-        """When the message that is now complete was submitted; None when no stamp came."""
+    def take(self, src: int, topic_id: int, entry_id: int) -> Origin:
+        """Of a message that is now complete, or given up; `at` is None when no stamp came."""
         if not self._origins:
-            return None
-        found = self._origins.pop((src, topic_id, entry_id), None)
-        return None if found is None else found[0]
+            return UNKNOWN
+        return self._origins.pop((src, topic_id, entry_id), UNKNOWN)
+
+    def look(self, src: int, topic_id: int, entry_id: int) -> Origin:
+        """Of one that is not."""
+        return self._origins.get((src, topic_id, entry_id), UNKNOWN)
 
     def expire(self, now: float) -> None:
         """Forget stamps whose message never became complete."""
         while self._origins:
-            key, (_, at) = next(iter(self._origins.items()))
-            if now - at < self._timeout_s:
+            key, origin = next(iter(self._origins.items()))
+            if now - origin.stamped_at < self._timeout_s:
                 return
             del self._origins[key]

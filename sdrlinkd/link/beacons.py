@@ -25,7 +25,7 @@ class Beacons:
         self._digest = digest
         if len(build_records([digest])) > equal_payload(pdu_size, 1):
             self._digest = digest.shortened()
-        self._boot_id = rng.randrange(1 << 16)
+        self.boot_id = rng.randrange(1 << 16)
         self._number = 0
         self.due_at = 0.0 if period_s > 0 else INFINITE
 
@@ -35,7 +35,7 @@ class Beacons:
 
     def take(self, start: float, neighbors: Iterable[Neighbor], rate: RateControl) -> list[Record]:
         """The records of a burst that leaves at `start`."""
-        records: list[Record] = [Beacon(self._boot_id, self._number), self._digest]
+        records: list[Record] = [Beacon(self.boot_id, self._number), self._digest]
         self._number = (self._number + 1) & 0xFFFF
         self.due_at = start + self._period_s * self._rng.uniform(1 - JITTER, 1 + JITTER)
         for neighbor in neighbors:

@@ -26,6 +26,10 @@ class Burst(NamedTuple):
     """In the order in which they were composed."""
     first_start: float = 0.0
     """Where it was to leave at first; later than that when it came too late."""
+    ready_at: float = 0.0
+    """From when on the radio could have taken it."""
+    clock: int | None = None
+    """Number of the CLOCK record inside, if any."""
 
 
 class Outcome(Enum):

@@ -37,6 +37,8 @@ class CarrierTraits(NamedTuple):
     mcs: int = 0
     """The fixed one."""
     needed_snr_db: tuple[float, ...] = (0.0,)
+    stamp_s: float = 2e-4
+    """How wrong the times may be at which bursts left and came."""
 
 
 class Sensed(NamedTuple):

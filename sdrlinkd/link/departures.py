@@ -16,7 +16,9 @@ from sdrlinkd.link.rate import RateControl, RateParams
 from sdrlinkd.link.returned import Returned
 from sdrlinkd.link.schedule import Allowance, ClassesParams, Forecasts, Limits, Shares
 from sdrlinkd.link.sender import Sender
-from sdrlinkd.wire import Record
+from sdrlinkd.link.tellings import Tellings
+from sdrlinkd.link.waits import WaitMeters
+from sdrlinkd.wire import Record, RecordType
 
 INFINITE = float("inf")
 NOTICE_S = 5e-4
@@ -38,17 +40,20 @@ class Departures:
     """Asks access when, limits how long, the sender what; late bursts go again."""
 
     def __init__(
-        self, sender: Sender, inbox: Inbox, beacons: Beacons, classes: ClassesParams,
-        own_id: int, has_control: bool, rng: Random,
+        self, sender: Sender, inbox: Inbox, beacons: Beacons, tellings: Tellings,
+        classes: ClassesParams, own_id: int, has_control: bool, rng: Random,
     ) -> None:  # fmt: skip
         self._sender = sender
         self._inbox = inbox
         self._beacons = beacons
+        self._tellings = tellings
         self._own_id = own_id
         self._rng = rng
         self._number = 0
         self._returned = Returned(has_control)
         self.airtime_s = 0.0
+        self.control_airtime_s = 0.0
+        """Of it, PDUs with nothing but records."""
         self.bursts_by_mcs: Counter[int] = Counter()
         self.forecasts = Forecasts()
         self.shares = Shares(classes)
@@ -57,6 +62,8 @@ class Departures:
         self.least_s = 0.0
         """No message can be younger when it arrives."""
         self._held = _NOT_HELD
+        self._ready_at: float | None = None
+        self.waits = WaitMeters()
         self.access: Access = Free()
         self.rate = RateControl(RateParams(), (0.0,), 0)
 
@@ -66,9 +73,11 @@ class Departures:
         longest_s = max(carrier.longest_burst_s[mcs] for mcs in self.rate.usable)
         self.access = make_access(access, self._own_id, carrier, longest_s, self._rng)
         self._lead_s = carrier.lead_s
-        lengths_s = enumerate(carrier.pdu_burst_s)
-        fastest_s = min((s for mcs, s in lengths_s if mcs in self.rate.usable), default=0.0)
-        self.least_s = carrier.lead_s + fastest_s
+        lengths_s = [
+            length_s for mcs, length_s in enumerate(carrier.pdu_burst_s) if mcs in self.rate.usable
+        ]
+        self.least_s = carrier.lead_s + min(lengths_s, default=0.0)
+        self._tellings.pdu_s = max(lengths_s, default=0.0)
         self._notice_s = carrier.ahead_s if carrier.is_lockstep else NOTICE_S
 
     def more_to_send(self) -> None:
@@ -85,10 +94,12 @@ class Departures:
         if self._returned:
             return self._again(opportunity)
         head = self._sender.outbox.head()
+        if self._ready_at is None:
+            self._ready_at = earliest - self._lead_s
         if head is not None:
             qos, destinations = head
             mcs = self.rate.mcs(destinations, qos, earliest)
-        elif earliest >= self._beacons.due_at or self._sender.packetizer.spare:
+        elif self._must_tell(earliest):
             qos, mcs = Qos.DEFAULT, self.rate.lowest
         else:
             return None
@@ -98,7 +109,8 @@ class Departures:
         allowance = self._allowance(slot, mcs, opportunity)
         # A schedule's phase holds for the planned start only.
         is_timed = self.access.frame(slot.start) is not None and (
-            slot.start >= self._beacons.due_at or bool(self._sender.packetizer.spare)
+            slot.start >= self._beacons.due_at
+            or self._sender.packetizer.spare.holds(RecordType.FRAME)
         )
         burst = self.compose(slot.start, allowance)
         if burst is None:
@@ -111,6 +123,9 @@ class Departures:
             # Beacons are for everybody.
             mcs = self.rate.lowest
         length_s = airtime_s(mcs, len(burst.pdus))
+        if n_alone := burst.carried.count([]):
+            self.control_airtime_s += length_s * n_alone / len(burst.pdus)
+            self._tellings.told_alone(slot.start)
         self.shares.spend(length_s, burst.classes, self._sender.outbox.waiting_classes())
         self.access.sent(slot.start + length_s, self._relayed_src(burst))
         self._number += 1
@@ -122,6 +137,7 @@ class Departures:
             airtime_s=length_s,
             number=self._number,
             first_start=slot.start,
+            ready_at=self._taken_ready_at(),
         )
 
     def compose(self, start: float, allowance: Allowance) -> Burst | None:
@@ -133,21 +149,22 @@ class Departures:
         sender, spare = self._sender, self._sender.packetizer.spare
         overdue, may_tell = False, allowance.most[Qos.DEFAULT] > 0
         if start >= self._beacons.due_at:
-            overdue = bool(spare)
+            overdue = spare.is_due(start)
             spare.offer(self._beacon_records(start))
-        elif spare and (frame := self.access.frame(start)):
+        elif spare.holds(RecordType.FRAME) and (frame := self.access.frame(start)):
             spare.renew(frame)
-            # Clocks do not wait for spare room.
+            # A schedule does not wait for spare room.
             overdue = True
+        overdue = self._tellings.tell(start) or overdue
         if overdue and may_tell:
             # Clocks cannot wait for the end of what is relayed, and no burst holds both.
             urgent = sender.compose(start, allowance.above(Qos.DEFAULT), self._own_id)
             burst = self._records_behind(urgent)
         else:
             burst = sender.compose(start, allowance)
-        if burst is None and spare and may_tell:
+        if burst is None and may_tell and spare.is_due(start):
             burst = sender.compose_records()
-        return burst
+        return self._tellings.took(burst)
 
     def _records_behind(self, urgent: Burst | None) -> Burst | None:
         """Records in a PDU of their own, behind what is more urgent than they are."""
@@ -168,6 +185,8 @@ class Departures:
             self._sender.packetizer.entry_ids.not_left(chain.from_iterable(burst.carried))
             return
         if outcome is Outcome.SENT:
+            self._tellings.left(burst)
+            self.waits.left(burst)
             self.airtime_s += burst.airtime_s
             self.bursts_by_mcs[burst.mcs] += 1
         self._sender.confirm(burst, outcome, now)
@@ -184,11 +203,12 @@ class Departures:
         wakes_at = self._sender.packetizer.next_wakeup(now)
         if wakes_at <= now and self._held.is_settled:
             wakes_at = self._held.until
-        return min(self._beacons.due_at, wakes_at)
+        return min(self._beacons.due_at, self._tellings.next_alone_at, wakes_at)
 
     def drain(self) -> None:
         """Nothing more will come: partial PDUs go at once, beacons end."""
         self._beacons.end()
+        self._tellings.end()
         self._sender.packetizer.flush()
 
     def clear(self) -> None:
@@ -219,8 +239,8 @@ class Departures:
         """For a burst in `slot`."""
         airtime_s, longest_s = opportunity.airtime_s, slot.end - slot.start
         asked = self._sender.outbox.waiting_classes()
-        if slot.start >= self._beacons.due_at or self._sender.packetizer.spare:
-            # Beacons are of the default class.
+        if self._must_tell(slot.start):
+            # Records are of the default class.
             asked.add(Qos.DEFAULT)
         one_s, two_s = airtime_s(mcs, 1), airtime_s(mcs, 2)
         if two_s > one_s:
@@ -242,6 +262,15 @@ class Departures:
             return allowance
         return allowance._replace(owed=tuple(owed))
 
+    def _must_tell(self, start: float) -> bool:
+        """Whether records deserve a PDU of their own."""
+        return start >= min(self._beacons.due_at, self._tellings.next_alone_at)
+
+    def _taken_ready_at(self) -> float:
+        """Since when the radio could have taken the burst that it now takes."""
+        ready_at, self._ready_at = self._ready_at, None
+        return 0.0 if ready_at is None else ready_at
+
     def _kept_free(self, start: float) -> None:
         """Settle what was not sent so that something more urgent could be."""
         held, self._held = self._held, _NOT_HELD
@@ -252,6 +281,7 @@ class Departures:
 
     def _beacon_records(self, start: float) -> list[Record]:
         records = self._beacons.take(start, self._inbox.neighbors.values(), self.rate)
+        records += self.waits.records()
         frame = self.access.frame(start)
         return records if frame is None else [*records, frame]
 

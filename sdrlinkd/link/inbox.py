@@ -2,16 +2,18 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
 
 from sdrlinkd.errors import PduError
 from sdrlinkd.link.ages import Ages
 from sdrlinkd.link.compression import Inflated
+from sdrlinkd.link.delivered import CDR_HEADER_SIZE, Delivered
+from sdrlinkd.link.ear import Ear
 from sdrlinkd.link.ledger import RxTally, balance
 from sdrlinkd.link.neighbors import Neighbor
 from sdrlinkd.link.params import LinkParams, ReassemblyParams
 from sdrlinkd.link.parity import is_sound, missing_fragments
-from sdrlinkd.link.policy import DEFAULT_POLICY, TopicPolicy
+from sdrlinkd.link.policy import DEFAULT_POLICY, INFINITE, TopicPolicy
+from sdrlinkd.link.receipts import DELIVERED
 from sdrlinkd.wire import (
     BROADCAST,
     CONTROL_TOPIC_ID,
@@ -21,6 +23,7 @@ from sdrlinkd.wire import (
     Pdu,
     Reassembly,
     ReassemblyLimits,
+    Receipt,
     Record,
     Registry,
     RegistryDigest,
@@ -30,46 +33,6 @@ from sdrlinkd.wire import (
     parse,
     parse_records,
 )
-
-CDR_HEADER_SIZE = 4
-
-
-class Delivered(NamedTuple):
-    """A whole message from the air.
-
-    `number` runs per (source, topic) from 1; `lost_pdus` are those known missing from the source
-    so far; `origin_at` is when it was submitted, in the receiver's own time (absent when no STAMP
-    came), so its age at any moment is that moment less `origin_at`.
-    """
-
-    src: int
-    topic_id: int
-    payload: bytes
-    number: int
-    lost_pdus: int
-    origin_at: float | None
-    heard_at: float
-    hops_left: int
-    snr_db: float | None
-
-
-class Ear(Protocol):
-    """Who wants to know more of what is heard than messages."""
-
-    def pdu_from(self, pdu: Pdu, stamps: list[Stamp], at: float, is_relayed: bool) -> None:
-        """A good PDU, for whomever, that is not our own voice; its burst's preamble came at `at`.
-
-        `is_relayed`: not its source has sent it.
-        """
-
-    def newcomer(self, src: int, at: float) -> None:
-        """A robot is heard for the first time, or has started anew."""
-
-    def sends_on(self, pdu: Pdu, data: bytes, at: float) -> bool:
-        """Whether this node forwards the PDU; heard for the first time."""
-
-    def record_from(self, src: int, record: Record, at: float) -> None:
-        """A control record."""
 
 
 class Inbox:
@@ -108,7 +71,9 @@ class Inbox:
         self.pdus_used = 0
         self.pdus_dropped: Counter[str] = Counter()
 
-    def hear(self, data: bytes, at: float, snr_db: float | None, now: float) -> list[Delivered]:
+    def hear(
+        self, data: bytes, at: float, snr_db: float | None, now: float, ended_at: float
+    ) -> list[Delivered]:
         """Take a PDU whose burst's preamble arrived at `at`; the messages it completed."""
         self.pdus_heard += 1
         try:
@@ -132,32 +97,50 @@ class Inbox:
         neighbor.hops_left = pdu.hop
         if not is_relayed:
             neighbor.note_snr(snr_db)
+        for record in records or ():
+            if isinstance(record, Stamp):
+                self._ages.stamp(pdu.src, record, at)
         is_sent_on = self._ear.sends_on(pdu, data, at)
         if pdu.dst not in (BROADCAST, self._own_id) and not self._hears_self:
             return self._drop("rx_relayed" if is_sent_on else "rx_not_for_us")
         for record in records or ():
-            if isinstance(record, Stamp):
-                self._ages.stamp(pdu.src, record.topic_id, record.entry_id, record.age_us, at)
-            elif isinstance(record, Beacon):
+            if isinstance(record, Beacon):
                 if neighbor.take_beacon(record):
                     neighbor.track.restart(seq, crc)
                     self._ear.newcomer(pdu.src, at)
             elif isinstance(record, RegistryDigest):
                 neighbor.digest = record
-            elif not is_relayed and not isinstance(record, Parity):
+            elif isinstance(record, Receipt):
+                if pdu.dst == self._own_id or record.node == self._own_id:
+                    self._ear.record_from(pdu.src, record, at)
+            elif not is_relayed and not isinstance(record, Parity | Stamp):
                 self._ear.record_from(pdu.src, record, at)
         repaired = self._repaired(pdu.src, records, at) if records else []
         entries = [*pdu.entries, *repaired] if repaired else pdu.entries
         if records is not None and len(entries) == 1:
             return self._drop("rx_control")
         self.pdus_used += 1
-        return self._take_entries(pdu, entries, neighbor, at, now)
+        return self._take_entries(pdu, entries, neighbor, at, now, ended_at)
+
+    def fresh_until(self, pdu: Pdu) -> float:
+        """When all its messages will be too old; inf where that is not known."""
+        until = 0.0
+        for entry in pdu.entries:
+            topic_id = entry.topic_id
+            if topic_id == CONTROL_TOPIC_ID and self._has_control:
+                continue
+            origin_at = self._ages.look(pdu.src, topic_id, entry.entry_id).at
+            if origin_at is None:
+                return INFINITE
+            lifespan_s = self.policies.get(topic_id, DEFAULT_POLICY).lifespan_s
+            until = max(until, origin_at + lifespan_s)
+        return until or INFINITE
 
     def expire(self, now: float) -> None:
         """Give up what has waited too long."""
         self.reassembly.expire(now)
+        self._note_lost(now)
         self._ages.expire(now)
-        self._note_lost()
 
     def audit(self) -> list[str]:
         """What does not add up in the RX ledgers; empty when all does."""
@@ -213,7 +196,13 @@ class Inbox:
         return entries
 
     def _take_entries(
-        self, pdu: Pdu, entries: Sequence[Entry], neighbor: Neighbor, at: float, now: float
+        self,
+        pdu: Pdu,
+        entries: Sequence[Entry],
+        neighbor: Neighbor,
+        at: float,
+        now: float,
+        ended_at: float,
     ) -> list[Delivered]:
         src = pdu.src
         reassembly = self.reassembly
@@ -226,17 +215,12 @@ class Inbox:
             if payload is None:
                 continue
             tally = self.tallies.get((src, topic_id)) or self._tally(src, topic_id)
-            if topic_id >= self._n_topics:
-                tally.dropped["rx_unknown_topic"] += 1
-                continue
-            origin_at = self._ages.origin(src, topic_id, entry.entry_id)
-            policy = self.policies.get(topic_id, DEFAULT_POLICY)
-            most = policy.max_bytes or self._max_expanded
-            reason = None
-            if pdu.compressed:
-                payload, reason = self._inflated.expand(payload, most)
-            if reason is None:
-                reason = _refusal(payload, policy, origin_at, now)
+            origin = self._ages.take(src, topic_id, entry.entry_id)
+            payload, reason = self._verdict(topic_id, payload, pdu.compressed, origin.at, now)
+            if origin.asks:
+                age_s = None if origin.at is None else now - origin.at
+                ended = reason or DELIVERED
+                self._ear.ended(src, topic_id, entry.entry_id, ended, age_s, now)
             if reason is not None:
                 tally.dropped[reason] += 1
                 continue
@@ -245,17 +229,42 @@ class Inbox:
             delivered.append(
                 Delivered(
                     src, topic_id, payload, tally.delivered, neighbor.track.lost,
-                    origin_at, at, pdu.hop,
-                    neighbor.snr_db,
+                    origin.at, at, pdu.hop,
+                    neighbor.snr_db, origin.stamped_at, ended_at,
                 )
             )  # fmt: skip
         if reassembly.lost:
-            self._note_lost()
+            self._note_lost(now)
         return delivered
 
-    def _note_lost(self) -> None:
-        for src, topic_id, reason in self.reassembly.take_lost():
+    def _verdict(
+        self,
+        topic_id: int,
+        payload: bytes,
+        is_compressed: bool,
+        origin_at: float | None,
+        now: float,
+    ) -> tuple[bytes, str | None]:
+        """(the message as it was submitted, why it is not handed over or None)."""
+        if topic_id >= self._n_topics:
+            return payload, "rx_unknown_topic"
+        policy = self.policies.get(topic_id, DEFAULT_POLICY)
+        reason = None
+        if is_compressed:
+            most = policy.max_bytes or self._max_expanded
+            payload, reason = self._inflated.expand(payload, most)
+        if reason is None:
+            reason = _refusal(payload, policy, origin_at, now)
+        # Without a control channel nobody can know.
+        if reason == "rx_no_age" and not self._has_control:
+            reason = None
+        return payload, reason
+
+    def _note_lost(self, now: float) -> None:
+        for src, topic_id, entry_id, reason in self.reassembly.take_lost():
             self._tally(src, topic_id).dropped[reason] += 1
+            if self._ages.take(src, topic_id, entry_id).asks:
+                self._ear.ended(src, topic_id, entry_id, reason, None, now)
 
     def _tally(self, src: int, topic_id: int) -> RxTally:
         return self.tallies.setdefault((src, topic_id), RxTally())
@@ -269,6 +278,9 @@ def _refusal(
         return "rx_bad_cdr"
     if policy.max_bytes and len(payload) > policy.max_bytes:
         return "rx_size_cap"
-    if origin_at is not None and now - origin_at > policy.lifespan_s:
-        return "rx_expired"
+    if policy.lifespan_s < INFINITE:
+        if origin_at is None:
+            return "rx_no_age" if policy.stamp else None
+        if now - origin_at > policy.lifespan_s:
+            return "rx_expired"
     return None

@@ -51,6 +51,7 @@ RX_REASONS = {
     "rx_partial_evicted": "given up for newer ones: the source's memory bound",
     "rx_partial_memory": "given up: the bound on memory of all sources",
     "rx_expired": "its lifespan ended before it could be handed over",
+    "rx_no_age": "no STAMP came with it, and its topic has a lifespan",
     "rx_size_cap": "larger than the topic's own size cap",
     "rx_bad_zstd": "its zstd frame cannot be read",
     "rx_inflates": "its zstd frame holds more than a message may have",

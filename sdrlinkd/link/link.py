@@ -1,19 +1,22 @@
 """The link: one node's whole traffic, as a calculator over bytes and `now`."""
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 from random import Random
 
 from zstandard import ZstdCompressionDict
 
 from sdrlinkd.link.access import Access, AccessParams
+from sdrlinkd.link.admission import NOT_TAKEN
 from sdrlinkd.link.beacons import Beacons
 from sdrlinkd.link.burst import Burst, Outcome
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity
 from sdrlinkd.link.compression import Inflated
+from sdrlinkd.link.delivered import Delivered
 from sdrlinkd.link.departures import Departures
-from sdrlinkd.link.inbox import Delivered, Inbox
+from sdrlinkd.link.inbox import Inbox
 from sdrlinkd.link.latched import Kept, Latched
-from sdrlinkd.link.meters import RateMeter, RecentAges
+from sdrlinkd.link.meters import RateMeter, rate_counters
+from sdrlinkd.link.outcomes import Outcomes
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
 from sdrlinkd.link.policy import DEFAULT_POLICY, TopicPolicy
 from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, Overrides, Qos
@@ -21,12 +24,26 @@ from sdrlinkd.link.rate import RateControl, RateParams
 from sdrlinkd.link.relay import Relay, RelayParams
 from sdrlinkd.link.schedule import ClassesParams
 from sdrlinkd.link.sender import Sender
+from sdrlinkd.link.tellings import Tellings
+from sdrlinkd.link.timesync import ClockParams, Clocks
 from sdrlinkd.link.why import Told, Why
 from sdrlinkd.reports import RATE_WINDOW_S
-from sdrlinkd.wire import CONTROL_TOPIC_ID, Frame, LinkReport, Pdu, Record, Registry, Stamp
+from sdrlinkd.wire import (
+    CONTROL_TOPIC_ID,
+    Clock,
+    Frame,
+    LinkReport,
+    Pdu,
+    Receipt,
+    Record,
+    Registry,
+    Stamp,
+    Waits,
+)
 
 NO_DICTIONARIES: Mapping[int, ZstdCompressionDict] = {}
 NO_RELAY = RelayParams()
+NO_CLOCK = ClockParams(period_s=0.0)
 DEFAULT_CLASSES = ClassesParams()
 
 
@@ -49,6 +66,7 @@ class Link:
         *,
         classes: ClassesParams = DEFAULT_CLASSES,
         relay: RelayParams = NO_RELAY,
+        clock: ClockParams = NO_CLOCK,
         dictionaries: Mapping[int, ZstdCompressionDict] = NO_DICTIONARIES,
         hears_self: bool = False,
         max_expanded: int = 1 << 20,
@@ -71,12 +89,26 @@ class Link:
             max_expanded,
         )
         self.rates = RateMeter(RATE_WINDOW_S)
-        self.ages: dict[tuple[int, int], RecentAges] = {}
+        self.waits: dict[tuple[int, int], Waits] = {}
+        """Why messages waited at their source, as that tells: by (source, topic id)."""
         period_s = params.beacon_s if registry.has_control else 0.0
         beacons = Beacons(period_s, params.pdu_size, self.digest, rng, own_id)
+        if not registry.has_control:
+            clock = NO_CLOCK
+        self.clocks = Clocks(clock, beacons.boot_id, own_id)
+        spare, neighbors = self.sender.packetizer.spare, self.inbox.neighbors
+        self.tellings = Tellings(clock, self.clocks, spare, neighbors)
         self.departures = Departures(
-            self.sender, self.inbox, beacons, classes, own_id, registry.has_control, rng
+            self.sender,
+            self.inbox,
+            beacons,
+            self.tellings,
+            classes,
+            own_id,
+            registry.has_control,
+            rng,
         )
+        self.outcomes = Outcomes(self.sender, self.tellings, neighbors, own_id, params.receipt_s)
         self._latched = Latched()
         self._why = Why(self.sender, self.departures.shares)
         self.relay = Relay(relay, own_id)
@@ -84,6 +116,7 @@ class Link:
     def attach(self, carrier: CarrierTraits, access: AccessParams, rate: RateParams) -> None:
         """Settle access and rate for the radio that is there. Raises ConfigError."""
         self.departures.attach(carrier, access, rate)
+        self.clocks.resolution_s = carrier.stamp_s
 
     @property
     def access(self) -> Access:
@@ -105,6 +138,8 @@ class Link:
         self.sender.set_policy(topic_id, policy)
         if policy.durability == "volatile":
             self._latched.forget(topic_id)
+        if not policy.deadman_s:
+            self.outcomes.deadman.forget(topic_id)
         self.inbox.policies[topic_id] = policy
 
     def why(self, topic_id: int, told: Told, now: float) -> list[str]:
@@ -120,42 +155,51 @@ class Link:
     ) -> str | None:
         """Queue a message; None, or the ledger's reason for refusing it."""
         refused = self.sender.submit(topic_id, payload, now, overrides)
+        if overrides.receipt:
+            self.outcomes.note(now)
+            if refused in NOT_TAKEN:
+                self.outcomes.refused(overrides.receipt, topic_id, refused)
         if refused is None:
             qos = self.sender.treatment(topic_id)[0] if overrides.qos is None else overrides.qos
             self.departures.forecasts.note((self.own_id, topic_id), qos, now)
             self.departures.more_to_send()
             if self.sender.policy(topic_id).durability == "transient_local":
-                self._latched.keep(topic_id, Kept(payload, now, overrides))
+                self._latched.keep(topic_id, Kept(payload, now, overrides._replace(receipt="")))
         return refused
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
         """The burst that should leave next, decided now; None: nothing to send, or not yet."""
-        return self.departures.next_burst(opportunity)
+        burst = self.departures.next_burst(opportunity)
+        if self.sender.packetizer.asking and burst is not None:
+            self.outcomes.note(burst.start)
+        return burst
 
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
         """What the radio says became of a burst."""
         self.departures.confirm(burst, outcome, now)
+        if self.sender.dropped_asking:
+            self.outcomes.note(now)
 
     def hear(
-        self, data: bytes, at: float, snr_db: float | None = None, now: float | None = None
+        self,
+        data: bytes,
+        at: float,
+        snr_db: float | None = None,
+        now: float | None = None,
+        ended_at: float | None = None,
     ) -> list[Delivered]:
         """Take a PDU whose burst's preamble arrived at `at`; the messages that it completed.
 
-        Absent `now` is `at`.
+        Its last sample came at `ended_at`. Absent `now` is `at`, as is `ended_at`.
         """
-        return self.inbox.hear(data, at, snr_db, at if now is None else now)
+        if ended_at is None:
+            ended_at = at
+        return self.inbox.hear(data, at, snr_db, at if now is None else now, ended_at)
 
     def delivered(self, message: Delivered, now: float) -> float | None:
         """The age in seconds at which `message` is handed over at `now`; None when unknown."""
-        if message.origin_at is None:
-            return None
-        age_s = now - message.origin_at
-        key = (message.src, message.topic_id)
-        ages = self.ages.get(key)
-        if ages is None:
-            ages = self.ages[key] = RecentAges()
-        ages.add(age_s)
-        return age_s
+        policy = self.inbox.policies.get(message.topic_id, DEFAULT_POLICY)
+        return self.outcomes.delivered(message, policy, now)
 
     def handle_timers(self, now: float) -> None:
         """Let time pass: expiries, reassembly timeouts, rate samples."""
@@ -164,9 +208,11 @@ class Link:
             self.sender.offer_again(offer, now)
             self.departures.more_to_send()
         self.inbox.expire(now)
+        self.tellings.look_round(now, self.own_id)
+        self.outcomes.expire(now)
         self._why.sample(now, len(self.registry))
         if self.rates.is_due(now):
-            self.rates.sample(self.rate_counters(), now)
+            self.rates.sample(rate_counters(self.sender, self.inbox, len(self.registry)), now)
 
     @property
     def has_work(self) -> bool:
@@ -185,22 +231,19 @@ class Link:
         """Drop what could not be sent any more, by name."""
         self.departures.clear()
         self.sender.shut_down()
+        self.outcomes.expire(float("inf"))
 
     def audit(self) -> list[str]:
         """Where the ledger does not add up; empty when it does."""
         return self.sender.audit() + self.inbox.audit()
 
-    def rate_counters(self) -> dict[Hashable, int]:
-        """The counters of which the snapshot shows rates."""
-        tx: dict[Hashable, int] = {
-            ("tx", topic.id): self.sender.tally(topic.id).accepted for topic in self.registry.topics
-        }
-        rx: dict[Hashable, int] = {
-            ("rx", *key): tally.delivered for key, tally in self.inbox.tallies.items()
-        }
-        return {**tx, **rx}
-
     # The inbox's ear.
+
+    def ended(
+        self, src: int, topic_id: int, entry_id: int, reason: str, age_s: float | None, now: float
+    ) -> None:
+        """Its sender wants to know."""
+        self.outcomes.ended(src, topic_id, entry_id, reason, age_s, now)
 
     def pdu_from(self, pdu: Pdu, stamps: list[Stamp], at: float, is_relayed: bool) -> None:
         """A good PDU that somebody else has sent."""
@@ -230,7 +273,8 @@ class Link:
         """Forward it, if that is our part."""
         if not self.relay.wants(pdu):
             return False
-        refused = self.sender.forward(pdu, data, at, at + self.relay.lifespan_s)
+        until = min(at + self.relay.lifespan_s, self.inbox.fresh_until(pdu))
+        refused = self.sender.forward(pdu, data, at, until)
         self.departures.more_to_send()
         return refused is None
 
@@ -243,3 +287,9 @@ class Link:
                 self.access.told_of(record.node, at)
         elif isinstance(record, Frame):
             self.access.take_frame(src, record, at)
+        elif isinstance(record, Clock) and src != self.own_id:
+            self.clocks.hear(src, record, at)
+        elif isinstance(record, Receipt):
+            self.outcomes.answered(src, record, at)
+        elif isinstance(record, Waits):
+            self.waits[src, record.topic_id] = record

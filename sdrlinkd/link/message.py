@@ -5,6 +5,7 @@ Lanes of equal class and priority form a *level*.
 """
 
 from collections import deque
+from collections.abc import Sequence
 from enum import Enum, auto
 
 from sdrlinkd.link.ledger import TxTally
@@ -26,7 +27,7 @@ class Outgoing:
     __slots__ = (
         "arrived_at", "dst", "entry_id", "expires_at", "fate", "is_compressed", "is_held",
         "is_whole", "k", "lane", "last_at", "next_index", "parity", "payload", "priority", "qos",
-        "rests_id", "stamped", "tally", "topic_id", "total", "unconfirmed",
+        "receipt", "rests_id", "stamped", "tally", "topic_id", "total", "unconfirmed",
     )  # fmt: skip
 
     def __init__(
@@ -63,6 +64,8 @@ class Outgoing:
         self.is_held = False
         self.unconfirmed = 0
         self.is_compressed = False
+        self.receipt = ""
+        """Under this name its producer wants to know what becomes of it."""
         self.parity: list[bytes] = []
         """Control records that follow its last fragment, the first one last."""
         self.is_whole = False
@@ -107,3 +110,8 @@ class Level:
         self.key = key
         self.lanes: list[Lane] = []
         self.per_dst: dict[int, int] = {}
+
+
+def with_first(levels: Sequence[Level], first: Qos) -> list[Level]:
+    """In service order, but those of class `first` before all others."""
+    return sorted(levels, key=lambda level: (level.key[0] != first, level.key))

@@ -1,9 +1,10 @@
-"""Rates and recent ages, sampled so that the path of a message pays nothing for them."""
+"""Rates, sampled so that the path of a message pays nothing for them."""
 
 from collections import deque
 from collections.abc import Hashable, Mapping
 
-AGE_SAMPLES = 256
+from sdrlinkd.link.inbox import Inbox
+from sdrlinkd.link.sender import Sender
 
 
 class RateMeter:
@@ -45,25 +46,12 @@ class RateMeter:
         return 0.0
 
 
-class RecentAges:
-    """The last ages of one topic, in seconds."""
-
-    __slots__ = ("_ages",)
-
-    def __init__(self) -> None:
-        self._ages: deque[float] = deque(maxlen=AGE_SAMPLES)
-
-    def add(self, age_s: float) -> None:
-        """Note the age of one message."""
-        self._ages.append(age_s)
-
-    def last_ms(self) -> float | None:
-        """Age of the newest message."""
-        return self._ages[-1] * 1e3 if self._ages else None
-
-    def quantile_ms(self, q: float) -> float | None:
-        """The `q` quantile (nearest rank) of the recent ages."""
-        if not self._ages:
-            return None
-        ordered = sorted(self._ages)
-        return ordered[min(len(ordered) - 1, int(q * len(ordered)))] * 1e3
+def rate_counters(sender: Sender, inbox: Inbox, n_topics: int) -> dict[Hashable, int]:
+    """The counters of which the snapshot shows rates."""
+    tx: dict[Hashable, int] = {
+        ("tx", topic_id): sender.tally(topic_id).accepted for topic_id in range(n_topics)
+    }
+    rx: dict[Hashable, int] = {
+        ("rx", *key): tally.delivered for key, tally in inbox.tallies.items()
+    }
+    return {**tx, **rx}

@@ -6,13 +6,12 @@ freezes at a message's first fragment. Greedy: further entries of the same topic
 Lower classes fill what is left over.
 """
 
-from collections.abc import Sequence
 from random import Random
 
 from sdrlinkd.link.draft import BuiltPdu, Draft
 from sdrlinkd.link.entry_ids import REST_FACTOR, TopicEntryIds
 from sdrlinkd.link.heads import Heads
-from sdrlinkd.link.message import Lane, Level, Outgoing
+from sdrlinkd.link.message import Lane, Level, Outgoing, with_first
 from sdrlinkd.link.outbox import Outbox
 from sdrlinkd.link.params import LinkParams
 from sdrlinkd.link.parity import parity_records
@@ -69,6 +68,8 @@ class Packetizer:
         self.heads = Heads(outbox, self.entry_ids, reassembly_timeout_s)
         self._sole = Sole(outbox, self.heads, params, src, has_control)
         self.spare = SpareRecords()
+        self.asking: list[Outgoing] = []
+        """Messages just stamped whose producers want to know what becomes of them."""
         self._may_wait = params.flush_s > 0
 
     def flush(self) -> None:
@@ -89,7 +90,7 @@ class Packetizer:
         may_be_own = src is None or src == self._src
         draft = Draft(self._pdu_size)
         looked_at = 0
-        order = levels if first is None else _with_first(levels, first)
+        order = levels if first is None else with_first(levels, first)
         for level in tuple(order):
             if draft.is_empty and (whole := self._sole.next_whole(level, start)):
                 return self._sole.relayed(whole, start) if src in (None, whole.src) else None
@@ -200,7 +201,7 @@ class Packetizer:
         length = min(k, size - at)
         is_last = at + length >= size
         needs_stamp = is_last and not head.stamped
-        if needs_stamp and length > draft.room_beside_stamp:
+        if needs_stamp and length + bool(head.receipt) > draft.room_beside_stamp:
             # The age goes ahead in a PDU of its own only where even an empty one is too small.
             return draft.is_empty and self._send_stamp_ahead(lane, head, k, draft, start)
         if length > draft.room or not self._begin(lane, head, k, start):
@@ -279,7 +280,11 @@ class Packetizer:
 
     def _stamp(self, draft: Draft, message: Outgoing, start: float) -> None:
         age_us = min(max(round((start - message.arrived_at) * 1e6), 0), MAX_AGE_US)
-        message.stamped = draft.add_record(build_stamp(message.topic_id, message.entry_id, age_us))
+        asks = bool(message.receipt)
+        stamp = build_stamp(message.topic_id, message.entry_id, age_us, asks)
+        message.stamped = draft.add_record(stamp)
+        if asks and message.stamped:
+            self.asking.append(message)
 
     def _must_wait(self, now: float) -> bool:
         """Whether what is pending should wait for more (paper section 4.3, Flush Timeout)."""
@@ -288,8 +293,3 @@ class Packetizer:
         if now >= self._outbox.oldest_arrival() + self._params.flush_s:
             return False
         return self._outbox.pending_bytes(self.k_single) < self.k_single
-
-
-def _with_first(levels: Sequence[Level], first: Qos) -> list[Level]:
-    """In service order, but those of class `first` before all others."""
-    return sorted(levels, key=lambda level: (level.key[0] != first, level.key))

@@ -44,3 +44,5 @@ class LinkParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     """Hops a PDU may travel; more than 1 asks relays to forward it."""
     beacon_s: Annotated[float, Meta(ge=0)] = 1.0
     """Period of beacons (presence, registry digest); 0: none."""
+    receipt_s: Annotated[float, Meta(gt=0, le=60)] = 3.0
+    """So long is waited for the RECEIPT of a message whose producer wants to know of it."""

@@ -1,6 +1,6 @@
 """How a topic's messages are treated, on their way out and where they arrive."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
@@ -25,6 +25,10 @@ class TopicPolicy(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Messages that may wait, latest wins; 0: as many as the queue holds."""
     lifespan_s: Positive = INFINITE
     """Seconds after which a message is worthless: neither sent nor handed over any more."""
+    deadman_s: Annotated[float, Meta(ge=0, le=60)] = 0.0
+    """Where it arrives: without a message handed over for so long, `stop` is, once; 0: never."""
+    stop: dict[str, Any] = {}
+    """Fields of that message; those that are not named are zero, so that {} is a zero Twist."""
     durability: Literal["volatile", "transient_local"] = "volatile"
     """transient_local: robots that come late get the last message."""
     dst: Annotated[int, Meta(ge=0, le=255)] | None = None

@@ -33,6 +33,10 @@ class Overrides(NamedTuple):
     priority: int | None = None
     dst: int | None = None
     lifespan_s: float | None = None
+    age_s: float = 0.0
+    """So old it is when it is submitted."""
+    receipt: str = ""
+    """The producer's name for it, who wants to know what becomes of it; empty: nobody does."""
 
 
 AS_CONFIGURED = Overrides()

@@ -3,6 +3,7 @@
 from collections import Counter
 
 from sdrlinkd.link.link import Link
+from sdrlinkd.link.time_report import clock_report, latency_report, waits_ms
 from sdrlinkd.reports import (
     LinkReport,
     NeighborReport,
@@ -26,6 +27,8 @@ def link_report(
         pdu_size=link.params.pdu_size,
         access=link.access.state,
         airtime_s=link.departures.airtime_s,
+        control_airtime_s=link.departures.control_airtime_s,
+        control_period_s=link.tellings.period_s,
         airtime_by_class_s={
             qos.label: round(used_s, 6) for qos, used_s in link.departures.shares.used_s.items()
         },
@@ -107,6 +110,7 @@ def _topics(link: Link, now: float, names_in: dict[int, str]) -> list[TopicRepor
                 reoffered=tally.reoffered,
                 queued=link.sender.outbox.queued_of_topic(topic.id),
                 dropped=dict(tally.dropped),
+                **waits_ms(link, topic.id),
             )
         )
     return reports
@@ -118,7 +122,7 @@ def _received(
     reports = []
     for (src, topic_id), tally in sorted(link.inbox.tallies.items()):
         topic = link.registry.by_id(topic_id)
-        ages = link.ages.get((src, topic_id))
+        ages = link.outcomes.latencies.get((src, topic_id))
         ended = tally.delivered + sum(tally.dropped.values())
         reports.append(
             ReceivedTopicReport(
@@ -134,6 +138,8 @@ def _received(
                 age_ms_last=ages.last_ms() if ages else None,
                 age_ms_p50=ages.quantile_ms(0.5) if ages else None,
                 age_ms_p99=ages.quantile_ms(0.99) if ages else None,
+                latency=latency_report(link, src, topic_id) if ages else None,
+                stops=link.outcomes.deadman.stops.get((src, topic_id), 0),
             )
         )
     return reports
@@ -160,6 +166,7 @@ def _neighbors(link: Link, now: float) -> list[NeighborReport]:
                 reboots=neighbor.reboots,
                 snr_db=neighbor.mean_snr_db,
                 registry=registry,
+                clock=clock_report(link, src, now),
                 snr_there_db=told[0] if told else None,
                 per_there=told[1] if told else None,
                 mcs=link.rate.chosen(src),

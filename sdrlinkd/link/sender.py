@@ -56,6 +56,9 @@ class Sender:
         self.pdus_composed = 0
         self.pdus_sent = 0
         self.pdus_failed = 0
+        self._has_control = registry.has_control
+        self.dropped_asking: list[tuple[Outgoing, str]] = []
+        """Messages whose producers want to know that."""
         self.bursts_sent = 0
         self.bursts_failed = 0
 
@@ -98,7 +101,8 @@ class Sender:
         return self._put(message, DEFAULT_POLICY)
 
     def _enqueue(self, topic_id: int, payload: bytes, at: float, wishes: Overrides) -> str | None:
-        qos, priority, dst, lifespan_s = wishes
+        qos, priority, dst, lifespan_s, age_s, receipt = wishes
+        at -= age_s
         topic = self._topics[topic_id]
         frame = topic.deflated.shrink(payload) if topic.deflated else None
         if frame is not None:
@@ -114,9 +118,10 @@ class Sender:
             topic.dst if dst is None else dst,
             at,
             at + (topic.policy.lifespan_s if lifespan_s is None else lifespan_s),
-            topic.stamp,
+            topic.stamp or (bool(receipt) and self._has_control),
             topic.tally,
         )
+        message.receipt = receipt
         message.is_compressed = frame is not None
         return self._put(message, topic.policy)
 
@@ -270,3 +275,5 @@ class Sender:
         message.fate = Fate.DROPPED
         self.outbox.in_flight.discard(message)
         message.tally.drop(reason)
+        if message.receipt:
+            self.dropped_asking.append((message, reason))

@@ -1,28 +1,72 @@
 """Control records that ride in spare room."""
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
-from sdrlinkd.wire import PduBuilder, Record, build_records
+from sdrlinkd.wire import PduBuilder, Receipt, Record, RecordType, build_records
+
+INFINITE = float("inf")
+LASTING = frozenset({RecordType.CLOCK, RecordType.RECEIPT})
+"""A beacon does not speak of the same."""
+
+
+class _Waiting(NamedTuple):
+    built: bytes
+    due_at: float
 
 
 class SpareRecords:
-    """What waits for a PDU with room; true while something does."""
+    """What waits for a PDU with room; each record knows from when on it deserves one of its own."""
 
     def __init__(self) -> None:
-        self._waiting: list[bytes] = []
+        self._waiting: dict[tuple[int, ...], _Waiting] = {}
 
     def __bool__(self) -> bool:
         return bool(self._waiting)
 
+    @property
+    def due_at(self) -> float:
+        """When the first of them deserves a PDU of its own."""
+        return min((each.due_at for each in self._waiting.values()), default=INFINITE)
+
+    def is_due(self, now: float) -> bool:
+        """Whether one does."""
+        return bool(self._waiting) and self.due_at <= now
+
+    def holds(self, kind: RecordType) -> bool:
+        """Whether a record of that type waits."""
+        return any(key[0] == kind for key in self._waiting)
+
+    def count(self, kind: RecordType) -> int:
+        """How many records of that type wait."""
+        return sum(key[0] == kind for key in self._waiting)
+
     def offer(self, records: Iterable[Record]) -> None:
-        """To send in the PDUs to come, in place of what was offered before."""
-        self._waiting = [build_records([record]) for record in records]
+        """A beacon: due at once, in place of the one before."""
+        kept = {key: each for key, each in self._waiting.items() if key[0] in LASTING}
+        built = (build_records([record]) for record in records)
+        # Two octets behind the header tell one from another of its type.
+        self._waiting = {(*each[:1], *each[2:4]): _Waiting(each, -INFINITE) for each in built}
+        self._waiting |= kept
+
+    def put(self, record: Record, due_at: float) -> None:
+        """One more, in place of what speaks of the same."""
+        built = build_records([record])
+        key: tuple[int, ...] = (built[0],)
+        if isinstance(record, Receipt):
+            key = (built[0], record.node, record.topic_id, record.entry_id)
+        known = self._waiting.get(key)
+        self._waiting[key] = _Waiting(built, due_at if known is None else known.due_at)
 
     def renew(self, record: Record) -> None:
         """Where a record of its type still waits, this one goes in its place."""
         built = build_records([record])
-        self._waiting = [built if each[0] == built[0] else each for each in self._waiting]
+        for key, (_, due_at) in self._waiting.items():
+            if key[0] == built[0]:
+                self._waiting[key] = _Waiting(built, due_at)
 
     def ride(self, pdu: PduBuilder) -> None:
         """As many as `pdu` has room for."""
-        self._waiting = [record for record in self._waiting if not pdu.add_record(record)]
+        rides = [key for key, each in self._waiting.items() if pdu.add_record(each.built)]
+        for key in rides:
+            del self._waiting[key]

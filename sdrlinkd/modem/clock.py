@@ -4,21 +4,26 @@
 class StreamClock:
     """Seconds since index 0; 0 until the first block. `host_s` is the monotonic clock at each call.
 
-    In a paced stream, time goes on between blocks with the monotonic clock; so it does when blocks
-    stop coming, until they return. In lock-step it stands still between blocks. It never goes back.
+    In a paced stream, time goes on between blocks with the monotonic clock, by the block that came
+    with the least delay lately; so it does when blocks stop coming, until they return. In lock-step
+    it stands still between blocks. It never goes back.
     """
 
     QUIET_S = 0.1
     """An unpaced stream without a block for so long has stopped."""
     GONE_S = 0.25
     """A paced one."""
+    LATELY_S = 0.25
+    """Twice this; crystals drift apart by some µs in it."""
 
     def __init__(self, rate_hz: float, paced: bool, lockstep: bool = False) -> None:
         self._rate_hz = rate_hz
         self._paced = paced
         self._lockstep = lockstep
         self._latest = 0.0
-        self._seen: tuple[int, float] | None = None
+        self._seen: tuple[int, float, float] | None = None
+        self._before = self._least = float("inf")
+        self._until = float("-inf")
 
     @property
     def end(self) -> int:
@@ -26,20 +31,29 @@ class StreamClock:
         return 0 if self._seen is None else self._seen[0]
 
     def observe(self, end: int, host_s: float) -> None:
-        """Samples up to before `end` were there at `host_s`; told from any thread."""
-        self._seen = end, host_s
+        """Samples up to before `end` were there at `host_s`; told by one thread after another."""
+        late_s = host_s - end / self._rate_hz
+        if host_s >= self._until:
+            self._before, self._least = self._least, late_s
+            if host_s >= self._until + self.LATELY_S:
+                self._before = late_s
+            self._until = host_s + self.LATELY_S
+        else:
+            self._least = min(self._least, late_s)
+        self._seen = end, host_s, min(self._before, self._least)
 
     def now(self, host_s: float) -> float:
         """Seconds on the stream."""
         if self._seen is None:
             return 0.0
-        end, seen_s = self._seen
-        since_s = host_s - seen_s
+        end, seen_s, least_s = self._seen
         if self._lockstep:
-            since_s = 0.0
-        elif not self._paced:
-            since_s -= self.QUIET_S
-        self._latest = max(self._latest, end / self._rate_hz + max(0.0, since_s))
+            now = end / self._rate_hz
+        elif self._paced:
+            now = max(end / self._rate_hz, host_s - least_s)
+        else:
+            now = end / self._rate_hz + max(0.0, host_s - seen_s - self.QUIET_S)
+        self._latest = max(self._latest, now)
         return self._latest
 
     def index(self, host_s: float) -> int:

@@ -213,7 +213,7 @@ class ModemLink:
     def _tell(self, events: Sequence[phy.Event]) -> None:
         rate = self._params.rate_hz
         heard = [
-            Heard(event.data, event.burst.start / rate, event.burst.snr_db)
+            Heard(event.data, event.burst.start / rate, event.burst.snr_db, event.at / rate)
             for event in events
             if isinstance(event, phy.PduHeard)
         ]
@@ -286,5 +286,7 @@ class ModemLink:
         if self._listener is not None:
             if report.problem:
                 self._problem = report.problem
+            if report.start is not None:
+                burst = burst._replace(start=report.start / self._params.rate_hz)
             self._listener.settled(burst, report.outcome, report.end / self._params.rate_hz)
         self._moved.set()

@@ -8,6 +8,8 @@ from sdrlinkd.modem.airtimes import Airtimes
 
 HANDOVER_S = 5e-4
 """A burst composed for a free air begins so much later: time to modulate it."""
+STAMP_SAMPLES = 1.0
+"""How far a preamble may be from where it is found."""
 REACTION_S = 0.002
 """From the last sample of a block to a decision, beyond the block itself."""
 
@@ -23,6 +25,7 @@ def carrier_traits(
         senses=can.receives,
         turnaround_s=can.turnaround_s,
         index_error_s=can.index_error_s,
+        stamp_s=STAMP_SAMPLES / params.rate_hz + can.index_error_s,
         lead_s=can.lead_s + can.turnaround_s + (HANDOVER_S if can.paced else 0.0),
         react_s=can.block_s + (REACTION_S if can.paced else 0.0),
         detect_s=2 * phy.SENSE_WINDOW / params.rate_hz,

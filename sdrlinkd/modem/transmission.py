@@ -33,6 +33,8 @@ class BurstReport(NamedTuple):
     outcome: Outcome
     end: int
     problem: str = ""
+    start: int | None = None
+    """Where it began, if it left."""
 
 
 class Transmission:
@@ -127,7 +129,9 @@ class Transmission:
         else:
             self.counters["bursts_slipped"] += report.start > start
             self._late_by_radio += report.outcome is TxOutcome.LATE
-            told = BurstReport(OUTCOMES[report.outcome], report.end)
+            outcome = OUTCOMES[report.outcome]
+            left_at = report.start if outcome is Outcome.SENT else None
+            told = BurstReport(outcome, report.end, start=left_at)
         self._end(burst, told)
 
     def _end(self, burst: Burst, told: BurstReport) -> None:

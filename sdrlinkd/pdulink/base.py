@@ -8,11 +8,15 @@ from sdrlinkd.reports import CarrierReport
 
 
 class Heard(NamedTuple):
-    """A PDU from the air: its bytes, when its burst's preamble arrived, and how good it was."""
+    """A PDU from the air: its bytes, when its burst's preamble arrived, and how good it was.
+
+    `ended_at`: when its last sample did; None: that takes no time.
+    """
 
     data: bytes
     at: float
     snr_db: float | None = None
+    ended_at: float | None = None
 
 
 class PduListener(Protocol):

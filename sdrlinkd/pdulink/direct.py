@@ -132,10 +132,10 @@ class DirectLink:
         for data in burst.pdus:
             for delay_s, arrived in self._impairment.arrivals(data):
                 if delay_s:
-                    heard = [Heard(arrived, start + delay_s)]
+                    heard = [Heard(arrived, start + delay_s, None, self.now() + delay_s)]
                     self._later(delay_s, partial(self._deliver, heard))
                 else:
-                    now.append(Heard(arrived, start))
+                    now.append(Heard(arrived, start, None, self.now()))
         if now:
             self._deliver(now)
 

@@ -69,8 +69,8 @@ class Frame(NamedTuple):
 
 
 class Receipt(NamedTuple):
-    """What became of a message of `node` here (255: of whoever this PDU is for), and its age then
-    in 0.1 ms (65535: not known, or older).
+    """What became of a message of `node` here (255: of whoever this PDU is for), its age then
+    (65535: not known, or older), and what has passed since; both in 0.1 ms.
     """
 
     topic_id: int
@@ -78,6 +78,7 @@ class Receipt(NamedTuple):
     status: int
     node: int = BROADCAST
     age_100us: int = NO_AGE
+    since_100us: int = 0
 
 
 class Waits(NamedTuple):
@@ -128,7 +129,7 @@ _FORMATS = {
 }
 # Fields behind those that a record always has.
 _ASKS = b"\x01"
-_WHOSE = struct.Struct(">BH")
+_WHOSE = struct.Struct(">BHH")
 # What the parser needs of a type, by its number: the fields' class and format.
 _KNOWN = {int(number): (kind, _FORMATS[number]) for kind, number in _TYPES.items()}
 
@@ -219,7 +220,7 @@ def _fixed(record: FixedRecord, number: RecordType) -> bytes:
     if isinstance(record, Stamp):
         return fields.pack(*record[:3]) + _ASKS * record.asks
     if isinstance(record, Receipt):
-        is_whole = record[3:] != (BROADCAST, NO_AGE)
+        is_whole = record[3:] != (BROADCAST, NO_AGE, 0)
         return fields.pack(*record[:3]) + (_WHOSE.pack(*record[3:]) if is_whole else b"")
     return fields.pack(*record)
 
@@ -229,6 +230,5 @@ def _with_more(record: FixedRecord, more: bytes) -> FixedRecord:
     if isinstance(record, Stamp):
         return record._replace(asks=bool(more[0] & _ASKS[0]))
     if isinstance(record, Receipt) and len(more) >= _WHOSE.size:
-        node, age_100us = _WHOSE.unpack_from(more)
-        return record._replace(node=node, age_100us=age_100us)
+        return Receipt(*record[:3], *_WHOSE.unpack_from(more))
     return record

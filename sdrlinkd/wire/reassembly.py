@@ -29,6 +29,7 @@ class Lost(NamedTuple):
 
     src: int
     topic_id: int
+    entry_id: int
     reason: str
 
 
@@ -189,7 +190,7 @@ class Reassembly:
 
     def _give_up(self, src: int, source: _Source, key: tuple[int, int], reason: str) -> None:
         self._remove(source, key)
-        self.lost.append(Lost(src, key[0], reason))
+        self.lost.append(Lost(src, *key, reason))
 
     def _remove(self, source: _Source, key: tuple[int, int]) -> None:
         partial = source.partials.pop(key)

@@ -4,6 +4,7 @@ import pytest
 
 from sdrlinkd.link import Allowance
 from sdrlinkd.link.ages import MAX_WAITING, Ages
+from sdrlinkd.wire import Stamp
 from tests.link.world import make_link, send_all
 
 
@@ -42,16 +43,16 @@ def test_no_stamp_no_age():
 
 def test_a_stale_stamp_is_forgotten():
     ages = Ages(timeout_s=1.0)
-    ages.stamp(1, 2, 3, age_us=500, at=10.0)
+    ages.stamp(1, Stamp(2, 3, 500), 10.0)
     ages.expire(10.9)
-    assert ages.origin(1, 2, 3) == pytest.approx(9.9995)
-    ages.stamp(1, 2, 3, age_us=500, at=10.0)
+    assert ages.take(1, 2, 3).at == pytest.approx(9.9995)
+    ages.stamp(1, Stamp(2, 3, 500), 10.0)
     ages.expire(11.0)
-    assert ages.origin(1, 2, 3) is None
+    assert ages.take(1, 2, 3).at is None
 
 
 def test_stamps_that_wait_are_bounded():
     ages = Ages(timeout_s=1.0)
     for i in range(3 * MAX_WAITING):
-        ages.stamp(i % 256, i % 16, i // 4096, 0, 0.0)
+        ages.stamp(i % 256, Stamp(i % 16, i // 4096, 0), 0.0)
     assert len(ages._origins) <= MAX_WAITING

@@ -56,7 +56,7 @@ records = st.one_of(
     st.builds(Beacon, st.integers(0, 0xFFFF), st.integers(0, 0xFFFF)),
     st.builds(LinkReport, octet, st.integers(-128, 127), octet, octet),
     st.tuples(octet, octet, octet).map(lambda fields: Receipt(*fields)),
-    st.builds(Receipt, octet, octet, octet, octet, u16),
+    st.builds(Receipt, octet, octet, octet, octet, u16, u16),
     st.builds(Frame, octet, octet, st.integers(0, 0xFFFF), st.integers(0, MAX_AGE_US)),
     st.builds(
         Parity,
@@ -118,8 +118,9 @@ def test_octets_behind_the_fields_of_stamp_receipt_and_clock():
 
     assert parsed(1, stamp + b"\x01") == [Stamp(1, 2, 3, asks=True)]
     assert parsed(1, stamp + b"\xfe\x07\x07") == [Stamp(1, 2, 3)]
-    assert parsed(5, receipt + b"\x04\x05") == [Receipt(1, 2, 3)]
-    assert parsed(5, receipt + b"\x04\x05\x06\x07") == [Receipt(1, 2, 3, 4, 0x0506)]
+    assert parsed(5, receipt + b"\x04\x05\x06\x07") == [Receipt(1, 2, 3)]
+    whole = receipt + b"\x04\x05\x06\x07\x08"
+    assert parsed(5, whole + b"\x09") == [Receipt(1, 2, 3, 4, 0x0506, 0x0708)]
     assert parsed(8, clock + bytes(6)) == [Clock(1, 2, 3, 4)]
     told = b"\x07\x00\x08\xff\xff\xff\xfe"
     assert parsed(8, clock + told + bytes(6)) == [Clock(1, 2, 3, 4, arrivals=(Arrival(7, 8, -20),))]
@@ -210,6 +211,7 @@ def test_any_bytes_are_records_or_refused():
         Receipt(0, 0, 256),
         Receipt(0, 0, 0, 256, 0),
         Receipt(0, 0, 0, 0, NO_AGE + 1),
+        Receipt(0, 0, 0, 0, 0, 65536),
         Waits(0, 0, 0, 256),
         Clock(65536, 0, 0, 0),
         Clock(0, 65536, 0, 0),

@@ -10,13 +10,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sdrlinkd.wire import Entry, Lost, Reassembly, ReassemblyLimits
+from sdrlinkd.wire import Entry, Reassembly, ReassemblyLimits
 
 SEED = 53
 SUPERSEDED = "rx_partial_superseded"
 TIMEOUT = "rx_partial_timeout"
 EVICTED = "rx_partial_evicted"
 MEMORY = "rx_partial_memory"
+
+
+def lost_of(reassembly):
+    """What was given up: (source, topic id, reason)."""
+    return [(each.src, each.topic_id, each.reason) for each in reassembly.take_lost()]
 
 
 octet = st.integers(0, 255)
@@ -76,7 +81,7 @@ def test_any_order_with_copies_yields_exactly_the_messages(case):
             assert key not in got
             got[key] = whole
     assert got == {key: b"".join(parts) for key, parts in messages.items()}
-    assert reassembly.take_lost() == []
+    assert lost_of(reassembly) == []
     assert reassembly.held == reassembly.held_bytes == 0
     assert reassembly.started == len(messages)
     copies = len(events) - sum(len(parts) for parts in messages.values())
@@ -98,7 +103,7 @@ class Model:
             same = parts.get(entry.index, entry.payload) == entry.payload
             if total != entry.total or not same:
                 del self.held[key]
-                self.lost.append(Lost(src, entry.topic_id, SUPERSEDED))
+                self.lost.append((src, entry.topic_id, SUPERSEDED))
             elif entry.index in parts:
                 return None
         _, parts, _ = self.held.setdefault(key, (entry.total, {}, now))
@@ -113,7 +118,7 @@ class Model:
         for key, (_, _, at) in list(self.held.items()):
             if now - at >= self.timeout:
                 del self.held[key]
-                self.lost.append(Lost(key[0], key[1], TIMEOUT))
+                self.lost.append((key[0], key[1], TIMEOUT))
 
 
 @st.composite
@@ -143,7 +148,7 @@ def test_agrees_with_the_plainest_form(steps):
         whole = reassembly.add(src, entry, now)
         assert whole == model.add(src, entry, now)
         delivered += whole is not None
-        given_up = reassembly.take_lost()
+        given_up = lost_of(reassembly)
         assert sorted(given_up) == sorted(model.lost)
         model.lost.clear()
         lost += len(given_up)
@@ -164,7 +169,7 @@ def test_sources_and_topics_do_not_mix():
     for src, topic_id, entry_id in keys:
         last = Entry(topic_id, entry_id, 1, 2, b"!")
         assert reassembly.add(src, last, 0.0) == bytes([src, topic_id, entry_id]) + b"!"
-    assert reassembly.take_lost() == []
+    assert lost_of(reassembly) == []
 
 
 @pytest.mark.parametrize("total", [2, 255])
@@ -191,11 +196,11 @@ def test_timeout():
     assert reassembly.next_expiry() == 11.0
     reassembly.add(1, second, 10.5)
     reassembly.expire(11.25)
-    assert reassembly.take_lost() == []
+    assert lost_of(reassembly) == []
     assert reassembly.next_expiry() == 11.5
     reassembly.expire(11.5)
-    assert reassembly.take_lost() == [Lost(1, 4, TIMEOUT)]
-    assert reassembly.take_lost() == []
+    assert lost_of(reassembly) == [(1, 4, TIMEOUT)]
+    assert lost_of(reassembly) == []
     assert reassembly.held == reassembly.held_bytes == 0
     assert reassembly.next_expiry() == math.inf
 
@@ -207,7 +212,7 @@ def test_a_copy_does_not_put_off_the_timeout():
     reassembly.add(1, first, 10.75)
     assert reassembly.duplicate_fragments == 1
     reassembly.expire(11.0)
-    assert reassembly.take_lost() == [Lost(1, 4, TIMEOUT)]
+    assert lost_of(reassembly) == [(1, 4, TIMEOUT)]
 
 
 def test_timeouts_of_many_sources():
@@ -217,9 +222,9 @@ def test_timeouts_of_many_sources():
     for src in range(8):
         assert reassembly.next_expiry() == src + 2.0
         reassembly.expire(src + 1.75)
-        assert reassembly.take_lost() == []
+        assert lost_of(reassembly) == []
         reassembly.expire(src + 2.0)
-        assert reassembly.take_lost() == [Lost(src, src, TIMEOUT)]
+        assert lost_of(reassembly) == [(src, src, TIMEOUT)]
 
 
 @pytest.mark.parametrize(
@@ -237,7 +242,7 @@ def test_another_message_under_the_same_id(newer):
     reassembly = make()
     reassembly.add(1, Entry(3, 7, 0, 3, b"a"), 0.0)
     assert reassembly.add(1, newer, 0.5) is None
-    assert reassembly.take_lost() == [Lost(1, 3, SUPERSEDED)]
+    assert lost_of(reassembly) == [(1, 3, SUPERSEDED)]
     assert (reassembly.started, reassembly.held) == (2, 1)
     parts = [b"x"] * newer.total
     parts[newer.index] = newer.payload
@@ -254,7 +259,7 @@ def test_a_whole_message_under_the_same_id():
     reassembly = make()
     reassembly.add(1, Entry(3, 7, 0, 3, b"a"), 0.0)
     assert reassembly.add(1, Entry(3, 7, 0, 1, b"new"), 0.5) == b"new"
-    assert reassembly.take_lost() == [Lost(1, 3, SUPERSEDED)]
+    assert lost_of(reassembly) == [(1, 3, SUPERSEDED)]
     assert (reassembly.started, reassembly.held, reassembly.held_bytes) == (2, 0, 0)
 
 
@@ -271,9 +276,9 @@ def test_the_message_silent_for_longest_is_evicted():
     for topic_id in (1, 2, 3):
         reassembly.add(5, Entry(topic_id, 0, 0, 9, bytes(100)), topic_id / 10)
     reassembly.add(5, Entry(1, 0, 1, 9, bytes(100)), 0.4)
-    assert reassembly.take_lost() == []
+    assert lost_of(reassembly) == []
     reassembly.add(5, Entry(4, 0, 0, 9, bytes(100)), 0.5)
-    assert reassembly.take_lost() == [Lost(5, 2, EVICTED)]
+    assert lost_of(reassembly) == [(5, 2, EVICTED)]
     assert reassembly.held == 3
 
 
@@ -282,7 +287,7 @@ def test_one_source_does_not_evict_another():
     reassembly.add(1, Entry(0, 0, 0, 2, b"quiet"), 0.0)
     for entry_id in range(100):
         reassembly.add(2, Entry(0, entry_id, 0, 2, bytes(100)), 0.5)
-    assert set(reassembly.take_lost()) == {Lost(2, 0, EVICTED)}
+    assert set(lost_of(reassembly)) == {(2, 0, EVICTED)}
     assert reassembly.add(1, Entry(0, 0, 1, 2, b"!"), 0.75) == b"quiet!"
 
 
@@ -292,15 +297,15 @@ def test_the_source_that_holds_most_pays_for_all():
         reassembly.add(1, Entry(entry_id, entry_id, 0, 2, bytes(100)), 0.0)
     for src in range(2, 6):
         reassembly.add(src, Entry(9, 0, 0, 2, bytes(100)), 0.25)
-    assert reassembly.take_lost() == []
+    assert lost_of(reassembly) == []
     reassembly.add(6, Entry(9, 0, 0, 2, bytes(100)), 0.5)
-    assert reassembly.take_lost() == [Lost(1, 0, MEMORY)]
+    assert lost_of(reassembly) == [(1, 0, MEMORY)]
 
 
 def test_a_message_too_large_for_the_bound_is_lost_by_name():
     reassembly = make(source_bytes=cost_of(10) - 1)
     assert reassembly.add(1, Entry(2, 0, 0, 2, bytes(10)), 0.0) is None
-    assert reassembly.take_lost() == [Lost(1, 2, EVICTED)]
+    assert lost_of(reassembly) == [(1, 2, EVICTED)]
     assert reassembly.held == reassembly.held_bytes == 0
 
 
@@ -325,13 +330,13 @@ def test_the_ledger_adds_up_at_every_step(sources):
             bytes([rng.randrange(2)]) * rng.choice((0, 1, 40, 2000)),
         )  # fmt: skip
         delivered += reassembly.add(rng.randrange(sources), entry, now) is not None
-        lost.update(reason for _, _, reason in reassembly.take_lost())
+        lost.update(reason for _, _, reason in lost_of(reassembly))
         where = f"seed {SEED} sources {sources} step {step}"
         assert reassembly.started == delivered + reassembly.held + lost.total(), where
         assert 0 <= reassembly.held_bytes <= most, where
         assert (reassembly.held == 0) == (reassembly.held_bytes == 0), where
     reassembly.expire(now + 0.5)
-    lost.update(reason for _, _, reason in reassembly.take_lost())
+    lost.update(reason for _, _, reason in lost_of(reassembly))
     assert reassembly.held == reassembly.held_bytes == 0
     assert reassembly.started == delivered + lost.total()
     assert delivered > 1000
@@ -349,8 +354,8 @@ def test_flood_of_partial_messages_stays_bounded():
         reassembly.add(src, Entry(topic_id, entry_id, 0, 255, bytes(200)), number * 1e-6)
         highest = max(highest, reassembly.held_bytes)
         if number % 1000 == 0:
-            lost.update(reassembly.take_lost())
-    lost.update(reassembly.take_lost())
+            lost.update(lost_of(reassembly))
+    lost.update(lost_of(reassembly))
     assert limits.total_bytes * 0.99 < highest <= limits.total_bytes
     assert {reason for _, _, reason in lost} == {MEMORY}
     assert reassembly.started == 100_000 == reassembly.held + lost.total()
@@ -383,7 +388,7 @@ def test_no_fragment_joins_a_message_past_its_timeout():
     reassembly = Reassembly(ReassemblyLimits(timeout_s=1.0))
     reassembly.add(1, Entry(1, 1, 0, 2, b"old"), 0.0)
     assert reassembly.add(1, Entry(1, 1, 1, 2, b"new"), 5.0) is None
-    assert reassembly.take_lost() == [Lost(1, 1, "rx_partial_timeout")]
+    assert lost_of(reassembly) == [(1, 1, "rx_partial_timeout")]
 
 
 def test_expires_at_the_moment_it_named():

@@ -314,11 +314,11 @@ ASKING_STAMP = RecordsVector(
     bytes([1, 7, 3, 0x10, 0x00, 0x00, 0x00, 0x05, 1]),
     (("STAMP", (3, 0x10, 5, True)),),
 )
-# To robot 4, after 12.3 ms.
+# To robot 4, at an age of 12.3 ms, 25.7 ms ago.
 FULL_RECEIPT = RecordsVector(
     "full_receipt",
-    bytes([5, 6, 3, 0x99, 1, 4, 0, 123]),
-    (("RECEIPT", (3, 0x99, 1, 4, 123)),),
+    bytes([5, 8, 3, 0x99, 1, 4, 0, 123, 1, 1]),
+    (("RECEIPT", (3, 0x99, 1, 4, 123, 257)),),
 )
 # Boot id 0xBEEF, number 0x0102; 0x0101 left at 2**32 + 1 ns; wall 2**40 ns, ± 300 µs = 0x012C.
 # Robot 9's CLOCK 0x0102 came 1 µs before that: -100 * 10 ns = 0xFFFFFF9C.

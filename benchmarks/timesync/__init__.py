@@ -1,0 +1,1 @@
+"""Clock filters on the same streams of stamps."""

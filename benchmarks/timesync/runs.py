@@ -1,0 +1,64 @@
+"""A filter over a stream: its error all along."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.timesync.filters import Filter, Ours
+from benchmarks.timesync.streams import Stream
+
+NEAR_S = 1e-3
+RECOVERED_S = 2e-3
+SETTLING_S = 5.0
+
+
+class Course(NamedTuple):
+    """At the times `at`, each just before the next exchange; nan: no estimate, no bound."""
+
+    at: np.ndarray
+    error_s: np.ndarray
+    bound_s: np.ndarray
+
+    @property
+    def last_error_s(self) -> float:
+        """At the end; a filter without an estimate is taken to believe that clocks agree."""
+        return float(self.error_s[-1])
+
+    def settled_s(self, near_s: float = NEAR_S, since: float = 0.0) -> float:
+        """How long after `since` errors stay below `near_s`; inf: they do not."""
+        after = self.at >= since
+        wrong = np.flatnonzero(~(np.abs(self.error_s[after]) < near_s))
+        if not len(wrong):
+            return 0.0
+        if wrong[-1] + 1 == np.count_nonzero(after):
+            return float("inf")
+        return float(self.at[after][wrong[-1] + 1] - since)
+
+    def held(self, step_at: float = np.inf) -> tuple[int, int]:
+        """(errors within their bound, all that had one), but for 5 s after a step."""
+        counts = np.isfinite(self.bound_s)
+        counts &= (self.at < step_at) | (self.at > step_at + SETTLING_S)
+        good = np.abs(self.error_s[counts]) <= self.bound_s[counts]
+        return int(np.count_nonzero(good)), int(np.count_nonzero(counts))
+
+
+def follow(filter_: Filter, stream: Stream) -> Course:
+    """Everything that `filter_` said."""
+    n = len(stream.exchanges) - 1
+    error_s, bound_s = np.full(n, np.nan), np.full(n, np.nan)
+    for i, exchange in enumerate(stream.exchanges[:-1]):
+        filter_.take(exchange)
+        at = float(stream.at[i + 1])
+        offset_s = filter_.offset(at)
+        truth_s = float(stream.offset_s[i])
+        # Of the step that comes with the next exchange nobody can know yet.
+        error_s[i] = np.nan if offset_s is None else offset_s - truth_s - _drift(stream, i)
+        if isinstance(filter_, Ours):
+            bound_s[i] = filter_.bound(at)
+    return Course(stream.at[:-1], error_s, bound_s)
+
+
+def _drift(stream: Stream, i: int) -> float:
+    """What the clocks drift apart until the next exchange, steps left out."""
+    moved = float(stream.offset_s[i + 1] - stream.offset_s[i])
+    return moved if abs(moved) < RECOVERED_S else 0.0

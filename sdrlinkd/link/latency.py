@@ -1,0 +1,75 @@
+"""How late messages of one topic come, and why: ages, jitter, and the parts of the delay."""
+
+from collections import deque
+from statistics import fmean, pstdev
+from typing import NamedTuple
+
+from hdrh.histogram import HdrHistogram
+
+RECENT = 256
+LONGEST_US = 600_000_000
+DIGITS = 2
+PERCENTILES = (50.0, 90.0, 99.0, 99.9)
+
+
+class Parts(NamedTuple):
+    """Of a message's age, in s: it waited at its source (and at relays), its fragments came one
+    after another, the last one was on the air, and it was demodulated and handed over.
+    """
+
+    wait_s: float
+    reassembly_s: float
+    air_s: float
+    handover_s: float
+
+
+class Latency:
+    """The last ages in full, all of them in a histogram."""
+
+    __slots__ = ("_ages", "_came_at", "_histogram", "_intervals", "_parts")
+
+    def __init__(self) -> None:
+        self._ages: deque[float] = deque(maxlen=RECENT)
+        self._parts: deque[Parts] = deque(maxlen=RECENT)
+        self._intervals: deque[float] = deque(maxlen=RECENT)
+        self._came_at: float | None = None
+        self._histogram = HdrHistogram(1, LONGEST_US, DIGITS)
+
+    def add(self, parts: Parts, now: float) -> float:
+        """A message is handed over at `now`; its age in s."""
+        age_s = sum(parts)
+        self._ages.append(age_s)
+        self._parts.append(parts)
+        if self._came_at is not None:
+            self._intervals.append(now - self._came_at)
+        self._came_at = now
+        self._histogram.record_value(min(max(1, round(1e6 * age_s)), LONGEST_US))
+        return age_s
+
+    def last_ms(self) -> float | None:
+        """Age of the newest message."""
+        return self._ages[-1] * 1e3 if self._ages else None
+
+    def quantile_ms(self, q: float) -> float | None:
+        """The `q` quantile (nearest rank) of the recent ages."""
+        if not self._ages:
+            return None
+        ordered = sorted(self._ages)
+        return ordered[min(len(ordered) - 1, int(q * len(ordered)))] * 1e3
+
+    def parts(self) -> Parts:
+        """Recent means; 0 before the first message."""
+        if not self._parts:
+            return Parts(0.0, 0.0, 0.0, 0.0)
+        return Parts(*map(fmean, zip(*self._parts, strict=True)))
+
+    def period_ms(self) -> tuple[float, float] | None:
+        """Mean and standard deviation of the time between messages, the Pound paper's Jd."""
+        if not self._intervals:
+            return None
+        return 1e3 * fmean(self._intervals), 1e3 * pstdev(self._intervals)
+
+    def percentiles_ms(self) -> dict[str, float]:
+        """Of all ages since the start, within 1 %; `max`, too."""
+        told = {f"{p:g}": 1e-3 * self._histogram.get_value_at_percentile(p) for p in PERCENTILES}
+        return {**told, "max": 1e-3 * self._histogram.get_max_value()}

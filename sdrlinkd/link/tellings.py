@@ -1,0 +1,96 @@
+"""When CLOCK and RECEIPT records go: in spare room, or in PDUs that take a bounded share of air."""
+
+from collections.abc import Mapping
+
+from sdrlinkd.link.burst import Burst
+from sdrlinkd.link.neighbors import Neighbor
+from sdrlinkd.link.spare import INFINITE, SpareRecords
+from sdrlinkd.link.timesync import ClockParams, Clocks
+from sdrlinkd.wire import MAX_ARRIVALS, Receipt, RecordType
+
+PATIENCE_S = 0.05
+"""What a RECEIPT waits for spare room at least."""
+PRESENT_S = 10.0
+"""A robot not heard for so long takes no share of the air."""
+MOST_RECEIPTS = 256
+
+
+class Tellings:
+    """Records that are not a beacon's. `pdu_s`: airtime of a PDU with nothing else."""
+
+    def __init__(
+        self,
+        params: ClockParams,
+        clocks: Clocks,
+        spare: SpareRecords,
+        neighbors: Mapping[int, Neighbor],
+    ) -> None:
+        self._params = params
+        self._clocks = clocks
+        self._spare = spare
+        self._neighbors = neighbors
+        self.pdu_s = 0.0
+        self._told_alone_at = -INFINITE
+        self._overdue_at = INFINITE
+        self._waits = False
+        self._others = 0
+        self.period_s = params.period_s
+        """Between PDUs of our own with nothing else."""
+
+    @property
+    def next_alone_at(self) -> float:
+        """From when on a PDU with nothing else may go, if something waits by then."""
+        if not self._others:
+            return self._spare.due_at
+        clock_at = max(self._clocks.due_at, self._told_alone_at + self.period_s)
+        return min(clock_at, self._spare.due_at)
+
+    def look_round(self, now: float, own_id: int) -> None:
+        """Who else is there: nobody else wants to know our clock, and all share the air."""
+        self._others = sum(
+            now - each.last_heard_at < PRESENT_S
+            for each in self._neighbors.values()
+            if each.src != own_id
+        )
+        needed_s = (1 + self._others) * self.pdu_s / self._params.share
+        self.period_s = max(self._params.period_s, needed_s)
+
+    def tell(self, start: float) -> bool:
+        """Have a CLOCK ride in the burst at `start`, if it is time; whether it cannot wait."""
+        if start < self._clocks.due_at or not self._others:
+            return False
+        waits = self._spare.holds(RecordType.CLOCK)
+        alone_at = max(start, self._told_alone_at + self.period_s)
+        self._spare.put(self._clocks.record(start, MAX_ARRIVALS), alone_at)
+        self._waits = True
+        if not waits:
+            self._overdue_at = alone_at + self.period_s
+        return start >= self._overdue_at
+
+    def receipt(self, receipt: Receipt, now: float) -> bool:
+        """Have it told; False where too many wait already."""
+        if self._spare.count(RecordType.RECEIPT) >= MOST_RECEIPTS:
+            return False
+        alone_at = max(now + PATIENCE_S, self._told_alone_at + self.period_s)
+        self._spare.put(receipt, alone_at)
+        return True
+
+    def took(self, burst: Burst | None) -> Burst | None:
+        """A burst that was just composed, with the number of the CLOCK in it."""
+        waits, self._waits = self._waits, self._spare.holds(RecordType.CLOCK)
+        if burst is None or self._waits or not waits:
+            return burst
+        return burst._replace(clock=self._clocks.rode())
+
+    def told_alone(self, start: float) -> None:
+        """A PDU with nothing but records leaves."""
+        self._told_alone_at = start
+
+    def left(self, burst: Burst) -> None:
+        """A burst has left."""
+        if burst.clock is not None:
+            self._clocks.left(burst.clock, burst.start)
+
+    def end(self) -> None:
+        """No more."""
+        self._clocks.end()

@@ -1,0 +1,129 @@
+"""What is known of one robot's clock, and how well."""
+
+from collections import OrderedDict
+from enum import Enum
+from typing import NamedTuple
+
+from sdrlinkd.link.timesync.envelope import DualEnvelope, Estimate
+from sdrlinkd.wire import UNKNOWN_WALL, Arrival, Clock
+
+COARSE_S = 0.005
+"""A bound above it is a coarse one."""
+UNKNOWN_S = 1.0
+"""A bound above it is none."""
+SILENT_S = 5.0
+"""Without news for so long, or this many periods of the other robot, the estimate only ages."""
+SILENT_PERIODS = 4
+SOLVE_S = 0.2
+REMEMBERED = 16
+SEQUENCE = 1 << 16
+
+
+class State(Enum):
+    """How well a clock is known."""
+
+    UNSYNCED = "unsynced"
+    COARSE = "coarse"
+    SYNCED = "synced"
+    HOLDOVER = "holdover"
+
+
+class Wall(NamedTuple):
+    """A host's time since 1970 less its link's clock, in ns, and how wrong that may be in s."""
+
+    ns: int
+    error_s: float
+
+
+class PeerClock:
+    """One robot's CLOCK records and when they came. Times in s of our own link's clock."""
+
+    def __init__(self, src: int, resolution_s: float) -> None:
+        self.src = src
+        self.envelope = DualEnvelope(resolution_s)
+        self.wall: Wall | None = None
+        self.refused = 0
+        """Records with another boot id, or a number that was not newer: not used."""
+        self.resets = 0
+        """It has started anew, with another clock."""
+        self.last_at = 0.0
+        self.period_s = 0.0
+        self._boot_id: int | None = None
+        self._strange_boot_id: int | None = None
+        self._arrivals: OrderedDict[int, float] = OrderedDict()
+        self._told: int | None = None
+        self._last_number = 0
+        self._solved_at = -float("inf")
+        self._has_news = False
+
+    def hear(self, clock: Clock, at: float, own_id: int, left: dict[int, float]) -> None:
+        """A CLOCK whose burst came at `at`; `left`: when our own left, by their numbers."""
+        if not self._is_acceptable(clock):
+            self.refused += 1
+            return
+        if self._arrivals:
+            self.period_s = at - self.last_at
+        self._last_number, self.last_at = clock.number, at
+        left_there = 1e-9 * clock.left_ns
+        came = self._arrivals.get(clock.stamped)
+        if came is not None:
+            self.envelope.heard(left_there, came, 0.0)
+            # What it tells again of the same CLOCK is nothing new.
+            del self._arrivals[clock.stamped]
+            self._has_news = True
+        self._arrivals[clock.number] = at
+        if len(self._arrivals) > REMEMBERED:
+            self._arrivals.popitem(last=False)
+        if clock.wall_ns != UNKNOWN_WALL:
+            self.wall = Wall(clock.wall_ns, 1e-6 * clock.wall_error_us)
+        for node, number, after_ns in clock.arrivals:
+            if node == own_id and number in left and number != self._told:
+                self._told = number
+                came_there = 1e-9 * (clock.left_ns + after_ns)
+                self.envelope.was_heard(left[number], came_there, 0.0)
+                self._has_news = True
+        self.estimate(at)
+
+    def arrival(self, base_s: float) -> Arrival | None:
+        """The last CLOCK heard, for our own to tell."""
+        if not self._arrivals:
+            return None
+        number, at = next(reversed(self._arrivals.items()))
+        return Arrival(self.src, number, 10 * round(1e8 * (at - base_s)))
+
+    def estimate(self, now: float) -> Estimate | None:
+        """Own minus its link's clock; made anew where there is something new."""
+        is_due = now - self._solved_at >= SOLVE_S or self.envelope.estimate is None
+        if self._has_news and is_due:
+            self._has_news, self._solved_at = False, now
+            self.envelope.solve(now)
+        return self.envelope.estimate
+
+    def state(self, now: float) -> State:
+        """How well its clock is known."""
+        known = self.estimate(now)
+        if known is None or known.bound(now) > UNKNOWN_S:
+            return State.UNSYNCED
+        if now - self.last_at > max(SILENT_S, SILENT_PERIODS * self.period_s):
+            return State.HOLDOVER
+        return State.COARSE if known.bound(now) > COARSE_S else State.SYNCED
+
+    def _is_acceptable(self, clock: Clock) -> bool:
+        if self._boot_id is None:
+            self._boot_id = clock.boot_id
+            return True
+        if clock.boot_id == self._boot_id:
+            newer = (clock.number - self._last_number) % SEQUENCE
+            return 0 < newer < SEQUENCE // 2
+        if clock.boot_id != self._strange_boot_id:
+            # It may be a recording of before; who has really started anew says so again.
+            self._strange_boot_id = clock.boot_id
+            return False
+        self._boot_id, self._strange_boot_id = clock.boot_id, None
+        self._arrivals.clear()
+        self._told = None
+        self.wall = None
+        self.period_s = 0.0
+        self.envelope.forget()
+        self.resets += 1
+        return True

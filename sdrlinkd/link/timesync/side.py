@@ -1,0 +1,73 @@
+"""Least delays of one direction, as they came."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+BUCKET_S = 0.1
+"""Of samples that close together the one with the least delay is kept, and the sum of all."""
+
+
+class Side:
+    """Upper bounds of an offset that drifts: the oldest first, no older than `window_s`."""
+
+    def __init__(self, window_s: float) -> None:
+        self._window_s = window_s
+        self._most = math.ceil(window_s / BUCKET_S) + 2
+        # Twice as long, so that moving down is rare.
+        self._rows = np.zeros((5, 2 * self._most))
+        self._begin = self._end = 0
+        self._bucket = -math.inf
+
+    def __len__(self) -> int:
+        return self._end - self._begin
+
+    @property
+    def x(self) -> NDArray[np.float64]:
+        """Times in s."""
+        return self._rows[0, self._begin : self._end]
+
+    @property
+    def v(self) -> NDArray[np.float64]:
+        """Bounds in s."""
+        return self._rows[1, self._begin : self._end]
+
+    def lowest(self, steepest: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(times, bounds) of those on which a line can rest that rises or falls no steeper."""
+        x, v = self.x, self.v
+        later, earlier = v + steepest * x, v - steepest * x
+        keep = later <= np.minimum.accumulate(later[::-1])[::-1]
+        keep &= earlier <= np.minimum.accumulate(earlier)
+        return x[keep], v[keep]
+
+    def totals(self) -> tuple[float, float, float]:
+        """(number of samples, mean of their times, mean of their bounds)."""
+        n, x, v = self._rows[2:, self._begin : self._end].sum(axis=1)
+        return float(n), float(x / n), float(v / n)
+
+    def add(self, x: float, v: float, slope: float) -> None:
+        """One more; `slope`: what bounds are thought to gain a second."""
+        rows, bucket = self._rows, math.floor(x / BUCKET_S)
+        if len(self) and bucket <= self._bucket:
+            last = self._end - 1
+            rows[2:, last] += (1.0, x, v)
+            if v - slope * x < rows[1, last] - slope * rows[0, last]:
+                rows[:2, last] = x, v
+            return
+        self.forget_before(x - self._window_s)
+        if self._end == rows.shape[1]:
+            keep = min(len(self), self._most)
+            rows[:, :keep] = rows[:, self._end - keep : self._end].copy()
+            self._begin, self._end = 0, keep
+        rows[:, self._end] = x, v, 1.0, x, v
+        self._end += 1
+        self._bucket = bucket
+
+    def forget_before(self, x: float) -> None:
+        """What is older."""
+        self._begin += int(np.searchsorted(self.x, x))
+
+    def clear(self) -> None:
+        """All of it."""
+        self._begin = self._end = 0
