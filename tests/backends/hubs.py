@@ -148,7 +148,9 @@ class Listener:
             self._joined.set()
             async for block in radio.blocks():
                 with self._moved:
-                    self._parts.append(np.zeros(block.n) if block.samples is None else block.samples)
+                    self._parts.append(
+                        np.zeros(block.n) if block.samples is None else block.samples
+                    )
                     self._end = block.index + block.n
                     self._moved.notify_all()
                 if self._is_over:
