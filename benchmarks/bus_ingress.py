@@ -33,7 +33,13 @@ class _Counted:
         self.count = 0
         self.done = asyncio.Event()
 
-    def submit(self, topic_id: int, payload: bytes, overrides: Overrides = AS_CONFIGURED) -> None:
+    def submit(
+        self,
+        topic_id: int,
+        payload: bytes,
+        overrides: Overrides = AS_CONFIGURED,
+        published_ns: int | None = None,  # noqa: ARG002  # producers here do not say
+    ) -> None:
         """Queue a message."""
         self._link.submit(topic_id, payload, time.monotonic(), overrides)
         self.count += 1

@@ -3,9 +3,9 @@ its bus.
 """
 
 import asyncio
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from random import Random
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from sdrlinkd.config import ModemParams
 from sdrlinkd.link import (
     AccessParams,
     Burst,
+    ClockParams,
     Link,
     LinkParams,
     Opportunity,
@@ -31,6 +32,7 @@ from sdrlinkd.wire import make_registry
 TOPICS = (("data", "std_msgs/msg/ByteMultiArray"), ("stop", "std_msgs/msg/Empty"))
 DATA, STOP = 0, 1
 TICK_S = 0.05
+NO_CLOCK = ClockParams(period_s=0.0)
 
 
 class Arrival(NamedTuple):
@@ -54,11 +56,11 @@ class Station:
 
     def __init__(
         self, own_id: int, radio: Radio, access: AccessParams, modem: ModemParams, pdu_size: int,
-        arrivals: Sequence[Arrival], seed: int,
+        arrivals: Sequence[Arrival], seed: int, clock: ClockParams = NO_CLOCK,
     ) -> None:  # fmt: skip
         self.link = Link(
             LinkParams(pdu_size=pdu_size), QueueParams(), ReassemblyParams(),
-            make_registry(TOPICS), own_id, Random(seed),
+            make_registry(TOPICS), own_id, Random(seed), clock=clock,
         )  # fmt: skip
         self.modem = ModemLink(modem, pdu_size, radio, "ether", access.policy != "none")
         self._access = access
@@ -107,6 +109,9 @@ class Station:
         self.link.confirm(burst, outcome, at)
 
 
+AnyStation = TypeVar("AnyStation", bound=Station)
+
+
 def poisson(
     rng: np.random.Generator, topic_id: int, per_s: float, size: int, duration_s: float
 ) -> Iterator[Arrival]:
@@ -130,13 +135,23 @@ async def run(
     seed: int,
 ) -> list[Station]:
     """All of it, up to `until_s`."""
+
+    def make(node: int, radio: Radio) -> Station:
+        return Station(node, radio, access, modem, pdu_size, arrivals[node], 100 * seed + node)
+
+    return await play(air, radios, make, until_s, seed)
+
+
+async def play(
+    air: AirParams,
+    radios: dict[int, RadioParams],
+    make: Callable[[int, Radio], AnyStation],
+    until_s: float,
+    seed: int,
+) -> list[AnyStation]:
+    """The same with stations of one's own kind."""
     ether = LocalEther(air, radios, World(air, {}), seed)
-    stations = [
-        Station(
-            each, ether.radios[each], access, modem, pdu_size, arrivals[each], 100 * seed + each
-        )
-        for each in radios
-    ]
+    stations = [make(each, ether.radios[each]) for each in radios]
     for station in stations:
         await station.open()
     async with asyncio.TaskGroup() as tasks:

@@ -11,7 +11,9 @@ STAMP_AT = 4
 _LITTLE, _BIG = struct.Struct("<iI"), struct.Struct(">iI")
 SECOND_NS = 1_000_000_000
 OLDEST_NS = 10 * SECOND_NS
-"""Data that were so old when they were published have no time of measurement: they are replayed."""
+"""Data that were so old when they were published are replayed; a message that was published so long
+before it came was by another clock.
+"""
 
 
 class LocalTimes(NamedTuple):
@@ -63,3 +65,9 @@ def header_stamp_ns(cdr: bytes) -> int | None:
 
 def _us(seconds: float) -> int:
     return max(1, round(1e6 * seconds))
+
+
+def age_since(published_ns: int, now_ns: int) -> float:
+    """Seconds since a producer published; 0 where that cannot be: a clock was set in between."""
+    age_ns = now_ns - published_ns
+    return 1e-9 * age_ns if 0 <= age_ns <= OLDEST_NS else 0.0

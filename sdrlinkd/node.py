@@ -21,7 +21,7 @@ from sdrlinkd.link import (
     link_notices,
     link_report,
 )
-from sdrlinkd.localtime import UNKNOWN, local_times
+from sdrlinkd.localtime import UNKNOWN, age_since, local_times
 from sdrlinkd.pdulink import Heard, PduLink
 from sdrlinkd.reports import Snapshot
 
@@ -77,9 +77,18 @@ class Node:
 
     # The bus's Ingress.
 
-    def submit(self, topic_id: int, payload: bytes, overrides: Overrides = AS_CONFIGURED) -> None:
+    def submit(
+        self,
+        topic_id: int,
+        payload: bytes,
+        overrides: Overrides = AS_CONFIGURED,
+        published_ns: int | None = None,
+    ) -> None:
         """A message from a producer."""
         now = self._pdu_link.now()
+        if published_ns is not None and not self._is_lockstep:
+            # Read next to each other: whatever comes between them is an error of the age.
+            overrides = overrides._replace(age_s=age_since(published_ns, time.time_ns()))
         transforms = self._transforms.get(topic_id)
         if transforms is not None:
             gathered, reason = transforms.take(payload, now)
@@ -87,9 +96,6 @@ class Node:
                 self.refuse(reason, topic_id, overrides.receipt)
                 return
             payload = gathered
-        if overrides.age_s and self._is_lockstep:
-            # The air's time is not that of producers.
-            overrides = overrides._replace(age_s=0.0)
         self._link.submit(topic_id, payload, now, overrides)
         if overrides.receipt:
             self._tell_verdicts()
@@ -105,13 +111,12 @@ class Node:
 
     def heard(self, pdus: Sequence[Heard]) -> None:
         """PDUs from the air."""
-        now = self._pdu_link.now()
+        now, now_ns = self._pdu_link.now(), time.time_ns()
         link = self._link
         for data, at, snr_db, ended_at in pdus:
             if self.bus.is_tapped:
                 self.bus.tap("rx", data)
             for message in link.hear(data, at, snr_db, now, ended_at):
-                now_ns = time.time_ns()
                 times, age_s = UNKNOWN, link.delivered(message, now)
                 if age_s is not None:
                     times = local_times(link, message, age_s, now, now_ns, self._headers)

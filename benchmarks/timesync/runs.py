@@ -21,7 +21,7 @@ class Course(NamedTuple):
 
     @property
     def last_error_s(self) -> float:
-        """At the end; a filter without an estimate is taken to believe that clocks agree."""
+        """At the end."""
         return float(self.error_s[-1])
 
     def settled_s(self, near_s: float = NEAR_S, since: float = 0.0) -> float:

@@ -42,15 +42,19 @@ QUIET_S = 0.01
 QUIET_ROUNDS = 3
 LAST_MESSAGES_S = 0.3
 PDU_TAP = b"\0pdu\0"
-OLDEST_S = 10.0
-"""A message that was published so long before it came was published by another clock."""
 
 
 class Ingress(Protocol):
     """Who takes messages from the bus."""
 
-    def submit(self, topic_id: int, payload: bytes, overrides: Overrides = AS_CONFIGURED) -> None:
-        """A good message."""
+    def submit(
+        self,
+        topic_id: int,
+        payload: bytes,
+        overrides: Overrides = AS_CONFIGURED,
+        published_ns: int | None = None,
+    ) -> None:
+        """A good message; when it was published, in ns since 1970, if its producer says so."""
 
     def refuse(self, reason: str, topic_id: int | None = None, receipt: str = "") -> None:
         """A message that cannot be taken, and the ledger's reason; `receipt`: as in Overrides."""
@@ -241,10 +245,9 @@ class Bus:
                 header.p,
                 header.d,
                 None if header.ls is None else header.ls * 1e-3,
-                0.0 if header.t is None else _age_s(header.t),
-                receipt,
+                receipt=receipt,
             )
-            self._ingress.submit(topic_id, payload, overrides)
+            self._ingress.submit(topic_id, payload, overrides, header.t)
 
     def _bad(self, what: str, topic_id: int | None = None, receipt: str = "") -> None:
         self._bad_last = what
@@ -263,9 +266,3 @@ class Bus:
     def _acknowledge(self, topic: bytes) -> None:
         self._out.send_multipart([topic, self._welcome])
         self._out_reader.recheck()
-
-
-def _age_s(published_ns: int) -> float:
-    """Since a producer published; a clock that was set in between cannot say."""
-    age_s = 1e-9 * (time.time_ns() - published_ns)
-    return age_s if 0 <= age_s <= OLDEST_S else 0.0

@@ -6,6 +6,7 @@ from sdrlinkd.cli import (
     demo,
     dictionary,
     lab,
+    latency,
     messages,
     pdu,
     phy,
@@ -17,6 +18,6 @@ from sdrlinkd.cli import (
 from sdrlinkd.cli.app import main, run
 
 __all__ = [
-    "bag", "bench", "demo", "dictionary", "lab", "main", "messages", "pdu", "phy", "plan",
-    "policy", "run", "status", "wifi",
+    "bag", "bench", "demo", "dictionary", "lab", "latency", "main", "messages", "pdu", "phy",
+    "plan", "policy", "run", "status", "wifi",
 ]  # fmt: skip

@@ -10,7 +10,17 @@ import typer
 from sdrlinkd.cli.app import app
 from sdrlinkd.errors import UserError
 
-NAMES = ("pound", "access", "bus", "ether", "modem_path", "phy_per", "phy_speed")
+NAMES = (
+    "pound",
+    "timesync",
+    "latency",
+    "access",
+    "bus",
+    "ether",
+    "modem_path",
+    "phy_per",
+    "phy_speed",
+)
 
 
 @app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})

@@ -11,7 +11,7 @@ from sdrlinkd.errors import UserError
 from sdrlinkd.units import octets, seconds
 
 
-def _topic_names() -> list[str]:
+def topic_names() -> list[str]:
     """For the shell's completion: what the running daemon sends."""
     try:
         with connect(None) as control:
@@ -21,7 +21,7 @@ def _topic_names() -> list[str]:
 
 
 Topic = Annotated[str, typer.Argument(help="Its name on the bus or in the registry.",
-                                      autocompletion=_topic_names)]  # fmt: skip
+                                      autocompletion=topic_names)]  # fmt: skip
 Text = str | None
 
 

@@ -5,7 +5,14 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from sdrlinkd.reports import LinkReport, NeighborReport, ReceivedTopicReport, Snapshot, TopicReport
+from sdrlinkd.reports import (
+    ClockReport,
+    LinkReport,
+    NeighborReport,
+    ReceivedTopicReport,
+    Snapshot,
+    TopicReport,
+)
 
 NOTHING = "–"
 
@@ -66,7 +73,7 @@ def _air(link: LinkReport) -> str:
 
 def sent_topics(topics: list[TopicReport]) -> Table:
     """Topics on their way out."""
-    table = _table("sent")
+    table = boxless("sent")
     for column, justify in (
         ("topic", "left"), ("class", "left"), ("prio", "right"), ("rate", "right"),
         ("in", "right"), ("sent", "right"), ("queued", "right"), ("dropped", "right"),
@@ -89,7 +96,7 @@ def sent_topics(topics: list[TopicReport]) -> Table:
 
 def received_topics(topics: list[ReceivedTopicReport]) -> Table:
     """Topics from the air."""
-    table = _table("heard")
+    table = boxless("heard")
     for column, justify in (
         ("topic", "left"), ("from", "right"), ("rate", "right"), ("in", "right"),
         ("lost", "right"), ("PDR", "right"), ("age ms", "right"), ("p50", "right"),
@@ -113,11 +120,11 @@ def received_topics(topics: list[ReceivedTopicReport]) -> Table:
 
 def neighbors(reports: list[NeighborReport]) -> Table:
     """Who is heard."""
-    table = _table("robots heard")
+    table = boxless("robots heard")
     for column, justify in (
         ("robot", "left"), ("heard", "right"), ("PDUs", "right"), ("lost", "right"),
         ("PER", "right"), ("twice", "right"), ("SNR", "right"), ("hears us", "right"),
-        ("MCS", "right"), ("registry", "left"),
+        ("MCS", "right"), ("registry", "left"), ("clock", "left"),
     ):  # fmt: skip
         table.add_column(column, justify=justify, no_wrap=True)  # type: ignore[arg-type]
     for report in reports:
@@ -132,8 +139,16 @@ def neighbors(reports: list[NeighborReport]) -> Table:
             NOTHING if report.snr_there_db is None else f"{report.snr_there_db:.1f} dB",
             str(report.mcs),
             Text(report.registry, style="bold red" if report.registry == "differs" else ""),
+            NOTHING if report.clock is None else clock_state(report.clock),
         )
     return table
+
+
+def clock_state(clock: ClockReport) -> str:
+    """How well another robot's clock is known."""
+    if clock.wall_bound_us is None or clock.state == "unsynced":
+        return clock.state
+    return f"{clock.state}, ± {milliseconds(clock.wall_bound_us / 1e3)} ms"
 
 
 def dropped(snapshot: Snapshot) -> Table | None:
@@ -150,7 +165,7 @@ def dropped(snapshot: Snapshot) -> Table | None:
     ]
     if not rows:
         return None
-    table = _table("dropped")
+    table = boxless("dropped")
     table.add_column("what")
     table.add_column("reason")
     table.add_column("count", justify="right")
@@ -185,7 +200,8 @@ def size(n_bytes: int) -> str:
     return f"{n_bytes} B"
 
 
-def _table(title: str) -> Table:
+def boxless(title: str) -> Table:
+    """A table with a title and as few lines as possible."""
     return Table(
         title=title,
         title_justify="left",

@@ -72,10 +72,12 @@ class AsyncPublisher(_AsyncSocket):
         dst: int | None = None,
         lifespan_ms: float | None = None,
         type: str | None = None,  # noqa: A002
+        published_ns: int | None = None,
     ) -> None:
         """Publish `cdr` under `topic`. Raises NoDaemonError after the timeout."""
         fields = {
-            "q": qos, "p": priority, "d": dst, "ls": lifespan_ms, "ty": type, "t": time.time_ns()
+            "q": qos, "p": priority, "d": dst, "ls": lifespan_ms, "ty": type,
+            "t": time.time_ns() if published_ns is None else published_ns,
         }  # fmt: skip
         try:
             async with asyncio.timeout(self._timeout_s):

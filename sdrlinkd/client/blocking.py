@@ -105,15 +105,18 @@ class Publisher(Endpoint):
         dst: int | None = None,
         lifespan_ms: float | None = None,
         type: str | None = None,  # noqa: A002
+        published_ns: int | None = None,
         receipt: bool = False,
     ) -> str | None:
         """Publish `cdr` under `topic`. What is left out comes from the daemon's configuration.
 
-        With `receipt`, each robot that it is for answers what became of it, under the name that is
-        returned; see the method `receipt`.
+        Its age counts from `published_ns` since 1970, else from now. With `receipt`, each robot
+        that it is for answers what became of it, under the name that is returned; see the method
+        `receipt`.
         """
         fields = {
-            "q": qos, "p": priority, "d": dst, "ls": lifespan_ms, "ty": type, "t": time.time_ns()
+            "q": qos, "p": priority, "d": dst, "ls": lifespan_ms, "ty": type,
+            "t": time.time_ns() if published_ns is None else published_ns,
         }  # fmt: skip
         name = None
         if receipt:

@@ -18,7 +18,7 @@ from sdrlinkd.link.schedule import Allowance, ClassesParams, Forecasts, Limits, 
 from sdrlinkd.link.sender import Sender
 from sdrlinkd.link.tellings import Tellings
 from sdrlinkd.link.waits import WaitMeters
-from sdrlinkd.wire import Record, RecordType
+from sdrlinkd.wire import Frame, Record, RecordType
 
 INFINITE = float("inf")
 NOTICE_S = 5e-4
@@ -150,7 +150,8 @@ class Departures:
         overdue, may_tell = False, allowance.most[Qos.DEFAULT] > 0
         if start >= self._beacons.due_at:
             overdue = spare.is_due(start)
-            spare.offer(self._beacon_records(start))
+            records = self._beacon_records(start)
+            spare.offer(records, self._alone_at(start, records))
         elif spare.holds(RecordType.FRAME) and (frame := self.access.frame(start)):
             spare.renew(frame)
             # A schedule does not wait for spare room.
@@ -261,6 +262,11 @@ class Departures:
         if not owed or one_s > longest_s:
             return allowance
         return allowance._replace(owed=tuple(owed))
+
+    def _alone_at(self, start: float, records: list[Record]) -> float:
+        """From when on a beacon deserves a PDU of its own."""
+        needs_it = self.rate.adapts or any(isinstance(each, Frame) for each in records)
+        return start if needs_it else self._tellings.alone_at(start)
 
     def _must_tell(self, start: float) -> bool:
         """Whether records deserve a PDU of their own."""

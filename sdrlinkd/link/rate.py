@@ -81,6 +81,11 @@ class RateControl:
         return self._lowest if self._params.adapt else self._fixed
 
     @property
+    def adapts(self) -> bool:
+        """Whether reports decide."""
+        return self._params.adapt
+
+    @property
     def usable(self) -> range:
         """The MCS that may be chosen."""
         if not self._params.adapt:

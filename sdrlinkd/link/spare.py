@@ -41,12 +41,12 @@ class SpareRecords:
         """How many records of that type wait."""
         return sum(key[0] == kind for key in self._waiting)
 
-    def offer(self, records: Iterable[Record]) -> None:
-        """A beacon: due at once, in place of the one before."""
+    def offer(self, records: Iterable[Record], due_at: float = -INFINITE) -> None:
+        """A beacon, in place of the one before."""
         kept = {key: each for key, each in self._waiting.items() if key[0] in LASTING}
         built = (build_records([record]) for record in records)
         # Two octets behind the header tell one from another of its type.
-        self._waiting = {(*each[:1], *each[2:4]): _Waiting(each, -INFINITE) for each in built}
+        self._waiting = {(*each[:1], *each[2:4]): _Waiting(each, due_at) for each in built}
         self._waiting |= kept
 
     def put(self, record: Record, due_at: float) -> None:

@@ -45,6 +45,10 @@ class Tellings:
         clock_at = max(self._clocks.due_at, self._told_alone_at + self.period_s)
         return min(clock_at, self._spare.due_at)
 
+    def alone_at(self, at: float) -> float:
+        """From when on what should go at `at` may have a PDU with nothing else."""
+        return max(at, self._told_alone_at + self.period_s) if self._others else at
+
     def look_round(self, now: float, own_id: int) -> None:
         """Who else is there: nobody else wants to know our clock, and all share the air."""
         self._others = sum(
@@ -60,7 +64,7 @@ class Tellings:
         if start < self._clocks.due_at or not self._others:
             return False
         waits = self._spare.holds(RecordType.CLOCK)
-        alone_at = max(start, self._told_alone_at + self.period_s)
+        alone_at = self.alone_at(start)
         self._spare.put(self._clocks.record(start, MAX_ARRIVALS), alone_at)
         self._waits = True
         if not waits:
@@ -71,7 +75,7 @@ class Tellings:
         """Have it told; False where too many wait already."""
         if self._spare.count(RecordType.RECEIPT) >= MOST_RECEIPTS:
             return False
-        alone_at = max(now + PATIENCE_S, self._told_alone_at + self.period_s)
+        alone_at = self.alone_at(now + PATIENCE_S)
         self._spare.put(receipt, alone_at)
         return True
 

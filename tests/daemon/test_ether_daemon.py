@@ -24,7 +24,8 @@ def on_ether(hub, robot=1, more=""):
     """The configuration of a robot on the air of `hub`."""
     return (
         f'namespace = "robot_{robot}"\nbackend = "ether"\n{more}'
-        f'[ether]\ndir = "{hub}"\n[modem]\nrate_hz = 1e6\n[link]\nbeacon_s = 0\n[clock]\nperiod_s = 0\n'
+        f'[ether]\ndir = "{hub}"\n[modem]\nrate_hz = 1e6\n[link]\nbeacon_s = 0\n'
+        "[clock]\nperiod_s = 0\n"
     )
 
 

@@ -17,8 +17,13 @@ ROOT = Path(__file__).parents[3]
 PACKAGES = {
     "zenoh": ["eclipse-zenoh"],
     "rclpy": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-std-msgs"],
+    "mavlink": ["pymavlink==2.4.50"],
 }
-CHECKS = {"zenoh": "import zenoh", "rclpy": "import rclpy, std_msgs.msg; rclpy.init()"}
+CHECKS = {
+    "zenoh": "import zenoh",
+    "rclpy": "import rclpy, std_msgs.msg; rclpy.init()",
+    "mavlink": "import pymavlink.dialects.v20.common",
+}
 WHEELS = (3, 11)
 """The one Python that the rclpy wheels are built for."""
 INSTALL_S = 600.0

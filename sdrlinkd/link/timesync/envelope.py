@@ -198,7 +198,7 @@ class _Fit:
             self._now,
             offset_s,
             skew,
-            max(most_s - offset_s, offset_s - least_s) + self._resolution_s,
+            max(most_s - offset_s, offset_s - least_s, 0.0) + self._resolution_s,
             max(self._highest - skew, skew - self._lowest),
         )
 

@@ -1,0 +1,75 @@
+"""The peers by name, how their ends are joined up, and which of them can run here."""
+
+import functools
+import json
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from typing import NamedTuple
+
+from benchmarks.latency.job import Address
+from benchmarks.latency.peers import daemon
+from benchmarks.latency.peers.way import End, Way
+from benchmarks.latency.processes import Child
+from benchmarks.pound.peers import environments
+
+BAUD = 921_600
+"""What PX4's TELEM2 is set to for a companion computer."""
+
+
+class Peer(NamedTuple):
+    """What a team would use."""
+
+    of: str
+    """The software whose manner this is."""
+    open: Callable[[int], AbstractContextManager[Way]]
+    """Makes a way for messages of so many bytes."""
+    environment: str = ""
+    """The virtual environment that some part of it needs."""
+
+
+def serial(
+    transport: str, environment: str = "", hop: str = ""
+) -> Callable[[int], AbstractContextManager[Way]]:
+    """Over a line of 921600 baud; `hop` is what a bridge on the companion is called."""
+
+    @contextmanager
+    def open_way(size: int) -> Iterator[Way]:
+        with ExitStack() as stack:
+            line = stack.enter_context(Child("line", "benchmarks.latency.peers.wire", str(BAUD)))
+            line.precede(real_time=True)
+            near, far = (Address(transport, device) for device in json.loads(line.line()))
+            ends = {"companion": End(near, environment), "fcu": End(far, environment)}
+            between = [line]
+            if hop:
+                arguments = (transport, near.place, str(size))
+                module = "benchmarks.latency.peers.bridge"
+                bridge = Child(hop, module, *arguments, environment=environment)
+                between.append(stack.enter_context(bridge))
+                bridge.precede(real_time=False)
+                ends["companion"] = End(Address("local", bridge.line()))
+            yield Way(ends, between, lambda: json.loads(line.finish()))
+
+    return open_way
+
+
+PEERS: dict[str, Peer] = {
+    "mavlink": Peer("MAVLink 2, parsed within the node", serial("mavlink", "mavlink"), "mavlink"),
+    "mavros": Peer(
+        "MAVLink 2, MAVROS between line and node", serial("mavlink", "mavlink", "mavros"), "mavlink"
+    ),
+    "direct": Peer("sdrlinkd, PDUs straight back", daemon.direct),
+    "ether": Peer("sdrlinkd, two daemons on a simulated air", daemon.ether),
+    "xrce": Peer("Micro XRCE-DDS, its agent between line and node", serial("xrce", hop="agent")),
+}
+
+
+@functools.cache
+def unavailable(peer: str) -> str | None:
+    """None where this peer can run, else why not; makes the environment that it needs."""
+    if peer not in PEERS:
+        return f"no peer is called {peer!r}; there are {', '.join(PEERS)}"
+    try:
+        environments.interpreter(PEERS[peer].environment)
+    except environments.EnvironmentLackingError as error:
+        return str(error)
+    return None

@@ -1,0 +1,202 @@
+"""Rows: the paper's Table 3 as an emulation, and what clocks and ages are good for."""
+
+from collections.abc import Iterable, Iterator
+from statistics import median
+
+import numpy as np
+
+from benchmarks.latency import airtime, clocks, control, lockstep
+from benchmarks.latency.correction import Direction
+from benchmarks.latency.peers.table import PEERS, unavailable
+from benchmarks.latency.session import Session, run
+from benchmarks.report import Row
+from sdrlinkd.config import ModemParams
+from sdrlinkd.modem import Airtimes
+
+OURS = ("direct", "ether")
+TOLD = ("mavlink", "mavros", "xrce", *OURS)
+PAPER_MS = {
+    ("xrce", "fwd"): (1.329, 0.162),
+    ("xrce", "bwd"): (1.752, 0.315),
+    ("mavros", "fwd"): (1.678, 0.560),
+    ("mavros", "bwd"): (2.133, 1.020),
+}
+"""Table 3: mean and standard deviation; its MAVLink is the one with MAVROS."""
+TARGET_MS = {"direct": (1.33, 0.16)}
+ANY_MS = 1e3
+"""Peers, and what only beyond the airtime has a target."""
+SHARE_PCT = 2.0
+
+
+def sessions(
+    seed: int,
+    seconds: float,
+    passes: int,
+    *,
+    stress: bool = False,
+    n_topics: int = 1,
+    of: Iterable[str] = TOLD,
+) -> dict[str, list[Session]]:
+    """Of every peer that can run here."""
+    found = {}
+    for name in of:
+        if unavailable(name) is None:
+            found[name] = [
+                run(name, seconds=seconds, stress=stress, n_topics=n_topics, seed=seed + each)
+                for each in range(passes)
+            ]
+    return found
+
+
+def ways(session: Session) -> dict[str, Direction]:
+    """Companion to FCU, and back."""
+    return {"fwd": session.forward, "bwd": session.backward}
+
+
+def table(found: dict[str, list[Session]]) -> Iterator[Row]:
+    """Mean and standard deviation each way, medians of the passes."""
+    for name, passes in found.items():
+        for way in ("fwd", "bwd"):
+            each = [ways(session)[way] for session in passes]
+            n = sum(one.n_heard for one in each)
+            peers = {
+                "true_mean": median(_ms(one.true_s, np.mean) for one in each),
+                "true_p50": median(_ms(one.true_s, np.median) for one in each),
+                "true_p99": median(_ms(one.true_s, _p99) for one in each),
+                "filter_error_us": median(_us(one.filter_error_s) for one in each),
+                "lost": float(sum(one.n_sent - one.n_heard for one in each)),
+            }
+            paper = PAPER_MS.get((name, way), (None, None))
+            target = TARGET_MS.get(name, (ANY_MS, ANY_MS))
+            for what, of, number in (("mean", np.nanmean, 0), ("std", np.nanstd, 1)):
+                value = median(_ms(_corrected(one), of) for one in each)
+                yield Row(f"{name}_115B_200hz_{what}_ms_{way}", value, "ms", target[number],
+                          "less", n, peers if what == "mean" else {},
+                          paper=paper[number], note=PEERS[name].of)  # fmt: skip
+
+
+def load(found: dict[str, list[Session]]) -> Iterator[Row]:
+    """Processor and memory, of everything between the two programs and of those."""
+    for what, unit in (("cpu_share", "cores"), ("rss_mib", "MiB")):
+        totals = {
+            name: median(sum(getattr(each, what).values()) for each in passes)
+            for name, passes in found.items()
+        }
+        if "direct" in totals:
+            peers = {name: value for name, value in totals.items() if name != "direct"}
+            yield Row(f"direct_{what}", totals["direct"], unit, max([*peers.values(), 1.0]),
+                      "less", len(found["direct"]), peers)  # fmt: skip
+
+
+def beyond_air(found: dict[str, list[Session]]) -> Iterator[Row]:
+    """What the ether's messages take besides the air; by the machine's clock."""
+    if "ether" not in found:
+        return
+    air_ms = 1e3 * lockstep.airtime_s()
+    n = sum(way.n_heard for each in found["ether"] for way in ways(each).values())
+    for what, of, target in (("mean", np.mean, 3.0), ("p99", _p99, 8.0)):
+        values = [
+            _ms(way.true_s, of) - air_ms for each in found["ether"] for way in ways(each).values()
+        ]
+        yield Row(f"ether_115B_200hz_beyond_air_{what}_ms", median(values), "ms", target, "less",
+                  n, {"airtime": air_ms, "best_pass": min(values)})  # fmt: skip
+
+
+def by_the_air(seed: int, seconds: float) -> Iterator[Row]:
+    """In lock-step: nothing but what the protocol does."""
+    found = lockstep.measure(seed, seconds)
+    late_ms, n = 1e3 * found.latencies_s, len(found.latencies_s)
+    yield Row("ether_115B_200hz_lockstep_std_ms", float(late_ms.std()), "ms", 0.08, "less",
+              n, {"mean": float(late_ms.mean()), "airtime": 1e3 * found.airtime_s})  # fmt: skip
+    yield Row("age_rms_us_lockstep", _us(found.age_errors_s), "µs", 20.0, "less", n)
+
+
+def by_the_clock(seconds: float) -> Iterator[Row]:
+    """Two daemons: what they know of each other."""
+    air = clocks.AIR
+    modem = ModemParams(rate_hz=air.rate_hz, mcs=air.mcs, block_s=air.block_s)
+    airtime_s = Airtimes(modem, air.pdu_size).airtime_s(air.mcs, 1)
+    ages: list[float] = []
+    for hz, target in ((5.0, 500.0), (50.0, 200.0)):
+        found = clocks.measure(hz, seconds, airtime_s)
+        ages += found.ages_s.tolist()
+        yield Row(f"e2e_offset_rms_us_{hz:g}hz", _us(found.offsets_s), "µs", target, "less",
+                  len(found.offsets_s), {"worst": 1e6 * float(np.abs(found.offsets_s).max()),
+                                         "within_bound_pct": 100 * found.within})  # fmt: skip
+    errors_us = 1e6 * np.array(ages)
+    peers = {f"p{q:g}": float(np.percentile(errors_us, q)) for q in (1, 50, 90, 99)}
+    yield Row("age_rms_us_realtime", float(np.sqrt(np.mean(errors_us**2))), "µs", 300.0, "less",
+              len(ages), peers)  # fmt: skip
+
+
+def shares(seed: int, seconds: float) -> Iterator[Row]:
+    """Of the air."""
+    for name, case in (
+        ("control_airtime_pct_5nodes", airtime.FAST),
+        ("control_airtime_pct_5nodes_1msps", airtime.SLOW),
+    ):
+        found = airtime.measure(case, seed, seconds)
+        peers = {"period_s": found.period_s, "all_pct": found.all_pct}
+        peers |= {f"receipts_{fate}": float(n) for fate, n in found.verdicts.items()}
+        yield Row(name, found.control_pct, "%", SHARE_PCT, "less", round(seconds), peers)
+
+
+def more_topics(seed: int, seconds: float, quick: bool) -> Row:
+    """The paper's future work: how it goes with more topics, 200 Hz each."""
+    peers: dict[str, float] = {}
+    value = 0.0
+    for n_topics in (2,) if quick else (2, 4, 7):
+        for name, each in sessions(
+            seed, seconds, 1, n_topics=n_topics, of=("mavlink", "xrce", "direct")
+        ).items():
+            value = _ms(each[0].forward.true_s, np.mean)
+            peers[f"{name}_{n_topics}"] = value
+            peers[f"{name}_{n_topics}_lost_pct"] = 100 * (
+                1 - each[0].forward.n_heard / max(1, each[0].forward.n_sent)
+            )
+    last = [key for key in peers if key.startswith("direct") and "lost" not in key][-1]
+    return Row("direct_topics_at_once_mean_ms", peers.pop(last), "ms", 10.0, "less", 1, peers,
+               note=f"{last.rpartition('_')[2]} topics of 200 Hz each way")  # fmt: skip
+
+
+def under_stress(seed: int, seconds: float, passes: int) -> Row:
+    """A busy program on every core."""
+    found = sessions(seed, seconds, passes, stress=True, of=("mavlink", "xrce", "direct"))
+    means = {
+        name: median(_ms(each.forward.true_s, np.mean) for each in of) for name, of in found.items()
+    }
+    stds = {
+        f"{name}_std": median(_ms(each.forward.true_s, np.std) for each in of)
+        for name, of in found.items()
+    }
+    return Row("direct_under_stress_mean_ms", means.pop("direct"), "ms", 3.0, "less", passes,
+               means | stds)  # fmt: skip
+
+
+def correction(seed: int, runs: int) -> Row:
+    """A control loop that knows how old its measurements are, beside one that does not."""
+    mean_s, seconds = 0.03, 3.0
+    rms = {
+        corrected: control.rms_mv(seed, mean_s, seconds, runs, corrected=corrected)
+        for corrected in (True, False)
+    }
+    return Row("loop_error_corrected_ratio", rms[True] / rms[False], "", 0.7, "less", runs,
+               {"corrected_mv": rms[True], "uncorrected_mv": rms[False]},
+               note=f"one-way latency {1e3 * mean_s:g} ms on average")  # fmt: skip
+
+
+def _corrected(one: Direction) -> np.ndarray:
+    """Where the paper's filter never converged, true latencies stand for corrected ones."""
+    return one.corrected_s if np.isfinite(one.corrected_s).any() else one.true_s
+
+
+def _ms(values: np.ndarray, of: object) -> float:
+    return float(1e3 * of(values)) if len(values) else float("nan")  # type: ignore[operator]
+
+
+def _us(errors_s: np.ndarray) -> float:
+    return float(1e6 * np.sqrt(np.mean(np.square(errors_s)))) if len(errors_s) else float("nan")
+
+
+def _p99(values: np.ndarray) -> float:
+    return float(np.quantile(values, 0.99))

@@ -1,0 +1,121 @@
+"""One assessment: VIO odometry to the FCU and IMU back, at the same time, between two clocks."""
+
+import json
+import time
+from contextlib import ExitStack
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.latency.clock import Clock
+from benchmarks.latency.correction import Direction, Seconds, Stamps, direction
+from benchmarks.latency.job import MOST_TOPICS, STAMP, Job
+from benchmarks.latency.peers.table import PEERS, unavailable
+from benchmarks.latency.peers.way import Way
+from benchmarks.latency.processes import Child, PeerError, busy_cores
+
+START_S = 0.3
+"""From both ends being ready to the start."""
+WARMUP_S = 6.5
+"""At 100 requests a second: more than the 500 samples that the paper's filter wants."""
+CLOCKS = {"companion": Clock(0.0, 0.0), "fcu": Clock(3.7, 20.0)}
+
+
+class Session(NamedTuple):
+    """What came of it."""
+
+    forward: Direction
+    """Companion computer to FCU."""
+    backward: Direction
+    """FCU to companion computer."""
+    cpu_share: dict[str, float]
+    """Of one core, by process, after the warm-up."""
+    rss_mib: dict[str, float]
+    """By process, at the end."""
+    filter_error_s: Seconds
+    """Of both ends, one after the other."""
+    line_late_s: Seconds
+    """How much after its time the emulated line let each piece go; empty where there is none."""
+
+
+def run(
+    transport_name: str,
+    *,
+    seconds: float,
+    rate_hz: float = 200.0,
+    size: int = 115,
+    n_topics: int = 1,
+    stress: bool = False,
+    seed: int = 1,
+    warmup_s: float = WARMUP_S,
+) -> Session:
+    """Measure a peer, for so long after the warm-up. Raises PeerError."""
+    if (reason := unavailable(transport_name)) is not None:
+        raise PeerError(f"{transport_name}: {reason}")
+    if not 1 <= n_topics <= MOST_TOPICS or size <= STAMP.size:
+        what = f"{n_topics} topics of {size} bytes"
+        raise ValueError(f"{what}; 1 to {MOST_TOPICS} of more than {STAMP.size} bytes are possible")
+    with ExitStack() as stack:
+        way = stack.enter_context(PEERS[transport_name].open(size))
+        jobs = {
+            side: Job(
+                side,
+                end.address,
+                CLOCKS[side],
+                rate_hz,
+                size,
+                n_topics,
+                warmup_s,
+                seconds,
+                seed,
+            )
+            for side, end in way.ends.items()
+        }
+        ends = {side: stack.enter_context(_start(job, way)) for side, job in jobs.items()}
+        for end in ends.values():
+            end.line()
+        if stress:
+            stack.enter_context(busy_cores())
+        return _measure(way, jobs, ends)
+
+
+def _start(job: Job, way: Way) -> Child:
+    environment = way.ends[job.side].environment
+    child = Child(job.side, "benchmarks.latency.endpoint", environment=environment)
+    child.precede(real_time=job.side == "fcu")
+    child.tell(job.to_json())
+    return child
+
+
+def _measure(way: Way, jobs: dict[str, Job], ends: dict[str, Child]) -> Session:
+    companion, fcu = jobs["companion"], jobs["fcu"]
+    processes = ends | {child.name: child for child in way.between}
+    start = time.monotonic() + START_S
+    for end in ends.values():
+        end.tell(repr(start))
+    _sleep_until(start + companion.warmup_s)
+    before = {name: child.usage() for name, child in processes.items()}
+    _sleep_until(start + companion.warmup_s + companion.seconds)
+    after = {name: child.usage() for name, child in processes.items()}
+    told = {side: _stamps(end.line()) for side, end in ends.items()}
+    forward = direction(companion, fcu, told["fcu"])
+    backward = direction(fcu, companion, told["companion"])
+    return Session(
+        forward,
+        backward,
+        {name: (after[name].cpu_s - before[name].cpu_s) / companion.seconds for name in processes},
+        {name: usage.rss_mib for name, usage in after.items()},
+        np.concatenate([forward.filter_error_s, backward.filter_error_s]),
+        np.array(way.line_late_s()),
+    )
+
+
+def _stamps(line: str) -> Stamps:
+    told = json.loads(line)
+    heard = np.array(told["heard"], dtype=np.float64).reshape(-1, 4)
+    exchanges = np.array(told["exchanges"], dtype=np.float64).reshape(-1, 4)
+    return Stamps(heard, exchanges / 1e9)
+
+
+def _sleep_until(at: float) -> None:
+    time.sleep(max(0.0, at - time.monotonic()))

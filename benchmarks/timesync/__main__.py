@@ -1,0 +1,34 @@
+"""Clock filters compared: `python -m benchmarks.timesync [--quick] [--json]`.
+
+A whole run draws docs/figures/timesync_*.png.
+"""
+
+import sys
+
+from benchmarks.report import Row, main
+from benchmarks.timesync import pictures, rows
+
+HZ, FAST_HZ = 5.0, 50.0
+
+
+def measure(seed: int, quick: bool) -> list[Row]:
+    """All rows."""
+    runs, stepped = (4, 1) if quick else (40, 8)
+    held = rows.Tally()
+    found = rows.precision(seed, runs, HZ, held)
+    told = [*rows.precision_rows(found, HZ)]
+    told.append(rows.steps(seed, stepped, HZ, held))
+    told += rows.hostile(seed, runs, HZ, held)
+    told.append(
+        Row("bound_holds_pct", held.percent, "%", 99.9, "more", held.all,
+            note="all scenarios, 5 s after steps left out")
+    )  # fmt: skip
+    told.append(rows.sample_clocks(seed, 15.0 if quick else 60.0))
+    told += rows.recorded()
+    if not quick:
+        pictures.draw(found, HZ)
+    return told
+
+
+if __name__ == "__main__":
+    sys.exit(main("timesync", measure))

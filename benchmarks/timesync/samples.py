@@ -1,0 +1,79 @@
+"""Sample clocks of two robots on the simulated air: what the link says of them, and the truth."""
+
+import asyncio
+
+import numpy as np
+
+from backends import AirParams, LocalEther, RadioParams, World
+from benchmarks.shared_air import Station
+from sdrlinkd.config import ModemParams
+from sdrlinkd.link import AccessParams, ClockParams
+
+RATE_HZ = 1e6
+PPM = {1: 12.0, 2: -9.0}
+SNR_DB = 20.0
+HZ = 5.0
+PDU_SIZE = 256
+EACH_S = 0.5
+SETTLING_S = 5.0
+
+
+class SampleClocks:
+    """What was found: errors in s, and bounds."""
+
+    def __init__(self) -> None:
+        self.errors_s: list[float] = []
+        self.bounds_s: list[float] = []
+
+    @property
+    def rms_us(self) -> float:
+        """Root of the mean square."""
+        return float(1e6 * np.sqrt(np.mean(np.square(self.errors_s))))
+
+
+def measure(seed: int, seconds: float) -> SampleClocks:
+    """From 5 s on, twice a second, both robots' opinion of each other."""
+    return asyncio.run(_measure(seed, seconds))
+
+
+async def _measure(seed: int, seconds: float) -> SampleClocks:
+    air = AirParams(rate_hz=RATE_HZ, snr_db=SNR_DB, block_s=0.002)
+    radios = {node: RadioParams(full_duplex=True, clock_ppm=ppm) for node, ppm in PPM.items()}
+    modem = ModemParams(rate_hz=RATE_HZ, mcs=1, block_s=air.block_s)
+    ether = LocalEther(air, radios, World(air, {}), seed)
+    clock = ClockParams(period_s=1 / HZ, share=0.5)
+    stations = [
+        Station(
+            node, ether.radios[node], AccessParams(), modem, PDU_SIZE, (), 100 * seed + node, clock
+        )
+        for node in radios
+    ]
+    found = SampleClocks()
+    for station in stations:
+        await station.open()
+    async with asyncio.TaskGroup() as tasks:
+        running = [tasks.create_task(station.modem.run()) for station in stations]
+        at = SETTLING_S
+        while at <= seconds:
+            await ether.run(at)
+            for station, other in zip(stations, reversed(stations), strict=True):
+                _look(station, other.link.own_id, found)
+            at += EACH_S
+        for station in stations:
+            await station.modem.close()
+        for task in running:
+            task.cancel()
+    return found
+
+
+def _look(station: Station, other: int, found: SampleClocks) -> None:
+    own = station.link.own_id
+    now = station.modem.now()
+    estimate = station.link.clocks.peers[other].estimate(now)
+    if estimate is None:
+        raise RuntimeError(f"robot {own} knows nothing of robot {other}'s clock")
+    # Both began to count at the air's 0.
+    paces = [1 + 1e-6 * PPM[node] for node in (own, other)]
+    truth_s = now * (1 - paces[1] / paces[0])
+    found.errors_s.append(estimate.offset(now) - truth_s)
+    found.bounds_s.append(estimate.bound(now))
