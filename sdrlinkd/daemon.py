@@ -29,7 +29,7 @@ from sdrlinkd.sdnotify import Notifier
 
 if TYPE_CHECKING:
     # Loading it brings recordings, of which a daemon of a real robot has none.
-    from sdrlinkd.adapters import Due, Transforms
+    from sdrlinkd.adapters import ChronySocket, Due, Transforms
 
 log = logging.getLogger("sdrlinkd")
 
@@ -100,7 +100,8 @@ async def _open(
     stack.callback(context.destroy)
     headers, stops = _types_of(setup)
     open_bus = partial(Bus, context, directory, setup)
-    node = Node(setup, link, pdu_link, open_bus, _transforms(setup), headers, stops)
+    chrony = _chrony(setup, stack)
+    node = Node(setup, link, pdu_link, open_bus, _transforms(setup), headers, stops, chrony)
     stack.callback(node.bus.close)
     control = Control(context, directory)
     stack.callback(control.close)
@@ -139,6 +140,16 @@ def _types_of(setup: Setup) -> tuple[frozenset[int], dict[int, bytes]]:
     from sdrlinkd.adapters import header_topics, stop_messages
 
     return header_topics(setup), stop_messages(setup)
+
+
+def _chrony(setup: Setup, stack: contextlib.AsyncExitStack) -> "ChronySocket | None":
+    from sdrlinkd.adapters import ChronySocket
+
+    if not setup.config.chrony.socket:
+        return None
+    chrony = ChronySocket(Path(setup.config.chrony.socket))
+    stack.callback(chrony.close)
+    return chrony
 
 
 def check(setup: Setup) -> None:

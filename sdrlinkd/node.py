@@ -16,6 +16,7 @@ from sdrlinkd.link import (
     Opportunity,
     Outcome,
     Overrides,
+    State,
     Told,
     Wall,
     link_notices,
@@ -27,10 +28,11 @@ from sdrlinkd.reports import Snapshot
 
 if TYPE_CHECKING:
     # Loading it brings recordings, of which a daemon of a real robot has none.
-    from sdrlinkd.adapters import Due, Transforms
+    from sdrlinkd.adapters import ChronySocket, Due, Transforms
 
 TICK_S = 0.05
 SHORTEST_TICK_S = 0.001
+CHRONY_S = 1.0
 SET_S = 0.1
 """By more than this a host's clock does not move unless it is set."""
 LEAST_ERROR_S = 5e-5
@@ -43,7 +45,8 @@ class Node:
     """Asks the link what to do and does it. Holds no queue and no decision of its own.
 
     Messages of the topics in `headers` begin with a std_msgs/Header; `stops` are the messages to
-    hand over, by topic id, when a command topic falls silent.
+    hand over, by topic id, when a command topic falls silent. `chrony` is told of another robot's
+    clock.
     """
 
     def __init__(
@@ -55,6 +58,7 @@ class Node:
         transforms: Mapping[int, "Transforms"],
         headers: Collection[int] = (),
         stops: Mapping[int, bytes] = NO_STOPS,
+        chrony: "ChronySocket | None" = None,
     ) -> None:
         self._setup = setup
         self._link = link
@@ -62,6 +66,8 @@ class Node:
         self._transforms = transforms
         self._headers = headers
         self._stops = stops
+        self._chrony = chrony
+        self._chrony_at = 0.0
         self._wall_ns: int | None = None
         self._wall_error_s = 0.0
         self._traffic: Iterator[Due] = iter(())
@@ -266,6 +272,15 @@ class Node:
                 self._wall_error_s = max(moved_s, 0.95 * self._wall_error_s)
         self._wall_ns = wall_ns
         self._link.clocks.wall = Wall(wall_ns, self._wall_error_s + LEAST_ERROR_S)
+        if self._chrony is not None and time.monotonic() - self._chrony_at >= CHRONY_S:
+            self._chrony_at = time.monotonic()
+            self._tell_chrony(self._chrony, self._setup.config.chrony.robot)
+
+    def _tell_chrony(self, chrony: "ChronySocket", robot: int) -> None:
+        now = self._pdu_link.now()
+        known = self._link.clocks.wall_offset(robot, now)
+        if known is not None and self._link.clocks.state(robot, now) is State.SYNCED:
+            chrony.send(time.time_ns(), -1e-9 * known[0])
 
     def audit(self) -> list[str]:
         """Where the ledger does not add up; empty when it does."""

@@ -1,6 +1,7 @@
 """The world outside: recordings, message types, a robot for demonstrations."""
 
 from sdrlinkd.adapters.bags import Bag, BagMessage, BagTopic, open_bag
+from sdrlinkd.adapters.chrony import ChronySocket
 from sdrlinkd.adapters.due import Due, due_messages
 from sdrlinkd.adapters.pacing import first_seconds, paced
 from sdrlinkd.adapters.robot import BuiltInRobot
@@ -13,6 +14,7 @@ __all__ = [
     "BagMessage",
     "BagTopic",
     "BuiltInRobot",
+    "ChronySocket",
     "Due",
     "Transforms",
     "due_messages",

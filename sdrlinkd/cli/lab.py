@@ -1,5 +1,6 @@
 """`lab`: a scenario with real daemons on one simulated air, in one command."""
 
+import os
 import sys
 import time
 from enum import StrEnum
@@ -74,8 +75,13 @@ def lab(
     title = chosen.title or scenario.stem
     began = time.monotonic()
     with Live(console=console, auto_refresh=False, transient=True) as live:
+        told: list[str] = []
 
         def watch(state: LabState) -> None:
+            if state.snapshots and not told:
+                told.append(os.path.commonpath([each.bus.runtime_dir for each in state.snapshots]))
+                hint = f"look at one: sdrlinkctl latency --runtime-dir {told[0]}/robot_ID"
+                console.print(hint, highlight=False, markup=False, soft_wrap=True)
             if console.is_terminal:
                 live.update(live_table(title, state), refresh=True)
 

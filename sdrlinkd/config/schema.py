@@ -36,6 +36,15 @@ class BusParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     max_message_bytes: Annotated[int, Meta(ge=64, le=1 << 24)] = 1 << 20
 
 
+class ChronyParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Another robot's clock as a source for this host's chronyd."""
+
+    socket: str = ""
+    """As in chrony.conf: `refclock SOCK PATH`; empty: none."""
+    robot: Annotated[int, Meta(ge=0, le=254)] = 0
+    """Whose clock is the true one."""
+
+
 class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One daemon's configuration. Every key has a default; see etc/sdrlinkd.toml."""
 
@@ -62,6 +71,7 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     classes: ClassesParams = ClassesParams()
     relay: RelayParams = RelayParams()
     clock: ClockParams = ClockParams()
+    chrony: ChronyParams = ChronyParams()
     tf: TransformParams = TransformParams()
     access: AccessParams = AccessParams()
     rate: RateParams = RateParams()

@@ -12,9 +12,9 @@ class Delivered(NamedTuple):
 
     `number` runs per (source, topic) from 1; `lost_pdus` are those known missing from the source
     so far; `origin_at` is when it was submitted, in the receiver's own time (absent when no STAMP
-    came), so its age at any moment is that moment less `origin_at`. The STAMP came in a burst whose
-    preamble was at `stamped_at`, the last fragment in one at `heard_at`, whose last sample of
-    interest was there at `ended_at`.
+    came), so its age at any moment is that moment less `origin_at`. Its first fragment came in a
+    burst whose preamble was at `began_at`, the last fragment in one at `heard_at`, whose last
+    sample of interest was there at `ended_at`.
     """
 
     src: int
@@ -26,15 +26,15 @@ class Delivered(NamedTuple):
     heard_at: float
     hops_left: int
     snr_db: float | None
-    stamped_at: float = 0.0
+    began_at: float = 0.0
     ended_at: float = 0.0
 
     def parts(self, now: float) -> Parts:
         """Of its age at `now`; for messages that had a STAMP."""
-        origin_at = self.stamped_at if self.origin_at is None else self.origin_at
+        origin_at = self.began_at if self.origin_at is None else self.origin_at
         return Parts(
-            self.stamped_at - origin_at,
-            self.heard_at - self.stamped_at,
+            self.began_at - origin_at,
+            self.heard_at - self.began_at,
             self.ended_at - self.heard_at,
             now - self.ended_at,
         )

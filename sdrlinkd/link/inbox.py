@@ -230,7 +230,7 @@ class Inbox:
                 Delivered(
                     src, topic_id, payload, tally.delivered, neighbor.track.lost,
                     origin.at, at, pdu.hop,
-                    neighbor.snr_db, origin.stamped_at, ended_at,
+                    neighbor.snr_db, reassembly.began_at, ended_at,
                 )
             )  # fmt: skip
         if reassembly.lost:

@@ -30,7 +30,8 @@ class Tellings:
         self._spare = spare
         self._neighbors = neighbors
         self.pdu_s = 0.0
-        self._told_alone_at = -INFINITE
+        self._told_alone_at = self._told_at = -INFINITE
+        self._tells_at = 0.0
         self._overdue_at = INFINITE
         self._waits = False
         self._others = 0
@@ -42,8 +43,7 @@ class Tellings:
         """From when on a PDU with nothing else may go, if something waits by then."""
         if not self._others:
             return self._spare.due_at
-        clock_at = max(self._clocks.due_at, self._told_alone_at + self.period_s)
-        return min(clock_at, self._spare.due_at)
+        return min(self._clock_alone_at, self._spare.due_at)
 
     def alone_at(self, at: float) -> float:
         """From when on what should go at `at` may have a PDU with nothing else."""
@@ -59,12 +59,20 @@ class Tellings:
         needed_s = (1 + self._others) * self.pdu_s / self._params.share
         self.period_s = max(self._params.period_s, needed_s)
 
+    @property
+    def _clock_alone_at(self) -> float:
+        """From when on the next CLOCK does not wait for spare room."""
+        if self._clocks.due_at == INFINITE:
+            return INFINITE
+        return max(self._told_at + self._params.period_s, self._told_alone_at + self.period_s)
+
     def tell(self, start: float) -> bool:
         """Have a CLOCK ride in the burst at `start`, if it is time; whether it cannot wait."""
         if start < self._clocks.due_at or not self._others:
             return False
         waits = self._spare.holds(RecordType.CLOCK)
-        alone_at = self.alone_at(start)
+        alone_at = max(start, self._clock_alone_at)
+        self._tells_at = start
         self._spare.put(self._clocks.record(start, MAX_ARRIVALS), alone_at)
         self._waits = True
         if not waits:
@@ -84,6 +92,7 @@ class Tellings:
         waits, self._waits = self._waits, self._spare.holds(RecordType.CLOCK)
         if burst is None or self._waits or not waits:
             return burst
+        self._told_at = self._tells_at
         return burst._replace(clock=self._clocks.rode())
 
     def told_alone(self, start: float) -> None:

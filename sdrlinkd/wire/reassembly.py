@@ -39,6 +39,7 @@ class Partial:
 
     total: int
     touched_at: float
+    began_at: float
     parts: dict[int, bytes] = field(default_factory=dict)
     cost: int = PARTIAL_OVERHEAD
     shape: tuple[int, int, int] | None = None
@@ -69,6 +70,8 @@ class Reassembly:
         self.held_bytes = 0
         self.held = 0
         self.started = 0
+        self.began_at = 0.0
+        """When the first fragment came of the message that `add` returned last."""
         self.duplicate_fragments = 0
 
     def add(self, src: int, entry: Entry, now: float) -> bytes | None:
@@ -79,6 +82,7 @@ class Reassembly:
             if source is not None and (topic_id, entry_id) in source.partials:
                 self._give_up(src, source, (topic_id, entry_id), "rx_partial_superseded")
             self.started += 1
+            self.began_at = now
             return payload
         if source is None:
             source = self._sources[src] = _Source()
@@ -100,6 +104,7 @@ class Reassembly:
         if len(partial.parts) == total - 1:
             partial.parts[index] = payload
             self._remove(source, key)
+            self.began_at = partial.began_at
             return b"".join([partial.parts[i] for i in range(total)])
         partial.parts[index] = payload
         self._keep(src, source, key, len(payload), now)
@@ -164,7 +169,7 @@ class Reassembly:
         self._keep_bounds(src, source)
 
     def _start(self, source: _Source, key: tuple[int, int], total: int, now: float) -> Partial:
-        partial = source.partials[key] = Partial(total, now)
+        partial = source.partials[key] = Partial(total, now, now)
         source.cost += PARTIAL_OVERHEAD
         self.held_bytes += PARTIAL_OVERHEAD
         self.held += 1

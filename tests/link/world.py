@@ -5,6 +5,7 @@ from random import Random
 from sdrlinkd.link import (
     Allowance,
     ClassesParams,
+    ClockParams,
     Link,
     LinkParams,
     Opportunity,
@@ -34,6 +35,7 @@ def make_link(
     relay=None,
     dictionaries=None,
     beacon_s=0.0,
+    clock=None,
     **params,
 ):
     """A link; `params` are LinkParams. No beacons unless asked for."""
@@ -48,6 +50,7 @@ def make_link(
         classes=classes or ClassesParams(),
         relay=relay or RelayParams(),
         dictionaries=dictionaries or {},
+        clock=clock or ClockParams(period_s=0.0),
     )
 
 

@@ -12,6 +12,8 @@ from sdrlinkd.wire import MAX_ARRIVALS, UNKNOWN_WALL, Clock, tellable
 REMEMBERED = 64
 SEQUENCE = 1 << 16
 MAX_WALL_ERROR_US = 0xFFFF
+RIDES_FROM = 0.75
+"""Of a period after the last one, a record is ready for spare room."""
 FORGOTTEN_S = 30.0
 """A robot not heard for so long is not told of any more."""
 
@@ -47,7 +49,7 @@ class Clocks:
 
     def record(self, start: float, room: int) -> Clock:
         """The next one, at `start`; it tells of at most `room` robots."""
-        self.due_at = start + self._period_s
+        self.due_at = start + RIDES_FROM * self._period_s
         stamped, left_s = self._number, start
         if self._left:
             stamped, left_s = next(reversed(self._left.items()))

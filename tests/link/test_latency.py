@@ -1,0 +1,128 @@
+"""Where a message's age comes from, and what control records cost."""
+
+from itertools import pairwise
+from random import Random
+
+import pytest
+
+from sdrlinkd.link import Allowance, ClockParams, Outcome, link_report
+from sdrlinkd.link.latency import Latency, Parts
+from sdrlinkd.wire import Clock, RecordType, Waits
+from tests.link.world import PDU_S, make_link, next_burst, records_in
+
+SEED = 4
+
+
+def test_the_parts_make_up_the_age():
+    sender, receiver = make_link(own_id=1, pdu_size=64), make_link(own_id=2, pdu_size=64)
+    payload = b"\0\1\0\0" + bytes(150)
+    sender.submit(0, payload, 1.0)
+    heard, at = [], 1.004
+    while burst := sender.departures.compose(at, Allowance.of(1)):
+        for pdu in burst.pdus:
+            heard += receiver.hear(pdu, at, None, at + 0.0025, at + 0.002)
+        at += 0.01
+    (message,) = heard
+    now = message.ended_at + 0.0005
+    parts = message.parts(now)
+    n = round((message.heard_at - 1.004) / 0.01)
+    assert n >= 2
+    assert parts == pytest.approx((0.004, 0.01 * n, 0.002, 0.0005))
+    assert receiver.delivered(message, now) == pytest.approx(sum(parts))
+    assert sum(parts) == pytest.approx(now - 1.0)
+    (report,) = link_report(receiver, now, {}, {}).received
+    told = report.latency
+    assert (told.wait_ms, told.air_ms) == pytest.approx((4.0, 2.0))
+    assert told.queue_ms is None, "the source has not told"
+
+
+def test_percentiles_period_and_jitter_are_those_of_the_messages():
+    rng, latency, now = Random(SEED), Latency(), 0.0
+    ages, intervals = [], []
+    for _ in range(256):
+        intervals.append(rng.uniform(0.01, 0.03))
+        now += intervals[-1]
+        ages.append(rng.expovariate(100))
+        latency.add(Parts(ages[-1], 0.0, 0.0, 0.0), now)
+        assert latency.last_ms() == pytest.approx(1e3 * ages[-1])
+    ages.sort()
+    told = latency.percentiles_ms()
+    assert told["50"] == pytest.approx(1e3 * ages[127], rel=0.02)
+    assert told["99"] == pytest.approx(1e3 * ages[252], rel=0.02)
+    assert told["max"] == pytest.approx(1e3 * ages[-1], rel=0.02)
+    mean_ms, std_ms = latency.period_ms()
+    rest = intervals[1:]
+    assert mean_ms == pytest.approx(1e3 * sum(rest) / 255)
+    mean = sum(rest) / 255
+    assert std_ms == pytest.approx(1e3 * (sum((x - mean) ** 2 for x in rest) / 255) ** 0.5)
+
+
+@pytest.mark.parametrize("age_s", [-0.001, 0.0, 1e9])
+def test_an_age_that_cannot_be_has_its_place_in_the_histogram_too(age_s):
+    latency = Latency()
+    latency.add(Parts(age_s, 0.0, 0.0, 0.0), 0.0)
+    assert latency.percentiles_ms()["max"] >= 0
+
+
+def test_why_a_message_waited_is_told_in_a_beacon():
+    link = make_link(beacon_s=0.5)
+    link.departures._lead_s = 0.002
+    link.submit(0, bytes(20), 0.0)
+    # The radio could take it at 10 ms, and its burst left 30 ms later than it was meant to.
+    burst = next_burst(link, 0.012)
+    link.confirm(burst._replace(start=0.042), Outcome.SENT, 0.05)
+    waits = link.departures.waits.of_topic[0]
+    assert (waits.queue_s, waits.access_s, waits.again_s) == pytest.approx((0.01, 0.002, 0.03))
+    link.submit(1, bytes(20), 0.6)
+    records = [each for pdu in next_burst(link, 0.6).pdus for each in records_in(pdu, 1024)]
+    told = [each for each in records if isinstance(each, Waits)]
+    assert told == [Waits(0, 61, 12, 182)]
+    receiver = make_link(own_id=2)
+    for record in told:
+        receiver.record_from(1, record, 0.0)
+    assert receiver.waits[1, 0] == told[0]
+
+
+def clocks_of(link, until, step_s=0.01, submit_s=None):
+    """(time, whether it went alone) of every CLOCK that left, robot 9 being there, too."""
+    found, now, next_at = [], 0.0, 0.0
+    while now < until:
+        now += step_s
+        if submit_s is not None and now >= next_at:
+            next_at += submit_s
+            link.submit(0, bytes(20), now)
+        link.inbox._new_neighbor(9, now).last_heard_at = now
+        link.handle_timers(now)
+        while burst := next_burst(link, now):
+            link.confirm(burst, Outcome.SENT, now + PDU_S)
+            for pdu, carried in zip(burst.pdus, burst.carried, strict=True):
+                if any(isinstance(each, Clock) for each in records_in(pdu, 1024)):
+                    found.append((now, not carried))
+                    assert burst.clock is not None
+    return found
+
+
+def test_clocks_ride_at_their_period_and_go_alone_within_their_share():
+    alone = make_link(clock=ClockParams(period_s=0.2, share=0.004))
+    alone.tellings.pdu_s = PDU_S
+    times = [at for at, is_alone in clocks_of(alone, 20.0) if is_alone]
+    gaps = [later - earlier for earlier, later in pairwise(times)]
+    # Two robots, 1 ms each: 2 ms / 0.004.
+    assert all(0.49 < gap < 0.53 for gap in gaps), gaps
+    assert alone.departures.control_airtime_s <= 20 * 0.004 / 2 + PDU_S
+    beside = make_link(clock=ClockParams(period_s=0.2, share=0.004))
+    beside.tellings.pdu_s = PDU_S
+    found = clocks_of(beside, 20.0, submit_s=0.05)
+    # They ride from three quarters of their period on.
+    assert 85 < len(found) <= 20 / 0.15 + 1
+    assert not any(is_alone for _, is_alone in found[1:])
+
+
+def test_a_robot_that_is_alone_does_not_tell_its_clock():
+    link = make_link(clock=ClockParams(), beacon_s=1.0)
+    for i in range(300):
+        link.handle_timers(i * 0.01)
+        while burst := next_burst(link, i * 0.01):
+            link.confirm(burst, Outcome.SENT, i * 0.01)
+            assert burst.clock is None
+    assert not link.sender.packetizer.spare.holds(RecordType.CLOCK)

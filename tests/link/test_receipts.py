@@ -1,0 +1,253 @@
+"""Receipts and deliveries agree, whatever the air does; nothing expired is handed over."""
+
+from collections import Counter
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sdrlinkd.link import (
+    DEFAULT_POLICY,
+    Allowance,
+    ClockParams,
+    Outcome,
+    Overrides,
+    RelayParams,
+    TopicPolicy,
+)
+from sdrlinkd.wire import Receipt
+from tests.link.world import make_link, next_burst
+
+STEP_S = 0.01
+AIR_S = 0.001
+RECEIPT_S = 2.0
+N = 60
+
+
+class Air:
+    """Robots that all hear each other, by chance; PDUs may be lost, doubled and overtaken."""
+
+    def __init__(self, seed, robots, loss=0.0, doubled=0.0, late=0.0, **params):
+        self.rng = Random(seed)
+        self.loss, self.doubled, self.late = loss, doubled, late
+        self.now = 0.0
+        self.links = {
+            robot: make_link(
+                own_id=robot, seed=100 * seed + robot, receipt_s=RECEIPT_S, beacon_s=1.0,
+                clock=ClockParams(), **params,
+            )
+            for robot in robots
+        }  # fmt: skip
+        self.under_way = []
+        self.delivered = Counter()
+        """(robot, payload): times it was handed over."""
+        self.expired = []
+        self.verdicts = []
+
+    def run(self, until):
+        while self.now < until:
+            self.now += STEP_S
+            for link in self.links.values():
+                link.handle_timers(self.now)
+                while burst := next_burst(link, self.now):
+                    self._send(link, burst)
+            due = [each for each in self.under_way if each[0] <= self.now]
+            self.under_way = [each for each in self.under_way if each[0] > self.now]
+            self.rng.shuffle(due)
+            for _, robot, pdu, at in due:
+                self._hear(robot, pdu, at)
+            for robot, link in self.links.items():
+                self.verdicts += [(robot, each) for each in link.outcomes.receipts.take()]
+                assert link.audit() == []
+
+    def _send(self, link, burst):
+        link.confirm(burst, Outcome.SENT, burst.start + AIR_S)
+        for robot in self.links:
+            if robot == link.own_id:
+                continue
+            for pdu in burst.pdus:
+                if self.rng.random() < self.loss:
+                    continue
+                for _ in range(1 + (self.rng.random() < self.doubled)):
+                    delay_s = AIR_S + (self.rng.random() < self.late) * self.rng.uniform(0, 0.3)
+                    self.under_way.append((burst.start + delay_s, robot, pdu, burst.start))
+
+    def _hear(self, robot, pdu, at):
+        link = self.links[robot]
+        for message in link.hear(pdu, at, 20.0, self.now):
+            self.delivered[robot, message.payload] += 1
+            age_s = link.delivered(message, self.now)
+            lifespan_s = link.inbox.policies.get(message.topic_id, DEFAULT_POLICY).lifespan_s
+            if age_s is None or age_s > lifespan_s + 1e-5:
+                self.expired.append((robot, age_s))
+
+
+def message(number, size=40):
+    return b"\0\1\0\0" + number.to_bytes(4, "little") + bytes(size)
+
+
+@settings(derandomize=True, deadline=None, max_examples=25)
+@given(
+    st.integers(0, 1000), st.floats(0, 0.6), st.floats(0, 0.5), st.floats(0, 0.5),
+    st.sampled_from([20, 150]), st.sampled_from([None, 0.05]),
+)  # fmt: skip
+def test_receipts_and_deliveries_agree(seed, loss, doubled, late, size, lifespan_s):
+    air = Air(seed, (1, 2, 3), loss, doubled, late, pdu_size=128)
+    policy = TopicPolicy(lifespan_s=lifespan_s or float("inf"))
+    for link in air.links.values():
+        link.set_policy(0, policy)
+    air.run(1.5)
+    sent = {}
+    for number in range(N):
+        sent[f"m{number}"] = (payload := message(number, size)), 2 if number % 2 else 255
+        overrides = Overrides(dst=sent[f"m{number}"][1], receipt=f"m{number}")
+        air.links[1].submit(0, payload, air.now, overrides)
+        air.run(air.now + 0.03)
+    air.run(air.now + RECEIPT_S + 0.5)
+    told = {(verdict.receipt, verdict.dst): verdict for _, verdict in air.verdicts}
+    assert len(told) == len(air.verdicts), "each robot is told of once"
+    assert all(robot == 1 for robot, _ in air.verdicts)
+    assert air.expired == []
+    assert max(air.delivered.values(), default=1) == 1
+    for name, (payload, dst) in sent.items():
+        mine = {at: verdict for (receipt, at), verdict in told.items() if receipt == name}
+        assert mine, name
+        for robot, verdict in mine.items():
+            got = air.delivered[robot, payload]
+            if verdict.fate == "delivered":
+                assert got == 1, (name, verdict)
+                assert 0 < verdict.took_s < 3.0
+            elif verdict.fate in ("expired", "dropped"):
+                assert got == 0, (name, verdict)
+            assert dst in (255, robot) or robot == 255
+    if loss == 0 and lifespan_s is None:
+        assert all(each.fate == "delivered" for each in told.values())
+        assert len(told) == N // 2 * 3
+
+
+def test_what_never_left_is_told_of_at_once():
+    link = make_link(queue=None)
+    link.set_policy(0, TopicPolicy(depth=1, max_bytes=100, lifespan_s=0.5))
+    link.submit(0, message(1), 0.0, Overrides(receipt="one"))
+    link.submit(0, message(2), 0.0, Overrides(receipt="two"))
+    link.submit(0, message(3, 200), 0.0, Overrides(receipt="three"))
+    link.handle_timers(1.0)
+    link.outcomes.refuse("tx_bad_envelope", 0, "four")
+    verdicts = link.outcomes.receipts.take()
+    assert [(each.receipt, each.fate, each.reason) for each in verdicts] == [
+        ("one", "dropped", "tx_superseded"),
+        ("three", "dropped", "tx_size_cap"),
+        ("two", "expired", "tx_expired"),
+        ("four", "dropped", "tx_bad_envelope"),
+    ]
+
+
+def test_nobody_there_is_an_answer_too():
+    link = make_link(receipt_s=1.0)
+    link.submit(0, message(1), 0.0, Overrides(receipt="one"))
+    burst = next_burst(link, 0.0)
+    link.confirm(burst, Outcome.SENT, 0.001)
+    link.handle_timers(0.9)
+    assert link.outcomes.receipts.take() == []
+    link.handle_timers(1.1)
+    (verdict,) = link.outcomes.receipts.take()
+    assert (verdict.fate, verdict.dst) == ("unknown", 255)
+
+
+def test_a_burst_that_the_radio_lost_is_no_delivery():
+    link = make_link()
+    link.submit(0, message(1), 0.0, Overrides(receipt="one", dst=2))
+    link.confirm(next_burst(link, 0.0), Outcome.LOST, 0.001)
+    (verdict,) = link.outcomes.receipts.take()
+    assert (verdict.fate, verdict.reason, verdict.dst) == ("dropped", "tx_radio_failed", 2)
+    link.handle_timers(100.0)
+    assert link.outcomes.receipts.take() == []
+
+
+def test_a_receipt_is_for_the_message_that_had_the_entry_id_then():
+    """Entry ids come again after 256 messages."""
+    air = Air(5, (1, 2), pdu_size=128)
+    air.run(1.5)
+    for number in range(600):
+        air.links[1].submit(0, message(number), air.now, Overrides(dst=2, receipt=f"m{number}"))
+        air.run(air.now + STEP_S)
+    air.run(air.now + RECEIPT_S + 0.5)
+    assert Counter(each.fate for _, each in air.verdicts) == {"delivered": 600}
+    assert air.links[1].outcomes.receipts.unasked == 0
+
+
+def test_a_receipt_of_the_short_form_is_for_whom_the_pdu_is():
+    """RECEIPT without node and age, as it was first written down."""
+    link = make_link()
+    link.submit(0, message(1), 0.0, Overrides(receipt="one", dst=2))
+    burst = next_burst(link, 0.0)
+    link.confirm(burst, Outcome.SENT, 0.001)
+    (pending,) = link.outcomes.receipts._pending.values()
+    entry_id = pending[0].message.entry_id
+    link.record_from(2, Receipt(0, entry_id, 1), 0.1)
+    (verdict,) = link.outcomes.receipts.take()
+    assert (verdict.fate, verdict.took_s) == ("delivered", None)
+
+
+@pytest.mark.parametrize("lifespan_s", [0.05, float("inf")])
+def test_a_message_of_unknown_age_is_refused_where_age_matters(lifespan_s):
+    sender, receiver = make_link(own_id=1), make_link(own_id=2)
+    sender.set_policy(0, TopicPolicy(stamp=False))
+    receiver.set_policy(0, TopicPolicy(lifespan_s=lifespan_s))
+    sender.submit(0, message(1), 0.0)
+    got = []
+    for pdu in sender.departures.compose(0.0, Allowance.of(63)).pdus:
+        got += receiver.hear(pdu, 0.0, None, 0.01)
+    assert len(got) == (lifespan_s == float("inf"))
+    assert receiver.inbox.tallies[1, 0].dropped["rx_no_age"] == (lifespan_s < 1)
+    receiver.set_policy(0, TopicPolicy(lifespan_s=lifespan_s, stamp=False))
+    sender.submit(0, message(2), 0.1)
+    for pdu in sender.departures.compose(0.1, Allowance.of(63)).pdus:
+        assert receiver.hear(pdu, 0.1, None, 0.11), "one's own decision"
+
+
+def test_a_relay_sends_on_nothing_that_is_too_old():
+    sender = make_link(own_id=1, hop_limit=2)
+    relay = make_link(own_id=2, hop_limit=2, relay=RelayParams(policy="flood"))
+    relay.set_policy(0, TopicPolicy(lifespan_s=0.2))
+    for number in range(2):
+        sender.submit(0, message(number), 0.0)
+        for pdu in sender.departures.compose(0.05, Allowance.of(63)).pdus:
+            relay.hear(pdu, 0.05, None, 0.05)
+        if number == 0:
+            assert relay.departures.compose(0.19, Allowance.of(63)).pdus
+    relay.departures.compose(0.21, Allowance.of(63))
+    assert relay.sender.relayed.dropped == {"tx_expired": 1}
+
+
+def test_a_command_topic_that_falls_silent_is_due_once():
+    air = Air(7, (1, 2))
+    air.links[2].set_policy(0, TopicPolicy(deadman_s=0.3))
+    deadman = air.links[2].outcomes.deadman
+    for number in range(5):
+        air.links[1].submit(0, message(number), air.now)
+        air.run(air.now + 0.1)
+        assert deadman.take_due(air.now) == []
+    assert deadman.next_at == pytest.approx(air.now + 0.2, abs=0.03)
+    air.run(air.now + 0.3)
+    assert deadman.take_due(air.now) == [(1, 0)]
+    air.run(air.now + 1.0)
+    assert deadman.take_due(air.now) == []
+    air.links[1].submit(0, message(9), air.now)
+    air.run(air.now + 0.1)
+    air.links[2].set_policy(0, TopicPolicy())
+    air.run(air.now + 1.0)
+    assert deadman.take_due(air.now) == [], "the policy has changed"
+    assert deadman.stops == {(1, 0): 1}
+
+
+def test_the_yardstick_sees_a_receipt_that_lies():
+    air = Air(1, (1, 2))
+    air.links[2].inbox._verdict = lambda *_: (b"", "rx_size_cap")
+    air.run(1.5)
+    air.links[1].submit(0, message(1), air.now, Overrides(receipt="one", dst=2))
+    air.run(air.now + 1.0)
+    ((_, verdict),) = air.verdicts
+    assert (verdict.fate, verdict.reason) == ("dropped", "rx_size_cap")
+    assert not air.delivered

@@ -1,0 +1,171 @@
+"""CLOCK records between two robots, honest and not."""
+
+from random import Random
+
+import pytest
+
+from sdrlinkd.link import ClockParams, State, Wall
+from sdrlinkd.link.timesync import Clocks
+from sdrlinkd.wire import UNKNOWN_WALL, Clock
+
+SEED = 3
+PERIOD_S = 0.2
+DELAY_S = 2e-6
+
+
+class Pair:
+    """Two robots whose clocks differ; both CLOCKs of a period go each way."""
+
+    def __init__(self, offset_s=7.0, skew=2e-5, delay_s=DELAY_S, seed=SEED):
+        self.offset_s, self.skew, self.delay_s = offset_s, skew, delay_s
+        self.rng = Random(seed)
+        self.one = Clocks(ClockParams(), 0xA, 1)
+        self.two = Clocks(ClockParams(), 0xB, 2)
+        for clocks in (self.one, self.two):
+            clocks.resolution_s = 1e-6
+        self.at = 10.0
+        """By the clock of robot 1."""
+        self.sent = []
+        """What robot 2 has sent, and when it came to robot 1."""
+
+    def there(self, at):
+        """By the clock of robot 2: one − two = offset + skew * t."""
+        return at - self.offset_s - self.skew * at
+
+    def period(self, lost=0.0):
+        at = self.at = self.at + PERIOD_S
+        if (record := self._send(self.one, at, lost)) is not None:
+            self.two.hear(1, record, self.there(at + self.delay_s))
+        at = self.at + 0.05
+        if (record := self._send(self.two, self.there(at), lost)) is not None:
+            self.sent.append((record, at + self.delay_s))
+            self.one.hear(2, record, at + self.delay_s)
+
+    def _send(self, clocks, at, lost):
+        record = clocks.record(at, 10)
+        clocks.left(clocks.rode(), at)
+        return None if self.rng.random() < lost else record
+
+    def run(self, periods, lost=0.0):
+        for _ in range(periods):
+            self.period(lost)
+
+    def error_s(self):
+        now = self.at + 0.1
+        return self.one.peers[2].estimate(now).offset(now) - self.offset_s - self.skew * now
+
+
+def test_two_robots_learn_each_others_clocks():
+    pair = Pair()
+    pair.period()
+    assert pair.one.state(2, pair.at) is State.UNSYNCED
+    pair.run(50, lost=0.3)
+    assert abs(pair.error_s()) < 3e-6
+    assert pair.one.state(2, pair.at) is State.SYNCED
+    assert pair.one.peers[2].estimate(pair.at).skew == pytest.approx(pair.skew, abs=1e-6)
+    other = pair.two.peers[1].estimate(pair.there(pair.at))
+    assert other.offset_s == pytest.approx(-pair.offset_s, abs=1e-3)
+    assert pair.one.state(1, pair.at) is State.SYNCED, "one's own"
+
+
+def test_who_falls_silent_is_known_less_and_less_well():
+    pair = Pair()
+    pair.run(100)
+    peer = pair.one.peers[2]
+    bound_s = peer.estimate(pair.at).bound(pair.at)
+    assert peer.state(pair.at + 5.5) is State.HOLDOVER
+    assert peer.estimate(pair.at).bound(pair.at + 100) > bound_s
+    assert peer.state(pair.at + 1e9) is State.UNSYNCED
+
+
+def test_a_coarse_clock_is_said_to_be_coarse():
+    pair = Pair(delay_s=0.012)
+    pair.run(50)
+    assert pair.one.state(2, pair.at) is State.COARSE
+    assert abs(pair.error_s()) < 1e-4, "delays are equal, but who knows that"
+
+
+def test_replayed_and_duplicated_clocks_are_counted_and_change_nothing():
+    pair = Pair()
+    pair.run(50)
+    peer = pair.one.peers[2]
+    before = (peer.envelope.samples, peer.estimate(pair.at))
+    for record, _ in pair.sent[:20] + pair.sent[-1:]:
+        pair.one.hear(2, record, pair.at + 0.06)
+    assert peer.refused == 21
+    assert (peer.envelope.samples, peer.estimate(pair.at)) == before
+
+
+def test_another_boot_id_is_believed_when_it_is_said_twice():
+    pair = Pair()
+    pair.run(50)
+    peer, estimate = pair.one.peers[2], pair.one.peers[2].estimate(pair.at)
+    stranger = Clock(0xC, 5, 5, 10**9)
+    pair.one.hear(2, stranger, pair.at + 0.06)
+    assert (peer.refused, peer.resets) == (1, 0)
+    assert peer.estimate(pair.at + 0.06) == estimate
+    pair.period()
+    pair.one.hear(2, stranger._replace(number=6), pair.at + 0.06)
+    assert peer.resets == 1
+    assert peer.estimate(pair.at + 0.1) is None
+    assert pair.one.state(2, pair.at + 0.1) is State.UNSYNCED
+
+
+def test_stamps_from_the_future_are_not_believed():
+    pair = Pair()
+    pair.run(50)
+    peer = pair.one.peers[2]
+    for i in range(20):
+        pair.period()
+        if i % 10 == 5:
+            record, came = pair.sent[-1]
+            lie = record._replace(number=(record.number + 1) % 65536, stamped=record.number,
+                                  left_ns=record.left_ns + 10**9)  # fmt: skip
+            pair.one.hear(2, lie, came + 0.01)
+            pair.two.rode()
+    assert peer.envelope.contradicted == 2
+    assert abs(pair.error_s()) < 3e-6
+
+
+@pytest.mark.parametrize("ppm", [-500, 500])
+def test_a_crystal_that_is_far_off_is_followed(ppm):
+    pair = Pair(skew=1e-6 * ppm)
+    pair.run(100, lost=0.1)
+    assert abs(pair.error_s()) < 3e-6
+    assert pair.one.peers[2].estimate(pair.at).skew == pytest.approx(1e-6 * ppm, abs=2e-6)
+
+
+def test_a_host_clock_that_is_set_is_followed_at_once():
+    pair = Pair()
+    pair.one.wall, pair.two.wall = Wall(10**18, 1e-4), Wall(10**18 + 7 * 10**9, 1e-4)
+    pair.run(50)
+    offset_ns, error_s, _ = pair.one.wall_offset(2, pair.at)
+    assert abs(offset_ns - pair.skew * pair.at * 1e9) < 1e4
+    assert 2e-4 < error_s < 3e-4
+    pair.one.wall = Wall(10**18 + 3600 * 10**9, 1e-4)
+    assert pair.one.wall_offset(2, pair.at)[0] - offset_ns == 3600 * 10**9
+    pair.two.wall = Wall(10**18 - 3593 * 10**9, 1e-4)
+    pair.period()
+    assert pair.one.wall_offset(2, pair.at)[0] - offset_ns == pytest.approx(7.2e12, rel=1e-9)
+
+
+def test_without_a_host_clock_nothing_is_said_of_it():
+    pair = Pair()
+    pair.run(10)
+    assert pair.one.wall_offset(2, pair.at) is None
+    pair.one.wall = Wall(0, 0.0)
+    assert pair.one.wall_offset(2, pair.at) is None, "theirs is not known"
+    assert pair.one.record(5.0, 10).wall_ns == 0
+    assert pair.two.record(5.0, 10).wall_ns == UNKNOWN_WALL
+    assert pair.one.wall_offset(9, pair.at) is None, "nobody"
+
+
+def test_numbers_wrap_and_records_tell_of_so_many_as_there_is_room_for():
+    pair = Pair()
+    pair.one._number = pair.two._number = 65530
+    pair.run(20)
+    assert abs(pair.error_s()) < 3e-6
+    for src in range(10, 30):
+        pair.one.hear(src, Clock(1, 1, 1, 1), pair.at)
+    assert len(pair.one.record(pair.at, 5).arrivals) == 5
+    assert len(pair.one.record(pair.at + 40, 30).arrivals) == 0, "nobody was heard for so long"

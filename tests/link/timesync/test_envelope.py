@@ -1,0 +1,138 @@
+"""The dual envelope: its bound holds whatever the delays, and clocks that jump are followed."""
+
+import math
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sdrlinkd.link import DualEnvelope
+from sdrlinkd.link.timesync.side import Side
+
+SEED = 11
+RESOLUTION_S = 2e-5
+
+
+def exchange(envelope, at, offset_s, there_s, back_s):
+    """Own − other's clock is `offset_s`; one burst each way, with these delays."""
+    envelope.was_heard(at, at + there_s - offset_s, 0.0)
+    envelope.heard(at + there_s - offset_s, at + there_s + back_s, 0.0)
+
+
+delays = st.one_of(st.just(0.0), st.floats(0, 0.03), st.floats(0, 5e-5))
+
+
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(
+    st.floats(-1e4, 1e4),
+    st.floats(-1e-3, 1e-3),
+    st.lists(st.tuples(st.floats(0.001, 3.0), delays, delays), min_size=1, max_size=60),
+)
+def test_the_error_is_within_the_bound_whatever_the_delays(offset_s, skew, steps):
+    envelope = DualEnvelope(RESOLUTION_S)
+    at = 0.0
+    for wait_s, there_s, back_s in steps:
+        at += wait_s
+        envelope.was_heard(at, at + there_s - (offset_s + skew * at), 0.0)
+        came = at + there_s + back_s
+        envelope.heard(came - back_s - (offset_s + skew * (came - back_s)), came, 0.0)
+        estimate = envelope.solve(came)
+        if estimate is None:
+            continue
+        truth_s = offset_s + skew * came
+        # The other side's clock was read a delay before ours.
+        slack_s = 1e-3 * 0.06
+        assert abs(estimate.offset(came) - truth_s) <= estimate.bound(came) + slack_s
+        later = came + 10.0
+        assert estimate.bound(later) >= estimate.bound(came)
+
+
+def noisy(rng, longest_s=0.02):
+    return 0.0 if rng.random() < 0.4 else rng.uniform(0, longest_s)
+
+
+@pytest.mark.parametrize("step_s", [0.003, -0.003, 0.05, -0.2, 3600.0])
+def test_a_clock_that_jumps_is_followed_within_five_seconds(step_s):
+    rng = Random(SEED)
+    envelope = DualEnvelope(RESOLUTION_S)
+    for i in range(300):
+        at = i / 5
+        offset_s = 1.0 + 2e-5 * at + (step_s if at >= 40 else 0.0)
+        exchange(envelope, at, offset_s, noisy(rng), noisy(rng))
+        envelope.solve(at + 0.1)
+        error_s = envelope.estimate.offset(at) - offset_s if envelope.estimate else math.inf
+        if 5 < at < 40 or at > 45:
+            assert abs(error_s) < 1e-3, f"{at} s, seed {SEED}"
+    assert envelope.steps == 1
+
+
+def test_single_bad_stamps_are_counted_and_change_nothing():
+    rng = Random(SEED)
+    good, bad = DualEnvelope(RESOLUTION_S), DualEnvelope(RESOLUTION_S)
+    n_bad = 0
+    for i in range(300):
+        at, there_s, back_s = i / 5, noisy(rng), noisy(rng)
+        for envelope in (good, bad):
+            exchange(envelope, at, 1.0, there_s, back_s)
+        if i > 50 and rng.random() < 0.02:
+            n_bad += 1
+            bad.heard(at - 1.0 + 0.04, at, 0.0)
+        for envelope in (good, bad):
+            envelope.solve(at + 0.1)
+    assert n_bad > 2
+    assert (bad.contradicted, bad.steps, good.contradicted) == (n_bad, 0, 0)
+    assert bad.estimate == good.estimate
+
+
+def test_stamps_from_the_future_before_anything_is_known_are_dropped_in_time():
+    rng = Random(SEED)
+    envelope = DualEnvelope(RESOLUTION_S)
+    envelope.heard(105.0, 0.05, 0.0)
+    for i in range(20):
+        at = 0.1 + i / 5
+        exchange(envelope, at, 1.0, noisy(rng), noisy(rng))
+        envelope.solve(at + 0.1)
+    assert envelope.narrowed
+    assert abs(envelope.estimate.offset(4.0) - 1.0) < 1e-3
+
+
+def test_delays_shorter_than_the_airtime_cannot_be():
+    envelope = DualEnvelope(RESOLUTION_S)
+    for i in range(40):
+        at, offset_s = i / 5, 1.0 if i < 20 else 1.0008
+        envelope.was_heard(at, at + 0.002 - offset_s, 0.002)
+        envelope.heard(at + 0.002 - offset_s, at + 0.004, 0.002)
+        envelope.solve(at + 0.1)
+    assert abs(envelope.estimate.offset(8.0) - 1.0008) < 5e-5
+
+
+def test_one_direction_alone_says_nothing():
+    envelope = DualEnvelope()
+    for i in range(10):
+        envelope.heard(i / 5, i / 5 + 0.001, 0.0)
+        assert envelope.solve(i / 5) is None
+
+
+def test_what_is_kept_is_bounded_and_no_older_than_the_window():
+    side = Side(5.0)
+    for i in range(20_000):
+        side.add(i * 0.003, 1.0 + (i % 7) * 1e-3, 0.0)
+    assert len(side) <= 52
+    assert side.x[0] >= 20_000 * 0.003 - 5.2
+    n, mean_x, mean_v = side.totals()
+    assert n == pytest.approx(5.0 / 0.003, rel=0.05)
+    assert mean_v == pytest.approx(1.003, abs=1e-4)
+    assert mean_x == pytest.approx(57.5, abs=0.2)
+
+
+@settings(derandomize=True, deadline=None)
+@given(st.lists(st.tuples(st.floats(0.11, 3), st.floats(0, 1)), min_size=1, max_size=40),
+       st.floats(-0.01, 0.01))  # fmt: skip
+def test_only_points_on_which_a_line_can_rest_are_looked_at(steps, slope):
+    side, x = Side(1000.0), 0.0
+    for wait_s, v in steps:
+        x += wait_s
+        side.add(x, v, 0.0)
+    xs, vs = side.lowest(0.01)
+    assert (vs - slope * xs).min() == (side.v - slope * side.x).min()
