@@ -1,6 +1,6 @@
 """How much of the air CLOCKs and RECEIPTs take, with five robots."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from random import Random
 from typing import NamedTuple
 
@@ -25,6 +25,8 @@ ROBOTS = 5
 PDU_SIZE = 1024
 REGISTRY = make_registry([("odom", "nav_msgs/Odometry"), ("cmd", "geometry_msgs/Twist")])
 ODOM, CMD = range(2)
+SETTLING_S = 10.0
+"""Until everybody knows how many they are."""
 CMD_HZ = 2.0
 """With a receipt from everybody."""
 ODOM_SIZE, CMD_SIZE = 700, 52
@@ -74,16 +76,29 @@ def measure(case: Case, seed: int, seconds: float) -> Share:
         air, World(air, {}), radios, links, modem, Airtimes(modem, PDU_SIZE),
         AccessParams(policy="minislot", nodes=list(robots)), arrivals, seed=seed,
     )  # fmt: skip
-    simulation.run(seconds + 5.0)
+    simulation.run(SETTLING_S)
+    control_s, all_s = _sent_s(links.values())
+    simulation.run(seconds + SETTLING_S)
+    control_then_s, all_then_s = _sent_s(links.values())
     verdicts: dict[str, int] = {}
     for link in links.values():
         for verdict in link.outcomes.receipts.take():
             verdicts[verdict.fate] = verdicts.get(verdict.fate, 0) + 1
-    total_s = seconds + 5.0
-    control_s = sum(link.departures.control_airtime_s for link in links.values())
-    all_s = sum(link.departures.airtime_s for link in links.values())
     period_s = float(np.mean([link.tellings.period_s for link in links.values()]))
-    return Share(100 * control_s / total_s, 100 * all_s / total_s, period_s, verdicts)
+    return Share(
+        100 * (control_then_s - control_s) / seconds,
+        100 * (all_then_s - all_s) / seconds,
+        period_s,
+        verdicts,
+    )
+
+
+def _sent_s(links: Iterable[Link]) -> tuple[float, float]:
+    """So far: (PDUs with nothing but records, all)."""
+    departures = [link.departures for link in links]
+    return sum(each.control_airtime_s for each in departures), sum(
+        each.airtime_s for each in departures
+    )
 
 
 def _traffic(case: Case, seed: int, robot: int, seconds: float) -> Iterator[Arrival]:

@@ -17,22 +17,22 @@ from sdrlinkd.cli.status import WATCH_PERIOD_S, ask_status
 from sdrlinkd.errors import UserError
 from sdrlinkd.reports import LatencyReport, LinkReport, ReceivedTopicReport
 
-WIDTH = 44
+WIDTH = 30
 """Characters of the longest waterfall."""
 PARTS = (
     ("queue", "queue_ms", "░", "yellow"),
     ("access", "access_ms", "▒", "magenta"),
     ("again", "again_ms", "!", "red"),
     ("source", "unsplit_ms", "░", "yellow"),
-    ("reassembly", "reassembly_ms", "▓", "cyan"),
+    ("frags", "reassembly_ms", "▓", "cyan"),
     ("air", "air_ms", "█", "blue"),
-    ("hand-over", "handover_ms", "·", "green"),
+    ("rx", "handover_ms", "·", "green"),
 )
 """Name, field, character and colour of each part, in the order of time."""
 MEANING = (
     "queue: for others before it; access: for the air; again: after a burst that did not leave; "
-    "reassembly: from its first fragment to its last; air: the last one; hand-over: demodulated "
-    "and given to the bus"
+    "frags: from its first fragment to its last; air: the last one; rx: demodulated and given to "
+    "the bus"
 )
 
 
@@ -105,12 +105,12 @@ def screen(link: LinkReport, heard: list[ReceivedTopicReport], *, whole: bool) -
 def _waterfalls(heard: list[ReceivedTopicReport], longest_ms: float) -> Table:
     table = boxless("latency, recent means in ms")
     table.add_column("topic", no_wrap=True)
-    table.add_column("age", justify="right")
+    table.add_column("age", justify="right", no_wrap=True)
     for name, field, *_ in PARTS:
         if any(_part_ms(each.latency, field) is not None for each in heard):
-            table.add_column(name, justify="right")
+            table.add_column(name, justify="right", no_wrap=True)
     for name in ("p99", "jitter"):
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
     for each in heard:
         latency = each.latency

@@ -13,6 +13,8 @@ PATIENCE_S = 0.05
 PRESENT_S = 10.0
 """A robot not heard for so long takes no share of the air."""
 MOST_RECEIPTS = 256
+LESS = 1.05
+"""A little less than the share, for robots not heard yet."""
 
 
 class Tellings:
@@ -56,7 +58,7 @@ class Tellings:
             for each in self._neighbors.values()
             if each.src != own_id
         )
-        needed_s = (1 + self._others) * self.pdu_s / self._params.share
+        needed_s = LESS * (1 + self._others) * self.pdu_s / self._params.share
         self.period_s = max(self._params.period_s, needed_s)
 
     @property
