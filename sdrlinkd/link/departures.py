@@ -160,16 +160,16 @@ class Departures:
         if overdue and may_tell:
             # Clocks cannot wait for the end of what is relayed, and no burst holds both.
             urgent = sender.compose(start, allowance.above(Qos.DEFAULT), self._own_id)
-            burst = self._records_behind(urgent)
+            burst = self._records_behind(urgent, start)
         else:
             burst = sender.compose(start, allowance)
         if burst is None and may_tell and spare.is_due(start):
-            burst = sender.compose_records()
+            burst = sender.compose_records(start)
         return self._tellings.took(burst)
 
-    def _records_behind(self, urgent: Burst | None) -> Burst | None:
+    def _records_behind(self, urgent: Burst | None, start: float) -> Burst | None:
         """Records in a PDU of their own, behind what is more urgent than they are."""
-        records = self._sender.compose_records()
+        records = self._sender.compose_records(start)
         if urgent is None or records is None:
             return urgent or records
         return urgent._replace(

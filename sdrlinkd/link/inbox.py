@@ -124,7 +124,7 @@ class Inbox:
 
     def fresh_until(self, pdu: Pdu) -> float:
         """When all its messages will be too old; inf where that is not known."""
-        until = 0.0
+        until = -INFINITE
         for entry in pdu.entries:
             topic_id = entry.topic_id
             if topic_id == CONTROL_TOPIC_ID and self._has_control:
@@ -134,7 +134,7 @@ class Inbox:
                 return INFINITE
             lifespan_s = self.policies.get(topic_id, DEFAULT_POLICY).lifespan_s
             until = max(until, origin_at + lifespan_s)
-        return until or INFINITE
+        return until if until > -INFINITE else INFINITE
 
     def expire(self, now: float) -> None:
         """Give up what has waited too long."""

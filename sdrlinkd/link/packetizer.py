@@ -108,7 +108,7 @@ class Packetizer:
                 if not message.stamped:
                     self._stamp(draft, message, start)
         if self.spare and draft.dst == BROADCAST:
-            self.spare.ride(draft)
+            self.spare.ride(draft, start)
         return self._finish(draft)
 
     def next_full(self, start: float, most: int, src: int | None = None) -> list[BuiltPdu]:
@@ -134,10 +134,10 @@ class Packetizer:
                 return head.src
         return self._src
 
-    def records_pdu(self) -> BuiltPdu | None:
-        """A PDU of its own for the offered records, when there are any."""
+    def records_pdu(self, start: float) -> BuiltPdu | None:
+        """A PDU of its own for the offered records, when there are any, in a burst at `start`."""
         draft = Draft(self._pdu_size)
-        self.spare.ride(draft)
+        self.spare.ride(draft, start)
         if draft.is_empty:
             return None
         draft.dst = BROADCAST

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from sdrlinkd.link.message import Outgoing
+from sdrlinkd.link.spare import RECEIPT_UNIT_S
 from sdrlinkd.wire import BROADCAST, NO_AGE, Receipt
 
-UNIT_S = 1e-4
+UNIT_S = RECEIPT_UNIT_S
 EARLIER_S = 0.05
 """So much may the far end's word of when a message was submitted be too early."""
 MOST_PENDING = 4096

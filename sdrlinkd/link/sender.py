@@ -180,9 +180,9 @@ class Sender:
         self.packetizer.heads.expire(now)
         self._settle_withdrawn()
 
-    def compose_records(self) -> Burst | None:
+    def compose_records(self, start: float) -> Burst | None:
         """A burst of one PDU for control records that found no spare room."""
-        built = self.packetizer.records_pdu()
+        built = self.packetizer.records_pdu(start)
         return None if built is None else self._counted(Burst([built.data], [[]], [built.qos]))
 
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:

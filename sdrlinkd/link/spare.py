@@ -6,6 +6,8 @@ from typing import NamedTuple
 from sdrlinkd.wire import PduBuilder, Receipt, Record, RecordType, build_records
 
 INFINITE = float("inf")
+RECEIPT_UNIT_S = 1e-4
+MAX_SINCE = 0xFFFF
 LASTING = frozenset({RecordType.CLOCK, RecordType.RECEIPT})
 """A beacon does not speak of the same."""
 
@@ -13,6 +15,9 @@ LASTING = frozenset({RecordType.CLOCK, RecordType.RECEIPT})
 class _Waiting(NamedTuple):
     built: bytes
     due_at: float
+    receipt: Receipt | None = None
+    since: float = 0.0
+    """When what the receipt tells of came about."""
 
 
 class SpareRecords:
@@ -50,23 +55,33 @@ class SpareRecords:
         self._waiting |= kept
 
     def put(self, record: Record, due_at: float) -> None:
-        """One more, in place of what speaks of the same."""
+        """One more, in place of one of its type."""
         built = build_records([record])
-        key: tuple[int, ...] = (built[0],)
-        if isinstance(record, Receipt):
-            key = (built[0], record.node, record.topic_id, record.entry_id)
-        known = self._waiting.get(key)
-        self._waiting[key] = _Waiting(built, due_at if known is None else known.due_at)
+        known = self._waiting.get((built[0],))
+        self._waiting[built[0],] = _Waiting(built, due_at if known is None else known.due_at)
+
+    def put_receipt(self, receipt: Receipt, due_at: float, since: float) -> None:
+        """One more, of what came about at `since`."""
+        built = build_records([receipt])
+        key = (built[0], receipt.node, receipt.topic_id, receipt.entry_id)
+        self._waiting[key] = _Waiting(built, due_at, receipt, since)
 
     def renew(self, record: Record) -> None:
         """Where a record of its type still waits, this one goes in its place."""
         built = build_records([record])
-        for key, (_, due_at) in self._waiting.items():
+        for key, each in self._waiting.items():
             if key[0] == built[0]:
-                self._waiting[key] = _Waiting(built, due_at)
+                self._waiting[key] = each._replace(built=built)
 
-    def ride(self, pdu: PduBuilder) -> None:
-        """As many as `pdu` has room for."""
-        rides = [key for key, each in self._waiting.items() if pdu.add_record(each.built)]
+    def ride(self, pdu: PduBuilder, start: float) -> None:
+        """As many as `pdu`, whose burst leaves at `start`, has room for."""
+        rides = [key for key, each in self._waiting.items() if pdu.add_record(_as_of(each, start))]
         for key in rides:
             del self._waiting[key]
+
+
+def _as_of(waiting: _Waiting, start: float) -> bytes:
+    if waiting.receipt is None:
+        return waiting.built
+    since = min(max(round((start - waiting.since) / RECEIPT_UNIT_S), 0), MAX_SINCE)
+    return build_records([waiting.receipt._replace(since_100us=since)])

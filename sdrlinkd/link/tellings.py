@@ -86,7 +86,7 @@ class Tellings:
         if self._spare.count(RecordType.RECEIPT) >= MOST_RECEIPTS:
             return False
         alone_at = self.alone_at(now + PATIENCE_S)
-        self._spare.put(receipt, alone_at)
+        self._spare.put_receipt(receipt, alone_at, now)
         return True
 
     def took(self, burst: Burst | None) -> Burst | None:

@@ -13,10 +13,15 @@ from sdrlinkd.link import (
     ClockParams,
     Outcome,
     Overrides,
+    Qos,
     RelayParams,
     TopicPolicy,
 )
-from sdrlinkd.wire import Receipt
+from sdrlinkd.link.draft import Draft
+from sdrlinkd.link.ledger import TxTally
+from sdrlinkd.link.message import Outgoing
+from sdrlinkd.link.spare import SpareRecords
+from sdrlinkd.wire import Receipt, parse_records
 from tests.link.world import make_link, next_burst
 
 STEP_S = 0.01
@@ -177,6 +182,25 @@ def test_a_receipt_is_for_the_message_that_had_the_entry_id_then():
     assert air.links[1].outcomes.receipts.unasked == 0
 
 
+def test_a_receipt_that_waited_is_for_the_message_of_then():
+    """It says since when; the entry id is another message's by now."""
+    receipts = make_link().outcomes.receipts
+    for name, at in (("then", 10.0), ("now", 10.5)):
+        asks = Outgoing(0, b"", Qos.DEFAULT, 0, 2, at, 99.0, wants_stamp=True, tally=TxTally())
+        asks.receipt, asks.entry_id = name, 7
+        receipts.expect(asks, (), at)
+    spare, draft = SpareRecords(), Draft(128)
+    spare.put_receipt(Receipt(0, 7, 1, 1, 100), 0.0, 10.01)
+    spare.ride(draft, 10.6)
+    (told,) = parse_records(draft._records[0])
+    assert told == Receipt(0, 7, 1, 1, 100, 5900)
+    receipts.hear(2, told, 10.6)
+    (verdict,) = receipts.take()
+    assert (verdict.receipt, verdict.took_s) == ("then", pytest.approx(0.01))
+    receipts.hear(2, told._replace(since_100us=0), 10.6)
+    assert receipts.take()[0].receipt == "now"
+
+
 def test_a_receipt_of_the_short_form_is_for_whom_the_pdu_is():
     """RECEIPT without node and age, as it was first written down."""
     link = make_link()
@@ -251,3 +275,14 @@ def test_the_yardstick_sees_a_receipt_that_lies():
     ((_, verdict),) = air.verdicts
     assert (verdict.fate, verdict.reason) == ("dropped", "rx_size_cap")
     assert not air.delivered
+
+
+def test_a_relay_that_has_just_begun_sends_on_nothing_that_is_too_old_either():
+    sender = make_link(own_id=1, hop_limit=2)
+    relay = make_link(own_id=2, hop_limit=2, relay=RelayParams(policy="flood"))
+    relay.set_policy(0, TopicPolicy(lifespan_s=0.2))
+    sender.submit(0, message(1), 5.0)
+    for pdu in sender.departures.compose(9.0, Allowance.of(63)).pdus:
+        relay.hear(pdu, 0.5, None, 0.5)
+    relay.departures.compose(0.6, Allowance.of(63))
+    assert relay.sender.relayed.dropped == {"tx_expired": 1}
