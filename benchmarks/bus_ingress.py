@@ -46,9 +46,11 @@ class _Counted:
         if self.count == self._expected:
             self.done.set()
 
-    def refuse(self, reason: str, topic_id: int | None = None, receipt: str = "") -> None:
+    def refuse(
+        self, reason: str, topic_id: int | None = None, receipt: str = "", dst: int | None = None
+    ) -> None:
         """No message of this benchmark may be refused."""
-        raise RuntimeError(f"topic {topic_id}: {reason} {receipt}")
+        raise RuntimeError(f"topic {topic_id}: {reason} {receipt} {dst}")
 
 
 def ingress_row(messages: int, runs: int) -> Row:

@@ -99,7 +99,7 @@ class Node:
         if transforms is not None:
             gathered, reason = transforms.take(payload, now)
             if gathered is None:
-                self.refuse(reason, topic_id, overrides.receipt)
+                self.refuse(reason, topic_id, overrides.receipt, overrides.dst)
                 return
             payload = gathered
         self._link.submit(topic_id, payload, now, overrides)
@@ -107,9 +107,15 @@ class Node:
             self._tell_verdicts()
         self._pdu_link.wake()
 
-    def refuse(self, reason: str, topic_id: int | None = None, receipt: str = "") -> None:
+    def refuse(
+        self,
+        reason: str,
+        topic_id: int | None = None,
+        receipt: str = "",
+        dst: int | None = None,
+    ) -> None:
         """A message that the bus could not take."""
-        self._link.outcomes.refuse(reason, topic_id, receipt)
+        self._link.outcomes.refuse(reason, topic_id, receipt, dst)
         if receipt:
             self._tell_verdicts()
 
@@ -258,9 +264,11 @@ class Node:
         for src, topic_id in self._link.outcomes.deadman.take_due(now):
             name = self._setup.republished_as(src, topic_id)
             stop = self._stops.get(topic_id)
-            if stop is not None:
-                log.warning("%s: silent, so the stop message was published", name)
-                self.bus.publish_stop(src, topic_id, stop)
+            if stop is None:
+                log.error("%s: silent, but of its type no stop message can be made", name)
+                continue
+            log.warning("%s: silent, so the stop message was published", name)
+            self.bus.publish_stop(src, topic_id, stop)
 
     def _look_at_clock(self) -> None:
         """What the host's clock is ahead of the link's, and how steadily."""

@@ -56,8 +56,14 @@ class Ingress(Protocol):
     ) -> None:
         """A good message; when it was published, in ns since 1970, if its producer says so."""
 
-    def refuse(self, reason: str, topic_id: int | None = None, receipt: str = "") -> None:
-        """A message that cannot be taken, and the ledger's reason; `receipt`: as in Overrides."""
+    def refuse(
+        self,
+        reason: str,
+        topic_id: int | None = None,
+        receipt: str = "",
+        dst: int | None = None,
+    ) -> None:
+        """A message that cannot be taken, and the ledger's reason; the rest is as in Overrides."""
 
 
 class Bus:
@@ -219,7 +225,7 @@ class Bus:
         except EnvelopeError as error:
             self._bad(str(error))
             return
-        receipt = header.id or "" if header is not None else ""
+        receipt, dst = ("", None) if header is None else (header.id or "", header.d)
         topic_id = self._topic_ids.get(topic)
         if topic_id is None:
             self._ingress.refuse("tx_unknown_topic")
@@ -227,9 +233,11 @@ class Bus:
             return
         size = len(payload)
         if size < CDR_HEADER_SIZE:
-            self._bad(f"payload of {size} bytes has no room for the CDR header", topic_id, receipt)
+            self._bad(
+                f"payload of {size} bytes has no room for the CDR header", topic_id, receipt, dst
+            )
         elif size > self._max_message_bytes:
-            self._ingress.refuse("tx_too_big", topic_id, receipt)
+            self._ingress.refuse("tx_too_big", topic_id, receipt, dst)
             self._bad_last = (
                 f"message of {size} B; bus.max_message_bytes allows {self._max_message_bytes}"
             )
@@ -237,7 +245,10 @@ class Bus:
             self._ingress.submit(topic_id, payload)
         elif header.ty is not None and header.ty != self._types[topic_id]:
             self._bad(
-                f"type {header.ty}; the registry has {self._types[topic_id]}", topic_id, receipt
+                f"type {header.ty}; the registry has {self._types[topic_id]}",
+                topic_id,
+                receipt,
+                dst,
             )
         else:
             overrides = Overrides(
@@ -249,9 +260,11 @@ class Bus:
             )
             self._ingress.submit(topic_id, payload, overrides, header.t)
 
-    def _bad(self, what: str, topic_id: int | None = None, receipt: str = "") -> None:
+    def _bad(
+        self, what: str, topic_id: int | None = None, receipt: str = "", dst: int | None = None
+    ) -> None:
         self._bad_last = what
-        self._ingress.refuse("tx_bad_envelope", topic_id, receipt)
+        self._ingress.refuse("tx_bad_envelope", topic_id, receipt, dst)
 
     def _take_subscription(self, frames: list[bytes]) -> None:
         subscribed, topic = frames[0][:1] == b"\x01", frames[0][1:]

@@ -89,14 +89,15 @@ def _chosen(link: LinkReport, name: str | None) -> list[ReceivedTopicReport]:
 def screen(link: LinkReport, heard: list[ReceivedTopicReport], *, whole: bool) -> RenderableType:
     """The waterfalls, and the clocks below them."""
     timed = [each for each in heard if each.latency is not None]
+    clocks = _clocks(link)
     if not timed:
-        return Text("no message with a STAMP was heard yet")
+        nothing = Text("no message with a STAMP was heard yet")
+        return nothing if clocks is None else Group(nothing, clocks)
     longest_ms = max(_total_ms(each.latency) for each in timed if each.latency)
     parts: list[RenderableType] = [_waterfalls(timed, longest_ms)]
     if whole:
         parts += [_percentiles(each) for each in timed]
     parts.append(Text(MEANING, style="dim"))
-    clocks = _clocks(link)
     if clocks is not None:
         parts.append(clocks)
     return Group(*parts)

@@ -88,6 +88,11 @@ def make_setup(config: Config, base: Path, source: str = "config") -> Setup:
             "channel, a registry of at most 15 topics; allowed here: false"
         )
     check_relay(config, node_id, registry, source)
+    if config.chrony.socket and config.chrony.robot == node_id:
+        raise ConfigError(
+            f"{source}: chrony.robot: got {node_id}, this robot itself; allowed: another robot, "
+            "whose clock is the true one"
+        )
     policies = _policies(config, registry, source)
     return Setup(
         config=config,

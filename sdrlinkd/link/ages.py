@@ -1,6 +1,7 @@
 """How old messages are: STAMP records meet the messages they speak of."""
 
 from collections import OrderedDict
+from collections.abc import Callable
 from typing import NamedTuple
 
 from sdrlinkd.wire import Stamp
@@ -51,10 +52,13 @@ class Ages:
         """Of one that is not."""
         return self._origins.get((src, topic_id, entry_id), UNKNOWN)
 
-    def expire(self, now: float) -> None:
-        """Forget stamps whose message never became complete."""
-        while self._origins:
+    def expire(self, now: float, is_held: Callable[[int, int, int], bool]) -> None:
+        """Forget stamps whose message never became complete, but for those it is still awaited."""
+        for _ in range(len(self._origins)):
             key, origin = next(iter(self._origins.items()))
             if now - origin.stamped_at < self._timeout_s:
                 return
-            del self._origins[key]
+            if is_held(*key):
+                self._origins.move_to_end(key)
+            else:
+                del self._origins[key]

@@ -26,6 +26,8 @@ class Burst(NamedTuple):
     """In the order in which they were composed."""
     first_start: float = 0.0
     """Where it was to leave at first; later than that when it came too late."""
+    n_records: int = 0
+    """PDUs with nothing but a beacon's, CLOCK and RECEIPT records."""
     ready_at: float = 0.0
     """From when on the radio could have taken it."""
     clock: int | None = None

@@ -123,8 +123,8 @@ class Departures:
             # Beacons are for everybody.
             mcs = self.rate.lowest
         length_s = airtime_s(mcs, len(burst.pdus))
-        if n_alone := burst.carried.count([]):
-            self.control_airtime_s += length_s * n_alone / len(burst.pdus)
+        if burst.n_records:
+            self.control_airtime_s += length_s * burst.n_records / len(burst.pdus)
             self._tellings.told_alone(slot.start)
         self.shares.spend(length_s, burst.classes, self._sender.outbox.waiting_classes())
         self.access.sent(slot.start + length_s, self._relayed_src(burst))
@@ -176,6 +176,7 @@ class Departures:
             pdus=urgent.pdus + records.pdus,
             carried=urgent.carried + records.carried,
             classes=urgent.classes + records.classes,
+            n_records=records.n_records,
         )
 
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:

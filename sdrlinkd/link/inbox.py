@@ -116,6 +116,9 @@ class Inbox:
             elif not is_relayed and not isinstance(record, Parity | Stamp):
                 self._ear.record_from(pdu.src, record, at)
         repaired = self._repaired(pdu.src, records, at) if records else []
+        if self.reassembly.lost:
+            # Parity needs room, too.
+            self._note_lost(now)
         entries = [*pdu.entries, *repaired] if repaired else pdu.entries
         if records is not None and len(entries) == 1:
             return self._drop("rx_control")
@@ -140,7 +143,7 @@ class Inbox:
         """Give up what has waited too long."""
         self.reassembly.expire(now)
         self._note_lost(now)
-        self._ages.expire(now)
+        self._ages.expire(now, self.reassembly.holds)
 
     def audit(self) -> list[str]:
         """What does not add up in the RX ledgers; empty when all does."""

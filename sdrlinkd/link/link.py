@@ -97,7 +97,8 @@ class Link:
             clock = NO_CLOCK
         self.clocks = Clocks(clock, beacons.boot_id, own_id)
         spare, neighbors = self.sender.packetizer.spare, self.inbox.neighbors
-        self.tellings = Tellings(clock, self.clocks, spare, neighbors)
+        room = self.sender.packetizer.k_single
+        self.tellings = Tellings(clock, self.clocks, spare, neighbors, room)
         self.departures = Departures(
             self.sender,
             self.inbox,
@@ -158,7 +159,9 @@ class Link:
         if overrides.receipt:
             self.outcomes.note(now)
             if refused in NOT_TAKEN:
-                self.outcomes.refused(overrides.receipt, topic_id, refused)
+                self.outcomes.refused(overrides.receipt, topic_id, refused, overrides.dst)
+            elif refused is None and not self.registry.has_control:
+                self.outcomes.unknowable(overrides.receipt, topic_id, overrides.dst)
         if refused is None:
             qos = self.sender.treatment(topic_id)[0] if overrides.qos is None else overrides.qos
             self.departures.forecasts.note((self.own_id, topic_id), qos, now)

@@ -25,7 +25,8 @@ class Outgoing:
     """One message on its way out."""
 
     __slots__ = (
-        "arrived_at", "dst", "entry_id", "expires_at", "fate", "is_compressed", "is_held",
+        "arrived_at", "dst", "entry_id", "expires_at", "fate", "is_compressed", "is_expected",
+        "is_held",
         "is_whole", "k", "lane", "last_at", "next_index", "parity", "payload", "priority", "qos",
         "receipt", "rests_id", "stamped", "tally", "topic_id", "total", "unconfirmed",
     )  # fmt: skip
@@ -68,6 +69,8 @@ class Outgoing:
         """Under this name its producer wants to know what becomes of it."""
         self.parity: list[bytes] = []
         """Control records that follow its last fragment, the first one last."""
+        self.is_expected = False
+        """The far ends were asked what becomes of it."""
         self.is_whole = False
         """The payload is another robot's PDU, to be sent on."""
 

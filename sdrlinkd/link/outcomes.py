@@ -7,7 +7,7 @@ from sdrlinkd.link.delivered import Delivered
 from sdrlinkd.link.latency import Latency
 from sdrlinkd.link.neighbors import Neighbor
 from sdrlinkd.link.policy import TopicPolicy
-from sdrlinkd.link.receipts import Receipts, make_receipt
+from sdrlinkd.link.receipts import Receipts, Verdict, make_receipt
 from sdrlinkd.link.sender import Sender
 from sdrlinkd.link.tellings import PRESENT_S, Tellings
 from sdrlinkd.wire import BROADCAST, Receipt
@@ -58,16 +58,28 @@ class Outcomes:
         if receipt.node in (self._own_id, BROADCAST):
             self.receipts.hear(src, receipt, at)
 
-    def refuse(self, reason: str, topic_id: int | None, receipt: str) -> None:
+    def refuse(
+        self, reason: str, topic_id: int | None, receipt: str, dst: int | None = None
+    ) -> None:
         """A message that the bus could not hand over."""
         self._sender.refuse(reason, topic_id)
         if receipt and topic_id is not None:
-            self.refused(receipt, topic_id, reason)
+            self.refused(receipt, topic_id, reason, dst)
 
-    def refused(self, receipt: str, topic_id: int, reason: str) -> None:
+    def refused(self, receipt: str, topic_id: int, reason: str, dst: int | None) -> None:
         """A message that was not taken."""
-        dst = self._sender.destination(topic_id)
-        self.receipts.refused(receipt, topic_id, dst, reason)
+        self._verdict(receipt, topic_id, dst, "dropped", reason)
+
+    def unknowable(self, receipt: str, topic_id: int, dst: int | None) -> None:
+        """A message that nobody can answer for want of a control channel."""
+        self._verdict(receipt, topic_id, dst, "unknown", "")
+
+    def _verdict(
+        self, receipt: str, topic_id: int, dst: int | None, fate: str, reason: str
+    ) -> None:
+        if dst is None:
+            dst = self._sender.destination(topic_id)
+        self.receipts.verdicts.append(Verdict(receipt, topic_id, dst, fate, reason))
 
     def note(self, now: float) -> None:
         """What has just been sent, or dropped."""

@@ -20,6 +20,7 @@ from sdrlinkd.link.schedule import ClassesParams
 from sdrlinkd.link.sole import Sole
 from sdrlinkd.link.spare import SpareRecords
 from sdrlinkd.wire import (
+    ASKING_STAMP_SIZE,
     BROADCAST,
     ENTRY_HEADER_SIZE,
     MAX_AGE_US,
@@ -232,6 +233,8 @@ class Packetizer:
             records.pop()
         if len(records) == n:
             return False
+        if head.stamped:
+            self._stamp(draft, head, start)
         draft.carried.append(head)
         draft.join(head)
         head.unconfirmed += 1
@@ -246,10 +249,10 @@ class Packetizer:
             lane.current = None
 
     def _parity_of(self, head: Outgoing) -> list[bytes]:
-        """Records, the first one last."""
-        ids, shape = (head.topic_id, head.entry_id), (head.k, head.total)
+        """Records, the first one last; beside them the age goes again, in case it was lost, too."""
         share = self._parity[head.qos] * self._has_control
-        return parity_records(head.payload, *shape, ids, share, self.k_single)[::-1]
+        ids, room = (head.topic_id, head.entry_id), self.k_single - ASKING_STAMP_SIZE
+        return parity_records(head.payload, head.k, head.total, ids, share, room)[::-1]
 
     def _send_stamp_ahead(
         self, lane: Lane, head: Outgoing, k: int, draft: Draft, start: float
@@ -282,8 +285,10 @@ class Packetizer:
         age_us = min(max(round((start - message.arrived_at) * 1e6), 0), MAX_AGE_US)
         asks = bool(message.receipt)
         stamp = build_stamp(message.topic_id, message.entry_id, age_us, asks)
-        message.stamped = draft.add_record(stamp)
-        if asks and message.stamped:
+        if not draft.add_record(stamp):
+            return
+        message.stamped = True
+        if asks and not message.is_expected:
             self.asking.append(message)
 
     def _must_wait(self, now: float) -> bool:

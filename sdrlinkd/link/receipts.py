@@ -66,6 +66,7 @@ class Receipts:
 
     def expect(self, message: Outgoing, present: Iterable[int], now: float) -> None:
         """A message has left; a broadcast one is for all robots `present`."""
+        message.is_expected = True
         awaited = set(present) if message.dst == BROADCAST else {message.dst}
         pending = _Pending(message, now + self._timeout_s, awaited or {BROADCAST})
         if self._n_pending >= MOST_PENDING:
@@ -103,11 +104,8 @@ class Receipts:
                     self._tell(message, dst, reason, None)
                 self._forget(pending)
                 return
-        self._tell(message, message.dst, reason, None)
-
-    def refused(self, receipt: str, topic_id: int, dst: int, reason: str) -> None:
-        """It was not even taken."""
-        self.verdicts.append(Verdict(receipt, topic_id, dst, "dropped", reason))
+        if not message.is_expected:
+            self._tell(message, message.dst, reason, None)
 
     def expire(self, now: float) -> None:
         """Who has not answered for so long does not know, or was not heard."""

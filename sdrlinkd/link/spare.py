@@ -74,7 +74,15 @@ class SpareRecords:
                 self._waiting[key] = each._replace(built=built)
 
     def ride(self, pdu: PduBuilder, start: float) -> None:
-        """As many as `pdu`, whose burst leaves at `start`, has room for."""
+        """As many as `pdu`, whose burst leaves at `start`, has room for.
+
+        A receipt that is older than its field can say would be taken for another message's.
+        """
+        oldest = start - MAX_SINCE * RECEIPT_UNIT_S
+        for key in [
+            key for key, each in self._waiting.items() if each.receipt and each.since < oldest
+        ]:
+            del self._waiting[key]
         rides = [key for key, each in self._waiting.items() if pdu.add_record(_as_of(each, start))]
         for key in rides:
             del self._waiting[key]

@@ -6,7 +6,7 @@ from sdrlinkd.link.burst import Burst
 from sdrlinkd.link.neighbors import Neighbor
 from sdrlinkd.link.spare import INFINITE, SpareRecords
 from sdrlinkd.link.timesync import ClockParams, Clocks
-from sdrlinkd.wire import MAX_ARRIVALS, Receipt, RecordType
+from sdrlinkd.wire import ARRIVAL_SIZE, CLOCK_SIZE, Receipt, RecordType
 
 PATIENCE_S = 0.05
 """What a RECEIPT waits for spare room at least."""
@@ -18,7 +18,9 @@ LESS = 1.05
 
 
 class Tellings:
-    """Records that are not a beacon's. `pdu_s`: airtime of a PDU with nothing else."""
+    """Records that are not a beacon's. A PDU with nothing else has room for `record_room` octets of
+    them, and takes `pdu_s` of airtime.
+    """
 
     def __init__(
         self,
@@ -26,11 +28,17 @@ class Tellings:
         clocks: Clocks,
         spare: SpareRecords,
         neighbors: Mapping[int, Neighbor],
+        record_room: int,
     ) -> None:
         self._params = params
         self._clocks = clocks
         self._spare = spare
         self._neighbors = neighbors
+        self._most_arrivals = (record_room - CLOCK_SIZE) // ARRIVAL_SIZE
+        self.fits = self._most_arrivals > 0
+        """Whether PDUs have room for clocks at all."""
+        if not self.fits:
+            clocks.end()
         self.pdu_s = 0.0
         self._told_alone_at = self._told_at = -INFINITE
         self._tells_at = 0.0
@@ -75,7 +83,7 @@ class Tellings:
         waits = self._spare.holds(RecordType.CLOCK)
         alone_at = max(start, self._clock_alone_at)
         self._tells_at = start
-        self._spare.put(self._clocks.record(start, MAX_ARRIVALS), alone_at)
+        self._spare.put(self._clocks.record(start, self._most_arrivals), alone_at)
         self._waits = True
         if not waits:
             self._overdue_at = alone_at + self.period_s

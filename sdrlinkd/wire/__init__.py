@@ -18,7 +18,15 @@ from sdrlinkd.wire.capacity import (
     max_message_size,
     pad_length,
 )
-from sdrlinkd.wire.clock import MAX_ARRIVALS, UNKNOWN_WALL, Arrival, Clock, tellable
+from sdrlinkd.wire.clock import (
+    ARRIVAL_SIZE,
+    CLOCK_SIZE,
+    MAX_ARRIVALS,
+    UNKNOWN_WALL,
+    Arrival,
+    Clock,
+    tellable,
+)
 from sdrlinkd.wire.control import (
     ASKING_STAMP_SIZE,
     MAX_AGE_US,
@@ -55,8 +63,10 @@ from sdrlinkd.wire.registry import (
 )
 
 __all__ = [
+    "ARRIVAL_SIZE",
     "ASKING_STAMP_SIZE",
     "BROADCAST",
+    "CLOCK_SIZE",
     "CONTROL_TOPIC_ID",
     "CRC_SIZE",
     "ENTRY_HEADER_SIZE",

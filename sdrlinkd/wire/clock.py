@@ -11,6 +11,8 @@ TICK_NS = 10
 """Arrivals are told in this unit."""
 _FIXED = struct.Struct(">HHHQqH")
 _ARRIVAL = struct.Struct(">BHi")
+CLOCK_SIZE, ARRIVAL_SIZE = 2 + _FIXED.size, _ARRIVAL.size
+"""Octets of a record without arrivals, and of each of those."""
 MAX_ARRIVALS = (255 - _FIXED.size) // _ARRIVAL.size
 _FARTHEST = (1 << 31) - 1
 

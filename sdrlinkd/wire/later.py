@@ -16,6 +16,10 @@ _POSTPONED = {int(RecordType.STAMP): _AGE, int(RecordType.FRAME): _PHASE}
 # The schedule is told by those who keep it.
 _FORWARDED = {int(RecordType.STAMP): _AGE}
 _U32 = struct.Struct(">I")
+# RECEIPT counts up in a smaller field, and not always.
+_SINCE, _SINCE_END, _SINCE_US = 6, 8, 100
+_U16 = struct.Struct(">H")
+MAX_SINCE = 0xFFFF
 HOP = 4
 """Octet of hops left and number of entries."""
 
@@ -24,6 +28,10 @@ def postponed(pdu: bytes, by_us: int) -> bytes:
     """A PDU of our own, with control channel, as it is when its burst leaves `by_us` µs later."""
     data = bytearray(pdu)
     _move(data, by_us, _POSTPONED)
+    for kind, at, length in _records(data):
+        if kind == RecordType.RECEIPT and length >= _SINCE_END:
+            (since,) = _U16.unpack_from(data, at + _SINCE)
+            _U16.pack_into(data, at + _SINCE, min(since + by_us // _SINCE_US, MAX_SINCE))
     return _sealed(data)
 
 
@@ -56,6 +64,14 @@ def lasting_identity(pdu: bytes) -> tuple[int, int, int]:
 
 def _times(pdu: bytes | bytearray, kinds: dict[int, int]) -> Iterator[int]:
     """Where in a good PDU the times stand of records of `kinds`."""
+    for kind, at, _ in _records(pdu):
+        offset = kinds.get(kind)
+        if offset is not None:
+            yield at + offset
+
+
+def _records(pdu: bytes | bytearray) -> Iterator[tuple[int, int, int]]:
+    """Of all records in a good PDU: type, where the value begins, and its length."""
     n_entries = HEADER.unpack_from(pdu)[HOP] & 0x0F
     at = HEADER_SIZE + (n_entries + 1) // 2
     for i in range(n_entries):
@@ -65,9 +81,7 @@ def _times(pdu: bytes | bytearray, kinds: dict[int, int]) -> Iterator[int]:
         at = begin + (pdu[at + 3] << 8 | pdu[at + 4])
         if topic_id == CONTROL_TOPIC_ID:
             while begin < at:
-                offset = kinds.get(pdu[begin])
-                if offset is not None:
-                    yield begin + TLV_HEADER_SIZE + offset
+                yield pdu[begin], begin + TLV_HEADER_SIZE, pdu[begin + 1]
                 begin += TLV_HEADER_SIZE + pdu[begin + 1]
 
 

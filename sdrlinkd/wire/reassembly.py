@@ -150,6 +150,11 @@ class Reassembly:
         """When `expire` may next have something to do; infinity when nothing is held."""
         return self._next_expiry if self.held else float("inf")
 
+    def holds(self, src: int, topic_id: int, entry_id: int) -> bool:
+        """Whether fragments of that message are kept."""
+        source = self._sources.get(src)
+        return source is not None and (topic_id, entry_id) in source.partials
+
     def take_lost(self) -> list[Lost]:
         """What was given up since the last call."""
         lost, self.lost = self.lost, []

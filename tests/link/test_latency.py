@@ -5,7 +5,7 @@ from random import Random
 
 import pytest
 
-from sdrlinkd.link import Allowance, ClockParams, Outcome, link_report
+from sdrlinkd.link import Allowance, ClockParams, Outcome, link_notices, link_report
 from sdrlinkd.link.latency import Latency, Parts
 from sdrlinkd.wire import Clock, RecordType, Waits
 from tests.link.world import PDU_S, make_link, next_burst, records_in
@@ -74,7 +74,7 @@ def test_why_a_message_waited_is_told_in_a_beacon():
     waits = link.departures.waits.of_topic[0]
     assert (waits.queue_s, waits.access_s, waits.again_s) == pytest.approx((0.01, 0.002, 0.03))
     link.submit(1, bytes(20), 0.6)
-    records = [each for pdu in next_burst(link, 0.6).pdus for each in records_in(pdu, 1024)]
+    records = [each for pdu in next_burst(link, 0.6).pdus for each in records_in(pdu, len(pdu))]
     told = [each for each in records if isinstance(each, Waits)]
     assert told == [Waits(0, 61, 12, 182)]
     receiver = make_link(own_id=2)
@@ -96,7 +96,7 @@ def clocks_of(link, until, step_s=0.01, submit_s=None):
         while burst := next_burst(link, now):
             link.confirm(burst, Outcome.SENT, now + PDU_S)
             for pdu, carried in zip(burst.pdus, burst.carried, strict=True):
-                if any(isinstance(each, Clock) for each in records_in(pdu, 1024)):
+                if any(isinstance(each, Clock) for each in records_in(pdu, len(pdu))):
                     found.append((now, not carried))
                     assert burst.clock is not None
     return found
@@ -126,3 +126,24 @@ def test_a_robot_that_is_alone_does_not_tell_its_clock():
             link.confirm(burst, Outcome.SENT, i * 0.01)
             assert burst.clock is None
     assert not link.sender.packetizer.spare.holds(RecordType.CLOCK)
+
+
+def test_on_small_pdus_clocks_tell_of_as_many_robots_as_there_is_room_for():
+    link = make_link(pdu_size=64, clock=ClockParams())
+    for src in range(2, 12):
+        link.clocks.hear(src, Clock(1, 1, 1, 1), 0.5)
+    found = clocks_of(link, 3.0)
+    assert len(found) > 5
+    tiny = make_link(pdu_size=32, clock=ClockParams())
+    assert clocks_of(tiny, 3.0) == []
+    assert any("have no room for CLOCK" in notice for notice in link_notices(tiny))
+    assert tiny.next_wakeup(3.0) > 3.0
+
+
+def test_a_stamp_that_goes_ahead_is_no_record_alone():
+    link = make_link(pdu_size=64, clock=ClockParams())
+    size = link.sender.packetizer.k_single
+    link.submit(0, bytes(size), 0.0)
+    burst = next_burst(link, 0.0)
+    assert len(burst.pdus) == 2
+    assert (burst.n_records, link.departures.control_airtime_s) == (0, 0.0)

@@ -10,6 +10,8 @@ from hypothesis import strategies as st
 from sdrlinkd.link import (
     DEFAULT_POLICY,
     Allowance,
+    ClassesParams,
+    ClassParams,
     ClockParams,
     Outcome,
     Overrides,
@@ -21,7 +23,7 @@ from sdrlinkd.link.draft import Draft
 from sdrlinkd.link.ledger import TxTally
 from sdrlinkd.link.message import Outgoing
 from sdrlinkd.link.spare import SpareRecords
-from sdrlinkd.wire import Receipt, parse_records
+from sdrlinkd.wire import Receipt, parse, parse_records
 from tests.link.world import make_link, next_burst
 
 STEP_S = 0.01
@@ -286,3 +288,75 @@ def test_a_relay_that_has_just_begun_sends_on_nothing_that_is_too_old_either():
         relay.hear(pdu, 0.5, None, 0.5)
     relay.departures.compose(0.6, Allowance.of(63))
     assert relay.sender.relayed.dropped == {"tx_expired": 1}
+
+
+@pytest.mark.parametrize("answered", [True, False])
+def test_a_message_is_told_of_once_however_late_it_fails(answered):
+    link = make_link(receipt_s=1.0)
+    link.submit(0, message(1), 0.0, Overrides(receipt="one", dst=2))
+    burst = next_burst(link, 0.0)
+    ((pending,),) = link.outcomes.receipts._pending.values()
+    if answered:
+        link.record_from(2, Receipt(0, pending.message.entry_id, 1), 0.1)
+    else:
+        link.handle_timers(2.0)
+    link.confirm(burst, Outcome.LOST, 2.1)
+    link.handle_timers(10.0)
+    (verdict,) = link.outcomes.receipts.take()
+    assert verdict.fate == ("delivered" if answered else "unknown")
+
+
+def test_without_a_control_channel_nobody_can_know():
+    link = make_link(topics=[(f"t{i}", "std_msgs/String") for i in range(16)])
+    assert link.submit(0, message(1), 0.0, Overrides(receipt="one", dst=3)) is None
+    (verdict,) = link.outcomes.receipts.take()
+    assert (verdict.fate, verdict.dst) == ("unknown", 3)
+
+
+def test_what_is_refused_names_the_robot_it_was_for():
+    link = make_link()
+    link.set_policy(0, TopicPolicy(max_bytes=10))
+    link.submit(0, message(1), 0.0, Overrides(receipt="one", dst=3))
+    assert link.outcomes.receipts.take()[0].dst == 3
+
+
+def test_an_early_stamp_is_kept_while_its_message_is_still_arriving():
+    sender, receiver = make_link(own_id=1, pdu_size=64), make_link(own_id=2, pdu_size=64)
+    receiver.set_policy(0, TopicPolicy(lifespan_s=60.0))
+    sender.submit(0, message(1, 900), 0.0)
+    pdus = []
+    for i in range(40):
+        if i == 2:
+            # Its rest leaves room for the other's age, too.
+            sender.submit(1, message(2, 4), 0.0)
+        burst = sender.departures.compose(0.05 * i, Allowance.of(1))
+        pdus += [(0.05 * i, pdu) for pdu in (burst.pdus if burst else ())]
+    got = []
+    for at, pdu in pdus:
+        receiver.handle_timers(at)
+        got += receiver.hear(pdu, at, None, at)
+    assert len(got) == 2
+    assert receiver.inbox.tallies[1, 0].dropped == {}
+
+
+def test_what_parity_repairs_has_its_age():
+    classes = ClassesParams(default=ClassParams(parity=0.3))
+    sender, receiver = (
+        make_link(own_id=1, pdu_size=128, classes=classes),
+        make_link(own_id=2, pdu_size=128),
+    )
+    receiver.set_policy(0, TopicPolicy(lifespan_s=60.0))
+    sender.submit(0, message(1, 1200), 0.0)
+    pdus = []
+    while burst := sender.departures.compose(0.1, Allowance.of(63)):
+        pdus += burst.pdus
+    last = max(
+        i for i, pdu in enumerate(pdus) if any(e.topic_id == 0 for e in parse(pdu, 128).entries)
+    )
+    got = []
+    for i, pdu in enumerate(pdus):
+        if i != last:
+            got += receiver.hear(pdu, 0.1, None, 0.11)
+    (heard,) = got
+    assert heard.origin_at == pytest.approx(0.0, abs=1e-5)
+    assert receiver.inbox.fragments_repaired >= 1

@@ -14,6 +14,8 @@ SEQUENCE = 1 << 16
 MAX_WALL_ERROR_US = 0xFFFF
 RIDES_FROM = 0.75
 """Of a period after the last one, a record is ready for spare room."""
+HOST_DRIFT = 1e-4
+"""Of a host's clock against its radio's, which it has told of at its last CLOCK."""
 FORGOTTEN_S = 30.0
 """A robot not heard for so long is not told of any more."""
 
@@ -58,12 +60,17 @@ class Clocks:
         if self.wall is not None:
             wall_ns = self.wall.ns
             error_us = min(round(1e6 * self.wall.error_s), MAX_WALL_ERROR_US)
-        heard = sorted(self.peers.values(), key=lambda peer: -peer.last_at)
         told = [
-            peer.arrival(1e-9 * left_ns) for peer in heard if start - peer.last_at < FORGOTTEN_S
+            peer.arrival(1e-9 * left_ns)
+            for peer in self.peers.values()
+            if start - peer.last_at < FORGOTTEN_S
         ]
         arrivals = [each for each in told if each is not None and tellable(each)]
         most = min(max(room, 0), MAX_ARRIVALS)
+        if len(arrivals) > most:
+            # In turn, so that everybody hears of himself.
+            first = self._number * most % len(arrivals)
+            arrivals = arrivals[first:] + arrivals[:first]
         return Clock(
             self._boot_id, self._number, stamped, left_ns, wall_ns, error_us, tuple(arrivals[:most])
         )
@@ -103,7 +110,7 @@ class Clocks:
         known = peer.estimate(now)
         if known is None:
             return None
-        hosts_s = self.wall.error_s + peer.wall.error_s
+        hosts_s = self.wall.error_s + peer.wall.error_s + HOST_DRIFT * max(0.0, now - peer.last_at)
         offset_ns = self.wall.ns - peer.wall.ns + round(1e9 * known.offset(now))
         return offset_ns, known.bound(now) + hosts_s, hosts_s
 

@@ -153,6 +153,8 @@ class DualEnvelope:
         middle = np.nextafter(float(np.median(times)), np.inf)
         for side in (self._above, self._below):
             side.forget_before(middle)
+            if len(side) == len(times):
+                side.clear()
 
 
 class _Fit:
@@ -216,8 +218,9 @@ class _Fit:
         """How likely each is, against the likeliest."""
         above, below = self._bounds(slopes)
         (n_above, x_above, v_above), (n_below, x_below, v_below) = self._totals
-        excess = v_above - slopes * x_above - above + self._resolution_s
-        lack = v_below + slopes * x_below - below + self._resolution_s
+        # Of samples close together the lowest is that for one slope; for others it may not be.
+        excess = np.maximum(v_above - slopes * x_above - above, 0.0) + self._resolution_s
+        lack = np.maximum(v_below + slopes * x_below - below, 0.0) + self._resolution_s
         # Crystals that are far off are rare, but there are some.
         unusual = -np.log(np.exp(-((1e6 * slopes / PRIOR_PPM) ** 2) / 2) + 1e-6)
         costs = n_above * np.log(excess) + n_below * np.log(lack) + unusual

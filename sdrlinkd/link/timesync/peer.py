@@ -4,7 +4,7 @@ from collections import OrderedDict
 from enum import Enum
 from typing import NamedTuple
 
-from sdrlinkd.link.timesync.envelope import DualEnvelope, Estimate
+from sdrlinkd.link.timesync.envelope import WINDOW_S, DualEnvelope, Estimate
 from sdrlinkd.wire import UNKNOWN_WALL, Arrival, Clock
 
 COARSE_S = 0.005
@@ -51,14 +51,14 @@ class PeerClock:
         self._boot_id: int | None = None
         self._strange_boot_id: int | None = None
         self._arrivals: OrderedDict[int, float] = OrderedDict()
-        self._told: int | None = None
+        self._told_left_at = -float("inf")
         self._last_number = 0
         self._solved_at = -float("inf")
         self._has_news = False
 
     def hear(self, clock: Clock, at: float, own_id: int, left: dict[int, float]) -> None:
         """A CLOCK whose burst came at `at`; `left`: when our own left, by their numbers."""
-        if not self._is_acceptable(clock):
+        if not self._is_acceptable(clock, at):
             self.refused += 1
             return
         if self._arrivals:
@@ -68,8 +68,9 @@ class PeerClock:
         came = self._arrivals.get(clock.stamped)
         if came is not None:
             self.envelope.heard(left_there, came, 0.0)
-            # What it tells again of the same CLOCK is nothing new.
-            del self._arrivals[clock.stamped]
+            # What it tells again of the same CLOCK, or of those before, is nothing new.
+            while clock.stamped in self._arrivals:
+                self._arrivals.popitem(last=False)
             self._has_news = True
         self._arrivals[clock.number] = at
         if len(self._arrivals) > REMEMBERED:
@@ -77,11 +78,14 @@ class PeerClock:
         if clock.wall_ns != UNKNOWN_WALL:
             self.wall = Wall(clock.wall_ns, 1e-6 * clock.wall_error_us)
         for node, number, after_ns in clock.arrivals:
-            if node == own_id and number in left and number != self._told:
-                self._told = number
+            left_at = left.get(number, self._told_left_at) if node == own_id else -float("inf")
+            if left_at > self._told_left_at:
+                self._told_left_at = left_at
                 came_there = 1e-9 * (clock.left_ns + after_ns)
-                self.envelope.was_heard(left[number], came_there, 0.0)
+                self.envelope.was_heard(left_at, came_there, 0.0)
                 self._has_news = True
+                # One of ours in each of its: more would be a lie.
+                break
         self.estimate(at)
 
     def arrival(self, base_s: float) -> Arrival | None:
@@ -108,9 +112,13 @@ class PeerClock:
             return State.HOLDOVER
         return State.COARSE if known.bound(now) > COARSE_S else State.SYNCED
 
-    def _is_acceptable(self, clock: Clock) -> bool:
+    def _is_acceptable(self, clock: Clock, at: float) -> bool:
         if self._boot_id is None:
             self._boot_id = clock.boot_id
+            return True
+        if clock.boot_id == self._boot_id and at - self.last_at > WINDOW_S:
+            # Its numbers may have gone round.
+            self._arrivals.clear()
             return True
         if clock.boot_id == self._boot_id:
             newer = (clock.number - self._last_number) % SEQUENCE
@@ -121,7 +129,7 @@ class PeerClock:
             return False
         self._boot_id, self._strange_boot_id = clock.boot_id, None
         self._arrivals.clear()
-        self._told = None
+        self._told_left_at = -float("inf")
         self.wall = None
         self.period_s = 0.0
         self.envelope.forget()

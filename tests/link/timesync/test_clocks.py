@@ -6,7 +6,7 @@ import pytest
 
 from sdrlinkd.link import ClockParams, State, Wall
 from sdrlinkd.link.timesync import Clocks
-from sdrlinkd.wire import UNKNOWN_WALL, Clock
+from sdrlinkd.wire import UNKNOWN_WALL, Arrival, Clock
 
 SEED = 3
 PERIOD_S = 0.2
@@ -169,3 +169,49 @@ def test_numbers_wrap_and_records_tell_of_so_many_as_there_is_room_for():
         pair.one.hear(src, Clock(1, 1, 1, 1), pair.at)
     assert len(pair.one.record(pair.at, 5).arrivals) == 5
     assert len(pair.one.record(pair.at + 40, 30).arrivals) == 0, "nobody was heard for so long"
+
+
+def test_who_tells_of_many_of_our_clocks_at_once_or_of_old_ones_is_believed_one():
+    pair = Pair()
+    pair.run(50)
+    peer, samples = pair.one.peers[2], pair.one.peers[2].envelope.samples
+    record, came = pair.sent[-1]
+    numbers = (40, 41, 10, 42, 11, 43, 12, 49, 13)
+    arrivals = tuple(Arrival(1, number, 10 * number) for number in numbers)
+    lie = record._replace(number=record.number + 1, stamped=0, arrivals=arrivals)
+    pair.one.hear(2, lie, came + 0.01)
+    assert peer.envelope.samples == samples
+    pair.two.rode()
+    pair.run(20)
+    assert abs(pair.error_s()) < 3e-6
+
+
+def test_numbers_that_went_round_while_nobody_listened_are_taken():
+    pair = Pair()
+    pair.run(20)
+    pair.two._number = (pair.two._number + 40_000) % 65536
+    pair.at += 61.0
+    pair.run(20)
+    assert pair.one.peers[2].refused == 0
+    assert abs(pair.error_s()) < 3e-6
+
+
+def test_where_there_is_little_room_everybody_is_told_of_in_turn():
+    pair = Pair()
+    for src in range(10, 20):
+        pair.one.hear(src, Clock(1, 1, 1, 1), 10.0)
+    told = set()
+    for i in range(10):
+        record = pair.one.record(10.0 + i, 3)
+        assert len(record.arrivals) == 3
+        told |= {each.node for each in record.arrivals}
+        pair.one.rode()
+    assert told == set(range(10, 20))
+
+
+def test_a_host_clock_not_heard_of_for_long_is_known_less_well():
+    pair = Pair()
+    pair.one.wall, pair.two.wall = Wall(0, 1e-4), Wall(0, 1e-4)
+    pair.run(20)
+    errors = [pair.one.wall_offset(2, pair.at + wait_s)[1] for wait_s in (0.2, 60.0)]
+    assert errors[1] > errors[0] + 5e-3

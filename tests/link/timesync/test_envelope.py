@@ -136,3 +136,25 @@ def test_only_points_on_which_a_line_can_rest_are_looked_at(steps, slope):
         side.add(x, v, 0.0)
     xs, vs = side.lowest(0.01)
     assert (vs - slope * xs).min() == (side.v - slope * side.x).min()
+
+
+@pytest.mark.parametrize("hz", [20, 50, 200])
+@pytest.mark.parametrize("seed", range(20))
+def test_samples_close_together_are_as_good_as_others(hz, seed):
+    rng = Random(seed)
+    envelope = DualEnvelope(1e-6)
+    for i in range(2 * hz):
+        at = i / hz
+        exchange(envelope, at, 1.0 + 3e-5 * at, rng.expovariate(1e3), rng.expovariate(1e3))
+        estimate = envelope.solve(at + 0.01)
+        truth_s = 1.0 + 3e-5 * at
+        assert abs(estimate.offset(at) - truth_s) <= estimate.bound(at) + 1e-5
+    assert abs(estimate.offset(at) - truth_s) < 5e-4, f"seed {seed}"
+
+
+def test_samples_in_any_order_end():
+    envelope = DualEnvelope(1e-6)
+    for number in (40, 41, 42, 10, 43, 44, 11, 45, 12, 46, 13):
+        envelope.was_heard(number * 0.15, number * 0.15 - 5.0, 0.0)
+        envelope.heard(number * 0.15 + 9.0, number * 0.15, 0.0)
+    assert envelope.solve(7.0) is None
