@@ -1,5 +1,6 @@
 """`latency`: how late messages come, why, and how well other robots' clocks are known."""
 
+import sys
 import time
 from typing import Annotated
 
@@ -17,6 +18,8 @@ from sdrlinkd.cli.status import WATCH_PERIOD_S, ask_status
 from sdrlinkd.errors import UserError
 from sdrlinkd.reports import LatencyReport, LinkReport, ReceivedTopicReport
 
+WIDE = 130
+"""In a file, nothing is cut short at the 80 columns of a terminal that is not there."""
 WIDTH = 30
 """Characters of the longest waterfall."""
 PARTS = (
@@ -61,7 +64,7 @@ def latency(
             }
             typer.echo(msgspec.json.encode(told).decode())
             return
-        console = Console()
+        console = Console() if sys.stdout.isatty() else Console(width=WIDE)
         if not watch:
             console.print(screen(link, heard, whole=topic is not None))
             return
@@ -105,7 +108,8 @@ def screen(link: LinkReport, heard: list[ReceivedTopicReport], *, whole: bool) -
 
 def _waterfalls(heard: list[ReceivedTopicReport], longest_ms: float) -> Table:
     table = boxless("latency, recent means in ms")
-    table.add_column("topic", no_wrap=True)
+    names = [each.republished_as or each.name for each in heard]
+    table.add_column("topic", no_wrap=True, min_width=max(map(len, names)))
     table.add_column("age", justify="right", no_wrap=True)
     for name, field, *_ in PARTS:
         if any(_part_ms(each.latency, field) is not None for each in heard):
@@ -113,9 +117,9 @@ def _waterfalls(heard: list[ReceivedTopicReport], longest_ms: float) -> Table:
     for name in ("p99", "jitter"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
-    for each in heard:
+    for each, topic in zip(heard, names, strict=True):
         latency = each.latency
-        row = [each.republished_as or each.name, milliseconds(_total_ms(latency))]
+        row = [topic, milliseconds(_total_ms(latency))]
         for _, field, *_ in PARTS:
             if any(_part_ms(other.latency, field) is not None for other in heard):
                 row.append(milliseconds(_part_ms(latency, field)))

@@ -33,7 +33,7 @@ stop = {{ linear = {{ z = -0.5 }} }}
 lifespan_s = 5.0
 [chrony]
 socket = "{chrony}"
-robot = 1
+robot = {source}
 """
 
 
@@ -43,9 +43,12 @@ def pair(start_daemon, tmp_path_factory):
     hub = tmp_path_factory.mktemp("hub")
     radios = {robot: RadioParams(full_duplex=True, clock_ppm=ppm) for robot, ppm in PPM.items()}
     with serving(hub, radios, **AIR):
-        chrony = hub / "chrony.sock"
+        chrony = str(hub / "chrony.sock")
         daemons = [
-            start_daemon(CONFIG.format(robot=robot, hub=hub, chrony=chrony)) for robot in PPM
+            start_daemon(
+                CONFIG.format(robot=robot, hub=hub, chrony=chrony * (robot == 2), source=3 - robot)
+            )
+            for robot in PPM
         ]
 
         def know_each_other():
@@ -97,7 +100,7 @@ def test_two_daemons_know_how_late_everything_is(pair, capsys):
         assert abs(clock.wall_offset_ms) < 5.0, "the same host"
         assert (clock.steps, clock.resets, clock.refused) == (0, 0, 0)
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as chronyd:
-        chronyd.bind(str(chrony))
+        chronyd.bind(chrony)
         chronyd.settimeout(10)
         offset_s = struct.unpack_from("@d", chronyd.recv(40), 16)[0]
         assert abs(offset_s) < 0.005, "robot 1 is on the same host"
