@@ -145,6 +145,7 @@ class Node:
             at, topic_id, payload = self._upcoming
             self._link.submit(topic_id, payload, self._began_at + at)
             self._upcoming = next(self._traffic, None)
+            self._pdu_link.wake()
         if now - self._ticked_at >= TICK_S:
             self._ticked_at = now
             for topic_id, transforms in self._transforms.items():

@@ -28,6 +28,7 @@ def status(snapshot: Snapshot) -> RenderableType:
         parts.append(received_topics(snapshot.link.received))
     if snapshot.link.neighbors:
         parts.append(neighbors(snapshot.link.neighbors))
+        parts += clocks(snapshot.link.neighbors)
     drops = dropped(snapshot)
     if drops is not None:
         parts.append(drops)
@@ -124,7 +125,7 @@ def neighbors(reports: list[NeighborReport]) -> Table:
     for column, justify in (
         ("robot", "left"), ("heard", "right"), ("PDUs", "right"), ("lost", "right"),
         ("PER", "right"), ("twice", "right"), ("SNR", "right"), ("hears us", "right"),
-        ("MCS", "right"), ("registry", "left"), ("clock", "left"),
+        ("MCS", "right"), ("registry", "left"),
     ):  # fmt: skip
         table.add_column(column, justify=justify, no_wrap=True)  # type: ignore[arg-type]
     for report in reports:
@@ -139,9 +140,14 @@ def neighbors(reports: list[NeighborReport]) -> Table:
             NOTHING if report.snr_there_db is None else f"{report.snr_there_db:.1f} dB",
             str(report.mcs),
             Text(report.registry, style="bold red" if report.registry == "differs" else ""),
-            NOTHING if report.clock is None else clock_state(report.clock),
         )
     return table
+
+
+def clocks(reports: list[NeighborReport]) -> list[Text]:
+    """How well those of others are known, in a line; nothing where nobody tells."""
+    known = [f"{each.src} {clock_state(each.clock)}" for each in reports if each.clock]
+    return [Text(f"clocks of robots: {'; '.join(known)}")] if known else []
 
 
 def clock_state(clock: ClockReport) -> str:
