@@ -1,0 +1,106 @@
+"""A bus from outside: faults in, counters out, in the process of a test."""
+
+import mmap
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+# layout.h: the order of Control's words, and where they are.
+FIELDS = (
+    *("unplugged", "unplugs", "stall", "lose", "underflow", "time_error", "crash", "hang"),
+    *("owner", "mode", "on_from_ns", "on_until_ns"),
+    *("sent", "bursts", "underflows", "late", "received", "lost", "overflows", "opened"),
+)
+HEADER = 4096
+UNITS = 16
+UNIT = 16818176
+SIZE = HEADER + UNITS * UNIT
+
+MODE_TX = 2
+
+
+@dataclass(frozen=True)
+class Stats:
+    """What a unit has done since its bus began, in samples or counts."""
+
+    sent: int
+    bursts: int
+    underflows: int
+    late: int
+    received: int
+    lost: int
+    overflows: int
+    opened: int
+    is_open: bool
+    is_transmitting: bool
+
+
+class Bus:
+    """The shared memory of the bus `name`, made if nobody has; removed when a `with` ends."""
+
+    def __init__(self, name: str) -> None:
+        self._path = Path(f"/dev/shm/soapy-loopback-{name}")  # noqa: S108
+        with self._path.open("a+b") as file:
+            if file.seek(0, 2) == 0:
+                file.truncate(SIZE)
+            self._map = mmap.mmap(file.fileno(), SIZE)
+        self._words = memoryview(self._map).cast("q")
+
+    def inject(self, unit: int, fault: str) -> None:
+        """A fault as README.md names it: "unplug", "overflow=5000", …"""
+        name, _, number = fault.partition("=")
+        count = int(number or 1)
+        if name == "unplug":
+            self._set(unit, "unplugs", self._get(unit, "unplugs") + 1)
+            self._set(unit, "unplugged", 1)
+        elif name == "replug":
+            self._set(unit, "unplugged", 0)
+        elif name == "overflow":
+            self._set(unit, "lose", int(number or 10000))
+        elif name in ("underflow", "time_error", "stall", "crash", "hang"):
+            self._set(unit, name, count)
+        else:
+            raise ValueError(name)
+
+    def stats(self, unit: int) -> Stats:
+        """Counters of this moment."""
+        word = {name: self._get(unit, name) for name in FIELDS}
+        now_ns = time.monotonic_ns()
+        on = word["mode"] == MODE_TX or word["on_from_ns"] <= now_ns < word["on_until_ns"]
+        counters = ("sent", "bursts", "underflows", "late", "received", "lost", "overflows")
+        return Stats(
+            *(word[name] for name in counters),
+            opened=word["opened"],
+            is_open=word["owner"] != 0,
+            is_transmitting=on,
+        )
+
+    def close(self) -> None:
+        """Removes the bus; devices that are open keep what they have."""
+        self._words.release()
+        self._map.close()
+        self._path.unlink(missing_ok=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _at(self, unit: int, name: str) -> int:
+        if not 0 <= unit < UNITS:
+            raise ValueError(unit)
+        return (HEADER + unit * UNIT) // 8 + FIELDS.index(name)
+
+    def _get(self, unit: int, name: str) -> int:
+        return self._words[self._at(unit, name)]
+
+    def _set(self, unit: int, name: str, value: int) -> None:
+        self._words[self._at(unit, name)] = value
