@@ -1,6 +1,12 @@
-"""Radios: IQ samples in and out."""
+"""Radios: IQ samples in and out.
 
-from backends.air import Channel
+What simulates air brings `phy` and its compiled code; it is loaded when it is first asked for, as
+the radio process, and others that only move samples, never do.
+"""
+
+import importlib
+from typing import TYPE_CHECKING
+
 from backends.base import (
     SENDING,
     BackendError,
@@ -13,30 +19,35 @@ from backends.base import (
     TxOutcome,
     TxReport,
 )
-from backends.ether import (
-    AirParams,
-    AirSense,
-    Answer,
-    BurstMedium,
-    BurstShape,
-    EtherHub,
-    EtherRadio,
-    Flight,
-    HubWatch,
-    LinkOverride,
-    LocalEther,
-    Outage,
-    RadioParams,
-    Track,
-    World,
-    burst_shape,
-)
-from backends.iqfile import IqFileRadio
-from backends.loopback import LoopbackRadio
 from backends.outstanding import GAP
-from backends.oversampled import OversampledRadio
 from backends.recording import RecordingInfo, RecordingReader, RecordingWriter, describe
 from backends.samples import SAMPLE_TYPES
+from backends.soapy import SoapyRadio, SoapySettings
+
+if TYPE_CHECKING:
+    from backends.air import Channel
+    from backends.ether import (
+        AirParams,
+        AirSense,
+        Answer,
+        BurstMedium,
+        BurstShape,
+        EtherHub,
+        EtherRadio,
+        Flight,
+        HubWatch,
+        LinkOverride,
+        LocalEther,
+        Outage,
+        RadioParams,
+        Track,
+        World,
+        burst_shape,
+    )
+    from backends.iqfile import IqFileRadio
+    from backends.loopback import LoopbackRadio
+    from backends.offset import OffsetRadio
+    from backends.oversampled import OversampledRadio
 
 __all__ = [
     "GAP",
@@ -58,6 +69,7 @@ __all__ = [
     "LinkOverride",
     "LocalEther",
     "LoopbackRadio",
+    "OffsetRadio",
     "Outage",
     "OversampledRadio",
     "Radio",
@@ -67,6 +79,8 @@ __all__ = [
     "RecordingWriter",
     "RxBlock",
     "Samples",
+    "SoapyRadio",
+    "SoapySettings",
     "Track",
     "Tuning",
     "TxBurst",
@@ -76,3 +90,19 @@ __all__ = [
     "burst_shape",
     "describe",
 ]
+
+_LATER = {
+    "backends.air": {"Channel"},
+    "backends.iqfile": {"IqFileRadio"},
+    "backends.loopback": {"LoopbackRadio"},
+    "backends.offset": {"OffsetRadio"},
+    "backends.oversampled": {"OversampledRadio"},
+}
+
+
+def __getattr__(name: str) -> object:
+    """What is loaded when it is asked for (PEP 562)."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    where = next((each for each, names in _LATER.items() if name in names), "backends.ether")
+    return getattr(importlib.import_module(where), name)

@@ -16,14 +16,11 @@ def answered(report: TxReport) -> asyncio.Future[TxReport]:
     return answer
 
 
-class Outstanding:
-    """Places bursts one after another, and answers each when the stream has passed its end."""
+class Places:
+    """Lays bursts one after another."""
 
     def __init__(self) -> None:
-        self._waiting: list[tuple[TxReport, asyncio.Future[TxReport]]] = []
         self._free_from = 0
-        self._is_over = False
-        self._first_end = NEVER
 
     def place(self, burst: TxBurst, earliest: int) -> int | None:
         """Where a burst begins when `earliest` is the first index possible; None: too late."""
@@ -32,6 +29,16 @@ class Outstanding:
             return None
         self._free_from = start + len(burst.samples) + GAP
         return start
+
+
+class Outstanding(Places):
+    """And answers each when the stream has passed its end."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._waiting: list[tuple[TxReport, asyncio.Future[TxReport]]] = []
+        self._is_over = False
+        self._first_end = NEVER
 
     def left(self, start: int, n_samples: int) -> asyncio.Future[TxReport]:
         """The report that comes when the last sample has left, or all is lost."""

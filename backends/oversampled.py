@@ -1,6 +1,6 @@
 """A radio at twice or four times the modem's rate: for those that are not made for slow ones."""
 
-from collections.abc import AsyncIterator, Awaitable
+from collections.abc import AsyncIterator, Awaitable, Iterator
 from dataclasses import replace
 
 from backends.base import Capabilities, Hear, Radio, RxBlock, Samples, Tuning, TxBurst, TxReport
@@ -15,6 +15,7 @@ class OversampledRadio:
         self._factor = factor
         self._down = Downsampler(factor)
         self._tuning: Tuning | None = None
+        self._last_ns = 0
 
     @property
     def capabilities(self) -> Capabilities:
@@ -37,27 +38,34 @@ class OversampledRadio:
         self._tuning = tuning
         await self._radio.open(replace(tuning, rate_hz=tuning.rate_hz * self._factor))
 
-    async def blocks(
-        self,
-        hear: Hear | None = None,  # noqa: ARG002  # filtered here, on the event loop
-    ) -> AsyncIterator[RxBlock]:
+    async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
         """Blocks REACH samples late; what lies before a gap is told as if silence followed."""
-        late_ns, last_ns = round(self._reach_s * 1e9), 0
-        async for block in self._radio.blocks():
-            last_ns = block.host_ns
-            if block.samples is not None:
-                samples = self._down.push(block.samples)
-                if len(samples):
-                    yield self._told(samples, block, block.host_ns - late_ns)
-                continue
-            if len(rest := self._down.flush()):
-                yield self._told(rest, block, block.host_ns)
-            begin = self._down.next_index
-            self._down.restart(block.index + block.n)
-            n = self._down.next_index - begin
-            yield RxBlock(begin, n, None, block.gap_reason, block.host_ns, self._unsure(block))
+
+        def hear_filtered(block: RxBlock) -> None:
+            if hear is not None:
+                for each in self._filtered(block):
+                    hear(each)
+
+        async for block in self._radio.blocks(None if hear is None else hear_filtered):
+            for each in self._filtered(block):
+                yield each
         if len(rest := self._down.flush()):
-            yield RxBlock(self._down.next_index - len(rest), len(rest), rest, "", last_ns)
+            index = self._down.next_index - len(rest)
+            yield RxBlock(index, len(rest), rest, "", self._last_ns)
+
+    def _filtered(self, block: RxBlock) -> Iterator[RxBlock]:
+        self._last_ns = block.host_ns
+        if block.samples is not None:
+            samples = self._down.push(block.samples)
+            if len(samples):
+                yield self._told(samples, block, block.host_ns - round(self._reach_s * 1e9))
+            return
+        if len(rest := self._down.flush()):
+            yield self._told(rest, block, block.host_ns)
+        begin = self._down.next_index
+        self._down.restart(block.index + block.n)
+        n = self._down.next_index - begin
+        yield RxBlock(begin, n, None, block.gap_reason, block.host_ns, self._unsure(block))
 
     def send(self, burst: TxBurst) -> Awaitable[TxReport]:
         """The burst with the filter's rise before and fall behind it."""

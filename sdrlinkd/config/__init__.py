@@ -11,6 +11,7 @@ from sdrlinkd.config.carriers import (
     TransformParams,
 )
 from sdrlinkd.config.load import explain_policy, load_config, parse_config, parse_toml
+from sdrlinkd.config.radios import SoapyParams
 from sdrlinkd.config.schema import BusParams, Config
 from sdrlinkd.config.setup import Setup, load_registry, make_setup
 
@@ -25,6 +26,7 @@ __all__ = [
     "ModemParams",
     "PlayParams",
     "Setup",
+    "SoapyParams",
     "TransformParams",
     "explain_policy",
     "load_config",

@@ -28,6 +28,32 @@ def check_carrier(config: Config, source: str) -> None:
             f'{source}: iqfile.receive, iqfile.transmit: both are ""; allowed: name a recording to '
             "play, one to write, or both"
         )
+    if config.backend == "soapy":
+        _check_soapy(config, source)
+
+
+def _check_soapy(config: Config, source: str) -> None:
+    modem, soapy = config.modem, config.soapy
+    if not soapy.device:
+        raise ConfigError(
+            f'{source}: soapy.device: got ""; allowed: a device, such as "driver=hackrf"; those '
+            "here are shown by: sdrlinkctl radio probe"
+        )
+    if not modem.frequency_hz:
+        raise ConfigError(
+            f'{source}: modem.frequency_hz: got 0 (not set); allowed with backend = "soapy": a '
+            "frequency that radio, antenna and licence are for, such as 433.5e6"
+        )
+    if soapy.tx_enabled and soapy.tx_gain_db is None and not soapy.tx_gains:
+        raise ConfigError(
+            f"{source}: soapy.tx_gain_db: not set; allowed with soapy.tx_enabled = true: a gain in "
+            "dB, or soapy.tx_gains by element; begin low: sdrlinkctl radio probe shows the range"
+        )
+    if soapy.offset_tuning == "on" and modem.oversampling == 1:
+        raise ConfigError(
+            f'{source}: soapy.offset_tuning: got "on" with modem.oversampling = 1; allowed: '
+            "modem.oversampling 2 or 4, room for the oscillator beside the channel"
+        )
 
 
 def _check_sharing(config: Config, source: str) -> None:

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+SIMULATED_HZ = 2.45e9
 Decibel = Annotated[float, Meta(ge=-300)]
 
 
@@ -31,7 +32,8 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     rate_hz: Annotated[float, Meta(ge=1e4, le=2e8)] = 5e6
     """Samples a second, and the width of the channel; the same at all nodes."""
-    frequency_hz: Annotated[float, Meta(ge=0, le=1e11)] = 2.45e9
+    frequency_hz: Annotated[float, Meta(ge=0, le=1e11)] = 0.0
+    """Middle of the channel; 0: not set, and simulations take SIMULATED_HZ."""
     mcs: Annotated[int, Meta(ge=0, le=9)] = 1
     """Modulation and code rate; `sdrlinkctl phy info` lists them."""
     grid: Literal["64/16", "64/8", "128/16", "256/32"] = "64/16"
@@ -60,6 +62,11 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Samples are received in pieces of this length."""
     oversampling: Literal[1, 2, 4] = 1
     """The radio runs at so many times `rate_hz`: for those that are not made for slow rates."""
+
+    @property
+    def carrier_hz(self) -> float:
+        """The middle of the channel, also where none is set."""
+        return self.frequency_hz or SIMULATED_HZ
 
 
 class LoopbackParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -15,6 +15,7 @@ from sdrlinkd.config.carriers import (
     PlayParams,
     TransformParams,
 )
+from sdrlinkd.config.radios import SoapyParams
 from sdrlinkd.link import (
     AccessParams,
     ClassesParams,
@@ -60,7 +61,7 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """Namespace under which another robot's topics are republished."""
     rx_depth: Annotated[int, Meta(ge=0)] = 256
     """Messages kept for a consumer that does not read; 0: without bound."""
-    backend: Literal["direct", "loopback", "iqfile", "ether"] = "direct"
+    backend: Literal["direct", "loopback", "iqfile", "ether", "soapy"] = "direct"
     drain_s: Annotated[float, Meta(ge=0, le=60)] = 1.0
     """Time to send what is queued when the daemon is stopped."""
     seed: int | None = None
@@ -81,6 +82,7 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     loopback: LoopbackParams = LoopbackParams()
     iqfile: IqFileParams = IqFileParams()
     ether: EtherParams = EtherParams()
+    soapy: SoapyParams = SoapyParams()
     channel: ChannelParams = ChannelParams()
     play: PlayParams = PlayParams()
     topic: dict[str, TopicPolicy] = {}
@@ -93,5 +95,4 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             "direct": self.direct.hear_self,
             "loopback": self.loopback.hear_self,
             "iqfile": self.iqfile.hear_self,
-            "ether": False,
-        }[self.backend]
+        }.get(self.backend, False)

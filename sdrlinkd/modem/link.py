@@ -51,7 +51,7 @@ class ModemLink:
             params.network,
             params.max_cfo_hz / params.rate_hz,
             phy.GRIDS[params.grid],
-            carrier_cycles=params.frequency_hz / params.rate_hz if params.one_crystal else 0.0,
+            carrier_cycles=params.carrier_hz / params.rate_hz if params.one_crystal else 0.0,
         )
         sense = phy.CarrierSense(params.carrier_db) if listens else None
         self._ear = Ear(self._receiver, sense, params.rate_hz)
@@ -73,7 +73,7 @@ class ModemLink:
         """Load the compiled code and open the radio."""
         params = self._params
         await self._tx.warm_up()
-        tuning = Tuning(params.rate_hz, params.frequency_hz)
+        tuning = Tuning(params.rate_hz, params.carrier_hz)
         try:
             await self._radio.open(tuning)
         except BackendError as error:

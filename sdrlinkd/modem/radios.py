@@ -13,12 +13,19 @@ from backends import (
     EtherRadio,
     IqFileRadio,
     LoopbackRadio,
+    OffsetRadio,
     OversampledRadio,
     Radio,
+    SoapyRadio,
+    SoapySettings,
 )
-from sdrlinkd.config import Config
+from sdrlinkd.config import Config, SoapyParams
 from sdrlinkd.errors import ConfigError, UserError
+from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.link import ModemLink
+
+# A device's settings that are configured under the same name.
+_SHARED = set(SoapyParams.__struct_fields__) & set(SoapySettings.__struct_fields__)
 
 
 def make_modem(config: Config, node_id: int, rng: Random) -> ModemLink:
@@ -45,6 +52,8 @@ def _make_radio(config: Config, node_id: int, rng: Random) -> Radio:
     if config.backend == "ether":
         who = f"process {os.getpid()} on {socket.gethostname()}"
         return EtherRadio(Path(config.ether.dir), node_id, who)
+    if config.backend == "soapy":
+        return _make_soapy(config)
     channel = _channel(config, rng.getrandbits(32))
     modem, loopback, iqfile = config.modem, config.loopback, config.iqfile
     if config.backend == "iqfile":
@@ -58,6 +67,23 @@ def _make_radio(config: Config, node_id: int, rng: Random) -> Radio:
             receive_type=iqfile.receive_format,
         )
     return LoopbackRadio(channel, modem.block_s, paced=loopback.paced, hear_self=loopback.hear_self)
+
+
+def _make_soapy(config: Config) -> Radio:
+    modem, soapy = config.modem, config.soapy
+    settings = SoapySettings(
+        # What both have is called alike.
+        **{name: getattr(soapy, name) for name in _SHARED},
+        rate_hz=modem.rate_hz * modem.oversampling,
+        frequency_hz=modem.frequency_hz,
+        block_s=modem.block_s,
+    )
+    shifts = soapy.offset_tuning == "on" or (
+        soapy.offset_tuning == "auto" and modem.oversampling > 1
+    )
+    longest_s = max(modem.max_burst_s, Airtimes(modem, config.link.pdu_size).airtime_s(0, 1))
+    radio = SoapyRadio(settings, longest_s, soapy.dc_block)
+    return OffsetRadio(radio) if shifts else radio
 
 
 def _check_airtime(config: Config) -> None:
@@ -82,7 +108,7 @@ def _channel(config: Config, seed: int) -> Channel:
     return Channel(
         phy.PathParams(
             rate_hz=modem.rate_hz * modem.oversampling,
-            carrier_hz=modem.frequency_hz,
+            carrier_hz=modem.carrier_hz,
             profile=air.profile,
             delay_spread_s=air.delay_spread_s,
             loss_db=air.loss_db,

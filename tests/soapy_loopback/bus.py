@@ -41,7 +41,7 @@ class Bus:
     """The shared memory of the bus `name`, made if nobody has; removed when a `with` ends."""
 
     def __init__(self, name: str) -> None:
-        self._path = Path(f"/dev/shm/soapy-loopback-{name}")  # noqa: S108
+        self._path = Path(f"/dev/shm/soapy-loopback-{name}")
         with self._path.open("a+b") as file:
             if file.seek(0, 2) == 0:
                 file.truncate(SIZE)

@@ -1,0 +1,81 @@
+"""A radio whose oscillator is beside the channel: what it leaks is not in the middle of it."""
+
+from collections.abc import AsyncIterator, Awaitable
+from dataclasses import replace
+
+import numpy as np
+
+from backends.base import Capabilities, Hear, Radio, RxBlock, Samples, Tuning, TxBurst, TxReport
+
+UP = np.array([1, 1j, -1, -1j], np.complex64)
+"""A quarter of the rate, where a turn has four samples: the cheapest shift there is."""
+
+
+class OffsetRadio:
+    """`radio` tuned a quarter of its rate below the channel; others see the channel at 0 Hz.
+
+    The channel must be narrower than half the rate.
+    """
+
+    def __init__(self, radio: Radio) -> None:
+        self._radio = radio
+        self._down = _Turns(UP.conj())
+        self._up = _Turns(UP)
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """The radio's."""
+        return self._radio.capabilities
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """The radio's."""
+        return self._radio.counters
+
+    @property
+    def detail(self) -> str:
+        """The radio's."""
+        return self._radio.detail
+
+    async def open(self, tuning: Tuning) -> None:
+        """Begin. Raises BackendError."""
+        beside_hz = tuning.frequency_hz - tuning.rate_hz / 4
+        await self._radio.open(replace(tuning, frequency_hz=beside_hz))
+
+    async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
+        """Blocks of the channel."""
+
+        def hear_shifted(block: RxBlock) -> None:
+            if hear is not None:
+                hear(self._shifted(block))
+
+        async for block in self._radio.blocks(None if hear is None else hear_shifted):
+            yield self._shifted(block)
+
+    def send(self, burst: TxBurst) -> Awaitable[TxReport]:
+        """A burst in the channel; its phase counts from its own first sample."""
+        samples = burst.samples * self._up.of(0, len(burst.samples))
+        return self._radio.send(burst._replace(samples=samples))
+
+    async def close(self) -> None:
+        """Stop."""
+        await self._radio.close()
+
+    def _shifted(self, block: RxBlock) -> RxBlock:
+        if block.samples is None:
+            return block
+        return replace(block, samples=block.samples * self._down.of(block.index, block.n))
+
+
+class _Turns:
+    """A turn by index, for any stretch of it."""
+
+    def __init__(self, turn: Samples) -> None:
+        self._turn = self._many = turn
+
+    def of(self, index: int, n: int) -> Samples:
+        """For `n` indices from `index` on."""
+        first = index % len(self._turn)
+        if len(self._many) < first + n:
+            self._many = np.tile(self._turn, 1 + (first + n) // len(self._turn))
+        return self._many[first : first + n]

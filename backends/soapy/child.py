@@ -1,0 +1,134 @@
+"""The radio process as the daemon sees it: started, spoken to, and ended whatever it does."""
+
+import contextlib
+import os
+import select
+import socket
+import subprocess
+import sys
+
+import msgspec
+
+from backends.base import Samples
+from backends.soapy import protocol
+from backends.soapy.protocol import Begin, Failed, FromProcess, Open, Order, Stretch
+from backends.soapy.ring import SampleRing, make_shared
+from backends.soapy.settings import SoapySettings
+
+END_S = 2.0
+"""A process that has not ended so long after it was told to is killed."""
+SOCKET_BYTES = 1 << 20
+
+
+class RadioChild:
+    """A radio process. `wait`: it waits for its device where it is not there."""
+
+    def __init__(
+        self, settings: SoapySettings, rx_samples: int, tx_samples: int, wait: bool
+    ) -> None:
+        kind = socket.SOCK_SEQPACKET
+        self._control, control = socket.socketpair(socket.AF_UNIX, kind)
+        self.control_fd = self._control.fileno()
+        """Readable when there is an answer."""
+        self._air, air = socket.socketpair(socket.AF_UNIX, kind)
+        for end in (self._control, control, air):
+            end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SOCKET_BYTES)
+        memory = [make_shared(rx_samples, "rx"), make_shared(tx_samples, "tx")]
+        self.rx = SampleRing(memory[0], rx_samples)
+        self.tx = SampleRing(memory[1], tx_samples)
+        inherited = [control.fileno(), air.fileno(), *memory]
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "backends.soapy.process", *map(str, inherited)],
+            stdin=subprocess.DEVNULL,
+            pass_fds=inherited,
+        )
+        control.close()
+        air.close()
+        for each in memory:
+            os.close(each)
+        self._poll = select.poll()
+        self._poll.register(self._air, select.POLLIN)
+        self._control.send(protocol.encode(Open(settings, rx_samples, tx_samples, wait)))
+        self._control.setblocking(False)
+        self._tx_at = 0
+        self._hangs = False
+
+    def first_answer(self, timeout_s: float) -> FromProcess | None:
+        """What it says within that time."""
+        with contextlib.suppress(InterruptedError):
+            if select.select([self._control], [], [], timeout_s)[0]:
+                return self.answer()
+        return None
+
+    def answer(self) -> FromProcess | None:
+        """What it has said; None: nothing yet. Of one that has ended, that."""
+        try:
+            data = self._control.recv(protocol.MOST_BYTES)
+        except BlockingIOError:
+            return None
+        except OSError:
+            data = b""
+        if not data:
+            return Failed(self._how_it_ended())
+        return protocol.from_process(data)
+
+    def begin(self) -> None:
+        """Have it receive from now on."""
+        self._say(Begin())
+
+    def stretch(self, timeout_s: float) -> Stretch | None:
+        """The next, if one comes in time. Raises EOFError when none will."""
+        if not self._poll.poll(1e3 * timeout_s):
+            return None
+        try:
+            data = self._air.recv(protocol.STRETCH_BYTES)
+        except OSError:
+            data = b""
+        if not data:
+            raise EOFError
+        return protocol.unpack_stretch(data)
+
+    def order(self, number: int, start: int, samples: Samples, latest: int | None) -> bool:
+        """Have samples sent; False when it cannot take them."""
+        n = len(samples)
+        at = self.tx.whole(self._tx_at, n)
+        if n > self.tx.capacity or at + n - self.tx.tail > self.tx.capacity:
+            return False
+        self.tx.view(at, n)[:] = samples
+        if not self._say(Order(number, start, n, at, latest)):
+            return False
+        self._tx_at = at + n
+        return True
+
+    def give_up(self) -> None:
+        """It hangs."""
+        self._hangs = True
+        self._process.kill()
+
+    def wait(self) -> None:
+        """Until it has ended, for at most END_S."""
+        try:
+            self._process.wait(END_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def end(self) -> None:
+        """End it; ending twice is fine."""
+        self._control.close()
+        self.wait()
+        self._air.close()
+
+    def _say(self, message: msgspec.Struct) -> bool:
+        try:
+            self._control.send(protocol.encode(message))
+        except OSError:
+            return False
+        return True
+
+    def _how_it_ended(self) -> str:
+        self.wait()
+        code = self._process.returncode
+        if self._hangs:
+            return "the driver hung"
+        return f"the driver crashed (signal {-code})" if code < 0 else "the radio process ended"

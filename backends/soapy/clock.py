@@ -1,0 +1,47 @@
+"""From a device's time to sample indices and back, in whole numbers: floats lose nanoseconds."""
+
+from fractions import Fraction
+
+
+class SampleTime:
+    """Index 0 is the first sample received; its time becomes known with `begin`."""
+
+    def __init__(self, rate_hz: float) -> None:
+        per_ns = Fraction(rate_hz) / 10**9
+        self._up, self._down = per_ns.numerator, per_ns.denominator
+        self._zero_ns: int | None = None
+        self._seen = (0, 0)
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether the device's time of index 0 is known."""
+        return self._zero_ns is not None
+
+    def begin(self, time_ns: int, index: int = 0) -> None:
+        """The sample `index` was there at `time_ns` by the device's clock."""
+        self._zero_ns = time_ns - self.ns(index)
+
+    def index_at(self, time_ns: int) -> int:
+        """Of the sample nearest to a time of the device."""
+        return self.samples(time_ns - (self._zero_ns or 0))
+
+    def time_ns(self, index: int) -> int:
+        """When the device has this sample."""
+        return (self._zero_ns or 0) + self.ns(index)
+
+    def samples(self, ns: int) -> int:
+        """So many in a time."""
+        return (2 * ns * self._up + self._down) // (2 * self._down)
+
+    def ns(self, samples: int) -> int:
+        """So long do they take."""
+        return (2 * samples * self._down + self._up) // (2 * self._up)
+
+    def saw(self, end: int, host_ns: int) -> None:
+        """All samples before `end` were there at `host_ns` by this host's clock."""
+        self._seen = end, host_ns
+
+    def now(self, host_ns: int) -> int:
+        """The index on its way now, by the host's clock since the last samples came."""
+        end, seen_ns = self._seen
+        return end + self.samples(host_ns - seen_ns) if seen_ns else end

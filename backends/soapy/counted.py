@@ -1,0 +1,176 @@
+"""In the radio process: bursts on devices that keep no time, placed by counting samples."""
+
+import time
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from backends.soapy.clock import SampleTime
+from backends.soapy.orders import Orders
+from backends.soapy.outgoing import Outgoing
+from backends.soapy.protocol import Order
+from backends.soapy.surface import (
+    ERRORS,
+    NOT_SUPPORTED,
+    TIMEOUT,
+    UNDERFLOW,
+    DriverError,
+    Values,
+)
+
+WRITE_US = 100_000
+HANDOVER_S = 0.01
+"""Before a transfer begins to leave, all of it must be there."""
+QUIET_S = 0.1
+
+
+@dataclass
+class _Out:
+    """A burst whose first sample is `start`."""
+
+    order: Order
+    start: int
+
+
+class CountedSender:
+    """Sends in spells: zeros, bursts where they belong, zeros up to whole transfers, off again.
+
+    Such devices send only whole transfers, whatever END_BURST says, and cut off what has not left
+    when they are told to stop. Indices are as good as the moment at which the first sample leaves
+    is known.
+    """
+
+    def __init__(
+        self, orders: Orders, outgoing: Outgoing, clock: SampleTime, leading: int, longest_s: float
+    ) -> None:
+        self._orders = orders
+        self._outgoing = outgoing
+        self._stream = outgoing.stream
+        self._clock = clock
+        self._leading = leading
+        self._longest = clock.samples(round(1e9 * longest_s))
+        self._transfer = max(1, self._stream.mtu)
+        self._zeros = np.zeros(self._transfer, np.complex64)
+        self._handover = self._transfer + clock.samples(round(1e9 * HANDOVER_S))
+        self._origin = self._written = 0
+        self._out: deque[_Out] = deque()
+        self._tells = True
+        self.counters = {"tx_spells": 0}
+
+    def step(self) -> None:
+        """Wait for orders a little; if there are any, send for a spell."""
+        self._orders.wait(QUIET_S)
+        if self.is_due():
+            self.send_spell()
+
+    def stop(self) -> None:
+        """Nothing is on between spells."""
+
+    def is_due(self) -> bool:
+        """Whether the first order has to go on its way now."""
+        waiting = self._orders.waiting
+        if not waiting:
+            return False
+        ahead = (1 + self._leading) * self._transfer + self._handover
+        return waiting[0].start <= self._clock.now(time.monotonic_ns()) + ahead
+
+    def send_spell(self) -> None:
+        """All that is to be sent, and what comes meanwhile; the transmitter is off afterwards."""
+        self.counters["tx_spells"] += 1
+        self._outgoing.activate()
+        self._origin = self._clock.now(time.monotonic_ns())
+        self._written = 0
+        try:
+            self._fill(self._leading * self._transfer)
+            while self._next_order():
+                self._send(self._orders.waiting.popleft())
+            # Whole transfers, and one more: the last one may be cut off.
+            self._fill(-self._written % self._transfer + self._transfer)
+            self._drain()
+        finally:
+            self._stream.deactivate()
+
+    def _next_order(self) -> bool:
+        """Whether another burst goes in this spell; waits as long as there is time to."""
+        while not self._orders.is_over and self._written < self._longest:
+            if self._orders.waiting:
+                return self._orders.waiting[0].start <= self._end + self._handover
+            spare = self._end - self._handover - self._clock.now(time.monotonic_ns())
+            if spare <= 0:
+                return False
+            self._orders.wait(max(1e-3, 1e-9 * self._clock.ns(spare)))
+            self._settle()
+        return False
+
+    @property
+    def _end(self) -> int:
+        """Where what is written next will leave."""
+        return self._origin + self._written
+
+    def _send(self, order: Order) -> None:
+        start = max(order.start, self._end)
+        if order.latest is not None and start > order.latest:
+            self._orders.done(order, "late", order.start)
+            return
+        self._fill(start - self._end)
+        self._out.append(_Out(order, start))
+        self._write(self._outgoing.converted(self._orders.samples(order)))
+
+    def _fill(self, n: int) -> None:
+        """Silence."""
+        while n > 0:
+            some = self._zeros[: min(n, len(self._zeros))]
+            self._write(self._outgoing.converted(some))
+            n -= len(some)
+
+    def _write(self, samples: Values) -> None:
+        """Raises DriverError when the device takes nothing for a long time."""
+        since_ns = time.monotonic_ns()
+        while len(samples):
+            moved = self._stream.write(samples, 0, 0, WRITE_US)
+            if moved.n > 0:
+                samples = samples[moved.n :]
+                self._written += moved.n
+                since_ns = time.monotonic_ns()
+            elif moved.n == UNDERFLOW:
+                self._underflow()
+            elif moved.n not in (0, TIMEOUT):
+                raise DriverError(f"sending failed ({ERRORS.get(moved.n, moved.n)})")
+            elif time.monotonic_ns() - since_ns > 1e9:
+                raise DriverError("it takes no samples for 1 s")
+            self._look()
+
+    def _drain(self) -> None:
+        """Until all but the last zeros have left; there is nothing that would tell."""
+        while not self._orders.is_over:
+            left = self._end - self._clock.now(time.monotonic_ns())
+            if left <= 0:
+                break
+            self._orders.wait(max(1e-3, 1e-9 * self._clock.ns(left)))
+            self._settle()
+        self._settle()
+
+    def _settle(self) -> None:
+        self._look()
+        now = self._clock.now(time.monotonic_ns())
+        while self._out and self._out[0].start + self._out[0].order.n <= now:
+            out = self._out.popleft()
+            self._orders.done(out.order, "sent", out.start)
+
+    def _look(self) -> None:
+        while self._tells:
+            told = self._stream.status(0)
+            if told.n == NOT_SUPPORTED:
+                self._tells = False
+            elif told.n == UNDERFLOW:
+                self._underflow()
+            else:
+                break
+
+    def _underflow(self) -> None:
+        """What is on its way was torn apart."""
+        now = self._clock.now(time.monotonic_ns())
+        while self._out and self._out[0].start <= now:
+            out = self._out.popleft()
+            self._orders.done(out.order, "underflow", out.start)

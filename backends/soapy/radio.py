@@ -1,0 +1,281 @@
+"""A radio behind SoapySDR, in a process of its own."""
+
+import asyncio
+import threading
+import time
+from collections import Counter
+from collections.abc import AsyncIterator, Awaitable, Callable
+from functools import partial
+
+import msgspec
+import numpy as np
+
+from backends.base import (
+    BackendError,
+    Capabilities,
+    Hear,
+    RxBlock,
+    Tuning,
+    TxBurst,
+    TxOutcome,
+    TxReport,
+)
+from backends.feed import BlockFeed
+from backends.outstanding import Places, answered
+from backends.soapy.child import RadioChild
+from backends.soapy.handed import Handed
+from backends.soapy.hearing import Hearing
+from backends.soapy.protocol import Counted, Failed, FromProcess, Left, Opened
+from backends.soapy.settings import Found, SoapySettings
+
+OPEN_S = 60.0
+"""Some devices load their firmware first."""
+HUNG_S = 3.0
+"""A device that says nothing for so long, beyond what it may send without listening, hangs."""
+LOOK_S = 0.1
+RX_RING_S, TX_RING_S = 0.25, 0.1
+LEAST_RING = 1 << 19
+RETRY_S = 0.25, 2.0
+
+
+class SoapyRadio:
+    """The device that `settings` names; `longest_s` is the longest burst it is given.
+
+    A device that goes away is looked for until it is back; what it missed is a gap.
+    """
+
+    def __init__(self, settings: SoapySettings, longest_s: float, removes_dc: bool = True) -> None:
+        self._settings = settings
+        self._longest_s = longest_s
+        self._hearing = Hearing(removes_dc)
+        self._feed = BlockFeed(self._next_block, "soapy", lambda _: False)
+        self._closing = threading.Event()
+        self._child: RadioChild | None = None
+        self._found: Found | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._places = Places()
+        self._handed = Handed()
+        self._rate_hz = 0.0
+        self._is_over = False
+        self._away = self._notice = ""
+        self._before: Counter[str] = Counter()
+        self._counted: Counter[str] = Counter(overflows=0, samples_lost=0)
+        self._outages = 0
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """As the device is."""
+        found, settings = self._known, self._settings
+        # Else the first sample leaves behind transfers of zeros.
+        lead_s = (2 + settings.leading_transfers) * found.tx_transfer_s
+        return Capabilities(
+            receives=True,
+            transmits=settings.tx_enabled,
+            full_duplex=found.full_duplex,
+            timestamps=found.has_time,
+            paced=True,
+            lead_s=settings.lead_s if found.keeps_time else lead_s,
+            turnaround_s=0.0 if found.full_duplex else settings.turnaround_s,
+            index_error_s=0.0 if found.has_time else found.receives_in_s,
+            block_s=found.receives_in_s,
+        )
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """Those of all processes so far, and ours."""
+        total = Counter(self._before)
+        total.update(self._counted)
+        return {**total, **self._handed.counters, "outages": self._outages}
+
+    @property
+    def detail(self) -> str:
+        """For people."""
+        found = self._found
+        if found is None:
+            return f"{self._settings.device}, not open"
+        parts = [
+            f"{found.driver} {found.hardware}",
+            f"{found.frequency_hz / 1e6:g} MHz",
+            found.gains,
+            "" if self._settings.tx_enabled else "tx_enabled = false",
+            f"away ({self._away}), looked for until it is back" if self._away else self._notice,
+        ]
+        return ", ".join(part for part in parts if part)
+
+    async def open(self, tuning: Tuning) -> None:
+        """Start the process and open the device. Raises BackendError."""
+        self._loop = asyncio.get_running_loop()
+        self._rate_hz = tuning.rate_hz
+        self._settings = msgspec.structs.replace(
+            self._settings, rate_hz=tuning.rate_hz, frequency_hz=tuning.frequency_hz
+        )
+        child = self._child = self._make_child(wait=False)
+        answer = await asyncio.to_thread(self._first_answer, child, OPEN_S)
+        if isinstance(answer, Opened):
+            self._found = answer.found
+            self._loop.add_reader(child.control_fd, self._listen, child)
+            return
+        await self.close()
+        if isinstance(answer, Failed):
+            raise BackendError(answer.reason)
+        raise BackendError(
+            f'soapy.device: got "{self._settings.device}", whose driver does not answer for '
+            f"{OPEN_S:g} s; unplug the device and plug it in again, or name another one"
+        )
+
+    async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
+        """What the antenna hears. Raises BackendError when the device will not have us any more."""
+        self._hearing.is_heard_at_once = hear is not None
+        if self._child is not None:
+            self._hearing.begin(self._child.rx, self._rate_hz)
+            self._child.begin()
+        try:
+            async for block, is_heard in self._feed.blocks(hear):
+                if not is_heard:
+                    yield block
+        finally:
+            self._is_over = True
+            self._handed.lose()
+
+    def send(self, burst: TxBurst) -> Awaitable[TxReport]:
+        """Hand a burst to the radio process; while the device is away it is lost."""
+        child, hearing = self._child, self._hearing
+        lost = TxReport(TxOutcome.LOST, burst.start, burst.start)
+        is_open = self._found is not None and not self._away and not self._is_over
+        if child is None or not is_open or not self._settings.tx_enabled:
+            return answered(lost)
+        start = self._places.place(burst, hearing.next_index + self._least_lead)
+        if start is None:
+            self._handed.counters["late"] += 1
+            return answered(lost._replace(outcome=TxOutcome.LATE))
+        number = self._handed.next_number()
+        samples = np.ascontiguousarray(burst.samples, np.complex64)
+        latest = None if burst.latest is None else burst.latest - hearing.base
+        if not child.order(number, start - hearing.base, samples, latest):
+            return answered(lost)
+        return self._handed.wait(number, start, len(samples))
+
+    async def close(self) -> None:
+        """Let go of the device."""
+        if self._closing.is_set():
+            return
+        self._closing.set()
+        child = self._child
+        if child is not None and self._loop is not None:
+            self._loop.remove_reader(child.control_fd)
+            await asyncio.to_thread(self._end)
+        self._handed.lose()
+
+    @property
+    def _known(self) -> Found:
+        if self._found is None:
+            raise RuntimeError("not open")
+        return self._found
+
+    @property
+    def _least_lead(self) -> int:
+        """So many samples after the last one heard, nothing can leave any more."""
+        if not self._known.keeps_time:
+            return 0
+        return round(0.5 * self._settings.lead_s * self._rate_hz)
+
+    def _make_child(self, wait: bool) -> RadioChild:
+        rate, settings = self._rate_hz, self._settings
+        rx = max(LEAST_RING, round(RX_RING_S * rate))
+        # In any case the burst that leaves and the next one.
+        tx = max(LEAST_RING, round((2 * self._longest_s + TX_RING_S + settings.lead_s) * rate))
+        return RadioChild(settings, rx, tx, wait)
+
+    def _first_answer(self, child: RadioChild, within_s: float) -> FromProcess | None:
+        until = time.monotonic() + within_s
+        while not self._closing.is_set() and time.monotonic() < until:
+            answer = child.first_answer(LOOK_S)
+            if answer is not None:
+                return answer
+        return None
+
+    def _end(self) -> None:
+        self._feed.stop()
+        if self._child is not None:
+            self._child.end()
+
+    # On the event loop.
+
+    def _listen(self, child: RadioChild) -> None:
+        """What the process has said."""
+        while (answer := child.answer()) is not None:
+            if isinstance(answer, Left):
+                self._handed.left(answer, self._hearing.base)
+            elif isinstance(answer, Counted):
+                self._counted, self._notice = Counter(answer.counters), answer.notice
+            elif isinstance(answer, Failed):
+                self._went(child, answer.reason)
+                return
+
+    def _went(self, child: RadioChild, reason: str) -> None:
+        """The device is gone."""
+        if self._away or self._loop is None:
+            return
+        self._loop.remove_reader(child.control_fd)
+        self._away = reason
+        self._outages += 1
+        self._before.update(self._counted)
+        self._counted.clear()
+        self._handed.lose()
+
+    def _came_back(self, child: RadioChild, found: Found) -> None:
+        self._child, self._found, self._away = child, found, ""
+        if self._loop is not None and not self._closing.is_set():
+            self._loop.add_reader(child.control_fd, self._listen, child)
+
+    # On the feed's thread.
+
+    def _next_block(self) -> RxBlock | None:
+        child, hearing = self._child, self._hearing
+        while child is not None and not self._closing.is_set():
+            try:
+                block = hearing.next(child, LOOK_S)
+            except EOFError:
+                child = self._look_for_it(child)
+                return None if child is None else hearing.gap("the radio was away", self._known)
+            if block is not None:
+                return block
+            if hearing.quiet_s > HUNG_S + self._settings.longest_tx_s:
+                child.give_up()
+        return None
+
+    def _look_for_it(self, lost: RadioChild) -> RadioChild | None:
+        """Until the device is back; None: we close before. Raises BackendError."""
+        lost.wait()
+        self._on_loop(partial(self._listen, lost))
+        lost.end()
+        wait_s, most_s = RETRY_S
+        while not self._closing.is_set():
+            child = self._make_child(wait=True)
+            answer = self._first_answer(child, float("inf"))
+            if isinstance(answer, Opened):
+                self._hearing.begin(child.rx, self._rate_hz)
+                child.begin()
+                self._on_loop(partial(self._came_back, child, answer.found))
+                return child
+            child.end()
+            if isinstance(answer, Failed) and answer.is_refusal:
+                raise BackendError(answer.reason)
+            self._closing.wait(wait_s)
+            wait_s = min(2 * wait_s, most_s)
+        return None
+
+    def _on_loop(self, action: Callable[[], None]) -> None:
+        """Have the event loop do it, and wait until it has, or we close."""
+        done = threading.Event()
+
+        def act() -> None:
+            action()
+            done.set()
+
+        loop = self._loop
+        if loop is None or loop.is_closed():
+            return
+        loop.call_soon_threadsafe(act)
+        while not done.wait(LOOK_S) and not self._closing.is_set():
+            continue

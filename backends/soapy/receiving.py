@@ -1,0 +1,209 @@
+"""In the radio process: samples from the device into shared memory, and an index for each."""
+
+import socket
+import time
+
+import numpy as np
+
+from backends.base import Samples
+from backends.soapy.clock import SampleTime
+from backends.soapy.protocol import Stretch, Why, pack_stretch
+from backends.soapy.ring import SampleRing
+from backends.soapy.surface import (
+    CORRUPTION,
+    ERRORS,
+    HAS_TIME,
+    OVERFLOW,
+    TIME_ERROR,
+    TIMEOUT,
+    DriverError,
+    Moved,
+    Stream,
+    Values,
+)
+
+STALLED_S = 1.0
+"""An active stream without a sample for so long is started anew, and after that given up."""
+TOLERANCE = 2
+"""Samples by which a device's stamps may be rounded."""
+MOST_US = 100_000
+
+
+class Receiving:
+    """The receive stream of one device, from index 0 on. Owned by one thread."""
+
+    def __init__(
+        self,
+        stream: Stream,
+        form: str,
+        ring: SampleRing,
+        air: socket.socket,
+        clock: SampleTime,
+        piece: int,
+        has_time: bool,
+    ) -> None:
+        self._stream = stream
+        self._ring = ring
+        self._air = air
+        self.clock = clock
+        self._piece = piece
+        self._has_time = has_time
+        self._into = _Into(form, piece)
+        self._next = 0
+        self._begun = self._at = self._until = 0
+        self._unsure = 0
+        self._heard_ns = time.monotonic_ns()
+        self._was_restarted = False
+        self.counters = {"overflows": 0, "samples_lost": 0, "stalls": 0, "clock_jumps": 0}
+
+    def start(self) -> None:
+        """Receive. Raises DriverError."""
+        _check(self._stream.activate())
+        self._heard_ns = time.monotonic_ns()
+
+    def pause(self) -> None:
+        """Receive no more for a while; for devices that send instead."""
+        self._tell(time.monotonic_ns())
+        _check(self._stream.deactivate())
+
+    def resume(self, why: Why = Why.SENDING) -> None:
+        """Receive again; what was missed is a gap, by the next stamp or this host's clock."""
+        self.start()
+        if not self._has_time:
+            self._gap_until_now(why)
+
+    def step(self, timeout_us: int = MOST_US) -> None:
+        """One call of the driver, and what follows. Raises DriverError when it is of no use."""
+        room = self._room()
+        moved = self._into.read(self._stream, room, timeout_us)
+        host_ns = time.monotonic_ns()
+        if moved.n > 0:
+            self._received(moved, room is not None, host_ns)
+        elif moved.n in (TIMEOUT, 0):
+            self._waited(host_ns)
+        elif moved.n == OVERFLOW and not self._has_time:
+            self._drain()
+        elif moved.n in (OVERFLOW, TIME_ERROR, CORRUPTION):
+            # The next stamp tells how many samples are missing.
+            self.counters["overflows"] += 1
+        else:
+            _check(moved.n)
+
+    def _room(self) -> Samples | None:
+        """Where the next samples go; None: the daemon has not made room."""
+        if self._at == self._until:
+            begin = self._ring.whole(self._at, self._piece)
+            if begin + self._piece - self._ring.tail > self._ring.capacity:
+                return None
+            self._begun = self._at = begin
+            self._until = begin + self._piece
+        return self._ring.view(self._at, self._until - self._at)
+
+    def _received(self, moved: Moved, is_kept: bool, host_ns: int) -> None:
+        self._heard_ns, self._was_restarted = host_ns, False
+        if moved.flags & HAS_TIME and self._has_time:
+            self._place(moved.time_ns, host_ns)
+        self._next += moved.n
+        self.clock.saw(self._next, host_ns)
+        if not is_kept:
+            self._lost(moved.n)
+            return
+        self._at += moved.n
+        if self._at == self._until:
+            self._tell(host_ns)
+
+    def _place(self, time_ns: int, host_ns: int) -> None:
+        """Compare the index of the next sample with where the ones before it ended."""
+        if not self.clock.has_begun:
+            self.clock.begin(time_ns, self._next)
+            return
+        ahead = self.clock.index_at(time_ns) - self._next
+        if ahead < -TOLERANCE:
+            # The device's clock was set; ours never goes back.
+            self.counters["clock_jumps"] += 1
+            self._gap_until_now(Why.RESTART)
+            self.clock.begin(time_ns, self._next)
+        elif ahead > TOLERANCE:
+            self._tell(host_ns)
+            self.counters["samples_lost"] += ahead
+            self._gap(ahead, Why.OVERFLOW, host_ns)
+
+    def _drain(self) -> None:
+        """Without stamps nobody knows where in what waits samples are missing: take it all away."""
+        self._tell(time.monotonic_ns())
+        while self._into.read(self._stream, None, 0).n > 0:
+            continue
+        self._lost(self._gap_until_now(Why.OVERFLOW))
+
+    def _waited(self, host_ns: int) -> None:
+        self._tell(host_ns)
+        if host_ns - self._heard_ns < STALLED_S * 1e9:
+            return
+        if self._was_restarted:
+            raise DriverError(f"it delivers no samples for {2 * STALLED_S:g} s")
+        self.counters["stalls"] += 1
+        self._stream.deactivate()
+        self.resume(Why.RESTART)
+        self._was_restarted = True
+
+    def _tell(self, host_ns: int) -> None:
+        """Hand over what there is of a piece."""
+        n = self._at - self._begun
+        if not n:
+            return
+        self._say(Stretch(self._next - n, n, self._begun, host_ns, self._unsure, Why.HEARD))
+        self._begun, self._unsure = self._at, 0
+
+    def _gap(self, n: int, why: Why, host_ns: int) -> None:
+        if not n:
+            return
+        self._unsure = 0 if self._has_time else self._piece
+        self._say(Stretch(self._next, n, 0, host_ns, self._unsure, why))
+        self._next += n
+        self.clock.saw(self._next, host_ns)
+
+    def _gap_until_now(self, why: Why) -> int:
+        """A gap by this host's clock; its length."""
+        host_ns = time.monotonic_ns()
+        self._tell(host_ns)
+        n = max(0, self.clock.now(host_ns) - self._next)
+        self._gap(n, why, host_ns)
+        return n
+
+    def _say(self, stretch: Stretch) -> None:
+        """The daemon sees from the next index what it was not told."""
+        try:
+            self._air.send(pack_stretch(stretch))
+        except BlockingIOError:
+            self._lost(stretch.n)
+
+    def _lost(self, n: int) -> None:
+        self.counters["overflows"] += 1
+        self.counters["samples_lost"] += n
+
+
+class _Into:
+    """Reads samples of any format that we speak as complex64."""
+
+    def __init__(self, form: str, most: int) -> None:
+        self._scratch: Samples = np.zeros(most, np.complex64)
+        kind = {"CF32": None, "CS16": np.int16, "CS8": np.int8}[form]
+        self._scale = np.float32(1 / 32768 if form == "CS16" else 1 / 128)
+        self._raw: Values | None = None if kind is None else np.zeros((most, 2), kind)
+
+    def read(self, stream: Stream, into: Samples | None, timeout_us: int) -> Moved:
+        """Fill `into`, or nothing that anybody sees."""
+        target = self._scratch if into is None else into
+        if self._raw is None:
+            return stream.read(target, timeout_us)
+        raw = self._raw[: len(target)]
+        moved = stream.read(raw.reshape(-1).view(f"V{2 * raw.itemsize}"), timeout_us)
+        if moved.n > 0:
+            parts = target[: moved.n].view(np.float32).reshape(-1, 2)
+            np.multiply(raw[: moved.n], self._scale, out=parts)
+        return moved
+
+
+def _check(n: int) -> None:
+    if n < 0:
+        raise DriverError(f"the stream failed ({ERRORS.get(n, n)})")

@@ -1,0 +1,50 @@
+"""Samples in memory that daemon and radio process share."""
+
+import mmap
+import os
+
+import numpy as np
+
+from backends.base import Samples
+
+_PAGE = mmap.PAGESIZE
+
+
+class SampleRing:
+    """`capacity` samples, written by one process in order and read by another.
+
+    The reader says in `tail` how many it is done with since the beginning; what was written is told
+    by messages, whose way through the kernel also orders the memory.
+    """
+
+    def __init__(self, fd: int, capacity: int) -> None:
+        self.capacity = capacity
+        self._map = mmap.mmap(fd, _PAGE + 8 * capacity)
+        self._tail = np.frombuffer(self._map, np.int64, 1)
+        self._samples: Samples = np.frombuffer(self._map, np.complex64, capacity, _PAGE)
+
+    @property
+    def tail(self) -> int:
+        """Samples that the reader is done with."""
+        return int(self._tail[0])
+
+    @tail.setter
+    def tail(self, n: int) -> None:
+        self._tail[0] = n
+
+    def view(self, first: int, n: int) -> Samples:
+        """Up to `n` samples from the `first` ever on; fewer at the ring's end."""
+        at = first % self.capacity
+        return self._samples[at : at + n]
+
+    def whole(self, first: int, n: int) -> int:
+        """The first place at or behind `first` where `n` samples lie in one piece."""
+        at = first % self.capacity
+        return first if at + n <= self.capacity else first + self.capacity - at
+
+
+def make_shared(capacity: int, name: str) -> int:
+    """A file descriptor of memory for so many samples; gone with the last process that has it."""
+    fd = os.memfd_create(f"sdrlinkd-{name}")
+    os.ftruncate(fd, _PAGE + 8 * capacity)
+    return fd

@@ -1,0 +1,68 @@
+"""What a device is to be set to, and what it then is; goes to the radio process and back."""
+
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+Gain = Annotated[float, Meta(ge=-200, le=200)]
+
+
+class SoapySettings(msgspec.Struct, frozen=True, kw_only=True):
+    """A device, chosen by `device` as SoapySDR's tools choose it; None: as the driver has it."""
+
+    device: str
+    rate_hz: float
+    frequency_hz: float
+    block_s: float = 0.001
+    tx_enabled: bool = False
+    channel: int = 0
+    rx_antenna: str = ""
+    tx_antenna: str = ""
+    rx_gain_db: float | None = None
+    tx_gain_db: float | None = None
+    rx_gains: dict[str, float] = {}
+    """By element."""
+    tx_gains: dict[str, float] = {}
+    bandwidth_hz: float = 0.0
+    """Of the analogue filters; 0: as the driver chooses."""
+    ppm: float = 0.0
+    clock_source: str = ""
+    stream_args: dict[str, str] = {}
+    settings: dict[str, str] = {}
+    """What only the driver knows."""
+    lead_s: float = 0.02
+    """Of bursts whose time the device itself keeps."""
+    turnaround_s: float = 0.05
+    """Between receiving and sending, where it cannot do both."""
+    leading_transfers: int = 1
+    """Zeros before the first burst where the first transfers do not get out whole."""
+    listen_s: float = 0.05
+    """So long a half-duplex device listens before it sends again."""
+    longest_tx_s: float = 1.0
+    """So long it sends without listening."""
+
+
+class Found(msgspec.Struct, frozen=True, kw_only=True):
+    """An open device."""
+
+    driver: str
+    hardware: str
+    binding: str
+    rate_hz: float
+    frequency_hz: float
+    full_duplex: bool
+    has_time: bool
+    receives_in_s: float
+    """Samples come in pieces of this length."""
+    tx_transfer_s: float = 0.0
+    gains: str = ""
+
+    @property
+    def keeps_time(self) -> bool:
+        """Whether bursts leave at times that the device itself keeps."""
+        return self.has_time and self.full_duplex
+
+
+class SettingError(Exception):
+    """Settings that the device does not take; the message cites key, given and allowed."""

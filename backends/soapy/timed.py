@@ -1,0 +1,180 @@
+"""In the radio process: bursts at times that the device itself keeps."""
+
+import time
+from dataclasses import dataclass
+
+from backends.soapy.clock import SampleTime
+from backends.soapy.orders import Orders
+from backends.soapy.outgoing import Outgoing
+from backends.soapy.protocol import Order
+from backends.soapy.surface import (
+    END_BURST,
+    ERRORS,
+    HAS_TIME,
+    NOT_SUPPORTED,
+    TIME_ERROR,
+    TIMEOUT,
+    UNDERFLOW,
+    DriverError,
+    Values,
+)
+
+WRITE_US = 50_000
+GRACE_S = 0.1
+"""So long after its end a burst's acknowledgement may come."""
+SLACK = 16
+"""Samples by which a burst may be acknowledged too early; the next one ends later than that."""
+IDLE_S = 0.5
+"""After so long without a burst the transmitter goes off."""
+BUSY_S, QUIET_S = 0.002, 0.1
+"""How long orders are waited for while bursts are out, and while none is."""
+
+
+@dataclass
+class _Out:
+    """A burst handed to the device, or on its way there."""
+
+    order: Order
+    is_failed: bool = False
+
+    @property
+    def end(self) -> int:
+        """Behind its last sample."""
+        return self.order.start + self.order.n
+
+
+class TimedSender:
+    """Hands bursts over with their time and END_BURST, and reads what became of them."""
+
+    def __init__(self, orders: Orders, outgoing: Outgoing, clock: SampleTime) -> None:
+        self._orders = orders
+        self._outgoing = outgoing
+        self._stream = outgoing.stream
+        self._clock = clock
+        self._out: list[_Out] = []
+        self._acknowledges: bool | None = None
+        self._tells = True
+        self._is_active = False
+        self._used_ns = 0
+        self.counters: dict[str, int] = {}
+
+    def step(self) -> None:
+        """Wait for orders a little, carry them out, look what became of others."""
+        self._orders.wait(BUSY_S if self._out else QUIET_S)
+        while self._orders.waiting:
+            self._send(self._orders.waiting.popleft())
+        self._look()
+        if self._is_active and not self._out:
+            self._rest()
+
+    def stop(self) -> None:
+        """The transmitter goes off."""
+        if self._is_active:
+            self._is_active = False
+            self._stream.deactivate()
+
+    def _send(self, order: Order) -> None:
+        if not self._clock.has_begun:
+            # Nothing was received yet: its index means nothing.
+            self._orders.done(order, "lost", order.start)
+            return
+        if not self._is_active:
+            self._outgoing.activate()
+            self._is_active = True
+        out = _Out(order)
+        self._out.append(out)
+        samples = self._outgoing.converted(self._orders.samples(order))
+        time_ns = self._clock.time_ns(order.start)
+        # END_BURST only with what a device takes at once: of a part it would be the end.
+        most = max(1, self._stream.mtu)
+        last = (len(samples) - 1) // most * most
+        flags = HAS_TIME
+        for piece, more in ((samples[:last], 0), (samples[last:], END_BURST)):
+            if len(piece) and not self._write(out, piece, flags | more, time_ns):
+                break
+            if len(piece):
+                flags = 0
+
+    def _write(self, out: _Out, samples: Values, flags: int, time_ns: int) -> bool:
+        """Whether the device took all of it; what is too late already is taken, and dropped."""
+        until = out.end + self._clock.samples(round(1e9 * GRACE_S))
+        while len(samples):
+            moved = self._stream.write(samples, flags, time_ns, WRITE_US)
+            self._look()
+            if moved.n > 0:
+                samples = samples[moved.n :]
+                flags &= ~HAS_TIME
+            elif moved.n == UNDERFLOW:
+                self._fail(out, "underflow")
+            elif moved.n == TIME_ERROR:
+                self._fail(out, "late")
+            elif moved.n not in (0, TIMEOUT):
+                raise DriverError(f"sending failed ({ERRORS.get(moved.n, moved.n)})")
+            if self._clock.now(time.monotonic_ns()) > until:
+                self._fail(out, "underflow")
+                self._end_burst()
+                return False
+        return True
+
+    def _end_burst(self) -> None:
+        """The device must not wait for the rest of a burst that was given up."""
+        self._stream.deactivate()
+        self._is_active = False
+
+    def _look(self) -> None:
+        """All that the device has to tell."""
+        while self._tells:
+            told = self._stream.status(0)
+            if told.n == NOT_SUPPORTED:
+                self._tells = False
+            elif told.n == UNDERFLOW:
+                self._fail_oldest("underflow")
+            elif told.n == TIME_ERROR:
+                self._fail_oldest("late")
+            elif told.n == 0 and told.flags & END_BURST:
+                self._acknowledged(told.time_ns if told.flags & HAS_TIME else None)
+            else:
+                break
+        self._give_up()
+
+    def _acknowledged(self, time_ns: int | None) -> None:
+        """The oldest burst has ended, or, by its time, a later one and all before it."""
+        self._acknowledges = True
+        if time_ns is not None:
+            end = self._clock.index_at(time_ns) + SLACK
+            while len(self._out) > 1 and self._out[1].end <= end:
+                self._settle("sent")
+        if self._out:
+            self._settle("sent")
+
+    def _give_up(self) -> None:
+        """Bursts whose acknowledgement should be there; of devices that have none, those over."""
+        now = self._clock.now(time.monotonic_ns())
+        grace_s = 0.0 if self._acknowledges is None and not self._tells else GRACE_S
+        grace = self._clock.samples(round(1e9 * grace_s))
+        while self._out and self._out[0].end + grace < now:
+            self._settle("lost" if self._acknowledges else "sent")
+
+    def _settle(self, outcome: str) -> None:
+        out = self._out.pop(0)
+        self._used_ns = time.monotonic_ns()
+        if not out.is_failed:
+            self._orders.done(out.order, outcome, out.order.start)
+
+    def _fail_oldest(self, outcome: str) -> None:
+        out = next((each for each in self._out if not each.is_failed), None)
+        if out is not None:
+            self._fail(out, outcome)
+
+    def _fail(self, out: _Out, outcome: str) -> None:
+        if out.is_failed:
+            return
+        out.is_failed = True
+        if outcome == "late":
+            # A burst that does not begin has no end to be acknowledged.
+            self._out.remove(out)
+        self._orders.done(out.order, outcome, out.order.start)
+
+    def _rest(self) -> None:
+        if time.monotonic_ns() - self._used_ns > IDLE_S * 1e9:
+            self.stop()
