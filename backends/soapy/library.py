@@ -5,10 +5,10 @@ from pathlib import Path
 from backends.soapy.surface import DriverError, Library
 
 MODULES = {
-    "airspy": "airspy", "bladerf": "bladerf", "hackrf": "HackRF", "lime": "LMS7",
-    "plutosdr": "Pluto", "remote": "remote", "rtlsdr": "rtlsdr", "uhd": "uhd",
+    "airspy": "airspy", "bladerf": "bladeRF", "hackrf": "HackRF", "lime": "LMS7",
+    "plutosdr": "PlutoSDR", "remote": "remote", "rtlsdr": "rtlsdr", "uhd": "uhd",
 }  # fmt: skip
-"""What the file of a driver's module has in its name."""
+"""What the file of a driver's module has in its name; in lower case, so has Debian's package."""
 
 
 def load_library() -> Library:
@@ -44,8 +44,7 @@ def why_not(library: Library, args: str, error: DriverError) -> str:
         there = ", ".join(sorted(Path(each).name for each in library.modules())) or "none"
         return (
             f'soapy.device: got "{args}", but SoapySDR has no driver "{driver}" (its modules: '
-            f"{there}); install it (on Debian: apt-get install soapysdr-module-{driver}) or name "
-            "another driver"
+            f"{there}); install its module{_package(driver)}, or name another driver"
         )
     if any(word in text.lower() for word in ("busy", "in use", "claimed")):
         return (
@@ -58,6 +57,11 @@ def why_not(library: Library, args: str, error: DriverError) -> str:
         f'soapy.device: got "{args}", but there is no such device ({text}){offered}. Plug it in, '
         "see that you may open it (udev rules), and look with: sdrlinkctl radio probe"
     )
+
+
+def _package(driver: str) -> str:
+    name = MODULES.get(driver, "").lower()
+    return f" (on Debian: apt-get install soapysdr-module-{name})" if name else ""
 
 
 def _found(library: Library) -> list[dict[str, str]]:

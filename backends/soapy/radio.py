@@ -27,6 +27,7 @@ from backends.soapy.handed import Handed
 from backends.soapy.hearing import Hearing
 from backends.soapy.protocol import Counted, Failed, FromProcess, Left, Opened
 from backends.soapy.settings import Found, SoapySettings
+from backends.soapy.traits import lead_s
 
 OPEN_S = 60.0
 """Some devices load their firmware first."""
@@ -66,15 +67,15 @@ class SoapyRadio:
     def capabilities(self) -> Capabilities:
         """As the device is."""
         found, settings = self._known, self._settings
-        # Else the first sample leaves behind transfers of zeros.
-        lead_s = (2 + settings.leading_transfers) * found.tx_transfer_s
         return Capabilities(
             receives=True,
             transmits=settings.tx_enabled,
             full_duplex=found.full_duplex,
             timestamps=found.has_time,
             paced=True,
-            lead_s=settings.lead_s if found.keeps_time else lead_s,
+            lead_s=lead_s(
+                found.keeps_time, settings.lead_s, found.tx_transfer_s, settings.leading_transfers
+            ),
             turnaround_s=0.0 if found.full_duplex else settings.turnaround_s,
             index_error_s=0.0 if found.has_time else found.receives_in_s,
             block_s=found.receives_in_s,

@@ -5,6 +5,8 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from backends.soapy.traits import keeps_time
+
 Gain = Annotated[float, Meta(ge=-200, le=200)]
 
 
@@ -61,7 +63,7 @@ class Found(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def keeps_time(self) -> bool:
         """Whether bursts leave at times that the device itself keeps."""
-        return self.has_time and self.full_duplex
+        return keeps_time(self.has_time, self.full_duplex)
 
 
 class SettingError(Exception):

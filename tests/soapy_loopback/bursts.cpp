@@ -79,7 +79,8 @@ int64_t BurstSender::take(const void *in, int64_t n, bool timed, long long time_
         dropping_ = true;
         in_burst_ = false;
         station_.control.late++;
-        tell(SOAPY_SDR_TIME_ERROR, 0, now);
+        // Its turn is when the one before has ended, and so is when it is found late.
+        tell(SOAPY_SDR_TIME_ERROR, 0, std::max(now, end_));
         return n;
     }
     station_.emission.publish(start, count, station_.tx.rate);
