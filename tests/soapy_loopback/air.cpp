@@ -96,7 +96,7 @@ void Ear::add_tuned(const Unit &unit, const Tuning &tuning, const Listener &list
     const int64_t base = same_clock ? first - listener.delay : int64_t(std::floor(position));
 
     const int64_t from = same_clock ? base : base - (TAPS / 2 - 1);
-    const size_t count = same_clock ? n : size_t(std::ceil(n * step)) + TAPS + 1;
+    const size_t count = same_clock ? n : size_t(std::ceil(n * step)) + 2 * TAPS;
     if (!fetch(unit, tuning, tuning.amplitude * listener.amplitude, from, count)) return;
     if (offset != 0) {
         const long double start = tuning.clock.air(time_of(from, rate)) / 1e9L * offset;
@@ -104,8 +104,8 @@ void Ear::add_tuned(const Unit &unit, const Tuning &tuning, const Listener &list
                offset / (rate * tuning.clock.skew), count);
     }
     if (same_clock) {
-        for (size_t i = 0; i < n; i++) re[i] += re_[i];
-        for (size_t i = 0; i < n; i++) im[i] += im_[i];
+        loopback::add(re_.data(), re, n);
+        loopback::add(im_.data(), im, n);
     } else {
         resample_add(re_.data(), im_.data(), double(position - base), step, re, im, n);
     }
@@ -114,8 +114,10 @@ void Ear::add_tuned(const Unit &unit, const Tuning &tuning, const Listener &list
 // Into re_ and im_; false when there is nothing.
 bool Ear::fetch(const Unit &unit, const Tuning &tuning, float gain, int64_t first, size_t n) {
     const float leak = tuning.leak > 0 && is_alive(unit) ? tuning.leak * gain : 0;
-    re_.assign(n, leak);
-    im_.assign(n, 0);
+    re_.resize(std::max(re_.size(), n));
+    im_.resize(re_.size());
+    fill(re_.data(), leak, n);
+    fill(im_.data(), 0, n);
     bool any = leak > 0;
     const int64_t last = first + int64_t(n);
     const uint64_t count = unit.segments.load(std::memory_order_acquire);

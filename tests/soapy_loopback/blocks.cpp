@@ -63,7 +63,7 @@ int BlockSender::write(const void *in, size_t n, int, long long, long timeout_us
         if (station_.gone()) return SOAPY_SDR_STREAM_ERROR;
         {
             const std::lock_guard lock(station_.mutex);
-            if (station_.settings.half_duplex) station_.enter(Mode::TX);
+            if (settings.half_duplex) station_.enter(Mode::TX);
             const int64_t now = station_.now(station_.tx.rate);
             advance(now);
             while (done < wanted && (filled_ > 0 || has_room(now))) {

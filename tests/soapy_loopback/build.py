@@ -3,6 +3,7 @@
 import hashlib
 import os
 import platform
+import shutil
 import subprocess
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
@@ -16,6 +17,21 @@ FAST = ["-O3", "-march=native", "-ffast-math"]
 
 class BuildError(Exception):
     """The driver does not compile here; the message is the compiler's."""
+
+
+def missing() -> str:
+    """What keeps the driver from being compiled here, for a test to say why it is skipped."""
+    if shutil.which("g++") is None:
+        return "no compiler: apt install g++"
+    header = "#include <SoapySDR/Device.hpp>"
+    probe = subprocess.run(
+        ["g++", "-fsyntax-only", "-x", "c++", "-"],
+        input=header,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return "no SoapySDR headers: apt install libsoapysdr-dev" if probe.returncode else ""
 
 
 def module_folder() -> Path:

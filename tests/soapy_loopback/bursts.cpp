@@ -21,19 +21,23 @@ void BurstSender::tell(int code, int flags, int64_t index) {
         events_.push_back({code, flags, index});
 }
 
+// Also takes back what was to be told of it.
+void BurstSender::cut(int64_t now) {
+    station_.control.sent -= station_.emission.cut(now);
+    station_.control.on_until_ns = std::min<int64_t>(station_.control.on_until_ns, monotonic_ns());
+    spans_.clear();
+    const auto is_ahead = [&](const Event &event) { return event.index > now; };
+    events_.erase(std::remove_if(events_.begin(), events_.end(), is_ahead), events_.end());
+}
+
 // A burst whose samples ran out before its end has failed.
 void BurstSender::advance(int64_t now) {
-    if (station_.control.underflow.exchange(0)) {
-        if (in_burst_ && end_ > now) {
-            station_.control.sent -= station_.emission.cut(now);
-            for (Span &span : spans_) span.end = std::min(span.end, std::max(now, span.start));
-            end_ = now;
-        } else {
-            tell(SOAPY_SDR_UNDERFLOW, 0, now);
-            station_.control.underflows++;
-        }
+    const bool fault = station_.control.underflow.exchange(0);
+    if (fault) {
+        cut(now);
+        end_ = std::min(end_, now);
     }
-    if (in_burst_ && !starved_ && now >= end_) {
+    if (fault || (in_burst_ && !starved_ && now >= end_)) {
         starved_ = true;
         tell(SOAPY_SDR_UNDERFLOW, 0, end_);
         station_.control.underflows++;
@@ -112,6 +116,7 @@ int BurstSender::write(const void *in, size_t n, int flags, long long time_ns, l
         if (station_.gone()) return SOAPY_SDR_STREAM_ERROR;
         {
             const std::lock_guard lock(station_.mutex);
+            if (settings.half_duplex) station_.enter(Mode::TX);
             const int64_t now = station_.now(station_.tx.rate);
             advance(now);
             const auto *from = static_cast<const uint8_t *>(in) + done * bytes(format_);
@@ -161,15 +166,9 @@ int BurstSender::status(int &flags, long long &time_ns, long timeout_us) {
 }
 
 void BurstSender::forget() {
-    const int64_t now = station_.now(station_.tx.rate);
-    station_.control.sent -= station_.emission.cut(now);
-    spans_.clear();
+    cut(station_.now(station_.tx.rate));
     in_burst_ = dropping_ = starved_ = false;
     end_ = 0;
-    events_.erase(std::remove_if(events_.begin(), events_.end(),
-                                 [&](const Event &event) { return event.index > now; }),
-                  events_.end());
-    station_.control.on_until_ns = std::min<int64_t>(station_.control.on_until_ns, monotonic_ns());
 }
 
 }  // namespace loopback

@@ -22,6 +22,7 @@ class BurstSender : public Sender {
         int64_t index;
     };
 
+    void cut(int64_t now);
     void advance(int64_t now);
     int64_t queued(int64_t now);
     bool place(bool timed, long long time_ns, int64_t now, int64_t &start);

@@ -73,11 +73,6 @@ void Bus::claim(int unit) {
         throw std::runtime_error("loopback: unit " + std::to_string(unit) + " is in use");
 }
 
-bool Bus::claimed(int unit) const {
-    flock lock = unit_lock(unit, F_WRLCK);
-    return fcntl(file_, F_OFD_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
-}
-
 int64_t Bus::air_ns() const {
     const int64_t now = monotonic_ns();
     return speed_ == 1 ? now : std::llround(now * static_cast<long double>(speed_));

@@ -16,7 +16,6 @@ class Bus {
 
     // Throws when another device is this unit.
     void claim(int unit);
-    bool claimed(int unit) const;
 
     Unit &unit(int number) { return memory_->unit[number]; }
     const Unit &unit(int number) const { return memory_->unit[number]; }

@@ -1,6 +1,9 @@
 """A bus from outside: faults in, counters out, in the process of a test."""
 
+import fcntl
 import mmap
+import os
+import struct
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +13,7 @@ from typing import Self
 # layout.h: the order of Control's words, and where they are.
 FIELDS = (
     *("unplugged", "unplugs", "stall", "lose", "underflow", "time_error", "crash", "hang"),
-    *("owner", "mode", "on_from_ns", "on_until_ns"),
+    *("owner", "plugged", "mode", "on_from_ns", "on_until_ns"),
     *("sent", "bursts", "underflows", "late", "received", "lost", "overflows", "opened"),
 )
 HEADER = 4096
@@ -19,6 +22,7 @@ UNIT = 16818176
 SIZE = HEADER + UNITS * UNIT
 
 MODE_TX = 2
+FLOCK = "hhqqi4x"
 
 
 @dataclass(frozen=True)
@@ -42,10 +46,10 @@ class Bus:
 
     def __init__(self, name: str) -> None:
         self._path = Path(f"/dev/shm/soapy-loopback-{name}")
-        with self._path.open("a+b") as file:
-            if file.seek(0, 2) == 0:
-                file.truncate(SIZE)
-            self._map = mmap.mmap(file.fileno(), SIZE)
+        self._file = self._path.open("a+b")
+        if self._file.seek(0, os.SEEK_END) == 0:
+            self._file.truncate(SIZE)
+        self._map = mmap.mmap(self._file.fileno(), SIZE)
         self._words = memoryview(self._map).cast("q")
 
     def inject(self, unit: int, fault: str) -> None:
@@ -73,7 +77,7 @@ class Bus:
         return Stats(
             *(word[name] for name in counters),
             opened=word["opened"],
-            is_open=word["owner"] != 0,
+            is_open=self._is_locked(unit),
             is_transmitting=on,
         )
 
@@ -81,6 +85,7 @@ class Bus:
         """Removes the bus; devices that are open keep what they have."""
         self._words.release()
         self._map.close()
+        self._file.close()
         self._path.unlink(missing_ok=True)
 
     def __enter__(self) -> Self:
@@ -93,6 +98,11 @@ class Bus:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+    def _is_locked(self, unit: int) -> bool:
+        ask = struct.pack(FLOCK, fcntl.F_WRLCK, os.SEEK_SET, unit, 1, 0)
+        answer = fcntl.fcntl(self._file, fcntl.F_OFD_GETLK, ask)
+        return struct.unpack(FLOCK, answer)[0] != fcntl.F_UNLCK
 
     def _at(self, unit: int, name: str) -> int:
         if not 0 <= unit < UNITS:

@@ -10,21 +10,23 @@ namespace {
 
 constexpr int ROTATED = 64;
 constexpr int PHASES = 1024;
+constexpr int RUN = 16;
+constexpr double KAISER = 6;
 constexpr size_t NOISE = 1 << 16, NOISE_RUN = 512;
 
 float saturated(float value, float peak) { return std::min(std::max(value, -peak - 1), peak); }
 
+// Shifts by a fraction of a sample; flat up to 0.4 of the rate.
 struct Filters {
     float tap[PHASES + 1][TAPS];
 
-    // Sinc under a Blackman window: exact where no fraction is asked for.
     Filters() {
         for (int phase = 0; phase <= PHASES; phase++) {
             double sum = 0;
             for (int k = 0; k < TAPS; k++) {
                 const double x = k - (TAPS / 2 - 1) - double(phase) / PHASES;
-                const double angle = 2 * M_PI * (x / TAPS);
-                const double window = 0.42 + 0.5 * std::cos(angle) + 0.08 * std::cos(2 * angle);
+                const double edge = std::max(0.0, 1 - std::pow(x / (TAPS / 2), 2));
+                const double window = std::cyl_bessel_i(0, KAISER * std::sqrt(edge));
                 const double sinc = std::fabs(x) < 1e-12 ? 1 : std::sin(M_PI * x) / (M_PI * x);
                 sum += tap[phase][k] = window * sinc;
             }
@@ -69,6 +71,14 @@ void from_ring(const int16_t *in, float gain, float *re, float *im, size_t n) {
     }
 }
 
+void fill(float *out, float value, size_t n) {
+    for (size_t i = 0; i < n; i++) out[i] = value;
+}
+
+void add(const float *in, float *out, size_t n) {
+    for (size_t i = 0; i < n; i++) out[i] += in[i];
+}
+
 void rotate(float *re, float *im, double phase, double step, size_t n) {
     float c[ROTATED], s[ROTATED];
     for (int i = 0; i < ROTATED; i++) {
@@ -91,22 +101,25 @@ void rotate(float *re, float *im, double phase, double step, size_t n) {
 void resample_add(const float *re, const float *im, double fraction, double step, float *out_re,
                   float *out_im, size_t n) {
     static const Filters filters;
-    for (size_t i = 0; i < n;) {
-        const double position = fraction + step * i;
+    const double drift = std::fabs(step - 1) * PHASES;
+    // So many samples in a row take the same filter.
+    const size_t same = drift * RUN < 1 ? RUN : std::max<size_t>(1, size_t(1 / drift));
+    for (size_t at = 0; at < n; at += same) {
+        const double position = fraction + step * at;
         const auto whole = static_cast<size_t>(position);
-        const int phase = int((position - whole) * PHASES + 0.5);
-        // As long as the drift stays below one of the filter's phases it is the same filter.
-        const double drift = std::fabs(step - 1) * PHASES;
-        const size_t run = drift * (n - i) < 1 ? n - i : std::max<size_t>(1, size_t(1 / drift));
-        const size_t count = std::min(run, n - i);
+        const float *tap = filters.tap[int((position - whole) * PHASES + 0.5)];
+        float x[RUN] = {}, y[RUN] = {};
         for (int k = 0; k < TAPS; k++) {
-            const float tap = filters.tap[phase][k];
-            for (size_t j = 0; j < count; j++) {
-                out_re[i + j] += tap * re[whole + k + j];
-                out_im[i + j] += tap * im[whole + k + j];
+            for (int i = 0; i < RUN; i++) {
+                x[i] += tap[k] * re[whole + k + i];
+                y[i] += tap[k] * im[whole + k + i];
             }
         }
-        i += count;
+        const size_t count = std::min(same, n - at);
+        for (size_t i = 0; i < count; i++) {
+            out_re[at + i] += x[i];
+            out_im[at + i] += y[i];
+        }
     }
 }
 
@@ -124,6 +137,7 @@ void add_noise(float *re, float *im, float rms, uint64_t &seed, size_t n) {
 }
 
 void from_planar(const float *re, const float *im, int bits, Format format, void *out, size_t n) {
+    if (format == Format::CS8) bits = std::min(bits, 8);
     const float peak = float((1 << (bits - 1)) - 1);
     auto convert = [&](auto *values, float scale) {
         using Value = std::remove_pointer_t<decltype(values)>;

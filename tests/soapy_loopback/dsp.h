@@ -5,7 +5,7 @@
 
 namespace loopback {
 
-constexpr int TAPS = 16;
+constexpr int TAPS = 32;
 
 enum class Format { CF32, CS16, CS8 };
 size_t bytes(Format format);
@@ -14,9 +14,12 @@ size_t bytes(Format format);
 void to_ring(const void *in, Format format, int bits, int16_t *out, size_t n);
 void from_ring(const int16_t *in, float gain, float *re, float *im, size_t n);
 
+void fill(float *out, float value, size_t n);
+void add(const float *in, float *out, size_t n);
 // Times e^(j 2 pi (phase + step i)); both in cycles.
 void rotate(float *re, float *im, double phase, double step, size_t n);
-// out[i] += in at position i * step + fraction, of which in[TAPS / 2 - 1] is 0.
+// out[i] += in at position i * step + fraction, of which in[TAPS / 2 - 1] is 0. Reads up to
+// 2 TAPS beyond the last of these.
 void resample_add(const float *re, const float *im, double fraction, double step, float *out_re,
                   float *out_im, size_t n);
 // Gaussian, of standard deviation `rms` over both parts together.

@@ -21,9 +21,12 @@ static_assert(sizeof(Word) == 8 && Word::is_always_lock_free);
 // Written and read by tests too: the order is that of FIELDS in __init__.py.
 struct Control {
     Word unplugged, unplugs, stall, lose, underflow, time_error, crash, hang;
-    Word owner, mode, on_from_ns, on_until_ns;
+    Word owner, plugged, mode, on_from_ns, on_until_ns;
     Word sent, bursts, underflows, late, received, lost, overflows, opened;
-    Word reserved[12];
+    Word reserved[11];
+
+    // Unplugged once, an open device stays so: only opening it anew helps.
+    bool is_plugged() const { return plugged == unplugs; }
 };
 
 // How a transmitter is set from a moment on, until the next Tuning.

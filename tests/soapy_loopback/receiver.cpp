@@ -153,15 +153,15 @@ void Receiver::render(void *out, int64_t n) {
 
 void Receiver::render_block(void *out, size_t n, const Listener &listener) {
     const Settings &settings = station_.settings;
-    std::fill_n(re_.begin(), n, float(settings.dc));
-    std::fill_n(im_.begin(), n, float(settings.dc));
+    fill(re_.data(), settings.dc, n);
+    fill(im_.data(), settings.dc, n);
     if (next_ < clean_) {
         add_noise(re_.data(), im_.data(), GARBAGE_RMS, seed_, n);
     } else {
         for (int number = 0; number < UNITS; number++) {
             if (number == settings.unit && !settings.self) continue;
             const Unit &other = station_.bus.unit(number);
-            if (!other.control.unplugged) ear_.add(other, listener, next_, n, re_.data(), im_.data());
+            if (other.control.is_plugged()) ear_.add(other, listener, next_, n, re_.data(), im_.data());
         }
         const float rms = std::pow(10.0, settings.noise_db / 20);
         if (settings.noise_db > -200) add_noise(re_.data(), im_.data(), rms, seed_, n);

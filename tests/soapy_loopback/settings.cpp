@@ -33,25 +33,29 @@ const std::map<std::string, Model> MODELS = {
       128}},
 };
 
-const SoapySDR::Kwargs PLAIN = {
-    {"unit", "0"},        {"bus", ""},           {"duplex", "full"},  {"mtu", "4096"},
-    {"fill", "no"},       {"time", "yes"},       {"ack", "yes"},      {"status", "yes"},
-    {"rxblock", "1024"},  {"txblock", "1"},      {"rxbuf", "262144"}, {"txbuf", "262144"},
-    {"inflight", "0"},    {"txlat_us", "1000"},  {"turn_us", "1000"}, {"bits", "16"},
-    {"speed", "1"},       {"noise_db", "-80"},   {"loss_db", "0"},    {"leak_db", "-200"},
-    {"cfo", "0"},         {"ppm", "0"},          {"delay", "0"},      {"dc", "0"},
-    {"self", "no"},       {"min_rate", "1"},     {"max_rate", "1e9"}, {"rate_error", "0"},
-    {"lie", "yes"},       {"busy", "no"},        {"absent", "no"},
+// Text, as SoapySDR has it; what a model does not say is as in the plain one.
+struct Default {
+    const char *key, *value;
 };
-const SoapySDR::Kwargs USRP = {
-    {"mtu", "2040"},      {"fill", "yes"},       {"rxblock", "2040"}, {"txbuf", "65536"},
-    {"bits", "12"},       {"min_rate", "200e3"}, {"max_rate", "61.44e6"},
+constexpr Default PLAIN[] = {
+    {"unit", "0"},       {"bus", ""},          {"duplex", "full"},  {"mtu", "4096"},
+    {"fill", "no"},      {"time", "yes"},      {"ack", "yes"},      {"status", "yes"},
+    {"rxblock", "1024"}, {"txblock", "1"},     {"rxbuf", "262144"}, {"txbuf", "262144"},
+    {"inflight", "0"},   {"txlat_us", "1000"}, {"turn_us", "1000"}, {"bits", "16"},
+    {"speed", "1"},      {"noise_db", "-80"},  {"loss_db", "0"},    {"leak_db", "-200"},
+    {"cfo", "0"},        {"ppm", "0"},         {"delay", "0"},      {"dc", "0"},
+    {"self", "no"},      {"min_rate", "1"},    {"max_rate", "1e9"}, {"rate_error", "0"},
+    {"lie", "yes"},      {"busy", "no"},       {"absent", "no"},
 };
-const SoapySDR::Kwargs HACKRF = {
-    {"duplex", "half"},   {"mtu", "131072"},     {"time", "no"},      {"ack", "no"},
+constexpr Default USRP[] = {
+    {"mtu", "2040"}, {"fill", "yes"},     {"rxblock", "2040"},   {"txbuf", "65536"},
+    {"bits", "12"},  {"noise_db", "-70"}, {"min_rate", "200e3"}, {"max_rate", "61.44e6"},
+};
+constexpr Default HACKRF[] = {
+    {"duplex", "half"},   {"mtu", "131072"},     {"time", "no"},       {"ack", "no"},
     {"status", "no"},     {"rxblock", "131072"}, {"txblock", "131072"}, {"rxbuf", "1966080"},
     {"txbuf", "1966080"}, {"txlat_us", "5000"},  {"turn_us", "20000"}, {"bits", "8"},
-    {"noise_db", "-60"},  {"leak_db", "-45"},    {"dc", "0.02"},      {"min_rate", "2e6"},
+    {"noise_db", "-45"},  {"leak_db", "-45"},    {"dc", "0.02"},       {"min_rate", "2e6"},
     {"max_rate", "20e6"},
 };
 
@@ -66,6 +70,10 @@ const Model *find_model(const SoapySDR::Kwargs &args) {
 struct Reader {
     SoapySDR::Kwargs values;
 
+    template <size_t N>
+    void otherwise(const Default (&defaults)[N]) {
+        for (const Default &one : defaults) values.emplace(one.key, one.value);
+    }
     const std::string &text(const std::string &key) const { return values.at(key); }
     double number(const std::string &key) const {
         size_t used = 0;
@@ -94,9 +102,9 @@ struct Reader {
 
 Settings::Settings(const SoapySDR::Kwargs &args) : model(find_model(args)) {
     Reader given{args};
-    if (model->name == "usrp") given.values.insert(USRP.begin(), USRP.end());
-    if (model->name == "hackrf") given.values.insert(HACKRF.begin(), HACKRF.end());
-    given.values.insert(PLAIN.begin(), PLAIN.end());
+    if (model->name == "usrp") given.otherwise(USRP);
+    if (model->name == "hackrf") given.otherwise(HACKRF);
+    given.otherwise(PLAIN);
 
     keeps_newest = model->name == "hackrf";
     bus = given.text("bus");

@@ -21,10 +21,10 @@ Station::Station(const Settings &given)
       bus(given.bus, given.speed),
       unit(bus.unit(given.unit)),
       control(unit.control),
-      emission(unit),
-      unplugs_(control.unplugs) {
+      emission(unit) {
     bus.claim(settings.unit);
     control.owner = getpid();
+    control.plugged = control.unplugs.load();
     control.opened++;
     emission.cut(std::numeric_limits<int64_t>::min());
     const double rate = std::max(settings.min_rate, std::min(1e6, settings.max_rate));
@@ -39,8 +39,6 @@ Station::~Station() {
     emission.cut(now(tx.rate));
     control.owner = 0;
 }
-
-bool Station::gone() const { return control.unplugged || control.unplugs != unplugs_; }
 
 int64_t Station::own_ns() const { return std::llround(clock.own(bus.air_ns())); }
 

@@ -19,8 +19,7 @@ class Station {
     explicit Station(const Settings &settings);
     ~Station();
 
-    // Unplugged, now or since it was opened: only opening it anew helps.
-    bool gone() const;
+    bool gone() const { return !control.is_plugged(); }
 
     // These want `mutex` held.
     int64_t now(double rate) const;
@@ -43,13 +42,13 @@ class Station {
     Emission emission;
     Clock clock;
     Tuned rx, tx;
-    Mode mode = Mode::OFF;
+    std::atomic<Mode> mode{Mode::OFF};
     int64_t time_offset_ns = 0;
 
   private:
     double carrier(double frequency) const;
 
-    int64_t unplugs_, ready_ns_ = 0, tuned_ns_ = 0;
+    int64_t ready_ns_ = 0, tuned_ns_ = 0;
 };
 
 }  // namespace loopback

@@ -51,6 +51,7 @@ SoapySDR::Stream *Device::setupStream(int direction, const std::string &name,
 
 void Device::closeStream(SoapySDR::Stream *stream) {
     if (stream == reinterpret_cast<SoapySDR::Stream *>(receiver_.get())) {
+        deactivateStream(stream, 0, 0);
         receiver_.reset();
     } else {
         stop_sending();
