@@ -153,8 +153,6 @@ class DualEnvelope:
         middle = np.nextafter(float(np.median(times)), np.inf)
         for side in (self._above, self._below):
             side.forget_before(middle)
-            if len(side) == len(times):
-                side.clear()
 
 
 class _Fit:

@@ -47,9 +47,13 @@ class Side:
         return float(n), float(x / n), float(v / n)
 
     def add(self, x: float, v: float, slope: float) -> None:
-        """One more; `slope`: what bounds are thought to gain a second."""
+        """One more, unless it is older than the last; `slope`: what bounds are thought to gain a
+        second.
+        """
         rows, bucket = self._rows, math.floor(x / BUCKET_S)
-        if len(self) and bucket <= self._bucket:
+        if bucket < self._bucket:
+            return
+        if len(self) and bucket == self._bucket:
             last = self._end - 1
             rows[2:, last] += (1.0, x, v)
             if v - slope * x < rows[1, last] - slope * rows[0, last]:
@@ -71,3 +75,4 @@ class Side:
     def clear(self) -> None:
         """All of it."""
         self._begin = self._end = 0
+        self._bucket = -math.inf

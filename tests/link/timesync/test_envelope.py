@@ -127,6 +127,28 @@ def test_what_is_kept_is_bounded_and_no_older_than_the_window():
 
 
 @settings(derandomize=True, deadline=None)
+@given(st.lists(st.one_of(st.floats(0, 20), st.none()), max_size=40))
+def test_times_stay_sorted_whatever_comes(times):
+    side = Side(5.0)
+    for x in times:
+        if x is None:
+            side.clear()
+        else:
+            side.add(x, -x, 0.0)
+        assert (side.x[1:] > side.x[:-1]).all()
+
+
+def test_what_came_before_does_not_count_once_all_is_forgotten():
+    side = Side(5.0)
+    side.add(3.0, 1.0, 0.0)
+    side.add(1.0, 0.0, 0.0)
+    assert (side.x.tolist(), side.v.tolist(), side.totals()[0]) == ([3.0], [1.0], 1.0)
+    side.clear()
+    side.add(1.0, 0.0, 0.0)
+    assert side.x.tolist() == [1.0]
+
+
+@settings(derandomize=True, deadline=None)
 @given(st.lists(st.tuples(st.floats(0.11, 3), st.floats(0, 1)), min_size=1, max_size=40),
        st.floats(-0.01, 0.01))  # fmt: skip
 def test_only_points_on_which_a_line_can_rest_are_looked_at(steps, slope):
