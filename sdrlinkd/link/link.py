@@ -294,5 +294,5 @@ class Link:
             self.clocks.hear(src, record, at)
         elif isinstance(record, Receipt):
             self.outcomes.answered(src, record, at)
-        elif isinstance(record, Waits):
+        elif isinstance(record, Waits) and record.topic_id < len(self.registry):
             self.waits[src, record.topic_id] = record

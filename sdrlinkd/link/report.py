@@ -183,7 +183,7 @@ def link_notices(link: Link) -> list[str]:
             "the registry uses all 16 topic ids, so there is no control channel: no ages, no "
             "beacons, no registry check; drop one topic to have them"
         )
-    if link.registry.has_control and not link.tellings.fits:
+    if not link.tellings.fits:
         notices.append(
             f"PDUs of {link.params.pdu_size} B have no room for CLOCK records, so nobody knows "
             "anybody's clock; give all robots a larger link.pdu_size"

@@ -35,8 +35,8 @@ class Tellings:
         self._spare = spare
         self._neighbors = neighbors
         self._most_arrivals = (record_room - CLOCK_SIZE) // ARRIVAL_SIZE
-        self.fits = self._most_arrivals > 0
-        """Whether PDUs have room for clocks at all."""
+        self.fits = self._most_arrivals > 0 or not params.period_s
+        """Whether PDUs have room for clocks, if there are any to be told."""
         if not self.fits:
             clocks.end()
         self.pdu_s = 0.0

@@ -83,6 +83,13 @@ def test_why_a_message_waited_is_told_in_a_beacon():
     assert receiver.waits[1, 0] == told[0]
 
 
+def test_of_topics_that_nobody_has_nothing_is_kept():
+    link = make_link(own_id=2)
+    for topic_id in range(256):
+        link.record_from(1, Waits(topic_id, 1, 2, 3), 0.0)
+    assert [topic_id for _, topic_id in link.waits] == [topic.id for topic in link.registry.topics]
+
+
 def clocks_of(link, until, step_s=0.01, submit_s=None):
     """(time, whether it went alone) of every CLOCK that left, robot 9 being there, too."""
     found, now, next_at = [], 0.0, 0.0
@@ -138,6 +145,8 @@ def test_on_small_pdus_clocks_tell_of_as_many_robots_as_there_is_room_for():
     assert clocks_of(tiny, 3.0) == []
     assert any("have no room for CLOCK" in notice for notice in link_notices(tiny))
     assert tiny.next_wakeup(3.0) > 3.0
+    without = make_link(pdu_size=32, clock=ClockParams(period_s=0.0))
+    assert not any("CLOCK" in notice for notice in link_notices(without))
 
 
 def test_a_stamp_that_goes_ahead_is_no_record_alone():
