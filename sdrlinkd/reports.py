@@ -186,6 +186,10 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     relayed: RelayReport = RelayReport()
     fragments_repaired: int = 0
     """Computed from parity."""
+    receipts_untold: int = 0
+    """RECEIPTs to others that found no room."""
+    receipts_unasked: int = 0
+    """RECEIPTs of others of which nothing was known here any more."""
     tx: TxReport
     rx: RxReport
     topics: list[TopicReport]

@@ -60,7 +60,9 @@ def queue(snapshot: Snapshot) -> Text:
         f"+ {sum(tx.dropped.values())} dropped;  queue: {waiting or 'empty'}"
         f" ({size(tx.queued_bytes)})\n"
         f"in:  {rx.pdus_heard} PDUs heard, {rx.started} messages begun = {rx.delivered} delivered "
-        f"+ {rx.held} incomplete + {sum(rx.dropped.values())} lost" + _air(snapshot.link)
+        f"+ {rx.held} incomplete + {sum(rx.dropped.values())} lost"
+        + _air(snapshot.link)
+        + _receipts(snapshot.link)
     )
 
 
@@ -70,6 +72,16 @@ def _air(link: LinkReport) -> str:
         return ""
     late = f"; {link.bursts_late} bursts came too late and went again" if link.bursts_late else ""
     return f"\nair: {link.access}; {link.airtime_s:.2f} s sent{late}"
+
+
+def _receipts(link: LinkReport) -> str:
+    """Those that reached nobody; nothing where there are none."""
+    parts = (
+        (link.receipts_untold, "to others found no room"),
+        (link.receipts_unasked, "came that nothing was known of any more"),
+    )
+    told = [f"{count} {words}" for count, words in parts if count]
+    return f"\nreceipts: {', '.join(told)}" if told else ""
 
 
 def sent_topics(topics: list[TopicReport]) -> Table:

@@ -43,6 +43,8 @@ def link_report(
             dropped=dict(link.sender.relayed.dropped),
         ),
         fragments_repaired=link.inbox.fragments_repaired,
+        receipts_untold=link.outcomes.receipts_untold,
+        receipts_unasked=link.outcomes.receipts.unasked,
         tx=_tx(link),
         rx=_rx(link),
         topics=_topics(link, now, names_in),

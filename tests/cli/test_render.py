@@ -46,6 +46,8 @@ SNAPSHOT = Snapshot(
         mcs_changes=[(3.5, 2, 3)],
         control_channel=True,
         registry_digest="8c29071360508ee6",
+        receipts_untold=4,
+        receipts_unasked=1,
         tx=TxReport(
             accepted=130, sent=110, queued=12, queued_bytes=18_000, in_flight=2,
             dropped={"tx_bad_envelope": 1, "tx_expired": 5},

@@ -18,11 +18,13 @@ from sdrlinkd.link import (
     Qos,
     RelayParams,
     TopicPolicy,
+    link_report,
 )
 from sdrlinkd.link.draft import Draft
 from sdrlinkd.link.ledger import TxTally
 from sdrlinkd.link.message import Outgoing
 from sdrlinkd.link.spare import SpareRecords
+from sdrlinkd.link.tellings import MOST_RECEIPTS
 from sdrlinkd.wire import Receipt, parse, parse_records
 from tests.link.world import make_link, next_burst
 
@@ -182,6 +184,15 @@ def test_a_receipt_is_for_the_message_that_had_the_entry_id_then():
     air.run(air.now + RECEIPT_S + 0.5)
     assert Counter(each.fate for _, each in air.verdicts) == {"delivered": 600}
     assert air.links[1].outcomes.receipts.unasked == 0
+
+
+def test_receipts_that_reach_nobody_are_reported():
+    link = make_link()
+    for number in range(300):
+        link.ended(2, number // 256, number % 256, "delivered", 0.1, 1.0)
+    link.record_from(2, Receipt(0, 5, 1), 1.0)
+    report = link_report(link, 1.0, {}, {})
+    assert (report.receipts_untold, report.receipts_unasked) == (300 - MOST_RECEIPTS, 1)
 
 
 def test_a_receipt_that_waited_is_for_the_message_of_then():
