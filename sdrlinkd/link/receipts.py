@@ -5,10 +5,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from sdrlinkd.link.message import Outgoing
-from sdrlinkd.link.spare import RECEIPT_UNIT_S
-from sdrlinkd.wire import BROADCAST, NO_AGE, Receipt
+from sdrlinkd.wire import BROADCAST, NO_AGE, RECEIPT_UNIT_S, Receipt
 
-UNIT_S = RECEIPT_UNIT_S
 EARLIER_S = 0.05
 """So much may the far end's word of when a message was submitted be too early."""
 MOST_PENDING = 4096
@@ -48,7 +46,7 @@ def make_receipt(
     src: int, topic_id: int, entry_id: int, reason: str, age_s: float | None
 ) -> Receipt:
     """What robot `src` is told of its message."""
-    age = NO_AGE if age_s is None else min(max(round(age_s / UNIT_S), 0), NO_AGE)
+    age = NO_AGE if age_s is None else min(max(round(age_s / RECEIPT_UNIT_S), 0), NO_AGE)
     return Receipt(topic_id, entry_id, STATUS[reason], src, age)
 
 
@@ -78,8 +76,8 @@ class Receipts:
 
     def hear(self, src: int, receipt: Receipt, at: float) -> None:
         """Robot `src` answers, in a burst whose preamble came at `at`."""
-        age_s = None if receipt.age_100us == NO_AGE else UNIT_S * receipt.age_100us
-        ended_at = at - UNIT_S * receipt.since_100us
+        age_s = None if receipt.age_100us == NO_AGE else RECEIPT_UNIT_S * receipt.age_100us
+        ended_at = at - RECEIPT_UNIT_S * receipt.since_100us
         # Entry ids come again: the last one that was there in time is meant.
         latest = ended_at + EARLIER_S - (age_s or 0.0)
         for pending in reversed(self._pending.get((receipt.topic_id, receipt.entry_id), ())):

@@ -3,11 +3,17 @@
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from sdrlinkd.wire import PduBuilder, Receipt, Record, RecordType, build_records
+from sdrlinkd.wire import (
+    MAX_SINCE,
+    RECEIPT_UNIT_S,
+    PduBuilder,
+    Receipt,
+    Record,
+    RecordType,
+    build_records,
+)
 
 INFINITE = float("inf")
-RECEIPT_UNIT_S = 1e-4
-MAX_SINCE = 0xFFFF
 LASTING = frozenset({RecordType.CLOCK, RecordType.RECEIPT})
 """A beacon does not speak of the same."""
 

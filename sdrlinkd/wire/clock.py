@@ -7,6 +7,8 @@ from sdrlinkd.errors import PduError
 
 UNKNOWN_WALL = -(1 << 63)
 MAX_WALL_ERROR_US = 0xFFFF
+CLOCK_NUMBERS = 1 << 16
+"""They go round."""
 TICK_NS = 10
 """Arrivals are told in this unit."""
 _FIXED = struct.Struct(">HHHQqH")

@@ -6,7 +6,13 @@ from collections.abc import Iterator
 
 from sdrlinkd.wire.builder import HEADER
 from sdrlinkd.wire.capacity import CRC_SIZE, ENTRY_HEADER_SIZE, HEADER_SIZE
-from sdrlinkd.wire.control import MAX_AGE_US, TLV_HEADER_SIZE, RecordType
+from sdrlinkd.wire.control import (
+    MAX_AGE_US,
+    MAX_SINCE,
+    RECEIPT_UNIT_US,
+    TLV_HEADER_SIZE,
+    RecordType,
+)
 from sdrlinkd.wire.pdu import identity
 from sdrlinkd.wire.registry import CONTROL_TOPIC_ID
 
@@ -17,9 +23,8 @@ _POSTPONED = {int(RecordType.STAMP): _AGE, int(RecordType.FRAME): _PHASE}
 _FORWARDED = {int(RecordType.STAMP): _AGE}
 _U32 = struct.Struct(">I")
 # RECEIPT counts up in a smaller field, and not always.
-_SINCE, _SINCE_END, _SINCE_US = 6, 8, 100
+_SINCE, _SINCE_END = 6, 8
 _U16 = struct.Struct(">H")
-MAX_SINCE = 0xFFFF
 HOP = 4
 """Octet of hops left and number of entries."""
 
@@ -31,7 +36,7 @@ def postponed(pdu: bytes, by_us: int) -> bytes:
     for kind, at, length in _records(data):
         if kind == RecordType.RECEIPT and length >= _SINCE_END:
             (since,) = _U16.unpack_from(data, at + _SINCE)
-            _U16.pack_into(data, at + _SINCE, min(since + by_us // _SINCE_US, MAX_SINCE))
+            _U16.pack_into(data, at + _SINCE, min(since + by_us // RECEIPT_UNIT_US, MAX_SINCE))
     return _sealed(data)
 
 

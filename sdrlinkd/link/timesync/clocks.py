@@ -7,11 +7,16 @@ import msgspec
 from msgspec import Meta
 
 from sdrlinkd.link.timesync.peer import PeerClock, State, Wall
-from sdrlinkd.wire import MAX_ARRIVALS, UNKNOWN_WALL, Clock, tellable
+from sdrlinkd.wire import (
+    CLOCK_NUMBERS,
+    MAX_ARRIVALS,
+    MAX_WALL_ERROR_US,
+    UNKNOWN_WALL,
+    Clock,
+    tellable,
+)
 
 REMEMBERED = 64
-SEQUENCE = 1 << 16
-MAX_WALL_ERROR_US = 0xFFFF
 RIDES_FROM = 0.75
 """Of a period after the last one, a record is ready for spare room."""
 HOST_DRIFT = 1e-4
@@ -77,7 +82,7 @@ class Clocks:
 
     def rode(self) -> int:
         """The record went into a burst; its number."""
-        number, self._number = self._number, (self._number + 1) % SEQUENCE
+        number, self._number = self._number, (self._number + 1) % CLOCK_NUMBERS
         return number
 
     def left(self, number: int, at: float) -> None:

@@ -5,7 +5,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from sdrlinkd.link.timesync.envelope import WINDOW_S, DualEnvelope, Estimate
-from sdrlinkd.wire import UNKNOWN_WALL, Arrival, Clock
+from sdrlinkd.wire import CLOCK_NUMBERS, UNKNOWN_WALL, Arrival, Clock
 
 COARSE_S = 0.005
 """A bound above it is a coarse one."""
@@ -16,7 +16,6 @@ SILENT_S = 5.0
 SILENT_PERIODS = 4
 SOLVE_S = 0.2
 REMEMBERED = 16
-SEQUENCE = 1 << 16
 
 
 class State(Enum):
@@ -93,7 +92,7 @@ class PeerClock:
         if not self._arrivals:
             return None
         number, at = next(reversed(self._arrivals.items()))
-        return Arrival(self.src, number, 10 * round(1e8 * (at - base_s)))
+        return Arrival(self.src, number, round(1e9 * (at - base_s)))
 
     def estimate(self, now: float) -> Estimate | None:
         """Own minus its link's clock; made anew where there is something new."""
@@ -121,8 +120,8 @@ class PeerClock:
             self._arrivals.clear()
             return True
         if clock.boot_id == self._boot_id:
-            newer = (clock.number - self._last_number) % SEQUENCE
-            return 0 < newer < SEQUENCE // 2
+            newer = (clock.number - self._last_number) % CLOCK_NUMBERS
+            return 0 < newer < CLOCK_NUMBERS // 2
         if clock.boot_id != self._strange_boot_id:
             # It may be a recording of before; who has really started anew says so again.
             self._strange_boot_id = clock.boot_id
