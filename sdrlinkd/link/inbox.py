@@ -82,8 +82,8 @@ class Inbox:
         except PduError as error:
             return self._drop(error.reason)
         is_relayed = pdu.hop < self._hop_limit
+        stamps = [record for record in records or () if isinstance(record, Stamp)]
         if pdu.src != self._own_id or is_relayed:
-            stamps = [record for record in records or () if isinstance(record, Stamp)]
             self._ear.pdu_from(pdu, stamps, at, is_relayed)
         if pdu.src == self._own_id and not self._hears_self:
             return self._drop("rx_own")
@@ -97,9 +97,8 @@ class Inbox:
         neighbor.hops_left = pdu.hop
         if not is_relayed:
             neighbor.note_snr(snr_db)
-        for record in records or ():
-            if isinstance(record, Stamp):
-                self._ages.stamp(pdu.src, record, at)
+        for stamp in stamps:
+            self._ages.stamp(pdu.src, stamp, at)
         is_sent_on = self._ear.sends_on(pdu, data, at)
         if pdu.dst not in (BROADCAST, self._own_id) and not self._hears_self:
             return self._drop("rx_relayed" if is_sent_on else "rx_not_for_us")

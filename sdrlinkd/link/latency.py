@@ -26,10 +26,9 @@ class Parts(NamedTuple):
 class Latency:
     """The last ages in full, all of them in a histogram."""
 
-    __slots__ = ("_ages", "_came_at", "_histogram", "_intervals", "_parts")
+    __slots__ = ("_came_at", "_histogram", "_intervals", "_parts")
 
     def __init__(self) -> None:
-        self._ages: deque[float] = deque(maxlen=RECENT)
         self._parts: deque[Parts] = deque(maxlen=RECENT)
         self._intervals: deque[float] = deque(maxlen=RECENT)
         self._came_at: float | None = None
@@ -38,7 +37,6 @@ class Latency:
     def add(self, parts: Parts, now: float) -> float:
         """A message is handed over at `now`; its age in s."""
         age_s = sum(parts)
-        self._ages.append(age_s)
         self._parts.append(parts)
         if self._came_at is not None:
             self._intervals.append(now - self._came_at)
@@ -48,13 +46,13 @@ class Latency:
 
     def last_ms(self) -> float | None:
         """Age of the newest message."""
-        return self._ages[-1] * 1e3 if self._ages else None
+        return sum(self._parts[-1]) * 1e3 if self._parts else None
 
     def quantile_ms(self, q: float) -> float | None:
         """The `q` quantile (nearest rank) of the recent ages."""
-        if not self._ages:
+        if not self._parts:
             return None
-        ordered = sorted(self._ages)
+        ordered = sorted(map(sum, self._parts))
         return ordered[min(len(ordered) - 1, int(q * len(ordered)))] * 1e3
 
     def parts(self) -> Parts:

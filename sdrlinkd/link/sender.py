@@ -183,11 +183,9 @@ class Sender:
     def compose_records(self, start: float) -> Burst | None:
         """A burst of one PDU for control records that found no spare room."""
         built = self.packetizer.records_pdu(start)
-        return (
-            None
-            if built is None
-            else self._counted(Burst([built.data], [[]], [built.qos], n_records=1))
-        )
+        if built is None:
+            return None
+        return self._counted(Burst([built.data], [[]], [built.qos], n_records=1))
 
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
         """The radio's word on a burst: its messages are sent, or dropped by name."""
