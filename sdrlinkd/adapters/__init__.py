@@ -3,6 +3,7 @@
 from sdrlinkd.adapters.bags import Bag, BagMessage, BagTopic, open_bag
 from sdrlinkd.adapters.chrony import ChronySocket
 from sdrlinkd.adapters.due import Due, due_messages
+from sdrlinkd.adapters.fields import cdr_from_fields
 from sdrlinkd.adapters.pacing import first_seconds, paced
 from sdrlinkd.adapters.robot import BuiltInRobot
 from sdrlinkd.adapters.stops import header_topics, stop_messages
@@ -17,6 +18,7 @@ __all__ = [
     "ChronySocket",
     "Due",
     "Transforms",
+    "cdr_from_fields",
     "due_messages",
     "empty",
     "first_seconds",

@@ -1,15 +1,11 @@
 """Messages that are handed over when a command topic falls silent."""
 
-import difflib
-import struct
-from collections.abc import Mapping
-from typing import Any
-
 from rosbags.interfaces import Nodetype
 
-from sdrlinkd.adapters.typestore import empty, knows, ros2_types, to_cdr
+from sdrlinkd.adapters.fields import cdr_from_fields
+from sdrlinkd.adapters.typestore import knows, ros2_types
 from sdrlinkd.config import Setup
-from sdrlinkd.errors import ConfigError
+from sdrlinkd.errors import ConfigError, UserError
 
 HEADER = "std_msgs/msg/Header"
 
@@ -31,15 +27,11 @@ def stop_messages(setup: Setup) -> dict[int, bytes]:
                     "not known here, so no stop message can be made; allowed: 0"
                 )
             continue
-        made[topic.id] = _made(topic.type, given, f"{where}.stop")
+        try:
+            made[topic.id] = cdr_from_fields(topic.type, given, f"{where}.stop")
+        except UserError as error:
+            raise ConfigError(str(error)) from None
     return made
-
-
-def _made(kind: str, given: Mapping[str, Any], where: str) -> bytes:
-    try:
-        return to_cdr(_filled(empty(kind), given, where), kind)
-    except (struct.error, ValueError, OverflowError) as error:
-        raise ConfigError(f"{where}: got {dict(given)!r}; {error}") from None
 
 
 def header_topics(setup: Setup) -> frozenset[int]:
@@ -51,38 +43,3 @@ def header_topics(setup: Setup) -> frozenset[int]:
 def _begins_with_header(kind: str) -> bool:
     fields = ros2_types().fielddefs[kind][1]
     return bool(fields) and fields[0][1] == (Nodetype.NAME, HEADER)
-
-
-def _filled(message: Any, given: Mapping[str, Any], where: str) -> Any:  # noqa: ANN401
-    """`message` with the fields of `given`, for error messages called `where`."""
-    kinds = dict(ros2_types().fielddefs[message.__msgtype__][1])
-    for name, value in given.items():
-        if name not in kinds:
-            near = difflib.get_close_matches(name, kinds, 1)
-            hint = f" (did you mean {near[0]}?)" if near else ""
-            raise ConfigError(f"{where}.{name}: no such field{hint}; allowed: {', '.join(kinds)}")
-        made = _value(getattr(message, name), kinds[name], value, f"{where}.{name}")
-        object.__setattr__(message, name, made)
-    return message
-
-
-def _value(old: Any, kind: Any, given: Any, where: str) -> Any:  # noqa: ANN401
-    """`given` as a field of that kind, which is `old` so far."""
-    node, inner = kind
-    if node == Nodetype.NAME:
-        if not isinstance(given, Mapping):
-            raise ConfigError(f"{where}: got {given!r}; allowed: a table of its fields")
-        return _filled(old, given, where)
-    if node != Nodetype.BASE:
-        raise ConfigError(f"{where}: got {given!r}; arrays stay as they are")
-    name = inner[0]
-    wanted: tuple[type, ...] = (int,)
-    if name in ("string", "wstring"):
-        wanted = (str,)
-    elif name == "bool":
-        wanted = (bool,)
-    elif name.startswith("float"):
-        wanted = (int, float)
-    if not isinstance(given, wanted) or isinstance(given, bool) != (name == "bool"):
-        raise ConfigError(f"{where}: got {given!r}; allowed: a {name}")
-    return float(given) if isinstance(given, int) and float in wanted else given

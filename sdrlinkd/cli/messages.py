@@ -11,7 +11,7 @@ from rich.console import Console
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from sdrlinkd.adapters import empty, from_cdr, knows, to_cdr
+from sdrlinkd.adapters import cdr_from_fields, from_cdr, knows
 from sdrlinkd.cli.app import RuntimeDir, app, connect
 from sdrlinkd.cli.status import ask_status
 from sdrlinkd.client import Message, Publisher, Subscriber
@@ -133,7 +133,7 @@ def _plain(value: Any) -> Any:  # noqa: ANN401
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _fill(message: Any, values: str, kind: str) -> Any:  # noqa: ANN401
+def _serialize(values: str, kind: str) -> bytes:
     try:
         given = YAML(typ="safe", pure=True).load(values)
     except YAMLError as error:
@@ -142,52 +142,7 @@ def _fill(message: Any, values: str, kind: str) -> Any:  # noqa: ANN401
         raise UserError(
             f"fields of {kind}: got {values!r}; allowed: a map such as '{{linear: {{x: 0.5}}}}'"
         )
-    _assign(message, given, kind)
-    return message
-
-
-def _assign(message: Any, given: dict[str, Any], path: str) -> None:  # noqa: ANN401
-    names = [name for name in message.__dataclass_fields__ if not name.startswith("_")]
-    for name, value in given.items():
-        if name not in names:
-            raise UserError(f"{path}: has no field {name}; allowed: {', '.join(names)}")
-        current = getattr(message, name)
-        if hasattr(current, "__msgtype__"):
-            if not isinstance(value, dict):
-                raise UserError(f"{path}.{name}: got {value!r}; allowed: a map of its fields")
-            _assign(current, value, f"{path}.{name}")
-        else:
-            setattr(message, name, _convert(current, value, f"{path}.{name}"))
-
-
-def _convert(current: Any, value: Any, path: str) -> Any:  # noqa: ANN401
-    """`value` as the field's own kind, which its default shows."""
-    try:
-        if isinstance(current, np.ndarray):
-            return np.asarray(value, dtype=current.dtype).reshape(-1)
-        if isinstance(current, float):
-            return float(value)
-    except (TypeError, ValueError, OverflowError):
-        raise UserError(f"{path}: got {value!r}; allowed: numbers") from None
-    kinds = {bool: "true or false", int: "a number", str: "text", list: "a list"}
-    for kind, words in kinds.items():
-        if isinstance(current, kind) and not isinstance(
-            value, (int, float) if kind is int else kind
-        ):
-            raise UserError(f"{path}: got {value!r}; allowed: {words}")
-    return value
-
-
-def _serialize(values: str, kind: str) -> bytes:
-    message = _fill(empty(kind), values, kind)
-    try:
-        return to_cdr(message, kind)
-    except Exception as error:
-        # The serializer is made from the definition; what does not fit fails in its own ways.
-        raise UserError(
-            f"{kind}: {values} does not fit its fields ({error}); lists of messages can be sent "
-            "with --cdr FILE"
-        ) from None
+    return cdr_from_fields(kind, given, kind)
 
 
 def _read(path: Path) -> bytes:

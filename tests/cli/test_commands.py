@@ -97,9 +97,9 @@ def test_pub_refuses_in_words(start_daemon, ctl):
     dir_ = ("--runtime-dir", daemon.directory)
     for arguments, says in (
         (("/robot_1/nothing",), "allowed: /robot_1/scan"),
-        (("/robot_1/cmd_vel", "{linear: {q: 1}}"), "has no field q; allowed: x, y, z"),
-        (("/robot_1/cmd_vel", "{linear: 3}"), "got 3; allowed: a map"),
-        (("/robot_1/cmd_vel", "{linear: {x: fast}}"), "got 'fast'; allowed: a number"),
+        (("/robot_1/cmd_vel", "{linear: {q: 1}}"), "linear.q: no such field; allowed: x, y, z"),
+        (("/robot_1/cmd_vel", "{linear: 3}"), "linear: got 3; allowed: a table"),
+        (("/robot_1/cmd_vel", "{linear: {x: fast}}"), "linear.x: got 'fast'; allowed: a float64"),
         (("/robot_1/cmd_vel", "[1]"), "allowed: a map"),
         (("/robot_1/cmd_vel", "{"), "not YAML"),
         (("/robot_1/cmd_vel", "{}", "--qos", "fast"), "allowed: urgent"),
