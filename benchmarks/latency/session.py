@@ -12,7 +12,7 @@ from benchmarks.latency.correction import Direction, Seconds, Stamps, direction
 from benchmarks.latency.job import MOST_TOPICS, STAMP, Job
 from benchmarks.latency.peers.table import PEERS, unavailable
 from benchmarks.latency.peers.way import Way
-from benchmarks.latency.processes import Child, PeerError, busy_cores
+from benchmarks.processes import Child, PeerError, busy_cores
 
 START_S = 0.3
 """From both ends being ready to the start."""

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from benchmarks.latency.peers.pacer import BUFFER, PIECE, Pacer
 from benchmarks.latency.peers.table import BAUD
-from benchmarks.latency.processes import Child
+from benchmarks.processes import Child
 
 BYTE_S = 10 / BAUD
 chunks = st.lists(st.tuples(st.floats(0, 0.01), st.binary(min_size=1, max_size=400)), max_size=30)

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from benchmarks.daemons import running
 from benchmarks.latency.peers.table import BAUD, PEERS, unavailable
-from benchmarks.latency.processes import PeerError
 from benchmarks.latency.session import run
+from benchmarks.processes import PeerError
 
 FRAME = 134
 """Bytes at least."""
@@ -28,6 +29,12 @@ def test_peers_that_are_not_there():
     assert "carrier pigeon" in unavailable("carrier pigeon")
     with pytest.raises(PeerError, match=", ".join(PEERS)):
         run("carrier pigeon", seconds=1.0)
+
+
+def test_a_daemon_that_does_not_start_says_why():
+    daemons = running("direct", [1], ["a"], "[link]\nnonsense = 1\n", "")
+    with pytest.raises(PeerError, match=r"daemon_1: .*link\.nonsense: unknown key"), daemons:
+        pass
 
 
 @pytest.mark.parametrize("given", [{"n_topics": 0}, {"n_topics": 16}, {"size": 12}])

@@ -1,6 +1,5 @@
 """The peers by name, how their ends are joined up, and which of them can run here."""
 
-import functools
 import json
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
@@ -9,8 +8,8 @@ from typing import NamedTuple
 from benchmarks.latency.job import Address
 from benchmarks.latency.peers import daemon
 from benchmarks.latency.peers.way import End, Way
-from benchmarks.latency.processes import Child
 from benchmarks.pound.peers import environments
+from benchmarks.processes import Child
 
 BAUD = 921_600
 """What PX4's TELEM2 is set to for a companion computer."""
@@ -63,13 +62,6 @@ PEERS: dict[str, Peer] = {
 }
 
 
-@functools.cache
 def unavailable(peer: str) -> str | None:
     """None where this peer can run, else why not; makes the environment that it needs."""
-    if peer not in PEERS:
-        return f"no peer is called {peer!r}; there are {', '.join(PEERS)}"
-    try:
-        environments.interpreter(PEERS[peer].environment)
-    except environments.EnvironmentLackingError as error:
-        return str(error)
-    return None
+    return environments.unavailable(PEERS, peer)

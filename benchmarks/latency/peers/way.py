@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from benchmarks.latency.job import Address
-from benchmarks.latency.processes import Child
+from benchmarks.processes import Child
 
 
 class End(NamedTuple):

@@ -9,7 +9,10 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
+from typing import Protocol
 
 ROOT = Path(__file__).parents[3]
 """What has the package `benchmarks`."""
@@ -31,6 +34,30 @@ INSTALL_S = 600.0
 
 class EnvironmentLackingError(Exception):
     """An environment cannot be had; the message says why."""
+
+
+class NeedsEnvironment(Protocol):
+    """A peer; "" is our own environment."""
+
+    @property
+    def environment(self) -> str:
+        """By name."""
+
+
+def unavailable(peers: Mapping[str, NeedsEnvironment], peer: str) -> str | None:
+    """None where this one can run, else why not; makes the environment that it needs."""
+    if peer not in peers:
+        return f"no peer is called {peer!r}; there are {', '.join(peers)}"
+    return _lacking(peers[peer].environment)
+
+
+@cache
+def _lacking(environment: str) -> str | None:
+    try:
+        interpreter(environment)
+    except EnvironmentLackingError as error:
+        return str(error)
+    return None
 
 
 def interpreter(environment: str) -> str:

@@ -1,6 +1,5 @@
 """The peers by name, and which of them can run here."""
 
-import functools
 from typing import NamedTuple
 
 from benchmarks.pound.peers import environments
@@ -35,13 +34,6 @@ PEERS: dict[str, Peer] = {
 }
 
 
-@functools.cache
 def unavailable(peer: str) -> str | None:
     """None where this peer can run, else why not; makes the environment that it needs."""
-    if peer not in PEERS:
-        return f"no peer is called {peer!r}; there are {', '.join(PEERS)}"
-    try:
-        environments.interpreter(PEERS[peer].environment)
-    except environments.EnvironmentLackingError as error:
-        return str(error)
-    return None
+    return environments.unavailable(PEERS, peer)

@@ -1,4 +1,4 @@
-"""Processes of a session: started, given their precedence, and measured from outside."""
+"""Processes of a benchmark: started, given their precedence, and measured from outside."""
 
 import os
 import subprocess
@@ -13,6 +13,7 @@ from benchmarks.pound.peers.environments import interpreter, variables
 
 REAL_TIME_PRIORITY = 10
 NICE = -10
+MOST_WORDS = 1 << 16
 TICKS_HZ = os.sysconf("SC_CLK_TCK")
 PAGE_MIB = os.sysconf("SC_PAGE_SIZE") / 2**20
 
@@ -89,10 +90,19 @@ class Child:
         # proc(5): utime and stime are the 14th and 15th field, the 3rd is the first here.
         return Usage((int(fields[11]) + int(fields[12])) / TICKS_HZ, resident * PAGE_MIB)
 
+    @property
+    def has_ended(self) -> bool:
+        """Of itself."""
+        return self._process.poll() is not None
+
+    def words(self) -> str:
+        """What it has complained of so far."""
+        said = os.pread(self._errors.fileno(), MOST_WORDS, 0)
+        return said.decode(errors="replace").strip()
+
     def _last_words(self) -> str:
         status = self._process.wait()
-        self._errors.seek(0)
-        lines = self._errors.read().decode(errors="replace").strip().splitlines()
+        lines = self.words().splitlines()
         return lines[-1] if lines else f"ended without a word, status {status}"
 
     def __enter__(self) -> Self:
