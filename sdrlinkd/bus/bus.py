@@ -153,10 +153,10 @@ class Bus:
 
     def tell(self, verdict: Verdict) -> None:
         """What became of a message whose producer wants to know."""
-        receipt, topic_id, dst, fate, reason, took_s = verdict
-        told = envelope.Receipt(receipt, self._names_in[topic_id], dst, fate, reason, took_s)
+        name = self._names_in[verdict.topic_id]
+        told = envelope.Receipt(verdict.receipt, name, *verdict[2:])
         frame = envelope.VERSION_BYTE + msgspec.msgpack.encode(told)
-        self._out.send_multipart([RECEIPT_PREFIX + receipt.encode() + b"\0", frame])
+        self._out.send_multipart([RECEIPT_PREFIX + told.id.encode() + b"\0", frame])
         self._out_reader.recheck()
 
     def tap(self, direction: str, data: bytes) -> None:

@@ -46,7 +46,9 @@ class OutHeader(msgspec.Struct, omit_defaults=True, gc=False):
 
 
 class Receipt(msgspec.Struct, frozen=True, omit_defaults=True):
-    """What became of a message at robot `d`; `took` is its age there in s."""
+    """What became of a message at robot `d`; `took` is its age there in s, `left` robots have still
+    to answer.
+    """
 
     id: str
     topic: str
@@ -54,6 +56,7 @@ class Receipt(msgspec.Struct, frozen=True, omit_defaults=True):
     fate: str
     reason: str = ""
     took: float | None = None
+    left: int = 0
 
 
 class Welcome(msgspec.Struct, frozen=True):

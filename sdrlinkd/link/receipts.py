@@ -24,7 +24,8 @@ EXPIRED = ("rx_expired", "tx_expired")
 class Verdict(NamedTuple):
     """For the producer: `fate` is delivered, expired, dropped or unknown; at robot `dst`.
 
-    `took_s` is the message's age when it was delivered there, where that is known.
+    `took_s` is the message's age when it was delivered there, where that is known; `left` robots
+    have still to answer.
     """
 
     receipt: str
@@ -33,6 +34,7 @@ class Verdict(NamedTuple):
     fate: str
     reason: str = ""
     took_s: float | None = None
+    left: int = 0
 
 
 @dataclass(slots=True)
@@ -88,7 +90,7 @@ class Receipts:
             pending.awaited.discard(src)
             known = receipt.status <= len(REASONS) and receipt.status
             reason = REASONS[receipt.status - 1] if known else f"rx_status_{receipt.status}"
-            self._tell(pending.message, src, reason, age_s)
+            self._tell(pending.message, src, reason, age_s, len(pending.awaited))
             if not pending.awaited:
                 self._forget(pending)
             return
@@ -98,8 +100,8 @@ class Receipts:
         """It did not get on the air, or not whole."""
         for pending in self._pending.get((message.topic_id, message.entry_id), ()):
             if pending.message is message:
-                for dst in pending.awaited:
-                    self._tell(message, dst, reason, None)
+                for left, dst in _counted_down(pending.awaited):
+                    self._tell(message, dst, reason, None, left)
                 self._forget(pending)
                 return
         if not message.is_expected:
@@ -119,19 +121,23 @@ class Receipts:
         verdicts, self.verdicts = self.verdicts, []
         return verdicts
 
-    def _tell(self, message: Outgoing, dst: int, reason: str, age_s: float | None) -> None:
+    def _tell(
+        self, message: Outgoing, dst: int, reason: str, age_s: float | None, left: int = 0
+    ) -> None:
         fate = "dropped"
         if reason == DELIVERED:
             fate, reason = DELIVERED, ""
         elif reason in EXPIRED:
             fate = "expired"
-        self.verdicts.append(Verdict(message.receipt, message.topic_id, dst, fate, reason, age_s))
+        self.verdicts.append(
+            Verdict(message.receipt, message.topic_id, dst, fate, reason, age_s, left)
+        )
 
     def _give_up(self, pending: _Pending) -> None:
         message = pending.message
         self.verdicts += [
-            Verdict(message.receipt, message.topic_id, dst, "unknown")
-            for dst in sorted(pending.awaited)
+            Verdict(message.receipt, message.topic_id, dst, "unknown", left=left)
+            for left, dst in _counted_down(pending.awaited)
         ]
 
     def _forget(self, pending: _Pending) -> None:
@@ -142,3 +148,8 @@ class Receipts:
             self._pending[key] = left
         else:
             del self._pending[key]
+
+
+def _counted_down(robots: set[int]) -> Iterable[tuple[int, int]]:
+    """(how many come after it, robot)."""
+    return zip(range(len(robots) - 1, -1, -1), sorted(robots), strict=True)

@@ -117,6 +117,10 @@ def test_receipts_and_deliveries_agree(seed, loss, doubled, late, size, lifespan
     told = {(verdict.receipt, verdict.dst): verdict for _, verdict in air.verdicts}
     assert len(told) == len(air.verdicts), "each robot is told of once"
     assert all(robot == 1 for robot, _ in air.verdicts)
+    left = {}
+    for _, verdict in air.verdicts:
+        left.setdefault(verdict.receipt, []).append(verdict.left)
+    assert all(each == list(range(len(each)))[::-1] for each in left.values()), "it counts down"
     assert air.expired == []
     assert max(air.delivered.values(), default=1) == 1
     for name, (payload, dst) in sent.items():
@@ -172,6 +176,19 @@ def test_a_burst_that_the_radio_lost_is_no_delivery():
     assert (verdict.fate, verdict.reason, verdict.dst) == ("dropped", "tx_radio_failed", 2)
     link.handle_timers(100.0)
     assert link.outcomes.receipts.take() == []
+
+
+def test_of_all_robots_asked_the_last_one_is_told_of_as_such():
+    link = make_link()
+    for robot in (2, 3):
+        link.inbox._new_neighbor(robot, 0.0).last_heard_at = 0.0
+    link.submit(0, message(1), 0.0, Overrides(receipt="one"))
+    link.confirm(next_burst(link, 0.0), Outcome.LOST, 0.001)
+    link.submit(0, message(2), 1.0, Overrides(receipt="two"))
+    link.confirm(next_burst(link, 1.0), Outcome.SENT, 1.001)
+    link.handle_timers(10.0)
+    told = [(each.receipt, each.dst, each.left) for each in link.outcomes.receipts.take()]
+    assert told == [("one", 2, 1), ("one", 3, 0), ("two", 2, 1), ("two", 3, 0)]
 
 
 def test_a_receipt_is_for_the_message_that_had_the_entry_id_then():
