@@ -13,7 +13,10 @@ import zmq.asyncio
 from sdrlinkd.client.blocking import LINGER_MS, RECEIVE_HWM, no_daemon
 from sdrlinkd.client.messages import (
     Message,
+    Receipt,
+    ReceiptIds,
     decode_in,
+    decode_receipt,
     encode_out,
     new_ack_topic,
     sync_frames,
@@ -32,12 +35,10 @@ class _AsyncSocket:
         self._timeout_s = timeout_s
         self._context = zmq.asyncio.Context()
         self._socket = self._context.socket(kind)
-        self._socket.linger = LINGER_MS
 
     async def close(self) -> None:
-        """Close the socket; what was sent has 200 ms to leave."""
-        self._socket.close()
-        self._context.term()
+        """Close the sockets; what was sent has 200 ms to leave."""
+        self._context.destroy(LINGER_MS)
 
     async def __aenter__(self) -> Self:
         return self
@@ -60,6 +61,9 @@ class AsyncPublisher(_AsyncSocket):
         super().__init__(zmq.PUSH, directory, timeout_s)
         self._socket.immediate = True
         self._sent = False
+        self._ids = ReceiptIds()
+        self._receipts: zmq.asyncio.Socket | None = None
+        self._subscribing = asyncio.Lock()
         self._socket.connect(endpoint(self.directory, IN_SOCKET))
 
     async def send(
@@ -73,18 +77,55 @@ class AsyncPublisher(_AsyncSocket):
         lifespan_ms: float | None = None,
         type: str | None = None,  # noqa: A002
         published_ns: int | None = None,
-    ) -> None:
-        """Publish `cdr` under `topic`. Raises NoDaemonError after the timeout."""
+        receipt: bool = False,
+    ) -> str | None:
+        """Publish `cdr` under `topic`; with `receipt`, the name under which it is answered.
+
+        Raises NoDaemonError after the timeout.
+        """
         fields = {
             "q": qos, "p": priority, "d": dst, "ls": lifespan_ms, "ty": type,
             "t": time.time_ns() if published_ns is None else published_ns,
         }  # fmt: skip
+        name = None
+        if receipt:
+            async with self._subscribing:
+                if self._receipts is None:
+                    self._receipts = await self._subscribed(self._ids.prefix)
+            name = fields["id"] = self._ids.new()
         try:
             async with asyncio.timeout(self._timeout_s):
                 await self._socket.send_multipart(encode_out(topic, cdr, fields))
             self._sent = True
         except TimeoutError:
             raise no_daemon(self.directory) from None
+        return name
+
+    async def receipt(self, timeout_s: float | None = None) -> Receipt | None:
+        """The next answer to messages sent with `receipt`; None when `timeout_s` passed first."""
+        if self._receipts is None:
+            return None
+        try:
+            async with asyncio.timeout(timeout_s):
+                return decode_receipt(await self._receipts.recv_multipart())
+        except TimeoutError:
+            return None
+
+    async def _subscribed(self, prefix: bytes) -> zmq.asyncio.Socket:
+        """A socket that misses nothing from now on. Raises NoDaemonError."""
+        socket = self._context.socket(zmq.SUB)
+        socket.connect(endpoint(self.directory, OUT_SOCKET))
+        ack_topic = new_ack_topic()
+        socket.subscribe(prefix)
+        socket.subscribe(ack_topic)
+        try:
+            async with asyncio.timeout(self._timeout_s):
+                await socket.recv_multipart()
+        except TimeoutError:
+            socket.close()
+            raise no_daemon(self.directory) from None
+        socket.unsubscribe(ack_topic)
+        return socket
 
     async def flush(self) -> None:
         """Wait until the daemon has taken everything sent. Raises NoDaemonError."""

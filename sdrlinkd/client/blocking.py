@@ -2,7 +2,6 @@
 
 import math
 import os
-import secrets
 import time
 from collections.abc import Iterator
 from types import TracebackType
@@ -11,9 +10,9 @@ from typing import Self
 import zmq
 
 from sdrlinkd.client.messages import (
-    RECEIPT_PREFIX,
     Message,
     Receipt,
+    ReceiptIds,
     decode_in,
     decode_receipt,
     encode_out,
@@ -90,8 +89,7 @@ class Publisher(Endpoint):
         self._socket.immediate = True
         self._socket.sndtimeo = int(timeout_s * 1000)
         self._sent = False
-        self._asked = 0
-        self._token = secrets.token_hex(4)
+        self._ids = ReceiptIds()
         self._receipts: zmq.Socket[bytes] | None = None
         self._connect(IN_SOCKET)
 
@@ -121,9 +119,8 @@ class Publisher(Endpoint):
         name = None
         if receipt:
             if self._receipts is None:
-                self._receipts = self._subscribed(RECEIPT_PREFIX + self._token.encode())
-            self._asked += 1
-            name = fields["id"] = f"{self._token}.{self._asked}"
+                self._receipts = self._subscribed(self._ids.prefix)
+            name = fields["id"] = self._ids.new()
         try:
             self._socket.send_multipart(encode_out(topic, cdr, fields))
             self._sent = True

@@ -56,7 +56,8 @@ class Message:
 class Receipt:
     """What became of a message at robot `dst`: `fate` is delivered, expired, dropped or unknown.
 
-    `reason` is one of the ledger's; `took_s` the message's age when it was delivered there.
+    `reason` is one of the ledger's; `took_s` the message's age when it was delivered there. `left`
+    robots have still to answer.
     """
 
     id: str
@@ -65,6 +66,21 @@ class Receipt:
     fate: str
     reason: str = ""
     took_s: float | None = None
+    left: int = 0
+
+
+class ReceiptIds:
+    """Names for a producer's messages that want a receipt; all are told of under `prefix`."""
+
+    def __init__(self) -> None:
+        self._token = secrets.token_hex(4)
+        self._count = 0
+        self.prefix = RECEIPT_PREFIX + self._token.encode()
+
+    def new(self) -> str:
+        """The next one."""
+        self._count += 1
+        return f"{self._token}.{self._count}"
 
 
 def decode_receipt(frames: Sequence[bytes]) -> Receipt | None:
@@ -79,6 +95,7 @@ def decode_receipt(frames: Sequence[bytes]) -> Receipt | None:
         fate=fields["fate"],
         reason=fields.get("reason", ""),
         took_s=fields.get("took"),
+        left=fields.get("left", 0),
     )
 
 

@@ -42,6 +42,23 @@ async def test_five_lines_each_in_asyncio(start_daemon, monkeypatch):
             break
 
 
+async def test_receipts_in_asyncio(start_daemon):
+    daemon = start_daemon()
+    async with AsyncPublisher(daemon.directory) as out:
+        assert await out.receipt(0) is None, "none was asked for"
+        assert await out.send("/robot_1/odom", CDR) is None
+        names = await asyncio.gather(
+            *(out.send("/robot_1/odom", CDR + bytes(4), dst=1, receipt=True) for _ in range(5))
+        )
+        told = [await out.receipt(20) for _ in names]
+        assert {each.id for each in told} == set(names)
+        assert {(each.topic, each.dst, each.fate, each.left) for each in told} == {
+            ("/robot_1/odom", 1, "delivered", 0)
+        }
+        assert await out.receipt(0.05) is None
+        await out.send("/robot_1/odom", CDR, dst=1, receipt=True)
+
+
 def test_a_prefix_takes_all_and_a_name_only_itself(start_daemon):
     registry_topics = "imu,sensor_msgs/Imu\nimu2,sensor_msgs/Imu\n"
     directory = start_daemon().directory
@@ -164,6 +181,9 @@ async def test_without_a_daemon_in_asyncio(tmp_path):
     with pytest.raises(NoDaemonError, match=str(tmp_path)):
         async with asyncio.timeout(10), AsyncPublisher(tmp_path, timeout_s=0.2) as out:
             await out.send("/a", CDR)
+    with pytest.raises(NoDaemonError, match=str(tmp_path)):
+        async with asyncio.timeout(10), AsyncPublisher(tmp_path, timeout_s=0.2) as out:
+            await out.send("/a", CDR, receipt=True)
     with pytest.raises(NoDaemonError, match=str(tmp_path)):
         async with asyncio.timeout(10), AsyncSubscriber(directory=tmp_path, timeout_s=0.2):
             pass
