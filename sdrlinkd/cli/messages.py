@@ -17,6 +17,7 @@ from sdrlinkd.cli.status import ask_status
 from sdrlinkd.client import Message, Publisher, Subscriber
 from sdrlinkd.errors import UserError
 from sdrlinkd.link import CDR_HEADER_SIZE
+from sdrlinkd.wire import BROADCAST
 
 MAX_SHOWN_ITEMS = 12
 
@@ -38,6 +39,9 @@ def pub(
     priority: Annotated[int | None, typer.Option(min=0, max=127)] = None,
     dst: Annotated[int | None, typer.Option(min=0, max=255, help="Destination robot.")] = None,
     lifespan: Annotated[float | None, typer.Option(min=0.001, help="Seconds.")] = None,
+    receipt: Annotated[
+        bool, typer.Option("--receipt", help="Say what became of each message, robot by robot.")
+    ] = False,
     runtime_dir: RuntimeDir = None,
 ) -> None:
     """Publish a message to the daemon."""
@@ -53,9 +57,9 @@ def pub(
         rate = 1.0
     lifespan_ms = None if lifespan is None else lifespan * 1e3
     with Publisher(runtime_dir) as publisher:
-        count = 0
+        count, waiting = 0, {}
         while True:
-            publisher.send(
+            name = publisher.send(
                 topic,
                 payload,
                 qos=qos,
@@ -63,12 +67,34 @@ def pub(
                 dst=dst,
                 lifespan_ms=lifespan_ms,
                 type=kind,
+                receipt=receipt,
             )
             count += 1
+            if name is not None:
+                waiting[name] = count
             if not rate or count == times:
                 break
-            time.sleep(min(1 / rate, 1e6))
+            next_at = time.monotonic() + min(1 / rate, 1e6)
+            _show_receipts(publisher, waiting, next_at)
+            time.sleep(max(0.0, next_at - time.monotonic()))
+        _show_receipts(publisher, waiting)
     typer.echo(f"published {count} × {len(payload)} B on {topic} ({kind})")
+
+
+def _show_receipts(
+    publisher: Publisher, waiting: dict[str, int], until: float | None = None
+) -> None:
+    """Those that come while messages, `waiting` by name, are not answered by all."""
+    while waiting:
+        told = publisher.receipt(None if until is None else max(0.0, until - time.monotonic()))
+        if told is None:
+            return
+        robot = "everyone" if told.dst == BROADCAST else f"robot {told.dst}"
+        reason = f" ({told.reason})" if told.reason else ""
+        took = "" if told.took_s is None else f", {1e3 * told.took_s:.2f} ms old"
+        typer.echo(f"message {waiting[told.id]}, {robot}: {told.fate}{reason}{took}")
+        if not told.left:
+            del waiting[told.id]
 
 
 @app.command()

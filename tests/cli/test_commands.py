@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+import re
 import subprocess
 import sys
 import threading
@@ -90,6 +91,19 @@ def test_pub_and_echo(start_daemon, ctl):
     assert echo.returncode == 0
     assert "/rx_robot_1/cmd_vel from robot 1" in out
     assert "linear: {x: 0.5, y: 0.0, z: 0.0}" in out
+
+
+def test_pub_says_what_became_of_each_message(start_daemon, ctl):
+    daemon = start_daemon("[link]\nreceipt_s = 0.2\n[topic.cmd_vel]\nmax_bytes = 20\n")
+    dir_ = ("--receipt", "--runtime-dir", daemon.directory)
+    code, out, _ = ctl("pub", "/robot_1/odom", "{}", "--dst", "1", "-t", "3", "-r", "20", *dir_)
+    assert code == 0
+    assert re.findall(r"message (\d), robot 1: delivered, \d+\.\d\d ms old", out) == list("123")
+    # A robot that is alone knows of nobody who could answer.
+    _, out, _ = ctl("pub", "/robot_1/odom", "{}", *dir_)
+    assert "message 1, everyone: unknown\n" in out
+    _, out, _ = ctl("pub", "/robot_1/cmd_vel", "{}", "--dst", "7", *dir_)
+    assert "message 1, robot 7: dropped (tx_size_cap)\n" in out
 
 
 def test_pub_refuses_in_words(start_daemon, ctl):
