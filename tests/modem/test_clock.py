@@ -1,5 +1,7 @@
 """The received stream as the clock."""
 
+from random import Random
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -77,3 +79,68 @@ def test_it_never_goes_back(kind, steps):
         now = clock.now(host_s)
         assert now >= max(latest, end / 1e5)
         latest = now
+
+
+BLOCK_S = 1e-3
+BEGAN_S = 100.0
+"""By the host's clock, when the stream began."""
+
+
+class Paced:
+    """A paced stream of blocks; each comes when its last sample was taken, and a delay later."""
+
+    def __init__(self):
+        self.clock = StreamClock(1e6, paced=True)
+        self.end = 0
+        self.host_s = 0.0
+
+    def block(self, delay_s, lost=0):
+        """The next one comes, `lost` blocks having been lost before it; the clock's time then."""
+        self.end += round(BLOCK_S * 1e6)
+        self.host_s = max(self.host_s, BEGAN_S + self.end / 1e6 + lost * BLOCK_S + delay_s)
+        self.clock.observe(self.end, self.host_s)
+        return self.clock.now(self.host_s)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_late_blocks_neither_set_time_back_nor_hold_it_up(seed):
+    rng, stream = Random(seed), Paced()
+    stream.block(2e-4)
+    for i in range(3000):
+        now = stream.block(2e-4 + (rng.uniform(0, 0.02) if 10 <= i % 53 < 30 else 0.0))
+        assert now == pytest.approx(stream.host_s - BEGAN_S - 2e-4, abs=1e-9), f"{i}, seed {seed}"
+
+
+@given(st.integers(1, 1500), st.integers(1, 20))
+def test_samples_that_are_lost_are_told_from_late_blocks_within_half_a_second(n_before, lost):
+    stream, latest = Paced(), 0.0
+    for _ in range(n_before):
+        latest = stream.block(2e-4)
+    shifted_at = stream.host_s
+    for _ in range(600):
+        now = stream.block(2e-4, lost)
+        assert now >= latest
+        latest = now
+        since_s, told_s = stream.host_s - shifted_at, stream.host_s - BEGAN_S - 2e-4
+        # Lately is 0.25 to 0.5 s ago; a block more until it is looked at.
+        if since_s <= 0.25:
+            assert now == pytest.approx(told_s, abs=1e-9)
+        elif since_s > 0.5 + (lost + 2) * BLOCK_S:
+            assert now == pytest.approx(told_s - lost * BLOCK_S, abs=1e-9)
+
+
+def test_a_shorter_delay_is_believed_at_once():
+    stream = Paced()
+    for _ in range(100):
+        stream.block(5e-3)
+    for _ in range(6):
+        now = stream.block(2e-4)
+    assert now == pytest.approx(stream.host_s - BEGAN_S - 2e-4, abs=1e-9)
+
+
+def test_after_half_a_second_of_silence_delays_of_before_count_no_more():
+    stream = Paced()
+    for _ in range(100):
+        stream.block(2e-4)
+    now = stream.block(2e-4, lost=600)
+    assert now == pytest.approx(stream.end / 1e6, abs=1e-9)
