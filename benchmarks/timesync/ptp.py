@@ -37,7 +37,6 @@ def traces() -> Iterator[Trace]:
                     if number != last:
                         rows.append(row)
                     last = number
-        # From where the servo began anew.
         at = np.array([1e-9 * int(row["t_ns"]) for row in rows])
         offset_s = np.array([float(row["offset_from_master_s"]) for row in rows])
         path_s = np.array([float(row["mean_path_delay_s"]) for row in rows])

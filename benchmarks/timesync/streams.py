@@ -1,6 +1,6 @@
 """Exchanges of stamps between two clocks over a radio with queues."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -40,9 +40,6 @@ class Stream(NamedTuple):
     exchanges: list[Exchange]
     at: np.ndarray
     offset_s: np.ndarray
-
-    def __iter__(self) -> Iterator[Exchange]:  # type: ignore[override]
-        return iter(self.exchanges)
 
 
 def _busy(rng: Generator, n: int, share: float, least_s: float = 0.0) -> np.ndarray:

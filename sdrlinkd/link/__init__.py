@@ -29,7 +29,7 @@ from sdrlinkd.link.schedule import (
     ClassesParams,
     ClassParams,
 )
-from sdrlinkd.link.timesync import ClockParams, DualEnvelope, Estimate, PaperFilter, State, Wall
+from sdrlinkd.link.timesync import ClockParams, DualEnvelope, PaperFilter, State, Wall
 from sdrlinkd.link.why import Told
 
 __all__ = [
@@ -53,7 +53,6 @@ __all__ = [
     "Deflated",
     "Delivered",
     "DualEnvelope",
-    "Estimate",
     "Link",
     "LinkParams",
     "Opportunity",
