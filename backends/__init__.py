@@ -22,7 +22,16 @@ from backends.base import (
 from backends.outstanding import GAP
 from backends.recording import RecordingInfo, RecordingReader, RecordingWriter, describe
 from backends.samples import SAMPLE_TYPES
-from backends.soapy import SoapyRadio, SoapySettings
+from backends.soapy import (
+    DeviceSurvey,
+    Outlook,
+    SoapyRadio,
+    SoapySettings,
+    Survey,
+    WaySurvey,
+    outlook,
+    survey,
+)
 
 if TYPE_CHECKING:
     from backends.air import Channel
@@ -61,6 +70,7 @@ __all__ = [
     "BurstShape",
     "Capabilities",
     "Channel",
+    "DeviceSurvey",
     "EtherHub",
     "EtherRadio",
     "Flight",
@@ -71,6 +81,7 @@ __all__ = [
     "LoopbackRadio",
     "OffsetRadio",
     "Outage",
+    "Outlook",
     "OversampledRadio",
     "Radio",
     "RadioParams",
@@ -81,14 +92,18 @@ __all__ = [
     "Samples",
     "SoapyRadio",
     "SoapySettings",
+    "Survey",
     "Track",
     "Tuning",
     "TxBurst",
     "TxOutcome",
     "TxReport",
+    "WaySurvey",
     "World",
     "burst_shape",
     "describe",
+    "outlook",
+    "survey",
 ]
 
 _LATER = {

@@ -1,16 +1,17 @@
 """Real radios, through SoapySDR (https://github.com/pothosware/SoapySDR)."""
 
+from backends.soapy.outlook import Outlook, outlook
 from backends.soapy.radio import SoapyRadio
 from backends.soapy.settings import SoapySettings
 from backends.soapy.survey import DeviceSurvey, Survey, WaySurvey, survey
-from backends.soapy.traits import lead_s
 
 __all__ = [
     "DeviceSurvey",
+    "Outlook",
     "SoapyRadio",
     "SoapySettings",
     "Survey",
     "WaySurvey",
-    "lead_s",
+    "outlook",
     "survey",
 ]

@@ -12,6 +12,7 @@ from sdrlinkd.cli import (
     phy,
     plan,
     policy,
+    radio,
     status,
     wifi,
 )
@@ -19,5 +20,5 @@ from sdrlinkd.cli.app import main, run
 
 __all__ = [
     "bag", "bench", "demo", "dictionary", "lab", "latency", "main", "messages", "pdu", "phy",
-    "plan", "policy", "run", "status", "wifi",
+    "plan", "policy", "radio", "run", "status", "wifi",
 ]  # fmt: skip

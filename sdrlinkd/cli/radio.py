@@ -1,0 +1,99 @@
+"""`radio`: what radios are here, and what a daemon would do with each. Needs no daemon."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
+
+import msgspec
+import typer
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from sdrlinkd.cli.app import AsJson, app
+from sdrlinkd.errors import UserError
+
+if TYPE_CHECKING:
+    from backends import DeviceSurvey, Outlook, WaySurvey
+
+radios = typer.Typer(help="Radios of this machine, by SoapySDR.", no_args_is_help=True)
+app.add_typer(radios, name="radio")
+
+
+@radios.command()
+def probe(
+    device: Annotated[
+        str, typer.Argument(help='As soapy.device: "driver=hackrf"; by default all there are.')
+    ] = "",
+    rate: Annotated[
+        float, typer.Option(min=1e4, max=2e8, help="Samples a second of the modem (modem.rate_hz).")
+    ] = 1e6,
+    json: AsJson = False,
+) -> None:
+    """Devices found, and what the daemon would do with each. Nothing is sent."""
+    from backends import BackendError, outlook, survey
+
+    console = Console(soft_wrap=True)
+    try:
+        with Console(stderr=True).status("looking at radios"):
+            found = survey(device)
+    except BackendError as error:
+        raise UserError(str(error)) from None
+    if json:
+        typer.echo(msgspec.json.encode(found))
+        return
+    if found.binding:
+        names = ", ".join(sorted(each.rsplit("/", 1)[-1] for each in found.modules)) or "none"
+        console.print(f"{found.binding}; driver modules: {names}", highlight=False)
+    for each in found.devices:
+        console.print(_table(each, outlook(each, rate), rate))
+    for note in found.notes:
+        console.print(note, highlight=False)
+    if not found.devices or all(each.problem for each in found.devices):
+        raise typer.Exit(2)
+
+
+def _table(device: "DeviceSurvey", ahead: "Outlook", rate_hz: float) -> Table:
+    table = Table(
+        title=device.label or device.device, title_justify="left", box=box.SIMPLE_HEAD,
+        show_header=False, pad_edge=False,
+    )  # fmt: skip
+    table.add_row("soapy.device", f'"{device.device}"')
+    if device.problem:
+        table.add_row("cannot be used", device.problem)
+        return table
+    table.add_row("radio", f"{device.driver} {device.hardware}")
+    for name, way in (("receives", device.rx), ("sends", device.tx)):
+        table.add_row(name, _way(way) if way is not None else "no")
+    if device.clock_sources:
+        table.add_row("soapy.clock_source", ", ".join(device.clock_sources))
+    modem = f"modem.rate_hz = {rate_hz:g}" + (
+        f", modem.oversampling = {ahead.oversampling}" if ahead.oversampling > 1 else ""
+    )
+    table.add_row("with " + modem, ahead.how)
+    if device.tx is not None:
+        turn = f" + turnaround {1e3 * ahead.turnaround_s:.3g}" if ahead.turnaround_s else ""
+        table.add_row(
+            "latency to expect",
+            f"{1e3 * ahead.latency_s:.3g} ms and the airtime: handed over {1e3 * ahead.lead_s:.3g} "
+            f"ms ahead{turn} + received in pieces of {1e3 * ahead.piece_s:.3g} ms",
+        )
+    for warning in ahead.warnings:
+        table.add_row("warning", warning)
+    return table
+
+
+def _way(way: "WaySurvey") -> str:
+    gains = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in way.gains_db.items())
+    return (
+        f"{_spans(way.rates_hz)} Msps, {_spans(way.frequencies_hz)} MHz\n"
+        f"gain {way.gain_db.low:g} to {way.gain_db.high:g} dB ({gains or 'no elements'}); "
+        f"antennas {', '.join(way.antennas) or 'one'}; transfers of {way.transfer} samples"
+    )
+
+
+def _spans(ranges: Sequence[tuple[float, float]]) -> str:
+    parts = [
+        f"{low / 1e6:g}" if low == high else f"{low / 1e6:g} to {high / 1e6:g}"
+        for low, high in ranges
+    ]
+    return ", ".join([*parts[:4], "…"] if len(parts) > 5 else parts)
