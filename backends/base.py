@@ -19,6 +19,18 @@ class BackendError(Exception):
     """A radio or recording that cannot be used; the message says what to do about it."""
 
 
+class Spells(NamedTuple):
+    """How a radio sends that must stop receiving for it, in s.
+
+    A burst follows the one before in the same spell when it is handed over `follow_s` before that
+    one ends, and the spell is shorter than `longest_s` then; else it begins `pause_s` after it.
+    """
+
+    follow_s: float
+    pause_s: float
+    longest_s: float
+
+
 @dataclass(frozen=True)
 class Capabilities:
     """What a radio can do.
@@ -28,7 +40,7 @@ class Capabilities:
     before has been done. `block_s`: samples come in pieces of this length. `lead_s`: how long
     before its start a burst must be handed over. `turnaround_s`: for so long before and after a
     burst a half-duplex radio hears nothing. `index_error_s`: how wrong indices may be after a gap,
-    where there are no `timestamps`.
+    where there are no `timestamps`. `spells`: it sends in such.
     """
 
     receives: bool
@@ -41,6 +53,7 @@ class Capabilities:
     lockstep: bool = False
     index_error_s: float = 0.0
     block_s: float = 0.001
+    spells: Spells | None = None
 
 
 @dataclass(frozen=True)

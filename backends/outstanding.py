@@ -17,9 +17,10 @@ def answered(report: TxReport) -> asyncio.Future[TxReport]:
 
 
 class Places:
-    """Lays bursts one after another."""
+    """Lays bursts one after another, at least `gap` samples apart."""
 
-    def __init__(self) -> None:
+    def __init__(self, gap: int = GAP) -> None:
+        self._gap = gap
         self._free_from = 0
 
     def place(self, burst: TxBurst, earliest: int) -> int | None:
@@ -27,7 +28,7 @@ class Places:
         start = max(burst.start, earliest, self._free_from)
         if burst.latest is not None and start > burst.latest:
             return None
-        self._free_from = start + len(burst.samples) + GAP
+        self._free_from = start + len(burst.samples) + self._gap
         return start
 
 

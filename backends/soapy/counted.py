@@ -18,10 +18,9 @@ from backends.soapy.surface import (
     DriverError,
     Values,
 )
+from backends.soapy.traits import HANDOVER_S
 
 WRITE_US = 100_000
-HANDOVER_S = 0.01
-"""Before a transfer begins to leave, all of it must be there."""
 QUIET_S = 0.1
 
 
@@ -42,7 +41,13 @@ class CountedSender:
     """
 
     def __init__(
-        self, orders: Orders, outgoing: Outgoing, clock: SampleTime, leading: int, longest_s: float
+        self,
+        orders: Orders,
+        outgoing: Outgoing,
+        clock: SampleTime,
+        leading: int,
+        longest_s: float,
+        turnaround_s: float,
     ) -> None:
         self._orders = orders
         self._outgoing = outgoing
@@ -53,6 +58,12 @@ class CountedSender:
         self._transfer = max(1, self._stream.mtu)
         self._zeros = np.zeros(self._transfer, np.complex64)
         self._handover = self._transfer + clock.samples(round(1e9 * HANDOVER_S))
+        # From the decision to send to the first sample of a burst.
+        self._ahead = (
+            clock.samples(round(1e9 * turnaround_s))
+            + (1 + leading) * self._transfer
+            + self._handover
+        )
         self._origin = self._written = 0
         self._out: deque[_Out] = deque()
         self._tells = True
@@ -72,8 +83,7 @@ class CountedSender:
         waiting = self._orders.waiting
         if not waiting:
             return False
-        ahead = (1 + self._leading) * self._transfer + self._handover
-        return waiting[0].start <= self._clock.now(time.monotonic_ns()) + ahead
+        return waiting[0].start <= self._clock.now(time.monotonic_ns()) + self._ahead
 
     def send_spell(self) -> None:
         """All that is to be sent, and what comes meanwhile; the transmitter is off afterwards."""
@@ -95,7 +105,7 @@ class CountedSender:
         """Whether another burst goes in this spell; waits as long as there is time to."""
         while not self._orders.is_over and self._written < self._longest:
             if self._orders.waiting:
-                return self._orders.waiting[0].start <= self._end + self._handover
+                return self._orders.waiting[0].start <= self._end + self._ahead
             spare = self._end - self._handover - self._clock.now(time.monotonic_ns())
             if spare <= 0:
                 return False

@@ -6,7 +6,6 @@ from backends.soapy.setting_up import LEAST_RATES
 from backends.soapy.settings import SoapySettings
 from backends.soapy.surface import Range
 from backends.soapy.survey import DeviceSurvey
-from backends.soapy.traits import lead_s
 
 FACTORS = (1, 2, 4)
 """What modem.oversampling may be."""
@@ -46,15 +45,14 @@ def outlook(device: DeviceSurvey, rate_hz: float) -> Outlook:
     radio_hz = factor * rate_hz
     piece_s = max(defaults.block_s, rx.transfer / radio_hz if rx else 0.0)
     transfer_s = tx.transfer / radio_hz if tx else 0.0
+    way_out = defaults.tx_traits(device.has_time, device.full_duplex, transfer_s)
     return Outlook(
         how=_how(device),
         rate_hz=rate_hz,
         oversampling=factor,
         piece_s=piece_s,
-        lead_s=lead_s(device.keeps_time, defaults.lead_s, transfer_s, defaults.leading_transfers)
-        if tx
-        else 0.0,
-        turnaround_s=0.0 if device.full_duplex or tx is None else defaults.turnaround_s,
+        lead_s=way_out.lead_s if tx else 0.0,
+        turnaround_s=way_out.turnaround_s if tx else 0.0,
         warnings=_warnings(device, rate_hz, bool(fitting), least, piece_s, transfer_s),
     )
 

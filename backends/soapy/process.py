@@ -110,7 +110,7 @@ class _Session:
                 else:
                     sender = CountedSender(
                         self._orders, outgoing, clock, settings.leading_transfers,
-                        settings.longest_tx_s,
+                        settings.longest_tx_s, 0.0 if full_duplex else settings.turnaround_s,
                     )  # fmt: skip
             self._orders.say(
                 Opened(

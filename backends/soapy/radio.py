@@ -27,7 +27,6 @@ from backends.soapy.handed import Handed
 from backends.soapy.hearing import Hearing
 from backends.soapy.protocol import Counted, Failed, FromProcess, Left, Opened
 from backends.soapy.settings import Found, SoapySettings
-from backends.soapy.traits import lead_s
 
 OPEN_S = 60.0
 """Some devices load their firmware first."""
@@ -54,7 +53,8 @@ class SoapyRadio:
         self._child: RadioChild | None = None
         self._found: Found | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._places = Places()
+        # Whoever plans bursts leaves a gap for echoes; at this rate it may hold a filter's tail.
+        self._places = Places(gap=0)
         self._handed = Handed()
         self._rate_hz = 0.0
         self._is_over = False
@@ -67,16 +67,16 @@ class SoapyRadio:
     def capabilities(self) -> Capabilities:
         """As the device is."""
         found, settings = self._known, self._settings
+        tx = settings.tx_traits(found.has_time, found.full_duplex, found.tx_transfer_s)
         return Capabilities(
             receives=True,
             transmits=settings.tx_enabled,
             full_duplex=found.full_duplex,
             timestamps=found.has_time,
             paced=True,
-            lead_s=lead_s(
-                found.keeps_time, settings.lead_s, found.tx_transfer_s, settings.leading_transfers
-            ),
-            turnaround_s=0.0 if found.full_duplex else settings.turnaround_s,
+            lead_s=tx.lead_s,
+            turnaround_s=tx.turnaround_s,
+            spells=tx.spells,
             index_error_s=0.0 if found.has_time else found.receives_in_s,
             block_s=found.receives_in_s,
         )

@@ -5,7 +5,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from backends.soapy.traits import keeps_time
+from backends.soapy.traits import TxTraits, keeps_time, tx_traits
 
 Gain = Annotated[float, Meta(ge=-200, le=200)]
 
@@ -43,6 +43,13 @@ class SoapySettings(msgspec.Struct, frozen=True, kw_only=True):
     """So long a half-duplex device listens before it sends again."""
     longest_tx_s: float = 1.0
     """So long it sends without listening."""
+
+    def tx_traits(self, has_time: bool, full_duplex: bool, transfer_s: float) -> TxTraits:
+        """How bursts leave a device of that nature."""
+        return tx_traits(
+            has_time, full_duplex, transfer_s, self.leading_transfers, self.lead_s,
+            self.turnaround_s, self.listen_s, self.longest_tx_s,
+        )  # fmt: skip
 
 
 class Found(msgspec.Struct, frozen=True, kw_only=True):

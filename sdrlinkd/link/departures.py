@@ -77,7 +77,8 @@ class Departures:
             length_s for mcs, length_s in enumerate(carrier.pdu_burst_s) if mcs in self.rate.usable
         ]
         self.least_s = carrier.lead_s + min(lengths_s, default=0.0)
-        self._tellings.pdu_s = max(lengths_s, default=0.0)
+        # A burst on its own makes a half-duplex radio deaf for much longer than it lasts.
+        self._tellings.pdu_s = max(lengths_s, default=0.0) + 2 * carrier.turnaround_s
         self._notice_s = carrier.ahead_s if carrier.is_lockstep else NOTICE_S
 
     def more_to_send(self) -> None:

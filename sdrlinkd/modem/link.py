@@ -14,7 +14,7 @@ from sdrlinkd.link import Burst, CarrierTraits, Opportunity, Outcome
 from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.clock import StreamClock
 from sdrlinkd.modem.ear import Ear
-from sdrlinkd.modem.plan import AirPlan
+from sdrlinkd.modem.plan import AirPlan, SpellPlan
 from sdrlinkd.modem.rx_thread import Demodulation, ReceiverHere, ReceiverThread
 from sdrlinkd.modem.traits import carrier_traits
 from sdrlinkd.modem.transmission import BurstReport, Transmission
@@ -84,6 +84,8 @@ class ModemLink:
         self._clock = StreamClock(params.rate_hz, can.paced, can.lockstep)
         lead, ahead = traits.lead_s * params.rate_hz, traits.ahead_s * params.rate_hz
         self._plan = AirPlan(math.ceil(lead), round(ahead))
+        if can.spells is not None:
+            self._plan = SpellPlan(math.ceil(lead), round(ahead), can.spells, params.rate_hz)
         if can.lockstep:
             self._rx = ReceiverHere(self._ear, params.rate_hz, self._step)
         else:

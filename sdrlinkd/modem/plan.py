@@ -1,6 +1,6 @@
 """When the next burst may leave, in samples."""
 
-from backends import GAP
+from backends import GAP, Spells
 
 EASE = 64
 """After so many bursts in time, most of what was added to the lead is gone."""
@@ -38,3 +38,36 @@ class AirPlan:
     def commit(self, start: int, n_samples: int) -> None:
         """A burst of `n_samples` will leave at `start`."""
         self._free_at = max(self._free_at, start + n_samples + GAP)
+
+
+class SpellPlan(AirPlan):
+    """The same for a radio that sends in spells: in the one that goes on, or in the next."""
+
+    def __init__(self, lead: int, ahead: int, spells: Spells, rate_hz: float) -> None:
+        super().__init__(lead, ahead)
+        self._follow, self._pause, self._longest = (round(each * rate_hz) for each in spells)
+        self._begun_at = 0
+        # None goes on before the first.
+        self._free_at = -self._pause
+
+    def wait(self, now: int) -> int:
+        """Samples until the next burst may be composed; 0: at once."""
+        if self._goes_on(now):
+            return super().wait(now)
+        return max(0, self._free_at + self._pause - now - self._lead)
+
+    def start(self, now: int) -> int:
+        """Where a burst composed now begins."""
+        if self._goes_on(now):
+            return self._free_at
+        return max(now + self._lead, self._free_at + self._pause)
+
+    def commit(self, start: int, n_samples: int) -> None:
+        """A burst of `n_samples` will leave at `start`."""
+        if start > self._free_at:
+            self._begun_at = start
+        super().commit(start, n_samples)
+
+    def _goes_on(self, now: int) -> bool:
+        is_short = self._free_at - self._begun_at < self._longest
+        return is_short and now + self._follow <= self._free_at
