@@ -1,0 +1,252 @@
+"""A radio that is another program: samples over ZeroMQ, both ways."""
+
+import threading
+import time
+from collections.abc import AsyncIterator, Awaitable
+
+import numpy as np
+import zmq
+
+from backends.base import (
+    BackendError,
+    Capabilities,
+    Hear,
+    RxBlock,
+    Samples,
+    Tuning,
+    TxBurst,
+    TxOutcome,
+    TxReport,
+)
+from backends.feed import BlockFeed
+from backends.outstanding import Outstanding, answered
+from backends.samples import SAMPLE_TYPES
+from backends.zmqstream.line import Line
+from backends.zmqstream.sockets import Pattern, Sink, Source, open_sink, open_source
+
+LOOK_MS = 20
+QUIET_S = 0.25
+"""A paced peer from which nothing comes for so long is not there."""
+WILD = 1e3
+"""No radio's samples are so large; those of another type, taken for floats, are."""
+NOT_THERE = "nothing comes from the peer"
+
+
+class ZmqRadio:
+    """Sends at `send` and receives at `receive`, which GNU Radio's sinks and sources name alike.
+
+    For every sample received one is sent, `lead_s` ahead: nothing piles up, whoever sets the pace.
+    While a `paced` peer is away, both go on by the clock.
+    """
+
+    def __init__(
+        self,
+        send: str,
+        receive: str,
+        pattern: Pattern,
+        type_name: str,
+        block_s: float,
+        lead_s: float,
+        paced: bool,
+    ) -> None:
+        self._endpoints = send, receive
+        self._pattern: Pattern = pattern
+        self._type = SAMPLE_TYPES[type_name]
+        self._block_s, self._lead_s = block_s, lead_s
+        self._paced = paced
+        self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
+        self._source: Source | None = None
+        self._sink: Sink | None = None
+        self._line = Line()
+        self._outstanding = Outstanding()
+        self._feed = BlockFeed(self._next_block, "zmq", self._is_due)
+        self._closing = threading.Event()
+        # The next sample to be sent and the bursts laid down belong together.
+        self._lock = threading.Lock()
+        self._received = self._sent = 0
+        self._pieces: list[Samples] = []
+        self._have = 0
+        self._last_ns = 0
+        self._is_open = False
+        self._notice = ""
+        self._gap = 0
+        self.counters = {
+            "overflows": 0, "samples_lost": 0, "late": 0, "outages": 0, "bad_messages": 0,
+            "clipped": 0,
+        }  # fmt: skip
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """Indices count samples: where a peer loses some, nobody can know."""
+        return Capabilities(
+            receives=True,
+            transmits=True,
+            full_duplex=True,
+            timestamps=True,
+            paced=self._paced,
+            lead_s=self._lead_s + self._block_s,
+            block_s=self._block_s,
+        )
+
+    @property
+    def detail(self) -> str:
+        """For people."""
+        send, receive = self._endpoints
+        kinds = {"push": "PUSH/PULL", "pub": "PUB/SUB", "req": "REQ/REP"}
+        text = f"{self._type.name} by {kinds[self._pattern]}, to {send}, from {receive}"
+        return f"{text}, {self._notice}" if self._notice else text
+
+    async def open(self, tuning: Tuning) -> None:
+        """Open the sockets. Raises BackendError."""
+        send, receive = self._endpoints
+        rate = tuning.rate_hz
+        self._rate_hz = rate
+        self._n = max(1, round(self._block_s * rate))
+        self._lead = max(self._n, round(self._lead_s * rate))
+        self._sink = open_sink(self._context, self._pattern, send, 2 + 2 * self._lead // self._n)
+        self._source = open_source(self._context, self._pattern, receive)
+        self._is_open = True
+
+    async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
+        """What the peer sends."""
+        self._last_ns = time.monotonic_ns()
+        try:
+            async for block, is_heard in self._feed.blocks(hear):
+                self._outstanding.settle(block.index + block.n)
+                if not is_heard:
+                    yield block
+        finally:
+            self._outstanding.lose()
+
+    def send(self, burst: TxBurst) -> Awaitable[TxReport]:
+        """Lay a burst on the line of samples to be sent."""
+        if not self._is_open:
+            return answered(TxReport(TxOutcome.LOST, burst.start, burst.start))
+        with self._lock:
+            start = self._outstanding.place(burst, self._sent)
+            if start is None:
+                self.counters["late"] += 1
+                return answered(TxReport(TxOutcome.LATE, burst.start, burst.start))
+            self._line.lay(start, burst.samples)
+        return self._outstanding.left(start, len(burst.samples))
+
+    async def close(self) -> None:
+        """Close the sockets."""
+        if self._is_open:
+            self._is_open = False
+            self._closing.set()
+            self._feed.stop()
+        self._context.destroy(linger=0)
+        self._outstanding.lose()
+
+    def _is_due(self, block: RxBlock) -> bool:
+        """In the feed's thread: whether a burst has left."""
+        return self._outstanding.is_due(block.index + block.n)
+
+    # In the feed's thread.
+
+    def _next_block(self) -> RxBlock | None:
+        source, sink = self._source, self._sink
+        if source is None or sink is None:
+            raise BackendError("blocks before open")
+        poller = zmq.Poller()
+        poller.register(source.socket, zmq.POLLIN)
+        if self._pattern == "req":
+            poller.register(sink.socket, zmq.POLLIN)
+        while not self._closing.is_set():
+            self._emit(sink)
+            if self._have >= self._n:
+                return self._block()
+            if self._gap:
+                return self._missing()
+            data = source.next()
+            if data is not None:
+                self._take(data)
+            elif not poller.poll(LOOK_MS):
+                self._wait()
+        return None
+
+    def _take(self, data: bytes) -> None:
+        """Samples of a message; what cannot be any is a gap of the same length."""
+        self._last_ns = time.monotonic_ns()
+        if len(data) % self._type.size:
+            self._refuse(
+                len(data) // self._type.size,
+                f"messages of {len(data)} B hold no whole {self._type.name} samples of "
+                f"{self._type.size} B: the peer sends another item type; set zmq.format",
+            )
+            return
+        samples = self._type.decode(data)
+        parts = samples.view(np.float32)
+        # Not smaller: that holds for NaN, too.
+        if len(parts) and not max(parts.max(), -parts.min()) < WILD:
+            self._refuse(
+                len(samples),
+                f"samples beyond ±{WILD:g}, or no numbers: the peer sends another item type than "
+                f"{self._type.name}; set zmq.format",
+            )
+            return
+        if self._notice == NOT_THERE:
+            self._notice = ""
+        self._pieces.append(samples)
+        self._have += len(samples)
+
+    def _refuse(self, n: int, notice: str) -> None:
+        self.counters["bad_messages"] += 1
+        self._notice = notice
+        self._gap += max(1, n)
+
+    def _block(self) -> RxBlock:
+        """All whole blocks that are there: who is late gets fewer, larger ones."""
+        n = self._have - self._have % self._n
+        whole = np.concatenate(self._pieces)
+        self._pieces, self._have = [whole[n:]] if self._have > n else [], self._have - n
+        return self._heard(RxBlock(self._received, n, whole[:n], "", self._last_ns))
+
+    def _missing(self) -> RxBlock:
+        n, self._gap = self._gap, 0
+        self.counters["samples_lost"] += n
+        return self._heard(RxBlock(self._received, n, None, self._notice, self._last_ns))
+
+    def _heard(self, block: RxBlock) -> RxBlock:
+        with self._lock:
+            self._received += block.n
+        return block
+
+    def _wait(self) -> None:
+        """Without a peer that sets the pace, the clock does."""
+        silent_ns = time.monotonic_ns() - self._last_ns
+        if not self._paced or silent_ns < QUIET_S * 1e9:
+            return
+        self.counters["outages"] += self._notice != NOT_THERE
+        self._notice = NOT_THERE
+        self._last_ns += silent_ns
+        self._gap += round(1e-9 * silent_ns * self._rate_hz)
+
+    def _emit(self, sink: Sink) -> None:
+        """As much as was received, and the lead."""
+        while (ahead := self._received + self._lead - self._sent) > 0:
+            if ahead > 2 * self._lead:
+                # Nobody takes it: what was to be sent at that time is not any more.
+                self._skip(ahead - self._lead)
+                continue
+            n = sink.wanted(min(ahead, self._n))
+            if not n:
+                return
+            with self._lock:
+                samples = self._line.take(self._sent, n)
+                self._sent += n
+            data, clipped = self._type.encode(samples)
+            self.counters["clipped"] += clipped
+            if not sink.send(data):
+                self._sent_nothing(n)
+                return
+
+    def _skip(self, n: int) -> None:
+        with self._lock:
+            self._line.take(self._sent, n)
+            self._sent += n
+
+    def _sent_nothing(self, n: int) -> None:
+        """A peer that takes nothing hears nothing; the samples are gone."""
+        self.counters["overflows"] += 1

@@ -1,0 +1,153 @@
+"""Samples in and out by the three patterns of gr-zeromq; bytes only."""
+
+import struct
+from typing import Literal, Protocol
+
+import zmq
+
+from backends.base import BackendError
+
+Pattern = Literal["push", "pub", "req"]
+NOBLOCK = int(zmq.NOBLOCK)
+_COUNT = struct.Struct("<I")
+Socket = zmq.Socket[bytes]
+
+
+class Source(Protocol):
+    """Where samples come from."""
+
+    socket: Socket
+
+    def next(self) -> bytes | None:
+        """The next message, if one is there."""
+
+
+class Sink(Protocol):
+    """Where samples go."""
+
+    socket: Socket
+
+    def wanted(self, have: int) -> int:
+        """How many of `have` samples the peer takes in one message now."""
+
+    def send(self, data: bytes) -> bool:
+        """Hand over a message; False when there is no room for it after all."""
+
+
+def open_source(context: zmq.Context[Socket], pattern: Pattern, endpoint: str) -> Source:
+    """A PULL, SUB or REQ socket. Raises BackendError."""
+    kind = {"push": zmq.PULL, "pub": zmq.SUB, "req": zmq.REQ}[pattern]
+    socket = _opened(context, kind, endpoint, "zmq.receive", binds=False)
+    if pattern == "pub":
+        socket.setsockopt(zmq.SUBSCRIBE, b"")
+    return _Asking(socket) if pattern == "req" else _Listening(socket)
+
+
+def open_sink(context: zmq.Context[Socket], pattern: Pattern, endpoint: str, ahead: int) -> Sink:
+    """A PUSH, PUB or REP socket; at most `ahead` messages wait in it. Raises BackendError."""
+    kind = {"push": zmq.PUSH, "pub": zmq.PUB, "req": zmq.REP}[pattern]
+    socket = _opened(context, kind, endpoint, "zmq.send", binds=True, ahead=ahead)
+    return _Answering(socket) if pattern == "req" else _Telling(socket)
+
+
+class _Listening:
+    """PULL or SUB. Of several parts, samples are the last; before them is gr-zeromq's key."""
+
+    def __init__(self, socket: Socket) -> None:
+        self.socket = socket
+
+    def next(self) -> bytes | None:
+        try:
+            return self.socket.recv_multipart(NOBLOCK)[-1]
+        except zmq.Again:
+            return None
+
+
+class _Asking(_Listening):
+    """REQ: GNU Radio's rep_sink wants the number of items, srsRAN takes whatever is asked."""
+
+    MOST = 4096
+
+    def __init__(self, socket: Socket) -> None:
+        super().__init__(socket)
+        socket.setsockopt(zmq.REQ_RELAXED, 1)
+        socket.setsockopt(zmq.REQ_CORRELATE, 0)
+        self._waits = False
+
+    def next(self) -> bytes | None:
+        answer = super().next() if self._waits else None
+        if answer is not None:
+            self._waits = False
+        if not self._waits:
+            try:
+                self.socket.send(_COUNT.pack(self.MOST), NOBLOCK)
+                self._waits = True
+            except zmq.Again:
+                pass
+        return answer
+
+
+class _Telling:
+    """PUSH or PUB."""
+
+    def __init__(self, socket: Socket) -> None:
+        self.socket = socket
+
+    def wanted(self, have: int) -> int:
+        return have
+
+    def send(self, data: bytes) -> bool:
+        try:
+            self.socket.send(data, NOBLOCK)
+        except zmq.Again:
+            return False
+        return True
+
+
+class _Answering:
+    """REP. Four bytes ask for so many items (GNU Radio), one byte for some (srsRAN)."""
+
+    def __init__(self, socket: Socket) -> None:
+        self.socket = socket
+        self._asked = 0
+
+    def wanted(self, have: int) -> int:
+        if not self._asked:
+            try:
+                request = self.socket.recv(NOBLOCK)
+            except zmq.Again:
+                return 0
+            self._asked = _COUNT.unpack(request)[0] if len(request) == _COUNT.size else 1 << 31
+        return min(have, self._asked)
+
+    def send(self, data: bytes) -> bool:
+        self._asked = 0
+        self.socket.send(data)
+        return True
+
+
+def _opened(
+    context: zmq.Context[Socket],
+    kind: int,
+    endpoint: str,
+    key: str,
+    binds: bool,
+    ahead: int = 1000,
+) -> Socket:
+    """As czmq has it, @ binds and > connects; without, `binds`."""
+    socket = context.socket(kind)
+    socket.setsockopt(zmq.LINGER, 0)
+    socket.setsockopt(zmq.SNDHWM, ahead)
+    plain = endpoint.lstrip("@>")
+    try:
+        if endpoint.startswith("@") or (binds and not endpoint.startswith(">")):
+            socket.bind(plain)
+        else:
+            socket.connect(plain)
+    except zmq.ZMQError as error:
+        raise BackendError(
+            f'{key}: got "{endpoint}", which cannot be used ({error.strerror}); allowed: an '
+            'endpoint of ZeroMQ such as "tcp://127.0.0.1:52001" or "ipc:///tmp/air", with @ before '
+            "it to bind and > to connect"
+        ) from None
+    return socket
