@@ -47,7 +47,8 @@ class Bus:
     def __init__(self, name: str) -> None:
         self._path = Path(f"/dev/shm/soapy-loopback-{name}")
         self._file = self._path.open("a+b")
-        if self._file.seek(0, os.SEEK_END) == 0:
+        if self._file.seek(0, os.SEEK_END) != SIZE:
+            self._file.truncate(0)
             self._file.truncate(SIZE)
         self._map = mmap.mmap(self._file.fileno(), SIZE)
         self._words = memoryview(self._map).cast("q")

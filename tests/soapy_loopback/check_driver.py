@@ -11,8 +11,10 @@ import numpy as np
 import SoapySDR
 from SoapySDR import (
     SOAPY_SDR_END_BURST,
+    SOAPY_SDR_HAS_TIME,
     SOAPY_SDR_OVERFLOW,
     SOAPY_SDR_RX,
+    SOAPY_SDR_STREAM_ERROR,
     SOAPY_SDR_TIME_ERROR,
     SOAPY_SDR_TIMEOUT,
     SOAPY_SDR_TX,
@@ -123,8 +125,25 @@ def check_burst_is_told_of_when_it_is_over():
         return f"told {late / 1e3:.0f} µs after its end"
 
 
+def check_reception_from_a_time_on():
+    with Bus(bus := new_bus()), Radio(bus, 0) as one:
+        one.device.deactivateStream(one.rx)
+        assert one.read(2040, 10_000)[0] == SOAPY_SDR_TIMEOUT
+        start = one.now_ns() + LEAD_NS
+        one.device.activateStream(one.rx, SOAPY_SDR_HAS_TIME | SOAPY_SDR_END_BURST, start, 5000)
+        ret, stamp, _ = one.read(10_000)
+        assert (ret, one.index(stamp)) == (5000, one.index(start))
+        assert one.read(2040, 10_000)[0] == SOAPY_SDR_TIMEOUT
+        one.device.activateStream(one.rx, SOAPY_SDR_HAS_TIME, start)
+        assert one.read(2040)[0] == SOAPY_SDR_STREAM_ERROR
+
+
 def check_late_starved_full():
-    with Bus(bus := new_bus()) as seen, Radio(bus, 0) as one, Radio(bus, 1) as other:
+    with (
+        Bus(bus := new_bus()) as seen,
+        Radio(bus, 0) as one,
+        Radio(bus, 1, rxbuf=1_000_000) as other,
+    ):
         sent = burst(10_000)
         assert one.write(sent, one.now_ns(), ends=False) == len(sent)
         assert one.write(sent, ends=True) == len(sent), "dropped up to its end"
@@ -209,15 +228,29 @@ def check_slow_motion():
 
 def check_rate_that_is_not_as_told():
     for lie, told in (("yes", 2e6), ("no", 2.02e6)):
-        with Bus(bus := new_bus()), Radio(bus, 0, rate_error=0.01, lie=lie) as one:
+        args = {"rate_error": 0.01, "lie": lie, "rxbuf": 2_000_000}
+        with Bus(bus := new_bus()), Radio(bus, 0, **args) as one:
             assert one.rate == told
-            one.read(2040)
-            began, n = time.monotonic(), 0
-            while time.monotonic() < began + 0.6:
-                n += one.read(2040)[0]
-            while (ret := one.read(2040, 0)[0]) > 0:
-                n += ret
-            assert abs(n / (time.monotonic() - began) / 2.02e6 - 1) < 0.004
+            # A busy machine is late now and then, not three times.
+            rates = [_measured_rate(one) for _ in range(3)]
+            assert any(abs(rate / 2.02e6 - 1) < 0.003 for rate in rates), rates
+
+
+def _measured_rate(radio):
+    (began, first), _, (ended, last) = _newest(radio), time.sleep(0.5), _newest(radio)
+    return (last - first) / (ended - began)
+
+
+def _newest(radio):
+    """The host's time, and the index of the sample taken then."""
+    index = None
+    while True:
+        ret, stamp, _ = radio.read(2040, 0)
+        now = time.monotonic()
+        if ret == SOAPY_SDR_TIMEOUT and index is not None:
+            return now, index
+        if ret > 0:
+            index = radio.index(stamp) + ret
 
 
 CHECKS = {

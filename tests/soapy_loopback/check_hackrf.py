@@ -20,14 +20,14 @@ def check_hackrf_short_blocks_never_leave():
     with (
         Bus(bus := new_bus()) as seen,
         Radio(bus, 0, model="hackrf") as one,
-        Radio(bus, 1) as other,
+        Radio(bus, 1, rxbuf=2_000_000) as other,
     ):
         sent = burst(2064)
         assert one.write(sent) == len(sent)
         assert find_burst(other.hear_for(0.25), sent)[1] < 0.3
         assert seen.stats(0).sent == 0
         assert one.write(np.zeros(BLOCK - len(sent), np.complex64)) == BLOCK - len(sent)
-        heard = other.hear_for(0.25)
+        heard = other.hear_for(0.5)
         at, match = find_burst(heard, sent)
         assert match > 0.95, match
         error = evm_db(heard[at : at + len(sent)], sent)
@@ -75,6 +75,32 @@ def check_hackrf_transmitter_without_samples():
         assert 0 < seen.stats(0).sent < 6 * BLOCK, "cut"
         assert np.abs(other.hear_for(0.3)[-2000:]).max() < 0.01
         return f"leaks {leak_db:.0f} dBFS"
+
+
+def check_hackrf_cuts_what_is_in_flight():
+    with Bus(bus := new_bus()) as seen, Radio(bus, 0, model="hackrf", inflight=4) as one:
+        assert one.write(burst(BLOCK)) == BLOCK
+        assert one.read(BLOCK)[0] == BLOCK
+        assert seen.stats(0).sent == 0
+
+
+def check_half_duplex_with_bursts():
+    with (
+        Bus(bus := new_bus()) as seen,
+        Radio(bus, 0, model="plain", duplex="half", turn_us=5000) as one,
+        Radio(bus, 1) as other,
+    ):
+        assert one.read(1024)[0] == 1024
+        sent = burst(4000)
+        assert one.write(sent) == len(sent)
+        ret, stamp, _ = one.read(1024)
+        assert ret == 1024
+        answer = one.status()
+        assert answer[0] == 0
+        assert one.index(stamp) - one.index(answer[2]) >= one.rate * 5e-3
+        start = answer[2] - round(len(sent) / one.rate * 1e9)
+        assert find_burst(other.read_from(start, len(sent)), sent)[1] > 0.95
+        assert seen.stats(0).bursts == 1
 
 
 def check_hackrf_rates_and_gains():

@@ -128,6 +128,7 @@ bool Device::hasHardwareTime(const std::string &) const { return station_->setti
 
 long long Device::getHardwareTime(const std::string &) const {
     want_there();
+    if (!station_->settings.time) return 0;
     const std::lock_guard lock(station_->mutex);
     return station_->own_ns() + station_->time_offset_ns;
 }

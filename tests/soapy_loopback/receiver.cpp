@@ -28,11 +28,17 @@ void Receiver::start(int64_t index, int64_t count, int64_t wrong) {
     const std::lock_guard lock(mutex_);
     station_.control.stall = 0;
     active_ = true;
+    failed_ = false;
     rate_ = station_.rx.rate;
     origin_ = next_ = index;
     last_ = count > 0 ? index + count : std::numeric_limits<int64_t>::max();
     clean_ = index + wrong;
     lost_from_ = -1;
+}
+
+void Receiver::fail() {
+    stop();
+    failed_ = true;
 }
 
 void Receiver::stop() {
@@ -50,7 +56,10 @@ void Receiver::obey_faults() {
     if (control.hang.exchange(0)) {
         while (true) sleep_ns(1'000'000'000);
     }
-    const int64_t lose = control.lose.exchange(0);
+}
+
+void Receiver::lose_samples() {
+    const int64_t lose = station_.control.lose.exchange(0);
     if (lose > 0 && lost_from_ < 0) {
         lost_from_ = next_;
         lost_until_ = next_ + lose;
@@ -99,11 +108,12 @@ int Receiver::read(void *out, size_t n, int &flags, long long &time_ns, long tim
     int64_t done = 0;
     flags = 0;
     while (true) {
-        if (station_.gone()) return SOAPY_SDR_STREAM_ERROR;
+        if (station_.gone() || failed_.exchange(false)) return SOAPY_SDR_STREAM_ERROR;
+        obey_faults();
         int64_t due = deadline;
         {
             const std::lock_guard lock(mutex_);
-            obey_faults();
+            lose_samples();
             if (active_ && !station_.control.stall) {
                 const int64_t ready = available();
                 if (done == 0 && lost_from_ == next_) return overflow(flags, time_ns);

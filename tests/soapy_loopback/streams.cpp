@@ -89,8 +89,12 @@ int Device::activateStream(SoapySDR::Stream *stream, int flags, long long time_n
         index = station_->now(rate);
         if ((flags & SOAPY_SDR_HAS_TIME) && station_->settings.time) {
             const long long own = time_ns - station_->time_offset_ns;
-            if (SoapySDR::timeNsToTicks(own, rate) < index) return SOAPY_SDR_TIME_ERROR;
-            index = SoapySDR::timeNsToTicks(own, rate);
+            const int64_t asked = SoapySDR::timeNsToTicks(own, rate);
+            if (asked < index) {
+                receiver_->fail();
+                return 0;
+            }
+            index = asked;
         }
     }
     receiver_->start(index, (flags & SOAPY_SDR_END_BURST) ? count : 0);
