@@ -11,6 +11,7 @@ namespace {
 constexpr int ROTATED = 64;
 constexpr int PHASES = 1024;
 constexpr int RUN = 16;
+typedef float Run __attribute__((vector_size(RUN * sizeof(float)), aligned(4), may_alias));
 constexpr double KAISER = 6;
 constexpr size_t NOISE = 1 << 16, NOISE_RUN = 512;
 
@@ -51,11 +52,11 @@ size_t bytes(Format format) {
 
 void to_ring(const void *in, Format format, int bits, int16_t *out, size_t n) {
     const float peak = float((1 << (bits - 1)) - 1);
-    const int shift = 16 - bits;
+    const int unit = 1 << (16 - bits);
     auto convert = [&](auto *values, float scale) {
         for (size_t i = 0; i < 2 * n; i++) {
             const float level = saturated(values[i] * scale * (peak + 1), peak);
-            out[i] = int16_t(int(std::nearbyint(level)) << shift);
+            out[i] = int16_t(int(std::nearbyint(level)) * unit);
         }
     };
     if (format == Format::CF32) convert(static_cast<const float *>(in), 1.0F);
@@ -108,12 +109,10 @@ void resample_add(const float *re, const float *im, double fraction, double step
         const double position = fraction + step * at;
         const auto whole = static_cast<size_t>(position);
         const float *tap = filters.tap[int((position - whole) * PHASES + 0.5)];
-        float x[RUN] = {}, y[RUN] = {};
+        Run x = {}, y = {};
         for (int k = 0; k < TAPS; k++) {
-            for (int i = 0; i < RUN; i++) {
-                x[i] += tap[k] * re[whole + k + i];
-                y[i] += tap[k] * im[whole + k + i];
-            }
+            x += tap[k] * *reinterpret_cast<const Run *>(re + whole + k);
+            y += tap[k] * *reinterpret_cast<const Run *>(im + whole + k);
         }
         const size_t count = std::min(same, n - at);
         for (size_t i = 0; i < count; i++) {
