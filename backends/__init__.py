@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from backends.loopback import LoopbackRadio
     from backends.offset import OffsetRadio
     from backends.oversampled import OversampledRadio
+    from backends.zmqstream import ZmqRadio
 
 __all__ = [
     "GAP",
@@ -102,6 +103,7 @@ __all__ = [
     "TxReport",
     "WaySurvey",
     "World",
+    "ZmqRadio",
     "burst_shape",
     "describe",
     "outlook",
@@ -114,6 +116,7 @@ _LATER = {
     "backends.loopback": {"LoopbackRadio"},
     "backends.offset": {"OffsetRadio"},
     "backends.oversampled": {"OversampledRadio"},
+    "backends.zmqstream": {"ZmqRadio"},
 }
 
 

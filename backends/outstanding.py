@@ -17,10 +17,9 @@ def answered(report: TxReport) -> asyncio.Future[TxReport]:
 
 
 class Places:
-    """Lays bursts one after another, at least `gap` samples apart."""
+    """Lays bursts one after another."""
 
-    def __init__(self, gap: int = GAP) -> None:
-        self._gap = gap
+    def __init__(self) -> None:
         self._free_from = 0
 
     def place(self, burst: TxBurst, earliest: int) -> int | None:
@@ -28,7 +27,7 @@ class Places:
         start = max(burst.start, earliest, self._free_from)
         if burst.latest is not None and start > burst.latest:
             return None
-        self._free_from = start + len(burst.samples) + self._gap
+        self._free_from = start + len(burst.samples) + GAP
         return start
 
 

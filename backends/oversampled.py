@@ -4,7 +4,11 @@ from collections.abc import AsyncIterator, Awaitable, Iterator
 from dataclasses import replace
 
 from backends.base import Capabilities, Hear, Radio, RxBlock, Samples, Tuning, TxBurst, TxReport
+from backends.outstanding import GAP
 from phy import REACH, Downsampler, upsample
+
+TRIM = GAP // 2
+"""Of the filter's rise and fall, where nearly nothing is: bursts GAP apart do not meet."""
 
 
 class OversampledRadio:
@@ -69,16 +73,19 @@ class OversampledRadio:
 
     def send(self, burst: TxBurst) -> Awaitable[TxReport]:
         """The burst with the filter's rise before and fall behind it."""
-        factor = self._factor
-        latest = None if burst.latest is None else (burst.latest - REACH) * factor
-        start = (burst.start - REACH) * factor
-        answer = self._radio.send(TxBurst(start, upsample(burst.samples, factor), latest))
-        return self._report(answer)
+        samples = upsample(burst.samples, self._factor)[TRIM:-TRIM]
+        latest = None if burst.latest is None else self._fast(burst.latest)
+        return self._report(self._radio.send(TxBurst(self._fast(burst.start), samples, latest)))
+
+    def _fast(self, start: int) -> int:
+        """Where the radio begins with a burst."""
+        return (start - REACH) * self._factor + TRIM
 
     async def _report(self, answer: Awaitable[TxReport]) -> TxReport:
         report = await answer
-        start = report.start // self._factor + REACH
-        return TxReport(report.outcome, start, max(start, report.end // self._factor - REACH))
+        start = (report.start - TRIM) // self._factor + REACH
+        end = (report.end + TRIM) // self._factor - REACH
+        return TxReport(report.outcome, start, max(start, end))
 
     async def close(self) -> None:
         """Stop."""

@@ -6,7 +6,8 @@ from fractions import Fraction
 class SampleTime:
     """Index 0 is the first sample received; its time becomes known with `begin`."""
 
-    def __init__(self, rate_hz: float) -> None:
+    def __init__(self, rate_hz: float, is_stamped: bool) -> None:
+        self._is_stamped = is_stamped
         per_ns = Fraction(rate_hz) / 10**9
         self._up, self._down = per_ns.numerator, per_ns.denominator
         self._zero_ns: int | None = None
@@ -14,6 +15,11 @@ class SampleTime:
 
     @property
     def has_begun(self) -> bool:
+        """Whether there was a first sample, and its time is known if the device stamps them."""
+        return self.knows_time or (not self._is_stamped and self._seen[1] > 0)
+
+    @property
+    def knows_time(self) -> bool:
         """Whether the device's time of index 0 is known."""
         return self._zero_ns is not None
 

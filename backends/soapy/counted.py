@@ -48,6 +48,7 @@ class CountedSender:
         leading: int,
         longest_s: float,
         turnaround_s: float,
+        in_flight: int,
     ) -> None:
         self._orders = orders
         self._outgoing = outgoing
@@ -57,7 +58,8 @@ class CountedSender:
         self._longest = clock.samples(round(1e9 * longest_s))
         self._transfer = max(1, self._stream.mtu)
         self._zeros = np.zeros(self._transfer, np.complex64)
-        self._handover = self._transfer + clock.samples(round(1e9 * HANDOVER_S))
+        self._in_flight = in_flight * self._transfer
+        self._handover = self._in_flight + self._transfer + clock.samples(round(1e9 * HANDOVER_S))
         # From the decision to send to the first sample of a burst.
         self._ahead = (
             clock.samples(round(1e9 * turnaround_s))
@@ -81,7 +83,7 @@ class CountedSender:
     def is_due(self) -> bool:
         """Whether the first order has to go on its way now."""
         waiting = self._orders.waiting
-        if not waiting:
+        if not waiting or not self._clock.has_begun:
             return False
         return waiting[0].start <= self._clock.now(time.monotonic_ns()) + self._ahead
 
@@ -89,7 +91,8 @@ class CountedSender:
         """All that is to be sent, and what comes meanwhile; the transmitter is off afterwards."""
         self.counters["tx_spells"] += 1
         self._outgoing.activate()
-        self._origin = self._clock.now(time.monotonic_ns())
+        # Zeros are in flight before what is written first.
+        self._origin = self._clock.now(time.monotonic_ns()) + self._in_flight
         self._written = 0
         try:
             self._fill(self._leading * self._transfer)
@@ -138,6 +141,7 @@ class CountedSender:
         """Raises DriverError when the device takes nothing for a long time."""
         since_ns = time.monotonic_ns()
         while len(samples):
+            self._catch_up()
             moved = self._stream.write(samples, 0, 0, WRITE_US)
             if moved.n > 0:
                 samples = samples[moved.n :]
@@ -177,6 +181,13 @@ class CountedSender:
                 self._underflow()
             else:
                 break
+
+    def _catch_up(self) -> None:
+        """A device that was given too little has sent something of its own in the meantime."""
+        late = self._clock.now(time.monotonic_ns()) + self._in_flight - self._end
+        if late > 0:
+            self._underflow()
+            self._origin += -(-late // self._transfer) * self._transfer
 
     def _underflow(self) -> None:
         """What is on its way was torn apart."""

@@ -5,6 +5,7 @@ crashes or hangs takes only this process with it. It opens the device once, and 
 fails or the daemon is gone.
 """
 
+import contextlib
 import os
 import signal
 import socket
@@ -24,13 +25,15 @@ from backends.soapy.protocol import MOST_BYTES, Failed, Open, Opened, to_open
 from backends.soapy.receiving import Receiving
 from backends.soapy.ring import SampleRing
 from backends.soapy.setting_up import choose_format, set_up
-from backends.soapy.settings import Found, SettingError, SoapySettings
+from backends.soapy.settings import Found, SettingError, SoapySettings, in_flight
 from backends.soapy.surface import RX, TX, DriverError, Library, Stream
 from backends.soapy.timed import TimedSender
 
 RETRY_S = 0.25, 1.0
 """A device that went away is looked for again after so long; more each time."""
 TALLY_S = 0.1
+PRIORITY = -10
+"""Where it may: samples do not wait."""
 SWITCH_INTERVAL_S = 5e-4
 """Two threads that mostly wait in the driver should not wait for each other."""
 
@@ -40,6 +43,8 @@ def main() -> None:
     # Whoever stops the daemon with Ctrl-C lets it end us.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
+    with contextlib.suppress(PermissionError):
+        os.setpriority(os.PRIO_PROCESS, 0, PRIORITY)
     control, air, rx_memory, tx_memory = (int(each) for each in sys.argv[1:5])
     with socket.socket(fileno=control) as control_socket, socket.socket(fileno=air) as air_socket:
         air_socket.setblocking(False)
@@ -88,8 +93,8 @@ class _Session:
 
     def _stream(self, library: Library, device: Device, settings: SoapySettings) -> None:
         gains = set_up(device, settings)
-        clock = SampleTime(settings.rate_hz)
         has_time, channel = device.has_time(), settings.channel
+        clock = SampleTime(settings.rate_hz, has_time)
         rx_form = choose_format(device, settings, RX)
         rx = device.open_stream(RX, channel, rx_form, settings.stream_args)
         streams = [rx]
@@ -111,6 +116,7 @@ class _Session:
                     sender = CountedSender(
                         self._orders, outgoing, clock, settings.leading_transfers,
                         settings.longest_tx_s, 0.0 if full_duplex else settings.turnaround_s,
+                        in_flight(settings, device.driver),
                     )  # fmt: skip
             self._orders.say(
                 Opened(
@@ -124,6 +130,7 @@ class _Session:
                         has_time=has_time,
                         receives_in_s=piece_of(settings, rx) / settings.rate_hz,
                         tx_transfer_s=tx.mtu / settings.rate_hz if tx is not None else 0.0,
+                        in_flight=in_flight(settings, device.driver),
                         gains=_told(gains),
                     )
                 )

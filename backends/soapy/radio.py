@@ -48,15 +48,15 @@ class SoapyRadio:
         self._settings = settings
         self._longest_s = longest_s
         self._hearing = Hearing(removes_dc)
-        self._feed = BlockFeed(self._next_block, "soapy", lambda _: False)
+        self._feed = BlockFeed(self._next_block, "soapy", self._is_due)
         self._closing = threading.Event()
         self._child: RadioChild | None = None
         self._found: Found | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
-        # Whoever plans bursts leaves a gap for echoes; at this rate it may hold a filter's tail.
-        self._places = Places(gap=0)
+        self._places = Places()
         self._handed = Handed()
         self._rate_hz = 0.0
+        self._yielded = 0
         self._is_over = False
         self._away = self._notice = ""
         self._before: Counter[str] = Counter()
@@ -67,7 +67,7 @@ class SoapyRadio:
     def capabilities(self) -> Capabilities:
         """As the device is."""
         found, settings = self._known, self._settings
-        tx = settings.tx_traits(found.has_time, found.full_duplex, found.tx_transfer_s)
+        tx = settings.tx_traits(found)
         return Capabilities(
             receives=True,
             transmits=settings.tx_enabled,
@@ -132,6 +132,8 @@ class SoapyRadio:
             self._child.begin()
         try:
             async for block, is_heard in self._feed.blocks(hear):
+                self._yielded = block.index + block.n
+                self._handed.settle(self._yielded)
                 if not is_heard:
                     yield block
         finally:
@@ -207,6 +209,8 @@ class SoapyRadio:
         while (answer := child.answer()) is not None:
             if isinstance(answer, Left):
                 self._handed.left(answer, self._hearing.base)
+                heard = self._hearing.is_heard_at_once
+                self._handed.settle(self._hearing.next_index if heard else self._yielded)
             elif isinstance(answer, Counted):
                 self._counted, self._notice = Counter(answer.counters), answer.notice
             elif isinstance(answer, Failed):
@@ -230,6 +234,9 @@ class SoapyRadio:
             self._loop.add_reader(child.control_fd, self._listen, child)
 
     # On the feed's thread.
+
+    def _is_due(self, block: RxBlock) -> bool:
+        return self._handed.is_due(block.index + block.n)
 
     def _next_block(self) -> RxBlock | None:
         child, hearing = self._child, self._hearing

@@ -114,7 +114,7 @@ class Receiving:
 
     def _place(self, time_ns: int, host_ns: int) -> None:
         """Compare the index of the next sample with where the ones before it ended."""
-        if not self.clock.has_begun:
+        if not self.clock.knows_time:
             self.clock.begin(time_ns, self._next)
             return
         ahead = self.clock.index_at(time_ns) - self._next

@@ -1,11 +1,11 @@
 """What a device is to be set to, and what it then is; goes to the radio process and back."""
 
-from typing import Annotated
+from typing import Annotated, Protocol
 
 import msgspec
 from msgspec import Meta
 
-from backends.soapy.traits import TxTraits, keeps_time, tx_traits
+from backends.soapy.traits import IN_FLIGHT, TxTraits, keeps_time, tx_traits
 
 Gain = Annotated[float, Meta(ge=-200, le=200)]
 
@@ -37,6 +37,8 @@ class SoapySettings(msgspec.Struct, frozen=True, kw_only=True):
     """Of bursts whose time the device itself keeps."""
     turnaround_s: float = 0.05
     """Between receiving and sending, where it cannot do both."""
+    transfers_in_flight: int | None = None
+    """Transfers that the driver takes ahead of the antenna; None: as is known of it."""
     leading_transfers: int = 1
     """Zeros before the first burst where the first transfers do not get out whole."""
     listen_s: float = 0.05
@@ -44,12 +46,33 @@ class SoapySettings(msgspec.Struct, frozen=True, kw_only=True):
     longest_tx_s: float = 1.0
     """So long it sends without listening."""
 
-    def tx_traits(self, has_time: bool, full_duplex: bool, transfer_s: float) -> TxTraits:
-        """How bursts leave a device of that nature."""
+    def tx_traits(self, found: "Sending") -> TxTraits:
+        """How bursts leave that device."""
         return tx_traits(
-            has_time, full_duplex, transfer_s, self.leading_transfers, self.lead_s,
-            self.turnaround_s, self.listen_s, self.longest_tx_s,
+            found.has_time, found.full_duplex, found.tx_transfer_s, found.in_flight,
+            self.leading_transfers, self.lead_s, self.turnaround_s, self.listen_s,
+            self.longest_tx_s,
         )  # fmt: skip
+
+
+class Sending(Protocol):
+    """What matters of a device for how bursts leave it."""
+
+    @property
+    def has_time(self) -> bool:
+        """Whether samples are stamped."""
+
+    @property
+    def full_duplex(self) -> bool:
+        """Whether it receives while it sends."""
+
+    @property
+    def tx_transfer_s(self) -> float:
+        """Length of a transfer."""
+
+    @property
+    def in_flight(self) -> int:
+        """Transfers that are taken ahead."""
 
 
 class Found(msgspec.Struct, frozen=True, kw_only=True):
@@ -65,12 +88,19 @@ class Found(msgspec.Struct, frozen=True, kw_only=True):
     receives_in_s: float
     """Samples come in pieces of this length."""
     tx_transfer_s: float = 0.0
+    in_flight: int = 0
     gains: str = ""
 
     @property
     def keeps_time(self) -> bool:
         """Whether bursts leave at times that the device itself keeps."""
         return keeps_time(self.has_time, self.full_duplex)
+
+
+def in_flight(settings: SoapySettings, driver: str) -> int:
+    """Transfers that this driver takes ahead."""
+    given = settings.transfers_in_flight
+    return IN_FLIGHT.get(driver.lower(), 0) if given is None else given
 
 
 class SettingError(Exception):

@@ -20,6 +20,8 @@ from backends.soapy.surface import (
 )
 
 WRITE_US = 50_000
+AHEAD_S = 0.25
+"""A device gets bursts at most so long before their time."""
 GRACE_S = 0.1
 """So long after its end a burst's acknowledgement may come."""
 SLACK = 16
@@ -60,12 +62,21 @@ class TimedSender:
 
     def step(self) -> None:
         """Wait for orders a little, carry them out, look what became of others."""
-        self._orders.wait(BUSY_S if self._out else QUIET_S)
-        while self._orders.waiting:
+        self._orders.wait(BUSY_S if self._out or self._orders.waiting else QUIET_S)
+        while self._is_due():
             self._send(self._orders.waiting.popleft())
         self._look()
         if self._is_active and not self._out:
             self._rest()
+
+    def _is_due(self) -> bool:
+        """Whether the first order goes to the device now; what is far off would fill its queue."""
+        waiting = self._orders.waiting
+        # Before the first sample, an index means nothing to the device.
+        if not waiting or not self._clock.has_begun:
+            return False
+        ahead = self._clock.samples(round(1e9 * AHEAD_S))
+        return waiting[0].start <= self._clock.now(time.monotonic_ns()) + ahead
 
     def stop(self) -> None:
         """The transmitter goes off."""
@@ -74,10 +85,6 @@ class TimedSender:
             self._stream.deactivate()
 
     def _send(self, order: Order) -> None:
-        if not self._clock.has_begun:
-            # Nothing was received yet: its index means nothing.
-            self._orders.done(order, "lost", order.start)
-            return
         if not self._is_active:
             self._outgoing.activate()
             self._is_active = True
@@ -98,8 +105,9 @@ class TimedSender:
     def _write(self, out: _Out, samples: Values, flags: int, time_ns: int) -> bool:
         """Whether the device took all of it; what is too late already is taken, and dropped."""
         until = out.end + self._clock.samples(round(1e9 * GRACE_S))
-        while len(samples):
+        while len(samples) and not self._orders.is_over:
             moved = self._stream.write(samples, flags, time_ns, WRITE_US)
+            self._orders.wait(0)
             self._look()
             if moved.n > 0:
                 samples = samples[moved.n :]
@@ -114,7 +122,7 @@ class TimedSender:
                 self._fail(out, "underflow")
                 self._end_burst()
                 return False
-        return True
+        return not len(samples)
 
     def _end_burst(self) -> None:
         """The device must not wait for the rest of a burst that was given up."""

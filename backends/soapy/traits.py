@@ -14,12 +14,17 @@ class TxTraits(NamedTuple):
     """How bursts leave a device, in s; `transfer_s` is the length of what it moves at once.
 
     Where samples are counted, bursts leave behind `leading` transfers of zeros, in whole transfers,
-    and one of zeros comes after them, for what is cut off at the end.
+    and one of zeros comes after them, for what is cut off at the end. A transfer is taken from the
+    driver when those `in_flight` before it have still to leave.
     """
 
     lead_s: float
     turnaround_s: float
     spells: Spells | None
+
+
+IN_FLIGHT = {"hackrf": 4}
+"""Transfers that a driver takes ahead of the antenna."""
 
 
 def keeps_time(has_time: bool, full_duplex: bool) -> bool:
@@ -28,20 +33,20 @@ def keeps_time(has_time: bool, full_duplex: bool) -> bool:
 
 
 def tx_traits(
-    has_time: bool, full_duplex: bool, transfer_s: float, leading: int, lead_s: float,
-    turnaround_s: float, listen_s: float, longest_s: float,
+    has_time: bool, full_duplex: bool, transfer_s: float, in_flight: int, leading: int,
+    lead_s: float, turnaround_s: float, listen_s: float, longest_s: float,
 ) -> TxTraits:  # fmt: skip
     """Of a device, and what it is set to."""
     if keeps_time(has_time, full_duplex):
         return TxTraits(lead_s, 0.0, None)
-    handover_s = transfer_s + HANDOVER_S
+    handover_s = (1 + in_flight) * transfer_s + HANDOVER_S
     if full_duplex:
         return TxTraits(handover_s + leading * transfer_s + MARGIN_S, 0.0, None)
     # Before the first sample, and after the last.
     deaf_s = turnaround_s + (1 + leading) * transfer_s
     spells = Spells(
         follow_s=handover_s + MARGIN_S,
-        pause_s=2 * turnaround_s + (3 + leading) * transfer_s + HANDOVER_S + MARGIN_S + listen_s,
+        pause_s=turnaround_s + 2 * transfer_s + listen_s + deaf_s + handover_s + MARGIN_S,
         longest_s=longest_s,
     )
     return TxTraits(handover_s + MARGIN_S, deaf_s, spells)

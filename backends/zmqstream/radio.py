@@ -70,6 +70,7 @@ class ZmqRadio:
         self._is_open = False
         self._notice = ""
         self._gap = 0
+        self._unsent = b""
         self.counters = {
             "overflows": 0, "samples_lost": 0, "late": 0, "outages": 0, "bad_messages": 0,
             "clipped": 0,
@@ -225,28 +226,24 @@ class ZmqRadio:
 
     def _emit(self, sink: Sink) -> None:
         """As much as was received, and the lead."""
-        while (ahead := self._received + self._lead - self._sent) > 0:
+        while True:
+            if self._unsent and not sink.send(self._unsent):
+                return
+            self._unsent = b""
+            ahead = self._received + self._lead - self._sent
             if ahead > 2 * self._lead:
-                # Nobody takes it: what was to be sent at that time is not any more.
-                self._skip(ahead - self._lead)
+                # Nobody took it: what was to be sent at that time is not any more.
+                self.counters["overflows"] += 1
+                self._next_samples(ahead - self._lead)
                 continue
-            n = sink.wanted(min(ahead, self._n))
+            n = sink.wanted(min(ahead, self._n)) if ahead > 0 else 0
             if not n:
                 return
-            with self._lock:
-                samples = self._line.take(self._sent, n)
-                self._sent += n
-            data, clipped = self._type.encode(samples)
+            self._unsent, clipped = self._type.encode(self._next_samples(n))
             self.counters["clipped"] += clipped
-            if not sink.send(data):
-                self._sent_nothing(n)
-                return
 
-    def _skip(self, n: int) -> None:
+    def _next_samples(self, n: int) -> Samples:
         with self._lock:
-            self._line.take(self._sent, n)
+            samples = self._line.take(self._sent, n)
             self._sent += n
-
-    def _sent_nothing(self, n: int) -> None:
-        """A peer that takes nothing hears nothing; the samples are gone."""
-        self.counters["overflows"] += 1
+        return samples

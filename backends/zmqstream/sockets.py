@@ -137,6 +137,8 @@ def _opened(
     """As czmq has it, @ binds and > connects; without, `binds`."""
     socket = context.socket(kind)
     socket.setsockopt(zmq.LINGER, 0)
+    socket.setsockopt(zmq.RECONNECT_IVL, 20)
+    socket.setsockopt(zmq.RECONNECT_IVL_MAX, 500)
     socket.setsockopt(zmq.SNDHWM, ahead)
     plain = endpoint.lstrip("@>")
     try:

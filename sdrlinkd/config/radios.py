@@ -44,6 +44,8 @@ class SoapyParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Bursts are handed over so long before their time, where the device keeps time."""
     turnaround_s: Seconds = 0.05
     """Between receiving and sending, where it cannot do both."""
+    transfers_in_flight: Annotated[int, Meta(ge=0, le=64)] | None = None
+    """Transfers that the driver takes ahead of the antenna; absent: as is known of it."""
     leading_transfers: Annotated[int, Meta(ge=0, le=16)] = 1
     """Zeros before the first burst, where the first transfers do not get out whole."""
     listen_s: Seconds = 0.05

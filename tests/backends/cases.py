@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from backends import IqFileRadio, LoopbackRadio, Radio, RadioParams
+from backends import IqFileRadio, LoopbackRadio, Radio, RadioParams, SoapyRadio, SoapySettings
 from backends.ether.medium import NOISE_DBFS
+from tests.backends.echo import ZmqEcho
 from tests.backends.hubs import SNR_DB, RadioOnHub
-from tests.backends.radios import AIR, BLOCK_S, PLAYED, heard, read, record
+from tests.backends.radios import AIR, BLOCK_S, PLAYED, N, heard, read, record
+from tests.soapy_loopback import missing
 
 TURNAROUND_S = 0.001
 
@@ -31,6 +33,10 @@ class Case:
     turnaround_s: float = 0.0
     begin: int = 0
     """Bursts handed over when the radio has been opened are in time from here on."""
+    gap_noise: float = 0.0
+    """What is heard where nothing was sent, at most."""
+    settles_with_blocks: bool = True
+    """Reports come just with the block that a burst ends in; else when the device tells."""
     snr_db: float | None = None
     """At which bursts arrive, whatever their own power; None: as they are, without noise."""
 
@@ -40,7 +46,7 @@ class Case:
     @property
     def noise(self):
         """What no sample of noise alone exceeds."""
-        return 0.0 if self.snr_db is None else 7 * 10 ** (NOISE_DBFS / 20)
+        return self.gap_noise if self.snr_db is None else 7 * 10 ** (NOISE_DBFS / 20)
 
     def gain(self, burst):
         """How much larger a burst arrives."""
@@ -92,6 +98,31 @@ def ether(name, paced, full_duplex):
     )
 
 
+def soapy(name, stamps):
+    """A device that hears itself: with stamps, bursts leave at times that it keeps."""
+    can = "time=yes,ack=yes" if stamps else "time=no,ack=no"
+    settings = SoapySettings(
+        device=f"driver=loopback,model=plain,self=yes,noise_db=-200,mtu={N},{can}",
+        rate_hz=0.0, frequency_hz=0.0, block_s=BLOCK_S, tx_enabled=True, tx_gain_db=40.0,
+        rx_gain_db=20.0,
+    )  # fmt: skip
+
+    def make(_):
+        return SoapyRadio(settings, longest_s=0.1, removes_dc=False)
+
+    return Case(
+        name, make, paced=True, hears_self=True, begin=10_000, settles_with_blocks=False,
+        gap_noise=1e-4,
+    )  # fmt: skip
+
+
+def zmq(name, pattern):
+    """A peer that sends back what it gets."""
+    return Case(
+        name, lambda folder: ZmqEcho(folder, pattern), paced=True, hears_self=True, begin=10_000
+    )
+
+
 RADIOS = (
     loopback("loopback", paced=True),
     loopback("loopback-unpaced", paced=False),
@@ -103,11 +134,21 @@ RADIOS = (
     ether("ether-half-duplex", paced=True, full_duplex=False),
     ether("ether-lockstep", paced=False, full_duplex=True),
     ether("ether-lockstep-half-duplex", paced=False, full_duplex=False),
+    soapy("soapy", stamps=True),
+    zmq("zmq-push", "push"),
+    zmq("zmq-req", "req"),
 )
+
+NEEDS = {"soapy": pytest.mark.skipif(bool(missing()), reason=missing())}
 
 
 def _those(applies):
-    return pytest.mark.parametrize("case", [case for case in RADIOS if applies(case)], ids=str)
+    cases = [
+        pytest.param(case, marks=NEEDS.get(case.name, ()), id=str(case))
+        for case in RADIOS
+        if applies(case)
+    ]
+    return pytest.mark.parametrize("case", cases)
 
 
 every_radio = _those(lambda _: True)

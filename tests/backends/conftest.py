@@ -5,6 +5,7 @@ import os
 import pytest
 
 from phy import warm_up
+from tests.soapy_loopback import missing, module_folder
 
 NOBODY = 65534
 
@@ -13,6 +14,16 @@ NOBODY = 65534
 def _warm():
     """Compiling takes longer on a fresh machine than a hub may be late."""
     warm_up()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _test_radio():
+    """SoapySDR finds the test radio, and no other driver: some take seconds to load."""
+    with pytest.MonkeyPatch.context() as patch:
+        if not missing():
+            patch.setenv("SOAPY_SDR_PLUGIN_PATH", str(module_folder()))
+            patch.setenv("SOAPY_SDR_ROOT", "/nonexistent")
+        yield
 
 
 @pytest.fixture

@@ -92,7 +92,7 @@ async def test_a_report_comes_with_the_block_of_the_last_sample(case, tmp_path):
             await turn()
             for each, burst in zip(sends, wanted, strict=True):
                 passed = block.index + block.n >= burst.start + len(burst.samples)
-                assert each.done() == passed
+                assert each.done() == passed or not case.settles_with_blocks
                 if each.done() and each not in settled:
                     settled.append(each)
             if len(settled) == len(sends):
