@@ -10,9 +10,10 @@ from typing import Any
 import msgspec
 import zmq
 
-from sdrlinkd.bus import RuntimeDirectory, SocketReader
+from sdrlinkd.bus import RuntimeDirectory
 from sdrlinkd.client import CONTROL_SOCKET
 from sdrlinkd.errors import UserError
+from sdrlinkd.reading import SocketReader
 
 log = logging.getLogger("sdrlinkd")
 

@@ -23,7 +23,7 @@ from sdrlinkd.control import Control, Verb
 from sdrlinkd.errors import UserError
 from sdrlinkd.link import Link, Told
 from sdrlinkd.node import Node
-from sdrlinkd.pdulink import DirectLink, PduLink
+from sdrlinkd.pdulink import DirectLink, PduLink, make_gnuradio
 from sdrlinkd.policies import Policies
 from sdrlinkd.sdnotify import Notifier
 
@@ -126,6 +126,8 @@ def _make_pdu_link(setup: Setup, rng: Random) -> PduLink:
     config = setup.config
     if config.backend == "direct":
         return DirectLink(config.direct, config.link.pdu_size, rng)
+    if config.backend == "gnuradio":
+        return make_gnuradio(config)
     # Else a busy event loop keeps the modem's threads from the interpreter for 5 ms at a time.
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     # The modem brings numba and scipy, which take their time to load.

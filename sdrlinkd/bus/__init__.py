@@ -1,7 +1,6 @@
 """The local ZeroMQ bus of one daemon; the document beside this file is its contract."""
 
 from sdrlinkd.bus.bus import PDU_TAP, Bus, Ingress
-from sdrlinkd.bus.reader import SocketReader
 from sdrlinkd.bus.sockets import RuntimeDirectory
 
-__all__ = ["PDU_TAP", "Bus", "Ingress", "RuntimeDirectory", "SocketReader"]
+__all__ = ["PDU_TAP", "Bus", "Ingress", "RuntimeDirectory"]

@@ -9,7 +9,6 @@ import zmq
 
 from sdrlinkd import __version__
 from sdrlinkd.bus import envelope
-from sdrlinkd.bus.reader import SocketReader
 from sdrlinkd.bus.sockets import RuntimeDirectory
 from sdrlinkd.client import (
     ACK_PREFIX,
@@ -30,6 +29,7 @@ from sdrlinkd.link import (
     Verdict,
 )
 from sdrlinkd.localtime import UNKNOWN, LocalTimes
+from sdrlinkd.reading import SocketReader
 from sdrlinkd.reports import BusReport
 
 # ZeroMQ hardly queues for us: what arrives is taken at once, so that every drop is ours and named.

@@ -11,7 +11,7 @@ from sdrlinkd.config.carriers import (
     TransformParams,
 )
 from sdrlinkd.config.load import explain_policy, load_config, parse_config, parse_toml
-from sdrlinkd.config.radios import SoapyParams
+from sdrlinkd.config.radios import GnuRadioParams, SoapyParams, ZmqParams
 from sdrlinkd.config.schema import BusParams, Config
 from sdrlinkd.config.setup import Setup, load_registry, make_setup
 
@@ -21,6 +21,7 @@ __all__ = [
     "Config",
     "DirectParams",
     "EtherParams",
+    "GnuRadioParams",
     "IqFileParams",
     "LoopbackParams",
     "ModemParams",
@@ -28,6 +29,7 @@ __all__ = [
     "Setup",
     "SoapyParams",
     "TransformParams",
+    "ZmqParams",
     "explain_policy",
     "load_config",
     "load_registry",

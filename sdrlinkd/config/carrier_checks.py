@@ -7,11 +7,16 @@ import msgspec
 from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError
 
+WITHOUT_AIR = ("direct", "gnuradio")
+"""Backends that carry PDUs, not samples."""
+
 
 def check_carrier(config: Config, source: str) -> None:
     """Raises ConfigError, citing key, given and allowed."""
     _check_sharing(config, source)
-    if config.backend == "direct":
+    if config.backend in ("zmq", "gnuradio"):
+        _check_endpoints(config, source)
+    if config.backend in WITHOUT_AIR:
         return
     modem, iqfile = config.modem, config.iqfile
     if modem.max_cfo_hz > modem.rate_hz / 4:
@@ -56,11 +61,25 @@ def _check_soapy(config: Config, source: str) -> None:
         )
 
 
+def _check_endpoints(config: Config, source: str) -> None:
+    backend = config.backend
+    section = config.zmq if backend == "zmq" else config.gnuradio
+    needed = ["send"] if config.gnuradio.transport in ("udp", "tcp") else ["send", "receive"]
+    for key in ["send", "receive"] if backend == "zmq" else needed:
+        if not getattr(section, key):
+            example = '"tcp://127.0.0.1:52001"' if "receive" in needed else '"127.0.0.1:52001"'
+            raise ConfigError(
+                f'{source}: {backend}.{key}: got ""; allowed: where the flowgraph is, such as '
+                f"{example}"
+            )
+
+
 def _check_sharing(config: Config, source: str) -> None:
     policy = config.access.policy
-    if policy != "none" and config.backend == "direct":
+    if policy != "none" and config.backend in WITHOUT_AIR:
         raise ConfigError(
-            f'{source}: access.policy: got "{policy}", but the backend "direct" has no air; '
+            f'{source}: access.policy: got "{policy}", but the backend "{config.backend}" has no '
+            "air that we could hear; "
             'allowed: "none", or a backend with a radio'
         )
     if config.rate.min_mcs > config.rate.max_mcs:

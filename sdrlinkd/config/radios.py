@@ -52,3 +52,36 @@ class SoapyParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """A half-duplex radio listens so long before it sends again."""
     longest_tx_s: Annotated[float, Meta(gt=0, le=10)] = 1.0
     """So long it sends without listening."""
+
+
+class ZmqParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Samples over ZeroMQ: a GNU Radio flowgraph, or srsRAN's radio, as the radio or the air."""
+
+    send: str = ""
+    """Endpoint that we bind, as GNU Radio's sinks do; @ before it binds, > connects."""
+    receive: str = ""
+    """Endpoint that we connect to, as GNU Radio's sources do."""
+    pattern: Literal["push", "pub", "req"] = "push"
+    """PUSH and PULL; PUB and SUB, which drops what a slow peer cannot take; REQ and REP."""
+    format: Literal["cf32_le", "ci16_le"] = "cf32_le"
+    lead_s: Annotated[float, Meta(ge=0, le=1)] = 0.02
+    """We send so far ahead of what we receive: what may be under way through the peer."""
+    paced: bool = True
+    """The peer keeps real time; while it is away, the clock does."""
+
+
+class GnuRadioParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A GNU Radio flowgraph as the PHY: it gets PDUs and gives PDUs."""
+
+    transport: Literal["zmq-push", "zmq-pub", "udp", "tcp"] = "zmq-push"
+    """PMT messages of gr-zeromq, or octets of a socket_pdu."""
+    send: str = ""
+    """zmq: endpoint that we bind; udp, tcp: HOST:PORT of the socket_pdu."""
+    receive: str = ""
+    """zmq: endpoint that we connect to; udp: HOST:PORT of ours, empty: answers come back."""
+    rate_bit_s: Annotated[float, Meta(gt=0, le=1e12)] = 100e3
+    """The pace that the flowgraph sustains; what comes faster waits in our queue, not in its."""
+    delay_s: Annotated[float, Meta(ge=0, le=10)] = 0.0
+    """How long PDUs take through it; known, it is part of the messages' age."""
+    hear_self: bool = False
+    """Take our own PDUs, where the flowgraph sends them back."""

@@ -15,7 +15,7 @@ from sdrlinkd.config.carriers import (
     PlayParams,
     TransformParams,
 )
-from sdrlinkd.config.radios import SoapyParams
+from sdrlinkd.config.radios import GnuRadioParams, SoapyParams, ZmqParams
 from sdrlinkd.link import (
     AccessParams,
     ClassesParams,
@@ -61,7 +61,7 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """Namespace under which another robot's topics are republished."""
     rx_depth: Annotated[int, Meta(ge=0)] = 256
     """Messages kept for a consumer that does not read; 0: without bound."""
-    backend: Literal["direct", "loopback", "iqfile", "ether", "soapy"] = "direct"
+    backend: Literal["direct", "loopback", "iqfile", "ether", "soapy", "zmq", "gnuradio"] = "direct"
     drain_s: Annotated[float, Meta(ge=0, le=60)] = 1.0
     """Time to send what is queued when the daemon is stopped."""
     seed: int | None = None
@@ -83,6 +83,8 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     iqfile: IqFileParams = IqFileParams()
     ether: EtherParams = EtherParams()
     soapy: SoapyParams = SoapyParams()
+    zmq: ZmqParams = ZmqParams()
+    gnuradio: GnuRadioParams = GnuRadioParams()
     channel: ChannelParams = ChannelParams()
     play: PlayParams = PlayParams()
     topic: dict[str, TopicPolicy] = {}
@@ -95,4 +97,5 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
             "direct": self.direct.hear_self,
             "loopback": self.loopback.hear_self,
             "iqfile": self.iqfile.hear_self,
+            "gnuradio": self.gnuradio.hear_self,
         }.get(self.backend, False)

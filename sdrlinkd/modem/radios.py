@@ -18,6 +18,7 @@ from backends import (
     Radio,
     SoapyRadio,
     SoapySettings,
+    ZmqRadio,
 )
 from sdrlinkd.config import Config, SoapyParams
 from sdrlinkd.errors import ConfigError, UserError
@@ -54,6 +55,12 @@ def _make_radio(config: Config, node_id: int, rng: Random) -> Radio:
         return EtherRadio(Path(config.ether.dir), node_id, who)
     if config.backend == "soapy":
         return _make_soapy(config)
+    if config.backend == "zmq":
+        zmq = config.zmq
+        return ZmqRadio(
+            zmq.send, zmq.receive, zmq.pattern, zmq.format, config.modem.block_s, zmq.lead_s,
+            zmq.paced,
+        )  # fmt: skip
     channel = _channel(config, rng.getrandbits(32))
     modem, loopback, iqfile = config.modem, config.loopback, config.iqfile
     if config.backend == "iqfile":

@@ -2,13 +2,16 @@
 
 from sdrlinkd.pdulink.base import Heard, PduLink, PduListener
 from sdrlinkd.pdulink.direct import DirectLink
+from sdrlinkd.pdulink.gnuradio import GnuRadioLink, make_gnuradio
 from sdrlinkd.pdulink.impairment import Arrival, Impairment
 
 __all__ = [
     "Arrival",
     "DirectLink",
+    "GnuRadioLink",
     "Heard",
     "Impairment",
     "PduLink",
     "PduListener",
+    "make_gnuradio",
 ]

@@ -14,9 +14,10 @@ from sdrlinkd.plan.model import Setting
 
 def setting_of(config: Config, robots: int, turnaround_s: float) -> Setting:
     """For `robots` of which all send the same. Raises UserError, ConfigError."""
-    if config.backend == "direct":
+    if config.backend in ("direct", "gnuradio"):
         raise UserError(
-            'backend: got "direct", which has no air to plan for; allowed: a backend with a radio'
+            f'backend: got "{config.backend}", which has no air to plan for; allowed: a backend '
+            "with a radio"
         )
     modem, pdu_size = config.modem, config.link.pdu_size
     airtimes = Airtimes(modem, pdu_size)

@@ -53,7 +53,7 @@ def test_shipped_registry_is_the_papers_table_4():
         ("link = 3", ["link", "got 3", "a table"]),
         ("[link]\nflush_s = nan", ["link.flush_s", "nan"]),
         ("[link]\ngreedy = 1", ["link.greedy", "got 1", "true or false"]),
-        ('backend = "usrp"', ["backend", '"usrp"', 'one of "direct", "ether", "iqfile"']),
+        ('backend = "usrp"', ["backend", '"usrp"', 'one of "direct", "ether"', '"soapy"']),
         ("[modem]\nmcs = 10", ["f.toml:2", "modem.mcs", "got 10", "from 0 to 9"]),
         ("[modem]\nrate_hz = 0", ["modem.rate_hz", "got 0"]),
         ('backend = "iqfile"', ["iqfile.receive, iqfile.transmit", "name a recording"]),

@@ -1,0 +1,21 @@
+"""GNU Radio as the PHY, without GNU Radio on our side."""
+
+from sdrlinkd.config import Config
+from sdrlinkd.pdulink.gnuradio.link import GnuRadioLink
+from sdrlinkd.pdulink.gnuradio.transport import TcpTransport, Transport, UdpTransport, ZmqTransport
+
+
+def make_gnuradio(config: Config) -> GnuRadioLink:
+    """The link that the configuration describes. Raises UserError."""
+    params, pdu_size = config.gnuradio, config.link.pdu_size
+    transport: Transport
+    if params.transport == "udp":
+        transport = UdpTransport(params.send, params.receive)
+    elif params.transport == "tcp":
+        transport = TcpTransport(params.send, pdu_size)
+    else:
+        transport = ZmqTransport(params.send, params.receive, params.transport == "zmq-pub")
+    return GnuRadioLink(params, pdu_size, transport)
+
+
+__all__ = ["GnuRadioLink", "make_gnuradio"]

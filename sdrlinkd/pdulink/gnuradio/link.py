@@ -1,0 +1,129 @@
+"""A GNU Radio flowgraph as the PHY: PDUs go to it one by one, at the pace that it sustains."""
+
+import asyncio
+import contextlib
+import time
+
+from sdrlinkd.config import GnuRadioParams
+from sdrlinkd.link import Burst, CarrierTraits, Opportunity, Outcome
+from sdrlinkd.pdulink.base import Heard, PduListener
+from sdrlinkd.pdulink.gnuradio.transport import Transport
+from sdrlinkd.reports import CarrierReport
+
+LOOK_S = 0.02
+"""A flowgraph that takes nothing is asked again after so long."""
+PACE_S = 1e-3
+"""How well a flowgraph's delay is known."""
+
+
+class GnuRadioLink:
+    """A burst is one PDU. What a flowgraph does not take waits in the queue."""
+
+    def __init__(self, params: GnuRadioParams, pdu_size: int, transport: Transport) -> None:
+        self._params = params
+        self._airtime_s = 8 * pdu_size / params.rate_bit_s
+        self._transport = transport
+        self._listener: PduListener | None = None
+        self._free_at = 0.0
+        self._on_air: Burst | None = None
+        self._woken = asyncio.Event()
+        self._settled = asyncio.Event()
+        self._settled.set()
+        self._is_taken = False
+        self._counters = {"pdus_out": 0, "pdus_in": 0}
+
+    def now(self) -> float:
+        """The monotonic clock: there are no samples to count."""
+        return time.monotonic()
+
+    async def open(self, listener: PduListener) -> CarrierTraits:
+        """Open the sockets. Raises UserError."""
+        self._listener = listener
+        await self._transport.open(self._heard)
+        airtime_s = self._airtime_s
+        return CarrierTraits(
+            kind="gnuradio", longest_burst_s=(airtime_s,), pdu_burst_s=(airtime_s,),
+            stamp_s=PACE_S + self._params.delay_s,
+        )  # fmt: skip
+
+    async def run(self) -> None:
+        """Ask for a PDU when the one before is over and the flowgraph takes another."""
+        listener = self._listener
+        if listener is None:
+            raise RuntimeError("run before open")
+        while True:
+            await asyncio.sleep(max(0.0, self._free_at - self.now()))
+            self._settle()
+            self._woken.clear()
+            self._is_taken = self._transport.is_ready()
+            if not self._is_taken:
+                await asyncio.sleep(LOOK_S)
+                continue
+            start = self.now()
+            burst = listener.next_burst(Opportunity(start, self._airtime, self._most_pdus))
+            if burst is not None:
+                self._send(burst, start)
+                continue
+            wait_s = max(0.0, listener.next_wakeup(start) - start)
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(None if wait_s == float("inf") else wait_s):
+                    await self._woken.wait()
+
+    def wake(self) -> None:
+        """There may be something to send."""
+        self._woken.set()
+
+    async def idle(self) -> None:
+        """Wait until every burst taken is settled."""
+        await self._settled.wait()
+
+    async def close(self) -> None:
+        """Close the sockets; what has not left is settled as lost."""
+        self._settle(Outcome.LOST)
+        self._listener = None
+        self._transport.close()
+
+    def report(self) -> CarrierReport:
+        """State and counters."""
+        params, is_open = self._params, self._listener is not None
+        state, notices = "up" if is_open and self._is_taken else "down", []
+        if is_open and not self._is_taken:
+            notices.append(
+                f"no flowgraph takes PDUs at {params.send} ({params.transport}): what is to be "
+                "sent waits"
+            )
+        return CarrierReport(
+            kind="gnuradio",
+            state=state,
+            detail=f"{params.rate_bit_s / 1e3:g} kbit/s, {params.transport} to {params.send}, from "
+            f"{params.receive or 'the same'}",
+            counters={**self._counters, **self._transport.counters},
+            notices=notices,
+        )
+
+    def _airtime(self, _: int, n_pdus: int) -> float:
+        return self._airtime_s * n_pdus
+
+    def _most_pdus(self, _: int, airtime_s: float) -> int:
+        return int(airtime_s >= self._airtime_s)
+
+    def _send(self, burst: Burst, start: float) -> None:
+        self._free_at = start + self._airtime_s * len(burst.pdus)
+        self._on_air = burst
+        self._settled.clear()
+        if all(self._transport.send(pdu) for pdu in burst.pdus):
+            self._counters["pdus_out"] += len(burst.pdus)
+        else:
+            self._settle(Outcome.LOST)
+
+    def _settle(self, outcome: Outcome = Outcome.SENT) -> None:
+        burst, self._on_air = self._on_air, None
+        if burst is not None and self._listener is not None:
+            self._listener.settled(burst, outcome, self.now())
+        self._settled.set()
+
+    def _heard(self, pdu: bytes) -> None:
+        self._counters["pdus_in"] += 1
+        if self._listener is not None:
+            now = self.now()
+            self._listener.heard([Heard(pdu, now - self._params.delay_s, None, now)])

@@ -1,0 +1,262 @@
+"""How PDUs get to a flowgraph and back: PMT messages over ZeroMQ, or octets over UDP or TCP."""
+
+import asyncio
+import binascii
+from collections.abc import Callable
+from typing import Protocol
+
+import zmq
+
+from sdrlinkd.errors import UserError
+from sdrlinkd.pdulink.gnuradio.pdus import from_gnu_radio, to_gnu_radio
+from sdrlinkd.reading import SocketReader
+
+Take = Callable[[bytes], None]
+AHEAD = 16
+"""PDUs that may wait in ZeroMQ for a flowgraph."""
+RETRY_S = 0.5
+RECEIVE_BYTES = 1 << 16
+
+
+class Transport(Protocol):
+    """Both directions. Calls `take` with every PDU that comes, on the event loop."""
+
+    counters: dict[str, int]
+
+    async def open(self, take: Take) -> None:
+        """Open sockets. Raises UserError."""
+
+    def is_ready(self) -> bool:
+        """Whether a PDU can be handed over."""
+
+    def send(self, pdu: bytes) -> bool:
+        """Hand one over; False when nobody took it."""
+
+    def close(self) -> None:
+        """Close sockets; closing twice is fine."""
+
+
+class ZmqTransport:
+    """gr-zeromq's message blocks: we bind `send` and connect to `receive`, as its own sinks and
+    sources do; @ before an endpoint binds it, > connects.
+    """
+
+    def __init__(self, send: str, receive: str, publishes: bool) -> None:
+        self._send, self._receive = send, receive
+        self._kinds = (zmq.PUB, zmq.SUB) if publishes else (zmq.PUSH, zmq.PULL)
+        self._publishes = publishes
+        self._context = zmq.Context()
+        self._out: zmq.Socket[bytes] | None = None
+        self._reader: SocketReader[bytes] | None = None
+        self.counters = {"bad_messages": 0}
+
+    async def open(self, take: Take) -> None:
+        """Open sockets."""
+        out, into = (self._context.socket(kind) for kind in self._kinds)
+        for each in (out, into):
+            each.setsockopt(zmq.LINGER, 0)
+            each.setsockopt(zmq.RECONNECT_IVL, 20)
+            each.setsockopt(zmq.RECONNECT_IVL_MAX, 500)
+        out.setsockopt(zmq.SNDHWM, AHEAD)
+        if self._publishes:
+            into.setsockopt(zmq.SUBSCRIBE, b"")
+        try:
+            _attach(out, self._send, "send", binds=True)
+            _attach(into, self._receive, "receive", binds=False)
+        except UserError:
+            self.close()
+            raise
+
+        def taken(data: bytes) -> None:
+            try:
+                pdu = from_gnu_radio(data)
+            except ValueError:
+                self.counters["bad_messages"] += 1
+                return
+            take(pdu)
+
+        self._out = out
+        self._reader = SocketReader(asyncio.get_running_loop(), into, into.recv, taken)
+
+    def is_ready(self) -> bool:
+        """A publisher never waits; else only when a flowgraph takes it."""
+        if self._out is None:
+            return False
+        return self._publishes or bool(int(self._out.getsockopt(zmq.EVENTS)) & zmq.POLLOUT)
+
+    def send(self, pdu: bytes) -> bool:
+        """Hand one over."""
+        if self._out is None:
+            return False
+        try:
+            self._out.send(to_gnu_radio(pdu), zmq.NOBLOCK)
+        except zmq.Again:
+            return False
+        return True
+
+    def close(self) -> None:
+        """Close sockets."""
+        if self._reader is not None:
+            self._reader.close()
+            self._reader = None
+        self._out = None
+        self._context.destroy(linger=0)
+
+
+class UdpTransport(asyncio.DatagramProtocol):
+    """A socket_pdu of UDP: a datagram is a PDU. We send to `send`; answers come back to us, or to
+    `receive` where that is given.
+    """
+
+    def __init__(self, send: str, receive: str) -> None:
+        self._peer = _address(send, "send")
+        self._own = _address(receive, "receive") if receive else None
+        self._socket: asyncio.DatagramTransport | None = None
+        self._take: Take = lambda _: None
+        self.counters = {"bad_messages": 0, "refused": 0}
+
+    async def open(self, take: Take) -> None:
+        """Open the socket."""
+        self._take = take
+        loop = asyncio.get_running_loop()
+        try:
+            self._socket, _ = await loop.create_datagram_endpoint(
+                lambda: self,
+                local_addr=self._own or ("0.0.0.0", 0),  # noqa: S104  # answers only
+            )
+        except OSError as error:
+            raise UserError(
+                f"gnuradio.receive: {self._own}: cannot be opened ({error.strerror})"
+            ) from None
+
+    def datagram_received(self, data: bytes, addr: object) -> None:  # noqa: ARG002
+        """A PDU."""
+        self._take(data)
+
+    def error_received(self, exc: Exception) -> None:  # noqa: ARG002
+        """Nobody listens there."""
+        self.counters["refused"] += 1
+
+    def is_ready(self) -> bool:
+        """Datagrams do not wait."""
+        return self._socket is not None
+
+    def send(self, pdu: bytes) -> bool:
+        """Hand one over."""
+        if self._socket is None:
+            return False
+        self._socket.sendto(pdu, self._peer)
+        return True
+
+    def close(self) -> None:
+        """Close the socket."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+
+class TcpTransport(asyncio.Protocol):
+    """A socket_pdu that is a TCP server: octets without frames. PDUs have all the same size, and
+    begin where their CRC says so.
+    """
+
+    def __init__(self, send: str, pdu_size: int) -> None:
+        self._peer = _address(send, "send")
+        self._pdu_size = pdu_size
+        self._socket: asyncio.Transport | None = None
+        self._take: Take = lambda _: None
+        self._have = bytearray()
+        self._retry: asyncio.TimerHandle | None = None
+        self._trying: asyncio.Task[None] | None = None
+        self._is_closed = False
+        self.counters = {"bad_octets": 0, "connections": 0}
+
+    async def open(self, take: Take) -> None:
+        """Connect, now or when the flowgraph is there."""
+        self._take = take
+        await self._connect()
+
+    async def _connect(self) -> None:
+        loop = asyncio.get_running_loop()
+        try:
+            await loop.create_connection(lambda: self, *self._peer)
+        except OSError:
+            self._later()
+
+    def _later(self) -> None:
+        if self._is_closed:
+            return
+        loop = asyncio.get_running_loop()
+
+        def again() -> None:
+            self._trying = asyncio.ensure_future(self._connect())
+
+        self._retry = loop.call_later(RETRY_S, again)
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """A flowgraph is there."""
+        assert isinstance(transport, asyncio.Transport)  # noqa: S101
+        self._socket = transport
+        self._have.clear()
+        self.counters["connections"] += 1
+
+    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
+        """It is gone."""
+        self._socket = None
+        self._later()
+
+    def data_received(self, data: bytes) -> None:
+        """Some octets."""
+        self._have += data
+        size = self._pdu_size
+        while len(self._have) >= size:
+            pdu = bytes(self._have[:size])
+            if binascii.crc_hqx(pdu, 0):
+                self.counters["bad_octets"] += 1
+                del self._have[0]
+                continue
+            del self._have[:size]
+            self._take(pdu)
+
+    def is_ready(self) -> bool:
+        """While connected, and what was sent has left."""
+        return self._socket is not None and not self._socket.get_write_buffer_size()
+
+    def send(self, pdu: bytes) -> bool:
+        """Hand one over."""
+        if self._socket is None:
+            return False
+        self._socket.write(pdu)
+        return True
+
+    def close(self) -> None:
+        """Disconnect."""
+        self._is_closed = True
+        for each in (self._retry, self._trying):
+            if each is not None:
+                each.cancel()
+        if self._socket is not None:
+            self._socket.abort()
+            self._socket = None
+
+
+def _attach(socket: zmq.Socket[bytes], endpoint: str, key: str, binds: bool) -> None:
+    plain = endpoint.lstrip("@>")
+    try:
+        if endpoint.startswith("@") or (binds and not endpoint.startswith(">")):
+            socket.bind(plain)
+        else:
+            socket.connect(plain)
+    except zmq.ZMQError as error:
+        raise UserError(
+            f'gnuradio.{key}: got "{endpoint}", which cannot be used ({error.strerror}); allowed: '
+            'an endpoint of ZeroMQ such as "tcp://127.0.0.1:52001", with @ before it to bind and > '
+            "to connect"
+        ) from None
+
+
+def _address(text: str, key: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(":")
+    if not host or not port.isdigit() or not 0 < int(port) < 1 << 16:
+        raise UserError(f'gnuradio.{key}: got "{text}"; allowed: HOST:PORT, "127.0.0.1:52001"')
+    return host.strip("[]"), int(port)

@@ -1,0 +1,41 @@
+"""GNU Radio's own interpreter, and its flowgraphs of etc/gnuradio."""
+
+import contextlib
+import functools
+import subprocess
+from pathlib import Path
+
+PYTHON = "/usr/bin/python3"
+FLOWGRAPHS = Path(__file__).parents[2] / "etc" / "gnuradio"
+
+
+@functools.cache
+def no_gnu_radio():
+    """Why flowgraphs cannot run here; "" when they can."""
+    try:
+        done = subprocess.run(
+            [PYTHON, "-c", "import gnuradio.zeromq, gnuradio.digital"],
+            capture_output=True,
+            check=False,
+        )
+    except OSError:
+        return f"needs GNU Radio: there is no {PYTHON}"
+    return "needs GNU Radio (Debian: gnuradio)" if done.returncode else ""
+
+
+@contextlib.contextmanager
+def flowgraph(name, *arguments):
+    """etc/gnuradio/NAME.py at work."""
+    process = subprocess.Popen(
+        [PYTHON, str(FLOWGRAPHS / f"{name}.py"), *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        line = process.stdout.readline().strip()
+        assert line == "ready", f"{name} says {line!r}"
+        yield process
+    finally:
+        process.terminate()
+        process.wait(20)
+        process.stdout.close()
