@@ -45,7 +45,7 @@ def options() -> argparse.Namespace:
     )
     parser.add_argument("--delay", type=int, default=0, metavar="SAMPLES", help="of the air")
     parser.add_argument(
-        "--block", type=int, default=512, metavar="SAMPLES", help="most of them in a message"
+        "--block", type=int, default=512, metavar="SAMPLES", help="come at once, in real time"
     )
     asked = parser.parse_args()
     if len(asked.node) < 2:
@@ -53,13 +53,13 @@ def options() -> argparse.Namespace:
     return asked
 
 
-class Air(gr.top_block):
+class Channel(gr.top_block):
     """Sources of all nodes, and for each the sum of the others."""
 
     def __init__(self, asked: argparse.Namespace) -> None:
         gr.top_block.__init__(self, "channel")
         self._asked = asked
-        silence = flowgraph.Silence(asked.rate)
+        silence = flowgraph.Silence(asked.rate, asked.block)
         noise = 10 ** ((asked.power_dbfs - asked.snr_db) / 20)
         last = len(asked.node) - 1
         carriers = [2 * math.pi * asked.cfo_hz / asked.rate * k / last for k in range(last + 1)]
@@ -112,8 +112,7 @@ class Air(gr.top_block):
 
 def main() -> None:
     """Run until told to end."""
-    asked = options()
-    flowgraph.run(Air(asked), asked.block)
+    flowgraph.run(Channel(options()))
 
 
 if __name__ == "__main__":

@@ -1,10 +1,13 @@
 """What the flowgraphs of this folder share: pace, start and end."""
 
+import os
 import signal
 import sys
 
 import pmt
-from gnuradio import blocks, gr
+from gnuradio import analog, blocks, gr
+
+gr.logging().set_default_level(gr.log_levels.warn)
 
 
 class Silence(gr.hier_block2):
@@ -12,7 +15,7 @@ class Silence(gr.hier_block2):
 
     PERIOD_S = 0.5
 
-    def __init__(self, rate_hz: float) -> None:
+    def __init__(self, rate_hz: float, at_once: int) -> None:
         gr.hier_block2.__init__(
             self, "silence", gr.io_signature(0, 0, 0), gr.io_signature(1, 1, gr.sizeof_gr_complex)
         )
@@ -23,16 +26,39 @@ class Silence(gr.hier_block2):
             [0] * int(rate_hz * self.PERIOD_S), True, 1, [gr.tag_utils.python_to_tag(again)]
         )
         throttle = blocks.throttle(gr.sizeof_gr_complex, rate_hz, False)
+        throttle.set_max_noutput_items(at_once)
         self.connect(zeros, throttle, self)
 
 
-def run(graph: gr.top_block, max_items: int) -> None:
-    """Until SIGTERM or SIGINT; no block does more than `max_items` at once."""
+class Air(gr.hier_block2):
+    """Noise, real time, and no way through for a sender's tags."""
+
+    AT_ONCE = 1024
+
+    def __init__(self, rate_hz: float, noise: float, seed: int) -> None:
+        complex_items = gr.io_signature(1, 1, gr.sizeof_gr_complex)
+        gr.hier_block2.__init__(self, "air", complex_items, complex_items)
+        total = blocks.add_cc()
+        self.connect(self, (total, 0))
+        self.connect(
+            analog.fastnoise_source_c(analog.GR_GAUSSIAN, noise, seed, 1 << 18), (total, 1)
+        )
+        self.connect(Silence(rate_hz, self.AT_ONCE), (total, 2))
+        self.connect(total, blocks.tag_gate(gr.sizeof_gr_complex, False), self)
+
+
+def run(graph: gr.top_block, note: str = "") -> None:
+    """Until SIGTERM or SIGINT."""
     ends = {signal.SIGTERM, signal.SIGINT}
     signal.pthread_sigmask(signal.SIG_BLOCK, ends)
-    graph.start(max_items)
-    sys.stdout.write("ready\n")
-    sys.stdout.flush()
-    signal.sigwait(ends)
+    with os.fdopen(os.dup(1), "w") as out:
+        os.dup2(2, 1)  # GNU Radio logs there
+        graph.start()
+        if note:
+            sys.stderr.write(f"{note}\n")
+        out.write("ready\n")
+        out.flush()
+        signal.sigwait(ends)
     graph.stop()
-    graph.wait()
+    # Without wait(): a sink that nobody hears never ends.
+    os._exit(0)

@@ -1,0 +1,83 @@
+"""Where a daemon's PDUs enter and leave a flowgraph."""
+
+import argparse
+
+from gnuradio import blocks, gr, network, pdu, zeromq
+
+ENDS = {
+    "push": (zeromq.pull_msg_source, zeromq.push_msg_sink),
+    "pub": (zeromq.sub_msg_source, zeromq.pub_msg_sink),
+}
+SERVERS = {"udp": "UDP_SERVER", "tcp": "TCP_SERVER"}
+# A sender's tags must not be taken for a receiver's: their keys differ.
+SENT, HEARD = "sent_len", "heard_len"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Those of every PHY."""
+    air = parser.add_mutually_exclusive_group(required=True)
+    air.add_argument(
+        "--link",
+        nargs="+",
+        metavar="ENDPOINT",
+        help="two daemons, full duplex: A_SEND A_RECEIVE B_SEND B_RECEIVE; udp, tcp: A B",
+    )
+    air.add_argument(
+        "--loop",
+        nargs="+",
+        metavar="ENDPOINT",
+        help="a daemon hears itself: SEND RECEIVE; udp, tcp: HOST:PORT",
+    )
+    parser.add_argument("--transport", choices=("zeromq", *SERVERS), default="zeromq")
+    parser.add_argument("--pattern", choices=ENDS, default="push", help="of zeromq")
+    parser.add_argument(
+        "--pdu-size", type=int, default=1024, metavar="BYTES", help="largest; tcp: of every PDU"
+    )
+    parser.add_argument("--rate", type=float, default=1e6, metavar="HZ")
+    parser.add_argument("--snr-db", type=float, default=25.0, metavar="DB")
+
+
+class Daemon:
+    """A daemon's end of a flowgraph."""
+
+    def __init__(self, graph: gr.top_block, asked: argparse.Namespace, *endpoints: str) -> None:
+        self._graph = graph
+        self._cut = asked.pdu_size if asked.transport == "tcp" else 0
+        if asked.transport == "zeromq":
+            source, sink = ENDS[asked.pattern]
+            send, receive = endpoints
+            self._source, self._out = source(send), "out"
+            self._sink, self._in = sink(receive), "in"
+        else:
+            host, _, port = endpoints[0].rpartition(":")
+            server = network.socket_pdu(SERVERS[asked.transport], host, port)
+            self._source = self._sink = server
+            self._out = self._in = "pdus"
+
+    def sent(self) -> gr.basic_block:
+        """Bytes of its PDUs, each tagged with its length."""
+        stream = pdu.pdu_to_tagged_stream(gr.types.byte_t, SENT)
+        self._graph.msg_connect(self._source, self._out, stream, "pdus")
+        if not self._cut:
+            return stream
+        # TCP has no ends of PDUs: what came is a stream, and is cut.
+        gate = blocks.tag_gate(gr.sizeof_char, False)
+        cut = blocks.stream_to_tagged_stream(gr.sizeof_char, 1, self._cut, SENT)
+        self._graph.connect(stream, gate, cut)
+        return cut
+
+    def hear(self, stream: gr.basic_block) -> None:
+        """Give it the PDUs of a stream of bytes."""
+        pdus = pdu.tagged_stream_to_pdu(gr.types.byte_t, HEARD)
+        self._graph.connect(stream, pdus)
+        self._graph.msg_connect(pdus, "pdus", self._sink, self._in)
+
+
+def pairs(graph: gr.top_block, asked: argparse.Namespace) -> list[tuple[Daemon, Daemon]]:
+    """Who speaks to whom."""
+    each = 2 if asked.transport == "zeromq" else 1
+    named = asked.link or asked.loop
+    if len(named) != (2 * each if asked.link else each):
+        raise SystemExit(f"{asked.transport} wants {each} endpoints for each daemon")
+    ends = [Daemon(graph, asked, *named[k : k + each]) for k in range(0, len(named), each)]
+    return list(zip(ends, reversed(ends), strict=True))
