@@ -2,6 +2,8 @@
 
 import argparse
 
+import buffers  # noqa: F401
+import pmt
 from gnuradio import blocks, gr, network, pdu, zeromq
 
 ENDS = {
@@ -11,6 +13,7 @@ ENDS = {
 SERVERS = {"udp": "UDP_SERVER", "tcp": "TCP_SERVER"}
 # A sender's tags must not be taken for a receiver's: their keys differ.
 SENT, HEARD = "sent_len", "heard_len"
+ARRIVED = "arrived_len"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -42,6 +45,9 @@ class Daemon:
 
     def __init__(self, graph: gr.top_block, asked: argparse.Namespace, *endpoints: str) -> None:
         self._graph = graph
+        # A throttle counts from its start: silence would be time to catch up with. This tag of the
+        # burst that comes of a PDU starts it anew.
+        self._paced = pdu.pdu_set(pmt.intern("rx_rate"), pmt.from_double(asked.rate))
         self._cut = asked.pdu_size if asked.transport == "tcp" else 0
         if asked.transport == "zeromq":
             source, sink = ENDS[asked.pattern]
@@ -56,14 +62,14 @@ class Daemon:
 
     def sent(self) -> gr.basic_block:
         """Bytes of its PDUs, each tagged with its length."""
-        stream = pdu.pdu_to_tagged_stream(gr.types.byte_t, SENT)
-        self._graph.msg_connect(self._source, self._out, stream, "pdus")
+        stream = pdu.pdu_to_tagged_stream(gr.types.byte_t, ARRIVED if self._cut else SENT)
+        self._graph.msg_connect(self._source, self._out, self._paced, "pdus")
+        self._graph.msg_connect(self._paced, "pdus", stream, "pdus")
         if not self._cut:
             return stream
         # TCP has no ends of PDUs: what came is a stream, and is cut.
-        gate = blocks.tag_gate(gr.sizeof_char, False)
         cut = blocks.stream_to_tagged_stream(gr.sizeof_char, 1, self._cut, SENT)
-        self._graph.connect(stream, gate, cut)
+        self._graph.connect(stream, cut)
         return cut
 
     def hear(self, stream: gr.basic_block) -> None:

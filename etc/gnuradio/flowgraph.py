@@ -14,6 +14,7 @@ class Silence(gr.hier_block2):
     """Zeros in real time: what is added to them comes in real time, too."""
 
     PERIOD_S = 0.5
+    AHEAD = 4096
 
     def __init__(self, rate_hz: float, at_once: int) -> None:
         gr.hier_block2.__init__(
@@ -27,23 +28,25 @@ class Silence(gr.hier_block2):
         )
         throttle = blocks.throttle(gr.sizeof_gr_complex, rate_hz, False)
         throttle.set_max_noutput_items(at_once)
+        throttle.set_max_output_buffer(self.AHEAD)
         self.connect(zeros, throttle, self)
 
 
 class Air(gr.hier_block2):
-    """Noise, real time, and no way through for a sender's tags."""
+    """Real time, noise, and no way through for a sender's tags."""
 
-    AT_ONCE = 1024
+    AT_ONCE = 4096
 
     def __init__(self, rate_hz: float, noise: float, seed: int) -> None:
         complex_items = gr.io_signature(1, 1, gr.sizeof_gr_complex)
         gr.hier_block2.__init__(self, "air", complex_items, complex_items)
+        throttle = blocks.throttle(gr.sizeof_gr_complex, rate_hz, False)
+        throttle.set_max_noutput_items(self.AT_ONCE)
         total = blocks.add_cc()
-        self.connect(self, (total, 0))
+        self.connect(self, throttle, (total, 0))
         self.connect(
             analog.fastnoise_source_c(analog.GR_GAUSSIAN, noise, seed, 1 << 18), (total, 1)
         )
-        self.connect(Silence(rate_hz, self.AT_ONCE), (total, 2))
         self.connect(total, blocks.tag_gate(gr.sizeof_gr_complex, False), self)
 
 

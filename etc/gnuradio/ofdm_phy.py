@@ -41,7 +41,6 @@ class Phy(gr.top_block):
     def __init__(self, asked: argparse.Namespace) -> None:
         gr.top_block.__init__(self, "ofdm_phy")
         for seed, (sender, hearer) in enumerate(daemons.pairs(self, asked), 1):
-            buffer = 2 * burst_samples(asked.pdu_size, asked.bits)
             send = digital.ofdm_tx(
                 packet_length_tag_key=daemons.SENT, bps_payload=asked.bits, scramble_bits=True
             )
@@ -52,8 +51,6 @@ class Phy(gr.top_block):
                 scramble_bits=True,
             )
             tail = digital.burst_shaper_cc([1, 1], 0, TAIL, False, daemons.SENT)
-            for part in (send, tail, hear):
-                part.set_min_output_buffer(buffer)
             noise = math.sqrt(CARRIERS) * 10 ** (-asked.snr_db / 20)
             air = flowgraph.Air(asked.rate, noise, seed)
             self.connect(sender.sent(), send, tail, air, hear)
