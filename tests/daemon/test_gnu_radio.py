@@ -1,5 +1,7 @@
 """Daemons with GNU Radio between them: as the air, as an OFDM modem, as a GFSK modem."""
 
+import contextlib
+import socket
 import struct
 
 import pytest
@@ -16,6 +18,7 @@ pytestmark = [
 N = 60
 PDU = 220
 SAMPLES = 200_000
+RATES = {"ofdm_phy": 3e5, "gfsk_phy": 1e5}
 
 
 @pytest.fixture
@@ -25,6 +28,20 @@ def endpoints(tmp_path_factory):
     return [
         (f"ipc://{folder}/{robot}-out", f"ipc://{folder}/{robot}-in") for robot in ("one", "two")
     ]
+
+
+@pytest.fixture
+def free_ports():
+    """So many TCP and UDP ports that nobody uses."""
+
+    def find(n):
+        with contextlib.ExitStack() as stack:
+            sockets = [stack.enter_context(socket.socket()) for _ in range(n)]
+            for each in sockets:
+                each.bind(("127.0.0.1", 0))
+            return [each.getsockname()[1] for each in sockets]
+
+    return find
 
 
 def on_samples(robot, ends, pattern="push", form="cf32_le"):
@@ -49,6 +66,15 @@ def is_ready(robot):
     """PDUs are taken, samples flow."""
     carrier = robot.snapshot().carrier
     return carrier.state == "up" and carrier.counters.get("samples", SAMPLES) >= SAMPLES
+
+
+def greet(robot):
+    """One PDU from it."""
+    name = robot.snapshot().namespace
+    with Publisher(robot.directory) as publisher:
+        publisher.send(f"/{name}/imu", bytes(20))
+        publisher.flush()
+    wait_for(lambda: robot.snapshot().link.tx.sent)
 
 
 def exchange(robots, n=N):
@@ -98,10 +124,35 @@ def test_gnu_radio_as_the_air(start_daemon, endpoints, pattern, form, sample):
         assert robot.snapshot().carrier.counters["bad_messages"] == 0
 
 
-def test_gnu_radios_ofdm_as_the_modem(start_daemon, endpoints):
+@pytest.mark.parametrize("phy", ["ofdm_phy", "gfsk_phy"])
+@pytest.mark.parametrize("pattern", ["push", "pub"])
+def test_gnu_radio_as_the_modem(start_daemon, endpoints, phy, pattern):
     one, two = endpoints
-    with flowgraph("ofdm_phy", "--link", *one, *two, "--pdu-size", PDU, "--snr-db", 25):
-        robots = [start_daemon(on_pdus(1, *one)), start_daemon(on_pdus(2, *two))]
+    with flowgraph(
+        phy, "--link", *one, *two, "--pdu-size", PDU, "--snr-db", 25, "--pattern", pattern
+    ):
+        robots = [
+            start_daemon(on_pdus(1, *one, f"zmq-{pattern}", RATES[phy])),
+            start_daemon(on_pdus(2, *two, f"zmq-{pattern}", RATES[phy])),
+        ]
+        bodies, heard = exchange(robots)
+    assert heard == [bodies, bodies]
+
+
+@pytest.mark.parametrize("transport", ["udp", "tcp"])
+def test_gnu_radio_as_the_modem_by_socket_pdu(start_daemon, free_ports, transport):
+    one, two = (f"127.0.0.1:{port}" for port in free_ports(2))
+    with flowgraph(
+        "ofdm_phy", "--link", one, two, "--pdu-size", PDU, "--snr-db", 25, "--transport", transport
+    ):
+        robots = [
+            start_daemon(on_pdus(1, one, "", transport)),
+            start_daemon(on_pdus(2, two, "", transport)),
+        ]
+        if transport == "udp":
+            # Its answers go to whom it has heard.
+            for robot in robots:
+                greet(robot)
         bodies, heard = exchange(robots)
     assert heard == [bodies, bodies]
 

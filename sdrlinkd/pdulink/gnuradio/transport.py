@@ -3,7 +3,7 @@
 import asyncio
 import binascii
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, cast
 
 import zmq
 
@@ -195,8 +195,7 @@ class TcpTransport(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """A flowgraph is there."""
-        assert isinstance(transport, asyncio.Transport)  # noqa: S101
-        self._socket = transport
+        self._socket = cast(asyncio.Transport, transport)
         self._have.clear()
         self.counters["connections"] += 1
 
