@@ -99,6 +99,7 @@ class SoapyRadio:
             f"{found.frequency_hz / 1e6:g} MHz",
             found.gains,
             "" if self._settings.tx_enabled else "tx_enabled = false",
+            found.binding,
             f"away ({self._away}), looked for until it is back" if self._away else self._notice,
         ]
         return ", ".join(part for part in parts if part)

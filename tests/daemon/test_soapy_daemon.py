@@ -1,0 +1,253 @@
+"""Daemons on SoapySDR radios, real drivers in real time: what one sends, the other republishes."""
+
+import os
+import struct
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+import pytest
+
+from sdrlinkd.client import Publisher, Subscriber
+from tests.daemon.soapy import air, on_soapy
+from tests.soapy_loopback import missing, module_folder
+from tests.waiting import wait_for
+
+pytestmark = [
+    pytest.mark.skipif(bool(missing()), reason=missing()),
+    pytest.mark.slow,
+    pytest.mark.timeout(300),
+]
+DEBIAN = Path("/usr/lib/python3/dist-packages")
+BINDING = DEBIAN / f"_SoapySDR{sysconfig.get_config_var('EXT_SUFFIX')}"
+
+
+@pytest.fixture(autouse=True)
+def _drivers(monkeypatch):
+    """No others than the test radio's."""
+    monkeypatch.setenv("SOAPY_SDR_PLUGIN_PATH", str(module_folder()))
+    monkeypatch.setenv("SOAPY_SDR_ROOT", "/nonexistent")
+
+
+@pytest.fixture
+def bus(request):
+    """An air of the test's own."""
+    name = f"{os.getpid()}-{abs(hash(request.node.name)) % 10**6}"
+    with air(name) as found:
+        yield name, found
+
+
+def up(robots):
+    """All radios stream."""
+    for robot in robots:
+        wait_for(lambda robot=robot: robot.snapshot().carrier.counters.get("samples", 0) > 0, 60)
+
+
+def body(number):
+    """An odometry message's worth of bytes, told from others by its number."""
+    return struct.pack("<IQ", 0x100, number) + bytes(120)
+
+
+def test_what_one_sends_the_other_republishes_both_ways(start_daemon, bus):
+    name, air_ = bus
+    robots = [start_daemon(on_soapy(robot, name)) for robot in (1, 2)]
+    up(robots)
+    n = 40
+    with (
+        Subscriber("/rx_robot_2/odom", directory=robots[0].directory, depth=0) as first,
+        Subscriber("/rx_robot_1/odom", directory=robots[1].directory, depth=0) as second,
+        Publisher(robots[0].directory) as one,
+        Publisher(robots[1].directory) as two,
+    ):
+        for number in range(n):
+            one.send("/robot_1/odom", body(number))
+            two.send("/robot_2/odom", body(number))
+        for listener in (first, second):
+            got = [listener.receive(20).payload for _ in range(n)]
+            assert got == [body(number) for number in range(n)]
+    for robot in robots:
+        snapshot = robot.snapshot()
+        assert snapshot.carrier.state == "up"
+        assert "loopback usrp, 915 MHz, rx 20 dB, tx 40 dB" in snapshot.carrier.detail
+        assert_whole(robot)
+    wait_for(lambda: not air_.stats(1).is_transmitting)
+
+
+@pytest.mark.parametrize("fault", ["unplug", "crash"])
+def test_traffic_flows_again_when_a_device_is_back(start_daemon, bus, fault):
+    """Within 2 s; no message comes twice, and the ledger holds."""
+    name, air_ = bus
+    robots = [start_daemon(on_soapy(robot, name)) for robot in (1, 2)]
+    up(robots)
+    number = iter(range(10**6))
+    with (
+        Subscriber("/rx_robot_1/odom", directory=robots[1].directory, depth=0) as listener,
+        Publisher(robots[0].directory) as sender,
+    ):
+
+        def send():
+            sender.send("/robot_1/odom", body(next(number)))
+            message = listener.receive(0.05)
+            got.extend([message.payload] if message else [])
+            return message
+
+        got = []
+        wait_for(send)
+        for unit in (1, 2):
+            air_.inject(unit, fault)
+            wait_for(lambda unit=unit: robots[unit - 1].snapshot().carrier.counters["outages"] == 1)
+            if fault == "unplug":
+                wait_for(lambda unit=unit: "away" in robots[unit - 1].snapshot().carrier.detail)
+                wait_for(lambda unit=unit: robots[unit - 1].snapshot().carrier.state == "down")
+                while listener.receive(0) is not None:
+                    continue
+                air_.inject(unit, "replug")
+                wait_for(send, 2.0 + SLOW_S)
+            else:
+                wait_for(lambda unit=unit: robots[unit - 1].snapshot().carrier.state == "up")
+                wait_for(send)
+    assert len(got) == len(set(got))
+    for robot in robots:
+        assert_whole(robot)
+
+
+SLOW_S = 2.0
+"""A process that starts anew on a busy machine."""
+
+
+def test_a_driver_that_hangs_is_given_up(start_daemon, bus):
+    name, air_ = bus
+    robot = start_daemon(on_soapy(1, name, soapy="longest_tx_s = 0.1\n"))
+    up([robot])
+    air_.inject(1, "hang")
+    wait_for(lambda: robot.snapshot().carrier.counters["outages"] == 1)
+    wait_for(lambda: robot.snapshot().carrier.state == "up")
+
+
+def test_faults_of_streams_are_counted_and_survived(start_daemon, bus):
+    name, air_ = bus
+    robots = [start_daemon(on_soapy(robot, name)) for robot in (1, 2)]
+    up(robots)
+
+    def counted(robot, counter):
+        return robots[robot - 1].snapshot().carrier.counters.get(counter, 0)
+
+    air_.inject(2, "overflow=5000")
+    wait_for(lambda: counted(2, "samples_lost") >= 5000)
+    assert counted(2, "gaps") >= 1
+    air_.inject(2, "stall")
+    wait_for(lambda: counted(2, "stalls") == 1)
+    with Publisher(robots[0].directory) as sender:
+        for fault, counter in (("time_error", "late"), ("underflow", "underflows")):
+            air_.inject(1, fault)
+
+            def provoke(counter=counter):
+                sender.send("/robot_1/odom", body(0))
+                return counted(1, counter) >= 1
+
+            wait_for(provoke)
+    for robot in robots:
+        assert robot.snapshot().carrier.state == "up"
+        assert_whole(robot)
+
+
+def test_a_half_duplex_radio_sends_in_spells(start_daemon, bus):
+    name, air_ = bus
+    half = {
+        "model": "hackrf",
+        "modem": "rate_hz = 2e6\noversampling = 4\n",
+        "soapy": "turnaround_s = 0.02\n",
+    }
+    quiet = "[link]\nbeacon_s = 0\n[clock]\nperiod_s = 0\n"
+    robots = [start_daemon(on_soapy(robot, name, **half) + quiet) for robot in (1, 2)]
+    up(robots)
+    with (
+        Subscriber("/rx_robot_1/odom", directory=robots[1].directory, depth=0) as listener,
+        Publisher(robots[0].directory) as sender,
+    ):
+        for number in range(10):
+            sender.send("/robot_1/odom", body(number))
+        assert [listener.receive(20).payload for _ in range(10)] == list(map(body, range(10)))
+    sent = robots[0].snapshot()
+    assert 1 <= sent.carrier.counters["tx_spells"] <= 4, "many bursts share a spell"
+    assert robots[1].snapshot().carrier.counters["tx_spells"] == 0
+    wait_for(lambda: not air_.stats(1).is_transmitting)
+    for robot in robots:
+        assert_whole(robot)
+
+
+def test_nothing_is_sent_unless_that_is_wanted(start_daemon, bus):
+    name, air_ = bus
+    config = on_soapy(1, name).replace("tx_enabled = true", "tx_enabled = false")
+    robot = start_daemon(config)
+    up([robot])
+    with Publisher(robot.directory) as sender:
+        sender.send("/robot_1/odom", body(0))
+        sender.flush()
+    snapshot = robot.snapshot()
+    assert snapshot.link.tx.queued == 1
+    assert any("only receives" in notice for notice in snapshot.notices)
+    stats = air_.stats(1)
+    assert (stats.sent, stats.is_transmitting) == (0, False)
+
+
+@pytest.mark.skipif(not BINDING.exists(), reason="needs python3-soapysdr, for this Python")
+def test_the_official_binding_serves_as_well(start_daemon, bus, tmp_path, monkeypatch):
+    for source in (BINDING, DEBIAN / "SoapySDR.py"):
+        (tmp_path / source.name).symlink_to(source)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    name, _ = bus
+    robots = [start_daemon(on_soapy(robot, name)) for robot in (1, 2)]
+    up(robots)
+    for robot in robots:
+        assert "Python binding" in robot.snapshot().carrier.detail
+    with (
+        Subscriber("/rx_robot_1/odom", directory=robots[1].directory) as listener,
+        Publisher(robots[0].directory) as sender,
+    ):
+        sender.send("/robot_1/odom", body(7))
+        assert listener.receive(20).payload == body(7)
+
+
+@pytest.mark.parametrize(
+    ("change", "parts"),
+    [
+        (("driver=loopback", "driver=hackrff"), ['no driver "hackrff"', "libloopbackSupport.so"]),
+        (("noise_db=-50", "noise_db=-50,absent=1"), ["there is no such device", "radio probe"]),
+        (("noise_db=-50", "noise_db=-50,busy=1"), ["in use", "stop the other program"]),
+        (("rate_hz = 1e6", "rate_hz = 7e7"), ["modem.rate_hz: got 70 Msps", "0.2 to 61.44 Msps"]),
+        (("tx_gain_db = 40.0", "tx_gain_db = 99.0"), ["soapy.tx_gain_db: got 99", "0 to 89 dB"]),
+        (("frequency_hz = 915e6", "frequency_hz = 7e9"), ["got 7000 MHz", "50 to 6000 MHz"]),
+        (
+            ("rx_gain_db = 20.0", 'rx_gains = { LNA = 3.0 }\nrx_antenna = "TX/RX"'),
+            ['soapy.rx_gains: got "LNA"', '"PGA"'],
+        ),
+        (("tx_gain_db = 40.0", 'tx_gain_db = 1\ntx_antenna = "X"'), ['tx_antenna: got "X"']),
+        (
+            ("noise_db=-50", "noise_db=-50,rate_error=0.01,lie=no"),
+            ["the device made it", "a rate that it keeps"],
+        ),
+    ],
+)
+def test_what_a_device_does_not_take_is_told_before_the_first_sample(
+    write_config, tmp_path, bus, change, parts
+):
+    config = on_soapy(1, bus[0])
+    assert change[0] in config
+    path = write_config(tmp_path, config.replace(*change))
+    done = subprocess.run(
+        [sys.executable, "-m", "sdrlinkd", "--config", str(path)],
+        capture_output=True, text=True, check=False, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 2, done.stderr
+    last = done.stderr.splitlines()[-1]
+    for part in parts:
+        assert part in last
+    assert "Traceback" not in done.stderr
+
+
+def assert_whole(robot):
+    """The ledger adds up."""
+    with robot.control() as control:
+        assert control.ask("check")["problems"] == []
