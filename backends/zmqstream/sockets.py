@@ -147,6 +147,7 @@ def _opened(
         else:
             socket.connect(plain)
     except zmq.ZMQError as error:
+        socket.close()
         raise BackendError(
             f'{key}: got "{endpoint}", which cannot be used ({error.strerror}); allowed: an '
             'endpoint of ZeroMQ such as "tcp://127.0.0.1:52001" or "ipc:///tmp/air", with @ before '

@@ -3,9 +3,9 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backends import GAP
+from backends import GAP, Spells
 from sdrlinkd.modem.load import LoadMeter
-from sdrlinkd.modem.plan import AirPlan
+from sdrlinkd.modem.plan import AirPlan, SpellPlan
 
 
 def test_an_idle_air_takes_a_burst_after_the_lead():
@@ -50,3 +50,30 @@ def test_the_load_is_a_mean_over_about_a_second():
     for _ in range(5000):
         load.add(cpu_s=0.00025, stream_s=0.001)
     assert abs(load.realtime_ratio - 4) < 0.1
+
+
+SPELLS = Spells(follow_s=0.03, pause_s=0.2, longest_s=0.5)
+
+
+def test_a_burst_joins_the_spell_that_goes_on_or_waits_for_the_next():
+    plan = SpellPlan(lead=100, ahead=10, spells=SPELLS, rate_hz=1000.0)
+    assert plan.start(now=0) == 100
+    plan.commit(100, 50)
+    free = 150 + GAP
+    # In time for the same spell: right behind.
+    assert plan.wait(now=60) == 12
+    assert plan.start(now=free - 30) == free
+    # Too late for it: a pause, in which it listens.
+    assert plan.start(now=free - 29) == free + 200
+    assert plan.wait(now=free - 29) == 200 + 29 - 100
+
+
+def test_a_spell_is_not_longer_than_it_may_be():
+    plan = SpellPlan(lead=100, ahead=10, spells=SPELLS, rate_hz=1000.0)
+    now, begun = 0, plan.start(0)
+    start = begun
+    while start - begun < 500:
+        plan.commit(start, 50)
+        now = start + 10
+        end, start = start + 50 + GAP, plan.start(now)
+    assert start >= end + 200

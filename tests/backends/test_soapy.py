@@ -1,0 +1,189 @@
+"""Parts of the radio behind SoapySDR: times, plans, bindings; faults that need a device's hand."""
+
+import asyncio
+import os
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from backends import BackendError, SoapyRadio, SoapySettings, Tuning, TxBurst, TxOutcome, survey
+from backends.soapy.clock import SampleTime
+from backends.soapy.library import driver_of
+from backends.soapy.outgoing import Outgoing
+from backends.soapy.ring import SampleRing, make_shared
+from backends.soapy.surface import DriverError, Moved, check_buffer, check_moved
+from backends.soapy.traits import tx_traits
+from tests.backends.radios import RATE, TUNING, N, noise, opened, take, turn
+from tests.soapy_loopback import Bus, missing
+
+needs_radio = pytest.mark.skipif(bool(missing()), reason=missing())
+rates = st.one_of(
+    st.integers(10_000, 60_000_000).map(float), st.floats(1e4, 6e7), st.just(1920000 / 7)
+)
+
+
+@given(rates, st.integers(0, 1 << 50), st.integers(0, 1 << 40))
+def test_indices_become_times_and_the_same_indices_again(rate_hz, zero_ns, index):
+    clock = SampleTime(rate_hz, is_stamped=True)
+    assert not clock.has_begun
+    clock.begin(zero_ns)
+    assert clock.has_begun
+    assert clock.index_at(clock.time_ns(index)) == index
+    later = SampleTime(rate_hz, is_stamped=True)
+    later.begin(clock.time_ns(index), index)
+    assert abs(later.time_ns(0) - zero_ns) <= 1
+
+
+@given(rates, st.integers(1, 1 << 40), st.integers(0, 1 << 40), st.integers(0, 1 << 35))
+def test_the_index_goes_on_by_the_hosts_clock_between_pieces(rate_hz, seen_ns, end, later_ns):
+    clock = SampleTime(rate_hz, is_stamped=False)
+    clock.saw(end, seen_ns)
+    assert clock.has_begun
+    assert clock.now(seen_ns) == end
+    assert abs(clock.now(seen_ns + later_ns) - end - later_ns * rate_hz / 1e9) <= 1
+
+
+@given(st.integers(8, 200), st.lists(st.integers(1, 8), max_size=60))
+def test_pieces_in_shared_memory_are_whole_and_come_back(capacity, sizes):
+    fd = make_shared(capacity, "test")
+    writer, reader = SampleRing(fd, capacity), SampleRing(fd, capacity)
+    os.close(fd)
+    at = 0
+    for number, n in enumerate(sizes):
+        at = writer.whole(at, n)
+        assert at % capacity + n <= capacity
+        writer.view(at, n)[:] = number
+        assert np.array_equal(reader.view(at, n), np.full(n, number, np.complex64))
+        at += n
+        reader.tail = at
+        assert writer.tail == at
+
+
+def test_buffers_that_a_driver_must_not_get_are_refused():
+    good = np.zeros(8, np.complex64)
+    check_buffer(good, 8, writeable=True)
+    for bad in (good[::2], good.reshape(2, 4), good.astype(np.complex128)):
+        with pytest.raises(ValueError, match="buffer must"):
+            check_buffer(bad, 8, writeable=True)
+    good.flags.writeable = False
+    check_buffer(good, 8, writeable=False)
+    with pytest.raises(ValueError, match="must not be written"):
+        check_buffer(good, 8, writeable=True)
+    with pytest.raises(DriverError, match="9 samples of 8"):
+        check_moved(Moved(9, 0, 0), 8)
+
+
+@pytest.mark.parametrize(("form", "full"), [("CS16", 32767), ("CS8", 127)])
+def test_other_formats_are_scaled_and_clipped(form, full):
+    values = Outgoing(None, form).converted(np.array([0.5 - 1j, 3 + 0j], np.complex64))
+    assert values.dtype.itemsize == {"CS16": 4, "CS8": 2}[form]
+    parts = np.frombuffer(values.tobytes(), {"CS16": "i2", "CS8": "i1"}[form])
+    assert parts.tolist() == [round(0.5 * full), -full, full, 0]
+
+
+def test_a_device_is_named_as_soapysdrs_tools_do():
+    assert driver_of("driver=hackrf,serial=1") == "hackrf"
+    assert driver_of("serial=1, driver = uhd") == "uhd"
+    assert driver_of("serial=1") == ""
+
+
+def test_what_counts_samples_hands_over_earlier_and_sends_in_spells():
+    timed = tx_traits(True, True, 1e-3, 0, 1, 0.02, 0.05, 0.05, 1.0)
+    assert (timed.lead_s, timed.turnaround_s, timed.spells) == (0.02, 0, None)
+    counted = tx_traits(False, True, 0.01, 0, 1, 0.02, 0.05, 0.05, 1.0)
+    assert counted.lead_s > 0.02
+    assert counted.spells is None
+    half = tx_traits(False, False, 0.01, 0, 1, 0.02, 0.05, 0.05, 1.0)
+    ahead = tx_traits(False, False, 0.01, 4, 1, 0.02, 0.05, 0.05, 1.0)
+    assert half.turnaround_s == pytest.approx(0.05 + 2 * 0.01)
+    assert ahead.lead_s == pytest.approx(half.lead_s + 4 * 0.01)
+    assert half.spells.pause_s > half.lead_s + half.turnaround_s + 0.05
+
+
+def radio(more="", model="plain", **settings):
+    """A device that hears itself."""
+    return SoapyRadio(
+        SoapySettings(
+            device=f"driver=loopback,model={model},self=yes,noise_db=-200,mtu={N}{more}",
+            rate_hz=0.0, frequency_hz=0.0, block_s=N / RATE, tx_enabled=True, tx_gain_db=40.0,
+            rx_gain_db=20.0, **settings,
+        ),
+        longest_s=0.1,
+        removes_dc=False,
+    )  # fmt: skip
+
+
+@needs_radio
+async def test_without_stamps_and_acknowledgements_bursts_are_counted_in():
+    """Where they leave is only as sure as the host's clock; that they do, and once, is sure."""
+    async with opened(radio(",time=no,ack=no")) as each:
+        can = each.capabilities
+        assert (can.timestamps, can.full_duplex, can.spells) == (False, True, None)
+        assert can.index_error_s > 0
+        blocks = each.blocks()
+        begin = (await take(blocks, 10 * N))[-1].index
+        burst = TxBurst(begin + round(0.2 * RATE), noise(3 * N))
+        sending = asyncio.ensure_future(each.send(burst))
+        taken = []
+        while not sending.done():
+            taken += await take(blocks, 1)
+            await turn()
+        taken += await take(blocks, taken[-1].index + 40 * N)
+    report = await sending
+    assert report.outcome is TxOutcome.SENT
+    stream = np.concatenate([block.samples for block in taken])
+    found = np.abs(np.correlate(stream, burst.samples, "valid"))
+    at = int(found.argmax())
+    energy = np.vdot(burst.samples, burst.samples).real
+    assert found[at] == pytest.approx(energy, rel=0.01)
+    assert taken[0].index + at == pytest.approx(report.start, abs=0.05 * RATE)
+
+
+@needs_radio
+async def test_what_comes_too_late_for_the_device_is_told():
+    name = f"late-{os.getpid()}"
+    with Bus(name) as bus:
+        async with opened(radio(f",time=yes,ack=yes,bus={name},unit=0")) as each:
+            blocks = each.blocks()
+            now = (await take(blocks, 20 * N))[-1].index
+            bus.inject(0, "time_error")
+            sending = asyncio.ensure_future(each.send(TxBurst(now + round(0.1 * RATE), noise(N))))
+            while not sending.done():
+                await take(blocks, 1)
+                await turn()
+            assert (await sending).outcome is TxOutcome.LATE
+            assert each.counters["late"] == 1
+            assert bus.stats(0).late == 1
+
+
+@needs_radio
+async def test_a_device_in_use_names_itself():
+    name = f"used-{os.getpid()}"
+    with Bus(name):
+        async with opened(radio(f",bus={name},unit=0")):
+            with pytest.raises(BackendError, match="in use"):
+                await radio(f",bus={name},unit=0").open(TUNING)
+
+
+@needs_radio
+async def test_a_rate_that_the_device_does_not_offer_is_refused():
+    with pytest.raises(BackendError, match=r"modem.rate_hz: got 0\.1 Msps .* 0\.2 to 61"):
+        await radio(model="usrp").open(Tuning(RATE, 915e6))
+
+
+@needs_radio
+def test_a_survey_tells_what_devices_can_do_and_which_module_is_missing():
+    (found,) = survey("driver=loopback,model=hackrf").devices
+    assert (found.full_duplex, found.has_time, found.keeps_time) == (False, False, False)
+    assert found.tx.transfer == 131072
+    assert found.rx.rates_hz[0].low == 2e6
+    assert set(found.rx.gains_db) == {"LNA", "VGA", "AMP"}
+    nothing = survey("driver=lime")
+    assert not nothing.devices
+    assert 'no driver "lime"' in nothing.notes[0]
+    assert "soapysdr-module-lms7" in nothing.notes[0]
+    absent = survey("driver=loopback,serial=X")
+    assert not absent.devices
+    assert "there is no such device" in absent.notes[0]
