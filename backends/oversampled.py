@@ -55,7 +55,11 @@ class OversampledRadio:
                 yield each
         if len(rest := self._down.flush()):
             index = self._down.next_index - len(rest)
-            yield RxBlock(index, len(rest), rest, "", self._last_ns)
+            last = RxBlock(index, len(rest), rest, "", self._last_ns)
+            if hear is None:
+                yield last
+            else:
+                hear(last)
 
     def _filtered(self, block: RxBlock) -> Iterator[RxBlock]:
         self._last_ns = block.host_ns

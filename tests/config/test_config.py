@@ -12,6 +12,8 @@ from sdrlinkd.link import ClassParams, TopicPolicy
 ROOT = Path(__file__).parents[2]
 ETC = ROOT / "etc"
 
+SOAPY = 'backend = "soapy"\n[soapy]\ndevice = "driver=hackrf"\n'
+
 
 def test_shipped_file_equals_the_defaults():
     assert load_config(ETC / "sdrlinkd.toml") == Config()
@@ -57,6 +59,22 @@ def test_shipped_registry_is_the_papers_table_4():
         ("[modem]\nmcs = 10", ["f.toml:2", "modem.mcs", "got 10", "from 0 to 9"]),
         ("[modem]\nrate_hz = 0", ["modem.rate_hz", "got 0"]),
         ('backend = "iqfile"', ["iqfile.receive, iqfile.transmit", "name a recording"]),
+        ('backend = "soapy"', ['soapy.device: got ""', "driver=hackrf", "radio probe"]),
+        (f"{SOAPY}", ["modem.frequency_hz: got 0 (not set)", "licence"]),
+        (f"{SOAPY}tx_enabled = true\n[modem]\nfrequency_hz = 4e8", ["soapy.tx_gain_db: not set"]),
+        (
+            f'{SOAPY}offset_tuning = "on"\n[modem]\nfrequency_hz = 4e8',
+            ['soapy.offset_tuning: got "on"', "modem.oversampling 2 or 4"],
+        ),
+        (f"{SOAPY}tx_gain_db = 'much'", ["f.toml:4", "soapy.tx_gain_db", "a number"]),
+        ('backend = "zmq"\n[zmq]\nreceive = "ipc:///x"', ['zmq.send: got ""', "tcp://127.0.0.1"]),
+        ('backend = "zmq"\n[zmq]\npattern = "pull"', ["zmq.pattern", '"push"', '"req"']),
+        ('backend = "gnuradio"\n[gnuradio]\nsend = "ipc:///x"', ['gnuradio.receive: got ""']),
+        ('backend = "gnuradio"\n[gnuradio]\ntransport = "tcp"', ['gnuradio.send: got ""']),
+        (
+            'backend = "gnuradio"\n[gnuradio]\nsend = "x"\nreceive = "y"\n[access]\npolicy="csma"',
+            ["access.policy", "gnuradio", "no air that we could hear"],
+        ),
         (
             'backend = "loopback"\n[modem]\nrate_hz = 1e5',
             ["modem.max_cfo_hz", "got 100000", "25000"],

@@ -98,9 +98,8 @@ class ZmqTransport:
         """Close sockets."""
         if self._reader is not None:
             self._reader.close()
-            self._reader = None
-        self._out = None
         self._context.destroy(linger=0)
+        self._reader = self._out = None
 
 
 class UdpTransport(asyncio.DatagramProtocol):
