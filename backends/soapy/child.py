@@ -1,6 +1,5 @@
 """The radio process as the daemon sees it: started, spoken to, and ended whatever it does."""
 
-import contextlib
 import os
 import select
 import socket
@@ -55,10 +54,9 @@ class RadioChild:
 
     def first_answer(self, timeout_s: float) -> FromProcess | None:
         """What it says within that time."""
-        with contextlib.suppress(InterruptedError):
-            if select.select([self._control], [], [], timeout_s)[0]:
-                return self.answer()
-        return None
+        poll = select.poll()
+        poll.register(self._control, select.POLLIN)
+        return self.answer() if poll.poll(1e3 * timeout_s) else None
 
     def answer(self) -> FromProcess | None:
         """What it has said; None: nothing yet. Of one that has ended, that."""

@@ -3,7 +3,7 @@
 import select
 import socket
 from collections import deque
-from collections.abc import Sequence
+from typing import TYPE_CHECKING, Protocol
 
 import msgspec
 
@@ -11,6 +11,9 @@ from backends.base import Samples
 from backends.soapy import protocol
 from backends.soapy.protocol import Counted, Left, Order
 from backends.soapy.ring import SampleRing
+
+if TYPE_CHECKING:
+    from backends.soapy.receiving import Receiving
 
 
 class Orders:
@@ -62,19 +65,27 @@ class Orders:
             self.has_begun = True
 
 
+class Counting(Protocol):
+    """A part that counts."""
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """From 0 on."""
+
+
 class Tally:
-    """Counters of several parts, told when they have changed."""
+    """What receiving and sending have counted, told when it has changed."""
 
-    def __init__(self, parts: Sequence[dict[str, int]]) -> None:
-        self._parts = parts
-        self._told: dict[str, int] = {}
-        self.notice = ""
-        self._told_notice = ""
+    def __init__(self, receiving: "Receiving", sender: Counting | None) -> None:
+        self._receiving, self._sender = receiving, sender
+        self._told: Counted | None = None
 
-    def news(self) -> Counted | None:
-        """What there is to tell."""
-        now = {name: n for part in self._parts for name, n in part.items()}
-        if now == self._told and self.notice == self._told_notice:
-            return None
-        self._told, self._told_notice = now, self.notice
-        return Counted(now, self.notice)
+    def tell(self, orders: Orders) -> None:
+        """The news, if there is any."""
+        sent = self._sender.counters if self._sender is not None else {}
+        rate = self._receiving.rate
+        counters = {**self._receiving.counters, "rate_faults": rate.faults, **sent}
+        now = Counted(counters, rate.notice)
+        if now != self._told:
+            self._told = now
+            orders.say(now)

@@ -8,6 +8,7 @@ import numpy as np
 from backends.base import Samples
 from backends.soapy.clock import SampleTime
 from backends.soapy.protocol import Stretch, Why, pack_stretch
+from backends.soapy.rate import RateWatch
 from backends.soapy.ring import SampleRing
 from backends.soapy.surface import (
     CORRUPTION,
@@ -41,6 +42,7 @@ class Receiving:
         clock: SampleTime,
         piece: int,
         has_time: bool,
+        rate_hz: float,
     ) -> None:
         self._stream = stream
         self._ring = ring
@@ -54,6 +56,7 @@ class Receiving:
         self._unsure = 0
         self._heard_ns = time.monotonic_ns()
         self._was_restarted = False
+        self.rate = RateWatch(clock, rate_hz, piece)
         self.counters = {"overflows": 0, "samples_lost": 0, "stalls": 0, "clock_jumps": 0}
 
     def start(self) -> None:
@@ -105,6 +108,7 @@ class Receiving:
             self._place(moved.time_ns, host_ns)
         self._next += moved.n
         self.clock.saw(self._next, host_ns)
+        self.rate.saw(self._next, host_ns)
         if not is_kept:
             self._lost(moved.n)
             return

@@ -187,3 +187,13 @@ def test_a_survey_tells_what_devices_can_do_and_which_module_is_missing():
     absent = survey("driver=loopback,serial=X")
     assert not absent.devices
     assert "there is no such device" in absent.notes[0]
+
+
+@needs_radio
+@pytest.mark.slow
+async def test_a_device_that_lies_about_its_rate_is_found_out():
+    async with opened(radio(",time=no,ack=no,rate_error=0.05,lie=yes")) as each:
+        async for _ in each.blocks():
+            if each.counters.get("rate_faults"):
+                break
+        assert "Msps, not at 0.1 as the device says" in each.detail

@@ -1,0 +1,127 @@
+"""In the radio process: one device, from open to the end."""
+
+import contextlib
+import socket
+
+from backends.soapy.clock import SampleTime
+from backends.soapy.counted import CountedSender
+from backends.soapy.device import WAYS, Device
+from backends.soapy.library import load_library, why_not
+from backends.soapy.orders import Orders
+from backends.soapy.outgoing import Outgoing
+from backends.soapy.protocol import Open, Opened
+from backends.soapy.receiving import Receiving
+from backends.soapy.ring import SampleRing
+from backends.soapy.setting_up import choose_format, set_up
+from backends.soapy.settings import Found, SettingError, in_flight
+from backends.soapy.streaming import Sender, stream
+from backends.soapy.surface import RX, TX, DriverError, Library, Stream
+from backends.soapy.timed import TimedSender
+
+RETRY_S = 0.25, 1.0
+"""A device that went away is looked for again after so long; more each time."""
+LOOK_S = 0.1
+
+
+class Session:
+    """Opens what is `asked` for, streams, and gives it all back."""
+
+    def __init__(self, asked: Open, orders: Orders, air: socket.socket, ring: SampleRing) -> None:
+        self._settings = asked.settings
+        self._waits = asked.wait
+        self._orders = orders
+        self._air = air
+        self._ring = ring
+
+    def run(self) -> None:
+        """Stream until the daemon closes its end. Raises SettingError, DriverError."""
+        library = load_library()
+        device = self._made(library)
+        if device is None:
+            return
+        with contextlib.ExitStack() as stack:
+            stack.callback(device.close)
+            self._stream(library, device, stack)
+
+    def _made(self, library: Library) -> Device | None:
+        wait_s, most_s = RETRY_S
+        args = self._settings.device
+        while not self._orders.is_over:
+            try:
+                return Device(library, args)
+            except DriverError as error:
+                if not self._waits:
+                    raise SettingError(why_not(library, args, error)) from None
+            self._orders.wait(wait_s)
+            wait_s = min(2 * wait_s, most_s)
+        return None
+
+    def _stream(self, library: Library, device: Device, stack: contextlib.ExitStack) -> None:
+        settings, orders = self._settings, self._orders
+        gains = set_up(device, settings)
+        has_time, full_duplex = device.has_time(), device.full_duplex(settings.channel)
+        clock = SampleTime(settings.rate_hz, has_time)
+        rx, rx_form = self._opened(device, RX, stack)
+        piece = max(1, round(settings.block_s * settings.rate_hz), rx.mtu)
+        receiving = Receiving(
+            rx, rx_form, self._ring, self._air, clock, piece, has_time, settings.rate_hz
+        )
+        sender, transfer = None, 0
+        if settings.tx_enabled:
+            tx, tx_form = self._opened(device, TX, stack)
+            sender, transfer = self._sender(device, Outgoing(tx, tx_form), clock), tx.mtu
+        found = Found(
+            driver=device.driver,
+            hardware=device.hardware,
+            binding=library.detail,
+            rate_hz=settings.rate_hz,
+            frequency_hz=settings.frequency_hz,
+            full_duplex=full_duplex,
+            has_time=has_time,
+            receives_in_s=piece / settings.rate_hz,
+            tx_transfer_s=transfer / settings.rate_hz,
+            in_flight=in_flight(settings, device.driver),
+            gains=_told(gains),
+        )
+        orders.say(Opened(found))
+        while not orders.has_begun and not orders.is_over:
+            orders.wait(LOOK_S)
+        receiving.start()
+        stream(receiving, sender, orders, full_duplex, settings.listen_s)
+
+    def _opened(self, device: Device, way: int, stack: contextlib.ExitStack) -> tuple[Stream, str]:
+        settings = self._settings
+        form = choose_format(device, settings, way)
+        opened = device.open_stream(way, settings.channel, form, settings.stream_args)
+        stack.callback(_end, opened)
+        return opened, form
+
+    def _sender(self, device: Device, outgoing: Outgoing, clock: SampleTime) -> Sender:
+        settings, full_duplex = self._settings, device.full_duplex(self._settings.channel)
+        if device.has_time() and full_duplex:
+            return TimedSender(self._orders, outgoing, clock)
+        return CountedSender(
+            self._orders,
+            outgoing,
+            clock,
+            leading=settings.leading_transfers,
+            in_flight=in_flight(settings, device.driver),
+            longest_s=settings.longest_tx_s,
+            turnaround_s=0.0 if full_duplex else settings.turnaround_s,
+        )
+
+
+def _end(opened: Stream) -> None:
+    # Of a device that was unplugged, nothing can be ended.
+    with contextlib.suppress(DriverError):
+        opened.deactivate()
+    with contextlib.suppress(DriverError):
+        opened.close()
+
+
+def _told(gains: dict[int, dict[str, float]]) -> str:
+    return ", ".join(
+        f"{WAYS[way]} {element + ' ' if element else ''}{gain_db:g} dB"
+        for way, by_element in gains.items()
+        for element, gain_db in by_element.items()
+    )
