@@ -13,7 +13,7 @@ gr.logging().set_default_level(gr.log_levels.warn)
 class Silence(gr.hier_block2):
     """Zeros in real time: what is added to them comes in real time, too."""
 
-    PERIOD_S = 0.5
+    PERIOD_S, LONGEST = 0.5, 1 << 19
     AHEAD = 4096
 
     def __init__(self, rate_hz: float, at_once: int) -> None:
@@ -23,9 +23,8 @@ class Silence(gr.hier_block2):
         # A throttle counts from its start: an hour of waiting would be an hour to catch up with.
         # This tag starts it anew.
         again = (0, pmt.intern("rx_rate"), pmt.from_double(rate_hz), pmt.PMT_F)
-        zeros = blocks.vector_source_c(
-            [0] * int(rate_hz * self.PERIOD_S), True, 1, [gr.tag_utils.python_to_tag(again)]
-        )
+        n = min(int(rate_hz * self.PERIOD_S), self.LONGEST)
+        zeros = blocks.vector_source_c([0] * n, True, 1, [gr.tag_utils.python_to_tag(again)])
         throttle = blocks.throttle(gr.sizeof_gr_complex, rate_hz, False)
         throttle.set_max_noutput_items(at_once)
         throttle.set_max_output_buffer(self.AHEAD)
