@@ -2,7 +2,7 @@
 
 from sdrlinkd.pdulink.base import Heard, PduLink, PduListener
 from sdrlinkd.pdulink.direct import DirectLink
-from sdrlinkd.pdulink.gnuradio import GnuRadioLink, make_gnuradio
+from sdrlinkd.pdulink.gnuradio import GnuRadioLink, from_gnu_radio, make_gnuradio, to_gnu_radio
 from sdrlinkd.pdulink.impairment import Arrival, Impairment
 
 __all__ = [
@@ -13,5 +13,7 @@ __all__ = [
     "Impairment",
     "PduLink",
     "PduListener",
+    "from_gnu_radio",
     "make_gnuradio",
+    "to_gnu_radio",
 ]

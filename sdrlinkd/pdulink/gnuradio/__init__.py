@@ -2,6 +2,7 @@
 
 from sdrlinkd.config import Config
 from sdrlinkd.pdulink.gnuradio.link import GnuRadioLink
+from sdrlinkd.pdulink.gnuradio.pdus import from_gnu_radio, to_gnu_radio
 from sdrlinkd.pdulink.gnuradio.transport import TcpTransport, Transport, UdpTransport, ZmqTransport
 
 
@@ -18,4 +19,4 @@ def make_gnuradio(config: Config) -> GnuRadioLink:
     return GnuRadioLink(params, pdu_size, transport)
 
 
-__all__ = ["GnuRadioLink", "make_gnuradio"]
+__all__ = ["GnuRadioLink", "from_gnu_radio", "make_gnuradio", "to_gnu_radio"]
