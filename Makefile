@@ -50,6 +50,7 @@ bench: $(DEV_STAMP)
 	$(BIN)/python -m benchmarks.phy_speed
 	$(BIN)/python -m benchmarks.access
 	$(BIN)/python -m benchmarks.ether
+	$(BIN)/python -m benchmarks.radio
 	$(BIN)/python -m benchmarks.pound
 
 system-packages:

@@ -1,7 +1,7 @@
 """Daemons of a benchmark, and the hub of their air, as programs of their own."""
 
 import time
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,6 +13,8 @@ from sdrlinkd.client import ControlClient, NoDaemonError
 START_S = 90.0
 QUIET = ("--log-level", "warning")
 TYPE = "std_msgs/UInt8MultiArray"
+TYPES = {"odom": "nav_msgs/Odometry"}
+"""Of topics with messages of their own."""
 DAEMON = """namespace = "robot_{robot}"
 registry = "registry.csv"
 rx_depth = 0
@@ -41,15 +43,17 @@ def running(
     scenario: str,
     *,
     precede: bool = False,
+    own: Mapping[int, str] | None = None,
 ) -> Iterator[Running]:
     """Until every daemon hears one, and then. Raises PeerError.
 
-    `config` are TOML tables for each of them, `scenario` is for the hub of an ether. With `precede`
-    they go before what else this machine does.
+    `config` are TOML tables for each of them, `own` those of one; `scenario` is for the hub of an
+    ether. With `precede` they go before what else this machine does.
     """
     with TemporaryDirectory(prefix="benchmark-") as name, ExitStack() as stack:
         folder = Path(name)
-        (folder / "registry.csv").write_text("".join(f"{each},{TYPE}\n" for each in topics))
+        lines = [f"{each},{TYPES.get(each, TYPE)}\n" for each in topics]
+        (folder / "registry.csv").write_text("".join(lines))
         programs: dict[str, tuple[str, ...]] = {}
         if backend == "ether":
             path = folder / "scenario.toml"
@@ -57,7 +61,8 @@ def running(
             programs["hub"] = ("sdrlinkd.cli.ether", str(path), "--dir", str(folder / "air"))
         for robot in robots:
             path = folder / f"{robot}.toml"
-            path.write_text(DAEMON.format(robot=robot, folder=folder, backend=backend) + config)
+            text = DAEMON.format(robot=robot, folder=folder, backend=backend) + config
+            path.write_text(text + (own or {}).get(robot, ""))
             programs[f"daemon_{robot}"] = ("sdrlinkd", "--config", str(path), *QUIET)
         children = []
         for program, arguments in programs.items():

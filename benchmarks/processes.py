@@ -1,5 +1,6 @@
 """Processes of a benchmark: started, given their precedence, and measured from outside."""
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -84,11 +85,16 @@ class Child:
 
     def usage(self) -> Usage:
         """Of all its threads."""
-        folder = Path(f"/proc/{self._process.pid}")
-        fields = (folder / "stat").read_text().rpartition(")")[2].split()
-        resident = int((folder / "statm").read_text().split()[1])
-        # proc(5): utime and stime are the 14th and 15th field, the 3rd is the first here.
-        return Usage((int(fields[11]) + int(fields[12])) / TICKS_HZ, resident * PAGE_MIB)
+        return _usage(self._process.pid)
+
+    def usage_below(self) -> list[Usage]:
+        """Of each process that it has started and that is there."""
+        own, found = str(self._process.pid), []
+        for folder in Path("/proc").glob("[0-9]*"):
+            with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+                if _fields(int(folder.name))[1] == own:
+                    found.append(_usage(int(folder.name)))
+        return found
 
     @property
     def has_ended(self) -> bool:
@@ -111,6 +117,18 @@ class Child:
     def __exit__(self, *_: object) -> None:
         self._process.kill()
         self._stack.close()
+
+
+def _fields(pid: int) -> list[str]:
+    """proc(5): the 3rd, its state, is the first here."""
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+
+
+def _usage(pid: int) -> Usage:
+    fields = _fields(pid)
+    resident = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    # utime and stime are the 14th and 15th field.
+    return Usage((int(fields[11]) + int(fields[12])) / TICKS_HZ, resident * PAGE_MIB)
 
 
 @contextmanager

@@ -10,6 +10,7 @@ import pytest
 
 from benchmarks.phy_per import false_pdus_in
 from phy import Transmitter
+from tests.soapy_loopback import missing as no_test_radio
 
 ROOT = Path(__file__).parents[1]
 
@@ -102,6 +103,18 @@ ROWS = {
         "tx_msps_220B_qpsk12",
         "rx_latency_us_220B_qpsk12",
     },
+    "radio": {
+        *(
+            f"usrp_like_{msps}msps_{each}"
+            for msps in (1, 2, 5, 10)
+            for each in ("lost_samples", "underflows", "daemon_cpu_pct", "radio_process_cpu_pct")
+        ),
+        *(
+            f"hackrf_like_odom_10hz_{way}_{each}"
+            for way in ("oneway", "twoway")
+            for each in ("p50_ms", "p99_ms", "pdr")
+        ),
+    },
     "ether": {
         "lockstep_8nodes_1msps_realtime_ratio",
         "realtime_2nodes_5msps_lost_blocks",
@@ -111,6 +124,8 @@ ROWS = {
 
 # Those of recordings that are not everywhere.
 OPTIONAL = {"ptp_over_wifi_strays_ms"}
+# Why one cannot run here, if so.
+LACKING = {"radio": no_test_radio}
 # Peers take their time, and a machine of their own to themselves.
 MORE = {"pound": ("--no-peers",)}
 
@@ -119,6 +134,8 @@ MORE = {"pound": ("--no-peers",)}
 @pytest.mark.timeout(250)
 @pytest.mark.parametrize("name", ROWS)
 def test_a_benchmark_prints_its_rows(name):
+    if reason := LACKING.get(name, str)():
+        pytest.skip(reason)
     done = subprocess.run(
         [sys.executable, "-m", f"benchmarks.{name}", "--quick", "--json", *MORE.get(name, ())],
         cwd=ROOT, capture_output=True, text=True, timeout=240,

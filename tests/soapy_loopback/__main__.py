@@ -1,8 +1,13 @@
-"""`python -m tests.soapy_loopback OUT`: the driver's module, for SOAPY_SDR_PLUGIN_PATH."""
+"""`python -m tests.soapy_loopback [OUT]`: the driver's module, for SOAPY_SDR_PLUGIN_PATH.
+
+Without OUT, in a folder of its own, compiled once per state of the source.
+"""
 
 import sys
 from pathlib import Path
 
-from tests.soapy_loopback.build import build
+from tests.soapy_loopback.build import build, missing, module_folder
 
-print(build(Path(sys.argv[1])))  # noqa: T201
+if reason := missing():
+    sys.exit(reason)
+print(build(Path(sys.argv[1])) if sys.argv[1:] else module_folder())  # noqa: T201

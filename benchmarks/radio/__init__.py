@@ -1,0 +1,1 @@
+"""Daemons on radios by SoapySDR, in real time, on the test radio of tests/soapy_loopback."""

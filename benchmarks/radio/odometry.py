@@ -1,0 +1,119 @@
+"""Odometry over radios like a HackRF: half duplex, whole transfers, no time stamps."""
+
+import struct
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from benchmarks.radio.pair import ROBOTS, Pair, pair
+from benchmarks.report import Row
+from sdrlinkd.adapters import BuiltInRobot
+from sdrlinkd.client import Publisher, Subscriber
+
+RATE_HZ, OVERSAMPLING = 2e6, 4
+TRANSFER = 131_072
+TURNAROUND_S = 0.02
+PERIOD_S = 0.1
+MESSAGES, QUICK_MESSAGES = 300, 60
+WARM_UP_S = 2.0
+DRAIN_S = 2.0
+STAMP = slice(4, 12)
+"""Of the header, in CDR."""
+ODOM_HZ = 30
+"""Of the robot whose messages these are."""
+MODEM = f"""[modem]
+rate_hz = {RATE_HZ}
+frequency_hz = 915e6
+oversampling = {OVERSAMPLING}
+"""
+SOAPY = f"""turnaround_s = {TURNAROUND_S}
+transfers_in_flight = 4
+"""
+ACCESS = {
+    "oneway": "",
+    "twoway": '[access]\npolicy = "tdma"\nnodes = [1, 2]\nslot_s = 0.3\nreuse = false\n',
+}
+SENDERS = {"oneway": ROBOTS[:1], "twoway": ROBOTS}
+
+
+@dataclass
+class Flow:
+    """From one robot to the other: when each message was sent and heard, in ns, by its stamp."""
+
+    sent: dict[bytes, int] = field(default_factory=dict)
+    heard: dict[bytes, int] = field(default_factory=dict)
+
+    def latencies_ms(self) -> list[float]:
+        """Of those that came."""
+        return [1e-6 * (self.heard[each] - at) for each, at in self.sent.items()
+                if each in self.heard]  # fmt: skip
+
+    def listen(self, ear: Subscriber, until: float) -> None:
+        """Note what comes."""
+        while (left_s := until - time.monotonic()) > 0:
+            message = ear.receive(left_s)
+            if message is not None:
+                self.heard[message.payload[STAMP]] = time.time_ns()
+
+
+def rows(seed: int, quick: bool) -> Iterator[Row]:
+    """p50, p99 and the share that came, with one robot that sends and with two."""
+    count = QUICK_MESSAGES if quick else MESSAGES
+    for way, access in ACCESS.items():
+        with pair("hackrf", "odom", MODEM + access, SOAPY, ",inflight=4,status=yes") as robots:
+            with ThreadPoolExecutor() as pool:
+                play = partial(_play, robots, count, seed)
+                flows = list(pool.map(play, SENDERS[way]))
+            looks = [robots.look(robot) for robot in ROBOTS]
+        counted = {
+            name: sum(look.counter(name) for look in looks)
+            for name in ("late", "underflows", "tx_spells")
+        }
+        yield from _rows_of(way, flows, counted)
+
+
+def _rows_of(way: str, flows: list[Flow], counted: dict[str, int]) -> Iterator[Row]:
+    name = f"hackrf_like_odom_10hz_{way}"
+    late_ms = np.array([each for flow in flows for each in flow.latencies_ms()])
+    sent = sum(len(flow.sent) for flow in flows)
+    words = ", ".join(f"{each} {n}" for each, n in counted.items())
+    note = f"nav_msgs/Odometry at {1 / PERIOD_S:g} Hz; both robots since their start: {words}"
+    peers = {
+        "a_transfer": 1e3 * TRANSFER / RATE_HZ / OVERSAMPLING, "turnaround": 1e3 * TURNAROUND_S,
+    }  # fmt: skip
+    for label, share in (("p50", 0.5), ("p99", 0.99)):
+        value = float(np.quantile(late_ms, share)) if len(late_ms) else float("inf")
+        yield Row(f"{name}_{label}_ms", value, "ms", None, "less", len(late_ms), peers, note=note)
+    yield Row(f"{name}_pdr", len(late_ms) / sent, "ratio", None, "more", sent, note=note)
+
+
+def _play(robots: Pair, count: int, seed: int, robot: int) -> Flow:
+    """`count` messages after those of the warm-up."""
+    flow = Flow()
+    other = next(each for each in ROBOTS if each != robot)
+    early = round(WARM_UP_S / PERIOD_S)
+    messages = _odometry(robot, early + count, seed)
+    begin = time.monotonic() + np.random.default_rng(seed + robot).uniform(0, PERIOD_S)
+    with (
+        Subscriber(f"/rx_robot_{robot}/odom", directory=robots.folders[other]) as ear,
+        Publisher(robots.folders[robot]) as out,
+    ):
+        for i, cdr in enumerate(messages):
+            flow.listen(ear, begin + i * PERIOD_S)
+            now_ns = time.time_ns()
+            stamp = struct.pack("<iI", *divmod(now_ns, 10**9))
+            if i >= early:
+                flow.sent[stamp] = now_ns
+            out.send(f"/robot_{robot}/odom", cdr[: STAMP.start] + stamp + cdr[STAMP.stop :])
+        flow.listen(ear, time.monotonic() + DRAIN_S)
+    return flow
+
+
+def _odometry(robot: int, count: int, seed: int) -> list[bytes]:
+    """Of a robot that drives around."""
+    driven = BuiltInRobot(f"robot_{robot}", count / ODOM_HZ, seed)
+    return [each.cdr for each in driven.messages() if each.topic.endswith("/odom")]

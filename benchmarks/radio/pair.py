@@ -1,0 +1,71 @@
+"""Two daemons, each with a test radio, that hear each other."""
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks import daemons
+from benchmarks.processes import Child, PeerError
+from benchmarks.radio.driver import a_bus
+from sdrlinkd.client import ControlClient
+
+ROBOTS = (1, 2)
+CONFIG = """{tables}
+[soapy]
+tx_enabled = true
+tx_gain_db = 40
+rx_gain_db = 20
+{soapy}
+"""
+DEVICE = 'device = "driver=loopback,bus={bus},unit={unit},model={model},noise_db=-50{more}"\n'
+
+
+@dataclass(frozen=True)
+class Look:
+    """A moment of a daemon: its status; processor seconds of it and its radio process so far."""
+
+    at: float
+    status: dict[str, Any]
+    daemon_cpu_s: float
+    radio_cpu_s: float
+
+    def counter(self, name: str) -> int:
+        """One of its carrier's."""
+        return int(self.status["carrier"]["counters"][name])
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Their sockets' folders and the daemons, by robot."""
+
+    folders: dict[int, Path]
+    daemons: dict[int, Child]
+
+    def look(self, robot: int) -> Look:
+        """As it is now. Raises PeerError when its radio process is not there."""
+        daemon = self.daemons[robot]
+        with ControlClient(self.folders[robot]) as control:
+            status = control.ask("status")
+        radio = daemon.usage_below()
+        if len(radio) != 1:
+            raise PeerError(f"{daemon.name} has {len(radio)} radio processes; {daemon.words()}")
+        return Look(time.monotonic(), status, daemon.usage().cpu_s, radio[0].cpu_s)
+
+
+@contextmanager
+def pair(model: str, topic: str, tables: str, soapy: str = "", more: str = "") -> Iterator[Pair]:
+    """Until each hears the other, and then. Raises PeerError.
+
+    TOML: `tables`, with that of the modem, and more lines of `soapy`; `more` of the device's
+    arguments.
+    """
+    config = CONFIG.format(tables=tables, soapy=soapy)
+    with a_bus() as bus:
+        own = {
+            robot: DEVICE.format(bus=bus, unit=robot, model=model, more=more) for robot in ROBOTS
+        }
+        with daemons.running("soapy", ROBOTS, [topic], config, "", own=own) as running:
+            yield Pair(running.folders, dict(zip(ROBOTS, running.children, strict=True)))
