@@ -21,7 +21,7 @@ from backends.base import (
     TxReport,
 )
 from backends.outstanding import GAP
-from backends.recording import RecordingInfo, RecordingReader, RecordingWriter, describe
+from backends.recording import RecordingInfo, RecordingReader, describe, refuse_same
 from backends.samples import SAMPLE_TYPES
 from backends.soapy import (
     DeviceSurvey,
@@ -33,6 +33,7 @@ from backends.soapy import (
     outlook,
     survey,
 )
+from backends.writing import Annotation, RecordingWriter
 
 if TYPE_CHECKING:
     from backends.air import Channel
@@ -66,6 +67,7 @@ __all__ = [
     "SENDING",
     "AirParams",
     "AirSense",
+    "Annotation",
     "Answer",
     "BackendError",
     "BurstMedium",
@@ -107,6 +109,7 @@ __all__ = [
     "burst_shape",
     "describe",
     "outlook",
+    "refuse_same",
     "survey",
 ]
 

@@ -20,7 +20,8 @@ from backends.base import (
 from backends.feed import BlockFeed
 from backends.outstanding import Outstanding, answered
 from backends.pace import Pace
-from backends.recording import RecordingReader, RecordingWriter, describe, refuse_same
+from backends.recording import RecordingReader, describe, refuse_same
+from backends.writing import RecordingWriter
 
 
 class IqFileRadio:

@@ -1,7 +1,6 @@
 """Recordings of samples: a data file and what SigMF's metadata says of it (sigmf.org)."""
 
 import contextlib
-import datetime
 import json
 import math
 from dataclasses import dataclass
@@ -55,72 +54,6 @@ class RecordingReader:
         self._file.close()
 
 
-class RecordingWriter:
-    """Writes a SigMF recording, sample by absolute index; what is skipped is silence.
-
-    On most file systems, silence takes no room on the disk. Of cu8, zeros are not silence: refused.
-    """
-
-    def __init__(self, path: Path, type_name: str, rate_hz: float, frequency_hz: float) -> None:
-        self._meta_path, data_path = sigmf_paths(path)
-        self._type = sample_type(type_name, str(path))
-        if self._type.offset:
-            raise BackendError(f"{path}: {type_name} is only read; write ci8 instead")
-        self._description = {
-            "global": {
-                "core:datatype": type_name,
-                "core:sample_rate": rate_hz,
-                "core:version": "1.2.0",
-                "core:recorder": "sdrlinkd",
-            },
-            "captures": [
-                {
-                    "core:sample_start": 0,
-                    "core:frequency": frequency_hz,
-                    "core:datetime": datetime.datetime.now(datetime.UTC)
-                    .isoformat(timespec="milliseconds")
-                    .replace("+00:00", "Z"),
-                }
-            ],
-            "annotations": [],
-        }
-        try:
-            self._meta_path.write_text(json.dumps(self._description, indent=2) + "\n")
-            self._file = data_path.open("wb", buffering=0)
-        except (OSError, ValueError) as error:
-            named = getattr(error, "filename", None) or path
-            raise BackendError(f"{named}: cannot be written ({_reason(error)})") from None
-        self.clipped = 0
-
-    def write(self, first: int, samples: Samples) -> None:
-        """Put samples at index `first`. Raises BackendError when the disk will not take them."""
-        data, clipped = self._type.encode(samples)
-        self.clipped += clipped
-        rest = memoryview(data)
-        try:
-            self._file.seek(first * self._type.size)
-            while rest:
-                # An unbuffered file may take a part only.
-                rest = rest[self._file.write(rest) or 0 :]
-        except OSError as error:
-            raise BackendError(f"{self._file.name}: cannot be written ({_reason(error)})") from None
-
-    def extend_to(self, end: int) -> None:
-        """Make the recording `end` samples long, with silence. Raises BackendError."""
-        if self._file.closed:
-            return
-        size = end * self._type.size
-        try:
-            if self._file.seek(0, 2) < size:
-                self._file.truncate(size)
-        except OSError as error:
-            raise BackendError(f"{self._file.name}: cannot be written ({_reason(error)})") from None
-
-    def close(self) -> None:
-        """Close the file; closing twice is fine."""
-        self._file.close()
-
-
 def refuse_same(receive: Path, transmit: Path) -> None:
     """Raises BackendError when both name one recording: writing would empty it."""
     if sigmf_paths(receive)[1].resolve() == sigmf_paths(transmit)[1].resolve():
@@ -161,7 +94,7 @@ def describe(path: Path, type_name: str = "", rate_hz: float | None = None) -> R
             )
         return _described(path, sample_type(type_name, str(path)), rate_hz, None, [])
     except (OSError, ValueError) as error:
-        raise BackendError(f"{path}: cannot be read ({_reason(error)})") from None
+        raise BackendError(f"{path}: cannot be read ({reason(error)})") from None
 
 
 def _from_sigmf(
@@ -221,7 +154,8 @@ def _number(value: object, where: str, allowed: str = "a number") -> float | Non
     raise BackendError(f"{where}: got {str(value)[:40]}; allowed: {allowed}")
 
 
-def _reason(error: OSError | ValueError) -> str:
+def reason(error: OSError | ValueError) -> str:
+    """Why a file cannot be had, in words."""
     return error.strerror or str(error) if isinstance(error, OSError) else str(error)
 
 
