@@ -1,4 +1,4 @@
-"""From the configuration to a modem with its radio."""
+"""From the configuration to a radio, and to a modem with one."""
 
 import math
 import os
@@ -28,33 +28,48 @@ from sdrlinkd.modem.link import ModemLink
 # A device's settings that are configured under the same name.
 _SHARED = set(SoapyParams.__struct_fields__) & set(SoapySettings.__struct_fields__)
 
+PDU_BACKENDS = ("direct", "gnuradio")
+"""They carry PDUs, not samples."""
+
 
 def make_modem(config: Config, node_id: int, rng: Random) -> ModemLink:
     """The modem on the radio that `config.backend` names. Raises UserError."""
     _check_airtime(config)
-    try:
-        radio = _make_radio(config, node_id, rng)
-    except BackendError as error:
-        raise UserError(str(error)) from None
-    if config.modem.oversampling > 1:
-        radio = OversampledRadio(radio, config.modem.oversampling)
     policy = config.access.policy
     return ModemLink(
         config.modem,
         config.link.pdu_size,
-        radio,
+        make_radio(config, node_id, rng, _longest_burst_s(config)),
         config.backend,
         listens=policy != "none",
         lead_grows=policy == "tdma",
     )
 
 
-def _make_radio(config: Config, node_id: int, rng: Random) -> Radio:
+def make_radio(config: Config, node_id: int, rng: Random, longest_s: float) -> Radio:
+    """The radio that `config.backend` names, at the modem's rate. Raises UserError.
+
+    `longest_s`: no burst that it is given is longer.
+    """
+    if config.backend in PDU_BACKENDS:
+        raise ConfigError(
+            f'backend: got "{config.backend}", which has no radio; allowed: "loopback", "iqfile", '
+            '"ether", "zmq" or "soapy"'
+        )
+    try:
+        radio = _make_radio(config, node_id, rng, longest_s)
+    except BackendError as error:
+        raise UserError(str(error)) from None
+    factor = config.modem.oversampling
+    return OversampledRadio(radio, factor) if factor > 1 else radio
+
+
+def _make_radio(config: Config, node_id: int, rng: Random, longest_s: float) -> Radio:
     if config.backend == "ether":
         who = f"process {os.getpid()} on {socket.gethostname()}"
         return EtherRadio(Path(config.ether.dir), node_id, who)
     if config.backend == "soapy":
-        return _make_soapy(config)
+        return _make_soapy(config, longest_s)
     if config.backend == "zmq":
         zmq = config.zmq
         return ZmqRadio(
@@ -76,7 +91,7 @@ def _make_radio(config: Config, node_id: int, rng: Random) -> Radio:
     return LoopbackRadio(channel, modem.block_s, paced=loopback.paced, hear_self=loopback.hear_self)
 
 
-def _make_soapy(config: Config) -> Radio:
+def _make_soapy(config: Config, longest_s: float) -> Radio:
     modem, soapy = config.modem, config.soapy
     settings = SoapySettings(
         # What both have is called alike.
@@ -88,9 +103,13 @@ def _make_soapy(config: Config) -> Radio:
     shifts = soapy.offset_tuning == "on" or (
         soapy.offset_tuning == "auto" and modem.oversampling > 1
     )
-    longest_s = max(modem.max_burst_s, Airtimes(modem, config.link.pdu_size).airtime_s(0, 1))
     radio = SoapyRadio(settings, longest_s, soapy.dc_block)
     return OffsetRadio(radio) if shifts else radio
+
+
+def _longest_burst_s(config: Config) -> float:
+    modem = config.modem
+    return max(modem.max_burst_s, Airtimes(modem, config.link.pdu_size).airtime_s(0, 1))
 
 
 def _check_airtime(config: Config) -> None:
