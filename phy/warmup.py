@@ -4,6 +4,7 @@ import numpy as np
 
 from phy.channel import Path, PathParams
 from phy.mcs import MCS_TABLE
+from phy.oversampling import Downsampler, upsample
 from phy.receiver import Receiver
 from phy.sensing import CarrierSense
 from phy.transmitter import Transmitter
@@ -18,3 +19,4 @@ def warm_up() -> None:
         receiver.push(samples)
         sense.push(samples)
         receiver.flush()
+    Downsampler(2).push(upsample(samples, 2))
