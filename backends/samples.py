@@ -37,7 +37,10 @@ class SampleType:
         parts: NDArray[np.float32] = np.ascontiguousarray(samples, np.complex64).view(np.float32)
         if self.dtype.kind == "f":
             return parts.astype(self.dtype).tobytes(), 0
-        scaled = np.round(np.nan_to_num(parts) * np.float32(self.full_scale) + self.offset)
+        if not np.isfinite(parts).all():
+            parts = np.nan_to_num(parts)
+        with np.errstate(over="ignore"):
+            scaled = np.rint(parts * np.float32(self.full_scale) + np.float32(self.offset))
         low = -self.full_scale + self.offset
         clipped = np.clip(scaled, np.ceil(low), low + 2 * self.full_scale - 1)
         return clipped.astype(self.dtype).tobytes(), int(np.count_nonzero(clipped != scaled))

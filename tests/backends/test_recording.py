@@ -60,6 +60,12 @@ def test_integers_come_back_to_half_a_step_or_are_clipped_and_counted(
     assert np.all(back[beyond] == np.where(parts > 0, 1 - 1 / full_scale, -1)[beyond])
 
 
+def test_what_is_no_number_is_silence_and_what_is_infinite_full_scale(tmp_path):
+    samples = np.array([complex(np.nan, 0.5), complex(np.inf, -np.inf), 1e38], np.complex64)
+    assert record(tmp_path / "odd", samples, "ci8") == 3
+    assert read(tmp_path / "odd").tolist() == [0.5j, complex(127 / 128, -1), 127 / 128]
+
+
 @pytest.mark.parametrize(
     ("type_name", "width", "full_scale"), [("ci16_le", 2, 32768), ("ci8", 1, 128)]
 )
