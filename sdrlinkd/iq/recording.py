@@ -47,7 +47,7 @@ class IqRecording:
         self, network: int | None, progress: Progress, grid: phy.Numerology = phy.OFDM_64_16
     ) -> Iterator[tuple[phy.Event, phy.Receiver]]:
         """What a receiver of `network` (None: any) finds; `progress(samples read)` on the way."""
-        receiver = phy.Receiver(network, self._max_frequency(), grid)
+        receiver = phy.Receiver(network, max_frequency(self.info.rate_hz), grid)
         yield from self._decode(receiver, progress)
 
     def points(
@@ -62,7 +62,7 @@ class IqRecording:
             while len(pieces) > 1 and sum(map(len, pieces[1:])) >= MAX_POINTS:
                 del pieces[0]
 
-        receiver = phy.Receiver(network, self._max_frequency(), grid, on_points=keep)
+        receiver = phy.Receiver(network, max_frequency(self.info.rate_hz), grid, on_points=keep)
         bursts = [
             event.burst
             for event, _ in self._decode(receiver, progress)
@@ -88,6 +88,7 @@ class IqRecording:
         for event in receiver.flush():
             yield event, receiver
 
-    def _max_frequency(self) -> float:
-        """In cycles a sample."""
-        return min(0.25, MAX_CFO_HZ / self.info.rate_hz) if self.info.rate_hz else 0.1
+
+def max_frequency(rate_hz: float | None) -> float:
+    """The largest carrier offset looked for, in cycles a sample."""
+    return min(0.25, MAX_CFO_HZ / rate_hz) if rate_hz else 0.1
