@@ -1,8 +1,10 @@
-"""Recordings of samples: made from a radio, looked into."""
+"""Recordings of samples: made from a radio, looked into, sent again."""
 
 from sdrlinkd.iq.capture import Capture, CaptureReport, CaptureState, CaptureWish
 from sdrlinkd.iq.modem_info import McsInfo, ModemInfo, modem_info
 from sdrlinkd.iq.recording import IqRecording, Points
+from sdrlinkd.iq.replay import Replay, ReplayReport, ReplayState
+from sdrlinkd.iq.replay_plan import ReplayPlan, plan_replay
 from sdrlinkd.iq.spectrum import Spectrum, spectrum_of
 
 __all__ = [
@@ -14,7 +16,12 @@ __all__ = [
     "McsInfo",
     "ModemInfo",
     "Points",
+    "Replay",
+    "ReplayPlan",
+    "ReplayReport",
+    "ReplayState",
     "Spectrum",
     "modem_info",
+    "plan_replay",
     "spectrum_of",
 ]
