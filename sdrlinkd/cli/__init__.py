@@ -13,6 +13,7 @@ from sdrlinkd.cli import (
     plan,
     policy,
     radio,
+    record,
     status,
     wifi,
 )
@@ -20,5 +21,5 @@ from sdrlinkd.cli.app import main, run
 
 __all__ = [
     "bag", "bench", "demo", "dictionary", "lab", "latency", "main", "messages", "pdu", "phy",
-    "plan", "policy", "radio", "run", "status", "wifi",
+    "plan", "policy", "radio", "record", "run", "status", "wifi",
 ]  # fmt: skip

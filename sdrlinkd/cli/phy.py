@@ -56,7 +56,7 @@ def info(
     """Carriers, rates and airtimes of every MCS."""
     from sdrlinkd.iq import modem_info
 
-    told = modem_info(rate, pdu_size, max_burst, _grid(grid))
+    told = modem_info(rate, pdu_size, max_burst, grid_named(grid))
     if json:
         typer.echo(msgspec.json.encode(told))
         return
@@ -110,7 +110,7 @@ def decode(
     ):
         pdus: list[tuple[int, bytes]] = []
         for event, receiver in recording.decode(
-            None if network < 0 else network, progress, _grid(grid)
+            None if network < 0 else network, progress, grid_named(grid)
         ):
             counters = dict(receiver.counters)
             ending = getattr(event, "ending", None)
@@ -163,7 +163,7 @@ def constellation(
         open_recording(file, type_name, rate) as recording,
         show_progress(f"points in {file.name}", recording) as progress,
     ):
-        points = recording.points(None if network < 0 else network, progress, _grid(grid))
+        points = recording.points(None if network < 0 else network, progress, grid_named(grid))
     if not points.by_modulation:
         raise UserError(
             f"{file}: no burst was found in {recording.info.n_samples} samples; "
@@ -175,7 +175,8 @@ def constellation(
     console.print(f"wrote {path}", highlight=False, markup=False, soft_wrap=True)
 
 
-def _grid(name: str) -> "phy.Numerology":
+def grid_named(name: str) -> "phy.Numerology":
+    """The grid that --grid names. Raises UserError."""
     import phy
 
     if name not in phy.GRIDS:

@@ -1,0 +1,23 @@
+"""Ctrl-C that ends a command well instead of breaking it off."""
+
+import asyncio
+import contextlib
+import signal
+from collections.abc import Callable, Iterator
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@contextlib.contextmanager
+def stopped_by_signals(stop: Callable[[], None]) -> Iterator[None]:
+    """Ctrl-C, a kill and a closed terminal call `stop`, on the event loop of the main thread."""
+    loop = asyncio.get_running_loop()
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    for number in SIGNALS:
+        loop.add_signal_handler(number, stop)
+    try:
+        yield
+    finally:
+        for number, was in before.items():
+            loop.remove_signal_handler(number)
+            signal.signal(number, was)
