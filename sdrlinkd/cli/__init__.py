@@ -14,6 +14,7 @@ from sdrlinkd.cli import (
     policy,
     radio,
     record,
+    replay,
     status,
     wifi,
 )
@@ -21,5 +22,5 @@ from sdrlinkd.cli.app import main, run
 
 __all__ = [
     "bag", "bench", "demo", "dictionary", "lab", "latency", "main", "messages", "pdu", "phy",
-    "plan", "policy", "radio", "record", "run", "status", "wifi",
+    "plan", "policy", "radio", "record", "replay", "run", "status", "wifi",
 ]  # fmt: skip
