@@ -51,6 +51,7 @@ bench: $(DEV_STAMP)
 	$(BIN)/python -m benchmarks.access
 	$(BIN)/python -m benchmarks.ether
 	$(BIN)/python -m benchmarks.radio
+	$(BIN)/python -m benchmarks.flowgraphs
 	$(BIN)/python -m benchmarks.pound
 
 system-packages:

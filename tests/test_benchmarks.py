@@ -10,6 +10,7 @@ import pytest
 
 from benchmarks.phy_per import false_pdus_in
 from phy import Transmitter
+from tests.pdulink.gnu_radio import no_gnu_radio
 from tests.soapy_loopback import missing as no_test_radio
 
 ROOT = Path(__file__).parents[1]
@@ -115,6 +116,12 @@ ROWS = {
             for each in ("p50_ms", "p99_ms", "pdr")
         ),
     },
+    "flowgraphs": {
+        f"{modem}_{size}b_{each}"
+        for modem in ("ofdm_bpsk", "ofdm_qpsk", "gfsk")
+        for size in (64, 220, 1000)
+        for each in ("pdr", "p50_ms", "pdus_per_s")
+    },
     "ether": {
         "lockstep_8nodes_1msps_realtime_ratio",
         "realtime_2nodes_5msps_lost_blocks",
@@ -125,7 +132,7 @@ ROWS = {
 # Those of recordings that are not everywhere.
 OPTIONAL = {"ptp_over_wifi_strays_ms"}
 # Why one cannot run here, if so.
-LACKING = {"radio": no_test_radio}
+LACKING = {"radio": no_test_radio, "flowgraphs": no_gnu_radio}
 # Peers take their time, and a machine of their own to themselves.
 MORE = {"pound": ("--no-peers",)}
 
