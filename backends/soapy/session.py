@@ -18,7 +18,7 @@ from backends.soapy.streaming import Sender, stream
 from backends.soapy.surface import RX, TX, DriverError, Library, Stream
 from backends.soapy.timed import TimedSender
 
-RETRY_S = 0.25, 1.0
+RETRY_S = 0.25, 0.5
 """A device that went away is looked for again after so long; more each time."""
 LOOK_S = 0.1
 

@@ -103,7 +103,7 @@ def test_traffic_flows_again_when_a_device_is_back(start_daemon, bus, fault):
                 while listener.receive(0) is not None:
                     continue
                 air_.inject(unit, "replug")
-                wait_for(send, 2.0 + SLOW_S)
+                wait_for(send, BACK_S)
             else:
                 wait_for(lambda unit=unit: robots[unit - 1].snapshot().carrier.state == "up")
                 wait_for(send)
@@ -112,8 +112,8 @@ def test_traffic_flows_again_when_a_device_is_back(start_daemon, bus, fault):
         assert_whole(robot)
 
 
-SLOW_S = 2.0
-"""A process that starts anew on a busy machine."""
+BACK_S = 2.0
+"""After its device is back, a daemon sends and hears again so soon."""
 
 
 def test_a_driver_that_hangs_is_given_up(start_daemon, bus):
