@@ -21,7 +21,8 @@ from backends.soapy.surface import (
 from backends.soapy.traits import HANDOVER_S
 
 WRITE_US = 100_000
-QUIET_S = 0.1
+BUSY_S, QUIET_S = 0.002, 0.1
+"""How long orders are waited for while one is not due yet, and while none is there."""
 
 
 @dataclass
@@ -73,7 +74,7 @@ class CountedSender:
 
     def step(self) -> None:
         """Wait for orders a little; if there are any, send for a spell."""
-        self._orders.wait(QUIET_S)
+        self._orders.wait(BUSY_S if self._orders.waiting else QUIET_S)
         if self.is_due():
             self.send_spell()
 

@@ -72,7 +72,7 @@ class ZmqRadio:
         self._gap = 0
         self._unsent = b""
         self.counters = {
-            "overflows": 0, "samples_lost": 0, "late": 0, "outages": 0, "bad_messages": 0,
+            "skips": 0, "samples_lost": 0, "late": 0, "outages": 0, "bad_messages": 0,
             "clipped": 0,
         }  # fmt: skip
 
@@ -233,7 +233,7 @@ class ZmqRadio:
             ahead = self._received + self._lead - self._sent
             if ahead > 2 * self._lead:
                 # Nobody took it: what was to be sent at that time is not any more.
-                self.counters["overflows"] += 1
+                self.counters["skips"] += 1
                 self._next_samples(ahead - self._lead)
                 continue
             n = sink.wanted(min(ahead, self._n)) if ahead > 0 else 0
