@@ -57,6 +57,8 @@ def _table(device: "DeviceSurvey", ahead: "Outlook", rate_hz: float) -> Table:
         title=device.label or device.device, title_justify="left", box=box.SIMPLE_HEAD,
         show_header=False, pad_edge=False,
     )  # fmt: skip
+    for _ in range(2):
+        table.add_column(overflow="fold")
     table.add_row("soapy.device", f'"{device.device}"')
     if device.problem:
         table.add_row("cannot be used", device.problem)
