@@ -21,7 +21,7 @@ from backends.base import (
     TxReport,
 )
 from backends.outstanding import GAP
-from backends.recording import RecordingInfo, RecordingReader, describe, refuse_same
+from backends.recording import GAP_LABEL, RecordingInfo, RecordingReader, describe, refuse_same
 from backends.samples import SAMPLE_TYPES
 from backends.soapy import (
     DeviceSurvey,
@@ -63,6 +63,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "GAP",
+    "GAP_LABEL",
     "SAMPLE_TYPES",
     "SENDING",
     "AirParams",

@@ -3,13 +3,14 @@
 import contextlib
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from backends.base import BackendError, Samples
 from backends.samples import SampleType, sample_type
 
+GAP_LABEL = "gap"
 META_SUFFIX, DATA_SUFFIX = ".sigmf-meta", ".sigmf-data"
 RAW_TYPES = {
     ".cf32": "cf32_le", ".fc32": "cf32_le", ".cfile": "cf32_le", ".c32": "cf32_le",
@@ -30,6 +31,8 @@ class RecordingInfo:
     frequency_hz: float | None
     damage: str
     """What is wrong with it without keeping it from being read."""
+    gaps: tuple[tuple[int, int], ...] = ()
+    """(first, n) of samples that are missing, by its annotations; they are silence."""
 
 
 class RecordingReader:
@@ -107,6 +110,7 @@ def _from_sigmf(
         stated_type = str(general["core:datatype"])
         channels = general.get("core:num_channels", 1)
         starts = [capture.get("core:sample_start", 0) for capture in captures]
+        gaps = _gaps(meta.get("annotations"))
         frequency = captures[0].get("core:frequency") if captures else None
         framed = [
             key
@@ -139,7 +143,19 @@ def _from_sigmf(
     kind = sample_type(stated_type, f"{meta_path}: core:datatype")
     carrier = _number(frequency, f"{meta_path}: core:frequency")
     begins = [_number(each, f"{meta_path}: core:sample_start") or 0.0 for each in starts]
-    return _described(data_path, kind, stated_rate or rate_hz, carrier, begins)
+    described = _described(data_path, kind, stated_rate or rate_hz, carrier, begins)
+    return replace(described, gaps=gaps)
+
+
+def _gaps(annotations: object) -> tuple[tuple[int, int], ...]:
+    """Those that are told as we do; what else others annotate is no business of ours."""
+    found = []
+    for each in annotations if isinstance(annotations, list) else []:
+        if isinstance(each, dict) and each.get("core:label") == GAP_LABEL:
+            start, n = each.get("core:sample_start"), each.get("core:sample_count")
+            if isinstance(start, int) and isinstance(n, int):
+                found.append((start, n))
+    return tuple(found)
 
 
 def _number(value: object, where: str, allowed: str = "a number") -> float | None:

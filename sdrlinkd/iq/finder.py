@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 
 import phy
-from backends import Annotation, Samples
+from backends import GAP_LABEL, Annotation, Samples
 from sdrlinkd.iq.recording import max_frequency
 
 PIECE = 1 << 16
@@ -47,7 +47,7 @@ class BurstFinder:
         """`n` samples from `start` on are missing."""
         self._gaps.append((start, n))
         told = f"{reason}: {n} samples, {1e3 * n / self._rate_hz:.3f} ms"
-        self.annotations.append(Annotation(start, n, "gap", told))
+        self.annotations.append(Annotation(start, n, GAP_LABEL, told))
 
     def look(self, end: int, least: int = 1) -> bool:
         """Look at the next piece before `end`; False: there are not even `least` samples."""

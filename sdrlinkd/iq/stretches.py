@@ -35,12 +35,14 @@ class Stretch(NamedTuple):
 def silence_of(recording: IqRecording) -> float:
     """The power below which it is silent: a little above the quietest there is.
 
-    What is only now and then more than 0, and then by the least step, is silent, too.
+    What is only now and then more than 0, and then by the least step, is silent, too. Where samples
+    are missing, nobody knows.
     """
     n_samples, kind = recording.info.n_samples, recording.info.type
     firsts = np.linspace(0, max(0, n_samples - LOOK), N_LOOKS).astype(int)
-    looks = [_powers(recording.read(int(first), LOOK)) for first in np.unique(firsts)]
-    quiet = float(np.percentile(np.concatenate(looks), QUIET_PERCENT))
+    looks = [_heard_powers(recording, int(first)) for first in np.unique(firsts)]
+    heard = np.concatenate(looks)
+    quiet = float(np.percentile(heard, QUIET_PERCENT)) if len(heard) else 0.0
     step = 0.0 if kind.dtype.kind == "f" else 1 / kind.full_scale
     return max(quiet * 10 ** (ABOVE_DB / 10), 2 * step**2)
 
@@ -64,6 +66,16 @@ def stretches_of(
                 raise _too_long(recording, run[0] * WINDOW, most, silence)
         progress(min(first + PIECE, n_samples))
     return [_stretch(recording, *run) for run in runs]
+
+
+def _heard_powers(recording: IqRecording, first: int) -> NDArray[np.float32]:
+    powers = _powers(recording.read(first, LOOK))
+    begins = first + WINDOW * np.arange(len(powers))
+    is_heard = np.ones(len(powers), bool)
+    for start, n in recording.info.gaps:
+        if start < first + LOOK and first < start + n:
+            is_heard &= (begins + WINDOW <= start) | (begins >= start + n)
+    return powers[is_heard]
 
 
 def _powers(samples: Samples) -> NDArray[np.float32]:

@@ -5,11 +5,11 @@ import json
 import pytest
 import sigmf
 
-from backends import Annotation, BackendError, RecordingWriter, describe
+from backends import GAP_LABEL, Annotation, BackendError, RecordingWriter, describe
 from tests.backends.radios import RATE, TUNING, noise, read
 
 BURST = Annotation(20, 30, "burst", "QPSK 1/2", (867.9e6, 868.1e6))
-GAP = Annotation(5, 10, "gap", "the radio lost samples")
+GAP = Annotation(5, 10, GAP_LABEL, "the radio lost samples")
 EPOCH_NS = 1_700_000_000_123_456_789
 
 
@@ -49,6 +49,7 @@ def test_annotations_and_captures_are_valid_sigmf(annotated):
     assert (second["core:sample_start"], second["core:datetime"][17:19]) == (15, "21")
     assert second["core:frequency"] == TUNING.frequency_hz
     assert describe(annotated).n_samples == 100
+    assert describe(annotated).gaps == ((5, 10),)
 
 
 def test_a_recording_that_is_cut_off_reads(tmp_path):

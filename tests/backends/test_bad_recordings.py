@@ -68,6 +68,13 @@ def test_a_type_asked_for_that_does_not_exist_is_named(tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.parametrize(
+    "annotations", [None, 5, [5], [{}], [{"core:label": "gap", "core:sample_start": 1e400}]]
+)
+def test_odd_annotations_are_of_no_matter(write, annotations):
+    assert describe(write({**GOOD, "annotations": annotations})).gaps == ()
+
+
 def test_a_bare_file_of_unknown_ending_needs_a_type(tmp_path):
     path = tmp_path / "bare.bin"
     path.write_bytes(bytes(8))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from backends import RecordingWriter
+from backends import GAP_LABEL, Annotation, RecordingWriter
 from sdrlinkd.errors import UserError
 from sdrlinkd.iq import IqRecording, plan_replay
 from sdrlinkd.iq.stretches import PAUSE, WINDOW
@@ -77,6 +77,19 @@ def test_what_is_longer_than_two_seconds_is_refused(tmp_path):
         planned(tmp_path, samples)
     plan = planned(tmp_path, samples[: 100_000 + round(1.5 * RATE_HZ)])
     assert plan.room_s == pytest.approx(0.5 + 1.5 * plan.stretches[0].n / RATE_HZ)
+
+
+def test_gaps_are_not_the_silence(tmp_path):
+    samples, _ = air([2000, 12_000], 20_000)
+    samples[5000:9000] = 0
+    writer = RecordingWriter(tmp_path / "rec", "ci16_le", RATE_HZ, 0)
+    writer.write(0, samples)
+    writer.describe([Annotation(5000, 4000, GAP_LABEL, "")])
+    writer.close()
+    with IqRecording(tmp_path / "rec") as recording:
+        plan = plan_replay(recording, RATE_HZ, None, None, lambda _: None)
+    assert len(plan.stretches) == 2
+    assert -50 < plan.silence_dbfs < -40
 
 
 def test_all_alike_is_silence_or_none(tmp_path):
