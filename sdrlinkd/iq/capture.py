@@ -1,6 +1,7 @@
 """From a radio into a recording, with annotations of every burst; nothing is ever sent."""
 
 import asyncio
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple, Self
@@ -13,6 +14,8 @@ from sdrlinkd.iq.finder import BurstFinder
 from sdrlinkd.iq.keeper import Keeper
 
 LOOK_S = 0.1
+SWITCH_INTERVAL_S = 1e-4
+"""Else who looks for bursts keeps the radio's thread from the interpreter for 5 ms at a time."""
 WAITING_S = 1.0
 """So much may wait for a slow disk."""
 
@@ -96,6 +99,8 @@ class Capture:
             finder, keeper = self._begin()
         except BackendError as error:
             raise UserError(str(error)) from None
+        interval_s = sys.getswitchinterval()
+        sys.setswitchinterval(SWITCH_INTERVAL_S)
         async with asyncio.TaskGroup() as tasks:
             watching = tasks.create_task(self._watch(watch, finder, keeper))
             receiving = tasks.create_task(self._receive(keeper))
@@ -107,6 +112,7 @@ class Capture:
                 await self._radio.close()
                 await asyncio.to_thread(keeper.finish)
                 watching.cancel()
+                sys.setswitchinterval(interval_s)
         if isinstance(keeper.failure, BackendError):
             raise UserError(str(keeper.failure))
         if keeper.failure is not None:
