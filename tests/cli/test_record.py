@@ -10,7 +10,6 @@ import pytest
 import sigmf
 
 from sdrlinkd.cli import run
-from tests.backends.conftest import own_rights  # noqa: F401
 from tests.iq.recordings import write_bursts
 from tests.waiting import wait_for
 
