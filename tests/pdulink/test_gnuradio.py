@@ -61,6 +61,32 @@ async def test_bad_messages_are_counted_and_the_next_one_works(tmp_path):
     context.destroy(linger=0)
 
 
+async def test_nothing_is_published_before_anybody_has_subscribed(tmp_path):
+    transport = ZmqTransport(f"ipc://{tmp_path}/out", f"ipc://{tmp_path}/in", publishes=True)
+    await transport.open(print)
+    context = zmq.Context()
+    assert not transport.is_ready()
+    for _ in range(2):
+        flowgraph = context.socket(zmq.SUB)
+        flowgraph.setsockopt(zmq.SUBSCRIBE, b"")
+        flowgraph.connect(f"ipc://{tmp_path}/out")
+        await until(transport.is_ready)
+        assert transport.send(whole(1))
+        assert flowgraph.poll(20_000)
+        assert from_gnu_radio(flowgraph.recv()) == whole(1)
+        flowgraph.close()
+        await until(lambda: not transport.is_ready())
+    transport.close()
+    context.destroy(linger=0)
+
+
+async def until(condition):
+    """ZeroMQ tells of peers only to who asks."""
+    async with asyncio.timeout(20):
+        while not condition():  # noqa: ASYNC110
+            await asyncio.sleep(0.005)
+
+
 @pytest.mark.parametrize("cut", [1, 7, 63, 64, 65, 1000])
 async def test_a_stream_of_octets_is_cut_where_pdus_are_whole(cut):
     """From any beginning, in any pieces."""

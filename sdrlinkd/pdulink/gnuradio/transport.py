@@ -2,6 +2,7 @@
 
 import asyncio
 import binascii
+import contextlib
 from collections.abc import Callable
 from typing import Protocol, cast
 
@@ -43,9 +44,10 @@ class ZmqTransport:
 
     def __init__(self, send: str, receive: str, publishes: bool) -> None:
         self._send, self._receive = send, receive
-        self._kinds = (zmq.PUB, zmq.SUB) if publishes else (zmq.PUSH, zmq.PULL)
+        self._kinds = (zmq.XPUB, zmq.SUB) if publishes else (zmq.PUSH, zmq.PULL)
         self._publishes = publishes
         self._context = zmq.Context()
+        self._subscribed = 0
         self._out: zmq.Socket[bytes] | None = None
         self._reader: SocketReader[bytes] | None = None
         self.counters = {"bad_messages": 0}
@@ -79,10 +81,16 @@ class ZmqTransport:
         self._reader = SocketReader(asyncio.get_running_loop(), into, into.recv, taken)
 
     def is_ready(self) -> bool:
-        """A publisher never waits; else only when a flowgraph takes it."""
-        if self._out is None:
+        """When a flowgraph takes it, or has subscribed to it."""
+        out = self._out
+        if out is None:
             return False
-        return self._publishes or bool(int(self._out.getsockopt(zmq.EVENTS)) & zmq.POLLOUT)
+        if not self._publishes:
+            return bool(int(out.getsockopt(zmq.EVENTS)) & zmq.POLLOUT)
+        with contextlib.suppress(zmq.Again):
+            while True:
+                self._subscribed += 1 if out.recv(zmq.NOBLOCK)[:1] == b"\1" else -1
+        return self._subscribed > 0
 
     def send(self, pdu: bytes) -> bool:
         """Hand one over."""
