@@ -1,45 +1,62 @@
-"""A peer: who receives in a thread of a busy process, by SoapySDR's C library.
+"""Peers: who receives in a thread of a busy process, by SoapySDR's C library; and GNU Radio.
 
-`python -m benchmarks.radio.bare DEVICE RATE_HZ SECONDS CHUNK SWITCH_S` prints the samples lost.
+`python -m benchmarks.radio.bare DEVICE SECONDS CHUNK SWITCH_S RATE_HZ…` prints the samples lost at
+each rate.
 """
 
 import subprocess
 import sys
 import threading
 import time
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from backends.soapy.native import NativeLibrary
 from backends.soapy.surface import HAS_TIME, OVERFLOW, RX, TIMEOUT
-from benchmarks.radio.driver import a_bus
+from benchmarks.radio.driver import ROOT, a_bus
 
 WAYS = {"thread": (4096, 5e-3), "tuned_thread": (65536, 5e-4)}
-"""Samples of a read, and how long Python lets a thread run; what is tuned comes last."""
-SHARE = 0.25
-NOTE = (
-    "thread: receives 4096 samples a read and nothing else, beside a main thread of pure Python; "
-    "tuned: 65536, and threads take turns every 0.5 ms; measured for a quarter of the time, and "
-    "scaled"
+"""Samples of a read, and how long Python lets a thread run."""
+THREADS = (
+    "thread: one robot's receiver and nothing else, 4096 samples a read, beside a main thread of "
+    "pure Python; tuned_thread: 65536, and threads take turns every 0.5 ms; both scaled to our time"
 )
+DEVICE = "driver=loopback,bus={bus},model=usrp"
 TIMEOUT_US = 100_000
+SYSTEM_PYTHON = "/usr/bin/python3"
+FLOWGRAPH = Path(__file__).with_name("flowgraph.py")
 
 
-def peers(msps: int, seconds: float) -> dict[str, float]:
-    """Samples that each would have lost."""
-    return {
-        name: _lost(1e6 * msps, SHARE * seconds, chunk, switch_s) / SHARE
-        for name, (chunk, switch_s) in WAYS.items()
-    }
+def lost_in_threads(rates_msps: Sequence[int], seconds: float) -> dict[str, dict[int, float]]:
+    """Samples a second that each loses, by rate."""
+    module = [sys.executable, "-m", "benchmarks.radio.bare"]
+    lost = {}
+    for name, numbers in WAYS.items():
+        told = _told(module, rates_msps, seconds, *numbers)
+        lost[name] = {each: n / seconds for each, n in told.items()}
+    return lost
 
 
-def _lost(rate_hz: float, seconds: float, chunk: int, switch_s: float) -> int:
+def flowgraph_cpu_pct(rates_msps: Sequence[int], seconds: float) -> dict[int, float]:
+    """Of one core for each radio, by rate; empty without GNU Radio."""
+    try:
+        return _told([SYSTEM_PYTHON, str(FLOWGRAPH)], rates_msps, seconds)
+    except (OSError, subprocess.CalledProcessError):
+        return {}
+
+
+def _told(
+    program: list[str], rates_msps: Sequence[int], seconds: float, *numbers: float
+) -> dict[int, float]:
+    """A figure for each rate, in the last line that the program prints."""
+    given = map(str, (seconds, *numbers, *(1e6 * each for each in rates_msps)))
     with a_bus() as bus:
-        device = f"driver=loopback,bus={bus},model=usrp"
-        numbers = map(str, (rate_hz, seconds, chunk, switch_s))
-        command = [sys.executable, "-m", "benchmarks.radio.bare", device, *numbers]
-        done = subprocess.run(command, check=True, capture_output=True, text=True)
-    return int(done.stdout)
+        command = [*program, DEVICE.format(bus=bus), *given]
+        done = subprocess.run(command, check=True, capture_output=True, text=True, cwd=ROOT)
+    figures = done.stdout.splitlines()[-1].split()
+    return dict(zip(rates_msps, map(float, figures), strict=True))
 
 
 class _Counting:
@@ -75,15 +92,18 @@ class _Counting:
 def main() -> None:
     """Receive beside a main thread that never waits."""
     device = sys.argv[1]
-    rate_hz, seconds, chunk, switch_s = (float(each) for each in sys.argv[2:6])
+    seconds, chunk, switch_s, *rates_hz = (float(each) for each in sys.argv[2:])
     sys.setswitchinterval(switch_s)
-    counting = _Counting(device, rate_hz, round(chunk))
-    thread = threading.Thread(target=counting.run, args=(seconds,))
-    thread.start()
-    turns = 0
-    while thread.is_alive():
-        turns += 1
-    print(counting.lost)
+    lost = []
+    for rate_hz in rates_hz:
+        counting = _Counting(device, rate_hz, round(chunk))
+        thread = threading.Thread(target=counting.run, args=(seconds,))
+        thread.start()
+        turns = 0
+        while thread.is_alive():
+            turns += 1
+        lost.append(counting.lost)
+    print(*lost)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,8 +19,6 @@ from sdrlinkd.client import ControlClient, Publisher, Subscriber
 RATES_MSPS = (1, 2, 5, 10)
 SURE_MSPS = 5
 """Beyond that, no machine is promised to keep up."""
-SECONDS, QUICK_S = 20.0, 4.0
-WARM_UP_S = 2.0
 REFILL_S = 0.25
 AHEAD_S = 1.0
 """Of the air's time, at least, waits while the transmitter is kept busy."""
@@ -33,6 +32,17 @@ frequency_hz = 915e6
 [topic.load]
 qos = "bulk"
 """
+
+
+class Times(NamedTuple):
+    """At each rate."""
+
+    warm_up_s: float
+    measured_s: float
+    peer_s: float
+
+
+WHOLE, QUICK = Times(2.0, 20.0, 5.0), Times(1.0, 4.0, 0.5)
 
 
 @dataclass(frozen=True)
@@ -51,6 +61,10 @@ class Span:
         """What a counter of its carrier has grown by."""
         return self.last.counter(name) - self.first.counter(name)
 
+    def cpu_pct(self, part: str) -> float:
+        """Processor time of `daemon` or `radio_process`, of one core."""
+        return 100 * (self.last.cpu_s[part] - self.first.cpu_s[part]) / self.seconds
+
     def link(self, way: str, name: str) -> int:
         """The same of the link's."""
         return int(self.last.status["link"][way][name] - self.first.status["link"][way][name])
@@ -58,52 +72,61 @@ class Span:
 
 def rows(seed: int, quick: bool) -> Iterator[Row]:
     """Four of each rate."""
-    seconds = QUICK_S if quick else SECONDS
+    times = QUICK if quick else WHOLE
+    threads = bare.lost_in_threads(RATES_MSPS, times.peer_s)
+    flowgraphs = {} if quick else bare.flowgraph_cpu_pct(RATES_MSPS, times.peer_s)
     for msps in RATES_MSPS:
-        yield from _rows_of(msps, under_load(1e6 * msps, seconds, seed), bare.peers(msps, seconds))
+        spans = under_load(1e6 * msps, times, seed)
+        lost = {name: of[msps] for name, of in threads.items()}
+        yield from _rows_of(msps, spans, lost, flowgraphs.get(msps))
 
 
-def under_load(rate_hz: float, seconds: float, seed: int) -> list[Span]:
+def under_load(rate_hz: float, times: Times, seed: int) -> list[Span]:
     """Of each robot. Raises PeerError."""
     with (
         pair("usrp", "load", CONFIG.format(rate=rate_hz)) as robots,
         _busy(robots.folders, rate_hz, seed),
     ):
-        time.sleep(WARM_UP_S)
+        time.sleep(times.warm_up_s)
         first = [robots.look(robot) for robot in ROBOTS]
-        time.sleep(seconds)
+        time.sleep(times.measured_s)
         last = [robots.look(robot) for robot in ROBOTS]
     return [Span(*each) for each in zip(first, last, strict=True)]
 
 
-def _rows_of(msps: int, spans: list[Span], threads: dict[str, float]) -> Iterator[Row]:
+def _rows_of(
+    msps: int, spans: list[Span], lost_a_s: dict[str, float], flowgraph: float | None
+) -> Iterator[Row]:
     name = f"usrp_like_{msps}msps"
     target = 0.0 if msps <= SURE_MSPS else None
     rate_hz, one = 1e6 * msps, spans[0]
-    seconds = sum(span.seconds for span in spans)
-    on_air_pct = 100 * min(span.count("samples_sent") / span.seconds / rate_hz for span in spans)
-    heard = sum(span.link("rx", "pdus_heard") for span in spans)
-    sent = sum(span.link("tx", "pdus_sent") for span in spans)
-    bursts = sum(span.link("tx", "bursts_sent") for span in spans)
-    note = f"{one.seconds:.1f} s, both robots; {on_air_pct:.1f} % of it on the air"
-    yield Row(f"{name}_lost_samples", sum(span.count("samples_lost") for span in spans), "samples",
-              target, "less", round(rate_hz * seconds), threads,
-              note=f"{note}; {heard} of {sent} PDUs heard; {bare.NOTE}")  # fmt: skip
-    yield Row(f"{name}_underflows", sum(span.count("underflows") for span in spans), "bursts",
-              target, "less", bursts, {"late": sum(span.count("late") for span in spans),
-                                       "on_air_pct": on_air_pct}, note=note)  # fmt: skip
-    for part, cpu_s in (
-        ("daemon", one.last.daemon_cpu_s - one.first.daemon_cpu_s),
-        ("radio_process", one.last.radio_cpu_s - one.first.radio_cpu_s),
-    ):
-        yield Row(f"{name}_{part}_cpu_pct", 100 * cpu_s / one.seconds, "%", None, "less",
-                  round(one.seconds), note=NOTES[part])  # fmt: skip
+    on_air = min(span.count("samples_sent") / span.seconds / rate_hz for span in spans)
+    sent, heard, bursts = (
+        sum(span.link(*of) for span in spans)
+        for of in (("tx", "pdus_sent"), ("rx", "pdus_heard"), ("tx", "bursts_sent"))
+    )
+    lost, underflows, late = (
+        sum(span.count(each) for span in spans) for each in ("samples_lost", "underflows", "late")
+    )
+    note = f"both robots, {one.seconds:.1f} s; {heard} PDUs heard of {sent}"
+    yield Row(f"{name}_lost_samples", lost, "samples", target, "less",
+              round(rate_hz * sum(span.seconds for span in spans)),
+              {each: a_second * one.seconds for each, a_second in lost_a_s.items()},
+              note=f"{note}; {bare.THREADS}")  # fmt: skip
+    yield Row(f"{name}_underflows", underflows, "bursts", target, "less", bursts,
+              {"late": late, "on_air_pct": 100 * on_air}, note=note)  # fmt: skip
+    for part, peers in (
+        ("daemon", {}), ("radio_process", {} if flowgraph is None else {"gnu_radio": flowgraph})
+    ):  # fmt: skip
+        yield Row(f"{name}_{part}_cpu_pct", one.cpu_pct(part), "%", None, "less",
+                  round(one.seconds), peers, note=NOTES[part])  # fmt: skip
 
 
 NOTES = {
-    "daemon": "of one core, user and system, in s of robot 1's daemon",
-    "radio_process": "of one core, user and system, in s of robot 1's radio process, the test "
-    "radio's driver with it: what converters, filters and air would do elsewhere",
+    "daemon": "of one core, user and system, robot 1's daemon; trials: seconds",
+    "radio_process": "of one core, user and system, robot 1's radio process and in it the test "
+    "radio's driver, which computes what converters and the air do elsewhere; gnu_radio: source "
+    "and sink alone, no bursts, with the same driver; trials: seconds",
 }
 
 

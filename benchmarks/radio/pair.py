@@ -25,12 +25,11 @@ DEVICE = 'device = "driver=loopback,bus={bus},unit={unit},model={model},noise_db
 
 @dataclass(frozen=True)
 class Look:
-    """A moment of a daemon: its status; processor seconds of it and its radio process so far."""
+    """A moment of a daemon: its status; processor time so far, its radio process's beside it."""
 
     at: float
     status: dict[str, Any]
-    daemon_cpu_s: float
-    radio_cpu_s: float
+    cpu_s: dict[str, float]
 
     def counter(self, name: str) -> int:
         """One of its carrier's."""
@@ -52,7 +51,8 @@ class Pair:
         radio = daemon.usage_below()
         if len(radio) != 1:
             raise PeerError(f"{daemon.name} has {len(radio)} radio processes; {daemon.words()}")
-        return Look(time.monotonic(), status, daemon.usage().cpu_s, radio[0].cpu_s)
+        cpu_s = {"daemon": daemon.usage().cpu_s, "radio_process": radio[0].cpu_s}
+        return Look(time.monotonic(), status, cpu_s)
 
 
 @contextmanager
