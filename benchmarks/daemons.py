@@ -1,7 +1,7 @@
 """Daemons of a benchmark, and the hub of their air, as programs of their own."""
 
 import time
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -34,6 +34,16 @@ class Running(NamedTuple):
     children: list[Child]
 
 
+def hears_one(daemon: ControlClient) -> bool:
+    """Whether it hears another robot."""
+    return bool(daemon.ask("peers"))
+
+
+def is_up(daemon: ControlClient) -> bool:
+    """Whether its radio works."""
+    return bool(daemon.ask("status")["carrier"]["state"] == "up")
+
+
 @contextmanager
 def running(
     backend: str,
@@ -44,8 +54,9 @@ def running(
     *,
     precede: bool = False,
     own: Mapping[int, str] | None = None,
+    ready: Callable[[ControlClient], bool] = hears_one,
 ) -> Iterator[Running]:
-    """Until every daemon hears one, and then. Raises PeerError.
+    """Until every daemon is `ready`, and then. Raises PeerError.
 
     `config` are TOML tables for each of them, `own` those of one; `scenario` is for the hub of an
     ether. With `precede` they go before what else this machine does.
@@ -70,22 +81,26 @@ def running(
             if precede:
                 children[-1].precede(real_time=False)
         folders = {robot: folder / str(robot) for robot in robots}
-        _wait_for(folders, children)
+        _wait_for(folders, children, ready)
         yield Running(folders, folder / "air", children)
 
 
-def _wait_for(folders: dict[int, Path], children: list[Child]) -> None:
+def _wait_for(
+    folders: dict[int, Path], children: list[Child], ready: Callable[[ControlClient], bool]
+) -> None:
     until = time.monotonic() + START_S
+    waiting = list(folders.values())
     while time.monotonic() < until and not any(child.has_ended for child in children):
         try:
-            heard = 0
-            for folder in folders.values():
-                with ControlClient(folder) as control:
-                    heard += len(control.ask("peers"))
-            if heard == len(folders):
+            while waiting:
+                with ControlClient(waiting[-1]) as control:
+                    if not ready(control):
+                        break
+                waiting.pop()
+            else:
                 return
         except (NoDaemonError, OSError):
             pass
         time.sleep(0.2)
     words = "\n".join(f"{child.name}: {child.words()}" for child in children)
-    raise PeerError(f"the daemons hear nobody; {words}")
+    raise PeerError(f"the daemons do not get ready; {words}")

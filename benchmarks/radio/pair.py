@@ -57,7 +57,7 @@ class Pair:
 
 @contextmanager
 def pair(model: str, topic: str, tables: str, soapy: str = "", more: str = "") -> Iterator[Pair]:
-    """Until each hears the other, and then. Raises PeerError.
+    """Until both radios work, and then. Raises PeerError.
 
     TOML: `tables`, with that of the modem, and more lines of `soapy`; `more` of the device's
     arguments.
@@ -67,5 +67,7 @@ def pair(model: str, topic: str, tables: str, soapy: str = "", more: str = "") -
         own = {
             robot: DEVICE.format(bus=bus, unit=robot, model=model, more=more) for robot in ROBOTS
         }
-        with daemons.running("soapy", ROBOTS, [topic], config, "", own=own) as running:
+        with daemons.running(
+            "soapy", ROBOTS, [topic], config, "", own=own, ready=daemons.is_up
+        ) as running:
             yield Pair(running.folders, dict(zip(ROBOTS, running.children, strict=True)))
