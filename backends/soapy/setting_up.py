@@ -1,6 +1,7 @@
 """Sets a device and reads back what it made of it."""
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Iterator, Sequence
 
 from backends.soapy.device import WAYS, Device
 from backends.soapy.settings import SettingError, SoapySettings
@@ -20,7 +21,8 @@ def set_up(device: Device, settings: SoapySettings) -> dict[int, dict[str, float
         _among("clock_source", settings.clock_source, device.clock_sources())
         device.set_clock_source(settings.clock_source)
     for key, value in settings.settings.items():
-        device.write_setting(key, value)
+        with _blaming(f'soapy.settings.{key}: got "{value}"'):
+            device.write_setting(key, value)
     for way in ways:
         _set_channel(device, settings, way)
         _set_antenna(device, settings, way)
@@ -29,9 +31,11 @@ def set_up(device: Device, settings: SoapySettings) -> dict[int, dict[str, float
     for way in ways:
         _set_frequency(device, settings, way)
         if settings.bandwidth_hz:
-            device.set_bandwidth(way, settings.channel, settings.bandwidth_hz)
+            with _blaming(f"soapy.bandwidth_hz: got {settings.bandwidth_hz:g}"):
+                device.set_bandwidth(way, settings.channel, settings.bandwidth_hz)
         if settings.ppm:
-            _set_ppm(device, settings, way)
+            with _blaming(f"soapy.ppm: got {settings.ppm:g}"):
+                device.set_ppm(way, settings.channel, settings.ppm)
     return {way: _set_gains(device, settings, way) for way in ways}
 
 
@@ -89,11 +93,13 @@ def _set_frequency(device: Device, settings: SoapySettings, way: int) -> None:
         raise SettingError(f"{what}, and the device tuned {WAYS[way]} to {got / 1e6:.6f} MHz")
 
 
-def _set_ppm(device: Device, settings: SoapySettings, way: int) -> None:
+@contextlib.contextmanager
+def _blaming(what: str) -> Iterator[None]:
+    """Where only the driver knows what is allowed, it says so itself."""
     try:
-        device.set_ppm(way, settings.channel, settings.ppm)
+        yield
     except DriverError as error:
-        raise SettingError(f"soapy.ppm: got {settings.ppm:g}; allowed here: 0 ({error})") from None
+        raise SettingError(f"{what}; the device refuses it: {error}") from None
 
 
 def _set_gains(device: Device, settings: SoapySettings, way: int) -> dict[str, float]:

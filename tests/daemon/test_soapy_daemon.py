@@ -225,6 +225,10 @@ def test_the_official_binding_serves_as_well(start_daemon, bus, tmp_path, monkey
         ),
         (("tx_gain_db = 40.0", 'tx_gain_db = 1\ntx_antenna = "X"'), ['tx_antenna: got "X"']),
         (
+            ("tx_gain_db = 40.0", 'tx_gain_db = 1\nsettings = { colour = "red" }'),
+            ['soapy.settings.colour: got "red"', "the device refuses it"],
+        ),
+        (
             ("noise_db=-50", "noise_db=-50,rate_error=0.01,lie=no"),
             ["the device made it", "a rate that it keeps"],
         ),
