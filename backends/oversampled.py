@@ -29,8 +29,10 @@ class OversampledRadio:
 
     @property
     def counters(self) -> dict[str, int]:
-        """The radio's."""
-        return self._radio.counters
+        """The radio's; samples as others count them."""
+        counted = self._radio.counters
+        lost = counted.get("samples_lost", 0)
+        return {**counted, "samples_lost": lost // self._factor} if lost else counted
 
     @property
     def detail(self) -> str:

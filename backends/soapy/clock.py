@@ -2,6 +2,9 @@
 
 from fractions import Fraction
 
+DRIFT_PPM = 100
+"""More than two crystals drift apart."""
+
 
 class SampleTime:
     """Index 0 is the first sample received; its time becomes known with `begin`."""
@@ -11,12 +14,12 @@ class SampleTime:
         per_ns = Fraction(rate_hz) / 10**9
         self._up, self._down = per_ns.numerator, per_ns.denominator
         self._zero_ns: int | None = None
-        self._seen = (0, 0)
+        self._late_ns = self._seen_ns = 0
 
     @property
     def has_begun(self) -> bool:
         """Whether there was a first sample, and its time is known if the device stamps them."""
-        return self.knows_time or (not self._is_stamped and self._seen[1] > 0)
+        return self.knows_time or (not self._is_stamped and self._seen_ns > 0)
 
     @property
     def knows_time(self) -> bool:
@@ -45,9 +48,14 @@ class SampleTime:
 
     def saw(self, end: int, host_ns: int) -> None:
         """All samples before `end` were there at `host_ns` by this host's clock."""
-        self._seen = end, host_ns
+        late_ns = host_ns - self.ns(end)
+        allowed = late_ns
+        if self._seen_ns:
+            # Who brings samples is late now and then, never early; and crystals drift.
+            allowed = self._late_ns + (host_ns - self._seen_ns) * DRIFT_PPM // 10**6
+        self._late_ns = min(late_ns, allowed)
+        self._seen_ns = host_ns
 
     def now(self, host_ns: int) -> int:
-        """The index on its way now, by the host's clock since the last samples came."""
-        end, seen_ns = self._seen
-        return end + self.samples(host_ns - seen_ns) if seen_ns else end
+        """The index on its way now, by the host's clock and the samples that came in time."""
+        return self.samples(host_ns - self._late_ns) if self._seen_ns else 0

@@ -12,13 +12,12 @@ from backends.soapy.outgoing import Outgoing
 from backends.soapy.protocol import Order
 from backends.soapy.surface import (
     ERRORS,
-    NOT_SUPPORTED,
     TIMEOUT,
     UNDERFLOW,
     DriverError,
     Values,
 )
-from backends.soapy.traits import HANDOVER_S
+from backends.soapy.traits import HANDOVER_S, TRAILING
 
 WRITE_US = 100_000
 BUSY_S, QUIET_S = 0.002, 0.1
@@ -69,7 +68,6 @@ class CountedSender:
         )
         self._origin = self._written = 0
         self._out: deque[_Out] = deque()
-        self._tells = True
         self.counters = {"tx_spells": 0}
 
     def step(self) -> None:
@@ -99,8 +97,9 @@ class CountedSender:
             self._fill(self._leading * self._transfer)
             while self._next_order():
                 self._send(self._orders.waiting.popleft())
-            # Whole transfers, and one more: the last one may be cut off.
-            self._fill(-self._written % self._transfer + self._transfer)
+            # Whole transfers, and more: a device takes the first one up to a transfer later than
+            # we think, and the last one may be cut off.
+            self._fill(-self._written % self._transfer + TRAILING * self._transfer)
             self._drain()
         finally:
             self._stream.deactivate()
@@ -148,13 +147,10 @@ class CountedSender:
                 samples = samples[moved.n :]
                 self._written += moved.n
                 since_ns = time.monotonic_ns()
-            elif moved.n == UNDERFLOW:
-                self._underflow()
-            elif moved.n not in (0, TIMEOUT):
+            elif moved.n not in (0, TIMEOUT, UNDERFLOW):
                 raise DriverError(f"sending failed ({ERRORS.get(moved.n, moved.n)})")
             elif time.monotonic_ns() - since_ns > 1e9:
                 raise DriverError("it takes no samples for 1 s")
-            self._look()
 
     def _drain(self) -> None:
         """Until all but the last zeros have left; there is nothing that would tell."""
@@ -167,25 +163,22 @@ class CountedSender:
         self._settle()
 
     def _settle(self) -> None:
-        self._look()
         now = self._clock.now(time.monotonic_ns())
         while self._out and self._out[0].start + self._out[0].order.n <= now:
             out = self._out.popleft()
             self._orders.done(out.order, "sent", out.start)
 
-    def _look(self) -> None:
-        while self._tells:
-            told = self._stream.status(0)
-            if told.n == NOT_SUPPORTED:
-                self._tells = False
-            elif told.n == UNDERFLOW:
-                self._underflow()
-            else:
-                break
-
     def _catch_up(self) -> None:
-        """A device that was given too little has sent something of its own in the meantime."""
-        late = self._clock.now(time.monotonic_ns()) + self._in_flight - self._end
+        """A device that was given too little has sent something of its own in the meantime.
+
+        Drivers tell of underflows, too, but of those before the first transfer and after the last
+        as well.
+        """
+        now = self._clock.now(time.monotonic_ns())
+        if self._written < self._transfer:
+            self._origin = now + self._in_flight - self._written
+            return
+        late = now + self._in_flight - self._end
         if late > 0:
             self._underflow()
             self._origin += -(-late // self._transfer) * self._transfer

@@ -54,6 +54,7 @@ class Receiving:
         self._next = 0
         self._begun = self._at = self._until = 0
         self._unsure = 0
+        self._missed: Why | None = None
         self._heard_ns = time.monotonic_ns()
         self._was_restarted = False
         self.rate = RateWatch(clock, rate_hz, piece)
@@ -72,8 +73,7 @@ class Receiving:
     def resume(self, why: Why = Why.SENDING) -> None:
         """Receive again; what was missed is a gap, by the next stamp or this host's clock."""
         self.start()
-        if not self._has_time:
-            self._gap_until_now(why)
+        self._missed = why
 
     def step(self, timeout_us: int = MOST_US) -> None:
         """One call of the driver, and what follows. Raises DriverError when it is of no use."""
@@ -106,6 +106,13 @@ class Receiving:
         self._heard_ns, self._was_restarted = host_ns, False
         if moved.flags & HAS_TIME and self._has_time:
             self._place(moved.time_ns, host_ns)
+        elif self._missed is not None:
+            # These samples have just come: what is missing lies before them.
+            n = max(0, self.clock.now(host_ns) - self._next - moved.n)
+            if self._missed is Why.OVERFLOW:
+                self._lost(n)
+            self._gap(n, self._missed, host_ns)
+        self._missed = None
         self._next += moved.n
         self.clock.saw(self._next, host_ns)
         self.rate.saw(self._next, host_ns)
@@ -125,7 +132,8 @@ class Receiving:
         if ahead < -TOLERANCE:
             # The device's clock was set; ours never goes back.
             self.counters["clock_jumps"] += 1
-            self._gap_until_now(Why.RESTART)
+            self._tell(host_ns)
+            self._gap(max(0, self.clock.now(host_ns) - self._next), Why.RESTART, host_ns)
             self.clock.begin(time_ns, self._next)
         elif ahead > TOLERANCE:
             self._tell(host_ns)
@@ -137,7 +145,7 @@ class Receiving:
         self._tell(time.monotonic_ns())
         while self._into.read(self._stream, None, 0).n > 0:
             continue
-        self._lost(self._gap_until_now(Why.OVERFLOW))
+        self._missed = Why.OVERFLOW
 
     def _waited(self, host_ns: int) -> None:
         self._tell(host_ns)
@@ -165,14 +173,6 @@ class Receiving:
         self._say(Stretch(self._next, n, 0, host_ns, self._unsure, why))
         self._next += n
         self.clock.saw(self._next, host_ns)
-
-    def _gap_until_now(self, why: Why) -> int:
-        """A gap by this host's clock; its length."""
-        host_ns = time.monotonic_ns()
-        self._tell(host_ns)
-        n = max(0, self.clock.now(host_ns) - self._next)
-        self._gap(n, why, host_ns)
-        return n
 
     def _say(self, stretch: Stretch) -> None:
         """The daemon sees from the next index what it was not told."""

@@ -14,8 +14,8 @@ class TxTraits(NamedTuple):
     """How bursts leave a device, in s; `transfer_s` is the length of what it moves at once.
 
     Where samples are counted, bursts leave behind `leading` transfers of zeros, in whole transfers,
-    and one of zeros comes after them, for what is cut off at the end. A transfer is taken from the
-    driver when those `in_flight` before it have still to leave.
+    and TRAILING of zeros come after them, for what is cut off at the end. A transfer is taken from
+    the driver when those `in_flight` before it have still to leave.
     """
 
     lead_s: float
@@ -23,6 +23,8 @@ class TxTraits(NamedTuple):
     spells: Spells | None
 
 
+TRAILING = 2
+"""Transfers of zeros after the last burst."""
 IN_FLIGHT = {"hackrf": 4}
 """Transfers that a driver takes ahead of the antenna."""
 
@@ -46,7 +48,12 @@ def tx_traits(
     deaf_s = turnaround_s + (1 + leading) * transfer_s
     spells = Spells(
         follow_s=handover_s + MARGIN_S,
-        pause_s=turnaround_s + 2 * transfer_s + listen_s + deaf_s + handover_s + MARGIN_S,
+        pause_s=turnaround_s
+        + (1 + TRAILING) * transfer_s
+        + listen_s
+        + deaf_s
+        + handover_s
+        + MARGIN_S,
         longest_s=longest_s,
     )
     return TxTraits(handover_s + MARGIN_S, deaf_s, spells)
