@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from backends.loopback import LoopbackRadio
     from backends.offset import OffsetRadio
     from backends.oversampled import OversampledRadio
-    from backends.zmqstream import ZmqRadio
+    from backends.zmqstream import ZmqRadio, open_endpoint
 
 __all__ = [
     "GAP",
@@ -109,6 +109,7 @@ __all__ = [
     "ZmqRadio",
     "burst_shape",
     "describe",
+    "open_endpoint",
     "outlook",
     "refuse_same",
     "survey",
@@ -120,7 +121,7 @@ _LATER = {
     "backends.loopback": {"LoopbackRadio"},
     "backends.offset": {"OffsetRadio"},
     "backends.oversampled": {"OversampledRadio"},
-    "backends.zmqstream": {"ZmqRadio"},
+    "backends.zmqstream": {"ZmqRadio", "open_endpoint"},
 }
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from backends.base import BackendError, Samples
+from backends.line import Line
 from phy import FrontEnd, FrontEndParams, Path, PathParams
 
 
@@ -37,7 +38,7 @@ class Timeline:
 
     def __init__(self) -> None:
         self._sent: list[tuple[int, Samples, Path]] = []
-        self._arriving: list[tuple[int, Samples]] = []
+        self._arriving = Line()
 
     def add(self, start: int, samples: Samples, path: Path) -> None:
         """Send `samples` at `start` through `path`; what overlaps adds up."""
@@ -46,18 +47,7 @@ class Timeline:
     def take(self, index: int, n: int) -> Samples | None:
         """What arrives in `index … index + n`, None for silence; earlier is forgotten."""
         self._carry(index + n)
-        if not self._arriving:
-            return None
-        out = np.zeros(n, np.complex64)
-        kept = []
-        for start, samples in self._arriving:
-            low, high = max(index, start), min(index + n, start + len(samples))
-            if low < high:
-                out[low - index : high - index] += samples[low - start : high - start]
-            if start + len(samples) > index + n:
-                kept.append((start, samples))
-        self._arriving = kept
-        return out
+        return self._arriving.take(index, n)
 
     def _carry(self, before: int) -> None:
         if not self._sent:
@@ -66,4 +56,4 @@ class Timeline:
         self._sent = [each for each in self._sent if each[0] - each[2].early >= before]
         for start, samples, path in sorted(due, key=lambda each: each[0]):
             offset, arriving = path.carry(samples)
-            self._arriving.append((start + offset, arriving))
+            self._arriving.lay(start + offset, arriving)

@@ -53,13 +53,18 @@ class RadioChild:
         self._hangs = False
 
     def first_answer(self, timeout_s: float) -> FromProcess | None:
-        """What it says within that time."""
+        """What it says within that time; of one that has ended, that."""
         poll = select.poll()
         poll.register(self._control, select.POLLIN)
-        return self.answer() if poll.poll(1e3 * timeout_s) else None
+        if not poll.poll(1e3 * timeout_s):
+            return None
+        try:
+            return self.answer()
+        except EOFError:
+            return Failed(self.how_it_ended())
 
     def answer(self) -> FromProcess | None:
-        """What it has said; None: nothing yet. Of one that has ended, that."""
+        """What it has said; None: nothing yet. Raises EOFError when it will say no more."""
         try:
             data = self._control.recv(protocol.MOST_BYTES)
         except BlockingIOError:
@@ -67,7 +72,7 @@ class RadioChild:
         except OSError:
             data = b""
         if not data:
-            return Failed(self._how_it_ended())
+            raise EOFError
         return protocol.from_process(data)
 
     def begin(self) -> None:
@@ -124,7 +129,8 @@ class RadioChild:
             return False
         return True
 
-    def _how_it_ended(self) -> str:
+    def how_it_ended(self) -> str:
+        """In words; waits until it has."""
         self.wait()
         code = self._process.returncode
         if self._hangs:

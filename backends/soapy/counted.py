@@ -184,7 +184,8 @@ class CountedSender:
             self._origin += -(-late // self._transfer) * self._transfer
 
     def _underflow(self) -> None:
-        """What is on its way was torn apart."""
+        """What is on its way was torn apart; what was over by then was not."""
+        self._settle()
         now = self._clock.now(time.monotonic_ns())
         while self._out and self._out[0].start <= now:
             out = self._out.popleft()

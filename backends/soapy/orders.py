@@ -3,17 +3,13 @@
 import select
 import socket
 from collections import deque
-from typing import TYPE_CHECKING, Protocol
 
 import msgspec
 
 from backends.base import Samples
 from backends.soapy import protocol
-from backends.soapy.protocol import Counted, Left, Order
+from backends.soapy.protocol import Left, Order
 from backends.soapy.ring import SampleRing
-
-if TYPE_CHECKING:
-    from backends.soapy.receiving import Receiving
 
 
 class Orders:
@@ -63,29 +59,3 @@ class Orders:
             self.waiting.append(wish)
         else:
             self.has_begun = True
-
-
-class Counting(Protocol):
-    """A part that counts."""
-
-    @property
-    def counters(self) -> dict[str, int]:
-        """From 0 on."""
-
-
-class Tally:
-    """What receiving and sending have counted, told when it has changed."""
-
-    def __init__(self, receiving: "Receiving", sender: Counting | None) -> None:
-        self._receiving, self._sender = receiving, sender
-        self._told: Counted | None = None
-
-    def tell(self, orders: Orders) -> None:
-        """The news, if there is any."""
-        sent = self._sender.counters if self._sender is not None else {}
-        rate = self._receiving.rate
-        counters = {**self._receiving.counters, "rate_faults": rate.faults, **sent}
-        now = Counted(counters, rate.notice)
-        if now != self._told:
-            self._told = now
-            orders.say(now)

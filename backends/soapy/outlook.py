@@ -3,13 +3,22 @@
 from typing import NamedTuple
 
 from backends.soapy.setting_up import LEAST_RATES
-from backends.soapy.settings import Found, SoapySettings, in_flight
+from backends.soapy.settings import SoapySettings, in_flight
 from backends.soapy.surface import Range
 from backends.soapy.survey import DeviceSurvey
 
 FACTORS = (1, 2, 4)
 """What modem.oversampling may be."""
 LONG_PIECE_S = 0.02
+
+
+class _Nature(NamedTuple):
+    """What matters for how bursts leave."""
+
+    has_time: bool
+    full_duplex: bool
+    tx_transfer_s: float
+    in_flight: int
 
 
 class Outlook(NamedTuple):
@@ -45,14 +54,10 @@ def outlook(device: DeviceSurvey, rate_hz: float) -> Outlook:
     radio_hz = factor * rate_hz
     piece_s = max(defaults.block_s, rx.transfer / radio_hz if rx else 0.0)
     transfer_s = tx.transfer / radio_hz if tx else 0.0
-    way_out = defaults.tx_traits(
-        Found(
-            driver=device.driver, hardware=device.hardware, binding="", rate_hz=radio_hz,
-            frequency_hz=0.0, full_duplex=device.full_duplex, has_time=device.has_time,
-            receives_in_s=piece_s, tx_transfer_s=transfer_s,
-            in_flight=in_flight(defaults, device.driver),
-        )
-    )  # fmt: skip
+    nature = _Nature(
+        device.has_time, device.full_duplex, transfer_s, in_flight(defaults, device.driver)
+    )
+    way_out = defaults.tx_traits(nature)
     return Outlook(
         how=_how(device),
         rate_hz=rate_hz,

@@ -51,6 +51,7 @@ class SoapyRadio:
         self._feed = BlockFeed(self._next_block, "soapy", self._is_due)
         self._closing = threading.Event()
         self._child: RadioChild | None = None
+        self._listened: RadioChild | None = None
         self._found: Found | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._places = Places()
@@ -115,7 +116,7 @@ class SoapyRadio:
         answer = await asyncio.to_thread(self._first_answer, child, OPEN_S)
         if isinstance(answer, Opened):
             self._found = answer.found
-            self._loop.add_reader(child.control_fd, self._listen, child)
+            self._hear_from(child)
             return
         await self.close()
         if isinstance(answer, Failed):
@@ -164,9 +165,8 @@ class SoapyRadio:
         if self._closing.is_set():
             return
         self._closing.set()
-        child = self._child
-        if child is not None and self._loop is not None:
-            self._loop.remove_reader(child.control_fd)
+        if self._child is not None:
+            self._unlisten(self._child)
             await asyncio.to_thread(self._end)
         self._handed.lose()
 
@@ -207,32 +207,53 @@ class SoapyRadio:
 
     def _listen(self, child: RadioChild) -> None:
         """What the process has said."""
-        while (answer := child.answer()) is not None:
-            if isinstance(answer, Left):
-                self._handed.left(answer, self._hearing.base)
-                heard = self._hearing.is_heard_at_once
-                self._handed.settle(self._hearing.next_index if heard else self._yielded)
-            elif isinstance(answer, Counted):
-                self._counted, self._notice = Counter(answer.counters), answer.notice
-            elif isinstance(answer, Failed):
-                self._went(child, answer.reason)
-                return
+        try:
+            while (answer := child.answer()) is not None:
+                self._told(child, answer)
+        except EOFError:
+            # The feed's thread notices, too, and waits until it is known how it ended.
+            self._unlisten(child)
+
+    def _told(self, child: RadioChild, answer: FromProcess) -> None:
+        if isinstance(answer, Left):
+            self._handed.left(answer, self._hearing.base)
+            heard = self._hearing.is_heard_at_once
+            self._handed.settle(self._hearing.next_index if heard else self._yielded)
+        elif isinstance(answer, Counted):
+            self._counted, self._notice = Counter(answer.counters), answer.notice
+        elif isinstance(answer, Failed):
+            self._went(child, answer.reason)
+
+    def _unlisten(self, child: RadioChild) -> None:
+        if self._listened is child and self._loop is not None:
+            self._loop.remove_reader(child.control_fd)
+            self._listened = None
 
     def _went(self, child: RadioChild, reason: str) -> None:
         """The device is gone."""
-        if self._away or self._loop is None:
+        self._unlisten(child)
+        if self._away:
             return
-        self._loop.remove_reader(child.control_fd)
         self._away = reason
         self._outages += 1
         self._before.update(self._counted)
         self._counted.clear()
         self._handed.lose()
 
+    def _lost(self, child: RadioChild, how: str) -> None:
+        """It has ended: what it had still to say, and if that does not tell, how."""
+        self._listen(child)
+        self._went(child, how)
+
     def _came_back(self, child: RadioChild, found: Found) -> None:
         self._child, self._found, self._away = child, found, ""
-        if self._loop is not None and not self._closing.is_set():
+        if not self._closing.is_set():
+            self._hear_from(child)
+
+    def _hear_from(self, child: RadioChild) -> None:
+        if self._loop is not None:
             self._loop.add_reader(child.control_fd, self._listen, child)
+            self._listened = child
 
     # On the feed's thread.
 
@@ -255,8 +276,8 @@ class SoapyRadio:
 
     def _look_for_it(self, lost: RadioChild) -> RadioChild | None:
         """Until the device is back; None: we close before. Raises BackendError."""
-        lost.wait()
-        self._on_loop(partial(self._listen, lost))
+        how = lost.how_it_ended()
+        self._on_loop(partial(self._lost, lost, how))
         lost.end()
         wait_s, most_s = RETRY_S
         while not self._closing.is_set():

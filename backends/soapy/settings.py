@@ -1,13 +1,10 @@
 """What a device is to be set to, and what it then is; goes to the radio process and back."""
 
-from typing import Annotated, Protocol
+from typing import Protocol
 
 import msgspec
-from msgspec import Meta
 
 from backends.soapy.traits import IN_FLIGHT, TxTraits, keeps_time, tx_traits
-
-Gain = Annotated[float, Meta(ge=-200, le=200)]
 
 
 class SoapySettings(msgspec.Struct, frozen=True, kw_only=True):

@@ -5,7 +5,8 @@ import time
 
 from backends.soapy.counted import CountedSender
 from backends.soapy.half_duplex import HalfDuplex
-from backends.soapy.orders import Orders, Tally
+from backends.soapy.orders import Orders
+from backends.soapy.protocol import Counted
 from backends.soapy.receiving import Receiving
 from backends.soapy.surface import DriverError
 from backends.soapy.timed import TimedSender
@@ -14,18 +15,36 @@ TELL_S = 0.1
 Sender = TimedSender | CountedSender
 
 
+class _Tally:
+    """What receiving and sending have counted, told when it has changed."""
+
+    def __init__(self, receiving: Receiving, sender: Sender | None) -> None:
+        self._receiving, self._sender = receiving, sender
+        self._told: Counted | None = None
+
+    def tell(self, orders: Orders) -> None:
+        """The news, if there is any."""
+        sent = self._sender.counters if isinstance(self._sender, CountedSender) else {}
+        rate = self._receiving.rate
+        counters = {**self._receiving.counters, "rate_faults": rate.faults, **sent}
+        now = Counted(counters, rate.notice)
+        if now != self._told:
+            self._told = now
+            orders.say(now)
+
+
 def stream(
     receiving: Receiving, sender: Sender | None, orders: Orders, full_duplex: bool, listen_s: float
 ) -> None:
     """Move samples. Raises DriverError when the device fails."""
-    tally = Tally(receiving, sender)
+    tally = _Tally(receiving, sender)
     if isinstance(sender, CountedSender) and not full_duplex:
         _in_turns(HalfDuplex(receiving, sender, orders, listen_s), orders, tally)
     else:
         _at_once(receiving, sender, orders, tally)
 
 
-def _in_turns(both: HalfDuplex, orders: Orders, tally: Tally) -> None:
+def _in_turns(both: HalfDuplex, orders: Orders, tally: _Tally) -> None:
     due = time.monotonic()
     while not orders.is_over:
         both.step()
@@ -34,7 +53,7 @@ def _in_turns(both: HalfDuplex, orders: Orders, tally: Tally) -> None:
             tally.tell(orders)
 
 
-def _at_once(receiving: Receiving, sender: Sender | None, orders: Orders, tally: Tally) -> None:
+def _at_once(receiving: Receiving, sender: Sender | None, orders: Orders, tally: _Tally) -> None:
     """Receiving has a thread of its own."""
     failures: list[Exception] = []
     stopped = threading.Event()

@@ -38,6 +38,8 @@ class _Out:
 
     order: Order
     is_failed: bool = False
+    is_whole: bool = False
+    """The device has all of it."""
 
     @property
     def end(self) -> int:
@@ -58,7 +60,6 @@ class TimedSender:
         self._tells = True
         self._is_active = False
         self._used_ns = 0
-        self.counters: dict[str, int] = {}
 
     def step(self) -> None:
         """Wait for orders a little, carry them out, look what became of others."""
@@ -101,6 +102,7 @@ class TimedSender:
                 break
             if len(piece):
                 flags = 0
+        out.is_whole = True
 
     def _write(self, out: _Out, samples: Values, flags: int, time_ns: int) -> bool:
         """Whether the device took all of it; what is too late already is taken, and dropped."""
@@ -160,7 +162,7 @@ class TimedSender:
         now = self._clock.now(time.monotonic_ns())
         grace_s = 0.0 if self._acknowledges is None and not self._tells else GRACE_S
         grace = self._clock.samples(round(1e9 * grace_s))
-        while self._out and self._out[0].end + grace < now:
+        while self._out and self._out[0].is_whole and self._out[0].end + grace < now:
             self._settle("lost" if self._acknowledges else "sent")
 
     def _settle(self, outcome: str) -> None:
@@ -178,7 +180,7 @@ class TimedSender:
         if out.is_failed:
             return
         out.is_failed = True
-        if outcome == "late":
+        if outcome == "late" and out in self._out:
             # A burst that does not begin has no end to be acknowledged.
             self._out.remove(out)
         self._orders.done(out.order, outcome, out.order.start)

@@ -19,9 +19,9 @@ from backends.base import (
     TxReport,
 )
 from backends.feed import BlockFeed
+from backends.line import Line
 from backends.outstanding import Outstanding, answered
 from backends.samples import SAMPLE_TYPES
-from backends.zmqstream.line import Line
 from backends.zmqstream.sockets import Pattern, Sink, Source, open_sink, open_source
 
 LOOK_MS = 20
@@ -57,6 +57,7 @@ class ZmqRadio:
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._source: Source | None = None
         self._sink: Sink | None = None
+        self._poller = zmq.Poller()
         self._line = Line()
         self._outstanding = Outstanding()
         self._feed = BlockFeed(self._next_block, "zmq", self._is_due)
@@ -106,6 +107,9 @@ class ZmqRadio:
         self._lead = max(self._n, round(self._lead_s * rate))
         self._sink = open_sink(self._context, self._pattern, send, 2 + 2 * self._lead // self._n)
         self._source = open_source(self._context, self._pattern, receive)
+        self._poller.register(self._source.socket, zmq.POLLIN)
+        if self._pattern == "req":
+            self._poller.register(self._sink.socket, zmq.POLLIN)
         self._is_open = True
 
     async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
@@ -150,20 +154,17 @@ class ZmqRadio:
         source, sink = self._source, self._sink
         if source is None or sink is None:
             raise BackendError("blocks before open")
-        poller = zmq.Poller()
-        poller.register(source.socket, zmq.POLLIN)
-        if self._pattern == "req":
-            poller.register(sink.socket, zmq.POLLIN)
         while not self._closing.is_set():
             self._emit(sink)
             if self._have >= self._n:
-                return self._block()
+                return self._block(self._have - self._have % self._n)
             if self._gap:
-                return self._missing()
+                # What came before it is told first.
+                return self._block(self._have) if self._have else self._missing()
             data = source.next()
             if data is not None:
                 self._take(data)
-            elif not poller.poll(LOOK_MS):
+            elif not self._poller.poll(LOOK_MS):
                 self._wait()
         return None
 
@@ -197,9 +198,8 @@ class ZmqRadio:
         self._notice = notice
         self._gap += max(1, n)
 
-    def _block(self) -> RxBlock:
-        """All whole blocks that are there: who is late gets fewer, larger ones."""
-        n = self._have - self._have % self._n
+    def _block(self, n: int) -> RxBlock:
+        """Of all that is there, as one: who is late gets fewer, larger ones."""
         whole = np.concatenate(self._pieces)
         self._pieces, self._have = [whole[n:]] if self._have > n else [], self._have - n
         return self._heard(RxBlock(self._received, n, whole[:n], "", self._last_ns))
@@ -246,4 +246,4 @@ class ZmqRadio:
         with self._lock:
             samples = self._line.take(self._sent, n)
             self._sent += n
-        return samples
+        return np.zeros(n, np.complex64) if samples is None else samples

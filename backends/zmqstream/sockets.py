@@ -5,12 +5,13 @@ from typing import Literal, Protocol
 
 import zmq
 
-from backends.base import BackendError
+from backends.zmqstream.endpoint import Socket, open_endpoint
 
 Pattern = Literal["push", "pub", "req"]
 NOBLOCK = int(zmq.NOBLOCK)
 _COUNT = struct.Struct("<I")
-Socket = zmq.Socket[bytes]
+WAITING = 16
+"""Requests that may wait for a peer."""
 
 
 class Source(Protocol):
@@ -37,7 +38,7 @@ class Sink(Protocol):
 def open_source(context: zmq.Context[Socket], pattern: Pattern, endpoint: str) -> Source:
     """A PULL, SUB or REQ socket. Raises BackendError."""
     kind = {"push": zmq.PULL, "pub": zmq.SUB, "req": zmq.REQ}[pattern]
-    socket = _opened(context, kind, endpoint, "zmq.receive", binds=False)
+    socket = open_endpoint(context, kind, endpoint, "zmq.receive", binds=False, ahead=WAITING)
     if pattern == "pub":
         socket.setsockopt(zmq.SUBSCRIBE, b"")
     return _Asking(socket) if pattern == "req" else _Listening(socket)
@@ -46,7 +47,7 @@ def open_source(context: zmq.Context[Socket], pattern: Pattern, endpoint: str) -
 def open_sink(context: zmq.Context[Socket], pattern: Pattern, endpoint: str, ahead: int) -> Sink:
     """A PUSH, PUB or REP socket; at most `ahead` messages wait in it. Raises BackendError."""
     kind = {"push": zmq.PUSH, "pub": zmq.PUB, "req": zmq.REP}[pattern]
-    socket = _opened(context, kind, endpoint, "zmq.send", binds=True, ahead=ahead)
+    socket = open_endpoint(context, kind, endpoint, "zmq.send", binds=True, ahead=ahead)
     return _Answering(socket) if pattern == "req" else _Telling(socket)
 
 
@@ -124,33 +125,3 @@ class _Answering:
         self._asked = 0
         self.socket.send(data)
         return True
-
-
-def _opened(
-    context: zmq.Context[Socket],
-    kind: int,
-    endpoint: str,
-    key: str,
-    binds: bool,
-    ahead: int = 1000,
-) -> Socket:
-    """As czmq has it, @ binds and > connects; without, `binds`."""
-    socket = context.socket(kind)
-    socket.setsockopt(zmq.LINGER, 0)
-    socket.setsockopt(zmq.RECONNECT_IVL, 20)
-    socket.setsockopt(zmq.RECONNECT_IVL_MAX, 500)
-    socket.setsockopt(zmq.SNDHWM, ahead)
-    plain = endpoint.lstrip("@>")
-    try:
-        if endpoint.startswith("@") or (binds and not endpoint.startswith(">")):
-            socket.bind(plain)
-        else:
-            socket.connect(plain)
-    except zmq.ZMQError as error:
-        socket.close()
-        raise BackendError(
-            f'{key}: got "{endpoint}", which cannot be used ({error.strerror}); allowed: an '
-            'endpoint of ZeroMQ such as "tcp://127.0.0.1:52001" or "ipc:///tmp/air", with @ before '
-            "it to bind and > to connect"
-        ) from None
-    return socket

@@ -123,3 +123,12 @@ async def test_an_endpoint_that_cannot_be_had_names_its_key(tmp_path):
         with pytest.raises(BackendError, match=key):
             await radio.open(TUNING)
         await radio.close()
+
+
+async def test_what_came_before_a_gap_is_told_before_it(peer):
+    async with opened(peer.radio()) as radio:
+        peer.push(noise(N // 2).tobytes())
+        peer.push(bytes(12))
+        before, gap = await take(radio.blocks(), N // 2 + 1)
+    assert np.array_equal(before.samples, noise(N // 2))
+    assert (gap.index, gap.samples) == (N // 2, None)

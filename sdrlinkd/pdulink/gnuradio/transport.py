@@ -8,6 +8,7 @@ from typing import Protocol, cast
 
 import zmq
 
+from backends import BackendError, open_endpoint
 from sdrlinkd.errors import UserError
 from sdrlinkd.pdulink.gnuradio.pdus import from_gnu_radio, to_gnu_radio
 from sdrlinkd.reading import SocketReader
@@ -54,20 +55,19 @@ class ZmqTransport:
 
     async def open(self, take: Take) -> None:
         """Open sockets."""
-        out, into = (self._context.socket(kind) for kind in self._kinds)
-        for each in (out, into):
-            each.setsockopt(zmq.LINGER, 0)
-            each.setsockopt(zmq.RECONNECT_IVL, 20)
-            each.setsockopt(zmq.RECONNECT_IVL_MAX, 500)
-        out.setsockopt(zmq.SNDHWM, AHEAD)
+        kind_out, kind_in = self._kinds
+        try:
+            out = open_endpoint(
+                self._context, kind_out, self._send, "gnuradio.send", binds=True, ahead=AHEAD
+            )
+            into = open_endpoint(
+                self._context, kind_in, self._receive, "gnuradio.receive", binds=False, ahead=AHEAD
+            )
+        except BackendError as error:
+            self.close()
+            raise UserError(str(error)) from None
         if self._publishes:
             into.setsockopt(zmq.SUBSCRIBE, b"")
-        try:
-            _attach(out, self._send, "send", binds=True)
-            _attach(into, self._receive, "receive", binds=False)
-        except UserError:
-            self.close()
-            raise
 
         def taken(data: bytes) -> None:
             try:
@@ -244,21 +244,6 @@ class TcpTransport(asyncio.Protocol):
         if self._socket is not None:
             self._socket.abort()
             self._socket = None
-
-
-def _attach(socket: zmq.Socket[bytes], endpoint: str, key: str, binds: bool) -> None:
-    plain = endpoint.lstrip("@>")
-    try:
-        if endpoint.startswith("@") or (binds and not endpoint.startswith(">")):
-            socket.bind(plain)
-        else:
-            socket.connect(plain)
-    except zmq.ZMQError as error:
-        raise UserError(
-            f'gnuradio.{key}: got "{endpoint}", which cannot be used ({error.strerror}); allowed: '
-            'an endpoint of ZeroMQ such as "tcp://127.0.0.1:52001", with @ before it to bind and > '
-            "to connect"
-        ) from None
 
 
 def _address(text: str, key: str) -> tuple[str, int]:
