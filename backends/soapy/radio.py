@@ -67,20 +67,7 @@ class SoapyRadio:
     @property
     def capabilities(self) -> Capabilities:
         """As the device is."""
-        found, settings = self._known, self._settings
-        tx = settings.tx_traits(found)
-        return Capabilities(
-            receives=True,
-            transmits=settings.tx_enabled,
-            full_duplex=found.full_duplex,
-            timestamps=found.has_time,
-            paced=True,
-            lead_s=tx.lead_s,
-            turnaround_s=tx.turnaround_s,
-            spells=tx.spells,
-            index_error_s=0.0 if found.has_time else found.receives_in_s,
-            block_s=found.receives_in_s,
-        )
+        return self._settings.capabilities(self._known)
 
     @property
     def counters(self) -> dict[str, int]:

@@ -4,6 +4,7 @@ from typing import Protocol
 
 import msgspec
 
+from backends.base import Capabilities
 from backends.soapy.traits import IN_FLIGHT, TxTraits, keeps_time, tx_traits
 
 
@@ -50,6 +51,22 @@ class SoapySettings(msgspec.Struct, frozen=True, kw_only=True):
             self.leading_transfers, self.lead_s, self.turnaround_s, self.listen_s,
             self.longest_tx_s,
         )  # fmt: skip
+
+    def capabilities(self, found: "Found") -> Capabilities:
+        """What a radio can do that is that device, set so."""
+        tx = self.tx_traits(found)
+        return Capabilities(
+            receives=True,
+            transmits=self.tx_enabled,
+            full_duplex=found.full_duplex,
+            timestamps=found.has_time,
+            paced=True,
+            lead_s=tx.lead_s,
+            turnaround_s=tx.turnaround_s,
+            spells=tx.spells,
+            index_error_s=0.0 if found.has_time else found.receives_in_s,
+            block_s=found.receives_in_s,
+        )
 
 
 class Sending(Protocol):
