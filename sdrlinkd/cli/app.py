@@ -3,19 +3,42 @@
 import os
 import signal
 import sys
+from importlib import import_module
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
 from sdrlinkd import __version__
+from sdrlinkd.cli.commands import COMMANDS
 from sdrlinkd.client import ControlClient, NoDaemonError, RefusedError
 from sdrlinkd.errors import UserError
 
 DEBUG_VARIABLE = "SDRLINKD_DEBUG"
 
+
+class Commands(TyperGroup):
+    """Loads a command when it is called: neither a short one nor completion waits for the modem."""
+
+    def __init__(self, **settings: Any) -> None:  # noqa: ANN401 (as the library has it)
+        super().__init__(**settings)
+        listed = {name: TyperCommand(name, help=each.help) for name, each in COMMANDS.items()}
+        self.commands = {**listed, **self.commands}
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 (as above)
+        """The command called, its name, and what is left of the arguments."""
+        name, listed, rest = super().resolve_command(ctx, args)
+        if name is None or listed is None:
+            return None, None, rest
+        for module in COMMANDS[name].modules:
+            import_module(f"{__package__}.{module}")
+        return name, typer.main.get_group(app).commands[name], rest
+
+
 app = typer.Typer(
     name="sdrlinkctl",
+    cls=Commands,
     help="Shows and steers sdrlinkd: ROS 2 messages between robots over software radio.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,

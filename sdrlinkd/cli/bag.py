@@ -15,7 +15,7 @@ from sdrlinkd.client import Publisher
 from sdrlinkd.errors import BagError, UserError
 from sdrlinkd.reports import TopicReport
 
-bags = typer.Typer(help="Recordings.", no_args_is_help=True)
+bags = typer.Typer(help="Recordings of messages.", no_args_is_help=True)
 app.add_typer(bags, name="bag")
 
 

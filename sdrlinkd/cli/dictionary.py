@@ -1,16 +1,16 @@
 """`topics train-dict`: a zstd dictionary for a topic's small messages, from a recording."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from zstandard import ZstdCompressionDict
 
-from sdrlinkd.adapters import open_bag
-from sdrlinkd.cli.status import topics_app
+from sdrlinkd.cli.topics import topics_app
 from sdrlinkd.errors import UserError
-from sdrlinkd.link import Deflated, train_dictionary
 from sdrlinkd.units import octets
+
+if TYPE_CHECKING:
+    from sdrlinkd.link import Deflated
 
 
 @topics_app.command("train-dict")
@@ -21,6 +21,11 @@ def train_dict(
     size: Annotated[str, typer.Option(help="Bytes of the dictionary.")] = "8k",
 ) -> None:
     """Train on every other message of a recording, and try it on the rest."""
+    from zstandard import ZstdCompressionDict
+
+    from sdrlinkd.adapters import open_bag
+    from sdrlinkd.link import Deflated, train_dictionary
+
     opened = open_bag(bag)
     try:
         payloads = [each.cdr for each in opened.messages() if each.topic == topic]
@@ -48,5 +53,5 @@ def train_dict(
     typer.echo(f'use it with: [topic.NAME] compress = "zstd", dictionary = "{out}", at all robots')
 
 
-def _total(deflated: Deflated, payloads: list[bytes]) -> int:
+def _total(deflated: "Deflated", payloads: list[bytes]) -> int:
     return sum(len(deflated.shrink(each) or each) for each in payloads)

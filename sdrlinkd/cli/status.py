@@ -1,4 +1,4 @@
-"""`status`, `topics`, `check`, `reload`: what a running daemon says of itself."""
+"""`status`, `check`, `reload`: what a running daemon says of itself."""
 
 import time
 from typing import Annotated
@@ -45,30 +45,6 @@ def status(
             while True:
                 time.sleep(WATCH_PERIOD_S)
                 live.update(render.status(ask_status(control)), refresh=True)
-
-
-topics_app = typer.Typer(help="Topics of the registry, and those heard from other robots.")
-app.add_typer(topics_app, name="topics")
-
-
-@topics_app.callback(invoke_without_command=True)
-def topics(context: typer.Context, runtime_dir: RuntimeDir = None, as_json: AsJson = False) -> None:
-    """Topics of the registry, and those heard from other robots."""
-    if context.invoked_subcommand:
-        return
-    with connect(runtime_dir) as control:
-        link = ask_status(control).link
-    if as_json:
-        typer.echo(msgspec.json.encode({"sent": link.topics, "heard": link.received}).decode())
-        return
-    console = Console()
-    for topic in link.topics:
-        console.print(
-            f"{topic.topic_id:>2}  {topic.name}  [dim]{topic.type}[/dim]"
-            + ("" if topic.subscribed else "  (not taken: see the key `topics`)")
-        )
-    for heard in link.received:
-        console.print(f"<-  {heard.republished_as or heard.name}  [dim]robot {heard.src}[/dim]")
 
 
 @app.command()

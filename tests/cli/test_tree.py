@@ -1,0 +1,64 @@
+"""The command tree: what is listed is what there is, and only what is called is loaded."""
+
+import subprocess
+import sys
+
+import pytest
+import typer
+from typer.core import TyperGroup
+
+from sdrlinkd.cli.app import app
+from sdrlinkd.cli.commands import COMMANDS
+
+HEAVY = ("numpy", "numba", "scipy", "rosbags", "phy", "sdrlinkd.link", "sdrlinkd.config")
+
+
+def one_line(text: str | None) -> str:
+    return (text or "").partition("\n\n")[0]
+
+
+def test_every_command_is_listed_with_its_own_help():
+    tree = typer.main.get_group(app)
+    for name, listed in COMMANDS.items():
+        _, command, rest = tree.resolve_command(typer.Context(tree), [name, "more"])
+        assert (command.name, one_line(command.help), rest) == (name, listed.help, ["more"])
+        assert isinstance(command, TyperGroup) or command.callback, "listed, and not there"
+    assert typer.main.get_group(app).commands.keys() == COMMANDS.keys()
+
+
+@pytest.mark.parametrize("arguments", [
+    ["--version"], ["status", "--help"], ["why", "--help"], ["topics", "--help"],
+    ["radio", "probe", "--help"],
+])  # fmt: skip
+def test_a_short_command_waits_for_nothing_that_it_does_not_need(arguments):
+    program = (
+        "import sys; from sdrlinkd.cli import run; assert run(sys.argv[1:]) == 0; "
+        f"print('heavy:', *(each for each in {HEAVY} if each in sys.modules))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, *arguments], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.splitlines()[-1] == "heavy:"
+
+
+def test_an_unknown_command_is_named_with_what_is_like_it():
+    done = subprocess.run(
+        [sys.executable, "-m", "sdrlinkd.cli", "stats"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert "Did you mean 'status'?" in done.stderr
+
+
+@pytest.mark.parametrize(("words", "count", "there"), [
+    ("sdrlinkctl ", 1, [*COMMANDS]),
+    ("sdrlinkctl re", 1, ["reload", "record", "replay"]),
+    ("sdrlinkctl bag ", 2, ["info", "play"]),
+])  # fmt: skip
+def test_tab_completes_commands(words, count, there):
+    done = subprocess.run(
+        [sys.executable, "-c", "from sdrlinkd.cli import main; main()"],
+        env={"COMP_WORDS": words, "COMP_CWORD": str(count),
+             "_SDRLINKCTL_COMPLETE": "complete_bash"},
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.split() == there
