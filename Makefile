@@ -6,7 +6,9 @@ BIN := $(VENV)/bin
 # What runs; and with what tests and checks need besides.
 STAMP := $(VENV)/.installed
 DEV_STAMP := $(VENV)/.installed-dev
-# Bytecode is made when a module is first used: most of a library never is.
+# Bytecode is made when a module is first used: most of a library never is. Containers like to forbid
+# it; then every start of a daemon would take a second longer.
+unexport PYTHONDONTWRITEBYTECODE
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt
 
 .PHONY: setup demo test check format bench system-packages clean

@@ -22,14 +22,15 @@ class BlockFeed:
     """Calls `next_block` again and again on a thread, until it returns None or `stop` is called.
 
     One wake-up of the event loop a block, and no turn of it while a block is made; none at all for
-    blocks that were heard, unless `is_due` says of one that something else is to be done then.
+    blocks that were heard, unless `is_due` says of the index after one that something else is to be
+    done then.
     """
 
     def __init__(
         self,
         next_block: Callable[[], RxBlock | None],
         name: str,
-        is_due: Callable[[RxBlock], bool],
+        is_due: Callable[[int], bool],
     ) -> None:
         self._next_block = next_block
         self._is_due = is_due
@@ -79,7 +80,7 @@ class BlockFeed:
         if self._hear is None or not block.n:
             return self._hand_over(Fed(block, is_heard=False))
         # What is due comes first: who hears of the block may act on it.
-        if self._is_due(block):
+        if self._is_due(block.index + block.n):
             if not self._hand_over(Fed(block, is_heard=True)):
                 return False
         else:

@@ -51,7 +51,7 @@ class IqFileRadio:
         self._reader: RecordingReader | None = None
         self._writer: RecordingWriter | None = None
         self._outstanding = Outstanding()
-        self._feed = BlockFeed(self._next_block, "iqfile", self._is_due)
+        self._feed = BlockFeed(self._next_block, "iqfile", self._outstanding.is_due)
         # The next block's index and the bursts to record belong together.
         self._lock = threading.Lock()
         self._next = 0
@@ -109,16 +109,10 @@ class IqFileRadio:
         self._pace = Pace(tuning.rate_hz, self._paced)
         self._is_open = True
 
-    async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
+    def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
         """The recording from its beginning to its end; without one, gaps without end."""
         self._pace.restart()
-        try:
-            async for block, is_heard in self._feed.blocks(hear):
-                self._outstanding.settle(block.index + block.n)
-                if not is_heard:
-                    yield block
-        finally:
-            self._outstanding.lose()
+        return self._outstanding.blocks(self._feed, hear)
 
     def send(self, burst: TxBurst) -> Awaitable[TxReport]:
         """Record a burst; blocks() raises BackendError when the disk will not take it."""
@@ -146,10 +140,6 @@ class IqFileRadio:
             with contextlib.suppress(BackendError):
                 self._writer.extend_to(self._next)
             self._writer.close()
-
-    def _is_due(self, block: RxBlock) -> bool:
-        """In the feed's thread: whether a burst has left."""
-        return self._outstanding.is_due(block.index + block.n)
 
     def _next_block(self) -> RxBlock | None:
         """In the feed's thread: what is received next, and what has left recorded."""

@@ -34,7 +34,7 @@ class LoopbackRadio:
         self._paced = paced
         self._hear_self = hear_self
         self._outstanding = Outstanding()
-        self._feed = BlockFeed(self._next_block, "loopback", self._is_due)
+        self._feed = BlockFeed(self._next_block, "loopback", self._outstanding.is_due)
         # The next block's index and the bursts sent belong together.
         self._lock = threading.Lock()
         self._next = 0
@@ -65,16 +65,10 @@ class LoopbackRadio:
         self._pace = Pace(tuning.rate_hz, self._paced)
         self._is_open = True
 
-    async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
+    def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
         """What the antenna hears; when the reader is far behind, what it missed is a gap."""
         self._pace.restart()
-        try:
-            async for block, is_heard in self._feed.blocks(hear):
-                self._outstanding.settle(block.index + block.n)
-                if not is_heard:
-                    yield block
-        finally:
-            self._outstanding.lose()
+        return self._outstanding.blocks(self._feed, hear)
 
     def send(self, burst: TxBurst) -> Awaitable[TxReport]:
         """Put a burst on the air."""
@@ -96,10 +90,6 @@ class LoopbackRadio:
             self._pace.end()
             self._feed.stop()
         self._outstanding.lose()
-
-    def _is_due(self, block: RxBlock) -> bool:
-        """In the feed's thread: whether a burst has left."""
-        return self._outstanding.is_due(block.index + block.n)
 
     def _next_block(self) -> RxBlock:
         """In the feed's thread."""

@@ -1,8 +1,10 @@
 """Bursts handed over whose last sample has not left yet."""
 
 import asyncio
+from collections.abc import AsyncIterator
 
-from backends.base import TxBurst, TxOutcome, TxReport
+from backends.base import Hear, RxBlock, TxBurst, TxOutcome, TxReport
+from backends.feed import BlockFeed
 
 NEVER = 1 << 62
 GAP = 32
@@ -49,6 +51,16 @@ class Outstanding(Places):
         self._waiting.append((report, answer))
         self._first_end = min(self._first_end, report.end)
         return answer
+
+    async def blocks(self, feed: BlockFeed, hear: Hear | None) -> AsyncIterator[RxBlock]:
+        """What the feed makes; bursts that have left by then are answered, and in the end all."""
+        try:
+            async for block, is_heard in feed.blocks(hear):
+                self.settle(block.index + block.n)
+                if not is_heard:
+                    yield block
+        finally:
+            self.lose()
 
     def is_due(self, index: int) -> bool:
         """Whether `settle` would have something to tell; asked from any thread."""

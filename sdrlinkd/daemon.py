@@ -130,7 +130,7 @@ def _make_pdu_link(setup: Setup, rng: Random) -> PduLink:
         return make_gnuradio(config)
     # Else a busy event loop keeps the modem's threads from the interpreter for 5 ms at a time.
     sys.setswitchinterval(SWITCH_INTERVAL_S)
-    # The modem brings numba and scipy, which take their time to load.
+    # The modem brings numba, which takes its time to load.
     from sdrlinkd.modem import make_modem
 
     return make_modem(config, setup.node_id, rng)

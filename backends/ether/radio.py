@@ -211,9 +211,9 @@ class EtherRadio:
                 self._hello()
         return None
 
-    def _is_due(self, block: RxBlock) -> bool:
+    def _is_due(self, end: int) -> bool:
         """In the feed's thread: whether something came with a block, or a burst has left."""
-        beside, end = self._beside[-1], block.index + block.n
+        beside = self._beside[-1]
         if beside.placed or beside.step or beside.welcome or self._joined.is_due(end):
             return True
         self._beside.pop()

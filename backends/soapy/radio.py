@@ -48,7 +48,6 @@ class SoapyRadio:
         self._settings = settings
         self._longest_s = longest_s
         self._hearing = Hearing(removes_dc)
-        self._feed = BlockFeed(self._next_block, "soapy", self._is_due)
         self._closing = threading.Event()
         self._child: RadioChild | None = None
         self._listened: RadioChild | None = None
@@ -56,6 +55,7 @@ class SoapyRadio:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._places = Places()
         self._handed = Handed()
+        self._feed = BlockFeed(self._next_block, "soapy", self._handed.is_due)
         self._rate_hz = 0.0
         self._yielded = 0
         self._is_over = False
@@ -243,9 +243,6 @@ class SoapyRadio:
             self._listened = child
 
     # On the feed's thread.
-
-    def _is_due(self, block: RxBlock) -> bool:
-        return self._handed.is_due(block.index + block.n)
 
     def _next_block(self) -> RxBlock | None:
         child, hearing = self._child, self._hearing

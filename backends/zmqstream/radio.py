@@ -60,7 +60,7 @@ class ZmqRadio:
         self._poller = zmq.Poller()
         self._line = Line()
         self._outstanding = Outstanding()
-        self._feed = BlockFeed(self._next_block, "zmq", self._is_due)
+        self._feed = BlockFeed(self._next_block, "zmq", self._outstanding.is_due)
         self._closing = threading.Event()
         # The next sample to be sent and the bursts laid down belong together.
         self._lock = threading.Lock()
@@ -112,16 +112,10 @@ class ZmqRadio:
             self._poller.register(self._sink.socket, zmq.POLLIN)
         self._is_open = True
 
-    async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
+    def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
         """What the peer sends."""
         self._last_ns = time.monotonic_ns()
-        try:
-            async for block, is_heard in self._feed.blocks(hear):
-                self._outstanding.settle(block.index + block.n)
-                if not is_heard:
-                    yield block
-        finally:
-            self._outstanding.lose()
+        return self._outstanding.blocks(self._feed, hear)
 
     def send(self, burst: TxBurst) -> Awaitable[TxReport]:
         """Lay a burst on the line of samples to be sent."""
@@ -143,10 +137,6 @@ class ZmqRadio:
             self._feed.stop()
         self._context.destroy(linger=0)
         self._outstanding.lose()
-
-    def _is_due(self, block: RxBlock) -> bool:
-        """In the feed's thread: whether a burst has left."""
-        return self._outstanding.is_due(block.index + block.n)
 
     # In the feed's thread.
 

@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
-from scipy import fft
 
 BLOCK = 64
 """Samples through which a channel stands still: at 100 km/h and 1 Msps it turns by 0.1 rad."""
@@ -26,6 +25,9 @@ def jakes(
 
 def moving_filter(x: NDArray[np.complex64], taps: NDArray[np.complex64]) -> NDArray[np.complex64]:
     """`x` through filters `taps` `[blocks, n_taps]`, a next one every BLOCK samples."""
+    # It takes longer to load than all of this package, and most radios do not move.
+    from scipy import fft
+
     n_blocks, n_taps = taps.shape
     n = BLOCK + n_taps - 1
     size = fft.next_fast_len(n)

@@ -1,7 +1,6 @@
 """The direct link: PDUs come straight back, as in the paper's loopback without a PHY."""
 
 import asyncio
-import contextlib
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -10,6 +9,7 @@ from random import Random
 from sdrlinkd.config import DirectParams
 from sdrlinkd.link import Burst, CarrierTraits, Opportunity, Outcome
 from sdrlinkd.pdulink.base import Heard, PduListener
+from sdrlinkd.pdulink.bell import Bell
 from sdrlinkd.pdulink.impairment import Impairment
 from sdrlinkd.reports import CarrierReport
 
@@ -28,7 +28,7 @@ class DirectLink:
         self._on_air: list[Burst] = []
         self._timers: set[asyncio.TimerHandle] = set()
         self._pdus = 0
-        self._woken = asyncio.Event()
+        self._bell = Bell()
         self._all_settled = asyncio.Event()
         self._all_settled.set()
 
@@ -48,20 +48,17 @@ class DirectLink:
             raise RuntimeError("run before open")
         while True:
             await asyncio.sleep(max(0.0, self._free_at - self.now()))
-            self._woken.clear()
+            self._bell.hush()
             start = self.now()
             burst = listener.next_burst(Opportunity(start, self._airtime_s, self._most_pdus))
             if burst is not None:
                 self._send(burst, start)
                 continue
-            wait_s = max(0.0, listener.next_wakeup(start) - start)
-            with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(None if wait_s == float("inf") else wait_s):
-                    await self._woken.wait()
+            await self._bell.wait(max(0.0, listener.next_wakeup(start) - start))
 
     def wake(self) -> None:
         """There may be something to send."""
-        self._woken.set()
+        self._bell.ring()
 
     def _airtime_s(self, _: int, n_pdus: int) -> float:
         return self._airtime_per_pdu_s * n_pdus

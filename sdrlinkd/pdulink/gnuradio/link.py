@@ -1,12 +1,12 @@
 """A GNU Radio flowgraph as the PHY: PDUs go to it one by one, at the pace that it sustains."""
 
 import asyncio
-import contextlib
 import time
 
 from sdrlinkd.config import GnuRadioParams
 from sdrlinkd.link import Burst, CarrierTraits, Opportunity, Outcome
 from sdrlinkd.pdulink.base import Heard, PduListener
+from sdrlinkd.pdulink.bell import Bell
 from sdrlinkd.pdulink.gnuradio.transport import Transport
 from sdrlinkd.reports import CarrierReport
 
@@ -26,7 +26,7 @@ class GnuRadioLink:
         self._listener: PduListener | None = None
         self._free_at = 0.0
         self._on_air: Burst | None = None
-        self._woken = asyncio.Event()
+        self._bell = Bell()
         self._settled = asyncio.Event()
         self._settled.set()
         self._is_taken = False
@@ -54,7 +54,7 @@ class GnuRadioLink:
         while True:
             await asyncio.sleep(max(0.0, self._free_at - self.now()))
             self._settle()
-            self._woken.clear()
+            self._bell.hush()
             self._is_taken = self._transport.is_ready()
             if not self._is_taken:
                 await asyncio.sleep(LOOK_S)
@@ -64,14 +64,11 @@ class GnuRadioLink:
             if burst is not None:
                 self._send(burst, start)
                 continue
-            wait_s = max(0.0, listener.next_wakeup(start) - start)
-            with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(None if wait_s == float("inf") else wait_s):
-                    await self._woken.wait()
+            await self._bell.wait(max(0.0, listener.next_wakeup(start) - start))
 
     def wake(self) -> None:
         """There may be something to send."""
-        self._woken.set()
+        self._bell.ring()
 
     async def idle(self) -> None:
         """Wait until every burst taken is settled."""
