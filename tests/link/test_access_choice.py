@@ -7,7 +7,7 @@ import pytest
 from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import AccessParams, CarrierTraits, Link, Qos, RateParams, Sensed, check_access
 from sdrlinkd.link.access import Free, Wish, make_access
-from sdrlinkd.link.access.choice import CLOCK_ERROR_S, LONGEST_ROUND_S, MARGIN_S
+from sdrlinkd.link.access.choice import CLOCK_ERROR_S, LONGEST_ROUND_S, LONGEST_SLOTTIME_S, MARGIN_S
 from sdrlinkd.link.access.csma import Csma
 from sdrlinkd.link.access.minislot import MiniSlots
 from sdrlinkd.link.access.tdma import Tdma
@@ -130,6 +130,24 @@ def test_too_long_a_round_is_refused_and_tdma_named_instead():
     few = make(params("minislot", many[:54]), traits=PACED)
     assert 0.9 * LONGEST_ROUND_S < few.round_s <= LONGEST_ROUND_S
     make(params("tdma", many), traits=PACED)
+
+
+def test_too_long_a_slottime_is_refused_and_tdma_named_instead():
+    message = refusal(params("csma", []), traits=SLOW)
+    assert message.startswith('access.policy: got "csma"; robots with this radio hear each other')
+    for part in ("begin only after 700 ms", "allowed: at most 100 ms: use tdma"):
+        assert part in message
+    quick = make(params("csma", []), traits=SLOW._replace(lead_s=0.05, react_s=0.04))
+    assert 0.9 * LONGEST_SLOTTIME_S < quick._slottime_s <= LONGEST_SLOTTIME_S
+
+
+@pytest.mark.parametrize(("turnaround_s", "is_told"), [(0.0, False), (3e-4, False), (0.08, True)])
+def test_without_turns_a_radio_that_turns_round_slowly_is_told_of(turnaround_s, is_told):
+    free = make(AccessParams(), traits=LOCKSTEP._replace(turnaround_s=turnaround_s))
+    assert bool(free.notices()) == is_told
+    if is_told:
+        assert "hears nothing for 160 ms" in free.notices()[0]
+        assert 'access.policy = "tdma"' in free.notices()[0]
 
 
 def test_a_slot_that_is_over_before_it_is_known_to_be_unused_is_not_reused():

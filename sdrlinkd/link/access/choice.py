@@ -19,6 +19,7 @@ CLOCK_ERROR_S = 1.5e-4
 MARGIN_S = 5e-6
 """Echoes and paths of a kilometre or so."""
 LONGEST_ROUND_S = 1.0
+LONGEST_SLOTTIME_S = 0.1
 
 
 def check_access(params: AccessParams, own_id: int) -> None:
@@ -43,7 +44,7 @@ def make_access(
     """
     check_access(params, own_id)
     if params.policy == "none":
-        return Free()
+        return Free(2 * traits.turnaround_s)
     _refuse_deaf(params, traits)
     # So far apart must two begin that the second can hear the first and still hold back.
     detect_s = traits.detect_s + MARGIN_S
@@ -51,6 +52,12 @@ def make_access(
     if params.policy == "csma":
         slottime_s = params.slottime_s or apart_s
         dwait_s = params.dwait_s or slottime_s
+        if slottime_s > LONGEST_SLOTTIME_S:
+            raise ConfigError(
+                'access.policy: got "csma"; robots with this radio hear each other begin only '
+                f"after {slottime_s * 1e3:.3g} ms; allowed: at most {LONGEST_SLOTTIME_S * 1e3:g} "
+                "ms: use tdma"
+            )
         return Csma(dwait_s, slottime_s, params.persist, detect_s, rng)
     minislot_s = params.minislot_s or apart_s
     if params.policy == "minislot":
