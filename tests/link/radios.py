@@ -20,6 +20,11 @@ _SHARED = CarrierTraits(
 LOCKSTEP = _SHARED._replace(is_lockstep=True, lead_s=50e-6 + 17 / RATE, react_s=LOOK_S)
 PACED = _SHARED._replace(lead_s=50e-6 + 0.003, react_s=LOOK_S + 0.002, ahead_s=AHEAD_S)
 
+SPELLS = _SHARED._replace(
+    kind="soapy", turnaround_s=0.08, index_error_s=0.001, lead_s=0.15, react_s=0.02
+)
+"""It takes long to turn round."""
+
 
 def params(policy, nodes, **more):
     """Access parameters."""

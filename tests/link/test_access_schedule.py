@@ -9,7 +9,7 @@ from sdrlinkd.link.access import Wish, make_access
 from sdrlinkd.link.access.tdma import FORGET_S, LISTEN_S
 from sdrlinkd.wire import Frame
 from tests.link.air import Air
-from tests.link.radios import LOCKSTEP, PACED, params
+from tests.link.radios import LOCKSTEP, PACED, SPELLS, params
 from tests.link.slots import LONGEST_S, SETTLED_S, make_air, places
 
 radios = pytest.mark.parametrize("traits", [LOCKSTEP, PACED], ids=["lockstep", "paced"])
@@ -83,6 +83,57 @@ def test_a_lower_root_that_appears_is_followed_by_all(traits):
         assert kept(air, came_at + 7.5) == {1: (1, 0), 2: (1, 1), 3: (1, 1)}
         air.assert_nobody_clashes(since=came_at + 4)
         assert sum(burst.src == 1 for burst in air.bursts) > 100
+
+
+@pytest.mark.parametrize("n", [2, 4], ids=["two", "two groups of two"])
+@pytest.mark.parametrize(
+    ("traits", "slot_s", "longest_s", "within_s"),
+    [(LOCKSTEP, 0.0, 0.004, 10), (PACED, 0.0, 0.004, 10), (SPELLS, 0.4, 0.04, 20)],
+    ids=["lockstep", "paced", "spells"],
+)
+def test_who_come_back_into_reach_find_each_other_whatever_they_send(
+    traits, slot_s, longest_s, within_s, n
+):
+    """All have too much to send, and slots at the same time wherever chance has put them."""
+    for seed in range(3):
+        ids, back_at = list(range(1, n + 1)), 5.0
+        late = Random(seed).uniform(0, 2 * max(slot_s, 0.005))
+        pairs = [(to, src) for to in ids for src in ids if to != src]
+        hears = {(to, src) for to, src in pairs if (to - src) % 2 == 0}
+        air = Air(
+            ids, params("tdma", ids, reuse=False, slot_s=slot_s), traits, seed, longest_s,
+            hears=hears, joins={i: late for i in ids if i % 2 == 0}, ppm={1: 15, 2: -15},
+            beacons=True,
+        )  # fmt: skip
+        air.run(back_at)
+        assert {root for root, _ in kept(air, back_at).values()} == {1, 2}
+        hears.update(pairs)
+        found_by = back_at + within_s
+        for i in ids:
+            for k in range(round(within_s / longest_s)):
+                air.offer(i, back_at + k * longest_s)
+        air.run(found_by)
+        roots = {root for root, _ in kept(air, found_by).values()}
+        assert roots == {1}, f"seed {seed}: slots {late:g} s apart"
+
+
+def test_a_root_that_nobody_follows_leaves_some_of_its_slots_to_others():
+    def used(nodes, is_followed=False):
+        access = begun(make(1, nodes=nodes, reuse=False), 1.0)
+        schedule, n = access.frame(1.0).schedule, 0
+        for k in range(1000):
+            at = 1.0 + k * access.round_s
+            if is_followed:
+                access.take_frame(2, Frame(1, 1, schedule, 0), at)
+            n += access.slot(Wish(at, Qos.DEFAULT, 0.0005, Sensed(at))) is not None
+            if at < 1.0 + FORGET_S:
+                assert n == k + 1, "it gives them some time"
+        return n
+
+    passed = round(FORGET_S / make(1).round_s)
+    assert 0.7 * (1000 - passed) + passed < used((1, 2, 3, 4)) < 0.8 * (1000 - passed) + passed
+    assert used((1, 2, 3, 4), is_followed=True) == 1000
+    assert used((1,)) == 1000, "who else could be there?"
 
 
 @radios

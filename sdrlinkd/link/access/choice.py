@@ -70,11 +70,16 @@ def make_access(
                 f"allowed: at most {LONGEST_ROUND_S:g} s: use tdma, or fewer robots"
             )
         return MiniSlots(own_id, params.nodes, minislot_s, detect_s)
-    return _make_tdma(params, own_id, traits, longest_burst_s, apart_s)
+    return _make_tdma(params, own_id, traits, longest_burst_s, apart_s, rng)
 
 
 def _make_tdma(
-    params: AccessParams, own_id: int, traits: CarrierTraits, longest_burst_s: float, apart_s: float
+    params: AccessParams,
+    own_id: int,
+    traits: CarrierTraits,
+    longest_burst_s: float,
+    apart_s: float,
+    rng: Random,
 ) -> Tdma:
     # Here two do not count from the same carrier, but each from its own clock.
     apart_s += CLOCK_ERROR_S
@@ -100,6 +105,7 @@ def _make_tdma(
         minislot_s,
         # Where a slot would be over before anybody could know it unused, its owner need not hurry.
         params.reuse and apart_s <= minislot_s < slot_s - guard_s - traits.overhead_s,
+        rng,
         look_s=traits.react_s + traits.ahead_s,
         detect_s=traits.detect_s + MARGIN_S + CLOCK_ERROR_S,
         gap_s=traits.gap_s,

@@ -3,6 +3,7 @@
 import math
 from binascii import crc_hqx
 from collections.abc import Sequence
+from random import Random
 from struct import pack
 
 from sdrlinkd.link.access.base import INFINITE, Carriers, Slot, Wish, next_on_grid
@@ -16,6 +17,8 @@ QUIET_S = 0.05
 FORGET_S = 3.0
 """A schedule not heard of for so long has lost its root; for twice as long, it is believed only
 from those as near to it as we were."""
+LISTEN_SHARE = 0.25
+"""Of its own slots, while nobody follows it: others may have theirs at the same time."""
 MAX_LEVEL = 255
 PAUSE_AFTER = 2 / 3
 
@@ -30,6 +33,11 @@ class Tdma(Carriers):
     tells it on with its own count of hops (level). With `reuse`, a slot whose owner is silent, or
     silent again, is open to the others in order, one `minislot_s` after another; but not to who
     knows of a robot it does not hear: that one may well be sending.
+
+    Robots that kept schedules of their own out of each other's reach may come back with slots at
+    the same time, and as long as all send in all of theirs, nobody hears anybody. A root that has
+    had no follower for FORGET_S listens through some of its slots, by chance, and goes where the
+    others are.
     """
 
     def __init__(
@@ -40,6 +48,7 @@ class Tdma(Carriers):
         guard_s: float,
         minislot_s: float,
         reuse: bool,
+        rng: Random,
         *,
         look_s: float,
         detect_s: float,
@@ -53,6 +62,7 @@ class Tdma(Carriers):
         self._guard_s = guard_s
         self._minislot_s = minislot_s
         self._reuse = reuse
+        self._rng = rng
         self._look_s = look_s
         self._detect_s = detect_s
         self._gap_s = gap_s
@@ -69,6 +79,9 @@ class Tdma(Carriers):
         self._begins_at = LISTEN_S + sum(node < own_id for node in nodes)
         self._strangers: dict[int, int] = {}
         self._heard_at: dict[int, float] = {}
+        self._followed_at = 0.0
+        self._listens = (-INFINITE, False)
+        """Of our latest slot: its begin, and whether we listen through it."""
         self._told_of_at: dict[int, float] = {}
 
     @property
@@ -101,12 +114,15 @@ class Tdma(Carriers):
             if earliest < self._begins_at and not self._is_first(earliest, sensed):
                 return None
             self._is_running, self._origin = True, earliest
+            self._followed_at = earliest
         self._forget(earliest)
         number = math.floor((earliest - self._origin) / self._slot_s)
         for each in (number, number + 1):
             begin = self._origin + each * self._slot_s
             end = begin + self._slot_s - self._guard_s
             turn = (self._rank - each) % len(self._nodes)
+            if turn == 0 and self._listens_through(begin, earliest):
+                continue
             start = self._start(begin, turn, earliest, sensed)
             if start is not None and start + need_s <= end:
                 if start >= earliest + self._look_s:
@@ -147,10 +163,14 @@ class Tdma(Carriers):
         self._forget(at)
         origin = at - 1e-6 * frame.phase_us
         told = (frame.root, frame.level + 1)
+        if frame.root == self._own_id:
+            self._followed_at = at
         if frame.root >= self._own_id:
             # They will follow us; until then we go on where they are.
+            if not (self._is_running and self._is_followed(at)):
+                self._origin = origin
             if not self._is_running:
-                self._origin, self._is_running = origin, True
+                self._is_running, self._followed_at = True, at
         elif frame.root == self._lost[0] and told[1] > self._lost[1] and at < self._lost[2]:
             # Somebody who has not forgotten it yet.
             return
@@ -179,6 +199,19 @@ class Tdma(Carriers):
         if self._level and now - self._told_at > FORGET_S:
             self._lost = (self._root, self._level, now + 2 * FORGET_S)
             self._root, self._level, self._parent = self._own_id, 0, self._own_id
+            self._followed_at = now
+
+    def _is_followed(self, now: float) -> bool:
+        """Whether anybody keeps our schedule, as far as we know; a root is given some time."""
+        return now - self._followed_at < FORGET_S
+
+    def _listens_through(self, begin: float, now: float) -> bool:
+        """Whether our slot that begins then stays empty, to hear who else sends in it."""
+        if self._level or self._is_followed(now) or len(self._nodes) == 1:
+            return False
+        if abs(begin - self._listens[0]) > self._slot_s / 2:
+            self._listens = (begin, self._rng.random() < LISTEN_SHARE)
+        return self._listens[1]
 
     def _knows_of_hidden(self, now: float) -> bool:
         """Whether others hear somebody whom we do not."""
