@@ -131,6 +131,24 @@ def _usage(pid: int) -> Usage:
     return Usage((int(fields[11]) + int(fields[12])) / TICKS_HZ, resident * PAGE_MIB)
 
 
+class Stolen:
+    """How much of the machine a hypervisor has given to others since; 0 % where none tells."""
+
+    def __init__(self) -> None:
+        self._since = _ticks()
+
+    def pct(self) -> float:
+        """Of all cores, so far."""
+        stolen, total = (now - then for now, then in zip(_ticks(), self._since, strict=True))
+        return 100 * stolen / max(1, total)
+
+
+def _ticks() -> tuple[int, int]:
+    """(stolen, all), proc_stat(5); guests' ticks, the last two, are in the users' already."""
+    ticks = [int(each) for each in Path("/proc/stat").read_text().split("\n", 1)[0].split()[1:9]]
+    return ticks[7], sum(ticks)
+
+
 @contextmanager
 def busy_cores() -> Iterator[None]:
     """A program that never waits, on every core, at the usual priority."""

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.processes import Stolen
 from benchmarks.radio import bare
 from benchmarks.radio.pair import ROBOTS, Look, pair
 from benchmarks.report import Row
@@ -51,6 +52,8 @@ class Span:
 
     first: Look
     last: Look
+    stolen_pct: float
+    """Of the machine's time."""
 
     @property
     def seconds(self) -> float:
@@ -88,10 +91,10 @@ def under_load(rate_hz: float, times: Times, seed: int) -> list[Span]:
         _busy(robots.folders, rate_hz, seed),
     ):
         time.sleep(times.warm_up_s)
-        first = [robots.look(robot) for robot in ROBOTS]
+        first, stolen = [robots.look(robot) for robot in ROBOTS], Stolen()
         time.sleep(times.measured_s)
-        last = [robots.look(robot) for robot in ROBOTS]
-    return [Span(*each) for each in zip(first, last, strict=True)]
+        last, stolen_pct = [robots.look(robot) for robot in ROBOTS], stolen.pct()
+    return [Span(*each, stolen_pct) for each in zip(first, last, strict=True)]
 
 
 def _rows_of(
@@ -111,7 +114,8 @@ def _rows_of(
     note = f"both robots, {one.seconds:.1f} s; {heard} PDUs heard of {sent}"
     yield Row(f"{name}_lost_samples", lost, "samples", target, "less",
               round(rate_hz * sum(span.seconds for span in spans)),
-              {each: a_second * one.seconds for each, a_second in lost_a_s.items()},
+              {"machine_stolen_pct": one.stolen_pct}
+              | {each: a_second * one.seconds for each, a_second in lost_a_s.items()},
               note=f"{note}; {bare.THREADS}")  # fmt: skip
     yield Row(f"{name}_underflows", underflows, "bursts", target, "less", bursts,
               {"late": late, "on_air_pct": 100 * on_air}, note=note)  # fmt: skip

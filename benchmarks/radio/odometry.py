@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from benchmarks.processes import Stolen
 from benchmarks.radio.pair import ROBOTS, Pair, pair
 from benchmarks.report import Row
 from sdrlinkd.adapters import BuiltInRobot
@@ -77,13 +78,17 @@ def rows(seed: int, quick: bool) -> Iterator[Row]:
             pair("hackrf", "odom", MODEM + ACCESS[way], SOAPY, DEVICE) as robots,
             ThreadPoolExecutor() as pool,
         ):
-            sent = {robot: messages[robot][: WARM_UP + count] for robot in senders}
+            sent, stolen = (
+                {robot: messages[robot][: WARM_UP + count] for robot in senders},
+                Stolen(),
+            )
             flows = list(pool.map(partial(_play, robots, seed), sent, sent.values()))
             looks = [robots.look(robot) for robot in ROBOTS]
         counted = {
             name: float(sum(look.counter(name) for look in looks))
             for name in ("tx_spells", "underflows", "late")
         }
+        counted["machine_stolen_pct"] = stolen.pct()
         yield from _rows_of(way, flows, counted)
 
 
