@@ -33,7 +33,7 @@ OPEN_S = 60.0
 HUNG_S = 3.0
 """A device that says nothing for so long, beyond what it may send without listening, hangs."""
 LOOK_S = 0.1
-RX_RING_S, TX_RING_S = 0.25, 0.1
+RX_RING_S, TX_RING_S = 0.5, 0.1
 LEAST_RING = 1 << 19
 RETRY_S = 0.25, 2.0
 

@@ -27,6 +27,8 @@ BITS_PER_SAMPLE = 0.65
 """QPSK 1/2, and more than it."""
 SIZE = 8192
 CDR = b"\0\1\0\0" + bytes(8) + SIZE.to_bytes(4, "little")
+DEVICE = f",rxbuf={256 * 2040}"
+"""What `num_recv_frames = 256` of etc/radios/usrp.toml makes of a USRP by USB."""
 CONFIG = """[modem]
 rate_hz = {rate}
 frequency_hz = 915e6
@@ -87,7 +89,7 @@ def rows(seed: int, quick: bool) -> Iterator[Row]:
 def under_load(rate_hz: float, times: Times, seed: int) -> list[Span]:
     """Of each robot. Raises PeerError."""
     with (
-        pair("usrp", "load", CONFIG.format(rate=rate_hz)) as robots,
+        pair("usrp", "load", CONFIG.format(rate=rate_hz), more=DEVICE) as robots,
         _busy(robots.folders, rate_hz, seed),
     ):
         time.sleep(times.warm_up_s)
