@@ -219,6 +219,33 @@ def test_the_fewest_hops_are_followed_and_the_parent_at_once():
     assert told(10.4) == (1, 8, 4000), "whom the old parent has not heard of yet"
 
 
+def test_who_follows_another_goes_where_that_one_is_and_nowhere_else():
+    """A robot that has just come has a schedule of its own, for a while."""
+    access = begun(make(2), 9.0)
+    schedule = access.frame(9.0).schedule
+    for step in range(20):
+        at = 10.0 + 0.5 * step
+        access.take_frame(1, Frame(1, 0, schedule, 1000), at)
+        access.take_frame(3, Frame(3, 0, schedule, 7000), at + 0.1)
+        assert access.frame(at)[:2] == (1, 1)
+        assert abs(access.frame(at).phase_us - 1000) <= 1
+
+
+def test_who_has_no_followers_goes_where_others_are_and_is_followed_there():
+    access = begun(make(2), 9.0)
+    schedule = access.frame(9.0).schedule
+    for at, phase_us in ((9.1, 777), (9.0 + FORGET_S, 7000)):
+        own_us = access.frame(at).phase_us
+        access.take_frame(3, Frame(3, 0, schedule, phase_us), at)
+        taken_us = access.frame(at).phase_us
+        assert access.frame(at)[:2] == (2, 0)
+        assert abs(taken_us - (own_us if at < 10 else phase_us)) <= 1
+    access.take_frame(3, Frame(2, 1, schedule, 7000), 12.5)
+    own_us = access.frame(12.6).phase_us
+    access.take_frame(4, Frame(4, 0, schedule, 99), 12.6)
+    assert access.frame(12.6).phase_us == own_us
+
+
 def test_who_follows_us_does_not_lead_us():
     access = begun(make(2), 9.0)
     schedule, before = access.frame(9.0).schedule, access.frame(20.0)

@@ -167,10 +167,10 @@ class Tdma(Carriers):
             self._followed_at = at
         if frame.root >= self._own_id:
             # They will follow us; until then we go on where they are.
-            if not (self._is_running and self._is_followed(at)):
-                self._origin = origin
             if not self._is_running:
-                self._is_running, self._followed_at = True, at
+                self._is_running, self._origin, self._followed_at = True, origin, at
+            elif self._is_alone(at):
+                self._origin = origin
         elif frame.root == self._lost[0] and told[1] > self._lost[1] and at < self._lost[2]:
             # Somebody who has not forgotten it yet.
             return
@@ -201,13 +201,13 @@ class Tdma(Carriers):
             self._root, self._level, self._parent = self._own_id, 0, self._own_id
             self._followed_at = now
 
-    def _is_followed(self, now: float) -> bool:
-        """Whether anybody keeps our schedule, as far as we know; a root is given some time."""
-        return now - self._followed_at < FORGET_S
+    def _is_alone(self, now: float) -> bool:
+        """Whether nobody keeps our schedule, nor we another's; a root is given some time."""
+        return not self._level and now - self._followed_at >= FORGET_S
 
     def _listens_through(self, begin: float, now: float) -> bool:
         """Whether our slot that begins then stays empty, to hear who else sends in it."""
-        if self._level or self._is_followed(now) or len(self._nodes) == 1:
+        if len(self._nodes) == 1 or not self._is_alone(now):
             return False
         if abs(begin - self._listens[0]) > self._slot_s / 2:
             self._listens = (begin, self._rng.random() < LISTEN_SHARE)
