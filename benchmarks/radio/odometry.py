@@ -78,10 +78,8 @@ def rows(seed: int, quick: bool) -> Iterator[Row]:
             pair("hackrf", "odom", MODEM + ACCESS[way], SOAPY, DEVICE) as robots,
             ThreadPoolExecutor() as pool,
         ):
-            sent, stolen = (
-                {robot: messages[robot][: WARM_UP + count] for robot in senders},
-                Stolen(),
-            )
+            sent = {robot: messages[robot][: WARM_UP + count] for robot in senders}
+            stolen = Stolen()
             flows = list(pool.map(partial(_play, robots, seed), sent, sent.values()))
             looks = [robots.look(robot) for robot in ROBOTS]
         counted = {

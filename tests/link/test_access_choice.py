@@ -7,7 +7,7 @@ import pytest
 from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import AccessParams, CarrierTraits, Link, Qos, RateParams, Sensed, check_access
 from sdrlinkd.link.access import Free, Wish, make_access
-from sdrlinkd.link.access.choice import CLOCK_ERROR_S, LONGEST_ROUND_S, LONGEST_SLOTTIME_S, MARGIN_S
+from sdrlinkd.link.access.choice import CLOCK_ERROR_S, LONGEST_APART_S, LONGEST_ROUND_S, MARGIN_S
 from sdrlinkd.link.access.csma import Csma
 from sdrlinkd.link.access.minislot import MiniSlots
 from sdrlinkd.link.access.tdma import Tdma
@@ -120,10 +120,11 @@ def test_too_short_a_slot_is_refused_with_the_longest_burst():
 
 
 def test_too_long_a_round_is_refused_and_tdma_named_instead():
-    """The radio needs 0.7 s for each of two robots in three sections."""
-    message = refusal(params("minislot", [1, 2]), traits=SLOW)
-    assert message.startswith('access.policy: got "minislot"; with 2 robots and a radio that needs')
-    for part in ("700 ms for each", "a round takes 4.2 s", "allowed: at most 1 s: use tdma, or"):
+    """The radio needs 90 ms for each of four robots in three sections."""
+    late = SLOW._replace(lead_s=0.05, react_s=0.04)
+    message = refusal(params("minislot", [1, 2, 3, 4]), traits=late)
+    assert message.startswith('access.policy: got "minislot"; with 4 robots and a radio that needs')
+    for part in ("90 ms for each", "a round takes 1.08 s", "allowed: at most 1 s: use tdma, or"):
         assert part in message
     many = list(range(255))
     assert "with 255 robots" in refusal(params("minislot", many), traits=PACED)
@@ -132,13 +133,17 @@ def test_too_long_a_round_is_refused_and_tdma_named_instead():
     make(params("tdma", many), traits=PACED)
 
 
-def test_too_long_a_slottime_is_refused_and_tdma_named_instead():
-    message = refusal(params("csma", []), traits=SLOW)
-    assert message.startswith('access.policy: got "csma"; robots with this radio hear each other')
-    for part in ("begin only after 700 ms", "allowed: at most 100 ms: use tdma"):
-        assert part in message
-    quick = make(params("csma", []), traits=SLOW._replace(lead_s=0.05, react_s=0.04))
-    assert 0.9 * LONGEST_SLOTTIME_S < quick._slottime_s <= LONGEST_SLOTTIME_S
+@pytest.mark.parametrize("policy", ["csma", "minislot"])
+def test_who_is_heard_too_late_is_refused_and_tdma_named_instead(policy):
+    for wanted in (params(policy, [1, 2]), params(policy, [1, 2], slottime_s=0.01)):
+        message = refusal(wanted, traits=SLOW)
+        assert message.startswith(f'access.policy: got "{policy}"; robots with this radio hear')
+        for part in ("begin only after 700 ms", "allowed: at most 100 ms: use tdma"):
+            assert part in message
+    access = make(params(policy, [1, 2]), traits=SLOW._replace(lead_s=0.05, react_s=0.04))
+    apart_s = access._slottime_s if policy == "csma" else access._minislot_s
+    assert 0.9 * LONGEST_APART_S < apart_s <= LONGEST_APART_S
+    make(params("tdma", [1, 2]), traits=SLOW)
 
 
 @pytest.mark.parametrize(("turnaround_s", "is_told"), [(0.0, False), (3e-4, False), (0.08, True)])

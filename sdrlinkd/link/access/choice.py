@@ -19,7 +19,8 @@ CLOCK_ERROR_S = 1.5e-4
 MARGIN_S = 5e-6
 """Echoes and paths of a kilometre or so."""
 LONGEST_ROUND_S = 1.0
-LONGEST_SLOTTIME_S = 0.1
+LONGEST_APART_S = 0.1
+"""What listens before it talks is of no use where others are heard later."""
 
 
 def check_access(params: AccessParams, own_id: int) -> None:
@@ -49,15 +50,15 @@ def make_access(
     # So far apart must two begin that the second can hear the first and still hold back.
     detect_s = traits.detect_s + MARGIN_S
     apart_s = traits.lead_s + traits.react_s + detect_s
+    if params.policy in ("csma", "minislot") and apart_s > LONGEST_APART_S:
+        raise ConfigError(
+            f'access.policy: got "{params.policy}"; robots with this radio hear each other begin '
+            f"only after {apart_s * 1e3:.3g} ms; allowed: at most {LONGEST_APART_S * 1e3:g} ms: "
+            "use tdma"
+        )
     if params.policy == "csma":
         slottime_s = params.slottime_s or apart_s
         dwait_s = params.dwait_s or slottime_s
-        if slottime_s > LONGEST_SLOTTIME_S:
-            raise ConfigError(
-                'access.policy: got "csma"; robots with this radio hear each other begin only '
-                f"after {slottime_s * 1e3:.3g} ms; allowed: at most {LONGEST_SLOTTIME_S * 1e3:g} "
-                "ms: use tdma"
-            )
         return Csma(dwait_s, slottime_s, params.persist, detect_s, rng)
     minislot_s = params.minislot_s or apart_s
     if params.policy == "minislot":
