@@ -20,6 +20,7 @@ class TopicReport(msgspec.Struct, frozen=True, kw_only=True):
     priority: int
     accepted: int = 0
     accepted_per_s: float = 0.0
+    accepted_bytes_per_s: float = 0.0
     sent: int = 0
     sent_bytes: int = 0
     queued: int = 0
@@ -87,6 +88,7 @@ class ReceivedTopicReport(msgspec.Struct, frozen=True, kw_only=True):
     delivered: int = 0
     delivered_per_s: float = 0.0
     delivered_bytes: int = 0
+    delivered_bytes_per_s: float = 0.0
     dropped: dict[str, int] = {}
     pdr: float | None = None
     age_ms_last: float | None = None
@@ -106,6 +108,8 @@ class NeighborReport(msgspec.Struct, frozen=True, kw_only=True):
     pdus_heard: int
     pdus_lost: int
     per: float
+    per_lately: float | None = None
+    """The same over the last `RATE_WINDOW_S`; null: nothing was due from it."""
     duplicates: int
     hops_left: int
     reboots: int
@@ -170,6 +174,10 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     access: str
     airtime_s: float
     """Time on the air, all bursts together."""
+    air_sent_pct: float = 0.0
+    """Share of the air that our bursts took over the last `RATE_WINDOW_S`."""
+    air_heard_pct: float = 0.0
+    """The same of the bursts of others, as far as they were heard."""
     airtime_by_class_s: dict[str, float] = {}
     """The same by the class of what was inside, bursts that failed included."""
     control_airtime_s: float = 0.0
@@ -202,8 +210,17 @@ class CarrierReport(msgspec.Struct, frozen=True, kw_only=True):
 
     kind: str
     state: str
-    """up | down | ended (a recording is over)"""
+    """up | waiting (for a radio that is not there yet) | refused (by the radio, which names what to
+    change) | down | ended (a recording is over)"""
     detail: str = ""
+    reason: str = ""
+    """Why it is not up, in a sentence."""
+    since_s: float = 0.0
+    """How long it has been in this state."""
+    level_dbfs: float | None = None
+    """Mean power of what the radio received lately; full scale is 0."""
+    clipped_pct: float = 0.0
+    """Share of the samples received lately that stood at full scale."""
     counters: dict[str, int] = {}
     realtime_ratio: float | None = None
     """How many times faster than real time the receiver works, in processor time."""
@@ -220,6 +237,15 @@ class BusReport(msgspec.Struct, frozen=True, kw_only=True):
     bad_envelope_last: str = ""
 
 
+class VerdictReport(msgspec.Struct, frozen=True, kw_only=True):
+    """How the daemon and its link fare, in a word and in plain sentences."""
+
+    level: str = "OK"
+    """OK | DEGRADED | DOWN"""
+    reasons: list[str] = []
+    """Why it is not OK, the worst first."""
+
+
 class Snapshot(msgspec.Struct, frozen=True, kw_only=True):
     """One moment of one daemon."""
 
@@ -231,6 +257,7 @@ class Snapshot(msgspec.Struct, frozen=True, kw_only=True):
     taken_at_unix_ns: int
     uptime_s: float
     loop_lag_ms: float
+    verdict: VerdictReport = VerdictReport()
     carrier: CarrierReport
     bus: BusReport
     link: LinkReport
