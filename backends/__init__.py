@@ -9,9 +9,12 @@ from typing import TYPE_CHECKING
 
 from backends.base import (
     SENDING,
+    AbsentError,
     BackendError,
     Capabilities,
+    Patience,
     Radio,
+    RefusalError,
     RxBlock,
     Samples,
     Spells,
@@ -20,6 +23,7 @@ from backends.base import (
     TxOutcome,
     TxReport,
 )
+from backends.late import LateRadio
 from backends.outstanding import GAP
 from backends.recording import GAP_LABEL, RecordingInfo, RecordingReader, describe, refuse_same
 from backends.samples import SAMPLE_TYPES
@@ -66,6 +70,7 @@ __all__ = [
     "GAP_LABEL",
     "SAMPLE_TYPES",
     "SENDING",
+    "AbsentError",
     "AirParams",
     "AirSense",
     "Annotation",
@@ -81,6 +86,7 @@ __all__ = [
     "Flight",
     "HubWatch",
     "IqFileRadio",
+    "LateRadio",
     "LinkOverride",
     "LocalEther",
     "LoopbackRadio",
@@ -88,11 +94,13 @@ __all__ = [
     "Outage",
     "Outlook",
     "OversampledRadio",
+    "Patience",
     "Radio",
     "RadioParams",
     "RecordingInfo",
     "RecordingReader",
     "RecordingWriter",
+    "RefusalError",
     "RxBlock",
     "Samples",
     "SoapyRadio",

@@ -19,6 +19,25 @@ class BackendError(Exception):
     """A radio or recording that cannot be used; the message says what to do about it."""
 
 
+class AbsentError(BackendError):
+    """A radio that is not there now, and may come."""
+
+
+class RefusalError(BackendError):
+    """A radio that is there and does not take its settings."""
+
+
+class Patience(Enum):
+    """What a radio does when it is opened and is not there."""
+
+    NONE = "none"
+    """It fails at once."""
+    THERE = "there"
+    """It waits until it is there."""
+    REPLUGGED = "replugged"
+    """It waits until it has been away and is back: it refused its settings before."""
+
+
 class Spells(NamedTuple):
     """How a radio sends that must stop receiving for it, in s.
 
@@ -113,6 +132,13 @@ class TxReport(NamedTuple):
     end: int
 
 
+class Levels(NamedTuple):
+    """Mean power in dB below full scale, and the share of samples that clip; both lately."""
+
+    power_dbfs: float
+    clipped: float
+
+
 class Radio(Protocol):
     """One radio. Everything but `send` is called from one task."""
 
@@ -127,6 +153,14 @@ class Radio(Protocol):
     @property
     def detail(self) -> str:
         """One line for people: which device, which file."""
+
+    @property
+    def trouble(self) -> str:
+        """Why nothing comes from it now, where it knows; empty: nothing is wrong."""
+
+    @property
+    def levels(self) -> Levels | None:
+        """How strong what it hears is, before any filter of ours; None: that is not known."""
 
     async def open(self, tuning: Tuning) -> None:
         """Begin. Raises BackendError."""

@@ -5,7 +5,8 @@ import threading
 from collections.abc import AsyncIterator, Callable
 from typing import NamedTuple
 
-from backends.base import Hear, RxBlock
+from backends.base import Hear, Levels, RxBlock
+from backends.levels import LevelMeter
 
 # Blocks that may wait for the event loop; past that the thread waits.
 MAX_WAITING = 16
@@ -39,7 +40,13 @@ class BlockFeed:
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._hear: Hear | None = None
+        self._meter = LevelMeter()
         self._queue: asyncio.Queue[Fed | BaseException | None] = asyncio.Queue()
+
+    @property
+    def levels(self) -> Levels | None:
+        """Of the blocks so far."""
+        return self._meter.levels
 
     async def blocks(self, hear: Hear | None) -> AsyncIterator[Fed]:
         """The blocks in order. What `next_block` or `hear` raise is raised here."""
@@ -77,6 +84,8 @@ class BlockFeed:
         if block is None:
             self._hand_over(None)
             return False
+        if block.samples is not None:
+            self._meter.push(block.samples)
         if self._hear is None or not block.n:
             return self._hand_over(Fed(block, is_heard=False))
         # What is due comes first: who hears of the block may act on it.

@@ -10,6 +10,7 @@ from backends.base import (
     BackendError,
     Capabilities,
     Hear,
+    Levels,
     RxBlock,
     Samples,
     Tuning,
@@ -87,6 +88,16 @@ class IqFileRadio:
         if self._damage:
             parts.append(self._damage)
         return ", ".join(parts)
+
+    @property
+    def trouble(self) -> str:
+        """It has none."""
+        return ""
+
+    @property
+    def levels(self) -> Levels | None:
+        """Of the blocks so far."""
+        return self._feed.levels
 
     async def open(self, tuning: Tuning) -> None:
         """Open the files. Raises BackendError, also when a recording is of another rate."""

@@ -6,7 +6,17 @@ from collections.abc import AsyncIterator, Awaitable
 import numpy as np
 
 from backends.air import Channel, Timeline
-from backends.base import Capabilities, Hear, RxBlock, Samples, Tuning, TxBurst, TxOutcome, TxReport
+from backends.base import (
+    Capabilities,
+    Hear,
+    Levels,
+    RxBlock,
+    Samples,
+    Tuning,
+    TxBurst,
+    TxOutcome,
+    TxReport,
+)
 from backends.feed import BlockFeed
 from backends.outstanding import Outstanding, answered
 from backends.pace import Pace
@@ -57,6 +67,16 @@ class LoopbackRadio:
     def detail(self) -> str:
         """For people."""
         return f"{self._profile} channel" + ("" if self._paced else ", unpaced")
+
+    @property
+    def trouble(self) -> str:
+        """It has none."""
+        return ""
+
+    @property
+    def levels(self) -> Levels | None:
+        """Of the blocks so far."""
+        return self._feed.levels
 
     async def open(self, tuning: Tuning) -> None:
         """Begin at index 0."""

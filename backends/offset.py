@@ -5,7 +5,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from backends.base import Capabilities, Hear, Radio, RxBlock, Samples, Tuning, TxBurst, TxReport
+from backends.base import (
+    Capabilities,
+    Hear,
+    Levels,
+    Radio,
+    RxBlock,
+    Samples,
+    Tuning,
+    TxBurst,
+    TxReport,
+)
 
 UP = np.array([1, 1j, -1, -1j], np.complex64)
 """A quarter of the rate, where a turn has four samples: the cheapest shift there is."""
@@ -36,6 +46,16 @@ class OffsetRadio:
     def detail(self) -> str:
         """The radio's."""
         return self._radio.detail
+
+    @property
+    def trouble(self) -> str:
+        """The radio's."""
+        return self._radio.trouble
+
+    @property
+    def levels(self) -> Levels | None:
+        """The radio's."""
+        return self._radio.levels
 
     async def open(self, tuning: Tuning) -> None:
         """Begin. Raises BackendError."""

@@ -3,7 +3,17 @@
 from collections.abc import AsyncIterator, Awaitable, Iterator
 from dataclasses import replace
 
-from backends.base import Capabilities, Hear, Radio, RxBlock, Samples, Tuning, TxBurst, TxReport
+from backends.base import (
+    Capabilities,
+    Hear,
+    Levels,
+    Radio,
+    RxBlock,
+    Samples,
+    Tuning,
+    TxBurst,
+    TxReport,
+)
 from backends.outstanding import GAP
 from phy import REACH, Downsampler, upsample
 
@@ -38,6 +48,16 @@ class OversampledRadio:
     def detail(self) -> str:
         """The radio's, and how much faster it is."""
         return f"{self._radio.detail}, {self._factor} times oversampled"
+
+    @property
+    def trouble(self) -> str:
+        """The radio's."""
+        return self._radio.trouble
+
+    @property
+    def levels(self) -> Levels | None:
+        """The radio's."""
+        return self._radio.levels
 
     async def open(self, tuning: Tuning) -> None:
         """Begin. Raises BackendError."""

@@ -14,6 +14,7 @@ from sdrlinkd.config import ModemParams
 from sdrlinkd.link import (
     AccessParams,
     Burst,
+    CarrierTraits,
     ClockParams,
     Link,
     LinkParams,
@@ -73,7 +74,11 @@ class Station:
 
     async def open(self) -> None:
         """Open the radio."""
-        self.link.attach(await self.modem.open(self), self._access, RateParams())
+        await self.modem.open(self)
+
+    def attach(self, traits: CarrierTraits) -> None:
+        """What the radio is."""
+        self.link.attach(traits, self._access, RateParams())
 
     def advance(self, now: float) -> None:
         """Messages that have come up to now."""

@@ -11,6 +11,7 @@ import uvloop
 from sdrlinkd import __version__, daemon
 from sdrlinkd.config import Setup, load_config, make_setup
 from sdrlinkd.errors import UserError
+from sdrlinkd.journal import JournalFormatter, is_read_by_journal
 
 DEFAULT_CONFIG = Path("/etc/sdrlinkd/sdrlinkd.toml")
 
@@ -18,10 +19,7 @@ DEFAULT_CONFIG = Path("/etc/sdrlinkd/sdrlinkd.toml")
 def main(arguments: list[str] | None = None) -> int:
     """Run the daemon; 0 after an orderly stop, 2 for what a person can mend."""
     options = _parser().parse_args(arguments)
-    logging.basicConfig(
-        level=options.log_level.upper(),
-        format="%(levelname)s %(message)s" if options.log_level == "debug" else "%(message)s",
-    )
+    _log_to_stderr(options.log_level)
     try:
         setup = _read(options.config)
         if options.check:
@@ -37,6 +35,14 @@ def main(arguments: list[str] | None = None) -> int:
         # Before the daemon's own handler stood.
         return 130
     return 0
+
+
+def _log_to_stderr(level: str) -> None:
+    text = "%(levelname)s %(message)s" if level == "debug" else "%(message)s"
+    handler = logging.StreamHandler()
+    make = JournalFormatter if is_read_by_journal() else logging.Formatter
+    handler.setFormatter(make(text))
+    logging.basicConfig(level=level.upper(), handlers=[handler])
 
 
 def _read(path: Path) -> Setup:

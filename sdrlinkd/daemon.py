@@ -7,25 +7,32 @@ import logging
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import AsyncIterator, Callable, Iterator
 from functools import partial
 from pathlib import Path
 from random import Random
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import zmq
 
+from backends import Patience
 from sdrlinkd import __version__
 from sdrlinkd.bus import Bus, RuntimeDirectory
 from sdrlinkd.client import runtime_dir
 from sdrlinkd.config import Config, Setup
-from sdrlinkd.control import Control, Verb
+from sdrlinkd.control import Control
 from sdrlinkd.errors import UserError
-from sdrlinkd.link import Link, Told
+from sdrlinkd.health import Level
+from sdrlinkd.link import Link
 from sdrlinkd.node import Node
+from sdrlinkd.opening import Opening
 from sdrlinkd.pdulink import DirectLink, PduLink, make_gnuradio
 from sdrlinkd.policies import Policies
+from sdrlinkd.reloading import Reloading
+from sdrlinkd.reports import Snapshot
 from sdrlinkd.sdnotify import Notifier
+from sdrlinkd.verbs import make_verbs
 
 if TYPE_CHECKING:
     # Loading it brings recordings, of which a daemon of a real robot has none.
@@ -33,8 +40,16 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("sdrlinkd")
 
-STATUS_LINE_PERIOD_S = 5.0
+WATCH_PERIOD_S = 1.0
+LEVELS = {
+    Level.INFO: logging.INFO,
+    Level.WARNING: logging.WARNING,
+    Level.ERROR: logging.ERROR,
+}
 SWITCH_INTERVAL_S = 1e-4
+START_S = 120.0
+"""Loading the modem may take so long on a small computer."""
+NOTICES_REPLUG = ("soapy", "ether")
 
 Reload = Callable[[], Setup]
 
@@ -51,15 +66,17 @@ async def run(setup: Setup, reload: Reload) -> None:
         loop.add_signal_handler(number, stop.set)
     notifier = Notifier()
     async with contextlib.AsyncExitStack() as stack:
-        node, control, policies = await _open(setup, stack, reload)
-        loop.add_signal_handler(signal.SIGHUP, _reload_on_signal, policies, setup, reload)
+        notifier.extend(START_S)
+        node, control, reloading = await _open(setup, stack, reload)
+        loop.add_signal_handler(signal.SIGHUP, reloading.on_signal)
         stack.callback(loop.remove_signal_handler, signal.SIGHUP)
-        async with asyncio.TaskGroup() as tasks:
+        async with _only_one_error(), asyncio.TaskGroup() as tasks:
             running = [
                 tasks.create_task(node.carry(), name="carry"),
                 tasks.create_task(node.tick(), name="tick"),
-                tasks.create_task(_notify(notifier, node, control), name="notify"),
+                tasks.create_task(_watch(notifier, node, control), name="watch"),
             ]
+            # The bus takes messages; the radio may come later.
             notifier.ready()
             await stop.wait()
             log.info("stopping: %d messages queued", node.snapshot(0).link.tx.queued)
@@ -69,12 +86,24 @@ async def run(setup: Setup, reload: Reload) -> None:
                 task.cancel()
         for problem in node.audit():
             log.error("ledger: %s", problem)
-        log.info("stopped: %s", status_line(node, control))
+        log.info("stopped: %s", status_line(node.snapshot(control.requests)))
+
+
+@contextlib.asynccontextmanager
+async def _only_one_error() -> AsyncIterator[None]:
+    """What a person has to mend is no group of errors. Raises UserError."""
+    try:
+        yield
+    except* UserError as group:
+        error: BaseException = group
+        while isinstance(error, BaseExceptionGroup):
+            error = error.exceptions[0]
+        raise error from None
 
 
 async def _open(
     setup: Setup, stack: contextlib.AsyncExitStack, reload: Reload
-) -> tuple[Node, Control, Policies]:
+) -> tuple[Node, Control, Reloading]:
     config = setup.config
     rng = Random(os.urandom(16) if config.seed is None else config.seed)
     directory = RuntimeDirectory(_runtime_directory(config))
@@ -94,20 +123,21 @@ async def _open(
         max_expanded=config.bus.max_message_bytes,
     )
     policies = Policies(setup, link)
-    pdu_link = _make_pdu_link(setup, rng)
+    make = partial(_make_pdu_link, rng, time.monotonic())
+    opening = Opening(setup, make, config.backend in NOTICES_REPLUG)
     context = zmq.Context()
     # Closes what a part that failed half-way left open; term() would wait for it for ever.
     stack.callback(context.destroy)
     headers, stops = _types_of(setup)
     open_bus = partial(Bus, context, directory, setup)
     chrony = _chrony(setup, stack)
-    node = Node(setup, link, pdu_link, open_bus, _transforms(setup), headers, stops, chrony)
+    node = Node(setup, link, opening, open_bus, _transforms(setup), headers, stops, chrony)
     stack.callback(node.bus.close)
     control = Control(context, directory)
     stack.callback(control.close)
-    control.serve(_verbs(setup, node, control, policies, reload))
-    stack.push_async_callback(pdu_link.close)
-    await node.open_carrier()
+    reloading = Reloading(setup, reload, policies, opening)
+    control.serve(make_verbs(setup, node, control, policies, opening, reloading))
+    stack.push_async_callback(opening.close)
     # What is loaded stays; to look through all of it would hold up everything for 50 ms.
     gc.collect()
     gc.freeze()
@@ -119,10 +149,10 @@ async def _open(
     )  # fmt: skip
     for warning in setup.warnings:
         log.warning("%s", warning)
-    return node, control, policies
+    return node, control, reloading
 
 
-def _make_pdu_link(setup: Setup, rng: Random) -> PduLink:
+def _make_pdu_link(rng: Random, began_s: float, setup: Setup, patience: Patience) -> PduLink:
     config = setup.config
     if config.backend == "direct":
         return DirectLink(config.direct, config.link.pdu_size, rng)
@@ -133,7 +163,7 @@ def _make_pdu_link(setup: Setup, rng: Random) -> PduLink:
     # The modem brings numba, which takes its time to load.
     from sdrlinkd.modem import make_modem
 
-    return make_modem(config, setup.node_id, rng)
+    return make_modem(config, setup.node_id, rng, patience, began_s)
 
 
 def _types_of(setup: Setup) -> tuple[frozenset[int], dict[int, bytes]]:
@@ -188,84 +218,28 @@ def _runtime_directory(config: Config) -> Path:
     return runtime_dir(given or None)
 
 
-def _verbs(
-    setup: Setup, node: Node, control: Control, policies: Policies, reload: Reload
-) -> dict[str, Verb]:
-    def hello(_: dict[str, Any]) -> object:
-        return {
-            "daemon": "sdrlinkd",
-            "version": __version__,
-            "node": setup.node_id,
-            "verbs": {name: verb.help for name, verb in verbs.items()},
-        }
-
-    def reload_policies(_: dict[str, Any]) -> object:
-        _reload_policies(policies, setup, reload)
-        log.info("topic policies re-read on request")
-        return {"reloaded": "topic policies", "unchanged": "all other keys need a restart"}
-
-    def set_policy(arguments: dict[str, Any]) -> object:
-        changes = {key: value for key, value in arguments.items() if key != "topic"}
-        if not changes:
-            raise UserError("set: nothing to change; name at least one key")
-        return policies.set(str(arguments.get("topic", "")), changes)
-
-    def why(arguments: dict[str, Any]) -> object:
-        topic_id = policies.topic_id(str(arguments.get("topic", "")))
-        told = Told(setup.source, policies.changed.get(topic_id, ()))
-        return {"why": node.why(topic_id, told)}
-
-    verbs = {
-        "hello": Verb(hello, "who answers, and what it can do"),
-        "status": Verb(lambda _: node.snapshot(control.requests), "the whole snapshot"),
-        "topics": Verb(lambda _: node.snapshot(control.requests).link.topics, "topics sent"),
-        "peers": Verb(lambda _: node.snapshot(control.requests).link.neighbors, "who is heard"),
-        "config": Verb(lambda _: setup.config, "the configuration in force"),
-        "check": Verb(
-            lambda _: {"problems": node.audit(), "ledger": node.snapshot(control.requests).link},
-            "whether the ledger adds up",
-        ),
-        "why": Verb(why, "what happens to a topic, in plain words"),
-        "set": Verb(set_policy, "change a topic's policy", changes=True),
-        "reload": Verb(reload_policies, "read the topic policies anew", changes=True),
-    }
-    return verbs
-
-
-def _reload_policies(policies: Policies, setup: Setup, reload: Reload) -> None:
-    """Apply the policies of the configuration as it is now. Raises UserError, changing nothing."""
-    changed = reload()
-    if changed.registry.digest() != setup.registry.digest():
-        raise UserError("the topic registry has changed, and topic ids with it; restart the daemon")
-    policies.reload(changed.policies)
-
-
-def _reload_on_signal(policies: Policies, setup: Setup, reload: Reload) -> None:
-    try:
-        _reload_policies(policies, setup, reload)
-    except UserError as error:
-        log.error("not reloaded, the old policies stay: %s", error)  # noqa: TRY400
-    else:
-        log.info("topic policies re-read; all other keys need a restart")
-
-
-async def _notify(notifier: Notifier, node: Node, control: Control) -> None:
-    """Feed the watchdog from the event loop, and keep the status line fresh; for ever."""
-    period_s = STATUS_LINE_PERIOD_S
+async def _watch(notifier: Notifier, node: Node, control: Control) -> None:
+    """Feed the watchdog from the event loop, keep the status line fresh, and log the story of the
+    drive; for ever.
+    """
+    period_s = WATCH_PERIOD_S
     if notifier.watchdog_s:
         period_s = min(period_s, notifier.watchdog_s / 3)
     while True:
         notifier.alive()
-        notifier.status(status_line(node, control))
+        snapshot = node.snapshot(control.requests)
+        for line in node.look(snapshot):
+            log.log(LEVELS[line.level], "%s", line.text)
+        notifier.status(status_line(snapshot))
         await asyncio.sleep(period_s)
 
 
-def status_line(node: Node, control: Control) -> str:
+def status_line(snapshot: Snapshot) -> str:
     """One line for systemd and the log."""
-    snapshot = node.snapshot(control.requests)
     tx, rx = snapshot.link.tx, snapshot.link.rx
+    verdict = ": ".join([snapshot.verdict.level, *snapshot.verdict.reasons[:1]])
     return (
-        f"{snapshot.carrier.kind} {snapshot.carrier.state}; "
+        f"{verdict}; {snapshot.carrier.kind} {snapshot.carrier.state}; "
         f"out {tx.sent}/{tx.accepted} sent, {tx.queued} queued, "
         f"{sum(tx.dropped.values())} dropped; "
         f"in {rx.delivered} delivered, {len(snapshot.link.neighbors)} robots heard"

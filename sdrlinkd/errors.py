@@ -6,6 +6,8 @@
     │   ├── RegistryError    a line of the topic registry
     │   ├── BusError         sockets, runtime directory, a second instance, no daemon
     │   └── BagError         a recording that cannot be read
+    ├── LinkAbsentError      what carries the PDUs is not there now; it is tried again
+    ├── LinkRefusedError     it is there and does not take its settings
     ├── PduError             bytes a peer put on the air; counted by `reason`, never logged as ours
     └── EnvelopeError        a bus message that breaks the envelope; counted, the next one works
 
@@ -35,6 +37,16 @@ class BusError(UserError):
 
 class BagError(UserError):
     """A recording that cannot be read, or only in part."""
+
+
+class LinkAbsentError(SdrlinkError):
+    """A radio, hub or flowgraph that is not there now, and may come."""
+
+
+class LinkRefusedError(SdrlinkError):
+    """A radio or hub that is there and does not take its settings; the message cites key, given and
+    allowed.
+    """
 
 
 class PduError(SdrlinkError):

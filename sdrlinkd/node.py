@@ -6,23 +6,28 @@ import time
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import msgspec
+
 from sdrlinkd import __version__
 from sdrlinkd.bus import Bus, Ingress
 from sdrlinkd.config import Setup
+from sdrlinkd.errors import LinkRefusedError
+from sdrlinkd.health import Health, Line
+from sdrlinkd.hostclock import HostClock
 from sdrlinkd.link import (
     AS_CONFIGURED,
     Burst,
+    CarrierTraits,
     Link,
     Opportunity,
     Outcome,
     Overrides,
-    State,
     Told,
-    Wall,
     link_notices,
     link_report,
 )
 from sdrlinkd.localtime import UNKNOWN, age_since, local_times
+from sdrlinkd.opening import Opening
 from sdrlinkd.pdulink import Heard, PduLink
 from sdrlinkd.reports import Snapshot
 
@@ -32,11 +37,8 @@ if TYPE_CHECKING:
 
 TICK_S = 0.05
 SHORTEST_TICK_S = 0.001
-CHRONY_S = 1.0
-SET_S = 0.1
-"""By more than this a host's clock does not move unless it is set."""
-LEAST_ERROR_S = 5e-5
 NO_STOPS: Mapping[int, bytes] = {}
+NO_TRAFFIC: Iterator["Due"] = iter(())
 
 log = logging.getLogger("sdrlinkd")
 
@@ -53,7 +55,7 @@ class Node:
         self,
         setup: Setup,
         link: Link,
-        pdu_link: PduLink,
+        opening: Opening,
         open_bus: Callable[[Ingress], Bus],
         transforms: Mapping[int, "Transforms"],
         headers: Collection[int] = (),
@@ -62,15 +64,13 @@ class Node:
     ) -> None:
         self._setup = setup
         self._link = link
-        self._pdu_link = pdu_link
+        self._opening = opening
         self._transforms = transforms
         self._headers = headers
         self._stops = stops
-        self._chrony = chrony
-        self._chrony_at = 0.0
-        self._wall_ns: int | None = None
-        self._wall_error_s = 0.0
-        self._traffic: Iterator[Due] = iter(())
+        self._host_clock = HostClock(link.clocks, chrony, setup.config.chrony.robot)
+        self._health = Health()
+        self._traffic: Iterator[Due] | None = None
         self._upcoming: Due | None = None
         self._began_at = 0.0
         self._ticked_at = float("-inf")
@@ -80,6 +80,10 @@ class Node:
         self._loop_lag_s = 0.0
         self._draining = False
         self.bus = open_bus(self)
+
+    @property
+    def _pdu_link(self) -> PduLink:
+        return self._opening.pdu_link
 
     # The bus's Ingress.
 
@@ -121,6 +125,15 @@ class Node:
 
     # The PDU link's listener.
 
+    def attach(self, traits: CarrierTraits) -> None:
+        """The PDU link is there: fit the link to it. Raises ConfigError."""
+        config = self._opening.config
+        self._link.attach(traits, config.access, config.rate)
+        self._is_lockstep = traits.is_lockstep
+        if self._traffic is not None:
+            self._upcoming = next(self._traffic, None)
+            self._began_at = self._pdu_link.now()
+
     def heard(self, pdus: Sequence[Heard]) -> None:
         """PDUs from the air."""
         now, now_ns = self._pdu_link.now(), time.time_ns()
@@ -144,7 +157,7 @@ class Node:
         while self._upcoming is not None and self._began_at + self._upcoming[0] <= now:
             at, topic_id, payload = self._upcoming
             self._link.submit(topic_id, payload, self._began_at + at)
-            self._upcoming = next(self._traffic, None)
+            self._upcoming = next(self._traffic or NO_TRAFFIC, None)
             self._pdu_link.wake()
         if now - self._ticked_at >= TICK_S:
             self._ticked_at = now
@@ -179,26 +192,22 @@ class Node:
 
     # The daemon's tasks.
 
-    async def open_carrier(self) -> None:
-        """Open the PDU link, and fit the link to it. Raises UserError."""
-        config = self._setup.config
-        traits = await self._pdu_link.open(self)
-        self._link.attach(traits, config.access, config.rate)
-        self._is_lockstep = traits.is_lockstep
-
     def play(self, traffic: Iterator["Due"]) -> None:
-        """Send messages of our own at their time."""
+        """Send messages of our own, from when the PDU link is there, at their time."""
         self._traffic = traffic
-        self._upcoming = next(traffic, None)
-        self._began_at = self._pdu_link.now()
 
     async def carry(self) -> None:
-        """Let the PDU link run; for ever."""
+        """Bring the PDU link up and let it run; for ever. Raises UserError."""
         config = self._setup.config
-        waits = config.backend == "iqfile" and config.iqfile.wait_for_consumer
-        if waits or config.play.wait_for_consumer:
-            await self.bus.has_consumer.wait()
-        await self._pdu_link.run()
+        while True:
+            await self._opening.until_up(self)
+            waits = config.backend == "iqfile" and config.iqfile.wait_for_consumer
+            if waits or config.play.wait_for_consumer:
+                await self.bus.has_consumer.wait()
+            try:
+                await self._pdu_link.run()
+            except LinkRefusedError as error:
+                self._opening.refused(str(error))
 
     async def tick(self) -> None:
         """Let the link's time pass, and measure how late the event loop is; for ever."""
@@ -208,8 +217,12 @@ class Node:
             due = time.monotonic() + tick_s
             await asyncio.sleep(tick_s)
             self._loop_lag_s = max(time.monotonic() - due, 0.9 * self._loop_lag_s)
-            if not self._is_lockstep:
-                self._look_at_clock()
+            if not self._opening.is_up:
+                # There is no air yet, and whether its time is ours is not known.
+                self._link.expire_queue(self._pdu_link.now())
+                self._tell_verdicts()
+            elif not self._is_lockstep:
+                self._host_clock.look(self._pdu_link.now())
                 self.advance(self._pdu_link.now())
 
     async def drain(self, at_most_s: float) -> None:
@@ -236,8 +249,8 @@ class Node:
     def snapshot(self, control_requests: int) -> Snapshot:
         """Everything there is to know, at this moment."""
         now = self._pdu_link.now()
-        carrier = self._pdu_link.report()
-        return Snapshot(
+        carrier = self._opening.report(time.monotonic())
+        snapshot = Snapshot(
             version=__version__,
             node=self._setup.node_id,
             namespace=self._setup.config.namespace,
@@ -245,6 +258,7 @@ class Node:
             taken_at_unix_ns=time.time_ns(),
             uptime_s=time.monotonic() - self._started_at,
             loop_lag_ms=self._loop_lag_s * 1e3,
+            host_clock_steps=self._host_clock.steps,
             carrier=carrier,
             bus=self.bus.report(control_requests),
             link=link_report(
@@ -255,6 +269,11 @@ class Node:
             ),
             notices=[*self._setup.warnings, *carrier.notices, *link_notices(self._link)],
         )
+        return msgspec.structs.replace(snapshot, verdict=self._health.judge(snapshot))
+
+    def look(self, snapshot: Snapshot) -> list[Line]:
+        """What a log should tell of what has changed since the last look; once a second."""
+        return self._health.look(snapshot)
 
     def _tell_verdicts(self) -> None:
         for verdict in self._link.outcomes.receipts.take():
@@ -270,26 +289,6 @@ class Node:
                 continue
             log.warning("%s: silent, so the stop message was published", name)
             self.bus.publish_stop(src, topic_id, stop)
-
-    def _look_at_clock(self) -> None:
-        """What the host's clock is ahead of the link's, and how steadily."""
-        wall_ns = time.time_ns() - round(1e9 * self._pdu_link.now())
-        if self._wall_ns is not None:
-            moved_s = 1e-9 * abs(wall_ns - self._wall_ns)
-            # A clock that was set is no less exact for it.
-            if moved_s < SET_S:
-                self._wall_error_s = max(moved_s, 0.95 * self._wall_error_s)
-        self._wall_ns = wall_ns
-        self._link.clocks.wall = Wall(wall_ns, self._wall_error_s + LEAST_ERROR_S)
-        if self._chrony is not None and time.monotonic() - self._chrony_at >= CHRONY_S:
-            self._chrony_at = time.monotonic()
-            self._tell_chrony(self._chrony, self._setup.config.chrony.robot)
-
-    def _tell_chrony(self, chrony: "ChronySocket", robot: int) -> None:
-        now = self._pdu_link.now()
-        known = self._link.clocks.wall_offset(robot, now)
-        if known is not None and self._link.clocks.state(robot, now) is State.SYNCED:
-            chrony.send(time.time_ns(), -1e-9 * known[0])
 
     def audit(self) -> list[str]:
         """Where the ledger does not add up; empty when it does."""

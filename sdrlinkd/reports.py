@@ -111,6 +111,8 @@ class NeighborReport(msgspec.Struct, frozen=True, kw_only=True):
     per_lately: float | None = None
     """The same over the last `RATE_WINDOW_S`; null: nothing was due from it."""
     duplicates: int
+    usual_gap_s: float = 0.0
+    """The longest pause between its PDUs lately."""
     hops_left: int
     reboots: int
     snr_db: float | None = None
@@ -187,6 +189,8 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     bursts_by_mcs: dict[int, int]
     bursts_late: int
     """Bursts that came too late for their slot and were sent again."""
+    mcs_lowest: int | None = None
+    """The slowest MCS that may be chosen; null: it is fixed."""
     mcs_changes: list[tuple[float, int, int]]
     """(when by the link's clock, neighbor, MCS from then on), the last ones."""
     control_channel: bool
@@ -257,6 +261,8 @@ class Snapshot(msgspec.Struct, frozen=True, kw_only=True):
     taken_at_unix_ns: int
     uptime_s: float
     loop_lag_ms: float
+    host_clock_steps: int = 0
+    """Times that this host's clock was set, by more than it strays."""
     verdict: VerdictReport = VerdictReport()
     carrier: CarrierReport
     bus: BusReport

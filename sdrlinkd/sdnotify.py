@@ -19,6 +19,10 @@ class Notifier:
         """The service is up."""
         self._send("READY=1", wait_s=1.0)
 
+    def extend(self, seconds: float) -> None:
+        """The state it is in, starting or stopping, may last so much longer."""
+        self._send(f"EXTEND_TIMEOUT_USEC={seconds * 1e6:.0f}")
+
     def stopping(self) -> None:
         """The service is on its way down."""
         self._send("STOPPING=1")

@@ -14,6 +14,7 @@ from sdrlinkd.client import ControlClient, NoDaemonError
 from sdrlinkd.reports import Snapshot
 from tests.waiting import wait_for
 
+MAIN = "import sys; from sdrlinkd.__main__ import main; sys.exit(main(sys.argv[1:]))"
 ETC = Path(__file__).parents[1] / "etc"
 
 
@@ -76,13 +77,14 @@ def start_daemon(
     """Starts daemons and stops them in order; each must end well, without a traceback."""
     started: list[Running] = []
 
-    def start(extra_toml: str = "") -> Running:
+    def start(extra_toml: str = "", before: str = "") -> Running:
+        """`before`: Python that the daemon runs first."""
         directory = tmp_path_factory.mktemp("node")
         config = write_config(directory, extra_toml)
         log_path = directory / "log"
         with log_path.open("wb") as log:
             process = subprocess.Popen(
-                [sys.executable, "-m", "sdrlinkd", "--config", str(config)],
+                [sys.executable, "-c", before + MAIN, "--config", str(config)],
                 stdout=log,
                 stderr=log,
             )

@@ -78,6 +78,16 @@ class LocalRadio:
         """For people."""
         return "simulated air in this process"
 
+    @property
+    def trouble(self) -> str:
+        """It has none."""
+        return ""
+
+    @property
+    def levels(self) -> None:
+        """Nobody asks here."""
+        return None
+
     async def open(self, tuning: Tuning) -> None:
         """Begin. Raises BackendError when it is set to another air."""
         if tuning.rate_hz != self._ether.air.rate_hz:

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import threading
+import time
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable
 from pathlib import Path
@@ -13,9 +14,12 @@ import numpy as np
 import zmq
 
 from backends.base import (
-    BackendError,
+    AbsentError,
     Capabilities,
     Hear,
+    Levels,
+    Patience,
+    RefusalError,
     RxBlock,
     Samples,
     Tuning,
@@ -27,15 +31,17 @@ from backends.ether import protocol
 from backends.ether.antenna import Antenna
 from backends.ether.downlink import Downlink
 from backends.ether.medium import LEAD, Piece
-from backends.ether.sockets import AIR, NOBLOCK, SKY, WAITING
+from backends.ether.sockets import AIR, NOBLOCK, SKY, connect
 from backends.feed import BlockFeed, Fed
 from backends.outstanding import answered
 
 # From the event loop to the hub, on a busy machine.
 LEAD_S = 0.002
 ANSWER_MS = 5000
+LOOK_MS = 100
 # A paced hub that says nothing for so long is gone; it is asked again that often.
 QUIET_MS = 500
+INFINITE = float("inf")
 
 
 class _Beside(NamedTuple):
@@ -50,10 +56,14 @@ class EtherRadio:
     """Joins the hub whose sockets are in `directory` as robot `node`; `who` names it to people.
 
     When the hub goes away, the stream stands still until it is back; then what it missed is a gap.
+    `patience`: of `open`, where there is no hub.
     """
 
-    def __init__(self, directory: Path, node: int, who: str) -> None:
+    def __init__(
+        self, directory: Path, node: int, who: str, patience: Patience = Patience.NONE
+    ) -> None:
         self._directory = directory
+        self._waits = patience is not Patience.NONE
         self._node = node
         self._who = who
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
@@ -86,12 +96,22 @@ class EtherRadio:
         parts = [self._welcome.air, "the hub is away" if self._is_away else "", self._notice]
         return ", ".join(part for part in parts if part)
 
+    @property
+    def trouble(self) -> str:
+        """While the hub is away."""
+        return "it answers no more; it is asked until it is back" if self._is_away else ""
+
+    @property
+    def levels(self) -> Levels | None:
+        """Of the blocks so far."""
+        return self._feed.levels
+
     async def open(self, tuning: Tuning) -> None:
         """Join. Raises BackendError, also when the hub refuses."""
         self._tuning = tuning
-        self._down = self._socket(zmq.DEALER, AIR)
+        self._down = connect(self._context, zmq.DEALER, self._directory / AIR)
         self._downlink = Downlink(self._down)
-        self._up = self._socket(zmq.PUSH, SKY)
+        self._up = connect(self._context, zmq.PUSH, self._directory / SKY)
         welcome = await asyncio.to_thread(self._ask)
         self._welcome = welcome
         self._down.setsockopt(zmq.RCVTIMEO, QUIET_MS)
@@ -180,13 +200,16 @@ class EtherRadio:
     def _ask(self) -> protocol.Welcome:
         """The first time, before there are blocks; in a thread."""
         self._hello()
-        while not self._closing.is_set() and self._down.poll(ANSWER_MS):
+        until = time.monotonic() + (INFINITE if self._waits else 1e-3 * ANSWER_MS)
+        while not self._closing.is_set() and time.monotonic() < until:
+            if not self._down.poll(LOOK_MS):
+                continue
             answer = protocol.from_hub(self._down.recv_multipart()[0])
             if isinstance(answer, protocol.Welcome):
                 return answer
             if isinstance(answer, protocol.Refused):
-                raise BackendError(answer.reason)
-        raise BackendError(
+                raise RefusalError(answer.reason)
+        raise AbsentError(
             f"{self._directory}: no hub answers there; start one: sdrlink-ether --dir "
             f"{self._directory}"
         )
@@ -203,7 +226,7 @@ class EtherRadio:
                 self._is_away = False
                 return self._receive(*self._downlink.with_more(message, samples))
             if isinstance(message, protocol.Refused):
-                raise BackendError(message.reason)
+                raise RefusalError(message.reason)
             if isinstance(message, protocol.Welcome):
                 return self._rejoin(message)
             if self._is_away and not self._has_asked and self._node not in message.nodes:
@@ -234,7 +257,7 @@ class EtherRadio:
                     continue
                 message, samples = self._downlink.read(NOBLOCK)
                 if isinstance(message, protocol.Refused):
-                    raise BackendError(message.reason)
+                    raise RefusalError(message.reason)
                 if isinstance(message, protocol.Stretch):
                     yield Fed(self._receive(message, samples), is_heard=False)
         finally:
@@ -274,15 +297,3 @@ class EtherRadio:
         self._last_host_ns = now_ns
         n = max(1, round(away_s * self._tuning.rate_hz))
         return self._joined.rejoin(n, "the hub was away", now_ns)
-
-    def _socket(self, kind: int, name: str) -> "zmq.Socket[bytes]":
-        socket = self._context.socket(kind)
-        socket.setsockopt(zmq.LINGER, 100)
-        socket.setsockopt(zmq.RCVHWM, WAITING)
-        socket.setsockopt(zmq.RECONNECT_IVL_MAX, QUIET_MS)
-        path = self._directory / name
-        try:
-            socket.connect(f"ipc://{path}")
-        except zmq.ZMQError as error:
-            raise BackendError(f"{path}: cannot be reached ({error.strerror})") from None
-        return socket

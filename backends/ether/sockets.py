@@ -19,6 +19,22 @@ NOBLOCK, MORE, _EVENTS, _POLLIN = (
 AIR, SKY = "air.sock", "sky.sock"
 # Stretches that may wait for a radio; half a second of blocks.
 WAITING = 500
+RECONNECT_MS = 500
+
+
+def connect(
+    context: "zmq.Context[zmq.Socket[bytes]]", kind: int, path: Path
+) -> "zmq.Socket[bytes]":
+    """A radio's socket to its hub. Raises BackendError."""
+    socket = context.socket(kind)
+    socket.setsockopt(zmq.LINGER, 100)
+    socket.setsockopt(zmq.RCVHWM, WAITING)
+    socket.setsockopt(zmq.RECONNECT_IVL_MAX, RECONNECT_MS)
+    try:
+        socket.connect(f"ipc://{path}")
+    except zmq.ZMQError as error:
+        raise BackendError(f"{path}: cannot be reached ({error.strerror})") from None
+    return socket
 
 
 class HubSockets:

@@ -5,10 +5,12 @@ import select
 import socket
 import subprocess
 import sys
+import threading
+import time
 
 import msgspec
 
-from backends.base import Samples
+from backends.base import Patience, Samples
 from backends.soapy import protocol
 from backends.soapy.protocol import Begin, Failed, FromProcess, Open, Order, Stretch
 from backends.soapy.ring import SampleRing, make_shared
@@ -16,14 +18,15 @@ from backends.soapy.settings import SoapySettings
 
 END_S = 2.0
 """A process that has not ended so long after it was told to is killed."""
+LOOK_S = 0.1
 SOCKET_BYTES = 1 << 20
 
 
 class RadioChild:
-    """A radio process. `wait`: it waits for its device where it is not there."""
+    """A radio process, as patient with its device as told."""
 
     def __init__(
-        self, settings: SoapySettings, rx_samples: int, tx_samples: int, wait: bool
+        self, settings: SoapySettings, rx_samples: int, tx_samples: int, patience: Patience
     ) -> None:
         kind = socket.SOCK_SEQPACKET
         self._control, control = socket.socketpair(socket.AF_UNIX, kind)
@@ -47,21 +50,26 @@ class RadioChild:
             os.close(each)
         self._poll = select.poll()
         self._poll.register(self._air, select.POLLIN)
-        self._control.send(protocol.encode(Open(settings, rx_samples, tx_samples, wait)))
+        self._control.send(protocol.encode(Open(settings, rx_samples, tx_samples, patience)))
         self._control.setblocking(False)
         self._tx_at = 0
         self._hangs = False
 
-    def first_answer(self, timeout_s: float) -> FromProcess | None:
-        """What it says within that time; of one that has ended, that."""
+    def first_answer(self, within_s: float, is_over: threading.Event) -> FromProcess | None:
+        """What it says first, or of one that has ended, that; None: nothing in time, or until
+        `is_over`.
+        """
         poll = select.poll()
         poll.register(self._control, select.POLLIN)
-        if not poll.poll(1e3 * timeout_s):
-            return None
-        try:
-            return self.answer()
-        except EOFError:
-            return Failed(self.how_it_ended())
+        until = time.monotonic() + within_s
+        while not is_over.is_set() and time.monotonic() < until:
+            if not poll.poll(1e3 * LOOK_S):
+                continue
+            try:
+                return self.answer()
+            except EOFError:
+                return Failed(self.how_it_ended())
+        return None
 
     def answer(self) -> FromProcess | None:
         """What it has said; None: nothing yet. Raises EOFError when it will say no more."""

@@ -5,6 +5,7 @@ from collections import deque
 
 from backends.base import SENDING, RxBlock
 from backends.dc import DcBlocker
+from backends.levels import LevelMeter
 from backends.soapy.child import RadioChild
 from backends.soapy.protocol import Stretch, Why
 from backends.soapy.ring import SampleRing
@@ -26,6 +27,7 @@ class Hearing:
 
     def __init__(self, removes_dc: bool) -> None:
         self._dc = DcBlocker() if removes_dc else None
+        self.meter = LevelMeter()
         self._rate_hz = 0.0
         self._done = 0
         self._last_ns = 0
@@ -77,6 +79,7 @@ class Hearing:
         if stretch.why != Why.HEARD:
             return RxBlock(index, n, None, REASONS[Why(stretch.why)], host_ns, unsure)
         samples = child.rx.view(stretch.at, n)
+        self.meter.push(samples)
         self._done = stretch.at + n
         if self._dc is not None:
             samples = self._dc.push(samples)

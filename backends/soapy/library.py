@@ -36,11 +36,17 @@ def has_module(library: Library, driver: str) -> bool | None:
     return False if driver in MODULES else None
 
 
+def is_driver_missing(library: Library, args: str, error: DriverError) -> bool:
+    """Whether a device could not be opened because no module has its driver."""
+    driver = driver_of(args)
+    return bool(driver) and not has_module(library, driver) and "no match" in str(error)
+
+
 def why_not(library: Library, args: str, error: DriverError) -> str:
     """Why no device could be opened by `args`, and what to do."""
     driver = driver_of(args)
     text = str(error)
-    if driver and not has_module(library, driver) and "no match" in text:
+    if is_driver_missing(library, args, error):
         there = ", ".join(sorted(Path(each).name for each in library.modules())) or "none"
         return (
             f'soapy.device: got "{args}", but SoapySDR has no driver "{driver}" (its modules: '

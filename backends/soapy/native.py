@@ -23,6 +23,7 @@ from typing import Any
 from backends.soapy.surface import (
     SAMPLE_BYTES,
     DriverError,
+    HostError,
     Kwargs,
     Moved,
     Range,
@@ -89,7 +90,7 @@ class NativeLibrary:
         names = (*NAMES, ctypes.util.find_library("SoapySDR"))
         found = next((each for each in names if _loads(each)), None)
         if found is None:
-            raise DriverError("libSoapySDR is not installed")
+            raise HostError("libSoapySDR is not installed")
         self._c = _declared(CDLL(found))
 
     @property

@@ -13,11 +13,11 @@ import socket
 import sys
 
 from backends.soapy.orders import Orders
-from backends.soapy.protocol import MOST_BYTES, Failed, to_open
+from backends.soapy.protocol import MOST_BYTES, Blame, Failed, to_open
 from backends.soapy.ring import SampleRing
 from backends.soapy.session import Session
 from backends.soapy.settings import SettingError
-from backends.soapy.surface import DriverError
+from backends.soapy.surface import DriverError, HostError
 
 REALTIME, NICE = 10, -10
 """Priorities, where they may be had: samples do not wait."""
@@ -40,9 +40,11 @@ def main() -> None:
         try:
             Session(asked, orders, air_socket, SampleRing(rx_memory, asked.rx_samples)).run()
         except SettingError as error:
-            orders.say(Failed(str(error), is_refusal=True))
+            orders.say(Failed(str(error), Blame.SETTINGS))
+        except HostError as error:
+            orders.say(Failed(str(error), Blame.HOST))
         except DriverError as error:
-            orders.say(Failed(str(error)))
+            orders.say(Failed(str(error), Blame.ABSENT))
 
 
 def _hurry() -> None:

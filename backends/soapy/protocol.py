@@ -1,24 +1,25 @@
 """What daemon and radio process tell each other: messages here, samples in shared memory."""
 
 import struct
-from enum import IntEnum
+from enum import Enum, IntEnum
 from typing import NamedTuple
 
 import msgspec
 
+from backends.base import AbsentError, BackendError, Patience, RefusalError
 from backends.soapy.settings import Found, SoapySettings
 
 MOST_BYTES = 1 << 16
 
 
 class Open(msgspec.Struct, frozen=True, tag="open"):
-    """The first message to the process. `wait`: until the device is there, if it is not."""
+    """The first message to the process."""
 
     settings: SoapySettings
     rx_samples: int
     """Of the shared memory."""
     tx_samples: int
-    wait: bool = False
+    patience: Patience = Patience.NONE
 
 
 class Begin(msgspec.Struct, frozen=True, tag="begin"):
@@ -41,11 +42,29 @@ class Opened(msgspec.Struct, frozen=True, tag="opened"):
     found: Found
 
 
+class Blame(Enum):
+    """Why a device does not stream."""
+
+    ABSENT = "absent"
+    """It is not there, in use, or went away."""
+    SETTINGS = "settings"
+    """It does not take them."""
+    HOST = "host"
+    """SoapySDR or the device's driver is not installed."""
+
+
+_ERRORS = {Blame.ABSENT: AbsentError, Blame.SETTINGS: RefusalError, Blame.HOST: BackendError}
+
+
 class Failed(msgspec.Struct, frozen=True, tag="failed"):
-    """It does not, or not any more; the process ends. `is_refusal`: settings are to blame."""
+    """It does not stream, or not any more; the process ends."""
 
     reason: str
-    is_refusal: bool = False
+    blame: Blame = Blame.ABSENT
+
+    def error(self) -> BackendError:
+        """For whoever wanted it open."""
+        return _ERRORS[self.blame](self.reason)
 
 
 class Left(msgspec.Struct, frozen=True, tag="left"):

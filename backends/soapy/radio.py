@@ -2,7 +2,6 @@
 
 import asyncio
 import threading
-import time
 from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable
 from functools import partial
@@ -11,9 +10,11 @@ import msgspec
 import numpy as np
 
 from backends.base import (
-    BackendError,
+    AbsentError,
     Capabilities,
     Hear,
+    Levels,
+    Patience,
     RxBlock,
     Tuning,
     TxBurst,
@@ -25,7 +26,8 @@ from backends.outstanding import Places, answered
 from backends.soapy.child import RadioChild
 from backends.soapy.handed import Handed
 from backends.soapy.hearing import Hearing
-from backends.soapy.protocol import Counted, Failed, FromProcess, Left, Opened
+from backends.soapy.protocol import Blame, Counted, Failed, FromProcess, Left, Opened
+from backends.soapy.ring import ring_sizes
 from backends.soapy.settings import Found, SoapySettings
 
 OPEN_S = 60.0
@@ -33,19 +35,25 @@ OPEN_S = 60.0
 HUNG_S = 3.0
 """A device that says nothing for so long, beyond what it may send without listening, hangs."""
 LOOK_S = 0.1
-RX_RING_S, TX_RING_S = 0.5, 0.1
-LEAST_RING = 1 << 19
 RETRY_S = 0.25, 2.0
 
 
 class SoapyRadio:
     """The device that `settings` names; `longest_s` is the longest burst it is given.
 
-    A device that goes away is looked for until it is back; what it missed is a gap.
+    A device that goes away is looked for until it is back; what it missed is a gap. `patience`: of
+    `open`, where it is not there.
     """
 
-    def __init__(self, settings: SoapySettings, longest_s: float, removes_dc: bool = True) -> None:
+    def __init__(
+        self,
+        settings: SoapySettings,
+        longest_s: float,
+        removes_dc: bool = True,
+        patience: Patience = Patience.NONE,
+    ) -> None:
         self._settings = settings
+        self._patience = patience
         self._longest_s = longest_s
         self._hearing = Hearing(removes_dc)
         self._closing = threading.Event()
@@ -83,14 +91,22 @@ class SoapyRadio:
         if found is None:
             return f"{self._settings.device}, not open"
         parts = [
-            f"{found.driver} {found.hardware}",
-            f"{found.frequency_hz / 1e6:g} MHz",
-            found.gains,
+            found.described,
             "" if self._settings.tx_enabled else "tx_enabled = false",
             found.binding,
             f"away ({self._away}), looked for until it is back" if self._away else self._notice,
         ]
         return ", ".join(part for part in parts if part)
+
+    @property
+    def trouble(self) -> str:
+        """While the device is away."""
+        return f"{self._away}; it is looked for until it is back" if self._away else ""
+
+    @property
+    def levels(self) -> Levels | None:
+        """As the device delivers it."""
+        return self._hearing.meter.levels
 
     async def open(self, tuning: Tuning) -> None:
         """Start the process and open the device. Raises BackendError."""
@@ -99,16 +115,17 @@ class SoapyRadio:
         self._settings = msgspec.structs.replace(
             self._settings, rate_hz=tuning.rate_hz, frequency_hz=tuning.frequency_hz
         )
-        child = self._child = self._make_child(wait=False)
-        answer = await asyncio.to_thread(self._first_answer, child, OPEN_S)
+        child = self._child = self._make_child(self._patience)
+        within_s = OPEN_S if self._patience is Patience.NONE else float("inf")
+        answer = await asyncio.to_thread(child.first_answer, within_s, self._closing)
         if isinstance(answer, Opened):
             self._found = answer.found
             self._hear_from(child)
             return
         await self.close()
         if isinstance(answer, Failed):
-            raise BackendError(answer.reason)
-        raise BackendError(
+            raise answer.error()
+        raise AbsentError(
             f'soapy.device: got "{self._settings.device}", whose driver does not answer for '
             f"{OPEN_S:g} s; unplug the device and plug it in again, or name another one"
         )
@@ -149,13 +166,12 @@ class SoapyRadio:
 
     async def close(self) -> None:
         """Let go of the device."""
-        if self._closing.is_set():
-            return
-        self._closing.set()
-        if self._child is not None:
-            self._unlisten(self._child)
-            await asyncio.to_thread(self._end)
-        self._handed.lose()
+        if not self._closing.is_set():
+            self._closing.set()
+            if self._child is not None:
+                self._unlisten(self._child)
+                await asyncio.to_thread(self._end)
+            self._handed.lose()
 
     @property
     def _known(self) -> Found:
@@ -170,20 +186,9 @@ class SoapyRadio:
             return 0
         return round(0.5 * self._settings.lead_s * self._rate_hz)
 
-    def _make_child(self, wait: bool) -> RadioChild:
-        rate, settings = self._rate_hz, self._settings
-        rx = max(LEAST_RING, round(RX_RING_S * rate))
-        # In any case the burst that leaves and the next one.
-        tx = max(LEAST_RING, round((2 * self._longest_s + TX_RING_S + settings.lead_s) * rate))
-        return RadioChild(settings, rx, tx, wait)
-
-    def _first_answer(self, child: RadioChild, within_s: float) -> FromProcess | None:
-        until = time.monotonic() + within_s
-        while not self._closing.is_set() and time.monotonic() < until:
-            answer = child.first_answer(LOOK_S)
-            if answer is not None:
-                return answer
-        return None
+    def _make_child(self, patience: Patience) -> RadioChild:
+        rx, tx = ring_sizes(self._rate_hz, self._longest_s, self._settings.lead_s)
+        return RadioChild(self._settings, rx, tx, patience)
 
     def _end(self) -> None:
         self._feed.stop()
@@ -259,22 +264,22 @@ class SoapyRadio:
         return None
 
     def _look_for_it(self, lost: RadioChild) -> RadioChild | None:
-        """Until the device is back; None: we close before. Raises BackendError."""
+        """Until the device is back; None: we close before. Raises RefusalError, BackendError."""
         how = lost.how_it_ended()
         self._on_loop(partial(self._lost, lost, how))
         lost.end()
         wait_s, most_s = RETRY_S
         while not self._closing.is_set():
-            child = self._make_child(wait=True)
-            answer = self._first_answer(child, float("inf"))
+            child = self._make_child(Patience.THERE)
+            answer = child.first_answer(float("inf"), self._closing)
             if isinstance(answer, Opened):
                 self._hearing.begin(child.rx, self._rate_hz)
                 child.begin()
                 self._on_loop(partial(self._came_back, child, answer.found))
                 return child
             child.end()
-            if isinstance(answer, Failed) and answer.is_refusal:
-                raise BackendError(answer.reason)
+            if isinstance(answer, Failed) and answer.blame is not Blame.ABSENT:
+                raise answer.error()
             self._closing.wait(wait_s)
             wait_s = min(2 * wait_s, most_s)
         return None

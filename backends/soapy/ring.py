@@ -9,6 +9,17 @@ from backends.base import Samples
 
 _PAGE = mmap.PAGESIZE
 
+RX_RING_S, TX_RING_S = 0.5, 0.1
+LEAST_RING = 1 << 19
+
+
+def ring_sizes(rate_hz: float, longest_s: float, lead_s: float) -> tuple[int, int]:
+    """Samples of a receive and of a transmit ring, for bursts of at most `longest_s`."""
+    rx = max(LEAST_RING, round(RX_RING_S * rate_hz))
+    # In any case the burst that leaves and the next one.
+    tx = max(LEAST_RING, round((2 * longest_s + TX_RING_S + lead_s) * rate_hz))
+    return rx, tx
+
 
 class SampleRing:
     """`capacity` samples, written by one process in order and read by another.

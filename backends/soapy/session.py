@@ -3,24 +3,27 @@
 import contextlib
 import socket
 
+from backends.base import Patience
 from backends.soapy.clock import SampleTime
 from backends.soapy.counted import CountedSender
 from backends.soapy.device import WAYS, Device
-from backends.soapy.library import load_library, why_not
+from backends.soapy.library import is_driver_missing, load_library, why_not
 from backends.soapy.orders import Orders
 from backends.soapy.outgoing import Outgoing
 from backends.soapy.protocol import Open, Opened
 from backends.soapy.receiving import Receiving
 from backends.soapy.ring import SampleRing
 from backends.soapy.setting_up import choose_format, set_up
-from backends.soapy.settings import Found, SettingError, in_flight
+from backends.soapy.settings import Found, in_flight
 from backends.soapy.streaming import Sender, stream
-from backends.soapy.surface import RX, TX, DriverError, Library, Stream
+from backends.soapy.surface import RX, TX, DriverError, HostError, Library, Stream
 from backends.soapy.timed import TimedSender
 
 RETRY_S = 0.25, 0.5
 """A device that went away is looked for again after so long; more each time."""
 LOOK_S = 0.1
+AWAY_S = 1.0
+"""A device that refused its settings is looked at so often."""
 
 
 class Session:
@@ -28,7 +31,7 @@ class Session:
 
     def __init__(self, asked: Open, orders: Orders, air: socket.socket, ring: SampleRing) -> None:
         self._settings = asked.settings
-        self._waits = asked.wait
+        self._patience = asked.patience
         self._orders = orders
         self._air = air
         self._ring = ring
@@ -44,17 +47,28 @@ class Session:
             self._stream(library, device, stack)
 
     def _made(self, library: Library) -> Device | None:
+        """The open device; None: the daemon is gone. Raises DriverError."""
         wait_s, most_s = RETRY_S
         args = self._settings.device
+        if self._patience is Patience.REPLUGGED:
+            self._wait_until_away(library)
         while not self._orders.is_over:
             try:
                 return Device(library, args)
             except DriverError as error:
-                if not self._waits:
-                    raise SettingError(why_not(library, args, error)) from None
+                reason = why_not(library, args, error)
+                if is_driver_missing(library, args, error):
+                    raise HostError(reason) from None
+                if self._patience is Patience.NONE:
+                    raise DriverError(reason) from None
             self._orders.wait(wait_s)
             wait_s = min(2 * wait_s, most_s)
         return None
+
+    def _wait_until_away(self, library: Library) -> None:
+        """Nobody can tell a device that was replugged from one that was not, but by its absence."""
+        while not self._orders.is_over and library.enumerate(self._settings.device):
+            self._orders.wait(AWAY_S)
 
     def _stream(self, library: Library, device: Device, stack: contextlib.ExitStack) -> None:
         settings, orders = self._settings, self._orders

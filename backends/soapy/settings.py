@@ -106,6 +106,12 @@ class Found(msgspec.Struct, frozen=True, kw_only=True):
     gains: str = ""
 
     @property
+    def described(self) -> str:
+        """For people."""
+        parts = [f"{self.driver} {self.hardware}, {self.frequency_hz / 1e6:g} MHz", self.gains]
+        return ", ".join(part for part in parts if part)
+
+    @property
     def keeps_time(self) -> bool:
         """Whether bursts leave at times that the device itself keeps."""
         return keeps_time(self.has_time, self.full_duplex)

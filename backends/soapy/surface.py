@@ -25,6 +25,10 @@ class DriverError(Exception):
     """What a driver, or SoapySDR itself, says went wrong."""
 
 
+class HostError(DriverError):
+    """SoapySDR or the driver's module is not installed: waiting does not help."""
+
+
 class Range(NamedTuple):
     """From `low` to `high`."""
 

@@ -11,6 +11,7 @@ from backends.base import (
     BackendError,
     Capabilities,
     Hear,
+    Levels,
     RxBlock,
     Samples,
     Tuning,
@@ -97,6 +98,16 @@ class ZmqRadio:
         kinds = {"push": "PUSH/PULL", "pub": "PUB/SUB", "req": "REQ/REP"}
         text = f"{self._type.name} by {kinds[self._pattern]}, to {send}, from {receive}"
         return f"{text}, {self._notice}" if self._notice else text
+
+    @property
+    def trouble(self) -> str:
+        """What the sockets say."""
+        return self._notice
+
+    @property
+    def levels(self) -> Levels | None:
+        """Of the blocks so far."""
+        return self._feed.levels
 
     async def open(self, tuning: Tuning) -> None:
         """Open the sockets. Raises BackendError."""

@@ -29,7 +29,7 @@ from sdrlinkd.link.schedule import (
     ClassesParams,
     ClassParams,
 )
-from sdrlinkd.link.timesync import ClockParams, DualEnvelope, PaperFilter, State, Wall
+from sdrlinkd.link.timesync import ClockParams, Clocks, DualEnvelope, PaperFilter, State, Wall
 from sdrlinkd.link.why import Told
 
 __all__ = [
@@ -50,6 +50,7 @@ __all__ = [
     "ClassParams",
     "ClassesParams",
     "ClockParams",
+    "Clocks",
     "Deflated",
     "Delivered",
     "DualEnvelope",

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from sdrlinkd.errors import PduError
 from sdrlinkd.link.ages import Ages
+from sdrlinkd.link.airmeter import AirMeter
 from sdrlinkd.link.compression import Inflated
 from sdrlinkd.link.delivered import CDR_HEADER_SIZE, Delivered
 from sdrlinkd.link.ear import Ear
@@ -67,6 +68,7 @@ class Inbox:
         self._ages = Ages(reassembly.timeout_s)
         self.neighbors: dict[int, Neighbor] = {}
         self.tallies: dict[tuple[int, int], RxTally] = {}
+        self.air = AirMeter()
         self.pdus_heard = 0
         self.pdus_used = 0
         self.pdus_dropped: Counter[str] = Counter()
@@ -76,6 +78,7 @@ class Inbox:
     ) -> list[Delivered]:
         """Take a PDU whose burst's preamble arrived at `at`; the messages it completed."""
         self.pdus_heard += 1
+        self.air.note(at, ended_at)
         try:
             pdu = parse(data, self._pdu_size)
             records = self._control_records(pdu)
@@ -88,7 +91,7 @@ class Inbox:
         if pdu.src == self._own_id and not self._hears_self:
             return self._drop("rx_own")
         neighbor = self.neighbors.get(pdu.src) or self._new_neighbor(pdu.src, at)
-        neighbor.last_heard_at = at
+        neighbor.heard_at(at)
         _, seq, crc = identity(data) if records is None else lasting_identity(data)
         if not neighbor.track.heard(seq, crc):
             neighbor.duplicates += 1

@@ -66,6 +66,7 @@ class TxTally:
     """Messages of one topic on their way out."""
 
     accepted: int = 0
+    accepted_bytes: int = 0
     sent: int = 0
     sent_bytes: int = 0
     reoffered: int = 0

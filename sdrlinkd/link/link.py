@@ -50,9 +50,8 @@ DEFAULT_CLASSES = ClassesParams()
 class Link:
     """Joins sender and inbox, access and rate. Never waits, never reads a clock.
 
-    `now`, `start` and `at` are seconds on one clock of the caller's choice; `rng` is the only
-    chance. `hears_self` is the paper's loopback experiment; a compressed message may grow to
-    `max_expanded` bytes.
+    `now`, `start` and `at` are seconds on one clock of the caller's choice; `rng` is all chance.
+    `hears_self`: the paper's loopback experiment. A compressed message may grow to `max_expanded`.
     """
 
     def __init__(
@@ -111,8 +110,7 @@ class Link:
         )
         self.outcomes = Outcomes(self.sender, self.tellings, neighbors, own_id, params.receipt_s)
         self._latched = Latched()
-        self._why = Why(self.sender, self.departures.shares)
-        self.relay = Relay(relay, own_id)
+        self._why, self.relay = Why(self.sender, self.departures.shares), Relay(relay, own_id)
 
     def attach(self, carrier: CarrierTraits, access: AccessParams, rate: RateParams) -> None:
         """Settle access and rate for the radio that is there. Raises ConfigError."""
@@ -163,7 +161,7 @@ class Link:
             elif refused is None and not self.registry.has_control:
                 self.outcomes.unknowable(overrides.receipt, topic_id, overrides.dst)
         if refused is None:
-            qos = self.sender.treatment(topic_id)[0] if overrides.qos is None else overrides.qos
+            qos = overrides.qos if overrides.qos is not None else self.sender.treatment(topic_id)[0]
             self.departures.forecasts.note((self.own_id, topic_id), qos, now)
             self.departures.more_to_send()
             if self.sender.policy(topic_id).durability == "transient_local":
@@ -173,7 +171,7 @@ class Link:
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
         """The burst that should leave next, decided now; None: nothing to send, or not yet."""
         burst = self.departures.next_burst(opportunity)
-        if self.sender.packetizer.asking and burst is not None:
+        if burst is not None and self.sender.packetizer.asking:
             self.outcomes.note(burst.start)
         return burst
 
@@ -191,18 +189,21 @@ class Link:
         now: float | None = None,
         ended_at: float | None = None,
     ) -> list[Delivered]:
-        """Take a PDU whose burst's preamble arrived at `at`; the messages that it completed.
-
-        Its last sample came at `ended_at`. Absent `now` is `at`, as is `ended_at`.
+        """Take a PDU whose burst's preamble arrived at `at`, and whose last sample at `ended_at`
+        (absent: `at`, as is `now`); the messages that it completed.
         """
-        if ended_at is None:
-            ended_at = at
-        return self.inbox.hear(data, at, snr_db, at if now is None else now, ended_at)
+        now, ended_at = at if now is None else now, at if ended_at is None else ended_at
+        return self.inbox.hear(data, at, snr_db, now, ended_at)
 
     def delivered(self, message: Delivered, now: float) -> float | None:
         """The age in seconds at which `message` is handed over at `now`; None when unknown."""
         policy = self.inbox.policies.get(message.topic_id, DEFAULT_POLICY)
         return self.outcomes.delivered(message, policy, now)
+
+    def expire_queue(self, now: float) -> None:
+        """Let time pass where there is nothing yet to send with: what is too old goes by name."""
+        self.sender.expire(now)
+        self.outcomes.expire(now)
 
     def handle_timers(self, now: float) -> None:
         """Let time pass: expiries, reassembly timeouts, rate samples."""
@@ -215,7 +216,8 @@ class Link:
         self.outcomes.expire(now)
         self._why.sample(now, len(self.registry))
         if self.rates.is_due(now):
-            self.rates.sample(rate_counters(self.sender, self.inbox, len(self.registry)), now)
+            counters = rate_counters(self.sender, self.inbox, self.departures.airtime_s)
+            self.rates.sample(counters, now)
 
     @property
     def has_work(self) -> bool:

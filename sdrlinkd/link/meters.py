@@ -46,12 +46,20 @@ class RateMeter:
         return 0.0
 
 
-def rate_counters(sender: Sender, inbox: Inbox, n_topics: int) -> dict[Hashable, int]:
-    """The counters of which the snapshot shows rates."""
-    tx: dict[Hashable, int] = {
-        ("tx", topic_id): sender.tally(topic_id).accepted for topic_id in range(n_topics)
+def rate_counters(sender: Sender, inbox: Inbox, sent_s: float) -> dict[Hashable, int]:
+    """The counters of which the snapshot shows rates; `sent_s`: our time on the air."""
+    counters: dict[Hashable, int] = {
+        ("air", "sent"): round(1e6 * sent_s),
+        ("air", "heard"): round(1e6 * inbox.air.heard_s),
     }
-    rx: dict[Hashable, int] = {
-        ("rx", *key): tally.delivered for key, tally in inbox.tallies.items()
-    }
-    return {**tx, **rx}
+    for topic_id in range(sender.n_topics):
+        tally = sender.tally(topic_id)
+        counters["tx", topic_id] = tally.accepted
+        counters["tx_bytes", topic_id] = tally.accepted_bytes
+    for key, heard in inbox.tallies.items():
+        counters["rx", *key] = heard.delivered
+        counters["rx_bytes", *key] = heard.delivered_bytes
+    for src, neighbor in inbox.neighbors.items():
+        counters["pdus", src] = neighbor.heard
+        counters["lost", src] = neighbor.track.lost
+    return counters

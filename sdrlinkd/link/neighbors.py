@@ -7,6 +7,7 @@ from sdrlinkd.wire import Beacon, Registry, RegistryDigest
 
 # Weight of the newest PDU in the mean SNR.
 SNR_WEIGHT = 0.2
+GAP_DECAY = 0.99
 
 
 @dataclass(slots=True)
@@ -18,6 +19,8 @@ class Neighbor:
     heard: int = 0
     duplicates: int = 0
     last_heard_at: float = 0.0
+    usual_gap_s: float = 0.0
+    """The longest pause between its PDUs lately."""
     hops_left: int = 0
     snr_db: float | None = None
     mean_snr_db: float | None = None
@@ -25,6 +28,13 @@ class Neighbor:
     reboots: int = 0
     digest: RegistryDigest | None = None
     _reported: tuple[int, int] = (0, 0)
+
+    def heard_at(self, at: float) -> None:
+        """One more PDU came."""
+        if self.last_heard_at:
+            # A pause is forgotten after some hundred PDUs without one as long.
+            self.usual_gap_s = max(at - self.last_heard_at, GAP_DECAY * self.usual_gap_s)
+        self.last_heard_at = at
 
     def note_snr(self, snr_db: float | None) -> None:
         """SNR of one more PDU."""

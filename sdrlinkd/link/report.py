@@ -3,6 +3,7 @@
 from collections import Counter
 
 from sdrlinkd.link.link import Link
+from sdrlinkd.link.neighbors import Neighbor
 from sdrlinkd.link.time_report import clock_report, latency_report, waits_ms
 from sdrlinkd.reports import (
     LinkReport,
@@ -27,12 +28,15 @@ def link_report(
         pdu_size=link.params.pdu_size,
         access=link.access.state,
         airtime_s=link.departures.airtime_s,
+        air_sent_pct=_air_pct(link, "sent", link.departures.airtime_s, now),
+        air_heard_pct=_air_pct(link, "heard", link.inbox.air.heard_s, now),
         control_airtime_s=link.departures.control_airtime_s,
         control_period_s=link.tellings.period_s,
         airtime_by_class_s={
             qos.label: round(used_s, 6) for qos, used_s in link.departures.shares.used_s.items()
         },
         bursts_by_mcs=dict(sorted(link.departures.bursts_by_mcs.items())),
+        mcs_lowest=link.rate.lowest if link.rate.adapts else None,
         bursts_late=link.departures.bursts_late,
         mcs_changes=list(link.rate.changes),
         control_channel=link.registry.has_control,
@@ -51,6 +55,11 @@ def link_report(
         received=_received(link, now, name_out),
         neighbors=_neighbors(link, now),
     )
+
+
+def _air_pct(link: Link, who: str, used_s: float, now: float) -> float:
+    """Share of the air lately, in %."""
+    return min(100.0, 1e-4 * link.rates.per_s(("air", who), round(1e6 * used_s), now))
 
 
 def _tx(link: Link) -> TxReport:
@@ -107,6 +116,9 @@ def _topics(link: Link, now: float, names_in: dict[int, str]) -> list[TopicRepor
                 priority=priority,
                 accepted=tally.accepted,
                 accepted_per_s=link.rates.per_s(("tx", topic.id), tally.accepted, now),
+                accepted_bytes_per_s=link.rates.per_s(
+                    ("tx_bytes", topic.id), tally.accepted_bytes, now
+                ),
                 sent=tally.sent,
                 sent_bytes=tally.sent_bytes,
                 reoffered=tally.reoffered,
@@ -135,6 +147,9 @@ def _received(
                 delivered=tally.delivered,
                 delivered_per_s=link.rates.per_s(("rx", src, topic_id), tally.delivered, now),
                 delivered_bytes=tally.delivered_bytes,
+                delivered_bytes_per_s=link.rates.per_s(
+                    ("rx_bytes", src, topic_id), tally.delivered_bytes, now
+                ),
                 dropped=dict(tally.dropped),
                 pdr=tally.delivered / ended if ended else None,
                 age_ms_last=ages.last_ms() if ages else None,
@@ -163,6 +178,8 @@ def _neighbors(link: Link, now: float) -> list[NeighborReport]:
                 pdus_heard=neighbor.heard,
                 pdus_lost=lost,
                 per=lost / (neighbor.heard + lost) if neighbor.heard + lost else 0.0,
+                per_lately=_per_lately(link, neighbor, now),
+                usual_gap_s=neighbor.usual_gap_s,
                 duplicates=neighbor.duplicates,
                 hops_left=neighbor.hops_left,
                 reboots=neighbor.reboots,
@@ -175,6 +192,13 @@ def _neighbors(link: Link, now: float) -> list[NeighborReport]:
             )
         )
     return reports
+
+
+def _per_lately(link: Link, neighbor: Neighbor, now: float) -> float | None:
+    """Its PDUs lost lately over those sent; None where it sent none."""
+    heard = link.rates.per_s(("pdus", neighbor.src), neighbor.heard, now)
+    lost = max(0.0, link.rates.per_s(("lost", neighbor.src), neighbor.track.lost, now))
+    return lost / (heard + lost) if heard + lost > 0 else None
 
 
 def link_notices(link: Link) -> list[str]:

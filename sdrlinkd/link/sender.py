@@ -72,6 +72,7 @@ class Sender:
         """Queue a message; None, or the ledger's reason why it was refused."""
         topic = self._topics[topic_id]
         topic.tally.accepted += 1
+        topic.tally.accepted_bytes += len(payload)
         refused = topic.admission.refuse(payload, now)
         if refused:
             topic.tally.drop(refused)
@@ -211,6 +212,11 @@ class Sender:
             self._drop(message, "tx_shutdown")
         for message in list(self.outbox.in_flight):
             self._drop(message, "tx_shutdown")
+
+    @property
+    def n_topics(self) -> int:
+        """Of the registry."""
+        return len(self._topics)
 
     def tally(self, topic_id: int) -> TxTally:
         """Counters of one topic."""

@@ -2,7 +2,10 @@
 
 
 class StreamClock:
-    """Seconds since index 0; 0 until the first block. `host_s` is the monotonic clock at each call.
+    """Seconds since index 0. `host_s` is the monotonic clock at each call.
+
+    Until the first block it stands at 0, or, given when it `began_s` by the host's clock, runs with
+    that.
 
     In a paced stream, time goes on between blocks with the monotonic clock, by the block that came
     with the least delay lately; so it does when blocks stop coming, until they return. In lock-step
@@ -16,7 +19,14 @@ class StreamClock:
     LATELY_S = 0.25
     """Twice this; crystals drift apart by some µs in it."""
 
-    def __init__(self, rate_hz: float, paced: bool, lockstep: bool = False) -> None:
+    def __init__(
+        self,
+        rate_hz: float,
+        paced: bool,
+        lockstep: bool = False,
+        began_s: float | None = None,
+    ) -> None:
+        self._began_s = began_s
         self._rate_hz = rate_hz
         self._paced = paced
         self._lockstep = lockstep
@@ -45,7 +55,9 @@ class StreamClock:
     def now(self, host_s: float) -> float:
         """Seconds on the stream."""
         if self._seen is None:
-            return 0.0
+            if self._began_s is not None:
+                self._latest = max(self._latest, host_s - self._began_s)
+            return self._latest
         end, seen_s, least_s = self._seen
         if self._lockstep:
             now = end / self._rate_hz

@@ -7,14 +7,15 @@ import time
 from collections.abc import Sequence
 
 import phy
-from backends import BackendError, Radio, RxBlock, Tuning
+from backends import AbsentError, BackendError, LateRadio, Radio, RefusalError, RxBlock, Tuning
 from sdrlinkd.config import ModemParams
-from sdrlinkd.errors import UserError
-from sdrlinkd.link import Burst, CarrierTraits, Opportunity, Outcome
+from sdrlinkd.errors import ConfigError, LinkAbsentError, LinkRefusedError, UserError
+from sdrlinkd.link import Burst, Opportunity, Outcome
 from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.clock import StreamClock
 from sdrlinkd.modem.ear import Ear
 from sdrlinkd.modem.plan import AirPlan, SpellPlan
+from sdrlinkd.modem.report import modem_report
 from sdrlinkd.modem.rx_thread import Demodulation, ReceiverHere, ReceiverThread
 from sdrlinkd.modem.traits import carrier_traits
 from sdrlinkd.modem.transmission import BurstReport, Transmission
@@ -31,7 +32,8 @@ class ModemLink:
 
     In lock-step all of it is done within the block that brought it. `listens`: someone wants to
     know whether there is a carrier on the air. `lead_grows`: bursts that must leave at a given
-    moment are handed over earlier when the machine proves to be slow.
+    moment are handed over earlier when the machine proves to be slow. `began_s`: the link's clock
+    has run since then (monotonic), before there was a radio; None: it begins with the samples.
     """
 
     def __init__(
@@ -42,9 +44,10 @@ class ModemLink:
         kind: str,
         listens: bool = False,
         lead_grows: bool = False,
+        began_s: float | None = None,
     ) -> None:
         self._params = params
-        self._radio = radio
+        self._radio = radio if began_s is None else LateRadio(radio, self._first_index)
         self._kind = kind
         self._airtimes = Airtimes(params, pdu_size)
         self._receiver = phy.Receiver(
@@ -56,10 +59,10 @@ class ModemLink:
         sense = phy.CarrierSense(params.carrier_db) if listens else None
         self._ear = Ear(self._receiver, sense, params.rate_hz)
         self._lead_grows = lead_grows
-        self._clock = StreamClock(params.rate_hz, paced=True)
+        self._clock = StreamClock(params.rate_hz, paced=True, began_s=began_s)
         self._plan = AirPlan(0)
         self._rx: Demodulation | None = None
-        self._tx = Transmission(params, radio)
+        self._tx = Transmission(params, self._radio)
         self._listener: PduListener | None = None
         self._moved = asyncio.Event()
         self._state = "down"
@@ -69,19 +72,24 @@ class ModemLink:
         """Seconds on the received stream."""
         return self._clock.now(time.monotonic())
 
-    async def open(self, listener: PduListener) -> CarrierTraits:
+    async def open(self, listener: PduListener) -> None:
         """Load the compiled code and open the radio."""
         params = self._params
         await self._tx.warm_up()
         tuning = Tuning(params.rate_hz, params.carrier_hz)
         try:
             await self._radio.open(tuning)
+        except AbsentError as error:
+            raise LinkAbsentError(str(error)) from None
+        except RefusalError as error:
+            raise LinkRefusedError(str(error)) from None
         except BackendError as error:
             raise UserError(str(error)) from None
-        can = self._radio.capabilities
+        can = self._can = self._radio.capabilities
         traits = carrier_traits(self._kind, can, params, self._airtimes)
-        self._can = can
-        self._clock = StreamClock(params.rate_hz, can.paced, can.lockstep)
+        if not can.paced:
+            # Time is that of the samples, from their first on.
+            self._clock = StreamClock(params.rate_hz, can.paced, can.lockstep)
         lead, ahead = traits.lead_s * params.rate_hz, traits.ahead_s * params.rate_hz
         self._plan = AirPlan(math.ceil(lead), round(ahead))
         if can.spells is not None:
@@ -90,23 +98,31 @@ class ModemLink:
             self._rx = ReceiverHere(self._ear, params.rate_hz, self._step)
         else:
             self._rx = ReceiverThread(self._ear, params.rate_hz, self._deliver, wakes=not can.paced)
+        try:
+            listener.attach(traits)
+        except ConfigError as error:
+            raise LinkRefusedError(str(error)) from None
         self._listener = listener
         self._state = "up"
-        return traits
 
     async def run(self) -> None:
-        """Receive, and send what is to be sent, until cancelled."""
+        """Receive, and send what is to be sent, until cancelled. Raises LinkRefusedError."""
         if self._rx is None:
             raise RuntimeError("run before open")
+        refusal = ""
         async with asyncio.TaskGroup() as tasks:
             self._tx.start(tasks, self._left)
-            if not self._can.lockstep:
-                tasks.create_task(self._send_when_due())
+            sending = None if self._can.lockstep else tasks.create_task(self._send_when_due())
             try:
                 await self._receive(self._rx)
             except BackendError as error:
                 self._state, self._problem = "down", str(error)
-            await asyncio.Event().wait()
+                refusal = str(error) if isinstance(error, RefusalError) else ""
+            if not refusal:
+                await asyncio.Event().wait()
+            elif sending is not None:
+                sending.cancel()
+        raise LinkRefusedError(refusal)
 
     def wake(self) -> None:
         """There may be something to send."""
@@ -131,42 +147,15 @@ class ModemLink:
 
     def report(self) -> CarrierReport:
         """State, counters of radio and receiver, and whether the PHY keeps up."""
-        params = self._params
-        counted = self._receiver.counters
-        ratio = self._realtime_ratio
-        return CarrierReport(
-            kind=self._kind,
-            state="down" if self._is_gone else self._state,
-            detail=f"{phy.MCS_TABLE[params.mcs].name}, {params.rate_hz / 1e6:g} Msps, "
-            f"{self._radio.detail}",
-            counters={
-                **self._radio.counters,
-                **self._tx.counters,
-                **{name: counted[name] for name in phy.COUNTERS},
-            },
-            realtime_ratio=round(ratio, 2) if ratio else None,
-            notices=self._notices(),
-        )
-
-    def _notices(self) -> list[str]:
-        notices = [self._problem] if self._problem else []
-        if self._is_gone:
-            notices.append(f"the radio delivers nothing ({self._radio.detail}); what is to be sent "
-                           "waits")  # fmt: skip
-        if self._radio.counters.get("overflows"):
-            notices.append(self._overflow_notice())
-        if self._state != "down" and not self._can.transmits:
-            notices.append("this radio only receives: what is to be sent stays in the queue")
-        return notices
-
-    def _overflow_notice(self) -> str:
-        counted = self._radio.counters
-        lost = counted["samples_lost"]
-        kept = 1 - lost / max(1, self._clock.end)
-        return (
-            f"the receiver fell behind {counted['overflows']} times and lost {lost} samples: it "
-            f"keeps up with {kept:.2f} of real time at {self._params.rate_hz / 1e6:g} Msps "
-            f"(demodulation alone with {self._realtime_ratio:.2f}); lower modem.rate_hz"
+        return modem_report(
+            self._kind,
+            "down" if self._is_gone else self._state,
+            self._problem,
+            self._params,
+            self._radio,
+            {**self._tx.counters, **{name: self._receiver.counters[name] for name in phy.COUNTERS}},
+            self._realtime_ratio,
+            self._clock.end,
         )
 
     @property
@@ -176,6 +165,10 @@ class ModemLink:
     @property
     def _is_gone(self) -> bool:
         return self._state == "up" and self._can.paced and self._clock.is_gone(time.monotonic())
+
+    def _first_index(self) -> int:
+        """Of the radio's first sample on the link's clock."""
+        return self._clock.index(time.monotonic()) if self._can.paced else 0
 
     async def _receive(self, receiver: Demodulation) -> None:
         """Take blocks from the radio; when the receiver is far behind, the radio has to wait."""

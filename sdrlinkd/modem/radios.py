@@ -15,6 +15,7 @@ from backends import (
     LoopbackRadio,
     OffsetRadio,
     OversampledRadio,
+    Patience,
     Radio,
     SoapyRadio,
     SoapySettings,
@@ -32,24 +33,43 @@ PDU_BACKENDS = ("direct", "gnuradio")
 """They carry PDUs, not samples."""
 
 
-def make_modem(config: Config, node_id: int, rng: Random) -> ModemLink:
-    """The modem on the radio that `config.backend` names. Raises UserError."""
+def make_modem(
+    config: Config,
+    node_id: int,
+    rng: Random,
+    patience: Patience = Patience.NONE,
+    began_s: float | None = None,
+) -> ModemLink:
+    """The modem on the radio that `config.backend` names. Raises UserError.
+
+    `patience`: of a radio that is not there when it is opened; `began_s`: the link's clock has run
+    since then (monotonic).
+    """
     _check_airtime(config)
     policy = config.access.policy
     return ModemLink(
         config.modem,
         config.link.pdu_size,
-        make_radio(config, node_id, rng, _longest_burst_s(config)),
+        make_radio(config, node_id, rng, _longest_burst_s(config), patience),
         config.backend,
         listens=policy != "none",
         lead_grows=policy == "tdma",
+        # In a recording, time begins with its first sample.
+        began_s=None if config.backend == "iqfile" else began_s,
     )
 
 
-def make_radio(config: Config, node_id: int, rng: Random, longest_s: float) -> Radio:
+def make_radio(
+    config: Config,
+    node_id: int,
+    rng: Random,
+    longest_s: float,
+    patience: Patience = Patience.NONE,
+) -> Radio:
     """The radio that `config.backend` names, at the modem's rate. Raises UserError.
 
-    `longest_s`: no burst that it is given is longer.
+    `longest_s`: no burst that it is given is longer. `patience`: of one that is not there when it
+    is opened.
     """
     if config.backend in PDU_BACKENDS:
         raise ConfigError(
@@ -57,19 +77,21 @@ def make_radio(config: Config, node_id: int, rng: Random, longest_s: float) -> R
             '"ether", "zmq" or "soapy"'
         )
     try:
-        radio = _make_radio(config, node_id, rng, longest_s)
+        radio = _make_radio(config, node_id, rng, longest_s, patience)
     except BackendError as error:
         raise UserError(str(error)) from None
     factor = config.modem.oversampling
     return OversampledRadio(radio, factor) if factor > 1 else radio
 
 
-def _make_radio(config: Config, node_id: int, rng: Random, longest_s: float) -> Radio:
+def _make_radio(
+    config: Config, node_id: int, rng: Random, longest_s: float, patience: Patience
+) -> Radio:
     if config.backend == "ether":
         who = f"process {os.getpid()} on {socket.gethostname()}"
-        return EtherRadio(Path(config.ether.dir), node_id, who)
+        return EtherRadio(Path(config.ether.dir), node_id, who, patience)
     if config.backend == "soapy":
-        return _make_soapy(config, longest_s)
+        return _make_soapy(config, longest_s, patience)
     if config.backend == "zmq":
         zmq = config.zmq
         return ZmqRadio(
@@ -91,7 +113,7 @@ def _make_radio(config: Config, node_id: int, rng: Random, longest_s: float) -> 
     return LoopbackRadio(channel, modem.block_s, paced=loopback.paced, hear_self=loopback.hear_self)
 
 
-def _make_soapy(config: Config, longest_s: float) -> Radio:
+def _make_soapy(config: Config, longest_s: float, patience: Patience) -> Radio:
     modem, soapy = config.modem, config.soapy
     settings = SoapySettings(
         # What both have is called alike.
@@ -103,7 +125,7 @@ def _make_soapy(config: Config, longest_s: float) -> Radio:
     shifts = soapy.offset_tuning == "on" or (
         soapy.offset_tuning == "auto" and modem.oversampling > 1
     )
-    radio = SoapyRadio(settings, longest_s, soapy.dc_block)
+    radio = SoapyRadio(settings, longest_s, soapy.dc_block, patience)
     return OffsetRadio(radio) if shifts else radio
 
 

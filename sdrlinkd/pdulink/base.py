@@ -22,6 +22,9 @@ class Heard(NamedTuple):
 class PduListener(Protocol):
     """Whom a PDU link tells and asks. Called on the event loop; must not wait."""
 
+    def attach(self, traits: CarrierTraits) -> None:
+        """The PDU link is there, and what it is. Raises ConfigError when it does not do."""
+
     def heard(self, pdus: Sequence[Heard]) -> None:
         """PDUs arrived."""
 
@@ -47,11 +50,18 @@ class PduLink(Protocol):
     def now(self) -> float:
         """Seconds on the link's clock."""
 
-    async def open(self, listener: PduListener) -> CarrierTraits:
-        """Begin to listen; what there is. Raises UserError when the carrier cannot be had."""
+    async def open(self, listener: PduListener) -> None:
+        """Begin to listen, and tell the listener what there is.
+
+        Raises LinkAbsentError or LinkRefusedError where another try may succeed, and UserError
+        where a person has to mend something first. Then it can only be closed.
+        """
 
     async def run(self) -> None:
-        """Carry PDUs until cancelled, in the daemon's task group."""
+        """Carry PDUs until cancelled, in the daemon's task group.
+
+        Raises LinkRefusedError when it will not have us any more.
+        """
 
     def wake(self) -> None:
         """There may be something to send."""

@@ -36,10 +36,10 @@ class DirectLink:
         """The monotonic clock: there are no samples to count."""
         return time.monotonic()
 
-    async def open(self, listener: PduListener) -> CarrierTraits:
+    async def open(self, listener: PduListener) -> None:
         """Begin to listen."""
         self._listener = listener
-        return CarrierTraits()
+        listener.attach(CarrierTraits())
 
     async def run(self) -> None:
         """Ask for a burst when the one before has left, but never without a turn of the loop."""

@@ -143,8 +143,7 @@ async def test_a_hub_that_is_slow_has_not_been_away(tmp_path, monkeypatch):
 
 
 async def test_a_radio_that_does_not_read_loses_samples_and_hinders_nobody(tmp_path, monkeypatch):
-    for module in ("sockets", "radio"):
-        monkeypatch.setattr(f"backends.ether.{module}.WAITING", 100)
+    monkeypatch.setattr("backends.ether.sockets.WAITING", 100)
     with serving(tmp_path, rate_hz=10 * RATE):
         listener = Listener(tmp_path, rate_hz=10 * RATE)
         async with opened(

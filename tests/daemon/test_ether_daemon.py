@@ -9,15 +9,14 @@ import pytest
 from backends import RadioParams
 from backends.ether import protocol
 from sdrlinkd.adapters import BuiltInRobot, due_messages
-from sdrlinkd.client import Subscriber
+from sdrlinkd.client import Publisher, Subscriber
 from tests.adapters.recordings import STORAGES, noisy_messages, ros2_bag
 from tests.backends.hubs import RawRadio, ask, serving
 from tests.waiting import wait_for
 
 AIR = {"rate_hz": 1e6, "frequency_hz": 2.45e9, "block_s": 0.001}
 BLOCK_S = AIR["block_s"]
-HASTY = "import sys, backends.ether.radio as radio; radio.ANSWER_MS = 100; "
-MAIN = "from sdrlinkd.__main__ import main; sys.exit(main(sys.argv[1:]))"
+HASTY = "import backends.ether.radio as radio; radio.ANSWER_MS = 100; "
 
 
 def on_ether(hub, robot=1, more=""):
@@ -29,45 +28,63 @@ def on_ether(hub, robot=1, more=""):
     )
 
 
-def start(config, code="import sys; "):
-    """A daemon that is to fail."""
-    return subprocess.Popen(
-        [sys.executable, "-c", code + MAIN, "--config", str(config)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
+def verdict(daemon):
+    """Its level, and the first reason for it."""
+    told = daemon.snapshot().verdict
+    return told.level, (told.reasons or [""])[0]
 
 
-def test_without_a_hub_a_daemon_says_what_to_start(write_config, tmp_path):
-    hub = tmp_path / "hub"
-    daemon = start(write_config(tmp_path, on_ether(hub)), HASTY)
-    _, err = daemon.communicate(timeout=60)
-    assert daemon.returncode == 2
-    assert f"sdrlinkd: {hub}: no hub answers there; start one: sdrlink-ether --dir {hub}" in err
-    assert err.count("\n") == 1
-    assert not list(tmp_path.glob("*.sock"))
-
-
-def test_a_second_robot_of_one_id_is_refused_and_the_first_is_told(
-    start_daemon, write_config, tmp_path, tmp_path_factory
+def test_without_a_hub_a_daemon_stays_and_joins_when_there_is_one(
+    start_daemon, tmp_path, tmp_path_factory
 ):
+    """What came in the meantime is sent then, as old as it is; what is too old is dropped."""
+    hub = tmp_path / "hub"
+    daemon = start_daemon(on_ether(hub), HASTY)
+    wait_for(lambda: daemon.snapshot().carrier.state == "waiting")
+    wait_for(lambda: "no hub yet, trying on" in daemon.log())
+    level, reason = verdict(daemon)
+    assert level == "DOWN"
+    assert f"{hub}: no hub answers there; start one: sdrlink-ether --dir {hub}" in reason
+    with Publisher(daemon.directory) as out:
+        out.send("/robot_1/odom", b"\0\1\0\0odom")
+        out.send("/robot_1/scan", b"\0\1\0\0scan", lifespan_ms=1)
+    wait_for(lambda: daemon.snapshot().link.tx.dropped.get("tx_expired") == 1)
+    with serving(hub, **AIR):
+        other = start_daemon(on_ether(hub, robot=2))
+        with Subscriber("/rx_robot_1/odom", directory=other.directory) as heard:
+            for each in (daemon, other):
+                wait_for(lambda each=each: each.snapshot().carrier.state == "up", 60)
+            # Its first PDU may have been too early for the other one.
+            wait_for(lambda: daemon.snapshot().link.tx.sent == 1)
+            with Publisher(daemon.directory) as out:
+                out.send("/robot_1/odom", b"\0\1\0\0more")
+            while heard.receive(10).payload != b"\0\1\0\0more":
+                continue
+        with daemon.control() as control:
+            assert control.ask("check")["problems"] == []
+        wait_for(lambda: "the hub is there after" in daemon.log())
+
+
+def test_a_second_robot_of_one_id_is_refused_and_the_first_is_told(start_daemon, tmp_path_factory):
     hub = tmp_path_factory.mktemp("hub")
     with serving(hub, **AIR):
         first = start_daemon(on_ether(hub))
         wait_for(lambda: first.snapshot().carrier.state == "up", 60)
-        second = start(write_config(tmp_path, on_ether(hub)))
-        _, err = second.communicate(timeout=60)
-        assert second.returncode == 2
-        assert f"robot 1 is on this air already: process {first.process.pid} on " in err
-        assert "another robot_id" in err
-        assert err.count("\n") == 1
-        told = f"asked for our id 1 on this air and was refused: process {second.pid} on "
+        second = start_daemon(on_ether(hub))
+        wait_for(lambda: second.snapshot().carrier.state == "refused", 60)
+        level, reason = verdict(second)
+        assert level == "DOWN"
+        assert f"robot 1 is on this air already: process {first.process.pid} on " in reason
+        assert "another robot_id" in reason
+        wait_for(lambda: "the hub refuses its settings: " in second.log())
+        told = f"asked for our id 1 on this air and was refused: process {second.process.pid} on "
         wait_for(lambda: told in first.snapshot().carrier.detail)
         assert first.snapshot().carrier.state == "up"
         assert list(ask(hub).nodes) == [1]
         first.process.terminate()
         assert first.process.wait(20) == 0
-        # The air is free for another.
-        wait_for(lambda: not ask(hub).nodes)
+        # The air is free for the other.
+        wait_for(lambda: second.snapshot().carrier.state == "up", 20)
 
 
 class Conductor(RawRadio):
@@ -151,7 +168,10 @@ def test_a_daemon_plays_the_topics_of_a_bag_that_it_knows(start_daemon, tmp_path
 
 def test_a_bag_that_cannot_be_played_is_refused_in_one_line(write_config, tmp_path):
     config = write_config(tmp_path, '[play]\nbag = "none.mcap"\nduration_s = 1.0\n')
-    daemon = start(config)
+    daemon = subprocess.Popen(
+        [sys.executable, "-m", "sdrlinkd", "--config", str(config)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
     _, err = daemon.communicate(timeout=60)
     assert daemon.returncode == 2
     assert "none.mcap: no such file" in err

@@ -1,14 +1,17 @@
 """Daemons on SoapySDR radios, real drivers in real time: what one sends, the other republishes."""
 
 import os
+import signal
 import struct
 import subprocess
 import sys
 import sysconfig
+import time
 from pathlib import Path
 
 import pytest
 
+from backends.soapy.session import AWAY_S
 from sdrlinkd.client import Publisher, Subscriber
 from tests.daemon.soapy import air, on_soapy
 from tests.soapy_loopback import missing, module_folder
@@ -212,45 +215,130 @@ def test_the_official_binding_serves_as_well(start_daemon, bus, tmp_path, monkey
         assert listener.receive(20).payload == body(7)
 
 
-@pytest.mark.parametrize(
-    ("change", "parts"),
-    [
-        (("driver=loopback", "driver=hackrff"), ['no driver "hackrff"', "libloopbackSupport.so"]),
-        (("noise_db=-50", "noise_db=-50,absent=1"), ["there is no such device", "radio probe"]),
-        (("noise_db=-50", "noise_db=-50,busy=1"), ["in use", "stop the other program"]),
-        (("rate_hz = 1e6", "rate_hz = 7e7"), ["modem.rate_hz: got 70 Msps", "0.2 to 61.44 Msps"]),
-        (("tx_gain_db = 40.0", "tx_gain_db = 99.0"), ["soapy.tx_gain_db: got 99", "0 to 89 dB"]),
-        (("frequency_hz = 915e6", "frequency_hz = 7e9"), ["got 7000 MHz", "50 to 6000 MHz"]),
-        (
-            ("rx_gain_db = 20.0", 'rx_gains = { LNA = 3.0 }\nrx_antenna = "TX/RX"'),
-            ['soapy.rx_gains: got "LNA"', '"PGA"'],
-        ),
-        (("tx_gain_db = 40.0", 'tx_gain_db = 1\ntx_antenna = "X"'), ['tx_antenna: got "X"']),
-        (
-            ("tx_gain_db = 40.0", 'tx_gain_db = 1\nsettings = { colour = "red" }'),
-            ['soapy.settings.colour: got "red"', "the device refuses it"],
-        ),
-        (
-            ("noise_db=-50", "noise_db=-50,rate_error=0.01,lie=no"),
-            ["the device made it", "a rate that it keeps"],
-        ),
-    ],
-)
-def test_what_a_device_does_not_take_is_told_before_the_first_sample(
-    write_config, tmp_path, bus, change, parts
-):
-    config = on_soapy(1, bus[0])
-    assert change[0] in config
-    path = write_config(tmp_path, config.replace(*change))
+def test_a_driver_that_is_not_installed_is_for_a_person_to_mend(write_config, tmp_path, bus):
+    """Nothing that is plugged in would help."""
+    config = on_soapy(1, bus[0]).replace("driver=loopback", "driver=hackrff")
     done = subprocess.run(
-        [sys.executable, "-m", "sdrlinkd", "--config", str(path)],
+        [sys.executable, "-m", "sdrlinkd", "--config", str(write_config(tmp_path, config))],
         capture_output=True, text=True, check=False, timeout=60,
     )  # fmt: skip
     assert done.returncode == 2, done.stderr
     last = done.stderr.splitlines()[-1]
-    for part in parts:
-        assert part in last
+    assert 'no driver "hackrff"' in last
+    assert "libloopbackSupport.so" in last
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("change", "state", "parts"),
+    [
+        (
+            ("noise_db=-50", "noise_db=-50,absent=1"),
+            "waiting", ["there is no such device", "radio probe"],
+        ),
+        (("noise_db=-50", "noise_db=-50,busy=1"), "waiting", ["in use", "stop the other program"]),
+        (
+            ("rate_hz = 1e6", "rate_hz = 7e7"),
+            "refused", ["modem.rate_hz: got 70 Msps", "0.2 to 61.44 Msps"],
+        ),
+        (
+            ("tx_gain_db = 40.0", "tx_gain_db = 99.0"),
+            "refused", ["soapy.tx_gain_db: got 99", "0 to 89 dB"],
+        ),
+        (
+            ("frequency_hz = 915e6", "frequency_hz = 7e9"),
+            "refused", ["got 7000 MHz", "50 to 6000 MHz"],
+        ),
+        (
+            ("rx_gain_db = 20.0", 'rx_gains = { LNA = 3.0 }\nrx_antenna = "TX/RX"'),
+            "refused", ['soapy.rx_gains: got "LNA"', '"PGA"'],
+        ),
+        (
+            ("tx_gain_db = 40.0", 'tx_gain_db = 1\ntx_antenna = "X"'),
+            "refused", ['tx_antenna: got "X"'],
+        ),
+        (
+            ("tx_gain_db = 40.0", 'tx_gain_db = 1\nsettings = { colour = "red" }'),
+            "refused", ['soapy.settings.colour: got "red"', "the device refuses it"],
+        ),
+        (
+            ("noise_db=-50", "noise_db=-50,rate_error=0.01,lie=no"),
+            "refused", ["the device made it", "a rate that it keeps"],
+        ),
+    ],
+)  # fmt: skip
+def test_what_a_device_does_not_take_is_a_state_and_no_end(start_daemon, bus, change, state, parts):
+    config = on_soapy(1, bus[0])
+    assert change[0] in config
+    robot = start_daemon(config.replace(*change))
+    wait_for(lambda: robot.snapshot().carrier.state == state, 60)
+    snapshot = robot.snapshot()
+    assert snapshot.verdict.level == "DOWN"
+    for part in parts:
+        assert part in snapshot.carrier.reason
+        assert part in snapshot.verdict.reasons[0]
+    assert_whole(robot)
+
+
+def test_a_radio_that_comes_late_is_waited_for(start_daemon, bus):
+    """What was queued meanwhile is sent, as old as it is; what grew too old is not."""
+    name, air_ = bus
+    air_.inject(1, "unplug")
+    robots = [start_daemon(on_soapy(robot, name)) for robot in (1, 2)]
+    late, other = robots
+    wait_for(lambda: late.snapshot().carrier.state == "waiting", 60)
+    up([other])
+    with (
+        Subscriber("/rx_robot_1/odom", directory=other.directory) as listener,
+        Publisher(late.directory) as sender,
+    ):
+        sender.send("/robot_1/scan", body(0), lifespan_ms=1)
+        wait_for(lambda: late.snapshot().link.tx.dropped.get("tx_expired") == 1)
+        sender.send("/robot_1/odom", body(1))
+        sender.flush()
+        asked_at = late.snapshot().uptime_s
+        air_.inject(1, "replug")
+        message = listener.receive(LINK_S)
+        assert message is not None, "no link in time"
+        assert message.payload == body(1)
+        waited_s = late.snapshot().uptime_s - asked_at
+        assert message.age_us * 1e-6 <= waited_s + 1.0
+    assert_whole(late)
+    wait_for(lambda: "the radio is there after" in late.log())
+    assert "no radio yet, trying on: soapy.device" in late.log()
+
+
+LINK_S = 5.0
+"""After its device is there, a daemon sends and hears so soon."""
+
+
+@pytest.mark.parametrize("mended_by", ["a reload", "replugging"])
+def test_settings_that_were_refused_are_tried_again(start_daemon, bus, mended_by):
+    name, air_ = bus
+    good = on_soapy(1, name)
+    robot = start_daemon(good.replace("tx_gain_db = 40.0", "tx_gain_db = 99.0"))
+    wait_for(lambda: robot.snapshot().carrier.state == "refused", 60)
+    wait_for(lambda: "the radio refuses its settings" in robot.log())
+    if mended_by == "a reload":
+        text = robot.config.read_text()
+        robot.config.write_text(text.replace("tx_gain_db = 99.0", "tx_gain_db = 40.0"))
+        robot.process.send_signal(signal.SIGHUP)
+        wait_for(lambda: robot.snapshot().carrier.state == "up", 20)
+        assert "tx 40 dB" in robot.snapshot().carrier.detail
+        assert "re-read: topic policies and the radio's settings" in robot.log()
+        return
+    opened = air_.stats(1).opened
+
+    def replugged():
+        """Away for longer than between two looks at it; when that is done, nobody outside knows."""
+        air_.inject(1, "unplug")
+        time.sleep(2 * AWAY_S)
+        air_.inject(1, "replug")
+        time.sleep(AWAY_S)
+        return air_.stats(1).opened > opened
+
+    wait_for(replugged, 60)
+    wait_for(lambda: robot.snapshot().carrier.state == "refused", 20)
 
 
 def assert_whole(robot):

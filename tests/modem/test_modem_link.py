@@ -31,6 +31,9 @@ class Listener:
         self.moved = asyncio.Event()
         self.now = float
 
+    def attach(self, traits):
+        self.traits = traits
+
     def heard(self, pdus):
         self.pdus += pdus
         self.moved.set()
@@ -69,7 +72,7 @@ def send(modem, listener, bursts):
 async def running(config):
     modem, listener = make_modem(config, 1, Random(1)), Listener()
     listener.now = modem.now
-    listener.traits = await modem.open(listener)
+    await modem.open(listener)
     task = asyncio.ensure_future(modem.run())
     try:
         yield modem, listener

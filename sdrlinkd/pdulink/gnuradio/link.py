@@ -36,15 +36,16 @@ class GnuRadioLink:
         """The monotonic clock: there are no samples to count."""
         return time.monotonic()
 
-    async def open(self, listener: PduListener) -> CarrierTraits:
+    async def open(self, listener: PduListener) -> None:
         """Open the sockets. Raises UserError."""
         self._listener = listener
         await self._transport.open(self._heard)
         airtime_s = self._airtime_s
-        return CarrierTraits(
+        traits = CarrierTraits(
             kind="gnuradio", longest_burst_s=(airtime_s,), pdu_burst_s=(airtime_s,),
             stamp_s=PACE_S + self._params.delay_s,
         )  # fmt: skip
+        listener.attach(traits)
 
     async def run(self) -> None:
         """Ask for a PDU when the one before is over and the flowgraph takes another."""

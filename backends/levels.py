@@ -1,0 +1,41 @@
+"""How strong what a radio hears is, and whether it clips."""
+
+import numpy as np
+
+from backends.base import Levels, Samples
+
+EVERY = 16
+"""One block in so many is looked at: that costs nearly nothing."""
+KEEPS = 0.98
+"""Of the means so far, at each look: they are over some hundred blocks."""
+FULL = 0.99
+"""An I or Q beyond this stands at full scale."""
+
+
+class LevelMeter:
+    """Looks at blocks as they come from the radio; used in one thread, read from any."""
+
+    def __init__(self) -> None:
+        self._blocks = 0
+        self._power = self._clipped = 0.0
+        self._weight = 0.0
+
+    def push(self, samples: Samples) -> None:
+        """A block."""
+        self._blocks += 1
+        if self._blocks % EVERY or not len(samples):
+            return
+        parts = np.abs(samples.view(np.float32))
+        power = 2 * float(np.dot(parts, parts)) / len(parts)
+        clipped = float(np.count_nonzero(parts >= FULL)) / len(parts)
+        self._weight = KEEPS * self._weight + (1 - KEEPS)
+        self._power = KEEPS * self._power + (1 - KEEPS) * power
+        self._clipped = KEEPS * self._clipped + (1 - KEEPS) * clipped
+
+    @property
+    def levels(self) -> Levels | None:
+        """None before the first look."""
+        weight, power = self._weight, self._power
+        if not weight:
+            return None
+        return Levels(10 * float(np.log10(max(power / weight, 1e-30))), self._clipped / weight)

@@ -1,0 +1,34 @@
+"""Looks at a daemon's snapshots, one a second."""
+
+from sdrlinkd.health.lately import Lately
+from sdrlinkd.health.limit import Limiter
+from sdrlinkd.health.story import Line, Story
+from sdrlinkd.health.verdict import judge
+from sdrlinkd.reports import Snapshot, VerdictReport
+
+
+class Health:
+    """Of one daemon. Time is the snapshots' `uptime_s`."""
+
+    def __init__(self) -> None:
+        self._lately = Lately()
+        self._story = Story()
+        self._limiter: Limiter[Line] = Limiter()
+
+    def judge(self, snapshot: Snapshot) -> VerdictReport:
+        """The verdict on any snapshot; changes nothing."""
+        return judge(snapshot, self._lately)
+
+    def look(self, snapshot: Snapshot) -> list[Line]:
+        """What a log should tell that was not so at the last look; about once a second."""
+        now = snapshot.uptime_s
+        lines = []
+        for line in self._story.tell(snapshot, self._lately):
+            passed = self._limiter.take(line.subject, line, now)
+            if passed is not None:
+                lines.append(passed)
+        for line, n in self._limiter.late(now):
+            more = f" ({n} lines on this were left out)" if n > 1 else ""
+            lines.append(line._replace(text=line.text + more))
+        self._lately.note(snapshot)
+        return lines

@@ -1,0 +1,46 @@
+"""What has grown within the last seconds, between snapshots."""
+
+from collections import deque
+
+from sdrlinkd.reports import RATE_WINDOW_S, Snapshot
+
+SHED = ("tx_overflow_old", "tx_overflow_new", "tx_topic_full", "tx_expired", "tx_stalled")
+"""Reasons that more air would have cured."""
+
+
+def shed_by_topic(snapshot: Snapshot) -> dict[str, int]:
+    """Messages dropped so far because there was too little air."""
+    return {
+        topic.name: sum(topic.dropped.get(reason, 0) for reason in SHED)
+        for topic in snapshot.link.topics
+    }
+
+
+class Lately:
+    """Remembers snapshots of the last `RATE_WINDOW_S`, taken about once a second."""
+
+    def __init__(self) -> None:
+        self._seen: deque[tuple[float, dict[str, int], int]] = deque()
+
+    def note(self, snapshot: Snapshot) -> None:
+        """Remember one."""
+        now = snapshot.uptime_s
+        while self._seen and now - self._seen[0][0] > RATE_WINDOW_S:
+            self._seen.popleft()
+        lost = snapshot.carrier.counters.get("samples_lost", 0)
+        self._seen.append((now, shed_by_topic(snapshot), lost))
+
+    def shed(self, snapshot: Snapshot) -> dict[str, int]:
+        """Messages dropped for want of air, by topic, the most first."""
+        if not self._seen:
+            return {}
+        _, before, _ = self._seen[0]
+        grown = {name: n - before.get(name, 0) for name, n in shed_by_topic(snapshot).items()}
+        kept = {name: n for name, n in grown.items() if n > 0}
+        return dict(sorted(kept.items(), key=lambda each: -each[1]))
+
+    def samples_lost(self, snapshot: Snapshot) -> int:
+        """Samples that the receiver did not get."""
+        if not self._seen:
+            return 0
+        return snapshot.carrier.counters.get("samples_lost", 0) - self._seen[0][2]

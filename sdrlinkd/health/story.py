@@ -1,0 +1,161 @@
+"""The story of a drive: what a log should tell of the change from one snapshot to the next."""
+
+from collections.abc import Iterator
+from enum import Enum
+from typing import NamedTuple
+
+from sdrlinkd.health.lately import Lately, shed_by_topic
+from sdrlinkd.health.verdict import is_away, is_silent
+from sdrlinkd.health.words import carrier_name, span
+from sdrlinkd.reports import NeighborReport, Snapshot
+
+
+class Level(Enum):
+    """As journald's priorities."""
+
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+class Line(NamedTuple):
+    """What happened to `subject`, for people."""
+
+    subject: str
+    level: Level
+    text: str
+
+
+class Story:
+    """Compares each snapshot with what was told of those before."""
+
+    def __init__(self) -> None:
+        self._state = ""
+        self._away_at: float | None = None
+        self._was_up = False
+        self._robots: dict[int, NeighborReport] = {}
+        self._silent: set[int] = set()
+        self._lowest: set[int] = set()
+        self._shedding_at: float | None = None
+        self._shed_before = 0
+        self._losing_at: float | None = None
+        self._steps = 0
+
+    def tell(self, snapshot: Snapshot, lately: Lately) -> Iterator[Line]:
+        """What is new."""
+        yield from self._radio(snapshot)
+        for robot in snapshot.link.neighbors:
+            if not robot.is_self:
+                yield from self._robot(robot, snapshot)
+        yield from self._queue(snapshot, lately)
+        yield from self._samples(snapshot, lately)
+        if snapshot.host_clock_steps > self._steps:
+            yield Line("host clock", Level.WARNING, "this host's clock was set: it jumped")
+        self._steps = snapshot.host_clock_steps
+
+    def _radio(self, snapshot: Snapshot) -> Iterator[Line]:
+        carrier, now = snapshot.carrier, snapshot.uptime_s
+        name, state = carrier_name(carrier), carrier.state
+        if state == self._state or (state == "down" and not is_away(carrier)):
+            return
+        before, self._state = self._state, state
+        if state == "up":
+            away = "" if self._away_at is None else f" after {span(now - self._away_at)}"
+            word = "back" if self._was_up else "there"
+            self._was_up, self._away_at = True, None
+            yield Line("radio", Level.INFO, f"the {name} is {word}{away}: {carrier.detail}")
+            return
+        if self._away_at is None:
+            self._away_at = max(0.0, now - carrier.since_s)
+        if state == "waiting":
+            yield Line("radio", Level.WARNING, f"no {name} yet, trying on: {carrier.reason}")
+        elif state == "refused":
+            yield Line(
+                "radio",
+                Level.ERROR,
+                f"the {name} refuses its settings: {carrier.reason}. Tried again after a reload "
+                "(SIGHUP), or when it was unplugged and is back",
+            )
+        elif state == "ended":
+            yield Line("radio", Level.INFO, f"the {name} is over")
+        elif before == "up":
+            yield Line("radio", Level.WARNING, f"the {name} is away: {carrier.reason}")
+
+    def _robot(self, robot: NeighborReport, snapshot: Snapshot) -> Iterator[Line]:
+        src, subject = robot.src, f"robot {robot.src}"
+        before = self._robots.get(src)
+        self._robots[src] = robot
+        snr = "" if robot.snr_db is None else f" at {robot.snr_db:.0f} dB"
+        if before is None:
+            yield Line(subject, Level.INFO, f"robot {src} is heard{snr}")
+        if is_silent(robot) and src not in self._silent:
+            self._silent.add(src)
+            ago = span(robot.last_heard_s_ago)
+            yield Line(subject, Level.WARNING, f"robot {src} is lost: not heard for {ago}")
+        elif src in self._silent and not is_silent(robot):
+            self._silent.remove(src)
+            yield Line(subject, Level.INFO, f"robot {src} is heard again{snr}")
+        if before is not None and robot.reboots > before.reboots:
+            yield Line(subject, Level.INFO, f"robot {src} has started anew")
+        yield from self._registry(robot, before, snapshot)
+        yield from self._mcs(robot, snapshot)
+        known = before.clock if before is not None else None
+        if known and robot.clock and robot.clock.steps > known.steps:
+            yield Line(f"{subject}'s clock", Level.WARNING, f"robot {src}'s clock jumped")
+
+    def _registry(
+        self, robot: NeighborReport, before: NeighborReport | None, snapshot: Snapshot
+    ) -> Iterator[Line]:
+        src, was = robot.src, "unknown" if before is None else before.registry
+        if robot.registry == was:
+            return
+        subject = f"robot {src}'s registry"
+        if robot.registry == "differs":
+            where = [each for each in snapshot.notices if each.startswith(f"robot {src} has anoth")]
+            text = where[0] if where else f"robot {src} has another registry"
+            yield Line(subject, Level.WARNING, text)
+        elif was == "differs":
+            yield Line(subject, Level.INFO, f"robot {src} has the same registry now")
+
+    def _mcs(self, robot: NeighborReport, snapshot: Snapshot) -> Iterator[Line]:
+        src, lowest = robot.src, snapshot.link.mcs_lowest
+        subject = f"MCS to robot {src}"
+        if lowest is None or robot.snr_there_db is None:
+            return
+        if robot.mcs <= lowest and src not in self._lowest:
+            self._lowest.add(src)
+            hears = f": it hears us at {robot.snr_there_db:.0f} dB"
+            text = f"the MCS to robot {src} is down to {robot.mcs}, the lowest{hears}"
+            yield Line(subject, Level.WARNING, text)
+        elif robot.mcs > lowest and src in self._lowest:
+            self._lowest.remove(src)
+            yield Line(subject, Level.INFO, f"the MCS to robot {src} is up again: {robot.mcs}")
+
+    def _queue(self, snapshot: Snapshot, lately: Lately) -> Iterator[Line]:
+        shed, now = lately.shed(snapshot), snapshot.uptime_s
+        total = sum(shed_by_topic(snapshot).values())
+        if shed and self._shedding_at is None:
+            self._shedding_at = now
+            self._shed_before = total - sum(shed.values())
+            worst = next(iter(shed))
+            yield Line(
+                "queue",
+                Level.WARNING,
+                f"more to send than the air carries: messages are dropped, most of {worst}; "
+                f"sdrlinkctl why {worst} says more",
+            )
+        elif not shed and self._shedding_at is not None:
+            lasted, dropped = span(now - self._shedding_at), total - self._shed_before
+            self._shedding_at = None
+            text = f"the air carries all there is to send again: {dropped} dropped in {lasted}"
+            yield Line("queue", Level.INFO, text)
+
+    def _samples(self, snapshot: Snapshot, lately: Lately) -> Iterator[Line]:
+        lost, now = lately.samples_lost(snapshot), snapshot.uptime_s
+        if lost > 0 and self._losing_at is None:
+            self._losing_at = now
+            text = f"the receiver loses samples ({lost} so far): this machine is too slow for them"
+            yield Line("samples", Level.WARNING, text)
+        elif lost <= 0 and self._losing_at is not None:
+            lasted, self._losing_at = span(now - self._losing_at), None
+            yield Line("samples", Level.INFO, f"no samples are lost any more, after {lasted}")

@@ -1,0 +1,119 @@
+"""OK, DEGRADED or DOWN, and why, the worst first."""
+
+from sdrlinkd.health.lately import Lately
+from sdrlinkd.health.words import carrier_name, percent, span
+from sdrlinkd.reports import RATE_WINDOW_S, CarrierReport, NeighborReport, Snapshot, VerdictReport
+
+SILENT_S = 5.0
+"""A robot that is not heard for so long, and for much longer than usual, is missed."""
+SILENT_TIMES = 3.0
+GONE_S = 600.0
+"""After so long it is not expected any more."""
+LOSSY = 0.03
+"""More of the PDUs lost than this is worth a word."""
+AWAY_S = 1.0
+CLIPPED_PCT = 0.1
+LATE_LOOP_MS = 250.0
+HEARS_OTHERS = ("soapy", "ether", "zmq", "gnuradio")
+"""Kinds with an air that other robots should be on."""
+
+
+def is_away(carrier: CarrierReport) -> bool:
+    """Whether what carried PDUs does not; a moment's pause is none."""
+    return carrier.state == "down" and carrier.since_s >= AWAY_S
+
+
+def is_silent(robot: NeighborReport) -> bool:
+    """Whether a robot that was heard is missed now."""
+    patience_s = max(SILENT_S, SILENT_TIMES * robot.usual_gap_s)
+    return robot.last_heard_s_ago > patience_s
+
+
+def judge(snapshot: Snapshot, lately: Lately) -> VerdictReport:
+    """The verdict on `snapshot`."""
+    down = _down(snapshot)
+    if down:
+        return VerdictReport(level="DOWN", reasons=[down])
+    reasons = [
+        *_robots(snapshot),
+        *_queue(snapshot, lately),
+        *_machine(snapshot, lately),
+    ]
+    if snapshot.state == "draining":
+        reasons.insert(0, "stopping: what is queued is sent, nothing more is taken")
+    return VerdictReport(level="DEGRADED" if reasons else "OK", reasons=reasons)
+
+
+def _down(snapshot: Snapshot) -> str:
+    carrier = snapshot.carrier
+    name, since = carrier_name(carrier), span(carrier.since_s)
+    if carrier.state == "waiting":
+        return f"no {name} since {since}: {carrier.reason}"
+    if carrier.state == "refused":
+        return f"the {name} refuses its settings: {carrier.reason}"
+    if is_away(carrier):
+        return f"no {name} since {since}" + (f": {carrier.reason}" if carrier.reason else "")
+    if carrier.state == "ended":
+        return f"the {name} is over"
+    return ""
+
+
+def _robots(snapshot: Snapshot) -> list[str]:
+    """What is wrong with whom we hear, and who hears us."""
+    robots = [each for each in snapshot.link.neighbors if not each.is_self]
+    reasons = []
+    if not robots and snapshot.carrier.kind in HEARS_OTHERS:
+        return ["no robot heard yet"]
+    for robot in robots:
+        if is_silent(robot):
+            if robot.last_heard_s_ago < GONE_S:
+                reasons.append(f"robot {robot.src} not heard for {span(robot.last_heard_s_ago)}")
+            continue
+        reasons += _quality(robot)
+    if robots and all(each.last_heard_s_ago >= GONE_S for each in robots):
+        last_s = min(each.last_heard_s_ago for each in robots)
+        reasons.append(f"no robot heard for {span(last_s)}")
+    return reasons
+
+
+def _quality(robot: NeighborReport) -> list[str]:
+    reasons = []
+    if robot.registry == "differs":
+        reasons.append(f"robot {robot.src} has another topic registry")
+    if robot.per_there is not None and robot.per_there >= LOSSY:
+        reasons.append(
+            f"robot {robot.src} hears us{_at(robot.snr_there_db)}, {percent(robot.per_there)} lost"
+        )
+    if robot.per_lately is not None and robot.per_lately >= LOSSY:
+        reasons.append(
+            f"we hear robot {robot.src}{_at(robot.snr_db)}, {percent(robot.per_lately)} lost"
+        )
+    return reasons
+
+
+def _at(snr_db: float | None) -> str:
+    return "" if snr_db is None else f" at {snr_db:.0f} dB"
+
+
+def _queue(snapshot: Snapshot, lately: Lately) -> list[str]:
+    shed = lately.shed(snapshot)
+    if not shed:
+        return []
+    worst = next(iter(shed))
+    others = f" and {len(shed) - 1} other topics" if len(shed) > 1 else ""
+    dropped = f"{sum(shed.values())} messages dropped in {RATE_WINDOW_S:g} s"
+    return [f"more to send than the air carries: {dropped}, most of {worst}{others}"]
+
+
+def _machine(snapshot: Snapshot, lately: Lately) -> list[str]:
+    carrier, reasons = snapshot.carrier, []
+    lost = lately.samples_lost(snapshot)
+    if lost > 0:
+        reasons.append(f"{lost} samples lost in {RATE_WINDOW_S:g} s: this machine is too slow")
+    if carrier.clipped_pct >= CLIPPED_PCT:
+        reasons.append(
+            f"the receiver clips {carrier.clipped_pct:.2g} % of the samples: lower its gain"
+        )
+    if snapshot.loop_lag_ms >= LATE_LOOP_MS:
+        reasons.append(f"the daemon runs {snapshot.loop_lag_ms:.0f} ms late: this machine is busy")
+    return reasons

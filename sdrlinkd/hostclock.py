@@ -1,0 +1,50 @@
+"""This host's clock beside the link's: how steadily it runs; and what chronyd is told of others."""
+
+import time
+from typing import TYPE_CHECKING
+
+from sdrlinkd.link import Clocks, State, Wall
+
+if TYPE_CHECKING:
+    # Loading it brings recordings, of which a daemon of a real robot has none.
+    from sdrlinkd.adapters import ChronySocket
+
+CHRONY_S = 1.0
+SET_S = 0.1
+"""By more than this a host's clock does not move unless it is set."""
+LEAST_ERROR_S = 5e-5
+
+
+class HostClock:
+    """Keeps `clocks.wall`, and tells `chrony` of the clock of `robot`."""
+
+    def __init__(self, clocks: Clocks, chrony: "ChronySocket | None", robot: int) -> None:
+        self._clocks = clocks
+        self._chrony = chrony
+        self._robot = robot
+        self._chrony_at = 0.0
+        self._wall_ns: int | None = None
+        self._error_s = 0.0
+        self.steps = 0
+        """Times that it was set."""
+
+    def look(self, now: float) -> None:
+        """What the host's clock is ahead of the link's, which is at `now`, and how steadily."""
+        wall_ns = time.time_ns() - round(1e9 * now)
+        if self._wall_ns is not None:
+            moved_s = 1e-9 * abs(wall_ns - self._wall_ns)
+            # A clock that was set is no less exact for it.
+            if moved_s < SET_S:
+                self._error_s = max(moved_s, 0.95 * self._error_s)
+            else:
+                self.steps += 1
+        self._wall_ns = wall_ns
+        self._clocks.wall = Wall(wall_ns, self._error_s + LEAST_ERROR_S)
+        if self._chrony is not None and time.monotonic() - self._chrony_at >= CHRONY_S:
+            self._chrony_at = time.monotonic()
+            self._tell(self._chrony, now)
+
+    def _tell(self, chrony: "ChronySocket", now: float) -> None:
+        known = self._clocks.wall_offset(self._robot, now)
+        if known is not None and self._clocks.state(self._robot, now) is State.SYNCED:
+            chrony.send(time.time_ns(), -1e-9 * known[0])

@@ -1,0 +1,31 @@
+"""Log lines with the journal's priorities, where it is the journal that reads them."""
+
+import logging
+import os
+import sys
+
+_PRIORITIES = {
+    logging.DEBUG: 7,
+    logging.INFO: 6,
+    logging.WARNING: 4,
+    logging.ERROR: 3,
+    logging.CRITICAL: 2,
+}
+
+
+def is_read_by_journal() -> bool:
+    """Whether stderr leads to the journal (systemd.exec(5), $JOURNAL_STREAM)."""
+    try:
+        found = os.fstat(sys.stderr.fileno())
+    except (OSError, ValueError):
+        return False
+    return os.environ.get("JOURNAL_STREAM") == f"{found.st_dev}:{found.st_ino}"
+
+
+class JournalFormatter(logging.Formatter):
+    """Begins each line with its priority in angle brackets (sd-daemon(3))."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Every line of a message has its own."""
+        mark = f"<{_PRIORITIES.get(record.levelno, 5)}>"
+        return "\n".join(mark + line for line in super().format(record).splitlines())

@@ -1,0 +1,60 @@
+"""What the modem tells of itself and its radio."""
+
+from collections.abc import Mapping
+
+import phy
+from backends import Radio
+from sdrlinkd.config import ModemParams
+from sdrlinkd.reports import CarrierReport
+
+
+def modem_report(
+    kind: str,
+    state: str,
+    problem: str,
+    params: ModemParams,
+    radio: Radio,
+    counters: Mapping[str, int],
+    realtime_ratio: float,
+    stream_end: int,
+) -> CarrierReport:
+    """`problem`: what ended the stream, if something did; `stream_end`: samples so far."""
+    levels = radio.levels
+    reason = problem
+    if state == "down" and not problem and stream_end:
+        reason = radio.trouble or "it delivers nothing"
+    return CarrierReport(
+        kind=kind,
+        state=state,
+        detail=f"{phy.MCS_TABLE[params.mcs].name}, {params.rate_hz / 1e6:g} Msps, {radio.detail}",
+        reason=reason,
+        level_dbfs=None if levels is None else round(levels.power_dbfs, 1),
+        clipped_pct=0.0 if levels is None else 100 * levels.clipped,
+        counters={**radio.counters, **counters},
+        realtime_ratio=round(realtime_ratio, 2) if realtime_ratio else None,
+        notices=_notices(state, problem, params, radio, realtime_ratio, stream_end),
+    )
+
+
+def _notices(
+    state: str,
+    problem: str,
+    params: ModemParams,
+    radio: Radio,
+    realtime_ratio: float,
+    stream_end: int,
+) -> list[str]:
+    notices = [problem] if problem else []
+    if state == "down" and not problem and stream_end:
+        notices.append(f"the radio delivers nothing ({radio.detail}); what is to be sent waits")
+    if radio.counters.get("overflows"):
+        lost = radio.counters["samples_lost"]
+        kept = 1 - lost / max(1, stream_end)
+        notices.append(
+            f"the receiver fell behind {radio.counters['overflows']} times and lost {lost} "
+            f"samples: it keeps up with {kept:.2f} of real time at {params.rate_hz / 1e6:g} Msps "
+            f"(demodulation alone with {realtime_ratio:.2f}); lower modem.rate_hz"
+        )
+    if state not in ("down", "ended") and not radio.capabilities.transmits:
+        notices.append("this radio only receives: what is to be sent stays in the queue")
+    return notices

@@ -1,0 +1,65 @@
+"""The configuration read again while the daemon runs."""
+
+import logging
+from collections.abc import Callable
+
+from sdrlinkd.config import Config, Setup
+from sdrlinkd.errors import UserError
+from sdrlinkd.opening import Opening
+from sdrlinkd.policies import Policies
+
+log = logging.getLogger("sdrlinkd")
+
+OF_THE_RADIO = ("modem", "soapy", "ether", "zmq", "gnuradio", "channel", "access", "rate")
+"""Sections that nobody has used while there is no radio."""
+ANYTIME = ("topic",)
+
+
+class Reloading:
+    """Applies what may change. `read` reads the configuration anew; `setup` is what was begun with.
+
+    That are the topic policies; and while there is no radio, what it is to be opened with.
+    """
+
+    def __init__(
+        self, setup: Setup, read: Callable[[], Setup], policies: Policies, opening: Opening
+    ) -> None:
+        self._setup = setup
+        self._read = read
+        self._policies = policies
+        self._opening = opening
+
+    def reload(self) -> str:
+        """Apply the configuration as it is now; what of it. Raises UserError, changing nothing."""
+        changed = self._read()
+        if changed.registry.digest() != self._setup.registry.digest():
+            raise UserError(
+                "the topic registry has changed, and topic ids with it; restart the daemon"
+            )
+        if self._opening.is_up:
+            self._policies.reload(changed.policies)
+            return "topic policies"
+        fixed = self._fixed(changed.config)
+        if fixed:
+            raise UserError(f"{', '.join(fixed)}: changed; restart the daemon for that")
+        self._policies.reload(changed.policies)
+        self._opening.try_again(changed)
+        return "topic policies and the radio's settings"
+
+    def on_signal(self) -> None:
+        """The same for SIGHUP: the log is told."""
+        try:
+            told = self.reload()
+        except UserError as error:
+            log.error("not reloaded, all stays as it was: %s", error)  # noqa: TRY400
+        else:
+            log.info("re-read: %s; all other keys need a restart", told)
+
+    def _fixed(self, config: Config) -> list[str]:
+        """Keys that have changed and may not."""
+        return [
+            key
+            for key in Config.__struct_fields__
+            if key not in (*OF_THE_RADIO, *ANYTIME)
+            and getattr(config, key) != getattr(self._setup.config, key)
+        ]

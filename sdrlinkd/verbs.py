@@ -1,0 +1,67 @@
+"""What the control socket answers."""
+
+import logging
+from typing import Any
+
+from sdrlinkd import __version__
+from sdrlinkd.config import Setup
+from sdrlinkd.control import Control, Verb
+from sdrlinkd.errors import UserError
+from sdrlinkd.link import Told
+from sdrlinkd.node import Node
+from sdrlinkd.opening import Opening
+from sdrlinkd.policies import Policies
+from sdrlinkd.reloading import Reloading
+
+log = logging.getLogger("sdrlinkd")
+
+
+def make_verbs(
+    setup: Setup,
+    node: Node,
+    control: Control,
+    policies: Policies,
+    opening: Opening,
+    reloading: Reloading,
+) -> dict[str, Verb]:
+    """By name (bus document, section 5)."""
+
+    def hello(_: dict[str, Any]) -> object:
+        return {
+            "daemon": "sdrlinkd",
+            "version": __version__,
+            "node": setup.node_id,
+            "verbs": {name: verb.help for name, verb in verbs.items()},
+        }
+
+    def reload_policies(_: dict[str, Any]) -> object:
+        told = reloading.reload()
+        log.info("re-read on request: %s", told)
+        return {"reloaded": told, "unchanged": "all other keys need a restart"}
+
+    def set_policy(arguments: dict[str, Any]) -> object:
+        changes = {key: value for key, value in arguments.items() if key != "topic"}
+        if not changes:
+            raise UserError("set: nothing to change; name at least one key")
+        return policies.set(str(arguments.get("topic", "")), changes)
+
+    def why(arguments: dict[str, Any]) -> object:
+        topic_id = policies.topic_id(str(arguments.get("topic", "")))
+        told = Told(setup.source, policies.changed.get(topic_id, ()))
+        return {"why": node.why(topic_id, told)}
+
+    verbs = {
+        "hello": Verb(hello, "who answers, and what it can do"),
+        "status": Verb(lambda _: node.snapshot(control.requests), "the whole snapshot"),
+        "topics": Verb(lambda _: node.snapshot(control.requests).link.topics, "topics sent"),
+        "peers": Verb(lambda _: node.snapshot(control.requests).link.neighbors, "who is heard"),
+        "config": Verb(lambda _: opening.config, "the configuration in force"),
+        "check": Verb(
+            lambda _: {"problems": node.audit(), "ledger": node.snapshot(control.requests).link},
+            "whether the ledger adds up",
+        ),
+        "why": Verb(why, "what happens to a topic, in plain words"),
+        "set": Verb(set_policy, "change a topic's policy", changes=True),
+        "reload": Verb(reload_policies, "read the topic policies anew", changes=True),
+    }
+    return verbs

@@ -1,0 +1,134 @@
+"""The log of a drive: each thing once, in order, and never a flood."""
+
+import itertools
+
+from sdrlinkd.health import Health, Level
+from sdrlinkd.reports import ClockReport
+from tests.health.snapshots import robot, snapshot, topic
+
+
+def story(*snapshots):
+    """What is logged, as (level, text)."""
+    health = Health()
+    return [(line.level.value, line.text) for each in snapshots for line in health.look(each)]
+
+
+def test_a_radio_that_comes_late_goes_and_comes_back():
+    absent = {"state": "waiting", "reason": "no such device", "since_s": 1.0}
+    away = {"state": "down", "reason": "the stream failed", "since_s": 1.5}
+    seen = [
+        snapshot(1.0, {"state": "down", "reason": "it is being opened", "since_s": 0.5}, []),
+        snapshot(2.0, absent, []),
+        snapshot(12.0, absent, []),
+        snapshot(13.0, robots=[]),
+        # A moment's pause is nothing.
+        snapshot(14.0, {**away, "since_s": 0.3}, []),
+        snapshot(15.0, robots=[]),
+        snapshot(20.0, away, []),
+        snapshot(21.0, {**away, "since_s": 2.5}, []),
+        snapshot(30.0, robots=[]),
+        snapshot(31.0, {"state": "refused", "reason": "got 99"}, []),
+    ]
+    assert story(*seen) == [
+        ("warning", "no radio yet, trying on: no such device"),
+        ("info", "the radio is there after 12 s: usrp"),
+        ("warning", "the radio is away: the stream failed"),
+        ("info", "the radio is back after 12 s: usrp"),
+        (
+            "error",
+            (
+                "the radio refuses its settings: got 99. Tried again after a reload (SIGHUP), or when "
+                "it was unplugged and is back"
+            ),
+        ),
+    ]
+
+
+def test_a_robot_comes_goes_starts_anew_and_comes_back():
+    notice = "robot 2 has another registry, differing in topic id 2"
+    seen = [
+        snapshot(1.0, robots=[]),
+        snapshot(2.0, robots=[robot(1, is_self=True), robot()]),
+        snapshot(3.0),
+        snapshot(8.0, robots=[robot(last_heard_s_ago=5.5)]),
+        snapshot(9.0, robots=[robot(last_heard_s_ago=6.5)]),
+        snapshot(10.0, robots=[robot(reboots=1, snr_db=None)]),
+        snapshot(11.0, robots=[robot(reboots=1, registry="differs")], notices=["x", notice]),
+        snapshot(12.0, robots=[robot(reboots=1, registry="differs")], notices=[notice]),
+        snapshot(13.0, robots=[robot(reboots=1)]),
+    ]
+    assert story(*seen)[1:] == [
+        ("info", "robot 2 is heard at 17 dB"),
+        ("warning", "robot 2 is lost: not heard for 6 s"),
+        ("info", "robot 2 is heard again"),
+        ("info", "robot 2 has started anew"),
+        ("warning", notice),
+        ("info", "robot 2 has the same registry now"),
+    ]
+
+
+def test_the_slowest_mcs_and_the_way_up_again():
+    def at(seconds, mcs):
+        return snapshot(seconds, robots=[robot(mcs=mcs, snr_there_db=2.0)], mcs_lowest=0)
+
+    told = story(at(1.0, 4), at(2.0, 0), at(3.0, 0), at(4.0, 2))
+    assert told[2:] == [
+        ("warning", "the MCS to robot 2 is down to 0, the lowest: it hears us at 2 dB"),
+        ("info", "the MCS to robot 2 is up again: 2"),
+    ]
+    # A fixed one is no news.
+    fixed = [snapshot(second, robots=[robot(mcs=0, snr_there_db=2.0)]) for second in (1.0, 2.0)]
+    assert len(story(*fixed)) == 2
+
+
+def test_a_queue_that_overflows_is_told_when_it_begins_and_when_it_ends():
+    def at(second):
+        dropped = min(max(second - 2, 0), 5) * 10
+        return snapshot(float(second), topics=[topic(dropped={"tx_overflow_old": dropped})])
+
+    assert story(*map(at, range(1, 30)))[2:] == [
+        (
+            "warning",
+            (
+                "more to send than the air carries: messages are dropped, most of /robot_1/scan; "
+                "sdrlinkctl why /robot_1/scan says more"
+            ),
+        ),
+        ("info", "the air carries all there is to send again: 50 dropped in 10 s"),
+    ]
+
+
+def test_clocks_that_jump():
+    def clock(steps):
+        return [robot(clock=ClockReport(state="synced", steps=steps))]
+
+    told = story(
+        snapshot(1.0, robots=clock(0)),
+        snapshot(2.0, robots=clock(1)),
+        snapshot(3.0, robots=clock(1), host_clock_steps=1),
+        snapshot(4.0, robots=clock(1), host_clock_steps=1),
+    )
+    assert told[2:] == [
+        ("warning", "robot 2's clock jumped"),
+        ("warning", "this host's clock was set: it jumped"),
+    ]
+
+
+def test_what_goes_on_and_off_all_day_does_not_fill_the_log():
+    """And the last word on it is the truth."""
+    health, lines = Health(), []
+    away = {"state": "down", "reason": "gone", "since_s": 1.5}
+    for second, is_away in zip(range(600), itertools.cycle((False, True)), strict=False):
+        lines += health.look(snapshot(float(second), away if is_away else None, []))
+    told = [line for line in lines if line.subject == "radio"]
+    assert len(told) < 50
+    assert any("left out" in line.text for line in told)
+    for second in range(600, 640):
+        lines += health.look(snapshot(float(second), robots=[]))
+    assert [line for line in lines if line.subject == "radio"][-1].text.startswith(
+        "the radio is back"
+    )
+
+
+def test_levels_are_those_of_the_journal():
+    assert {level.value for level in Level} == {"info", "warning", "error"}

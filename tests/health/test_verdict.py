@@ -1,0 +1,121 @@
+"""A verdict says the worst first, and why."""
+
+import pytest
+
+from sdrlinkd.health import Health
+from tests.health.snapshots import robot, snapshot, topic
+
+
+def verdict(*seen):
+    """On the last of these snapshots."""
+    health = Health()
+    for each in seen:
+        health.look(each)
+    told = health.judge(seen[-1])
+    return told.level, told.reasons
+
+
+def test_all_is_well():
+    assert verdict(snapshot()) == ("OK", [])
+
+
+@pytest.mark.parametrize(
+    ("carrier", "reason"),
+    [
+        (
+            {"kind": "soapy", "state": "waiting", "since_s": 12.2, "reason": "no such device"},
+            "no radio since 12 s: no such device",
+        ),
+        (
+            {"kind": "ether", "state": "waiting", "since_s": 3700, "reason": "no hub answers"},
+            "no hub since 1 h 1 min: no hub answers",
+        ),
+        (
+            {"state": "refused", "reason": "soapy.tx_gain_db: got 99"},
+            "the radio refuses its settings: soapy.tx_gain_db: got 99",
+        ),
+        (
+            {"state": "down", "since_s": 75, "reason": "it delivers nothing"},
+            "no radio since 1 min 15 s: it delivers nothing",
+        ),
+        ({"kind": "gnuradio", "state": "down", "since_s": 2}, "no flowgraph since 2 s"),
+        ({"kind": "iqfile", "state": "ended"}, "the recording is over"),
+    ],
+)
+def test_without_a_radio_nothing_else_matters(carrier, reason):
+    lossy = robot(per_there=0.5)
+    assert verdict(snapshot(carrier=carrier, robots=[lossy])) == ("DOWN", [reason])
+
+
+def test_a_moment_without_samples_is_no_outage():
+    assert verdict(snapshot(carrier={"state": "down", "since_s": 0.4})) == ("OK", [])
+
+
+@pytest.mark.parametrize(
+    ("robots", "reasons"),
+    [
+        ([], ["no robot heard yet"]),
+        (
+            [robot(per_there=0.04, snr_there_db=3.2)],
+            ["robot 2 hears us at 3 dB, 4 % lost"],
+        ),
+        ([robot(per_there=0.02)], []),
+        ([robot(per_lately=0.1, snr_db=5.0)], ["we hear robot 2 at 5 dB, 10 % lost"]),
+        ([robot(registry="differs")], ["robot 2 has another topic registry"]),
+        ([robot(last_heard_s_ago=6.0), robot(3)], ["robot 2 not heard for 6 s"]),
+        # It usually pauses for so long: half duplex.
+        ([robot(last_heard_s_ago=30.0, usual_gap_s=15.0)], []),
+        ([robot(last_heard_s_ago=50.0, usual_gap_s=15.0)], ["robot 2 not heard for 50 s"]),
+        # It has left.
+        ([robot(last_heard_s_ago=700.0), robot(3)], []),
+        ([robot(last_heard_s_ago=7200.0)], ["no robot heard for 2 h 0 min"]),
+        # What it said of us before it fell silent is not news.
+        ([robot(last_heard_s_ago=9.0, per_there=0.5)], ["robot 2 not heard for 9 s"]),
+    ],
+)
+def test_robots(robots, reasons):
+    assert verdict(snapshot(robots=robots)) == ("DEGRADED" if reasons else "OK", reasons)
+
+
+def test_alone_with_a_loopback_is_not_lonely():
+    own = robot(1, is_self=True)
+    for carrier in ({"kind": "direct"}, {"kind": "loopback"}, {"kind": "iqfile"}):
+        assert verdict(snapshot(carrier=carrier, robots=[own])) == ("OK", [])
+
+
+def test_messages_dropped_for_want_of_air():
+    def at(seconds, **dropped):
+        return snapshot(at=seconds, topics=[topic(dropped=dropped), topic("/robot_1/odom")])
+
+    told = verdict(at(1.0), at(2.0, tx_overflow_old=3, tx_expired=2, tx_throttled=90))
+    assert told == (
+        "DEGRADED",
+        ["more to send than the air carries: 5 messages dropped in 5 s, most of /robot_1/scan"],
+    )
+    over = [at(float(second), tx_overflow_old=3) for second in range(3, 12)]
+    assert verdict(at(1.0), at(2.0, tx_overflow_old=3), *over) == ("OK", [])
+
+
+def test_a_machine_that_is_too_slow_and_a_receiver_that_clips():
+    lost = [
+        snapshot(at=1.0),
+        snapshot(
+            at=2.0,
+            carrier={"counters": {"samples_lost": 5000}, "clipped_pct": 1.26},
+            loop_lag_ms=300.0,
+        ),
+    ]
+    assert verdict(*lost) == (
+        "DEGRADED",
+        [
+            "5000 samples lost in 5 s: this machine is too slow",
+            "the receiver clips 1.3 % of the samples: lower its gain",
+            "the daemon runs 300 ms late: this machine is busy",
+        ],
+    )
+
+
+def test_stopping_comes_first():
+    level, reasons = verdict(snapshot(robots=[], state="draining"))
+    assert level == "DEGRADED"
+    assert reasons[0].startswith("stopping")
