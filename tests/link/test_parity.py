@@ -4,17 +4,18 @@ from random import Random
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from sdrlinkd.link import Allowance, Outcome, Overrides, Qos
 from sdrlinkd.link.parity import parity_records
 from sdrlinkd.wire import Entry, Pdu, build, parse
+from tests.laws import law
 from tests.link.images import images_over, pdus_of, protected
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(
     size=st.integers(1, 70_000), pdu_size=st.sampled_from((220, 528, 1024, 1500, 2047)),
     share=st.floats(0.01, 0.5), seed=st.integers(0, 2**32),

@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from phy.kernels.bits import get, put, put_signs, to_octets
@@ -23,6 +23,7 @@ from phy.ldpc import (
     new_workspace,
     segmentation,
 )
+from tests.laws import law
 
 RATES = [Fraction(1, 2), Fraction(2, 3), Fraction(3, 4), Fraction(5, 6)]
 CODES = [QuasiCyclic(z, rate) for z in LIFTINGS for rate in RATES]
@@ -147,7 +148,7 @@ def test_the_vectors_do_what_the_plain_decoder_says_bit_for_bit(code):
     assert outcomes == {True, False}
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(st.integers(1, 2047 + 4), st.sampled_from(RATES), st.floats(0, 1), st.integers(0, 2**32 - 1))
 def test_blocks_of_any_size_come_back(n_bytes, rate, more, seed):
     rng = np.random.default_rng(seed)
@@ -168,7 +169,7 @@ def test_blocks_of_any_size_come_back(n_bytes, rate, more, seed):
     assert np.array_equal(decoded(llr, form, new_workspace()), bits), seed
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
+@law(40)
 @given(
     st.integers(1, 500),
     st.sampled_from(RATES),
@@ -196,7 +197,7 @@ def test_blocks_are_decoded_as_the_plain_decoder_does_codeword_by_codeword(
     assert np.array_equal(bits, np.concatenate(expected)), seed
 
 
-@settings(derandomize=True, deadline=None)
+@law()
 @given(st.lists(st.integers(0, 100), max_size=20), st.integers(0, 2**32 - 1))
 def test_signs_become_words_and_words_octets(sizes, seed):
     rng = np.random.default_rng(seed)
