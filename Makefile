@@ -54,7 +54,7 @@ fuzz: $(DEV_STAMP)
 	SDRLINK_TRIALS=300 $(PYTEST) --timeout=0 -m hypothesis $(TESTS)
 
 fresh:
-	sh tests/fresh/fresh.sh
+	sh etc/fresh.sh
 
 check: $(DEV_STAMP)
 	$(BIN)/ruff format --check .
