@@ -1,5 +1,6 @@
 # make demo   set up, then the main job        make check  format, lint, types, import rules
-# make test   set up, then all tests           make bench  measurements beside peers
+# make quick  set up, then what every edit wants; make test  all tests; make soak, make fuzz  for hours
+# make bench  measurements beside peers        make fresh  README's commands on a minimal Debian (root)
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -11,7 +12,12 @@ DEV_STAMP := $(VENV)/.installed-dev
 unexport PYTHONDONTWRITEBYTECODE
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt
 
-.PHONY: setup demo test check format bench system-packages clean
+# Tests in parallel; those in real time run last, alone. `make test TESTS=tests/link` is a part.
+TESTS ?= tests
+WORKERS ?= auto
+PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 8 --dist loadgroup --no-loadscope-reorder
+
+.PHONY: setup demo quick test soak fuzz fresh check format bench system-packages clean
 
 setup: $(STAMP)
 
@@ -33,7 +39,22 @@ demo: setup
 	$(BIN)/sdrlinkctl demo
 
 test: $(DEV_STAMP) system-packages
-	$(BIN)/python -m pytest
+	$(PYTEST) $(TESTS)
+
+quick: $(DEV_STAMP)
+	SDRLINK_TRIALS=0.2 $(PYTEST) -m "not slow and not realtime" $(TESTS)
+
+# Rates with 30 times as many trials, then real time ten times over.
+soak: $(DEV_STAMP)
+	SDRLINK_TRIALS=30 $(PYTEST) --timeout=0 -m soak $(TESTS)
+	for i in 1 2 3 4 5 6 7 8 9 10; do $(PYTEST) -m realtime $(TESTS) || exit 1; done
+
+# Laws on input that nobody has seen yet, another each time.
+fuzz: $(DEV_STAMP)
+	SDRLINK_TRIALS=300 $(PYTEST) --timeout=0 -m hypothesis $(TESTS)
+
+fresh:
+	sh etc/fresh.sh
 
 check: $(DEV_STAMP)
 	$(BIN)/ruff format --check .

@@ -1,26 +1,26 @@
 #!/bin/sh
-# Installs what etc/apt-packages.txt lists and this machine lacks: as root where apt is present, or
-# when SDRLINK_APT=1 asks for it (with sudo). Else says in one line what will be skipped.
+# Installs what etc/apt-packages.txt lists and this machine lacks. A person at a terminal is asked first;
+# SDRLINK_APT=1 says yes (with sudo, where it is not root), SDRLINK_APT=0 says no. Who may not, or has no
+# apt, is told nothing here: the tests say in one line what they leave out.
 set -eu
 missing=""
-what=""
-while read -r package command reason; do
+while read -r package command _; do
     case "$package" in ''|'#'*) continue ;; esac
     { command -v "$command" >/dev/null 2>&1 || [ -e "$command" ]; } && continue
     missing="$missing $package"
-    what="${what:+$what, }$reason"
 done < "$(dirname "$0")/apt-packages.txt"
-[ -n "$missing" ] || exit 0
-run=""
+[ -n "$missing" ] && command -v apt-get >/dev/null 2>&1 || exit 0
+sudo=""
 if [ "$(id -u)" != 0 ]; then
-    [ "${SDRLINK_APT:-0}" = 1 ] || run=no
-    [ "$run" = no ] || run=sudo
+    [ "${SDRLINK_APT:-0}" = 1 ] || exit 0
+    sudo=sudo
 fi
-if [ "$run" = no ] || ! command -v apt-get >/dev/null 2>&1; then
-    echo "skipping $what: needs$missing (apt-get install$missing, or SDRLINK_APT=1 make test)"
-    exit 0
+if [ -z "${SDRLINK_APT:-}" ] && [ -t 0 ] && [ -t 1 ]; then
+    printf 'some tests need system packages:%s\ninstall them with apt-get? [y/N] ' "$missing"
+    read -r SDRLINK_APT
 fi
-echo "installing$missing for $what"
-$run apt-get update -qq
+case "${SDRLINK_APT:-1}" in 1|y|Y|yes) ;; *) exit 0 ;; esac
+echo "installing$missing"
+$sudo apt-get update -qq
 # shellcheck disable=SC2086
-DEBIAN_FRONTEND=noninteractive $run apt-get install -y -qq --no-install-recommends $missing >/dev/null
+DEBIAN_FRONTEND=noninteractive $sudo apt-get install -y -qq --no-install-recommends $missing >/dev/null

@@ -12,7 +12,14 @@ import pytest
 
 from sdrlinkd.client import ControlClient, NoDaemonError
 from sdrlinkd.reports import Snapshot
+from tests.tiers import (
+    pytest_collection_modifyitems,
+    pytest_configure,
+    pytest_terminal_summary,
+)
 from tests.waiting import wait_for
+
+__all__ = ["pytest_collection_modifyitems", "pytest_configure", "pytest_terminal_summary"]
 
 MAIN = "import sys; from sdrlinkd.__main__ import main; sys.exit(main(sys.argv[1:]))"
 ETC = Path(__file__).parents[1] / "etc"

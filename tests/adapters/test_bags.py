@@ -3,7 +3,6 @@
 import sqlite3
 from contextlib import closing
 from itertools import pairwise
-from pathlib import Path
 from random import Random
 
 import pytest
@@ -15,8 +14,6 @@ from rosbags.typesys import Stores, get_typestore
 from sdrlinkd.adapters import from_cdr, open_bag
 from sdrlinkd.errors import BagError
 from tests.adapters.recordings import CUSTOM, STORAGES, noisy_messages, ros1_bag, ros2_bag
-
-SHARED = Path(__file__).parents[3] / "shared" / "data"
 
 
 def read(path):
@@ -282,23 +279,3 @@ def test_what_is_no_bag_is_refused_in_words(tmp_path, name):
     with pytest.raises(BagError, match=name) as refused:
         open_bag(path)
     assert "\n" not in str(refused.value)
-
-
-@pytest.mark.parametrize(
-    ("name", "count"),
-    [
-        ("bags/sqlite3/husky_real_first100s", 4252),
-        ("bags/sqlite3/mrclam7_robots123_30s", 5731),
-        ("bags/mcap/nav2_turtlebot_sim.mcap", 8197),
-        ("bags/ros1/turtlesim_teleop.bag", 8647),
-        ("bags/ros1/lidar_stationary_2014.bag", 1265),
-        ("cdr/talker.mcap", 20),
-    ],
-)
-def test_real_recordings_are_read_whole(name, count):
-    if not SHARED.exists():
-        pytest.skip("the recordings are not part of the project; see ../shared/data")
-    messages, damage = read(SHARED / name)
-    assert len(messages) == count
-    assert damage == ""
-    assert all(a[2] <= b[2] for a, b in pairwise(messages))

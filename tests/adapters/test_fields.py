@@ -3,11 +3,12 @@
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.adapters import cdr_from_fields, empty, from_cdr, to_cdr
 from sdrlinkd.errors import UserError
+from tests.laws import law
 
 KINDS = (
     "geometry_msgs/msg/Twist", "nav_msgs/msg/Odometry", "nav_msgs/msg/Path", "std_msgs/msg/Bool",
@@ -81,7 +82,7 @@ values = st.recursive(
 )
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@law(300)
 @given(st.sampled_from(KINDS), st.dictionaries(names, values, max_size=3))
 def test_whatever_people_write_it_is_a_message_or_refused_in_words(kind, fields):
     try:

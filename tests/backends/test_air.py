@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from backends import BackendError, Channel
@@ -14,6 +14,7 @@ from backends.air import Timeline
 from backends.pace import Pace
 from phy import PROFILES, FrontEndParams, PathParams
 from tests.backends.radios import AIR, RATE, noise
+from tests.laws import law
 
 END = 2500
 TIMEOUT_S = 20
@@ -58,7 +59,7 @@ some_bursts = st.lists(st.tuples(st.integers(20, 2000), st.integers(0, 600)), ma
 some_sizes = st.lists(st.integers(0, 400), max_size=6)
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@law(100)
 @given(some_bursts, some_sizes, st.sampled_from([0, 7, 130]))
 def test_any_pieces_are_the_line_of_all_bursts_added_up(bursts, sizes, delay):
     channel = air(delay_s=delay / 1e6, loss_db=3)
@@ -160,7 +161,7 @@ def clock(monkeypatch):
     return clock
 
 
-@settings(derandomize=True, deadline=None)
+@law()
 @given(st.lists(st.integers(0, 10**13), min_size=2), st.floats(1e3, 1e8))
 def test_paced_time_grows_with_the_index(indices, rate_hz):
     pace = Pace(rate_hz, paced=True)

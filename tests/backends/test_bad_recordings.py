@@ -6,12 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from backends import SAMPLE_TYPES, BackendError, RecordingReader, RecordingWriter, describe
 from backends.recording import RAW_TYPES
 from tests.backends.radios import RATE, noise, read, record
+from tests.laws import law
 
 GOOD = {
     "global": {"core:datatype": "ci8", "core:sample_rate": 1e6, "core:version": "1.2.0"},
@@ -161,7 +162,7 @@ def described(path, *arguments):
         return str(error)
 
 
-@settings(derandomize=True, deadline=None, max_examples=250)
+@law(250)
 @given(any_json | nearly, st.sampled_from(["", "ci8"]), st.sampled_from([None, 1e6]))
 def test_any_json_is_read_or_refused_in_words(hostile, metadata, type_name, rate_hz):
     (hostile / "x.sigmf-meta").write_text(json.dumps(metadata))

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from backends import GAP, RadioParams
@@ -21,6 +21,7 @@ from tests.backends.airs import (
     loud,
     medium,
 )
+from tests.laws import law
 
 END_S = 0.008
 END = round(END_S * RATE)
@@ -66,7 +67,7 @@ def test_deafness_of_bursts_close_together_is_one():
     assert np.flatnonzero(deaf).tolist() == indices(800, 1600 + GAP + 200)
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(some_bursts, some_times, st.sampled_from([0, 80]))
 def test_who_is_deaf_misses_what_arrives_meanwhile_and_nothing_else(bursts, times, turnaround):
     lines = []
@@ -82,7 +83,7 @@ def test_who_is_deaf_misses_what_arrives_meanwhile_and_nothing_else(bursts, time
     assert np.array_equal(half[~deaf], full[~deaf])
 
 
-@settings(derandomize=True, deadline=None, max_examples=80)
+@law(80)
 @given(some_bursts, some_bursts, some_times, some_times, st.sampled_from(list(PROFILES)))
 def test_whenever_samples_are_taken_they_are_the_same(early, late, times, others, profile):
     """Each once and in order, for each of three nodes with clocks and radios of their own."""
@@ -109,7 +110,7 @@ def test_whenever_samples_are_taken_they_are_the_same(early, late, times, others
             assert np.array_equal(deafness(each), deafness(whole))
 
 
-@settings(derandomize=True, deadline=None)
+@law()
 @given(some_bursts, some_times, st.booleans())
 def test_pieces_are_as_long_as_they_say_and_never_empty(bursts, times, is_half):
     made = medium({0: half_duplex(0.0001) if is_half else PLAIN, 1: PLAIN, 2: PLAIN})
@@ -164,7 +165,7 @@ def test_a_burst_handed_over_by_the_lead_is_in_time(radio):
     assert made.send(0, burst(start, 40, exact=True)) == start
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(
     st.floats(0, 0.004),
     st.floats(-200, 200),

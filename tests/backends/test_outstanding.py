@@ -1,14 +1,15 @@
 """Bursts that have been handed over and have not left."""
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from backends import TxBurst
 from backends.outstanding import GAP, Outstanding
+from tests.laws import law
 
 
-@settings(derandomize=True, deadline=None, max_examples=100)
+@law(100)
 @given(
     st.lists(
         st.tuples(

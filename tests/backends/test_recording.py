@@ -6,13 +6,14 @@ import json
 import numpy as np
 import pytest
 import sigmf
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from backends import SAMPLE_TYPES, BackendError, RecordingReader, RecordingWriter, describe
 from backends.recording import RAW_TYPES
 from tests.backends.radios import RATE, TUNING, noise, read, record
+from tests.laws import law
 
 WRITTEN = ("cf32_le", "ci16_le", "ci8")
 some_parts = arrays(
@@ -37,7 +38,7 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("recordings")
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(some_parts)
 def test_floats_come_back_as_they_were(folder, parts):
     samples = parts.view(np.complex64)
@@ -46,7 +47,7 @@ def test_floats_come_back_as_they_were(folder, parts):
 
 
 @pytest.mark.parametrize(("type_name", "full_scale"), [("ci16_le", 32768), ("ci8", 128)])
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(some_parts)
 def test_integers_come_back_to_half_a_step_or_are_clipped_and_counted(
     folder, type_name, full_scale, parts
@@ -107,7 +108,7 @@ def test_samples_are_complex_numbers_that_may_be_written_to(tmp_path, type_name)
     samples *= 2
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(st.lists(st.integers(0, 300), max_size=15))
 def test_any_pieces_read_are_the_same_samples(recorded, sizes):
     samples, path = recorded
@@ -118,7 +119,7 @@ def test_any_pieces_read_are_the_same_samples(recorded, sizes):
     assert np.array_equal(np.concatenate([samples[:0], *pieces]), samples[: edges[-1]])
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(st.lists(st.tuples(st.integers(0, 1200), st.integers(0, 1200)), max_size=8))
 def test_pieces_are_read_in_any_order(recorded, pieces):
     samples, path = recorded
@@ -128,7 +129,7 @@ def test_pieces_are_read_in_any_order(recorded, pieces):
     reader.close()
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(
     st.lists(st.tuples(st.integers(0, 500), st.integers(1, 80)), max_size=8),
     st.sampled_from(WRITTEN),

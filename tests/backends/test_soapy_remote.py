@@ -13,10 +13,19 @@ import pytest
 
 from backends import SoapyRadio, SoapySettings, Tuning, TxBurst
 from tests.backends.radios import noise, opened, send, take
+from tests.machine import ROOT as NO_ROOT
+from tests.machine import lacks
 from tests.soapy_loopback import missing, module_folder
 
 ROOT = Path(__file__).parents[2]
-NEEDS = ("unshare", "ip", "ss", "dbus-daemon", "avahi-daemon", "SoapySDRServer")
+NEEDS = {
+    "unshare": "util-linux",
+    "ip": "iproute2",
+    "ss": "iproute2",
+    "dbus-daemon": "dbus",
+    "avahi-daemon": "avahi-daemon",
+    "SoapySDRServer": "soapyremote-server",
+}
 NO_SERVER = 77
 NAMESPACES = ("unshare", "--net", "--mount", "--pid", "--fork", "--kill-child", "--mount-proc")
 RATE = 1e6
@@ -26,10 +35,10 @@ def lacking():
     """Why there can be no server here; "" when there can."""
     if why := missing():
         return why
+    if absent := [package for name, package in NEEDS.items() if not shutil.which(name)]:
+        return lacks(*absent)
     if os.geteuid():
-        return "needs root, for namespaces of its own"
-    if absent := [name for name in NEEDS if not shutil.which(name)]:
-        return f"needs {', '.join(absent)}"
+        return f"{NO_ROOT}, for namespaces of its own"
     may = subprocess.run([*NAMESPACES, "true"], capture_output=True, check=False)
     return "needs namespaces of its own" if may.returncode else ""
 

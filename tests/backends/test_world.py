@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from backends import AirParams, LinkOverride, Outage, Track, World
+from tests.laws import law
 
 SPEED_OF_LIGHT = 299_792_458.0
 AIR = AirParams(snr_db=17.0, snr_db_at_1m=60.0, path_loss_exponent=2.0)
@@ -24,7 +25,7 @@ def between(outages):
     return lambda t: world.hop(1, 2, t) is not None
 
 
-@settings(derandomize=True, deadline=None)
+@law()
 @given(
     st.lists(
         st.tuples(st.integers(-50, 50), metres, metres),
@@ -69,7 +70,7 @@ def test_snr_falls_with_distance_by_the_exponent(exponent, distance_m, snr_db):
     assert world.hop(0, 1, 0.0).snr_db == pytest.approx(snr_db, abs=1e-9)
 
 
-@settings(derandomize=True, deadline=None)
+@law()
 @given(metres, metres, st.floats(0, 8))
 def test_places_work_both_ways_and_light_takes_its_time(x, y, exponent):
     air = AirParams(snr_db_at_1m=300.0, path_loss_exponent=exponent)
@@ -164,7 +165,7 @@ def test_an_outage_begins_with_its_first_moment_and_ends_before_its_last():
     assert not any(is_heard(t) for t in (1.0, 1.5, np.nextafter(2.0, 0)))
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@law(300)
 @given(
     st.lists(
         st.tuples(st.integers(0, 40), st.integers(0, 40)).map(lambda at: tuple(sorted(at))),

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -35,9 +36,20 @@ from benchmarks.pound.peers.wire import (
     cut_tcpros,
     cut_udpros,
 )
+from tests.machine import ROOT as NO_ROOT
+from tests.machine import lacks
 
-NO_NETWORK = namespaces.available()
-in_namespaces = pytest.mark.skipif(NO_NETWORK is not None, reason=NO_NETWORK or "")
+
+def no_network():
+    """Why there can be no namespaces here; "" when there can."""
+    if not shutil.which("tc"):
+        return lacks("iproute2")
+    if os.geteuid():
+        return f"{NO_ROOT}, for network namespaces"
+    return namespaces.available() or ""
+
+
+in_namespaces = pytest.mark.skipif(bool(no_network()), reason=no_network())
 
 messages = st.integers(8, 20_000).map(lambda size: bytes(i % 251 for i in range(size)))
 

@@ -4,12 +4,13 @@ import json
 
 import msgspec
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.bus import envelope
 from sdrlinkd.client import pack_map
 from sdrlinkd.errors import EnvelopeError
+from tests.laws import law
 
 TOPIC = b"/robot_1/odom\0"
 CDR = b"\0\1\0\0data"
@@ -55,7 +56,7 @@ def test_refused_with_a_reason(frames, says):
         envelope.decode(frames)
 
 
-@settings(derandomize=True, deadline=None, max_examples=500)
+@law(500)
 @given(st.lists(st.binary(max_size=40), max_size=5), st.booleans())
 def test_any_frames_decode_or_are_refused(frames, plausible):
     if plausible and len(frames) >= 2:

@@ -4,10 +4,11 @@ import tracemalloc
 
 import msgspec
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.client import pack_map, unpack
+from tests.laws import law
 
 plain = (
     st.none() | st.booleans() | st.integers(-(2**63), 2**64 - 1) | st.floats(allow_nan=False)
@@ -21,20 +22,20 @@ nested = st.recursive(
 )
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@law(300)
 @given(st.dictionaries(st.text(max_size=40), plain, max_size=15))
 def test_what_it_packs_others_read(values):
     assert msgspec.msgpack.decode(pack_map(values)) == values
     assert unpack(pack_map(values)) == values
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@law(150)
 @given(nested)
 def test_what_others_pack_it_reads(value):
     assert unpack(msgspec.msgpack.encode(value)) == value
 
 
-@settings(derandomize=True, deadline=None, max_examples=2000)
+@law(2000)
 @given(st.binary(max_size=60))
 def test_any_bytes_are_a_value_or_refused(data):
     try:
@@ -67,7 +68,7 @@ def test_a_huge_claim_costs_no_more_than_the_bytes_there_are(head):
     assert peak < 1_000_000
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@law(150)
 @given(nested, st.data())
 def test_a_cut_value_is_refused(value, data):
     whole = msgspec.msgpack.encode(value)

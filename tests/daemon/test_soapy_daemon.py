@@ -14,6 +14,7 @@ import pytest
 from backends.soapy.session import AWAY_S
 from sdrlinkd.client import Publisher, Subscriber
 from tests.daemon.soapy import air, on_soapy
+from tests.machine import lacks
 from tests.soapy_loopback import missing, module_folder
 from tests.waiting import wait_for
 
@@ -197,7 +198,7 @@ def test_nothing_is_sent_unless_that_is_wanted(start_daemon, bus):
     assert (stats.sent, stats.is_transmitting) == (0, False)
 
 
-@pytest.mark.skipif(not BINDING.exists(), reason="needs python3-soapysdr, for this Python")
+@pytest.mark.skipif(not BINDING.exists(), reason=lacks("python3-soapysdr"))
 def test_the_official_binding_serves_as_well(start_daemon, bus, tmp_path, monkeypatch):
     for source in (BINDING, DEBIAN / "SoapySDR.py"):
         (tmp_path / source.name).symlink_to(source)

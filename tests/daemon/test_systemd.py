@@ -15,6 +15,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.machine import lacks
+
 ROOT = Path(__file__).parents[2]
 UNITS = [ROOT / "systemd" / name for name in ("sdrlinkd.service", "sdrlinkd@.service")]
 # What may differ between one node and several.
@@ -24,7 +26,7 @@ PATIENCE_S = 30.0
 
 needs_systemd_analyze = pytest.mark.skipif(
     shutil.which("systemd-analyze") is None,
-    reason="systemd-analyze is not installed; etc/apt-packages.txt names its package (systemd)",
+    reason=lacks("systemd"),
 )
 each_unit = pytest.mark.parametrize("unit", UNITS, ids=lambda unit: unit.name)
 

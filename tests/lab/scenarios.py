@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+SHIPPED = Path(__file__).parents[2] / "etc/scenarios"
+
 ROBOTS = """
 [[robot]]
 id = 1

@@ -2,7 +2,6 @@
 
 import json
 from itertools import pairwise
-from pathlib import Path
 from random import Random
 
 import pytest
@@ -12,10 +11,9 @@ from sdrlinkd.errors import UserError
 from sdrlinkd.lab import load_scenario
 from sdrlinkd.lab.scenario import outages_of
 from sdrlinkd.lab.traces import read_outages
+from tests.lab.scenarios import SHIPPED
 
-SHARED = Path(__file__).parents[3] / "shared" / "data"
 SHIPYARD = "log_ax_high_ax_160mhz_6ghz_loc4_robot_control.jsonl"
-QUIET = "log_perama_site_ac_80mhz_5ghz_run1_loc2.jsonl"
 PERIOD_S = 0.5
 
 
@@ -160,30 +158,40 @@ def test_without_a_trace_no_folder_is_asked_for(tmp_path):
     assert outages_of(load_scenario(tmp_path / "s.toml"), None) == [Outage(1, 2), Outage(4, 5)]
 
 
-def recorded(name):
-    path = SHARED / "traces" / name
-    if not path.exists():
-        pytest.skip("the logs are not part of the project; see ../shared/data")
-    numbers = [json.loads(line)["payload"]["seqnum"] for line in path.read_text().splitlines()]
-    return path, (max(numbers) - min(numbers) + 1) * PERIOD_S
+def log_of(path, states):
+    """Writes a log of one message a period, lost where `states` is True; when it was."""
+    lines = [_line(number + 1000) for number, is_lost in enumerate(states) if not is_lost]
+    path.write_bytes(b"".join(line + b"\n" for line in lines))
+    edges = [i for i in range(1, len(states)) if states[i] != states[i - 1]]
+    return [(begin * PERIOD_S, end * PERIOD_S) for begin, end in pairwise(edges) if states[begin]]
 
 
-def test_the_shipyards_outages_are_those_of_its_log():
-    path, span_s = recorded(SHIPYARD)
-    found = read_outages(path, PERIOD_S, 0.0)
-    lost_s = sum(end - begin for begin, end in found)
-    assert 0.30 < lost_s / span_s < 0.35
-    assert max(end - begin for begin, end in found) > 10
-    assert all(0 <= begin < end <= span_s for begin, end in found)
-    assert all(one.end_s < other.begin_s for one, other in pairwise(found))
+def shipyard(seed, n):
+    """What a robot between ships loses: a third, some singly, some for many seconds."""
+    rng = Random(seed)
+    states = [False]
+    while len(states) < n:
+        states += [True] * (rng.choice((1, 1, 2)) if rng.random() < 0.8 else rng.randint(20, 40))
+        states += [False] * rng.randint(1, 25)
+    return [*states[:n], False]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_outages_of_a_long_log_are_the_runs_of_what_is_lost(tmp_path, seed):
+    states = shipyard(seed, 400)
+    expected = log_of(tmp_path / SHIPYARD, states)
+    assert read_outages(tmp_path / SHIPYARD, PERIOD_S, 0.0) == [Outage(*each) for each in expected]
+    lost_s = sum(end - begin for begin, end in expected)
+    assert lost_s == PERIOD_S * sum(states)
+    assert 0.15 < lost_s / (PERIOD_S * len(states)) < 0.6
+    assert max(end - begin for begin, end in expected) >= 10
     # The shipped scenario's part of it.
-    scenario = load_scenario(Path(__file__).parents[2] / "etc/scenarios/shipyard-outage.toml")
-    world = scenario.world(outages_of(scenario, path.parent))
-    tenths = [world.is_out(t / 10) for t in range(round(10 * scenario.duration_s))]
-    assert 0 < sum(tenths) < len(tenths)
+    scenario = load_scenario(SHIPPED / "shipyard-outage.toml")
+    world = scenario.world(outages_of(scenario, tmp_path))
+    periods = range(round(scenario.duration_s / PERIOD_S))
+    assert [world.is_out((t + 0.5) * PERIOD_S) for t in periods] == states[: len(periods)]
 
 
-def test_a_log_without_losses_has_no_outages():
-    path, span_s = recorded(QUIET)
-    assert span_s > 100
-    assert read_outages(path, PERIOD_S, 0.0) == []
+def test_a_log_without_losses_has_no_outages(tmp_path):
+    assert log_of(tmp_path / "quiet.jsonl", [False] * 400) == []
+    assert read_outages(tmp_path / "quiet.jsonl", PERIOD_S, 0.0) == []

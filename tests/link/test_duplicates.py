@@ -2,10 +2,11 @@
 
 from random import Random
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link.duplicates import SequenceTrack
+from tests.laws import law
 
 
 def test_a_copy_is_a_duplicate_also_when_late():
@@ -34,7 +35,7 @@ def test_late_arrivals_take_the_count_back():
     assert track.lost == 1
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(st.integers(0, 2**32), st.floats(0, 0.6), st.integers(0, 255))
 def test_losses_are_exact_while_gaps_stay_below_128(seed, loss, first):
     rng = Random(seed)
@@ -53,7 +54,7 @@ def test_losses_are_exact_while_gaps_stay_below_128(seed, loss, first):
     assert track.restarts == 0
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(st.integers(0, 2**32))
 def test_any_order_within_the_window_delivers_each_once(seed):
     rng = Random(seed)

@@ -4,7 +4,7 @@ from collections import Counter
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.config import DirectParams
@@ -22,6 +22,7 @@ from sdrlinkd.link import (
 )
 from sdrlinkd.link.message import Fate
 from sdrlinkd.pdulink import Impairment
+from tests.laws import law
 from tests.link.world import make_link, send_all
 
 
@@ -60,7 +61,7 @@ def any_policy(rng):
     )
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
+@law(40)
 @given(st.integers(0, 2**32))
 def test_the_ledger_holds_at_every_step_of_any_run(seed):
     rng = Random(seed)
@@ -120,7 +121,7 @@ def test_the_ledger_holds_at_every_step_of_any_run(seed):
     assert link.sender.outbox.queued == len(link.sender.outbox.in_flight) == 0
 
 
-@settings(derandomize=True, deadline=None, max_examples=30)
+@law(30)
 @given(st.integers(0, 2**32))
 def test_whatever_the_air_does_nothing_is_made_up(seed):
     """Loss, duplication, bit errors and overtaking: each message arrives whole, once, or not."""
@@ -159,7 +160,7 @@ def test_whatever_the_air_does_nothing_is_made_up(seed):
     assert len(got) > 60, f"seed {seed}: positive control"
 
 
-@settings(derandomize=True, deadline=None, max_examples=30)
+@law(30)
 @given(st.integers(0, 2**32))
 def test_order_holds_within_a_topic(seed):
     rng = Random(seed)

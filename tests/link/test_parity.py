@@ -1,36 +1,21 @@
 """Messages whose lost PDUs are computed from the others."""
 
-from pathlib import Path
 from random import Random
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 
-from sdrlinkd.link import Allowance, ClassesParams, ClassParams, Outcome, Overrides, Qos
+from sdrlinkd.link import Allowance, Outcome, Overrides, Qos
 from sdrlinkd.link.parity import parity_records
 from sdrlinkd.wire import Entry, Pdu, build, parse
-from tests.link.world import make_link
-
-TRACES = Path(__file__).parents[3] / "shared/data/traces/orbit_links_rssi.npz"
-
-
-def protected(share, own_id=1, **more):
-    classes = ClassesParams(bulk=ClassParams(parity=share))
-    return make_link(own_id, classes=classes, seed=own_id, **more)
+from tests.laws import law
+from tests.link.images import images_over, pdus_of, protected
 
 
-def pdus_of(link, payload, now=0.0, topic=0):
-    link.submit(topic, payload, now, Overrides(Qos.BULK))
-    pdus = []
-    while burst := link.departures.compose(now, Allowance.of(63)):
-        link.confirm(burst, Outcome.SENT, now)
-        pdus += burst.pdus
-    return pdus
-
-
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(
     size=st.integers(1, 70_000), pdu_size=st.sampled_from((220, 528, 1024, 1500, 2047)),
     share=st.floats(0.01, 0.5), seed=st.integers(0, 2**32),
@@ -139,27 +124,16 @@ def test_memory_is_bounded_whatever_comes():
     assert receiver.audit() == []
 
 
-@pytest.mark.skipif(not TRACES.exists(), reason="the logs are not part of the project")
-def test_over_recorded_links_memory_is_bounded_and_parity_helps():
-    """PDUs are lost where a real link's signal was weak."""
-    archive = np.load(TRACES, allow_pickle=True)
-    name = max(archive.files, key=lambda each: archive[each].size)
-    rssi = np.asarray(archive[name], float).reshape(-1)[:6000]
-    lost = rssi < np.nanquantile(rssi, 0.07)
+def fading(seed, n):
+    """Whether each of `n` PDUs is lost: 7 %, where a strength that changes slowly is weakest."""
+    rng = np.random.default_rng(seed)
+    strength = lfilter([1.0], [1.0, -0.6], rng.standard_normal(n))
+    return strength < np.quantile(strength, 0.07)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_over_fading_links_memory_is_bounded_and_parity_helps(seed):
+    lost = fading(seed, 6000)
+    assert lost.mean() == pytest.approx(0.07, abs=0.001)
     got = {share: images_over(lost, share) for share in (0.0, 0.2)}
     assert got[0.2] > got[0.0] + 5
-
-
-def images_over(lost, share):
-    """How many of 60 images arrive."""
-    sender, receiver = protected(share, pdu_size=1024), protected(0.0, 2, pdu_size=1024)
-    at = got = 0
-    for i in range(60):
-        for pdu in pdus_of(sender, i.to_bytes(8, "big") + bytes(40_000), i * 0.3):
-            if not lost[at % len(lost)]:
-                got += len(receiver.hear(pdu, i * 0.3))
-            at += 1
-        receiver.handle_timers(i * 0.3)
-        assert receiver.inbox.reassembly.held_bytes <= 1 << 20
-        assert receiver.audit() == sender.audit() == []
-    return got

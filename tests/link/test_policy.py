@@ -5,12 +5,13 @@ from random import Random
 
 import pytest
 import zstandard
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link import Allowance, Outcome, Overrides, Qos, QueueParams, TopicPolicy
 from sdrlinkd.link.compression import Inflated
 from sdrlinkd.wire import Entry, Pdu, build
+from tests.laws import law
 from tests.link.world import make_link, send_all
 
 CDR = b"\0\1\0\0"
@@ -84,7 +85,7 @@ def test_bounds_in_seconds_follow_what_the_air_carries():
     assert link.audit() == []
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(st.binary(max_size=3000), st.integers(0, 2**32), st.booleans())
 def test_compressed_or_not_messages_arrive_as_they_were(payload, seed, repetitive):
     rng = Random(seed)
@@ -155,7 +156,7 @@ def test_a_frame_that_cannot_be_used_is_dropped_by_name(frame, reason):
     assert link.audit() == []
 
 
-@settings(derandomize=True, deadline=None, max_examples=200)
+@law(200)
 @given(st.binary(max_size=200))
 def test_any_bytes_inflate_to_no_more_than_they_may(data):
     whole = zstandard.compress(TEXT)
@@ -179,7 +180,7 @@ def test_lifespan_and_size_hold_where_messages_arrive():
     assert receiver.audit() == []
 
 
-@settings(derandomize=True, deadline=None, max_examples=30)
+@law(30)
 @given(st.integers(0, 2**32))
 def test_what_has_expired_is_never_handed_over(seed):
     rng = Random(seed)

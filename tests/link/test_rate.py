@@ -3,7 +3,7 @@
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link import Qos, RateParams
@@ -17,6 +17,7 @@ from sdrlinkd.link.rate import (
     RateControl,
 )
 from sdrlinkd.wire import BROADCAST, LinkReport
+from tests.laws import law
 
 NEEDED = (1.0, 4.0, 7.0, 10.0, 13.0, 17.0, 19.0)
 MARGIN, URGENT_MARGIN, HYSTERESIS = 2.0, 5.0, 1.5
@@ -62,7 +63,7 @@ def test_it_is_left_downwards_as_soon_as_the_margin_is_gone(mcs):
     assert choice(rate) == mcs - 1
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(st.integers(0, 2**32), st.floats(0, 25))
 def test_snr_that_jitters_within_the_hysteresis_changes_nothing(seed, snr_db):
     rng = Random(seed)
@@ -154,7 +155,7 @@ def test_nobody_there_gets_the_lowest():
     assert choice(rate, to={7}) == 2
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(st.dictionaries(st.integers(2, 20), st.floats(0, 30), min_size=1, max_size=6))
 def test_a_broadcast_suits_the_worst_and_a_unicast_its_own(snrs):
     rate = make()
@@ -168,7 +169,7 @@ def test_a_broadcast_suits_the_worst_and_a_unicast_its_own(snrs):
         assert rate.chosen(src) == alone[src]
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(st.lists(st.floats(-40, 40), min_size=2, max_size=2), st.sampled_from(list(Qos)))
 def test_more_snr_is_never_a_slower_mcs(snrs, qos):
     low, high = (make(), make())

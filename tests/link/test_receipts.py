@@ -4,7 +4,7 @@ from collections import Counter
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link import (
@@ -26,6 +26,7 @@ from sdrlinkd.link.message import Outgoing
 from sdrlinkd.link.spare import SpareRecords
 from sdrlinkd.link.tellings import MOST_RECEIPTS
 from sdrlinkd.wire import Receipt, parse, parse_records
+from tests.laws import law
 from tests.link.world import make_link, next_burst
 
 STEP_S = 0.01
@@ -96,7 +97,7 @@ def message(number, size=40):
     return b"\0\1\0\0" + number.to_bytes(4, "little") + bytes(size)
 
 
-@settings(derandomize=True, deadline=None, max_examples=25)
+@law(25)
 @given(
     st.integers(0, 1000), st.floats(0, 0.6), st.floats(0, 0.5), st.floats(0, 0.5),
     st.sampled_from([20, 150]), st.sampled_from([None, 0.05]),

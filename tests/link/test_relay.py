@@ -3,12 +3,13 @@
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import Allowance, Outcome, Overrides, Qos, Relay, RelayParams, TopicPolicy
 from sdrlinkd.wire import parse
+from tests.laws import law
 from tests.link.world import make_link, send_all
 
 HOPS = 3
@@ -140,7 +141,7 @@ def test_a_relay_does_not_keep_what_is_old():
     assert two.audit() == []
 
 
-@settings(derandomize=True, deadline=None, max_examples=30)
+@law(30)
 @given(st.integers(0, 2**32))
 def test_in_any_mesh_messages_arrive_once_and_the_ledgers_add_up(seed):
     """Flooding over random links that lose a tenth; everybody sends to everybody."""

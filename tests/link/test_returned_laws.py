@@ -3,18 +3,19 @@
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link import Outcome, TopicPolicy
 from sdrlinkd.wire import parse
+from tests.laws import law
 from tests.link.test_laws import assert_books_balance
 from tests.link.world import make_link, next_burst
 
 SIZE = 64
 
 
-@settings(derandomize=True, deadline=None, max_examples=25)
+@law(25)
 @given(st.integers(0, 2**32))
 def test_the_ledger_adds_up_at_every_step_of_any_run(seed):
     rng = Random(seed)
@@ -46,7 +47,7 @@ def test_the_ledger_adds_up_at_every_step_of_any_run(seed):
     assert link.sender.outbox.queued == len(link.sender.outbox.in_flight) == 0
 
 
-@settings(derandomize=True, deadline=None, max_examples=12)
+@law(12)
 @given(st.integers(0, 2**32))
 def test_every_message_arrives_once_and_in_order_however_many_come_late(seed):
     rng = Random(seed)

@@ -3,7 +3,7 @@
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link import (
@@ -21,6 +21,7 @@ from sdrlinkd.link import (
 )
 from sdrlinkd.link.access import Free, Slot
 from sdrlinkd.link.schedule import Allowance, Forecasts, Limits, Shares
+from tests.laws import law
 from tests.link.world import PDU_S, airtime_s, make_link, most_pdus, next_burst
 
 PERIOD_S = 0.02
@@ -124,7 +125,7 @@ def test_what_nobody_can_foresee_shortens_bursts_and_what_is_alone_has_long_ones
     assert allow(forecasts, 2.0, max_burst_s=0.003).most == (100,) * 4
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
+@law(40)
 @given(st.integers(0, 2**32))
 def test_no_class_with_a_share_starves(seed):
     """Each gets its share of the air while it waits, whatever the others want."""

@@ -1,12 +1,13 @@
 """How long bursts are, and what fits."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import phy
 from sdrlinkd.config import ModemParams
 from sdrlinkd.modem.airtimes import Airtimes
+from tests.laws import law
 
 INFINITE = float("inf")
 N_MCS = len(phy.MCS_TABLE)
@@ -34,7 +35,7 @@ def test_a_burst_is_as_long_as_its_samples(mcs, n_pdus):
     assert make().airtime_s(mcs, n_pdus) == len(samples) / 5e6
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@law(150)
 @given(airtimes, mcs_numbers, st.floats(0, 0.6))
 def test_what_is_said_to_fit_fits_and_no_more_would(times, mcs, airtime_s):
     most = times.most_pdus(mcs, airtime_s)
@@ -47,7 +48,7 @@ def test_what_is_said_to_fit_fits_and_no_more_would(times, mcs, airtime_s):
         assert times.airtime_s(mcs, 1) > airtime_s
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@law(150)
 @given(airtimes, mcs_numbers, st.integers(1, phy.MAX_PDUS))
 def test_a_burst_fits_into_its_own_length(times, mcs, n_pdus):
     most = times.most_pdus(mcs, INFINITE)
@@ -72,7 +73,7 @@ def test_one_pdu_may_be_longer_than_bursts_of_several():
     assert times.longest_s()[0] == times.airtime_s(0, 1)
 
 
-@settings(derandomize=True, deadline=None, max_examples=50)
+@law(50)
 @given(airtimes)
 def test_the_longest_is_the_longest_that_is_ever_sent(times):
     for mcs, longest_s in enumerate(times.longest_s()):

@@ -5,6 +5,8 @@ import functools
 import subprocess
 from pathlib import Path
 
+from tests.machine import lacks
+
 PYTHON = "/usr/bin/python3"
 FLOWGRAPHS = Path(__file__).parents[2] / "etc" / "gnuradio"
 
@@ -19,8 +21,8 @@ def no_gnu_radio():
             check=False,
         )
     except OSError:
-        return f"needs GNU Radio: there is no {PYTHON}"
-    return "needs GNU Radio (Debian: gnuradio)" if done.returncode else ""
+        return lacks("gnuradio")
+    return lacks("gnuradio") if done.returncode else ""
 
 
 @contextlib.contextmanager

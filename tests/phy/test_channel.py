@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import j0
 
 from phy.channel import PROFILES, FrontEnd, FrontEndParams, Path, PathParams
 from phy.channel.fading import BLOCK, jakes, moving_filter
 from phy.channel.resampling import N_TAPS, echo_filters, stretch
+from tests.laws import law
 from tests.phy.signals import noise, silence, turned
 
 SEED = 43
@@ -88,7 +89,7 @@ def test_eight_bits_make_the_noise_of_eight_bits():
     assert power_db(y - x) == pytest.approx(decibel(2 * (1 / 128) ** 2 / 12), abs=0.3)
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
+@law(40)
 @given(st.lists(st.integers(0, 700), min_size=1, max_size=20), st.sampled_from([0, 8]))
 def test_any_chunking_of_a_front_end_gives_the_same_samples(sizes, bits):
     params = FrontEndParams(noise_dbfs=-20, image_db=30, dc_dbfs=-40, bits=bits)

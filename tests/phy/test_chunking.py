@@ -4,10 +4,11 @@ from itertools import cycle
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from phy import BurstOver, PduHeard, Receiver, Transmitter, preamble
+from tests.laws import law
 from tests.phy.signals import endings, heard, noise, payloads, silence, turned
 
 
@@ -71,7 +72,7 @@ chunk_sizes = st.lists(
 )
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@law(150)
 @given(st.integers(0, 2**32), chunk_sizes, st.booleans())
 def test_any_chunking_yields_the_same_events_and_counts(seed, sizes, with_gap):
     x, gap_at, gap, _ = make_stream(seed)

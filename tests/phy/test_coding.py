@@ -4,7 +4,7 @@ from math import erfc, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from phy.convolutional import (
@@ -16,6 +16,7 @@ from phy.convolutional import (
     decode,
     encode,
 )
+from tests.laws import law
 
 SEED = 11
 RATES = (HALF, TWO_THIRDS, THREE_QUARTERS)
@@ -94,7 +95,7 @@ def test_puncturing_is_the_standards(code, kept):
     assert code.n_coded(8 * 33) == len(wanted)
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(st.binary(min_size=1, max_size=300), st.sampled_from(RATES))
 def test_decoding_undoes_encoding(data, code):
     block = np.frombuffer(data, np.uint8)

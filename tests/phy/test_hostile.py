@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from phy import Receiver, Transmitter
+from tests.laws import law
 from tests.phy.signals import hear, heard, noise, noisy, payloads, silence, turned
 
 SEED = 37
@@ -86,7 +87,7 @@ def test_a_clipped_burst_is_heard():
     assert heard(hear(clipped.astype(np.complex64))[0]) == pdus
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(st.data())
 def test_anything_may_come_between_bursts(data):
     """Pieces of bursts, noise, levels and no numbers: no crash, and no PDU that nobody sent."""

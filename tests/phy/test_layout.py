@@ -5,7 +5,7 @@ from math import ceil
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from phy import (
@@ -18,6 +18,7 @@ from phy import (
     layout,
     most_pdus,
 )
+from tests.laws import law
 
 SEED = 23
 
@@ -49,7 +50,7 @@ def test_lengths_counted_by_hand(mcs, n_pdus, size, symbols, samples):
     assert (plan.n_symbols, plan.n_samples) == (symbols, samples)
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(grids, mcs_indices, pdu_counts, pdu_sizes)
 def test_symbols_through_against_laying_out_every_pdu(grid, mcs, n_pdus, size):
     plan = layout(grid, mcs, n_pdus, size)
@@ -68,7 +69,7 @@ def test_symbols_through_against_laying_out_every_pdu(grid, mcs, n_pdus, size):
     assert plan.n_symbols == plan.symbols_through(n_pdus)
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
+@law(40)
 @given(grids, mcs_indices, pdu_counts, st.integers(1, 300))
 def test_a_burst_is_as_long_as_its_layout_says_and_of_power_1(grid, mcs, n_pdus, size):
     pdus = [np.random.default_rng(SEED).bytes(size)] * n_pdus
@@ -89,7 +90,7 @@ def test_zeros_make_no_peaks():
     assert 10 * np.log10(np.max(np.abs(burst) ** 2)) < 12
 
 
-@settings(derandomize=True, deadline=None, max_examples=200)
+@law(200)
 @given(grids, mcs_indices, pdu_sizes, st.integers(0, 200_000))
 def test_most_pdus_is_the_largest_number_that_fits(grid, mcs, size, n_samples):
     most = most_pdus(grid, mcs, size, n_samples)

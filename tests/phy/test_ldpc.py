@@ -1,14 +1,12 @@
 """LDPC codes: the standard's codewords, blocks of any size, and how much noise they bear."""
 
 import hashlib
-import json
 import zlib
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from phy.kernels.bits import get, put, put_signs, to_octets
@@ -25,8 +23,8 @@ from phy.ldpc import (
     new_workspace,
     segmentation,
 )
+from tests.laws import law
 
-GOLDEN = Path(__file__).parents[3] / "shared" / "data" / "golden" / "ldpc_80211n_codewords.json"
 RATES = [Fraction(1, 2), Fraction(2, 3), Fraction(3, 4), Fraction(5, 6)]
 CODES = [QuasiCyclic(z, rate) for z in LIFTINGS for rate in RATES]
 SEED = 5
@@ -85,15 +83,28 @@ def noisy(rng, coded, ebn0_db, rate, scale=8):
     return np.clip(np.round(2 * scale * y / variance), -511, 511).astype(np.int16)
 
 
-@pytest.mark.skipif(not GOLDEN.exists(), reason="the codewords are not here")
-def test_codewords_made_elsewhere_are_ours():
-    seen = set()
-    for each in json.loads(GOLDEN.read_text()):
-        code = QuasiCyclic(each["n"] // 24, Fraction(each["k"], each["n"]))
-        word = np.unpackbits(np.frombuffer(bytes.fromhex(each["codeword_hex"]), np.uint8))[: code.n]
-        assert np.array_equal(encoded(code, word[: code.k].copy()), word)
-        seen.add((code.n, code.rate))
-    assert len(seen) == len(CODES)
+def solved(matrix, right):
+    """The bits `x` with `matrix · x = right` over GF(2), by elimination; `matrix` has full rank."""
+    rows = np.concatenate((matrix, right[:, None]), axis=1) % 2 == 1
+    n = len(rows)
+    for column in range(n):
+        pivot = column + int(np.argmax(rows[column:, column]))
+        assert rows[pivot, column], "the matrix has full rank"
+        rows[[column, pivot]] = rows[[pivot, column]]
+        others = rows[:, column].copy()
+        others[column] = False
+        rows[others] ^= rows[column]
+    return rows[:, n].astype(np.uint8)
+
+
+@codes
+def test_parity_is_what_solving_the_checks_gives(code):
+    """H · c = 0 has one solution for each data, whatever the shape of H."""
+    matrix, rng = parity_check(code), np.random.default_rng(SEED)
+    for _ in range(3):
+        data = random_bits(rng, code.k)
+        parity = solved(matrix[:, code.k :], matrix[:, : code.k] @ data)
+        assert np.array_equal(encoded(code, data), np.concatenate((data, parity)))
 
 
 @codes
@@ -137,7 +148,7 @@ def test_the_vectors_do_what_the_plain_decoder_says_bit_for_bit(code):
     assert outcomes == {True, False}
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(st.integers(1, 2047 + 4), st.sampled_from(RATES), st.floats(0, 1), st.integers(0, 2**32 - 1))
 def test_blocks_of_any_size_come_back(n_bytes, rate, more, seed):
     rng = np.random.default_rng(seed)
@@ -158,7 +169,7 @@ def test_blocks_of_any_size_come_back(n_bytes, rate, more, seed):
     assert np.array_equal(decoded(llr, form, new_workspace()), bits), seed
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
+@law(40)
 @given(
     st.integers(1, 500),
     st.sampled_from(RATES),
@@ -186,7 +197,7 @@ def test_blocks_are_decoded_as_the_plain_decoder_does_codeword_by_codeword(
     assert np.array_equal(bits, np.concatenate(expected)), seed
 
 
-@settings(derandomize=True, deadline=None)
+@law()
 @given(st.lists(st.integers(0, 100), max_size=20), st.integers(0, 2**32 - 1))
 def test_signs_become_words_and_words_octets(sizes, seed):
     rng = np.random.default_rng(seed)

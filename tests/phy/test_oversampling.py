@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from phy import REACH, Downsampler, Transmitter, upsample
 from phy.oversampling import low_pass
+from tests.laws import law
 from tests.phy.signals import hear, heard, noise, noisy, payloads, silence
 
 SEED = 91
@@ -37,7 +38,7 @@ def test_downsampling_is_filtering_and_taking_every_so_many(factor):
     assert down.next_index == len(out) == -(-len(x) // factor)
 
 
-@settings(derandomize=True, deadline=None)
+@law()
 @given(
     st.sampled_from([1, 2, 4]),
     st.integers(0, 50),

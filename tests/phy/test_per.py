@@ -3,17 +3,15 @@
 SNR is the burst's mean power over the noise power of a complex sample.
 """
 
-from pathlib import Path
-from time import monotonic
-
 import numpy as np
 import pytest
 
 from phy import BurstOver, Receiver, Transmitter
+from tests.phy.foreign import FOREIGN
+from tests.phy.quiet import quiet
 from tests.phy.signals import heard, noise, noisy, silence, turned
 
 SEED = 41
-RECORDINGS = Path(__file__).parents[2].parent / "shared/data/iq"
 
 
 def n_lost(n, mcs, size, snr_db, max_frequency=0.02, **settings):
@@ -81,15 +79,6 @@ def test_preambles_are_found_below_the_noise():
     assert n_found > 0.9 * 200
 
 
-def quiet(samples, network, max_frequency=0.1):
-    """Counters of a receiver that must not hear a PDU in `samples`, nor take long to see it."""
-    receiver = Receiver(network, max_frequency)
-    begin = monotonic()
-    assert heard(receiver.push(samples) + receiver.flush()) == []
-    assert monotonic() - begin < 1 + 5e-6 * len(samples)
-    return receiver.counters
-
-
 networks = pytest.mark.parametrize("network", [0, None])
 
 
@@ -108,33 +97,11 @@ def test_nothing_is_heard_in_silence(network):
     assert counters["triggers"] == 0
 
 
-def recorded(name):
-    """A recording as complex samples at full scale 1."""
-    path = RECORDINGS / name
-    if not path.exists():
-        pytest.skip("recordings are not here")
-    if path.suffix == ".cf32":
-        return np.fromfile(path, np.complex64)
-    if path.suffix == ".i16":
-        return (np.fromfile(path, "<i2").astype(np.float32) / 32768).view(np.complex64)
-    return ((np.fromfile(path, np.uint8).astype(np.float32) - 127.5) / 127.5).view(np.complex64)
-
-
 @networks
-@pytest.mark.parametrize(
-    ("name", "wifi"),
-    [
-        ("adsb_modes1_2M.u8", False),
-        ("gps_l1_noise_4M.cf32", False),
-        ("futuresdr_wlan_bpsk_1-2_15db.cf32", True),
-        ("wifi_11a_6mbps_conducted_20M.i16", True),
-        ("wifi_11a_24mbps_conducted_20M.i16", True),
-        ("wifi_11n_26mbps_radiated_20M.i16", True),
-    ],
-)
-def test_nothing_of_ours_is_heard_in_recordings_of_others(name, wifi, network):
+@pytest.mark.parametrize("name", FOREIGN)
+def test_nothing_of_ours_is_heard_in_what_others_send(name, network):
     """Wi-Fi's long training is ours too, but its short training lacks our code."""
-    counters = quiet(recorded(name), network)
-    assert counters["triggers"] > 0 or not wifi
+    counters = quiet(FOREIGN[name](np.random.default_rng(SEED)), network)
+    assert counters["triggers"] > 0 or not name.startswith("wifi")
     assert counters["preambles"] == counters["headers_bad"] == 0
     assert counters["bursts"] == counters["bursts_foreign"] == 0

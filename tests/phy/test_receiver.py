@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from phy import (
@@ -18,6 +18,7 @@ from phy import (
     points,
 )
 from phy.channel import FrontEnd, FrontEndParams, Path, PathParams
+from tests.laws import law
 from tests.phy.signals import endings, hear, heard, noisy, payloads, silence, turned
 
 SEED = 29
@@ -39,7 +40,7 @@ def carried(burst, seed=SEED, front_end=None, **path):
     return FrontEnd(front_end or FrontEndParams(noise_dbfs=-30), rng).receive(x)
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(st.integers(0, 6), st.integers(1, 63), st.integers(1, 2047), st.integers(0, 99))
 def test_pdus_come_back(mcs, n_pdus, size, seed):
     rng = np.random.default_rng(seed)

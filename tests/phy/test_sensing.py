@@ -4,11 +4,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from phy import CarrierSense, Transmitter
 from phy.kernels.sensing import DOUBLING, LEAST_FLOOR, WINDOW
+from tests.laws import law
 from tests.phy.signals import noise, noisy, payloads, silence, turned
 
 SEED = 53
@@ -241,7 +242,7 @@ def told(x, cuts, gaps):
     return sense.next_index, sense.busy_until, sense.noise_dbfs
 
 
-@settings(derandomize=True, deadline=None, max_examples=150)
+@law(150)
 @given(st.integers(0, 2**32), st.lists(st.floats(0, 1), max_size=40), st.booleans())
 def test_any_chunking_tells_the_same(seed, cuts, with_gaps):
     """Empty chunks among them: a cut may come twice, though a gap only once."""

@@ -1,18 +1,14 @@
-"""802.11a frames: of a transmitter written from the standard, and recorded ones of others."""
-
-from pathlib import Path
+"""802.11a frames: of a transmitter written from the standard, and the standard's own message."""
 
 import numpy as np
 import pytest
 
 from phy.wifi import RATES, receive
+from tests.phy.ht_frames import high_throughput_frame
 from tests.phy.signals import noise, noisy, silence, turned
 from tests.phy.wifi_frames import frame, with_fcs
 
 SEED = 53
-RECORDINGS = Path(__file__).parents[2].parent / "shared/data/iq"
-
-recorded = pytest.mark.skipif(not RECORDINGS.is_dir(), reason="no recordings beside the project")
 
 
 def psdus(rng, n):
@@ -63,26 +59,42 @@ def test_what_is_cut_or_no_frame_is_none():
     assert list(receive(silence(3))) == []
 
 
-def read_i16(name):
-    values = np.fromfile(RECORDINGS / name, "<i2").astype(np.float32) / 32768
-    return values.view(np.complex64)
+# Annex G's message with the FCS that the standard prints (tables G.1, of 2007 and later).
+MESSAGE = (
+    bytes.fromhex("0402002e006008cd37a60020d6013cf1006008ad3baf0000")
+    + b"Joy, bright spark of divinity,\nDaughter of Elysium,\nFire-insired we trea"
+    + bytes.fromhex("673321b6")
+)
 
 
-@recorded
-@pytest.mark.parametrize(("name", "mbps"), [("6mbps", 6), ("24mbps", 24)])
-def test_frames_from_an_access_point_have_the_right_fcs(name, mbps):
-    """Made by hardware that knows nothing of us, recorded by others over a cable."""
-    frames = list(receive(read_i16(f"wifi_11a_{name}_conducted_20M.i16")))
-    assert all(each.is_right and each.rate.mbps == mbps for each in frames)
-    data = [each.psdu for each in frames if len(each.psdu) == 138]
-    assert len(data) >= 8
-    ends = {bytes.fromhex("e4907e152a16"), bytes.fromhex("e8de27906e42")}
-    assert all({psdu[4:10], psdu[10:16]} == ends for psdu in data)
+def test_the_standards_own_message_is_read_with_its_fcs():
+    assert with_fcs(MESSAGE[:-4]) == MESSAGE
+    rng = np.random.default_rng(SEED)
+    x = noisy(rng, np.concatenate((silence(100), frame(MESSAGE, 36), silence(99))), 30)
+    assert [(each.psdu, each.is_right, each.rate.mbps) for each in receive(x)] == [
+        (MESSAGE, True, 36)
+    ]
 
 
-@recorded
-def test_frames_of_another_receiver_are_read():
-    samples = np.fromfile(RECORDINGS / "futuresdr_wlan_bpsk_1-2_15db.cf32", np.complex64)
-    frames = list(receive(samples))
-    assert frames
-    assert all(each.is_right and each.rate.mbps == 6 for each in frames)
+@pytest.mark.parametrize("mbps", [6, 24])
+def test_frames_as_a_radio_records_them_have_the_right_fcs(mbps):
+    """Octets of 16-bit samples, weak, off the middle, with the radio's own offset."""
+    rng = np.random.default_rng(SEED)
+    sent = [with_fcs(rng.bytes(134)) for _ in range(8)]
+    parts = [silence(300)]
+    for psdu in sent:
+        x = turned(frame(psdu, mbps), rng.uniform(-0.002, 0.002), rng.random())
+        parts += [x * 10 ** rng.uniform(-1.5, -0.5), silence(int(rng.integers(200, 900)))]
+    x = np.concatenate(parts)
+    x += noise(rng, len(x), 1e-5) + (2e-4 - 1e-4j)
+    coarse = np.round(x.astype(np.complex64).view(np.float32) * 2000).astype("<i2")
+    read = (coarse.astype(np.float32) / 32768).view(np.complex64)
+    got = [(each.psdu, each.is_right, each.rate.mbps) for each in receive(read)]
+    assert got == [(psdu, True, mbps) for psdu in sent]
+
+
+def test_a_high_throughput_frame_is_not_taken_for_one_of_ours():
+    """802.11n begins as 802.11a does; what follows its SIGNAL is another code."""
+    rng = np.random.default_rng(SEED)
+    x = np.concatenate((silence(100), high_throughput_frame(psdus(rng, 1)[0]), silence(99)))
+    assert not any(each.is_right for each in receive(noisy(rng, x, 25)))

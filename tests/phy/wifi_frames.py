@@ -76,13 +76,18 @@ def in_time(carriers):
     return np.fft.ifft(bins)
 
 
-def symbol(bits, per_carrier, number):
-    """One OFDM symbol with its prefix; SIGNAL is number 0."""
+def symbol(bits, per_carrier, number, turn=1):
+    """One OFDM symbol with its prefix, its data times `turn`; SIGNAL is number 0."""
     spread = interleaved(bits, per_carrier)
     groups = [spread[i : i + per_carrier] for i in range(0, len(spread), per_carrier)]
-    carriers = {k: point(group) for k, group in zip(DATA, groups, strict=True)}
+    carriers = {k: turn * point(group) for k, group in zip(DATA, groups, strict=True)}
     polarity = 1 - 2 * register([1] * 7, 127)[number % 127]
     carriers |= {k: polarity * sign for k, sign in PILOTS.items()}
+    return prefixed(carriers)
+
+
+def prefixed(carriers):
+    """A symbol of these carriers behind its prefix."""
     body = in_time(carriers)
     return np.concatenate((body[-16:], body))
 
@@ -91,14 +96,19 @@ def with_fcs(body):
     return body + zlib.crc32(body).to_bytes(4, "little")
 
 
+def beginning(code, length):
+    """Parts of the training and SIGNAL."""
+    short = in_time({k: (13 / 6) ** 0.5 * (1 + 1j) * sign for k, sign in SHORT.items()})
+    long = in_time(LONG)
+    head = [int(bit) for bit in f"{code:04b}0"] + [length >> i & 1 for i in range(12)]
+    head += [sum(head) % 2] + [0] * 6
+    return [np.tile(short, 3)[:160], long[32:], long, long, symbol(coded(head, "11"), 1, 0)]
+
+
 def frame(psdu, mbps, seed=(1, 0, 1, 1, 1, 0, 1)):
     """Samples of a whole frame, at mean power 1."""
     code, per_carrier, pattern = RATES[mbps]
-    short = in_time({k: (13 / 6) ** 0.5 * (1 + 1j) * sign for k, sign in SHORT.items()})
-    long = in_time(LONG)
-    head = [int(bit) for bit in f"{code:04b}0"] + [len(psdu) >> i & 1 for i in range(12)]
-    head += [sum(head) % 2] + [0] * 6
-    parts = [np.tile(short, 3)[:160], long[32:], long, long, symbol(coded(head, "11"), 1, 0)]
+    parts = beginning(code, len(psdu))
     data = [0] * 16 + [octet >> i & 1 for octet in psdu for i in range(8)]
     n_coded = 48 * per_carrier
     n_data = n_coded * len(pattern) // (2 * pattern.count("1"))

@@ -1,5 +1,6 @@
 """Compiles the driver, once per state of its source."""
 
+import functools
 import hashlib
 import os
 import platform
@@ -8,6 +9,8 @@ import subprocess
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+
+from tests.machine import lacks
 
 HERE = Path(__file__).parent
 COMPILE = ["g++", "-std=c++17", "-O2", "-Wall", "-Wextra", "-fPIC"]
@@ -19,10 +22,11 @@ class BuildError(Exception):
     """The driver does not compile here; the message is the compiler's."""
 
 
+@functools.cache
 def missing() -> str:
-    """What keeps the driver from being compiled here, for a test to say why it is skipped."""
+    """What keeps the driver from being compiled here, as tests.machine has it; "" if nothing."""
     if shutil.which("g++") is None:
-        return "no compiler: apt install g++"
+        return lacks("g++", "libsoapysdr-dev")
     header = "#include <SoapySDR/Device.hpp>"
     probe = subprocess.run(
         ["g++", "-fsyntax-only", "-x", "c++", "-"],
@@ -31,7 +35,7 @@ def missing() -> str:
         text=True,
         check=False,
     )
-    return "no SoapySDR headers: apt install libsoapysdr-dev" if probe.returncode else ""
+    return lacks("libsoapysdr-dev") if probe.returncode else ""
 
 
 def module_folder() -> Path:

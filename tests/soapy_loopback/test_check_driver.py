@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.machine import lacks
 from tests.soapy_loopback import missing, module_folder
 
 ROOT = Path(__file__).parents[2]
@@ -18,7 +19,7 @@ def test_driver_passes_its_checks():
         pytest.skip(why)
     probe = subprocess.run(["env", PYTHON, "-c", "import SoapySDR, numpy"], capture_output=True)
     if probe.returncode:
-        pytest.skip(f"{PYTHON} has no SoapySDR: apt install python3-soapysdr")
+        pytest.skip(lacks("python3-soapysdr", "python3-numpy"))
     # Without a root SoapySDR loads no other driver: this is faster, and quiet.
     where = {"SOAPY_SDR_PLUGIN_PATH": str(module_folder()), "SOAPY_SDR_ROOT": "/nonexistent"}
     done = subprocess.run(

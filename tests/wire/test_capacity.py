@@ -1,7 +1,7 @@
 """The paper's arithmetic: B, k*, L_pad, and what follows from them."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.wire import (
@@ -16,6 +16,7 @@ from sdrlinkd.wire import (
     max_message_size,
     pad_length,
 )
+from tests.laws import law
 
 EVERY_SIZE = range(MIN_PDU_SIZE, MAX_PDU_SIZE + 1)
 
@@ -67,7 +68,7 @@ def test_pad_length(pdu_size, payload_sizes, pad):
     assert pad_length(pdu_size, payload_sizes) == pad
 
 
-@settings(derandomize=True, deadline=None)
+@law()
 @given(st.sampled_from(EVERY_SIZE), st.lists(st.integers(0, 300), min_size=1, max_size=15))
 def test_a_pdu_fits_exactly_when_pad_is_not_negative(pdu_size, payload_sizes):
     entries = [Entry(0, 0, 0, 1, bytes(k)) for k in payload_sizes]

@@ -3,7 +3,7 @@
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.errors import PduError
@@ -24,6 +24,7 @@ from sdrlinkd.wire import (
     build_records,
     parse_records,
 )
+from tests.laws import law
 from tests.wire.vectors import RECORDS
 
 SEED = 6
@@ -79,13 +80,13 @@ unknown = st.builds(
 )
 
 
-@settings(derandomize=True, deadline=None)
+@law()
 @given(st.lists(records))
 def test_parse_undoes_build(sent):
     assert parse_records(build_records(sent)) == sent
 
 
-@settings(derandomize=True, deadline=None)
+@law()
 @given(st.lists(st.tuples(unknown, records)), unknown)
 def test_unknown_types_are_skipped(pairs, last):
     payload = b"".join(skipped + build_records([record]) for skipped, record in pairs) + last
@@ -97,7 +98,7 @@ def test_reserved_types_are_skipped(kind):
     assert parse_records(bytes([kind, 2, 1, 6, 5, 3, 1, 2, 3])) == [Receipt(1, 2, 3)]
 
 
-@settings(derandomize=True, deadline=None)
+@law()
 @given(
     records.filter(lambda record: not isinstance(record, OPEN)),
     st.binary(max_size=200),

@@ -1,7 +1,7 @@
 """A PDU that leaves later: its ages and phases move, all else stays."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.wire import (
@@ -21,6 +21,7 @@ from sdrlinkd.wire import (
     parse_records,
     postponed,
 )
+from tests.laws import law
 from tests.wire.test_pdu import sized_pdus
 from tests.wire.vectors import BY_NAME, crc16_xmodem, reseal
 
@@ -65,7 +66,7 @@ def built(draw):
     return builder.build(0, 1, 255, draw(octet), 1, draw(octet)), pdu_size, entries, told
 
 
-@settings(derandomize=True, deadline=None, max_examples=120)
+@law(120)
 @given(built(), steps_us)
 def test_ages_and_phases_move_and_nothing_else(case, by_us):
     pdu, pdu_size, entries, told = case
@@ -82,13 +83,13 @@ def test_ages_and_phases_move_and_nothing_else(case, by_us):
         assert after == pdu
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
+@law(40)
 @given(built())
 def test_a_pdu_that_leaves_in_time_stays_as_it_is(case):
     assert postponed(case[0], 0) == case[0]
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
+@law(40)
 @given(built(), times_us, times_us)
 def test_two_delays_are_one(case, first_us, second_us):
     assert postponed(postponed(case[0], first_us), second_us) == postponed(
@@ -96,7 +97,7 @@ def test_two_delays_are_one(case, first_us, second_us):
     )
 
 
-@settings(derandomize=True, deadline=None, max_examples=40)
+@law(40)
 @given(sized_pdus(), steps_us)
 def test_messages_are_never_touched_whatever_they_look_like(case, by_us):
     """Payloads here are any octets; those under topic id 0xF would be records."""

@@ -5,11 +5,12 @@ from collections import Counter
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.errors import PduError
 from sdrlinkd.wire import Entry, Pdu, build, entry_budget, identity, parse
+from tests.laws import law
 from tests.wire.vectors import BY_NAME, PDUS, crc16_xmodem, reseal
 
 REASONS = {"rx_short", "rx_crc", "rx_version", "rx_flags", "rx_entry", "rx_pad"}
@@ -43,7 +44,7 @@ def sized_pdus(draw):
     return pdu, pdu_size
 
 
-@settings(derandomize=True, deadline=None, max_examples=400)
+@law(400)
 @given(sized_pdus())
 def test_parse_undoes_build(case):
     pdu, pdu_size = case
@@ -53,7 +54,7 @@ def test_parse_undoes_build(case):
     assert parse(octets, pdu_size) == pdu
 
 
-@settings(derandomize=True, deadline=None, max_examples=200)
+@law(200)
 @given(sized_pdus(), st.integers(0, 15))
 def test_identity_outlives_relays(case, hop):
     pdu, pdu_size = case

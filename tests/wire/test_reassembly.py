@@ -7,10 +7,11 @@ from itertools import pairwise, product
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.wire import Entry, Reassembly, ReassemblyLimits
+from tests.laws import law
 
 SEED = 53
 SUPERSEDED = "rx_partial_superseded"
@@ -68,7 +69,7 @@ def arrivals(draw):
     return messages, events
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@law(300)
 @given(arrivals())
 def test_any_order_with_copies_yields_exactly_the_messages(case):
     messages, events = case
@@ -133,7 +134,7 @@ def few_entries(draw):
 steps = st.lists(st.tuples(st.integers(0, 3), st.integers(0, 1), few_entries()), max_size=60)
 
 
-@settings(derandomize=True, deadline=None, max_examples=300)
+@law(300)
 @given(steps)
 def test_agrees_with_the_plainest_form(steps):
     reassembly = make(timeout_s=1.0)

@@ -1,11 +1,12 @@
 """The topic registry: its file, its errors and its digest."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.errors import RegistryError
 from sdrlinkd.wire import RegistryDigest, Topic, make_registry, parse_registry
+from tests.laws import law
 from tests.wire.vectors import TABLE_4
 
 PAIRS = [tuple(line.split(",")) for line in TABLE_4.csv.splitlines()]
@@ -115,7 +116,7 @@ names = st.from_regex(r"\A/?[A-Za-z_][A-Za-z0-9_]{0,6}(/[A-Za-z_][A-Za-z0-9_]{0,
 types = st.from_regex(r"\A[A-Za-z][A-Za-z0-9_]{0,6}/(msg/)?[A-Za-z][A-Za-z0-9_]{0,6}\Z")
 
 
-@settings(derandomize=True, deadline=None)
+@law()
 @given(
     st.lists(
         st.tuples(names, types),
@@ -131,7 +132,7 @@ def test_csv_round_trip(pairs):
     assert again.digest() == registry.digest()
 
 
-@settings(derandomize=True, deadline=None)
+@law()
 @given(st.text())
 def test_any_text_is_a_registry_or_an_error(text):
     try:

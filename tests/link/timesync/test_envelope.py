@@ -4,11 +4,12 @@ import math
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link import DualEnvelope
 from sdrlinkd.link.timesync.side import Side
+from tests.laws import law
 
 SEED = 11
 RESOLUTION_S = 2e-5
@@ -23,7 +24,7 @@ def exchange(envelope, at, offset_s, there_s, back_s):
 delays = st.one_of(st.just(0.0), st.floats(0, 0.03), st.floats(0, 5e-5))
 
 
-@settings(derandomize=True, deadline=None, max_examples=60)
+@law(60)
 @given(
     st.floats(-1e4, 1e4),
     st.floats(-1e-3, 1e-3),
@@ -126,7 +127,7 @@ def test_what_is_kept_is_bounded_and_no_older_than_the_window():
     assert mean_x == pytest.approx(57.5, abs=0.2)
 
 
-@settings(derandomize=True, deadline=None)
+@law()
 @given(st.lists(st.one_of(st.floats(0, 20), st.none()), max_size=40))
 def test_times_stay_sorted_whatever_comes(times):
     side = Side(5.0)
@@ -148,7 +149,7 @@ def test_what_came_before_does_not_count_once_all_is_forgotten():
     assert side.x.tolist() == [1.0]
 
 
-@settings(derandomize=True, deadline=None)
+@law()
 @given(st.lists(st.tuples(st.floats(0.11, 3), st.floats(0, 1)), min_size=1, max_size=40),
        st.floats(-0.01, 0.01))  # fmt: skip
 def test_only_points_on_which_a_line_can_rest_are_looked_at(steps, slope):

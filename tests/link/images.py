@@ -1,0 +1,35 @@
+"""Links whose bulk has parity, and images sent over them."""
+
+from sdrlinkd.link import Allowance, ClassesParams, ClassParams, Outcome, Overrides, Qos
+from tests.link.world import make_link
+
+
+def protected(share, own_id=1, **more):
+    """A link whose bulk has that share of parity."""
+    classes = ClassesParams(bulk=ClassParams(parity=share))
+    return make_link(own_id, classes=classes, seed=own_id, **more)
+
+
+def pdus_of(link, payload, now=0.0, topic=0):
+    """The PDUs that carry a payload as bulk."""
+    link.submit(topic, payload, now, Overrides(Qos.BULK))
+    pdus = []
+    while burst := link.departures.compose(now, Allowance.of(63)):
+        link.confirm(burst, Outcome.SENT, now)
+        pdus += burst.pdus
+    return pdus
+
+
+def images_over(lost, share):
+    """How many of 60 images arrive where PDU i is lost if `lost[i]` is; memory stays bounded."""
+    sender, receiver = protected(share, pdu_size=1024), protected(0.0, 2, pdu_size=1024)
+    at = got = 0
+    for i in range(60):
+        for pdu in pdus_of(sender, i.to_bytes(8, "big") + bytes(40_000), i * 0.3):
+            if not lost[at % len(lost)]:
+                got += len(receiver.hear(pdu, i * 0.3))
+            at += 1
+        receiver.handle_timers(i * 0.3)
+        assert receiver.inbox.reassembly.held_bytes <= 1 << 20
+        assert receiver.audit() == sender.audit() == []
+    return got

@@ -1,0 +1,15 @@
+"""A receiver that must hear nothing."""
+
+from time import process_time
+
+from phy import Receiver
+from tests.phy.signals import heard
+
+
+def quiet(samples, network, max_frequency=0.1):
+    """Counters of a receiver that must not hear a PDU in `samples`, nor work long to see it."""
+    receiver = Receiver(network, max_frequency)
+    begin = process_time()
+    assert heard(receiver.push(samples) + receiver.flush()) == []
+    assert process_time() - begin < 1 + 5e-6 * len(samples)
+    return receiver.counters

@@ -1,0 +1,33 @@
+"""The tiers of the suite: what runs beside what, and what is told at the end."""
+
+import signal
+
+import pytest
+from hypothesis import settings
+
+from tests.laws import law
+from tests.machine import left_out
+
+
+def pytest_configure() -> None:
+    """A shell's background job ignores SIGINT, and so would all that tests start."""
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    # Those that do not say how many examples they want.
+    settings.register_profile("law", law())
+    settings.load_profile("law")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Those in real time come last, one after the other, when the other workers are done."""
+    for item in items:
+        if item.get_closest_marker("realtime"):
+            item.add_marker(pytest.mark.xdist_group("realtime"))
+    items.sort(key=lambda item: item.get_closest_marker("realtime") is not None)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """What was left out, and what it needs, in one line."""
+    skipped = terminalreporter.stats.get("skipped", [])
+    if line := left_out([report.longrepr[2].removeprefix("Skipped: ") for report in skipped]):
+        terminalreporter.write_line(line)
