@@ -157,6 +157,8 @@ class RxReport(msgspec.Struct, frozen=True, kw_only=True):
     held: int
     held_bytes: int
     dropped: dict[str, int]
+    control_bad: int = 0
+    """Control entries skipped because they could not be read (rx_control_bad)."""
 
 
 class RelayReport(msgspec.Struct, frozen=True, kw_only=True):

@@ -89,6 +89,7 @@ def _rx(link: Link) -> RxReport:
         held=inbox.reassembly.held,
         held_bytes=inbox.reassembly.held_bytes,
         dropped=dict(sum((tally.dropped for tally in tallies), Counter())),
+        control_bad=inbox.control_bad,
     )
 
 
