@@ -25,16 +25,16 @@ def robot_id(config: Config, topics: Iterable[str], source: str) -> int:
     if config.namespace:
         return _from_namespace(config.namespace, where)
     found = {name: number for name in topics if (number := _last_number(name))}
-    numbers = {int(each) if _fits(each) else each for each in found.values()}
+    numbers = set(found.values())
     if len(numbers) > 1:
         raise ConfigError(
             f'{where}, and namespace is "", so the last number in the topics\' names is meant, but '
             f"they disagree: {_listed(found)}; allowed: {_ALLOWED}, a namespace, or topics with "
             "one robot's names"
         )
-    for number in numbers:
-        if isinstance(number, int):
-            return number
+    number = numbers.pop() if numbers else ""
+    if _fits(number):
+        return int(number)
     problem = f"is {_listed(found)}, above {MOST}" if found else "is not there: no name has digits"
     raise ConfigError(
         f'{where}, and namespace is "", so the last number in the topics\' names is meant, but it '
