@@ -12,8 +12,8 @@ STAMP_AT = 4
 _LITTLE, _BIG = struct.Struct("<iI"), struct.Struct(">iI")
 SECOND_NS = 1_000_000_000
 OLDEST_NS = 10 * SECOND_NS
-"""Data that were so old when they were published are replayed. For so long after the host's clock was
-set, no message is believed to be older.
+"""Data that were so old when they were published are replayed. For so long after the host's clock
+was set, no message is believed to be older.
 """
 STEP_NS = SECOND_NS
 """By more than this a clock does not move unless it is set."""

@@ -223,6 +223,8 @@ class CarrierReport(msgspec.Struct, frozen=True, kw_only=True):
     """Mean power of what the radio received lately; full scale is 0."""
     clipped_pct: float = 0.0
     """Share of the samples received lately that stood at full scale."""
+    max_cfo_hz: float | None = None
+    """Bursts are looked for up to so far off in frequency."""
     counters: dict[str, int] = {}
     realtime_ratio: float | None = None
     """How many times faster than real time the receiver works, in processor time."""

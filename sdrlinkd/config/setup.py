@@ -6,8 +6,9 @@ from pathlib import Path
 
 from zstandard import ZstdCompressionDict
 
-from sdrlinkd.config.carrier_checks import check_carrier, with_paths
+from sdrlinkd.config.carrier_checks import WITHOUT_AIR, check_carrier, with_paths
 from sdrlinkd.config.link_checks import check_relay, load_dictionaries
+from sdrlinkd.config.offsets import cfo_told, cfo_warning
 from sdrlinkd.config.robot_id import robot_id
 from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError, RegistryError
@@ -62,6 +63,7 @@ class Setup:
             f"robot {self.node_id}, namespace {config.namespace or '-'}, backend {config.backend}",
             f"PDUs of {size} B; messages up to {max_message_size(size)} B",
             flush_told(config.link.flush_s),
+            *([] if config.backend in WITHOUT_AIR else [cfo_told(config.modem)]),
             *(
                 f"  {topic_id:>2}  {name}  {self.registry.topics[topic_id].type}"
                 for name, topic_id in self.topics_in.items()
@@ -194,7 +196,8 @@ def _policies(config: Config, registry: Registry, source: str) -> dict[int, Topi
 
 def _warnings(config: Config, registry: Registry) -> list[str]:
     most = max_message_size(config.link.pdu_size)
-    return [
+    deaf = "" if config.backend in WITHOUT_AIR else cfo_warning(config.modem)
+    return ([deaf] if deaf else []) + [
         f"{topic.name} ({topic.type}) can be larger than the {most} B that 255 fragments of "
         f"{config.link.pdu_size} B PDUs carry; larger messages are refused (tx_too_big)"
         for topic in registry.topics

@@ -49,7 +49,7 @@ class ModemLink:
         self._airtimes = Airtimes(params, pdu_size)
         self._receiver = phy.Receiver(
             params.network,
-            params.max_cfo_hz / params.rate_hz,
+            params.searched_cfo_hz / params.rate_hz,
             phy.GRIDS[params.grid],
             carrier_cycles=params.carrier_hz / params.rate_hz if params.one_crystal else 0.0,
         )
@@ -138,7 +138,8 @@ class ModemLink:
             kind=self._kind,
             state="down" if self._is_gone else self._state,
             detail=f"{phy.MCS_TABLE[params.mcs].name}, {params.rate_hz / 1e6:g} Msps, "
-            f"{self._radio.detail}",
+            f"CFO up to {params.searched_cfo_hz / 1e3:.3g} kHz, {self._radio.detail}",
+            max_cfo_hz=round(params.searched_cfo_hz, 3),
             counters={
                 **self._radio.counters,
                 **self._tx.counters,

@@ -79,8 +79,12 @@ def test_shipped_registry_is_the_papers_table_4():
             ["access.policy", "gnuradio", "no air that we could hear"],
         ),
         (
-            'backend = "loopback"\n[modem]\nrate_hz = 1e5',
-            ["modem.max_cfo_hz", "got 100000", "25000"],
+            'backend = "loopback"\n[modem]\nrate_hz = 1e5\nmax_cfo_hz = 1e5',
+            ["modem.max_cfo_hz", "got 100000", "25000", '"auto"'],
+        ),
+        (
+            "[modem]\nmax_cfo_hz = true",
+            ["f.toml:2: modem.max_cfo_hz: got true", '"auto" or a number from 0 to 1000000'],
         ),
         ('[iqfile]\nformat = "cu8"', ["iqfile.format", '"cu8"', '"ci16_le"']),
         ('[channel]\nprofile = "x"', ["channel.profile", '"awgn"']),
