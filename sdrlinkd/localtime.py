@@ -1,6 +1,7 @@
 """When messages were published and their data measured, by this host's clock."""
 
 import struct
+import time
 from collections.abc import Collection
 from typing import NamedTuple
 
@@ -11,9 +12,11 @@ STAMP_AT = 4
 _LITTLE, _BIG = struct.Struct("<iI"), struct.Struct(">iI")
 SECOND_NS = 1_000_000_000
 OLDEST_NS = 10 * SECOND_NS
-"""Data that were so old when they were published are replayed; a message that was published so long
-before it came was by another clock.
+"""Data that were so old when they were published are replayed. For so long after the host's clock
+was set, no message is believed to be older.
 """
+STEP_NS = SECOND_NS
+"""By more than this a clock does not move unless it is set."""
 
 
 class LocalTimes(NamedTuple):
@@ -67,7 +70,26 @@ def _us(seconds: float) -> int:
     return max(1, round(1e6 * seconds))
 
 
-def age_since(published_ns: int, now_ns: int) -> float:
-    """Seconds since a producer published; 0 where that cannot be: a clock was set in between."""
-    age_ns = now_ns - published_ns
-    return 1e-9 * age_ns if 0 <= age_ns <= OLDEST_NS else 0.0
+def host_clocks() -> tuple[int, int]:
+    """The host's time since 1970, and a clock of it that is never set and runs on while it sleeps;
+    both in ns.
+    """
+    return time.time_ns(), time.clock_gettime_ns(time.CLOCK_BOOTTIME)
+
+
+class PublishClock:
+    """How old messages are by when their producers say they were published; see `host_clocks`."""
+
+    def __init__(self) -> None:
+        self._ahead_ns: int | None = None
+        self._set_at_ns = -OLDEST_NS
+
+    def age_s(self, published_ns: int, now_ns: int, own_ns: int) -> float:
+        """Seconds since then; 0 where that cannot be told: the host's clock was set in between."""
+        ahead_ns = now_ns - own_ns
+        if self._ahead_ns is not None and abs(ahead_ns - self._ahead_ns) > STEP_NS:
+            self._set_at_ns = own_ns
+        self._ahead_ns = ahead_ns
+        age_ns = now_ns - published_ns
+        is_unsure = age_ns > OLDEST_NS and own_ns - self._set_at_ns < OLDEST_NS
+        return 0.0 if age_ns < 0 or is_unsure else 1e-9 * age_ns

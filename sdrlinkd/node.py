@@ -26,7 +26,7 @@ from sdrlinkd.link import (
     link_notices,
     link_report,
 )
-from sdrlinkd.localtime import UNKNOWN, age_since, local_times
+from sdrlinkd.localtime import UNKNOWN, PublishClock, host_clocks, local_times
 from sdrlinkd.opening import Opening
 from sdrlinkd.pdulink import Heard, PduLink
 from sdrlinkd.reports import Snapshot
@@ -70,6 +70,7 @@ class Node:
         self._stops = stops
         self._host_clock = HostClock(link.clocks, chrony, setup.config.chrony.robot)
         self._health = Health()
+        self._publish_clock = PublishClock()
         self._traffic: Iterator[Due] | None = None
         self._upcoming: Due | None = None
         self._began_at = 0.0
@@ -98,7 +99,8 @@ class Node:
         now = self._pdu_link.now()
         if published_ns is not None and not self._is_lockstep:
             # Read next to each other: whatever comes between them is an error of the age.
-            overrides = overrides._replace(age_s=age_since(published_ns, time.time_ns()))
+            age_s = self._publish_clock.age_s(published_ns, *host_clocks())
+            overrides = overrides._replace(age_s=age_s)
         transforms = self._transforms.get(topic_id)
         if transforms is not None:
             gathered, reason = transforms.take(payload, now)

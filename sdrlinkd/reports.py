@@ -159,6 +159,8 @@ class RxReport(msgspec.Struct, frozen=True, kw_only=True):
     held: int
     held_bytes: int
     dropped: dict[str, int]
+    control_bad: int = 0
+    """Control entries skipped because they could not be read (rx_control_bad)."""
 
 
 class RelayReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -225,6 +227,8 @@ class CarrierReport(msgspec.Struct, frozen=True, kw_only=True):
     """Mean power of what the radio received lately; full scale is 0."""
     clipped_pct: float = 0.0
     """Share of the samples received lately that stood at full scale."""
+    max_cfo_hz: float | None = None
+    """Bursts are looked for up to so far off in frequency."""
     counters: dict[str, int] = {}
     realtime_ratio: float | None = None
     """How many times faster than real time the receiver works, in processor time."""

@@ -5,7 +5,7 @@ import struct
 import pytest
 
 from sdrlinkd.link import Delivered, Wall
-from sdrlinkd.localtime import UNKNOWN, age_since, header_stamp_ns, local_times
+from sdrlinkd.localtime import UNKNOWN, PublishClock, header_stamp_ns, local_times
 from tests.link.world import make_link
 
 NOW_NS = 1_800_000_000_000_000_000
@@ -64,7 +64,27 @@ def test_what_is_no_stamp_is_none(payload):
 
 
 @pytest.mark.parametrize(
-    ("ago_ns", "age_s"), [(0, 0.0), (5_000_000, 0.005), (-1, 0.0), (3600 * 10**9, 0.0)]
+    ("ago_ns", "age_s"),
+    [(0, 0.0), (5_000_000, 0.005), (-1, 0.0), (12 * 10**9, 12.0), (3600 * 10**9, 3600.0)],
 )
-def test_the_age_of_what_was_published_by_another_clock_counts_from_now(ago_ns, age_s):
-    assert age_since(NOW_NS - ago_ns, NOW_NS) == pytest.approx(age_s)
+def test_a_message_is_as_old_as_its_producer_says(ago_ns, age_s):
+    assert PublishClock().age_s(NOW_NS - ago_ns, NOW_NS, 0) == pytest.approx(age_s)
+
+
+@pytest.mark.parametrize("step_s", [3600, -3600, 5])
+def test_after_the_hosts_clock_was_set_great_ages_are_not_believed(step_s):
+    clock, second = PublishClock(), 10**9
+    assert clock.age_s(NOW_NS, NOW_NS, 0) == 0.0
+    later = NOW_NS + step_s * second
+    assert clock.age_s(later - 3600 * second, later + second // 10, second // 10) == 0.0
+    # Small ones are, at once; and all, once messages from before must be through.
+    assert clock.age_s(later, later + second // 5, second // 5) == pytest.approx(0.2)
+    at = later + 11 * second
+    assert clock.age_s(at - 12 * second, at, 11 * second) == pytest.approx(12.0)
+
+
+def test_a_clock_that_is_slewed_was_not_set():
+    clock, own_ns, now_ns = PublishClock(), 0, NOW_NS
+    for _ in range(100):
+        own_ns, now_ns = own_ns + 10**9, now_ns + 10**9 + 500_000
+        assert clock.age_s(now_ns - 12 * 10**9, now_ns, own_ns) == pytest.approx(12.0)

@@ -3,6 +3,9 @@
 import time
 from dataclasses import dataclass
 
+import numpy as np
+
+from backends.base import Samples
 from backends.soapy.clock import SampleTime
 from backends.soapy.orders import Orders
 from backends.soapy.outgoing import Outgoing
@@ -26,10 +29,14 @@ GRACE_S = 0.1
 """So long after its end a burst's acknowledgement may come."""
 SLACK = 16
 """Samples by which a burst may be acknowledged too early; the next one ends later than that."""
+TAIL = 8
+"""Zeros behind a burst; the next one begins later than that."""
 IDLE_S = 0.5
 """After so long without a burst the transmitter goes off."""
 BUSY_S, QUIET_S = 0.002, 0.1
 """How long orders are waited for while bursts are out, and while none is."""
+
+_NOTHING = np.zeros(0, np.complex64)
 
 
 @dataclass
@@ -38,6 +45,8 @@ class _Out:
 
     order: Order
     is_failed: bool = False
+    is_begun: bool = False
+    """The device has a part of it."""
     is_whole: bool = False
     """The device has all of it."""
 
@@ -91,7 +100,7 @@ class TimedSender:
             self._is_active = True
         out = _Out(order)
         self._out.append(out)
-        samples = self._outgoing.converted(self._orders.samples(order))
+        samples = self._outgoing.converted(self._with_tail(self._orders.samples(order)))
         time_ns = self._clock.time_ns(order.start)
         # END_BURST only with what a device takes at once: of a part it would be the end.
         most = max(1, self._stream.mtu)
@@ -104,8 +113,18 @@ class TimedSender:
                 flags = 0
         out.is_whole = True
 
+    @staticmethod
+    def _with_tail(samples: Samples) -> Samples:
+        """With zeros behind them: some devices keep the last sample on the air."""
+        return np.concatenate((samples, np.zeros(TAIL, np.complex64)))
+
     def _write(self, out: _Out, samples: Values, flags: int, time_ns: int) -> bool:
-        """Whether the device took all of it; what is too late already is taken, and dropped."""
+        """Whether the device took all of it.
+
+        A device that tells of late bursts by status takes them, and drops them. One that refuses
+        them here would refuse them for ever: the burst is given up at once, and the daemon plans
+        another before those behind it are late, too.
+        """
         until = out.end + self._clock.samples(round(1e9 * GRACE_S))
         while len(samples) and not self._orders.is_over:
             moved = self._stream.write(samples, flags, time_ns, WRITE_US)
@@ -114,10 +133,15 @@ class TimedSender:
             if moved.n > 0:
                 samples = samples[moved.n :]
                 flags &= ~HAS_TIME
+                out.is_begun = True
             elif moved.n == UNDERFLOW:
                 self._fail(out, "underflow")
             elif moved.n == TIME_ERROR:
-                self._fail(out, "late")
+                # What has begun to leave must not go again.
+                self._fail(out, "underflow" if out.is_begun else "late")
+                if out.is_begun:
+                    self._end_burst()
+                return False
             elif moved.n not in (0, TIMEOUT):
                 raise DriverError(f"sending failed ({ERRORS.get(moved.n, moved.n)})")
             if self._clock.now(time.monotonic_ns()) > until:
@@ -127,7 +151,11 @@ class TimedSender:
         return not len(samples)
 
     def _end_burst(self) -> None:
-        """The device must not wait for the rest of a burst that was given up."""
+        """The device must not wait for the rest of a burst that was given up.
+
+        To some, going off says so; to others, only END_BURST.
+        """
+        self._stream.write(self._outgoing.converted(_NOTHING), END_BURST, 0, WRITE_US)
         self._stream.deactivate()
         self._is_active = False
 

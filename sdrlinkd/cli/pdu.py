@@ -152,7 +152,7 @@ def _records(payload: bytes) -> list[str]:
     try:
         return [f"         {record}" for record in parse_records(payload)]
     except PduError:
-        return ["         (no control records: topic id 15 is a topic of this registry)"]
+        return ["         (cannot be read as control records, so it is skipped: rx_control_bad)"]
 
 
 def _topic(topic_id: int, registry: Registry | None) -> str:

@@ -51,12 +51,18 @@ def info(
     ] = 1024,
     max_burst: Annotated[float, typer.Option(min=1e-6, max=1, help="Longest burst in s.")] = 0.005,
     grid: Grid = "64/16",
+    frequency: Annotated[
+        float, typer.Option(min=1, max=1e11, help="Middle of the channel in Hz.")
+    ] = 2.45e9,
+    crystal_ppm: Annotated[
+        float, typer.Option(min=0, max=200, help="How far every radio's crystal may be off.")
+    ] = 40.0,
     json: AsJson = False,
 ) -> None:
     """Carriers, rates and airtimes of every MCS."""
     from sdrlinkd.iq import modem_info
 
-    told = modem_info(rate, pdu_size, max_burst, grid_named(grid))
+    told = modem_info(rate, pdu_size, max_burst, grid_named(grid), frequency, crystal_ppm)
     if json:
         typer.echo(msgspec.json.encode(told))
         return
@@ -65,7 +71,7 @@ def info(
         f"{told.rate_hz / 1e6:g} Msps: {told.n_fft} carriers {told.spacing_hz / 1e3:g} kHz apart, "
         f"{told.n_data} for data, {told.n_pilots} pilots, {told.occupied_hz / 1e6:.3g} MHz wide\n"
         f"symbols of {told.symbol_us:g} µs, of these {told.echoes_us:g} µs for echoes; "
-        f"preamble and header {told.preamble_us:g} µs a burst",
+        f"preamble and header {told.preamble_us:g} µs a burst\n{told.cfo}",
         highlight=False,
         soft_wrap=True,
     )

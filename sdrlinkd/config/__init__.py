@@ -1,6 +1,7 @@
 """Configuration: TOML → types → what the parts are built with."""
 
 from sdrlinkd.config.carriers import (
+    SIMULATED_HZ,
     ChannelParams,
     DirectParams,
     EtherParams,
@@ -11,11 +12,13 @@ from sdrlinkd.config.carriers import (
     TransformParams,
 )
 from sdrlinkd.config.load import explain_policy, load_config, parse_config, parse_toml
+from sdrlinkd.config.offsets import cfo_told, cfo_warning
 from sdrlinkd.config.radios import GnuRadioParams, SoapyParams, ZmqParams
 from sdrlinkd.config.schema import BusParams, Config
 from sdrlinkd.config.setup import Setup, load_registry, make_setup
 
 __all__ = [
+    "SIMULATED_HZ",
     "BusParams",
     "ChannelParams",
     "Config",
@@ -30,6 +33,8 @@ __all__ = [
     "SoapyParams",
     "TransformParams",
     "ZmqParams",
+    "cfo_told",
+    "cfo_warning",
     "explain_policy",
     "load_config",
     "load_registry",

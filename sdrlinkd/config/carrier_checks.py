@@ -19,10 +19,10 @@ def check_carrier(config: Config, source: str) -> None:
     if config.backend in WITHOUT_AIR:
         return
     modem, iqfile = config.modem, config.iqfile
-    if modem.max_cfo_hz > modem.rate_hz / 4:
+    if modem.searched_cfo_hz > modem.most_cfo_hz:
         raise ConfigError(
-            f"{source}: modem.max_cfo_hz: got {modem.max_cfo_hz:g}; allowed: at most a quarter of "
-            f"modem.rate_hz, {modem.rate_hz / 4:g}"
+            f"{source}: modem.max_cfo_hz: got {modem.searched_cfo_hz:g}; allowed: at most a "
+            f'quarter of modem.rate_hz, {modem.most_cfo_hz:g}, or "auto"'
         )
     if config.backend == "ether" and not config.ether.dir:
         raise ConfigError(

@@ -51,8 +51,11 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     preamble_boost_db: Annotated[float, Meta(ge=0, le=3)] = 0.0
     """The preamble is sent so much stronger than the rest: where peaks limit an amplifier, bursts
     are found farther away."""
-    max_cfo_hz: Annotated[float, Meta(ge=0, le=1e6)] = 1e5
-    """Largest carrier offset between two radios."""
+    max_cfo_hz: Literal["auto"] | Annotated[float, Meta(ge=0, le=1e6)] = "auto"
+    """Largest carrier offset between two radios at which bursts are looked for; "auto": what
+    `crystal_ppm` makes of it, as far as a receiver can search."""
+    crystal_ppm: Annotated[float, Meta(ge=0, le=200)] = 40.0
+    """How far every radio's crystal may be off."""
     one_crystal: bool = True
     """Carrier and samples of every radio come from the same crystal: the offset of the one tells
     that of the other."""
@@ -67,6 +70,23 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     def carrier_hz(self) -> float:
         """The middle of the channel, also where none is set."""
         return self.frequency_hz or SIMULATED_HZ
+
+    @property
+    def apart_hz(self) -> float:
+        """How far two radios' carriers may be apart, both crystals off as far as they may be."""
+        return 2e-6 * self.crystal_ppm * self.carrier_hz
+
+    @property
+    def most_cfo_hz(self) -> float:
+        """The largest carrier offset that a receiver can search at this rate."""
+        return self.rate_hz / 4
+
+    @property
+    def searched_cfo_hz(self) -> float:
+        """The carrier offset up to which bursts are looked for."""
+        if self.max_cfo_hz == "auto":
+            return min(self.apart_hz, self.most_cfo_hz)
+        return float(self.max_cfo_hz)
 
 
 class LoopbackParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -17,6 +17,8 @@ def allowed(kind: inspect.Type) -> str:
     if isinstance(kind, inspect.StrType):
         return 'text in "quotes"'
     if isinstance(kind, inspect.LiteralType):
+        if len(kind.values) == 1:
+            return f'"{kind.values[0]}"'
         return "one of " + ", ".join(f'"{value}"' for value in kind.values)
     if isinstance(kind, inspect.ListType):
         few, most = kind.min_length, kind.max_length
@@ -29,8 +31,10 @@ def allowed(kind: inspect.Type) -> str:
     if isinstance(kind, inspect.StructType | inspect.DictType):
         return "a table"
     if isinstance(kind, inspect.UnionType):
+        # Words first: they are the likelier choice.
+        types = sorted(kind.types, key=lambda each: not isinstance(each, inspect.LiteralType))
         return " or ".join(
-            allowed(each) for each in kind.types if not isinstance(each, inspect.NoneType)
+            allowed(each) for each in types if not isinstance(each, inspect.NoneType)
         )
     return str(kind)
 

@@ -52,7 +52,8 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     namespace: str = "robot_1"
     """ROS namespace of this robot's topics; empty: the registry holds absolute names."""
     robot_id: Annotated[int, Meta(ge=-1, le=254)] = -1
-    """Source id on the air; -1: the last digits of the namespace."""
+    """Source id on the air; -1: the last number in the namespace, or, without one, in the names of
+    the topics taken."""
     registry: str = "registry.csv"
     """Topic registry, relative to the configuration file; the same file at all nodes."""
     topics: list[str] = []

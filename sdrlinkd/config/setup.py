@@ -6,16 +6,16 @@ from pathlib import Path
 
 from zstandard import ZstdCompressionDict
 
-from sdrlinkd.config.carrier_checks import check_carrier, with_paths
+from sdrlinkd.config.carrier_checks import WITHOUT_AIR, check_carrier, with_paths
 from sdrlinkd.config.link_checks import check_relay, load_dictionaries
+from sdrlinkd.config.offsets import cfo_told, cfo_warning
+from sdrlinkd.config.robot_id import robot_id
 from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError, RegistryError
-from sdrlinkd.link import TopicPolicy, check_access
+from sdrlinkd.link import TopicPolicy, check_access, flush_told
 from sdrlinkd.wire import Registry, equal_payload, max_message_size, parse_registry
 
-MAX_ID_DIGITS = 3
 MIN_BEACON_S = 0.01
-_DIGITS = re.compile(r"\d+")
 _NAMESPACE = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _RX_NAME = re.compile(r"(/[A-Za-z_]\w*)+/?", re.ASCII)
 _PLACEHOLDER = re.compile(r"\{(src_id|src)\}")
@@ -62,6 +62,8 @@ class Setup:
         return [
             f"robot {self.node_id}, namespace {config.namespace or '-'}, backend {config.backend}",
             f"PDUs of {size} B; messages up to {max_message_size(size)} B",
+            flush_told(config.link.flush_s),
+            *([] if config.backend in WITHOUT_AIR else [cfo_told(config.modem)]),
             *(
                 f"  {topic_id:>2}  {name}  {self.registry.topics[topic_id].type}"
                 for name, topic_id in self.topics_in.items()
@@ -77,7 +79,8 @@ def make_setup(config: Config, base: Path, source: str = "config") -> Setup:
     _check_texts(config, source)
     check_carrier(config, source)
     config = with_paths(config, base)
-    node_id = _node_id(config, source)
+    topics_in = _topics_in(config, registry, source)
+    node_id = robot_id(config, topics_in, source)
     try:
         check_access(config.access, node_id)
     except ConfigError as error:
@@ -98,7 +101,7 @@ def make_setup(config: Config, base: Path, source: str = "config") -> Setup:
         config=config,
         registry=registry,
         node_id=node_id,
-        topics_in=_topics_in(config, registry, source),
+        topics_in=topics_in,
         policies=policies,
         dictionaries=load_dictionaries(policies, base, source),
         transforms=_transforms(config, registry, source),
@@ -117,19 +120,6 @@ def load_registry(path: Path) -> Registry:
             "it is a CSV of `name,type` lines, named by the key `registry`"
         ) from None
     return parse_registry(text, str(path))
-
-
-def _node_id(config: Config, source: str) -> int:
-    if config.robot_id >= 0:
-        return config.robot_id
-    runs = _DIGITS.findall(config.namespace)
-    if runs and len(runs[-1]) <= MAX_ID_DIGITS and int(runs[-1]) < 255:
-        return int(runs[-1])
-    raise ConfigError(
-        f'{source}: robot_id: got -1 (from the namespace), but namespace "{config.namespace}" '
-        "ends in no number below 255; allowed: robot_id from 0 to 254, or a namespace "
-        'such as "robot_1"'
-    )
 
 
 def _check_texts(config: Config, source: str) -> None:
@@ -206,7 +196,8 @@ def _policies(config: Config, registry: Registry, source: str) -> dict[int, Topi
 
 def _warnings(config: Config, registry: Registry) -> list[str]:
     most = max_message_size(config.link.pdu_size)
-    return [
+    deaf = "" if config.backend in WITHOUT_AIR else cfo_warning(config.modem)
+    return ([deaf] if deaf else []) + [
         f"{topic.name} ({topic.type}) can be larger than the {most} B that 255 fragments of "
         f"{config.link.pdu_size} B PDUs carry; larger messages are refused (tx_too_big)"
         for topic in registry.topics

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 
 import phy
 from backends import GAP_LABEL, Annotation, Samples
-from sdrlinkd.iq.recording import max_frequency
+from sdrlinkd.iq.recording import MAX_FREQUENCY
 
 PIECE = 1 << 16
 LEAST = 1 << 14
@@ -26,7 +26,7 @@ class BurstFinder:
         self._read = read
         self._rate_hz, self._frequency_hz = rate_hz, frequency_hz
         self._grid = grid
-        self._receiver = phy.Receiver(network, max_frequency(rate_hz), grid)
+        self._receiver = phy.Receiver(network, MAX_FREQUENCY, grid)
         self._gaps: deque[tuple[int, int]] = deque()
         self.next_index = 0
         """What is before it was looked at."""

@@ -3,6 +3,7 @@
 import msgspec
 
 import phy
+from sdrlinkd.config import SIMULATED_HZ, ModemParams, cfo_told, cfo_warning
 from sdrlinkd.errors import UserError
 
 
@@ -36,13 +37,25 @@ class ModemInfo(msgspec.Struct, frozen=True, kw_only=True):
     """Echoes that the cyclic prefix takes."""
     preamble_us: float
     """Preamble and header of each burst."""
+    frequency_hz: float
+    max_cfo_hz: float
+    """Bursts are looked for up to so far off in frequency, as `cfo` says in words."""
+    cfo: str
     mcs: list[McsInfo]
 
 
 def modem_info(
-    rate_hz: float, pdu_size: int, max_burst_s: float, grid: phy.Numerology = phy.OFDM_64_16
+    rate_hz: float,
+    pdu_size: int,
+    max_burst_s: float,
+    grid: phy.Numerology = phy.OFDM_64_16,
+    frequency_hz: float = SIMULATED_HZ,
+    crystal_ppm: float = ModemParams().crystal_ppm,
 ) -> ModemInfo:
-    """Everything that follows from rate, PDU size and longest burst. Raises UserError."""
+    """Everything that follows from rate, PDU size and longest burst, and from the middle of the
+    channel and the radios' crystals. Raises UserError.
+    """
+    params = ModemParams(rate_hz=rate_hz, frequency_hz=frequency_hz, crystal_ppm=crystal_ppm)
     try:
         rows = [_mcs_info(grid, each, rate_hz, pdu_size, max_burst_s) for each in phy.MCS_TABLE]
     except ValueError as error:
@@ -62,6 +75,9 @@ def modem_info(
         symbol_us=grid.n_symbol / rate_hz * 1e6,
         echoes_us=grid.n_cp / rate_hz * 1e6,
         preamble_us=opening / rate_hz * 1e6,
+        frequency_hz=frequency_hz,
+        max_cfo_hz=params.searched_cfo_hz,
+        cfo=cfo_warning(params) or cfo_told(params),
         mcs=rows,
     )
 

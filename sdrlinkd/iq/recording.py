@@ -14,7 +14,9 @@ from sdrlinkd.errors import UserError
 
 PIECE = 1 << 18
 MAX_POINTS = 20_000
-MAX_CFO_HZ = 1e5
+MAX_FREQUENCY = 0.25
+"""The largest carrier offset looked for, in cycles a sample: as far as a receiver can search, for
+whatever crystals the radios have."""
 
 Progress = Callable[[int], None]
 
@@ -47,7 +49,7 @@ class IqRecording:
         self, network: int | None, progress: Progress, grid: phy.Numerology = phy.OFDM_64_16
     ) -> Iterator[tuple[phy.Event, phy.Receiver]]:
         """What a receiver of `network` (None: any) finds; `progress(samples read)` on the way."""
-        receiver = phy.Receiver(network, max_frequency(self.info.rate_hz), grid)
+        receiver = phy.Receiver(network, MAX_FREQUENCY, grid)
         yield from self._decode(receiver, progress)
 
     def points(
@@ -62,7 +64,7 @@ class IqRecording:
             while len(pieces) > 1 and sum(map(len, pieces[1:])) >= MAX_POINTS:
                 del pieces[0]
 
-        receiver = phy.Receiver(network, max_frequency(self.info.rate_hz), grid, on_points=keep)
+        receiver = phy.Receiver(network, MAX_FREQUENCY, grid, on_points=keep)
         bursts = [
             event.burst
             for event, _ in self._decode(receiver, progress)
@@ -87,8 +89,3 @@ class IqRecording:
             progress(min(first + PIECE, self.info.n_samples))
         for event in receiver.flush():
             yield event, receiver
-
-
-def max_frequency(rate_hz: float | None) -> float:
-    """The largest carrier offset looked for, in cycles a sample."""
-    return min(0.25, MAX_CFO_HZ / rate_hz) if rate_hz else 0.1

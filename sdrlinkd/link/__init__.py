@@ -5,6 +5,7 @@ from sdrlinkd.link.burst import Burst, Outcome
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity, Sensed
 from sdrlinkd.link.compression import Deflated, train_dictionary
 from sdrlinkd.link.delivered import CDR_HEADER_SIZE, Delivered
+from sdrlinkd.link.flush import flush_told
 from sdrlinkd.link.ledger import RX_PDU_REASONS, RX_REASONS, TX_REASONS
 from sdrlinkd.link.link import Link
 from sdrlinkd.link.message import Outgoing
@@ -76,6 +77,7 @@ __all__ = [
     "Verdict",
     "Wall",
     "check_access",
+    "flush_told",
     "link_notices",
     "link_report",
     "make_access",

@@ -212,7 +212,7 @@ class Departures:
         """Nothing more will come: partial PDUs go at once, beacons end."""
         self._beacons.end()
         self._tellings.end()
-        self._sender.packetizer.flush()
+        self._sender.packetizer.flush.end()
 
     def clear(self) -> None:
         """Nothing goes again."""

@@ -19,6 +19,7 @@ from sdrlinkd.wire import (
     BROADCAST,
     CONTROL_TOPIC_ID,
     Beacon,
+    ControlEntries,
     Entry,
     Parity,
     Pdu,
@@ -29,11 +30,13 @@ from sdrlinkd.wire import (
     Registry,
     RegistryDigest,
     Stamp,
+    control_entries,
     identity,
     lasting_identity,
     parse,
-    parse_records,
 )
+
+_NO_CONTROL = ControlEntries([], 0, 0)
 
 
 class Inbox:
@@ -72,6 +75,8 @@ class Inbox:
         self.pdus_heard = 0
         self.pdus_used = 0
         self.pdus_dropped: Counter[str] = Counter()
+        self.control_bad = 0
+        """Control entries that could not be read, rx_control_bad."""
 
     def hear(
         self, data: bytes, at: float, snr_db: float | None, now: float, ended_at: float
@@ -81,22 +86,24 @@ class Inbox:
         self.air.note(at, ended_at)
         try:
             pdu = parse(data, self._pdu_size)
-            records = self._control_records(pdu)
         except PduError as error:
             return self._drop(error.reason)
+        control = control_entries(pdu) if self._has_control else _NO_CONTROL
+        records = control.records
         is_relayed = pdu.hop < self._hop_limit
-        stamps = [record for record in records or () if isinstance(record, Stamp)]
+        stamps = [record for record in records if isinstance(record, Stamp)]
         if pdu.src != self._own_id or is_relayed:
             self._ear.pdu_from(pdu, stamps, at, is_relayed)
         if pdu.src == self._own_id and not self._hears_self:
             return self._drop("rx_own")
         neighbor = self.neighbors.get(pdu.src) or self._new_neighbor(pdu.src, at)
         neighbor.heard_at(at)
-        _, seq, crc = identity(data) if records is None else lasting_identity(data)
+        _, seq, crc = lasting_identity(data) if stamps else identity(data)
         if not neighbor.track.heard(seq, crc):
             neighbor.duplicates += 1
             return self._drop("rx_dup")
         neighbor.heard += 1
+        self.control_bad += control.n_bad
         neighbor.hops_left = pdu.hop
         if not is_relayed:
             neighbor.note_snr(snr_db)
@@ -105,7 +112,7 @@ class Inbox:
         is_sent_on = self._ear.sends_on(pdu, data, at)
         if pdu.dst not in (BROADCAST, self._own_id) and not self._hears_self:
             return self._drop("rx_relayed" if is_sent_on else "rx_not_for_us")
-        for record in records or ():
+        for record in records:
             if isinstance(record, Beacon):
                 if neighbor.take_beacon(record):
                     neighbor.track.restart(seq, crc)
@@ -122,8 +129,8 @@ class Inbox:
             # Parity needs room, too.
             self._note_lost(now)
         entries = [*pdu.entries, *repaired] if repaired else pdu.entries
-        if records is not None and len(entries) == 1:
-            return self._drop("rx_control")
+        if len(entries) == control.n_entries:
+            return self._drop("rx_control" if control.n_bad < len(entries) else "rx_control_bad")
         self.pdus_used += 1
         return self._take_entries(pdu, entries, neighbor, at, now, ended_at)
 
@@ -167,17 +174,6 @@ class Inbox:
     def _drop(self, reason: str) -> list[Delivered]:
         self.pdus_dropped[reason] += 1
         return []
-
-    def _control_records(self, pdu: Pdu) -> list[Record] | None:
-        """The records in control entries; None when the PDU has no such entry."""
-        records: list[Record] | None = None
-        if self._has_control:
-            for entry in pdu.entries:
-                if entry.topic_id == CONTROL_TOPIC_ID:
-                    if entry.total != 1:
-                        raise PduError("rx_entry", "control records are never fragmented")
-                    records = (records or []) + parse_records(entry.payload)
-        return records
 
     def _new_neighbor(self, src: int, at: float) -> Neighbor:
         self._ear.newcomer(src, at)

@@ -55,10 +55,10 @@ def rate_counters(sender: Sender, inbox: Inbox, sent_s: float) -> dict[Hashable,
     for topic_id in range(sender.n_topics):
         tally = sender.tally(topic_id)
         counters["tx", topic_id] = tally.accepted
-        counters["tx_bytes", topic_id] = tally.accepted_bytes
+        counters["accepted_bytes", topic_id] = tally.accepted_bytes
     for key, heard in inbox.tallies.items():
         counters["rx", *key] = heard.delivered
-        counters["rx_bytes", *key] = heard.delivered_bytes
+        counters["delivered_bytes", *key] = heard.delivered_bytes
     for src, neighbor in inbox.neighbors.items():
         counters["pdus", src] = neighbor.heard
         counters["lost", src] = neighbor.track.lost

@@ -49,6 +49,7 @@ class Outbox:
         self._turn = 0
         self.queued = 0
         self.queued_bytes = 0
+        self._with_lifespan = 0
         self.relays = False
         """Whether other robots' PDUs have ever waited here."""
         self.bytes_per_s = INFINITE
@@ -139,6 +140,14 @@ class Outbox:
             default=float("inf"),
         )
 
+    def first_begun(self) -> float:
+        """Of messages begun and not through, when the first was last served; infinity: none is."""
+        return min((each.last_at for each in self._begun()), default=INFINITE)
+
+    def has_lifespans(self) -> bool:
+        """Whether anything that waits, or its rest, will be worthless some day."""
+        return self._with_lifespan > 0 or any(each.expires_at < INFINITE for each in self._begun())
+
     def pending_bytes(self, enough: int) -> int:
         """Bytes of all that waits, entry headers included; counting stops at `enough`."""
         total = -ENTRY_HEADER_SIZE
@@ -163,6 +172,13 @@ class Outbox:
         topic = self._by_topic.get(topic_id)
         return len(topic.messages) if topic is not None else 0
 
+    def _begun(self) -> Iterator[Outgoing]:
+        """Messages of which something has been sent, and something has not."""
+        for level in self.levels:
+            for lane in level.lanes:
+                if lane.current is not None:
+                    yield lane.current
+
     def _enqueue(self, message: Outgoing) -> None:
         key = (message.qos, -message.priority, message.topic_id, message.dst)
         lane = self._lanes.get(key)
@@ -181,6 +197,7 @@ class Outbox:
         topic.messages[message] = None
         topic.n_bytes += len(message.payload)
         self.queued += 1
+        self._with_lifespan += message.expires_at < INFINITE
         self.queued_bytes += len(message.payload)
         self._class_bytes[message.qos] += len(message.payload)
 
@@ -246,6 +263,7 @@ class Outbox:
         del topic.messages[message]
         topic.n_bytes -= len(message.payload)
         self.queued -= 1
+        self._with_lifespan -= message.expires_at < INFINITE
         self.queued_bytes -= len(message.payload)
         self._class_bytes[message.qos] -= len(message.payload)
 

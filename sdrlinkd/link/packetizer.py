@@ -10,6 +10,7 @@ from random import Random
 
 from sdrlinkd.link.draft import BuiltPdu, Draft
 from sdrlinkd.link.entry_ids import REST_FACTOR, TopicEntryIds
+from sdrlinkd.link.flush import Flush
 from sdrlinkd.link.heads import Heads
 from sdrlinkd.link.message import Lane, Level, Outgoing, with_first
 from sdrlinkd.link.outbox import Outbox
@@ -71,11 +72,7 @@ class Packetizer:
         self.spare = SpareRecords()
         self.asking: list[Outgoing] = []
         """Messages just stamped whose producers want to know what becomes of them."""
-        self._may_wait = params.flush_s > 0
-
-    def flush(self) -> None:
-        """From now on partial PDUs do not wait."""
-        self._may_wait = False
+        self.flush = Flush(params.flush_s, outbox, self.k_single, reassembly_timeout_s)
 
     def next_pdu(
         self, start: float, first: Qos | None = None, src: int | None = None
@@ -86,7 +83,7 @@ class Packetizer:
         is in vain is withdrawn; see `heads`.
         """
         levels = self._outbox.levels
-        if not levels or (self._may_wait and self._must_wait(start)):
+        if not levels or self.flush.must_wait(start):
             return None
         may_be_own = src is None or src == self._src
         draft = Draft(self._pdu_size)
@@ -120,7 +117,7 @@ class Packetizer:
         levels = self._outbox.levels
         if not levels or (src is not None and src != self._src):
             return []
-        if self._may_wait and self._must_wait(start):
+        if self.flush.must_wait(start):
             return []
         built = self._sole.filled(levels[0], start, self._seq, most)
         self._seq = (self._seq + len(built)) & 0xFF
@@ -149,8 +146,8 @@ class Packetizer:
         """When `next_pdu` may next have something to send; −inf: now; infinity: nothing waits."""
         if not self._outbox:
             return float("inf")
-        if self._may_wait and self._must_wait(now):
-            return self._outbox.oldest_arrival() + self._params.flush_s
+        if self.flush.must_wait(now):
+            return self.flush.due_at()
         return min(
             self.entry_ids.next_free(lane.waiting[0]) if lane.current is None else float("-inf")
             for level in self._outbox.levels
@@ -290,11 +287,3 @@ class Packetizer:
         message.stamped = True
         if asks and not message.is_expected:
             self.asking.append(message)
-
-    def _must_wait(self, now: float) -> bool:
-        """Whether what is pending should wait for more (paper section 4.3, Flush Timeout)."""
-        if self._outbox.levels[0].key[0] <= Qos.LATENCY:
-            return False
-        if now >= self._outbox.oldest_arrival() + self._params.flush_s:
-            return False
-        return self._outbox.pending_bytes(self.k_single) < self.k_single

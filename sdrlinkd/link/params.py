@@ -1,6 +1,6 @@
 """What steers the link. Defaults, ranges and meaning stand here and nowhere else."""
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
@@ -36,8 +36,9 @@ class LinkParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     """Least payload bytes of an entry when topics share PDUs, k_min."""
     greedy: bool = True
     """Fill a PDU with further entries of the same topics."""
-    flush_s: Annotated[float, Meta(ge=0)] = 0.0
-    """Time a partial PDU may wait for more; inf: only full ones. Urgent and latency never wait."""
+    flush_s: Literal["now"] | Annotated[float, Meta(ge=0)] = "now"
+    """Time a PDU that is not full may wait for more; "now": none. 0.0 is the paper's: without end,
+    never by time. Urgent, latency and messages with a lifespan never wait."""
     dst: Annotated[int, Meta(ge=0, le=255)] = 255
     """Destination robot of topics that name none; 255: everyone."""
     hop_limit: Annotated[int, Meta(ge=1, le=15)] = 1

@@ -34,7 +34,7 @@ class Overrides(NamedTuple):
     dst: int | None = None
     lifespan_s: float | None = None
     age_s: float = 0.0
-    """So old it is when it is submitted."""
+    """So old it is when it is submitted, by its producer's word."""
     receipt: str = ""
     """The producer's name for it, who wants to know what becomes of it; empty: nobody does."""
 

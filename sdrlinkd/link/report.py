@@ -98,6 +98,7 @@ def _rx(link: Link) -> RxReport:
         held=inbox.reassembly.held,
         held_bytes=inbox.reassembly.held_bytes,
         dropped=dict(sum((tally.dropped for tally in tallies), Counter())),
+        control_bad=inbox.control_bad,
     )
 
 
@@ -117,7 +118,7 @@ def _topics(link: Link, now: float, names_in: dict[int, str]) -> list[TopicRepor
                 accepted=tally.accepted,
                 accepted_per_s=link.rates.per_s(("tx", topic.id), tally.accepted, now),
                 accepted_bytes_per_s=link.rates.per_s(
-                    ("tx_bytes", topic.id), tally.accepted_bytes, now
+                    ("accepted_bytes", topic.id), tally.accepted_bytes, now
                 ),
                 sent=tally.sent,
                 sent_bytes=tally.sent_bytes,
@@ -148,7 +149,7 @@ def _received(
                 delivered_per_s=link.rates.per_s(("rx", src, topic_id), tally.delivered, now),
                 delivered_bytes=tally.delivered_bytes,
                 delivered_bytes_per_s=link.rates.per_s(
-                    ("rx_bytes", src, topic_id), tally.delivered_bytes, now
+                    ("delivered_bytes", src, topic_id), tally.delivered_bytes, now
                 ),
                 dropped=dict(tally.dropped),
                 pdr=tally.delivered / ended if ended else None,

@@ -13,7 +13,7 @@ from sdrlinkd.link.message import Fate, Outgoing
 from sdrlinkd.link.outbox import Outbox
 from sdrlinkd.link.packetizer import Packetizer
 from sdrlinkd.link.params import LinkParams, QueueParams
-from sdrlinkd.link.policy import DEFAULT_POLICY, TopicPolicy
+from sdrlinkd.link.policy import DEFAULT_POLICY, INFINITE, TopicPolicy
 from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, Overrides, Qos
 from sdrlinkd.link.schedule import Allowance, ClassesParams
 from sdrlinkd.link.topic_state import TopicState
@@ -21,6 +21,9 @@ from sdrlinkd.wire import Pdu, Registry, max_message_size
 
 RELAYED = 256
 """Lanes of others' PDUs have this and their source in place of a topic id."""
+UNLIKELY_AGE_S = 10.0
+"""A message without a lifespan that was published so long ago comes from another clock, or from a
+recording: its age counts from now. With a lifespan it is as old as it says."""
 MAX_PDUS = 63
 """Of a burst, whatever carries it."""
 
@@ -77,7 +80,7 @@ class Sender:
         if refused:
             topic.tally.drop(refused)
             return refused
-        return self._enqueue(topic_id, payload, now, overrides)
+        return self._enqueue(topic_id, payload, now, now, overrides)
 
     def offer_again(self, offer: Offer, now: float) -> None:
         """Queue a latched message for a robot that came late, as old as it is."""
@@ -87,7 +90,7 @@ class Sender:
             return
         topic.tally.accepted += 1
         topic.tally.reoffered += 1
-        self._enqueue(topic_id, payload, at, overrides._replace(dst=dst))
+        self._enqueue(topic_id, payload, at, now, overrides._replace(dst=dst))
 
     def forward(self, pdu: Pdu, data: bytes, at: float, until: float) -> str | None:
         """Queue another robot's PDU that came in a burst at `at`; None, or why it was refused."""
@@ -101,10 +104,15 @@ class Sender:
         message.is_whole = True
         return self._put(message, DEFAULT_POLICY)
 
-    def _enqueue(self, topic_id: int, payload: bytes, at: float, wishes: Overrides) -> str | None:
+    def _enqueue(
+        self, topic_id: int, payload: bytes, at: float, now: float, wishes: Overrides
+    ) -> str | None:
         qos, priority, dst, lifespan_s, age_s, receipt = wishes
-        at -= age_s
         topic = self._topics[topic_id]
+        if lifespan_s is None:
+            lifespan_s = topic.policy.lifespan_s
+        if age_s <= UNLIKELY_AGE_S or lifespan_s < INFINITE:
+            at -= age_s
         frame = topic.deflated.shrink(payload) if topic.deflated else None
         if frame is not None:
             payload = frame
@@ -118,12 +126,16 @@ class Sender:
             topic.priority if priority is None else priority,
             topic.dst if dst is None else dst,
             at,
-            at + (topic.policy.lifespan_s if lifespan_s is None else lifespan_s),
+            at + lifespan_s,
             topic.stamp or (bool(receipt) and self._has_control),
             topic.tally,
         )
         message.receipt = receipt
         message.is_compressed = frame is not None
+        if message.expires_at <= now:
+            # It must not take the place of one that is fresh.
+            self._drop(message, "tx_expired")
+            return "tx_expired"
         return self._put(message, topic.policy)
 
     def _put(self, message: Outgoing, policy: TopicPolicy) -> str | None:

@@ -52,7 +52,7 @@ class ModemLink:
         self._airtimes = Airtimes(params, pdu_size)
         self._receiver = phy.Receiver(
             params.network,
-            params.max_cfo_hz / params.rate_hz,
+            params.searched_cfo_hz / params.rate_hz,
             phy.GRIDS[params.grid],
             carrier_cycles=params.carrier_hz / params.rate_hz if params.one_crystal else 0.0,
         )

@@ -52,6 +52,7 @@ from sdrlinkd.wire.control import (
     build_stamp,
     parse_records,
 )
+from sdrlinkd.wire.control_entries import ControlEntries, control_entries
 from sdrlinkd.wire.later import forwarded, lasting_identity, postponed
 from sdrlinkd.wire.pdu import Entry, Pdu, build, flags, identity, parse
 from sdrlinkd.wire.reassembly import Lost, Partial, Reassembly, ReassemblyLimits
@@ -96,6 +97,7 @@ __all__ = [
     "Arrival",
     "Beacon",
     "Clock",
+    "ControlEntries",
     "Entry",
     "Frame",
     "LinkReport",
@@ -118,6 +120,7 @@ __all__ = [
     "build_full",
     "build_records",
     "build_stamp",
+    "control_entries",
     "entry_budget",
     "equal_payload",
     "flags",

@@ -6,7 +6,7 @@ from enum import IntEnum
 from typing import NamedTuple
 
 from sdrlinkd.errors import PduError
-from sdrlinkd.wire.clock import Clock, build_clock, parse_clock
+from sdrlinkd.wire.clock import CLOCK_SIZE, Clock, build_clock, parse_clock
 from sdrlinkd.wire.registry import BROADCAST, RegistryDigest
 
 TLV_HEADER_SIZE = 2
@@ -143,6 +143,13 @@ PARITY_OVERHEAD = TLV_HEADER_SIZE + _PARITY.size
 STAMP_SIZE = TLV_HEADER_SIZE + _FORMATS[RecordType.STAMP].size
 _STAMP_RECORD = struct.Struct(">BBBBI")
 ASKING_STAMP_SIZE = STAMP_SIZE + len(_ASKS)
+# Octets that a record's value always has, by its type's number.
+_LEAST = {
+    **{int(number): fields.size for number, fields in _FORMATS.items()},
+    int(RecordType.DIGEST): RegistryDigest.OVERALL_SIZE,
+    int(RecordType.PARITY): _PARITY.size,
+    int(RecordType.CLOCK): CLOCK_SIZE - TLV_HEADER_SIZE,
+}
 
 
 def build_records(records: Iterable[Record]) -> bytes:
@@ -157,41 +164,50 @@ def build_stamp(topic_id: int, entry_id: int, age_us: int, asks: bool = False) -
     return bytes(record + _ASKS if asks else record)
 
 
+def record_spans(octets: bytes | bytearray, begin: int, end: int) -> list[tuple[int, int, int]]:
+    """Of all records in a control entry's payload, `octets[begin:end]`: type, where the value
+    begins, and its length.
+
+    Raises PduError (rx_control_bad) when a record overruns the payload or is too short for its
+    type: then none of them is used.
+    """
+    spans = []
+    at = begin
+    while at < end:
+        if at + TLV_HEADER_SIZE > end:
+            raise PduError("rx_control_bad", "a control record is cut in its header")
+        number, length = octets[at], octets[at + 1]
+        at += TLV_HEADER_SIZE
+        if at + length > end:
+            raise PduError("rx_control_bad", f"control record {number} of {length} bytes overruns")
+        if length < _LEAST.get(number, 0):
+            raise PduError("rx_control_bad", f"control record {number} has only {length} bytes")
+        spans.append((number, at, length))
+        at += length
+    return spans
+
+
 def parse_records(payload: bytes) -> list[Record]:
     """The records in a control entry's payload; unknown types are skipped.
 
     A known record may be longer than we know it: later versions append fields. Raises PduError
-    (rx_entry) when a record overruns the payload or is too short for its type.
+    as `record_spans` does.
     """
     records: list[Record] = []
-    at, end = 0, len(payload)
-    while at < end:
-        if at + TLV_HEADER_SIZE > end:
-            raise PduError("rx_entry", "a control record is cut in its header")
-        number, length = payload[at], payload[at + 1]
-        at += TLV_HEADER_SIZE
-        if at + length > end:
-            raise PduError("rx_entry", f"control record {number} of {length} bytes overruns")
+    for number, at, length in record_spans(payload, 0, len(payload)):
         if number in _KNOWN:
             kind, fields = _KNOWN[number]
-            if length < fields.size:
-                raise PduError("rx_entry", f"control record {number} has only {length} bytes")
             record = kind(*fields.unpack_from(payload, at))
             if length > fields.size:
                 record = _with_more(record, payload[at + fields.size : at + length])
             records.append(record)
         elif number == RecordType.DIGEST:
-            if length < RegistryDigest.OVERALL_SIZE:
-                raise PduError("rx_entry", f"control record {number} has only {length} bytes")
             records.append(RegistryDigest.from_bytes(payload[at : at + length]))
         elif number == RecordType.PARITY:
-            if length < _PARITY.size:
-                raise PduError("rx_entry", f"control record {number} has only {length} bytes")
             data = payload[at + _PARITY.size : at + length]
             records.append(Parity._make((*_PARITY.unpack_from(payload, at), data)))
         elif number == RecordType.CLOCK:
             records.append(parse_clock(payload[at : at + length]))
-        at += length
     return records
 
 

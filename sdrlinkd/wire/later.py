@@ -3,15 +3,17 @@
 import struct
 from binascii import crc_hqx
 from collections.abc import Iterator
+from contextlib import suppress
 
+from sdrlinkd.errors import PduError
 from sdrlinkd.wire.builder import HEADER
 from sdrlinkd.wire.capacity import CRC_SIZE, ENTRY_HEADER_SIZE, HEADER_SIZE
 from sdrlinkd.wire.control import (
     MAX_AGE_US,
     MAX_SINCE,
     RECEIPT_UNIT_US,
-    TLV_HEADER_SIZE,
     RecordType,
+    record_spans,
 )
 from sdrlinkd.wire.pdu import identity
 from sdrlinkd.wire.registry import CONTROL_TOPIC_ID
@@ -76,18 +78,20 @@ def _times(pdu: bytes | bytearray, kinds: dict[int, int]) -> Iterator[int]:
 
 
 def _records(pdu: bytes | bytearray) -> Iterator[tuple[int, int, int]]:
-    """Of all records in a good PDU: type, where the value begins, and its length."""
+    """Of all records in a good PDU: type, where the value begins, and its length.
+
+    Control entries that cannot be read have none.
+    """
     n_entries = HEADER.unpack_from(pdu)[HOP] & 0x0F
     at = HEADER_SIZE + (n_entries + 1) // 2
     for i in range(n_entries):
         pair = pdu[HEADER_SIZE + i // 2]
         topic_id = pair >> 4 if i % 2 == 0 else pair & 0x0F
-        begin = at + ENTRY_HEADER_SIZE
+        begin, total = at + ENTRY_HEADER_SIZE, pdu[at + 2]
         at = begin + (pdu[at + 3] << 8 | pdu[at + 4])
-        if topic_id == CONTROL_TOPIC_ID:
-            while begin < at:
-                yield pdu[begin], begin + TLV_HEADER_SIZE, pdu[begin + 1]
-                begin += TLV_HEADER_SIZE + pdu[begin + 1]
+        if topic_id == CONTROL_TOPIC_ID and total == 1:
+            with suppress(PduError):
+                yield from record_spans(pdu, begin, at)
 
 
 def _move(data: bytearray, by_us: int, kinds: dict[int, int]) -> None:

@@ -16,6 +16,8 @@ BROADCAST = 0xFF
 
 _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _TYPE = re.compile(r"([A-Za-z]\w*)/(?:msg/)?([A-Za-z]\w*)", re.ASCII)
+# A line before the first topic; the latter is the paper's.
+_HEADERS = (["name", "type"], ["topic", "type"])
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,16 +109,17 @@ class Registry:
 
 
 def parse_registry(text: str, source: str = "registry") -> Registry:
-    """Registry from CSV text: one `name,type` a line; empty lines and `#` comments are skipped.
+    """Registry from CSV text: one `name,type` a line; empty lines and `#` comments are skipped, and
+    a header `name,type` or `Topic, Type`.
 
     Raises RegistryError that cites `source` and the line.
     """
     pairs: list[tuple[str, str, str]] = []
     for number, raw in enumerate(text.removeprefix("\ufeff").split("\n"), start=1):
         line = raw.split("#", 1)[0].strip()
-        if not line or (not pairs and line.replace(" ", "").lower() == "name,type"):
-            continue
         fields = [field.strip() for field in line.split(",")]
+        if not line or (not pairs and [each.lower() for each in fields] in _HEADERS):
+            continue
         if len(fields) != 2:
             raise RegistryError(
                 f"{source}:{number}: got {raw.strip()!r}; a line is `name,type`, "

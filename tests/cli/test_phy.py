@@ -31,6 +31,10 @@ def test_info_for_people_and_programs(ctl):
     assert code == 0
     for part in ("1 Msps: 64 carriers 15.625 kHz apart", "16QAM 3/4", "64QAM 3/4", "3.55 ms"):
         assert part in out
+    assert "bursts are looked for up to 196 kHz off: two crystals of ±40 ppm" in out
+    code, out, _ = ctl("info", "--rate", "1e6", "--frequency", "5.9e9")
+    assert "up to 250 kHz off" in out
+    assert "raise modem.rate_hz, or tell better crystals" in out
     code, out, _ = ctl("info", "--json")
     told = json.loads(out)
     assert (told["rate_hz"], len(told["mcs"])) == (5e6, 10)

@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from sdrlinkd.config import Config, load_config, make_setup, parse_config
-from sdrlinkd.errors import ConfigError, RegistryError, UserError
+from sdrlinkd.errors import RegistryError, UserError
 from sdrlinkd.link import ClassParams, TopicPolicy
 
 ROOT = Path(__file__).parents[2]
@@ -54,6 +54,9 @@ def test_shipped_registry_is_the_papers_table_4():
         ("topics = [1]", ["topics", "got 1", "text"]),
         ("link = 3", ["link", "got 3", "a table"]),
         ("[link]\nflush_s = nan", ["link.flush_s", "nan"]),
+        ('[link]\nflush_s = "soon"', ['link.flush_s: got "soon"', '"now" or a number at least 0']),
+        ("[link]\nflush_s = -1", ["link.flush_s: got -1", '"now" or a number at least 0']),
+        ("[link]\nflush_s = true", ["link.flush_s: got true", '"now" or a number at least 0']),
         ("[link]\ngreedy = 1", ["link.greedy", "got 1", "true or false"]),
         ('backend = "usrp"', ["backend", '"usrp"', 'one of "direct", "ether"', '"soapy"']),
         ("[modem]\nmcs = 10", ["f.toml:2", "modem.mcs", "got 10", "from 0 to 9"]),
@@ -76,8 +79,12 @@ def test_shipped_registry_is_the_papers_table_4():
             ["access.policy", "gnuradio", "no air that we could hear"],
         ),
         (
-            'backend = "loopback"\n[modem]\nrate_hz = 1e5',
-            ["modem.max_cfo_hz", "got 100000", "25000"],
+            'backend = "loopback"\n[modem]\nrate_hz = 1e5\nmax_cfo_hz = 1e5',
+            ["modem.max_cfo_hz", "got 100000", "25000", '"auto"'],
+        ),
+        (
+            "[modem]\nmax_cfo_hz = true",
+            ["f.toml:2: modem.max_cfo_hz: got true", '"auto" or a number from 0 to 1000000'],
         ),
         ('[iqfile]\nformat = "cu8"', ["iqfile.format", '"cu8"', '"ci16_le"']),
         ('[channel]\nprofile = "x"', ["channel.profile", '"awgn"']),
@@ -142,19 +149,10 @@ def test_an_error_cites_key_given_and_allowed(text, parts):
         assert part in message
 
 
-@pytest.mark.parametrize(
-    ("namespace", "node_id"),
-    [("robot_1", 1), ("/robot_34", 34), ("fleet2/robot7", 7), ("r254", 254)],
-)
-def test_robot_id_is_the_last_digits_of_the_namespace(namespace, node_id):
-    assert make_setup(Config(namespace=namespace), ETC).node_id == node_id
-
-
-@pytest.mark.parametrize("namespace", ["robot", "r255", ""])
-def test_a_namespace_without_a_usable_number_needs_a_robot_id(namespace):
-    with pytest.raises(ConfigError, match="robot_id"):
-        make_setup(Config(namespace=namespace), ETC)
-    assert make_setup(Config(namespace=namespace, robot_id=9), ETC).node_id == 9
+def test_check_says_what_the_flush_time_means():
+    summary = make_setup(parse_config("[link]\nflush_s = 0.0"), ETC).summary()
+    assert any("link.flush_s = 0.0: a PDU that is not full waits until" in each for each in summary)
+    assert any('link.flush_s = "now"' in each for each in make_setup(Config(), ETC).summary())
 
 
 def test_topics_are_taken_under_the_namespace_and_republished_by_source():

@@ -118,7 +118,10 @@ def test_a_node_that_only_plays_says_why_nothing_leaves(start_daemon, tmp_path):
     [
         ("[modem]\nmcs = 10", "modem.mcs: got 10; allowed: a whole number from 0 to 9"),
         ("[modem]\nrate_hz = 10", "modem.rate_hz: got 10; allowed: a number from"),
-        ("[modem]\nrate_hz = 2e5", "modem.max_cfo_hz: got 100000; allowed: at most a quarter"),
+        (
+            "[modem]\nrate_hz = 2e5\nmax_cfo_hz = 1e5",
+            "modem.max_cfo_hz: got 100000; allowed: at most a quarter",
+        ),
         ("[modem]\nrate_hz = 1e4\nmcs = 0\nmax_cfo_hz = 0", "raise modem.rate_hz or modem.mcs"),
         ("[link]\npdu_size = 5000", "link.pdu_size: got 5000; allowed"),
         ('[channel]\nprofile = "vacuum"', 'got "vacuum"; allowed: one of "awgn"'),

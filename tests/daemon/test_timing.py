@@ -92,6 +92,11 @@ def test_two_daemons_know_how_late_everything_is(pair, capsys):
             assert 0 < message.sampled_error_us < 50_000
             parts_us = message.waited_us + message.reassembly_us + message.on_air_us
             assert 7_000 < parts_us <= message.age_us + 10
+        # Its lifespan is 5 s.
+        out.send("/robot_1/odom", odometry(sent_ns), receipt=True,
+                 published_ns=time.time_ns() - 12 * 10**9)  # fmt: skip
+        receipt = out.receipt(20)
+        assert (receipt.fate, receipt.reason) == ("expired", "tx_expired")
     for daemon, src, sign in ((one, 2, 1), (two, 1, -1)):
         (neighbor,) = daemon.snapshot().link.neighbors
         clock = neighbor.clock

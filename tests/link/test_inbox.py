@@ -21,8 +21,8 @@ def pdu(src=1, dst=255, seq=0, topic_id=0, payload=b"\0\1\0\0data", total=1, hop
         (pdu()[:-1] + b"\xff", "rx_crc"),
         (pdu(src=2), "rx_own"),
         (pdu(dst=7), "rx_not_for_us"),
-        (pdu(topic_id=15, total=2), "rx_entry"),
-        (pdu(topic_id=15, payload=b"\1\x06short"), "rx_entry"),
+        (pdu(topic_id=15, total=2), "rx_control_bad"),
+        (pdu(topic_id=15, payload=b"\1\x06short"), "rx_control_bad"),
         (pdu(topic_id=15, payload=b"\xee\x00"), "rx_control"),
     ],
 )

@@ -3,7 +3,7 @@
 import pytest
 
 from sdrlinkd.link import Allowance, Outcome, Overrides, Qos, QueueParams, TopicPolicy, link_notices
-from tests.link.world import layouts, make_link, send_all
+from tests.link.world import layouts, make_link, records_in, send_all
 
 
 def dropped(link):
@@ -69,6 +69,37 @@ def test_expired_messages_are_not_sent():
     link.submit(0, bytes(9), 0.0, Overrides(lifespan_s=2.0))
     assert [pdu[0][3] for pdu in layouts(send_all(link, now=1.0), 64)] == [9]
     assert dropped(link) == {("odom", "tx_expired"): 1}
+
+
+@pytest.mark.parametrize("age_s", [1.0, 12.0, 3600.0])
+def test_a_message_that_is_too_old_when_it_comes_expires_at_once(age_s):
+    """However old it is, and it does not take the place of a fresh one."""
+    link = make_link(pdu_size=64)
+    link.set_policies({0: TopicPolicy(depth=1, lifespan_s=0.3)})
+    assert link.submit(0, bytes(8), 0.0) is None
+    assert link.submit(0, bytes(9), 0.0, Overrides(age_s=age_s, receipt="old")) == "tx_expired"
+    assert [pdu[0][3] for pdu in layouts(send_all(link, now=0.1), 64)] == [8]
+    assert dropped(link) == {("odom", "tx_expired"): 1}
+    assert [(each.receipt, each.fate) for each in link.outcomes.receipts.take()] == [
+        ("old", "expired")
+    ]
+    assert link.audit() == []
+
+
+@pytest.mark.parametrize(("age_s", "told_us"), [(9.0, 9_000_000), (12.0, 0), (3600.0, 0)])
+def test_without_a_lifespan_great_ages_count_from_now(age_s, told_us):
+    """A recording that is played, or another clock."""
+    link = make_link(pdu_size=64)
+    link.submit(0, bytes(8), 0.0, Overrides(age_s=age_s))
+    (pdu,) = send_all(link)
+    assert [each.age_us for each in records_in(pdu, 64)] == [told_us]
+
+
+def test_a_long_lifespan_bears_a_great_age():
+    link = make_link(pdu_size=64)
+    link.submit(0, bytes(8), 0.0, Overrides(age_s=12.0, lifespan_s=60.0))
+    (pdu,) = send_all(link)
+    assert [each.age_us for each in records_in(pdu, 64)] == [12_000_000]
 
 
 def test_the_rest_of_an_expired_message_is_withdrawn():

@@ -6,8 +6,6 @@ from sdrlinkd.link import Allowance, Outcome, Overrides, Qos, TopicPolicy
 from sdrlinkd.wire import BROADCAST, Beacon, RegistryDigest, Stamp, parse, parse_records
 from tests.link.world import layouts, make_link, send_all
 
-INFINITE = float("inf")
-
 
 def no_stamps(link):
     link.set_policies({i: TopicPolicy(stamp=False) for i in range(len(link.registry))})
@@ -118,35 +116,6 @@ def test_a_large_message_gets_a_larger_k_among_others():
     link.submit(1, bytes(10), 0.0)
     first = layouts(send_all(link), 220)[0]
     assert first[0] == (0, 0, 255, 150)
-
-
-class TestFlush:
-    def test_a_partial_pdu_waits_for_more(self):
-        link = no_stamps(make_link(pdu_size=220, flush_s=0.2))
-        link.submit(0, bytes(50), 1.0)
-        assert link.departures.compose(1.1, Allowance.of(8)) is None
-        assert link.next_wakeup(1.1) == pytest.approx(1.2)
-        link.submit(1, bytes(50), 1.15)
-        assert len(link.departures.compose(1.2, Allowance.of(8)).pdus) == 1
-
-    def test_a_full_one_does_not(self):
-        link = no_stamps(make_link(pdu_size=220, flush_s=0.2))
-        link.submit(0, bytes(400), 1.0)
-        assert len(link.departures.compose(1.0, Allowance.of(1)).pdus) == 1
-
-    def test_infinity_sends_only_full_ones(self):
-        link = no_stamps(make_link(pdu_size=220, flush_s=INFINITE))
-        link.submit(0, bytes(50), 0.0)
-        assert link.departures.compose(1e6, Allowance.of(8)) is None
-        assert link.next_wakeup(0.0) == INFINITE
-        link.drain()
-        assert len(link.departures.compose(1e6, Allowance.of(8)).pdus) == 1
-
-    @pytest.mark.parametrize("qos", [Qos.URGENT, Qos.LATENCY])
-    def test_urgent_and_latency_never_wait(self, qos):
-        link = make_link(pdu_size=220, flush_s=INFINITE)
-        link.submit(0, bytes(50), 0.0, Overrides(qos=qos))
-        assert len(link.departures.compose(0.0, Allowance.of(8)).pdus) == 1
 
 
 def records_of(pdu, pdu_size):

@@ -139,6 +139,27 @@ async def test_each_burst_leaves_with_its_own_mcs():
             assert end - heard_at[burst.pdus[0]] == pytest.approx(samples / 1e6, abs=5e-6)
 
 
+@pytest.mark.parametrize(("rate_hz", "ppm"), [(5e6, 80), (5e6, -80), (1e6, 40), (1e6, -40)])
+async def test_by_default_radios_hear_each_other_however_far_their_crystals_are_off(rate_hz, ppm):
+    """At 5.9 GHz, where 40 ppm are 236 kHz; nothing is set but the frequency."""
+    sent = list(bursts(7, 4))
+    air = Config(
+        backend="loopback",
+        link=LinkParams(pdu_size=SIZE),
+        loopback=LoopbackParams(paced=False),
+        channel=ChannelParams(snr_db=15, clock_ppm=ppm),
+        modem=ModemParams(rate_hz=rate_hz, frequency_hz=5.9e9),
+    )
+    async with running(air) as (modem, listener):
+        send(modem, listener, sent)
+        pdus = [pdu for burst in sent for pdu in burst.pdus]
+        await listener.until(lambda: len(listener.settled_bursts) == len(sent))
+        await listener.until(lambda: len(listener.pdus) == len(pdus))
+        assert [heard.data for heard in listener.pdus] == pdus
+        assert modem.report().max_cfo_hz == min(472e3, rate_hz / 4)
+        assert "CFO up to " in modem.report().detail
+
+
 async def test_the_next_burst_is_asked_for_only_when_the_one_before_is_nearly_out():
     async with running(config(True)) as (modem, listener):
         send(modem, listener, bursts(5, 6))

@@ -51,6 +51,16 @@ int64_t BurstSender::queued(int64_t now) {
     return sum;
 }
 
+// In the middle of a burst that is refused, what of it is there stays until its END_BURST.
+bool BurstSender::refuse() {
+    const bool returned = station_.settings.late_return;
+    station_.emission.drop_staged();
+    dropping_ = !returned;
+    in_burst_ = in_burst_ && returned;
+    station_.control.late++;
+    return returned;
+}
+
 // Where samples go that are there now; false: too late.
 bool BurstSender::place(bool timed, long long time_ns, int64_t now, int64_t &start) {
     const double rate = station_.tx.rate;
@@ -79,10 +89,7 @@ int64_t BurstSender::take(const void *in, int64_t n, bool timed, long long time_
     int64_t start;
     now = station_.now(station_.tx.rate);
     if (!place(timed, time_ns, now, start) || station_.control.time_error.exchange(0)) {
-        station_.emission.drop_staged();
-        dropping_ = true;
-        in_burst_ = false;
-        station_.control.late++;
+        if (refuse()) return -1;
         // Its turn is when the one before has ended, and so is when it is found late.
         tell(SOAPY_SDR_TIME_ERROR, 0, std::max(now, end_));
         return n;
@@ -121,7 +128,9 @@ int BurstSender::write(const void *in, size_t n, int flags, long long time_ns, l
             advance(now);
             const auto *from = static_cast<const uint8_t *>(in) + done * bytes(format_);
             const bool timed = done == 0 && (flags & SOAPY_SDR_HAS_TIME);
-            done += take(from, wanted - done, timed, time_ns, now);
+            const int64_t taken = take(from, wanted - done, timed, time_ns, now);
+            if (taken < 0) return done > 0 ? done : SOAPY_SDR_TIME_ERROR;
+            done += taken;
             if (done == int64_t(n)) {
                 if (ends) end_burst();
                 return n == 0 && settings.fill ? SOAPY_SDR_TIMEOUT : done;

@@ -25,6 +25,7 @@ class BurstSender : public Sender {
     void cut(int64_t now);
     void advance(int64_t now);
     int64_t queued(int64_t now);
+    bool refuse();
     bool place(bool timed, long long time_ns, int64_t now, int64_t &start);
     int64_t take(const void *in, int64_t n, bool timed, long long time_ns, int64_t now);
     void end_burst();

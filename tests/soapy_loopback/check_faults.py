@@ -96,6 +96,25 @@ def check_faults_of_streams():
         assert one.status()[0] == SOAPY_SDR_TIME_ERROR
 
 
+def check_late_by_return():
+    """As SoapyBladeRF: refused, and nothing of it is taken."""
+    with Bus(bus := new_bus()) as seen, Radio(bus, 0, late="return") as one:
+        sent = burst(10_000)
+        for n in (1, 2):
+            assert one.write(sent, one.now_ns()) == SOAPY_SDR_TIME_ERROR
+            assert (seen.stats(0).late, seen.stats(0).sent) == (n, 0)
+        assert one.status(20_000)[0] == SOAPY_SDR_TIMEOUT
+        assert one.write(sent, one.now_ns() + 20 * LEAD_NS) == len(sent)
+        assert one.status(1_000_000)[0] == 0
+        start = one.now_ns() + 20 * LEAD_NS
+        assert one.write(sent, start, ends=False) == len(sent)
+        seen.inject(0, "time_error")
+        assert one.write(sent, ends=False) == SOAPY_SDR_TIME_ERROR
+        assert one.write(sent[:0]) == SOAPY_SDR_TIMEOUT
+        ret, _, end = one.status(1_000_000)
+        assert (ret, one.index(end)) == (0, one.index(start) + len(sent))
+
+
 def check_unplugged():
     with Bus(bus := new_bus()) as seen:
         with Radio(bus, 0) as one:

@@ -40,6 +40,7 @@ struct Default {
 constexpr Default PLAIN[] = {
     {"unit", "0"},       {"bus", ""},          {"duplex", "full"},  {"mtu", "4096"},
     {"fill", "no"},      {"time", "yes"},      {"ack", "yes"},      {"status", "yes"},
+    {"late", "status"},
     {"rxblock", "1024"}, {"txblock", "1"},     {"rxbuf", "262144"}, {"txbuf", "262144"},
     {"inflight", "0"},   {"txlat_us", "1000"}, {"turn_us", "1000"}, {"bits", "16"},
     {"speed", "1"},      {"noise_db", "-80"},  {"loss_db", "0"},    {"leak_db", "-200"},
@@ -115,6 +116,7 @@ Settings::Settings(const SoapySDR::Kwargs &args) : model(find_model(args)) {
     time = given.flag("time");
     ack = given.flag("ack");
     status = given.flag("status");
+    late_return = given.text("late") == "return";
     self = given.flag("self");
     lie = given.flag("lie");
     busy = given.flag("busy");

@@ -26,7 +26,7 @@ struct Settings {
     const Model *model;
     std::string bus, serial;
     int unit;
-    bool half_duplex, fill, time, ack, status, self, lie, busy, absent, keeps_newest;
+    bool half_duplex, fill, time, ack, status, late_return, self, lie, busy, absent, keeps_newest;
     // Samples. A tx_block above 1: only whole blocks leave, and END_BURST is not heeded.
     int64_t mtu, rx_block, tx_block, rx_buffer, tx_buffer, delay;
     int in_flight, bits;

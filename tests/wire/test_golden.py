@@ -8,6 +8,7 @@ from sdrlinkd.errors import PduError
 from sdrlinkd.wire import (
     Beacon,
     Clock,
+    ControlEntries,
     Entry,
     Frame,
     LinkReport,
@@ -18,6 +19,7 @@ from sdrlinkd.wire import (
     Waits,
     build,
     build_records,
+    control_entries,
     identity,
     parse,
     parse_records,
@@ -106,6 +108,12 @@ def test_build_records(vector):
 @each_payload
 def test_parse_records(vector):
     assert parse_records(vector.payload) == records_of(vector)
+
+
+def test_an_entry_that_cannot_be_read_is_skipped_and_no_other():
+    vector = BY_NAME["message_and_spoilt_control"]
+    told = control_entries(parse(vector.octets, vector.pdu_size))
+    assert told == ControlEntries([Receipt(3, 0x99, 1)], n_entries=2, n_bad=1)
 
 
 @each_digest

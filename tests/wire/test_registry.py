@@ -29,6 +29,8 @@ def numbered(count):
         "/scan,sensor_msgs/msg/LaserScan\n/odom,nav_msgs/msg/Odometry\n",
         "name,type\nscan,sensor_msgs/LaserScan\nodom,nav_msgs/Odometry\n",
         "name, type\n scan , sensor_msgs/LaserScan\t\n  odom,nav_msgs/Odometry\n",
+        "Topic, Type\nscan,sensor_msgs/LaserScan\nodom,nav_msgs/Odometry\n",
+        "\ufeff TOPIC\t,type \nscan,sensor_msgs/LaserScan\nodom,nav_msgs/Odometry\n",
         "# laser\n\nscan,sensor_msgs/LaserScan # front\n\n   \n#x,y\nodom,nav_msgs/Odometry#",
     ],
 )
@@ -66,7 +68,7 @@ def test_seventeen_topics():
         parse_registry(numbered(17), "robots.csv")
 
 
-@pytest.mark.parametrize("text", ["", "\n\n", "# nothing\n", "name,type\n"])
+@pytest.mark.parametrize("text", ["", "\n\n", "# nothing\n", "name,type\n", "Topic,Type\n"])
 def test_no_topics(text):
     with pytest.raises(RegistryError, match=r"^robots\.csv: no topics"):
         parse_registry(text, "robots.csv")
@@ -95,6 +97,7 @@ def test_no_topics(text):
         ("odom,nav_msgs.msg.Odometry", "type 'nav_msgs.msg.Odometry'"),
         ("odom,nav_msgs/Odömetry", "type 'nav_msgs/Odömetry'"),
         ("name,type", "type 'type'"),
+        ("Topic,Type", "type 'Type'"),
         ("scan,nav_msgs/Odometry", r"scan is listed twice, first at robots\.csv:2"),
         ("/scan,sensor_msgs/LaserScan", r"scan is listed twice, first at robots\.csv:2"),
     ],

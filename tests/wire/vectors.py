@@ -421,6 +421,25 @@ _timed_later = _timed._replace(
     ])),
 )  # fmt: skip
 
+# A control entry that cannot be read (clause 6), the message beside it, and one that can.
+_spoilt = PduVector(
+    "message_and_spoilt_control",
+    48, DEFAULT, 1, EVERYONE, 3, 1,
+    (
+        EntryFields(CONTROL, 5, 0, 1, bytes([5, 3, 1, 0x2A, 1, 4, 4, 6])),
+        EntryFields(1, 0x2A, 0, 1, HI),
+        EntryFields(CONTROL, 6, 0, 1, RECEIPT.payload),
+    ),
+    with_crc(bytes([
+        0x00, 1, 0xFF, 3, 0x13,
+        0xF1, 0xF0,
+        0x05, 0, 1, 0x00, 0x08, 5, 3, 1, 0x2A, 1, 4, 4, 6,  # LINK_REPORT ends after 1 of 4
+        0x2A, 0, 1, 0x00, 0x06, 0x00, 0x01, 0x00, 0x00, 0x68, 0x69,
+        0x06, 0, 1, 0x00, 0x05, 5, 3, 3, 0x99, 1,
+        0, 0, 0, 0, 0,  # 48 - 9 - 13 - 11 - 10 = 5
+    ])),
+)  # fmt: skip
+
 PDUS = (
     _single,
     _single_full,
@@ -437,6 +456,7 @@ PDUS = (
     _report,
     _timed,
     _timed_later,
+    _spoilt,
 )
 BY_NAME = {vector.name: vector for vector in PDUS}
 
@@ -453,6 +473,11 @@ DOCUMENTED = {
     "report_and_receipt": (
         "00 05 06 0b 11 f0 00 00 01 00 0b 04 04 06 f3 33 "
         "02 05 03 03 99 01 00 00 00 00 00 00 00 00 02 af"
+    ),
+    "message_and_spoilt_control": (
+        "00 01 ff 03 13 f1 f0 05 00 01 00 08 05 03 01 2a "
+        "01 04 04 06 2a 00 01 00 06 00 01 00 00 68 69 06 "
+        "00 01 00 05 05 03 03 99 01 00 00 00 00 00 97 d9"
     ),
 }
 

@@ -1,0 +1,26 @@
+"""How far off in frequency bursts are looked for, in words."""
+
+from sdrlinkd.config.carriers import ModemParams
+
+
+def cfo_told(modem: ModemParams) -> str:
+    """How far, and why, in a line."""
+    searched = f"bursts are looked for up to {modem.searched_cfo_hz / 1e3:.3g} kHz off"
+    if modem.max_cfo_hz != "auto":
+        return f"{searched} (modem.max_cfo_hz)"
+    return (
+        f"{searched}: two crystals of ±{modem.crystal_ppm:g} ppm (modem.crystal_ppm) at "
+        f"{modem.carrier_hz / 1e6:g} MHz can be {modem.apart_hz / 1e3:.3g} kHz apart"
+    )
+
+
+def cfo_warning(modem: ModemParams) -> str:
+    """Where two radios may not hear each other: what to do. Empty where they will."""
+    if modem.frequency_hz == 0 or modem.searched_cfo_hz >= modem.apart_hz:
+        return ""
+    apart = "" if modem.max_cfo_hz == "auto" else f", but they can be {modem.apart_hz:g} Hz apart"
+    key = "modem.rate_hz" if modem.max_cfo_hz == "auto" else "modem.max_cfo_hz"
+    return (
+        f"{cfo_told(modem)}{apart}; radios farther apart do not hear each other: raise {key}, or "
+        "tell better crystals (modem.crystal_ppm)"
+    )

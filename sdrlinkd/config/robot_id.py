@@ -1,0 +1,75 @@
+"""Which robot this is: told, or read from names (paper section 4.3)."""
+
+import re
+from collections.abc import Iterable
+
+from sdrlinkd.config.schema import Config
+from sdrlinkd.errors import ConfigError
+
+MOST = 254
+"""255 is everyone."""
+MOST_LISTED = 4
+_DIGITS = re.compile(r"[0-9]+")
+_ALLOWED = f"robot_id from 0 to {MOST}"
+
+
+def robot_id(config: Config, topics: Iterable[str], source: str) -> int:
+    """As configured; with -1 the rightmost run of digits in the namespace.
+
+    Without a namespace, that in the names of `topics`, the ones taken from the bus: those that hold
+    digits must agree. Raises ConfigError.
+    """
+    if config.robot_id >= 0:
+        return config.robot_id
+    where = f"{source}: robot_id: got -1"
+    if config.namespace:
+        return _from_namespace(config.namespace, where)
+    found = {name: number for name in topics if (number := _last_number(name))}
+    numbers = set(found.values())
+    if len(numbers) > 1:
+        raise ConfigError(
+            f'{where}, and namespace is "", so the last number in the topics\' names is meant, but '
+            f"they disagree: {_listed(found)}; allowed: {_ALLOWED}, a namespace, or topics with "
+            "one robot's names"
+        )
+    number = numbers.pop() if numbers else ""
+    if _fits(number):
+        return int(number)
+    problem = f"is {_listed(found)}, above {MOST}" if found else "is not there: no name has digits"
+    raise ConfigError(
+        f'{where}, and namespace is "", so the last number in the topics\' names is meant, but it '
+        f'{problem}; allowed: {_ALLOWED}, or a namespace such as "robot_1"'
+    )
+
+
+def _from_namespace(namespace: str, where: str) -> int:
+    number = _last_number(namespace)
+    if _fits(number):
+        return int(number)
+    problem = f"is {_short(number)}, above {MOST}" if number else "is not there"
+    raise ConfigError(
+        f'{where} (the last number in the namespace), but in "{_short(namespace)}" it {problem}; '
+        f'allowed: {_ALLOWED}, or a namespace such as "robot_1"'
+    )
+
+
+def _last_number(name: str) -> str:
+    """Its rightmost digits, without leading zeros; empty: none."""
+    runs = _DIGITS.findall(name)
+    return (runs[-1].lstrip("0") or "0") if runs else ""
+
+
+def _fits(number: str) -> bool:
+    return bool(number) and len(number) <= len(str(MOST)) and int(number) <= MOST
+
+
+def _listed(found: dict[str, str]) -> str:
+    """One name for each number."""
+    names = {number: name for name, number in reversed(found.items())}
+    told = [f"{_short(number)} in {name}" for number, name in reversed(names.items())]
+    more = len(told) - MOST_LISTED
+    return ", ".join(told[:MOST_LISTED]) + (f" and {more} more" if more > 0 else "")
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 60 else text[:57] + "..."

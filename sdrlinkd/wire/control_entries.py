@@ -1,0 +1,35 @@
+"""What the control entries of a PDU say, those aside that cannot be read (section 6)."""
+
+from typing import NamedTuple
+
+from sdrlinkd.errors import PduError
+from sdrlinkd.wire.control import Record, parse_records
+from sdrlinkd.wire.pdu import Pdu
+from sdrlinkd.wire.registry import CONTROL_TOPIC_ID
+
+
+class ControlEntries(NamedTuple):
+    """`records` of the entries that can be read, of `n_entries`; `n_bad` cannot."""
+
+    records: list[Record]
+    n_entries: int
+    n_bad: int
+
+
+def control_entries(pdu: Pdu) -> ControlEntries:
+    """Of a PDU with control channel. An entry that cannot be read costs itself, and all of it."""
+    records: list[Record] = []
+    n_entries = n_bad = 0
+    for entry in pdu.entries:
+        if entry.topic_id != CONTROL_TOPIC_ID:
+            continue
+        n_entries += 1
+        if entry.total != 1:
+            # Control records are never fragmented.
+            n_bad += 1
+            continue
+        try:
+            records += parse_records(entry.payload)
+        except PduError:
+            n_bad += 1
+    return ControlEntries(records, n_entries, n_bad)
