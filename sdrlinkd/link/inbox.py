@@ -30,10 +30,10 @@ from sdrlinkd.wire import (
     Registry,
     RegistryDigest,
     Stamp,
-    control_entries,
     identity,
     lasting_identity,
     parse,
+    read_control_entries,
 )
 
 _NO_CONTROL = ControlEntries([], 0, 0)
@@ -88,7 +88,7 @@ class Inbox:
             pdu = parse(data, self._pdu_size)
         except PduError as error:
             return self._drop(error.reason)
-        control = control_entries(pdu) if self._has_control else _NO_CONTROL
+        control = read_control_entries(pdu) if self._has_control else _NO_CONTROL
         records = control.records
         is_relayed = pdu.hop < self._hop_limit
         stamps = [record for record in records if isinstance(record, Stamp)]

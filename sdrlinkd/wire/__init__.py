@@ -52,7 +52,7 @@ from sdrlinkd.wire.control import (
     build_stamp,
     parse_records,
 )
-from sdrlinkd.wire.control_entries import ControlEntries, control_entries
+from sdrlinkd.wire.control_entries import ControlEntries, read_control_entries
 from sdrlinkd.wire.later import forwarded, lasting_identity, postponed
 from sdrlinkd.wire.pdu import Entry, Pdu, build, flags, identity, parse
 from sdrlinkd.wire.reassembly import Lost, Partial, Reassembly, ReassemblyLimits
@@ -120,7 +120,6 @@ __all__ = [
     "build_full",
     "build_records",
     "build_stamp",
-    "control_entries",
     "entry_budget",
     "equal_payload",
     "flags",
@@ -135,5 +134,6 @@ __all__ = [
     "parse_records",
     "parse_registry",
     "postponed",
+    "read_control_entries",
     "tellable",
 ]

@@ -16,7 +16,7 @@ class ControlEntries(NamedTuple):
     n_bad: int
 
 
-def control_entries(pdu: Pdu) -> ControlEntries:
+def read_control_entries(pdu: Pdu) -> ControlEntries:
     """Of a PDU with control channel. An entry that cannot be read costs itself, and all of it."""
     records: list[Record] = []
     n_entries = n_bad = 0
