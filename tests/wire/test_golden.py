@@ -19,11 +19,11 @@ from sdrlinkd.wire import (
     Waits,
     build,
     build_records,
-    control_entries,
     identity,
     parse,
     parse_records,
     parse_registry,
+    read_control_entries,
 )
 from tests.wire.vectors import (
     BY_NAME,
@@ -112,7 +112,7 @@ def test_parse_records(vector):
 
 def test_an_entry_that_cannot_be_read_is_skipped_and_no_other():
     vector = BY_NAME["message_and_spoilt_control"]
-    told = control_entries(parse(vector.octets, vector.pdu_size))
+    told = read_control_entries(parse(vector.octets, vector.pdu_size))
     assert told == ControlEntries([Receipt(3, 0x99, 1)], n_entries=2, n_bad=1)
 
 
