@@ -131,9 +131,10 @@ def _make_pdu_link(setup: Setup, rng: Random) -> PduLink:
     # Else a busy event loop keeps the modem's threads from the interpreter for 5 ms at a time.
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     # The modem brings numba, which takes its time to load.
+    from sdrlinkd.compiling import compile_modem
     from sdrlinkd.modem import make_modem
 
-    return make_modem(config, setup.node_id, rng)
+    return make_modem(config, setup.node_id, rng, partial(compile_modem, log.info))
 
 
 def _types_of(setup: Setup) -> tuple[frozenset[int], dict[int, bytes]]:

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import phy
 from backends import BackendError, Radio, RxBlock, Tuning
@@ -31,7 +31,8 @@ class ModemLink:
 
     In lock-step all of it is done within the block that brought it. `listens`: someone wants to
     know whether there is a carrier on the air. `lead_grows`: bursts that must leave at a given
-    moment are handed over earlier when the machine proves to be slow.
+    moment are handed over earlier when the machine proves to be slow. `load` compiles the PHY, or
+    loads what is compiled, before the radio is opened; on a thread.
     """
 
     def __init__(
@@ -42,6 +43,7 @@ class ModemLink:
         kind: str,
         listens: bool = False,
         lead_grows: bool = False,
+        load: Callable[[], None] = phy.warm_up,
     ) -> None:
         self._params = params
         self._radio = radio
@@ -56,6 +58,7 @@ class ModemLink:
         sense = phy.CarrierSense(params.carrier_db) if listens else None
         self._ear = Ear(self._receiver, sense, params.rate_hz)
         self._lead_grows = lead_grows
+        self._load = load
         self._clock = StreamClock(params.rate_hz, paced=True)
         self._plan = AirPlan(0)
         self._rx: Demodulation | None = None
@@ -72,7 +75,7 @@ class ModemLink:
     async def open(self, listener: PduListener) -> CarrierTraits:
         """Load the compiled code and open the radio."""
         params = self._params
-        await self._tx.warm_up()
+        await self._tx.warm_up(self._load)
         tuning = Tuning(params.rate_hz, params.carrier_hz)
         try:
             await self._radio.open(tuning)

@@ -3,6 +3,7 @@
 import math
 import os
 import socket
+from collections.abc import Callable
 from pathlib import Path
 from random import Random
 
@@ -32,7 +33,9 @@ PDU_BACKENDS = ("direct", "gnuradio")
 """They carry PDUs, not samples."""
 
 
-def make_modem(config: Config, node_id: int, rng: Random) -> ModemLink:
+def make_modem(
+    config: Config, node_id: int, rng: Random, load: Callable[[], None] = phy.warm_up
+) -> ModemLink:
     """The modem on the radio that `config.backend` names. Raises UserError."""
     _check_airtime(config)
     policy = config.access.policy
@@ -43,6 +46,7 @@ def make_modem(config: Config, node_id: int, rng: Random) -> ModemLink:
         config.backend,
         listens=policy != "none",
         lead_grows=policy == "tdma",
+        load=load,
     )
 
 
