@@ -14,6 +14,7 @@ from sdrlinkd.cli.compiling import compile_first
 from sdrlinkd.cli.pace import MAX_SEED, Pace, chosen_scenario
 from sdrlinkd.errors import UserError
 from sdrlinkd.lab import make_hub
+from sdrlinkd.parent import end_with_parent
 
 DEFAULT_DIRECTORY = Path(tempfile.gettempdir()) / "sdrlink-ether"
 
@@ -55,6 +56,7 @@ def ether(
 
 def main() -> None:
     """Run the hub; exit code 2 for what a person can mend."""
+    end_with_parent()
     try:
         app(prog_name="sdrlink-ether")
     except UserError as error:
