@@ -27,8 +27,7 @@ $(STAMP): pyproject.toml constraints.txt sdrlinkd/__init__.py
 	@$(PYTHON) -m venv $(VENV) || \
 		{ echo "python3 has no venv module; on Debian: apt-get install python3-venv"; exit 1; }
 	$(PIP) -e '.[plots]'
-	@echo "compiling the modem (once)"
-	@$(BIN)/python -c 'import phy; phy.warm_up()'
+	@$(BIN)/python -m sdrlinkd.cli.compiling
 	@touch $@
 
 $(DEV_STAMP): $(STAMP)

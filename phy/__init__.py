@@ -9,6 +9,7 @@ from phy.error_rate import (
     pdu_lost_rate,
 )
 from phy.header import MAX_PDU_BYTES, MAX_PDUS, N_NETWORKS
+from phy.kernels.cache import temporary_cache
 from phy.layout import BurstLayout, layout, most_pdus
 from phy.mcs import MCS_TABLE, Mcs
 from phy.numerology import GRIDS, OFDM_64_8, OFDM_64_16, Numerology
@@ -55,6 +56,7 @@ __all__ = [
     "pdu_error_rate",
     "pdu_lost_rate",
     "points",
+    "temporary_cache",
     "upsample",
     "warm_up",
 ]

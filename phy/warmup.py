@@ -1,22 +1,107 @@
-"""Compiles every kernel, or loads it from the cache, before the first burst needs it."""
+"""Compiles every kernel that a link runs, or loads it from the cache, before it is needed."""
+
+import sys
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import Any
 
 import numpy as np
+from numba.core.caching import NullCache
+from numba.core.dispatcher import Dispatcher
+from numba.core.event import Event, Listener, install_listener
+from numpy.typing import NDArray
 
-from phy.channel import Path, PathParams
+from phy import header, preamble
+from phy.channel import FrontEnd, FrontEndParams, Path, PathParams
 from phy.mcs import MCS_TABLE
+from phy.numerology import OFDM_64_16
 from phy.oversampling import Downsampler, upsample
 from phy.receiver import Receiver
 from phy.sensing import CarrierSense
 from phy.transmitter import Transmitter
 
+Progress = Callable[[int, int], None]
 
-def warm_up() -> None:
-    """Send a PDU through every MCS. Seconds on a fresh machine, a fraction of one later."""
+RATE_HZ, CARRIER_HZ, CLOCK_PPM = 1e6, 1e8, 40.0
+"""As far apart as crystals are; 0.004 cycles a sample, which a receiver expects."""
+LONG = 2000
+"""Octets of a PDU through which two clocks drift apart by a sample."""
+# What only 802.11a and measurements run.
+_ELSEWHERE = {"demodulator.learn_channel", "ldpc_encoder.encode_blocks", "viterbi._decode"}
+
+
+def warm_up(progress: Progress | None = None) -> None:
+    """Run all that is compiled. Minutes on a fresh machine, a fraction of a second later.
+
+    `progress(done, total)` is told of each kernel when it has been compiled; of none that is loaded
+    from the cache. What it raises ends the warm-up, and what is compiled by then stays so.
+    """
+    with ExitStack() as stack:
+        if progress is not None:
+            stack.enter_context(install_listener("numba:compile", _Compiled(progress)))
+        _run()
+
+
+class _Compiled(Listener):
+    """Counts kernels that can be run, by whatever means."""
+
+    def __init__(self, progress: Progress) -> None:
+        self._progress = progress
+        self._kernels = _kernels()
+
+    def on_start(self, event: Event) -> None:
+        """Nothing is told of it."""
+
+    def on_end(self, event: Event) -> None:
+        """One more, or a step of one."""
+        compiled = event.data["dispatcher"]
+        if compiled in self._kernels:
+            done = sum(kernel is compiled or bool(kernel.overloads) for kernel in self._kernels)
+            self._progress(done, len(self._kernels))
+
+
+def _kernels() -> set[Any]:
+    """Those of a link; steps, which are not cached, are compiled with each."""
+    modules = [module for name, module in sys.modules.items() if name.startswith("phy.kernels.")]
+    found: dict[str, Any] = {
+        f"{each.py_func.__module__.removeprefix('phy.kernels.')}.{name}": each
+        for module in modules
+        for name, each in vars(module).items()
+        if isinstance(each, Dispatcher)
+    }
+    # What is cached numba does not tell otherwise.
+    return {
+        each
+        for name, each in found.items()
+        if name not in _ELSEWHERE and not isinstance(each._cache, NullCache)  # noqa: SLF001
+    }
+
+
+def _run() -> None:
+    rng = np.random.default_rng(0)
     transmitter, receiver, sense = Transmitter(), Receiver(), CarrierSense()
-    path = Path(PathParams(rate_hz=1e6, carrier_hz=1e9, clock_ppm=1.0), np.random.default_rng(0))
-    for mcs in MCS_TABLE:
-        _, samples = path.carry(transmitter.modulate([bytes(32)], mcs.index))
+    path = Path(PathParams(rate_hz=RATE_HZ, carrier_hz=CARRIER_HZ, clock_ppm=CLOCK_PPM), rng)
+    front_end = FrontEnd(FrontEndParams(noise_dbfs=-30.0), rng)
+
+    def hear(burst: NDArray[np.complex64]) -> None:
+        samples = front_end.receive(path.carry(burst)[1])
         receiver.push(samples)
         sense.push(samples)
         receiver.flush()
-    Downsampler(2).push(upsample(samples, 2))
+
+    for mcs in MCS_TABLE:
+        hear(transmitter.modulate([bytes(32)], mcs.index))
+    hear(transmitter.modulate([bytes(LONG)], 0))
+    burst = transmitter.modulate([bytes(32)], 0)
+    hear(_with_bad_header(burst, rng))
+    Downsampler(2).push(upsample(burst, 2))
+
+
+def _with_bad_header(
+    burst: NDArray[np.complex64], rng: np.random.Generator
+) -> NDArray[np.complex64]:
+    """One whose header's check fails: other headers that are likely are tried."""
+    n = header.n_symbols(OFDM_64_16) * OFDM_64_16.n_symbol
+    bad = burst.copy()
+    bad[preamble.length() :][:n] = rng.permutation(burst[preamble.length() :][:n])
+    return bad

@@ -12,12 +12,14 @@ from sdrlinkd import __version__, daemon
 from sdrlinkd.config import Setup, load_config, make_setup
 from sdrlinkd.errors import UserError
 from sdrlinkd.journal import JournalFormatter, is_read_by_journal
+from sdrlinkd.parent import end_with_parent
 
 DEFAULT_CONFIG = Path("/etc/sdrlinkd/sdrlinkd.toml")
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the daemon; 0 after an orderly stop, 2 for what a person can mend."""
+    end_with_parent()
     options = _parser().parse_args(arguments)
     _log_to_stderr(options.log_level)
     try:

@@ -25,6 +25,7 @@ from sdrlinkd.control import Control
 from sdrlinkd.errors import UserError
 from sdrlinkd.health import Level
 from sdrlinkd.link import Link
+from sdrlinkd.loading import Loading
 from sdrlinkd.node import Node
 from sdrlinkd.opening import Opening
 from sdrlinkd.pdulink import DirectLink, PduLink, make_gnuradio
@@ -49,6 +50,8 @@ LEVELS = {
 SWITCH_INTERVAL_S = 1e-4
 START_S = 120.0
 """Loading the modem may take so long on a small computer."""
+STOP_S = 30.0
+"""A radio takes so long to be let go at the most, and so does a kernel that is being compiled."""
 NOTICES_REPLUG = ("soapy", "ether")
 
 Reload = Callable[[], Setup]
@@ -81,6 +84,7 @@ async def run(setup: Setup, reload: Reload) -> None:
             await stop.wait()
             log.info("stopping: %d messages queued", node.snapshot(0).link.tx.queued)
             notifier.stopping()
+            notifier.extend(setup.config.drain_s + STOP_S)
             await node.drain(setup.config.drain_s)
             for task in running:
                 task.cancel()
@@ -123,8 +127,9 @@ async def _open(
         max_expanded=config.bus.max_message_bytes,
     )
     policies = Policies(setup, link)
-    make = partial(_make_pdu_link, rng, time.monotonic())
-    opening = Opening(setup, make, config.backend in NOTICES_REPLUG)
+    loading = Loading()
+    make = partial(_make_pdu_link, rng, time.monotonic(), loading)
+    opening = Opening(setup, make, config.backend in NOTICES_REPLUG, lambda: loading.told)
     context = zmq.Context()
     # Closes what a part that failed half-way left open; term() would wait for it for ever.
     stack.callback(context.destroy)
@@ -138,6 +143,7 @@ async def _open(
     reloading = Reloading(setup, reload, policies, opening)
     control.serve(make_verbs(setup, node, control, policies, opening, reloading))
     stack.push_async_callback(opening.close)
+    stack.callback(loading.give_up)
     # What is loaded stays; to look through all of it would hold up everything for 50 ms.
     gc.collect()
     gc.freeze()
@@ -152,7 +158,9 @@ async def _open(
     return node, control, reloading
 
 
-def _make_pdu_link(rng: Random, began_s: float, setup: Setup, patience: Patience) -> PduLink:
+def _make_pdu_link(
+    rng: Random, began_s: float, loading: Loading, setup: Setup, patience: Patience
+) -> PduLink:
     config = setup.config
     if config.backend == "direct":
         return DirectLink(config.direct, config.link.pdu_size, rng)
@@ -163,7 +171,7 @@ def _make_pdu_link(rng: Random, began_s: float, setup: Setup, patience: Patience
     # The modem brings numba, which takes its time to load.
     from sdrlinkd.modem import make_modem
 
-    return make_modem(config, setup.node_id, rng, patience, began_s)
+    return make_modem(config, setup.node_id, rng, patience, began_s, loading)
 
 
 def _types_of(setup: Setup) -> tuple[frozenset[int], dict[int, bytes]]:

@@ -26,13 +26,16 @@ class Opening:
 
     `make` builds one from a configuration; what could not be opened is closed, and another one is
     made for the next try. A PDU link that `notices_replug` is tried again without being told to
-    after its settings were refused.
+    after its settings were refused. `progress` says what takes so long, where something does.
     """
 
-    def __init__(self, setup: Setup, make: Make, notices_replug: bool) -> None:
+    def __init__(
+        self, setup: Setup, make: Make, notices_replug: bool, progress: Callable[[], str]
+    ) -> None:
         self._setup = setup
         self._make = make
         self._notices_replug = notices_replug
+        self._progress = progress
         self._told_to = asyncio.Event()
         self._patience = Patience.NONE
         self.state = "down"
@@ -84,7 +87,8 @@ class Opening:
         """What the PDU link tells, or why there is none; since when, on the clock of `at`."""
         told = self.pdu_link.report()
         if not self.is_up:
-            told = replace(told, state=self.state, reason=self.reason, notices=[])
+            reason = self._progress() or self.reason
+            told = replace(told, state=self.state, reason=reason, notices=[])
         if told.state != self._told_state:
             self._told_state, self._told_since = told.state, at
         return replace(told, since_s=at - self._told_since)

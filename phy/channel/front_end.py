@@ -53,8 +53,11 @@ class FrontEnd:
     def _noisy(self, x: NDArray[np.complex64]) -> NDArray[np.complex64]:
         noisy = np.empty_like(x)
         first, self._next_index = self._next_index, self._next_index + len(x)
+        # Read-only, whatever came: else numba compiles anew for the other kind.
+        parts = x.view(np.float32)
+        parts.setflags(write=False)
         add_noise(
-            x.view(np.float32),
+            parts,
             self._key,
             first,
             float(self._noise),

@@ -1,6 +1,7 @@
 """`demo`: the paper's experiment on this machine, in one command."""
 
 import sys
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -11,6 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from sdrlinkd import __version__
 from sdrlinkd.cli.app import app
+from sdrlinkd.cli.compiling import compile_first
 from sdrlinkd.cli.output import REPORT, load_pictures, make_folder, write_report
 from sdrlinkd.demo import (
     DemoReport,
@@ -18,10 +20,13 @@ from sdrlinkd.demo import (
     RunResult,
     Source,
     Trace,
+    find_rate,
+    is_good,
     open_source,
     run_demo,
     table_6,
     topic_table,
+    verdict,
 )
 from sdrlinkd.wire import MAX_PDU_SIZE, MIN_PDU_SIZE
 
@@ -70,7 +75,7 @@ def demo(
         int, typer.Option(min=MIN_PDU_SIZE, max=MAX_PDU_SIZE, help="Octets of a PDU.")
     ] = 64,
     mcs: Annotated[
-        int, typer.Option(min=0, max=6, help="Modulation and code rate; `phy info` lists them.")
+        int, typer.Option(min=0, max=9, help="Modulation and code rate; `phy info` lists them.")
     ] = 1,
     snr: Annotated[
         float, typer.Option(min=-30, help="Burst power over noise power in the band, in dB.")
@@ -85,8 +90,13 @@ def demo(
         ChannelKind, typer.Option(help="The simulated air: noise alone, or echoes that fade.")
     ] = ChannelKind.AWGN,
     rate: Annotated[
-        float, typer.Option(min=1e4, max=2e8, help="Samples a second of the modem.")
-    ] = 5e6,
+        float | None,
+        typer.Option(
+            min=1e4,
+            max=2e8,
+            help="Samples a second of the modem; by default what this machine carries, up to 5e6.",
+        ),
+    ] = None,
     record: Annotated[
         Path | None, typer.Option(help="Keep the recording of iqfile under this name (SigMF).")
     ] = None,
@@ -105,18 +115,23 @@ def demo(
     make_folder(out, PICTURES)
     results: list[RunResult] = []
     traces: dict[str, Trace] = {}
-    for kind in dict.fromkeys(link or list(LinkKind)):
-        source = open_source(bag, registry, topics or [], duration, seed)
-        if not results:
-            for reason in source.left_out:
-                _say(console, f"left out: {reason}", style="yellow")
-        options = Options(
-            link=kind.value, pdu_size=pdu_size, speed=speed, seed=seed, mcs=mcs, snr_db=snr,
-            clock_ppm=ppm, channel=channel.value, rate_hz=rate, recording=record,
-        )  # fmt: skip
+    kinds = list(dict.fromkeys(link or list(LinkKind)))
+    options = Options(
+        link=kinds[0].value, pdu_size=pdu_size, speed=speed, seed=seed, mcs=mcs, snr_db=snr,
+        clock_ppm=ppm, channel=channel.value, recording=record,
+    )  # fmt: skip
+    source = open_source(bag, registry, topics or [], duration, seed)
+    for reason in source.left_out:
+        _say(console, f"left out: {reason}", style="yellow")
+    if kinds != [LinkKind.DIRECT]:
+        compile_first(console)
+        rate = rate or _measure(console, source, options)
+        options = replace(options, rate_hz=rate)
+    for kind in kinds:
+        options = replace(options, link=kind.value)
         result, traces[kind.value] = _run(console, source, options)
         results.append(result)
-        source.recording.close()
+    source.recording.close()
     told = DemoReport(version=__version__, runs=results)
     for path in (out / REPORT, json_file):
         if path is not None:
@@ -132,6 +147,23 @@ def demo(
     _say(console, f"wrote {out}/{REPORT}, {', '.join(PICTURES)}")
     if results[0].damage:
         _say(console, f"warning: {results[0].damage}", style="yellow")
+    for result in results:
+        if text := verdict(result):
+            _say(console, text, style="yellow" if is_good(result) else "bold red")
+    if not all(map(is_good, results)):
+        raise typer.Exit(1)
+
+
+def _measure(console: Console, source: Source, options: Options) -> float:
+    """The rate that this machine carries, and a line of why."""
+    with console.status("measuring what this machine carries"):
+        found = find_rate(source, options)
+    tried = ", ".join(
+        f"{100 * each.busy:.0f} % of the time at {each.rate_hz / 1e6:g}" for each in found.tried
+    )
+    rate = f"rate: {found.rate_hz / 1e6:g} Msps"
+    _say(console, f"{rate}; a processor of this machine is busy with it for {tried} Msps")
+    return found.rate_hz
 
 
 def _run(console: Console, source: Source, options: Options) -> tuple[RunResult, Trace]:
@@ -153,8 +185,9 @@ def _run(console: Console, source: Source, options: Options) -> tuple[RunResult,
 
 
 def _summary(result: RunResult) -> str:
+    identical = "yes" if result.bytes_identical else "NO" if result.received else "none came"
     text = (
-        f"{result.name}: bytes identical: {'yes' if result.bytes_identical else 'NO'}; "
+        f"{result.name}: bytes identical: {identical}; "
         f"ledger adds up: {'yes' if result.ledger_adds_up else 'NO'}; "
         f"{result.entries_per_message:.1f} entries a message; "
         f"dropped: {result.dropped or 'nothing'}"
@@ -166,10 +199,7 @@ def _summary(result: RunResult) -> str:
             f"{heard.pdus_bad} bad"
         )
         if heard.samples_lost:
-            text += (
-                f"; this machine was too slow for {heard.rate_hz / 1e6:g} Msps and lost "
-                f"{heard.samples_lost} samples: try a lower --rate"
-            )
+            text += f"; {heard.samples_lost} samples lost"
     return text
 
 

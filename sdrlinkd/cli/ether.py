@@ -7,11 +7,14 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
 
 from sdrlinkd import __version__
+from sdrlinkd.cli.compiling import compile_first
 from sdrlinkd.cli.pace import MAX_SEED, Pace, chosen_scenario
 from sdrlinkd.errors import UserError
 from sdrlinkd.lab import make_hub
+from sdrlinkd.parent import end_with_parent
 
 DEFAULT_DIRECTORY = Path(tempfile.gettempdir()) / "sdrlink-ether"
 
@@ -41,6 +44,7 @@ def ether(
     chosen = None
     if scenario is not None:
         chosen = chosen_scenario(scenario, seed, duration, pace)
+    compile_first(Console(stderr=True))
     hub = make_hub(chosen, directory, traces)
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: hub.stop())
@@ -52,6 +56,7 @@ def ether(
 
 def main() -> None:
     """Run the hub; exit code 2 for what a person can mend."""
+    end_with_parent()
     try:
         app(prog_name="sdrlink-ether")
     except UserError as error:

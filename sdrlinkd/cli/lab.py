@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.live import Live
 
 from sdrlinkd.cli.app import app
+from sdrlinkd.cli.compiling import compile_first
 from sdrlinkd.cli.output import REPORT, load_pictures, make_folder, write_report
 from sdrlinkd.cli.pace import MAX_SEED, Pace, chosen_scenario
 from sdrlinkd.lab import (
@@ -73,6 +74,7 @@ def lab(
     make_folder(out, [PICTURE])
     options = LabOptions(scenario, chosen, bag, traces)
     title = chosen.title or scenario.stem
+    compile_first(console)
     began = time.monotonic()
     with Live(console=console, auto_refresh=False, transient=True) as live:
         told: list[str] = []

@@ -12,6 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 from rich.table import Table
 
 from sdrlinkd.cli.app import app
+from sdrlinkd.cli.compiling import compile_first
 from sdrlinkd.cli.one_radio import (
     Antenna,
     ConfigFile,
@@ -85,6 +86,7 @@ def record(
         None if network < 0 else network,
         grid_named(grid or radio.config.modem.grid),
     )
+    compile_first(Console(stderr=True))
     report = asyncio.run(_capture(radio, wish))
     gain_key = "--gain or --gains" if config is None else "soapy.rx_gain_db or soapy.rx_gains"
     console = Console(soft_wrap=True)

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 from sdrlinkd.cli.app import app
+from sdrlinkd.cli.compiling import compile_first
 from sdrlinkd.cli.one_radio import (
     Antenna,
     ConfigFile,
@@ -83,6 +84,7 @@ def replay(
         _refuse_itself(file, radio)
         with show_progress(f"silence in {file.name}", recording) as progress:
             plan = plan_replay(recording, radio.config.modem.rate_hz, silence, backoff, progress)
+        compile_first(Console(stderr=True))
         report = asyncio.run(_replay(radio, recording, plan, times))
     for line in _lines(report, plan):
         console.print(line, highlight=False, markup=False)

@@ -25,13 +25,13 @@ def daemon_process(config: Path) -> Process:
 
 
 @contextlib.contextmanager
-def daemon(config: Path) -> Iterator[None]:
+def daemon(config: Path) -> Iterator[Process]:
     """A running daemon."""
     process = daemon_process(config)
     try:
         process.start()
         wait_until_up(process, config.parent)
-        yield
+        yield process
     finally:
         process.stop()
 

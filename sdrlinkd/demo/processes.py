@@ -1,6 +1,7 @@
 """Processes of ours, of which none is left behind."""
 
 import contextlib
+import os
 import signal
 import subprocess
 import sys
@@ -8,11 +9,16 @@ import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from sdrlinkd import parent
+
 STOP_TIMEOUT_S = 20.0
 
 
 class Process:
-    """A Python module that runs by itself once started; its log is shown only when it fails."""
+    """A Python module that runs by itself once started; its log is shown only when it fails.
+
+    It ends with us, also when we are killed.
+    """
 
     def __init__(self, module: str, arguments: Sequence[str], log_path: Path) -> None:
         self._module = module
@@ -26,10 +32,19 @@ class Process:
             # In a session of its own: Ctrl-C is ours to pass on, in the right order.
             self._process = subprocess.Popen(
                 [sys.executable, "-m", self._module, *self._arguments],
+                stdin=subprocess.PIPE,
                 stdout=log_file,
                 stderr=log_file,
                 start_new_session=True,
+                env={**os.environ, parent.VARIABLE: "1"},
             )
+
+    @property
+    def pid(self) -> int:
+        """Its number, once it is started."""
+        if self._process is None:
+            raise RuntimeError("pid before start")
+        return self._process.pid
 
     @property
     def is_running(self) -> bool:
@@ -50,6 +65,8 @@ class Process:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        if self._process.stdin is not None:
+            self._process.stdin.close()
 
 
 @contextlib.contextmanager

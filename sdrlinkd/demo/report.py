@@ -6,6 +6,7 @@ import numpy as np
 from msgspec import Struct
 
 from sdrlinkd.demo.links import Options
+from sdrlinkd.demo.load import Load
 from sdrlinkd.demo.source import Source
 from sdrlinkd.demo.trace import Pair, Trace, goodput_bytes_per_s, latencies_s, path_error_m
 from sdrlinkd.reports import Snapshot
@@ -30,6 +31,7 @@ class PhyResult(Struct, frozen=True, kw_only=True):
     """What the modem was told, and what its receiver counted."""
 
     mcs: str
+    mcs_index: int
     rate_hz: float
     channel: str
     snr_db: float
@@ -39,9 +41,13 @@ class PhyResult(Struct, frozen=True, kw_only=True):
     pdus_bad: int
     headers_bad: int
     samples_lost: int
-    """On a machine too slow for the rate."""
+    """What the receiver could not take in time."""
     snr_db_measured: float | None
     realtime_ratio: float | None
+    busy: float | None = None
+    """Share of the time in which the daemon's busiest thread ran or wanted to."""
+    waited: float | None = None
+    """Of that, share of the time in which other programs had the processors."""
 
 
 class RunResult(Struct, frozen=True, kw_only=True):
@@ -152,12 +158,13 @@ def run_result(
     )
 
 
-def phy_result(options: Options, receiver: Snapshot) -> PhyResult:
-    """What the modem of the receiving node counted."""
+def phy_result(options: Options, receiver: Snapshot, load: Load | None) -> PhyResult:
+    """What the modem of the receiving node counted, and its load where it kept time."""
     counters = receiver.carrier.counters
     snr = [each.snr_db for each in receiver.link.neighbors if each.snr_db is not None]
     return PhyResult(
         mcs=receiver.carrier.detail.split(",")[0],
+        mcs_index=options.mcs,
         rate_hz=options.rate_hz,
         channel=options.channel,
         snr_db=options.snr_db,
@@ -169,4 +176,6 @@ def phy_result(options: Options, receiver: Snapshot) -> PhyResult:
         samples_lost=counters.get("samples_lost", 0),
         snr_db_measured=snr[0] if snr else None,
         realtime_ratio=receiver.carrier.realtime_ratio,
+        busy=None if load is None else round(load.busy, 3),
+        waited=None if load is None else round(load.waited, 3),
     )

@@ -1,13 +1,14 @@
 """One run: real daemons, a producer, a consumer, and the clock between them."""
 
-import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 from sdrlinkd.adapters import paced
 from sdrlinkd.client import Publisher
+from sdrlinkd.demo.folder import run_folder
 from sdrlinkd.demo.links import Options, write_config
+from sdrlinkd.demo.load import Load, LoadOf
 from sdrlinkd.demo.nodes import Consumer, daemon, problems_of, snapshot_of
 from sdrlinkd.demo.report import RunResult, phy_result, run_result
 from sdrlinkd.demo.source import Source
@@ -28,13 +29,14 @@ def run_demo(source: Source, options: Options, progress: Progress) -> tuple[RunR
     `progress(sent, received)` is called as the run goes on.
     """
     trace = Trace({topic.name: topic.type for topic in source.registry.topics})
-    with tempfile.TemporaryDirectory(prefix="sdrlink-") as folder:
+    with run_folder() as folder:
         if options.link == "iqfile":
             sent, heard, duration_s, problems = _over_recording(
-                Path(folder), source, options, trace, progress
+                folder, source, options, trace, progress
             )
+            load = None
         else:
-            sent, duration_s, problems = _to_itself(Path(folder), source, options, trace, progress)
+            sent, duration_s, problems, load = _to_itself(folder, source, options, trace, progress)
             heard = sent
     tx, rx = sent.link.tx, heard.link.rx
     pdus = {k: v for k, v in rx.pdus_dropped.items() if k not in ("rx_control", "rx_dup")}
@@ -47,25 +49,25 @@ def run_demo(source: Source, options: Options, progress: Progress) -> tuple[RunR
         entries=tx.entries,
         dropped={**tx.dropped, **rx.dropped, **pdus},
         ledger_adds_up=not problems,
-        phy=None if options.link == "direct" else phy_result(options, heard),
+        phy=None if options.link == "direct" else phy_result(options, heard, load),
     )
     return result, trace
 
 
 def _to_itself(
     folder: Path, source: Source, options: Options, trace: Trace, progress: Progress
-) -> tuple[Snapshot, float, list[str]]:
-    """One node that hears itself: (its snapshot, duration in s, problems of the ledger)."""
+) -> tuple[Snapshot, float, list[str], Load]:
+    """One node that hears itself: (its snapshot, duration in s, problems of the ledger, load)."""
     config = write_config(folder / "node", source, options, "both", folder)
     directory = config.parent
-    with daemon(config), Consumer(directory, trace) as consumer:
-        began = time.monotonic()
+    with daemon(config) as process, Consumer(directory, trace) as consumer:
+        began, load = time.monotonic(), LoadOf(process.pid)
         _produce(source, options, directory, trace, lambda: progress(trace.n_sent, consumer.count))
         snapshot = _wait_until_through(
             directory, consumer, trace.n_sent, lambda: progress(trace.n_sent, consumer.count)
         )
         duration_s = max(consumer.last_at, trace.last_sent_at) - began
-        return snapshot, duration_s, problems_of(directory)
+        return snapshot, duration_s, problems_of(directory), load.read()
 
 
 def _over_recording(

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import phy
 from backends import AirParams, BackendError, EtherHub, World
 from sdrlinkd.errors import UserError
 from sdrlinkd.lab.scenario import Scenario, outages_of
@@ -11,10 +10,9 @@ from sdrlinkd.lab.scenario import Scenario, outages_of
 def make_hub(scenario: Scenario | None, directory: Path, traces: Path | None) -> EtherHub:
     """For `scenario`, or an air of which nothing is known but that all hear each other.
 
-    Raises UserError when the folder cannot be had.
+    The modem should have been compiled: else the first burst that is delayed would have the air
+    wait for it. Raises UserError when the folder cannot be had.
     """
-    # Else the first burst that is delayed would have the air wait for compiled code.
-    phy.warm_up()
     try:
         if scenario is None:
             air = AirParams()

@@ -1,7 +1,6 @@
 """One run: a hub, a daemon for each robot, who sends and who listens; all stopped at the end."""
 
 import contextlib
-import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -14,6 +13,7 @@ from sdrlinkd.demo import (
     Source,
     daemon_process,
     problems_of,
+    run_folder,
     snapshot_of,
     wait_until_up,
 )
@@ -69,7 +69,7 @@ def run_lab(options: LabOptions, watch: Watch) -> LabReport:
     """Run a scenario to its end. Raises UserError; whatever happens, nothing is left running."""
     scenario = options.scenario
     with contextlib.ExitStack() as stack:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sdrlink-")))
+        folder = stack.enter_context(run_folder())
         outages_of(scenario, options.traces)
         sources = open_sources(scenario, options.bag)
         for source in sources.values():

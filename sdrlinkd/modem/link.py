@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import phy
 from backends import AbsentError, BackendError, LateRadio, Radio, RefusalError, RxBlock, Tuning
@@ -34,6 +34,7 @@ class ModemLink:
     know whether there is a carrier on the air. `lead_grows`: bursts that must leave at a given
     moment are handed over earlier when the machine proves to be slow. `began_s`: the link's clock
     has run since then (monotonic), before there was a radio; None: it begins with the samples.
+    `load` compiles the PHY, or loads what is compiled, before the radio is opened; on a thread.
     """
 
     def __init__(
@@ -45,6 +46,7 @@ class ModemLink:
         listens: bool = False,
         lead_grows: bool = False,
         began_s: float | None = None,
+        load: Callable[[], None] = phy.warm_up,
     ) -> None:
         self._params = params
         self._radio = radio if began_s is None else LateRadio(radio, self._first_index)
@@ -60,6 +62,7 @@ class ModemLink:
         self._ear = Ear(self._receiver, sense, params.rate_hz)
         self._lead_grows = lead_grows
         self._clock = StreamClock(params.rate_hz, paced=True, began_s=began_s)
+        self._load = load
         self._plan = AirPlan(0)
         self._rx: Demodulation | None = None
         self._tx = Transmission(params, self._radio)
@@ -75,7 +78,7 @@ class ModemLink:
     async def open(self, listener: PduListener) -> None:
         """Load the compiled code and open the radio."""
         params = self._params
-        await self._tx.warm_up()
+        await self._tx.warm_up(self._load)
         tuning = Tuning(params.rate_hz, params.carrier_hz)
         try:
             await self._radio.open(tuning)

@@ -3,6 +3,7 @@
 import math
 import os
 import socket
+from collections.abc import Callable
 from pathlib import Path
 from random import Random
 
@@ -39,11 +40,12 @@ def make_modem(
     rng: Random,
     patience: Patience = Patience.NONE,
     began_s: float | None = None,
+    load: Callable[[], None] = phy.warm_up,
 ) -> ModemLink:
     """The modem on the radio that `config.backend` names. Raises UserError.
 
     `patience`: of a radio that is not there when it is opened; `began_s`: the link's clock has run
-    since then (monotonic).
+    since then (monotonic); `load` compiles the PHY, or loads it.
     """
     _check_airtime(config)
     policy = config.access.policy
@@ -56,6 +58,7 @@ def make_modem(
         lead_grows=policy == "tdma",
         # In a recording, time begins with its first sample.
         began_s=None if config.backend == "iqfile" else began_s,
+        load=load,
     )
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from sdrlinkd.cli import run
 from sdrlinkd.demo import LINKS, Options, open_source, run_demo
+from sdrlinkd.demo.links import write_config
 from tests.adapters.recordings import STORAGES, noisy_messages, ros2_bag
 
 
@@ -86,6 +87,26 @@ def test_noise_beyond_the_code_loses_messages_by_name():
     assert result.received == 0 or result.bytes_identical
 
 
+def test_every_mcs_can_be_shown(tmp_path):
+    arguments = ("--link", "ofdm", "--rate", 2e6, "--duration", 0.5, "--out", tmp_path)
+    assert demo("--mcs", 9, "--snr", 35, *arguments) == 0
+    (result,) = json.loads((tmp_path / "report.json").read_text())["runs"]
+    assert (result["phy"]["mcs"], result["pdr"]) == ("256QAM 5/6", 1.0)
+
+
+def test_a_clean_link_that_loses_messages_is_a_fault(tmp_path, monkeypatch, capsys):
+    def lossy(*arguments):
+        path = write_config(*arguments)
+        path.write_text(path.read_text() + "[direct]\nloss = 0.5\n")
+        return path
+
+    monkeypatch.setattr("sdrlinkd.demo.run.write_config", lossy)
+    arguments = ("--link", "direct", "--duration", 0.5, "--out", tmp_path)
+    assert demo(*arguments) == 1
+    (told,) = [line for line in capsys.readouterr().out.splitlines() if "did not arrive" in line]
+    assert told.startswith("direct: ")
+
+
 def test_a_picture_that_cannot_be_written_is_told_in_words(tmp_path, capsys):
     (tmp_path / "path.png").mkdir()
     assert demo("--duration", 0.2, "--link", "direct", "--out", tmp_path) == 2
@@ -124,5 +145,5 @@ def test_bad_input_is_refused_in_words(tmp_path, capsys):
         assert "Traceback" not in out + err
     assert demo("--pdu-size", "7") == 2
     assert demo("--link", "carrier-pigeon") == 2
-    assert demo("--mcs", "9") == 2
+    assert demo("--mcs", "10") == 2
     assert demo("--channel", "vacuum") == 2

@@ -1,0 +1,52 @@
+"""Compiling the modem, which is done once, and telling how far it is."""
+
+import os
+import time
+from collections.abc import Callable
+
+import phy
+
+Say = Callable[[str], None]
+
+EVERY_S = 10.0
+
+
+def compile_modem(
+    say: Say,
+    every_s: float = EVERY_S,
+    passing: Say | None = None,
+    watch: Callable[[int, int], None] | None = None,
+) -> None:
+    """Compile the modem, or load it: minutes the first time, less than a second later.
+
+    `say` is told how long it took and what else should be known, and nothing when all was there;
+    `passing`, by default also `say`, how far it is, at most once in `every_s`. `watch(done, total)`
+    is told of every kernel that was compiled; what it raises ends the work.
+    """
+    told = passing or say
+    began = time.monotonic()
+    last = -every_s
+
+    def progress(done: int, total: int) -> None:
+        nonlocal last
+        if watch is not None:
+            watch(done, total)
+        so_far_s = time.monotonic() - began
+        if so_far_s - last >= every_s:
+            last = so_far_s
+            told(f"compiling the modem: {done} of {total} kernels, {so_far_s:.0f} s so far, once")
+
+    phy.warm_up(progress)
+    if last >= 0:
+        say(f"compiled the modem in {time.monotonic() - began:.0f} s")
+    folder = phy.temporary_cache()
+    if folder is not None and os.access(folder, os.W_OK):
+        say(
+            f"the compiled modem is kept in {folder}: neither the program's folder nor the "
+            "user's cache can be written; NUMBA_CACHE_DIR names a lasting one"
+        )
+    elif folder is not None:
+        say(
+            "the compiled modem cannot be kept, and is compiled anew at every start: no folder can "
+            "be written; NUMBA_CACHE_DIR names one"
+        )

@@ -1,0 +1,72 @@
+"""Which rate this machine carries, measured with what is to run then."""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+from sdrlinkd.adapters import first_seconds, paced
+from sdrlinkd.client import Publisher
+from sdrlinkd.demo.folder import run_folder
+from sdrlinkd.demo.links import Options, write_config
+from sdrlinkd.demo.load import LoadOf
+from sdrlinkd.demo.nodes import Consumer, daemon, snapshot_of
+from sdrlinkd.demo.source import Source
+from sdrlinkd.demo.trace import Trace
+
+RATES_HZ = (5e6, 2e6, 1e6, 5e5)
+MEASURE_S = 2.0
+MOST_BUSY = 2 / 3
+"""Of the time. The rest is for what else comes up."""
+MOST_AIR = 0.8
+"""Of the time on the air. With more, messages would wait for it longer than for a machine."""
+
+
+class Tried(NamedTuple):
+    """A rate; shares of the time for which a processor is busy at it, and the air."""
+
+    rate_hz: float
+    busy: float
+    air: float
+
+
+class Found(NamedTuple):
+    """A rate, and those that were tried."""
+
+    rate_hz: float
+    tried: list[Tried]
+
+
+Measure = Callable[[Source, Options], Tried]
+
+
+def tried_out(source: Source, options: Options) -> Tried:
+    """A daemon sends the first seconds of `source` over noisy air to itself."""
+    trace = Trace({topic.name: topic.type for topic in source.registry.topics})
+    with run_folder() as folder:
+        config = write_config(folder / "node", source, options, "both", folder)
+        with daemon(config) as process, Consumer(config.parent, trace):
+            load, began = LoadOf(process.pid), time.monotonic()
+            with Publisher(config.parent) as publisher:
+                messages = first_seconds(source.messages(), MEASURE_S * options.speed)
+                for message in paced(messages, options.speed):
+                    publisher.send(message.topic, message.cdr, type=message.type)
+            time.sleep(max(0.0, began + MEASURE_S - time.monotonic()))
+            sent = snapshot_of(config.parent).carrier.counters["samples_sent"]
+            span_s = time.monotonic() - began
+            return Tried(options.rate_hz, load.read().busy, sent / options.rate_hz / span_s)
+
+
+def find_rate(source: Source, options: Options, measure: Measure = tried_out) -> Found:
+    """The highest of RATES_HZ at which a third of the time is free; else where most is.
+
+    Lower ones at which the air would be too full are none.
+    """
+    tried: list[Tried] = []
+    for rate_hz in RATES_HZ:
+        if tried and tried[0].air * tried[0].rate_hz / rate_hz > MOST_AIR:
+            break
+        tried.append(measure(source, replace(options, link="ofdm", rate_hz=rate_hz)))
+        if tried[-1].busy <= MOST_BUSY:
+            return Found(rate_hz, tried)
+    return Found(min(tried, key=lambda each: each.busy).rate_hz, tried)

@@ -1,0 +1,65 @@
+"""Whether a run brought what its link should bring, and if not, why."""
+
+import phy
+from sdrlinkd.demo.report import PhyResult, RunResult
+
+CLEAN_PER = 1e-6
+MARGIN_DB = 0.5
+"""By which the law of packet errors may be off."""
+STOOD_STILL = 0.5
+"""Who waited for half of what is lost, has lost it by waiting."""
+SATURATED = 0.9
+
+
+def is_clean(result: RunResult) -> bool:
+    """Whether nothing on its air takes messages: no fading, and SNR enough for its MCS."""
+    heard = result.phy
+    if heard is None:
+        return True
+    snr_db = heard.snr_db - MARGIN_DB
+    per = phy.pdu_error_rate(heard.mcs_index, snr_db, result.pdu_size)
+    return heard.channel == "awgn" and per <= CLEAN_PER
+
+
+def is_good(result: RunResult) -> bool:
+    """Whether all arrived that should have, unchanged, and the ledger knows of each."""
+    if not result.ledger_adds_up or (result.received and not result.bytes_identical):
+        return False
+    return result.received == result.sent or not is_clean(result)
+
+
+def verdict(result: RunResult) -> str:
+    """What is missing or wrong and why, in a sentence; empty when nothing is."""
+    missing = result.sent - result.received
+    if missing <= 0:
+        wrong = "" if result.bytes_identical else "what arrived is not what was sent"
+        wrong = wrong if result.ledger_adds_up else "its ledger does not add up"
+        return wrong and f"{result.name}: {wrong}, which is a bug of ours"
+    text = f"{result.name}: {missing} of {result.sent} messages did not arrive: "
+    heard = result.phy
+    if heard is not None and heard.samples_lost:
+        return text + _why_slow(heard, result.duration_s)
+    if heard is not None and not is_clean(result):
+        needed_db = phy.needed_snr_db(heard.mcs_index, result.pdu_size, CLEAN_PER) + MARGIN_DB
+        fades = "" if heard.channel == "awgn" else f" on a channel that fades ({heard.channel})"
+        return text + (
+            f"{heard.mcs} brings everything from {needed_db:.0f} dB on, and this air has "
+            f"{heard.snr_db:g} dB{fades}"
+        )
+    named = ", ".join(f"{count} {name}" for name, count in result.dropped.items())
+    return text + (named or "no reason is known, which is a bug of ours")
+
+
+def _why_slow(heard: PhyResult, duration_s: float) -> str:
+    rate = f"{heard.rate_hz / 1e6:g} Msps"
+    lost_s = heard.samples_lost / heard.rate_hz
+    lost = f"the receiver lost {lost_s:.1f} s of the {duration_s:.1f} s"
+    waited = heard.waited or 0.0
+    if (heard.busy or 0.0) - waited > SATURATED:
+        return f"{lost}, as a processor of this machine is too slow for {rate}; try a lower --rate"
+    if waited * duration_s > STOOD_STILL * lost_s:
+        return (
+            f"{lost}, as other programs had the processors for {waited * duration_s:.1f} s; end "
+            f"them, or try a lower --rate than {rate}"
+        )
+    return f"{lost}, as the daemon stood still; was it suspended, or the machine?"

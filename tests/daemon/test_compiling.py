@@ -1,0 +1,106 @@
+"""Daemons and compiled code: nothing is compiled while a link runs, and a cold start tells."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import phy
+from sdrlinkd import compiling
+from sdrlinkd.client import Publisher
+from sdrlinkd.compiling import compile_modem
+from tests.waiting import wait_for
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_no_kind_of_link_compiles_anything(tmp_path):
+    """In one process and with signatures, not files: so it costs seconds, whatever is cached."""
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.daemon.link_kinds", str(tmp_path)],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == ""
+
+
+def test_a_daemon_with_a_cold_cache_takes_messages_says_so_and_can_be_stopped(
+    start_daemon, tmp_path, monkeypatch
+):
+    """Its radio is opened behind that."""
+    (tmp_path / "cold").mkdir()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cold"))
+    daemon = start_daemon(
+        f'drain_s = 0\nbackend = "iqfile"\n[iqfile]\ntransmit = "{tmp_path / "radio"}"\n'
+    )
+    wait_for(lambda: "compiling the modem: " in daemon.log(), timeout_s=60)
+    with Publisher(daemon.directory) as out:
+        out.send("/robot_1/odom", b"\0\1\0\0odom")
+    wait_for(lambda: "the modem is being compiled, once" in daemon.snapshot().carrier.reason)
+    snapshot = daemon.snapshot()
+    assert snapshot.verdict.level == "DOWN"
+    assert snapshot.link.tx.queued == 1
+    assert not list(tmp_path.glob("radio*"))
+    daemon.process.terminate()
+    assert daemon.process.wait(60) == 0
+    assert "compiled the modem in" not in daemon.log()
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """What is said of a warm-up that compiles kernels at these times, in a cache that is there."""
+
+    def call(times, folder=None, **options):
+        clock = iter([0.0, *times, times[-1] if times else 0.0])
+        monkeypatch.setattr(compiling.time, "monotonic", lambda: next(clock))
+
+        def warm_up(progress):
+            for done in range(len(times)):
+                progress(done + 1, 64)
+
+        monkeypatch.setattr(phy, "warm_up", warm_up)
+        monkeypatch.setattr(phy, "temporary_cache", lambda: folder)
+        said = []
+        compile_modem(said.append, **options)
+        return said
+
+    return call
+
+
+def test_progress_is_told_now_and_then(told):
+    assert told([0.5, 1.0, 9.0, 10.6, 30.0, 31.0]) == [
+        "compiling the modem: 1 of 64 kernels, 0 s so far, once",
+        "compiling the modem: 4 of 64 kernels, 11 s so far, once",
+        "compiling the modem: 5 of 64 kernels, 30 s so far, once",
+        "compiled the modem in 31 s",
+    ]
+
+
+def test_of_a_warm_cache_nothing_is_told(told):
+    assert told([]) == []
+
+
+def test_a_screen_shows_progress_elsewhere(told):
+    passing = []
+    assert told([0.5, 1.0], every_s=0.1, passing=passing.append) == ["compiled the modem in 1 s"]
+    assert len(passing) == 2
+
+
+def test_where_it_is_kept_is_told_in_a_line(told, tmp_path):
+    (line,) = told([], tmp_path)
+    assert f"is kept in {tmp_path}: neither" in line
+    (line,) = told([], tmp_path / "none")
+    assert "compiled anew at every start" in line
+
+
+def test_it_can_be_given_up(told):
+    class GivenUpError(Exception):
+        """Who waits for it has gone."""
+
+    def stop(done, total):
+        if done == 2:
+            raise GivenUpError(total)
+
+    with pytest.raises(GivenUpError, match="64"):
+        told([0.5, 1.0, 2.0], watch=stop)

@@ -1,0 +1,91 @@
+"""A demonstration or a lab that is killed leaves no process, and the next run takes its folder."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from sdrlinkd.demo import run_folder
+from tests.lab.scenarios import processes_of, write_scenario
+from tests.waiting import wait_for
+
+
+@pytest.fixture
+def killed(tmp_path, monkeypatch):
+    """Runs a command until `is_up(folder of its run)`, then kills it; that folder."""
+    temporary = tmp_path / "tmp"
+    temporary.mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
+
+    def call(is_up, *arguments):
+        process = subprocess.Popen(
+            [sys.executable, "-m", "sdrlinkd.cli", *map(str, arguments)],
+            cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+        )  # fmt: skip
+        try:
+            wait_for(lambda: process.poll() is not None or is_up(temporary), 120)
+            assert process.poll() is None, process.stderr.read()
+            assert len(processes_of(temporary)) > 0
+        finally:
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+            process.stderr.close()
+        return temporary
+
+    return call
+
+
+def sockets(temporary):
+    return list(temporary.glob("sdrlink-*/*/ctl.sock"))
+
+
+@pytest.mark.parametrize("command", ["demo", "lab"])
+def test_no_process_is_left_and_the_next_run_removes_the_folder(
+    killed, tmp_path, command, monkeypatch
+):
+    if command == "demo":
+        arguments, n_daemons = ["--link", "ofdm", "--rate", "1e6", "--duration", "60"], 1
+    else:
+        arguments, n_daemons = [write_scenario(tmp_path, pace="realtime"), "--duration", 600], 2
+    temporary = killed(lambda at: len(sockets(at)) == n_daemons, command, *arguments)
+    (left,) = temporary.glob("sdrlink-*")
+    wait_for(lambda: not processes_of(temporary), 60)
+    monkeypatch.setattr("tempfile.tempdir", str(temporary))
+    with run_folder() as folder:
+        assert not left.exists()
+        assert list(temporary.glob("sdrlink-*")) == [folder]
+        with run_folder() as other:
+            # One that is in use is not removed.
+            assert folder.exists()
+            assert other != folder
+    assert list(temporary.glob("sdrlink-*")) == []
+
+
+def test_what_is_not_of_a_run_is_left_alone(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    (tmp_path / "sdrlink-ether").mkdir()
+    (tmp_path / "sdrlink-bench-1").mkdir()
+    (tmp_path / "sdrlink-dead").mkdir()
+    (tmp_path / "sdrlink-dead" / "run.lock").write_text("")
+    with run_folder():
+        assert {each.name for each in tmp_path.iterdir()} > {"sdrlink-ether", "sdrlink-bench-1"}
+        assert not (tmp_path / "sdrlink-dead").exists()
+
+
+def test_a_daemon_that_does_not_stop_is_killed_in_the_end(tmp_path):
+    """Who starts it is gone: nobody else would."""
+    code = (
+        "import signal, sdrlinkd.parent as parent; parent.STOP_S = 0.1;"
+        "signal.signal(signal.SIGTERM, signal.SIG_IGN); parent.end_with_parent();"
+        "print('.', flush=True); signal.pause()"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        env={**os.environ, "SDRLINKD_ENDS_WITH_STDIN": "1"},
+    )  # fmt: skip
+    process.stdout.readline()
+    process.stdin.close()
+    assert process.wait(20) == -signal.SIGKILL
+    process.stdout.close()
