@@ -38,7 +38,7 @@ class Opening:
         self._progress = progress
         self._told_to = asyncio.Event()
         self._patience = Patience.NONE
-        self.state = "down"
+        self.state = "opening"
         self.reason = BEING_OPENED
         self._told_state, self._told_since = "", 0.0
         self.pdu_link = make(setup, Patience.NONE)

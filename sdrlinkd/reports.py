@@ -216,8 +216,8 @@ class CarrierReport(msgspec.Struct, frozen=True, kw_only=True):
 
     kind: str
     state: str
-    """up | waiting (for a radio that is not there yet) | refused (by the radio, which names what to
-    change) | down | ended (a recording is over)"""
+    """opening | up | waiting (for a radio that is not there yet) | refused (by a radio that does
+    not take its settings) | down | ended (a recording is over)"""
     detail: str = ""
     reason: str = ""
     """Why it is not up, in a sentence."""

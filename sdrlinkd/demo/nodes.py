@@ -55,8 +55,11 @@ def wait_until_up(process: Process, directory: Path) -> None:
     while process.is_running and time.monotonic() < deadline:
         # It answers before its modem is ready.
         with contextlib.suppress(NoDaemonError):
-            if snapshot_of(directory).carrier.state != "down":
+            carrier = snapshot_of(directory).carrier
+            if carrier.state in ("up", "ended"):
                 return
+            if carrier.state in ("waiting", "refused"):
+                raise UserError(f"the daemon has no link: {carrier.reason}")
         time.sleep(0.02)
     raise UserError(f"the daemon did not start:\n{process.log()}")
 

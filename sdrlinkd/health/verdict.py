@@ -47,6 +47,8 @@ def judge(snapshot: Snapshot, lately: Lately) -> VerdictReport:
 def _down(snapshot: Snapshot) -> str:
     carrier = snapshot.carrier
     name, since = carrier_name(carrier), span(carrier.since_s)
+    if carrier.state == "opening":
+        return f"no {name} yet: {carrier.reason}"
     if carrier.state == "waiting":
         return f"no {name} since {since}: {carrier.reason}"
     if carrier.state == "refused":

@@ -26,8 +26,7 @@ def modem_report(
     return CarrierReport(
         kind=kind,
         state=state,
-        detail=f"{phy.MCS_TABLE[params.mcs].name}, {params.rate_hz / 1e6:g} Msps, "
-        f"CFO up to {params.searched_cfo_hz / 1e3:.3g} kHz, {radio.detail}",
+        detail=f"{phy.MCS_TABLE[params.mcs].name}, {params.rate_hz / 1e6:g} Msps, {radio.detail}",
         max_cfo_hz=round(params.searched_cfo_hz, 3),
         reason=reason,
         level_dbfs=None if levels is None else round(levels.power_dbfs, 1),
@@ -57,6 +56,6 @@ def _notices(
             f"samples: it keeps up with {kept:.2f} of real time at {params.rate_hz / 1e6:g} Msps "
             f"(demodulation alone with {realtime_ratio:.2f}); lower modem.rate_hz"
         )
-    if state not in ("down", "ended") and not radio.capabilities.transmits:
+    if state != "down" and not radio.capabilities.transmits:
         notices.append("this radio only receives: what is to be sent stays in the queue")
     return notices

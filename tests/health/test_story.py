@@ -17,7 +17,7 @@ def test_a_radio_that_comes_late_goes_and_comes_back():
     absent = {"state": "waiting", "reason": "no such device", "since_s": 1.0}
     away = {"state": "down", "reason": "the stream failed", "since_s": 1.5}
     seen = [
-        snapshot(1.0, {"state": "down", "reason": "it is being opened", "since_s": 0.5}, []),
+        snapshot(1.0, {"state": "opening", "since_s": 0.5}, []),
         snapshot(2.0, absent, []),
         snapshot(12.0, absent, []),
         snapshot(13.0, robots=[]),

@@ -23,6 +23,10 @@ def test_all_is_well():
     ("carrier", "reason"),
     [
         (
+            {"state": "opening", "since_s": 0.0, "reason": "it is being opened"},
+            "no radio yet: it is being opened",
+        ),
+        (
             {"kind": "soapy", "state": "waiting", "since_s": 12.2, "reason": "no such device"},
             "no radio since 12 s: no such device",
         ),

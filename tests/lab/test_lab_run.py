@@ -110,7 +110,7 @@ def test_another_seed_gives_another_run(runs):
 def test_a_daemon_that_cannot_start_tells_why(run_small, nothing_left):
     with pytest.raises(UserError) as error:
         run_small(extra="slot_s = 1e-4\n")
-    for part in ("the daemon did not start", "access.slot_s: got 0.0001", "allowed: at least"):
+    for part in ("the daemon has no link", "access.slot_s: got 0.0001", "allowed: at least"):
         assert part in str(error.value)
     assert "Traceback" not in str(error.value)
 
@@ -144,7 +144,9 @@ def test_an_interrupt_while_a_process_starts_leaves_none(run_small, nothing_left
             signal.raise_signal(signal.SIGINT)
         return started[-1]
 
-    stand_in = SimpleNamespace(Popen=start, TimeoutExpired=subprocess.TimeoutExpired)
+    stand_in = SimpleNamespace(
+        Popen=start, PIPE=subprocess.PIPE, TimeoutExpired=subprocess.TimeoutExpired
+    )
     monkeypatch.setattr("sdrlinkd.demo.processes.subprocess", stand_in)
     try:
         with pytest.raises(KeyboardInterrupt):

@@ -157,7 +157,6 @@ async def test_by_default_radios_hear_each_other_however_far_their_crystals_are_
         await listener.until(lambda: len(listener.pdus) == len(pdus))
         assert [heard.data for heard in listener.pdus] == pdus
         assert modem.report().max_cfo_hz == min(472e3, rate_hz / 4)
-        assert "CFO up to " in modem.report().detail
 
 
 async def test_the_next_burst_is_asked_for_only_when_the_one_before_is_nearly_out():
