@@ -10,7 +10,7 @@ import phy
 from sdrlinkd.cli import run
 from tests.iq.recordings import RATE_HZ, write_bursts
 from tests.phy.signals import noisy, silence
-from tests.phy.wifi_frames import frame, with_fcs
+from tests.phy.wifi_frames import frame, ht_frame, with_fcs
 
 
 @pytest.fixture
@@ -144,6 +144,27 @@ def test_wifi_frames_for_people_and_programs(ctl, wifi_file):
     told = [json.loads(line) for line in out.strip().split("\n")]
     assert [(bytes.fromhex(each["psdu"]), each["mbps"]) for each in told] == sent
     assert [each["fcs"] for each in told] == [True, False, True]
+
+
+def test_frames_of_802_11n_are_told_as_such(ctl, tmp_path):
+    """In mixed format they begin as one of 6 Mbit/s that would be wrong."""
+    parts = [silence(400), ht_frame(3, 138), silence(400), ht_frame(7, 900, True, True)]
+    path = tmp_path / "air.cf32"
+    rng = np.random.default_rng(3)
+    noisy(rng, np.concatenate([*parts, silence(400)]), 28).astype(np.complex64).tofile(path)
+    code, out, _ = ctl("decode-wifi", path)
+    assert code == 0
+    mixed, greenfield, summary = out.strip().split("\n")
+    assert "802.11n HT-mixed, MCS 3, 20 MHz  138 B, not read  SNR" in mixed
+    assert "802.11n HT-greenfield, MCS 7, 40 MHz  900 B, not read  SNR" in greenfield
+    assert summary.startswith("0 frames, 0 with right FCS, in")
+    assert summary.endswith("; 2 frames of 802.11n, which are not read")
+    assert "wrong" not in out
+    _, out, _ = ctl("decode-wifi", path, "--json")
+    told = [json.loads(line) for line in out.strip().split("\n")]
+    assert [(each["format"], each["mcs"], each["mhz"], each["n_bytes"]) for each in told] == [
+        ("HT-mixed", 3, 20, 138), ("HT-greenfield", 7, 40, 900),
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("piece", [3000, 4000, 4500])

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from phy.wifi import RATES, receive
+from phy.wifi import RATES, HtFrame, HtSignal, WifiFrame, receive
 from tests.phy.signals import noise, noisy, silence, turned
-from tests.phy.wifi_frames import frame, with_fcs
+from tests.phy.wifi_frames import frame, ht_frame, with_fcs
 
 SEED = 53
 RECORDINGS = Path(__file__).parents[2].parent / "shared/data/iq"
@@ -63,6 +63,38 @@ def test_what_is_cut_or_no_frame_is_none():
     assert list(receive(silence(3))) == []
 
 
+@pytest.mark.parametrize("greenfield", [False, True], ids=["mixed", "greenfield"])
+@pytest.mark.parametrize(
+    ("mcs", "n_bytes", "wide"), [(0, 1, False), (7, 65535, True), (76, 138, False)]
+)
+def test_frames_of_802_11n_are_told_as_such(greenfield, mcs, n_bytes, wide):
+    rng = np.random.default_rng(SEED)
+    parts = [silence(300)]
+    for _ in range(3):
+        sent = ht_frame(mcs, n_bytes, wide, greenfield)
+        parts += [turned(sent, -0.003, rng.random()), silence(500)]
+    psdu = psdus(rng, 1)[0]
+    parts += [frame(psdu, 6), silence(200)]
+    *got, last = receive(noisy(rng, np.concatenate(parts), 15))
+    assert [(each.signal, each.is_greenfield) for each in got] == [
+        (HtSignal(mcs, n_bytes, wide), greenfield)
+    ] * 3
+    for each in got:
+        assert each.cfo_hz == pytest.approx(-0.003 * 20e6, abs=1000)
+        assert each.snr_db == pytest.approx(15, abs=1.5)
+    # What is said of one does not spill over to the next.
+    assert last.psdu == psdu
+
+
+def test_a_frame_of_6_mbit_whatever_is_in_it_is_none_of_802_11n():
+    rng = np.random.default_rng(SEED)
+    sent = psdus(rng, 60)
+    x = np.concatenate([np.concatenate((silence(300), frame(psdu, 6))) for psdu in sent])
+    got = list(receive(noisy(rng, np.concatenate((x, silence(200))), 8)))
+    assert [each.psdu for each in got if isinstance(each, WifiFrame)] == sent
+    assert len(got) == len(sent)
+
+
 def read_i16(name):
     values = np.fromfile(RECORDINGS / name, "<i2").astype(np.float32) / 32768
     return values.view(np.complex64)
@@ -86,3 +118,13 @@ def test_frames_of_another_receiver_are_read():
     frames = list(receive(samples))
     assert frames
     assert all(each.is_right and each.rate.mbps == 6 for each in frames)
+
+
+@recorded
+def test_frames_of_802_11n_on_the_air_are_told_and_those_beside_them_read():
+    """MCS 3 is 26 Mbit/s; the block acknowledgements between them are 802.11a."""
+    frames = list(receive(read_i16("wifi_11n_26mbps_radiated_20M.i16")))
+    ht = [each for each in frames if isinstance(each, HtFrame)]
+    assert sum(each.signal == HtSignal(3, 138, False) for each in ht) == 5
+    assert all(each.is_right for each in frames if isinstance(each, WifiFrame))
+    assert len(frames) - len(ht) == 5
