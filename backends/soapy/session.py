@@ -6,7 +6,7 @@ import socket
 from backends.soapy.clock import SampleTime
 from backends.soapy.counted import CountedSender
 from backends.soapy.device import WAYS, Device
-from backends.soapy.library import load_library, why_not
+from backends.soapy.library import load_library, no_radio, why_not
 from backends.soapy.orders import Orders
 from backends.soapy.outgoing import Outgoing
 from backends.soapy.protocol import Open, Opened
@@ -46,6 +46,8 @@ class Session:
     def _made(self, library: Library) -> Device | None:
         wait_s, most_s = RETRY_S
         args = self._settings.device
+        if refused := no_radio(args):
+            raise SettingError(refused)
         while not self._orders.is_over:
             try:
                 return Device(library, args)
