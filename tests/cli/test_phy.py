@@ -68,17 +68,39 @@ def test_noise_has_no_bursts(ctl, tmp_path):
 
 
 @pytest.mark.parametrize("picture", ["spectrum", "constellation"])
-def test_pictures_are_drawn(ctl, tmp_path, picture):
+def test_pictures_are_drawn(ctl, tmp_path, monkeypatch, picture):
+    """In the folder where one is, not among the recordings."""
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
     write_bursts(tmp_path / "rec")
+    recorded = sorted(tmp_path.iterdir())
     code, out, _ = ctl(picture, tmp_path / "rec.sigmf-data")
     assert code == 0
-    path = tmp_path / f"rec.{picture}.png"
-    assert str(path) in out.replace("\n", "")
+    path = tmp_path / "here" / f"rec.{picture}.png"
+    assert f"wrote rec.{picture}.png" in out
+    assert sorted(tmp_path.iterdir()) == recorded
     assert path.read_bytes().startswith(b"\x89PNG")
     assert path.stat().st_size > 8000
     other = tmp_path / "other.png"
     assert ctl(picture, tmp_path / "rec", "--out", other)[0] == 0
     assert other.is_file()
+
+
+@pytest.mark.parametrize(
+    ("file", "options", "told"),
+    [
+        ("rec", (), "; at 2 Msps, by its metadata"),
+        ("raw.i16", ("--rate", "4e6"), "; at 4 Msps, as told"),
+        ("raw.i16", (), "; its rate is not known, so frequencies are in cycles a sample"),
+    ],
+)
+def test_a_spectrum_says_of_which_rate_it_is(ctl, tmp_path, monkeypatch, file, options, told):
+    monkeypatch.chdir(tmp_path)
+    write_bursts(tmp_path / "rec")
+    (tmp_path / "raw.i16").write_bytes((tmp_path / "rec.sigmf-data").read_bytes())
+    code, out, _ = ctl("spectrum", tmp_path / file, *options)
+    assert code == 0
+    assert told in out
 
 
 def test_a_recording_cut_in_mid_sample_is_read_as_far_as_it_goes(ctl, tmp_path):
