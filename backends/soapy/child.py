@@ -12,6 +12,7 @@ import msgspec
 
 from backends.base import Patience, Samples
 from backends.soapy import protocol
+from backends.soapy.chatter import Chatter
 from backends.soapy.protocol import Begin, Failed, FromProcess, Open, Order, Stretch
 from backends.soapy.ring import SampleRing, make_shared
 from backends.soapy.settings import SoapySettings
@@ -38,12 +39,16 @@ class RadioChild:
         memory = [make_shared(rx_samples, "rx"), make_shared(tx_samples, "tx")]
         self.rx = SampleRing(memory[0], rx_samples)
         self.tx = SampleRing(memory[1], tx_samples)
+        self._chatter = Chatter()
         inherited = [control.fileno(), air.fileno(), *memory]
         self._process = subprocess.Popen(
             [sys.executable, "-m", "backends.soapy.process", *map(str, inherited)],
             stdin=subprocess.DEVNULL,
+            stdout=self._chatter.fd,
+            stderr=self._chatter.fd,
             pass_fds=inherited,
         )
+        self._chatter.begin()
         control.close()
         air.close()
         for each in memory:
@@ -143,4 +148,7 @@ class RadioChild:
         code = self._process.returncode
         if self._hangs:
             return "the driver hung"
-        return f"the driver crashed (signal {-code})" if code < 0 else "the radio process ended"
+        if code < 0:
+            return f"the driver crashed (signal {-code})"
+        last = self._chatter.last_line() if code else ""
+        return f"the radio process ended{f' ({last})' if last else ''}"

@@ -42,6 +42,17 @@ def is_driver_missing(library: Library, args: str, error: DriverError) -> bool:
     return bool(driver) and not has_module(library, driver) and "no match" in str(error)
 
 
+def no_radio(args: str) -> str:
+    """Why what `args` names is no radio; empty where it may be one."""
+    if driver_of(args) != "null":
+        return ""
+    return (
+        f'soapy.device: got "{args}", which is built into SoapySDR and is no radio: it neither '
+        "sends nor receives; allowed: a radio's driver, such as driver=hackrf; those here are "
+        "shown by: sdrlinkctl radio probe"
+    )
+
+
 def why_not(library: Library, args: str, error: DriverError) -> str:
     """Why no device could be opened by `args`, and what to do."""
     driver = driver_of(args)

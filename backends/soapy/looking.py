@@ -5,7 +5,7 @@ import sys
 import msgspec
 
 from backends.soapy.device import Device
-from backends.soapy.library import driver_of, has_module, load_library, why_not
+from backends.soapy.library import driver_of, has_module, load_library, no_radio, why_not
 from backends.soapy.surface import RX, TX, DriverError, Library
 from backends.soapy.survey import DeviceSurvey, Survey, WaySurvey
 
@@ -22,6 +22,8 @@ def _look(args: str) -> Survey:
         return Survey(binding="", modules=[], devices=[], notes=[_INSTALL.format(error)])
     modules = library.modules()
     devices, notes = [], []
+    if refused := no_radio(args):
+        return Survey(binding=library.detail, modules=modules, devices=[], notes=[refused])
     for found in library.enumerate(args):
         named = ",".join(
             f"{key}={value}"

@@ -7,7 +7,7 @@ from backends.base import Patience
 from backends.soapy.clock import SampleTime
 from backends.soapy.counted import CountedSender
 from backends.soapy.device import WAYS, Device
-from backends.soapy.library import is_driver_missing, load_library, why_not
+from backends.soapy.library import is_driver_missing, load_library, no_radio, why_not
 from backends.soapy.orders import Orders
 from backends.soapy.outgoing import Outgoing
 from backends.soapy.protocol import Open, Opened
@@ -50,6 +50,8 @@ class Session:
         """The open device; None: the daemon is gone. Raises DriverError."""
         wait_s, most_s = RETRY_S
         args = self._settings.device
+        if refused := no_radio(args):
+            raise HostError(refused)
         if self._patience is Patience.REPLUGGED:
             self._wait_until_away(library)
         while not self._orders.is_over:

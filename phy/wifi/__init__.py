@@ -4,6 +4,7 @@ Nothing of the daemon uses it.
 """
 
 from phy.wifi.bits import RATES, Rate
-from phy.wifi.reception import RATE_HZ, WifiFrame, receive
+from phy.wifi.high_throughput import HtSignal
+from phy.wifi.reception import RATE_HZ, HtFrame, WifiFrame, receive
 
-__all__ = ["RATES", "RATE_HZ", "Rate", "WifiFrame", "receive"]
+__all__ = ["RATES", "RATE_HZ", "HtFrame", "HtSignal", "Rate", "WifiFrame", "receive"]

@@ -3,6 +3,7 @@
 import cmath
 import math
 from collections.abc import Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -18,8 +19,11 @@ from phy.kernels.demodulator import learn_channel
 from phy.kernels.parcel import Parcel
 from phy.numerology import OFDM_64_16
 from phy.wifi.bits import Rate, Signal, has_right_fcs, parse_data, parse_signal
+from phy.wifi.high_throughput import HT_SIG_SYMBOLS, HtSignal, parse_ht_signal
 
 RATE_HZ = 20e6
+HT_LEGACY_MBPS = 6
+"""What 802.11n frames in mixed format say to receivers of 802.11a."""
 
 _GRID = OFDM_64_16
 _SEGMENT = preamble.SEGMENT
@@ -45,7 +49,22 @@ class WifiFrame(NamedTuple):
     cfo_hz: float
 
 
-def receive(samples: NDArray[np.complex64]) -> Iterator[WifiFrame]:
+class HtFrame(NamedTuple):
+    """An 802.11n frame, of which the HT-SIG field alone is read; `start` is as above.
+
+    In mixed format it begins as an 802.11a frame of 6 Mbit/s; in greenfield format it does not.
+    """
+
+    start: int
+    signal: HtSignal
+    is_greenfield: bool
+    snr_db: float
+    cfo_hz: float
+    end: int
+    """Where the preamble says that it is over; in greenfield format the end of HT-SIG."""
+
+
+def receive(samples: NDArray[np.complex64]) -> Iterator[WifiFrame | HtFrame]:
     """The frames in `samples`, complex64 at 20 Msps, in order."""
     at = 0
     for begin in map(int, _repetitions(samples)):
@@ -54,8 +73,10 @@ def receive(samples: NDArray[np.complex64]) -> Iterator[WifiFrame]:
         frame = _read(samples, begin)
         if frame is not None:
             yield frame
-            n_symbols = 1 + frame.rate.n_symbols(len(frame.psdu))
-            at = frame.start + 2 * _GRID.n_fft + n_symbols * _GRID.n_symbol
+            if isinstance(frame, HtFrame):
+                at = frame.end
+                continue
+            at = _end(frame.start, 1 + frame.rate.n_symbols(len(frame.psdu)))
 
 
 def _repetitions(x: NDArray[np.complex64]) -> NDArray[np.int64]:
@@ -72,7 +93,12 @@ def _repetitions(x: NDArray[np.complex64]) -> NDArray[np.int64]:
     return found
 
 
-def _read(samples: NDArray[np.complex64], begin: int) -> WifiFrame | None:
+def _end(start: int, n_symbols: int) -> int:
+    """Behind so many symbols, SIGNAL the first; the frame's first long symbol is at `start`."""
+    return start + 2 * _GRID.n_fft + n_symbols * _GRID.n_symbol
+
+
+def _read(samples: NDArray[np.complex64], begin: int) -> WifiFrame | HtFrame | None:
     training = samples[begin : begin + _WINDOW + _SEGMENT]
     lag = np.vdot(training[:-_SEGMENT], training[_SEGMENT:])
     coarse = cmath.phase(lag) / (2 * math.pi * _SEGMENT)
@@ -85,16 +111,42 @@ def _read(samples: NDArray[np.complex64], begin: int) -> WifiFrame | None:
     signal_window = window + 2 * _GRID.n_fft + _GRID.n_cp
     llr = _llrs(samples, window, signal_window, 1, frequency, channel, Modulation.BPSK, 0)
     signal = parse_signal(llr) if llr is not None else None
-    if signal is None:
-        return None
     # As measured on the training: what follows teaches the channel, not the noise.
     ratio = channel.content.gain / channel.content.no
     snr_db = 10 * math.log10(ratio * _GRID.n_used / _GRID.n_fft)
+    cfo_hz = frequency * RATE_HZ
+    at = partial(_ht_signal, samples, window, signal_window, frequency)
+    if (ht := at(0)) is not None:
+        return HtFrame(start, ht, True, snr_db, cfo_hz, _end(start, HT_SIG_SYMBOLS))
+    if signal is None:
+        return None
+    if signal.rate.mbps == HT_LEGACY_MBPS and (ht := at(1)) is not None:
+        n_symbols = 1 + signal.rate.n_symbols(signal.n_bytes)
+        return HtFrame(start, ht, False, snr_db, cfo_hz, _end(start, n_symbols))
     psdu = _psdu(samples, window, signal_window + _GRID.n_symbol, frequency, channel, signal)
     if psdu is None:
         return None
     right = has_right_fcs(psdu)
-    return WifiFrame(start, signal.rate, psdu, right, snr_db, frequency * RATE_HZ)
+    return WifiFrame(start, signal.rate, psdu, right, snr_db, cfo_hz)
+
+
+def _ht_signal(
+    samples: NDArray[np.complex64],
+    window: int,
+    signal_window: int,
+    frequency: float,
+    first_symbol: int,
+) -> HtSignal | None:
+    """HT-SIG where symbol `first_symbol` behind the training begins; None: there is none."""
+    points = np.zeros((HT_SIG_SYMBOLS, _GRID.n_data), np.complex64)
+    begin = signal_window + first_symbol * _GRID.n_symbol
+    # A channel of its own: these points teach nothing.
+    channel = _channel(samples, window, frequency)
+    llr = _llrs(
+        samples, window, begin, HT_SIG_SYMBOLS, frequency, channel, Modulation.BPSK, first_symbol,
+        points,
+    )  # fmt: skip
+    return None if llr is None else parse_ht_signal(points)
 
 
 def _long_training(
@@ -137,8 +189,12 @@ def _llrs(
     channel: Parcel[Channel],
     modulation: Modulation,
     first_symbol: int,
+    points: NDArray[np.complex64] | None = None,
 ) -> NDArray[np.int16] | None:
-    """LLRs of `n_symbols` from the FFT window at `window` on; None when samples are missing."""
+    """LLRs of `n_symbols` from the FFT window at `window` on; None when samples are missing.
+
+    `points` gets the equalised points, if they are wanted.
+    """
     last = window + (n_symbols - 1) * _GRID.n_symbol + _GRID.n_fft
     if last > len(samples):
         return None
@@ -146,7 +202,7 @@ def _llrs(
     powers = np.empty(n_symbols, np.float32)
     Demodulator(_GRID).demodulate(
         samples[window:last], frequency, 0j, window - origin, modulation, channel, first_symbol,
-        llr, powers,
+        llr, powers, points,
     )  # fmt: skip
     return llr
 

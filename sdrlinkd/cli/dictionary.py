@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 def train_dict(
     bag: Annotated[Path, typer.Argument(help="rosbag2 folder, .mcap, .db3 or .bag")],
     topic: Annotated[str, typer.Argument(help="As it is called in the recording.")],
-    out: Annotated[Path, typer.Option(help="File to write.")] = Path("topic.zdict"),
+    out: Annotated[
+        Path | None, typer.Option(help="File to write; by default odom.zdict for /odom.")
+    ] = None,
     size: Annotated[str, typer.Option(help="Bytes of the dictionary.")] = "8k",
 ) -> None:
     """Train on every other message of a recording, and try it on the rest."""
@@ -44,13 +46,19 @@ def train_dict(
     rest = payloads[1::2] or payloads
     raw = sum(map(len, rest))
     with_it, without = (_total(Deflated(each), rest) for each in (ZstdCompressionDict(made), None))
-    out.write_bytes(made)
+    name = topic.strip("/")
+    out = out or Path(f"{name.replace('/', '_')}.zdict")
+    try:
+        out.write_bytes(made)
+    except OSError as error:
+        raise UserError(f"{out}: cannot be written ({error.strerror})") from None
     typer.echo(
         f"{out}: {len(made)} B from {len(payloads[::2])} messages; {len(rest)} others take "
         f"{100 * with_it / raw:.0f} % of their size with it, {100 * without / raw:.0f} % with zstd "
         "alone"
     )
-    typer.echo(f'use it with: [topic.NAME] compress = "zstd", dictionary = "{out}", at all robots')
+    key = name if name.isidentifier() else f'"{name}"'
+    typer.echo(f'use it with: [topic.{key}] compress = "zstd", dictionary = "{out}", at all robots')
 
 
 def _total(deflated: "Deflated", payloads: list[bytes]) -> int:

@@ -40,7 +40,9 @@ Network = Annotated[int, typer.Option(min=-1, max=7, help="Only bursts of this n
 Grid = Annotated[
     str, typer.Option(help="FFT size/prefix: 64/16, 64/8, 128/16 or 256/32, as in modem.grid.")
 ]
-Out = Annotated[Path | None, typer.Option(help="PNG to write; by default named like FILE.")]
+Out = Annotated[
+    Path | None, typer.Option(help="PNG to write; by default in this folder, named like FILE.")
+]
 
 
 @phys.command()
@@ -148,9 +150,12 @@ def spectrum(
         show_progress(f"spectrum of {file.name}", recording) as progress,
     ):
         measured = spectrum_of(recording, progress)
-    path = out or Path(f"{_stem(file)}.spectrum.png")
+    path = out or _picture_of(file, "spectrum")
     pictures.draw_spectrum(measured, recording.info.rate_hz, file.name, path)
-    console.print(f"wrote {path}", highlight=False, markup=False, soft_wrap=True)
+    console.print(
+        f"wrote {path}; {_rate_told(recording.info.rate_hz, rate)}",
+        highlight=False, markup=False, soft_wrap=True,
+    )  # fmt: skip
 
 
 @phys.command()
@@ -175,7 +180,7 @@ def constellation(
             f"{file}: no burst was found in {recording.info.n_samples} samples; "
             "`sdrlinkctl phy spectrum` shows what is there"
         )
-    path = out or Path(f"{_stem(file)}.constellation.png")
+    path = out or _picture_of(file, "constellation")
     title = f"{file.name}, {len(points.bursts)} bursts"
     pictures.draw_constellation(points, title, path)
     console.print(f"wrote {path}", highlight=False, markup=False, soft_wrap=True)
@@ -258,5 +263,16 @@ def _print_counters(console: Console, counters: dict[str, int], recording: "IqRe
     )
 
 
-def _stem(file: Path) -> str:
-    return str(file).removesuffix(".sigmf-meta").removesuffix(".sigmf-data")
+def _picture_of(file: Path, what: str) -> Path:
+    """In the current folder: that of the recording is the user's data."""
+    stem = file.name.removesuffix(".sigmf-meta").removesuffix(".sigmf-data")
+    return Path(f"{stem}.{what}.png")
+
+
+def _rate_told(rate_hz: float | None, asked: float | None) -> str:
+    if rate_hz is None:
+        return (
+            "its rate is not known, so frequencies are in cycles a sample and times in samples: "
+            "--rate tells it"
+        )
+    return f"at {rate_hz / 1e6:g} Msps, {'as told' if asked else 'by its metadata'}"

@@ -10,7 +10,7 @@ from rich.console import Console
 from sdrlinkd.cli.phy import RecordingFile, SampleType, open_recording, phys, show_progress
 
 if TYPE_CHECKING:
-    from phy.wifi import WifiFrame
+    from phy.wifi import HtFrame, WifiFrame
     from sdrlinkd.iq import IqRecording
     from sdrlinkd.iq.recording import Progress as OnProgress
 
@@ -35,26 +35,36 @@ def decode_wifi(
     type_name: SampleType = "",
     json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
 ) -> None:
-    """802.11a frames in a recording at 20 Msps."""
+    """802.11a frames in a recording at 20 Msps; 802.11n frames are told as such, not read."""
+    from phy.wifi import HtFrame
+
     console = Console(soft_wrap=True)
-    n, n_right = 0, 0
+    n, n_right, n_ht = 0, 0, 0
     with (
         open_recording(file, type_name, 20e6) as recording,
         show_progress(f"decode {file.name}", recording) as progress,
     ):
         for at, frame in _frames(recording, progress):
-            n, n_right = n + 1, n_right + frame.is_right
-            if json:
-                typer.echo(msgspec.json.encode(_as_record(at, frame)))
+            if isinstance(frame, HtFrame):
+                n_ht += 1
+                record, line = _as_ht_record(at, frame), _ht_line(at, frame)
             else:
-                console.print(_line(at, frame), highlight=False, markup=False)
+                n, n_right = n + 1, n_right + frame.is_right
+                record, line = _as_record(at, frame), _line(at, frame)
+            if json:
+                typer.echo(msgspec.json.encode(record))
+            else:
+                console.print(line, highlight=False, markup=False)
         n_samples = recording.info.n_samples
     if not json:
         told = f"{n} frames, {n_right} with right FCS, in {n_samples} samples"
+        told += f"; {n_ht} frames of 802.11n, which are not read" if n_ht else ""
         console.print(told, highlight=False)
 
 
-def _frames(recording: "IqRecording", progress: "OnProgress") -> Iterator[tuple[int, "WifiFrame"]]:
+def _frames(
+    recording: "IqRecording", progress: "OnProgress"
+) -> Iterator[tuple[int, "WifiFrame | HtFrame"]]:
     """(sample at which it begins, frame)."""
     from phy.wifi import receive
 
@@ -78,6 +88,32 @@ def _line(at: int, frame: "WifiFrame") -> str:
         f"FCS {fcs}  SNR {frame.snr_db:.1f} dB  CFO {frame.cfo_hz / 1e3:+.2f} kHz"
     )
     return f"{told}  {_kind(frame.psdu)} {_addresses(frame.psdu)}" if frame.is_right else told
+
+
+def _ht_line(at: int, frame: "HtFrame") -> str:
+    signal = frame.signal
+    width = "40" if signal.is_40_mhz else "20"
+    return (
+        f"{at / 20e6:.6f} s  802.11n {_format(frame)}, MCS {signal.mcs}, {width} MHz  "
+        f"{signal.n_bytes} B, not read  SNR {frame.snr_db:.1f} dB  "
+        f"CFO {frame.cfo_hz / 1e3:+.2f} kHz"
+    )
+
+
+def _format(frame: "HtFrame") -> str:
+    return "HT-greenfield" if frame.is_greenfield else "HT-mixed"
+
+
+def _as_ht_record(at: int, frame: "HtFrame") -> dict[str, object]:
+    return {
+        "sample": at,
+        "format": _format(frame),
+        "mcs": frame.signal.mcs,
+        "mhz": 40 if frame.signal.is_40_mhz else 20,
+        "n_bytes": frame.signal.n_bytes,
+        "snr_db": round(frame.snr_db, 2),
+        "cfo_hz": round(frame.cfo_hz, 1),
+    }
 
 
 def _as_record(at: int, frame: "WifiFrame") -> dict[str, object]:

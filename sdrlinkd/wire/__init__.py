@@ -52,9 +52,9 @@ from sdrlinkd.wire.control import (
     build_stamp,
     parse_records,
 )
-from sdrlinkd.wire.control_entries import ControlEntries, read_control_entries
 from sdrlinkd.wire.later import forwarded, lasting_identity, postponed
 from sdrlinkd.wire.pdu import Entry, Pdu, build, flags, identity, parse
+from sdrlinkd.wire.readable import ControlEntries, read_control_entries
 from sdrlinkd.wire.reassembly import Lost, Partial, Reassembly, ReassemblyLimits
 from sdrlinkd.wire.registry import (
     BROADCAST,

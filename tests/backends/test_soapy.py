@@ -2,6 +2,8 @@
 
 import asyncio
 import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from backends import BackendError, SoapyRadio, SoapySettings, Tuning, TxBurst, TxOutcome, survey
+from backends.soapy.chatter import Chatter
 from backends.soapy.clock import SampleTime
 from backends.soapy.library import driver_of
 from backends.soapy.outgoing import Outgoing
@@ -168,6 +171,41 @@ async def test_a_device_in_use_names_itself():
 
 
 @needs_radio
+@pytest.mark.parametrize("debug", ["", "1"])
+async def test_what_drivers_print_is_shown_to_those_who_ask(monkeypatch, tmp_path, capfd, debug):
+    (tmp_path / "libbroken.so").write_text("no module")
+    path = f"{os.environ['SOAPY_SDR_PLUGIN_PATH']}:{tmp_path}"
+    monkeypatch.setenv("SOAPY_SDR_PLUGIN_PATH", path)
+    monkeypatch.setenv("SDRLINKD_DEBUG", debug)
+    with pytest.raises(BackendError, match="there is no such device"):
+        await radio(",absent=yes").open(TUNING)
+    out, err = capfd.readouterr()
+    assert ("libbroken.so" in out + err) == bool(debug)
+    assert bool(out + err) == bool(debug)
+
+
+def test_of_what_a_process_prints_the_last_line_is_kept():
+    chatter = Chatter()
+    code = (
+        "import sys; print('first'); print('last', file=sys.stderr); sys.stdout.write(5000 * 'U')"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-u", "-c", code], stdout=chatter.fd, stderr=chatter.fd
+    ) as process:
+        chatter.begin()
+        process.wait()
+    assert chatter.last_line().startswith("UUU")
+    assert list(chatter._lines)[:2] == ["first", "last"]
+
+
+@needs_radio
+async def test_the_device_that_is_no_radio_is_told_as_such():
+    null = SoapySettings(device="driver=null,type=null", rate_hz=0.0, frequency_hz=0.0)
+    with pytest.raises(BackendError, match="built into SoapySDR and is no radio"):
+        await SoapyRadio(null, longest_s=0.1).open(TUNING)
+
+
+@needs_radio
 async def test_a_rate_that_the_device_does_not_offer_is_refused():
     with pytest.raises(BackendError, match=r"modem.rate_hz: got 0\.1 Msps .* 0\.2 to 61"):
         await radio(model="usrp").open(Tuning(RATE, 915e6))
@@ -184,6 +222,10 @@ def test_a_survey_tells_what_devices_can_do_and_which_module_is_missing():
     assert not nothing.devices
     assert 'no driver "lime"' in nothing.notes[0]
     assert "soapysdr-module-lms7" in nothing.notes[0]
+    for args in ("driver=null", "driver=null,type=null"):
+        no_radio = survey(args)
+        assert not no_radio.devices
+        assert "is built into SoapySDR and is no radio" in no_radio.notes[0]
     absent = survey("driver=loopback,serial=X")
     assert not absent.devices
     assert "there is no such device" in absent.notes[0]

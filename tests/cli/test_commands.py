@@ -411,7 +411,7 @@ def test_a_policy_that_is_not_allowed_is_refused_and_changes_nothing(
     assert told["old"] == {"depth": 0}
 
 
-def test_a_dictionary_is_trained_from_a_recording(ctl, tmp_path):
+def test_a_dictionary_is_trained_from_a_recording(ctl, tmp_path, monkeypatch):
     words = b"\0\1\0\0the same words over and over, but for number %d"
     messages = [("/odom", "std_msgs/msg/String", i, words % (i % 97)) for i in range(2000)]
     bag = ros2_bag(tmp_path / "bag", StoragePlugin.SQLITE3, messages)
@@ -420,6 +420,13 @@ def test_a_dictionary_is_trained_from_a_recording(ctl, tmp_path):
     )
     assert code == 0
     assert "others take" in out
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = ctl("topics", "train-dict", bag, "/odom", "--size", "2k")
+    assert code == 0
+    assert (tmp_path / "odom.zdict").read_bytes() == (tmp_path / "d").read_bytes()
+    assert '[topic.odom] compress = "zstd", dictionary = "odom.zdict"' in out
+    code, _, err = ctl("topics", "train-dict", bag, "/odom", "--out", "none/d", "--size", "2k")
+    assert (code, err) == (2, "sdrlinkctl: none/d: cannot be written (No such file or directory)\n")
     code, _, err = ctl("topics", "train-dict", bag, "/none", "--out", tmp_path / "d")
     assert code == 2
     assert "/none: not in" in err

@@ -10,7 +10,7 @@ import phy
 from sdrlinkd.cli import run
 from tests.iq.recordings import RATE_HZ, write_bursts
 from tests.phy.signals import noisy, silence
-from tests.phy.wifi_frames import frame, with_fcs
+from tests.phy.wifi_frames import frame, ht_frame, with_fcs
 
 
 @pytest.fixture
@@ -68,17 +68,39 @@ def test_noise_has_no_bursts(ctl, tmp_path):
 
 
 @pytest.mark.parametrize("picture", ["spectrum", "constellation"])
-def test_pictures_are_drawn(ctl, tmp_path, picture):
+def test_pictures_are_drawn(ctl, tmp_path, monkeypatch, picture):
+    """In the folder where one is, not among the recordings."""
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
     write_bursts(tmp_path / "rec")
+    recorded = sorted(tmp_path.iterdir())
     code, out, _ = ctl(picture, tmp_path / "rec.sigmf-data")
     assert code == 0
-    path = tmp_path / f"rec.{picture}.png"
-    assert str(path) in out.replace("\n", "")
+    path = tmp_path / "here" / f"rec.{picture}.png"
+    assert f"wrote rec.{picture}.png" in out
+    assert sorted(tmp_path.iterdir()) == recorded
     assert path.read_bytes().startswith(b"\x89PNG")
     assert path.stat().st_size > 8000
     other = tmp_path / "other.png"
     assert ctl(picture, tmp_path / "rec", "--out", other)[0] == 0
     assert other.is_file()
+
+
+@pytest.mark.parametrize(
+    ("file", "options", "told"),
+    [
+        ("rec", (), "; at 2 Msps, by its metadata"),
+        ("raw.i16", ("--rate", "4e6"), "; at 4 Msps, as told"),
+        ("raw.i16", (), "; its rate is not known, so frequencies are in cycles a sample"),
+    ],
+)
+def test_a_spectrum_says_of_which_rate_it_is(ctl, tmp_path, monkeypatch, file, options, told):
+    monkeypatch.chdir(tmp_path)
+    write_bursts(tmp_path / "rec")
+    (tmp_path / "raw.i16").write_bytes((tmp_path / "rec.sigmf-data").read_bytes())
+    code, out, _ = ctl("spectrum", tmp_path / file, *options)
+    assert code == 0
+    assert told in out
 
 
 def test_a_recording_cut_in_mid_sample_is_read_as_far_as_it_goes(ctl, tmp_path):
@@ -144,6 +166,27 @@ def test_wifi_frames_for_people_and_programs(ctl, wifi_file):
     told = [json.loads(line) for line in out.strip().split("\n")]
     assert [(bytes.fromhex(each["psdu"]), each["mbps"]) for each in told] == sent
     assert [each["fcs"] for each in told] == [True, False, True]
+
+
+def test_frames_of_802_11n_are_told_as_such(ctl, tmp_path):
+    """In mixed format they begin as one of 6 Mbit/s that would be wrong."""
+    parts = [silence(400), ht_frame(3, 138), silence(400), ht_frame(7, 900, True, True)]
+    path = tmp_path / "air.cf32"
+    rng = np.random.default_rng(3)
+    noisy(rng, np.concatenate([*parts, silence(400)]), 28).astype(np.complex64).tofile(path)
+    code, out, _ = ctl("decode-wifi", path)
+    assert code == 0
+    mixed, greenfield, summary = out.strip().split("\n")
+    assert "802.11n HT-mixed, MCS 3, 20 MHz  138 B, not read  SNR" in mixed
+    assert "802.11n HT-greenfield, MCS 7, 40 MHz  900 B, not read  SNR" in greenfield
+    assert summary.startswith("0 frames, 0 with right FCS, in")
+    assert summary.endswith("; 2 frames of 802.11n, which are not read")
+    assert "wrong" not in out
+    _, out, _ = ctl("decode-wifi", path, "--json")
+    told = [json.loads(line) for line in out.strip().split("\n")]
+    assert [(each["format"], each["mcs"], each["mhz"], each["n_bytes"]) for each in told] == [
+        ("HT-mixed", 3, 20, 138), ("HT-greenfield", 7, 40, 900),
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("piece", [3000, 4000, 4500])

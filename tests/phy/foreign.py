@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from tests.phy.ht_frames import high_throughput_frame
 from tests.phy.signals import noise, noisy, silence, turned
-from tests.phy.wifi_frames import frame, with_fcs
+from tests.phy.wifi_frames import frame, ht_frame, with_fcs
 
 
 def echoed(rng, x):
@@ -56,5 +55,5 @@ FOREIGN = {
     "wifi-6": lambda rng: wifi(rng, lambda psdu: frame(psdu, 6), 15),
     "wifi-24": lambda rng: wifi(rng, lambda psdu: frame(psdu, 24), 30),
     "wifi-54": lambda rng: wifi(rng, lambda psdu: frame(psdu, 54), 30),
-    "wifi-n": lambda rng: wifi(rng, high_throughput_frame, 25),
+    "wifi-n": lambda rng: wifi(rng, lambda psdu: ht_frame(1, len(psdu)), 25),
 }

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from phy.wifi import RATES, receive
-from tests.phy.ht_frames import high_throughput_frame
+from phy.wifi import RATES, HtSignal, WifiFrame, receive
 from tests.phy.signals import noise, noisy, silence, turned
-from tests.phy.wifi_frames import frame, with_fcs
+from tests.phy.wifi_frames import frame, ht_frame, with_fcs
 
 SEED = 53
 
@@ -59,6 +58,38 @@ def test_what_is_cut_or_no_frame_is_none():
     assert list(receive(silence(3))) == []
 
 
+@pytest.mark.parametrize("greenfield", [False, True], ids=["mixed", "greenfield"])
+@pytest.mark.parametrize(
+    ("mcs", "n_bytes", "wide"), [(0, 1, False), (7, 65535, True), (76, 138, False)]
+)
+def test_frames_of_802_11n_are_told_as_such(greenfield, mcs, n_bytes, wide):
+    rng = np.random.default_rng(SEED)
+    parts = [silence(300)]
+    for _ in range(3):
+        sent = ht_frame(mcs, n_bytes, wide, greenfield)
+        parts += [turned(sent, -0.003, rng.random()), silence(500)]
+    psdu = psdus(rng, 1)[0]
+    parts += [frame(psdu, 6), silence(200)]
+    *got, last = receive(noisy(rng, np.concatenate(parts), 15))
+    assert [(each.signal, each.is_greenfield) for each in got] == [
+        (HtSignal(mcs, n_bytes, wide), greenfield)
+    ] * 3
+    for each in got:
+        assert each.cfo_hz == pytest.approx(-0.003 * 20e6, abs=1000)
+        assert each.snr_db == pytest.approx(15, abs=1.5)
+    # What is said of one does not spill over to the next.
+    assert last.psdu == psdu
+
+
+def test_a_frame_of_6_mbit_whatever_is_in_it_is_none_of_802_11n():
+    rng = np.random.default_rng(SEED)
+    sent = psdus(rng, 60)
+    x = np.concatenate([np.concatenate((silence(300), frame(psdu, 6))) for psdu in sent])
+    got = list(receive(noisy(rng, np.concatenate((x, silence(200))), 8)))
+    assert [each.psdu for each in got if isinstance(each, WifiFrame)] == sent
+    assert len(got) == len(sent)
+
+
 # Annex G's message with the FCS that the standard prints (tables G.1, of 2007 and later).
 MESSAGE = (
     bytes.fromhex("0402002e006008cd37a60020d6013cf1006008ad3baf0000")
@@ -91,10 +122,3 @@ def test_frames_as_a_radio_records_them_have_the_right_fcs(mbps):
     read = (coarse.astype(np.float32) / 32768).view(np.complex64)
     got = [(each.psdu, each.is_right, each.rate.mbps) for each in receive(read)]
     assert got == [(psdu, True, mbps) for psdu in sent]
-
-
-def test_a_high_throughput_frame_is_not_taken_for_one_of_ours():
-    """802.11n begins as 802.11a does; what follows its SIGNAL is another code."""
-    rng = np.random.default_rng(SEED)
-    x = np.concatenate((silence(100), high_throughput_frame(psdus(rng, 1)[0]), silence(99)))
-    assert not any(each.is_right for each in receive(noisy(rng, x, 25)))

@@ -77,7 +77,7 @@ def in_time(carriers):
 
 
 def symbol(bits, per_carrier, number, turn=1):
-    """One OFDM symbol with its prefix, its data times `turn`; SIGNAL is number 0."""
+    """One OFDM symbol with its prefix; SIGNAL is number 0. Data are turned by `turn`."""
     spread = interleaved(bits, per_carrier)
     groups = [spread[i : i + per_carrier] for i in range(0, len(spread), per_carrier)]
     carriers = {k: turn * point(group) for k, group in zip(DATA, groups, strict=True)}
@@ -96,19 +96,50 @@ def with_fcs(body):
     return body + zlib.crc32(body).to_bytes(4, "little")
 
 
-def beginning(code, length):
-    """Parts of the training and SIGNAL."""
+def training():
+    """Ten short segments, and the long symbols with their prefix."""
     short = in_time({k: (13 / 6) ** 0.5 * (1 + 1j) * sign for k, sign in SHORT.items()})
     long = in_time(LONG)
-    head = [int(bit) for bit in f"{code:04b}0"] + [length >> i & 1 for i in range(12)]
+    return [np.tile(short, 3)[:160], long[32:], long, long]
+
+
+def signal(code, n_bytes):
+    """SIGNAL's symbol."""
+    head = [int(bit) for bit in f"{code:04b}0"] + [n_bytes >> i & 1 for i in range(12)]
     head += [sum(head) % 2] + [0] * 6
-    return [np.tile(short, 3)[:160], long[32:], long, long, symbol(coded(head, "11"), 1, 0)]
+    return symbol(coded(head, "11"), 1, 0)
+
+
+def ht_bits(mcs, n_bytes, wide):
+    """HT-SIG's 48 bits with its CRC, a long division (19.3.9.4.4)."""
+    bits = [mcs >> i & 1 for i in range(7)] + [int(wide)] + [n_bytes >> i & 1 for i in range(16)]
+    bits += [1, 1, 1, 0, 0, 0, 0, 0, 0, 0]
+    rest = [bit ^ (i < 8) for i, bit in enumerate(bits + [0] * 8)]
+    for i in range(len(bits)):
+        if rest[i]:
+            for power in (8, 2, 1, 0):
+                rest[i + 8 - power] ^= 1
+    return bits + [1 - bit for bit in rest[-8:]] + [0] * 6
+
+
+def ht_frame(mcs, n_bytes, wide=False, greenfield=False, n_symbols=7):
+    """An 802.11n frame whose data, and the training for it, are any symbols."""
+    ht = coded(ht_bits(mcs, n_bytes, wide), "11")
+    parts, first = training(), 0
+    if not greenfield:
+        # At 6 Mbit/s as long as what follows.
+        parts.append(signal(RATES[6][0], 3 * (2 + n_symbols) - 3))
+        first = 1
+    parts += [symbol(ht[48 * i : 48 * i + 48], 1, first + i, turn=1j) for i in range(2)]
+    rng = np.random.default_rng(mcs)
+    parts += [symbol(list(rng.integers(0, 2, 48)), 1, first + 2 + i) for i in range(n_symbols)]
+    return (np.concatenate(parts) * 64 / np.sqrt(52)).astype(np.complex64)
 
 
 def frame(psdu, mbps, seed=(1, 0, 1, 1, 1, 0, 1)):
     """Samples of a whole frame, at mean power 1."""
     code, per_carrier, pattern = RATES[mbps]
-    parts = beginning(code, len(psdu))
+    parts = [*training(), signal(code, len(psdu))]
     data = [0] * 16 + [octet >> i & 1 for octet in psdu for i in range(8)]
     n_coded = 48 * per_carrier
     n_data = n_coded * len(pattern) // (2 * pattern.count("1"))

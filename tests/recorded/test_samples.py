@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from phy.ldpc import QuasiCyclic, Segmentation, encode
-from phy.wifi import receive
+from phy.wifi import HtFrame, HtSignal, WifiFrame, receive
 from tests.phy.quiet import quiet
 
 
@@ -54,6 +54,15 @@ def test_frames_of_another_receiver_are_read(data):
     frames = list(receive(samples(data / "iq/futuresdr_wlan_bpsk_1-2_15db.cf32")))
     assert frames
     assert all(each.is_right and each.rate.mbps == 6 for each in frames)
+
+
+def test_frames_of_802_11n_on_the_air_are_told_and_those_beside_them_read(data):
+    """MCS 3 is 26 Mbit/s; the block acknowledgements between them are 802.11a."""
+    frames = list(receive(samples(data / "iq/wifi_11n_26mbps_radiated_20M.i16")))
+    ht = [each for each in frames if isinstance(each, HtFrame)]
+    assert sum(each.signal == HtSignal(3, 138, False) for each in ht) == 5
+    assert all(each.is_right for each in frames if isinstance(each, WifiFrame))
+    assert len(frames) - len(ht) == 5
 
 
 def test_codewords_made_elsewhere_are_ours(data):
