@@ -138,7 +138,7 @@ class ModemLink:
             kind=self._kind,
             state="down" if self._is_gone else self._state,
             detail=f"{phy.MCS_TABLE[params.mcs].name}, {params.rate_hz / 1e6:g} Msps, "
-            f"CFO up to {params.searched_cfo_hz / 1e3:.3g} kHz, {self._radio.detail}",
+            f"{self._radio.detail}, CFO up to {params.searched_cfo_hz / 1e3:.3g} kHz",
             max_cfo_hz=round(params.searched_cfo_hz, 3),
             counters={
                 **self._radio.counters,
