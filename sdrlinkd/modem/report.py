@@ -26,7 +26,8 @@ def modem_report(
     return CarrierReport(
         kind=kind,
         state=state,
-        detail=f"{phy.MCS_TABLE[params.mcs].name}, {params.rate_hz / 1e6:g} Msps, {radio.detail}",
+        detail=f"{phy.MCS_TABLE[params.mcs].name}, {params.rate_hz / 1e6:g} Msps, {radio.detail}, "
+        f"CFO up to {params.searched_cfo_hz / 1e3:.3g} kHz",
         max_cfo_hz=round(params.searched_cfo_hz, 3),
         reason=reason,
         level_dbfs=None if levels is None else round(levels.power_dbfs, 1),
