@@ -103,6 +103,7 @@ async def _open(
     chrony = _chrony(setup, stack)
     node = Node(setup, link, pdu_link, open_bus, _transforms(setup), headers, stops, chrony)
     stack.callback(node.bus.close)
+    policies.announce = node.bus.announce
     control = Control(context, directory)
     stack.callback(control.close)
     control.serve(_verbs(setup, node, control, policies, reload))
