@@ -126,7 +126,7 @@ class Bus:
         """These policies are in force now, by topic id: producers learn what that changes."""
         self._welcome = announcement(self._setup, policies, self._boot)
         self._out.setsockopt(zmq.XPUB_WELCOME_MSG, b"\0" + self._welcome)
-        self._undropped.send([b"\0" + self._welcome])
+        self._undropped.send(b"", [b"\0" + self._welcome])
 
     def tell(self, verdict: Verdict) -> None:
         """What became of a message whose producer wants to know."""
@@ -135,7 +135,9 @@ class Bus:
 
     def _tell(self, told: envelope.Receipt) -> None:
         frame = envelope.VERSION_BYTE + msgspec.msgpack.encode(told)
-        self._undropped.send([RECEIPT_PREFIX + told.id.encode() + b"\0", frame])
+        topic = RECEIPT_PREFIX + told.id.encode() + b"\0"
+        # Our clients' names are a producer's and a number.
+        self._undropped.send(topic.rpartition(b".")[0], [topic, frame])
 
     def tap(self, direction: str, data: bytes) -> None:
         """Show a PDU to those who watch."""
@@ -212,4 +214,4 @@ class Bus:
             self.has_consumer.set()
 
     def _acknowledge(self, topic: bytes) -> None:
-        self._undropped.send([topic, self._welcome])
+        self._undropped.send(topic, [topic, self._welcome])

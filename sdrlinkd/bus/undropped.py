@@ -4,6 +4,7 @@ import asyncio
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 
 import zmq
 
@@ -11,40 +12,59 @@ RETRY_S = 0.001
 STUCK_S = 1.0
 """Whoever has not read for so long loses what is for it, as with messages."""
 
+Frames = Sequence[bytes]
+
+
+@dataclass(slots=True)
+class _Lane:
+    waiting: deque[Frames] = field(default_factory=deque)
+    moved_at: float = 0.0
+    is_stuck: bool = False
+
 
 class Undropped:
-    """Sends on an XPUB socket and waits where a subscriber's queue is full; order is kept.
+    """Sends on an XPUB socket, and waits while a subscriber's queue is full.
 
     ZeroMQ drops what such a queue has no room for: right for messages, which are numbered, and
-    wrong for an answer that somebody waits for. `sent` is called after each use of the socket.
+    wrong for an answer that somebody waits for. Order is kept within a lane; a subscriber that does
+    not read holds up its lane alone, and that for STUCK_S at most. `used` is called after each use
+    of the socket.
     """
 
     def __init__(
         self,
         loop: asyncio.AbstractEventLoop,
         socket: zmq.Socket[bytes],
-        sent: Callable[[], None],
+        used: Callable[[], None],
     ) -> None:
         self._loop = loop
         self._socket = socket
-        self._sent = sent
-        self._waiting: deque[Sequence[bytes]] = deque()
-        self._stuck_since: float | None = None
+        self._used = used
+        self._lanes: dict[bytes, _Lane] = {}
+        """Those whose subscriber's queue was full."""
         self._retry: asyncio.TimerHandle | None = None
 
-    def send(self, frames: Sequence[bytes]) -> None:
-        """At once, or as soon as there is room."""
-        self._waiting.append(frames)
-        if self._retry is None:
-            self._send_waiting()
+    def send(self, name: bytes, frames: Frames) -> None:
+        """In lane `name`: at once, or as soon as there is room."""
+        lane = self._lanes.get(name)
+        if lane is not None and not lane.is_stuck:
+            lane.waiting.append(frames)
+        elif self._fits(frames):
+            self._lanes.pop(name, None)
+        elif lane is not None:
+            self._socket.send_multipart(frames, zmq.NOBLOCK)
+        else:
+            self._lanes[name] = _Lane(deque([frames]), time.monotonic())
+            if self._retry is None:
+                self._retry = self._loop.call_later(RETRY_S, self._send_waiting)
+        self._used()
 
     def close(self, at_most_s: float) -> None:
         """Send what waits, for at most `at_most_s`."""
         deadline = time.monotonic() + at_most_s
-        while self._waiting and time.monotonic() < deadline:
+        while self._retry is not None and time.monotonic() < deadline:
+            time.sleep(RETRY_S)
             self._send_waiting()
-            if self._waiting:
-                time.sleep(RETRY_S)
         if self._retry is not None:
             self._retry.cancel()
 
@@ -52,22 +72,32 @@ class Undropped:
         if self._retry is not None:
             self._retry.cancel()
             self._retry = None
-        is_stuck = self._stuck_since is not None and (
-            time.monotonic() - self._stuck_since > STUCK_S
-        )
-        # Only for these: a message must not wait for the slowest of its consumers.
-        self._socket.setsockopt(zmq.XPUB_NODROP, int(not is_stuck))
-        try:
-            while self._waiting:
-                self._socket.send_multipart(self._waiting[0], zmq.NOBLOCK)
-                self._waiting.popleft()
-                if not is_stuck:
-                    self._stuck_since = None
-            self._stuck_since = None
-        except zmq.Again:
-            if self._stuck_since is None:
-                self._stuck_since = time.monotonic()
+        for name, lane in list(self._lanes.items()):
+            self._advance(lane)
+            if not lane.waiting and not lane.is_stuck:
+                del self._lanes[name]
+        if any(lane.waiting for lane in self._lanes.values()):
             self._retry = self._loop.call_later(RETRY_S, self._send_waiting)
+        self._used()
+
+    def _advance(self, lane: _Lane) -> None:
+        now, waiting = time.monotonic(), lane.waiting
+        while waiting and self._fits(waiting[0]):
+            waiting.popleft()
+            lane.moved_at = now
+        if now - lane.moved_at > STUCK_S:
+            lane.is_stuck = True
+            while waiting:
+                self._socket.send_multipart(waiting.popleft(), zmq.NOBLOCK)
+
+    def _fits(self, frames: Frames) -> bool:
+        """Whether all its subscribers had room, and so have it."""
+        # Not for messages: those do not wait for the slowest of their consumers.
+        self._socket.setsockopt(zmq.XPUB_NODROP, 1)
+        try:
+            self._socket.send_multipart(frames, zmq.NOBLOCK)
+        except zmq.Again:
+            return False
         finally:
             self._socket.setsockopt(zmq.XPUB_NODROP, 0)
-        self._sent()
+        return True

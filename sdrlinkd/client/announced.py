@@ -86,9 +86,10 @@ def unknown_topic(name: str, known: Iterable[str]) -> str:
     from difflib import get_close_matches
 
     names = list(known)
-    # Of `odom` and `/robot_9/odom`, the last part says more than the whole.
+    # Of `odom`, the last part says more than the whole.
+    by_last_part = {_last_part(each): each for each in names}
     close = get_close_matches(name, names, 1) or [
-        each for each in names if each.rpartition("/")[2] == name.rpartition("/")[2]
+        by_last_part[each] for each in get_close_matches(_last_part(name), by_last_part, 1)
     ]
     hint = f" did you mean {close[0]}?" if close else ""
     more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
@@ -109,6 +110,10 @@ def too_large(name: str, size: int, most: int, key: str) -> str:
 def wrong_type(name: str, given: str, registered: str) -> str:
     """In words: the registry has another."""
     return f"type: got {_shown(given)}; allowed: {registered}, which {name} has in the registry"
+
+
+def _last_part(name: str) -> str:
+    return name.rpartition("/")[2]
 
 
 def _shown(value: object) -> str:

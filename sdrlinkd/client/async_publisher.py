@@ -107,6 +107,8 @@ class AsyncPublisher(AsyncSocket):
             if left_s <= 0:
                 return None
             await self._until(lambda: awaited.has_come, min(left_s, STILL_THERE_S))
+        # Who asks again and again lets others go on.
+        await asyncio.sleep(0)
         return None
 
     async def wait_for_daemon(self, timeout_s: float | None = None) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import zmq.asyncio
 
-from sdrlinkd.client.endpoint import LINGER_MS
+from sdrlinkd.client.blocking_socket import LINGER_MS
 
 if TYPE_CHECKING:
     from typing_extensions import Self

@@ -7,7 +7,7 @@ from typing import Any
 
 import zmq
 
-from sdrlinkd.client.endpoint import Endpoint
+from sdrlinkd.client.blocking_socket import Endpoint
 from sdrlinkd.client.errors import no_daemon
 from sdrlinkd.client.flatmap import Value, pack_map, unpack
 from sdrlinkd.client.paths import CONTROL_SOCKET, chosen_dir, is_there

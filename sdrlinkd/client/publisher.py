@@ -8,7 +8,7 @@ from types import TracebackType
 
 import zmq
 
-from sdrlinkd.client.endpoint import Endpoint
+from sdrlinkd.client.blocking_socket import Endpoint
 from sdrlinkd.client.errors import no_daemon, restarted
 from sdrlinkd.client.messages import Receipt, sync_frames
 from sdrlinkd.client.paths import IN_SOCKET, OUT_SOCKET, chosen_dir

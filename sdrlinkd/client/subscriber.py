@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import zmq
 
-from sdrlinkd.client.endpoint import Endpoint
+from sdrlinkd.client.blocking_socket import Endpoint
 from sdrlinkd.client.errors import no_daemon
 from sdrlinkd.client.messages import Message, decode_in, new_ack_topic, topic_filter
 from sdrlinkd.client.paths import OUT_SOCKET, chosen_dir
