@@ -6,6 +6,7 @@
     │   ├── RegistryError    a line of the topic registry
     │   ├── BusError         sockets, runtime directory, a second instance, no daemon
     │   └── BagError         a recording that cannot be read
+    ├── CdrError             bytes that are no message of their type, as any program may send
     ├── PduError             bytes a peer put on the air; counted by `reason`, never logged as ours
     └── EnvelopeError        a bus message that breaks the envelope; counted, the next one works
 
@@ -35,6 +36,10 @@ class BusError(UserError):
 
 class BagError(UserError):
     """A recording that cannot be read, or only in part."""
+
+
+class CdrError(SdrlinkError):
+    """A payload that is no message of its type; the message says why not."""
 
 
 class PduError(SdrlinkError):
