@@ -14,6 +14,7 @@ from sdrlinkd.client import (
     Publisher,
     Subscriber,
     pack_map,
+    producer,
 )
 from tests.conftest import ETC
 from tests.waiting import wait_for
@@ -152,7 +153,14 @@ def registry_of(folder, *names):
     return path
 
 
-def test_a_daemon_with_another_registry_is_believed(start_daemon, restart, tmp_path):
+@pytest.fixture(params=["looks", "only asks"])
+def looking(request, monkeypatch):
+    """A producer that has not looked yet, after a restart, asks before it refuses."""
+    if request.param == "only asks":
+        monkeypatch.setattr(producer, "LOOK_S", 1e9)
+
+
+def test_a_daemon_with_another_registry_is_believed(start_daemon, restart, tmp_path, looking):
     registry = registry_of(tmp_path, "one", "two")
     daemon = start_daemon(f'registry = "{registry}"\n')
     with Publisher(daemon.directory) as out:
@@ -168,7 +176,7 @@ def test_a_daemon_with_another_registry_is_believed(start_daemon, restart, tmp_p
 
 
 async def test_a_daemon_with_another_registry_is_believed_in_asyncio(
-    start_daemon, restart, tmp_path
+    start_daemon, restart, tmp_path, looking
 ):
     registry = registry_of(tmp_path, "one", "two")
     daemon = start_daemon(f'registry = "{registry}"\n')
