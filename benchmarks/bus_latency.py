@@ -42,7 +42,7 @@ def _through_daemon(messages: int) -> list[float]:
         )
         try:
             with (
-                Subscriber("/rx_robot_1/odom", directory=folder, timeout_s=30) as subscriber,
+                Subscriber("/rx_robot_1/odom", runtime_dir=folder, timeout_s=30) as subscriber,
                 Publisher(folder) as publisher,
             ):
                 return _paced(

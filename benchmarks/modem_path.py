@@ -99,7 +99,7 @@ def _latencies(seed: int, messages: int, backend: str) -> list[float]:
         )
         try:
             with (
-                Subscriber("/rx_robot_1/odom", directory=folder, timeout_s=120) as subscriber,
+                Subscriber("/rx_robot_1/odom", runtime_dir=folder, timeout_s=120) as subscriber,
                 Publisher(folder) as publisher,
             ):
                 _wait_until_up(directory)

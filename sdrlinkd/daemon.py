@@ -138,6 +138,7 @@ async def _open(
     chrony = _chrony(setup, stack)
     node = Node(setup, link, opening, open_bus, _transforms(setup), headers, stops, chrony)
     stack.callback(node.bus.close)
+    policies.announce = node.bus.announce
     control = Control(context, directory)
     stack.callback(control.close)
     reloading = Reloading(setup, reload, policies, opening)

@@ -8,6 +8,7 @@
     │   └── BagError         a recording that cannot be read
     ├── LinkAbsentError      what carries the PDUs is not there now; it is tried again
     ├── LinkRefusedError     it is there and does not take its settings
+    ├── CdrError             bytes that are no message of their type, as any program may send
     ├── PduError             bytes a peer put on the air; counted by `reason`, never logged as ours
     └── EnvelopeError        a bus message that breaks the envelope; counted, the next one works
 
@@ -47,6 +48,10 @@ class LinkRefusedError(SdrlinkError):
     """A radio or hub that is there and does not take its settings; the message cites key, given and
     allowed.
     """
+
+
+class CdrError(SdrlinkError):
+    """A payload that is no message of its type; the message says why not."""
 
 
 class PduError(SdrlinkError):

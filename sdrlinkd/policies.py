@@ -1,7 +1,7 @@
 """Policies in force: those of the file, and what was set since."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import msgspec
@@ -24,12 +24,15 @@ class Policies:
         self._link = link
         self.changed: dict[int, set[str]] = {}
         """Keys by topic id that were set since the file was read."""
+        self.announce: Callable[[Mapping[int, TopicPolicy]], None] | None = None
+        """Told of the policies in force when they have changed."""
         link.set_policies(setup.policies)
 
     def reload(self, policies: Mapping[int, TopicPolicy]) -> None:
         """Those of the file again."""
         self.changed.clear()
         self._link.set_policies(policies)
+        self._announce()
 
     def topic_id(self, name: str) -> int:
         """By its bus name or registry name. Raises UserError."""
@@ -57,6 +60,7 @@ class Policies:
         self.changed.setdefault(topic_id, set()).update(changes)
         # As the link has it, not as we gave it.
         new = self._link.sender.policy(topic_id)
+        self._announce()
         told = {key: getattr(new, key) for key in changes}
         log.info("policy of %s: %s", self._setup.registry.topics[topic_id].name, told)
         return {
@@ -64,3 +68,8 @@ class Policies:
             "old": {key: getattr(old, key) for key in changes},
             "new": told,
         }
+
+    def _announce(self) -> None:
+        if self.announce is not None:
+            topics = self._setup.registry.topics
+            self.announce({topic.id: self._link.sender.policy(topic.id) for topic in topics})

@@ -40,7 +40,7 @@ def measure(hz: float, seconds: float, airtime_s: float) -> Found:
         with (
             Publisher(one) as out_1,
             Publisher(two) as out_2,
-            Subscriber("/rx_robot_1/load", directory=two) as heard,
+            Subscriber("/rx_robot_1/load", runtime_dir=two) as heard,
             ControlClient(one) as control_1,
             ControlClient(two) as control_2,
         ):

@@ -166,7 +166,7 @@ def _play(ends: Ends, flows: list[Flow], seed: int) -> tuple[list[Trace], float]
     ended = threading.Event()
 
     def listen(ready: threading.Event) -> None:
-        with Subscriber(*[f"/rx_robot_1/{f.name}" for f in flows], directory=ends.hears) as ear:
+        with Subscriber(*[f"/rx_robot_1/{f.name}" for f in flows], runtime_dir=ends.hears) as ear:
             ready.set()
             while not ended.is_set():
                 message = ear.receive(0.2)

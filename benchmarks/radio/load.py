@@ -170,6 +170,6 @@ def _refill(
 
 
 def _consume(folder: Path, stop: threading.Event) -> None:
-    with Subscriber("*", directory=folder) as heard:
+    with Subscriber("*", runtime_dir=folder) as heard:
         while not stop.is_set():
             heard.receive(REFILL_S)

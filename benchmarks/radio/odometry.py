@@ -110,7 +110,7 @@ def _play(robots: Pair, seed: int, robot: int, messages: list[bytes]) -> Flow:
     other = next(each for each in ROBOTS if each != robot)
     begin = time.monotonic() + np.random.default_rng(seed + robot).uniform(0, PERIOD_S)
     with (
-        Subscriber(f"/rx_robot_{robot}/odom", directory=robots.folders[other]) as ear,
+        Subscriber(f"/rx_robot_{robot}/odom", runtime_dir=robots.folders[other]) as ear,
         Publisher(robots.folders[robot]) as out,
     ):
         for i, cdr in enumerate(messages):

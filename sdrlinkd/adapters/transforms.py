@@ -5,6 +5,7 @@ from typing import Any
 
 from sdrlinkd.adapters.typestore import from_cdr, ros2_types, to_cdr
 from sdrlinkd.config import TransformParams
+from sdrlinkd.errors import CdrError
 
 TYPE = "tf2_msgs/msg/TFMessage"
 
@@ -21,7 +22,7 @@ class Transforms:
         """(what is to be sent now, ""), or (None, the ledger's reason)."""
         try:
             message = from_cdr(payload, TYPE)
-        except Exception:  # the library's generated code raises whatever it meets
+        except CdrError:
             return None, "tx_bad_transform"
         wanted = [each for each in message.transforms if self._wants(each.child_frame_id)]
         if not wanted:

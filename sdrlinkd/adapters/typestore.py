@@ -7,7 +7,7 @@ from rosbags.convert.converter import default_message, is_same_wireformat, migra
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from sdrlinkd.errors import UserError
+from sdrlinkd.errors import CdrError, UserError
 
 
 @cache
@@ -27,8 +27,11 @@ def to_cdr(message: object, kind: str) -> bytes:
 
 
 def from_cdr(data: bytes, kind: str) -> Any:  # noqa: ANN401
-    """The message in CDR bytes."""
-    return ros2_types().deserialize_cdr(data, kind)
+    """The message in CDR bytes. Raises CdrError for what is not valid CDR of that type."""
+    try:
+        return ros2_types().deserialize_cdr(data, kind)
+    except Exception as error:  # the library's generated code raises whatever it meets
+        raise CdrError(f"not valid CDR of {kind}: {str(error).rstrip('.')}") from None
 
 
 def empty(kind: str) -> Any:  # noqa: ANN401

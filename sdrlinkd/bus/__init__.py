@@ -1,6 +1,7 @@
 """The local ZeroMQ bus of one daemon; the document beside this file is its contract."""
 
-from sdrlinkd.bus.bus import PDU_TAP, Bus, Ingress
+from sdrlinkd.bus.bus import PDU_TAP, Bus
+from sdrlinkd.bus.intake import Ingress
 from sdrlinkd.bus.sockets import RuntimeDirectory
 
 __all__ = ["PDU_TAP", "Bus", "Ingress", "RuntimeDirectory"]

@@ -1,15 +1,18 @@
 """The local bus: messages in from producers, messages out to consumers."""
 
 import asyncio
+import secrets
 import time
-from typing import Protocol
+from collections.abc import Mapping
 
 import msgspec
 import zmq
 
-from sdrlinkd import __version__
 from sdrlinkd.bus import envelope
+from sdrlinkd.bus.announcement import announcement
+from sdrlinkd.bus.intake import Ingress, Intake
 from sdrlinkd.bus.sockets import RuntimeDirectory
+from sdrlinkd.bus.undropped import Undropped
 from sdrlinkd.client import (
     ACK_PREFIX,
     IN_PUB_SOCKET,
@@ -19,15 +22,7 @@ from sdrlinkd.client import (
     SYNC_PREFIX,
 )
 from sdrlinkd.config import Setup
-from sdrlinkd.errors import EnvelopeError
-from sdrlinkd.link import (
-    AS_CONFIGURED,
-    CDR_HEADER_SIZE,
-    QOS_BY_LABEL,
-    Delivered,
-    Overrides,
-    Verdict,
-)
+from sdrlinkd.link import Delivered, TopicPolicy, Verdict
 from sdrlinkd.localtime import UNKNOWN, LocalTimes
 from sdrlinkd.reading import SocketReader
 from sdrlinkd.reports import BusReport
@@ -44,28 +39,6 @@ LAST_MESSAGES_S = 0.3
 PDU_TAP = b"\0pdu\0"
 
 
-class Ingress(Protocol):
-    """Who takes messages from the bus."""
-
-    def submit(
-        self,
-        topic_id: int,
-        payload: bytes,
-        overrides: Overrides = AS_CONFIGURED,
-        published_ns: int | None = None,
-    ) -> None:
-        """A good message; when it was published, in ns since 1970, if its producer says so."""
-
-    def refuse(
-        self,
-        reason: str,
-        topic_id: int | None = None,
-        receipt: str = "",
-        dst: int | None = None,
-    ) -> None:
-        """A message that cannot be taken, and the ledger's reason; the rest is as in Overrides."""
-
-
 class Bus:
     """Sockets `in`, `in-pub` and `out` of one daemon."""
 
@@ -78,22 +51,19 @@ class Bus:
     ) -> None:
         self._context = context
         self._directory = directory
-        self._topic_ids = {name.encode() + b"\0": id_ for name, id_ in setup.topics_in.items()}
+        self._setup = setup
+        self._intake = Intake(setup, ingress, self._tell)
         self._names_in = {id_: name for name, id_ in setup.topics_in.items()}
         self._types = {topic.id: topic.type for topic in setup.registry.topics}
         self._republished_as = setup.republished_as
-        self._max_message_bytes = setup.config.bus.max_message_bytes
-        self._ingress = ingress
         self._frames_out: dict[tuple[int, int], bytes] = {}
         self._received = 0
         self._published = 0
-        self._bad_last = ""
         self._taps = 0
         self.has_consumer = asyncio.Event()
         """Set once somebody has subscribed to messages from the air."""
-        self._welcome = envelope.VERSION_BYTE + msgspec.msgpack.encode(
-            envelope.Welcome("sdrlinkd", __version__, [1], list(setup.topics_in))
-        )
+        self._boot = secrets.token_hex(4)
+        self._welcome = announcement(setup, setup.policies, self._boot)
         loop = asyncio.get_running_loop()
         self._sockets: list[zmq.Socket[bytes]] = []
         self._pull = self._bind(zmq.PULL, IN_SOCKET, {zmq.RCVHWM: IN_HWM})
@@ -110,6 +80,7 @@ class Bus:
         self._out_reader = SocketReader(
             loop, self._out, self._out.recv_multipart, self._take_subscription
         )
+        self._undropped = Undropped(loop, self._out, self._out_reader.recheck)
 
     @property
     def is_tapped(self) -> bool:
@@ -151,13 +122,22 @@ class Bus:
         self._out.send_multipart(envelope.encode(self._topic_out(src, topic_id), header, payload))
         self._out_reader.recheck()
 
+    def announce(self, policies: Mapping[int, TopicPolicy]) -> None:
+        """These policies are in force now, by topic id: producers learn what that changes."""
+        self._welcome = announcement(self._setup, policies, self._boot)
+        self._out.setsockopt(zmq.XPUB_WELCOME_MSG, b"\0" + self._welcome)
+        self._undropped.send(b"", [b"\0" + self._welcome])
+
     def tell(self, verdict: Verdict) -> None:
         """What became of a message whose producer wants to know."""
         name = self._names_in[verdict.topic_id]
-        told = envelope.Receipt(verdict.receipt, name, *verdict[2:])
+        self._tell(envelope.Receipt(verdict.receipt, name, *verdict[2:]))
+
+    def _tell(self, told: envelope.Receipt) -> None:
         frame = envelope.VERSION_BYTE + msgspec.msgpack.encode(told)
-        self._out.send_multipart([RECEIPT_PREFIX + told.id.encode() + b"\0", frame])
-        self._out_reader.recheck()
+        topic = RECEIPT_PREFIX + told.id.encode() + b"\0"
+        # Our clients' names are a producer's and a number.
+        self._undropped.send(topic.rpartition(b".")[0], [topic, frame])
 
     def tap(self, direction: str, data: bytes) -> None:
         """Show a PDU to those who watch."""
@@ -196,6 +176,7 @@ class Bus:
     def close(self) -> None:
         """Close all sockets; consumers get what ZeroMQ already has for them."""
         self._close_ingress()
+        self._undropped.close(1e-3 * LINGER_MS)
         self._out_reader.close()
         for socket in self._sockets:
             socket.close(linger=LINGER_MS)
@@ -207,7 +188,7 @@ class Bus:
             received=self._received,
             published=self._published,
             control_requests=control_requests,
-            bad_envelope_last=self._bad_last,
+            bad_envelope_last=self._intake.last_bad,
         )
 
     def _bind(self, kind: int, name: str, options: dict[int, int | bytes]) -> zmq.Socket[bytes]:
@@ -220,51 +201,7 @@ class Bus:
             self._acknowledge(ACK_PREFIX + frames[0].removeprefix(SYNC_PREFIX))
             return
         self._received += 1
-        try:
-            topic, header, payload = envelope.decode(frames)
-        except EnvelopeError as error:
-            self._bad(str(error))
-            return
-        receipt, dst = ("", None) if header is None else (header.id or "", header.d)
-        topic_id = self._topic_ids.get(topic)
-        if topic_id is None:
-            self._ingress.refuse("tx_unknown_topic")
-            self._bad_last = f"unknown topic {topic[:-1].decode(errors='replace')}"
-            return
-        size = len(payload)
-        if size < CDR_HEADER_SIZE:
-            self._bad(
-                f"payload of {size} bytes has no room for the CDR header", topic_id, receipt, dst
-            )
-        elif size > self._max_message_bytes:
-            self._ingress.refuse("tx_too_big", topic_id, receipt, dst)
-            self._bad_last = (
-                f"message of {size} B; bus.max_message_bytes allows {self._max_message_bytes}"
-            )
-        elif header is None:
-            self._ingress.submit(topic_id, payload)
-        elif header.ty is not None and header.ty != self._types[topic_id]:
-            self._bad(
-                f"type {header.ty}; the registry has {self._types[topic_id]}",
-                topic_id,
-                receipt,
-                dst,
-            )
-        else:
-            overrides = Overrides(
-                None if header.q is None else QOS_BY_LABEL[header.q],
-                header.p,
-                header.d,
-                None if header.ls is None else header.ls * 1e-3,
-                receipt=receipt,
-            )
-            self._ingress.submit(topic_id, payload, overrides, header.t)
-
-    def _bad(
-        self, what: str, topic_id: int | None = None, receipt: str = "", dst: int | None = None
-    ) -> None:
-        self._bad_last = what
-        self._ingress.refuse("tx_bad_envelope", topic_id, receipt, dst)
+        self._intake.take(frames)
 
     def _take_subscription(self, frames: list[bytes]) -> None:
         subscribed, topic = frames[0][:1] == b"\x01", frames[0][1:]
@@ -277,5 +214,4 @@ class Bus:
             self.has_consumer.set()
 
     def _acknowledge(self, topic: bytes) -> None:
-        self._out.send_multipart([topic, self._welcome])
-        self._out_reader.recheck()
+        self._undropped.send(topic, [topic, self._welcome])

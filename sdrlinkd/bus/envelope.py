@@ -59,17 +59,30 @@ class Receipt(msgspec.Struct, frozen=True, omit_defaults=True):
     left: int = 0
 
 
+class Taken(msgspec.Struct, frozen=True):
+    """A topic that is taken: messages up to `most` B, by the setting `key`; others are `over`."""
+
+    ty: str
+    most: int
+    key: str
+    over: str
+
+
 class Welcome(msgspec.Struct, frozen=True):
-    """What a new subscriber is told."""
+    """What a new subscriber is told; `boot` is another one after each start."""
 
     daemon: str
     version: str
     envelope: list[int]
+    boot: str
     topics: list[str]
+    takes: dict[str, Taken]
 
 
 _from_msgpack = msgspec.msgpack.Decoder(InHeader)
 _from_json = msgspec.json.Decoder(InHeader)
+_any_msgpack = msgspec.msgpack.Decoder(dict[str, object])
+_any_json = msgspec.json.Decoder(dict[str, object])
 _to_msgpack = msgspec.msgpack.Encoder()
 
 
@@ -95,6 +108,27 @@ def decode(frames: Sequence[bytes]) -> tuple[bytes, InHeader | None, bytes]:
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise EnvelopeError(f"header: {error}") from None
     raise EnvelopeError(f"header begins with {header[:1]!r}; allowed: 0x01 (MessagePack) or {{")
+
+
+def wanted_of(frames: Sequence[bytes]) -> tuple[str, int | None, dict[str, object]]:
+    """(receipt's id, destination, all fields) of a message that cannot be decoded, as far as they
+    can be read.
+    """
+    header = frames[1] if len(frames) > 1 else b""
+    try:
+        fields = (
+            _any_msgpack.decode(header[1:])
+            if header[:1] == VERSION_BYTE
+            else _any_json.decode(header)
+        )
+    except (msgspec.DecodeError, UnicodeDecodeError):
+        return "", None, {}
+    id_, dst = fields.get("id"), fields.get("d")
+    return (
+        id_ if isinstance(id_, str) and len(id_) <= MAX_HEADER_BYTES else "",
+        dst if isinstance(dst, int) and 0 <= dst <= 255 else None,
+        fields,
+    )
 
 
 def encode(topic: bytes, header: OutHeader, payload: bytes) -> list[bytes]:

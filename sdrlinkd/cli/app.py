@@ -12,7 +12,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from sdrlinkd import __version__
 from sdrlinkd.cli.commands import COMMANDS
-from sdrlinkd.client import ControlClient, NoDaemonError, RefusedError
+from sdrlinkd.client import ControlClient, MessageRefusedError, NoDaemonError, RefusedError
 from sdrlinkd.errors import UserError
 
 DEBUG_VARIABLE = "SDRLINKD_DEBUG"
@@ -72,7 +72,7 @@ def run(arguments: list[str]) -> int:
         return done.code if isinstance(done.code, int) else 1
     except KeyboardInterrupt:
         return 130
-    except (UserError, NoDaemonError, RefusedError) as error:
+    except (UserError, MessageRefusedError, NoDaemonError, RefusedError) as error:
         sys.stderr.write(f"sdrlinkctl: {error}\n")
         return 2
     except OSError as error:

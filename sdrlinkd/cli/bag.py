@@ -11,7 +11,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from sdrlinkd.adapters import BagMessage, BagTopic, first_seconds, open_bag, paced
 from sdrlinkd.cli.app import RuntimeDir, app, connect
 from sdrlinkd.cli.status import ask_status
-from sdrlinkd.client import Publisher
+from sdrlinkd.client import MessageRefusedError, Publisher
 from sdrlinkd.errors import BagError, UserError
 from sdrlinkd.reports import TopicReport
 
@@ -65,7 +65,7 @@ def play(
     messages: Iterator[BagMessage] = (m for m in opened.messages() if m.topic in route)
     if duration is not None:
         messages = first_seconds(messages, duration)
-    sent = 0
+    sent, refused = 0, dict[str, list[str]]()
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
@@ -75,10 +75,19 @@ def play(
     with Publisher(runtime_dir) as publisher, Progress(*columns, console=console) as progress:
         task = progress.add_task(bag.name, total=None if duration else total)
         for message in paced(messages, rate):
-            publisher.send(route[message.topic], message.cdr, type=message.type)
-            sent += 1
+            try:
+                publisher.send(route[message.topic], message.cdr, type=message.type)
+                sent += 1
+            except MessageRefusedError as error:
+                refused.setdefault(message.topic, []).append(str(error))
             progress.advance(task)
     opened.close()
+    for name, reasons in refused.items():
+        console.print(
+            f"not sent: {len(reasons)} messages of {name} ({reasons[0]})",
+            style="yellow",
+            markup=False,
+        )
     typer.echo(f"played {sent} messages of {bag}")
     if opened.damage:
         raise BagError(opened.damage)

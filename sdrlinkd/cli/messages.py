@@ -13,10 +13,12 @@ from ruamel.yaml.error import YAMLError
 
 from sdrlinkd.adapters import cdr_from_fields, from_cdr, knows
 from sdrlinkd.cli.app import RuntimeDir, app, connect
+from sdrlinkd.cli.names import refuse_own, topic_sent
 from sdrlinkd.cli.status import ask_status
-from sdrlinkd.client import Message, Publisher, Subscriber
-from sdrlinkd.errors import UserError
+from sdrlinkd.client import QOS, Message, Publisher, Subscriber
+from sdrlinkd.errors import CdrError, UserError
 from sdrlinkd.link import CDR_HEADER_SIZE
+from sdrlinkd.units import seconds
 from sdrlinkd.wire import BROADCAST
 
 MAX_SHOWN_ITEMS = 12
@@ -24,7 +26,7 @@ MAX_SHOWN_ITEMS = 12
 
 @app.command()
 def pub(
-    topic: Annotated[str, typer.Argument(help="Bus topic, such as /robot_1/cmd_vel.")],
+    topic: Annotated[str, typer.Argument(help="Its name on the bus or in the registry.")],
     values: Annotated[
         str, typer.Argument(help="Fields in YAML: '{linear: {x: 0.5}}'; the rest is default.")
     ] = "{}",
@@ -38,24 +40,26 @@ def pub(
     qos: Annotated[str | None, typer.Option(help="urgent, latency, default or bulk.")] = None,
     priority: Annotated[int | None, typer.Option(min=0, max=127)] = None,
     dst: Annotated[int | None, typer.Option(min=0, max=255, help="Destination robot.")] = None,
-    lifespan: Annotated[float | None, typer.Option(min=0.001, help="Seconds.")] = None,
+    lifespan: Annotated[
+        str | None, typer.Option(help="Worthless after: 300ms, 2s; plain numbers are seconds.")
+    ] = None,
     receipt: Annotated[
         bool, typer.Option("--receipt", help="Say what became of each message, robot by robot.")
     ] = False,
     runtime_dir: RuntimeDir = None,
 ) -> None:
     """Publish a message to the daemon."""
-    if qos not in (None, "urgent", "latency", "default", "bulk"):
-        raise UserError(f'--qos: got "{qos}"; allowed: urgent, latency, default, bulk')
+    if qos is not None and qos not in QOS:
+        raise UserError(f'--qos: got "{qos}"; allowed: {", ".join(QOS)}')
+    lifespan_ms = None if lifespan is None else 1e3 * seconds(lifespan, "--lifespan")
+    if lifespan_ms == 0:
+        raise UserError(f"--lifespan: got {lifespan}; allowed: more than 0")
     with connect(runtime_dir) as control:
-        sent = {each.name: each for each in ask_status(control).link.topics if each.subscribed}
-    if topic not in sent:
-        raise UserError(f"topic {topic} is not taken by the daemon; allowed: {', '.join(sent)}")
-    kind = sent[topic].type
+        sent = topic_sent(topic, ask_status(control))
+    topic, kind = sent.name, sent.type
     payload = _read(cdr_file) if cdr_file else _serialize(values, kind)
     if times > 1 and not rate:
         rate = 1.0
-    lifespan_ms = None if lifespan is None else lifespan * 1e3
     with Publisher(runtime_dir) as publisher:
         count, waiting = 0, {}
         while True:
@@ -112,15 +116,13 @@ def echo(
     """Show messages heard from other robots."""
     console = Console()
     shown = 0
-    connect(runtime_dir).close()
-    with Subscriber(topic, directory=runtime_dir) as subscriber:
+    with connect(runtime_dir) as control:
+        refuse_own(topic, ask_status(control), str(control.ask("config")["rx_format"]))
+    with Subscriber(topic, runtime_dir=runtime_dir) as subscriber:
         while message := subscriber.receive(timeout):
-            console.print(_headline(message), style="bold", highlight=False, markup=False)
-            if raw:
-                console.print(message.payload.hex(" "), highlight=False, markup=False)
-            else:
-                console.print(as_yaml(message), highlight=False, markup=False, end="")
-            console.print("---")
+            _print(console, _headline(message), style="bold")
+            _print(console, message.payload.hex(" ") if raw else as_yaml(message).rstrip("\n"))
+            _print(console, "---")
             shown += 1
             if shown == count:
                 return
@@ -130,15 +132,25 @@ def echo(
         )
 
 
+def _print(console: Console, text: str, style: str | None = None) -> None:
+    # The terminal breaks long lines; in a file they stay whole.
+    console.print(text, style=style, highlight=False, markup=False, soft_wrap=True)
+
+
 def as_yaml(message: Message) -> str:
-    """A message's fields as YAML, long arrays cut."""
+    """A message's fields as YAML, long arrays cut; in brackets why it cannot be shown so."""
+    size = len(message.payload)
     if not knows(message.type):
-        return f"({message.type} is not known here; --raw shows {len(message.payload)} bytes)\n"
+        return f"({message.type} is not known here; --raw shows {size} bytes)\n"
+    try:
+        fields = from_cdr(message.payload, message.type)
+    except CdrError as error:
+        return f"(bad message of {size} bytes, {error}; --raw shows them)\n"
     out = StringIO()
     writer = YAML(typ="safe", pure=True)
     writer.default_flow_style = None
     writer.width = 100
-    writer.dump(_plain(from_cdr(message.payload, message.type)), out)
+    writer.dump(_plain(fields), out)
     return out.getvalue()
 
 

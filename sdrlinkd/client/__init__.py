@@ -10,18 +10,35 @@ with Subscriber("/rx_robot_2/odom") as heard:
 with Publisher() as out:
     out.send("/robot_1/cmd_vel", cdr_bytes, receipt=True)
     print(out.receipt(timeout_s=5.0))
+
+A message that the daemon does not take is refused by `send` (MessageRefusedError). In a callback of
+a ROS node `send(..., timeout_s=0)` never blocks. Runs on Python 3.10 and newer.
 """
 
-from sdrlinkd.client.aio import AsyncPublisher, AsyncSubscriber
-from sdrlinkd.client.blocking import NoDaemonError, Publisher, Subscriber, no_daemon
+from sdrlinkd.client.announced import (
+    QOS,
+    check_wishes,
+    too_large,
+    too_short,
+    unknown_topic,
+    wrong_type,
+)
+from sdrlinkd.client.async_publisher import AsyncPublisher
+from sdrlinkd.client.async_subscriber import AsyncSubscriber
+from sdrlinkd.client.awaited import DAEMON_GONE
 from sdrlinkd.client.control import ControlClient, RefusedError
+from sdrlinkd.client.errors import (
+    EnvelopeMismatchError,
+    MessageRefusedError,
+    NoDaemonError,
+    no_daemon,
+)
 from sdrlinkd.client.flatmap import pack_map, unpack
 from sdrlinkd.client.messages import (
     ACK_PREFIX,
     ENVELOPE_VERSION,
     RECEIPT_PREFIX,
     SYNC_PREFIX,
-    EnvelopeMismatchError,
     Message,
     Receipt,
 )
@@ -33,14 +50,18 @@ from sdrlinkd.client.paths import (
     endpoint,
     runtime_dir,
 )
+from sdrlinkd.client.publisher import Publisher
+from sdrlinkd.client.subscriber import Subscriber
 
 __all__ = [
     "ACK_PREFIX",
     "CONTROL_SOCKET",
+    "DAEMON_GONE",
     "ENVELOPE_VERSION",
     "IN_PUB_SOCKET",
     "IN_SOCKET",
     "OUT_SOCKET",
+    "QOS",
     "RECEIPT_PREFIX",
     "SYNC_PREFIX",
     "AsyncPublisher",
@@ -48,14 +69,20 @@ __all__ = [
     "ControlClient",
     "EnvelopeMismatchError",
     "Message",
+    "MessageRefusedError",
     "NoDaemonError",
     "Publisher",
     "Receipt",
     "RefusedError",
     "Subscriber",
+    "check_wishes",
     "endpoint",
     "no_daemon",
     "pack_map",
     "runtime_dir",
+    "too_large",
+    "too_short",
+    "unknown_topic",
     "unpack",
+    "wrong_type",
 ]

@@ -7,9 +7,10 @@ from typing import Any
 
 import zmq
 
-from sdrlinkd.client.blocking import Endpoint, no_daemon
+from sdrlinkd.client.blocking_socket import Endpoint
+from sdrlinkd.client.errors import no_daemon
 from sdrlinkd.client.flatmap import Value, pack_map, unpack
-from sdrlinkd.client.paths import CONTROL_SOCKET, is_there
+from sdrlinkd.client.paths import CONTROL_SOCKET, chosen_dir, is_there
 
 PROTOCOL = b"sdrl1"
 
@@ -26,12 +27,16 @@ class ControlClient(Endpoint):
     """One request at a time over the control socket. Raises NoDaemonError where there is none."""
 
     def __init__(
-        self, directory: str | os.PathLike[str] | None = None, timeout_s: float = 5.0
+        self,
+        runtime_dir: str | os.PathLike[str] | None = None,
+        timeout_s: float = 5.0,
+        *,
+        directory: str | os.PathLike[str] | None = None,
     ) -> None:
-        super().__init__(zmq.DEALER, directory)
-        if not is_there(self.directory / CONTROL_SOCKET):
+        super().__init__(zmq.DEALER, chosen_dir(runtime_dir, directory))
+        if not is_there(self.runtime_dir / CONTROL_SOCKET):
             self.close()
-            raise no_daemon(self.directory)
+            raise no_daemon(self.runtime_dir)
         self._timeout_s = timeout_s
         self._socket.immediate = True
         self._connect(CONTROL_SOCKET)
@@ -46,7 +51,7 @@ class ControlClient(Endpoint):
                 [PROTOCOL, request_id, verb.encode(), pack_map(arguments or {})]
             )
         except zmq.Again:
-            raise no_daemon(self.directory) from None
+            raise no_daemon(self.runtime_dir) from None
         while (left_s := deadline - time.monotonic()) > 0:
             if not self._poll(left_s):
                 break
@@ -57,4 +62,4 @@ class ControlClient(Endpoint):
                 if status != b"ok":
                     raise RefusedError(answer["code"], answer["reason"])
                 return answer
-        raise no_daemon(self.directory)
+        raise no_daemon(self.runtime_dir)

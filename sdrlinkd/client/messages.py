@@ -1,10 +1,11 @@
 """Bus messages as Python values (bus document, section 3)."""
 
 import secrets
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from sdrlinkd.client.flatmap import Value, pack_map, unpack
+from sdrlinkd.client.errors import EnvelopeMismatchError
+from sdrlinkd.client.flatmap import unpack
 
 ENVELOPE_VERSION = b"\x01"
 # A topic that only one client asks for; the daemon answers on it when the subscription is active,
@@ -12,10 +13,8 @@ ENVELOPE_VERSION = b"\x01"
 ACK_PREFIX = b"\0ack\0"
 SYNC_PREFIX = b"\0sync\0"
 RECEIPT_PREFIX = b"\0receipt\0"
-
-
-class EnvelopeMismatchError(ValueError):
-    """What arrived is not an envelope of version 1."""
+WELCOME_PREFIX = b"\0" + ENVELOPE_VERSION
+"""Of an announcement, which is one frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +55,9 @@ class Message:
 class Receipt:
     """What became of a message at robot `dst`: `fate` is delivered, expired, dropped or unknown.
 
-    `reason` is one of the ledger's; `took_s` the message's age when it was delivered there. `left`
-    robots have still to answer.
+    `reason` is one of the ledger's, or `daemon_gone`: the daemon was restarted or does not answer,
+    and nobody knows. `took_s` is the message's age when it was delivered there. `left` robots have
+    still to answer.
     """
 
     id: str
@@ -67,20 +67,6 @@ class Receipt:
     reason: str = ""
     took_s: float | None = None
     left: int = 0
-
-
-class ReceiptIds:
-    """Names for a producer's messages that want a receipt; all are told of under `prefix`."""
-
-    def __init__(self) -> None:
-        self._token = secrets.token_hex(4)
-        self._count = 0
-        self.prefix = RECEIPT_PREFIX + self._token.encode()
-
-    def new(self) -> str:
-        """The next one."""
-        self._count += 1
-        return f"{self._token}.{self._count}"
 
 
 def decode_receipt(frames: Sequence[bytes]) -> Receipt | None:
@@ -97,12 +83,6 @@ def decode_receipt(frames: Sequence[bytes]) -> Receipt | None:
         took_s=fields.get("took"),
         left=fields.get("left", 0),
     )
-
-
-def encode_out(topic: str, payload: bytes, fields: Mapping[str, Value]) -> list[bytes]:
-    """The three frames of a message to the daemon; fields that are None are left out."""
-    given = {key: value for key, value in fields.items() if value is not None}
-    return [topic.encode() + b"\0", ENVELOPE_VERSION + pack_map(given), payload]
 
 
 def decode_in(frames: Sequence[bytes]) -> Message | None:

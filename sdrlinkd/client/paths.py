@@ -23,6 +23,15 @@ def runtime_dir(given: str | os.PathLike[str] | None = None) -> Path:
     return Path(base) / "sdrlinkd" if base else Path(f"/tmp/sdrlinkd-{os.getuid()}")  # noqa: S108
 
 
+def chosen_dir(
+    runtime_dir_: str | os.PathLike[str] | None, directory: str | os.PathLike[str] | None
+) -> Path:
+    """The runtime directory, for a caller who may name it by either word."""
+    if runtime_dir_ is not None and directory is not None:
+        raise TypeError("runtime_dir and directory are two names of one thing; give runtime_dir")
+    return runtime_dir(directory if runtime_dir_ is None else runtime_dir_)
+
+
 def is_there(path: Path) -> bool:
     """Whether `path` exists, as far as this user may know: outside the group one may not look."""
     try:

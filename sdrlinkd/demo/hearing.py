@@ -23,7 +23,7 @@ class Hearing(threading.Thread):
     ) -> None:
         super().__init__(name="hearing", daemon=True)
         self._take = take
-        self._subscriber = Subscriber(topic, directory=directory, depth=0)
+        self._subscriber = Subscriber(topic, runtime_dir=directory, depth=0)
         self._done = threading.Event()
         self.count = 0
         self.last_at = 0.0

@@ -41,7 +41,7 @@ class Player(threading.Thread):
         prefix = f"/{self._source.namespace}/" if self._source.namespace else "/"
         self.began_at = time.monotonic()
         try:
-            with Publisher(self._directory) as publisher:
+            with Publisher(self._directory, checked=False) as publisher:
                 messages = paced(self._source.messages(), 1.0, sleep=self._wait)
                 for message in messages:
                     if self._stopped.is_set():

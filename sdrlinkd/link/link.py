@@ -156,7 +156,7 @@ class Link:
         refused = self.sender.submit(topic_id, payload, now, overrides)
         if overrides.receipt:
             self.outcomes.note(now)
-            if refused in NOT_TAKEN:
+            if refused in NOT_TAKEN or (refused and not self.registry.has_control):
                 self.outcomes.refused(overrides.receipt, topic_id, refused, overrides.dst)
             elif refused is None and not self.registry.has_control:
                 self.outcomes.unknowable(overrides.receipt, topic_id, overrides.dst)

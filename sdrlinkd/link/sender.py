@@ -130,7 +130,8 @@ class Sender:
             topic.stamp or (bool(receipt) and self._has_control),
             topic.tally,
         )
-        message.receipt = receipt
+        # Without a control channel it has been answered already: nobody can know.
+        message.receipt = receipt if self._has_control else ""
         message.is_compressed = frame is not None
         if message.expires_at <= now:
             # It must not take the place of one that is fresh.

@@ -94,7 +94,7 @@ def test_pub_and_echo(start_daemon, ctl):
 
 
 def test_pub_says_what_became_of_each_message(start_daemon, ctl):
-    daemon = start_daemon("[link]\nreceipt_s = 0.2\n[topic.cmd_vel]\nmax_bytes = 20\n")
+    daemon = start_daemon("[link]\nreceipt_s = 0.2\n[topic.cmd_vel]\nperiod_s = 1000\n")
     dir_ = ("--receipt", "--runtime-dir", daemon.directory)
     code, out, _ = ctl("pub", "/robot_1/odom", "{}", "--dst", "1", "-t", "3", "-r", "20", *dir_)
     assert code == 0
@@ -102,8 +102,8 @@ def test_pub_says_what_became_of_each_message(start_daemon, ctl):
     # A robot that is alone knows of nobody who could answer.
     _, out, _ = ctl("pub", "/robot_1/odom", "{}", *dir_)
     assert "message 1, everyone: unknown\n" in out
-    _, out, _ = ctl("pub", "/robot_1/cmd_vel", "{}", "--dst", "7", *dir_)
-    assert "message 1, robot 7: dropped (tx_size_cap)\n" in out
+    _, out, _ = ctl("pub", "cmd_vel", "{}", "--dst", "7", "-t", "2", "-r", "1000", *dir_)
+    assert "message 2, robot 7: dropped (tx_throttled)\n" in out
 
 
 def test_pub_refuses_in_words(start_daemon, ctl):
@@ -116,7 +116,7 @@ def test_pub_refuses_in_words(start_daemon, ctl):
         (("/robot_1/cmd_vel", "{linear: {x: fast}}"), "linear.x: got 'fast'; allowed: a float64"),
         (("/robot_1/cmd_vel", "[1]"), "allowed: a map"),
         (("/robot_1/cmd_vel", "{"), "not YAML"),
-        (("/robot_1/cmd_vel", "{}", "--qos", "fast"), "allowed: urgent"),
+        (("/robot_1/cmd_vel", "{}", "--qos", "fast"), "allowed: bulk, default, latency, urgent"),
         (("/robot_1/cmd_vel", "{}", "--cdr", "/nothing"), "cannot be read"),
     ):
         code, _, err = ctl("pub", *arguments, *dir_)

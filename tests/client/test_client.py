@@ -155,17 +155,6 @@ def test_a_slow_reader_sees_the_gap_in_the_numbers(start_daemon):
         assert message.number - first == int.from_bytes(message.payload[4:8], "little")
 
 
-def test_a_wrong_type_is_refused_and_counted(start_daemon):
-    daemon = start_daemon()
-    with Publisher(daemon.directory) as out:
-        out.send("/robot_1/odom", CDR, type="sensor_msgs/msg/Imu")
-        out.send("/robot_1/nothing", CDR)
-    snapshot = daemon.snapshot()
-    assert snapshot.link.tx.sent == 0
-    assert snapshot.link.tx.dropped == {"tx_bad_envelope": 1, "tx_unknown_topic": 1}
-    assert "unknown topic" in snapshot.bus.bad_envelope_last
-
-
 @pytest.mark.parametrize(
     "make",
     [lambda d: Publisher(d, timeout_s=0.2), lambda d: Subscriber(directory=d, timeout_s=0.2)],

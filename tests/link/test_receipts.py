@@ -16,6 +16,7 @@ from sdrlinkd.link import (
     Outcome,
     Overrides,
     Qos,
+    QueueParams,
     RelayParams,
     TopicPolicy,
     link_report,
@@ -340,6 +341,26 @@ def test_without_a_control_channel_nobody_can_know():
     assert link.submit(0, message(1), 0.0, Overrides(receipt="one", dst=3)) is None
     (verdict,) = link.outcomes.receipts.take()
     assert (verdict.fate, verdict.dst) == ("unknown", 3)
+
+
+def test_without_a_control_channel_everything_is_told_once():
+    queue = QueueParams(max_bytes=100)
+    link = make_link(topics=[(f"t{i}", "std_msgs/String") for i in range(16)], queue=queue)
+    link.set_policy(0, TopicPolicy(depth=1, lifespan_s=0.5))
+    link.submit(0, message(1), 0.0, Overrides(receipt="superseded"))
+    link.submit(0, message(2), 0.0, Overrides(receipt="expired"))
+    link.submit(0, message(3, 200), 0.0, Overrides(receipt="too large"))
+    link.handle_timers(1.0)
+    link.submit(0, message(4), 1.0, Overrides(receipt="lost"))
+    link.confirm(next_burst(link, 1.0), Outcome.LOST, 1.001)
+    link.handle_timers(100.0)
+    told = [(each.receipt, each.fate, each.reason) for each in link.outcomes.receipts.take()]
+    assert told == [
+        ("superseded", "unknown", ""),
+        ("expired", "unknown", ""),
+        ("too large", "dropped", "tx_overflow_new"),
+        ("lost", "unknown", ""),
+    ]
 
 
 def test_what_is_refused_names_the_robot_it_was_for():

@@ -28,7 +28,7 @@ class BusEnd:
         if address.transport != SHARED:
             ours = theirs = "t"
         self._out = Publisher(address.place)
-        self._heard = Subscriber(f"/rx_robot_{other}/{theirs}*", directory=address.place)
+        self._heard = Subscriber(f"/rx_robot_{other}/{theirs}*", runtime_dir=address.place)
         self._prefix = f"/robot_{robot}/{ours}"
         self._skip = len(f"/rx_robot_{other}/{theirs}")
 

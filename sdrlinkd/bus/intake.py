@@ -1,0 +1,129 @@
+"""Messages from producers: decoded and checked, then handed on or refused by name."""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Protocol
+
+from sdrlinkd.bus import envelope
+from sdrlinkd.client import (
+    MessageRefusedError,
+    check_wishes,
+    too_large,
+    too_short,
+    unknown_topic,
+    wrong_type,
+)
+from sdrlinkd.config import Setup
+from sdrlinkd.errors import EnvelopeError
+from sdrlinkd.link import AS_CONFIGURED, CDR_HEADER_SIZE, QOS_BY_LABEL, Overrides
+from sdrlinkd.wire import BROADCAST
+
+
+class Ingress(Protocol):
+    """Who takes messages from the bus."""
+
+    def submit(
+        self,
+        topic_id: int,
+        payload: bytes,
+        overrides: Overrides = AS_CONFIGURED,
+        published_ns: int | None = None,
+    ) -> None:
+        """A good message; when it was published, in ns since 1970, if its producer says so."""
+
+    def refuse(
+        self,
+        reason: str,
+        topic_id: int | None = None,
+        receipt: str = "",
+        dst: int | None = None,
+    ) -> None:
+        """A message that cannot be taken, and the ledger's reason; the rest is as in Overrides."""
+
+
+TellRefused = Callable[[envelope.Receipt], None]
+LONGEST_NAME = 256
+
+
+class Intake:
+    """What the bus takes. `tell` answers for messages of no topic, of which the link knows none."""
+
+    def __init__(self, setup: Setup, ingress: Ingress, tell: TellRefused) -> None:
+        self._topic_ids = {name.encode() + b"\0": id_ for name, id_ in setup.topics_in.items()}
+        self._names = setup.topics_in
+        self._types: Mapping[int, str] = {each.id: each.type for each in setup.registry.topics}
+        self._most = setup.config.bus.max_message_bytes
+        self._ingress = ingress
+        self._tell = tell
+        self._last_bad: Callable[[], str] = str
+
+    @property
+    def last_bad(self) -> str:
+        """What was wrong with the last message that could not be taken."""
+        return self._last_bad()
+
+    def take(self, frames: list[bytes]) -> None:
+        """A message as it came."""
+        try:
+            topic, header, payload = envelope.decode(frames)
+        except EnvelopeError as error:
+            self._refuse_envelope(frames, str(error))
+            return
+        receipt, dst = ("", None) if header is None else (header.id or "", header.d)
+        topic_id = self._topic_ids.get(topic)
+        if topic_id is None:
+            # Whoever asks has the time to look for what was meant; a flood of them leaves none.
+            words = partial(unknown_topic, name := _name(topic), self._names)
+            self._refuse_unowned("tx_unknown_topic", words, name, receipt, dst)
+            return
+        size = len(payload)
+        if size < CDR_HEADER_SIZE:
+            words = partial(too_short, _name(topic), size)
+            self._refuse("tx_bad_envelope", words, topic_id, receipt, dst)
+        elif size > self._most:
+            key = f"bus.max_message_bytes = {self._most}"
+            words = partial(too_large, _name(topic), size, self._most, key)
+            self._refuse("tx_too_big", words, topic_id, receipt, dst)
+        elif header is None:
+            self._ingress.submit(topic_id, payload)
+        elif header.ty is not None and header.ty != self._types[topic_id]:
+            words = partial(wrong_type, _name(topic), header.ty, self._types[topic_id])
+            self._refuse("tx_bad_envelope", words, topic_id, receipt, dst)
+        else:
+            overrides = Overrides(
+                None if header.q is None else QOS_BY_LABEL[header.q],
+                header.p,
+                header.d,
+                None if header.ls is None else header.ls * 1e-3,
+                receipt=receipt,
+            )
+            self._ingress.submit(topic_id, payload, overrides, header.t)
+
+    def _refuse(
+        self, reason: str, words: Callable[[], str], topic_id: int, receipt: str, dst: int | None
+    ) -> None:
+        self._last_bad = words
+        self._ingress.refuse(reason, topic_id, receipt, dst)
+
+    def _refuse_envelope(self, frames: list[bytes], words: str) -> None:
+        receipt, dst, fields = envelope.wanted_of(frames)
+        try:
+            check_wishes(
+                fields.get("q"), fields.get("p"), fields.get("d"), fields.get("ls"), fields.get("t")
+            )
+        except MessageRefusedError as error:
+            words = str(error)
+        self._refuse_unowned("tx_bad_envelope", partial(str, words), _name(frames[0]), receipt, dst)
+
+    def _refuse_unowned(
+        self, reason: str, words: Callable[[], str], name: str, receipt: str, dst: int | None
+    ) -> None:
+        self._last_bad = words
+        self._ingress.refuse(reason)
+        if receipt:
+            at = BROADCAST if dst is None else dst
+            self._tell(envelope.Receipt(receipt, name, at, "dropped", reason))
+
+
+def _name(topic: bytes) -> str:
+    return topic[:LONGEST_NAME].removesuffix(b"\0").decode(errors="replace")

@@ -1,0 +1,103 @@
+"""What is told once and must arrive: acknowledgements, announcements, receipts."""
+
+import asyncio
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import zmq
+
+RETRY_S = 0.001
+STUCK_S = 1.0
+"""Whoever has not read for so long loses what is for it, as with messages."""
+
+Frames = Sequence[bytes]
+
+
+@dataclass(slots=True)
+class _Lane:
+    waiting: deque[Frames] = field(default_factory=deque)
+    moved_at: float = 0.0
+    is_stuck: bool = False
+
+
+class Undropped:
+    """Sends on an XPUB socket, and waits while a subscriber's queue is full.
+
+    ZeroMQ drops what such a queue has no room for: right for messages, which are numbered, and
+    wrong for an answer that somebody waits for. Order is kept within a lane; a subscriber that does
+    not read holds up its lane alone, and that for STUCK_S at most. `used` is called after each use
+    of the socket.
+    """
+
+    def __init__(
+        self,
+        loop: asyncio.AbstractEventLoop,
+        socket: zmq.Socket[bytes],
+        used: Callable[[], None],
+    ) -> None:
+        self._loop = loop
+        self._socket = socket
+        self._used = used
+        self._lanes: dict[bytes, _Lane] = {}
+        """Those whose subscriber's queue was full."""
+        self._retry: asyncio.TimerHandle | None = None
+
+    def send(self, name: bytes, frames: Frames) -> None:
+        """In lane `name`: at once, or as soon as there is room."""
+        lane = self._lanes.get(name)
+        if lane is not None and not lane.is_stuck:
+            lane.waiting.append(frames)
+        elif self._fits(frames):
+            self._lanes.pop(name, None)
+        elif lane is not None:
+            self._socket.send_multipart(frames, zmq.NOBLOCK)
+        else:
+            self._lanes[name] = _Lane(deque([frames]), time.monotonic())
+            if self._retry is None:
+                self._retry = self._loop.call_later(RETRY_S, self._send_waiting)
+        self._used()
+
+    def close(self, at_most_s: float) -> None:
+        """Send what waits, for at most `at_most_s`."""
+        deadline = time.monotonic() + at_most_s
+        while self._retry is not None and time.monotonic() < deadline:
+            time.sleep(RETRY_S)
+            self._send_waiting()
+        if self._retry is not None:
+            self._retry.cancel()
+
+    def _send_waiting(self) -> None:
+        if self._retry is not None:
+            self._retry.cancel()
+            self._retry = None
+        for name, lane in list(self._lanes.items()):
+            self._advance(lane)
+            if not lane.waiting and not lane.is_stuck:
+                del self._lanes[name]
+        if any(lane.waiting for lane in self._lanes.values()):
+            self._retry = self._loop.call_later(RETRY_S, self._send_waiting)
+        self._used()
+
+    def _advance(self, lane: _Lane) -> None:
+        now, waiting = time.monotonic(), lane.waiting
+        while waiting and self._fits(waiting[0]):
+            waiting.popleft()
+            lane.moved_at = now
+        if now - lane.moved_at > STUCK_S:
+            lane.is_stuck = True
+            while waiting:
+                self._socket.send_multipart(waiting.popleft(), zmq.NOBLOCK)
+
+    def _fits(self, frames: Frames) -> bool:
+        """Whether all its subscribers had room, and so have it."""
+        # Not for messages: those do not wait for the slowest of their consumers.
+        self._socket.setsockopt(zmq.XPUB_NODROP, 1)
+        try:
+            self._socket.send_multipart(frames, zmq.NOBLOCK)
+        except zmq.Again:
+            return False
+        finally:
+            self._socket.setsockopt(zmq.XPUB_NODROP, 0)
+        return True

@@ -1,0 +1,129 @@
+"""What the daemon takes, as it announces it (bus document, section 4.1), and what it does not.
+
+The daemon refuses with the same words: they are told here and nowhere else.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from sdrlinkd.client.errors import MessageRefusedError
+
+QOS = ("bulk", "default", "latency", "urgent")
+MAX_PRIORITY = 127
+BROADCAST = 255
+CDR_HEADER_SIZE = 4
+MOST_NAMES = 20
+"""Of an error message: whoever has more topics looks them up."""
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """What the daemon says of a topic that it takes.
+
+    `most` is the size of the largest message in octets, `key` the setting that it follows from,
+    and `over` the ledger's name for one that is larger.
+    """
+
+    type: str
+    most: int
+    key: str
+    over: str
+
+
+class Announced:
+    """A daemon's announcement. `boot` is another one after each of its starts."""
+
+    def __init__(self, fields: Mapping[str, Any]) -> None:
+        self.boot: str = fields.get("boot", "")
+        self.topics = {
+            name: Topic(each["ty"], each["most"], each["key"], each["over"])
+            for name, each in fields["takes"].items()
+        }
+        self.most = {name: topic.most for name, topic in self.topics.items()}
+        self.types = {name: topic.type for name, topic in self.topics.items()}
+        self.frames = {name: name.encode() + b"\0" for name in self.topics}
+
+    def check(self, name: str, size: int, type_: str | None) -> None:
+        """Raises MessageRefusedError if a message of `size` octets for topic `name` is refused."""
+        topic = self.topics.get(name)
+        if topic is None:
+            raise MessageRefusedError("tx_unknown_topic", unknown_topic(name, self.topics))
+        if size < CDR_HEADER_SIZE:
+            raise MessageRefusedError("tx_bad_envelope", too_short(name, size))
+        if size > topic.most:
+            raise MessageRefusedError(topic.over, too_large(name, size, topic.most, topic.key))
+        if type_ is not None and type_ != topic.type:
+            raise MessageRefusedError("tx_bad_envelope", wrong_type(name, type_, topic.type))
+
+
+def check_wishes(
+    qos: object = None,
+    priority: object = None,
+    dst: object = None,
+    lifespan_ms: object = None,
+    published_ns: object = None,
+) -> None:
+    """What a producer may ask for one message, whatever the daemon. Raises MessageRefusedError."""
+    words = ""
+    if qos is not None and qos not in QOS:
+        words = f"qos: got {_shown(qos)}; allowed: {', '.join(QOS)}"
+    elif priority is not None and not _is_within(priority, MAX_PRIORITY):
+        words = f"priority: got {_shown(priority)}; allowed: 0 to {MAX_PRIORITY}, the most urgent"
+    elif dst is not None and not _is_within(dst, BROADCAST):
+        words = f"dst: got {_shown(dst)}; allowed: a robot's id, 0 to 254, or 255 for everyone"
+    elif lifespan_ms is not None and not _is_above_0(lifespan_ms):
+        words = f"lifespan_ms: got {_shown(lifespan_ms)}; allowed: a number above 0"
+    elif published_ns is not None and not _is_within(published_ns, (1 << 63) - 1):
+        words = f"published_ns: got {_shown(published_ns)}; allowed: nanoseconds since 1970"
+    if words:
+        raise MessageRefusedError("tx_bad_envelope", words)
+
+
+def unknown_topic(name: str, known: Iterable[str]) -> str:
+    """In words: the daemon does not take it."""
+    # Only for whoever made a mistake.
+    from difflib import get_close_matches
+
+    names = list(known)
+    # Of `odom`, the last part says more than the whole.
+    by_last_part = {_last_part(each): each for each in names}
+    close = get_close_matches(name, names, 1) or [
+        by_last_part[each] for each in get_close_matches(_last_part(name), by_last_part, 1)
+    ]
+    hint = f" did you mean {close[0]}?" if close else ""
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    allowed = ", ".join(names[:MOST_NAMES]) or "none"
+    return f"topic: got {_shown(name)};{hint} allowed: {allowed}{more}"
+
+
+def too_short(name: str, size: int) -> str:
+    """In words: not even a header."""
+    return f"{name}: too short: {size} B; CDR begins with a header of {CDR_HEADER_SIZE} B"
+
+
+def too_large(name: str, size: int, most: int, key: str) -> str:
+    """In words: more than `key` allows."""
+    return f"{name}: too large: {size} B; at most {most} B with {key}"
+
+
+def wrong_type(name: str, given: str, registered: str) -> str:
+    """In words: the registry has another."""
+    return f"type: got {_shown(given)}; allowed: {registered}, which {name} has in the registry"
+
+
+def _last_part(name: str) -> str:
+    return name.rpartition("/")[2]
+
+
+def _shown(value: object) -> str:
+    return f'"{value}"' if isinstance(value, str) else f"{value}"
+
+
+def _is_within(value: object, most: int) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= most
+
+
+def _is_above_0(value: object) -> bool:
+    # Not for NaN, which is neither.
+    return isinstance(value, int | float) and not isinstance(value, bool) and value > 0

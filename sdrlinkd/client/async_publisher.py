@@ -1,0 +1,218 @@
+"""Publish from asyncio programs."""
+
+import asyncio
+import math
+import os
+from collections.abc import Callable
+from types import TracebackType
+
+import zmq
+import zmq.asyncio
+
+from sdrlinkd.client.async_socket import AsyncSocket
+from sdrlinkd.client.errors import no_daemon, restarted
+from sdrlinkd.client.messages import Receipt, sync_frames
+from sdrlinkd.client.paths import IN_SOCKET, OUT_SOCKET, chosen_dir, endpoint
+from sdrlinkd.client.producer import STILL_THERE_S, Producer, wishes
+from sdrlinkd.client.publisher import RECONNECT_MS
+
+# For Python 3.10, which has no asyncio.timeout, and whose asyncio.TimeoutError is one of its own.
+
+
+class AsyncPublisher(AsyncSocket):
+    """As `Publisher`, awaiting instead of blocking. For one event loop, and any of its tasks."""
+
+    def __init__(
+        self,
+        runtime_dir: str | os.PathLike[str] | None = None,
+        timeout_s: float = 5.0,
+        *,
+        checked: bool = True,
+        directory: str | os.PathLike[str] | None = None,
+    ) -> None:
+        super().__init__(zmq.PUSH, chosen_dir(runtime_dir, directory), timeout_s)
+        self._socket.immediate = True
+        self._sent = False
+        self._producer = Producer(checked)
+        self._told = self._context.socket(zmq.SUB)
+        self._told.rcvhwm = 0
+        self._told.reconnect_ivl = RECONNECT_MS
+        self._listening = asyncio.Lock()
+        for topic in self._producer.topics:
+            self._told.subscribe(topic)
+        self._told.connect(endpoint(self.runtime_dir, OUT_SOCKET))
+        self._socket.connect(endpoint(self.runtime_dir, IN_SOCKET))
+
+    async def send(
+        self,
+        topic: str,
+        cdr: bytes,
+        *,
+        qos: str | None = None,
+        priority: int | None = None,
+        dst: int | None = None,
+        lifespan_ms: float | None = None,
+        type: str | None = None,  # noqa: A002
+        published_ns: int | None = None,
+        receipt: bool = False,
+        timeout_s: float | None = None,
+    ) -> str | None:
+        """Publish `cdr` under `topic`; with `receipt`, the name under which it is answered.
+
+        Raises NoDaemonError after the timeout, at once when that is 0, and MessageRefusedError for
+        what the daemon does not take: as `Publisher.send`.
+        """
+        producer = self._producer
+        fields = wishes(qos, priority, dst, lifespan_ms, type, published_ns)
+        wait_s = self._timeout_s if timeout_s is None else timeout_s
+        if producer.is_time_to_look():
+            await self._hear()
+        if not producer.takes(topic, cdr, type):
+            # Nothing is refused by hearsay: the daemon may have been restarted.
+            await self._ask(wait_s)
+            producer.check(topic, cdr, type)
+        name = None
+        if receipt:
+            if not producer.is_subscribed:
+                await self._ask(wait_s, must_answer=True)
+            name = fields["id"] = producer.awaited.new_id()
+        frames = producer.encode(topic, cdr, fields, published_ns)
+        while True:
+            try:
+                await self._socket.send_multipart(frames, zmq.NOBLOCK)
+                break
+            except zmq.Again:
+                if not await self._is_writable(wait_s):
+                    raise no_daemon(self.runtime_dir) from None
+                # It may be another daemon by now.
+                await self._ask(wait_s, must_answer=receipt)
+                producer.check(topic, cdr, type)
+        self._sent = True
+        if name is not None:
+            producer.awaited.expect(name, topic, dst, producer.boot)
+        return name
+
+    async def receipt(self, timeout_s: float | None = None) -> Receipt | None:
+        """The next answer to messages sent with `receipt`, as `Publisher.receipt`.
+
+        None when `timeout_s` passed first, or when no answer is owed any more.
+        """
+        loop, awaited = asyncio.get_running_loop(), self._producer.awaited
+        deadline = float("inf") if timeout_s is None else loop.time() + timeout_s
+        while awaited:
+            await self._hear()
+            if (came := awaited.next(self._producer.boot)) is not None:
+                return came
+            left_s = deadline - loop.time()
+            if left_s <= 0:
+                return None
+            await self._until(lambda: awaited.has_come, min(left_s, STILL_THERE_S))
+        # Who asks again and again lets others go on.
+        await asyncio.sleep(0)
+        return None
+
+    async def wait_for_daemon(self, timeout_s: float | None = None) -> None:
+        """Until the daemon answers, for at most `timeout_s`, else the publisher's.
+
+        Raises NoDaemonError.
+        """
+        await self._ask(self._timeout_s if timeout_s is None else timeout_s, must_answer=True)
+
+    async def flush(self) -> None:
+        """Wait until the daemon has taken everything sent. Raises NoDaemonError."""
+        question = self._question()
+        answers = self._producer.answers(question)
+        try:
+            if not await self._until(lambda: bool(answers), self._timeout_s):
+                raise no_daemon(self.runtime_dir)
+            await asyncio.wait_for(
+                self._socket.send_multipart(sync_frames(question)), self._timeout_s
+            )
+            if not await self._until(lambda: len(answers) > 1, self._timeout_s):
+                raise no_daemon(self.runtime_dir)
+        except asyncio.TimeoutError:
+            raise no_daemon(self.runtime_dir) from None
+        finally:
+            self._answered(question)
+        # A new daemon answers that the subscription is active once more.
+        if len(set(answers)) > 1:
+            raise restarted(self.runtime_dir)
+
+    async def _ask(self, wait_s: float, *, must_answer: bool = False) -> None:
+        """Have the daemon's present word. Raises NoDaemonError when there is none in time.
+
+        Where nothing may be waited for, what is known has to do, unless it `must_answer`.
+        """
+        producer = self._producer
+        if not wait_s:
+            await self._hear()
+            if producer.known is None or (must_answer and not producer.is_subscribed):
+                raise no_daemon(self.runtime_dir)
+            return
+        question = self._question()
+        answered = await self._until(lambda: bool(producer.answers(question)), wait_s)
+        self._answered(question)
+        if not answered:
+            raise no_daemon(self.runtime_dir)
+
+    async def _is_writable(self, wait_s: float) -> bool:
+        """Whether the daemon takes messages, within `wait_s`."""
+        poller = zmq.asyncio.Poller()
+        poller.register(self._socket, zmq.POLLOUT)
+        return bool(await poller.poll(math.ceil(wait_s * 1000)))
+
+    def _question(self) -> bytes:
+        topic = self._producer.ask()
+        self._told.subscribe(topic)
+        return topic
+
+    def _answered(self, question: bytes) -> None:
+        self._told.unsubscribe(question)
+        self._producer.forget(question)
+
+    async def _until(self, is_done: Callable[[], bool], timeout_s: float) -> bool:
+        """Hear the daemon until `is_done`; whether that was in time."""
+
+        async def listen() -> None:
+            while not is_done():
+                # One task listens for all. It takes nothing while it can be cancelled.
+                async with self._listening:
+                    if not is_done():
+                        await self._told.poll()
+                        await self._drain()
+
+        try:
+            await asyncio.wait_for(listen(), timeout_s)
+        except asyncio.TimeoutError:
+            return is_done()
+        return True
+
+    async def _hear(self) -> None:
+        """Take what the daemon has sent so far, unless a task listens already; does not wait."""
+        # What is taken from under a listener would not wake it.
+        if not self._listening.locked():
+            await self._drain()
+
+    async def _drain(self) -> None:
+        try:
+            while True:
+                self._producer.take(await self._told.recv_multipart(zmq.NOBLOCK))
+        except zmq.Again:
+            pass
+        begin, done = self._producer.unprompted()
+        if begin is not None:
+            self._told.subscribe(begin)
+        elif done is not None:
+            self._told.unsubscribe(done)
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            if error is None and self._sent:
+                await self.flush()
+        finally:
+            await self.close()

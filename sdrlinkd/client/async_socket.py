@@ -1,0 +1,42 @@
+"""What the asyncio clients have in common."""
+
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+import zmq.asyncio
+
+from sdrlinkd.client.blocking_socket import LINGER_MS
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+
+class AsyncSocket:
+    """A ZeroMQ socket in its own context, closed by `async with`."""
+
+    def __init__(self, kind: int, runtime_dir: Path, timeout_s: float) -> None:
+        self.runtime_dir = runtime_dir
+        self._timeout_s = timeout_s
+        self._context = zmq.asyncio.Context()
+        self._socket = self._context.socket(kind)
+
+    @property
+    def directory(self) -> Path:
+        """The same as `runtime_dir`."""
+        return self.runtime_dir
+
+    async def close(self) -> None:
+        """Close the sockets; what was sent has 200 ms to leave."""
+        self._context.destroy(LINGER_MS)
+
+    async def __aenter__(self) -> "Self":
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        await self.close()

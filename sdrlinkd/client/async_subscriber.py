@@ -1,0 +1,61 @@
+"""Subscribe from asyncio programs."""
+
+import asyncio
+import os
+from collections.abc import AsyncIterator
+from typing import TYPE_CHECKING
+
+import zmq
+
+from sdrlinkd.client.async_socket import AsyncSocket
+from sdrlinkd.client.errors import no_daemon
+from sdrlinkd.client.messages import Message, decode_in, new_ack_topic, topic_filter
+from sdrlinkd.client.paths import OUT_SOCKET, chosen_dir, endpoint
+from sdrlinkd.client.subscriber import RECEIVE_HWM
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+
+class AsyncSubscriber(AsyncSocket):
+    """As `Subscriber`, an asynchronous iterator; enter it with `async with`."""
+
+    def __init__(
+        self,
+        *topics: str,
+        runtime_dir: str | os.PathLike[str] | None = None,
+        timeout_s: float = 5.0,
+        directory: str | os.PathLike[str] | None = None,
+    ) -> None:
+        super().__init__(zmq.SUB, chosen_dir(runtime_dir, directory), timeout_s)
+        self._topics = topics or ("/*",)
+        self._socket.rcvhwm = RECEIVE_HWM
+
+    async def __aenter__(self) -> "Self":
+        self._socket.connect(endpoint(self.runtime_dir, OUT_SOCKET))
+        token = new_ack_topic()
+        for topic in self._topics:
+            self._socket.subscribe(topic_filter(topic))
+        self._socket.subscribe(token)
+        try:
+            await asyncio.wait_for(self._subscribed(token), self._timeout_s)
+        except asyncio.TimeoutError:
+            await self.close()
+            raise no_daemon(self.runtime_dir) from None
+        self._socket.unsubscribe(token)
+        return self
+
+    async def _subscribed(self, token: bytes) -> None:
+        while (await self._socket.recv_multipart())[0] != token:
+            pass
+
+    async def receive(self) -> Message:
+        """The next message."""
+        while True:
+            message = decode_in(await self._socket.recv_multipart())
+            if message is not None:
+                return message
+
+    async def __aiter__(self) -> AsyncIterator[Message]:
+        while True:
+            yield await self.receive()

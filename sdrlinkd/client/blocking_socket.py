@@ -1,0 +1,59 @@
+"""What the blocking clients have in common."""
+
+import math
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+import zmq
+
+from sdrlinkd.client.errors import no_daemon
+from sdrlinkd.client.paths import endpoint
+
+LINGER_MS = 200
+
+if TYPE_CHECKING:
+    # ROS 2 Humble has Python 3.10, where typing has none; only type checkers need this one.
+    from typing_extensions import Self
+
+
+class Endpoint:
+    """A ZeroMQ socket in its own context, closed by `with`."""
+
+    def __init__(self, kind: int, runtime_dir: Path) -> None:
+        self.runtime_dir = runtime_dir
+        self._context = zmq.Context()
+        self._socket = self._context.socket(kind)
+        self._socket.linger = LINGER_MS
+
+    @property
+    def directory(self) -> Path:
+        """The same as `runtime_dir`."""
+        return self.runtime_dir
+
+    def _connect(self, name: str, socket: "zmq.Socket[bytes] | None" = None) -> None:
+        try:
+            (self._socket if socket is None else socket).connect(endpoint(self.runtime_dir, name))
+        except zmq.ZMQError:
+            self.close()
+            raise no_daemon(self.runtime_dir) from None
+
+    def _poll(self, timeout_s: float | None) -> bool:
+        timeout_ms = None if timeout_s is None else math.ceil(timeout_s * 1000)
+        return bool(self._socket.poll(timeout_ms))
+
+    def close(self) -> None:
+        """Close the socket; what was sent has 200 ms to leave."""
+        self._socket.close()
+        self._context.term()
+
+    def __enter__(self) -> "Self":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()

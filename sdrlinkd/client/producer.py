@@ -1,0 +1,164 @@
+"""What a producer knows of its daemon, and what it says to it; without a socket.
+
+The publishers bring frames and time: one subscription tells of announcements, acknowledgements and
+receipts, in the order in which the daemon sent them.
+"""
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from sdrlinkd.client.announced import Announced, check_wishes
+from sdrlinkd.client.awaited import AwaitedReceipts
+from sdrlinkd.client.errors import EnvelopeMismatchError
+from sdrlinkd.client.flatmap import Value, pack_map, unpack
+from sdrlinkd.client.messages import (
+    ACK_PREFIX,
+    ENVELOPE_VERSION,
+    RECEIPT_PREFIX,
+    WELCOME_PREFIX,
+    decode_receipt,
+    new_ack_topic,
+)
+
+LOOK_S = 0.02
+"""So often, at most, a producer looks whether the daemon has announced something."""
+
+STILL_THERE_S = 1.0
+"""After such a silence, a producer that waits for receipts asks whether the daemon is there."""
+GONE_S = 5.0
+"""After so long without an answer, it is not."""
+
+
+class Producer:
+    """One producer's half of the conversation. `is_checked`: it refuses what the daemon would."""
+
+    def __init__(self, is_checked: bool) -> None:
+        self._is_checked = is_checked
+        self._look_at = 0.0
+        self._questions: dict[bytes, list[str]] = {}
+        """Boots of those who answered, by the topic of the answer."""
+        self._unprompted: bytes | None = None
+        self._unprompted_at = self._heard_at = time.monotonic()
+        self._confirmed = ""
+        """Boot of the daemon that has our subscriptions."""
+        self.known: Announced | None = None
+        self.awaited = AwaitedReceipts()
+
+    @property
+    def topics(self) -> tuple[bytes, ...]:
+        """Subscriptions that a producer has from the beginning."""
+        return WELCOME_PREFIX, self.awaited.prefix
+
+    def is_time_to_look(self) -> bool:
+        """Whether it is worth a look at the socket."""
+        now = time.monotonic()
+        if now < self._look_at:
+            return False
+        self._look_at = now + LOOK_S
+        return True
+
+    def take(self, frames: Sequence[bytes]) -> None:
+        """What the daemon sent. Raises EnvelopeMismatchError."""
+        topic = frames[0]
+        self._heard_at = time.monotonic()
+        try:
+            if topic.startswith(RECEIPT_PREFIX):
+                if (receipt := decode_receipt(frames)) is not None:
+                    self.awaited.take(receipt)
+                return
+            told = topic.removeprefix(WELCOME_PREFIX) if len(frames) == 1 else frames[1][1:]
+            known = Announced(unpack(told))
+        except (ValueError, KeyError, TypeError, AttributeError):
+            raise EnvelopeMismatchError(
+                "the daemon announces itself in words of another version; update it or the client"
+            ) from None
+        self.known = known
+        if topic.startswith(ACK_PREFIX):
+            self._confirmed = known.boot
+            self._questions.get(topic, []).append(known.boot)
+
+    def ask(self) -> bytes:
+        """The topic of an acknowledgement, to be subscribed to."""
+        topic = new_ack_topic()
+        self._questions[topic] = []
+        return topic
+
+    def answers(self, topic: bytes) -> list[str]:
+        """Boots of the daemons that have answered so far."""
+        return self._questions[topic]
+
+    def forget(self, topic: bytes) -> None:
+        """No answer is awaited any more."""
+        self._questions.pop(topic, None)
+
+    def unprompted(self) -> tuple[bytes | None, bytes | None]:
+        """Topics to (subscribe to, unsubscribe from): what is asked without waiting for an answer.
+
+        Whether a new daemon has the subscriptions, and whether that which owes receipts is there.
+        """
+        now = time.monotonic()
+        if self._unprompted is not None:
+            if not self._questions[self._unprompted]:
+                if self.awaited and now - self._unprompted_at > GONE_S:
+                    self.known = None
+                return None, None
+            done, self._unprompted = self._unprompted, None
+            self.forget(done)
+            return None, done
+        is_silent = bool(self.awaited) and now - self._heard_at > STILL_THERE_S
+        if self.known is not None and (is_silent or not self.is_subscribed):
+            self._unprompted, self._unprompted_at = self.ask(), now
+            return self._unprompted, None
+        return None, None
+
+    @property
+    def is_subscribed(self) -> bool:
+        """Whether no receipt of a message sent now can be missed."""
+        return self.known is not None and self.known.boot == self._confirmed
+
+    @property
+    def boot(self) -> str:
+        """Of the daemon that is known."""
+        return "" if self.known is None else self.known.boot
+
+    def takes(self, topic: str, cdr: bytes, type_: str | None) -> bool:
+        """Whether the daemon takes such a message, by what is known."""
+        known = self.known
+        if known is None:
+            return False
+        if not self._is_checked:
+            return True
+        return (
+            4 <= len(cdr) <= known.most.get(topic, -1)
+            and (type_ is None or type_ == known.types[topic])
+        )  # fmt: skip
+
+    def check(self, topic: str, cdr: bytes, type_: str | None) -> None:
+        """The same; raises MessageRefusedError."""
+        if self._is_checked and self.known is not None:
+            self.known.check(topic, len(cdr), type_)
+
+    def encode(
+        self, topic: str, cdr: bytes, fields: dict[str, Value], published_ns: int | None
+    ) -> list[bytes]:
+        """The three frames of a message."""
+        given = {key: value for key, value in fields.items() if value is not None}
+        given["t"] = time.time_ns() if published_ns is None else published_ns
+        frame = None if self.known is None else self.known.frames.get(topic)
+        if frame is None:
+            frame = topic.encode() + b"\0"
+        return [frame, ENVELOPE_VERSION + pack_map(given), cdr]
+
+
+def wishes(
+    qos: str | None,
+    priority: int | None,
+    dst: int | None,
+    lifespan_ms: float | None,
+    type_: str | None,
+    published_ns: int | None,
+) -> dict[str, Any]:
+    """Header fields of a message. Raises MessageRefusedError for what no daemon takes."""
+    check_wishes(qos, priority, dst, lifespan_ms, published_ns)
+    return {"q": qos, "p": priority, "d": dst, "ls": lifespan_ms, "ty": type_}

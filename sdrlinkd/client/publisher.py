@@ -1,0 +1,232 @@
+"""Publish from ordinary, blocking programs."""
+
+import math
+import os
+import time
+from collections.abc import Callable
+from types import TracebackType
+
+import zmq
+
+from sdrlinkd.client.blocking_socket import Endpoint
+from sdrlinkd.client.errors import no_daemon, restarted
+from sdrlinkd.client.messages import Receipt, sync_frames
+from sdrlinkd.client.paths import IN_SOCKET, OUT_SOCKET, chosen_dir
+from sdrlinkd.client.producer import STILL_THERE_S, Producer, wishes
+
+RECONNECT_MS = 20
+"""Faster than a PUSH socket's 100 ms: who takes messages should have said first which."""
+FOREVER = float("inf")
+
+
+class Publisher(Endpoint):
+    """Hands messages to the local daemon. For one thread at a time.
+
+    `send` blocks for at most `timeout_s` while the daemon is away or busy, then raises
+    NoDaemonError: nothing is ever queued for a daemon that is not there. With 0 it never blocks:
+    that is for callbacks, such as those of a ROS 2 executor, which must not hold up their node.
+
+    What the daemon would refuse is refused here, by its own words and with its own limits, which it
+    announces; also after it was restarted with others. `checked=False` leaves topics, types and
+    sizes to the daemon, for measurements: its ledger counts them.
+    """
+
+    def __init__(
+        self,
+        runtime_dir: str | os.PathLike[str] | None = None,
+        timeout_s: float = 5.0,
+        *,
+        checked: bool = True,
+        directory: str | os.PathLike[str] | None = None,
+    ) -> None:
+        """Does not wait for the daemon: see `wait_for_daemon`.
+
+        `runtime_dir` is where the daemon's sockets are; `directory` is another word for it.
+        """
+        super().__init__(zmq.PUSH, chosen_dir(runtime_dir, directory))
+        self._socket.immediate = True
+        self._timeout_s = timeout_s
+        self._producer = Producer(checked)
+        self._sent = False
+        self._told = self._context.socket(zmq.SUB)
+        self._told.rcvhwm = 0
+        self._told.reconnect_ivl = RECONNECT_MS
+        for topic in self._producer.topics:
+            self._told.subscribe(topic)
+        self._connect(OUT_SOCKET, self._told)
+        self._connect(IN_SOCKET)
+
+    def send(
+        self,
+        topic: str,
+        cdr: bytes,
+        *,
+        qos: str | None = None,
+        priority: int | None = None,
+        dst: int | None = None,
+        lifespan_ms: float | None = None,
+        type: str | None = None,  # noqa: A002
+        published_ns: int | None = None,
+        receipt: bool = False,
+        timeout_s: float | None = None,
+    ) -> str | None:
+        """Publish `cdr` under `topic`. What is left out comes from the daemon's configuration.
+
+        Its age counts from `published_ns` since 1970, else from now. With `receipt`, each robot
+        that it is for answers what became of it, under the name that is returned; see the method
+        `receipt`.
+
+        Blocks for at most `timeout_s`, else the publisher's: 0 never blocks and raises
+        NoDaemonError at once where the daemon is not connected (yet) or does not keep up. Raises
+        MessageRefusedError for a message that the daemon does not take: an unknown topic, another
+        type than the registry's, one that is too large, or a value out of range.
+        """
+        producer = self._producer
+        fields = wishes(qos, priority, dst, lifespan_ms, type, published_ns)
+        wait_s = self._timeout_s if timeout_s is None else timeout_s
+        if producer.is_time_to_look():
+            self._hear()
+        if not producer.takes(topic, cdr, type):
+            # Nothing is refused by hearsay: the daemon may have been restarted.
+            self._ask(wait_s)
+            producer.check(topic, cdr, type)
+        name = None
+        if receipt:
+            if not producer.is_subscribed:
+                self._ask(wait_s, must_answer=True)
+            name = fields["id"] = producer.awaited.new_id()
+        frames = producer.encode(topic, cdr, fields, published_ns)
+        while True:
+            try:
+                self._socket.send_multipart(frames, zmq.NOBLOCK)
+                break
+            except zmq.Again:
+                if not (wait_s and self._socket.poll(math.ceil(wait_s * 1000), zmq.POLLOUT)):
+                    raise no_daemon(self.runtime_dir) from None
+                # It may be another daemon by now.
+                self._ask(wait_s, must_answer=receipt)
+                producer.check(topic, cdr, type)
+        self._sent = True
+        if name is not None:
+            producer.awaited.expect(name, topic, dst, producer.boot)
+        return name
+
+    def receipt(self, timeout_s: float | None = None) -> Receipt | None:
+        """The next answer to messages sent with `receipt`.
+
+        None when `timeout_s` passed first, or when no answer is owed any more. Every message is
+        answered: with `unknown` where its daemon has ended, or has not answered for 6 s.
+        """
+        awaited, deadline = self._producer.awaited, _after(timeout_s)
+        while awaited:
+            self._hear()
+            if (came := awaited.next(self._producer.boot)) is not None:
+                return came
+            left_s = deadline - time.monotonic()
+            if left_s <= 0:
+                return None
+            self._until(lambda: awaited.has_come, min(left_s, STILL_THERE_S))
+        return None
+
+    def wait_for_daemon(self, timeout_s: float | None = None) -> None:
+        """Until the daemon answers, for at most `timeout_s`, else the publisher's.
+
+        Raises NoDaemonError.
+        """
+        self._ask(self._timeout_s if timeout_s is None else timeout_s, must_answer=True)
+
+    def flush(self, timeout_s: float = 5.0) -> None:
+        """Wait until the daemon has taken everything sent. Raises NoDaemonError.
+
+        ZeroMQ may drop the end of a long burst when the sender goes at once; who leaves the
+        `with` block in peace has flushed.
+        """
+        deadline = _after(timeout_s)
+        question = self._question()
+        answers = self._producer.answers(question)
+        try:
+            if not self._until(lambda: bool(answers), timeout_s):
+                raise no_daemon(self.runtime_dir)
+            left_s = max(deadline - time.monotonic(), 0.0)
+            if not self._socket.poll(math.ceil(left_s * 1000), zmq.POLLOUT):
+                raise no_daemon(self.runtime_dir)
+            self._socket.send_multipart(sync_frames(question), zmq.NOBLOCK)
+            if not self._until(lambda: len(answers) > 1, max(deadline - time.monotonic(), 0.0)):
+                raise no_daemon(self.runtime_dir)
+        except zmq.Again:
+            raise no_daemon(self.runtime_dir) from None
+        finally:
+            self._answered(question)
+        # A new daemon answers that the subscription is active once more.
+        if len(set(answers)) > 1:
+            raise restarted(self.runtime_dir)
+
+    def close(self) -> None:
+        """Close the sockets; what was sent has 200 ms to leave."""
+        self._told.close()
+        super().close()
+
+    def _ask(self, wait_s: float, *, must_answer: bool = False) -> None:
+        """Have the daemon's present word. Raises NoDaemonError when there is none in time.
+
+        Where nothing may be waited for, what is known has to do, unless it `must_answer`.
+        """
+        producer = self._producer
+        if not wait_s:
+            self._hear()
+            if producer.known is None or (must_answer and not producer.is_subscribed):
+                raise no_daemon(self.runtime_dir)
+            return
+        question = self._question()
+        answered = self._until(lambda: bool(producer.answers(question)), wait_s)
+        self._answered(question)
+        if not answered:
+            raise no_daemon(self.runtime_dir)
+
+    def _question(self) -> bytes:
+        topic = self._producer.ask()
+        self._told.subscribe(topic)
+        return topic
+
+    def _answered(self, question: bytes) -> None:
+        self._told.unsubscribe(question)
+        self._producer.forget(question)
+
+    def _until(self, is_done: Callable[[], bool], timeout_s: float) -> bool:
+        """Hear the daemon until `is_done`; whether that was in time."""
+        deadline = time.monotonic() + timeout_s
+        while not is_done():
+            left_s = max(deadline - time.monotonic(), 0.0)
+            if not self._told.poll(math.ceil(left_s * 1000)):
+                return False
+            self._hear()
+        return True
+
+    def _hear(self) -> None:
+        """Take what the daemon has sent so far."""
+        try:
+            while True:
+                self._producer.take(self._told.recv_multipart(zmq.NOBLOCK))
+        except zmq.Again:
+            pass
+        begin, done = self._producer.unprompted()
+        if begin is not None:
+            self._told.subscribe(begin)
+        elif done is not None:
+            self._told.unsubscribe(done)
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            if error is None and self._sent:
+                self.flush()
+        finally:
+            self.close()
+
+
+def _after(timeout_s: float | None) -> float:
+    return FOREVER if timeout_s is None else time.monotonic() + timeout_s

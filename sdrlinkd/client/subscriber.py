@@ -1,0 +1,69 @@
+"""Subscribe from ordinary, blocking programs."""
+
+import os
+import time
+from collections.abc import Iterator
+
+import zmq
+
+from sdrlinkd.client.blocking_socket import Endpoint
+from sdrlinkd.client.errors import no_daemon
+from sdrlinkd.client.messages import Message, decode_in, new_ack_topic, topic_filter
+from sdrlinkd.client.paths import OUT_SOCKET, chosen_dir
+
+RECEIVE_HWM = 1000
+
+
+class Subscriber(Endpoint):
+    """Receives what other robots sent. A topic that ends with `*` is a prefix.
+
+    `depth` messages wait for a slow reader, 0: without bound; what is beyond is missing, and shows
+    as a step in `Message.number`.
+    """
+
+    def __init__(
+        self,
+        *topics: str,
+        runtime_dir: str | os.PathLike[str] | None = None,
+        timeout_s: float = 5.0,
+        depth: int = RECEIVE_HWM,
+        directory: str | os.PathLike[str] | None = None,
+    ) -> None:
+        """Waits for the daemon, for at most `timeout_s`, then raises NoDaemonError.
+
+        `runtime_dir` is where the daemon's sockets are; `directory` is another word for it.
+        """
+        super().__init__(zmq.SUB, chosen_dir(runtime_dir, directory))
+        self._socket.rcvhwm = depth
+        self._connect(OUT_SOCKET)
+        for topic in topics or ("/*",):
+            self._socket.subscribe(topic_filter(topic))
+        self._wait_until_subscribed(timeout_s)
+
+    def receive(self, timeout_s: float | None = None) -> Message | None:
+        """The next message; None when `timeout_s` passed without one."""
+        deadline = None if timeout_s is None else time.monotonic() + timeout_s
+        while True:
+            if not self._poll(None if deadline is None else max(0.0, deadline - time.monotonic())):
+                return None
+            message = decode_in(self._socket.recv_multipart())
+            if message is not None:
+                return message
+
+    def __iter__(self) -> Iterator[Message]:
+        while True:
+            message = self.receive()
+            if message is not None:
+                yield message
+
+    def _wait_until_subscribed(self, timeout_s: float) -> None:
+        """The daemon answers subscriptions in order, so its answer to ours means all are active."""
+        token = new_ack_topic()
+        self._socket.subscribe(token)
+        deadline = time.monotonic() + timeout_s
+        while (left_s := deadline - time.monotonic()) > 0:
+            if self._poll(left_s) and self._socket.recv_multipart()[0] == token:
+                self._socket.unsubscribe(token)
+                return
+        self.close()
+        raise no_daemon(self.runtime_dir)

@@ -1,0 +1,98 @@
+"""Answers wait for a subscriber whose queue is full, and for nobody else's."""
+
+import asyncio
+
+import pytest
+import zmq
+
+from sdrlinkd.bus import undropped
+
+ROOM = 4
+"""Messages that a subscriber of these tests has room for, both ends of the pipe together."""
+
+
+@pytest.fixture
+def sockets():
+    """(XPUB, a SUB for `slow`, a SUB for `quick`)."""
+    context = zmq.Context()
+    out = context.socket(zmq.XPUB)
+    out.sndhwm = ROOM // 2
+    out.bind("inproc://out")
+    subs = []
+    for topic in (b"slow", b"quick"):
+        sub = context.socket(zmq.SUB)
+        sub.rcvhwm = ROOM // 2
+        sub.subscribe(topic)
+        sub.connect("inproc://out")
+        assert out.recv() == b"\x01" + topic
+        subs.append(sub)
+    yield out, *subs
+    context.destroy(linger=0)
+
+
+def heard(sub):
+    got = []
+    while sub.poll(0):
+        got.append(int(sub.recv_multipart()[1]))
+    return got
+
+
+def numbered(topic, numbers):
+    return [[topic, b"%d" % number] for number in numbers]
+
+
+async def until(condition):
+    async with asyncio.timeout(30):
+        while not condition():  # noqa: ASYNC110 (a timer of the loop is what is tested)
+            await asyncio.sleep(0.001)
+
+
+async def test_who_has_no_room_waits_and_nobody_else(sockets, monkeypatch):
+    monkeypatch.setattr(undropped, "STUCK_S", 1000.0)
+    out, slow, quick = sockets
+    certain = undropped.Undropped(asyncio.get_running_loop(), out, lambda: None)
+    for frames in numbered(b"slow", range(20)):
+        certain.send(b"slow", frames)
+    for frames in numbered(b"quick", range(ROOM)):
+        certain.send(b"quick", frames)
+    assert heard(quick) == list(range(ROOM))
+    got = []
+
+    def read():
+        got.extend(heard(slow))
+        return len(got) == 20
+
+    await until(read)
+    assert got == list(range(20))
+    out.get(zmq.EVENTS)  # takes note of the room there is again
+    certain.send(b"slow", [b"slow", b"20"])
+    assert heard(slow) == [20]
+    certain.close(1.0)
+
+
+async def test_who_does_not_read_at_all_is_given_up_until_it_does(sockets, monkeypatch):
+    monkeypatch.setattr(undropped, "STUCK_S", 0.0)
+    out, slow, _ = sockets
+    certain = undropped.Undropped(asyncio.get_running_loop(), out, lambda: None)
+    for frames in numbered(b"slow", range(20)):
+        certain.send(b"slow", frames)
+    await until(lambda: certain._lanes[b"slow"].is_stuck)
+    certain.send(b"slow", [b"slow", b"20"])
+    assert heard(slow) == list(range(ROOM))
+    out.get(zmq.EVENTS)
+    certain.send(b"slow", [b"slow", b"21"])
+    assert heard(slow) == [21]
+    assert not certain._lanes
+    certain.close(1.0)
+
+
+async def test_at_the_end_there_is_a_little_time(sockets, monkeypatch):
+    out, slow, _ = sockets
+    certain = undropped.Undropped(asyncio.get_running_loop(), out, lambda: None)
+    for frames in numbered(b"slow", range(20)):
+        certain.send(b"slow", frames)
+    got = []
+    monkeypatch.setattr(undropped.time, "sleep", lambda _: got.extend(heard(slow)))
+    certain.close(30.0)
+    got += heard(slow)
+    assert got == list(range(20))
