@@ -30,6 +30,7 @@ from backends.soapy import (
     SoapySettings,
     Survey,
     WaySurvey,
+    least_rate_hz,
     outlook,
     survey,
 )
@@ -109,6 +110,7 @@ __all__ = [
     "ZmqRadio",
     "burst_shape",
     "describe",
+    "least_rate_hz",
     "open_endpoint",
     "outlook",
     "refuse_same",

@@ -2,6 +2,7 @@
 
 from backends.soapy.outlook import Outlook, outlook
 from backends.soapy.radio import SoapyRadio
+from backends.soapy.setting_up import least_rate_hz
 from backends.soapy.settings import SoapySettings
 from backends.soapy.survey import DeviceSurvey, Survey, WaySurvey, survey
 
@@ -12,6 +13,7 @@ __all__ = [
     "SoapySettings",
     "Survey",
     "WaySurvey",
+    "least_rate_hz",
     "outlook",
     "survey",
 ]

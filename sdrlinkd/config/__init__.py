@@ -1,5 +1,6 @@
 """Configuration: TOML → types → what the parts are built with."""
 
+from sdrlinkd.config.carrier_checks import WITHOUT_AIR
 from sdrlinkd.config.carriers import (
     ChannelParams,
     DirectParams,
@@ -11,11 +12,14 @@ from sdrlinkd.config.carriers import (
     TransformParams,
 )
 from sdrlinkd.config.load import explain_policy, load_config, parse_config, parse_toml
+from sdrlinkd.config.not_checked import unchecked
+from sdrlinkd.config.places import located
 from sdrlinkd.config.radios import GnuRadioParams, SoapyParams, ZmqParams
 from sdrlinkd.config.schema import BusParams, Config
 from sdrlinkd.config.setup import Setup, load_registry, make_setup
 
 __all__ = [
+    "WITHOUT_AIR",
     "BusParams",
     "ChannelParams",
     "Config",
@@ -33,7 +37,9 @@ __all__ = [
     "explain_policy",
     "load_config",
     "load_registry",
+    "located",
     "make_setup",
     "parse_config",
     "parse_toml",
+    "unchecked",
 ]
