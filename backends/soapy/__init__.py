@@ -1,5 +1,6 @@
 """Real radios, through SoapySDR (https://github.com/pothosware/SoapySDR)."""
 
+from backends.soapy.library import driver_of
 from backends.soapy.outlook import Outlook, outlook
 from backends.soapy.radio import SoapyRadio
 from backends.soapy.setting_up import least_rate_hz
@@ -13,6 +14,7 @@ __all__ = [
     "SoapySettings",
     "Survey",
     "WaySurvey",
+    "driver_of",
     "least_rate_hz",
     "outlook",
     "survey",

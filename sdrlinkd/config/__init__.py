@@ -16,9 +16,10 @@ from sdrlinkd.config.not_checked import unchecked
 from sdrlinkd.config.places import located
 from sdrlinkd.config.radios import GnuRadioParams, SoapyParams, ZmqParams
 from sdrlinkd.config.schema import BusParams, Config
-from sdrlinkd.config.setup import Setup, load_registry, make_setup
+from sdrlinkd.config.setup import UNBOUNDED_TYPES, Setup, load_registry, make_setup
 
 __all__ = [
+    "UNBOUNDED_TYPES",
     "WITHOUT_AIR",
     "BusParams",
     "ChannelParams",
