@@ -1,4 +1,4 @@
-"""docs/radios/hackrf.md from its first to its last command, on a radio that is like a HackRF."""
+"""The pages of radios from their first to their last command, on test radios that are like them."""
 
 import contextlib
 import os
@@ -16,7 +16,7 @@ from tests.soapy_loopback import Bus, missing, module_folder
 from tests.waiting import wait_for
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs" / "radios" / "hackrf.md"
+PAGES = ROOT / "docs" / "radios"
 NOT_HERE = ("sudo ", "make setup", "export PATH", "hackrf_info")
 """Needs root, or a HackRF of metal; or it has been done."""
 MAY_SAY_NO = ("sdrlinkctl doctor", "sdrlinkctl status", "sdrlinkctl plan")
@@ -33,9 +33,10 @@ pytestmark = [
 class Laptop:
     """A folder, a radio and sockets of its own."""
 
-    def __init__(self, folder, unit, bus):
+    def __init__(self, folder, unit, bus, driver, model):
         self.folder = folder
-        self.device = f"driver=loopback,model=hackrf,bus={bus},unit={unit}"
+        self._driver = driver
+        self.device = f"driver=loopback,model={model},bus={bus},unit={unit}"
         self.environment = os.environ | {
             "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
             "SDRLINKD_RUNTIME_DIR": str(folder / "run"),
@@ -48,7 +49,7 @@ class Laptop:
 
     def type(self, command):
         """What is on the screen then; a command behind `&` is left running."""
-        line = command.line.replace("driver=hackrf", self.device)
+        line = command.line.replace(self._driver, self.device)
         if command.runs_on:
             return self._leave_running(line.removesuffix("&"), command.shown)
         done = subprocess.run(
@@ -59,7 +60,7 @@ class Laptop:
         allowed = (0, 1) if line.startswith(MAY_SAY_NO) else (0,)
         assert done.returncode in allowed, f"{line}\n{done.stdout}"
         for path in self.folder.glob("team/*.toml"):
-            path.write_text(path.read_text().replace('"driver=hackrf"', f'"{self.device}"'))
+            path.write_text(path.read_text().replace(f'"{self._driver}"', f'"{self.device}"'))
         return done.stdout
 
     def _leave_running(self, line, shown):
@@ -89,37 +90,48 @@ class Laptop:
             assert "Traceback" not in log.read_text(), log.read_text()
 
 
-@pytest.fixture
-def laptops(tmp_path):
+@contextlib.contextmanager
+def laptops(folder, driver, model):
     """`first` and `second`, on one air."""
     name = f"page-{uuid.uuid4().hex[:12]}"
     with Bus(name), contextlib.ExitStack() as stack:
-        made = {
-            who: Laptop(tmp_path / who, unit, name) for unit, who in enumerate(("first", "second"))
-        }
-        for each in made.values():
-            stack.callback(each.close)
+        made = {}
+        for unit, who in enumerate(("first", "second")):
+            made[who] = Laptop(folder / who, unit, name, driver, model)
+            stack.callback(made[who].close)
         yield made
 
 
-def test_every_command_of_the_page_works_and_shows_what_is_printed(laptops):
+def walk(page, typists, default=""):
+    """Types every command of a page, as `default` where it does not say who; how many it were."""
     run = 0
-    for command in commands_of(PAGE.read_text()):
-        if not command.who:
-            assert command.line.startswith(NOT_HERE), f"who types this? {command.line}"
+    for command in commands_of((PAGES / page).read_text()):
+        named = command.who or default
+        if command.line.startswith(NOT_HERE):
             continue
-        for who in laptops if command.who == "both" else [command.who]:
-            screen = laptops[who].type(command)
+        assert named, f"who types this? {command.line}"
+        for who in typists if named == "both" else [named]:
+            screen = typists[who].type(command)
             assert "Traceback" not in screen
             assert not missing_words(command.shown, screen), screen
             run += 1
         if command.line.startswith("sdrlinkctl init"):
             # "Copy the folder to the second laptop."
-            shutil.copytree(laptops["first"].folder / "team", laptops["second"].folder / "team")
-            copied = laptops["second"].folder / "team" / "robot_2.toml"
-            text = copied.read_text().replace(laptops["first"].device, laptops["second"].device)
-            copied.write_text(text)
-    assert run >= 14
+            first, second = typists["first"], typists["second"]
+            shutil.copytree(first.folder / "team", second.folder / "team")
+            copied = second.folder / "team" / "robot_2.toml"
+            copied.write_text(copied.read_text().replace(first.device, second.device))
+    return run
+
+
+def test_the_hackrf_page_works_and_shows_what_is_printed(tmp_path):
+    with laptops(tmp_path, "driver=hackrf", "hackrf") as both:
+        assert walk("hackrf.md", both) >= 14
+
+
+def test_the_usrp_page_works_and_shows_what_is_printed(tmp_path):
+    with laptops(tmp_path, "driver=uhd", "usrp") as both:
+        assert walk("usrp.md", both, default="first") >= 3
 
 
 def test_words_that_are_not_on_the_screen_are_missed():
