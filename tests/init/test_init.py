@@ -1,5 +1,6 @@
 """`sdrlinkctl init`: what it writes is good, and nothing is written that is not wanted."""
 
+import contextlib
 import os
 import pty
 import subprocess
@@ -10,9 +11,11 @@ from rosbags.rosbag2 import StoragePlugin
 
 from sdrlinkd.__main__ import main
 from sdrlinkd.cli import run
+from sdrlinkd.client import Publisher, Subscriber
 from sdrlinkd.config import load_config, load_registry, make_setup
 from sdrlinkd.init import MOST_TOPICS, RADIOS, FoundTopic, choose
 from tests.adapters.recordings import noisy_messages, ros2_bag
+from tests.waiting import wait_for
 
 ODOM = ("--topic", "odom:nav_msgs/msg/Odometry")
 
@@ -225,3 +228,37 @@ def test_what_is_missing_is_asked_with_a_default(tmp_path, capsys):
         assert part in said
     assert "robot 2" in checked(tmp_path / "team" / "sdrlinkd.toml", capsys)
     assert len(load_registry(tmp_path / "team" / "registry.csv")) == 2
+
+
+@pytest.mark.slow
+def test_a_team_on_the_ether_talks_at_once(init, tmp_path, monkeypatch):
+    """As the ether's page says: a hub, and the daemons with what was written."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    assert init("--radio", "ether", "--robots", 2, "--id", "all", *ODOM)[0] == 0
+    logs = [(tmp_path / name).open("w+") for name in ("air", "1", "2")]
+    lines = [
+        ("sdrlinkd.cli.ether", "--dir", "team/air"),
+        ("sdrlinkd", "--config", "team/robot_1.toml"),
+        ("sdrlinkd", "--config", "team/robot_2.toml"),
+    ]
+    with contextlib.ExitStack() as stack:
+        for line, log in zip(lines, logs, strict=True):
+            stack.enter_context(log)
+            process = stack.enter_context(
+                subprocess.Popen([sys.executable, "-m", *line], stdout=log, stderr=log)
+            )
+            stack.callback(process.terminate)
+        sockets = [tmp_path / "sdrlinkd" / f"robot_{number}" for number in (1, 2)]
+        for each in sockets:
+            wait_for((each / "out.sock").exists, 60)
+        with (
+            Publisher(sockets[0]) as out,
+            Subscriber("/rx_robot_1/odom", directory=sockets[1]) as heard,
+        ):
+
+            def is_heard():
+                out.send("/robot_1/odom", bytes(700))
+                return heard.receive(0.1)
+
+            wait_for(is_heard, 60)
