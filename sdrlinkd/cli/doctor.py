@@ -15,10 +15,8 @@ from rich.text import Text
 
 from sdrlinkd.cli.app import AsJson, RuntimeDir, app
 from sdrlinkd.client import runtime_dir as chosen_dir
-from sdrlinkd.errors import UserError
 
 if TYPE_CHECKING:
-    from backends import Survey
     from sdrlinkd.config import Setup
     from sdrlinkd.doctor import Finding, HostTerm
 
@@ -60,52 +58,53 @@ def doctor(
 
 
 def _look(setup: "Setup | None", runtime_dir: Path | None) -> tuple[list["Finding"], "HostTerm"]:
-    from backends import driver_of
     from sdrlinkd import doctor as checks
     from sdrlinkd.config import WITHOUT_AIR, Config
 
     config = setup.config if setup is not None else Config()
     backend = config.backend
     device = config.soapy.device if backend == "soapy" else ""
-    driver = driver_of(device)
-    stat, wall, monotonic = _stat(), time.time_ns(), time.monotonic_ns()
-    pdu_size = config.link.pdu_size
-    headroom = (
-        checks.measure_headroom(config.modem, pdu_size, MODEM_S)
-        if backend not in WITHOUT_AIR or setup is None
-        else None
-    )
+    # Before we are a load ourselves.
+    load, stat, wall, monotonic = os.getloadavg()[0], _stat(), time.time_ns(), time.monotonic_ns()
+    headroom = []
+    if backend not in WITHOUT_AIR or setup is None:
+        headroom = [checks.headroom_found(config.modem, config.link.pdu_size, MODEM_S)]
     host = asyncio.run(checks.measure_host(WAKES))
     step_s = 1e-9 * (time.time_ns() - wall - (time.monotonic_ns() - monotonic))
     given = runtime_dir or config.bus.runtime_dir or os.environ.get("RUNTIME_DIRECTORY") or None
     found = [
         *checks.check_machine(
-            os.cpu_count() or 1, os.getloadavg()[0], (stat, _stat()),
-            ROOT / "sys/devices/system/cpu", is_timed=backend in TIMED,
+            os.cpu_count() or 1, load, (stat, _stat()), ROOT / "sys/devices/system/cpu",
+            is_timed=backend in TIMED,
         ),
         *_environment(),
         *checks.check_directory(chosen_dir(given), os.getuid()),
         *checks.check_clock(checks.kernel_clock(), step_s, config.chrony.socket),
         *checks.check_limits(checks.granted(), device, ROOT),
-        *([] if headroom is None else [checks.check_headroom(headroom)]),
+        *headroom,
         checks.check_host(host, config.soapy.lead_s if device else None),
     ]  # fmt: skip
-    if setup is None or driver in checks.ON_USB:
-        found += checks.check_usb(driver, ROOT)
-    found += checks.check_radio(
-        setup.config if setup is not None else None,
-        _survey(device) if setup is None or device else None,
-    )
-    return found, host
+    return found + _radio(setup, device), host
 
 
-def _survey(device: str) -> "Survey":
-    from backends import BackendError, survey
+def _radio(setup: "Setup | None", device: str) -> list["Finding"]:
+    from backends import BackendError, driver_of, survey
+    from sdrlinkd.doctor import ON_USB, Finding, State, check_radio, check_usb
 
+    config = setup.config if setup is not None else None
+    if config is not None and not device:
+        return check_radio(config, None)
     try:
-        return survey(device)
+        there = survey(device)
     except BackendError as error:
-        raise UserError(str(error)) from None
+        to_do = "name one device with soapy.device, such as driver=hackrf, and look again"
+        return [Finding("device", State.BAD, str(error), to_do)]
+    driver = driver_of(device)
+    usb = check_usb(driver, ROOT) if not driver or driver in ON_USB else []
+    if any(not each.problem for each in there.devices):
+        # It works; that its ids are not known here, or that it is no USB device, does not matter.
+        usb = [each for each in usb if each.state is State.GOOD]
+    return usb + check_radio(config, there)
 
 
 def _environment() -> list["Finding"]:

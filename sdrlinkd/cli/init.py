@@ -12,6 +12,7 @@ from sdrlinkd.cli.app import RuntimeDir, app, connect
 from sdrlinkd.cli.questions import Questions
 from sdrlinkd.errors import UserError
 from sdrlinkd.init import (
+    RADIOS,
     REGISTRY,
     Choice,
     FoundTopic,
@@ -33,7 +34,8 @@ MOST_ROBOTS = 254
 @app.command()
 def init(
     radio: Annotated[
-        str, typer.Option(help="hackrf, usrp, lime, bladerf, pluto, soapy, ether, loopback, direct")
+        str,
+        typer.Option(help=", ".join(RADIOS), autocompletion=lambda: list(RADIOS)),
     ] = "",
     robots: Annotated[
         int | None, typer.Option(min=1, max=MOST_ROBOTS, help="So many share the air.")

@@ -8,7 +8,7 @@ from sdrlinkd.doctor.clock import KernelClock, check_clock, kernel_clock
 from sdrlinkd.doctor.directory import check_directory
 from sdrlinkd.doctor.environment import check_environment
 from sdrlinkd.doctor.finding import Finding, State
-from sdrlinkd.doctor.headroom import Headroom, check_headroom, measure_headroom
+from sdrlinkd.doctor.headroom import Headroom, check_headroom, headroom_found, measure_headroom
 from sdrlinkd.doctor.host import HostTerm, check_host, measure_host
 from sdrlinkd.doctor.limits import Granted, check_limits, granted
 from sdrlinkd.doctor.machine import check_machine
@@ -33,6 +33,7 @@ __all__ = [
     "check_radio",
     "check_usb",
     "granted",
+    "headroom_found",
     "kernel_clock",
     "measure_headroom",
     "measure_host",

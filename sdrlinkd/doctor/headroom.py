@@ -12,7 +12,8 @@ import tomli_w
 from sdrlinkd.client import Publisher
 from sdrlinkd.config import ModemParams
 from sdrlinkd.demo import daemon_process, snapshot_of, wait_until_up
-from sdrlinkd.doctor.finding import Finding, good_if
+from sdrlinkd.doctor.finding import Finding, bad, good_if
+from sdrlinkd.errors import UserError
 
 MOST = 0.8
 """The rest of a core is for what comes at once."""
@@ -34,6 +35,15 @@ class Headroom(NamedTuple):
     """While the air is full: every burst is made, and received."""
     samples_lost: int
     """While it was full: the receiver did not keep up."""
+
+
+def headroom_found(modem: ModemParams, pdu_size: int, seconds: float) -> Finding:
+    """Measured, or why it cannot be."""
+    try:
+        return check_headroom(measure_headroom(modem, pdu_size, seconds))
+    except UserError as error:
+        said = str(error).splitlines()[-1]
+        return bad("CPU headroom", f"no daemon ran to be measured: {said}", "mend that first")
 
 
 def measure_headroom(modem: ModemParams, pdu_size: int, seconds: float) -> Headroom:

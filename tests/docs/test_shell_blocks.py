@@ -1,4 +1,4 @@
-"""What pages tell their reader to type is at least a shell's language, and names files that are there."""
+"""What pages tell their reader to type is a shell's language, and names files that are there."""
 
 import re
 import subprocess
