@@ -34,6 +34,8 @@ from backends.soapy import (
     SoapySettings,
     Survey,
     WaySurvey,
+    driver_of,
+    least_rate_hz,
     outlook,
     survey,
 )
@@ -117,6 +119,8 @@ __all__ = [
     "ZmqRadio",
     "burst_shape",
     "describe",
+    "driver_of",
+    "least_rate_hz",
     "open_endpoint",
     "outlook",
     "refuse_same",

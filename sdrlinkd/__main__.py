@@ -9,8 +9,8 @@ from pathlib import Path
 import uvloop
 
 from sdrlinkd import __version__, daemon
-from sdrlinkd.config import Setup, load_config, make_setup
-from sdrlinkd.errors import UserError
+from sdrlinkd.config import WITHOUT_AIR, Setup, load_config, located, make_setup, unchecked
+from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.journal import JournalFormatter, is_read_by_journal
 from sdrlinkd.parent import end_with_parent
 
@@ -25,8 +25,7 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         setup = _read(options.config)
         if options.check:
-            daemon.check(setup)
-            sys.stdout.write("\n".join([*setup.summary(), "the configuration is good", ""]))
+            sys.stdout.write("\n".join([*_checked(setup), ""]))
             return 0
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
             runner.run(daemon.run(setup, lambda: _read(options.config)))
@@ -49,6 +48,25 @@ def _log_to_stderr(level: str) -> None:
 
 def _read(path: Path) -> Setup:
     return make_setup(load_config(path), path.parent, str(path))
+
+
+def _checked(setup: Setup) -> list[str]:
+    """What follows from the configuration, and what only the radio can tell. Raises UserError."""
+    daemon.check(setup)
+    if setup.config.backend not in WITHOUT_AIR:
+        # It brings the modem.
+        from sdrlinkd.modem import check_airtime
+
+        try:
+            check_airtime(setup.config)
+        except ConfigError as error:
+            raise ConfigError(located(str(error), setup.source)) from None
+    verdict = (
+        "the file is good; what is not checked shows when the daemon starts"
+        if unchecked(setup.config)
+        else "the configuration is good"
+    )
+    return [*setup.summary(), verdict]
 
 
 def _parser() -> argparse.ArgumentParser:

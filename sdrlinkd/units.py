@@ -1,4 +1,4 @@
-"""Times and sizes as people write them."""
+"""Times, sizes, frequencies and rates as people write them."""
 
 import math
 import re
@@ -16,7 +16,16 @@ _SIZES = {
     "mb": 10**6,
     "mib": 1 << 20,
 }
-_NUMBER = re.compile(r"\s*(inf|[0-9]*\.?[0-9]+(?:e[+-]?[0-9]+)?)\s*([a-zµ]*)\s*", re.IGNORECASE)
+_THOUSANDS = {"": 1.0, "k": 1e3, "m": 1e6, "g": 1e9}
+_FREQUENCIES = {"": 1.0} | {
+    prefix + unit: value for prefix, value in _THOUSANDS.items() for unit in ("hz", "sps")
+}
+_BIT_RATES = {"": 1.0} | {
+    prefix + unit: value for prefix, value in _THOUSANDS.items() for unit in ("bit/s", "bps")
+}
+_NUMBER = re.compile(
+    r"\s*(inf|(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?)\s*([a-zµ/]*)\s*", re.IGNORECASE
+)
 
 
 def seconds(text: str, key: str) -> float:
@@ -30,6 +39,24 @@ def octets(text: str, key: str) -> int:
     if not math.isfinite(value):
         raise UserError(f"{key}: got {text}; allowed: a size such as 64000, 64k or 1MiB")
     return round(value)
+
+
+def hertz(text: str, key: str) -> float:
+    """`433.92e6`, `433.92 MHz`, `2 Msps`. Raises UserError that cites `key`."""
+    allowed = "a frequency or rate such as 433.92e6, 433.92MHz or 2Msps"
+    return _finite(text, key, _FREQUENCIES, allowed)
+
+
+def bits_per_second(text: str, key: str) -> float:
+    """`1e5`, `100 kbit/s`. Raises UserError that cites `key`."""
+    return _finite(text, key, _BIT_RATES, "a bit rate such as 1e5 or 100kbit/s")
+
+
+def _finite(text: str, key: str, units: dict[str, float], allowed: str) -> float:
+    value = _read(text, key, units, allowed)
+    if not math.isfinite(value):
+        raise UserError(f"{key}: got {text}; allowed: {allowed}")
+    return value
 
 
 def _read(text: str, key: str, units: dict[str, float] | dict[str, int], allowed: str) -> float:

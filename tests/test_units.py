@@ -1,9 +1,9 @@
-"""Times and sizes as people write them."""
+"""Times, sizes, frequencies and rates as people write them."""
 
 import pytest
 
 from sdrlinkd.errors import UserError
-from sdrlinkd.units import octets, seconds
+from sdrlinkd.units import bits_per_second, hertz, octets, seconds
 
 
 @pytest.mark.parametrize(
@@ -21,10 +21,30 @@ def test_sizes(text, value):
     assert octets(text, "key") == value
 
 
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("433.92e6", 433.92e6),
+        ("433.92 MHz", 433.92e6),
+        ("2Msps", 2e6),
+        ("2.4ghz", 2.4e9),
+        ("1.", 1),
+    ],
+)
+def test_frequencies_and_rates(text, value):
+    assert hertz(text, "key") == pytest.approx(value)
+
+
+@pytest.mark.parametrize(("text", "value"), [("1e5", 1e5), ("100 kbit/s", 1e5), ("1.5Mbps", 1.5e6)])
+def test_bit_rates(text, value):
+    assert bits_per_second(text, "key") == pytest.approx(value)
+
+
 @pytest.mark.parametrize("text", ["", "fast", "1parsec", "-1", "1 2", "1e", "nan"])
 def test_what_is_neither_is_refused(text):
-    for read in (seconds, octets):
+    for read in (seconds, octets, hertz, bits_per_second):
         with pytest.raises(UserError, match="--key: got"):
             read(text, "--key")
-    with pytest.raises(UserError):
-        octets("inf", "--key")
+    for read in (octets, hertz, bits_per_second):
+        with pytest.raises(UserError):
+            read("inf", "--key")

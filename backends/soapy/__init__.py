@@ -1,7 +1,9 @@
 """Real radios, through SoapySDR (https://github.com/pothosware/SoapySDR)."""
 
+from backends.soapy.library import driver_of
 from backends.soapy.outlook import Outlook, outlook
 from backends.soapy.radio import SoapyRadio
+from backends.soapy.setting_up import least_rate_hz
 from backends.soapy.settings import SoapySettings
 from backends.soapy.survey import DeviceSurvey, Survey, WaySurvey, survey
 
@@ -12,6 +14,8 @@ __all__ = [
     "SoapySettings",
     "Survey",
     "WaySurvey",
+    "driver_of",
+    "least_rate_hz",
     "outlook",
     "survey",
 ]

@@ -4,6 +4,7 @@ import contextlib
 from collections.abc import Iterator, Sequence
 
 from backends.soapy.device import WAYS, Device
+from backends.soapy.library import driver_of
 from backends.soapy.settings import SettingError, SoapySettings
 from backends.soapy.surface import RX, SAMPLE_BYTES, TX, DriverError, Range
 
@@ -12,6 +13,11 @@ RATE_TOLERANCE = 1e-3
 FREQUENCY_TOLERANCE_HZ = 1e3
 LEAST_RATES = {"hackrf": 2e6}
 """Of drivers that claim to go slower, and do not."""
+
+
+def least_rate_hz(args: str) -> float:
+    """The slowest rate of the driver that device `args` name, as far as is known without it."""
+    return LEAST_RATES.get(driver_of(args).lower(), 0.0)
 
 
 def set_up(device: Device, settings: SoapySettings) -> dict[int, dict[str, float]]:

@@ -4,7 +4,7 @@ from rosbags.interfaces import Nodetype
 
 from sdrlinkd.adapters.fields import cdr_from_fields
 from sdrlinkd.adapters.typestore import knows, ros2_types
-from sdrlinkd.config import Setup
+from sdrlinkd.config import Setup, located
 from sdrlinkd.errors import ConfigError, UserError
 
 HEADER = "std_msgs/msg/Header"
@@ -15,11 +15,18 @@ def stop_messages(setup: Setup) -> dict[int, bytes]:
 
     Raises ConfigError where a policy asks for what cannot be made.
     """
+    try:
+        return _made(setup)
+    except ConfigError as error:
+        raise ConfigError(located(str(error), setup.source)) from None
+
+
+def _made(setup: Setup) -> dict[int, bytes]:
     made = {}
     for topic in setup.registry.topics:
         policy = setup.policies.get(topic.id)
         given = policy.stop if policy is not None else {}
-        where = f"{setup.source}: topic.{topic.name}"
+        where = f"topic.{topic.name}"
         if not knows(topic.type):
             if policy is not None and (policy.deadman_s or given):
                 raise ConfigError(

@@ -15,6 +15,11 @@ COMMANDS = {
     "status": Listed(
         "One screen: link, queue, topics, robots heard, drops by reason.", ("status",)
     ),
+    "init": Listed("Write a configuration and a registry to begin with.", ("init",)),
+    "doctor": Listed(
+        "Check machine, environment, radio, permissions and clock, and say what to do.",
+        ("doctor",),
+    ),
     "topics": Listed(
         "Topics of the registry, and those heard from other robots.", ("topics", "dictionary")
     ),

@@ -1,6 +1,7 @@
 """The radio of a command that needs no daemon: of a configuration, or named by itself."""
 
 import math
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, NamedTuple
@@ -10,8 +11,26 @@ from msgspec.structs import replace
 
 from sdrlinkd.config import Config, ModemParams, SoapyParams, load_config, make_setup
 from sdrlinkd.errors import UserError
+from sdrlinkd.units import hertz
 
 MOST_GAIN_DB = 200
+
+
+def _between(option: str, least: int, most: int) -> Callable[[str], float]:
+    """Reads a frequency or rate in that range, in Hz."""
+
+    def read(text: str) -> float:
+        try:
+            value = hertz(text, option)
+        except UserError:
+            value = math.nan
+        if not least <= value <= most:
+            raise UserError(
+                f"{option}: got {text}; allowed: {least} to {most}, or with its unit, such as 2 MHz"
+            )
+        return value
+
+    return read
 
 
 class Factor(StrEnum):
@@ -32,11 +51,19 @@ Device = Annotated[
 ]
 Frequency = Annotated[
     float | None,
-    typer.Option(metavar="HZ", min=1, max=1e11, help="Of --device: middle of the channel."),
+    typer.Option(
+        metavar='"433.92 MHz"',
+        parser=_between("--frequency", 1, 10**11),
+        help="Of --device: middle of the channel, in Hz or with its unit.",
+    ),
 ]
 Rate = Annotated[
     float | None,
-    typer.Option(metavar="HZ", min=1e4, max=2e8, help="Of --device: samples a second."),
+    typer.Option(
+        metavar='"2 Msps"',
+        parser=_between("--rate", 10**4, 2 * 10**8),
+        help="Of --device: samples a second, as a number or with its unit.",
+    ),
 ]
 Oversampling = Annotated[
     Factor, typer.Option(help="Of --device: it runs at so many times the rate.")

@@ -1,5 +1,6 @@
 """Configuration: TOML → types → what the parts are built with."""
 
+from sdrlinkd.config.carrier_checks import WITHOUT_AIR
 from sdrlinkd.config.carriers import (
     SIMULATED_HZ,
     ChannelParams,
@@ -12,13 +13,17 @@ from sdrlinkd.config.carriers import (
     TransformParams,
 )
 from sdrlinkd.config.load import explain_policy, load_config, parse_config, parse_toml
+from sdrlinkd.config.not_checked import unchecked
 from sdrlinkd.config.offsets import cfo_told, cfo_warning
+from sdrlinkd.config.places import located
 from sdrlinkd.config.radios import GnuRadioParams, SoapyParams, ZmqParams
 from sdrlinkd.config.schema import BusParams, Config
-from sdrlinkd.config.setup import Setup, load_registry, make_setup
+from sdrlinkd.config.setup import UNBOUNDED_TYPES, Setup, load_registry, make_setup
 
 __all__ = [
     "SIMULATED_HZ",
+    "UNBOUNDED_TYPES",
+    "WITHOUT_AIR",
     "BusParams",
     "ChannelParams",
     "Config",
@@ -38,7 +43,9 @@ __all__ = [
     "explain_policy",
     "load_config",
     "load_registry",
+    "located",
     "make_setup",
     "parse_config",
     "parse_toml",
+    "unchecked",
 ]

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import msgspec
 
+from backends import least_rate_hz
 from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError
 
@@ -11,57 +12,70 @@ WITHOUT_AIR = ("direct", "gnuradio")
 """Backends that carry PDUs, not samples."""
 
 
-def check_carrier(config: Config, source: str) -> None:
-    """Raises ConfigError, citing key, given and allowed."""
-    _check_sharing(config, source)
+def check_carrier(config: Config) -> None:
+    """Raises ConfigError that begins with the key, and says what was given and what is allowed."""
+    _check_sharing(config)
     if config.backend in ("zmq", "gnuradio"):
-        _check_endpoints(config, source)
+        _check_endpoints(config)
     if config.backend in WITHOUT_AIR:
         return
     modem, iqfile = config.modem, config.iqfile
     if modem.searched_cfo_hz > modem.most_cfo_hz:
         raise ConfigError(
-            f"{source}: modem.max_cfo_hz: got {modem.searched_cfo_hz:g}; allowed: at most a "
+            f"modem.max_cfo_hz: got {modem.searched_cfo_hz:g}; allowed: at most a "
             f'quarter of modem.rate_hz, {modem.most_cfo_hz:g}, or "auto"'
         )
     if config.backend == "ether" and not config.ether.dir:
         raise ConfigError(
-            f'{source}: ether.dir: got ""; allowed: the folder of a hub: sdrlink-ether --dir FOLDER'
+            'ether.dir: got ""; allowed with backend = "ether": the folder of a hub, as in '
+            "sdrlink-ether --dir FOLDER"
         )
     if config.backend == "iqfile" and not (iqfile.receive or iqfile.transmit):
         raise ConfigError(
-            f'{source}: iqfile.receive, iqfile.transmit: both are ""; allowed: name a recording to '
-            "play, one to write, or both"
+            'iqfile.receive, iqfile.transmit: both are ""; allowed with backend = "iqfile": a '
+            "recording to play (name a recording, SigMF or raw), one to write, or both"
         )
     if config.backend == "soapy":
-        _check_soapy(config, source)
+        _check_soapy(config)
 
 
-def _check_soapy(config: Config, source: str) -> None:
+def _check_soapy(config: Config) -> None:
     modem, soapy = config.modem, config.soapy
     if not soapy.device:
         raise ConfigError(
-            f'{source}: soapy.device: got ""; allowed: a device, such as "driver=hackrf"; those '
-            "here are shown by: sdrlinkctl radio probe"
+            'soapy.device: got ""; allowed with backend = "soapy": a device, such as '
+            '"driver=hackrf"; those here are shown by: sdrlinkctl radio probe'
+        )
+    if "=" not in soapy.device:
+        raise ConfigError(
+            f'soapy.device: got "{soapy.device}"; allowed: KEY=VALUE, with commas between, such as '
+            f'"driver={soapy.device}"; those here are shown by: sdrlinkctl radio probe'
+        )
+    least_hz = least_rate_hz(soapy.device)
+    if modem.rate_hz * modem.oversampling < least_hz:
+        raise ConfigError(
+            f"modem.rate_hz: got {modem.rate_hz / 1e6:g} Msps with modem.oversampling = "
+            f"{modem.oversampling}; allowed by this driver: at least {least_hz / 1e6:g} Msps at "
+            "the radio (modem.rate_hz × modem.oversampling)"
         )
     if not modem.frequency_hz:
         raise ConfigError(
-            f'{source}: modem.frequency_hz: got 0 (not set); allowed with backend = "soapy": a '
+            'modem.frequency_hz: got 0 (not set); allowed with backend = "soapy": a '
             "frequency that radio, antenna and licence are for, such as 433.5e6"
         )
     if soapy.tx_enabled and soapy.tx_gain_db is None and not soapy.tx_gains:
         raise ConfigError(
-            f"{source}: soapy.tx_gain_db: not set; allowed with soapy.tx_enabled = true: a gain in "
+            "soapy.tx_gain_db: not set; allowed with soapy.tx_enabled = true: a gain in "
             "dB, or soapy.tx_gains by element; begin low: sdrlinkctl radio probe shows the range"
         )
     if soapy.offset_tuning == "on" and modem.oversampling == 1:
         raise ConfigError(
-            f'{source}: soapy.offset_tuning: got "on" with modem.oversampling = 1; allowed: '
+            'soapy.offset_tuning: got "on" with modem.oversampling = 1; allowed: '
             "modem.oversampling 2 or 4, room for the oscillator beside the channel"
         )
 
 
-def _check_endpoints(config: Config, source: str) -> None:
+def _check_endpoints(config: Config) -> None:
     backend = config.backend
     section = config.zmq if backend == "zmq" else config.gnuradio
     needed = ["send"] if config.gnuradio.transport in ("udp", "tcp") else ["send", "receive"]
@@ -69,22 +83,22 @@ def _check_endpoints(config: Config, source: str) -> None:
         if not getattr(section, key):
             example = '"tcp://127.0.0.1:52001"' if "receive" in needed else '"127.0.0.1:52001"'
             raise ConfigError(
-                f'{source}: {backend}.{key}: got ""; allowed: where the flowgraph is, such as '
-                f"{example}"
+                f'{backend}.{key}: got ""; allowed with backend = "{backend}": where '
+                f"the flowgraph is, such as {example}"
             )
 
 
-def _check_sharing(config: Config, source: str) -> None:
+def _check_sharing(config: Config) -> None:
     policy = config.access.policy
     if policy != "none" and config.backend in WITHOUT_AIR:
         raise ConfigError(
-            f'{source}: access.policy: got "{policy}", but the backend "{config.backend}" has no '
+            f'access.policy: got "{policy}", but the backend "{config.backend}" has no '
             "air that we could hear; "
             'allowed: "none", or a backend with a radio'
         )
     if config.rate.min_mcs > config.rate.max_mcs:
         raise ConfigError(
-            f"{source}: rate.min_mcs: got {config.rate.min_mcs}; allowed: at most rate.max_mcs, "
+            f"rate.min_mcs: got {config.rate.min_mcs}; allowed: at most rate.max_mcs, "
             f"{config.rate.max_mcs}"
         )
 

@@ -28,7 +28,7 @@ def allowed(kind: inspect.Type) -> str:
         elif few is not None:
             length = f" of at least {few}" + (f" and at most {most}" if most is not None else "")
         return f"a list{length}, each of it {allowed(kind.item_type)}"
-    if isinstance(kind, inspect.StructType | inspect.DictType):
+    if is_table(kind):
         return "a table"
     if isinstance(kind, inspect.UnionType):
         # Words first: they are the likelier choice.
@@ -59,6 +59,11 @@ def keys_of(kind: inspect.Type) -> list[str] | None:
         if isinstance(kind, inspect.StructType)
         else None
     )
+
+
+def is_table(kind: inspect.Type) -> bool:
+    """Whether a value of `kind` is a table."""
+    return isinstance(kind, inspect.StructType | inspect.DictType)
 
 
 def child(kind: inspect.Type, key: str) -> inspect.Type | None:

@@ -11,32 +11,28 @@ from sdrlinkd.link import Qos, Relay, TopicPolicy
 from sdrlinkd.wire import Registry
 
 
-def check_relay(config: Config, node_id: int, registry: Registry, source: str) -> None:
-    """Raises ConfigError for what cannot work, citing key, given and allowed."""
-    try:
-        relay = Relay(config.relay, node_id)
-    except ConfigError as error:
-        raise ConfigError(f"{source}: {error}") from None
+def check_relay(config: Config, node_id: int, registry: Registry) -> None:
+    """Raises ConfigError that begins with the key, and says what was given and what is allowed."""
+    relay = Relay(config.relay, node_id)
     if config.relay.policy == "routes" and not config.relay.routes:
         raise ConfigError(
-            f'{source}: relay.routes: got []; allowed with relay.policy = "routes": FROM>TO, such '
-            'as "1>3"'
+            'relay.routes: got []; allowed with relay.policy = "routes": FROM>TO, such as "1>3"'
         )
     if relay.is_on and config.link.hop_limit < 2:
         raise ConfigError(
-            f"{source}: link.hop_limit: got {config.link.hop_limit}; allowed with [relay]: at "
-            "least 2, the same at all robots"
+            f"link.hop_limit: got {config.link.hop_limit}; allowed with relay.policy = "
+            f'"{config.relay.policy}": at least 2, the same at all robots'
         )
     for qos in Qos:
         if config.classes.of(qos).parity and not registry.has_control:
             raise ConfigError(
-                f"{source}: classes.{qos.label}.parity: got {config.classes.of(qos).parity:g}; it "
+                f"classes.{qos.label}.parity: got {config.classes.of(qos).parity:g}; it "
                 "needs a control channel, a registry of at most 15 topics; allowed here: 0"
             )
 
 
 def load_dictionaries(
-    policies: Mapping[int, TopicPolicy], base: Path, source: str
+    policies: Mapping[int, TopicPolicy], registry: Registry, base: Path
 ) -> dict[int, ZstdCompressionDict]:
     """By topic id. Raises ConfigError."""
     found = {}
@@ -44,17 +40,18 @@ def load_dictionaries(
         if not policy.dictionary:
             continue
         path = base / policy.dictionary
+        key = f"topic.{registry.topics[topic_id].name}.dictionary"
         try:
             made = ZstdCompressionDict(path.read_bytes())
             ZstdCompressor(dict_data=made)
         except (OSError, ZstdError, ValueError) as error:
             raise ConfigError(
-                f"{source}: topic.dictionary: {str(path)!r} cannot be used ({error}); allowed: a "
+                f"{key}: {str(path)!r} cannot be used ({error}); allowed: a "
                 "file made by `sdrlinkctl topics train-dict`"
             ) from None
         if not made.dict_id():
             raise ConfigError(
-                f"{source}: topic.dictionary: {str(path)!r} is no trained dictionary; allowed: a "
+                f"{key}: {str(path)!r} is no trained dictionary; allowed: a "
                 "file made by `sdrlinkctl topics train-dict`"
             )
         found[topic_id] = made

@@ -2,7 +2,6 @@
 
 import re
 import tomllib
-from collections import Counter
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
@@ -11,7 +10,8 @@ from typing import TypeVar
 import msgspec
 from msgspec import inspect
 
-from sdrlinkd.config import describe
+from sdrlinkd.config import describe, quantities
+from sdrlinkd.config.places import KeyPath, cite
 from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import TopicPolicy
@@ -47,7 +47,7 @@ def parse_toml(text: str, source: str, kind: type[S]) -> S:
         raise ConfigError(f"{source}: not TOML: {error}") from None
     _refuse_unknown(raw, describe.type_of(kind), [], text, source)
     try:
-        return msgspec.convert(raw, kind)
+        return msgspec.convert(quantities.as_numbers(raw, describe.type_of(kind)), kind)
     except msgspec.ValidationError as error:
         raise _explain(error, raw, text, source, describe.type_of(kind)) from None
 
@@ -63,17 +63,6 @@ def explain_policy(changes: Mapping[str, object]) -> str:
             what = describe.allowed(inner) if inner is not None else "nothing of that name"
             return f"{key}: got {describe.given(value)}; allowed: {what}"
     return f"{', '.join(changes)}: not allowed together"
-
-
-# Keys and, inside lists, places.
-KeyPath = list[str | int]
-
-
-def cite(source: str, text: str, path: KeyPath) -> str:
-    """`file:line: section.key`, as far as the line can be found."""
-    line = _line_of(text, path)
-    name = ".".join(step for step in path if isinstance(step, str))
-    return f"{source}:{line}: {name}" if line else f"{source}: {name}"
 
 
 def _refuse_unknown(
@@ -128,6 +117,8 @@ def _explain(
         where = cite(source, text, named[:-1] or named)
         return ConfigError(f"{where}: has no {missing[1]}; allowed: {what}")
     what = describe.allowed(kind) if kind is not None else str(error)
+    if kind is not None and named:
+        what += quantities.example(named[-1], kind)
     return ConfigError(f"{cite(source, text, named)}: got {describe.given(value)}; allowed: {what}")
 
 
@@ -141,36 +132,3 @@ def _first_bad_key(table: dict[str, object], kind: inspect.Type | None) -> str:
         except msgspec.ValidationError:
             return key
     return "*"
-
-
-def _line_of(text: str, path: KeyPath) -> int | None:
-    """Line of `path` in the TOML text; the section's line when the key is not spelled plainly."""
-    section: KeyPath = []
-    tables: Counter[str] = Counter()
-    best = None
-    for number, line in enumerate(text.splitlines(), start=1):
-        header = re.match(r"\s*(\[{1,2})([^\[\]]+)\]", line)
-        if header:
-            parts = [part.strip().strip("\"'") for part in header[2].split(".")]
-            tables[".".join(parts)] += header[1] == "[["
-            section = _section(parts, tables)
-            if section == path[: len(section)]:
-                best = number
-            continue
-        key = re.match(r"\s*([\w\"'.\-]+)\s*=", line)
-        if key:
-            dotted = [*section, *(part.strip("\"'") for part in key[1].split("."))]
-            if dotted == path[: len(dotted)]:
-                return number
-    return best
-
-
-def _section(parts: list[str], tables: Counter[str]) -> KeyPath:
-    """A header's path, with the place of each array of tables that it is in."""
-    section: KeyPath = []
-    for i, part in enumerate(parts):
-        section.append(part)
-        n = tables[".".join(parts[: i + 1])]
-        if n:
-            section.append(n - 1)
-    return section

@@ -13,7 +13,7 @@ _DIGITS = re.compile(r"[0-9]+")
 _ALLOWED = f"robot_id from 0 to {MOST}"
 
 
-def robot_id(config: Config, topics: Iterable[str], source: str) -> int:
+def robot_id(config: Config, topics: Iterable[str]) -> int:
     """As configured; with -1 the rightmost run of digits in the namespace.
 
     Without a namespace, that in the names of `topics`, the ones taken from the bus: those that hold
@@ -21,7 +21,7 @@ def robot_id(config: Config, topics: Iterable[str], source: str) -> int:
     """
     if config.robot_id >= 0:
         return config.robot_id
-    where = f"{source}: robot_id: got -1"
+    where = "robot_id: got -1"
     if config.namespace:
         return _from_namespace(config.namespace, where)
     found = {name: number for name in topics if (number := _last_number(name))}

@@ -8,7 +8,9 @@ from zstandard import ZstdCompressionDict
 
 from sdrlinkd.config.carrier_checks import WITHOUT_AIR, check_carrier, with_paths
 from sdrlinkd.config.link_checks import check_relay, load_dictionaries
+from sdrlinkd.config.not_checked import unchecked
 from sdrlinkd.config.offsets import cfo_told, cfo_warning
+from sdrlinkd.config.places import located
 from sdrlinkd.config.robot_id import robot_id
 from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError, RegistryError
@@ -70,41 +72,49 @@ class Setup:
             ),
             f"heard messages appear as {self.republished_as(2, 0)} (from robot 2)",
             *(f"warning: {warning}" for warning in self.warnings),
+            *(f"not checked: {each}" for each in unchecked(config)),
         ]
 
 
 def make_setup(config: Config, base: Path, source: str = "config") -> Setup:
-    """Resolve `config`; file names in it are relative to `base`. Raises UserError."""
-    registry = load_registry(base / config.registry)
-    _check_texts(config, source)
-    check_carrier(config, source)
-    config = with_paths(config, base)
-    topics_in = _topics_in(config, registry, source)
-    node_id = robot_id(config, topics_in, source)
+    """Resolve `config`; file names in it are relative to `base`.
+
+    Raises UserError. An error about a key cites its line where `source` is the file.
+    """
     try:
-        check_access(config.access, node_id)
+        return _resolve(config, base, source)
     except ConfigError as error:
-        raise ConfigError(f"{source}: {error}") from None
+        raise ConfigError(located(str(error), source)) from None
+
+
+def _resolve(config: Config, base: Path, source: str) -> Setup:
+    registry = load_registry(base / config.registry)
+    _check_texts(config)
+    check_carrier(config)
+    config = with_paths(config, base)
+    topics_in = _topics_in(config, registry)
+    node_id = robot_id(config, topics_in)
+    check_access(config.access, node_id)
     if config.rate.adapt and not (registry.has_control and config.link.beacon_s):
         raise ConfigError(
-            f"{source}: rate.adapt: got true; it needs beacons (link.beacon_s) and a control "
+            "rate.adapt: got true; it needs beacons (link.beacon_s) and a control "
             "channel, a registry of at most 15 topics; allowed here: false"
         )
-    check_relay(config, node_id, registry, source)
+    check_relay(config, node_id, registry)
     if config.chrony.socket and config.chrony.robot == node_id:
         raise ConfigError(
-            f"{source}: chrony.robot: got {node_id}, this robot itself; allowed: another robot, "
+            f"chrony.robot: got {node_id}, this robot itself; allowed: another robot, "
             "whose clock is the true one"
         )
-    policies = _policies(config, registry, source)
+    policies = _policies(config, registry)
     return Setup(
         config=config,
         registry=registry,
         node_id=node_id,
         topics_in=topics_in,
         policies=policies,
-        dictionaries=load_dictionaries(policies, base, source),
-        transforms=_transforms(config, registry, source),
+        dictionaries=load_dictionaries(policies, registry, base),
+        transforms=_transforms(config, registry),
         warnings=_warnings(config, registry),
         source=source,
     )
@@ -122,39 +132,38 @@ def load_registry(path: Path) -> Registry:
     return parse_registry(text, str(path))
 
 
-def _check_texts(config: Config, source: str) -> None:
+def _check_texts(config: Config) -> None:
     if config.namespace and not _NAMESPACE.fullmatch(config.namespace):
         raise ConfigError(
-            f'{source}: namespace: got "{config.namespace}"; allowed: a ROS namespace such as '
+            f'namespace: got "{config.namespace}"; allowed: a ROS namespace such as '
             '"robot_1", or ""'
         )
     named = _PLACEHOLDER.sub("1", config.rx_format)
     if named == config.rx_format or not _RX_NAME.fullmatch(named):
         raise ConfigError(
-            f'{source}: rx_format: got "{config.rx_format}"; allowed: a name that starts with / '
+            f'rx_format: got "{config.rx_format}"; allowed: a name that starts with / '
             'and holds {src_id}, such as "/rx_robot_{src_id}"'
         )
     if 0 < config.link.beacon_s < MIN_BEACON_S:
         raise ConfigError(
-            f"{source}: link.beacon_s: got {config.link.beacon_s}; allowed: 0 (none), or at least "
+            f"link.beacon_s: got {config.link.beacon_s}; allowed: 0 (none), or at least "
             f"{MIN_BEACON_S}"
         )
     if "\0" in config.bus.runtime_dir:
-        raise ConfigError(f"{source}: bus.runtime_dir: holds a NUL; allowed: a directory's name")
+        raise ConfigError("bus.runtime_dir: holds a NUL; allowed: a directory's name")
     most = equal_payload(config.link.pdu_size, 1)
     if config.link.min_fragment > most:
         raise ConfigError(
-            f"{source}: link.min_fragment: got {config.link.min_fragment}; allowed: at most "
+            f"link.min_fragment: got {config.link.min_fragment}; allowed: at most "
             f"{most} with link.pdu_size = {config.link.pdu_size}"
         )
 
 
-def _topics_in(config: Config, registry: Registry, source: str) -> dict[str, int]:
+def _topics_in(config: Config, registry: Registry) -> dict[str, int]:
     for name in config.topics:
         if registry.by_name(name) is None:
             raise ConfigError(
-                f'{source}: topics: got "{name}"; allowed: names of the registry: '
-                f"{registry.suggest(name)}"
+                f'topics: got "{name}"; allowed: names of the registry: {registry.suggest(name)}'
             )
     wanted = {name.removeprefix("/") for name in config.topics}
     prefix = "/" + config.namespace.strip("/") if config.namespace else ""
@@ -165,41 +174,55 @@ def _topics_in(config: Config, registry: Registry, source: str) -> dict[str, int
     }
 
 
-def _transforms(config: Config, registry: Registry, source: str) -> list[int]:
+def _transforms(config: Config, registry: Registry) -> list[int]:
     found = []
     for name in config.tf.topics:
         topic = registry.by_name(name)
         if topic is None or topic.type != TF_TYPE:
             fit = [each.name for each in registry.topics if each.type == TF_TYPE]
             raise ConfigError(
-                f'{source}: tf.topics: got "{name}"; allowed: topics of the registry of type '
+                f'tf.topics: got "{name}"; allowed: topics of the registry of type '
                 f"{TF_TYPE}: {', '.join(fit) or 'none'}"
             )
         found.append(topic.id)
     return found
 
 
-def _policies(config: Config, registry: Registry, source: str) -> dict[int, TopicPolicy]:
+def _policies(config: Config, registry: Registry) -> dict[int, TopicPolicy]:
     policies = {}
     for name, policy in config.topic.items():
         topic = registry.by_name(name)
         if topic is None:
             raise ConfigError(
-                f'{source}: topic."{name}": unknown topic; allowed: names of the registry: '
+                f'topic."{name}": unknown topic; allowed: names of the registry: '
                 f"{registry.suggest(name)}"
             )
         if topic.id in policies:
-            raise ConfigError(f'{source}: topic."{name}": stands twice, with and without the slash')
+            raise ConfigError(f'topic."{name}": stands twice, with and without the slash')
         policies[topic.id] = policy
     return policies
 
 
 def _warnings(config: Config, registry: Registry) -> list[str]:
-    most = max_message_size(config.link.pdu_size)
+    size, least = config.link.pdu_size, config.link.min_fragment
+    most, shared = max_message_size(size), equal_payload(size, 2)
+    lonely = (
+        f"link.min_fragment = {least} is more than the {shared} B that each of two topics gets in "
+        f"a PDU of {size} B: topics seldom share a PDU; at most {shared} lets them"
+    )
+    full = (
+        f"{len(registry)} topics take every topic id: no ages, no beacons, no link reports, no "
+        f"receipts; at most {len(registry) - 1} leave one for them"
+    )
     deaf = "" if config.backend in WITHOUT_AIR else cfo_warning(config.modem)
-    return ([deaf] if deaf else []) + [
-        f"{topic.name} ({topic.type}) can be larger than the {most} B that 255 fragments of "
-        f"{config.link.pdu_size} B PDUs carry; larger messages are refused (tx_too_big)"
-        for topic in registry.topics
-        if topic.type in UNBOUNDED_TYPES
-    ]
+    return (
+        [deaf] * bool(deaf)
+        + [lonely] * (least > shared)
+        + [full] * (not registry.has_control)
+        + [
+            f"{topic.name} ({topic.type}) can be larger than the {most} B that 255 fragments of "
+            f"{config.link.pdu_size} B PDUs carry; larger messages are refused (tx_too_big)"
+            for topic in registry.topics
+            if topic.type in UNBOUNDED_TYPES
+        ]
+    )

@@ -2,7 +2,7 @@
 
 from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.link import ModemLink
-from sdrlinkd.modem.radios import make_modem, make_radio
+from sdrlinkd.modem.radios import check_airtime, make_modem, make_radio
 from sdrlinkd.modem.traits import carrier_traits
 
-__all__ = ["Airtimes", "ModemLink", "carrier_traits", "make_modem", "make_radio"]
+__all__ = ["Airtimes", "ModemLink", "carrier_traits", "check_airtime", "make_modem", "make_radio"]

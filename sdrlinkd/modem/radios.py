@@ -47,7 +47,7 @@ def make_modem(
     `patience`: of a radio that is not there when it is opened; `began_s`: the link's clock has run
     since then (monotonic); `load` compiles the PHY, or loads it.
     """
-    _check_airtime(config)
+    check_airtime(config)
     policy = config.access.policy
     return ModemLink(
         config.modem,
@@ -137,7 +137,8 @@ def _longest_burst_s(config: Config) -> float:
     return max(modem.max_burst_s, Airtimes(modem, config.link.pdu_size).airtime_s(0, 1))
 
 
-def _check_airtime(config: Config) -> None:
+def check_airtime(config: Config) -> None:
+    """Raises ConfigError where a PDU is so long on the air that fragments would be given up."""
     modem, size = config.modem, config.link.pdu_size
     airtime_s = phy.layout(phy.GRIDS[modem.grid], modem.mcs, 1, size).n_samples / modem.rate_hz
     if airtime_s > config.reassembly.timeout_s / 2:

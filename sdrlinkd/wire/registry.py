@@ -154,8 +154,9 @@ def _assemble(pairs: list[tuple[str, str, str]], source: str) -> Registry:
         topics.append(Topic(len(topics), name, f"{kind[1]}/msg/{kind[2]}"))
     if len(topics) > MAX_TOPICS:
         raise RegistryError(
-            f"{source}: {len(topics)} topics; a PDU's topic id has room for {MAX_TOPICS} "
-            f"(and for {MAX_TOPICS - 1} with ages, beacons and link reports)"
+            f"{source}: {len(topics)} topics; allowed: at most {MAX_TOPICS - 1}, or {MAX_TOPICS} "
+            f"without ages, beacons and link reports (a PDU's topic id has 4 bits); take "
+            f"{len(topics) - MAX_TOPICS + 1} lines out, the same ones at all robots"
         )
     if not topics:
         raise RegistryError(f"{source}: no topics; write at least one line such as "

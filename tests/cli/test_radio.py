@@ -73,6 +73,9 @@ def test_what_is_not_there_is_told_apart(capsys, args, part):
 def test_shipped_radio_configurations_want_only_a_frequency(name):
     path = ETC / "radios" / f"{name}.toml"
     text = path.read_text().replace("frequency_hz = 0.0 ", "frequency_hz = 433.92e6 ")
+    # In its place, and copied beside a registry, as a page may say.
+    assert (ETC / "radios" / "registry.csv").read_text() == (ETC / "registry.csv").read_text()
+    assert make_setup(parse_config(text, str(path)), ETC)
     setup = make_setup(parse_config(text, str(path)), path.parent)
     assert setup.config.backend == "soapy"
     assert not load_config(path).soapy.tx_enabled

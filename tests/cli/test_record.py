@@ -116,6 +116,15 @@ def test_bad_input_is_refused_in_one_line(ctl, tmp_path, arguments, says):
     assert not list(tmp_path.iterdir())
 
 
+def test_frequency_and_rate_take_their_units(ctl, tmp_path):
+    given = ("--device", "driver=none", "--frequency", "433 MHz", "--rate", "2 Msps")
+    _, _, with_units = ctl("record", tmp_path / "rec", *given)
+    _, _, plain = ctl("record", tmp_path / "rec", *DEVICE)
+    assert with_units == plain
+    code, _, err = ctl("record", tmp_path / "rec", *given, "--rate", "5 GB")
+    assert (code, "--rate: got 5 GB; allowed: 10000 to 200000000" in err) == (2, True)
+
+
 @pytest.mark.parametrize(
     ("option", "value", "says"),
     [

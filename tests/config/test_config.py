@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from sdrlinkd.config import Config, load_config, make_setup, parse_config
-from sdrlinkd.errors import RegistryError, UserError
+from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.link import ClassParams, TopicPolicy
 
 ROOT = Path(__file__).parents[2]
@@ -200,3 +200,30 @@ min_mcs = 1
 """
     config = make_setup(parse_config(text), ETC).config
     assert (config.access.nodes, config.rate.min_mcs) == ([1, 2, 3], 1)
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "value"),
+    [
+        ('drain_s = "300 ms"', "drain_s", 0.3),
+        ('[topic.odom]\nlifespan_s = "300ms"', "topic.odom.lifespan_s", 0.3),
+        ('[topic.odom]\nlifespan_s = "inf"', "topic.odom.lifespan_s", float("inf")),
+        ('[classes.bulk]\nmax_burst_s = "2 ms"', "classes.bulk.max_burst_s", 0.002),
+        ('[modem]\nfrequency_hz = "433.92 MHz"', "modem.frequency_hz", 433.92e6),
+        ('[modem]\nrate_hz = "2 Msps"', "modem.rate_hz", 2e6),
+        ('[modem]\nmax_cfo_hz = "20 kHz"', "modem.max_cfo_hz", 2e4),
+        ('[gnuradio]\nrate_bit_s = "1.5 Mbit/s"', "gnuradio.rate_bit_s", 1.5e6),
+        ('[access]\nslot_s = "0.3 s"', "access.slot_s", 0.3),
+    ],
+)
+def test_times_frequencies_and_rates_take_a_unit(text, where, value):
+    found = parse_config(text)
+    for step in where.split("."):
+        found = found[step] if isinstance(found, dict) else getattr(found, step)
+    assert found == pytest.approx(value)
+
+
+def test_text_stays_text_where_no_quantity_is_wanted():
+    assert parse_config('[soapy]\nsettings = { a_s = "5 ms" }').soapy.settings == {"a_s": "5 ms"}
+    with pytest.raises(ConfigError, match=r"from 32 to 2047$"):
+        parse_config('[link]\npdu_size = "64 ms"')

@@ -1,0 +1,146 @@
+"""`doctor`: whether this machine can carry a node, line by line. Needs no daemon."""
+
+import asyncio
+import os
+import time
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import msgspec
+import typer
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from sdrlinkd.cli.app import AsJson, RuntimeDir, app
+from sdrlinkd.client import runtime_dir as chosen_dir
+
+if TYPE_CHECKING:
+    from sdrlinkd.config import Setup
+    from sdrlinkd.doctor import Finding, HostTerm
+
+MARKS = {"good": ("✓", "green"), "bad": ("✗", "bold red"), "not applicable": ("–", "dim")}
+TIMED = ("soapy", "ether", "loopback", "zmq")
+"""Backends whose samples come by the clock."""
+ROOT = Path("/")
+MODEM_S = 2.0
+WAKES = 1000
+
+
+@app.command()
+def doctor(
+    config: Annotated[
+        Path | None, typer.Option("--config", help="What the machine is to carry.")
+    ] = None,
+    runtime_dir: RuntimeDir = None,
+    as_json: AsJson = False,
+) -> None:
+    """Check machine, environment, radio, permissions and clock, and say what to do.
+
+    A radio is opened, and nothing is sent. Exit code 1 where something must be done.
+    """
+    from sdrlinkd.config import load_config, make_setup
+
+    setup = None
+    if config is not None:
+        setup = make_setup(load_config(config), config.parent, str(config))
+    with Console(stderr=True).status("looking"):
+        found, host = _look(setup, runtime_dir)
+    is_bad = any(each.state == "bad" for each in found)
+    if as_json:
+        told = {"ok": not is_bad, "host_s": host.host_s, "findings": found}
+        typer.echo(msgspec.json.encode(told).decode())
+    else:
+        _print(found)
+    if is_bad:
+        raise typer.Exit(1)
+
+
+def _look(setup: "Setup | None", runtime_dir: Path | None) -> tuple[list["Finding"], "HostTerm"]:
+    from sdrlinkd import doctor as checks
+    from sdrlinkd.config import WITHOUT_AIR, Config
+
+    config = setup.config if setup is not None else Config()
+    backend = config.backend
+    device = config.soapy.device if backend == "soapy" else ""
+    # Before we are a load ourselves.
+    load, stat, wall, monotonic = os.getloadavg()[0], _stat(), time.time_ns(), time.monotonic_ns()
+    headroom = []
+    if backend not in WITHOUT_AIR or setup is None:
+        headroom = [checks.headroom_found(config.modem, config.link.pdu_size, MODEM_S)]
+    host = asyncio.run(checks.measure_host(WAKES))
+    step_s = 1e-9 * (time.time_ns() - wall - (time.monotonic_ns() - monotonic))
+    given = runtime_dir or config.bus.runtime_dir or os.environ.get("RUNTIME_DIRECTORY") or None
+    found = [
+        *checks.check_machine(
+            os.cpu_count() or 1, load, (stat, _stat()), ROOT / "sys/devices/system/cpu",
+            is_timed=backend in TIMED,
+        ),
+        *_environment(),
+        *checks.check_directory(chosen_dir(given), os.getuid()),
+        *checks.check_clock(checks.kernel_clock(), step_s, config.chrony.socket),
+        *checks.check_limits(checks.granted(), device, ROOT),
+        *headroom,
+        checks.check_host(host, config.soapy.lead_s if device else None),
+    ]  # fmt: skip
+    return found + _radio(setup, device), host
+
+
+def _radio(setup: "Setup | None", device: str) -> list["Finding"]:
+    from backends import BackendError, driver_of, survey
+    from sdrlinkd.doctor import ON_USB, Finding, State, check_radio, check_usb
+
+    config = setup.config if setup is not None else None
+    if config is not None and not device:
+        return check_radio(config, None)
+    try:
+        there = survey(device)
+    except BackendError as error:
+        to_do = "name one device with soapy.device, such as driver=hackrf, and look again"
+        return [Finding("device", State.BAD, str(error), to_do)]
+    driver = driver_of(device)
+    usb = check_usb(driver, ROOT) if not driver or driver in ON_USB else []
+    if any(not each.problem for each in there.devices):
+        # It works; that its ids are not known here, or that it is no USB device, does not matter.
+        usb = [each for each in usb if each.state is State.GOOD]
+    return usb + check_radio(config, there)
+
+
+def _environment() -> list["Finding"]:
+    import phy
+    import sdrlinkd
+    from sdrlinkd.doctor import check_environment
+
+    try:
+        requirements = metadata.requires("sdrlinkd") or []
+    except metadata.PackageNotFoundError:
+        requirements = []
+    phy_folder = Path(phy.__file__).parent
+    cache = Path(os.environ.get("NUMBA_CACHE_DIR") or phy_folder / "kernels" / "__pycache__")
+    return check_environment(
+        requirements, metadata.version, Path(sdrlinkd.__file__).parents[1], phy_folder.parent, cache
+    )
+
+
+def _stat() -> str:
+    try:
+        return (ROOT / "proc/stat").read_text()
+    except OSError:
+        return ""
+
+
+def _print(found: list["Finding"]) -> None:
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column()
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for each in found:
+        mark, style = MARKS[each.state]
+        table.add_row(Text(mark, style), Text(each.what), Text(each.told))
+        if each.to_do:
+            table.add_row("", "", Text(f"→ {each.to_do}"))
+    console = Console(highlight=False)
+    console.print(table)
+    n = sum(each.state == "bad" for each in found)
+    console.print(f"{n} to do" if n else "nothing to do")

@@ -1,0 +1,200 @@
+"""`init`: a configuration and a registry to begin with. Needs no daemon."""
+
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from sdrlinkd.cli.app import RuntimeDir, app, connect
+from sdrlinkd.cli.questions import Questions
+from sdrlinkd.errors import UserError
+from sdrlinkd.init import (
+    RADIOS,
+    REGISTRY,
+    Choice,
+    FoundTopic,
+    RadioPreset,
+    Team,
+    choose,
+    copy_of,
+    named,
+    team_files,
+    topics_of_graph,
+)
+
+if TYPE_CHECKING:
+    pass
+
+MOST_ROBOTS = 254
+
+
+@app.command()
+def init(
+    radio: Annotated[
+        str,
+        typer.Option(help=", ".join(RADIOS), autocompletion=lambda: list(RADIOS)),
+    ] = "",
+    robots: Annotated[
+        int | None, typer.Option(min=1, max=MOST_ROBOTS, help="So many share the air.")
+    ] = None,
+    frequency: Annotated[
+        str, typer.Option(metavar="HZ", help='Middle of the channel, such as "433.92 MHz".')
+    ] = "",
+    own: Annotated[
+        str, typer.Option("--id", help="Which robot this is, from 1 on; all: a file for each.")
+    ] = "",
+    topic: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME:TYPE; with --bag or --from-graph NAME; repeatable."),
+    ] = None,
+    bag: Annotated[Path | None, typer.Option(help="The topics are those of a recording.")] = None,
+    from_graph: Annotated[
+        bool, typer.Option("--from-graph", help="The topics are those that ROS 2 has now.")
+    ] = False,
+    from_daemon: Annotated[
+        bool, typer.Option("--from-daemon", help="As the running daemon, for another --id.")
+    ] = False,
+    device: Annotated[
+        str, typer.Option(metavar="ARGS", help='As soapy.device, such as "driver=hackrf".')
+    ] = "",
+    out: Annotated[Path, typer.Option(help="Folder to write to.")] = Path(),
+    force: Annotated[bool, typer.Option("--force", help="Replace files.")] = False,
+    runtime_dir: RuntimeDir = None,
+) -> None:
+    """Write a configuration and a registry to begin with.
+
+    What no option says is asked, where a terminal is there to answer.
+    """
+    questions = Questions()
+    if from_daemon:
+        files = _copied(questions, own, runtime_dir)
+    else:
+        preset = questions.radio(radio)
+        count = questions.robots(robots) if preset.shares_air else 1
+        frequency = questions.frequency(frequency) if preset.is_real else ""
+        device = questions.device(device, preset) if preset.is_real else ""
+        ids = questions.own_ids(own, count)
+        found = _topics(questions, topic or [], bag, from_graph=from_graph)
+        air, sockets = (out / "air").absolute(), _socket_folder()
+        team = Team(preset, count, frequency, device, found, air, sockets)
+        files = team_files(team, ids)
+    _write(files, out, force)
+    console = Console(soft_wrap=True, highlight=False, markup=False)
+    console.print(f"wrote {', '.join(str(out / name) for name in files)}")
+    for line in _next(files, out, None if from_daemon else preset):
+        console.print(line)
+
+
+def _topics(
+    questions: Questions, wanted: list[str], bag: Path | None, *, from_graph: bool
+) -> list[FoundTopic]:
+    if bag is not None and from_graph:
+        raise UserError("--bag, --from-graph: both given; allowed: one of them")
+    if bag is None and not from_graph:
+        if wanted:
+            return named(wanted)
+        answer = questions.topics()
+        if answer == ["graph"]:
+            from_graph = True
+        elif len(answer) == 1 and ":" not in answer[0]:
+            bag = Path(answer[0])
+        else:
+            return named(answer)
+    choice = (
+        choose(topics_of_graph(), wanted, "the ROS 2 graph")
+        if bag is None
+        else choose(_topics_of(bag), wanted, str(bag))
+    )
+    _tell(choice)
+    return choice.taken
+
+
+def _topics_of(bag: Path) -> list[FoundTopic]:
+    # It brings the message types.
+    from sdrlinkd.adapters import open_bag
+
+    opened = open_bag(bag)
+    try:
+        return [FoundTopic(*each[:3]) for each in opened.topics()]
+    finally:
+        opened.close()
+
+
+def _tell(choice: Choice) -> None:
+    console = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
+    for name, reason in choice.left_out.items():
+        console.print(f"left out: {name} ({reason})", style="yellow")
+    if any(reason.startswith("no room") for reason in choice.left_out.values()):
+        console.print("choose others with --topic NAME, repeated", style="yellow")
+
+
+def _copied(questions: Questions, own: str, runtime_dir: Path | None) -> dict[str, str]:
+    import msgspec
+
+    from sdrlinkd.config import Config
+
+    with connect(runtime_dir) as control:
+        config: Config = msgspec.convert(control.ask("config"), Config)
+        topics = control.ask("topics")
+    ids = questions.own_ids(own, MOST_ROBOTS)
+    if len(ids) > 1:
+        raise UserError('--id: got "all"; allowed with --from-daemon: one robot')
+    prefix = f"/{config.namespace.strip('/')}/" if config.namespace else "/"
+    lines = "".join(f"{each['name'].removeprefix(prefix)},{each['type']}\n" for each in topics)
+    return {
+        REGISTRY: "# Topic registry: the same file at all robots.\n" + lines,
+        "sdrlinkd.toml": copy_of(config, ids[0]),
+    }
+
+
+def _socket_folder() -> Path:
+    own = os.environ.get("XDG_RUNTIME_DIR")
+    return Path(own, "sdrlinkd") if own else Path(tempfile.gettempdir(), f"sdrlinkd-{os.getuid()}")
+
+
+def _write(files: dict[str, str], out: Path, force: bool) -> None:
+    """All of them, or none. Raises UserError."""
+    from sdrlinkd.config import load_config, make_setup
+
+    there = [name for name in files if (out / name).exists()]
+    if there and not force:
+        names = ", ".join(str(out / name) for name in there)
+        raise UserError(f"{names}: there already; allowed: another --out, or --force to replace")
+    with tempfile.TemporaryDirectory() as trial:
+        for name, text in files.items():
+            (Path(trial) / name).write_text(text)
+        for name in files:
+            if name != REGISTRY:
+                make_setup(load_config(Path(trial) / name), Path(trial), name)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for name, text in files.items():
+            (out / name).write_text(text)
+    except OSError as error:
+        raise UserError(f"{error.filename} cannot be written ({error.strerror})") from None
+
+
+def _next(files: dict[str, str], out: Path, preset: RadioPreset | None) -> list[str]:
+    """What to type then; `preset` is None where nobody says which radio it is."""
+    configs = [out / name for name in files if name != REGISTRY]
+    is_real = preset is not None and preset.is_real
+    is_here = len(configs) > 1 and not is_real
+    lines = ["next:", f"  sdrlinkd --check --config {configs[0]}"]
+    if is_real:
+        lines += [
+            f"  sdrlinkctl doctor --config {configs[0]}",
+            "  put 60 dB of attenuation between the radios; then set tx_enabled = true in the file",
+        ]
+    if preset is not None and preset.backend == "ether":
+        lines.append(f"  sdrlink-ether --dir {out / 'air'} &")
+    behind = " &" if is_here else ""
+    lines += [f"  sdrlinkd --config {each}{behind}" for each in configs[: None if is_here else 1]]
+    if len(configs) > 1 and not is_here:
+        rest = ", ".join(each.name for each in configs[1:])
+        lines.append(f"  bring {REGISTRY} and {rest} to the other robots, one each")
+    elif len(configs) == 1 and (preset is None or preset.shares_air):
+        lines.append(f"  the other robots need the same {REGISTRY}, and an --id each")
+    return lines

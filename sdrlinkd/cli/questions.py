@@ -1,0 +1,114 @@
+"""Questions with a default, for what the command line does not say."""
+
+import sys
+from collections.abc import Callable
+from difflib import get_close_matches
+from typing import TypeVar
+
+import typer
+
+from sdrlinkd.errors import UserError
+from sdrlinkd.init import RADIOS, RadioPreset
+from sdrlinkd.units import hertz
+
+T = TypeVar("T")
+
+TOPICS = "scan:sensor_msgs/msg/LaserScan odom:nav_msgs/msg/Odometry cmd_vel:geometry_msgs/msg/Twist"
+
+
+class Questions:
+    """Asks where a terminal is there; else what is missing is an error that names the option."""
+
+    def __init__(self) -> None:
+        self._can_ask = sys.stdin.isatty()
+
+    def radio(self, given: str) -> RadioPreset:
+        """Which radio."""
+        if not given and self._can_ask:
+            for name, preset in RADIOS.items():
+                typer.echo(f"  {name:<9} {preset.title}")
+        return self._answer("--radio", "which radio", "hackrf", given, _radio)
+
+    def robots(self, given: int | None) -> int:
+        """How many robots share the air."""
+        text = "" if given is None else str(given)
+        return self._answer("--robots", "how many robots share the air", "2", text, _count)
+
+    def frequency(self, given: str) -> str:
+        """The middle of the channel, as written."""
+        return self._answer("--frequency", _BAND, "433.92 MHz", given, _frequency)
+
+    def device(self, given: str, preset: RadioPreset) -> str:
+        """As soapy.device; asked only where the preset does not know it."""
+        if not given and preset.device:
+            return ""
+        return self._answer("--device", "which device", "", given, _device)
+
+    def own_ids(self, given: str, robots: int) -> list[int]:
+        """The robots to write for; the only one is not asked for."""
+        if not given and robots == 1:
+            return [1]
+        return self._answer(
+            "--id", f"which of them is this one, 1 to {robots}, or all", "1", given,
+            lambda text: _ids(text, robots),
+        )  # fmt: skip
+
+    def topics(self) -> list[str]:
+        """NAME:TYPE, or a bag, or `graph`."""
+        what = "which topics: NAME:TYPE with blanks between, a bag's path, or graph (ROS 2, now)"
+        return self._answer("--topic", what, TOPICS, "", str.split)
+
+    def _answer(
+        self, option: str, question: str, default: str, given: str, read: Callable[[str], T]
+    ) -> T:
+        if given or not self._can_ask:
+            if not given:
+                raise UserError(
+                    f"{option}: not given, and no terminal to ask at; {question}?"
+                    + (f" such as {default}" if default else "")
+                )
+            return read(given)
+        while True:
+            try:
+                return read(typer.prompt(question, default=default or None))
+            except UserError as error:
+                typer.echo(str(error), err=True)
+
+
+_BAND = "which frequency, one that antenna and licence are for"
+
+
+def _radio(text: str) -> RadioPreset:
+    preset = RADIOS.get(text)
+    if preset is None:
+        close = get_close_matches(text, RADIOS, n=1)
+        hint = f"; did you mean {close[0]}?" if close else ""
+        raise UserError(f'--radio: got "{text}"; allowed: {", ".join(RADIOS)}{hint}')
+    return preset
+
+
+def _count(text: str) -> int:
+    if not (text.isdecimal() and 1 <= int(text) <= 254):
+        raise UserError(f'--robots: got "{text}"; allowed: a whole number from 1 to 254')
+    return int(text)
+
+
+def _frequency(text: str) -> str:
+    value = hertz(text, "--frequency")
+    if not 1e5 <= value <= 1e11:
+        raise UserError(f"--frequency: got {text}; allowed: with its unit, such as 433.92 MHz")
+    return text
+
+
+def _device(text: str) -> str:
+    if "=" not in text:
+        raise UserError(f'--device: got "{text}"; allowed: KEY=VALUE, such as "driver=hackrf"')
+    return text
+
+
+def _ids(text: str, robots: int) -> list[int]:
+    if text == "all":
+        return list(range(1, robots + 1))
+    if not (text.isdecimal() and 1 <= int(text) <= robots):
+        raise UserError(f'--id: got "{text}"; allowed: 1 to {robots}, or all')
+    return [int(text)]

@@ -1,0 +1,81 @@
+"""Where in a TOML file a key stands: errors cite it as `file:line: section.key`."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+# Keys and, inside lists, places.
+KeyPath = list[str | int]
+
+_KEY = re.compile(r"[A-Za-z_]\w*(?:\.(?:\w+|\"[^\"]*\"))*")
+
+
+def cite(source: str, text: str, path: KeyPath) -> str:
+    """`file:line: section.key`, as far as the line can be found."""
+    line = _line_of(text, path)
+    name = ".".join(step for step in path if isinstance(step, str))
+    return f"{source}:{line}: {name}" if line else f"{source}: {name}"
+
+
+def located(message: str, source: str) -> str:
+    """`message`, which begins with a key, after the file and the line that it is about.
+
+    `source` is the file where there is one; its line is that of the key, of the next key that the
+    message names where the first one is not written down, or of the section.
+    """
+    plain = message.removeprefix(f"{source}: ")
+    try:
+        text = Path(source).read_text()
+    except (OSError, ValueError):
+        return f"{source}: {plain}"
+    paths = list(_keys_in(plain))
+    lines = [_line_of(text, path, exact=True) for path in paths] + [
+        _line_of(text, path) for path in paths[:1]
+    ]
+    line = next((each for each in lines if each), None)
+    return f"{source}:{line}: {plain}" if line else f"{source}: {plain}"
+
+
+def _keys_in(message: str) -> Iterator[KeyPath]:
+    """What may be keys, in order; that a word is none shows when the file does not have it."""
+    for found in _KEY.finditer(message):
+        yield [part.strip('"') for part in re.findall(r"\"[^\"]*\"|\w+", found[0])]
+
+
+def _line_of(text: str, path: KeyPath, *, exact: bool = False) -> int | None:
+    """Line of `path` in the TOML text.
+
+    The section's line when the key is not spelled plainly, unless it must be `exact`.
+    """
+    section: KeyPath = []
+    tables: Counter[str] = Counter()
+    best = None
+    for number, line in enumerate(text.splitlines(), start=1):
+        header = re.match(r"\s*(\[{1,2})([^\[\]]+)\]", line)
+        if header:
+            parts = [part.strip().strip("\"'") for part in header[2].split(".")]
+            tables[".".join(parts)] += header[1] == "[["
+            section = _section(parts, tables)
+            is_around = section == path[: len(section)] and not (exact and len(section) < 2)
+            # `[[link]]` where a table is wanted.
+            if is_around or (best is None and section[: len(path)] == path):
+                best = number
+            continue
+        key = re.match(r"\s*([\w\"'.\-]+)\s*=", line)
+        if key:
+            dotted = [*section, *(part.strip("\"'") for part in key[1].split("."))]
+            if dotted == path[: len(dotted)]:
+                return number
+    return best
+
+
+def _section(parts: list[str], tables: Counter[str]) -> KeyPath:
+    """A header's path, with the place of each array of tables that it is in."""
+    section: KeyPath = []
+    for i, part in enumerate(parts):
+        section.append(part)
+        n = tables[".".join(parts[: i + 1])]
+        if n:
+            section.append(n - 1)
+    return section

@@ -1,0 +1,40 @@
+"""Whether this machine can carry a node: what is looked at, what is found, what to do about it.
+
+A check takes what it looks at as arguments and returns findings. It prints nothing and changes
+nothing; a radio is opened to listen only.
+"""
+
+from sdrlinkd.doctor.clock import KernelClock, check_clock, kernel_clock
+from sdrlinkd.doctor.directory import check_directory
+from sdrlinkd.doctor.environment import check_environment
+from sdrlinkd.doctor.finding import Finding, State
+from sdrlinkd.doctor.headroom import Headroom, check_headroom, headroom_found, measure_headroom
+from sdrlinkd.doctor.host import HostTerm, check_host, measure_host
+from sdrlinkd.doctor.limits import Granted, check_limits, granted
+from sdrlinkd.doctor.machine import check_machine
+from sdrlinkd.doctor.radio import check_radio
+from sdrlinkd.doctor.usb import ON_USB, check_usb
+
+__all__ = [
+    "ON_USB",
+    "Finding",
+    "Granted",
+    "Headroom",
+    "HostTerm",
+    "KernelClock",
+    "State",
+    "check_clock",
+    "check_directory",
+    "check_environment",
+    "check_headroom",
+    "check_host",
+    "check_limits",
+    "check_machine",
+    "check_radio",
+    "check_usb",
+    "granted",
+    "headroom_found",
+    "kernel_clock",
+    "measure_headroom",
+    "measure_host",
+]

@@ -1,0 +1,81 @@
+"""This host's clock: whether something keeps it, and whether it stepped while we looked."""
+
+import ctypes
+import os
+from pathlib import Path
+from typing import NamedTuple
+
+from sdrlinkd.doctor.finding import Finding, good, good_if, none
+
+STEP_S = 0.05
+_UNSYNCHRONISED = 0x0040
+_ERROR = 5
+
+
+class KernelClock(NamedTuple):
+    """What the kernel says of it. Errors in s."""
+
+    is_synchronised: bool
+    error_s: float
+
+
+class _Timex(ctypes.Structure):
+    """struct timex of adjtimex(2), as far as we read it; the rest is room."""
+
+    _fields_ = (
+        ("modes", ctypes.c_uint),
+        ("offset", ctypes.c_long),
+        ("frequency", ctypes.c_long),
+        ("max_error", ctypes.c_long),
+        ("estimated_error", ctypes.c_long),
+        ("status", ctypes.c_int),
+        ("room", ctypes.c_char * 512),
+    )
+
+
+def kernel_clock() -> KernelClock | None:
+    """By adjtimex(2), which changes nothing with no modes; None where there is none."""
+    timex = _Timex()
+    try:
+        state = ctypes.CDLL(None, use_errno=True).adjtimex(ctypes.byref(timex))
+    except (AttributeError, OSError):
+        return None
+    if state < 0:
+        return None
+    is_synchronised = state != _ERROR and not timex.status & _UNSYNCHRONISED
+    return KernelClock(is_synchronised, 1e-6 * timex.max_error)
+
+
+def check_clock(kernel: KernelClock | None, step_s: float, chrony: str) -> list[Finding]:
+    """`step_s`: the wall clock against the monotonic one while we looked. `chrony`: the socket in
+    the configuration, "" for none."""
+    found = [
+        _synchronised(kernel),
+        good_if(
+            abs(step_s) < STEP_S, "clock's steps",
+            "none while we looked" if abs(step_s) < STEP_S else f"it jumped by {step_s:+.3f} s",
+            "have one program set it, slowly: chrony with makestep only at its start",
+        ),
+    ]  # fmt: skip
+    if chrony:
+        found.append(
+            good_if(
+                Path(chrony).exists() and os.access(chrony, os.W_OK), "chrony.socket", chrony,
+                f"chronyd does not listen there: `refclock SOCK {chrony}` in chrony.conf, and "
+                "start chronyd before the daemon",
+            )
+        )  # fmt: skip
+    return found
+
+
+def _synchronised(kernel: KernelClock | None) -> Finding:
+    what = "clock"
+    if kernel is None:
+        return none(what, "the kernel does not tell")
+    if kernel.is_synchronised:
+        return good(what, f"kept by NTP or the like, within {1e3 * kernel.error_s:.0f} ms")
+    return none(
+        what,
+        "nothing keeps it: ages of messages need no clock; stamps in ROS messages do (chrony, or "
+        "[chrony] by another robot)",
+    )

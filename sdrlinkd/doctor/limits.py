@@ -1,0 +1,110 @@
+"""What the system grants: going before others, memory, buffers of sockets and USB."""
+
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+from sdrlinkd.doctor.finding import Finding, bad, good, good_if, none
+
+NETWORK_BUFFER = 24_912_805
+"""Bytes that UHD's manual wants for a receiving socket."""
+USB_BUFFER_MB = 16
+"""Of the kernel, for all transfers under way; 0: without bound."""
+REALTIME = 10
+
+
+class Granted(NamedTuple):
+    """As found on this machine."""
+
+    can_hurry: bool
+    """Whether a thread could take real-time priority when it was tried."""
+    nice: int
+    """The best niceness that this user may take."""
+    shared_memory: bool
+    """Whether memory for two processes could be had."""
+    files: int
+    """RLIMIT_NOFILE."""
+
+
+def granted() -> Granted:
+    """What this process and its children may do."""
+    best_nice = 20 - resource.getrlimit(resource.RLIMIT_NICE)[0]
+    files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if os.geteuid() == 0:
+        best_nice = -20
+    return Granted(_can_hurry(), max(-20, best_nice), _can_share(), files)
+
+
+def _can_hurry() -> bool:
+    """Tried in a child, which gives it back by ending."""
+    code = f"import os; os.sched_setscheduler(0, os.SCHED_RR, os.sched_param({REALTIME}))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)  # noqa: S603
+    return done.returncode == 0
+
+
+def _can_share() -> bool:
+    try:
+        os.close(os.memfd_create("sdrlinkd-doctor"))
+    except OSError:
+        return False
+    return True
+
+
+def check_limits(granted: Granted, device: str, root: Path) -> list[Finding]:
+    """`device`: as soapy.device, "" without a radio. `root`: / or a copy of its /proc and /sys."""
+    return [
+        _hurry(granted, is_needed=bool(device)),
+        good_if(
+            granted.shared_memory, "shared memory", "for samples between daemon and radio process",
+            "memfd_create is forbidden here: a seccomp profile of the container?",
+        ),
+        good_if(
+            granted.files >= 256, "open files", f"{granted.files} allowed", "ulimit -n 1024",
+        ),
+        _buffer(device, root),
+    ]  # fmt: skip
+
+
+def _hurry(granted: Granted, *, is_needed: bool) -> Finding:
+    what = "real-time priority"
+    if granted.can_hurry:
+        return good(what, "granted")
+    instead = f"not granted; niceness down to {granted.nice}"
+    if not is_needed:
+        return none(what, f"{instead}; only a real radio's process asks for it")
+    return bad(
+        what, instead,
+        "the systemd unit has LimitRTPRIO=50; by hand: `@sdrlink - rtprio 50` in "
+        "/etc/security/limits.d/sdrlinkd.conf and log in again",
+    )  # fmt: skip
+
+
+def _buffer(device: str, root: Path) -> Finding:
+    what = "radio's buffers"
+    if not device:
+        return none(what, "no real radio is configured")
+    if any(key in device for key in ("addr=", "remote", "hostname=", "uri=ip:")):
+        limit = _number(root / "proc/sys/net/core/rmem_max")
+        if limit is None:
+            return none(what, "net.core.rmem_max is not to be seen")
+        return good_if(
+            limit >= NETWORK_BUFFER, what, f"net.core.rmem_max = {limit}",
+            f"sudo sysctl -w net.core.rmem_max={NETWORK_BUFFER} (and in /etc/sysctl.d)",
+        )  # fmt: skip
+    limit = _number(root / "sys/module/usbcore/parameters/usbfs_memory_mb")
+    if limit is None:
+        return none(what, "the kernel shows no usbfs_memory_mb")
+    return good_if(
+        limit == 0 or limit >= USB_BUFFER_MB, what, f"{limit} MB of the kernel for USB",
+        f"echo {USB_BUFFER_MB} | sudo tee /sys/module/usbcore/parameters/usbfs_memory_mb",
+    )  # fmt: skip
+
+
+def _number(path: Path) -> int | None:
+    try:
+        return int(path.read_text())
+    except (OSError, ValueError):
+        return None

@@ -1,0 +1,67 @@
+"""The computer: its cores, who else uses them, and whether they are slowed down."""
+
+from pathlib import Path
+
+from sdrlinkd.doctor.finding import Finding, bad, good, good_if, none
+
+BUSY = 1.0
+"""Programs that want to run, for each core; more of them than that wait for each other."""
+STOLEN = 0.05
+"""A virtual machine that loses more of its time to others loses samples."""
+SLOW_GOVERNORS = ("powersave", "conservative")
+
+
+def check_machine(
+    cores: int, load: float, stat: tuple[str, str], cpus: Path, *, is_timed: bool
+) -> list[Finding]:
+    """`load`: programs that wanted to run, a mean of the last minute. `stat`: /proc/stat twice,
+    some time between. `cpus`: /sys/devices/system/cpu. `is_timed`: a radio, real or simulated,
+    wants its samples in time."""
+    return [
+        good_if(
+            cores > 1 or not is_timed, "cores", f"{cores}",
+            "two cores at least: one for the modem, one for all else",
+        ),
+        good_if(
+            load <= BUSY * cores, "load", f"{load:.2f} on {cores} cores, in the last minute",
+            "end other programs, or give the daemon cores of its own (systemd: AllowedCPUs=)",
+        ),
+        _stolen(*stat),
+        _governor(cpus, is_timed=is_timed),
+    ]  # fmt: skip
+
+
+def _stolen(before: str, after: str) -> Finding:
+    first, last = _times(before), _times(after)
+    spent = [late - early for early, late in zip(first, last, strict=False)]
+    if len(spent) < 8 or sum(spent) <= 0:
+        return none("stolen time", "/proc/stat does not tell")
+    share = spent[7] / sum(spent)
+    return good_if(
+        share <= STOLEN, "stolen time", f"{100 * share:.0f} % of this machine went to others",
+        "a virtual machine that shares its cores loses samples: a host of its own, or fixed cores",
+    )  # fmt: skip
+
+
+def _times(stat: str) -> list[int]:
+    """The times of all cores together, in ticks: user, nice, system, idle, …, stolen."""
+    line = next((line for line in stat.splitlines() if line.startswith("cpu ")), "")
+    return [int(each) for each in line.split()[1:9] if each.isdigit()]
+
+
+def _governor(cpus: Path, *, is_timed: bool) -> Finding:
+    found = set()
+    for path in cpus.glob("cpu[0-9]*/cpufreq/scaling_governor"):
+        try:
+            found.add(path.read_text().strip())
+        except OSError:
+            continue
+    if not found:
+        return none("frequency governor", "the machine shows none")
+    told = ", ".join(sorted(found))
+    if is_timed and found & set(SLOW_GOVERNORS):
+        return bad(
+            "frequency governor", told,
+            "a slowed core comes late: sudo cpupower frequency-set -g performance",
+        )  # fmt: skip
+    return good("frequency governor", told)

@@ -1,0 +1,22 @@
+"""New teams: the configurations and the registry that they begin with, as text."""
+
+from sdrlinkd.init.choosing import MOST_TOPICS, Choice, FoundTopic, choose, named
+from sdrlinkd.init.copying import copy_of
+from sdrlinkd.init.graph import topics_of_graph
+from sdrlinkd.init.radios import RADIOS, RadioPreset
+from sdrlinkd.init.team import REGISTRY, Team, team_files
+
+__all__ = [
+    "MOST_TOPICS",
+    "RADIOS",
+    "REGISTRY",
+    "Choice",
+    "FoundTopic",
+    "RadioPreset",
+    "Team",
+    "choose",
+    "copy_of",
+    "named",
+    "team_files",
+    "topics_of_graph",
+]

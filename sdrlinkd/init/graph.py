@@ -1,0 +1,35 @@
+"""The topics of a running ROS 2 graph, asked of ROS's own command line."""
+
+import re
+import shutil
+import subprocess
+
+from sdrlinkd.errors import UserError
+from sdrlinkd.init.choosing import FoundTopic
+
+PATIENCE_S = 30.0
+_LINE = re.compile(r"(/\S+) \[([^\],]+)\]")
+
+
+def topics_of_graph() -> list[FoundTopic]:
+    """What `ros2 topic list -t` names; topics of several types are not among them.
+
+    Raises UserError where there is no ROS 2 in this shell.
+    """
+    program = shutil.which("ros2")
+    if program is None:
+        raise UserError(
+            "--from-graph: there is no `ros2` in PATH; source ROS 2's setup.bash first, or name "
+            "--bag FILE or --topic NAME:TYPE"
+        )
+    try:
+        done = subprocess.run(  # noqa: S603 (ROS's own program, with fixed arguments)
+            [program, "topic", "list", "-t"],
+            capture_output=True, text=True, check=False, timeout=PATIENCE_S,
+        )  # fmt: skip
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise UserError(f"--from-graph: `ros2 topic list -t` does not answer ({error})") from None
+    if done.returncode:
+        said = " ".join(done.stderr.split())[-200:]
+        raise UserError(f"--from-graph: `ros2 topic list -t` failed: {said}")
+    return [FoundTopic(name, kind) for name, kind in _LINE.findall(done.stdout)]

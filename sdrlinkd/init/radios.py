@@ -1,0 +1,62 @@
+"""What is known to work with each kind of radio, to begin with."""
+
+from typing import NamedTuple
+
+
+class RadioPreset(NamedTuple):
+    """How a configuration for it begins."""
+
+    title: str
+    backend: str
+    device: str = ""
+    rate: str = "2 Msps"
+    oversampling: int = 1
+    soapy: tuple[tuple[str, str], ...] = ()
+    """Gains and antennas: lines of TOML with a comment. Sending is always off to begin with."""
+    slot: str = ""
+    """Of robots that take turns; empty: made from the radio."""
+
+    @property
+    def is_real(self) -> bool:
+        """Whether it sends radio waves."""
+        return self.backend == "soapy"
+
+    @property
+    def shares_air(self) -> bool:
+        """Whether several robots hear each other by it."""
+        return self.backend in ("soapy", "ether")
+
+
+_LOW = "dB; begin low: sdrlinkctl radio probe shows the range"
+_ANY = (("tx_gain_db = 30.0", _LOW), ("rx_gain_db = 30.0", ""))
+
+RADIOS = {
+    "hackrf": RadioPreset(
+        "HackRF One (half duplex: some tenths of a second late)", "soapy", "driver=hackrf",
+        oversampling=4, slot="0.3 s",
+        soapy=(
+            ("tx_gains = { AMP = 0, VGA = 20 }", "dB; begin low"),
+            ("rx_gains = { AMP = 0, LNA = 24, VGA = 20 }", "its input bears -5 dBm, no more"),
+        ),
+    ),
+    "usrp": RadioPreset(
+        "USRP, by UHD", "soapy", "driver=uhd",
+        soapy=(
+            ("tx_gain_db = 40.0", _LOW),
+            ("rx_gain_db = 40.0", ""),
+            ('tx_antenna = "TX/RX"', ""),
+            ('rx_antenna = "RX2"', ""),
+            ('stream_args = { num_recv_frames = "256" }', ""),
+        ),
+    ),
+    "lime": RadioPreset("LimeSDR", "soapy", "driver=lime", soapy=_ANY),
+    "bladerf": RadioPreset("bladeRF", "soapy", "driver=bladerf", soapy=_ANY),
+    "pluto": RadioPreset("ADALM-Pluto", "soapy", "driver=plutosdr", soapy=_ANY),
+    "soapy": RadioPreset("another one that SoapySDR knows (--device)", "soapy", soapy=_ANY),
+    "ether": RadioPreset("none: a simulated air, many daemons on one computer", "ether",
+                         rate="5 Msps"),
+    "loopback": RadioPreset("none: one daemon that hears itself through the modem", "loopback",
+                            rate="5 Msps"),
+    "direct": RadioPreset("none: one daemon that hears itself, without a modem", "direct"),
+}  # fmt: skip
+"""By the name that a person gives."""

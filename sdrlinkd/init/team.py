@@ -1,0 +1,105 @@
+"""From a few answers to the files of a team."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+from sdrlinkd.init.choosing import FoundTopic
+from sdrlinkd.init.radios import RadioPreset
+
+REGISTRY = "registry.csv"
+
+
+class Team(NamedTuple):
+    """What a person says of it. Robots are numbered 1 to `robots`."""
+
+    radio: RadioPreset
+    robots: int
+    frequency: str
+    """As written, with its unit; empty where there is no real radio."""
+    device: str
+    """As soapy.device; empty: the preset's."""
+    topics: list[FoundTopic]
+    air: Path
+    """Folder of the hub, for a simulated air."""
+    sockets: Path
+    """Folder of the daemons' sockets, where several run on one computer."""
+
+
+def team_files(team: Team, ids: list[int]) -> dict[str, str]:
+    """File names and their text: the registry, and a configuration for each of `ids`."""
+    names = {number: f"robot_{number}.toml" for number in ids}
+    if len(ids) == 1:
+        names = {ids[0]: "sdrlinkd.toml"}
+    return {
+        REGISTRY: _registry(team.topics),
+        **{name: _config(team, number, len(ids) > 1) for number, name in names.items()},
+    }
+
+
+def _registry(topics: list[FoundTopic]) -> str:
+    lines = "".join(f"{topic.name},{topic.type}\n" for topic in topics)
+    return (
+        "# Topic registry: one `name,type` a line; the line's place is the topic id.\n"
+        "# Every robot of the team needs this same file. At most 15 topics.\n" + lines
+    )
+
+
+def _config(team: Team, number: int, has_neighbors: bool) -> str:
+    radio, name = team.radio, f"robot_{number}"
+    parts = [_head(team, number)]
+    if radio.backend != "direct":
+        parts.append(_modem(team))
+    if radio.is_real:
+        parts.append(
+            "[soapy]\n"
+            + _line(f'device = "{team.device or radio.device}"', "sdrlinkctl radio probe shows it")
+            + _line("tx_enabled = false", "nothing is sent until you set this to true")
+            + "".join(_line(*each) for each in radio.soapy)
+        )
+    if radio.backend == "ether":
+        parts.append("[ether]\n" + _line(f'dir = "{team.air}"', "sdrlink-ether --dir serves it"))
+    if radio.shares_air and team.robots > 1:
+        parts.append(_access(team))
+    if has_neighbors and not radio.is_real:
+        parts.append("[bus]\n" + _line(f'runtime_dir = "{team.sockets / name}"'))
+    return "\n".join(parts)
+
+
+def _head(team: Team, number: int) -> str:
+    return (
+        f"# Robot {number} of {team.robots}, begun by `sdrlinkctl init`. All keys and what they "
+        "mean:\n# etc/sdrlinkd.toml in the source; installed: share/sdrlinkd/sdrlinkd.toml.\n"
+        + _line(f'namespace = "robot_{number}"', f"its topics: /robot_{number}/…")
+        + _line(f'registry = "{REGISTRY}"', "the same file at all robots")
+        + _line(f'backend = "{team.radio.backend}"')
+    )
+
+
+def _modem(team: Team) -> str:
+    radio = team.radio
+    lines = [_line(f'rate_hz = "{radio.rate}"', "the channel's width; the same at all robots")]
+    if radio.oversampling > 1:
+        told = "the radio runs at so many times that rate"
+        lines.append(_line(f"oversampling = {radio.oversampling}", told))
+    if radio.is_real:
+        lines.append(
+            _line(f'frequency_hz = "{team.frequency}"', "what antenna and licence are for")
+        )
+    lines.append(_line("mcs = 1", "QPSK 1/2; sdrlinkctl phy info lists them"))
+    return "[modem]\n" + "".join(lines)
+
+
+def _access(team: Team) -> str:
+    nodes = ", ".join(str(number) for number in range(1, team.robots + 1))
+    lines = [
+        _line('policy = "tdma"', "turns on the air; the same at all robots"),
+        _line(f"nodes = [{nodes}]"),
+    ]
+    if team.radio.slot:
+        told = "a turn: room for this radio to change its direction"
+        lines += [_line(f'slot_s = "{team.radio.slot}"', told), _line("reuse = false")]
+    return "[access]\n" + "".join(lines)
+
+
+def _line(assignment: str, comment: str = "") -> str:
+    return f"{assignment:<27} # {comment}\n" if comment else f"{assignment}\n"

@@ -1,0 +1,175 @@
+"""Mistakes that people make in a configuration: each gets one line that says where and what."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from sdrlinkd.__main__ import main
+
+ETC = Path(__file__).parents[2] / "etc"
+
+LOOPBACK = 'backend = "loopback"\n'
+SOAPY = 'backend = "soapy"\n[soapy]\ndevice = "driver=uhd"\n'
+ON_AIR = "[modem]\nfrequency_hz = 4e8\n"
+
+# What stands in the file, the line that is cited (0: none), and what is said of it.
+MISTAKES = [
+    ('namespce = "robot_1"', 1, ["namespce: unknown key; did you mean namespace?"]),
+    ('[topic.scan]\nqos = "realtime"', 2, ['topic.scan.qos: got "realtime"', 'one of "bulk"']),
+    ("[link]\npdu_size = 3000", 2, ["link.pdu_size: got 3000", "from 32 to 2047"]),
+    ('[link]\npdu_size = "1024"', 2, ['link.pdu_size: got "1024"', "a whole number"]),
+    ("[link]\nhop_limit = 0", 2, ["link.hop_limit: got 0", "from 1 to 15"]),
+    ("[link]\n\nbeacon_s = 1e-9", 3, ["link.beacon_s", "at least 0.01"]),
+    ("[link]\nmin_fragment = 2000", 2, ["link.min_fragment: got 2000", "at most 1011"]),
+    ("robot_id = 300", 1, ["robot_id: got 300", "from -1 to 254"]),
+    ('namespace = "robot"', 1, ["robot_id", 'namespace "robot"', "robot_1"]),
+    ('namespace = "a b1"', 1, ['namespace: got "a b1"', "a ROS namespace"]),
+    ('rx_format = "heard"', 1, ['rx_format: got "heard"', "{src_id}"]),
+    ('registry = "nowhere.csv"', 0, ["registry cannot be read"]),
+    ("registry = 5", 1, ["registry: got 5", "text"]),
+    ('topics = ["odm"]', 1, ['topics: got "odm"', "did you mean odom"]),
+    ('topics = "odom"', 1, ['topics: got "odom"', "a list"]),
+    ("[topic.odo]\ndepth = 1", 1, ['topic."odo": unknown topic', "did you mean odom"]),
+    ('[topic.odom]\n[topic."/odom"]', 2, ["stands twice"]),
+    ("[topic.odom]\nprio = 3", 2, ["topic.odom.prio: unknown key; did you mean priority"]),
+    ('[topic.odom]\nlifespan_s = "0.3 parsec"', 2, ["topic.odom.lifespan_s", '"300 ms"']),
+    ('[topic.odom]\nlifespan_s = "soon"', 2, ['got "soon"', "with its unit"]),
+    ("[topic.odom]\ndepth = -1", 2, ["topic.odom.depth: got -1"]),
+    (
+        '[topic.odom]\ncompress = "zstd"\ndictionary = "none.zdict"', 3,
+        ["topic.odom.dictionary", "train-dict"],
+    ),
+    ("[topic.cmd_vel]\nstop = { linear = { q = 1 } }", 2, ["cmd_vel.stop.linear.q", "x, y, z"]),
+    ('[tf]\ntopics = ["odom"]', 2, ['tf.topics: got "odom"', "TFMessage: none"]),
+    ('backend = "usrp"', 1, ['backend: got "usrp"', '"soapy"']),
+    ('[access]\npolicy = "csma"', 2, ['access.policy: got "csma"', '"direct" has no air']),
+    ('[access]\npolicy = "tdma"\nnodes = [1, 2]', 2, ["access.policy", '"direct" has no air']),
+    (f'{LOOPBACK}[access]\npolicy = "aloha"', 3, ['access.policy: got "aloha"', '"minislot"']),
+    (f'{LOOPBACK}[access]\npolicy = "tdma"\nnodes = [2, 3]', 4, ["access.nodes: got [2, 3]"]),
+    (f'{LOOPBACK}[access]\npolicy = "tdma"', 3, ["access.nodes: got []", "this robot's 1"]),
+    (
+        f'{LOOPBACK}[access]\nnodes = [1, 2, 1]\npolicy = "minislot"', 3,
+        ["access.nodes", "each robot once"],
+    ),
+    ("[rate]\nmin_mcs = 3\nmax_mcs = 2", 2, ["rate.min_mcs: got 3", "rate.max_mcs, 2"]),
+    ("[link]\nbeacon_s = 0\n[rate]\nadapt = true", 4, ["rate.adapt: got true", "beacons"]),
+    ('[relay]\npolicy = "routes"', 2, ["relay.routes: got []", "1>3"]),
+    ('[relay]\npolicy = "routes"\nroutes = ["1-3"]', 3, ['relay.routes: got "1-3"', "FROM>TO"]),
+    ('[relay]\npolicy = "flood"', 2, ["link.hop_limit: got 1", "at least 2"]),
+    ('[chrony]\nsocket = "/run/c.sock"\nrobot = 1', 3, ["chrony.robot: got 1", "another robot"]),
+    (f"{LOOPBACK}[modem]\nrate_hz = 1e5", 3, ["modem.max_cfo_hz: got 100000", "25000"]),
+    (
+        f"{LOOPBACK}[modem]\nrate_hz = 1e4\nmax_cfo_hz = 1e3", 3,
+        ["modem.rate_hz: got 10000", "on the air", "reassembly.timeout_s"],
+    ),
+    (f'{LOOPBACK}[modem]\nfrequency_hz = "433 Mhm"', 3, ['"433 Mhm"', '"433.92 MHz"']),
+    (f'{LOOPBACK}[modem]\nrate_hz = "5 kHz"', 3, ['modem.rate_hz: got "5 kHz"', '"2 Msps"']),
+    ("[modem]\nmcs = 10", 2, ["modem.mcs: got 10", "from 0 to 9"]),
+    ('backend = "ether"', 1, ['ether.dir: got ""', "sdrlink-ether --dir"]),
+    ('backend = "iqfile"', 1, ["iqfile.receive, iqfile.transmit", "name a recording"]),
+    ('backend = "zmq"\n[zmq]\nsend = "tcp://127.0.0.1:1"', 1, ['zmq.receive: got ""']),
+    ('backend = "soapy"', 1, ['soapy.device: got ""', "radio probe"]),
+    ('backend = "soapy"\n[soapy]\ndevice = "hackrf"', 3, ['got "hackrf"', "driver=hackrf"]),
+    (SOAPY, 1, ["modem.frequency_hz: got 0 (not set)", "licence"]),
+    (f"{SOAPY}tx_enabled = true\n{ON_AIR}", 4, ["soapy.tx_gain_db: not set", "begin low"]),
+    (f'{SOAPY}offset_tuning = "on"\n{ON_AIR}', 4, ['soapy.offset_tuning: got "on"']),
+    (
+        f"{SOAPY.replace('uhd', 'hackrf')}{ON_AIR}rate_hz = 1e6", 6,
+        ["modem.rate_hz: got 1 Msps", "at least 2 Msps"],
+    ),
+    ("[direct]\nloss = 1.5", 2, ["direct.loss: got 1.5", "from 0 to 1"]),
+    ("drain_s = true", 1, ["drain_s: got true", "a number"]),
+    ("[[link]]\npdu_size = 64", 1, ["link: got", "a table"]),
+    ("nonsense", 0, ["not TOML"]),
+    ("a = " + "[" * 3000, 0, ["not TOML"]),
+    ('registry = "a\\u0000b"', 0, ["registry cannot be read"]),
+    ('[bus]\nruntime_dir = "a\\u0000b"', 2, ["bus.runtime_dir", "NUL"]),
+]  # fmt: skip
+
+
+@pytest.fixture
+def check(tmp_path, capsys):
+    """`sdrlinkd --check` of a text: exit code, what it says, and its error."""
+
+    def of(text):
+        path = tmp_path / "m.toml"
+        path.write_text(text)
+        code = main(["--check", "--config", str(path)])
+        out, err = capsys.readouterr()
+        return code, out, err.replace(f"{tmp_path}/", "")
+
+    (tmp_path / "registry.csv").write_text((ETC / "registry.csv").read_text())
+    return of
+
+
+@pytest.mark.parametrize(("text", "line", "parts"), MISTAKES)
+def test_a_mistake_is_told_in_one_line_with_its_place(check, text, line, parts):
+    code, out, err = check(text)
+    assert (code, out, err.count("\n")) == (2, "", 1), err
+    assert "Traceback" not in err
+    cited = re.match(r"sdrlinkd: m\.toml:(\d+): ", err)
+    assert int(cited[1]) == line if line else not cited, err
+    for part in parts:
+        assert part in err
+
+
+def test_there_are_forty_and_more():
+    assert len(MISTAKES) >= 40
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        (
+            f'{SOAPY}rx_gains = {{ VGA = 90 }}\n{ON_AIR}[access]\npolicy = "csma"',
+            ["not checked: whether", "frequency, rate, gains", "doctor", '"csma" fits'],
+        ),
+        ('backend = "ether"\n[ether]\ndir = "air"', ["not checked: whether a hub answers"]),
+        ('backend = "iqfile"\n[iqfile]\nreceive = "x"', ["not checked: whether", "be read"]),
+        ('backend = "zmq"\n[zmq]\nsend = "@a"\nreceive = "b"', ["not checked: whether the flowg"]),
+        ('backend = "gnuradio"\n[gnuradio]\nsend = "a"\nreceive = "b"', ["flowgraph answers"]),
+    ],
+)
+def test_what_only_the_radio_can_tell_is_named(check, text, parts):
+    code, out, err = check(text)
+    assert (code, err) == (0, "")
+    for part in parts:
+        assert part in out
+    assert "the configuration is good" not in out
+    assert out.endswith("the file is good; what is not checked shows when the daemon starts\n")
+
+
+@pytest.mark.parametrize("text", ["", LOOPBACK, 'backend = "iqfile"\n[iqfile]\ntransmit = "x"'])
+def test_what_the_file_alone_decides_is_good(check, text):
+    code, out, _ = check(text)
+    assert (code, out.endswith("the configuration is good\n")) == (0, True)
+
+
+def test_large_fragments_that_keep_topics_apart_are_warned_of(check):
+    _, out, _ = check("[link]\nmin_fragment = 504")
+    assert "warning: link.min_fragment = 504 is more than the 503 B that each of two topics" in out
+    assert "min_fragment" not in check("[link]\nmin_fragment = 503")[1]
+
+
+def test_a_registry_beyond_the_limit_says_what_to_do(check, tmp_path):
+    for n, parts in (
+        (23, ["23 topics; allowed: at most 15", "take 8 lines out", "all robots"]),
+        (17, ["17 topics; allowed: at most 15", "take 2 lines out"]),
+    ):
+        (tmp_path / "many.csv").write_text("".join(f"t{i},a/B\n" for i in range(n)))
+        code, _, err = check('registry = "many.csv"')
+        assert (code, err.count("\n")) == (2, 1)
+        for part in parts:
+            assert part in err
+    (tmp_path / "many.csv").write_text("".join(f"t{i},a/B\n" for i in range(16)))
+    code, out, _ = check('registry = "many.csv"')
+    assert code == 0
+    assert "warning: 16 topics take every topic id: no ages" in out
+
+
+@pytest.mark.parametrize("path", [".", "none.toml"])
+def test_a_file_that_cannot_be_read_is_told(capsys, path):
+    assert main(["--check", "--config", path]) == 2
+    err = capsys.readouterr().err
+    assert (err.count("\n"), "Traceback" in err) == (1, False)

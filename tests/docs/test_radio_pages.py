@@ -1,0 +1,139 @@
+"""The pages of radios from their first to their last command, on test radios that are like them."""
+
+import contextlib
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import uuid
+from pathlib import Path
+
+import pytest
+
+from tests.docs.pages import commands_of, missing_words
+from tests.soapy_loopback import Bus, missing, module_folder
+from tests.waiting import wait_for
+
+ROOT = Path(__file__).parents[2]
+PAGES = ROOT / "docs" / "radios"
+NOT_HERE = ("sudo ", "make setup", "export PATH", "hackrf_info")
+"""Needs root, or a HackRF of metal; or it has been done."""
+MAY_SAY_NO = ("sdrlinkctl doctor", "sdrlinkctl status", "sdrlinkctl plan")
+"""Their exit code is about this machine and its air."""
+PATIENCE_S = 240
+
+pytestmark = [
+    pytest.mark.skipif(bool(missing()), reason=missing()),
+    pytest.mark.slow,
+    pytest.mark.timeout(900),
+]
+
+
+class Laptop:
+    """A folder, a radio and sockets of its own."""
+
+    def __init__(self, folder, unit, bus, driver, model):
+        self.folder = folder
+        self._driver = driver
+        self.device = f"driver=loopback,model={model},bus={bus},unit={unit}"
+        self.environment = os.environ | {
+            "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
+            "SDRLINKD_RUNTIME_DIR": str(folder / "run"),
+            "SOAPY_SDR_PLUGIN_PATH": str(module_folder()),
+            "SOAPY_SDR_ROOT": "/nonexistent",
+            "COLUMNS": "100",
+        }
+        self._behind = []
+        folder.mkdir()
+
+    def type(self, command):
+        """What is on the screen then; a command behind `&` is left running."""
+        line = command.line.replace(self._driver, self.device)
+        if command.runs_on:
+            return self._leave_running(line.removesuffix("&"), command.shown)
+        done = subprocess.run(
+            line, shell=True, cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=PATIENCE_S,
+            check=False,
+        )  # fmt: skip
+        allowed = (0, 1) if line.startswith(MAY_SAY_NO) else (0,)
+        assert done.returncode in allowed, f"{line}\n{done.stdout}"
+        for path in self.folder.glob("team/*.toml"):
+            path.write_text(path.read_text().replace(f'"{self._driver}"', f'"{self.device}"'))
+        return done.stdout
+
+    def _leave_running(self, line, shown):
+        log = self.folder / f"log{len(self._behind)}"
+        with log.open("wb") as out:
+            process = subprocess.Popen(
+                f"exec {line}", shell=True, cwd=self.folder, env=self.environment,
+                stdin=subprocess.DEVNULL, stdout=out, stderr=out,
+            )  # fmt: skip
+        self._behind.append((process, log))
+
+        def is_shown():
+            assert process.poll() is None, log.read_text()
+            return not missing_words(shown, log.read_text())
+
+        wait_for(is_shown, PATIENCE_S)
+        return log.read_text()
+
+    def close(self):
+        """Ends what was left running, the last first: in good order, and without a traceback."""
+        for process, log in reversed(self._behind):
+            process.send_signal(signal.SIGTERM)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(30)
+            process.kill()
+            process.wait()
+            assert "Traceback" not in log.read_text(), log.read_text()
+
+
+@contextlib.contextmanager
+def laptops(folder, driver, model):
+    """`first` and `second`, on one air."""
+    name = f"page-{uuid.uuid4().hex[:12]}"
+    with Bus(name), contextlib.ExitStack() as stack:
+        made = {}
+        for unit, who in enumerate(("first", "second")):
+            made[who] = Laptop(folder / who, unit, name, driver, model)
+            stack.callback(made[who].close)
+        yield made
+
+
+def walk(page, typists, default=""):
+    """Types every command of a page, as `default` where it does not say who; how many it were."""
+    run = 0
+    for command in commands_of((PAGES / page).read_text()):
+        named = command.who or default
+        if command.line.startswith(NOT_HERE):
+            continue
+        assert named, f"who types this? {command.line}"
+        for who in typists if named == "both" else [named]:
+            screen = typists[who].type(command)
+            assert "Traceback" not in screen
+            assert not missing_words(command.shown, screen), screen
+            run += 1
+        if command.line.startswith("sdrlinkctl init"):
+            # "Copy the folder to the second laptop."
+            first, second = typists["first"], typists["second"]
+            shutil.copytree(first.folder / "team", second.folder / "team")
+            copied = second.folder / "team" / "robot_2.toml"
+            copied.write_text(copied.read_text().replace(first.device, second.device))
+    return run
+
+
+def test_the_hackrf_page_works_and_shows_what_is_printed(tmp_path):
+    with laptops(tmp_path, "driver=hackrf", "hackrf") as both:
+        assert walk("hackrf.md", both) >= 14
+
+
+def test_the_usrp_page_works_and_shows_what_is_printed(tmp_path):
+    with laptops(tmp_path, "driver=uhd", "usrp") as both:
+        assert walk("usrp.md", both, default="first") >= 3
+
+
+def test_words_that_are_not_on_the_screen_are_missed():
+    assert missing_words(("SNR 33 dB", "…"), "SNR 7 dB") == {}
+    assert missing_words(("registry same",), "registry differs") == {"registry same": ["same"]}
