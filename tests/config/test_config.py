@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from sdrlinkd.config import Config, load_config, make_setup, parse_config
-from sdrlinkd.errors import ConfigError, UserError
+from sdrlinkd.errors import ConfigError, RegistryError, UserError
 from sdrlinkd.link import ClassParams, TopicPolicy
 
 ROOT = Path(__file__).parents[2]

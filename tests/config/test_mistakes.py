@@ -23,7 +23,7 @@ MISTAKES = [
     ("[link]\n\nbeacon_s = 1e-9", 3, ["link.beacon_s", "at least 0.01"]),
     ("[link]\nmin_fragment = 2000", 2, ["link.min_fragment: got 2000", "at most 1011"]),
     ("robot_id = 300", 1, ["robot_id: got 300", "from -1 to 254"]),
-    ('namespace = "robot"', 1, ["robot_id", 'namespace "robot"', "robot_1"]),
+    ('namespace = "robot"', 1, ["robot_id", 'in "robot" it is not there', "robot_1"]),
     ('namespace = "a b1"', 1, ['namespace: got "a b1"', "a ROS namespace"]),
     ('rx_format = "heard"', 1, ['rx_format: got "heard"', "{src_id}"]),
     ('registry = "nowhere.csv"', 0, ["registry cannot be read"]),
@@ -58,7 +58,10 @@ MISTAKES = [
     ('[relay]\npolicy = "routes"\nroutes = ["1-3"]', 3, ['relay.routes: got "1-3"', "FROM>TO"]),
     ('[relay]\npolicy = "flood"', 2, ["link.hop_limit: got 1", "at least 2"]),
     ('[chrony]\nsocket = "/run/c.sock"\nrobot = 1', 3, ["chrony.robot: got 1", "another robot"]),
-    (f"{LOOPBACK}[modem]\nrate_hz = 1e5", 3, ["modem.max_cfo_hz: got 100000", "25000"]),
+    (
+        f"{LOOPBACK}[modem]\nrate_hz = 1e5\nmax_cfo_hz = 1e5", 4,
+        ["modem.max_cfo_hz: got 100000", "25000"],
+    ),
     (
         f"{LOOPBACK}[modem]\nrate_hz = 1e4\nmax_cfo_hz = 1e3", 3,
         ["modem.rate_hz: got 10000", "on the air", "reassembly.timeout_s"],
