@@ -13,11 +13,14 @@ class Listed(NamedTuple):
 
 COMMANDS = {
     "status": Listed(
-        "One screen: link, queue, topics, robots heard, drops by reason.", ("status",)
+        "The verdict in plain words, and one screen of reasons; the exit code is the verdict, too.",
+        ("status",),
     ),
+    "list": Listed("The daemons of this host.", ("listing",)),
     "topics": Listed(
         "Topics of the registry, and those heard from other robots.", ("topics", "dictionary")
     ),
+    "topic": Listed("Rate, bandwidth and delay of a topic heard.", ("topic",)),
     "latency": Listed(
         "How late messages come and why, topic by topic; and the clocks of the robots heard.",
         ("latency",),

@@ -13,6 +13,7 @@ from ruamel.yaml.error import YAMLError
 
 from sdrlinkd.adapters import cdr_from_fields, from_cdr, knows
 from sdrlinkd.cli.app import RuntimeDir, app, connect
+from sdrlinkd.cli.names import heard_names, one_of, robot_names, topic_names
 from sdrlinkd.cli.status import ask_status
 from sdrlinkd.client import Message, Publisher, Subscriber
 from sdrlinkd.errors import UserError
@@ -20,11 +21,15 @@ from sdrlinkd.link import CDR_HEADER_SIZE
 from sdrlinkd.wire import BROADCAST
 
 MAX_SHOWN_ITEMS = 12
+QOS = ("urgent", "latency", "default", "bulk")
 
 
 @app.command()
 def pub(
-    topic: Annotated[str, typer.Argument(help="Bus topic, such as /robot_1/cmd_vel.")],
+    topic: Annotated[
+        str,
+        typer.Argument(help="Bus topic, such as /robot_1/cmd_vel.", autocompletion=topic_names),
+    ],
     values: Annotated[
         str, typer.Argument(help="Fields in YAML: '{linear: {x: 0.5}}'; the rest is default.")
     ] = "{}",
@@ -35,9 +40,15 @@ def pub(
         float, typer.Option("--rate", "-r", min=0.0, max=1e6, help="Hz; 0: once.")
     ] = 0.0,
     times: Annotated[int, typer.Option("--times", "-t", min=0, help="0: until Ctrl-C.")] = 0,
-    qos: Annotated[str | None, typer.Option(help="urgent, latency, default or bulk.")] = None,
+    qos: Annotated[
+        str | None,
+        typer.Option(help="urgent, latency, default or bulk.", autocompletion=one_of(*QOS)),
+    ] = None,
     priority: Annotated[int | None, typer.Option(min=0, max=127)] = None,
-    dst: Annotated[int | None, typer.Option(min=0, max=255, help="Destination robot.")] = None,
+    dst: Annotated[
+        int | None,
+        typer.Option(min=0, max=255, help="Destination robot.", autocompletion=robot_names),
+    ] = None,
     lifespan: Annotated[float | None, typer.Option(min=0.001, help="Seconds.")] = None,
     receipt: Annotated[
         bool, typer.Option("--receipt", help="Say what became of each message, robot by robot.")
@@ -100,7 +111,11 @@ def _show_receipts(
 @app.command()
 def echo(
     topic: Annotated[
-        str, typer.Argument(help="Bus topic, such as /rx_robot_2/odom, or a prefix with *.")
+        str,
+        typer.Argument(
+            help="Bus topic, such as /rx_robot_2/odom, or a prefix with *.",
+            autocompletion=heard_names,
+        ),
     ] = "/*",
     raw: Annotated[bool, typer.Option("--raw", help="Show the CDR bytes in hex.")] = False,
     count: Annotated[int, typer.Option("--count", "-n", min=0, help="0: until Ctrl-C.")] = 0,
