@@ -134,6 +134,17 @@ class FittedTable:
                           style=style)  # fmt: skip
         return table
 
+    def texts(self, widths: dict[int, int]) -> list[list[Text]]:
+        """The cells of every row, for a table of another library that is given the widths."""
+        told = []
+        for cells, style in self.rows:
+            row = [self._drawn(cells[place], n) for place, n in widths.items()]
+            for text, place in zip(row, widths, strict=True):
+                text.justify = "right" if self.columns[place].kind == "figure" else "left"
+                text.stylize(style)
+            told.append(row)
+        return told
+
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         if self.title:
             yield Text(self.title, style="italic")
@@ -159,7 +170,7 @@ class FittedTable:
         if callable(cell):
             return cell(width)
         if isinstance(cell, Text):
-            return cell
+            return Text(wrapped(cell.plain, width), style=cell.style)
         return Text(wrapped(cell, width))
 
 

@@ -16,6 +16,10 @@ COMMANDS = {
         "The verdict in plain words, and one screen of reasons; the exit code is the verdict, too.",
         ("status",),
     ),
+    "top": Listed(
+        "The link, live: verdict, robots both ways, topics, the last minutes; why and set, too.",
+        ("top",),
+    ),
     "list": Listed("The daemons of this host.", ("listing",)),
     "topics": Listed(
         "Topics of the registry, and those heard from other robots.", ("topics", "dictionary")

@@ -131,7 +131,7 @@ def busy(at: int = 0) -> Snapshot:
             delivered=123_456 + 29 * at, delivered_per_s=29.5 if i else 0.0,
             delivered_bytes=10**9, delivered_bytes_per_s=2.5e6,
             dropped={"rx_partial_timeout": 100 * src}, pdr=1 - src / 100,
-            age_ms_last=1234.5, age_ms_p50=12.25 * src, age_ms_p99=250.0,
+            age_ms_last=1234.5 - 5 * (at % 100), age_ms_p50=12.25 * src, age_ms_p99=250.0,
             latency=LatencyReport(
                 wait_ms=20.5, queue_ms=10.25, access_ms=10.0, again_ms=0.25, reassembly_ms=4.5,
                 air_ms=src + 0.5, handover_ms=2.25, period_ms=33.3, jitter_ms=123.45,
@@ -145,7 +145,7 @@ def busy(at: int = 0) -> Snapshot:
         NeighborReport(
             src=src, is_self=False, last_heard_s_ago=0.25 * src, pdus_heard=10**6 + 30 * at,
             pdus_lost=1000 * src, per=src / 1000, per_lately=src / 100, duplicates=4, hops_left=1,
-            reboots=0, snr_db=30.0 - 2 * src + at % 5, snr_there_db=28.0 - 2 * src,
+            reboots=0, snr_db=30.0 - 2 * src + abs(at % 120 - 60) / 6, snr_there_db=28.0 - 2 * src,
             per_there=src / 50, mcs=src % 8, registry="differs" if src == 5 else "same",
             clock=ClockReport(
                 state="synced", offset_ms=-12345.678, bound_us=12.5, skew_ppm=-10.25,
@@ -156,8 +156,12 @@ def busy(at: int = 0) -> Snapshot:
     ]  # fmt: skip
     link = msgspec.structs.replace(
         SNAPSHOT.link, topics=out, received=heard, neighbors=robots,
-        air_sent_pct=12.5 + 5 * (at % 4), air_heard_pct=40.25,
-        tx=msgspec.structs.replace(SNAPSHOT.link.tx, queued=7 + at % 6, dropped=DROPPED),
+        air_sent_pct=12.5 + abs(at % 80 - 40), air_heard_pct=40.25,
+        tx=msgspec.structs.replace(SNAPSHOT.link.tx, queued=7 + at % 60, dropped=DROPPED),
+        rx=msgspec.structs.replace(
+            SNAPSHOT.link.rx, delivered=100 + 50 * at,
+            dropped={"rx_partial_timeout": 3 + at * at // 30},
+        ),
     )  # fmt: skip
     reasons = [f"robot {src} hears us at {3 * src} dB, {src} % lost" for src in range(2, 10)]
     return msgspec.structs.replace(
