@@ -89,9 +89,7 @@ async def test_the_daemon_is_asked_again_and_again():
     looks = iter([SNAPSHOT, None, busy()])
     app = TopApp(lambda: next(looks, busy()), Asked(), lambda: "waiting", 0.01)
     async with app.run_test(size=(80, 24)) as pilot:
-        while "robot 9 hears" not in str(app.query_one("#verdict", Static).render()) and (
-            "5 more reasons" not in text_of(app)
-        ):
+        while "5 more reasons" not in text_of(app):
             await pilot.pause(0.01)
 
 

@@ -76,18 +76,23 @@ class TopApp(App[None]):
         self._snapshot: Snapshot | None = None
         self._order = next(iter(ORDERS))
         self._rows: list[TopicRow] = []
+        names = ("verdict", "robot", "trend", "robots")
+        self._verdict, self._robot, self._trend, self._robots = (
+            Static(id=name, markup=False) for name in names
+        )
+        self._table: DataTable[Text] = DataTable(cursor_type="row")
+        self._filter = Input(id="filter", placeholder="topic, class or robot 2", compact=True)
 
     def compose(self) -> ComposeResult:
         """From top to bottom."""
-        for name in ("verdict", "robot", "trend", "robots"):
-            yield Static(id=name, markup=False)
-        yield DataTable(cursor_type="row")
-        yield Input(id="filter", placeholder="topic, class or robot 2", compact=True)
+        yield from (self._verdict, self._robot, self._trend, self._robots)
+        yield self._table
+        yield self._filter
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
         """Begin to look."""
-        self.query_one(DataTable).focus()
+        self._table.focus()
         if self._period_s:
             self.set_interval(self._period_s, self._follow)
             self.call_after_refresh(self._follow)
@@ -104,7 +109,7 @@ class TopApp(App[None]):
         """One more moment of the link; None: nobody answers."""
         self._history.add(snapshot)
         if snapshot is None:
-            self.query_one("#verdict", Static).update(Text(self._waiting(), style="bold yellow"))
+            self._verdict.update(Text(self._waiting(), style="bold yellow"))
         else:
             self._snapshot = snapshot
         self._draw(is_there=snapshot is not None)
@@ -116,21 +121,22 @@ class TopApp(App[None]):
     def _draw(self, *, is_there: bool) -> None:
         """The last snapshot; while the daemon is away, the verdict is not of now."""
         at, width = self._snapshot, self.size.width
-        if at is None or not width:
+        # Quitting, there is an answer still to come, and no screen any more.
+        if at is None or not width or not self._table.is_attached:
             return
         if is_there:
-            self.query_one("#verdict", Static).update(verdict(at, width))
+            self._verdict.update(verdict(at, width))
         named = f" ({at.namespace})" if at.namespace else ""
         told = (
             f"robot {at.node}{named}  {at.carrier.kind} {at.carrier.state}  "
             f"up {duration(at.uptime_s)}  {at.bus.runtime_dir}"
         )
-        self.query_one("#robot", Static).update(Text(told))
-        self.query_one("#trend", Static).update(self._trend(width))
+        self._robot.update(Text(told))
+        self._trend.update(self._series(width))
         self._draw_robots(at, width)
         self._draw_topics(at, width)
 
-    def _trend(self, width: int) -> Text:
+    def _series(self, width: int) -> Text:
         """Two series a line."""
         half = (width - 2) // 2
         lines = [*(series.line(half) for series in self._history.series), MINUTES]
@@ -142,39 +148,37 @@ class TopApp(App[None]):
         most = max(2, self.size.height // 5)
         table = robots_table(robots, rule=False)
         shown = most if len(robots) <= most else most - 1
-        where = self.query_one("#robots", Static)
-        where.display = bool(robots)
+        self._robots.display = bool(robots)
         parts: list[RenderableType] = [table.fitted(width, shown)]
         if len(robots) > shown:
             parts.append(Text(f"+ {len(robots) - shown} robots: sdrlinkctl status --all", "bold"))
-        where.update(Group(*parts))
+        self._robots.update(Group(*parts))
 
     def _draw_topics(self, at: Snapshot, width: int) -> None:
-        shown = self.query_one(DataTable)
         selected = self._selected()
-        scrolled = shown.scroll_y
-        self._rows = topic_rows(at, self._order, self.query_one("#filter", Input).value)
+        scrolled = self._table.scroll_y
+        self._rows = topic_rows(at, self._order, self._filter.value)
         table = topics_table(self._rows)
         # The bar at the right takes two.
         widths = table.widths(width - 2)
-        shown.clear(columns=True)
+        self._table.clear(columns=True)
         for place, n in widths.items():
             column = table.columns[place]
             head = Text(column.name, justify="right" if column.kind == "figure" else "left")
-            shown.add_column(head, width=n)
+            self._table.add_column(head, width=n)
         for row, cells, height in zip(
             self._rows, table.texts(widths), table.heights(width - 2), strict=True
         ):
-            shown.add_row(*cells, key=row.key, height=height)
+            self._table.add_row(*cells, key=row.key, height=height)
         if selected is not None:
             for index, row in enumerate(self._rows):
                 if row.key == selected.key:
-                    shown.move_cursor(row=index, scroll=False)
+                    self._table.move_cursor(row=index, scroll=False)
                     break
-        shown.scroll_to(y=scrolled, animate=False)
+        self._table.scroll_to(y=scrolled, animate=False)
 
     def _selected(self) -> TopicRow | None:
-        index = self.query_one(DataTable).cursor_row
+        index = self._table.cursor_row
         return self._rows[index] if 0 <= index < len(self._rows) else None
 
     def action_sort(self) -> None:
@@ -186,14 +190,12 @@ class TopApp(App[None]):
 
     def action_filter(self) -> None:
         """Ask for a text."""
-        field = self.query_one("#filter", Input)
-        field.display = True
-        field.focus()
+        self._filter.display = True
+        self._filter.focus()
 
     def action_unfilter(self) -> None:
         """All topics again."""
-        field = self.query_one("#filter", Input)
-        field.value = ""
+        self._filter.value = ""
         self.on_input_submitted()
 
     def on_input_changed(self) -> None:
@@ -202,9 +204,8 @@ class TopApp(App[None]):
 
     def on_input_submitted(self) -> None:
         """Back to the table; the text stays in force."""
-        field = self.query_one("#filter", Input)
-        field.display = bool(field.value)
-        self.query_one(DataTable).focus()
+        self._filter.display = bool(self._filter.value)
+        self._table.focus()
 
     def on_data_table_row_selected(self) -> None:
         """Enter."""
