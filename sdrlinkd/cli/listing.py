@@ -4,6 +4,8 @@ A daemon that runs listens on its control socket, and the kernel tells of every 
 listens on: nothing is registered, so nothing can be stale.
 """
 
+import contextlib
+import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
@@ -21,17 +23,19 @@ from sdrlinkd.tables import screen_console
 SOCKETS = Path("/proc/net/unix")
 LISTENS = 0x10000
 """Linux's __SO_ACCEPTCON, among the flags of a socket."""
+SOCKET_NAMES = (CONTROL_SOCKET, IN_SOCKET, OUT_SOCKET)
 PATIENCE_S = 1.0
 LOCK = "lock"
 """Holds the daemon's process id, beside its sockets."""
 
 
 class Listed(NamedTuple):
-    """A daemon; `snapshot` is None where it does not answer this user."""
+    """A daemon; `snapshot` is None where it does not answer, and `problem` says why."""
 
     directory: Path
     pid: int | None
     snapshot: Snapshot | None
+    problem: str = ""
 
 
 @app.command("list")
@@ -45,7 +49,9 @@ def list_daemons(as_json: AsJson = False) -> None:
         typer.echo("no sdrlinkd runs on this host; start one: sdrlinkd --config FILE")
         return
     screen_console().print(
-        daemons_table([(str(each.directory), each.pid, each.snapshot) for each in found])
+        daemons_table(
+            [(str(each.directory), each.pid, each.snapshot or each.problem) for each in found]
+        )
     )
 
 
@@ -61,7 +67,7 @@ def directories() -> list[Path]:
         path.parent
         for path in listening
         if path.name == CONTROL_SOCKET
-        and {path.parent / IN_SOCKET, path.parent / OUT_SOCKET} <= listening
+        and {path.parent / name for name in SOCKET_NAMES} <= listening
     )
 
 
@@ -69,12 +75,29 @@ def _listening(lines: Iterable[str]) -> Iterable[Path]:
     """Num RefCount Protocol Flags Type St Inode Path."""
     for line in lines:
         parts = line.split(maxsplit=7)
-        if len(parts) == 8 and int(parts[3], 16) & LISTENS and parts[7].startswith("/"):
-            yield Path(parts[7])
+        # A name that begins with @ is no file.
+        if len(parts) < 8 or not int(parts[3], 16) & LISTENS or parts[7].startswith("@"):
+            continue
+        path = Path(parts[7])
+        if path.is_absolute():
+            yield path
+        elif path.name in SOCKET_NAMES:
+            yield from _resolved(path)
+
+
+def _resolved(path: Path) -> Iterable[Path]:
+    """A socket that a daemon has named from where it was started."""
+    for link in Path("/proc").glob("[0-9]*/cwd"):
+        with contextlib.suppress(OSError):
+            whole = link.readlink() / path
+            if whole.is_socket():
+                yield whole
 
 
 def _look(directory: Path) -> Listed:
-    snapshot = None
+    snapshot, problem = None, "no answer"
+    if not os.access(directory / CONTROL_SOCKET, os.W_OK):
+        problem = "not open to this user"
     try:
         with connect(directory, PATIENCE_S) as control:
             snapshot = msgspec.convert(control.ask("status"), Snapshot)
@@ -84,7 +107,7 @@ def _look(directory: Path) -> Listed:
         pid = int((directory / LOCK).read_text())
     except (OSError, ValueError):
         pid = None
-    return Listed(directory, pid, snapshot)
+    return Listed(directory, pid, snapshot, problem)
 
 
 def _told(each: Listed) -> dict[str, object]:
@@ -99,4 +122,5 @@ def _told(each: Listed) -> dict[str, object]:
         "state": at.carrier.state if at else None,
         "uptime_s": at.uptime_s if at else None,
         "version": at.version if at else None,
+        "problem": None if at else each.problem,
     }

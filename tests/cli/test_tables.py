@@ -79,7 +79,10 @@ def everything(width: int) -> dict[str, list[object]]:
         robots=[robot(i) for i in range(1, 7)],
         pairs=[pair(i, j) for i in range(1, 7) for j in range(1, 7) if i != j],
     )
-    listed = [(f"/run/user/1000/{LONG}", 12345, at), ("/run/sdrlinkd", 1, SNAPSHOT)]
+    listed = [
+        (f"/run/user/1000/{LONG}", 12345, at), ("/run/sdrlinkd", 1, SNAPSHOT),
+        ("/run/other", None, "no answer"),
+    ]  # fmt: skip
     return {
         "status": [StatusScreen(at, 24), StatusScreen(at, None)],
         "latency": latency_screen(at.link, at.link.received, whole=True),

@@ -10,8 +10,8 @@ from sdrlinkd.reports import Snapshot
 from sdrlinkd.tables import NOTHING, FittedTable, figure, words
 
 
-def daemons_table(found: Sequence[tuple[str, int | None, Snapshot | None]]) -> FittedTable:
-    """A row a daemon: (runtime directory, process id, what it says)."""
+def daemons_table(found: Sequence[tuple[str, int | None, Snapshot | str]]) -> FittedTable:
+    """A row a daemon: (runtime directory, process id, what it says or why it does not)."""
     table = FittedTable(
         "",
         (
@@ -21,8 +21,8 @@ def daemons_table(found: Sequence[tuple[str, int | None, Snapshot | None]]) -> F
     )  # fmt: skip
     for directory, pid, at in found:
         process = NOTHING if pid is None else str(pid)
-        if at is None:
-            table.add(NOTHING, "", "no answer to this user", "", NOTHING, directory, process)
+        if isinstance(at, str):
+            table.add(NOTHING, NOTHING, at, NOTHING, NOTHING, directory, process)
             continue
         level = at.verdict.level
         table.add(
