@@ -77,8 +77,8 @@ def table_of(benchmark: str, rows: list[Row]) -> FittedTable:
     table = FittedTable(
         f"benchmarks.{benchmark}",
         (
-            words("row"), figure("value"), figure("target", 1), words("peers in the same run", 3),
-            figure("trials", 2),
+            words("row", least=40), figure("value"), figure("target", 1),
+            words("peers in the same run", 3), figure("trials", 2),
         ),
     )  # fmt: skip
     for row in rows:

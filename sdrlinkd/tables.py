@@ -182,19 +182,24 @@ def _length(cell: Cell) -> int:
 
 
 def wrapped(text: str, width: int) -> str:
-    """`text` in lines of at most `width`, broken before `/`, after `_`, `,` and at spaces."""
+    """`text` in lines of at most `width`, broken at spaces; what is longer, before `/`, after `_`.
+
+    What is longer still is broken anywhere.
+    """
     lines = []
     for paragraph in text.split("\n"):
         line = ""
-        for part in re.findall(r" ?/?[^/_, ]*[_,]?", paragraph):
-            piece = part
-            if cell_len(line + piece) > width and line:
-                lines.append(line.rstrip())
-                line, piece = "", piece.lstrip(" ")
-            while cell_len(piece) > width:
-                lines.append(piece[:width])
-                piece = piece[width:]
-            line += piece
+        for word in re.findall(r" ?[^ ]*", paragraph):
+            is_whole = cell_len(word.lstrip(" ")) <= width
+            for part in [word] if is_whole else re.findall(r" ?/?[^/_, ]*[_,]?", word):
+                piece = part
+                if cell_len(line + piece) > width and line:
+                    lines.append(line.rstrip())
+                    line, piece = "", piece.lstrip(" ")
+                while cell_len(piece) > width:
+                    lines.append(piece[:width])
+                    piece = piece[width:]
+                line += piece
         lines.append(line.rstrip())
     return "\n".join(lines)
 

@@ -114,6 +114,9 @@ def everything(snapshot: Snapshot, width: int) -> list[RenderableType]:
     """The screen of `--all`: every topic, robot and reason."""
     link = snapshot.link
     parts: list[RenderableType] = [verdict(snapshot, width, whole=True), *head(snapshot, width)]
+    counted = ", ".join(f"{key} {n}" for key, n in snapshot.carrier.counters.items() if n)
+    if counted:
+        parts.append(_labelled("counts", counted, width))
     parts += [*_receipts(snapshot, width), Text()]
     parts.append(sent_table(link.topics, rule=True))
     if link.received:
