@@ -79,6 +79,7 @@ async def test_a_daemon_that_goes_is_waited_for_and_comes_back():
         await shown(pilot, [None])
         assert "waiting for sdrlinkd" in text_of(pilot.app)
         await shown(pilot, [SNAPSHOT, None, None])
+        await pilot.press("s")
         assert "waiting for sdrlinkd in /run" in text_of(pilot.app)
         assert "/robot_1/odom" in text_of(pilot.app)
         await shown(pilot, [SNAPSHOT])

@@ -42,6 +42,7 @@ class TopApp(App[None]):
     #trend { height: 3; margin: 0; color: $accent; }
     #robots { height: auto; margin: 1 0; }
     DataTable { height: 1fr; }
+    .old { text-opacity: 40%; }
     #filter { dock: bottom; display: none; height: 1; }
     ModalScreen { align: center middle; }
     .box { width: 76; max-width: 100%; height: auto; max-height: 100%; padding: 1 2;
@@ -74,6 +75,7 @@ class TopApp(App[None]):
         self._period_s = period_s
         self._history = History()
         self._snapshot: Snapshot | None = None
+        self._is_there = False
         self._order = next(iter(ORDERS))
         self._rows: list[TopicRow] = []
         names = ("verdict", "robot", "trend", "robots")
@@ -108,23 +110,26 @@ class TopApp(App[None]):
     def show(self, snapshot: Snapshot | None) -> None:
         """One more moment of the link; None: nobody answers."""
         self._history.add(snapshot)
+        self._is_there = snapshot is not None
         if snapshot is None:
             self._verdict.update(Text(self._waiting(), style="bold yellow"))
         else:
             self._snapshot = snapshot
-        self._draw(is_there=snapshot is not None)
+        self._draw()
 
     def on_resize(self) -> None:
         """Other columns may fit now."""
-        self._draw(is_there=True)
+        self._draw()
 
-    def _draw(self, *, is_there: bool) -> None:
+    def _draw(self) -> None:
         """The last snapshot; while the daemon is away, the verdict is not of now."""
         at, width = self._snapshot, self.size.width
         # Quitting, there is an answer still to come, and no screen any more.
         if at is None or not width or not self._table.is_attached:
             return
-        if is_there:
+        for part in (self._robot, self._trend, self._robots, self._table):
+            part.set_class(not self._is_there, "old")
+        if self._is_there:
             self._verdict.update(verdict(at, width))
         named = f" ({at.namespace})" if at.namespace else ""
         told = (
@@ -186,7 +191,7 @@ class TopApp(App[None]):
         orders = [*ORDERS]
         self._order = orders[(orders.index(self._order) + 1) % len(orders)]
         self.notify(f"sorted by {self._order}", timeout=2)
-        self._draw(is_there=True)
+        self._draw()
 
     def action_filter(self) -> None:
         """Ask for a text."""
@@ -200,7 +205,7 @@ class TopApp(App[None]):
 
     def on_input_changed(self) -> None:
         """While it is typed."""
-        self._draw(is_there=True)
+        self._draw()
 
     def on_input_submitted(self) -> None:
         """Back to the table; the text stays in force."""
