@@ -43,7 +43,7 @@ class Follower:
         try:
             return self._control.ask(verb, arguments)
         except NoDaemonError:
-            # Who comes after it has a socket of its own.
+            # A new connection tells at once whether anybody is there.
             self.close()
             raise
 

@@ -193,3 +193,12 @@ async def test_a_daemon_without_anything_is_shown():
         await shown(pilot, [msgspec.structs.replace(SNAPSHOT, link=link)])
         await pilot.press("w", "p", "s")
         assert "robot 1 (robot_1)" in text_of(pilot.app)
+
+
+async def test_an_answer_that_comes_when_it_has_ended_is_dropped():
+    app = make_app()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await shown(pilot, [SNAPSHOT])
+        await pilot.press("q")
+    app.show(busy())
+    app.show(None)

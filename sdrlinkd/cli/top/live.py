@@ -109,6 +109,9 @@ class TopApp(App[None]):
 
     def show(self, snapshot: Snapshot | None) -> None:
         """One more moment of the link; None: nobody answers."""
+        # While it quits, there is an answer still to come, and no screen any more.
+        if not self.is_running or not self._table.is_attached:
+            return
         self._history.add(snapshot)
         self._is_there = snapshot is not None
         if snapshot is None:
@@ -124,8 +127,7 @@ class TopApp(App[None]):
     def _draw(self) -> None:
         """The last snapshot; while the daemon is away, the verdict is not of now."""
         at, width = self._snapshot, self.size.width
-        # Quitting, there is an answer still to come, and no screen any more.
-        if at is None or not width or not self._table.is_attached:
+        if at is None or not width:
             return
         for part in (self._robot, self._trend, self._robots, self._table):
             part.set_class(not self._is_there, "old")
