@@ -9,8 +9,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Literal
 
-from rich.console import Console
-from rich.table import Table
+from sdrlinkd.tables import FittedTable, figure, screen_console, words
 
 
 @dataclass
@@ -69,23 +68,25 @@ def main(
         }
         sys.stdout.write(json.dumps(report, indent=2) + "\n")
     else:
-        # In a file, rows are not cut short at the 80 columns of a terminal that is not there.
-        console = Console() if sys.stdout.isatty() else Console(width=110)
-        console.print(_table(benchmark, rows))
+        screen_console().print(table_of(benchmark, rows))
     return 0 if all(row.ok for row in rows) else 1
 
 
-def _table(benchmark: str, rows: list[Row]) -> Table:
-    table = Table(title=f"benchmarks.{benchmark}", title_justify="left")
-    table.add_column("row", no_wrap=True)
-    for column in ("value", "target", "peers in the same run", "trials"):
-        table.add_column(column)
+def table_of(benchmark: str, rows: list[Row]) -> FittedTable:
+    """What a person reads."""
+    table = FittedTable(
+        f"benchmarks.{benchmark}",
+        (
+            words("row", least=40), figure("value"), figure("target", 1),
+            words("peers in the same run", 3), figure("trials", 2),
+        ),
+    )  # fmt: skip
     for row in rows:
         here = f"{row.value:,.4g} {row.unit}"
         if row.like_for_like is not None:
             here += f" ({row.like_for_like:,.4g})"
         sign = "≥" if row.better == "more" else "≤"
-        table.add_row(
+        table.add(
             row.name,
             here,
             "" if row.target is None else f"{sign} {row.target:,.4g}",

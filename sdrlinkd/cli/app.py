@@ -89,9 +89,9 @@ def run(arguments: list[str]) -> int:
     return 0
 
 
-def connect(runtime_dir: Path | None) -> ControlClient:
+def connect(runtime_dir: Path | None, timeout_s: float = 5.0) -> ControlClient:
     """The control socket of the running daemon."""
-    return ControlClient(runtime_dir)
+    return ControlClient(runtime_dir, timeout_s)
 
 
 @app.callback(invoke_without_command=True)

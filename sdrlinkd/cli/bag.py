@@ -14,6 +14,7 @@ from sdrlinkd.cli.status import ask_status
 from sdrlinkd.client import MessageRefusedError, Publisher
 from sdrlinkd.errors import BagError, UserError
 from sdrlinkd.reports import TopicReport
+from sdrlinkd.tables import FittedTable, figure, screen_console, words
 
 bags = typer.Typer(help="Recordings of messages.", no_args_is_help=True)
 app.add_typer(bags, name="bag")
@@ -23,14 +24,18 @@ app.add_typer(bags, name="bag")
 def info(bag: Annotated[Path, typer.Argument(help="rosbag2 folder, .mcap, .db3 or .bag")]) -> None:
     """Topics of a recording."""
     opened = open_bag(bag)
-    console = Console()
-    for topic in opened.topics():
-        console.print(
-            f"{topic.n_messages:>7}  {topic.name}  {topic.type}", highlight=False, markup=False
-        )
+    screen_console().print(table_of(opened.topics()))
     opened.close()
     if opened.damage:
         raise BagError(opened.damage)
+
+
+def table_of(topics: list[BagTopic]) -> FittedTable:
+    """A row a topic."""
+    table = FittedTable("", (figure("messages"), words("topic"), words("type", 1)))
+    for topic in topics:
+        table.add(str(topic.n_messages), topic.name, topic.type)
+    return table
 
 
 @bags.command()

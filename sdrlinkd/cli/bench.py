@@ -17,9 +17,12 @@ NAMES = (
     "access",
     "bus",
     "ether",
+    "flowgraphs",
     "modem_path",
+    "phy_curves",
     "phy_per",
     "phy_speed",
+    "radio",
 )
 
 

@@ -13,8 +13,14 @@ class Listed(NamedTuple):
 
 COMMANDS = {
     "status": Listed(
-        "One screen: link, queue, topics, robots heard, drops by reason.", ("status",)
+        "The verdict in plain words, and one screen of reasons; the exit code is the verdict, too.",
+        ("status",),
     ),
+    "top": Listed(
+        "The link, live: verdict, robots both ways, topics, the last minutes; why and set, too.",
+        ("top",),
+    ),
+    "list": Listed("The daemons of this host.", ("listing",)),
     "init": Listed("Write a configuration and a registry to begin with.", ("init",)),
     "doctor": Listed(
         "Check machine, environment, radio, permissions and clock, and say what to do.",
@@ -23,6 +29,7 @@ COMMANDS = {
     "topics": Listed(
         "Topics of the registry, and those heard from other robots.", ("topics", "dictionary")
     ),
+    "topic": Listed("Rate, bandwidth and delay of a topic heard.", ("topic",)),
     "latency": Listed(
         "How late messages come and why, topic by topic; and the clocks of the robots heard.",
         ("latency",),

@@ -1,6 +1,5 @@
 """`demo`: the paper's experiment on this machine, in one command."""
 
-import sys
 from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
@@ -28,6 +27,7 @@ from sdrlinkd.demo import (
     topic_table,
     verdict,
 )
+from sdrlinkd.tables import screen_console
 from sdrlinkd.wire import MAX_PDU_SIZE, MIN_PDU_SIZE
 
 
@@ -109,8 +109,7 @@ def demo(
     ),
 ) -> None:
     """Send a robot's messages through daemons and radios; measure what the paper measured."""
-    # In a file, names are not cut short at the 80 columns of a terminal that is not there.
-    console = Console() if sys.stdout.isatty() else Console(width=110)
+    console = screen_console()
     pictures = load_pictures("sdrlinkd.demo")
     make_folder(out, PICTURES)
     results: list[RunResult] = []

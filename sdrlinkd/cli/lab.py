@@ -1,7 +1,6 @@
 """`lab`: a scenario with real daemons on one simulated air, in one command."""
 
 import os
-import sys
 import time
 from enum import StrEnum
 from pathlib import Path
@@ -9,7 +8,6 @@ from typing import Annotated
 
 import msgspec
 import typer
-from rich.console import Console
 from rich.live import Live
 
 from sdrlinkd.cli.app import app
@@ -24,6 +22,7 @@ from sdrlinkd.lab import (
     pair_table,
     run_lab,
 )
+from sdrlinkd.tables import screen_console
 
 PICTURE = "lab.png"
 
@@ -63,7 +62,7 @@ def lab(
     ),
 ) -> None:
     """Run several robots' daemons on one simulated air; measure who got what of whom."""
-    console = Console() if sys.stdout.isatty() else Console(width=110)
+    console = screen_console()
     chosen = chosen_scenario(scenario, seed, duration, pace)
     if access is not None:
         section = {**chosen.daemon.get("access", {}), "policy": access.value}

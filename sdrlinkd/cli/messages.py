@@ -13,6 +13,7 @@ from ruamel.yaml.error import YAMLError
 
 from sdrlinkd.adapters import cdr_from_fields, from_cdr, knows
 from sdrlinkd.cli.app import RuntimeDir, app, connect
+from sdrlinkd.cli.completion import heard_names, one_of, robot_names, topic_names
 from sdrlinkd.cli.names import refuse_own, topic_sent
 from sdrlinkd.cli.status import ask_status
 from sdrlinkd.client import QOS, Message, Publisher, Subscriber
@@ -26,7 +27,10 @@ MAX_SHOWN_ITEMS = 12
 
 @app.command()
 def pub(
-    topic: Annotated[str, typer.Argument(help="Its name on the bus or in the registry.")],
+    topic: Annotated[
+        str,
+        typer.Argument(help="Its name on the bus or in the registry.", autocompletion=topic_names),
+    ],
     values: Annotated[
         str, typer.Argument(help="Fields in YAML: '{linear: {x: 0.5}}'; the rest is default.")
     ] = "{}",
@@ -37,9 +41,15 @@ def pub(
         float, typer.Option("--rate", "-r", min=0.0, max=1e6, help="Hz; 0: once.")
     ] = 0.0,
     times: Annotated[int, typer.Option("--times", "-t", min=0, help="0: until Ctrl-C.")] = 0,
-    qos: Annotated[str | None, typer.Option(help="urgent, latency, default or bulk.")] = None,
+    qos: Annotated[
+        str | None,
+        typer.Option(help="urgent, latency, default or bulk.", autocompletion=one_of(*QOS)),
+    ] = None,
     priority: Annotated[int | None, typer.Option(min=0, max=127)] = None,
-    dst: Annotated[int | None, typer.Option(min=0, max=255, help="Destination robot.")] = None,
+    dst: Annotated[
+        int | None,
+        typer.Option(min=0, max=255, help="Destination robot.", autocompletion=robot_names),
+    ] = None,
     lifespan: Annotated[
         str | None, typer.Option(help="Worthless after: 300ms, 2s; plain numbers are seconds.")
     ] = None,
@@ -104,7 +114,11 @@ def _show_receipts(
 @app.command()
 def echo(
     topic: Annotated[
-        str, typer.Argument(help="Bus topic, such as /rx_robot_2/odom, or a prefix with *.")
+        str,
+        typer.Argument(
+            help="Bus topic, such as /rx_robot_2/odom, or a prefix with *.",
+            autocompletion=heard_names,
+        ),
     ] = "/*",
     raw: Annotated[bool, typer.Option("--raw", help="Show the CDR bytes in hex.")] = False,
     count: Annotated[int, typer.Option("--count", "-n", min=0, help="0: until Ctrl-C.")] = 0,

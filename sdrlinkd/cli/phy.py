@@ -7,21 +7,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 import typer
-from rich import box
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
 from sdrlinkd.cli.app import AsJson, app
 from sdrlinkd.cli.output import load_pictures
 from sdrlinkd.cli.pdu import one_line
 from sdrlinkd.config import load_registry
 from sdrlinkd.errors import UserError
+from sdrlinkd.tables import FittedTable, figure, screen_console, words
 from sdrlinkd.wire import MAX_PDU_SIZE, MIN_PDU_SIZE
 
 if TYPE_CHECKING:
     import phy
-    from sdrlinkd.iq import IqRecording
+    from sdrlinkd.iq import IqRecording, ModemInfo
     from sdrlinkd.iq.recording import Progress as OnProgress
 
 phys = typer.Typer(help="The modem, and recordings of samples.", no_args_is_help=True)
@@ -68,7 +67,7 @@ def info(
     if json:
         typer.echo(msgspec.json.encode(told))
         return
-    console = Console()
+    console = screen_console()
     console.print(
         f"{told.rate_hz / 1e6:g} Msps: {told.n_fft} carriers {told.spacing_hz / 1e3:g} kHz apart, "
         f"{told.n_data} for data, {told.n_pilots} pilots, {told.occupied_hz / 1e6:.3g} MHz wide\n"
@@ -77,16 +76,20 @@ def info(
         highlight=False,
         soft_wrap=True,
     )
-    table = Table(
-        title=f"PDUs of {told.pdu_size} B, bursts up to {told.max_burst_s * 1e3:g} ms",
-        title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True,
+    console.print(table_of(told))
+
+
+def table_of(told: "ModemInfo") -> FittedTable:
+    """A row an MCS."""
+    table = FittedTable(
+        f"PDUs of {told.pdu_size} B, bursts up to {told.max_burst_s * 1e3:g} ms",
+        (
+            figure("MCS"), words("modulation"), figure("Mbit/s"), figure("1 PDU"),
+            figure("PDUs a burst", 2), figure("burst", 1), figure("goodput Mbit/s"),
+        ),
     )  # fmt: skip
-    table.add_column("MCS", justify="right")
-    table.add_column("modulation")
-    for column in ("Mbit/s", "1 PDU", "PDUs a burst", "burst", "goodput Mbit/s"):
-        table.add_column(column, justify="right")
     for row in told.mcs:
-        table.add_row(
+        table.add(
             str(row.mcs),
             row.name,
             f"{row.rate_bit_s / 1e6:.3g}",
@@ -95,7 +98,7 @@ def info(
             f"{row.burst_ms:.3g} ms",
             f"{row.burst_goodput_bit_s / 1e6:.3g}",
         )
-    console.print(table)
+    return table
 
 
 @phys.command()

@@ -5,15 +5,19 @@ from typing import Annotated
 
 import msgspec
 import typer
-from rich.console import Console
-from rich.table import Table
 
 from sdrlinkd.adapters import open_bag
 from sdrlinkd.cli.app import AsJson, app
 from sdrlinkd.config import Setup, load_config, make_setup
 from sdrlinkd.errors import UserError
 from sdrlinkd.plan import Load, Plan, loads_from_bag, make_plan, parse_load, setting_of
+from sdrlinkd.tables import FittedTable, figure, screen_console, words
 from sdrlinkd.units import seconds
+
+COLUMNS = (
+    words("topic"), words("class", 4, 7), figure("Hz"), figure("bytes", 2), figure("PDUs", 1),
+    figure("Mbit/s", 3), figure("air"), figure("worst case"),
+)  # fmt: skip
 
 
 @app.command()
@@ -45,27 +49,26 @@ def plan(
         text = {**made._asdict(), "topics": topics, "classes": classes}
         typer.echo(msgspec.json.encode(text).decode())
     else:
+        console = screen_console()
         for line in lines(made, robots):
-            Console(width=100).print(line, highlight=False)
+            console.print(line, highlight=False)
     if not made.is_feasible:
         raise typer.Exit(1)
 
 
-def lines(made: Plan, robots: int) -> list[Table | str]:
+def lines(made: Plan, robots: int) -> list[FittedTable | str]:
     """What a person reads."""
-    table = Table(title="plan", title_justify="left")
-    for column in ("topic", "class", "Hz", "bytes", "PDUs", "Mbit/s", "air", "worst case"):
-        table.add_column(column, justify="left" if column in ("topic", "class") else "right")
+    table = FittedTable("plan", COLUMNS)
     for each in made.topics:
         worst = f"{1e3 * each.worst_s:.1f} ms" if each.worst_s < float("inf") else "never ends"
-        table.add_row(
+        table.add(
             each.name, each.qos, f"{each.rate_hz:.3g}", f"{each.size:.0f}", str(each.pdus),
             f"{each.rate_mbps:.3g}", f"{100 * each.air:.1f} %", worst,
             style="bold red" if each.is_late or each.worst_s == float("inf") else "",
         )  # fmt: skip
     for qos in made.classes:
         if qos.air:
-            table.add_row("", qos.qos, "", "", "", "", f"{100 * qos.air:.1f} %", "", style="dim")
+            table.add("", qos.qos, "", "", "", "", f"{100 * qos.air:.1f} %", "", style="dim")
     all_of = "" if robots == 1 else f" by {robots} robots"
     verdict = "feasible" if made.is_feasible else "NOT feasible"
     return [table, f"{100 * made.air:.3g} % of the air{all_of}: {verdict}", *made.advice]

@@ -6,29 +6,22 @@ import msgspec
 import typer
 
 from sdrlinkd.cli.app import AsJson, RuntimeDir, app, connect
-from sdrlinkd.client import NoDaemonError, RefusedError
+from sdrlinkd.cli.completion import one_of, robot_names, topic_names
 from sdrlinkd.errors import UserError
 from sdrlinkd.units import octets, seconds
-
-
-def topic_names() -> list[str]:
-    """For the shell's completion: what the running daemon sends."""
-    try:
-        with connect(None) as control:
-            return [topic["name"] for topic in control.ask("topics")]
-    except (NoDaemonError, RefusedError, UserError, OSError):
-        return []
-
 
 Topic = Annotated[str, typer.Argument(help="Its name on the bus or in the registry.",
                                       autocompletion=topic_names)]  # fmt: skip
 Text = str | None
+QOS = ("urgent", "latency", "default", "bulk")
 
 
 @app.command("set")
 def set_policy(
     topic: Topic,
-    qos: Annotated[Text, typer.Option(help="urgent, latency, default or bulk.")] = None,
+    qos: Annotated[
+        Text, typer.Option(help="urgent, latency, default or bulk.", autocompletion=one_of(*QOS))
+    ] = None,
     priority: Annotated[int | None, typer.Option(help="0 to 127, the most urgent.")] = None,
     period: Annotated[Text, typer.Option(help="Send no more often: 0.1, 100ms; 0: always.")] = None,
     lifespan: Annotated[Text, typer.Option(help="Worthless after: 300ms, 2s, inf.")] = None,
@@ -36,14 +29,28 @@ def set_policy(
         Text, typer.Option(help="Silent for so long, and the stop message is published here.")
     ] = None,
     depth: Annotated[int | None, typer.Option(help="Messages that may wait; 0: all.")] = None,
-    history: Annotated[Text, typer.Option(help="keep_last or keep_all.")] = None,
-    durability: Annotated[Text, typer.Option(help="volatile or transient_local.")] = None,
-    dst: Annotated[int | None, typer.Option(help="Robot that it is for; 255: everyone.")] = None,
+    history: Annotated[
+        Text,
+        typer.Option(help="keep_last or keep_all.", autocompletion=one_of("keep_last", "keep_all")),
+    ] = None,
+    durability: Annotated[
+        Text,
+        typer.Option(
+            help="volatile or transient_local.",
+            autocompletion=one_of("volatile", "transient_local"),
+        ),
+    ] = None,
+    dst: Annotated[
+        int | None,
+        typer.Option(help="Robot that it is for; 255: everyone.", autocompletion=robot_names),
+    ] = None,
     decimate: Annotated[int | None, typer.Option(help="Send one in so many.")] = None,
     on_change: Annotated[
         bool | None, typer.Option("--on-change/--always", help="Send only what differs.")
     ] = None,
-    compress: Annotated[Text, typer.Option(help="none or zstd.")] = None,
+    compress: Annotated[
+        Text, typer.Option(help="none or zstd.", autocompletion=one_of("none", "zstd"))
+    ] = None,
     max_bytes: Annotated[Text, typer.Option(help="Refuse larger ones: 64k; 0: none.")] = None,
     queue_bytes: Annotated[Text, typer.Option(help="Bytes that may wait; 0: no bound.")] = None,
     queue_s: Annotated[Text, typer.Option(help="The same as time on the air.")] = None,

@@ -5,12 +5,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 import typer
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
 from sdrlinkd.cli.app import AsJson, app
 from sdrlinkd.errors import UserError
+from sdrlinkd.tables import FittedTable, screen_console, words
 
 if TYPE_CHECKING:
     from backends import DeviceSurvey, Outlook, WaySurvey
@@ -32,7 +31,7 @@ def probe(
     """Devices found, and what the daemon would do with each. Nothing is sent."""
     from backends import BackendError, outlook, survey
 
-    console = Console(soft_wrap=True)
+    console = screen_console()
     try:
         with Console(stderr=True).status("looking at radios"):
             found = survey(device)
@@ -43,44 +42,42 @@ def probe(
         return
     if found.binding:
         names = ", ".join(sorted(each.rsplit("/", 1)[-1] for each in found.modules)) or "none"
-        console.print(f"{found.binding}; driver modules: {names}", highlight=False)
+        console.print(f"{found.binding}; driver modules: {names}", highlight=False, soft_wrap=True)
     for each in found.devices:
-        console.print(_table(each, outlook(each, rate), rate))
+        console.print(table_of(each, outlook(each, rate), rate))
     for note in found.notes:
-        console.print(note, highlight=False)
+        console.print(note, highlight=False, soft_wrap=True)
     if not found.devices or all(each.problem for each in found.devices):
         raise typer.Exit(2)
 
 
-def _table(device: "DeviceSurvey", ahead: "Outlook", rate_hz: float) -> Table:
-    table = Table(
-        title=device.label or device.device, title_justify="left", box=box.SIMPLE_HEAD,
-        show_header=False, pad_edge=False,
-    )  # fmt: skip
-    for _ in range(2):
-        table.add_column(overflow="fold")
-    table.add_row("soapy.device", f'"{device.device}"')
+def table_of(device: "DeviceSurvey", ahead: "Outlook", rate_hz: float) -> FittedTable:
+    """What it is, what it can do, and what a daemon would do with it."""
+    table = FittedTable(
+        device.label or device.device, (words("", least=20), words("")), heads=False
+    )
+    table.add("soapy.device", f'"{device.device}"')
     if device.problem:
-        table.add_row("cannot be used", device.problem)
+        table.add("cannot be used", device.problem)
         return table
-    table.add_row("radio", f"{device.driver} {device.hardware}")
-    for name, way in (("receives", device.rx), ("sends", device.tx)):
-        table.add_row(name, _way(way) if way is not None else "no")
+    table.add("radio", f"{device.driver} {device.hardware}")
+    for does, way in (("receives", device.rx), ("sends", device.tx)):
+        table.add(does, _way(way) if way is not None else "no")
     if device.clock_sources:
-        table.add_row("soapy.clock_source", ", ".join(device.clock_sources))
+        table.add("soapy.clock_source", ", ".join(device.clock_sources))
     modem = f"modem.rate_hz = {rate_hz:g}" + (
         f", modem.oversampling = {ahead.oversampling}" if ahead.oversampling > 1 else ""
     )
-    table.add_row("with " + modem, ahead.how)
+    table.add("with " + modem, ahead.how)
     if device.tx is not None:
         turn = f" + turnaround {1e3 * ahead.turnaround_s:.3g}" if ahead.turnaround_s else ""
-        table.add_row(
+        table.add(
             "latency to expect",
             f"{1e3 * ahead.latency_s:.3g} ms and the airtime: handed over {1e3 * ahead.lead_s:.3g} "
             f"ms ahead{turn} + received in pieces of {1e3 * ahead.piece_s:.3g} ms",
         )
     for warning in ahead.warnings:
-        table.add_row("warning", warning)
+        table.add("warning", warning)
     return table
 
 
@@ -98,4 +95,4 @@ def _spans(ranges: Sequence[tuple[float, float]]) -> str:
         f"{low / 1e6:g}" if low == high else f"{low / 1e6:g} to {high / 1e6:g}"
         for low, high in ranges
     ]
-    return ", ".join([*parts[:4], "…"] if len(parts) > 5 else parts)
+    return ", ".join([*parts[:4], f"and {len(parts) - 4} more"] if len(parts) > 5 else parts)

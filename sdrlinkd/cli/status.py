@@ -1,19 +1,28 @@
 """`status`, `check`, `reload`: what a running daemon says of itself."""
 
+import sys
 import time
+from collections.abc import Callable
 from typing import Annotated
 
 import msgspec
 import typer
 from rich.console import Console
 from rich.live import Live
+from rich.text import Text
 
-from sdrlinkd.cli import render
 from sdrlinkd.cli.app import AsJson, RuntimeDir, app, connect
-from sdrlinkd.client import ControlClient
+from sdrlinkd.cli.completion import field_names
+from sdrlinkd.cli.fields import USUAL, CsvLines, as_text, fields_of
+from sdrlinkd.cli.following import WATCH_PERIOD_S, Follower
+from sdrlinkd.cli.screens import StatusScreen
+from sdrlinkd.client import ControlClient, NoDaemonError
+from sdrlinkd.errors import UserError
 from sdrlinkd.reports import LinkReport, Snapshot
+from sdrlinkd.tables import SCREEN, screen_console
 
-WATCH_PERIOD_S = 0.5
+EXIT_CODES = {"OK": 0, "DEGRADED": 1, "DOWN": 3}
+NO_DAEMON = 4
 
 
 def ask_status(control: ControlClient) -> Snapshot:
@@ -25,26 +34,100 @@ def ask_status(control: ControlClient) -> Snapshot:
 def status(
     runtime_dir: RuntimeDir = None,
     as_json: AsJson = False,
-    watch: Annotated[bool, typer.Option("--watch", "-w", help="Keep the screen fresh.")] = False,
+    watch: Annotated[
+        bool, typer.Option("--watch", "-w", help="Keep the screen fresh, also over a restart.")
+    ] = False,
+    everything: Annotated[
+        bool, typer.Option("--all", "-a", help="Show everything, not only what fits the screen.")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing.")] = False,
+    field: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Print this value alone, such as link.tx.sent or topics.odom.sent; repeatable.",
+            autocompletion=field_names,
+        ),
+    ] = None,
+    as_csv: Annotated[
+        bool, typer.Option("--csv", help="Print the fields in one line, below their names.")
+    ] = False,
 ) -> None:
-    """One screen: link, queue, topics, robots heard, drops by reason."""
-    console = Console()
-    with connect(runtime_dir) as control:
-        snapshot = ask_status(control)
-        if as_json:
+    """The verdict in plain words, and one screen of reasons; the exit code is the verdict, too.
+
+    0: OK; 1: DEGRADED; 3: DOWN; 4: no daemon answers.
+    """
+    if quiet and watch:
+        raise UserError("--quiet: got it with --watch; allowed: one of the two")
+    if as_json and (as_csv or field):
+        raise UserError("--json: got it with --csv or --field; allowed: one of the two")
+    show = _printer(as_json=as_json, as_csv=as_csv, names=field or [])
+    if watch:
+        _watch(Follower(runtime_dir), show, whole=everything)
+    try:
+        with connect(runtime_dir) as control:
+            snapshot = ask_status(control)
+    except NoDaemonError as error:
+        if not quiet:
+            sys.stderr.write(f"sdrlinkctl: {error}\n")
+        raise typer.Exit(NO_DAEMON) from None
+    if not quiet:
+        if show is not None:
+            show(snapshot)
+        else:
+            console = screen_console()
+            # The shell's next prompt takes a line, too.
+            console.print(StatusScreen(snapshot, None if everything else _height(console) - 1))
+    raise typer.Exit(EXIT_CODES.get(snapshot.verdict.level, 1))
+
+
+def _printer(*, as_json: bool, as_csv: bool, names: list[str]) -> Callable[[Snapshot], None] | None:
+    """Prints a snapshot for programs; None: it is for people."""
+
+    def as_object(snapshot: Snapshot) -> None:
+        typer.echo(msgspec.json.encode(snapshot).decode())
+
+    def in_lines(snapshot: Snapshot) -> None:
+        for value in fields_of(snapshot, names):
+            typer.echo(as_text(value))
+
+    if as_json:
+        return as_object
+    if as_csv:
+        return CsvLines(names or USUAL)
+    return in_lines if names else None
+
+
+def _watch(follower: Follower, show: Callable[[Snapshot], None] | None, *, whole: bool) -> None:
+    """Until Ctrl-C."""
+    console = screen_console()
+    with follower:
+        if show is not None or not console.is_terminal:
             while True:
-                typer.echo(msgspec.json.encode(snapshot).decode())
-                if not watch:
-                    return
+                snapshot = follower.look()
+                if snapshot is not None and show is not None:
+                    show(snapshot)
+                elif snapshot is not None:
+                    console.print(StatusScreen(snapshot, None if whole else _height(console)))
+                    console.print()
+                sys.stdout.flush()
                 time.sleep(WATCH_PERIOD_S)
-                snapshot = ask_status(control)
-        if not watch:
-            console.print(render.status(snapshot))
-            return
-        with Live(render.status(snapshot), console=console, auto_refresh=False) as live:
+        with Live(console=console, screen=True, auto_refresh=False) as live:
             while True:
+                snapshot = follower.look()
+                # The terminal may have another size by now.
+                height = None if whole else _height(console)
+                live.update(
+                    Text(follower.waiting, style="bold yellow")
+                    if snapshot is None
+                    else StatusScreen(snapshot, height),
+                    refresh=True,
+                )
                 time.sleep(WATCH_PERIOD_S)
-                live.update(render.status(ask_status(control)), refresh=True)
+
+
+def _height(console: Console) -> int:
+    """Lines of the terminal; of what is none, those of the smallest one."""
+    return console.height if console.is_terminal else SCREEN[1]
 
 
 @app.command()

@@ -2,10 +2,11 @@
 
 import msgspec
 import typer
-from rich.console import Console
 
 from sdrlinkd.cli.app import AsJson, RuntimeDir, app, connect
 from sdrlinkd.cli.status import ask_status
+from sdrlinkd.reports import LinkReport
+from sdrlinkd.tables import FittedTable, figure, screen_console, words
 
 topics_app = typer.Typer(help="Topics of the registry, and those heard from other robots.")
 app.add_typer(topics_app, name="topics")
@@ -21,11 +22,18 @@ def topics(context: typer.Context, runtime_dir: RuntimeDir = None, as_json: AsJs
     if as_json:
         typer.echo(msgspec.json.encode({"sent": link.topics, "heard": link.received}).decode())
         return
-    console = Console()
+    console = screen_console()
+    for table in tables(link):
+        console.print(table)
+
+
+def tables(link: LinkReport) -> list[FittedTable]:
+    """What is sent, and what is heard."""
+    sent = FittedTable("sent", (figure("id"), words("topic"), words("type", 2), words("", 1)))
     for topic in link.topics:
-        console.print(
-            f"{topic.topic_id:>2}  {topic.name}  [dim]{topic.type}[/dim]"
-            + ("" if topic.subscribed else "  (not taken: see the key `topics`)")
-        )
-    for heard in link.received:
-        console.print(f"<-  {heard.republished_as or heard.name}  [dim]robot {heard.src}[/dim]")
+        left_out = "" if topic.subscribed else "not taken: see the key `topics`"
+        sent.add(str(topic.topic_id), topic.name, topic.type, left_out)
+    heard = FittedTable("heard", (words("topic"), figure("from robot")))
+    for each in link.received:
+        heard.add(each.republished_as or each.name, str(each.src))
+    return [sent, heard] if heard.rows else [sent]

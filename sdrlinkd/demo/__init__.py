@@ -6,7 +6,7 @@ from sdrlinkd.demo.links import LINKS, Options
 from sdrlinkd.demo.nodes import daemon_process, problems_of, snapshot_of, wait_until_up
 from sdrlinkd.demo.processes import Process
 from sdrlinkd.demo.rate import Found, find_rate
-from sdrlinkd.demo.report import DemoReport, RunResult, latency_ms
+from sdrlinkd.demo.report import DemoReport, RunResult, TopicResult, latency_ms
 from sdrlinkd.demo.run import run_demo
 from sdrlinkd.demo.source import Source, open_source
 from sdrlinkd.demo.table import table_6, topic_table
@@ -24,6 +24,7 @@ __all__ = [
     "RunResult",
     "Sample",
     "Source",
+    "TopicResult",
     "Trace",
     "daemon_process",
     "find_rate",

@@ -1,61 +1,43 @@
 """Our figures beside the paper's Table 6."""
 
-from rich import box
-from rich.table import Table
-
 from sdrlinkd.demo.report import RunResult, TopicResult
 from sdrlinkd.demo.trace import ODOMETRY
+from sdrlinkd.tables import NOTHING, FittedTable, figure, words
 
 # GRCon 2025, Table 6: /odom alone, 15 entries a message.
 PAPER_TABLE_6 = {
     "ofdm": ("38.0", "1328", "12", "0.01", "228.6"),
     "direct": ("15.0", "452", "452", "1.00", "21767.9"),
 }
-COLUMNS = ("s", "sent", "recv", "PDR", "B/s", "p50 ms", "p99 ms", "path m")
-NOTHING = "–"
+COLUMNS = (
+    words("config"), figure("s", 3), figure("sent"), figure("recv"), figure("PDR"),
+    figure("B/s", 2), figure("p50 ms"), figure("p99 ms"), figure("path m", 1),
+)  # fmt: skip
 
 
-def table_6(runs: list[RunResult]) -> Table:
+def table_6(runs: list[RunResult]) -> FittedTable:
     """A row a run, one for each of its odometry topics, and the paper's."""
-    table = _table("The paper's Table 6, and this run")
-    table.add_column("config", no_wrap=True)
-    for column in COLUMNS:
-        table.add_column(column, justify="right", no_wrap=True)
+    table = FittedTable("The paper's Table 6, and this run", COLUMNS)
     for run in runs:
-        table.add_row(run.name, *_figures(run, run), style="bold")
+        table.add(run.name, *_figures(run, run), style="bold")
         for topic in run.topics:
             if topic.type == ODOMETRY:
-                table.add_row(f"  /{topic.name}", *_figures(run, topic))
+                table.add(f"  /{topic.name}", *_figures(run, topic))
         paper = PAPER_TABLE_6.get(run.name)
         if paper:
             figures = (*paper, "Fig. 6", "Fig. 6", "Fig. 7")
-            table.add_row("  paper /odom", *figures, style="dim")
+            table.add("  paper /odom", *figures, style="dim")
     return table
 
 
-def topic_table(run: RunResult) -> Table:
+def topic_table(run: RunResult) -> FittedTable:
     """A row a topic."""
-    table = _table(f"{run.name}: {run.source} in PDUs of {run.pdu_size} B")
-    table.add_column("topic", no_wrap=True)
-    table.add_column("type", no_wrap=True)
-    for column in ("sent", "recv", "PDR"):
-        table.add_column(column, justify="right", no_wrap=True)
+    columns = (words("topic"), words("type", 1), figure("sent"), figure("recv"), figure("PDR"))
+    table = FittedTable(f"{run.name}: {run.source} in PDUs of {run.pdu_size} B", columns)
     for topic in run.topics:
         kind = topic.type.replace("/msg/", "/")
-        table.add_row(
-            "/" + topic.name, kind, str(topic.sent), str(topic.received), f"{topic.pdr:.3f}"
-        )
+        table.add("/" + topic.name, kind, str(topic.sent), str(topic.received), f"{topic.pdr:.3f}")
     return table
-
-
-def _table(title: str) -> Table:
-    return Table(
-        title=title,
-        title_justify="left",
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-        collapse_padding=True,
-    )
 
 
 def _figures(run: RunResult, part: RunResult | TopicResult) -> tuple[str, ...]:

@@ -1,47 +1,48 @@
 """A run on the screen: all robots while it goes on, all pairs when it is over."""
 
-from rich import box
 from rich.console import Group
 from rich.progress_bar import ProgressBar
-from rich.table import Table
 from rich.text import Text
 
 from phy import MCS_TABLE
 from sdrlinkd.lab.report import LabReport, PairResult
 from sdrlinkd.lab.run import LabState
 from sdrlinkd.reports import Snapshot
+from sdrlinkd.tables import NOTHING, FittedTable, figure, words
 
-NOTHING = "–"
 MOST_ROWS = 20
+
+
+LIVE = (
+    figure("robot"), words("state", 3), words("MCS", 4, 9), figure("air %"), figure("out", 1),
+    figure("queued"), figure("dropped"), figure("in", 5), figure("PER %"), figure("age ms"),
+    words("hears (SNR dB)", 2),
+)  # fmt: skip
 
 
 def live_table(title: str, state: LabState) -> Group:
     """A row a robot."""
-    table = _table(title)
-    table.add_column("robot", no_wrap=True)
-    table.add_column("state", no_wrap=True)
-    for column in ("MCS", "air %", "out", "queued", "dropped", "in", "PER %", "age p50 ms"):
-        table.add_column(column, justify="right", no_wrap=True)
-    table.add_column("hears (SNR dB)")
+    table = FittedTable(title, LIVE)
     for snapshot in state.snapshots:
-        table.add_row(*_live_row(snapshot, state.now_s))
-    line = Text(f"{state.now_s:.1f} of {state.until_s:g} s ")
-    return Group(table, line, ProgressBar(total=state.until_s, completed=state.now_s, width=60))
+        table.add(*_live_row(snapshot, state.now_s))
+    line = Text(f" {state.now_s:.1f} of {state.until_s:g} s")
+    return Group(table, ProgressBar(total=state.until_s, completed=state.now_s, width=40), line)
 
 
-def pair_table(report: LabReport) -> Table:
+def pair_table(report: LabReport) -> FittedTable:
     """A row a direction; where there are many, a row a receiver."""
     if len(report.pairs) > MOST_ROWS:
         return _receiver_table(report)
-    table = _table(f"{report.title or report.scenario}: who got what of whom")
-    table.add_column("from", no_wrap=True)
-    table.add_column("to", no_wrap=True)
-    for column in ("sent", "received", "PDR", "p50 ms", "p99 ms"):
-        table.add_column(column, justify="right", no_wrap=True)
-    table.add_column("PDR in each tenth", no_wrap=True)
+    table = FittedTable(
+        f"{report.title or report.scenario}: who got what of whom",
+        (
+            words("from"), words("to"), figure("sent"), figure("received"), figure("PDR"),
+            figure("p50 ms"), figure("p99 ms"), words("PDR in each tenth", 1),
+        ),
+    )  # fmt: skip
     for pair in report.pairs:
         latency = pair.latency_ms
-        table.add_row(
+        table.add(
             str(pair.sender),
             str(pair.receiver),
             str(pair.sent),
@@ -54,10 +55,14 @@ def pair_table(report: LabReport) -> Table:
     return table
 
 
-def _receiver_table(report: LabReport) -> Table:
-    table = _table(f"{report.title or report.scenario}: who got what of all others")
-    for column in ("robot", "sent to it", "received", "PDR", "worst from", "p50 ms", "p99 ms"):
-        table.add_column(column, justify="right", no_wrap=True)
+def _receiver_table(report: LabReport) -> FittedTable:
+    table = FittedTable(
+        f"{report.title or report.scenario}: who got what of all others",
+        (
+            figure("robot"), figure("sent to it", 1), figure("received"), figure("PDR"),
+            figure("worst from"), figure("p50 ms", 2), figure("p99 ms"),
+        ),
+    )  # fmt: skip
     for robot in report.robots:
         pairs = [pair for pair in report.pairs if pair.receiver == robot.id]
         if not pairs:
@@ -65,7 +70,7 @@ def _receiver_table(report: LabReport) -> Table:
         sent, received = (sum(getattr(p, key) for p in pairs) for key in ("sent", "received"))
         worst = min(pairs, key=lambda pair: pair.pdr)
         slowest = [pair.latency_ms for pair in pairs if pair.latency_ms]
-        table.add_row(
+        table.add(
             str(robot.id),
             str(sent),
             str(received),
@@ -109,14 +114,4 @@ def _live_row(snapshot: Snapshot, now_s: float) -> tuple[str, ...]:
         f"{100 * lost / (heard + lost):.1f}" if heard + lost else NOTHING,
         f"{sorted(ages)[len(ages) // 2]:.1f}" if ages else NOTHING,
         hears or NOTHING,
-    )
-
-
-def _table(title: str) -> Table:
-    return Table(
-        title=Text(title),
-        title_justify="left",
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-        collapse_padding=True,
     )

@@ -10,7 +10,7 @@ from typer.core import TyperGroup
 from sdrlinkd.cli.app import app
 from sdrlinkd.cli.commands import COMMANDS
 
-HEAVY = ("numpy", "numba", "scipy", "rosbags", "phy", "sdrlinkd.link", "sdrlinkd.config")
+HEAVY = ("textual", "numpy", "numba", "scipy", "rosbags", "phy", "sdrlinkd.link", "sdrlinkd.config")
 
 
 def one_line(text: str | None) -> str:
@@ -28,7 +28,8 @@ def test_every_command_is_listed_with_its_own_help():
 
 @pytest.mark.parametrize("arguments", [
     ["--version"], ["status", "--help"], ["why", "--help"], ["topics", "--help"],
-    ["radio", "probe", "--help"],
+    ["radio", "probe", "--help"], ["top", "--help"], ["list", "--help"], ["topic", "hz", "--help"],
+    ["latency", "--help"],
 ])  # fmt: skip
 def test_a_short_command_waits_for_nothing_that_it_does_not_need(arguments):
     program = (

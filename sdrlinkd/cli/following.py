@@ -1,0 +1,71 @@
+"""Looking at a daemon again and again, also over its restart."""
+
+import os
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import msgspec
+
+from sdrlinkd.cli.app import connect
+from sdrlinkd.client import ControlClient, NoDaemonError, runtime_dir
+from sdrlinkd.reports import Snapshot
+
+WATCH_PERIOD_S = 0.5
+PATIENCE_S = 2.0
+"""For an answer; a daemon that is busier than this is as good as away."""
+
+
+class Follower:
+    """The snapshots of one daemon; None while it is away. It comes back by itself."""
+
+    def __init__(self, directory: str | os.PathLike[str] | None) -> None:
+        self.directory: Path = runtime_dir(directory)
+        self._control: ControlClient | None = None
+        self._away_since: float | None = None
+
+    def look(self) -> Snapshot | None:
+        """The snapshot of now; None: nobody answers. Raises RefusedError."""
+        try:
+            snapshot = msgspec.convert(self.ask("status"), Snapshot)
+        except NoDaemonError:
+            if self._away_since is None:
+                self._away_since = time.monotonic()
+            return None
+        self._away_since = None
+        return snapshot
+
+    def ask(self, verb: str, arguments: dict[str, Any] | None = None) -> Any:  # noqa: ANN401
+        """The daemon's answer. Raises NoDaemonError and RefusedError."""
+        if self._control is None:
+            self._control = connect(self.directory, PATIENCE_S)
+        try:
+            return self._control.ask(verb, arguments)
+        except NoDaemonError:
+            # A new connection tells at once whether anybody is there.
+            self.close()
+            raise
+
+    @property
+    def waiting(self) -> str:
+        """What to say while it is away."""
+        for_s = 0.0 if self._away_since is None else time.monotonic() - self._away_since
+        return f"waiting for sdrlinkd in {self.directory} ({for_s:.0f} s)"
+
+    def close(self) -> None:
+        """Leave."""
+        if self._control is not None:
+            self._control.close()
+            self._control = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()

@@ -1,0 +1,126 @@
+"""`list`: the daemons of this host.
+
+A daemon that runs listens on its control socket, and the kernel tells of every socket that somebody
+listens on: nothing is registered, so nothing can be stale.
+"""
+
+import contextlib
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+import typer
+
+from sdrlinkd.cli.app import AsJson, app, connect
+from sdrlinkd.cli.screens import daemons_table
+from sdrlinkd.client import CONTROL_SOCKET, IN_SOCKET, OUT_SOCKET, NoDaemonError, RefusedError
+from sdrlinkd.client import runtime_dir as usual_directory
+from sdrlinkd.reports import Snapshot
+from sdrlinkd.tables import screen_console
+
+SOCKETS = Path("/proc/net/unix")
+LISTENS = 0x10000
+"""Linux's __SO_ACCEPTCON, among the flags of a socket."""
+SOCKET_NAMES = (CONTROL_SOCKET, IN_SOCKET, OUT_SOCKET)
+PATIENCE_S = 1.0
+LOCK = "lock"
+"""Holds the daemon's process id, beside its sockets."""
+
+
+class Listed(NamedTuple):
+    """A daemon; `snapshot` is None where it does not answer, and `problem` says why."""
+
+    directory: Path
+    pid: int | None
+    snapshot: Snapshot | None
+    problem: str = ""
+
+
+@app.command("list")
+def list_daemons(as_json: AsJson = False) -> None:
+    """The daemons of this host."""
+    found = [_look(directory) for directory in directories()]
+    if as_json:
+        typer.echo(msgspec.json.encode([_told(each) for each in found]).decode())
+        return
+    if not found:
+        typer.echo("no sdrlinkd runs on this host; start one: sdrlinkd --config FILE")
+        return
+    screen_console().print(
+        daemons_table(
+            [(str(each.directory), each.pid, each.snapshot or each.problem) for each in found]
+        )
+    )
+
+
+def directories() -> list[Path]:
+    """Runtime directories whose three sockets somebody listens on."""
+    try:
+        lines = SOCKETS.read_text(errors="surrogateescape").splitlines()[1:]
+    except OSError:
+        # Not this kernel: then only the usual place.
+        return [usual_directory()]
+    listening = set(_listening(lines))
+    return sorted(
+        path.parent
+        for path in listening
+        if path.name == CONTROL_SOCKET
+        and {path.parent / name for name in SOCKET_NAMES} <= listening
+    )
+
+
+def _listening(lines: Iterable[str]) -> Iterable[Path]:
+    """Num RefCount Protocol Flags Type St Inode Path."""
+    for line in lines:
+        parts = line.split(maxsplit=7)
+        # A name that begins with @ is no file.
+        if len(parts) < 8 or not int(parts[3], 16) & LISTENS or parts[7].startswith("@"):
+            continue
+        path = Path(parts[7])
+        if path.is_absolute():
+            yield path
+        elif path.name in SOCKET_NAMES:
+            yield from _resolved(path)
+
+
+def _resolved(path: Path) -> Iterable[Path]:
+    """A socket that a daemon has named from where it was started."""
+    for link in Path("/proc").glob("[0-9]*/cwd"):
+        with contextlib.suppress(OSError):
+            whole = link.readlink() / path
+            if whole.is_socket():
+                yield whole
+
+
+def _look(directory: Path) -> Listed:
+    snapshot, problem = None, "no answer"
+    if not os.access(directory / CONTROL_SOCKET, os.W_OK):
+        problem = "not open to this user"
+    try:
+        with connect(directory, PATIENCE_S) as control:
+            snapshot = msgspec.convert(control.ask("status"), Snapshot)
+    except (NoDaemonError, RefusedError, msgspec.ValidationError):
+        pass
+    try:
+        pid = int((directory / LOCK).read_text())
+    except (OSError, ValueError):
+        pid = None
+    return Listed(directory, pid, snapshot, problem)
+
+
+def _told(each: Listed) -> dict[str, object]:
+    at = each.snapshot
+    return {
+        "runtime_dir": str(each.directory),
+        "pid": each.pid,
+        "node": at.node if at else None,
+        "namespace": at.namespace if at else None,
+        "verdict": at.verdict if at else None,
+        "backend": at.carrier.kind if at else None,
+        "state": at.carrier.state if at else None,
+        "uptime_s": at.uptime_s if at else None,
+        "version": at.version if at else None,
+        "problem": None if at else each.problem,
+    }

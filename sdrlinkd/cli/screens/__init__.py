@@ -1,0 +1,30 @@
+"""What commands show, and how it is laid out. Every figure comes from the reports."""
+
+from sdrlinkd.cli.screens.daemons import daemons_table
+from sdrlinkd.cli.screens.figures import (
+    bytes_rate,
+    clock_state,
+    duration,
+    milliseconds,
+    rate,
+    sparkline,
+)
+from sdrlinkd.cli.screens.latency import latency_screen
+from sdrlinkd.cli.screens.rows import failed, is_idle, robots_table
+from sdrlinkd.cli.screens.status import StatusScreen, verdict
+
+__all__ = [
+    "StatusScreen",
+    "bytes_rate",
+    "clock_state",
+    "daemons_table",
+    "duration",
+    "failed",
+    "is_idle",
+    "latency_screen",
+    "milliseconds",
+    "rate",
+    "robots_table",
+    "sparkline",
+    "verdict",
+]

@@ -1,0 +1,135 @@
+"""Means and spreads of the last figures, as `ros2 topic` tells them."""
+
+import math
+from collections import deque
+
+
+class Spread:
+    """Mean, least, most and standard deviation of the last `window` values."""
+
+    def __init__(self, window: int) -> None:
+        self._values: deque[float] = deque(maxlen=window)
+
+    def add(self, value: float) -> None:
+        """One more; the oldest goes."""
+        self._values.append(value)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    @property
+    def total(self) -> float:
+        """Of all in the window."""
+        return math.fsum(self._values)
+
+    @property
+    def first(self) -> float:
+        """The oldest one."""
+        return self._values[0]
+
+    @property
+    def mean(self) -> float:
+        """0 where there is nothing."""
+        return self.total / len(self._values) if self._values else 0.0
+
+    @property
+    def least(self) -> float:
+        """0 where there is nothing."""
+        return min(self._values, default=0.0)
+
+    @property
+    def most(self) -> float:
+        """0 where there is nothing."""
+        return max(self._values, default=0.0)
+
+    @property
+    def std_dev(self) -> float:
+        """Of the population, as ROS has it."""
+        mean = self.mean
+        return math.sqrt(math.fsum((each - mean) ** 2 for each in self._values) / max(1, len(self)))
+
+
+class Rate:
+    """`ros2 topic hz`: times between messages, in s."""
+
+    def __init__(self, window: int) -> None:
+        self._between = Spread(window)
+        self._last_s: float | None = None
+
+    def add(self, at_s: float, size: int, age_s: float | None) -> None:  # noqa: ARG002
+        """A message came."""
+        if self._last_s is not None:
+            self._between.add(at_s - self._last_s)
+        self._last_s = at_s
+
+    def lines(self) -> list[str]:
+        """Nothing before the second message."""
+        spread = self._between
+        if not len(spread) or not spread.total:
+            return []
+        return [f"average rate: {1 / spread.mean:.3f}", _spread(spread)]
+
+
+class Bandwidth:
+    """`ros2 topic bw`: bytes of payload a second."""
+
+    def __init__(self, window: int) -> None:
+        self._sizes = Spread(window)
+        self._times: deque[float] = deque(maxlen=window)
+
+    def add(self, at_s: float, size: int, age_s: float | None) -> None:  # noqa: ARG002
+        """A message came."""
+        self._sizes.add(size)
+        self._times.append(at_s)
+
+    def lines(self) -> list[str]:
+        """Nothing before the second message."""
+        sizes = self._sizes
+        if len(sizes) < 2 or self._times[-1] <= self._times[0]:
+            return []
+        # The first message came before the time that is counted.
+        per_s = (sizes.total - sizes.first) / (self._times[-1] - self._times[0])
+        of_sizes = (
+            f"mean: {_bytes(sizes.mean)} min: {_bytes(sizes.least)} max: {_bytes(sizes.most)}"
+        )
+        return [f"{_bytes(per_s)}/s from {len(sizes)} messages", f"\tMessage size {of_sizes}"]
+
+
+class Delay:
+    """`ros2 topic delay`: the ages at which messages are handed over, in s."""
+
+    def __init__(self, window: int) -> None:
+        self._ages = Spread(window)
+        self._unknown = 0
+
+    def add(self, at_s: float, size: int, age_s: float | None) -> None:  # noqa: ARG002
+        """A message came."""
+        if age_s is None:
+            self._unknown += 1
+        else:
+            self._ages.add(age_s)
+
+    def lines(self) -> list[str]:
+        """Messages of unknown age are counted, and in no figure."""
+        told = [f"{self._unknown} messages of unknown age"] if self._unknown else []
+        if not len(self._ages):
+            return told
+        return [f"average delay: {self._ages.mean:.3f}", _spread(self._ages), *told]
+
+
+Measure = Rate | Bandwidth | Delay
+
+
+def _spread(spread: Spread) -> str:
+    return (
+        f"\tmin: {spread.least:.3f}s max: {spread.most:.3f}s std dev: {spread.std_dev:.5f}s "
+        f"window: {len(spread)}"
+    )
+
+
+def _bytes(count: float) -> str:
+    """As ROS writes them."""
+    for unit, scale in (("MB", 1e6), ("KB", 1e3)):
+        if count >= scale:
+            return f"{count / scale:.2f} {unit}"
+    return f"{count:.0f} B"

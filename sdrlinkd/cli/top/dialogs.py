@@ -1,0 +1,100 @@
+"""What `top` opens above its screen: an explanation, and a form for a topic's policy."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import BindingType
+from textual.containers import Vertical
+from textual.screen import ModalScreen
+from textual.widgets import Input, Label, Static
+
+from sdrlinkd.client import NoDaemonError, RefusedError
+from sdrlinkd.errors import UserError
+from sdrlinkd.units import seconds
+
+Ask = Callable[[str, dict[str, Any]], Any]
+
+
+class Explanation(ModalScreen[None]):
+    """Sentences, until any key."""
+
+    def __init__(self, title: str, lines: list[str]) -> None:
+        super().__init__()
+        self._title, self._lines = title, lines
+
+    def compose(self) -> ComposeResult:
+        """A box of text."""
+        with Vertical(classes="box"):
+            yield Label(self._title, classes="title", markup=False)
+            yield Static("\n".join(self._lines), markup=False)
+            yield Label("any key: back", classes="hint")
+
+    def on_key(self) -> None:
+        """Back."""
+        self.dismiss()
+
+
+class PolicyForm(ModalScreen[str]):
+    """Fields of a policy; Enter sends those that were filled in, Escape goes back."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [("escape", "cancel", "Back")]
+    FIELDS = (
+        ("qos", "class", "urgent, latency, default or bulk"),
+        ("priority", "priority", "0 to 127, the most urgent"),
+        ("period_s", "period", "send no more often: 100ms; 0: always"),
+        ("lifespan_s", "lifespan", "worthless after: 300ms, 2s, inf"),
+        ("depth", "depth", "messages that may wait; 0: all"),
+    )
+
+    def __init__(self, topic: str, now: dict[str, str], ask: Ask) -> None:
+        super().__init__()
+        self._topic, self._now, self._ask = topic, now, ask
+
+    def compose(self) -> ComposeResult:
+        """A line a field, empty: what is empty stays as it is."""
+        with Vertical(classes="box"):
+            yield Label(f"policy of {self._topic}", classes="title", markup=False)
+            for key, label, help_text in self.FIELDS:
+                now = f" (now {self._now[key]})" if key in self._now else ""
+                yield Label(f"{label}{now}: {help_text}", markup=False)
+                yield Input(id=key, placeholder="unchanged", compact=True)
+            yield Label("", id="problem", markup=False)
+            yield Label("Enter: set    Tab: next    Escape: back", classes="hint")
+
+    def action_cancel(self) -> None:
+        """Back, changing nothing."""
+        self.dismiss("")
+
+    async def on_input_submitted(self) -> None:
+        """Set what was filled in; what the daemon refuses is shown, and the form stays."""
+        try:
+            changes = self._changes()
+            if not changes:
+                self.dismiss("")
+                return
+            told = await asyncio.to_thread(self._ask, "set", {"topic": self._topic, **changes})
+        except (UserError, RefusedError, NoDaemonError) as error:
+            self.query_one("#problem", Label).update(str(error))
+            return
+        self.dismiss(
+            f"{told['topic']}: "
+            + ", ".join(f"{key} {told['old'][key]} -> {told['new'][key]}" for key in changes)
+        )
+
+    def _changes(self) -> dict[str, Any]:
+        """Raises UserError."""
+        given = {key: self.query_one(f"#{key}", Input).value.strip() for key, *_ in self.FIELDS}
+        return {key: _value(key, text) for key, text in given.items() if text}
+
+
+def _value(key: str, text: str) -> str | int | float:
+    if key.endswith("_s"):
+        return seconds(text, key.removesuffix("_s"))
+    if key == "qos":
+        return text
+    try:
+        return int(text)
+    except ValueError:
+        raise UserError(f"{key}: got {text}; allowed: a whole number") from None

@@ -1,0 +1,116 @@
+"""`topic hz`, `topic bw`, `topic delay`: how often, how much and how late, as `ros2 topic` does."""
+
+import math
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sdrlinkd.cli.app import RuntimeDir, app, connect
+from sdrlinkd.cli.completion import heard_names
+from sdrlinkd.cli.spans import Bandwidth, Delay, Measure, Rate
+from sdrlinkd.cli.status import ask_status
+from sdrlinkd.client import Subscriber
+from sdrlinkd.errors import UserError
+from sdrlinkd.reports import Snapshot
+
+topic_app = typer.Typer(help="Rate, bandwidth and delay of a topic heard.", no_args_is_help=True)
+app.add_typer(topic_app, name="topic")
+
+TELL_S = 1.0
+WINDOW = 10_000
+
+Heard = Annotated[
+    str,
+    typer.Argument(metavar="NAME", help="Such as /rx_robot_2/odom.", autocompletion=heard_names),
+]
+Window = Annotated[int, typer.Option("--window", "-w", min=2, help="Messages that count.")]
+Count = Annotated[int, typer.Option("--count", "-n", min=0, help="0: until Ctrl-C.")]
+Duration = Annotated[float | None, typer.Option(min=0.01, max=1e6, help="Seconds.")]
+
+
+@topic_app.command()
+def hz(
+    name: Heard,
+    window: Window = WINDOW,
+    count: Count = 0,
+    duration: Duration = None,
+    runtime_dir: RuntimeDir = None,
+) -> None:
+    """How often it comes: the mean rate in Hz, and the times between messages."""
+    _measure(name, Rate(window), Rate(1 << 24), count, duration, runtime_dir)
+
+
+@topic_app.command()
+def bw(
+    name: Heard,
+    window: Window = WINDOW,
+    count: Count = 0,
+    duration: Duration = None,
+    runtime_dir: RuntimeDir = None,
+) -> None:
+    """How much it brings: bytes of payload a second, and the sizes of messages."""
+    _measure(name, Bandwidth(window), Bandwidth(1 << 24), count, duration, runtime_dir)
+
+
+@topic_app.command()
+def delay(
+    name: Heard,
+    window: Window = WINDOW,
+    count: Count = 0,
+    duration: Duration = None,
+    runtime_dir: RuntimeDir = None,
+) -> None:
+    """How late it comes: the age of each message when it is handed over; no clocks need agree."""
+    _measure(name, Delay(window), Delay(1 << 24), count, duration, runtime_dir)
+
+
+def _measure(
+    name: str,
+    lately: Measure,
+    whole: Measure,
+    count: int,
+    duration: float | None,
+    runtime_dir: Path | None,
+) -> None:
+    """Tell every second until Ctrl-C or the end; then of everything. Raises UserError."""
+    with connect(runtime_dir) as control:
+        _refuse_own(name, ask_status(control))
+    began_s = tell_s = time.monotonic()
+    until_s = math.inf if duration is None else began_s + duration
+    heard = told = 0
+    with Subscriber(name, directory=runtime_dir, depth=0) as subscriber:
+        try:
+            while (now_s := time.monotonic()) < until_s and not 0 < count <= heard:
+                message = subscriber.receive(max(0.0, min(until_s, tell_s + TELL_S) - now_s))
+                now_s = time.monotonic()
+                if message is not None:
+                    heard += 1
+                    age_s = None if message.age_us is None else message.age_us / 1e6
+                    for measure in (lately, whole):
+                        measure.add(now_s, len(message.payload), age_s)
+                if now_s >= tell_s + TELL_S:
+                    tell_s = now_s
+                    _say(lately.lines() if heard > told else ["no new messages"])
+                    told = heard
+        finally:
+            typer.echo(f"{name}: {heard} messages in {time.monotonic() - began_s:.1f} s")
+            _say(whole.lines())
+    if not heard:
+        raise UserError(f"{name}: nothing was heard; `sdrlinkctl topics` lists what is heard")
+
+
+def _refuse_own(name: str, snapshot: Snapshot) -> None:
+    heard = [each.republished_as for each in snapshot.link.received]
+    if name in heard or name not in {each.name for each in snapshot.link.topics}:
+        return
+    raise UserError(
+        f"{name}: this robot sends it; what others send appears under a name such as "
+        f"{heard[0] if heard else '/rx_robot_2/odom'} (sdrlinkctl topics)"
+    )
+
+
+def _say(lines: list[str]) -> None:
+    for line in lines:
+        typer.echo(line)

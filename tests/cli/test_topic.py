@@ -1,0 +1,185 @@
+"""`topic hz|bw|delay`, `list` and what TAB knows, with a real daemon; and the arithmetic alone."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from sdrlinkd.adapters import empty, to_cdr
+from sdrlinkd.cli import run
+from sdrlinkd.cli.bench import NAMES
+from sdrlinkd.cli.spans import Bandwidth, Delay, Rate
+from sdrlinkd.client import Publisher
+from tests.waiting import wait_for
+
+ODOM = "/robot_1/odom"
+HEARD = "/rx_robot_1/odom"
+KIND = "nav_msgs/msg/Odometry"
+ROOT = Path(__file__).parents[2]
+
+
+def fed(measure, times, sizes=(), ages=()):
+    for at, time_s in enumerate(times):
+        measure.add(time_s, sizes[at] if sizes else 0, ages[at] if ages else None)
+    return measure.lines()
+
+
+def test_the_rate_reads_as_that_of_ros():
+    assert fed(Rate(100), [0.0]) == []
+    assert fed(Rate(100), [0.0, 0.1, 0.3]) == [
+        "average rate: 6.667", "\tmin: 0.100s max: 0.200s std dev: 0.05000s window: 2",
+    ]  # fmt: skip
+    assert fed(Rate(2), [0.0, 9.0, 9.5, 10.0])[0] == "average rate: 2.000"
+
+
+def test_bandwidth_counts_from_the_first_message():
+    assert fed(Bandwidth(100), [0.0], [5]) == []
+    assert fed(Bandwidth(100), [0.0, 1.0, 2.0], [999, 1500, 2500]) == [
+        "2.00 KB/s from 3 messages", "\tMessage size mean: 1.67 KB min: 999 B max: 2.50 KB",
+    ]  # fmt: skip
+
+
+def test_delay_leaves_out_what_it_does_not_know():
+    assert fed(Delay(10), [0, 1], ages=[None, None]) == ["2 messages of unknown age"]
+    assert fed(Delay(10), [0, 1, 2], ages=[0.25, None, 0.75]) == [
+        "average delay: 0.500", "\tmin: 0.250s max: 0.750s std dev: 0.25000s window: 2",
+        "1 messages of unknown age",
+    ]  # fmt: skip
+
+
+def measuring(daemon, *arguments):
+    """`topic …` while messages come, until it ends; what it printed."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "sdrlinkd.cli", "topic", *arguments, "--runtime-dir",
+         str(daemon.directory)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    message = to_cdr(empty(KIND), KIND)
+    with Publisher(daemon.directory) as out:
+        while process.poll() is None:
+            out.send(ODOM, message)
+            wait_for(lambda: True)
+    told, err = process.communicate()
+    assert process.returncode == 0, err
+    return told, len(message)
+
+
+@pytest.mark.parametrize(("what", "pattern"), [
+    ("hz", r"average rate: \d+\.\d{3}\n\tmin: \S+s max: \S+s std dev: \S+s window: 49\n"),
+    ("bw", r"\S+ [KM]?B/s from 50 messages\n\tMessage size mean: 708 B min: 708 B max: 708 B\n"),
+    ("delay", r"average delay: \d\.\d{3}\n\tmin: \S+s max: \S+s std dev: \S+s window: 50\n"),
+])  # fmt: skip
+def test_a_topic_heard_is_measured(start_daemon, what, pattern):
+    told, size = measuring(start_daemon(), what, HEARD, "--count", "50")
+    assert size == 708
+    assert re.search(HEARD + r": 50 messages in \d+\.\d s\n" + pattern + "$", told), told
+
+
+def test_ctrl_c_ends_with_a_summary(start_daemon):
+    daemon = start_daemon()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "sdrlinkd.cli", "topic", "hz", HEARD, "--runtime-dir",
+         str(daemon.directory)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    # It says so when a second has passed without any.
+    assert process.stdout.readline() == "no new messages\n"
+    process.send_signal(signal.SIGINT)
+    told, err = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert f"{HEARD}: 0 messages in" in told
+    assert "Traceback" not in err
+
+
+def test_what_is_not_heard_is_told(start_daemon, capsys):
+    there = ("--runtime-dir", str(start_daemon().directory))
+    assert run(["topic", "hz", ODOM, *there]) == 2
+    assert "this robot sends it; what others send appears under" in capsys.readouterr().err
+    assert run(["topic", "bw", "/rx_robot_9/odom", "--duration", "0.05", *there]) == 2
+    assert "nothing was heard" in capsys.readouterr().err
+
+
+def test_list_finds_a_daemon_wherever_its_directory_is(start_daemon, capsys):
+    daemon = start_daemon()
+    assert run(["list", "--json"]) == 0
+    found = {each["runtime_dir"]: each for each in json.loads(capsys.readouterr().out)}
+    mine = found[str(daemon.directory)]
+    assert (mine["node"], mine["namespace"], mine["backend"]) == (1, "robot_1", "direct")
+    assert mine["pid"] == daemon.process.pid
+    assert run(["list"]) == 0
+    assert str(daemon.process.pid) in capsys.readouterr().out
+    daemon.process.terminate()
+    assert daemon.process.wait(20) == 0
+    run(["list", "--json"])
+    assert str(daemon.directory) not in capsys.readouterr().out
+
+
+def test_list_finds_a_directory_that_is_named_from_where_the_daemon_was_started(
+    tmp_path, write_config, capsys
+):
+    config = write_config(tmp_path).read_text().replace(f'"{tmp_path}"', '"here"')
+    (tmp_path / "relative.toml").write_text(config)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "sdrlinkd", "--config", "relative.toml"], cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)}, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+
+    def is_listed():
+        run(["list", "--json"])
+        found = json.loads(capsys.readouterr().out)
+        return str(tmp_path / "here") in {each["runtime_dir"] for each in found if each["node"]}
+
+    try:
+        wait_for(is_listed)
+    finally:
+        process.terminate()
+        assert process.wait(20) == 0
+
+
+def completed(words, directory):
+    done = subprocess.run(
+        [sys.executable, "-c", "from sdrlinkd.cli import main; main()"],
+        env={"COMP_WORDS": words, "COMP_CWORD": str(words.count(" ")),
+             "_SDRLINKCTL_COMPLETE": "complete_bash", "SDRLINKD_RUNTIME_DIR": str(directory)},
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return done.stdout.split()
+
+
+def test_tab_knows_live_names(start_daemon):
+    daemon = start_daemon()
+    with Publisher(daemon.directory) as out:
+        out.send(ODOM, to_cdr(empty(KIND), KIND))
+    wait_for(lambda: daemon.snapshot().link.received != [])
+    for words, there in (
+        ("sdrlinkctl set /robot_1/o", ["/robot_1/odom"]),
+        ("sdrlinkctl set /robot_1/odom --qos ", ["urgent", "latency", "default", "bulk"]),
+        ("sdrlinkctl pub /robot_1/cm", ["/robot_1/cmd_vel"]),
+        ("sdrlinkctl pub x --dst ", ["255"]),
+        ("sdrlinkctl echo /rx", [HEARD]),
+        ("sdrlinkctl topic hz /rx", [HEARD]),
+        ("sdrlinkctl latency /rx", [HEARD]),
+        ("sdrlinkctl status --field link.tx.se", ["link.tx.sent"]),
+        ("sdrlinkctl status --field verd", ["verdict"]),
+        ("sdrlinkctl status --field tx.bursts_s", ["tx.bursts_sent"]),
+    ):
+        assert completed(words, daemon.directory) == there, words
+
+
+def test_tab_is_silent_where_there_is_no_daemon(tmp_path):
+    assert completed("sdrlinkctl set /rob", tmp_path) == []
+
+
+def test_bench_names_every_benchmark():
+    """A module that can be run, or a package with a door for that."""
+    there = {
+        path.stem if path.name != "__main__.py" else path.parent.name
+        for path in [*ROOT.glob("benchmarks/*.py"), *ROOT.glob("benchmarks/*/__main__.py")]
+        if path.name == "__main__.py" or '__name__ == "__main__"' in path.read_text()
+    }
+    assert set(NAMES) == there
