@@ -25,6 +25,7 @@ from sdrlinkd.link import (
 from sdrlinkd.localtime import UNKNOWN, age_since, local_times
 from sdrlinkd.pdulink import Heard, PduLink
 from sdrlinkd.reports import Snapshot
+from sdrlinkd.traffic import OwnTraffic
 
 if TYPE_CHECKING:
     # Loading it brings recordings, of which a daemon of a real robot has none.
@@ -70,9 +71,7 @@ class Node:
         self._chrony_at = 0.0
         self._wall_ns: int | None = None
         self._wall_error_s = 0.0
-        self._traffic: Iterator[Due] = iter(())
-        self._upcoming: Due | None = None
-        self._began_at = 0.0
+        self._traffic: OwnTraffic[Due] | None = None
         self._ticked_at = float("-inf")
         self._is_lockstep = False
         self._queue_moved = asyncio.Event()
@@ -141,10 +140,8 @@ class Node:
 
     def advance(self, now: float) -> None:
         """Time has come so far: traffic of our own that is due, and the link's timers."""
-        while self._upcoming is not None and self._began_at + self._upcoming[0] <= now:
-            at, topic_id, payload = self._upcoming
-            self._link.submit(topic_id, payload, self._began_at + at)
-            self._upcoming = next(self._traffic, None)
+        for at, message in self._traffic.due(now) if self._traffic else ():
+            self._link.submit(message.topic_id, message.payload, at)
             self._pdu_link.wake()
         if now - self._ticked_at >= TICK_S:
             self._ticked_at = now
@@ -188,9 +185,7 @@ class Node:
 
     def play(self, traffic: Iterator["Due"]) -> None:
         """Send messages of our own at their time."""
-        self._traffic = traffic
-        self._upcoming = next(traffic, None)
-        self._began_at = self._pdu_link.now()
+        self._traffic = OwnTraffic(traffic, self._pdu_link.now())
 
     async def carry(self) -> None:
         """Let the PDU link run; for ever."""
@@ -211,6 +206,15 @@ class Node:
             if not self._is_lockstep:
                 self._look_at_clock()
                 self.advance(self._pdu_link.now())
+                await self._end_recording()
+
+    async def _end_recording(self) -> None:
+        """When all our own traffic is in it; one that is played ends by itself."""
+        if self._traffic and self._traffic.is_over and not self._link.has_work:
+            self._traffic, config = None, self._setup.config
+            if config.backend == "iqfile" and not config.iqfile.receive:
+                await self._pdu_link.idle()
+                await self._pdu_link.close()
 
     async def drain(self, at_most_s: float) -> None:
         """Take nothing more, send what is queued for at most `at_most_s`, drop the rest by name."""
