@@ -8,12 +8,19 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from sdrlinkd.adapters import BagMessage, BagTopic, first_seconds, open_bag, paced
+from sdrlinkd.adapters import BagMessage, BagTopic, first_seconds, open_bag, paced, summarise
 from sdrlinkd.cli.app import RuntimeDir, app, connect
 from sdrlinkd.cli.status import ask_status
 from sdrlinkd.client import Publisher
 from sdrlinkd.errors import BagError, UserError
 from sdrlinkd.reports import TopicReport
+
+COLUMNS = (
+    TextColumn("{task.description}", markup=False),
+    BarColumn(),
+    MofNCompleteColumn(),
+    TimeRemainingColumn(),
+)
 
 bags = typer.Typer(help="Recordings of messages.", no_args_is_help=True)
 app.add_typer(bags, name="bag")
@@ -21,14 +28,25 @@ app.add_typer(bags, name="bag")
 
 @bags.command()
 def info(bag: Annotated[Path, typer.Argument(help="rosbag2 folder, .mcap, .db3 or .bag")]) -> None:
-    """Topics of a recording."""
+    """How long a recording is; how many messages of each topic, how often and how large."""
     opened = open_bag(bag)
-    console = Console()
-    for topic in opened.topics():
-        console.print(
-            f"{topic.n_messages:>7}  {topic.name}  {topic.type}", highlight=False, markup=False
-        )
+    console = Console(stderr=True)
+    with Progress(
+        *COLUMNS, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
+        task = bar.add_task(bag.name, total=sum(topic.n_messages for topic in opened.topics()))
+        found = summarise(opened, lambda done: bar.update(task, completed=done))
     opened.close()
+    typer.echo(
+        f"{found.duration_s:.1f} s, {found.n_messages} messages, {found.n_bytes / 1e6:.2f} MB"
+    )
+    typer.echo(f"{'count':>7} {'Hz':>8} {'mean B':>8} {'max B':>8}")
+    for topic in found.topics:
+        rate = "–" if topic.rate_hz is None else f"{topic.rate_hz:.2f}"
+        typer.echo(
+            f"{topic.n_messages:>7} {rate:>8} {topic.mean_bytes:>8.0f} {topic.max_bytes:>8}  "
+            f"{topic.name}  {topic.type}"
+        )
     if opened.damage:
         raise BagError(opened.damage)
 
@@ -61,20 +79,19 @@ def play(
         console.print(f"left out: {name} ({reason})", style="yellow", markup=False)
     if not route:
         raise UserError(f"{bag}: the daemon takes none of its topics; it takes {', '.join(taken)}")
+
+    def messages() -> Iterator[BagMessage]:
+        taken_ones = (m for m in opened.messages() if m.topic in route)
+        return taken_ones if duration is None else first_seconds(taken_ones, duration)
+
     total = sum(topic.n_messages for topic in opened.topics() if topic.name in route)
-    messages: Iterator[BagMessage] = (m for m in opened.messages() if m.topic in route)
     if duration is not None:
-        messages = first_seconds(messages, duration)
+        # Only who reads them knows how many there are.
+        total = sum(1 for _ in messages())
     sent = 0
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-    )
-    with Publisher(runtime_dir) as publisher, Progress(*columns, console=console) as progress:
-        task = progress.add_task(bag.name, total=None if duration else total)
-        for message in paced(messages, rate):
+    with Publisher(runtime_dir) as publisher, Progress(*COLUMNS, console=console) as progress:
+        task = progress.add_task(bag.name, total=total)
+        for message in paced(messages(), rate):
             publisher.send(route[message.topic], message.cdr, type=message.type)
             sent += 1
             progress.advance(task)
@@ -97,7 +114,8 @@ def _route(
         source, separator, target = rule.partition(":=")
         if not separator:
             raise UserError(f"--remap: got {rule!r}; allowed: /from:=/to")
-        mapping[source] = target
+        mapping[_absolute(source)] = target
+    only = [_absolute(name) for name in only]
     known = {topic.name for topic in topics}
     for name in (*only, *mapping):
         if name not in known:
@@ -118,3 +136,7 @@ def _route(
         else:
             route[topic.name] = target
     return route, left_out
+
+
+def _absolute(name: str) -> str:
+    return f"/{name.removeprefix('/')}"
