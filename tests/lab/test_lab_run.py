@@ -144,7 +144,9 @@ def test_an_interrupt_while_a_process_starts_leaves_none(run_small, nothing_left
             signal.raise_signal(signal.SIGINT)
         return started[-1]
 
-    stand_in = SimpleNamespace(Popen=start, TimeoutExpired=subprocess.TimeoutExpired)
+    stand_in = SimpleNamespace(
+        Popen=start, PIPE=subprocess.PIPE, TimeoutExpired=subprocess.TimeoutExpired
+    )
     monkeypatch.setattr("sdrlinkd.demo.processes.subprocess", stand_in)
     try:
         with pytest.raises(KeyboardInterrupt):
