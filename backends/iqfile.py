@@ -143,14 +143,14 @@ class IqFileRadio:
             self._is_open = False
             self._pace.end()
             self._feed.stop()
+            if self._writer is not None:
+                # On a disk that is full, the recording just ends with its last burst.
+                with contextlib.suppress(BackendError):
+                    self._writer.extend_to(self._next)
         self._outstanding.lose()
-        if self._reader is not None:
-            self._reader.close()
-        if self._writer is not None:
-            # On a disk that is full, the recording just ends with its last burst.
-            with contextlib.suppress(BackendError):
-                self._writer.extend_to(self._next)
-            self._writer.close()
+        for part in (self._reader, self._writer):
+            if part is not None:
+                part.close()
 
     def _next_block(self) -> RxBlock | None:
         """In the feed's thread: what is received next, and what has left recorded."""

@@ -30,6 +30,7 @@ from sdrlinkd.localtime import UNKNOWN, PublishClock, host_clocks, local_times
 from sdrlinkd.opening import Opening
 from sdrlinkd.pdulink import Heard, PduLink
 from sdrlinkd.reports import Snapshot
+from sdrlinkd.traffic import OwnTraffic
 
 if TYPE_CHECKING:
     # Loading it brings recordings, of which a daemon of a real robot has none.
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
 TICK_S = 0.05
 SHORTEST_TICK_S = 0.001
 NO_STOPS: Mapping[int, bytes] = {}
-NO_TRAFFIC: Iterator["Due"] = iter(())
 
 log = logging.getLogger("sdrlinkd")
 
@@ -71,9 +71,7 @@ class Node:
         self._host_clock = HostClock(link.clocks, chrony, setup.config.chrony.robot)
         self._health = Health()
         self._publish_clock = PublishClock()
-        self._traffic: Iterator[Due] | None = None
-        self._upcoming: Due | None = None
-        self._began_at = 0.0
+        self._traffic: OwnTraffic[Due] | None = None
         self._ticked_at = float("-inf")
         self._is_lockstep = False
         self._queue_moved = asyncio.Event()
@@ -133,8 +131,7 @@ class Node:
         self._link.attach(traits, config.access, config.rate)
         self._is_lockstep = traits.is_lockstep
         if self._traffic is not None:
-            self._upcoming = next(self._traffic, None)
-            self._began_at = self._pdu_link.now()
+            self._traffic.begin(self._pdu_link.now())
 
     def heard(self, pdus: Sequence[Heard]) -> None:
         """PDUs from the air."""
@@ -156,10 +153,8 @@ class Node:
 
     def advance(self, now: float) -> None:
         """Time has come so far: traffic of our own that is due, and the link's timers."""
-        while self._upcoming is not None and self._began_at + self._upcoming[0] <= now:
-            at, topic_id, payload = self._upcoming
-            self._link.submit(topic_id, payload, self._began_at + at)
-            self._upcoming = next(self._traffic or NO_TRAFFIC, None)
+        for at, message in self._traffic.due(now) if self._traffic else ():
+            self._link.submit(message.topic_id, message.payload, at)
             self._pdu_link.wake()
         if now - self._ticked_at >= TICK_S:
             self._ticked_at = now
@@ -196,7 +191,7 @@ class Node:
 
     def play(self, traffic: Iterator["Due"]) -> None:
         """Send messages of our own, from when the PDU link is there, at their time."""
-        self._traffic = traffic
+        self._traffic = OwnTraffic(traffic)
 
     async def carry(self) -> None:
         """Bring the PDU link up and let it run; for ever. Raises UserError."""
@@ -226,6 +221,15 @@ class Node:
             elif not self._is_lockstep:
                 self._host_clock.look(self._pdu_link.now())
                 self.advance(self._pdu_link.now())
+                await self._end_recording()
+
+    async def _end_recording(self) -> None:
+        """When all our own traffic is in it; one that is played ends by itself."""
+        if self._traffic and self._traffic.is_over and not self._link.has_work:
+            self._traffic, config = None, self._setup.config
+            if config.backend == "iqfile" and not config.iqfile.receive:
+                await self._pdu_link.idle()
+                await self._pdu_link.close()
 
     async def drain(self, at_most_s: float) -> None:
         """Take nothing more, send what is queued for at most `at_most_s`, drop the rest by name."""

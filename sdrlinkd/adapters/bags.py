@@ -16,7 +16,7 @@ MAX_REASON = 200
 
 
 class BagTopic(NamedTuple):
-    """One topic of a recording."""
+    """One topic of a recording; its name begins with a slash, whatever the recording says."""
 
     name: str
     type: str
@@ -86,7 +86,7 @@ class _WholeBag:
     def topics(self) -> list[BagTopic]:
         counts: Counter[tuple[str, str]] = Counter()
         for connection in self._reader.connections:
-            counts[connection.topic, connection.msgtype] += connection.msgcount
+            counts[_absolute(connection.topic), connection.msgtype] += connection.msgcount
         return [BagTopic(*key, count) for key, count in sorted(counts.items())]
 
     def messages(self) -> Iterator[BagMessage]:
@@ -98,7 +98,7 @@ class _WholeBag:
                 if self._ros1 is not None:
                     cdr = self._ros1.convert(cdr, connection.msgtype)
                 done += 1
-                yield BagMessage(connection.topic, connection.msgtype, time_ns, cdr)
+                yield BagMessage(_absolute(connection.topic), connection.msgtype, time_ns, cdr)
         except GeneratorExit:
             raise
         except Exception as error:
@@ -139,7 +139,7 @@ class _DamagedBag:
     def _message(self, piece: Piece) -> BagMessage | None:
         kind = piece.type if "/msg/" in piece.type else piece.type.replace("/", "/msg/")
         if not piece.definition:
-            return BagMessage(piece.topic, kind, piece.time_ns, piece.data)
+            return BagMessage(_absolute(piece.topic), kind, piece.time_ns, piece.data)
         try:
             converter = self._converters.get(kind)
             if converter is None:
@@ -150,7 +150,12 @@ class _DamagedBag:
             # A damaged message fails in as many ways as there are types.
             self._unconvertible[kind] += 1
             return None
-        return BagMessage(piece.topic, kind, piece.time_ns, cdr)
+        return BagMessage(_absolute(piece.topic), kind, piece.time_ns, cdr)
+
+
+def _absolute(name: str) -> str:
+    """As all the rest of us calls it; ROS 1 records names as a publisher has given them."""
+    return f"/{name.removeprefix('/')}"
 
 
 def _one_line(error: Exception) -> str:

@@ -8,7 +8,15 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from sdrlinkd.adapters import BagMessage, BagTopic, first_seconds, open_bag, paced
+from sdrlinkd.adapters import (
+    BagMessage,
+    BagSummary,
+    BagTopic,
+    first_seconds,
+    open_bag,
+    paced,
+    summarise,
+)
 from sdrlinkd.cli.app import RuntimeDir, app, connect
 from sdrlinkd.cli.status import ask_status
 from sdrlinkd.client import MessageRefusedError, Publisher
@@ -16,25 +24,48 @@ from sdrlinkd.errors import BagError, UserError
 from sdrlinkd.reports import TopicReport
 from sdrlinkd.tables import FittedTable, figure, screen_console, words
 
+COLUMNS = (
+    TextColumn("{task.description}", markup=False),
+    BarColumn(),
+    MofNCompleteColumn(),
+    TimeRemainingColumn(),
+)
+
 bags = typer.Typer(help="Recordings of messages.", no_args_is_help=True)
 app.add_typer(bags, name="bag")
 
 
 @bags.command()
 def info(bag: Annotated[Path, typer.Argument(help="rosbag2 folder, .mcap, .db3 or .bag")]) -> None:
-    """Topics of a recording."""
+    """How long a recording is; how many messages of each topic, how often and how large."""
     opened = open_bag(bag)
-    screen_console().print(table_of(opened.topics()))
+    console = Console(stderr=True)
+    with Progress(
+        *COLUMNS, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
+        task = bar.add_task(bag.name, total=sum(topic.n_messages for topic in opened.topics()))
+        found = summarise(opened, lambda done: bar.update(task, completed=done))
     opened.close()
+    typer.echo(
+        f"{found.duration_s:.1f} s, {found.n_messages} messages, {found.n_bytes / 1e6:.2f} MB"
+    )
+    screen_console().print(table_of(found))
     if opened.damage:
         raise BagError(opened.damage)
 
 
-def table_of(topics: list[BagTopic]) -> FittedTable:
+def table_of(found: BagSummary) -> FittedTable:
     """A row a topic."""
-    table = FittedTable("", (figure("messages"), words("topic"), words("type", 1)))
-    for topic in topics:
-        table.add(str(topic.n_messages), topic.name, topic.type)
+    table = FittedTable(
+        "",
+        (figure("count"), figure("Hz"), figure("mean B", 2), figure("max B", 3), words("topic"),
+         words("type", 1)),
+    )  # fmt: skip
+    for topic in found.topics:
+        table.add(
+            str(topic.n_messages), "–" if topic.rate_hz is None else f"{topic.rate_hz:.2f}",
+            f"{topic.mean_bytes:.0f}", str(topic.max_bytes), topic.name, topic.type,
+        )  # fmt: skip
     return table
 
 
@@ -66,20 +97,19 @@ def play(
         console.print(f"left out: {name} ({reason})", style="yellow", markup=False)
     if not route:
         raise UserError(f"{bag}: the daemon takes none of its topics; it takes {', '.join(taken)}")
+
+    def messages() -> Iterator[BagMessage]:
+        taken_ones = (m for m in opened.messages() if m.topic in route)
+        return taken_ones if duration is None else first_seconds(taken_ones, duration)
+
     total = sum(topic.n_messages for topic in opened.topics() if topic.name in route)
-    messages: Iterator[BagMessage] = (m for m in opened.messages() if m.topic in route)
     if duration is not None:
-        messages = first_seconds(messages, duration)
+        # Only who reads them knows how many there are.
+        total = sum(1 for _ in messages())
     sent, refused = 0, dict[str, list[str]]()
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-    )
-    with Publisher(runtime_dir) as publisher, Progress(*columns, console=console) as progress:
-        task = progress.add_task(bag.name, total=None if duration else total)
-        for message in paced(messages, rate):
+    with Publisher(runtime_dir) as publisher, Progress(*COLUMNS, console=console) as progress:
+        task = progress.add_task(bag.name, total=total)
+        for message in paced(messages(), rate):
             try:
                 publisher.send(route[message.topic], message.cdr, type=message.type)
                 sent += 1
@@ -111,7 +141,8 @@ def _route(
         source, separator, target = rule.partition(":=")
         if not separator:
             raise UserError(f"--remap: got {rule!r}; allowed: /from:=/to")
-        mapping[source] = target
+        mapping[_absolute(source)] = target
+    only = [_absolute(name) for name in only]
     known = {topic.name for topic in topics}
     for name in (*only, *mapping):
         if name not in known:
@@ -132,3 +163,7 @@ def _route(
         else:
             route[topic.name] = target
     return route, left_out
+
+
+def _absolute(name: str) -> str:
+    return f"/{name.removeprefix('/')}"

@@ -11,9 +11,9 @@ from rich.console import Console
 
 from sdrlinkd import __version__
 from sdrlinkd.cli.compiling import compile_first
-from sdrlinkd.cli.pace import MAX_SEED, Pace, chosen_scenario
+from sdrlinkd.cli.pace import MAX_SEED, Pace, chosen_scenario, scenario_names
 from sdrlinkd.errors import UserError
-from sdrlinkd.lab import make_hub
+from sdrlinkd.lab import find_scenario, make_hub
 from sdrlinkd.parent import end_with_parent
 
 DEFAULT_DIRECTORY = Path(tempfile.gettempdir()) / "sdrlink-ether"
@@ -24,7 +24,11 @@ app = typer.Typer(name="sdrlink-ether", pretty_exceptions_enable=False, add_comp
 @app.command()
 def ether(
     scenario: Annotated[
-        Path | None, typer.Argument(help="Robots and air; without one, all hear all at 20 dB.")
+        Path | None,
+        typer.Argument(
+            help="Robots and air: a file, or a shipped one by name; by default all hear all.",
+            autocompletion=scenario_names,
+        ),
     ] = None,
     directory: Annotated[
         Path, typer.Option("--dir", help="Folder for the hub's sockets; daemons name it, too.")
@@ -43,6 +47,7 @@ def ether(
     """Serve one simulated air to daemons with `backend = "ether"`, until Ctrl-C."""
     chosen = None
     if scenario is not None:
+        scenario = find_scenario(scenario)
         chosen = chosen_scenario(scenario, seed, duration, pace)
     compile_first(Console(stderr=True))
     hub = make_hub(chosen, directory, traces)

@@ -1,6 +1,5 @@
 """`lab`: a scenario with real daemons on one simulated air, in one command."""
 
-import os
 import time
 from enum import StrEnum
 from pathlib import Path
@@ -9,15 +8,17 @@ from typing import Annotated
 import msgspec
 import typer
 from rich.live import Live
+from rich.text import Text
 
 from sdrlinkd.cli.app import app
 from sdrlinkd.cli.compiling import compile_first
 from sdrlinkd.cli.output import REPORT, load_pictures, make_folder, write_report
-from sdrlinkd.cli.pace import MAX_SEED, Pace, chosen_scenario
+from sdrlinkd.cli.pace import MAX_SEED, Pace, chosen_scenario, scenario_names
 from sdrlinkd.lab import (
     LabOptions,
     LabReport,
     LabState,
+    find_scenario,
     live_table,
     pair_table,
     run_lab,
@@ -39,7 +40,11 @@ class Policy(StrEnum):
 @app.command()
 def lab(
     scenario: Annotated[
-        Path, typer.Argument(help="Robots and air, such as etc/scenarios/two-robots.toml.")
+        Path,
+        typer.Argument(
+            help="Robots and air: a file, or the name of a shipped one, such as two-robots.",
+            autocompletion=scenario_names,
+        ),
     ],
     bag: Annotated[
         Path | None, typer.Option(help="What the robots send; by default a built-in robot's.")
@@ -63,6 +68,7 @@ def lab(
 ) -> None:
     """Run several robots' daemons on one simulated air; measure who got what of whom."""
     console = screen_console()
+    scenario = find_scenario(scenario)
     chosen = chosen_scenario(scenario, seed, duration, pace)
     if access is not None:
         section = {**chosen.daemon.get("access", {}), "policy": access.value}
@@ -76,12 +82,19 @@ def lab(
     compile_first(console)
     began = time.monotonic()
     with Live(console=console, auto_refresh=False, transient=True) as live:
+        starting = f"starting the hub and {len(chosen.robot)} robots"
+        if console.is_terminal:
+            live.update(Text(starting), refresh=True)
+        else:
+            console.print(starting, highlight=False)
         told: list[str] = []
 
         def watch(state: LabState) -> None:
             if state.snapshots and not told:
-                told.append(os.path.commonpath([each.bus.runtime_dir for each in state.snapshots]))
-                hint = f"look at one: sdrlinkctl latency --runtime-dir {told[0]}/robot_ID"
+                # Not before they answer.
+                told.extend(each.bus.runtime_dir for each in state.snapshots)
+                others = "".join(f", {Path(each).name}" for each in told[1:])
+                hint = f"look at one: sdrlinkctl latency --runtime-dir {told[0]}{others}"
                 console.print(hint, highlight=False, markup=False, soft_wrap=True)
             if console.is_terminal:
                 live.update(live_table(title, state), refresh=True)

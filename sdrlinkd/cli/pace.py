@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 
 from sdrlinkd.errors import UserError
-from sdrlinkd.lab import Scenario, load_scenario
+from sdrlinkd.lab import Scenario, load_scenario, shipped_scenarios
 
 MAX_SEED = (1 << 31) - 1
 
@@ -28,3 +28,13 @@ def chosen_scenario(
     changes = {"seed": seed, "duration_s": duration_s, "pace": pace.value if pace else None}
     given = {key: value for key, value in changes.items() if value is not None}
     return msgspec.structs.replace(load_scenario(path), **given)
+
+
+def scenario_names(incomplete: str) -> list[str]:
+    """For completion: shipped scenarios by name, and files."""
+    files = [
+        f"{path}/" if path.is_dir() else str(path)
+        for path in sorted(Path().glob(f"{incomplete}*") if not incomplete.startswith("/") else ())
+        if path.is_dir() or path.suffix == ".toml"
+    ]
+    return [*(name for name in shipped_scenarios() if name.startswith(incomplete)), *files]

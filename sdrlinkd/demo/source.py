@@ -59,13 +59,12 @@ class Source:
         messages = first_seconds(self.recording.messages(), self.duration_s)
         return (message for message in messages if message.topic in wanted)
 
-    def expected(self) -> int | None:
-        """How many messages that will be, where it is known beforehand."""
-        return (
-            sum(topic.n_messages for topic in self.topics)
-            if self.duration_s == float("inf")
-            else None
-        )
+    def expected(self) -> int:
+        """How many messages that will be."""
+        if self.duration_s == float("inf"):
+            return sum(topic.n_messages for topic in self.topics)
+        # Only who reads them knows how many there are.
+        return sum(1 for _ in self.messages())
 
 
 def open_source(

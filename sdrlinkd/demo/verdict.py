@@ -37,7 +37,7 @@ def verdict(result: RunResult) -> str:
         return wrong and f"{result.name}: {wrong}, which is a bug of ours"
     text = f"{result.name}: {missing} of {result.sent} messages did not arrive: "
     heard = result.phy
-    if heard is not None and heard.samples_lost:
+    if heard is not None and (heard.samples_lost or (heard.busy or 0.0) > SATURATED):
         return text + _why_slow(heard, result.duration_s)
     if heard is not None and not is_clean(result):
         needed_db = phy.needed_snr_db(heard.mcs_index, result.pdu_size, CLEAN_PER) + MARGIN_DB
@@ -53,7 +53,9 @@ def verdict(result: RunResult) -> str:
 def _why_slow(heard: PhyResult, duration_s: float) -> str:
     rate = f"{heard.rate_hz / 1e6:g} Msps"
     lost_s = heard.samples_lost / heard.rate_hz
-    lost = f"the receiver lost {lost_s:.1f} s of the {duration_s:.1f} s"
+    lost = "the receiver fell behind"
+    if heard.samples_lost:
+        lost = f"the receiver lost {lost_s:.1f} s of the {duration_s:.1f} s"
     waited = heard.waited or 0.0
     if (heard.busy or 0.0) - waited > SATURATED:
         return f"{lost}, as a processor of this machine is too slow for {rate}; try a lower --rate"

@@ -4,6 +4,7 @@ from sdrlinkd.lab.hub import make_hub
 from sdrlinkd.lab.report import LabReport, PairResult, RobotResult
 from sdrlinkd.lab.run import LabOptions, LabState, run_lab
 from sdrlinkd.lab.scenario import Scenario, load_scenario
+from sdrlinkd.lab.shipped import find_scenario, shipped_scenarios
 from sdrlinkd.lab.simulation import Arrival, Pair, Simulation, Station
 from sdrlinkd.lab.table import live_table, pair_table
 
@@ -18,9 +19,11 @@ __all__ = [
     "Scenario",
     "Simulation",
     "Station",
+    "find_scenario",
     "live_table",
     "load_scenario",
     "make_hub",
     "pair_table",
     "run_lab",
+    "shipped_scenarios",
 ]

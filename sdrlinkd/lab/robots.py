@@ -10,7 +10,7 @@ import tomli_w
 
 from sdrlinkd.config import parse_config
 from sdrlinkd.demo import Source, open_source
-from sdrlinkd.errors import ConfigError
+from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.lab.scenario import RobotParams, Scenario
 
 SEED_STEP = 1000
@@ -24,6 +24,15 @@ TABLES = ("modem", "access", "bus", "ether")
 
 def open_sources(scenario: Scenario, bag: Path | None) -> dict[int, Source]:
     """By robot. Raises UserError."""
+    try:
+        return _open_sources(scenario, bag)
+    except UserError as error:
+        if bag is not None:
+            raise
+        raise UserError(f"{error}; what a recording has: name it with --bag") from None
+
+
+def _open_sources(scenario: Scenario, bag: Path | None) -> dict[int, Source]:
     return {
         robot.id: open_source(
             bag,

@@ -83,7 +83,7 @@ class ReceiverThread:
         self._blocks: queue.SimpleQueue[RxBlock | None] = queue.SimpleQueue()
         self._loop = asyncio.get_running_loop()
         self._has_room = asyncio.Event()
-        self._is_waited_for = False
+        self._is_waited_for = self._is_stopped = False
         self._ended = asyncio.Event()
         self.load = LoadMeter()
         self._thread = threading.Thread(target=self._work, name="phy-rx", daemon=True)
@@ -100,7 +100,7 @@ class ReceiverThread:
     async def put(self, block: RxBlock) -> None:
         """Hand over a block; waits while too many are waiting already."""
         self._begin()
-        while self._blocks.qsize() >= MAX_BLOCKS:
+        while self._blocks.qsize() >= MAX_BLOCKS and not self._is_stopped:
             self._has_room.clear()
             self._is_waited_for = True
             # The thread may have been faster than that.
@@ -115,10 +115,12 @@ class ReceiverThread:
         await self._ended.wait()
 
     def stop(self) -> None:
-        """End the thread, whatever waits."""
+        """End the thread, whatever waits; nobody has to wait for it any more."""
+        self._is_stopped = True
         self._blocks.put(None)
         if self._thread.ident:
             self._thread.join()
+        self._has_room.set()
 
     def _begin(self) -> None:
         if not self._thread.ident:

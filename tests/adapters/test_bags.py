@@ -11,7 +11,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_typestore
 
-from sdrlinkd.adapters import from_cdr, open_bag
+from sdrlinkd.adapters import due_messages, from_cdr, open_bag, summarise
 from sdrlinkd.errors import BagError
 from tests.adapters.recordings import CUSTOM, STORAGES, noisy_messages, ros1_bag, ros2_bag
 
@@ -279,3 +279,30 @@ def test_what_is_no_bag_is_refused_in_words(tmp_path, name):
     with pytest.raises(BagError, match=name) as refused:
         open_bag(path)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+def test_names_are_absolute_whatever_the_recording_says(tmp_path, storage):
+    """ROS 1 records what a publisher has typed, and its bags are converted as they are."""
+    messages = [(t.removeprefix("/"), *rest) for t, *rest in noisy_messages(3, 30)]
+    bag = open_bag(ros2_bag(tmp_path / "bag", STORAGES[storage], messages))
+    assert [topic.name for topic in bag.topics()] == ["/chat", "/odom"]
+    assert {message.topic for message in bag.messages()} == {"/chat", "/odom"}
+    due = due_messages(bag, 10.0, 0.0, {"/odom": 3})
+    assert [each.topic_id for each in due] == [3] * 20
+    bag.close()
+
+
+def test_a_summary_tells_length_rates_and_sizes(tmp_path):
+    ms = 1_000_000
+    messages = [("/chat", "std_msgs/msg/String", 100 * ms * i, bytes(10 + i)) for i in range(11)]
+    messages += [("/once", "std_msgs/msg/String", 1500 * ms, bytes(40))]
+    bag = open_bag(ros2_bag(tmp_path / "bag", STORAGES["mcap"], messages))
+    read = []
+    found = summarise(bag, read.append)
+    assert read == list(range(1, 13))
+    assert (found.duration_s, found.n_messages, found.n_bytes) == (1.5, 12, 205)
+    chat, once = found.topics
+    assert chat == ("/chat", "std_msgs/msg/String", 11, 10.0, 15.0, 20)
+    assert once == ("/once", "std_msgs/msg/String", 1, None, 40.0, 40)
+    bag.close()

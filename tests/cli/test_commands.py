@@ -241,7 +241,10 @@ def test_bag_play_and_info(start_daemon, ctl, recorded):
     dir_ = ("--runtime-dir", daemon.directory)
     code, out, _ = ctl("bag", "info", recorded)
     assert code == 0
-    assert "60  /odom" in out
+    (length, _, *lines) = out.splitlines()
+    assert length.startswith("2.0 s, 200 messages, ")
+    rows = {words[4]: words for words in map(str.split, lines)}
+    assert rows["/odom"] == ["60", "30.00", "724", "724", "/odom", "nav_msgs/msg/Odometry"]
     with Subscriber(
         ODOM.replace("robot_1", "rx_robot_1"), directory=daemon.directory, depth=0
     ) as heard:
@@ -273,6 +276,15 @@ def test_bag_play_and_info(start_daemon, ctl, recorded):
     ):
         code, _, err = ctl("bag", "play", recorded, *arguments, *dir_)
         assert (code, says in err) == (2, True), err
+
+
+def test_a_bag_whose_names_have_no_slash_is_played(start_daemon, ctl, tmp_path):
+    daemon = start_daemon()
+    messages = [("odom", "nav_msgs/msg/Odometry", 1_000_000 * i, bytes(724)) for i in range(20)]
+    bag = ros2_bag(tmp_path / "bag", StoragePlugin.MCAP, messages)
+    for topics in ((), ("--topics", "odom"), ("--remap", "odom:=/robot_1/odom")):
+        code, out, _ = ctl("bag", "play", bag, *topics, "--runtime-dir", daemon.directory)
+        assert (code, "played 20 messages" in out) == (0, True)
 
 
 def test_a_truncated_bag_is_played_as_far_as_it_goes(start_daemon, ctl, recorded):

@@ -1,14 +1,17 @@
 """`sdrlinkctl lab`: one command runs a scenario; report and picture lie in a folder."""
 
 import time
+from pathlib import Path
 
 import msgspec
 import pytest
 
 from backends import HubWatch
 from sdrlinkd.cli import run
-from sdrlinkd.lab import LabReport
+from sdrlinkd.cli.pace import scenario_names
+from sdrlinkd.lab import LabReport, find_scenario
 from sdrlinkd.lab import run as run_module
+from tests.conftest import ETC
 from tests.lab.reports import report, robot
 from tests.lab.scenarios import write_scenario
 
@@ -186,3 +189,35 @@ def test_a_ledger_that_does_not_add_up_is_a_failure(lab, come_to, tmp_path):
     (line,) = [each for each in out.splitlines() if "THE LEDGER DOES NOT ADD UP" in each]
     assert line.startswith("robot 2: ")
     assert (tmp_path / "out/report.json").exists()
+
+
+@pytest.mark.parametrize("name", ["two-robots", "two-robots.toml"])
+def test_a_shipped_scenario_is_called_by_its_name(lab, asked, tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    code, out, _ = lab(name)
+    assert code == 0
+    assert asked[0].path == ETC / "scenarios/two-robots.toml"
+    assert "starting the hub and 2 robots" in out
+    # One's own goes before it.
+    own = write_scenario(tmp_path).rename(tmp_path / name)
+    lab(name)
+    assert asked[1].path.absolute() == own
+
+
+def test_who_mistypes_a_scenario_is_shown_the_names(lab, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, _, err = lab("two-robot")
+    assert code == 2
+    assert "two-robot: no such scenario; did you mean two-robots?; allowed: a TOML file" in err
+
+
+def test_scenarios_of_a_wheel_are_found_and_completed(tmp_path, monkeypatch):
+    share = tmp_path / "share/sdrlinkd/scenarios"
+    share.mkdir(parents=True)
+    (share / "mine.toml").write_text("")
+    (tmp_path / "more").mkdir()
+    (tmp_path / "my-own.toml").write_text("")
+    monkeypatch.setattr("sdrlinkd.lab.shipped.FOLDERS", (tmp_path / "none", share))
+    monkeypatch.chdir(tmp_path)
+    assert scenario_names("m") == ["mine", "more/", "my-own.toml"]
+    assert find_scenario(Path("mine")) == share / "mine.toml"

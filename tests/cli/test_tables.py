@@ -9,7 +9,7 @@ from rich.text import Text
 
 from backends import DeviceSurvey, Outlook, WaySurvey
 from benchmarks.report import Row, table_of
-from sdrlinkd.adapters import BagTopic
+from sdrlinkd.adapters import BagSummary, TopicSummary
 from sdrlinkd.cli import bag, phy, plan, radio, topics
 from sdrlinkd.cli.screens import StatusScreen, daemons_table, latency_screen
 from sdrlinkd.demo import RunResult, TopicResult, table_6, topic_table
@@ -24,6 +24,15 @@ from tests.lab.reports import lost, pair, report, robot
 WIDTHS = (80, 100, 140)
 ODOMETRY = "nav_msgs/msg/Odometry"
 LATENCY = {"p50": 347.25, "p90": 400.0, "p99": 2144.67, "max": 3000.0}
+
+SUMMARY = BagSummary(
+    duration_s=3600.0,
+    n_messages=1_234_567,
+    n_bytes=10**11,
+    topics=[
+        TopicSummary(f"/{LONG}", "sensor_msgs/msg/Image", 1_234_567, 342.93, 921_664.0, 12_921_664)
+    ],
+)
 
 
 def run(kind: str, topic: str) -> RunResult:
@@ -91,7 +100,7 @@ def everything(width: int) -> dict[str, list[object]]:
         "plan": [*plan.lines(planned(LONG), 3)],
         "phy info": [phy.table_of(modem_info(5e6, 1024, 0.005))],
         "radio probe": [radio.table_of(*surveyed(f"driver=hackrf,serial={LONG}"), 2e6)],
-        "bag info": [bag.table_of([BagTopic(f"/{LONG}", "sensor_msgs/msg/Image", 1_234_567)])],
+        "bag info": [bag.table_of(SUMMARY)],
         "topics": [*topics.tables(at.link)],
         "list": [daemons_table(listed)],
         "bench": [table_of("path_cost", bench_rows())],

@@ -151,3 +151,26 @@ def test_a_recording_of_another_rate_is_refused_in_one_line(write_config, tmp_pa
     *_, last = done.stderr.splitlines()
     assert "is sampled at 1e+06 Hz; the modem is set to 5e+06 Hz" in last
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("paced", [False, True])
+def test_a_recording_ends_with_what_the_daemon_plays_into_it(start_daemon, tmp_path, paced):
+    """Unpaced, it would fill the disk in no time."""
+    node = start_daemon(
+        f'namespace = "robot_1"\nbackend = "iqfile"\n[play]\nduration_s = 0.5\n[modem]\n'
+        f'rate_hz = 2e6\n[iqfile]\ntransmit = "{tmp_path}/rec"\npaced = {str(paced).lower()}\n'
+    )
+    wait_for(lambda: node.snapshot().carrier.state == "ended", timeout_s=60)
+    size = (tmp_path / "rec.sigmf-data").stat().st_size
+    tx = node.snapshot().link.tx
+    assert (tx.accepted, tx.sent, tx.queued) == (50, 50, 0)
+    with node.control() as control:
+        assert control.ask("check")["problems"] == []
+    assert (tmp_path / "rec.sigmf-data").stat().st_size == size
+    # And what is in it can be heard.
+    other = start_daemon(
+        f'namespace = "robot_2"\nbackend = "iqfile"\n[modem]\nrate_hz = 2e6\n'
+        f'[iqfile]\nreceive = "{tmp_path}/rec"\npaced = false\nwait_for_consumer = true\n'
+    )
+    with Subscriber("/rx_robot_1/*", directory=other.directory) as heard:
+        assert all(heard.receive(20) is not None for _ in range(50))

@@ -113,6 +113,14 @@ def test_a_picture_that_cannot_be_written_is_told_in_words(tmp_path, capsys):
     assert "path.png" in capsys.readouterr().err
 
 
+def test_a_bag_whose_names_have_no_slash_is_sent(tmp_path):
+    messages = [("fix", "std_msgs/msg/String", 1_000_000 * i, bytes(12)) for i in range(20)]
+    bag = ros2_bag(tmp_path / "bag", STORAGES["mcap"], messages)
+    assert demo("--bag", bag, "--link", "direct", "--out", tmp_path / "out") == 0
+    (result,) = json.loads((tmp_path / "out/report.json").read_text())["runs"]
+    assert (result["sent"], result["received"], result["topics"][0]["name"]) == (20, 20, "fix")
+
+
 @pytest.mark.parametrize("storage", STORAGES)
 def test_a_bag_with_garbage_in_its_padding_arrives_unchanged(tmp_path, storage, capsys):
     bag = ros2_bag(

@@ -45,6 +45,11 @@ def test_samples_that_were_lost_have_a_cause_of_their_own(changes, says):
     assert says in verdict(slow)
 
 
+def test_who_falls_behind_loses_messages_before_samples():
+    slow = with_phy(replace(SHORT, dropped={"tx_stalled": 4}), busy=0.99, waited=0.03)
+    assert "the receiver fell behind, as a processor of this machine is too slow" in verdict(slow)
+
+
 def test_what_the_noise_takes_is_no_fault():
     noisy = with_phy(SHORT, mcs="64QAM 3/4", mcs_index=6)
     assert is_good(noisy)

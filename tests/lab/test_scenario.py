@@ -3,7 +3,8 @@
 import pytest
 
 from sdrlinkd.errors import ConfigError, UserError
-from sdrlinkd.lab import load_scenario
+from sdrlinkd.lab import load_scenario, shipped_scenarios
+from sdrlinkd.lab.robots import open_sources
 from sdrlinkd.lab.scenario import outages_of
 
 ONE = "[[robot]]\nid = 1\n"
@@ -210,3 +211,14 @@ def test_who_can_ever_hear_whom(load, text, reach):
 def test_who_comes_near_while_it_lasts_is_in_reach(load, path, is_heard):
     text = "duration_s = 20\n[air]\nsnr_db_at_1m = 50\n" + ONE + "path = [[0, 0, 0]]\n" + TWO
     assert load(text + f"path = {path}\n").in_reach(1, 2) == is_heard
+
+
+def test_shipped_scenarios_need_no_recording_but_one_that_says_so():
+    for name, path in shipped_scenarios().items():
+        scenario = load_scenario(path)
+        if name == "mrclam-three":
+            with pytest.raises(UserError, match="name it with --bag"):
+                open_sources(scenario, None)
+            continue
+        for source in open_sources(scenario, None).values():
+            assert source.topics, name
