@@ -89,7 +89,7 @@ class NativeLibrary:
         names = (*NAMES, ctypes.util.find_library("SoapySDR"))
         found = next((each for each in names if _loads(each)), None)
         if found is None:
-            raise DriverError("libSoapySDR is not installed")
+            raise DriverError("there is no libSoapySDR")
         self._c = _declared(CDLL(found))
 
     @property

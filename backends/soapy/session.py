@@ -6,7 +6,7 @@ import socket
 from backends.soapy.clock import SampleTime
 from backends.soapy.counted import CountedSender
 from backends.soapy.device import WAYS, Device
-from backends.soapy.library import load_library, why_not
+from backends.soapy.library import load_library, not_installed, why_not
 from backends.soapy.orders import Orders
 from backends.soapy.outgoing import Outgoing
 from backends.soapy.protocol import Open, Opened
@@ -35,7 +35,12 @@ class Session:
 
     def run(self) -> None:
         """Stream until the daemon closes its end. Raises SettingError, DriverError."""
-        library = load_library()
+        args = self._settings.device
+        try:
+            library = load_library()
+        except DriverError as error:
+            reason = not_installed(error)
+            raise SettingError(f'soapy.device: got "{args}", but {reason}') from None
         device = self._made(library)
         if device is None:
             return

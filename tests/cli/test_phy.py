@@ -126,6 +126,7 @@ def wifi_file(tmp_path):
     return path, sent
 
 
+@pytest.mark.slow
 def test_wifi_frames_for_people_and_programs(ctl, wifi_file):
     path, sent = wifi_file
     code, out, _ = ctl("decode-wifi", path)

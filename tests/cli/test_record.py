@@ -177,6 +177,7 @@ def test_files_that_cannot_be_written_are_named(ctl, config, tmp_path):
     assert "(No space left on device)" in err
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_a_recording_well(config, tmp_path):
     path = config("loopback")
     process = subprocess.Popen(

@@ -181,6 +181,7 @@ def test_ready_means_reachable_for_the_group(manager: Manager):
     assert modes == dict.fromkeys(["ctl.sock", "in-pub.sock", "in.sock", "out.sock"], 0o770)
 
 
+@pytest.mark.realtime
 def test_the_watchdog_is_fed_in_time(manager: Manager):
     feeds = 8
     with manager.daemon():
