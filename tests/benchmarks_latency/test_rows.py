@@ -9,6 +9,7 @@ from benchmarks.latency.peers import daemon, table
 from benchmarks.latency.session import Session, run
 
 
+@pytest.mark.slow
 def test_by_the_air_latencies_and_ages_are_exact():
     told = {row.name: row for row in rows.by_the_air(3, 1.0)}
     assert set(told) == {"ether_115B_200hz_lockstep_std_ms", "age_rms_us_lockstep"}

@@ -72,6 +72,7 @@ def test_a_hub_tells_where_it_is_and_serves_its_folder_alone(start_hub, refused,
     assert hub.stderr.read() == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [

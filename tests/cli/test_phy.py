@@ -63,6 +63,7 @@ def test_noise_has_no_bursts(ctl, tmp_path):
     assert "no burst was found in 100000 samples" in err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("picture", ["spectrum", "constellation"])
 def test_pictures_are_drawn(ctl, tmp_path, picture):
     write_bursts(tmp_path / "rec")

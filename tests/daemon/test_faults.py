@@ -242,6 +242,7 @@ def test_a_second_instance_exits_with_2_and_the_first_is_unharmed(start_daemon):
     assert daemon.snapshot().state == "running"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["in.sock", "in-pub.sock", "out.sock", "ctl.sock"])
 def test_an_occupied_socket_is_named_and_left_alone(tmp_path, name, write_config):
     context = zmq.Context()
@@ -309,6 +310,7 @@ def test_control_refuses_in_words(start_daemon):
     assert daemon.snapshot().state == "running"
 
 
+@pytest.mark.slow
 def test_config_check_prints_what_follows(write_config, tmp_path):
     config = write_config(tmp_path)
     checked = subprocess.run(

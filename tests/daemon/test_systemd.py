@@ -68,6 +68,7 @@ def test_both_units_are_hardened_alike():
     assert len(one) > 40
 
 
+@pytest.mark.slow
 @each_unit
 def test_bad_configuration_is_not_restarted(unit: Path, tmp_path: Path):
     config = tmp_path / "bad.toml"
@@ -193,11 +194,13 @@ def test_the_watchdog_is_fed_in_time(manager: Manager):
         assert time.monotonic() - begun < feeds * WATCHDOG_S
 
 
+@pytest.mark.slow
 def test_the_status_line_names_the_carrier(manager: Manager):
     with manager.daemon():
         assert manager.wait_for("STATUS=").startswith("STATUS=direct up")
 
 
+@pytest.mark.slow
 def test_sigterm_is_an_orderly_stop(manager: Manager):
     with manager.daemon() as process:
         manager.wait_for("READY=1")

@@ -95,6 +95,7 @@ def test_a_picture_that_cannot_be_written_is_told_in_words(tmp_path, capsys):
     assert "path.png" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("storage", STORAGES)
 def test_a_bag_with_garbage_in_its_padding_arrives_unchanged(tmp_path, storage, capsys):
     bag = ros2_bag(

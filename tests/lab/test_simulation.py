@@ -218,6 +218,7 @@ def test_a_chain_keeps_one_schedule():
     assert told == {1: (1, 0), 2: (1, 1), 3: (1, 2), 4: (1, 3), 5: (1, 4)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("policy", ["none", "csma", "minislot", "tdma"])
 def test_looking_only_when_it_may_matter_loses_nothing(policy, monkeypatch):
     """Against a look after every block, as a modem does it."""
