@@ -39,16 +39,16 @@ _KNEES = (
 
 def measure(seed: int, quick: bool, recordings: Path | None = None) -> list[Row]:
     """All rows; that of recordings where there are any."""
-    n = 1000 if quick else 10_000
+    n = 500 if quick else 10_000
     rows = [_knee(*knee, seed, n) for knee in _KNEES]
-    rows[0].peers |= _peers_at_64_bytes(seed, 300 if quick else 1000)
+    rows[0].peers |= _peers_at_64_bytes(seed, 60 if quick else 1000)
     return [
         *rows,
         _tdl_a(seed, n),
         _gap_to_bound(seed, n),
         _headers(seed, n),
         _doppler(seed, n // 10),
-        _false_pdus(seed, 10**7 if quick else 10**9),
+        _false_pdus(seed, 10**6 if quick else 10**9),
         *([false_pdus_in(recordings)] if recordings else []),
     ]
 

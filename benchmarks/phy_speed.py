@@ -48,7 +48,7 @@ class _Peers:
 
 def measure(seed: int, quick: bool) -> list[Row]:
     """All rows."""
-    rounds = 5 if quick else 20
+    rounds = 3 if quick else 20
     peers = _measure_peers(seed)
     return [
         _search("search_msps_noise", 200.0, _noise(seed), rounds, peers),

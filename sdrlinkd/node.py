@@ -46,9 +46,8 @@ log = logging.getLogger("sdrlinkd")
 class Node:
     """Asks the link what to do and does it. Holds no queue and no decision of its own.
 
-    Messages of the topics in `headers` begin with a std_msgs/Header; `stops` are the messages to
-    hand over, by topic id, when a command topic falls silent. `chrony` is told of another robot's
-    clock.
+    Messages of the topics in `headers` begin with a std_msgs/Header; `stops`, by topic id, are to
+    be handed over when a command topic falls silent. `chrony` is told of another robot's clock.
     """
 
     def __init__(

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.machine import lacks, left_out
 
 IGNORING = ("sh", "-c", "trap '' INT; exec \"$@\"", "sh")
@@ -14,6 +16,7 @@ def test_interrupts_reach_tests():
     assert signal.getsignal(signal.SIGINT) == signal.default_int_handler
 
 
+@pytest.mark.slow
 def test_interrupts_reach_tests_of_a_caller_who_ignores_them():
     """As shells start background jobs."""
     name = f"{__file__}::{test_interrupts_reach_tests.__name__}"

@@ -18,9 +18,16 @@ def pytest_configure() -> None:
     settings.load_profile("law")
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Those in real time come last, one after the other, when the other workers are done."""
+    """Those in real time come last, one after the other, when the other workers are done.
+
+    A daemon takes a second to start: what starts one is slow, unless it is marked as quick.
+    """
     for item in items:
+        starts = "start_daemon" in getattr(item, "fixturenames", ())
+        if starts and not item.get_closest_marker("quick"):
+            item.add_marker(pytest.mark.slow)
         if item.get_closest_marker("realtime"):
             item.add_marker(pytest.mark.xdist_group("realtime"))
     items.sort(key=lambda item: item.get_closest_marker("realtime") is not None)

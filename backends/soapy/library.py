@@ -76,6 +76,14 @@ def why_not(library: Library, args: str, error: DriverError) -> str:
     )
 
 
+def not_installed(error: DriverError) -> str:
+    """Why there is no SoapySDR, and what to do."""
+    return (
+        f"SoapySDR is not installed ({error}); on Debian: apt-get install libsoapysdr0.8 "
+        "soapysdr-tools and the radio's soapysdr-module-…"
+    )
+
+
 def _package(driver: str) -> str:
     name = MODULES.get(driver, "").lower()
     return f" (on Debian: apt-get install soapysdr-module-{name})" if name else ""

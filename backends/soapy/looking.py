@@ -5,21 +5,23 @@ import sys
 import msgspec
 
 from backends.soapy.device import Device
-from backends.soapy.library import driver_of, has_module, load_library, no_radio, why_not
+from backends.soapy.library import (
+    driver_of,
+    has_module,
+    load_library,
+    no_radio,
+    not_installed,
+    why_not,
+)
 from backends.soapy.surface import RX, TX, DriverError, Library
 from backends.soapy.survey import DeviceSurvey, Survey, WaySurvey
-
-_INSTALL = (
-    "SoapySDR is not installed ({}); on Debian: apt-get install libsoapysdr0.8 soapysdr-tools and "
-    "the radio's soapysdr-module-…"
-)
 
 
 def _look(args: str) -> Survey:
     try:
         library = load_library()
     except DriverError as error:
-        return Survey(binding="", modules=[], devices=[], notes=[_INSTALL.format(error)])
+        return Survey(binding="", modules=[], devices=[], notes=[not_installed(error)])
     modules = library.modules()
     devices, notes = [], []
     if refused := no_radio(args):

@@ -23,7 +23,6 @@ from typing import Any
 from backends.soapy.surface import (
     SAMPLE_BYTES,
     DriverError,
-    HostError,
     Kwargs,
     Moved,
     Range,
@@ -90,7 +89,7 @@ class NativeLibrary:
         names = (*NAMES, ctypes.util.find_library("SoapySDR"))
         found = next((each for each in names if _loads(each)), None)
         if found is None:
-            raise HostError("libSoapySDR is not installed")
+            raise DriverError("there is no libSoapySDR")
         self._c = _declared(CDLL(found))
 
     @property

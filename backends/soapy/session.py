@@ -7,7 +7,13 @@ from backends.base import Patience
 from backends.soapy.clock import SampleTime
 from backends.soapy.counted import CountedSender
 from backends.soapy.device import WAYS, Device
-from backends.soapy.library import is_driver_missing, load_library, no_radio, why_not
+from backends.soapy.library import (
+    is_driver_missing,
+    load_library,
+    no_radio,
+    not_installed,
+    why_not,
+)
 from backends.soapy.orders import Orders
 from backends.soapy.outgoing import Outgoing
 from backends.soapy.protocol import Open, Opened
@@ -37,8 +43,13 @@ class Session:
         self._ring = ring
 
     def run(self) -> None:
-        """Stream until the daemon closes its end. Raises SettingError, DriverError."""
-        library = load_library()
+        """Stream until the daemon closes its end. Raises SettingError, DriverError, HostError."""
+        args = self._settings.device
+        try:
+            library = load_library()
+        except DriverError as error:
+            reason = not_installed(error)
+            raise HostError(f'soapy.device: got "{args}", but {reason}') from None
         device = self._made(library)
         if device is None:
             return

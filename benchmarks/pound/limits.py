@@ -44,7 +44,7 @@ def recovery(seed: int, quick: bool) -> Recovery:
     """
     rng = np.random.default_rng(seed)
     found = Recovery([], [])
-    for trial in range(3 if quick else 10):
+    for trial in range(1 if quick else 10):
         lasers = _after_outage(["laser_0", "laser_1"], rng, seed + trial)
         found.lasers_s.append(max(lasers.values()))
         found.images_s.append(_after_outage(["laser_0", "image"], rng, seed + trial)["image"])
@@ -89,7 +89,7 @@ def _fresh_again(trace: Trace, end: float, limit_s: float) -> float:
 def urgent_waits_ms(seed: int, quick: bool) -> tuple[Times, float, float]:
     """(ages of urgent messages at random times while 10 MB wait, own airtime, the bound) in ms."""
     air = Air()
-    seconds = 4.0 if quick else 13.0
+    seconds = 1.5 if quick else 13.0
     bulk = Flow("bulk", 50_000, 1e-5, BULK_BYTES // 50_000, "bulk")
     rng = np.random.default_rng(seed)
     n = int(seconds * 20)

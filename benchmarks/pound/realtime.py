@@ -108,7 +108,7 @@ def _fresh_after(trace: Trace, end: float, limit_s: float) -> float:
 
 
 def _tables(ends: Ends, seed: int, quick: bool) -> list[Row]:
-    n = 250 if quick else 1000
+    n = 100 if quick else 1000
     rng = np.random.default_rng(seed)
     flows = [
         Flow("laser", 1024, 0.02, n, phase_s=rng.uniform(0, 0.02)),
@@ -132,13 +132,13 @@ def _tables(ends: Ends, seed: int, quick: bool) -> list[Row]:
 def _limits(ends: Ends, seed: int, quick: bool) -> list[Row]:
     """Bandwidth, and urgent messages while 10 MB wait."""
     rng = np.random.default_rng(seed)
-    seconds = 3.0 if quick else 8.0
+    seconds = 1.0 if quick else 8.0
     offered = 8e-6 * 65536 / 6.5
     (bulk,), _ = _play(ends, [Flow("image", 65536, offered, int(seconds / offered))], seed)
     heard = np.sort(bulk.heard_at[~np.isnan(bulk.heard_at)])
     heard = heard[heard < seconds]
     mbps = 8e-6 * 65536 * (len(heard) - 1) / float(heard[-1] - heard[0])
-    n = 40 if quick else 150
+    n = 15 if quick else 150
     length_s = n / 20
     n_bulk = int(min(BULK_BYTES, length_s * 5.5e6 / 8) / 50_000)
     stop = Flow("stop", 16, length_s / n, n, jitter_s=0.02, phase_s=0.3 + rng.uniform(0, 0.01))

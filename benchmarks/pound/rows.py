@@ -79,7 +79,7 @@ def three_nodes(seed: int, quick: bool, peers: Beside) -> list[Row]:
 
 def bandwidth(seed: int, quick: bool, peers: Mapping[str, Mapping[int, float]]) -> list[Row]:
     """Fig. 19 at its largest messages; the others in the note."""
-    seconds = 3.0 if quick else 10.0
+    seconds = 1.0 if quick else 10.0
     largest = {name: of[SIZE_64KB] for name, of in peers.items() if SIZE_64KB in of}
     found = {size: limits.bandwidth(size, seconds, seed) for size in limits.SIZES}
     note = ", ".join(f"{size // 1024} KB {mbps:.2f}" for size, mbps in found.items())

@@ -165,6 +165,7 @@ def test_a_damaged_rosbag2_gives_what_is_left_unaltered(tmp_path, storage, seed)
     check_damaged(path, file, written, seed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compression", [None, *Writer1.CompressionFormat])
 def test_a_damaged_ros1_bag_gives_what_is_left_unaltered(tmp_path, compression):
     path = ros1_bag(tmp_path / "run.bag", compression, 4000)
@@ -253,6 +254,7 @@ def flip_some(damaged, rng):
         damaged[rng.randrange(len(damaged))] ^= rng.randrange(1, 256)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [zero_a_stretch, flip_some])
 def test_a_ros1_bag_damaged_anywhere_gives_words(tmp_path, change):
     path = ros1_bag(tmp_path / "run.bag", Writer1.CompressionFormat.LZ4, 300)

@@ -32,6 +32,7 @@ def test_a_drive_of_ros2_is_read_whole(tmp_path, storage):
     assert len(written) == sum(COUNTS.values()) > 2000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compression", [None, *Writer1.CompressionFormat])
 def test_a_drive_of_ros1_is_read_whole(tmp_path, compression):
     written = ros1_drive(tmp_path / "drive.bag", compression, DURATION_S)

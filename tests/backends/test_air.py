@@ -130,6 +130,7 @@ def test_the_same_seed_is_the_same_air(profile):
     assert not np.allclose(one, other)
 
 
+@pytest.mark.slow
 def test_the_same_seed_is_the_same_noise():
     silence = np.zeros(1000, np.complex64)
     one, same, other = (

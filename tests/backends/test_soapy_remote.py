@@ -43,6 +43,7 @@ def lacking():
     return "needs namespaces of its own" if may.returncode else ""
 
 
+@pytest.mark.realtime
 @pytest.mark.slow
 @pytest.mark.skipif(bool(lacking()), reason=lacking())
 def test_a_device_behind_soapyremote_keeps_time_as_if_it_were_here():

@@ -181,6 +181,7 @@ def test_a_peer_that_is_not_there_has_a_reason():
     assert "no peer is called 'telepathy'" in unavailable("telepathy")
 
 
+@pytest.mark.slow
 @in_namespaces
 @pytest.mark.parametrize("peer", ["tcp_nodelay", "pound_like"])
 def test_a_second_of_laser_and_image(peer):

@@ -41,6 +41,7 @@ def publish(daemon, count=3):
             out.send(ODOM, to_cdr(empty("nav_msgs/msg/Odometry"), "nav_msgs/msg/Odometry"))
 
 
+@pytest.mark.quick
 def test_status_for_people_and_programs(start_daemon, ctl):
     daemon = start_daemon()
     publish(daemon)

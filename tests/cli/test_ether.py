@@ -56,6 +56,7 @@ def refused(monkeypatch, capsys):
     return call
 
 
+@pytest.mark.slow
 def test_a_hub_tells_where_it_is_and_serves_its_folder_alone(start_hub, refused, tmp_path):
     folder = tmp_path / "air"
     hub, line = start_hub(folder)
@@ -71,6 +72,7 @@ def test_a_hub_tells_where_it_is_and_serves_its_folder_alone(start_hub, refused,
     assert hub.stderr.read() == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
@@ -186,6 +188,7 @@ def carrier(node):
     return node.snapshot().carrier
 
 
+@pytest.mark.slow
 def test_daemons_outlive_their_hub(start_hub, start_daemon, tmp_path_factory):
     folder = tmp_path_factory.mktemp("air")
     hub, _ = start_hub(folder)

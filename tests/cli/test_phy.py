@@ -67,6 +67,7 @@ def test_noise_has_no_bursts(ctl, tmp_path):
     assert "no burst was found in 100000 samples" in err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("picture", ["spectrum", "constellation"])
 def test_pictures_are_drawn(ctl, tmp_path, monkeypatch, picture):
     """In the folder where one is, not among the recordings."""
@@ -152,6 +153,7 @@ def wifi_file(tmp_path):
     return path, sent
 
 
+@pytest.mark.slow
 def test_wifi_frames_for_people_and_programs(ctl, wifi_file):
     path, sent = wifi_file
     code, out, _ = ctl("decode-wifi", path)

@@ -52,6 +52,7 @@ def test_for_programs(capsys):
     assert found["devices"][0]["rx"]["formats"] == ["CF32", "CS16", "CS8"]
 
 
+@pytest.mark.slow
 @needs_radio
 @pytest.mark.parametrize(
     ("args", "part"),

@@ -11,7 +11,7 @@ import sigmf
 
 from sdrlinkd.cli import run
 from tests.iq.recordings import write_bursts
-from tests.waiting import wait_for
+from tests.waiting import group, wait_for
 
 REGISTRY = Path(__file__).parents[2] / "etc/registry.csv"
 DEVICE = ("--device", "driver=none", "--frequency", "433e6", "--rate", "2e6")
@@ -186,16 +186,17 @@ def test_files_that_cannot_be_written_are_named(ctl, config, tmp_path):
     assert "(No space left on device)" in err
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_a_recording_well(config, tmp_path):
     path = config("loopback")
-    process = subprocess.Popen(
+    with group(
         [sys.executable, "-m", "sdrlinkd.cli", "record", tmp_path / "rec", "--config", path],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    data = tmp_path / "rec.sigmf-data"
-    wait_for(lambda: data.exists() and data.stat().st_size > 100_000, timeout_s=60)
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=60)
+    ) as process:  # fmt: skip
+        data = tmp_path / "rec.sigmf-data"
+        wait_for(lambda: data.exists() and data.stat().st_size > 100_000, timeout_s=60)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (0, "")
     assert "bursts    0, 0 PDUs good, 0 bad" in out
     theirs = sigmf.fromfile(f"{tmp_path}/rec.sigmf-meta")

@@ -25,7 +25,7 @@ PATIENCE_S = 60
 ATTEMPTS = 3
 """A busy machine may lose samples, or be late."""
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.realtime
 
 
 @pytest.fixture

@@ -26,6 +26,7 @@ def test_every_command_is_listed_with_its_own_help():
     assert typer.main.get_group(app).commands.keys() == COMMANDS.keys()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arguments", [
     ["--version"], ["status", "--help"], ["why", "--help"], ["topics", "--help"],
     ["radio", "probe", "--help"], ["top", "--help"], ["list", "--help"], ["topic", "hz", "--help"],
@@ -50,6 +51,7 @@ def test_an_unknown_command_is_named_with_what_is_like_it():
     assert "Did you mean 'status'?" in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("words", "count", "there"), [
     ("sdrlinkctl ", 1, [*COMMANDS]),
     ("sdrlinkctl re", 1, ["reload", "record", "replay"]),

@@ -119,6 +119,7 @@ class Conductor(RawRadio):
             self.push(protocol.Done(token=self._token, step=step))
 
 
+@pytest.mark.realtime
 def test_what_is_planned_leaves_at_its_time_by_the_airs_clock(start_daemon, tmp_path_factory):
     hub = tmp_path_factory.mktemp("hub")
     plan = list(due_messages(BuiltInRobot("robot_1", 0.5, 1), 0.5, 0.3, {"/robot_1/cmd_vel": 3}))

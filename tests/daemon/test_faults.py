@@ -13,7 +13,7 @@ import pytest
 import zmq
 
 from sdrlinkd.client import Publisher, RefusedError, Subscriber
-from tests.waiting import wait_for
+from tests.waiting import group, wait_for
 
 CDR = b"\0\1\0\0"
 
@@ -32,6 +32,7 @@ def problems(daemon):
         return control.ask("check")["problems"]
 
 
+@pytest.mark.quick
 def test_message_out_message_in_and_the_snapshot_tells(start_daemon):
     daemon = start_daemon()
     payload = CDR + os.urandom(720)
@@ -203,21 +204,29 @@ def test_what_has_arrived_before_sigterm_is_in_the_ledger(start_daemon):
     assert "/300 sent" in daemon.log()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "link"),
     [(signal.SIGTERM, "direct"), (signal.SIGHUP, "direct"), (signal.SIGINT, "ofdm")],
 )
 def test_a_demo_that_is_ended_leaves_nothing_behind(tmp_path, number, link):
     environment = {**os.environ, "TMPDIR": str(tmp_path)}
-    demo = subprocess.Popen(
-        [sys.executable, "-m", "sdrlinkd.cli", "demo", "--link", link, "--out", tmp_path / "out"],
-        env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    wait_for(lambda: list(tmp_path.glob("sdrlink-*/*/ctl.sock")))
-    demo.send_signal(number)
-    assert demo.wait(20) != 0
-    assert "Traceback" not in demo.stderr.read()
-    demo.stderr.close()
+    command = [
+        sys.executable,
+        "-m",
+        "sdrlinkd.cli",
+        "demo",
+        "--link",
+        link,
+        "--out",
+        tmp_path / "out",
+    ]
+    with group(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as demo:
+        wait_for(lambda: list(tmp_path.glob("sdrlink-*/*/ctl.sock")), 60)
+        demo.send_signal(number)
+        _, err = demo.communicate(timeout=60)
+    assert demo.returncode != 0
+    assert b"Traceback" not in err
     assert not list(tmp_path.glob("sdrlink-*"))
 
 
@@ -233,6 +242,7 @@ def test_a_second_instance_exits_with_2_and_the_first_is_unharmed(start_daemon):
     assert daemon.snapshot().state == "running"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["in.sock", "in-pub.sock", "out.sock", "ctl.sock"])
 def test_an_occupied_socket_is_named_and_left_alone(tmp_path, name, write_config):
     context = zmq.Context()
@@ -300,6 +310,7 @@ def test_control_refuses_in_words(start_daemon):
     assert daemon.snapshot().state == "running"
 
 
+@pytest.mark.slow
 def test_config_check_prints_what_follows(write_config, tmp_path):
     config = write_config(tmp_path)
     checked = subprocess.run(

@@ -12,7 +12,7 @@ from tests.waiting import wait_for
 
 pytestmark = [
     pytest.mark.skipif(bool(no_gnu_radio()), reason=no_gnu_radio()),
-    pytest.mark.slow,
+    pytest.mark.realtime,
     pytest.mark.timeout(300),
 ]
 N = 60

@@ -20,7 +20,7 @@ from tests.waiting import wait_for
 
 pytestmark = [
     pytest.mark.skipif(bool(missing()), reason=missing()),
-    pytest.mark.slow,
+    pytest.mark.realtime,
     pytest.mark.timeout(300),
 ]
 DEBIAN = Path("/usr/lib/python3/dist-packages")

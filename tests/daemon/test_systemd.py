@@ -68,6 +68,7 @@ def test_both_units_are_hardened_alike():
     assert len(one) > 40
 
 
+@pytest.mark.slow
 @each_unit
 def test_bad_configuration_is_not_restarted(unit: Path, tmp_path: Path):
     config = tmp_path / "bad.toml"
@@ -181,6 +182,7 @@ def test_ready_means_reachable_for_the_group(manager: Manager):
     assert modes == dict.fromkeys(["ctl.sock", "in-pub.sock", "in.sock", "out.sock"], 0o770)
 
 
+@pytest.mark.realtime
 def test_the_watchdog_is_fed_in_time(manager: Manager):
     feeds = 8
     with manager.daemon():
@@ -192,11 +194,13 @@ def test_the_watchdog_is_fed_in_time(manager: Manager):
         assert time.monotonic() - begun < feeds * WATCHDOG_S
 
 
+@pytest.mark.slow
 def test_the_status_line_begins_with_the_verdict(manager: Manager):
     with manager.daemon():
         assert "direct up" in manager.wait_for("STATUS=OK")
 
 
+@pytest.mark.slow
 def test_sigterm_is_an_orderly_stop(manager: Manager):
     with manager.daemon() as process:
         manager.wait_for("READY=1")

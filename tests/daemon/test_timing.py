@@ -14,6 +14,8 @@ from sdrlinkd.client import Publisher, Subscriber
 from tests.backends.hubs import serving
 from tests.waiting import wait_for
 
+pytestmark = pytest.mark.realtime
+
 AIR = {"rate_hz": 1e6, "frequency_hz": 2.45e9, "block_s": 0.001, "snr_db": 25.0}
 PPM = {1: 20.0, 2: -15.0}
 TWIST, ODOMETRY = "geometry_msgs/msg/Twist", "nav_msgs/msg/Odometry"

@@ -14,6 +14,7 @@ def demo(*arguments):
     return run(["demo", *(str(argument) for argument in arguments)])
 
 
+@pytest.mark.realtime
 @pytest.mark.slow
 def test_the_whole_of_table_6(tmp_path, capsys):
     code = demo("--duration", 4, "--out", tmp_path, "--json", tmp_path / "copy.json",
@@ -53,6 +54,7 @@ def test_the_whole_of_table_6(tmp_path, capsys):
     assert (tmp_path / "recording.sigmf-meta").is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("link", "pdu_size", "speed"),
     [("direct", 64, 4.0), ("direct", 1024, 4.0), ("ofdm", 1024, 1.0)],
@@ -77,6 +79,7 @@ def test_a_run_adds_up(link, pdu_size, speed):
     assert seen[-1] == (200, 200)
 
 
+@pytest.mark.slow
 def test_noise_beyond_the_code_loses_messages_by_name():
     source = open_source(None, None, [], 2.0, 1)
     options = Options(link="ofdm", pdu_size=220, snr_db=0.5)
@@ -121,6 +124,7 @@ def test_a_bag_whose_names_have_no_slash_is_sent(tmp_path):
     assert (result["sent"], result["received"], result["topics"][0]["name"]) == (20, 20, "fix")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("storage", STORAGES)
 def test_a_bag_with_garbage_in_its_padding_arrives_unchanged(tmp_path, storage, capsys):
     bag = ros2_bag(

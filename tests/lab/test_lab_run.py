@@ -15,7 +15,7 @@ from sdrlinkd.client import Subscriber
 from sdrlinkd.errors import UserError
 from sdrlinkd.lab import LabOptions, load_scenario, run_lab
 from tests.lab.scenarios import processes_of, write_scenario
-from tests.waiting import wait_for
+from tests.waiting import group, wait_for
 
 MESSAGES = 30
 """What each robot sends: 3 s of velocity commands at 10 Hz."""
@@ -163,13 +163,11 @@ def test_an_interrupt_while_a_process_starts_leaves_none(run_small, nothing_left
 def test_a_lab_that_is_interrupted_leaves_nothing_behind(tmp_path_factory):
     folder = tmp_path_factory.mktemp("end")
     path = write_scenario(folder, pace="realtime")
-    lab = subprocess.Popen(
-        [sys.executable, "-m", "sdrlinkd.cli", "lab", path, "--out", folder / "out",
-         "--duration", "600"],
-        env={**os.environ, "TMPDIR": str(folder)},
+    command = [sys.executable, "-m", "sdrlinkd.cli", "lab", path, "--out", folder / "out"]
+    with group(
+        [*command, "--duration", "600"], env={**os.environ, "TMPDIR": str(folder)},
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-    )  # fmt: skip
-    try:
+    ) as lab:  # fmt: skip
         wait_for(lambda: len(list(folder.glob("sdrlink-*/robot_*/ctl.sock"))) == 2, 60)
         for robot in folder.glob("sdrlink-*/robot_*"):
             with Subscriber(directory=robot, timeout_s=60) as heard:
@@ -177,10 +175,6 @@ def test_a_lab_that_is_interrupted_leaves_nothing_behind(tmp_path_factory):
         assert len(processes_of(folder)) == 4
         lab.send_signal(signal.SIGINT)
         out, _ = lab.communicate(timeout=60)
-    finally:
-        lab.kill()
-        lab.wait()
-        lab.stdout.close()
     assert lab.returncode == 130, out
     assert "Traceback" not in out
     assert processes_of(folder) == []

@@ -10,6 +10,7 @@ STRANGE = "50 $_$ of [/b] robots [bold"
 """Signs that Matplotlib and Rich take for their own."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "given",
     [

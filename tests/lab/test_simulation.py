@@ -111,6 +111,7 @@ def two_at_40_percent(policy, n_nodes=2, seconds=1.0, seed=3):
     return by_samples, got(sim), {node: len(arrivals[node]) for node in nodes}
 
 
+@pytest.mark.slow
 def test_without_access_it_loses_what_samples_lose():
     """Two that talk at once are deaf, and collide at a third."""
     by_samples, by_bursts, sent = two_at_40_percent("none", n_nodes=3)
@@ -148,6 +149,7 @@ def small_messages(n, per_s, until_s, seed):
     return {node: poisson(node, per_s, 40, until_s, seed) for node in range(1, n + 1)}
 
 
+@pytest.mark.slow
 def test_24_robots_with_tdma_for_ten_minutes():
     """The first tells the schedule; that the others hardly tell of themselves saves half the time
     that this takes.
@@ -168,6 +170,7 @@ def test_24_robots_with_tdma_for_ten_minutes():
     assert max(age_s for _, age_s in got(sim).values()) < round_s
 
 
+@pytest.mark.slow
 def test_12_robots_with_minislots_for_two_minutes():
     n, seconds, seed = 12, 120.0, 8
     overlaps = Overlaps()
@@ -215,6 +218,7 @@ def test_a_chain_keeps_one_schedule():
     assert told == {1: (1, 0), 2: (1, 1), 3: (1, 2), 4: (1, 3), 5: (1, 4)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("policy", ["none", "csma", "minislot", "tdma"])
 def test_looking_only_when_it_may_matter_loses_nothing(policy, monkeypatch):
     """Against a look after every block, as a modem does it."""

@@ -85,6 +85,7 @@ def test_a_lower_root_that_appears_is_followed_by_all(traits):
         assert sum(burst.src == 1 for burst in air.bursts) > 100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [2, 4], ids=["two", "two groups of two"])
 @pytest.mark.parametrize(
     ("traits", "slot_s", "longest_s", "within_s"),

@@ -212,6 +212,7 @@ def test_profiles_are_normalised(name, n, last):
     assert np.sqrt(variance) == pytest.approx(1, abs=0.005)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("profile", ["tdl-a", "tdl-c"])
 def test_echoes_have_the_delays_and_powers_of_the_profile(profile):
     params = PathParams(rate_hz=RATE, profile=profile, delay_spread_s=20 / RATE)

@@ -192,6 +192,7 @@ def faded_symbols(modulation, h, no, rng):
     return coded, (bins + noise).astype(np.complex64)
 
 
+@pytest.mark.slow
 @every_modulation
 def test_a_channel_that_fades_is_followed(modulation):
     """Echoes turn against each other: the band moves through its fades, as at 40 Hz and 5 Msps.

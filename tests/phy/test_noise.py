@@ -60,6 +60,7 @@ def test_any_part_can_be_made_alone_and_adds_to_a_signal():
     assert np.array_equal(far[60:], made(40, first=2**40 + 60))
 
 
+@pytest.mark.slow
 def test_it_is_gaussian_to_its_tails():
     n = 4_000_000
     for parts in made(n).view(np.float32).reshape(n, 2).T.astype(np.float64):

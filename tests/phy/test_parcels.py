@@ -67,6 +67,7 @@ def test_what_a_kernel_does_not_expect_is_refused(field, value, told):
         Parcel(content()._replace(**{field: value}))
 
 
+@pytest.mark.slow
 def test_a_change_in_one_kernel_has_all_compiled_anew(tmp_path):
     """Whoever calls it has it within, as numba cannot know."""
     copy = tmp_path / "phy"

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from phy import BurstOver, Receiver, Transmitter
+from tests.laws import often
 from tests.phy.foreign import FOREIGN
 from tests.phy.quiet import quiet
 from tests.phy.signals import heard, noise, noisy, silence, turned
@@ -31,10 +32,12 @@ def n_lost(n, mcs, size, snr_db, max_frequency=0.02, **settings):
     return n - len(got)
 
 
+@pytest.mark.soak
 def test_qpsk_half_of_220_bytes_at_6_db_loses_one_in_a_hundred_at_most():
-    assert n_lost(1000, mcs=1, size=220, snr_db=6) <= 10
+    assert n_lost(often(1000), mcs=1, size=220, snr_db=6) <= often(10)
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize(
     ("mcs", "size", "snr_db", "most"),
     [
@@ -54,7 +57,7 @@ def test_qpsk_half_of_220_bytes_at_6_db_loses_one_in_a_hundred_at_most():
 )
 def test_of_300_bursts_near_the_knee_few_are_lost(mcs, size, snr_db, most):
     """At the lower SNR of each, a percent or two are lost, and 1 dB less would be over `most`."""
-    assert n_lost(300, mcs, size, snr_db) <= most
+    assert n_lost(often(300), mcs, size, snr_db) <= often(most)
 
 
 @pytest.mark.parametrize(("mcs", "size", "snr_db"), [(0, 64, -4.0), (1, 220, -1.5), (6, 220, 13.0)])
@@ -63,32 +66,37 @@ def test_the_yardstick_tells_noise_from_signal(mcs, size, snr_db):
     assert n_lost(50, mcs, size, snr_db) > 25
 
 
+@pytest.mark.soak
 def test_a_wide_search_for_the_carrier_costs_little():
     """±96 kHz at 1 Msps: five times as many hypotheses."""
-    assert n_lost(300, mcs=1, size=220, snr_db=1.5, max_frequency=0.096) <= 9
+    n = often(300)
+    assert n_lost(n, mcs=1, size=220, snr_db=1.5, max_frequency=0.096) <= often(9)
 
 
+@pytest.mark.soak
 def test_preambles_are_found_below_the_noise():
     """Headers at -2 dB: what all else stands on must be the last to fail."""
     rng = np.random.default_rng(SEED)
     receiver, n_found = Receiver(), 0
-    for _ in range(200):
+    for _ in range(often(200)):
         burst = turned(Transmitter().modulate([bytes(9)], 0), rng.uniform(-0.02, 0.02))
         events = receiver.push(noisy(rng, np.concatenate((silence(500), burst)), -2))
         n_found += sum(isinstance(event, BurstOver) for event in events)
-    assert n_found > 0.9 * 200
+    assert n_found > 0.9 * often(200)
 
 
 networks = pytest.mark.parametrize("network", [0, None])
 
 
+@pytest.mark.soak
 @networks
 def test_nothing_is_heard_in_noise(network):
     rng = np.random.default_rng(SEED)
-    counters = quiet(noise(rng, 2_000_000), network)
-    assert counters["samples"] == 2_000_000
-    assert counters["triggers"] < 100
-    assert counters["preambles"] == counters["bursts"] == 0
+    for _ in range(often(1)):
+        counters = quiet(noise(rng, 2_000_000), network)
+        assert counters["samples"] == 2_000_000
+        assert counters["triggers"] < 100
+        assert counters["preambles"] == counters["bursts"] == 0
 
 
 @networks

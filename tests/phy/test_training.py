@@ -62,6 +62,7 @@ def test_least_squares_tells_gains_and_noise():
     assert power == pytest.approx(np.sum(np.abs(h) ** 2), rel=0.03)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("boost", [0.7, 1.0, 1.41])
 def test_a_header_tells_how_much_stronger_the_preamble_was(boost):
     """The channel is that of the header, with all four symbols' help."""

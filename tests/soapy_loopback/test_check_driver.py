@@ -13,6 +13,7 @@ ROOT = Path(__file__).parents[2]
 PYTHON = "/usr/bin/python3"
 
 
+@pytest.mark.realtime
 @pytest.mark.slow
 def test_driver_passes_its_checks():
     if why := missing():

@@ -345,6 +345,7 @@ def test_the_ledger_adds_up_at_every_step(sources):
     assert kinds <= set(lost), lost
 
 
+@pytest.mark.slow
 def test_flood_of_partial_messages_stays_bounded():
     reassembly = make()
     limits = ReassemblyLimits()
