@@ -27,6 +27,10 @@ class TopicReport(msgspec.Struct, frozen=True, kw_only=True):
     reoffered: int = 0
     """Of those accepted: sent again to robots that came late."""
     dropped: dict[str, int] = {}
+    lifespan_s: float | None = None
+    """After that its messages are not sent any more; null: they have no end."""
+    lifespan_from: str = ""
+    """Who says so: topic | class; empty: nobody."""
     queue_ms: float | None = None
     """Of what they waited, lately: for others before them; for the air; for another chance."""
     access_ms: float | None = None

@@ -6,6 +6,7 @@ from sdrlinkd.link.carrier import CarrierTraits, Opportunity, Sensed
 from sdrlinkd.link.compression import Deflated, train_dictionary
 from sdrlinkd.link.delivered import CDR_HEADER_SIZE, Delivered
 from sdrlinkd.link.ledger import RX_PDU_REASONS, RX_REASONS, TX_REASONS
+from sdrlinkd.link.lifespan import Lifespan, lifespan_of
 from sdrlinkd.link.link import Link
 from sdrlinkd.link.message import Outgoing
 from sdrlinkd.link.outbox import Outbox
@@ -26,8 +27,12 @@ from sdrlinkd.link.schedule import (
     OVERRUN,
     SHARED_OVERRUN,
     Allowance,
+    BulkParams,
     ClassesParams,
     ClassParams,
+    DefaultParams,
+    LatencyParams,
+    UrgentParams,
 )
 from sdrlinkd.link.timesync import ClockParams, DualEnvelope, PaperFilter, State, Wall
 from sdrlinkd.link.why import Told
@@ -45,14 +50,18 @@ __all__ = [
     "TX_REASONS",
     "AccessParams",
     "Allowance",
+    "BulkParams",
     "Burst",
     "CarrierTraits",
     "ClassParams",
     "ClassesParams",
     "ClockParams",
+    "DefaultParams",
     "Deflated",
     "Delivered",
     "DualEnvelope",
+    "LatencyParams",
+    "Lifespan",
     "Link",
     "LinkParams",
     "Opportunity",
@@ -72,9 +81,11 @@ __all__ = [
     "State",
     "Told",
     "TopicPolicy",
+    "UrgentParams",
     "Verdict",
     "Wall",
     "check_access",
+    "lifespan_of",
     "link_notices",
     "link_report",
     "make_access",

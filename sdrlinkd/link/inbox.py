@@ -134,7 +134,7 @@ class Inbox:
             origin_at = self._ages.look(pdu.src, topic_id, entry.entry_id).at
             if origin_at is None:
                 return INFINITE
-            lifespan_s = self.policies.get(topic_id, DEFAULT_POLICY).lifespan_s
+            lifespan_s = self.policies.get(topic_id, DEFAULT_POLICY).own_lifespan_s
             until = max(until, origin_at + lifespan_s)
         return until if until > -INFINITE else INFINITE
 
@@ -280,9 +280,9 @@ def _refusal(
         return "rx_bad_cdr"
     if policy.max_bytes and len(payload) > policy.max_bytes:
         return "rx_size_cap"
-    if policy.lifespan_s < INFINITE:
+    if policy.own_lifespan_s < INFINITE:
         if origin_at is None:
             return "rx_no_age" if policy.stamp else None
-        if now - origin_at > policy.lifespan_s:
+        if now - origin_at > policy.own_lifespan_s:
             return "rx_expired"
     return None

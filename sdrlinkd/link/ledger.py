@@ -19,7 +19,7 @@ TX_REASONS = {
     "tx_topic_full": "the topic's own bound; its oldest went",
     "tx_overflow_old": "shed from a full queue: oldest of the lowest class",
     "tx_overflow_new": "refused by a full queue that holds only higher classes",
-    "tx_expired": "its lifespan ended before it was sent",
+    "tx_expired": "its lifespan (its own, its topic's or its class's) ended before it was sent",
     "tx_stalled": "nothing of it could be sent for as long as receivers wait for the rest",
     "tx_radio_down": "no radio to send it",
     "tx_radio_failed": "the radio reported that a burst did not leave whole",

@@ -97,6 +97,7 @@ def _topics(link: Link, now: float, names_in: dict[int, str]) -> list[TopicRepor
     for topic in link.registry.topics:
         tally = link.sender.tally(topic.id)
         qos, priority = link.sender.treatment(topic.id)
+        lifespan = link.sender.lifespan(topic.id)
         reports.append(
             TopicReport(
                 topic_id=topic.id,
@@ -105,6 +106,8 @@ def _topics(link: Link, now: float, names_in: dict[int, str]) -> list[TopicRepor
                 subscribed=topic.id in names_in,
                 qos=qos.label,
                 priority=priority,
+                lifespan_s=lifespan.seconds if lifespan.source else None,
+                lifespan_from=lifespan.source,
                 accepted=tally.accepted,
                 accepted_per_s=link.rates.per_s(("tx", topic.id), tally.accepted, now),
                 sent=tally.sent,
@@ -199,7 +202,7 @@ def link_notices(link: Link) -> list[str]:
         )
     least_s = link.departures.least_s
     for topic in link.registry.topics:
-        lifespan_s = link.sender.policy(topic.id).lifespan_s
+        lifespan_s = link.sender.lifespan(topic.id).seconds
         if lifespan_s < least_s:
             notices.append(
                 f"{topic.name}: lifespan_s of {1e3 * lifespan_s:.3g} ms can never be met: composing"

@@ -9,6 +9,7 @@ from sdrlinkd.link.burst import Burst, Outcome
 from sdrlinkd.link.draft import BuiltPdu
 from sdrlinkd.link.latched import Offer
 from sdrlinkd.link.ledger import TxTally, balance
+from sdrlinkd.link.lifespan import Lifespan, lifespan_of
 from sdrlinkd.link.message import Fate, Outgoing
 from sdrlinkd.link.outbox import Outbox
 from sdrlinkd.link.packetizer import Packetizer
@@ -40,6 +41,7 @@ class Sender:
         dictionaries: Mapping[int, ZstdCompressionDict],
     ) -> None:
         self._max_message_size = max_message_size(params.pdu_size)
+        self._classes = classes
         self.outbox = Outbox(queue)
         self.packetizer = Packetizer(
             params, src, self.outbox, rng, reassembly_timeout_s, registry.has_control, classes
@@ -82,7 +84,8 @@ class Sender:
         """Queue a latched message for a robot that came late, as old as it is."""
         topic_id, (payload, at, overrides), dst = offer
         topic = self._topics[topic_id]
-        if at + topic.policy.lifespan_s <= now:
+        lifespan_s = overrides.lifespan_s or self.lifespan(topic_id, overrides.qos).seconds
+        if at + lifespan_s <= now:
             return
         topic.tally.accepted += 1
         topic.tally.reoffered += 1
@@ -110,6 +113,8 @@ class Sender:
         if len(payload) > self._max_message_size:
             topic.tally.drop("tx_too_big")
             return "tx_too_big"
+        if lifespan_s is None:
+            lifespan_s = self.lifespan(topic_id, qos).seconds
         message = Outgoing(
             topic_id,
             payload,
@@ -117,7 +122,7 @@ class Sender:
             topic.priority if priority is None else priority,
             topic.dst if dst is None else dst,
             at,
-            at + (topic.policy.lifespan_s if lifespan_s is None else lifespan_s),
+            at + lifespan_s,
             topic.stamp or (bool(receipt) and self._has_control),
             topic.tally,
         )
@@ -234,6 +239,11 @@ class Sender:
         """Class and priority that a topic's messages get by default."""
         topic = self._topics[topic_id]
         return topic.qos, topic.priority
+
+    def lifespan(self, topic_id: int, qos: Qos | None = None) -> Lifespan:
+        """That of a topic's messages that name none; of class `qos`, else of the topic's."""
+        topic = self._topics[topic_id]
+        return lifespan_of(topic.policy, topic.qos if qos is None else qos, self._classes)
 
     def audit(self) -> list[str]:
         """What does not add up in the TX ledger; empty when all does."""

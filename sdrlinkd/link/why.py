@@ -56,9 +56,8 @@ class Why:
             n = self._lately(("drop", topic_id, reason), total, now)
             if n:
                 short = short or reason in OVERFLOW
-                lines.append(
-                    f"{_share(n, came)} {self._said(reason, policy, told)} ({reason}, {n})"
-                )
+                said = self._said(reason, topic_id, policy, told)
+                lines.append(f"{_share(n, came)} {said} ({reason}, {n})")
         waiting = self._sender.outbox.queued_of_topic(topic_id)
         if waiting:
             lines.append(f"{waiting} wait")
@@ -70,8 +69,11 @@ class Why:
         state_dst = self._sender.destination(topic_id)
         to = "everyone" if state_dst == BROADCAST else f"robot {state_dst}"
         line = f"{name}: class {policy.qos}, priority {policy.priority}, to {to}"
-        if policy.lifespan_s < INFINITE:
-            line += f", worthless after {_seconds(policy.lifespan_s)}"
+        lifespan = self._sender.lifespan(topic_id)
+        if lifespan.source:
+            line += f", worthless after {_seconds(lifespan.seconds)}"
+            if lifespan.source == "class":
+                line += " as its class says"
         if policy.compress != "none":
             line += f", compressed with {policy.compress}"
         if policy.durability == "transient_local":
@@ -79,17 +81,26 @@ class Why:
         by = f"set while running: {', '.join(sorted(told.changed))}" if told.changed else ""
         return f"{line} ({'; '.join(each for each in (told.source, by) if each)})"
 
-    def _said(self, reason: str, policy: TopicPolicy, told: Told) -> str:
+    def _said(self, reason: str, topic_id: int, policy: TopicPolicy, told: Told) -> str:
         if reason == "tx_throttled":
             by = "sdrlinkctl set" if "period_s" in told.changed else told.source
             return f"throttled to {1 / policy.period_s:.3g} Hz by {by}"
         if reason == "tx_superseded":
             return f"gave way to newer ones: depth {policy.kept}"
         if reason == "tx_expired":
-            return f"were older than {_seconds(policy.lifespan_s)} before their turn came"
+            return self._too_old(topic_id, policy)
         if reason in ("tx_overflow_old", "tx_overflow_new", "tx_topic_full"):
             return f"shed: {TX_REASONS[reason]}"
         return f"dropped: {TX_REASONS[reason]}"
+
+    def _too_old(self, topic_id: int, policy: TopicPolicy) -> str:
+        lifespan = self._sender.lifespan(topic_id)
+        if not lifespan.source:
+            # Each message says it itself.
+            return "were older than their producer allows before their turn came"
+        of_class = lifespan.source == "class"
+        whose = f", the lifespan of class {policy.qos}," if of_class else ""
+        return f"were older than {_seconds(lifespan.seconds)}{whose} before their turn came"
 
     def _air(self, qos: Qos, now: float) -> str:
         used = {

@@ -16,6 +16,7 @@ from sdrlinkd.link import (
     ClassesParams,
     Qos,
     TopicPolicy,
+    lifespan_of,
 )
 from sdrlinkd.modem import Airtimes
 from sdrlinkd.plan.traffic import Load, after_policy
@@ -111,7 +112,8 @@ def make_plan(loads: Sequence[Load], policies: Mapping[int, TopicPolicy], settin
     topics = [
         TopicPlan(
             task.load.name, task.qos.label, task.load.rate_hz, task.load.size, task.pdus,
-            task.cost_s / task.period_s, _worst_s(task, tasks, setting), task.policy.lifespan_s,
+            task.cost_s / task.period_s, _worst_s(task, tasks, setting),
+            lifespan_of(task.policy, task.qos, setting.classes).seconds,
             8e-6 * task.load.rate_hz * task.load.size,
         )
         for task in tasks

@@ -2,16 +2,27 @@
 
 from sdrlinkd.link.schedule.allowance import OVERRUN, SHARED_OVERRUN, Allowance, Limits
 from sdrlinkd.link.schedule.forecast import Forecasts
-from sdrlinkd.link.schedule.params import ClassesParams, ClassParams
+from sdrlinkd.link.schedule.params import (
+    BulkParams,
+    ClassesParams,
+    ClassParams,
+    DefaultParams,
+    LatencyParams,
+    UrgentParams,
+)
 from sdrlinkd.link.schedule.shares import Shares
 
 __all__ = [
     "OVERRUN",
     "SHARED_OVERRUN",
     "Allowance",
+    "BulkParams",
     "ClassParams",
     "ClassesParams",
+    "DefaultParams",
     "Forecasts",
+    "LatencyParams",
     "Limits",
     "Shares",
+    "UrgentParams",
 ]
