@@ -176,6 +176,12 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
 
     pdu_size: int
     access: str
+    access_policy: str = "none"
+    """The one in force; where access.policy is auto, the one that was chosen."""
+    access_reason: str = ""
+    """Why that one."""
+    access_share_pct: float = 100.0
+    """Of the air, what it carries on this radio: bursts of all robots, when all always send."""
     airtime_s: float
     """Time on the air, all bursts together."""
     air_sent_pct: float = 0.0

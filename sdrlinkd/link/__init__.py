@@ -1,6 +1,14 @@
 """The link: queues, packing, duplicates, ages and the ledger, as a calculator over `now`."""
 
-from sdrlinkd.link.access import AccessParams, check_access, make_access
+from sdrlinkd.link.access import (
+    AccessParams,
+    Settled,
+    check_access,
+    make_access,
+    may_share,
+    percent,
+    settle,
+)
 from sdrlinkd.link.burst import Burst, Outcome
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity, Sensed
 from sdrlinkd.link.compression import Deflated, train_dictionary
@@ -19,7 +27,7 @@ from sdrlinkd.link.qos import (
     Overrides,
     Qos,
 )
-from sdrlinkd.link.rate import RateChange, RateParams
+from sdrlinkd.link.rate import RateChange, RateControl, RateParams
 from sdrlinkd.link.receipts import Verdict
 from sdrlinkd.link.relay import Relay, RelayParams
 from sdrlinkd.link.report import link_notices, link_report
@@ -73,11 +81,13 @@ __all__ = [
     "Qos",
     "QueueParams",
     "RateChange",
+    "RateControl",
     "RateParams",
     "ReassemblyParams",
     "Relay",
     "RelayParams",
     "Sensed",
+    "Settled",
     "State",
     "Told",
     "TopicPolicy",
@@ -89,5 +99,8 @@ __all__ = [
     "link_notices",
     "link_report",
     "make_access",
+    "may_share",
+    "percent",
+    "settle",
     "train_dictionary",
 ]

@@ -104,6 +104,8 @@ class Inbox:
             return self._drop("rx_relayed" if is_sent_on else "rx_not_for_us")
         for record in records or ():
             if isinstance(record, Beacon):
+                if not is_relayed:
+                    self._ear.record_from(pdu.src, record, at)
                 if neighbor.take_beacon(record):
                     neighbor.track.restart(seq, crc)
                     self._ear.newcomer(pdu.src, at)

@@ -7,6 +7,7 @@ from zstandard import ZstdCompressionDict
 
 from sdrlinkd.link.access import Access, AccessParams
 from sdrlinkd.link.admission import NOT_TAKEN
+from sdrlinkd.link.air_use import AirUse
 from sdrlinkd.link.beacons import Beacons
 from sdrlinkd.link.burst import Burst, Outcome
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity
@@ -30,6 +31,7 @@ from sdrlinkd.link.why import Told, Why
 from sdrlinkd.reports import RATE_WINDOW_S
 from sdrlinkd.wire import (
     CONTROL_TOPIC_ID,
+    Beacon,
     Clock,
     Frame,
     LinkReport,
@@ -74,20 +76,15 @@ class Link:
         self.params = params
         self.registry = registry
         self.own_id = own_id
+        self._own_src = bytes((own_id,))
         self.digest = registry.digest({i: each.dict_id() for i, each in dictionaries.items()})
         self.sender = Sender(
             params, queue, registry, own_id, rng, reassembly.timeout_s, classes, dictionaries
         )
         self.inbox = Inbox(
-            params,
-            reassembly,
-            registry,
-            own_id,
-            hears_self,
-            self,
-            Inflated(dictionaries),
+            params, reassembly, registry, own_id, hears_self, self, Inflated(dictionaries),
             max_expanded,
-        )
+        )  # fmt: skip
         self.rates = RateMeter(RATE_WINDOW_S)
         self.waits: dict[tuple[int, int], Waits] = {}
         """Why messages waited at their source, as that tells: by (source, topic id)."""
@@ -100,18 +97,13 @@ class Link:
         room = self.sender.packetizer.k_single
         self.tellings = Tellings(clock, self.clocks, spare, neighbors, room)
         self.departures = Departures(
-            self.sender,
-            self.inbox,
-            beacons,
-            self.tellings,
-            classes,
-            own_id,
-            registry.has_control,
+            self.sender, self.inbox, beacons, self.tellings, classes, own_id, registry.has_control,
             rng,
-        )
+        )  # fmt: skip
         self.outcomes = Outcomes(self.sender, self.tellings, neighbors, own_id, params.receipt_s)
         self._latched = Latched()
-        self._why = Why(self.sender, self.departures.shares)
+        self.air = AirUse(self.departures)
+        self._why = Why(self.sender, self.departures.shares, self.air)
         self.relay = Relay(relay, own_id)
 
     def attach(self, carrier: CarrierTraits, access: AccessParams, rate: RateParams) -> None:
@@ -197,6 +189,8 @@ class Link:
         """
         if ended_at is None:
             ended_at = at
+        if data[1:2] != self._own_src:
+            self.air.heard(at, ended_at)
         return self.inbox.hear(data, at, snr_db, at if now is None else now, ended_at)
 
     def delivered(self, message: Delivered, now: float) -> float | None:
@@ -288,6 +282,8 @@ class Link:
                 self.rate.take(src, record, at)
             else:
                 self.access.told_of(record.node, at)
+        elif isinstance(record, Beacon):
+            self.access.beacon(src)
         elif isinstance(record, Frame):
             self.access.take_frame(src, record, at)
         elif isinstance(record, Clock) and src != self.own_id:

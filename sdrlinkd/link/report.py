@@ -26,6 +26,9 @@ def link_report(
     return LinkReport(
         pdu_size=link.params.pdu_size,
         access=link.access.state,
+        access_policy=link.departures.settled.policy,
+        access_reason=link.departures.settled.reason,
+        access_share_pct=100 * link.departures.settled.share,
         airtime_s=link.departures.airtime_s,
         control_airtime_s=link.departures.control_airtime_s,
         control_period_s=link.tellings.period_s,

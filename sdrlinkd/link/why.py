@@ -3,6 +3,7 @@
 from collections.abc import Collection, Hashable
 from typing import NamedTuple
 
+from sdrlinkd.link.air_use import AirUse
 from sdrlinkd.link.ledger import TX_REASONS
 from sdrlinkd.link.meters import RateMeter
 from sdrlinkd.link.policy import INFINITE, TopicPolicy
@@ -13,6 +14,8 @@ from sdrlinkd.wire import BROADCAST
 
 MINUTE_S = 60.0
 STEP_S = 2.0
+FULL = 0.85
+"""No policy leaves much less than the rest idle."""
 OVERFLOW = ("tx_overflow_old", "tx_overflow_new", "tx_topic_full", "tx_superseded", "tx_expired")
 """Reasons that more air would have cured."""
 
@@ -27,13 +30,16 @@ class Told(NamedTuple):
 class Why:
     """Remembers the last minute."""
 
-    def __init__(self, sender: Sender, shares: Shares) -> None:
+    def __init__(self, sender: Sender, shares: Shares, air: AirUse) -> None:
         self._sender = sender
         self._shares = shares
+        self._air_use = air
+        self._began_at = float("inf")
         self._meter = RateMeter(MINUTE_S, STEP_S)
 
     def sample(self, now: float, n_topics: int) -> None:
         """Now and then."""
+        self._began_at = min(self._began_at, now)
         if self._meter.is_due(now):
             self._meter.sample(self._counters(n_topics), now)
 
@@ -63,6 +69,7 @@ class Why:
             lines.append(f"{waiting} wait")
         if short or waiting:
             lines.append(self._air(Qos(self._sender.treatment(topic_id)[0]), now))
+            lines += self._idle(now)
         return lines
 
     def _treatment(self, name: str, policy: TopicPolicy, told: Told, topic_id: int) -> str:
@@ -119,6 +126,24 @@ class Why:
             f" (the others: {others})" if others else ""
         )
 
+    def _idle(self, now: float) -> list[str]:
+        """An air that is full, or idles between turns."""
+        over_s = min(MINUTE_S, now - self._began_at)
+        if over_s <= 0:
+            return []
+        sent, heard = (
+            1e-6 * self._lately(("air", each), round(1e6 * used_s), now) / over_s
+            for each, used_s in self._used_s().items()
+        )
+        busy = min(1.0, sent + heard)
+        words = self._air_use.idle_words(1 - busy)
+        if words is None:
+            words = f"the air was {'full' if busy > FULL else f'in use {100 * busy:.0f} %'}"
+        return [f"{words} (ours {100 * min(1.0, sent):.0f} %, others' {100 * heard:.0f} %)"]
+
+    def _used_s(self) -> dict[str, float]:
+        return {"sent": self._air_use.sent_s, "heard": self._air_use.heard_s}
+
     def _lately(self, key: Hashable, value: int, now: float) -> int:
         return self._meter.grown(key, value, now)
 
@@ -126,6 +151,8 @@ class Why:
         counters: dict[Hashable, int] = {
             ("air", qos): round(1e6 * used_s) for qos, used_s in self._shares.used_s.items()
         }
+        for each, used_s in self._used_s().items():
+            counters["air", each] = round(1e6 * used_s)
         for topic_id in range(n_topics):
             tally = self._sender.tally(topic_id)
             counters["accepted", topic_id] = tally.accepted

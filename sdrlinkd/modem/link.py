@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import phy
 from backends import BackendError, Radio, RxBlock, Tuning
@@ -30,8 +30,8 @@ class ModemLink:
     """A PDU link over a radio: the PHY off the event loop, everything else on it.
 
     In lock-step all of it is done within the block that brought it. `listens`: someone wants to
-    know whether there is a carrier on the air. `lead_grows`: bursts that must leave at a given
-    moment are handed over earlier when the machine proves to be slow.
+    know whether there is a carrier on the air. `lead_grows`: whether, on a radio like that, bursts
+    that must leave at a given moment are handed over earlier when the machine proves to be slow.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class ModemLink:
         radio: Radio,
         kind: str,
         listens: bool = False,
-        lead_grows: bool = False,
+        lead_grows: Callable[[CarrierTraits], bool] = lambda _: False,
     ) -> None:
         self._params = params
         self._radio = radio
@@ -55,7 +55,8 @@ class ModemLink:
         )
         sense = phy.CarrierSense(params.carrier_db) if listens else None
         self._ear = Ear(self._receiver, sense, params.rate_hz)
-        self._lead_grows = lead_grows
+        self._may_lead_grow = lead_grows
+        self._lead_grows = False
         self._clock = StreamClock(params.rate_hz, paced=True)
         self._plan = AirPlan(0)
         self._rx: Demodulation | None = None
@@ -81,6 +82,7 @@ class ModemLink:
         can = self._radio.capabilities
         traits = carrier_traits(self._kind, can, params, self._airtimes)
         self._can = can
+        self._lead_grows = self._may_lead_grow(traits)
         self._clock = StreamClock(params.rate_hz, can.paced, can.lockstep)
         lead, ahead = traits.lead_s * params.rate_hz, traits.ahead_s * params.rate_hz
         self._plan = AirPlan(math.ceil(lead), round(ahead))

@@ -22,6 +22,7 @@ from backends import (
 )
 from sdrlinkd.config import Config, SoapyParams
 from sdrlinkd.errors import ConfigError, UserError
+from sdrlinkd.link import CarrierTraits, RateControl, may_share, settle
 from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.link import ModemLink
 
@@ -35,14 +36,14 @@ PDU_BACKENDS = ("direct", "gnuradio")
 def make_modem(config: Config, node_id: int, rng: Random) -> ModemLink:
     """The modem on the radio that `config.backend` names. Raises UserError."""
     _check_airtime(config)
-    policy = config.access.policy
+    access = config.access
     return ModemLink(
         config.modem,
         config.link.pdu_size,
         make_radio(config, node_id, rng, _longest_burst_s(config)),
         config.backend,
-        listens=policy != "none",
-        lead_grows=policy == "tdma",
+        listens=may_share(access, node_id),
+        lead_grows=lambda traits: _has_slots(config, node_id, traits),
     )
 
 
@@ -62,6 +63,17 @@ def make_radio(config: Config, node_id: int, rng: Random, longest_s: float) -> R
         raise UserError(str(error)) from None
     factor = config.modem.oversampling
     return OversampledRadio(radio, factor) if factor > 1 else radio
+
+
+def _has_slots(config: Config, node_id: int, traits: CarrierTraits) -> bool:
+    """Whether access comes to tdma; what is refused is so where the link is fitted to the radio."""
+    longest_s = traits.longest_in_use_s(
+        RateControl(config.rate, traits.needed_snr_db, traits.mcs).usable
+    )
+    try:
+        return settle(config.access, node_id, traits, longest_s, Random(0)).policy == "tdma"
+    except ConfigError:
+        return False
 
 
 def _make_radio(config: Config, node_id: int, rng: Random, longest_s: float) -> Radio:
