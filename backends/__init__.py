@@ -26,11 +26,13 @@ from backends.samples import SAMPLE_TYPES
 from backends.soapy import (
     DeviceSurvey,
     Outlook,
+    Presumed,
     SoapyRadio,
     SoapySettings,
     Survey,
     WaySurvey,
     outlook,
+    presume,
     survey,
 )
 from backends.writing import Annotation, RecordingWriter
@@ -88,6 +90,7 @@ __all__ = [
     "Outage",
     "Outlook",
     "OversampledRadio",
+    "Presumed",
     "Radio",
     "RadioParams",
     "RecordingInfo",
@@ -111,6 +114,7 @@ __all__ = [
     "describe",
     "open_endpoint",
     "outlook",
+    "presume",
     "refuse_same",
     "survey",
 ]

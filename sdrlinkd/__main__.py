@@ -25,8 +25,8 @@ def main(arguments: list[str] | None = None) -> int:
     try:
         setup = _read(options.config)
         if options.check:
-            daemon.check(setup)
-            sys.stdout.write("\n".join([*setup.summary(), "the configuration is good", ""]))
+            told = daemon.check(setup)
+            sys.stdout.write("\n".join([*setup.summary(), *told, "the configuration is good", ""]))
             return 0
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
             runner.run(daemon.run(setup, lambda: _read(options.config)))

@@ -1,5 +1,6 @@
 """Real radios, through SoapySDR (https://github.com/pothosware/SoapySDR)."""
 
+from backends.soapy.natures import Presumed, presume
 from backends.soapy.outlook import Outlook, outlook
 from backends.soapy.radio import SoapyRadio
 from backends.soapy.settings import SoapySettings
@@ -8,10 +9,12 @@ from backends.soapy.survey import DeviceSurvey, Survey, WaySurvey, survey
 __all__ = [
     "DeviceSurvey",
     "Outlook",
+    "Presumed",
     "SoapyRadio",
     "SoapySettings",
     "Survey",
     "WaySurvey",
     "outlook",
+    "presume",
     "survey",
 ]

@@ -32,6 +32,7 @@ from sdrlinkd.link.receipts import Verdict
 from sdrlinkd.link.relay import Relay, RelayParams
 from sdrlinkd.link.report import link_notices, link_report
 from sdrlinkd.link.schedule import (
+    IDLE_SHARE,
     OVERRUN,
     SHARED_OVERRUN,
     Allowance,
@@ -49,6 +50,7 @@ __all__ = [
     "AS_CONFIGURED",
     "CDR_HEADER_SIZE",
     "DEFAULT_POLICY",
+    "IDLE_SHARE",
     "MAX_PRIORITY",
     "OVERRUN",
     "QOS_BY_LABEL",

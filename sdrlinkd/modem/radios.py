@@ -103,19 +103,24 @@ def _make_radio(config: Config, node_id: int, rng: Random, longest_s: float) -> 
     return LoopbackRadio(channel, modem.block_s, paced=loopback.paced, hear_self=loopback.hear_self)
 
 
-def _make_soapy(config: Config, longest_s: float) -> Radio:
+def soapy_settings(config: Config) -> SoapySettings:
+    """What the device is to be set to."""
     modem, soapy = config.modem, config.soapy
-    settings = SoapySettings(
+    return SoapySettings(
         # What both have is called alike.
         **{name: getattr(soapy, name) for name in _SHARED},
         rate_hz=modem.rate_hz * modem.oversampling,
         frequency_hz=modem.frequency_hz,
         block_s=modem.block_s,
     )
+
+
+def _make_soapy(config: Config, longest_s: float) -> Radio:
+    modem, soapy = config.modem, config.soapy
     shifts = soapy.offset_tuning == "on" or (
         soapy.offset_tuning == "auto" and modem.oversampling > 1
     )
-    radio = SoapyRadio(settings, longest_s, soapy.dc_block)
+    radio = SoapyRadio(soapy_settings(config), longest_s, soapy.dc_block)
     return OffsetRadio(radio) if shifts else radio
 
 

@@ -1,6 +1,12 @@
 """How long the next burst may be, and whether it had better wait."""
 
-from sdrlinkd.link.schedule.allowance import OVERRUN, SHARED_OVERRUN, Allowance, Limits
+from sdrlinkd.link.schedule.allowance import (
+    IDLE_SHARE,
+    OVERRUN,
+    SHARED_OVERRUN,
+    Allowance,
+    Limits,
+)
 from sdrlinkd.link.schedule.forecast import Forecasts
 from sdrlinkd.link.schedule.params import (
     BulkParams,
@@ -13,6 +19,7 @@ from sdrlinkd.link.schedule.params import (
 from sdrlinkd.link.schedule.shares import Shares
 
 __all__ = [
+    "IDLE_SHARE",
     "OVERRUN",
     "SHARED_OVERRUN",
     "Allowance",
