@@ -85,7 +85,7 @@ def _capabilities(config: Config, turnaround_s: float | None) -> tuple[Capabilit
         return (
             _simulated(config, turn_s, ETHER_LEAD_S),
             (
-                f"ether: taken for half duplex with a turnaround of {1e3 * turn_s:g} ms, in blocks of "
+                f"ether: taken for half duplex, turnaround {1e3 * turn_s:g} ms, in blocks of "
                 f"{1e3 * modem.block_s:g} ms: the hub tells when the daemon is there"
             ),
             False,

@@ -8,7 +8,7 @@ from sdrlinkd.config import Config
 from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import CarrierTraits, Settled, percent, settle
 from sdrlinkd.modem import PresumedRadio, presume_radio
-from sdrlinkd.plan.model import Setting
+from sdrlinkd.plan.air import Setting
 
 HOST_S = 0.01
 """What the machines at both ends add, at most: buses, event loops and demodulation, on a machine

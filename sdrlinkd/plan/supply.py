@@ -52,7 +52,8 @@ def supply_of(
         open_s = max(burst_s, slot_s - 2 * pdu_s)
         if traits.spell_s < INFINITE:
             return _one_spell_a_slot(traits, access.round_s, open_s, burst_s)
-        gap_s = access.round_s - slot_s + burst_s + decided_s + traits.react_s
+        missed_s = max(burst_s, access.step_s)
+        gap_s = access.round_s - slot_s + missed_s + decided_s + traits.react_s
         return Supply(gap_s, open_s, access.round_s - open_s)
     if traits.spell_s < INFINITE:
         # Too late for a spell is who comes `follow` before it ends.

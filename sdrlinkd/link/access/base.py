@@ -62,6 +62,10 @@ class Access(Protocol):
     def share(self) -> float:
         """Of the air, what one robot has when all want to send, were it not for their bursts."""
 
+    @property
+    def step_s(self) -> float:
+        """In a turn that was not used from its begin, bursts begin so far apart; 0: anywhere."""
+
     def mean_wait_s(self, qos: Qos) -> float:
         """From the end of a carrier to a burst of that class, on average."""
 
@@ -125,6 +129,11 @@ class Carriers:
     def share(self) -> float:
         """All of it."""
         return 1.0
+
+    @property
+    def step_s(self) -> float:
+        """Anywhere."""
+        return 0.0
 
     def mean_wait_s(self, qos: Qos) -> float:  # noqa: ARG002  # not all ask for it
         """None."""

@@ -112,6 +112,11 @@ class Tdma(Carriers):
         """Our slot, but for its guard."""
         return (self._slot_s - self._guard_s) / self._frame_s
 
+    @property
+    def step_s(self) -> float:
+        """With reuse, others may have begun."""
+        return self._reuse * self._minislot_s * len(self._nodes)
+
     def carries(self, burst_s: float) -> float:
         """All but guards and gaps."""
         open_s = self._slot_s - self._guard_s
