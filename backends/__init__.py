@@ -30,6 +30,7 @@ from backends.samples import SAMPLE_TYPES
 from backends.soapy import (
     DeviceSurvey,
     Outlook,
+    Presumed,
     SoapyRadio,
     SoapySettings,
     Survey,
@@ -37,6 +38,7 @@ from backends.soapy import (
     driver_of,
     least_rate_hz,
     outlook,
+    presume,
     survey,
 )
 from backends.writing import Annotation, RecordingWriter
@@ -97,6 +99,7 @@ __all__ = [
     "Outlook",
     "OversampledRadio",
     "Patience",
+    "Presumed",
     "Radio",
     "RadioParams",
     "RecordingInfo",
@@ -123,6 +126,7 @@ __all__ = [
     "least_rate_hz",
     "open_endpoint",
     "outlook",
+    "presume",
     "refuse_same",
     "survey",
 ]

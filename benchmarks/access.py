@@ -117,7 +117,7 @@ def simulate(case: Case, duration_s: float, seed: int) -> Result:
         )
         for node in range(1, NODES + 1)
     }
-    access = AccessParams(policy=case.policy, nodes=list(radios), persist=case.persist)  # type: ignore[arg-type]
+    access = AccessParams(policy=case.policy, nodes=list(radios), persist=case.persist, force=True)  # type: ignore[arg-type]
     modem = ModemParams(rate_hz=RATE_HZ, mcs=MCS, max_burst_s=MAX_BURST_S)
     arrivals = {
         node: sorted(

@@ -25,6 +25,7 @@ from sdrlinkd.link import (
     QueueParams,
     RateParams,
     ReassemblyParams,
+    may_share,
 )
 from sdrlinkd.modem import ModemLink
 from sdrlinkd.pdulink import Heard
@@ -63,7 +64,7 @@ class Station:
             LinkParams(pdu_size=pdu_size), QueueParams(), ReassemblyParams(),
             make_registry(TOPICS), own_id, Random(seed), clock=clock,
         )  # fmt: skip
-        self.modem = ModemLink(modem, pdu_size, radio, "ether", access.policy != "none")
+        self.modem = ModemLink(modem, pdu_size, radio, "ether", may_share(access, own_id))
         self._access = access
         self._arrivals = iter(arrivals)
         self._next = next(self._arrivals, None)

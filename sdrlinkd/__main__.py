@@ -52,7 +52,7 @@ def _read(path: Path) -> Setup:
 
 def _checked(setup: Setup) -> list[str]:
     """What follows from the configuration, and what only the radio can tell. Raises UserError."""
-    daemon.check(setup)
+    told = daemon.check(setup)
     if setup.config.backend not in WITHOUT_AIR:
         # It brings the modem.
         from sdrlinkd.modem import check_airtime
@@ -66,7 +66,7 @@ def _checked(setup: Setup) -> list[str]:
         if unchecked(setup.config)
         else "the configuration is good"
     )
-    return [*setup.summary(), verdict]
+    return [*setup.summary(), *told, verdict]
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -20,9 +20,9 @@ from backends import Patience
 from sdrlinkd import __version__
 from sdrlinkd.bus import Bus, RuntimeDirectory
 from sdrlinkd.client import runtime_dir
-from sdrlinkd.config import Config, Setup
+from sdrlinkd.config import Config, Setup, located
 from sdrlinkd.control import Control
-from sdrlinkd.errors import UserError
+from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.health import Level
 from sdrlinkd.link import Link
 from sdrlinkd.loading import Loading
@@ -193,9 +193,16 @@ def _chrony(setup: Setup, stack: contextlib.AsyncExitStack) -> "ChronySocket | N
     return chrony
 
 
-def check(setup: Setup) -> None:
-    """What only the message types can tell. Raises ConfigError."""
+def check(setup: Setup) -> list[str]:
+    """What only the message types and the radio's nature can tell. Raises ConfigError."""
     _types_of(setup)
+    # The modem brings numba, which takes its time to load.
+    from sdrlinkd.modem import access_words
+
+    try:
+        return access_words(setup.config, setup.node_id)
+    except ConfigError as error:
+        raise ConfigError(located(str(error), setup.source)) from None
 
 
 def _transforms(setup: Setup) -> dict[int, "Transforms"]:

@@ -123,11 +123,11 @@ class Node:
             self._tell_verdicts()
 
     # The PDU link's listener.
-
     def attach(self, traits: CarrierTraits) -> None:
         """The PDU link is there: fit the link to it. Raises ConfigError."""
         config = self._opening.config
         self._link.attach(traits, config.access, config.rate)
+        log.info("access %s", self._link.departures.settled.sentence)
         self._is_lockstep = traits.is_lockstep
         if self._traffic is not None:
             self._traffic.begin(self._pdu_link.now())

@@ -61,11 +61,11 @@ class Policies:
         # As the link has it, not as we gave it.
         new = self._link.sender.policy(topic_id)
         self._announce()
-        told = {key: getattr(new, key) for key in changes}
+        told = {key: _told(getattr(new, key)) for key in changes}
         log.info("policy of %s: %s", self._setup.registry.topics[topic_id].name, told)
         return {
             "topic": self._setup.registry.topics[topic_id].name,
-            "old": {key: getattr(old, key) for key in changes},
+            "old": {key: _told(getattr(old, key)) for key in changes},
             "new": told,
         }
 
@@ -73,3 +73,8 @@ class Policies:
         if self.announce is not None:
             topics = self._setup.registry.topics
             self.announce({topic.id: self._link.sender.policy(topic.id) for topic in topics})
+
+
+def _told(value: object) -> object:
+    """As JSON can say it, which knows no infinity."""
+    return "inf" if value == float("inf") else value

@@ -27,6 +27,10 @@ class TopicReport(msgspec.Struct, frozen=True, kw_only=True):
     reoffered: int = 0
     """Of those accepted: sent again to robots that came late."""
     dropped: dict[str, int] = {}
+    lifespan_s: float | None = None
+    """After that its messages are not sent any more; null: they have no end."""
+    lifespan_from: str = ""
+    """Who says so: topic | class; empty: nobody."""
     queue_ms: float | None = None
     """Of what they waited, lately: for others before them; for the air; for another chance."""
     access_ms: float | None = None
@@ -176,6 +180,12 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
 
     pdu_size: int
     access: str
+    access_policy: str = "none"
+    """The one in force; where access.policy is auto, the one that was chosen."""
+    access_reason: str = ""
+    """Why that one."""
+    access_share_pct: float = 100.0
+    """Of the air, what it carries on this radio: bursts of all robots, when all always send."""
     airtime_s: float
     """Time on the air, all bursts together."""
     air_sent_pct: float = 0.0

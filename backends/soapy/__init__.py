@@ -1,6 +1,7 @@
 """Real radios, through SoapySDR (https://github.com/pothosware/SoapySDR)."""
 
 from backends.soapy.library import driver_of
+from backends.soapy.natures import Presumed, presume
 from backends.soapy.outlook import Outlook, outlook
 from backends.soapy.radio import SoapyRadio
 from backends.soapy.setting_up import least_rate_hz
@@ -10,6 +11,7 @@ from backends.soapy.survey import DeviceSurvey, Survey, WaySurvey, survey
 __all__ = [
     "DeviceSurvey",
     "Outlook",
+    "Presumed",
     "SoapyRadio",
     "SoapySettings",
     "Survey",
@@ -17,5 +19,6 @@ __all__ = [
     "driver_of",
     "least_rate_hz",
     "outlook",
+    "presume",
     "survey",
 ]

@@ -1,10 +1,13 @@
 """What `sdrlinkctl plan` says, against what happens."""
 
+from random import Random
+
 import numpy as np
 
+from backends import GAP
 from benchmarks.pound.ours import MAX_BURST_S, MCS, PDU_SIZE, RATE_HZ, Air, Run
 from sdrlinkd.config import ModemParams
-from sdrlinkd.link import Qos, TopicPolicy
+from sdrlinkd.link import AccessParams, CarrierTraits, Qos, TopicPolicy, settle
 from sdrlinkd.modem import Airtimes
 from sdrlinkd.plan import Load, Plan, Setting, make_plan
 
@@ -21,9 +24,12 @@ def plan_of(run: Run, air: Air) -> Plan:
         Load(i, flow.name, 1 / flow.period_s, flow.size + CDR_OVERHEAD, flow.size + CDR_OVERHEAD)
         for i, flow in enumerate(flows)
     ]
+    # In lock-step composing takes no time.
+    traits = CarrierTraits(is_lockstep=True, gap_s=GAP / RATE_HZ, react_s=air.block_s)
+    settled = settle(AccessParams(policy="none"), 1, traits, air.max_burst_s, Random(0))
     setting = Setting(
-        Airtimes(modem, PDU_SIZE), PDU_SIZE, MCS, air.max_burst_s, air.classes, 1, air.policy,
-        gap_s=5 / RATE_HZ, react_s=air.block_s, pause_s=dict.fromkeys(Qos, 0.0),
+        Airtimes(modem, PDU_SIZE), PDU_SIZE, MCS, air.max_burst_s, air.classes, 1, settled, traits,
+        host_s=0.0,
     )  # fmt: skip
     policies = {
         i: TopicPolicy(qos=flow.qos)  # type: ignore[arg-type]

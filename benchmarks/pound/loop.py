@@ -22,14 +22,24 @@ from benchmarks.pound.peers.control import (
 )
 from benchmarks.pound.tables import BLOCK_3N_S
 from sdrlinkd.lab import Arrival
-from sdrlinkd.link import ClassesParams, ClassParams, Delivered, Overrides, Qos
+from sdrlinkd.link import (
+    BulkParams,
+    ClassesParams,
+    DefaultParams,
+    Delivered,
+    LatencyParams,
+    Overrides,
+    Qos,
+)
 from sdrlinkd.wire import make_registry
 
 REGISTRY = make_registry([(name, "std_msgs/msg/UInt8MultiArray") for name in ("y", "u", "bulk")])
 Y, U, BULK = range(3)
 _DOUBLE = struct.Struct("<d")
-CLASSES = ClassesParams(bulk=ClassParams(share=0.05, max_burst_s=0.003))
-FIFO = ClassesParams(latency=ClassParams(), default=ClassParams(), bulk=ClassParams())
+CLASSES = ClassesParams(bulk=BulkParams(max_burst_s=0.003))
+FIFO = ClassesParams(
+    latency=LatencyParams(share=0.0), default=DefaultParams(share=0.0), bulk=BulkParams(share=0.0)
+)
 TWO = Air(policy="minislot", turnaround_s=1e-4, max_burst_s=0.01, block_s=BLOCK_3N_S)
 
 

@@ -13,8 +13,8 @@ from sdrlinkd.config import ModemParams
 from sdrlinkd.lab import Arrival, Simulation
 from sdrlinkd.link import (
     AccessParams,
+    BulkParams,
     ClassesParams,
-    ClassParams,
     Delivered,
     Link,
     LinkParams,
@@ -56,7 +56,7 @@ class Air(NamedTuple):
     turnaround_s: float = 0.0
     overrides: Sequence[LinkOverride] = ()
     max_burst_s: float = MAX_BURST_S
-    classes: ClassesParams = ClassesParams(bulk=ClassParams(share=0.05, max_burst_s=BULK_BURST_S))
+    classes: ClassesParams = ClassesParams(bulk=BulkParams(max_burst_s=BULK_BURST_S))
     block_s: float = BLOCK_S
     pdu_size: int = PDU_SIZE
     routes: Mapping[int, Sequence[str]] = {}

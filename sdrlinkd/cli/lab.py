@@ -71,7 +71,7 @@ def lab(
     scenario = find_scenario(scenario)
     chosen = chosen_scenario(scenario, seed, duration, pace)
     if access is not None:
-        section = {**chosen.daemon.get("access", {}), "policy": access.value}
+        section = {**chosen.daemon.get("access", {}), "policy": access.value, "force": True}
         chosen = msgspec.structs.replace(chosen, daemon={**chosen.daemon, "access": section})
     if bag is None and chosen.bag:
         bag = scenario.parent / chosen.bag

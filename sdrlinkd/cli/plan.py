@@ -10,7 +10,16 @@ from sdrlinkd.adapters import open_bag
 from sdrlinkd.cli.app import AsJson, app
 from sdrlinkd.config import Setup, load_config, make_setup
 from sdrlinkd.errors import UserError
-from sdrlinkd.plan import Load, Plan, loads_from_bag, make_plan, parse_load, setting_of
+from sdrlinkd.plan import (
+    HOST_S,
+    LeftOut,
+    Load,
+    Plan,
+    loads_from_bag,
+    make_plan,
+    parse_load,
+    setting_of,
+)
 from sdrlinkd.tables import FittedTable, figure, screen_console, words
 from sdrlinkd.units import seconds
 
@@ -27,36 +36,46 @@ def plan(
         list[str] | None, typer.Option(help="NAME:RATE:SIZE, such as scan:50:1KB; repeatable.")
     ] = None,
     bag: Annotated[Path | None, typer.Option(help="Rates and sizes from a recording.")] = None,
-    robots: Annotated[int, typer.Option(min=1, max=255, help="So many send the same.")] = 1,
+    robots: Annotated[
+        int | None,
+        typer.Option(min=1, max=255, help="So many send the same; else as access.nodes lists."),
+    ] = None,
     turnaround: Annotated[
-        str, typer.Option(help="Of the radio, from hearing to sending.")
-    ] = "0.1ms",
+        str | None, typer.Option(help="Of the radio, from hearing to sending; else as configured.")
+    ] = None,
+    host: Annotated[
+        str, typer.Option(help="What the machines add; `sdrlinkctl doctor` measures it.")
+    ] = f"{1e3 * HOST_S:g}ms",
     as_json: AsJson = False,
 ) -> None:
     """Airtime and worst-case latency by topic; exit code 1 when the air cannot carry it."""
     setup = make_setup(load_config(config), config.parent, str(config))
+    turnaround_s = None if turnaround is None else seconds(turnaround, "--turnaround")
+    setting = setting_of(setup.config, setup.node_id, robots, turnaround_s, seconds(host, "--host"))
     loads = [parse_load(text, setup.registry) for text in topic or []]
+    left_out: list[LeftOut] = []
     if bag is not None:
         told = {load.topic_id for load in loads}
-        loads += [load for load in _from_bag(bag, setup) if load.topic_id not in told]
+        found, left_out = _from_bag(bag, setup)
+        loads += [load for load in found if load.topic_id not in told]
     if not loads:
-        raise UserError("nothing to plan; name --bag FILE, or topics with --topic NAME:RATE:SIZE")
-    setting = setting_of(setup.config, robots, seconds(turnaround, "--turnaround"))
-    made = make_plan(sorted(loads), setup.policies, setting)
+        raise UserError(_nothing(left_out))
+    made = make_plan(sorted(loads), setup.policies, setting, left_out)
     if as_json:
         topics = [{**each._asdict(), "is_late": each.is_late} for each in made.topics]
         classes = [each._asdict() for each in made.classes]
-        text = {**made._asdict(), "topics": topics, "classes": classes}
+        left = [each._asdict() for each in made.left_out]
+        text = {**made._asdict(), "topics": topics, "classes": classes, "left_out": left}
         typer.echo(msgspec.json.encode(text).decode())
     else:
         console = screen_console()
-        for line in lines(made, robots):
+        for line in lines(made):
             console.print(line, highlight=False)
     if not made.is_feasible:
         raise typer.Exit(1)
 
 
-def lines(made: Plan, robots: int) -> list[FittedTable | str]:
+def lines(made: Plan) -> list[FittedTable | str]:
     """What a person reads."""
     table = FittedTable("plan", COLUMNS)
     for each in made.topics:
@@ -69,15 +88,26 @@ def lines(made: Plan, robots: int) -> list[FittedTable | str]:
     for qos in made.classes:
         if qos.air:
             table.add("", qos.qos, "", "", "", "", f"{100 * qos.air:.1f} %", "", style="dim")
-    all_of = "" if robots == 1 else f" by {robots} robots"
+    all_of = "" if made.robots == 1 else f" by {made.robots} robots"
+    if made.robots > 1 and made.policy == "none":
+        all_of = f" by each of {made.robots} robots"
     verdict = "feasible" if made.is_feasible else "NOT feasible"
-    return [table, f"{100 * made.air:.3g} % of the air{all_of}: {verdict}", *made.advice]
+    asked = f"{100 * made.air:.3g} % of what the air carries asked for{all_of}: {verdict}"
+    left_out = [f"left out: {name} ({n} messages): {why}" for name, n, why in made.left_out]
+    return [table, asked, *made.advice, *made.notes, *left_out]
 
 
-def _from_bag(path: Path, setup: Setup) -> list[Load]:
+def _nothing(left_out: list[LeftOut]) -> str:
+    if not left_out:
+        return "nothing to plan; name --bag FILE, or topics with --topic NAME:RATE:SIZE"
+    names = ", ".join(f"{each.name} ({each.why})" for each in left_out)
+    return f"--bag: nothing in it is planned: {names}; name topics with --topic NAME:RATE:SIZE"
+
+
+def _from_bag(path: Path, setup: Setup) -> tuple[list[Load], list[LeftOut]]:
     opened = open_bag(path)
     try:
         messages = ((each.topic, 1e-9 * each.time_ns, each.cdr) for each in opened.messages())
-        return loads_from_bag(messages, setup.registry, setup.policies)
+        return loads_from_bag(messages, setup.registry, setup.policies, setup.config.topics)
     finally:
         opened.close()

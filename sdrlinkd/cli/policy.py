@@ -85,7 +85,9 @@ def set_policy(
         return
     typer.echo(f"{answer['topic']}:")
     for key in changes:
-        typer.echo(f"  {key}: {_shown(answer['old'][key])} -> {_shown(answer['new'][key])}")
+        typer.echo(
+            f"  {key}: {_shown(key, answer['old'][key])} -> {_shown(key, answer['new'][key])}"
+        )
 
 
 @app.command()
@@ -100,7 +102,7 @@ def why(topic: Topic, runtime_dir: RuntimeDir = None, as_json: AsJson = False) -
         typer.echo(line)
 
 
-def _shown(value: object) -> str:
+def _shown(key: str, value: object) -> str:
     if value is None:
-        return "as in [link]"
+        return "that of its class" if key == "lifespan_s" else "as in [link]"
     return f"{value:g}" if isinstance(value, float) else str(value)

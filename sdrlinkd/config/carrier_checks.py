@@ -90,11 +90,11 @@ def _check_endpoints(config: Config) -> None:
 
 def _check_sharing(config: Config) -> None:
     policy = config.access.policy
-    if policy != "none" and config.backend in WITHOUT_AIR:
+    if policy not in ("auto", "none") and config.backend in WITHOUT_AIR:
         raise ConfigError(
             f'access.policy: got "{policy}", but the backend "{config.backend}" has no '
             "air that we could hear; "
-            'allowed: "none", or a backend with a radio'
+            'allowed: "auto" or "none", or a backend with a radio'
         )
     if config.rate.min_mcs > config.rate.max_mcs:
         raise ConfigError(

@@ -15,7 +15,7 @@ def unchecked(config: Config) -> list[str]:
         "zmq": ["whether the flowgraph answers, and sends this rate and format (it is not asked)"],
         "gnuradio": ["whether the flowgraph answers (it is not asked)"],
     }.get(backend, [])
-    if policy != "none" and found:
+    if policy not in ("none", "auto") and found:
         found.append(f'whether access.policy "{policy}" fits what the radio can do')
     return found
 

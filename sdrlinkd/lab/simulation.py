@@ -91,7 +91,8 @@ class Simulation:
     Decisions fall at the ends of blocks of `air.block_s`, as in a simulation of samples in
     lock-step. `watch` is told of every burst, `listen` of what
     a node gets, and when. `keep_s`: see BurstMedium. Raises ConfigError where
-    the radios cannot carry the access policy.
+    the radios cannot carry the access policy. `fit` makes another radio's traits of the air's own,
+    such as one that wants its bursts earlier.
     """
 
     def __init__(
@@ -108,6 +109,7 @@ class Simulation:
         rate: RateParams | None = None,
         seed: int = 0,
         keep_s: float = 0.0,
+        fit: Callable[[CarrierTraits], CarrierTraits] = lambda traits: traits,
         watch: Callable[[Flight], None] = lambda _: None,
         listen: Callable[[int, Delivered, float], None] = lambda *_: None,
     ) -> None:
@@ -127,8 +129,9 @@ class Simulation:
         for node, radio in radios.items():
             link = links[node]
             can = self._medium.join(node, radio)
-            traits = carrier_traits("ether", can, modem, airtimes)
+            traits = fit(carrier_traits("ether", can, modem, airtimes))
             link.attach(traits, access, rate or RateParams())
+            self._policy = link.departures.settled.policy
             pace, coming = 1 + 1e-6 * radio.clock_ppm, iter(arrivals.get(node, ()))
             least_s = traits.turnaround_s + airtimes.airtime_s(max(link.rate.usable), 1)
             station = self.stations[node] = Station(link, traits, pace, coming, least_s)
@@ -203,7 +206,7 @@ class Simulation:
             until, idle_since, burst_at = self._medium.sensed(link.own_id, self.now)
             burst_at = None if burst_at is None else burst_at * pace
             sensed = Sensed(until * pace, idle_since * pace, burst_at)
-            looks_at = _next_chance(station, self._access, sensed, now)
+            looks_at = _next_chance(station, self._policy, self._access, sensed, now)
             if looks_at > now:
                 break
             earliest = max(now + traits.lead_s, station.free_at)
@@ -238,7 +241,9 @@ class Simulation:
         for node, snr_db in self._medium.readers(flight, number, nodes):
             station = self.stations[node]
             link, pace = station.link, station.pace
-            for message in link.hear(pdu, flight.arrives[node] * pace, snr_db, self.now * pace):
+            at = flight.arrives[node]
+            ended_at = (at + flight.shape.pdus[number][1]) * pace
+            for message in link.hear(pdu, at * pace, snr_db, self.now * pace, ended_at):
                 age_s = link.delivered(message, self.now * pace)
                 pair = self.pairs[message.src, node, message.topic_id]
                 pair.received += 1
@@ -259,7 +264,9 @@ class Simulation:
         self._at(self._block(self.now + TICK_S), _ARRIVE, self._tick)
 
 
-def _next_chance(station: Station, access: AccessParams, sensed: Sensed, t: float) -> float:
+def _next_chance(
+    station: Station, name: str, access: AccessParams, sensed: Sensed, t: float
+) -> float:
     """Before this, and `t`, the link will not say anything else, if nothing new comes.
 
     All by the station's clock. In tdma: its own slot; with reuse, also those before that, so many
@@ -268,7 +275,7 @@ def _next_chance(station: Station, access: AccessParams, sensed: Sensed, t: floa
     policy, traits = station.link.access, station.traits
     frame = policy.frame(t + traits.lead_s)
     carrier_end = -INFINITE if sensed.burst_at is None else sensed.idle_since
-    if access.policy in ("csma", "minislot"):
+    if name in ("csma", "minislot"):
         return max(t, carrier_end, station.free_at - traits.gap_s)
     if frame is None:
         return t

@@ -1,12 +1,21 @@
 """The link: queues, packing, duplicates, ages and the ledger, as a calculator over `now`."""
 
-from sdrlinkd.link.access import AccessParams, check_access, make_access
+from sdrlinkd.link.access import (
+    AccessParams,
+    Settled,
+    check_access,
+    make_access,
+    may_share,
+    percent,
+    settle,
+)
 from sdrlinkd.link.burst import Burst, Outcome
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity, Sensed
 from sdrlinkd.link.compression import Deflated, train_dictionary
 from sdrlinkd.link.delivered import CDR_HEADER_SIZE, Delivered
 from sdrlinkd.link.flush import flush_told
 from sdrlinkd.link.ledger import RX_PDU_REASONS, RX_REASONS, TX_REASONS
+from sdrlinkd.link.lifespan import Lifespan, lifespan_of
 from sdrlinkd.link.link import Link
 from sdrlinkd.link.message import Outgoing
 from sdrlinkd.link.outbox import Outbox
@@ -19,16 +28,21 @@ from sdrlinkd.link.qos import (
     Overrides,
     Qos,
 )
-from sdrlinkd.link.rate import RateChange, RateParams
+from sdrlinkd.link.rate import RateChange, RateControl, RateParams
 from sdrlinkd.link.receipts import Verdict
 from sdrlinkd.link.relay import Relay, RelayParams
 from sdrlinkd.link.report import link_notices, link_report
 from sdrlinkd.link.schedule import (
+    IDLE_SHARE,
     OVERRUN,
     SHARED_OVERRUN,
     Allowance,
+    BulkParams,
     ClassesParams,
     ClassParams,
+    DefaultParams,
+    LatencyParams,
+    UrgentParams,
 )
 from sdrlinkd.link.timesync import ClockParams, Clocks, DualEnvelope, PaperFilter, State, Wall
 from sdrlinkd.link.why import Told
@@ -37,6 +51,7 @@ __all__ = [
     "AS_CONFIGURED",
     "CDR_HEADER_SIZE",
     "DEFAULT_POLICY",
+    "IDLE_SHARE",
     "MAX_PRIORITY",
     "OVERRUN",
     "QOS_BY_LABEL",
@@ -46,15 +61,19 @@ __all__ = [
     "TX_REASONS",
     "AccessParams",
     "Allowance",
+    "BulkParams",
     "Burst",
     "CarrierTraits",
     "ClassParams",
     "ClassesParams",
     "ClockParams",
     "Clocks",
+    "DefaultParams",
     "Deflated",
     "Delivered",
     "DualEnvelope",
+    "LatencyParams",
+    "Lifespan",
     "Link",
     "LinkParams",
     "Opportunity",
@@ -66,20 +85,27 @@ __all__ = [
     "Qos",
     "QueueParams",
     "RateChange",
+    "RateControl",
     "RateParams",
     "ReassemblyParams",
     "Relay",
     "RelayParams",
     "Sensed",
+    "Settled",
     "State",
     "Told",
     "TopicPolicy",
+    "UrgentParams",
     "Verdict",
     "Wall",
     "check_access",
     "flush_told",
+    "lifespan_of",
     "link_notices",
     "link_report",
     "make_access",
+    "may_share",
+    "percent",
+    "settle",
     "train_dictionary",
 ]

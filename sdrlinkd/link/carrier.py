@@ -1,6 +1,6 @@
 """What the link must know of that which carries its PDUs."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import NamedTuple
 
 INFINITE = float("inf")
@@ -29,6 +29,13 @@ class CarrierTraits(NamedTuple):
     overhead_s: float = 0.0
     """What a burst takes besides its PDUs."""
     gap_s: float = 0.0
+    spell_s: float = INFINITE
+    """It sends without listening for so long at most."""
+    spell_follow_s: float = 0.0
+    """What is decided so long before a burst is over leaves right behind it, else in the next
+    spell."""
+    spell_pause_s: float = 0.0
+    """Between two spells."""
     ahead_s: float = 0.0
     """A burst whose time is fixed may be decided so much before it has to be."""
     longest_burst_s: tuple[float, ...] = (0.0,)
@@ -39,6 +46,10 @@ class CarrierTraits(NamedTuple):
     needed_snr_db: tuple[float, ...] = (0.0,)
     stamp_s: float = 2e-4
     """How wrong the times may be at which bursts left and came."""
+
+    def longest_in_use_s(self, usable: Collection[int]) -> float:
+        """The longest burst of any of these MCS."""
+        return max(self.longest_burst_s[mcs] for mcs in usable)
 
 
 class Sensed(NamedTuple):

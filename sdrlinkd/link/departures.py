@@ -6,7 +6,7 @@ from itertools import chain
 from random import Random
 from typing import NamedTuple
 
-from sdrlinkd.link.access import Access, AccessParams, Free, Slot, Wish, make_access
+from sdrlinkd.link.access import Access, AccessParams, Free, Settled, Slot, Wish, settle
 from sdrlinkd.link.beacons import Beacons
 from sdrlinkd.link.burst import Burst, Outcome
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity
@@ -65,13 +65,15 @@ class Departures:
         self._ready_at: float | None = None
         self.waits = WaitMeters()
         self.access: Access = Free()
+        self.settled = Settled(self.access, "none", "as there is no radio yet", {"none": 1.0})
         self.rate = RateControl(RateParams(), (0.0,), 0)
 
     def attach(self, carrier: CarrierTraits, access: AccessParams, rate: RateParams) -> None:
         """Settle access and rate for the radio that is there. Raises ConfigError."""
         self.rate = RateControl(rate, carrier.needed_snr_db, carrier.mcs)
-        longest_s = max(carrier.longest_burst_s[mcs] for mcs in self.rate.usable)
-        self.access = make_access(access, self._own_id, carrier, longest_s, self._rng)
+        longest_s = carrier.longest_in_use_s(self.rate.usable)
+        self.settled = settle(access, self._own_id, carrier, longest_s, self._rng)
+        self.access = self.settled.access
         self._lead_s = carrier.lead_s
         lengths_s = [
             length_s for mcs, length_s in enumerate(carrier.pdu_burst_s) if mcs in self.rate.usable
@@ -87,11 +89,7 @@ class Departures:
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
         """The burst that should leave next, decided now; None: nothing to send, or not yet."""
-        earliest, airtime_s, sensed = (
-            opportunity.earliest,
-            opportunity.airtime_s,
-            opportunity.sensed,
-        )
+        earliest, airtime_s, _, sensed, _ = opportunity
         if self._returned:
             return self._again(opportunity)
         head = self._sender.outbox.head()

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 from sdrlinkd.errors import PduError
 from sdrlinkd.link.ages import Ages
-from sdrlinkd.link.airmeter import AirMeter
 from sdrlinkd.link.compression import Inflated
 from sdrlinkd.link.delivered import CDR_HEADER_SIZE, Delivered
 from sdrlinkd.link.ear import Ear
@@ -71,7 +70,6 @@ class Inbox:
         self._ages = Ages(reassembly.timeout_s)
         self.neighbors: dict[int, Neighbor] = {}
         self.tallies: dict[tuple[int, int], RxTally] = {}
-        self.air = AirMeter()
         self.pdus_heard = 0
         self.pdus_used = 0
         self.pdus_dropped: Counter[str] = Counter()
@@ -83,7 +81,6 @@ class Inbox:
     ) -> list[Delivered]:
         """Take a PDU whose burst's preamble arrived at `at`; the messages it completed."""
         self.pdus_heard += 1
-        self.air.note(at, ended_at)
         try:
             pdu = parse(data, self._pdu_size)
         except PduError as error:
@@ -114,6 +111,8 @@ class Inbox:
             return self._drop("rx_relayed" if is_sent_on else "rx_not_for_us")
         for record in records:
             if isinstance(record, Beacon):
+                if not is_relayed:
+                    self._ear.record_from(pdu.src, record, at)
                 if neighbor.take_beacon(record):
                     neighbor.track.restart(seq, crc)
                     self._ear.newcomer(pdu.src, at)
@@ -144,7 +143,7 @@ class Inbox:
             origin_at = self._ages.look(pdu.src, topic_id, entry.entry_id).at
             if origin_at is None:
                 return INFINITE
-            lifespan_s = self.policies.get(topic_id, DEFAULT_POLICY).lifespan_s
+            lifespan_s = self.policies.get(topic_id, DEFAULT_POLICY).own_lifespan_s
             until = max(until, origin_at + lifespan_s)
         return until if until > -INFINITE else INFINITE
 
@@ -279,9 +278,9 @@ def _refusal(
         return "rx_bad_cdr"
     if policy.max_bytes and len(payload) > policy.max_bytes:
         return "rx_size_cap"
-    if policy.lifespan_s < INFINITE:
+    if policy.own_lifespan_s < INFINITE:
         if origin_at is None:
             return "rx_no_age" if policy.stamp else None
-        if now - origin_at > policy.lifespan_s:
+        if now - origin_at > policy.own_lifespan_s:
             return "rx_expired"
     return None

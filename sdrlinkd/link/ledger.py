@@ -1,6 +1,7 @@
 """The ledger: what entered, and what became of it (bus document, section 6)."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 TX_REASONS = {
@@ -19,7 +20,7 @@ TX_REASONS = {
     "tx_topic_full": "the topic's own bound; its oldest went",
     "tx_overflow_old": "shed from a full queue: oldest of the lowest class",
     "tx_overflow_new": "refused by a full queue that holds only higher classes",
-    "tx_expired": "its lifespan ended before it was sent",
+    "tx_expired": "its lifespan (its own, its topic's or its class's) ended before it was sent",
     "tx_stalled": "nothing of it could be sent for as long as receivers wait for the rest",
     "tx_radio_down": "no radio to send it",
     "tx_radio_failed": "the radio reported that a burst did not leave whole",
@@ -95,3 +96,18 @@ def balance(name: str, entered: int, parts: dict[str, int]) -> list[str]:
         return []
     listed = " + ".join(f"{value} {key}" for key, value in parts.items())
     return [f"{name}: {entered} entered, but {listed} = {total}"]
+
+
+def tx_balance(tallies: Sequence[TxTally], queued: int, in_flight: int) -> list[str]:
+    """Where the transmit ledger does not add up, over all topics."""
+    dropped = sum((each.dropped for each in tallies), Counter[str]())
+    return balance(
+        "tx messages",
+        sum(each.accepted for each in tallies),
+        {
+            "sent": sum(each.sent for each in tallies),
+            "queued": queued,
+            "in_flight": in_flight,
+            **dropped,
+        },
+    )

@@ -7,6 +7,7 @@ from zstandard import ZstdCompressionDict
 
 from sdrlinkd.link.access import Access, AccessParams
 from sdrlinkd.link.admission import NOT_TAKEN
+from sdrlinkd.link.air_use import AirUse
 from sdrlinkd.link.beacons import Beacons
 from sdrlinkd.link.burst import Burst, Outcome
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity
@@ -30,6 +31,7 @@ from sdrlinkd.link.why import Told, Why
 from sdrlinkd.reports import RATE_WINDOW_S
 from sdrlinkd.wire import (
     CONTROL_TOPIC_ID,
+    Beacon,
     Clock,
     Frame,
     LinkReport,
@@ -73,20 +75,15 @@ class Link:
         self.params = params
         self.registry = registry
         self.own_id = own_id
+        self._own_src = bytes((own_id,))
         self.digest = registry.digest({i: each.dict_id() for i, each in dictionaries.items()})
         self.sender = Sender(
             params, queue, registry, own_id, rng, reassembly.timeout_s, classes, dictionaries
         )
         self.inbox = Inbox(
-            params,
-            reassembly,
-            registry,
-            own_id,
-            hears_self,
-            self,
-            Inflated(dictionaries),
+            params, reassembly, registry, own_id, hears_self, self, Inflated(dictionaries),
             max_expanded,
-        )
+        )  # fmt: skip
         self.rates = RateMeter(RATE_WINDOW_S)
         self.waits: dict[tuple[int, int], Waits] = {}
         """Why messages waited at their source, as that tells: by (source, topic id)."""
@@ -99,18 +96,14 @@ class Link:
         room = self.sender.packetizer.k_single
         self.tellings = Tellings(clock, self.clocks, spare, neighbors, room)
         self.departures = Departures(
-            self.sender,
-            self.inbox,
-            beacons,
-            self.tellings,
-            classes,
-            own_id,
-            registry.has_control,
+            self.sender, self.inbox, beacons, self.tellings, classes, own_id, registry.has_control,
             rng,
-        )
+        )  # fmt: skip
         self.outcomes = Outcomes(self.sender, self.tellings, neighbors, own_id, params.receipt_s)
         self._latched = Latched()
-        self._why, self.relay = Why(self.sender, self.departures.shares), Relay(relay, own_id)
+        self.air = AirUse(self.departures)
+        self._why = Why(self.sender, self.departures.shares, self.air)
+        self.relay = Relay(relay, own_id)
 
     def attach(self, carrier: CarrierTraits, access: AccessParams, rate: RateParams) -> None:
         """Settle access and rate for the radio that is there. Raises ConfigError."""
@@ -193,6 +186,8 @@ class Link:
         (absent: `at`, as is `now`); the messages that it completed.
         """
         now, ended_at = at if now is None else now, at if ended_at is None else ended_at
+        if data[1:2] != self._own_src:
+            self.air.heard(at, ended_at)
         return self.inbox.hear(data, at, snr_db, now, ended_at)
 
     def delivered(self, message: Delivered, now: float) -> float | None:
@@ -216,7 +211,7 @@ class Link:
         self.outcomes.expire(now)
         self._why.sample(now, len(self.registry))
         if self.rates.is_due(now):
-            counters = rate_counters(self.sender, self.inbox, self.departures.airtime_s)
+            counters = rate_counters(self.sender, self.inbox, self.air.sent_s, self.air.heard_s)
             self.rates.sample(counters, now)
 
     @property
@@ -290,6 +285,8 @@ class Link:
                 self.rate.take(src, record, at)
             else:
                 self.access.told_of(record.node, at)
+        elif isinstance(record, Beacon):
+            self.access.beacon(src)
         elif isinstance(record, Frame):
             self.access.take_frame(src, record, at)
         elif isinstance(record, Clock) and src != self.own_id:

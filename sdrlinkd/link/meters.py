@@ -46,11 +46,15 @@ class RateMeter:
         return 0.0
 
 
-def rate_counters(sender: Sender, inbox: Inbox, sent_s: float) -> dict[Hashable, int]:
-    """The counters of which the snapshot shows rates; `sent_s`: our time on the air."""
+def rate_counters(
+    sender: Sender, inbox: Inbox, sent_s: float, heard_s: float
+) -> dict[Hashable, int]:
+    """The counters of which the snapshot shows rates; `sent_s`, `heard_s`: time on the air, ours
+    and that of others.
+    """
     counters: dict[Hashable, int] = {
         ("air", "sent"): round(1e6 * sent_s),
-        ("air", "heard"): round(1e6 * inbox.air.heard_s),
+        ("air", "heard"): round(1e6 * heard_s),
     }
     for topic_id in range(sender.n_topics):
         tally = sender.tally(topic_id)

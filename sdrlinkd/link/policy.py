@@ -23,8 +23,9 @@ class TopicPolicy(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """keep_all: `depth` does not count."""
     depth: Amount = 0
     """Messages that may wait, latest wins; 0: as many as the queue holds."""
-    lifespan_s: Positive = INFINITE
-    """Seconds after which a message is worthless: neither sent nor handed over any more."""
+    lifespan_s: Positive | None = None
+    """Seconds after which a message is worthless: neither sent nor handed over any more; absent:
+    not sent after that of its class."""
     deadman_s: Annotated[float, Meta(ge=0, le=60)] = 0.0
     """Where it arrives: without a message handed over for so long, `stop` is, once; 0: never."""
     stop: dict[str, Any] = {}
@@ -56,6 +57,11 @@ class TopicPolicy(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     def kept(self) -> int:
         """Messages that may wait; 0: as many as the queue holds."""
         return self.depth if self.history == "keep_last" else 0
+
+    @property
+    def own_lifespan_s(self) -> float:
+        """That of the topic itself; inf where it has none."""
+        return INFINITE if self.lifespan_s is None else self.lifespan_s
 
 
 DEFAULT_POLICY = TopicPolicy()

@@ -27,9 +27,12 @@ def link_report(
     return LinkReport(
         pdu_size=link.params.pdu_size,
         access=link.access.state,
+        access_policy=link.departures.settled.policy,
+        access_reason=link.departures.settled.reason,
+        access_share_pct=100 * link.departures.settled.share,
         airtime_s=link.departures.airtime_s,
-        air_sent_pct=_air_pct(link, "sent", link.departures.airtime_s, now),
-        air_heard_pct=_air_pct(link, "heard", link.inbox.air.heard_s, now),
+        air_sent_pct=_air_pct(link, "sent", link.air.sent_s, now),
+        air_heard_pct=_air_pct(link, "heard", link.air.heard_s, now),
         control_airtime_s=link.departures.control_airtime_s,
         control_period_s=link.tellings.period_s,
         airtime_by_class_s={
@@ -107,6 +110,7 @@ def _topics(link: Link, now: float, names_in: dict[int, str]) -> list[TopicRepor
     for topic in link.registry.topics:
         tally = link.sender.tally(topic.id)
         qos, priority = link.sender.treatment(topic.id)
+        lifespan = link.sender.lifespan(topic.id)
         reports.append(
             TopicReport(
                 topic_id=topic.id,
@@ -115,6 +119,8 @@ def _topics(link: Link, now: float, names_in: dict[int, str]) -> list[TopicRepor
                 subscribed=topic.id in names_in,
                 qos=qos.label,
                 priority=priority,
+                lifespan_s=lifespan.seconds if lifespan.source else None,
+                lifespan_from=lifespan.source,
                 accepted=tally.accepted,
                 accepted_per_s=link.rates.per_s(("tx", topic.id), tally.accepted, now),
                 accepted_bytes_per_s=link.rates.per_s(
@@ -224,7 +230,7 @@ def link_notices(link: Link) -> list[str]:
         )
     least_s = link.departures.least_s
     for topic in link.registry.topics:
-        lifespan_s = link.sender.policy(topic.id).lifespan_s
+        lifespan_s = link.sender.lifespan(topic.id).seconds
         if lifespan_s < least_s:
             notices.append(
                 f"{topic.name}: lifespan_s of {1e3 * lifespan_s:.3g} ms can never be met: composing"

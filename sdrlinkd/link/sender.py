@@ -8,7 +8,8 @@ from zstandard import ZstdCompressionDict
 from sdrlinkd.link.burst import Burst, Outcome
 from sdrlinkd.link.draft import BuiltPdu
 from sdrlinkd.link.latched import Offer
-from sdrlinkd.link.ledger import TxTally, balance
+from sdrlinkd.link.ledger import TxTally, tx_balance
+from sdrlinkd.link.lifespan import Lifespan, lifespan_of
 from sdrlinkd.link.message import Fate, Outgoing
 from sdrlinkd.link.outbox import Outbox
 from sdrlinkd.link.packetizer import Packetizer
@@ -43,6 +44,7 @@ class Sender:
         dictionaries: Mapping[int, ZstdCompressionDict],
     ) -> None:
         self._max_message_size = max_message_size(params.pdu_size)
+        self._classes = classes
         self.outbox = Outbox(queue)
         self.packetizer = Packetizer(
             params, src, self.outbox, rng, reassembly_timeout_s, registry.has_control, classes
@@ -86,7 +88,8 @@ class Sender:
         """Queue a latched message for a robot that came late, as old as it is."""
         topic_id, (payload, at, overrides), dst = offer
         topic = self._topics[topic_id]
-        if at + topic.policy.lifespan_s <= now:
+        lifespan_s = overrides.lifespan_s or self.lifespan(topic_id, overrides.qos).seconds
+        if at + lifespan_s <= now:
             return
         topic.tally.accepted += 1
         topic.tally.reoffered += 1
@@ -110,7 +113,7 @@ class Sender:
         qos, priority, dst, lifespan_s, age_s, receipt = wishes
         topic = self._topics[topic_id]
         if lifespan_s is None:
-            lifespan_s = topic.policy.lifespan_s
+            lifespan_s = self.lifespan(topic_id, qos).seconds
         if age_s <= UNLIKELY_AGE_S or lifespan_s < INFINITE:
             at -= age_s
         frame = topic.deflated.shrink(payload) if topic.deflated else None
@@ -254,23 +257,15 @@ class Sender:
         topic = self._topics[topic_id]
         return topic.qos, topic.priority
 
+    def lifespan(self, topic_id: int, qos: Qos | None = None) -> Lifespan:
+        """That of a topic's messages that name none; of class `qos`, else of the topic's."""
+        topic = self._topics[topic_id]
+        return lifespan_of(topic.policy, topic.qos if qos is None else qos, self._classes)
+
     def audit(self) -> list[str]:
         """What does not add up in the TX ledger; empty when all does."""
         tallies = [self.refused, self.relayed, *(topic.tally for topic in self._topics)]
-        dropped: dict[str, int] = {}
-        for each in tallies:
-            for reason, count in each.dropped.items():
-                dropped[reason] = dropped.get(reason, 0) + count
-        return balance(
-            "tx messages",
-            sum(each.accepted for each in tallies),
-            {
-                "sent": sum(each.sent for each in tallies),
-                "queued": self.outbox.queued,
-                "in_flight": len(self.outbox.in_flight),
-                **dropped,
-            },
-        )
+        return tx_balance(tallies, self.outbox.queued, len(self.outbox.in_flight))
 
     def _counted(self, burst: Burst) -> Burst | None:
         self.pdus_composed += len(burst.pdus)

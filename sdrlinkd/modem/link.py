@@ -10,7 +10,7 @@ import phy
 from backends import AbsentError, BackendError, LateRadio, Radio, RefusalError, RxBlock, Tuning
 from sdrlinkd.config import ModemParams
 from sdrlinkd.errors import ConfigError, LinkAbsentError, LinkRefusedError, UserError
-from sdrlinkd.link import Burst, Opportunity, Outcome
+from sdrlinkd.link import Burst, CarrierTraits, Opportunity, Outcome
 from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.clock import StreamClock
 from sdrlinkd.modem.ear import Ear
@@ -31,10 +31,11 @@ class ModemLink:
     """A PDU link over a radio: the PHY off the event loop, everything else on it.
 
     In lock-step all of it is done within the block that brought it. `listens`: someone wants to
-    know whether there is a carrier on the air. `lead_grows`: bursts that must leave at a given
-    moment are handed over earlier when the machine proves to be slow. `began_s`: the link's clock
-    has run since then (monotonic), before there was a radio; None: it begins with the samples.
-    `load` compiles the PHY, or loads what is compiled, before the radio is opened; on a thread.
+    know whether there is a carrier on the air. `lead_grows`: whether, on a radio like that, bursts
+    that must leave at a given moment are handed over earlier when the machine proves to be slow.
+    `began_s`: the link's clock has run since then (monotonic), before there was a radio; None: it
+    begins with the samples. `load` compiles the PHY, or loads what is compiled, before the radio
+    is opened; on a thread.
     """
 
     def __init__(
@@ -44,7 +45,7 @@ class ModemLink:
         radio: Radio,
         kind: str,
         listens: bool = False,
-        lead_grows: bool = False,
+        lead_grows: Callable[[CarrierTraits], bool] = lambda _: False,
         began_s: float | None = None,
         load: Callable[[], None] = phy.warm_up,
     ) -> None:
@@ -60,7 +61,8 @@ class ModemLink:
         )
         sense = phy.CarrierSense(params.carrier_db) if listens else None
         self._ear = Ear(self._receiver, sense, params.rate_hz)
-        self._lead_grows = lead_grows
+        self._may_lead_grow = lead_grows
+        self._lead_grows = False
         self._clock = StreamClock(params.rate_hz, paced=True, began_s=began_s)
         self._load = load
         self._plan = AirPlan(0)
@@ -90,6 +92,7 @@ class ModemLink:
             raise UserError(str(error)) from None
         can = self._can = self._radio.capabilities
         traits = carrier_traits(self._kind, can, params, self._airtimes)
+        self._lead_grows = self._may_lead_grow(traits)
         if not can.paced:
             # Time is that of the samples, from their first on.
             self._clock = StreamClock(params.rate_hz, can.paced, can.lockstep)

@@ -24,6 +24,7 @@ from backends import (
 )
 from sdrlinkd.config import Config, SoapyParams
 from sdrlinkd.errors import ConfigError, UserError
+from sdrlinkd.link import CarrierTraits, RateControl, may_share, settle
 from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.link import ModemLink
 
@@ -48,14 +49,14 @@ def make_modem(
     since then (monotonic); `load` compiles the PHY, or loads it.
     """
     check_airtime(config)
-    policy = config.access.policy
+    access = config.access
     return ModemLink(
         config.modem,
         config.link.pdu_size,
         make_radio(config, node_id, rng, _longest_burst_s(config), patience),
         config.backend,
-        listens=policy != "none",
-        lead_grows=policy == "tdma",
+        listens=may_share(access, node_id),
+        lead_grows=lambda traits: _has_slots(config, node_id, traits),
         # In a recording, time begins with its first sample.
         began_s=None if config.backend == "iqfile" else began_s,
         load=load,
@@ -87,6 +88,17 @@ def make_radio(
     return OversampledRadio(radio, factor) if factor > 1 else radio
 
 
+def _has_slots(config: Config, node_id: int, traits: CarrierTraits) -> bool:
+    """Whether access comes to tdma; what is refused is so where the link is fitted to the radio."""
+    longest_s = traits.longest_in_use_s(
+        RateControl(config.rate, traits.needed_snr_db, traits.mcs).usable
+    )
+    try:
+        return settle(config.access, node_id, traits, longest_s, Random(0)).policy == "tdma"
+    except ConfigError:
+        return False
+
+
 def _make_radio(
     config: Config, node_id: int, rng: Random, longest_s: float, patience: Patience
 ) -> Radio:
@@ -116,19 +128,24 @@ def _make_radio(
     return LoopbackRadio(channel, modem.block_s, paced=loopback.paced, hear_self=loopback.hear_self)
 
 
-def _make_soapy(config: Config, longest_s: float, patience: Patience) -> Radio:
+def soapy_settings(config: Config) -> SoapySettings:
+    """What the device is to be set to."""
     modem, soapy = config.modem, config.soapy
-    settings = SoapySettings(
+    return SoapySettings(
         # What both have is called alike.
         **{name: getattr(soapy, name) for name in _SHARED},
         rate_hz=modem.rate_hz * modem.oversampling,
         frequency_hz=modem.frequency_hz,
         block_s=modem.block_s,
     )
+
+
+def _make_soapy(config: Config, longest_s: float, patience: Patience) -> Radio:
+    modem, soapy = config.modem, config.soapy
     shifts = soapy.offset_tuning == "on" or (
         soapy.offset_tuning == "auto" and modem.oversampling > 1
     )
-    radio = SoapyRadio(settings, longest_s, soapy.dc_block, patience)
+    radio = SoapyRadio(soapy_settings(config), longest_s, soapy.dc_block, patience)
     return OffsetRadio(radio) if shifts else radio
 
 

@@ -1,7 +1,9 @@
 """What the link must know of a modem on a radio."""
 
+import math
+
 import phy
-from backends import GAP, Capabilities
+from backends import GAP, Capabilities, Spells
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import CarrierTraits
 from sdrlinkd.modem.airtimes import Airtimes
@@ -18,6 +20,7 @@ def carrier_traits(
     kind: str, can: Capabilities, params: ModemParams, airtimes: Airtimes
 ) -> CarrierTraits:
     """In lock-step composing takes no time, but it happens only when there is a block."""
+    follow_s, pause_s, longest_s = can.spells or Spells(0.0, 0.0, math.inf)
     return CarrierTraits(
         kind=kind,
         is_lockstep=can.lockstep,
@@ -31,6 +34,9 @@ def carrier_traits(
         detect_s=2 * phy.SENSE_WINDOW / params.rate_hz,
         overhead_s=airtimes.overhead_s,
         gap_s=GAP / params.rate_hz,
+        spell_s=longest_s,
+        spell_follow_s=follow_s,
+        spell_pause_s=pause_s,
         ahead_s=can.block_s if can.lockstep else params.tx_lead_s,
         longest_burst_s=airtimes.longest_s(),
         pdu_burst_s=airtimes.shortest_s(),

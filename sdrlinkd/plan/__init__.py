@@ -1,11 +1,14 @@
 """Whether traffic fits the air, before anything is sent."""
 
-from sdrlinkd.plan.model import ClassPlan, Plan, Setting, TopicPlan, make_plan
-from sdrlinkd.plan.setting import setting_of
-from sdrlinkd.plan.traffic import Load, loads_from_bag, parse_load
+from sdrlinkd.plan.air import Setting
+from sdrlinkd.plan.model import ClassPlan, Plan, TopicPlan, make_plan
+from sdrlinkd.plan.setting import HOST_S, setting_of
+from sdrlinkd.plan.traffic import LeftOut, Load, loads_from_bag, parse_load
 
 __all__ = [
+    "HOST_S",
     "ClassPlan",
+    "LeftOut",
     "Load",
     "Plan",
     "Setting",

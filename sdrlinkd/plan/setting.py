@@ -4,36 +4,77 @@ from random import Random
 
 import msgspec
 
-from backends import Capabilities
 from sdrlinkd.config import Config
-from sdrlinkd.errors import UserError
-from sdrlinkd.link import Qos, make_access
-from sdrlinkd.modem import Airtimes, carrier_traits
-from sdrlinkd.plan.model import Setting
+from sdrlinkd.errors import ConfigError
+from sdrlinkd.link import CarrierTraits, Settled, percent, settle
+from sdrlinkd.modem import PresumedRadio, presume_radio
+from sdrlinkd.plan.air import Setting
+
+HOST_S = 0.01
+"""What the machines at both ends add, at most: buses, event loops and demodulation, on a machine
+with two cores that has something else to do, too."""
 
 
-def setting_of(config: Config, robots: int, turnaround_s: float) -> Setting:
-    """For `robots` of which all send the same. Raises UserError, ConfigError."""
-    if config.backend in ("direct", "gnuradio"):
-        raise UserError(
-            f'backend: got "{config.backend}", which has no air to plan for; allowed: a backend '
-            "with a radio"
-        )
-    modem, pdu_size = config.modem, config.link.pdu_size
-    airtimes = Airtimes(modem, pdu_size)
-    radio = Capabilities(
-        receives=True, transmits=True, full_duplex=False, timestamps=True, paced=True,
-        turnaround_s=turnaround_s, block_s=modem.block_s,
-    )  # fmt: skip
-    traits = carrier_traits("radio", radio, modem, airtimes)
-    longest_s = traits.longest_burst_s[modem.mcs]
-    # Robot 1 stands for all.
-    nodes = list(range(1, robots + 1))
-    policy = config.access.policy if robots > 1 else "none"
-    params = msgspec.structs.replace(config.access, policy=policy, nodes=nodes)
-    access = make_access(params, 1, traits, longest_s, Random(0))
+def setting_of(
+    config: Config,
+    own_id: int,
+    robots: int | None = None,
+    turnaround_s: float | None = None,
+    host_s: float = HOST_S,
+) -> Setting:
+    """For as many robots as access.nodes lists, or `robots`, of which all send the same.
+
+    `turnaround_s`: of the radio, if not as configured. Raises UserError, ConfigError.
+    """
+    radio = presume_radio(config, turnaround_s)
+    access = config.access
+    if robots is not None:
+        policy = access.policy if robots > 1 else "none"
+        nodes, own_id = list(range(1, robots + 1)), 1
+        access = msgspec.structs.replace(access, policy=policy, nodes=nodes)
+    n = max(1, len(set(access.nodes)))
+    forced = msgspec.structs.replace(access, force=True)
+    settled = settle(forced, own_id, radio.traits, radio.longest_s, Random(0))
+    notes = _notes(config, radio, settled, n, host_s)
+    try:
+        settle(access, own_id, radio.traits, radio.longest_s, Random(0))
+    except ConfigError as error:
+        notes.append(f"the daemon refuses this: {error}")
+    modem = config.modem
+    longest_s = radio.traits.longest_burst_s[modem.mcs]
     return Setting(
-        airtimes, pdu_size, modem.mcs, longest_s, config.classes, robots, policy, traits.gap_s,
-        traits.lead_s + traits.react_s, {qos: access.mean_wait_s(qos) for qos in Qos},
-        access.share, access.round_s if policy == "tdma" else 0.0,
+        radio.airtimes, config.link.pdu_size, modem.mcs, longest_s, config.classes, n, settled,
+        radio.traits, host_s, tuple(notes),
     )  # fmt: skip
+
+
+def _notes(
+    config: Config, radio: PresumedRadio, settled: Settled, n: int, host_s: float
+) -> list[str]:
+    rate = f"{config.modem.rate_hz / 1e6:g} Msps"
+    if config.modem.oversampling > 1:
+        rate += f" (the radio at {config.modem.rate_hz * config.modem.oversampling / 1e6:g} Msps)"
+    who = "one robot" if n == 1 else f"{n} robots"
+    notes = [f"{who}, {rate}, access {settled.sentence}"]
+    if radio.presumption:
+        notes.append(f"radio: {radio.presumption}")
+    notes.append(_times(radio.traits, host_s))
+    if n > 1 and settled.policy == "none":
+        notes.append(
+            f"without turns, what {n} robots send at once collides where they share the air; that "
+            f"is not in this plan (each carries up to {percent(settled.share)} alone)"
+        )
+    if settled.policy == "csma":
+        notes.append("csma: what collides is lost, and one in a hundred waits longer than this")
+    return notes
+
+
+def _times(traits: CarrierTraits, host_s: float) -> str:
+    spell = ""
+    if traits.spell_s < float("inf"):
+        spell = f", {1e3 * traits.spell_pause_s:.0f} ms between two spells of sending"
+    return (
+        f"in each worst case: lead {1e3 * traits.lead_s:.3g} ms{spell}, "
+        f"reception {1e3 * traits.react_s:.3g} ms, the machines {1e3 * host_s:.3g} ms "
+        "(--host; `sdrlinkctl doctor` measures it)"
+    )

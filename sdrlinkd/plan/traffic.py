@@ -2,8 +2,8 @@
 
 import math
 import re
-from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections import Counter, defaultdict
+from collections.abc import Collection, Iterable, Mapping
 from typing import NamedTuple
 
 from sdrlinkd.errors import UserError
@@ -26,6 +26,14 @@ class Load(NamedTuple):
     largest: float
 
 
+class LeftOut(NamedTuple):
+    """A topic of a recording that is not planned, and why."""
+
+    name: str
+    messages: int
+    why: str
+
+
 def parse_load(text: str, registry: Registry) -> Load:
     """`scan:50:1KB`: topic, messages a second, bytes. Raises UserError."""
     found = _LOAD.fullmatch(text.replace(" ", ""))
@@ -45,13 +53,23 @@ def loads_from_bag(
     messages: Iterable[tuple[str, float, bytes]],
     registry: Registry,
     policies: Mapping[int, TopicPolicy],
-) -> list[Load]:
-    """From (topic, time in s, payload) of a recording; compression as the policies say."""
+    taken: Collection[str] = (),
+) -> tuple[list[Load], list[LeftOut]]:
+    """From (topic, time in s, payload) of a recording; compression as the policies say.
+
+    `taken`: registry names that the daemon takes from the bus; empty: all.
+    """
     times: dict[int, list[float]] = defaultdict(list)
     sizes: dict[int, list[int]] = defaultdict(list)
+    others: Counter[tuple[str, str]] = Counter()
+    wanted = {name.removeprefix("/") for name in taken}
     for name, at, payload in messages:
         topic = registry.by_name(name) or registry.by_name(name.rsplit("/", 1)[-1])
         if topic is None:
+            others[name, "not in the registry"] += 1
+            continue
+        if wanted and topic.name not in wanted:
+            others[name, "not among those that the key `topics` takes"] += 1
             continue
         policy = policies.get(topic.id, DEFAULT_POLICY)
         times[topic.id].append(at)
@@ -67,7 +85,8 @@ def loads_from_bag(
         rate = (len(came) - 1) / span if span > 0 else 1.0
         mean = math.fsum(known) / len(known)
         loads.append(Load(topic_id, registry.topics[topic_id].name, rate, mean, max(known)))
-    return loads
+    left_out = [LeftOut(name, count, why) for (name, why), count in sorted(others.items())]
+    return loads, left_out
 
 
 def after_policy(load: Load, policy: TopicPolicy) -> Load:

@@ -57,7 +57,7 @@ def simulation(
     }  # fmt: skip
     return Simulation(
         air, World(air, {}, links), radios(len(ids), seed), made, modem, Airtimes(modem, pdu_size),
-        AccessParams(policy=policy, nodes=ids if policy in ("minislot", "tdma") else []),
+        AccessParams(policy=policy, nodes=[] if policy == "none" else ids, force=True),
         {node: [Arrival(*each) for each in arrivals[node]] for node in ids},
         seed=seed, keep_s=keep_s, **more,
     )  # fmt: skip
@@ -94,7 +94,7 @@ def two_at_40_percent(policy, n_nodes=2, seconds=1.0, seed=3):
         for node in range(1, n_nodes + 1)
     }
     nodes = list(arrivals)
-    access = AccessParams(policy=policy, nodes=nodes if policy != "none" else [])
+    access = AccessParams(policy=policy, nodes=nodes if policy != "none" else [], force=True)
     modem = ModemParams(rate_hz=RATE, mcs=MCS)
     stations = asyncio.run(
         shared_air.run(air, radios(n_nodes, seed), access, modem, pdu_size, arrivals, until_s, seed)

@@ -28,4 +28,4 @@ SPELLS = _SHARED._replace(
 
 def params(policy, nodes, **more):
     """Access parameters."""
-    return AccessParams(policy=policy, nodes=list(nodes), **more)
+    return AccessParams(policy=policy, nodes=list(nodes), **{"force": True, **more})

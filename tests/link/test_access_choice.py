@@ -45,8 +45,8 @@ def test_each_policy_by_its_name(policy, traits):
 
 
 def test_none_needs_nothing():
-    assert isinstance(make(AccessParams(), traits=DEAF), Free)
-    assert isinstance(make(AccessParams(), traits=RECEIVER), Free)
+    assert isinstance(make(params("none", []), traits=DEAF), Free)
+    assert isinstance(make(params("none", []), traits=RECEIVER), Free)
 
 
 @pytest.mark.parametrize("policy", SHARED)
@@ -148,7 +148,7 @@ def test_who_is_heard_too_late_is_refused_and_tdma_named_instead(policy):
 
 @pytest.mark.parametrize(("turnaround_s", "is_told"), [(0.0, False), (3e-4, False), (0.08, True)])
 def test_without_turns_a_radio_that_turns_round_slowly_is_told_of(turnaround_s, is_told):
-    free = make(AccessParams(), traits=LOCKSTEP._replace(turnaround_s=turnaround_s))
+    free = make(params("none", []), traits=LOCKSTEP._replace(turnaround_s=turnaround_s))
     assert bool(free.notices()) == is_told
     if is_told:
         assert "hears nothing for 160 ms" in free.notices()[0]

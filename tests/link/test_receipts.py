@@ -89,7 +89,7 @@ class Air:
         for message in link.hear(pdu, at, 20.0, self.now):
             self.delivered[robot, message.payload] += 1
             age_s = link.delivered(message, self.now)
-            lifespan_s = link.inbox.policies.get(message.topic_id, DEFAULT_POLICY).lifespan_s
+            lifespan_s = link.inbox.policies.get(message.topic_id, DEFAULT_POLICY).own_lifespan_s
             if age_s is None or age_s > lifespan_s + 1e-5:
                 self.expired.append((robot, age_s))
 

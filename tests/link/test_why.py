@@ -46,8 +46,9 @@ def test_a_topic_that_is_shed_says_what_the_air_was_used_for():
             link.confirm(burst, Outcome.SENT, now)
     told = link.why(0, FILE, now)
     assert any("% shed: " in line for line in told)
-    assert told[-1].startswith("bulk got ")
-    assert "airtime (the others: urgent" in told[-1]
+    assert told[-2].startswith("bulk got ")
+    assert "airtime (the others: urgent" in told[-2]
+    assert told[-1] == "the air was full (ours 100 %, others' 0 %)"
 
 
 def test_a_topic_of_which_nothing_comes():

@@ -34,7 +34,7 @@ GOLDEN = Path(__file__).parent / "plan.txt"
 
 def setting(policy="none", robots=1, mcs=3):
     config = parse_config(CONFIG.format(policy=policy).replace("mcs = 3", f"mcs = {mcs}"))
-    return setting_of(config, robots, 1e-4)
+    return setting_of(config, 1, robots, 1e-4, 0.0)
 
 
 def planned(*loads, policies=None, **how):
@@ -45,7 +45,7 @@ def planned(*loads, policies=None, **how):
 
 
 def test_shares_of_the_air_are_those_of_the_modem():
-    plan = planned("scan:50:1KB", "map:5:64KiB")
+    plan = planned("scan:50:990", "map:5:64KiB")
     scan, image = plan.topics
     one_s = setting().airtimes.airtime_s(3, 1)
     assert (scan.pdus, image.pdus) == (1, 65)
@@ -58,7 +58,7 @@ def test_shares_of_the_air_are_those_of_the_modem():
 def test_what_is_more_urgent_waits_less_and_more_load_lets_others_wait_longer():
     few, many = planned("scan:10:1KB", "map:5:64KiB"), planned("scan:80:1KB", "map:5:64KiB")
     for plan in (few, many):
-        assert plan.topics[0].worst_s < 0.01 < plan.topics[1].worst_s
+        assert plan.topics[0].worst_s < 0.015 < plan.topics[1].worst_s
     assert many.topics[1].worst_s > few.topics[1].worst_s
 
 
@@ -66,7 +66,7 @@ def test_too_much_is_not_feasible_and_says_what_to_change():
     plan = planned("scan:50:1KB", "map:20:64KiB")
     assert not plan.is_feasible
     assert plan.topics[1].worst_s == float("inf")
-    assert plan.topics[0].worst_s < 0.01
+    assert plan.topics[0].worst_s < 0.015
     (advice,) = plan.advice
     assert "map takes the most" in advice
     assert "topic.map.period_s = 0.1" in advice
@@ -96,17 +96,30 @@ def test_robots_that_share_the_air_wait_for_each_other(policy):
 def test_rates_and_sizes_from_a_recording():
     messages = [("/robot_1/odom", 0.1 * i, bytes(600 + i)) for i in range(11)]
     messages += [("/other", 0.0, b"")]
-    (load,) = loads_from_bag(messages, REGISTRY, {})
+    (load,), left_out = loads_from_bag(messages, REGISTRY, {})
+    assert left_out == [("/other", 1, "not in the registry")]
     assert load == Load(1, "odom", pytest.approx(10), 605, 610)
-    (small,) = loads_from_bag(messages, REGISTRY, {1: TopicPolicy(compress="zstd")})
+    (small,), _ = loads_from_bag(messages, REGISTRY, {1: TopicPolicy(compress="zstd")})
     assert small.size < 100
+
+
+def test_what_of_a_recording_is_not_planned_is_listed():
+    messages = [
+        (name, 0.1 * i, bytes(100)) for i in range(3) for name in ("/fix", "/scan", "/odom")
+    ]
+    loads, left_out = loads_from_bag(messages, REGISTRY, {}, ["/odom"])
+    assert [load.name for load in loads] == ["odom"]
+    assert left_out == [
+        ("/fix", 3, "not in the registry"),
+        ("/scan", 3, "not among those that the key `topics` takes"),
+    ]
 
 
 def test_the_worst_case_is_that_of_the_largest_message():
     same, larger = (Load(0, "scan", 20.0, 1000.0, most) for most in (1000.0, 20_000.0))
     one, other = (make_plan([load], {}, setting()).topics[0] for load in (same, larger))
     assert one.air == other.air
-    assert other.worst_s > 5 * one.worst_s
+    assert other.worst_s > 2.5 * one.worst_s
 
 
 @pytest.mark.parametrize("text", ["scan", "scan:50", "scan:0:1", "scan:fast:1KB", "scan:5:1parsec"])
@@ -138,4 +151,4 @@ def test_a_plan_without_traffic_or_without_an_air_is_refused(tmp_path, capsys):
     code, told = plan_text(tmp_path, capsys)
     assert (code, "name --bag FILE" in told.err) == (2, True)
     with pytest.raises(UserError, match="has no air"):
-        setting_of(parse_config(""), 1, 0.0)
+        setting_of(parse_config(""), 1)

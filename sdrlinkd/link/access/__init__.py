@@ -1,8 +1,21 @@
 """Medium access: when a node may send on an air that it shares."""
 
+from sdrlinkd.link.access.auto import Settled, may_share, percent, settle
 from sdrlinkd.link.access.base import Access, Slot, Wish
 from sdrlinkd.link.access.choice import check_access, make_access
 from sdrlinkd.link.access.free import Free
 from sdrlinkd.link.access.params import AccessParams
 
-__all__ = ["Access", "AccessParams", "Free", "Slot", "Wish", "check_access", "make_access"]
+__all__ = [
+    "Access",
+    "AccessParams",
+    "Free",
+    "Settled",
+    "Slot",
+    "Wish",
+    "check_access",
+    "make_access",
+    "may_share",
+    "percent",
+    "settle",
+]

@@ -62,8 +62,17 @@ class Access(Protocol):
     def share(self) -> float:
         """Of the air, what one robot has when all want to send, were it not for their bursts."""
 
+    @property
+    def step_s(self) -> float:
+        """In a turn that was not used from its begin, bursts begin so far apart; 0: anywhere."""
+
     def mean_wait_s(self, qos: Qos) -> float:
         """From the end of a carrier to a burst of that class, on average."""
+
+    def carries(self, burst_s: float) -> float:
+        """Share of the air that bursts of that length take, of all robots together, when each
+        always has one more to send: of class default, and whole.
+        """
 
     def slot(self, wish: Wish) -> Slot | None:
         """Where it may leave; None: not now."""
@@ -84,6 +93,9 @@ class Access(Protocol):
     def told_of(self, node: int, at: float) -> None:
         """At `at` another robot told that it hears `node`."""
 
+    def beacon(self, src: int) -> None:
+        """A beacon of `src` came, from itself."""
+
     def frame(self, start: float) -> Frame | None:
         """What to tell others of the schedule in a burst that leaves at `start`."""
 
@@ -100,6 +112,8 @@ class Carriers:
     def __init__(self) -> None:
         self._own_ends = [NEVER]
         """Of the last bursts, ascending: some may be on their way to the radio still."""
+        self._scheduled: set[int] = set()
+        """Who takes turns by a schedule."""
 
     @property
     def round_s(self) -> float:
@@ -115,6 +129,11 @@ class Carriers:
     def share(self) -> float:
         """All of it."""
         return 1.0
+
+    @property
+    def step_s(self) -> float:
+        """Anywhere."""
+        return 0.0
 
     def mean_wait_s(self, qos: Qos) -> float:  # noqa: ARG002  # not all ask for it
         """None."""
@@ -144,15 +163,24 @@ class Carriers:
     def told_of(self, node: int, at: float) -> None:
         """Who hears whom does not matter."""
 
+    def beacon(self, src: int) -> None:
+        """Who is there does not matter."""
+
     def frame(self, start: float) -> Frame | None:
         """No schedule."""
 
-    def take_frame(self, src: int, frame: Frame, at: float) -> None:
-        """No schedule."""
+    def take_frame(self, src: int, frame: Frame, at: float) -> None:  # noqa: ARG002  # not all ask
+        """Who has one has another policy."""
+        self._scheduled.add(src)
 
     def notices(self) -> list[str]:
-        """Nothing."""
-        return []
+        """Who shares the air in another way."""
+        return [
+            f"robot {src} takes turns by a tdma schedule and this robot does not: what both send "
+            "collides; give both the same [access], and radios of one kind where access.policy is "
+            "auto"
+            for src in sorted(self._scheduled)
+        ]
 
     @property
     def own_end(self) -> float:

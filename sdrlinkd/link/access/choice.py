@@ -25,7 +25,7 @@ LONGEST_APART_S = 0.1
 
 def check_access(params: AccessParams, own_id: int) -> None:
     """What can be told without a radio. Raises ConfigError."""
-    if params.policy in ("minislot", "tdma"):
+    if params.policy in ("minislot", "tdma") or (params.policy == "auto" and params.nodes):
         if own_id not in params.nodes:
             raise ConfigError(
                 f"access.nodes: got {params.nodes}; allowed with access.policy = "
@@ -39,17 +39,18 @@ def check_access(params: AccessParams, own_id: int) -> None:
 def make_access(
     params: AccessParams, own_id: int, traits: CarrierTraits, longest_burst_s: float, rng: Random
 ) -> Access:
-    """The policy, for bursts of at most `longest_burst_s`.
+    """The policy, any but auto, for bursts of at most `longest_burst_s`.
 
     Raises ConfigError when the radio cannot carry it.
     """
     check_access(params, own_id)
+    if params.policy == "auto":
+        raise ValueError("auto is no policy: settle it first")
     if params.policy == "none":
-        return Free(2 * traits.turnaround_s)
+        return make_free(traits)
     _refuse_deaf(params, traits)
-    # So far apart must two begin that the second can hear the first and still hold back.
     detect_s = traits.detect_s + MARGIN_S
-    apart_s = traits.lead_s + traits.react_s + detect_s
+    apart_s = reaction_s(traits)
     if params.policy in ("csma", "minislot") and apart_s > LONGEST_APART_S:
         raise ConfigError(
             f'access.policy: got "{params.policy}"; robots with this radio hear each other begin '
@@ -59,7 +60,8 @@ def make_access(
     if params.policy == "csma":
         slottime_s = params.slottime_s or apart_s
         dwait_s = params.dwait_s or slottime_s
-        return Csma(dwait_s, slottime_s, params.persist, detect_s, rng)
+        robots = max(2, len(set(params.nodes)))
+        return Csma(dwait_s, slottime_s, params.persist, detect_s, rng, robots)
     minislot_s = params.minislot_s or apart_s
     if params.policy == "minislot":
         _refuse_short("minislot_s", minislot_s, apart_s, traits)
@@ -72,6 +74,18 @@ def make_access(
             )
         return MiniSlots(own_id, params.nodes, minislot_s, detect_s)
     return _make_tdma(params, own_id, traits, longest_burst_s, apart_s, rng)
+
+
+def make_free(traits: CarrierTraits, is_alone: bool = False) -> Free:
+    """No policy; `is_alone`: and nobody to share the air with."""
+    return Free(
+        2 * traits.turnaround_s, traits.gap_s, traits.spell_s, traits.spell_pause_s, is_alone
+    )
+
+
+def reaction_s(traits: CarrierTraits) -> float:
+    """So far apart must two begin that the second can hear the first and still hold back."""
+    return traits.lead_s + traits.react_s + traits.detect_s + MARGIN_S
 
 
 def _make_tdma(

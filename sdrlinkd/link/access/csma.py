@@ -22,9 +22,16 @@ class Csma(Carriers):
     """
 
     def __init__(
-        self, dwait_s: float, slottime_s: float, persist: float, detect_s: float, rng: Random
+        self,
+        dwait_s: float,
+        slottime_s: float,
+        persist: float,
+        detect_s: float,
+        rng: Random,
+        robots: int = 2,
     ) -> None:
         super().__init__()
+        self._robots = robots
         self._dwait_s = dwait_s
         self._slottime_s = slottime_s
         self._persist = persist
@@ -52,6 +59,15 @@ class Csma(Carriers):
         waits, eagerness = WINDOWS[qos]
         passed = 1 / min(1.0, eagerness * self._persist) - 1
         return self._dwait_s + (waits + passed) * self._slottime_s
+
+    def carries(self, burst_s: float) -> float:
+        """What does not collide, beside the slots that all let pass."""
+        waits, eagerness = WINDOWS[Qos.DEFAULT]
+        chance, n = min(1.0, eagerness * self._persist), self._robots
+        anybody = 1 - (1 - chance) ** n
+        nobody_else = n * chance * (1 - chance) ** (n - 1) / anybody
+        idle_s = self._dwait_s + (waits + 1 / anybody - 1) * self._slottime_s
+        return nobody_else * burst_s / (burst_s + idle_s)
 
     @property
     def others_follow(self) -> bool:

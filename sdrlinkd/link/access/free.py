@@ -1,17 +1,32 @@
 """`none`: an air of our own."""
 
-from sdrlinkd.link.access.base import Carriers, Slot, Wish
+from sdrlinkd.link.access.base import INFINITE, Carriers, Slot, Wish
 
 DEAF_S = 0.02
 """A radio that is deaf for longer than most bursts last is no radio for several without turns."""
 
 
 class Free(Carriers):
-    """Sends whenever there is something to send; `deaf_s`: then it hears nothing for longer."""
+    """Sends whenever there is something to send.
 
-    def __init__(self, deaf_s: float = 0.0) -> None:
+    `deaf_s`: then it hears nothing for longer; `gap_s` stays free between two bursts, and `pause_s`
+    after it has sent for `spell_s`. `is_alone`: nobody else should be on this air.
+    """
+
+    def __init__(
+        self,
+        deaf_s: float = 0.0,
+        gap_s: float = 0.0,
+        spell_s: float = INFINITE,
+        pause_s: float = 0.0,
+        is_alone: bool = False,
+    ) -> None:
         super().__init__()
         self._deaf_s = deaf_s
+        self._gap_s = gap_s
+        self._spells = spell_s, pause_s
+        self._is_alone = is_alone
+        self._others: set[int] = set()
 
     @property
     def state(self) -> str:
@@ -22,13 +37,32 @@ class Free(Carriers):
         """At once."""
         return Slot(wish.earliest)
 
+    def carries(self, burst_s: float) -> float:
+        """All but gaps, and what it listens between spells."""
+        spell_s, pause_s = self._spells
+        listens = pause_s / (spell_s + pause_s) if spell_s < INFINITE else 0.0
+        gaps = self._gap_s / (burst_s + self._gap_s) if self._gap_s else 0.0
+        return (1 - gaps) * (1 - listens)
+
+    def heard(self, src: int, at: float, is_relayed: bool) -> None:  # noqa: ARG002  # not all ask
+        """There is somebody else after all."""
+        if self._is_alone and not is_relayed:
+            self._others.add(src)
+
     def notices(self) -> list[str]:
         """Two that are deaf so long lose most of each other's bursts."""
+        notices = super().notices()
+        if self._others and not notices:
+            who = ", ".join(map(str, sorted(self._others)))
+            notices.append(
+                f"robot {who} sends on this air, too, and access.nodes lists nobody else: what is "
+                "sent at once collides; list all robots in access.nodes at all of them"
+            )
         if self._deaf_s < DEAF_S:
-            return []
+            return notices
         notice = (
             "for each burst of its own, this radio hears nothing for "
             f"{self._deaf_s * 1e3:.3g} ms: where other robots send, too, set "
             'access.policy = "tdma" at all of them'
         )
-        return [notice]
+        return [*notices, notice]

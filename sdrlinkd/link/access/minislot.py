@@ -64,6 +64,15 @@ class MiniSlots(Carriers):
         return self._minislot_s * (1 + (n - 1) / 2 + (n if qos > Qos.LATENCY else 0))
 
     @property
+    def turn_s(self) -> float:
+        """From a carrier's end to the first of the lower level."""
+        return self._minislot_s * (1 + len(self._nodes))
+
+    def carries(self, burst_s: float) -> float:
+        """Whoever is next in order begins when all of the higher level were passed."""
+        return burst_s / (burst_s + self.turn_s)
+
+    @property
     def others_follow(self) -> bool:
         """In their mini-slots."""
         return True

@@ -11,9 +11,13 @@ Seconds = Annotated[float, Meta(ge=0, le=10)]
 class AccessParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How robots share the air; the same at all of them. Times of 0 are made from the radio's."""
 
-    policy: Literal["none", "csma", "minislot", "tdma"] = "none"
+    policy: Literal["auto", "none", "csma", "minislot", "tdma"] = "auto"
+    """auto: none where `nodes` lists nobody else, minislot where the radio reacts soon, else tdma.
+    """
     nodes: list[Annotated[int, Meta(ge=0, le=254)]] = []
-    """Robots that share it, in one order at all of them; for minislot and tdma."""
+    """Robots that share it, in one order at all of them; for auto, minislot and tdma."""
+    force: bool = False
+    """Take a policy that carries less than half of what the best one would."""
     persist: Annotated[float, Meta(gt=0, le=1)] = 0.05
     """csma: chance to send in an idle slot (PERSIST)."""
     dwait_s: Seconds = 0.0

@@ -2,6 +2,7 @@
 
 import math
 from binascii import crc_hqx
+from collections import Counter
 from collections.abc import Sequence
 from random import Random
 from struct import pack
@@ -21,6 +22,8 @@ LISTEN_SHARE = 0.25
 """Of its own slots, while nobody follows it: others may have theirs at the same time."""
 MAX_LEVEL = 255
 PAUSE_AFTER = 2 / 3
+UNSCHEDULED = 3
+"""After so many beacons without a schedule, a robot has none."""
 
 
 class Tdma(Carriers):
@@ -78,6 +81,8 @@ class Tdma(Carriers):
         self._told_at = 0.0
         self._begins_at = LISTEN_S + sum(node < own_id for node in nodes)
         self._strangers: dict[int, int] = {}
+        self._unscheduled: Counter[int] = Counter()
+        """Beacons of each robot since it told of a schedule: who has one tells it beside each."""
         self._heard_at: dict[int, float] = {}
         self._followed_at = 0.0
         self._listens = (-INFINITE, False)
@@ -106,6 +111,16 @@ class Tdma(Carriers):
     def share(self) -> float:
         """Our slot, but for its guard."""
         return (self._slot_s - self._guard_s) / self._frame_s
+
+    @property
+    def step_s(self) -> float:
+        """With reuse, others may have begun."""
+        return self._reuse * self._minislot_s * len(self._nodes)
+
+    def carries(self, burst_s: float) -> float:
+        """All but guards and gaps."""
+        open_s = self._slot_s - self._guard_s
+        return open_s / self._slot_s * burst_s / (burst_s + self._gap_s)
 
     def slot(self, wish: Wish) -> Slot | None:
         """In our own slot, or in one that nobody uses."""
@@ -146,6 +161,10 @@ class Tdma(Carriers):
         if node != self._own_id:
             self._told_of_at[node] = at
 
+    def beacon(self, src: int) -> None:
+        """A schedule should come with it."""
+        self._unscheduled[src] += 1
+
     def frame(self, start: float) -> Frame | None:
         """The schedule as we keep it."""
         if not self._is_running:
@@ -156,6 +175,7 @@ class Tdma(Carriers):
 
     def take_frame(self, src: int, frame: Frame, at: float) -> None:
         """Follow the lowest root, by the fewest hops."""
+        self._unscheduled.pop(src, None)
         if frame.schedule != self._schedule:
             self._strangers[src] = frame.schedule
             return
@@ -182,8 +202,14 @@ class Tdma(Carriers):
             self._told_at = at
 
     def notices(self) -> list[str]:
-        """Who keeps another schedule."""
+        """Who keeps another schedule, or none."""
         return [
+            f"robot {src} is heard and keeps no tdma schedule: what it sends falls into others' "
+            "slots; give it the same [access], and a radio of the same kind where access.policy "
+            "is auto"
+            for src, n in sorted(self._unscheduled.items())
+            if n >= UNSCHEDULED
+        ] + [
             f"robot {src} keeps another tdma schedule; give both the same nodes, slot_s, guard_s "
             f"and minislot_s in [access] (ours: {self.state})"
             for src in sorted(self._strangers)

@@ -1,17 +1,35 @@
 """How long the next burst may be, and whether it had better wait."""
 
-from sdrlinkd.link.schedule.allowance import OVERRUN, SHARED_OVERRUN, Allowance, Limits
+from sdrlinkd.link.schedule.allowance import (
+    IDLE_SHARE,
+    OVERRUN,
+    SHARED_OVERRUN,
+    Allowance,
+    Limits,
+)
 from sdrlinkd.link.schedule.forecast import Forecasts
-from sdrlinkd.link.schedule.params import ClassesParams, ClassParams
+from sdrlinkd.link.schedule.params import (
+    BulkParams,
+    ClassesParams,
+    ClassParams,
+    DefaultParams,
+    LatencyParams,
+    UrgentParams,
+)
 from sdrlinkd.link.schedule.shares import Shares
 
 __all__ = [
+    "IDLE_SHARE",
     "OVERRUN",
     "SHARED_OVERRUN",
     "Allowance",
+    "BulkParams",
     "ClassParams",
     "ClassesParams",
+    "DefaultParams",
     "Forecasts",
+    "LatencyParams",
     "Limits",
     "Shares",
+    "UrgentParams",
 ]

@@ -9,6 +9,7 @@ from sdrlinkd.link.qos import Qos
 
 Share = Annotated[float, Meta(ge=0, le=0.3)]
 Seconds = Annotated[float, Meta(ge=0, le=1)]
+Lifespan = Annotated[float, Meta(gt=0)]
 
 
 class ClassParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -22,15 +23,42 @@ class ClassParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     parity: Annotated[float, Meta(ge=0, le=1)] = 0.0
     """Fragments of parity for each one of a large message: so large a share of its PDUs may be
     lost."""
+    lifespan_s: Lifespan = float("inf")
+    """Seconds after which a message is not sent any more, where neither it nor its topic says."""
+
+
+class UrgentParams(ClassParams, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What must come now or not at all."""
+
+    lifespan_s: Lifespan = 1.0
+
+
+class LatencyParams(ClassParams, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What is worth little when it is old."""
+
+    share: Share = 0.1
+    lifespan_s: Lifespan = 2.0
+
+
+class DefaultParams(ClassParams, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What names no class."""
+
+    share: Share = 0.05
+
+
+class BulkParams(ClassParams, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What fills the air."""
+
+    share: Share = 0.05
 
 
 class ClassesParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """By class."""
 
-    urgent: ClassParams = ClassParams()
-    latency: ClassParams = ClassParams(share=0.1)
-    default: ClassParams = ClassParams(share=0.05)
-    bulk: ClassParams = ClassParams(share=0.05)
+    urgent: UrgentParams = UrgentParams()
+    latency: LatencyParams = LatencyParams()
+    default: DefaultParams = DefaultParams()
+    bulk: BulkParams = BulkParams()
 
     def of(self, qos: Qos) -> ClassParams:
         """That of a class."""

@@ -1,0 +1,143 @@
+"""Which policy fits the radio, and what each of them carries on it."""
+
+from collections.abc import Mapping
+from random import Random
+from typing import Literal, NamedTuple
+
+import msgspec
+
+from sdrlinkd.errors import ConfigError
+from sdrlinkd.link.access.base import Access
+from sdrlinkd.link.access.choice import check_access, make_access, make_free, reaction_s
+from sdrlinkd.link.access.params import AccessParams
+from sdrlinkd.link.carrier import CarrierTraits
+
+SOON_S = 0.001
+"""Mini-slots are for radios that hear another begin, and hold back, within this."""
+FAIR = 0.5
+"""A policy that carries less than this of what the best one does is not taken."""
+ALONE = ("direct", "gnuradio", "iqfile", "loopback")
+"""Backends without an air that robots share."""
+
+
+Policy = Literal["auto", "none", "csma", "minislot", "tdma"]
+
+
+class Settled(NamedTuple):
+    """The policy in force, and why. `shares`: of the air, what each policy carries."""
+
+    access: Access
+    policy: Policy
+    reason: str
+    shares: Mapping[str, float]
+
+    @property
+    def share(self) -> float:
+        """That of the policy in force."""
+        return self.shares[self.policy]
+
+    @property
+    def best(self) -> str:
+        """The policy that carries the most."""
+        return max(self.shares, key=lambda each: self.shares[each])
+
+    @property
+    def sentence(self) -> str:
+        """For people."""
+        return f"{self.policy}, {self.reason}; it carries {percent(self.share)} of the air"
+
+
+def settle(
+    params: AccessParams, own_id: int, traits: CarrierTraits, longest_burst_s: float, rng: Random
+) -> Settled:
+    """What access comes to on this radio, for bursts of at most `longest_burst_s`.
+
+    The same at all robots of a team whose parameters and radios are the same. Raises ConfigError
+    where the radio cannot carry the policy, or another one carries twice as much.
+    """
+    check_access(params, own_id)
+    policy, reason = params.policy, "as configured"
+    shares: dict[str, float] = {}
+    if policy != "none" and (policy == "csma" or _others(params, own_id)):
+        shares = air_shares(params, own_id, traits, longest_burst_s)
+    if policy == "auto":
+        policy, reason = _chosen(params, own_id, traits, shares)
+    if policy == "none":
+        is_alone = params.policy == "auto" and traits.senses and traits.kind not in ALONE
+        access: Access = make_free(traits, is_alone)
+        shares = {}
+    else:
+        wanted = msgspec.structs.replace(params, policy=policy)
+        access = make_access(wanted, own_id, traits, longest_burst_s, rng)
+    shares = {**shares, policy: access.carries(longest_burst_s)}
+    settled = Settled(access, policy, reason, shares)
+    if not params.force:
+        _refuse_poor(settled, max(2, len(set(params.nodes))))
+    return settled
+
+
+def may_share(params: AccessParams, own_id: int) -> bool:
+    """Whether the robot has to listen before it talks, as far as that is known without a radio."""
+    if params.policy == "auto":
+        return bool(_others(params, own_id))
+    return params.policy != "none"
+
+
+def air_shares(
+    params: AccessParams, own_id: int, traits: CarrierTraits, longest_burst_s: float
+) -> dict[str, float]:
+    """Of the air, what each policy carries with times made from the radio; 0: it cannot."""
+    shares: dict[str, float] = {}
+    policies: tuple[Policy, ...] = ("csma", "minislot", "tdma")
+    # csma need not know who there is: one more robot, then.
+    nodes = params.nodes or [own_id, (own_id + 1) % 255]
+    for policy in policies:
+        wanted = AccessParams(policy=policy, nodes=nodes, persist=params.persist)
+        try:
+            made = make_access(wanted, own_id, traits, longest_burst_s, Random(0))
+        except ConfigError:
+            shares[policy] = 0.0
+        else:
+            shares[policy] = made.carries(longest_burst_s)
+    return shares
+
+
+def percent(share: float) -> str:
+    """`93 %`, `6.6 %`."""
+    return f"{100 * share:.2g} %" if share < 0.995 else "100 %"
+
+
+def _others(params: AccessParams, own_id: int) -> set[int]:
+    return set(params.nodes) - {own_id}
+
+
+def _chosen(
+    params: AccessParams, own_id: int, traits: CarrierTraits, shares: Mapping[str, float]
+) -> tuple[Policy, str]:
+    """(policy, why) where it is auto."""
+    if traits.kind in ALONE or not traits.senses:
+        return "none", f'as no other robot shares the air of the backend "{traits.kind}"'
+    if not _others(params, own_id):
+        return "none", "as access.nodes lists nobody else"
+    if not traits.transmits:
+        return "none", "as this radio only receives here"
+    apart_s, n = reaction_s(traits), len(set(params.nodes))
+    reacts = f"this radio hears another begin, and holds back, within {1e3 * apart_s:.3g} ms"
+    if apart_s > SOON_S:
+        return "tdma", f"as {reacts}, and mini-slots are for {1e3 * SOON_S:g} ms and less"
+    if shares["minislot"] < FAIR * shares["tdma"]:
+        return "tdma", (
+            f"as with {n} robots mini-slots carry {percent(shares['minislot'])} of the air and "
+            f"slots {percent(shares['tdma'])}"
+        )
+    return "minislot", f"as {reacts}"
+
+
+def _refuse_poor(settled: Settled, n: int) -> None:
+    best, share = settled.best, settled.share
+    if share < FAIR * settled.shares[best]:
+        raise ConfigError(
+            f'access.policy: got "{settled.policy}", which carries {percent(share)} of the air '
+            f"with {n} robots on this radio, where {best} carries {percent(settled.shares[best])}; "
+            f'allowed: "auto" or "{best}", or access.force = true'
+        )

@@ -1,0 +1,147 @@
+"""Worst-case latency of periodic topics, by response-time analysis.
+
+A message waits for what is more urgent and for one burst of what is not (Joseph and Pandya 1986,
+with blocking): `R = G + B + C + Σ ⌈R / T_j⌉ C_j` over all topics j that go before it, where G is
+what a turn is waited for, and all else is served in turns. Where R is longer than the topic's own
+period, its next messages are looked at, too (Lehoczky 1990).
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from sdrlinkd.link import IDLE_SHARE, OVERRUN, SHARED_OVERRUN, Qos, TopicPolicy
+from sdrlinkd.plan.air import Setting
+from sdrlinkd.plan.supply import Supply
+from sdrlinkd.plan.traffic import Load
+
+FOREVER = float("inf")
+ROUNDS = 5000
+MOST_WAITING = 200
+"""Messages of one topic."""
+RECORDS_S, RECORDS = 1.0, 0.02
+"""A PDU of a beacon's records in so long, and of the air for CLOCK and RECEIPT of all robots."""
+LEVEL = Qos.LATENCY
+"""Up to this class robots go before others' lower ones; among those, nobody orders robots."""
+
+
+class Task(NamedTuple):
+    """A topic as the analysis sees it: a message takes `cost_s` on the air, every `period_s`.
+
+    The largest takes `most_s`, in so many bursts.
+    """
+
+    load: Load
+    policy: TopicPolicy
+    qos: Qos
+    rank: tuple[int, int]
+    period_s: float
+    pdus: int
+    cost_s: float
+    most_s: float
+    bursts: int
+
+
+def worst_s(task: Task, tasks: Sequence[Task], setting: Setting, supply: Supply) -> float:
+    """The age at which a message of `task` is handed over at the far end, at worst; inf: no end."""
+    lower = [other for other in tasks if other.rank > task.rank]
+    before = [other for other in tasks if other.rank <= task.rank and other is not task]
+    beside = _beside(task, lower, supply)
+    demand = sum(other.cost_s / other.period_s for other in (task, *before, *beside))
+    if demand * (1 + supply.others) > supply.share:
+        return FOREVER
+    found_s, done_s = 0.0, 0.0
+    # Where one is not done before the next comes, a later one of the same topic may be the latest.
+    for number in range(1, MOST_WAITING):
+        rest_s = supply.gap_s + _blocked_s(task, before, lower, setting, supply)
+        done_s = _done_s(number, rest_s, task, before, beside, setting, supply)
+        found_s = max(found_s, done_s - (number - 1) * task.period_s)
+        if done_s <= number * task.period_s or done_s == FOREVER:
+            break
+    else:
+        return FOREVER
+    return found_s + setting.traits.react_s + setting.host_s
+
+
+def _blocked_s(
+    task: Task, before: Sequence[Task], lower: Sequence[Task], setting: Setting, supply: Supply
+) -> float:
+    """What has begun is not interrupted: a beacon, or a burst of what is less urgent."""
+    blocked_s = setting.one_s
+    if lower:
+        blocked_s = min(setting.longest_s, max(other.most_s for other in lower))
+        if task.qos < max(other.qos for other in lower):
+            # Periodic topics are foreseen: it ends about when they are due, as far as blocks tell.
+            blocked_s = (SHARED_OVERRUN if supply.others else OVERRUN) * setting.each_s
+            blocked_s += 0.0 if setting.traits.is_lockstep else setting.traits.react_s
+            often = setting.one_s * sum(1 / each.period_s for each in (task, *before)) > IDLE_SHARE
+            if often or supply.closed_s:
+                # The air is not kept free for so much, nor for what comes while it is another's.
+                blocked_s = setting.one_s
+    if supply.others:
+        # A burst of another robot has begun.
+        blocked_s += min(setting.longest_s, max((t.most_s for t in lower), default=setting.one_s))
+    return blocked_s
+
+
+def _done_s(
+    number: int, rest_s: float, task: Task, before: Sequence[Task], beside: Sequence[Task],
+    setting: Setting, supply: Supply,
+) -> float:  # fmt: skip
+    """When that many messages of a topic are through, which come from 0 on, one a period."""
+    robots = 1 + supply.others
+    own_s = number * (task.most_s + task.bursts * supply.passed_s)
+    until_s = rest_s + supply.takes(own_s)
+    for _ in range(ROUNDS):
+        busy_s = sum(
+            math.ceil(until_s / other.period_s) * other.most_s * robots for other in before
+        )
+        busy_s += supply.others * math.ceil(until_s / task.period_s) * task.most_s
+        # Keeping the air free for them costs what does not fill a PDU.
+        idle_s = sum(
+            math.ceil(until_s / other.period_s) * setting.each_s / 2
+            for other in before
+            if other.qos < task.qos and task.bursts > 1
+        )
+        busy_s += min(idle_s, IDLE_SHARE * until_s)
+        turns = number * task.bursts + sum(
+            math.ceil(until_s / other.period_s) * other.bursts
+            for other in before
+            if _level(other) == _level(task)
+        )
+        if _level(task):
+            # Records are of class default.
+            busy_s += math.ceil(until_s / RECORDS_S) * setting.one_s
+            busy_s += RECORDS * until_s * robots / setting.robots
+        busy_s += _between_s(until_s, turns, beside, setting, supply)
+        more_s = rest_s + supply.takes(own_s + busy_s)
+        if more_s <= until_s + 1e-9:
+            return until_s
+        if more_s > 1000 * task.period_s + 60:
+            break
+        until_s = more_s
+    return FOREVER
+
+
+def _level(task: Task) -> bool:
+    """Whether robots that share the air let those of the other level go first."""
+    return task.qos > LEVEL
+
+
+def _beside(task: Task, lower: Sequence[Task], supply: Supply) -> list[Task]:
+    """What is less urgent, and of which others send all the same while this waits: in a level,
+    robots take turns whatever they have.
+    """
+    return [other for other in lower if supply.others and _level(other) == _level(task)]
+
+
+def _between_s(
+    worst_s: float, turns: int, beside: Sequence[Task], setting: Setting, supply: Supply
+) -> float:
+    """Bursts of those, in so long: one of each robot before each of our turns, or all there are."""
+    if not beside:
+        return 0.0
+    longest_s = min(setting.longest_s, max(other.most_s for other in beside))
+    pause_s = max(supply.pause_s[other.qos] for other in beside)
+    all_s = sum(math.ceil(worst_s / other.period_s) * other.most_s for other in beside)
+    return supply.others * min(turns * (longest_s + pause_s), all_s)
