@@ -154,7 +154,7 @@ async def _open(
         "sdrlinkd %s: robot %d on %s, %d topics, sockets in %s",
         __version__, setup.node_id, config.backend, len(setup.topics_in), directory.path,
     )  # fmt: skip
-    for warning in setup.warnings:
+    for warning in setup.all_warnings:
         log.warning("%s", warning)
     return node, control, reloading
 
@@ -244,7 +244,7 @@ async def _watch(notifier: Notifier, node: Node, control: Control) -> None:
     while True:
         notifier.alive()
         snapshot = node.snapshot(control.requests)
-        for line in node.look(snapshot):
+        for line in node.health.look(snapshot):
             log.log(LEVELS[line.level], "%s", line.text)
         notifier.status(status_line(snapshot))
         await asyncio.sleep(period_s)

@@ -12,7 +12,7 @@ from sdrlinkd import __version__
 from sdrlinkd.bus import Bus, Ingress
 from sdrlinkd.config import Setup
 from sdrlinkd.errors import LinkRefusedError
-from sdrlinkd.health import Health, Line
+from sdrlinkd.health import Health
 from sdrlinkd.hostclock import HostClock
 from sdrlinkd.link import (
     AS_CONFIGURED,
@@ -68,7 +68,7 @@ class Node:
         self._headers = headers
         self._stops = stops
         self._host_clock = HostClock(link.clocks, chrony, setup.config.chrony.robot)
-        self._health = Health()
+        self.health = Health()
         self._publish_clock = PublishClock()
         self._traffic: OwnTraffic[Due] | None = None
         self._ticked_at = float("-inf")
@@ -255,6 +255,7 @@ class Node:
         """Everything there is to know, at this moment."""
         now = self._pdu_link.now()
         carrier = self._opening.report(time.monotonic())
+        noted = link_notices(self._link, self._setup.topic_warnings)
         snapshot = Snapshot(
             version=__version__,
             node=self._setup.node_id,
@@ -272,13 +273,9 @@ class Node:
                 {topic_id: name for name, topic_id in self._setup.topics_in.items()},
                 self.bus.names_out(),
             ),
-            notices=[*self._setup.warnings, *carrier.notices, *link_notices(self._link)],
+            notices=[*self._setup.warnings, *carrier.notices, *noted],
         )
-        return msgspec.structs.replace(snapshot, verdict=self._health.judge(snapshot))
-
-    def look(self, snapshot: Snapshot) -> list[Line]:
-        """What a log should tell of what has changed since the last look; once a second."""
-        return self._health.look(snapshot)
+        return msgspec.structs.replace(snapshot, verdict=self.health.judge(snapshot))
 
     def _tell_verdicts(self) -> None:
         for verdict in self._link.outcomes.receipts.take():

@@ -48,6 +48,8 @@ class Setup:
     transforms: list[int]
     """Topics that [tf] is about."""
     warnings: list[str]
+    topic_warnings: dict[int, str]
+    """What matters of a topic, once it is used."""
     source: str = "config"
     """The file that all this is from."""
 
@@ -56,6 +58,11 @@ class Setup:
         topic = self.registry.by_id(topic_id)
         name = topic.name if topic else str(topic_id)
         return _PLACEHOLDER.sub(str(src), self.config.rx_format).rstrip("/") + "/" + name
+
+    @property
+    def all_warnings(self) -> list[str]:
+        """Of the whole and of the topics."""
+        return [*self.warnings, *self.topic_warnings.values()]
 
     def summary(self) -> list[str]:
         """What `--check` prints."""
@@ -71,7 +78,7 @@ class Setup:
                 for name, topic_id in self.topics_in.items()
             ),
             f"heard messages appear as {self.republished_as(2, 0)} (from robot 2)",
-            *(f"warning: {warning}" for warning in self.warnings),
+            *(f"warning: {warning}" for warning in self.all_warnings),
             *(f"not checked: {each}" for each in unchecked(config)),
         ]
 
@@ -116,6 +123,7 @@ def _resolve(config: Config, base: Path, source: str) -> Setup:
         dictionaries=load_dictionaries(policies, registry, base),
         transforms=_transforms(config, registry),
         warnings=_warnings(config, registry),
+        topic_warnings=_topic_warnings(config, registry),
         source=source,
     )
 
@@ -205,7 +213,7 @@ def _policies(config: Config, registry: Registry) -> dict[int, TopicPolicy]:
 
 def _warnings(config: Config, registry: Registry) -> list[str]:
     size, least = config.link.pdu_size, config.link.min_fragment
-    most, shared = max_message_size(size), equal_payload(size, 2)
+    shared = equal_payload(size, 2)
     lonely = (
         f"link.min_fragment = {least} is more than the {shared} B that each of two topics gets in "
         f"a PDU of {size} B: topics seldom share a PDU; at most {shared} lets them"
@@ -215,14 +223,14 @@ def _warnings(config: Config, registry: Registry) -> list[str]:
         f"receipts; at most {len(registry) - 1} leave one for them"
     )
     deaf = "" if config.backend in WITHOUT_AIR else cfo_warning(config.modem)
-    return (
-        [deaf] * bool(deaf)
-        + [lonely] * (least > shared)
-        + [full] * (not registry.has_control)
-        + [
-            f"{topic.name} ({topic.type}) can be larger than the {most} B that 255 fragments of "
-            f"{config.link.pdu_size} B PDUs carry; larger messages are refused (tx_too_big)"
-            for topic in registry.topics
-            if topic.type in UNBOUNDED_TYPES
-        ]
-    )
+    return [deaf] * bool(deaf) + [lonely] * (least > shared) + [full] * (not registry.has_control)
+
+
+def _topic_warnings(config: Config, registry: Registry) -> dict[int, str]:
+    size = config.link.pdu_size
+    return {
+        topic.id: f"{topic.name} ({topic.type}) can be larger than the {max_message_size(size)} B "
+        f"that 255 fragments of {size} B PDUs carry; larger messages are refused (tx_too_big)"
+        for topic in registry.topics
+        if topic.type in UNBOUNDED_TYPES
+    }

@@ -92,7 +92,7 @@ def _modem(team: Team) -> str:
 def _access(team: Team) -> str:
     nodes = ", ".join(str(number) for number in range(1, team.robots + 1))
     lines = [
-        _line('policy = "tdma"', "turns on the air; the same at all robots"),
+        _line('policy = "auto"', "what the radio can do best; the same at all robots"),
         _line(f"nodes = [{nodes}]"),
     ]
     if team.radio.slot:

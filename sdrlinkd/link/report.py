@@ -1,6 +1,7 @@
 """The link's report: counters in, frozen structs out."""
 
 from collections import Counter
+from collections.abc import Mapping
 
 from sdrlinkd.link.link import Link
 from sdrlinkd.link.neighbors import Neighbor
@@ -14,6 +15,8 @@ from sdrlinkd.reports import (
     TopicReport,
     TxReport,
 )
+
+NOTHING_NOTED: Mapping[int, str] = {}
 
 
 def link_report(
@@ -208,9 +211,12 @@ def _per_lately(link: Link, neighbor: Neighbor, now: float) -> float | None:
     return lost / (heard + lost) if heard + lost > 0 else None
 
 
-def link_notices(link: Link) -> list[str]:
-    """What a person should know about this link, in sentences."""
-    notices = []
+def link_notices(link: Link, of_topics: Mapping[int, str] = NOTHING_NOTED) -> list[str]:
+    """What a person should know about this link, in sentences.
+
+    `of_topics`: what should be known of topics by id, once a producer uses them.
+    """
+    notices = [text for each, text in of_topics.items() if link.sender.tally(each).accepted]
     if not link.registry.has_control:
         notices.append(
             "the registry uses all 16 topic ids, so there is no control channel: no ages, no "

@@ -55,8 +55,9 @@ def test_without_an_air_that_robots_share_it_is_none(kind):
     assert f'"{kind}"' in found.reason
 
 
-def test_who_only_receives_takes_no_turns():
-    found = settled(auto([1, 2]), USRP._replace(transmits=False))
+@pytest.mark.parametrize("policy", ["auto", "minislot", "tdma", "csma"])
+def test_who_only_receives_takes_no_turns(policy):
+    found = settled(auto([1, 2], policy=policy), USRP._replace(transmits=False))
     assert (found.policy, found.reason) == ("none", "as this radio only receives here")
 
 

@@ -54,7 +54,6 @@ def test_none_needs_nothing():
     ("traits", "why"),
     [
         (DEAF, 'the backend "direct" does not hear the air'),
-        (RECEIVER, 'the backend "iqfile" only receives here'),
         (LOCKSTEP._replace(senses=False), 'the backend "ether" does not hear the air'),
     ],
 )

@@ -57,6 +57,9 @@ def settle(
     """
     check_access(params, own_id)
     policy, reason = params.policy, "as configured"
+    if not traits.transmits:
+        # Who never sends needs no turn, whatever the others do.
+        policy, reason = "none", "as this radio only receives here"
     shares: dict[str, float] = {}
     if policy != "none" and (policy == "csma" or _others(params, own_id)):
         shares = air_shares(params, own_id, traits, longest_burst_s)
@@ -119,8 +122,6 @@ def _chosen(
         return "none", f'as no other robot shares the air of the backend "{traits.kind}"'
     if not _others(params, own_id):
         return "none", "as access.nodes lists nobody else"
-    if not traits.transmits:
-        return "none", "as this radio only receives here"
     apart_s, n = reaction_s(traits), len(set(params.nodes))
     reacts = f"this radio hears another begin, and holds back, within {1e3 * apart_s:.3g} ms"
     if apart_s > SOON_S:

@@ -133,11 +133,6 @@ def _refuse_deaf(params: AccessParams, traits: CarrierTraits) -> None:
             f'access.policy: got "{params.policy}", but the backend "{traits.kind}" does not hear '
             'the air; allowed: "none"'
         )
-    if not traits.transmits:
-        raise ConfigError(
-            f'access.policy: got "{params.policy}", but the backend "{traits.kind}" only '
-            'receives here; allowed: "none"'
-        )
 
 
 def _refuse_short(key: str, given_s: float, least_s: float, traits: CarrierTraits) -> None:
