@@ -117,6 +117,7 @@ async def _open(
         "sdrlinkd %s: robot %d on %s, %d topics, sockets in %s",
         __version__, setup.node_id, config.backend, len(setup.topics_in), directory.path,
     )  # fmt: skip
+    log.info("access %s", link.departures.settled.sentence)
     for warning in setup.warnings:
         log.warning("%s", warning)
     return node, control, policies

@@ -184,7 +184,6 @@ class Node:
         config = self._setup.config
         traits = await self._pdu_link.open(self)
         self._link.attach(traits, config.access, config.rate)
-        log.info("access %s", self._link.departures.settled.sentence)
         self._is_lockstep = traits.is_lockstep
 
     def play(self, traffic: Iterator["Due"]) -> None:
