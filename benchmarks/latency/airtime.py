@@ -74,7 +74,7 @@ def measure(case: Case, seed: int, seconds: float) -> Share:
     arrivals = {robot: list(_traffic(case, seed, robot, seconds)) for robot in robots}
     simulation = Simulation(
         air, World(air, {}), radios, links, modem, Airtimes(modem, PDU_SIZE),
-        AccessParams(policy="minislot", nodes=list(robots)), arrivals, seed=seed,
+        AccessParams(policy="minislot", nodes=list(robots), force=True), arrivals, seed=seed,
     )  # fmt: skip
     simulation.run(SETTLING_S)
     control_s, all_s = _sent_s(links.values())

@@ -171,7 +171,7 @@ def simulate(
         links,
         modem,
         Airtimes(modem, air.pdu_size),
-        AccessParams(policy=air.policy, nodes=list(clocks_ppm)),  # type: ignore[arg-type]
+        AccessParams(policy=air.policy, nodes=list(clocks_ppm), force=True),  # type: ignore[arg-type]
         arrivals,
         seed=seed,
         listen=listen,

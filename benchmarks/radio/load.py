@@ -89,7 +89,7 @@ def rows(seed: int, quick: bool) -> Iterator[Row]:
 def under_load(rate_hz: float, times: Times, seed: int) -> list[Span]:
     """Of each robot. Raises PeerError."""
     with (
-        pair("usrp", "load", CONFIG.format(rate=rate_hz), more=DEVICE) as robots,
+        pair("usrp", ["load"], CONFIG.format(rate=rate_hz), more=DEVICE) as robots,
         _busy(robots.folders, rate_hz, seed),
     ):
         time.sleep(times.warm_up_s)

@@ -75,7 +75,7 @@ def rows(seed: int, quick: bool) -> Iterator[Row]:
     for way, senders in SENDERS.items():
         count = QUICK_MESSAGES // len(senders) if quick else MESSAGES
         with (
-            pair("hackrf", "odom", MODEM + ACCESS[way], SOAPY, DEVICE) as robots,
+            pair("hackrf", ["odom"], MODEM + ACCESS[way], SOAPY, DEVICE) as robots,
             ThreadPoolExecutor() as pool,
         ):
             sent = {robot: messages[robot][: WARM_UP + count] for robot in senders}

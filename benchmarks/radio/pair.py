@@ -1,7 +1,7 @@
 """Two daemons, each with a test radio, that hear each other."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -56,7 +56,9 @@ class Pair:
 
 
 @contextmanager
-def pair(model: str, topic: str, tables: str, soapy: str = "", more: str = "") -> Iterator[Pair]:
+def pair(
+    model: str, topics: Collection[str], tables: str, soapy: str = "", more: str = ""
+) -> Iterator[Pair]:
     """Until both radios work, and then. Raises PeerError.
 
     TOML: `tables`, with that of the modem, and more lines of `soapy`; `more` of the device's
@@ -68,6 +70,6 @@ def pair(model: str, topic: str, tables: str, soapy: str = "", more: str = "") -
             robot: DEVICE.format(bus=bus, unit=robot, model=model, more=more) for robot in ROBOTS
         }
         with daemons.running(
-            "soapy", ROBOTS, [topic], config, "", own=own, ready=daemons.is_up
+            "soapy", ROBOTS, topics, config, "", own=own, ready=daemons.is_up
         ) as running:
             yield Pair(running.folders, dict(zip(ROBOTS, running.children, strict=True)))

@@ -383,7 +383,7 @@ def test_a_policy_is_set_while_the_daemon_runs_and_explained(start_daemon, ctl):
     assert code == 0
     assert out.splitlines() == [
         "odom:", "  qos: default -> latency", "  priority: 64 -> 90", "  period_s: 0 -> 10",
-        "  lifespan_s: inf -> 0.3", "  depth: 0 -> 1", "  compress: none -> zstd",
+        "  lifespan_s: that of its class -> 0.3", "  depth: 0 -> 1", "  compress: none -> zstd",
     ]  # fmt: skip
     publish(daemon, 10)
     wait_for(lambda: daemon.snapshot().link.tx.accepted == 10)

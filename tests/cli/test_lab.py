@@ -114,7 +114,7 @@ def test_options_go_before_the_scenario(lab, asked, tmp_path):
     (options,) = asked
     scenario = options.scenario
     assert (scenario.duration_s, scenario.seed, scenario.pace) == (1.5, 9, "realtime")
-    assert scenario.daemon == {"modem": {"mcs": 2}, "access": {"policy": "csma"}}
+    assert scenario.daemon == {"modem": {"mcs": 2}, "access": {"policy": "csma", "force": True}}
     assert (options.path, options.bag, options.traces) == (path, tmp_path / "bag", tmp_path)
 
 
@@ -127,7 +127,7 @@ def test_without_options_the_scenario_is_as_written(lab, asked, tmp_path):
     assert (plain.scenario.pace, plain.traces) == ("lockstep", None)
     assert plain.bag == tmp_path / "recordings/a"
     assert plain.scenario.daemon["access"] == {"policy": "tdma", "slot_s": 0.1}
-    assert changed.scenario.daemon["access"] == {"policy": "none", "slot_s": 0.1}
+    assert changed.scenario.daemon["access"] == {"policy": "none", "slot_s": 0.1, "force": True}
 
 
 @pytest.mark.parametrize(

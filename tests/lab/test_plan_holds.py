@@ -145,8 +145,8 @@ def test_what_fills_the_air_comes_not_much_sooner_than_the_plan_says(policy, rob
 
     _, setting = set_up(policy, robots, **RADIOS[radio])
     rates = (0.1 * n for n in range(400, 1, -1))
-    per_s = next(each for each in rates if plan_of(setting, loads(each)).is_feasible)
+    per_s = 0.9 * next(each for each in rates if plan_of(setting, loads(each)).is_feasible)
     plan, ages = trial(policy, robots, loads(per_s), 7 + robots, **RADIOS[radio])
-    assert plan.air > 0.8
+    assert plan.air > 0.75
     bulk, p99_s = plan.topics[1], np.quantile(ages[1], 0.99)
     assert bulk.worst_s / 3 < p99_s <= bulk.worst_s
