@@ -4,6 +4,7 @@ import time
 from typing import TYPE_CHECKING
 
 from sdrlinkd.link import Clocks, State, Wall
+from sdrlinkd.localtime import host_clocks
 
 if TYPE_CHECKING:
     # Loading it brings recordings, of which a daemon of a real robot has none.
@@ -24,6 +25,7 @@ class HostClock:
         self._robot = robot
         self._chrony_at = 0.0
         self._wall_ns: int | None = None
+        self._ahead_ns: int | None = None
         self._error_s = 0.0
         self.steps = 0
         """Times that it was set."""
@@ -36,9 +38,13 @@ class HostClock:
             # A clock that was set is no less exact for it.
             if moved_s < SET_S:
                 self._error_s = max(moved_s, 0.95 * self._error_s)
-            else:
-                self.steps += 1
         self._wall_ns = wall_ns
+        # The link's time may jump, too: what was set is told by a clock that never is.
+        host_ns, own_ns = host_clocks()
+        ahead_ns = host_ns - own_ns
+        if self._ahead_ns is not None and 1e-9 * abs(ahead_ns - self._ahead_ns) >= SET_S:
+            self.steps += 1
+        self._ahead_ns = ahead_ns
         self._clocks.wall = Wall(wall_ns, self._error_s + LEAST_ERROR_S)
         if self._chrony is not None and time.monotonic() - self._chrony_at >= CHRONY_S:
             self._chrony_at = time.monotonic()

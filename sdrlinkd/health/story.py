@@ -73,7 +73,7 @@ class Story:
             yield Line(
                 "radio",
                 Level.ERROR,
-                f"the {name} refuses its settings: {carrier.reason}. Tried again after a reload "
+                f"the settings do not fit the {name}: {carrier.reason}. Tried again after a reload "
                 "(SIGHUP), or when it was unplugged and is back",
             )
         elif state == "ended":

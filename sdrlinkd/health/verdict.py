@@ -52,7 +52,7 @@ def _down(snapshot: Snapshot) -> str:
     if carrier.state == "waiting":
         return f"no {name} since {since}: {carrier.reason}"
     if carrier.state == "refused":
-        return f"the {name} refuses its settings: {carrier.reason}"
+        return f"the settings do not fit the {name}: {carrier.reason}"
     if is_away(carrier):
         return f"no {name} since {since}" + (f": {carrier.reason}" if carrier.reason else "")
     if carrier.state == "ended":

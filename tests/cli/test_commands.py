@@ -244,7 +244,7 @@ def test_bag_play_and_info(start_daemon, ctl, recorded):
     assert code == 0
     (length, _, *lines) = out.splitlines()
     assert length.startswith("2.0 s, 200 messages, ")
-    rows = {words[4]: words for words in map(str.split, lines)}
+    rows = {words[4]: words for words in map(str.split, lines) if len(words) == 6}
     assert rows["/odom"] == ["60", "30.00", "724", "724", "/odom", "nav_msgs/msg/Odometry"]
     with Subscriber(
         ODOM.replace("robot_1", "rx_robot_1"), directory=daemon.directory, depth=0

@@ -163,7 +163,7 @@ def test_topics_are_taken_under_the_namespace_and_republished_by_source():
 
 def test_a_topic_that_can_be_too_large_is_warned_about():
     setup = make_setup(parse_config("[link]\npdu_size = 64"), ETC)
-    assert any("map" in warning and "13005 B" in warning for warning in setup.warnings)
+    assert any("map" in warning and "13005 B" in warning for warning in setup.all_warnings)
 
 
 def test_a_missing_registry_says_what_it_is(tmp_path):

@@ -125,8 +125,8 @@ def test_there_are_forty_and_more():
     ("text", "parts"),
     [
         (
-            f'{SOAPY}rx_gains = {{ VGA = 90 }}\n{ON_AIR}[access]\npolicy = "csma"',
-            ["not checked: whether", "frequency, rate, gains", "doctor", '"csma" fits'],
+            f'{SOAPY}rx_gains = {{ VGA = 90 }}\n{ON_AIR}[access]\npolicy = "tdma"\nnodes = [1, 2]',
+            ["not checked: whether", "frequency, rate, gains", "doctor", '"tdma" fits'],
         ),
         ('backend = "ether"\n[ether]\ndir = "air"', ["not checked: whether a hub answers"]),
         ('backend = "iqfile"\n[iqfile]\nreceive = "x"', ["not checked: whether", "be read"]),

@@ -92,7 +92,7 @@ def on_ether(robot: int) -> str:
     """One of two who share the air."""
     return (
         f'namespace = "robot_{robot}"\nbackend = "ether"\n[ether]\ndir = "{FOLDER}/hub"\n'
-        '[access]\npolicy = "csma"\n' + MODEM
+        '[access]\npolicy = "csma"\nforce = true\n' + MODEM
     )
 
 

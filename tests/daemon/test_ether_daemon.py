@@ -76,7 +76,7 @@ def test_a_second_robot_of_one_id_is_refused_and_the_first_is_told(start_daemon,
         assert level == "DOWN"
         assert f"robot 1 is on this air already: process {first.process.pid} on " in reason
         assert "another robot_id" in reason
-        wait_for(lambda: "the hub refuses its settings: " in second.log())
+        wait_for(lambda: "the settings do not fit the hub: " in second.log())
         told = f"asked for our id 1 on this air and was refused: process {second.process.pid} on "
         wait_for(lambda: told in first.snapshot().carrier.detail)
         assert first.snapshot().carrier.state == "up"

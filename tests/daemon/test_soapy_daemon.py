@@ -319,7 +319,7 @@ def test_settings_that_were_refused_are_tried_again(start_daemon, bus, mended_by
     good = on_soapy(1, name)
     robot = start_daemon(good.replace("tx_gain_db = 40.0", "tx_gain_db = 99.0"))
     wait_for(lambda: robot.snapshot().carrier.state == "refused", 60)
-    wait_for(lambda: "the radio refuses its settings" in robot.log())
+    wait_for(lambda: "the settings do not fit the radio" in robot.log())
     if mended_by == "a reload":
         text = robot.config.read_text()
         robot.config.write_text(text.replace("tx_gain_db = 99.0", "tx_gain_db = 40.0"))

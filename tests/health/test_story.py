@@ -37,8 +37,8 @@ def test_a_radio_that_comes_late_goes_and_comes_back():
         (
             "error",
             (
-                "the radio refuses its settings: got 99. Tried again after a reload (SIGHUP), or "
-                "when it was unplugged and is back"
+                "the settings do not fit the radio: got 99. Tried again after a reload (SIGHUP), "
+                "or when it was unplugged and is back"
             ),
         ),
     ]

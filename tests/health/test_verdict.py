@@ -36,7 +36,7 @@ def test_all_is_well():
         ),
         (
             {"state": "refused", "reason": "soapy.tx_gain_db: got 99"},
-            "the radio refuses its settings: soapy.tx_gain_db: got 99",
+            "the settings do not fit the radio: soapy.tx_gain_db: got 99",
         ),
         (
             {"state": "down", "since_s": 75, "reason": "it delivers nothing"},
