@@ -13,10 +13,10 @@ from tests.waiting import wait_for
 
 
 @pytest.fixture
-def killed(tmp_path, monkeypatch):
+def killed(tmp_path, tmp_path_factory, monkeypatch):
     """Runs a command until `is_up(folder of its run)`, then kills it; that folder."""
-    temporary = tmp_path / "tmp"
-    temporary.mkdir()
+    # A short name: there are sockets in it.
+    temporary = tmp_path_factory.mktemp("k")
     monkeypatch.setenv("TMPDIR", str(temporary))
 
     def call(is_up, *arguments):
@@ -41,6 +41,7 @@ def sockets(temporary):
     return list(temporary.glob("sdrlink-*/*/ctl.sock"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["demo", "lab"])
 def test_no_process_is_left_and_the_next_run_removes_the_folder(
     killed, tmp_path, command, monkeypatch
