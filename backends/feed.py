@@ -24,7 +24,7 @@ class BlockFeed:
 
     One wake-up of the event loop a block, and no turn of it while a block is made; none at all for
     blocks that were heard, unless `is_due` says of the index after one that something else is to be
-    done then.
+    done then. `measures`: how strong what is in the blocks is.
     """
 
     def __init__(
@@ -32,6 +32,7 @@ class BlockFeed:
         next_block: Callable[[], RxBlock | None],
         name: str,
         is_due: Callable[[int], bool],
+        measures: bool = True,
     ) -> None:
         self._next_block = next_block
         self._is_due = is_due
@@ -40,13 +41,13 @@ class BlockFeed:
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._hear: Hear | None = None
-        self._meter = LevelMeter()
+        self._meter = LevelMeter() if measures else None
         self._queue: asyncio.Queue[Fed | BaseException | None] = asyncio.Queue()
 
     @property
     def levels(self) -> Levels | None:
         """Of the blocks so far."""
-        return self._meter.levels
+        return self._meter.levels if self._meter else None
 
     async def blocks(self, hear: Hear | None) -> AsyncIterator[Fed]:
         """The blocks in order. What `next_block` or `hear` raise is raised here."""
@@ -84,7 +85,7 @@ class BlockFeed:
         if block is None:
             self._hand_over(None)
             return False
-        if block.samples is not None:
+        if self._meter and block.samples is not None:
             self._meter.push(block.samples)
         if self._hear is None or not block.n:
             return self._hand_over(Fed(block, is_heard=False))

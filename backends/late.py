@@ -1,8 +1,8 @@
 """A radio on a clock that began before it."""
 
-from collections.abc import AsyncIterator, Awaitable, Callable
+import threading
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from dataclasses import replace
-from time import monotonic_ns
 
 from backends.base import Capabilities, Hear, Levels, Radio, RxBlock, Tuning, TxBurst, TxReport
 
@@ -10,15 +10,16 @@ NOT_OPEN = "the radio was not open yet"
 
 
 class LateRadio:
-    """`radio`, whose first sample others see at index `first()`; what lies before it is a gap.
+    """`radio`, whose samples others see from index `first()` on; what lies before is a gap.
 
-    `first` is asked when the stream begins.
+    `first` is asked when the radio's first block is there, and nothing is sent before.
     """
 
     def __init__(self, radio: Radio, first: Callable[[], int]) -> None:
         self._radio = radio
         self._ask_first = first
         self._first = 0
+        self._has_begun = threading.Event()
 
     @property
     def capabilities(self) -> Capabilities:
@@ -51,20 +52,15 @@ class LateRadio:
 
     async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
         """The gap, then the radio's blocks."""
-        first = self._first = self._ask_first()
 
         def hear_shifted(block: RxBlock) -> None:
             if hear is not None:
-                hear(replace(block, index=block.index + first))
+                for each in self._shifted(block):
+                    hear(each)
 
-        if first:
-            gap = RxBlock(0, first, None, NOT_OPEN, monotonic_ns())
-            if hear is None:
-                yield gap
-            else:
-                hear(gap)
         async for block in self._radio.blocks(None if hear is None else hear_shifted):
-            yield replace(block, index=block.index + first)
+            for each in self._shifted(block):
+                yield each
 
     def send(self, burst: TxBurst) -> Awaitable[TxReport]:
         """The burst at the radio's own index."""
@@ -76,6 +72,14 @@ class LateRadio:
     async def close(self) -> None:
         """Stop."""
         await self._radio.close()
+
+    def _shifted(self, block: RxBlock) -> Iterator[RxBlock]:
+        if not self._has_begun.is_set():
+            self._has_begun.set()
+            self._first = max(0, self._ask_first() - block.index - block.n)
+            if self._first:
+                yield RxBlock(0, self._first, None, NOT_OPEN, block.host_ns)
+        yield replace(block, index=block.index + self._first) if self._first else block
 
     async def _report(self, answer: Awaitable[TxReport], first: int) -> TxReport:
         report = await answer

@@ -9,8 +9,8 @@ from pathlib import Path
 import uvloop
 
 from sdrlinkd import __version__, daemon
-from sdrlinkd.config import WITHOUT_AIR, Setup, load_config, located, make_setup, unchecked
-from sdrlinkd.errors import ConfigError, UserError
+from sdrlinkd.config import Setup, load_config, make_setup, unchecked
+from sdrlinkd.errors import UserError
 from sdrlinkd.journal import JournalFormatter, is_read_by_journal
 from sdrlinkd.parent import end_with_parent
 
@@ -53,14 +53,6 @@ def _read(path: Path) -> Setup:
 def _checked(setup: Setup) -> list[str]:
     """What follows from the configuration, and what only the radio can tell. Raises UserError."""
     told = daemon.check(setup)
-    if setup.config.backend not in WITHOUT_AIR:
-        # It brings the modem.
-        from sdrlinkd.modem import check_airtime
-
-        try:
-            check_airtime(setup.config)
-        except ConfigError as error:
-            raise ConfigError(located(str(error), setup.source)) from None
     verdict = (
         "the file is good; what is not checked shows when the daemon starts"
         if unchecked(setup.config)

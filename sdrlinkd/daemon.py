@@ -7,7 +7,6 @@ import logging
 import os
 import signal
 import sys
-import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -20,7 +19,7 @@ from backends import Patience
 from sdrlinkd import __version__
 from sdrlinkd.bus import Bus, RuntimeDirectory
 from sdrlinkd.client import runtime_dir
-from sdrlinkd.config import Config, Setup, located
+from sdrlinkd.config import WITHOUT_AIR, Config, Setup, located
 from sdrlinkd.control import Control
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.health import Level
@@ -49,7 +48,7 @@ LEVELS = {
 }
 SWITCH_INTERVAL_S = 1e-4
 START_S = 120.0
-"""Loading the modem may take so long on a small computer."""
+"""Loading what the daemon is made of may take so long on a small computer."""
 STOP_S = 30.0
 """A radio takes so long to be let go at the most, and so does a kernel that is being compiled."""
 NOTICES_REPLUG = ("soapy", "ether")
@@ -128,7 +127,7 @@ async def _open(
     )
     policies = Policies(setup, link)
     loading = Loading()
-    make = partial(_make_pdu_link, rng, time.monotonic(), loading)
+    make = partial(_make_pdu_link, rng, loading)
     opening = Opening(setup, make, config.backend in NOTICES_REPLUG, lambda: loading.told)
     context = zmq.Context()
     # Closes what a part that failed half-way left open; term() would wait for it for ever.
@@ -141,7 +140,7 @@ async def _open(
     policies.announce = node.bus.announce
     control = Control(context, directory)
     stack.callback(control.close)
-    reloading = Reloading(setup, reload, policies, opening)
+    reloading = Reloading(setup, reload, check, policies, opening)
     control.serve(make_verbs(setup, node, control, policies, opening, reloading))
     stack.push_async_callback(opening.close)
     stack.callback(loading.give_up)
@@ -160,7 +159,7 @@ async def _open(
 
 
 def _make_pdu_link(
-    rng: Random, began_s: float, loading: Loading, setup: Setup, patience: Patience
+    rng: Random, loading: Loading, setup: Setup, patience: Patience, began_s: float
 ) -> PduLink:
     config = setup.config
     if config.backend == "direct":
@@ -197,9 +196,11 @@ def check(setup: Setup) -> list[str]:
     """What only the message types and the radio's nature can tell. Raises ConfigError."""
     _types_of(setup)
     # The modem brings numba, which takes its time to load.
-    from sdrlinkd.modem import access_words
+    from sdrlinkd.modem import access_words, check_airtime
 
     try:
+        if setup.config.backend not in WITHOUT_AIR:
+            check_airtime(setup.config)
         return access_words(setup.config, setup.node_id)
     except ConfigError as error:
         raise ConfigError(located(str(error), setup.source)) from None

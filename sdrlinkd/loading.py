@@ -1,5 +1,6 @@
 """The modem, compiled or loaded on a thread while the bus takes messages already."""
 
+import asyncio
 import logging
 import threading
 
@@ -11,14 +12,26 @@ class _GivenUpError(Exception):
 
 
 class Loading:
-    """Called on a thread; `told` is how far it is, for people."""
+    """Done once, whoever waits for it and gives up; `told` is how far it is, for people."""
 
     def __init__(self) -> None:
         self._is_given_up = threading.Event()
+        self._done: asyncio.Future[None] | None = None
         self.told = ""
 
-    def __call__(self) -> None:
-        """Compile the modem, or load it."""
+    async def __call__(self) -> None:
+        """Wait until the modem is compiled, or loaded."""
+        if self._done is None:
+            self._done = asyncio.ensure_future(asyncio.to_thread(self._load))
+            # Where nobody waits any more, nobody needs to know.
+            self._done.add_done_callback(lambda done: done.cancelled() or done.exception())
+        await asyncio.shield(self._done)
+
+    def give_up(self) -> None:
+        """Stop behind the kernel that is being compiled: what is done stays so."""
+        self._is_given_up.set()
+
+    def _load(self) -> None:
         # It brings numba, which takes its time.
         from sdrlinkd.compiling import compile_modem
 
@@ -26,10 +39,6 @@ class Loading:
             compile_modem(log.info, watch=self._watch)
         finally:
             self.told = ""
-
-    def give_up(self) -> None:
-        """Stop behind the kernel that is being compiled: what is done stays so."""
-        self._is_given_up.set()
 
     def _watch(self, done: int, total: int) -> None:
         self.told = f"the modem is being compiled, once: {done} of {total} kernels"

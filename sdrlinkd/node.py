@@ -11,7 +11,6 @@ import msgspec
 from sdrlinkd import __version__
 from sdrlinkd.bus import Bus, Ingress
 from sdrlinkd.config import Setup
-from sdrlinkd.errors import LinkRefusedError
 from sdrlinkd.health import Health
 from sdrlinkd.hostclock import HostClock
 from sdrlinkd.link import (
@@ -72,7 +71,7 @@ class Node:
         self._publish_clock = PublishClock()
         self._traffic: OwnTraffic[Due] | None = None
         self._ticked_at = float("-inf")
-        self._is_lockstep = False
+        self._is_lockstep = self._is_attached = False
         self._queue_moved = asyncio.Event()
         self._started_at = time.monotonic()
         self._loop_lag_s = 0.0
@@ -128,7 +127,7 @@ class Node:
         config = self._opening.config
         self._link.attach(traits, config.access, config.rate)
         log.info("access %s", self._link.departures.settled.sentence)
-        self._is_lockstep = traits.is_lockstep
+        self._is_lockstep, self._is_attached = traits.is_lockstep, True
         if self._traffic is not None:
             self._traffic.begin(self._pdu_link.now())
 
@@ -200,10 +199,7 @@ class Node:
             waits = config.backend == "iqfile" and config.iqfile.wait_for_consumer
             if waits or config.play.wait_for_consumer:
                 await self.bus.has_consumer.wait()
-            try:
-                await self._pdu_link.run()
-            except LinkRefusedError as error:
-                self._opening.refused(str(error))
+            await self._opening.run()
 
     async def tick(self) -> None:
         """Let the link's time pass, and measure how late the event loop is; for ever."""
@@ -213,8 +209,8 @@ class Node:
             due = time.monotonic() + tick_s
             await asyncio.sleep(tick_s)
             self._loop_lag_s = max(time.monotonic() - due, 0.9 * self._loop_lag_s)
-            if not self._opening.is_up:
-                # There is no air yet, and whether its time is ours is not known.
+            if not self._is_attached:
+                # There has been no air yet, and whether its time is ours is not known.
                 self._link.expire_queue(self._pdu_link.now())
                 self._tell_verdicts()
             elif not self._is_lockstep:
@@ -237,7 +233,9 @@ class Node:
         self._link.drain()
         self._pdu_link.wake()
         try:
-            async with asyncio.timeout(at_most_s):
+            # Without a radio, waiting sends nothing.
+            is_vain = self._opening.state in ("waiting", "refused")
+            async with asyncio.timeout(0 if is_vain else at_most_s):
                 while self._link.has_work:
                     self._queue_moved.clear()
                     await self._queue_moved.wait()

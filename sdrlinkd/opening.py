@@ -4,13 +4,14 @@ configuration asks of it.
 
 import asyncio
 import contextlib
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Coroutine
 
 from msgspec.structs import replace
 
 from backends import Patience
 from sdrlinkd.config import Config, Setup
-from sdrlinkd.errors import LinkAbsentError, LinkRefusedError
+from sdrlinkd.errors import LinkAbsentError, LinkRefusedError, UserError
 from sdrlinkd.pdulink import PduLink, PduListener
 from sdrlinkd.reports import CarrierReport
 
@@ -18,15 +19,16 @@ RETRY_S = 0.25, 2.0
 """What is not there is tried again after so long; more each time."""
 BEING_OPENED = "it is being opened"
 
-Make = Callable[[Setup, Patience], PduLink]
+Make = Callable[[Setup, Patience, float], PduLink]
 
 
 class Opening:
-    """Owns the PDU link while it is not up, and `state` and `reason` of that time.
+    """Owns the PDU link, and `state` and `reason` of the time in which it is not up.
 
-    `make` builds one from a configuration; what could not be opened is closed, and another one is
-    made for the next try. A PDU link that `notices_replug` is tried again without being told to
-    after its settings were refused. `progress` says what takes so long, where something does.
+    `make` builds one from a configuration, on a clock that began at a given monotonic time; what
+    could not be opened is closed, and another one is made for the next try. A PDU link that
+    `notices_replug` is tried again without being told to after its settings were refused.
+    `progress` says what takes so long, where something does.
     """
 
     def __init__(
@@ -38,10 +40,11 @@ class Opening:
         self._progress = progress
         self._told_to = asyncio.Event()
         self._patience = Patience.NONE
+        self._knows_when = True
         self.state = "opening"
         self.reason = BEING_OPENED
         self._told_state, self._told_since = "", 0.0
-        self.pdu_link = make(setup, Patience.NONE)
+        self.pdu_link = make(setup, Patience.NONE, time.monotonic())
 
     @property
     def config(self) -> Config:
@@ -53,41 +56,67 @@ class Opening:
         """Whether it carries PDUs, or did when last heard of."""
         return self.state == "up"
 
+    @property
+    def is_working(self) -> bool:
+        """Whether it carries PDUs now."""
+        return self.is_up and self.pdu_link.report().state != "down"
+
     async def until_up(self, listener: PduListener) -> None:
         """Try until it is there. Raises UserError when a person has to mend something first."""
         wait_s, most_s = RETRY_S
         while not self.is_up:
-            if self._patience is not Patience.NONE:
-                await self.pdu_link.close()
-                self.pdu_link = self._make(self._setup, self._patience)
-            self._told_to.clear()
-            if await self._try(listener) or self._told_to.is_set():
+            is_first = self._patience is Patience.NONE
+            if self._told_to.is_set():
+                # Whatever was found out meanwhile was of the settings before.
+                self._patience = Patience.THERE
+                self._told_to.clear()
+            try:
+                if not is_first:
+                    await self._renew()
+                await self._unless_told(self.pdu_link.open(listener))
+            except LinkAbsentError as error:
+                self._wait("waiting", str(error), Patience.THERE, knows_when=True)
+            except LinkRefusedError as error:
+                self.refused(str(error))
+            except UserError as error:
+                if is_first:
+                    raise
+                # It was good enough to begin with: no reason to end.
+                self._wait("refused", str(error), Patience.THERE, knows_when=False)
+            else:
+                if not self._told_to.is_set():
+                    self.state, self.reason = "up", ""
                 continue
             with contextlib.suppress(TimeoutError):
-                knows_when = self.state == "waiting" or self._notices_replug
-                async with asyncio.timeout(wait_s if knows_when else None):
+                async with asyncio.timeout(wait_s if self._knows_when else None):
                     await self._told_to.wait()
             wait_s = min(2 * wait_s, most_s)
 
+    async def run(self) -> None:
+        """Let it carry PDUs until it will not have us any more, or is to be opened anew."""
+        try:
+            await self._unless_told(self.pdu_link.run())
+        except LinkRefusedError as error:
+            self.refused(str(error))
+
     def refused(self, reason: str) -> None:
-        """What was up will not have us any more."""
-        self.state, self.reason = "refused", reason
-        self._patience = Patience.REPLUGGED
+        """What is there does not take its settings."""
+        self._wait("refused", reason, Patience.REPLUGGED, self._notices_replug)
 
     def try_again(self, setup: Setup) -> None:
         """A person says that it may succeed now, with this configuration."""
-        if self.is_up:
-            return
         self._setup = setup
         # Whatever it is, it is there now or can be waited for.
-        self._patience = Patience.THERE
+        self._wait("opening", BEING_OPENED, Patience.THERE, knows_when=True)
         self._told_to.set()
 
     def report(self, at: float) -> CarrierReport:
         """What the PDU link tells, or why there is none; since when, on the clock of `at`."""
         told = self.pdu_link.report()
         if not self.is_up:
-            reason = self._progress() or self.reason
+            # An attempt that waits may know more by now.
+            latest = told.reason if self.state == "waiting" else ""
+            reason = self._progress() or latest or self.reason
             told = replace(told, state=self.state, reason=reason, notices=[])
         if told.state != self._told_state:
             self._told_state, self._told_since = told.state, at
@@ -97,24 +126,26 @@ class Opening:
         """Close what there is."""
         await self.pdu_link.close()
 
-    async def _try(self, listener: PduListener) -> bool:
-        """Open it, or give up when told to try again."""
-        opening = asyncio.ensure_future(self.pdu_link.open(listener))
+    async def _renew(self) -> None:
+        """Another one in place of what there is. Its clock goes on where that one stands."""
+        began_s = time.monotonic() - self.pdu_link.now()
+        await self.pdu_link.close()
+        self.pdu_link = self._make(self._setup, self._patience, began_s)
+
+    def _wait(self, state: str, reason: str, patience: Patience, knows_when: bool) -> None:
+        self.state, self.reason = state, reason
+        self._patience, self._knows_when = patience, knows_when
+
+    async def _unless_told(self, work: Coroutine[object, object, None]) -> None:
+        """Do it, but for being told to try again: then it is given up. Raises what it raises."""
+        working = asyncio.ensure_future(work)
         told = asyncio.ensure_future(self._told_to.wait())
         try:
-            await asyncio.wait((opening, told), return_when=asyncio.FIRST_COMPLETED)
-            if not opening.done():
-                return False
-            opening.result()
-        except LinkAbsentError as error:
-            self.state, self.reason = "waiting", str(error)
-            self._patience = Patience.THERE
-            return False
-        except LinkRefusedError as error:
-            self.refused(str(error))
-            return False
+            await asyncio.wait((working, told), return_when=asyncio.FIRST_COMPLETED)
         finally:
-            for each in (opening, told):
-                each.cancel()
-        self.state, self.reason = "up", ""
-        return True
+            told.cancel()
+            if not working.done():
+                working.cancel()
+                await asyncio.wait((working,))
+        if not working.cancelled():
+            working.result()

@@ -16,29 +16,41 @@ ANYTIME = ("topic",)
 
 
 class Reloading:
-    """Applies what may change. `read` reads the configuration anew; `setup` is what was begun with.
+    """Applies what may change: the topic policies and, while there is no radio, its settings.
 
-    That are the topic policies; and while there is no radio, what it is to be opened with.
+    `read` reads the configuration anew; `check` raises UserError for what the file alone tells to
+    be wrong; `setup` is what was begun with.
     """
 
     def __init__(
-        self, setup: Setup, read: Callable[[], Setup], policies: Policies, opening: Opening
+        self,
+        setup: Setup,
+        read: Callable[[], Setup],
+        check: Callable[[Setup], object],
+        policies: Policies,
+        opening: Opening,
     ) -> None:
         self._setup = setup
         self._read = read
+        self._check = check
         self._policies = policies
         self._opening = opening
 
     def reload(self) -> str:
-        """Apply the configuration as it is now; what of it. Raises UserError, changing nothing."""
+        """Apply what has changed; which parts were. Raises UserError, changing nothing."""
         changed = self._read()
         if changed.registry.digest() != self._setup.registry.digest():
             raise UserError(
                 "the topic registry has changed, and topic ids with it; restart the daemon"
             )
-        if self._opening.is_up:
+        is_same = all(
+            getattr(changed.config, key) == getattr(self._opening.config, key)
+            for key in OF_THE_RADIO
+        )
+        if self._opening.is_working or (self._opening.is_up and is_same):
             self._policies.reload(changed.policies)
             return "topic policies"
+        self._check(changed)
         fixed = self._fixed(changed.config)
         if fixed:
             raise UserError(f"{', '.join(fixed)}: changed; restart the daemon for that")

@@ -62,6 +62,10 @@ def make_verbs(
         ),
         "why": Verb(why, "what happens to a topic, in plain words"),
         "set": Verb(set_policy, "change a topic's policy", changes=True),
-        "reload": Verb(reload_policies, "read the topic policies anew", changes=True),
+        "reload": Verb(
+            reload_policies,
+            "read the topic policies anew and, while there is no radio, its settings",
+            changes=True,
+        ),
     }
     return verbs

@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import threading
-import time
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable
 from pathlib import Path
@@ -14,7 +13,6 @@ import numpy as np
 import zmq
 
 from backends.base import (
-    AbsentError,
     Capabilities,
     Hear,
     Levels,
@@ -30,6 +28,7 @@ from backends.base import (
 from backends.ether import protocol
 from backends.ether.antenna import Antenna
 from backends.ether.downlink import Downlink
+from backends.ether.joining import join
 from backends.ether.medium import LEAD, Piece
 from backends.ether.sockets import AIR, NOBLOCK, SKY, connect
 from backends.feed import BlockFeed, Fed
@@ -38,7 +37,6 @@ from backends.outstanding import answered
 # From the event loop to the hub, on a busy machine.
 LEAD_S = 0.002
 ANSWER_MS = 5000
-LOOK_MS = 100
 # A paced hub that says nothing for so long is gone; it is asked again that often.
 QUIET_MS = 500
 INFINITE = float("inf")
@@ -68,7 +66,10 @@ class EtherRadio:
         self._who = who
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._feed = BlockFeed(self._next_block, "ether", self._is_due)
-        self._closing = threading.Event()
+        self._closing, self._is_idle = threading.Event(), threading.Event()
+        self._is_idle.set()
+        self._is_welcome = False
+        self._welcome: protocol.Welcome
         self._readable = asyncio.Event()
         self._antenna: Antenna | None = None
         self._beside: deque[_Beside] = deque()
@@ -112,10 +113,10 @@ class EtherRadio:
         self._down = connect(self._context, zmq.DEALER, self._directory / AIR)
         self._downlink = Downlink(self._down)
         self._up = connect(self._context, zmq.PUSH, self._directory / SKY)
-        welcome = await asyncio.to_thread(self._ask)
-        self._welcome = welcome
+        self._is_idle.clear()
+        await asyncio.to_thread(self._ask)
         self._down.setsockopt(zmq.RCVTIMEO, QUIET_MS)
-        self._antenna = Antenna(welcome.radio, welcome.seed, tuning.rate_hz)
+        self._antenna = Antenna(self._welcome.radio, self._welcome.seed, tuning.rate_hz)
 
     async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
         """What the hub hands out. Raises BackendError when it will not have us any more."""
@@ -167,8 +168,11 @@ class EtherRadio:
         if self._closing.is_set():
             return
         self._closing.set()
-        if self._antenna is not None:
+        # A socket is not closed under who polls it.
+        await asyncio.to_thread(self._is_idle.wait)
+        if self._is_welcome:
             self._say(protocol.Bye(token=self._welcome.token))
+        if self._antenna is not None:
             self._feed.stop()
             self._readable.set()
             asyncio.get_running_loop().remove_reader(int(self._down.fd))
@@ -186,33 +190,25 @@ class EtherRadio:
         with contextlib.suppress(zmq.Again):
             self._up.send_multipart([protocol.encode(message), *more], NOBLOCK)
 
-    def _hello(self) -> None:
-        hello = protocol.Hello(
+    def _hello(self) -> protocol.Hello:
+        return protocol.Hello(
             version=protocol.VERSION,
             node=self._node,
             who=self._who,
             rate_hz=self._tuning.rate_hz,
             frequency_hz=self._tuning.frequency_hz,
         )
-        with contextlib.suppress(zmq.Again):
-            self._down.send(protocol.encode(hello), NOBLOCK)
 
-    def _ask(self) -> protocol.Welcome:
+    def _ask(self) -> None:
         """The first time, before there are blocks; in a thread."""
-        self._hello()
-        until = time.monotonic() + (INFINITE if self._waits else 1e-3 * ANSWER_MS)
-        while not self._closing.is_set() and time.monotonic() < until:
-            if not self._down.poll(LOOK_MS):
-                continue
-            answer = protocol.from_hub(self._down.recv_multipart()[0])
-            if isinstance(answer, protocol.Welcome):
-                return answer
-            if isinstance(answer, protocol.Refused):
-                raise RefusalError(answer.reason)
-        raise AbsentError(
-            f"{self._directory}: no hub answers there; start one: sdrlink-ether --dir "
-            f"{self._directory}"
-        )
+        within_s = INFINITE if self._waits else 1e-3 * ANSWER_MS
+        try:
+            self._welcome = join(
+                self._down, self._hello(), self._directory, within_s, self._closing
+            )
+            self._is_welcome = True
+        finally:
+            self._is_idle.set()
 
     def _next_block(self) -> RxBlock | None:
         """In the feed's thread."""
@@ -231,7 +227,8 @@ class EtherRadio:
                 return self._rejoin(message)
             if self._is_away and not self._has_asked and self._node not in message.nodes:
                 self._has_asked = True
-                self._hello()
+                with contextlib.suppress(zmq.Again):
+                    self._down.send(protocol.encode(self._hello()), NOBLOCK)
         return None
 
     def _is_due(self, end: int) -> bool:

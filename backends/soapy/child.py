@@ -60,8 +60,8 @@ class RadioChild:
         self._tx_at = 0
         self._hangs = False
 
-    def first_answer(self, within_s: float, is_over: threading.Event) -> FromProcess | None:
-        """What it says first, or of one that has ended, that; None: nothing in time, or until
+    def next_answer(self, within_s: float, is_over: threading.Event) -> FromProcess | None:
+        """What it says next, or of one that has ended, that; None: nothing in time, or until
         `is_over`.
         """
         poll = select.poll()
@@ -134,6 +134,8 @@ class RadioChild:
         self._control.close()
         self.wait()
         self._air.close()
+        for ring in (self.rx, self.tx):
+            ring.close()
 
     def _say(self, message: msgspec.Struct) -> bool:
         try:

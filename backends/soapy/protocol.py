@@ -56,6 +56,15 @@ class Blame(Enum):
 _ERRORS = {Blame.ABSENT: AbsentError, Blame.SETTINGS: RefusalError, Blame.HOST: BackendError}
 
 
+class Waiting(msgspec.Struct, frozen=True, tag="waiting"):
+    """It looks for its device, which is not there; `reason` where that is another than before.
+
+    Said again and again: a process that does not hangs.
+    """
+
+    reason: str = ""
+
+
 class Failed(msgspec.Struct, frozen=True, tag="failed"):
     """It does not stream, or not any more; the process ends."""
 
@@ -83,7 +92,7 @@ class Counted(msgspec.Struct, frozen=True, tag="counted"):
     notice: str = ""
 
 
-FromProcess = Opened | Failed | Left | Counted
+FromProcess = Opened | Waiting | Failed | Left | Counted
 encode = msgspec.msgpack.Encoder().encode
 to_open = msgspec.msgpack.Decoder(Open).decode
 _wish = msgspec.msgpack.Decoder(Begin | Order)

@@ -3,7 +3,7 @@
 import asyncio
 import threading
 from collections import Counter
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable
 from functools import partial
 
 import msgspec
@@ -26,7 +26,8 @@ from backends.outstanding import Places, answered
 from backends.soapy.child import RadioChild
 from backends.soapy.handed import Handed
 from backends.soapy.hearing import Hearing
-from backends.soapy.protocol import Blame, Counted, Failed, FromProcess, Left, Opened
+from backends.soapy.on_loop import on_loop
+from backends.soapy.protocol import Blame, Counted, Failed, FromProcess, Left, Opened, Waiting
 from backends.soapy.ring import ring_sizes
 from backends.soapy.settings import Found, SoapySettings
 
@@ -63,11 +64,11 @@ class SoapyRadio:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._places = Places()
         self._handed = Handed()
-        self._feed = BlockFeed(self._next_block, "soapy", self._handed.is_due)
+        self._feed = BlockFeed(self._next_block, "soapy", self._handed.is_due, measures=False)
         self._rate_hz = 0.0
         self._yielded = 0
         self._is_over = False
-        self._away = self._notice = ""
+        self._away = self._notice = self._waits_for = ""
         self._before: Counter[str] = Counter()
         self._counted: Counter[str] = Counter(overflows=0, samples_lost=0)
         self._outages = 0
@@ -100,8 +101,10 @@ class SoapyRadio:
 
     @property
     def trouble(self) -> str:
-        """While the device is away."""
-        return f"{self._away}; it is looked for until it is back" if self._away else ""
+        """While the device is away, or not there yet."""
+        if self._away:
+            return f"{self._away}; it is looked for until it is back"
+        return self._waits_for
 
     @property
     def levels(self) -> Levels | None:
@@ -115,9 +118,11 @@ class SoapyRadio:
         self._settings = msgspec.structs.replace(
             self._settings, rate_hz=tuning.rate_hz, frequency_hz=tuning.frequency_hz
         )
-        child = self._child = self._make_child(self._patience)
-        within_s = OPEN_S if self._patience is Patience.NONE else float("inf")
-        answer = await asyncio.to_thread(child.first_answer, within_s, self._closing)
+        try:
+            child = self._child = self._make_child(self._patience)
+        except OSError as error:
+            raise AbsentError(f"the radio process cannot be started ({error.strerror})") from None
+        answer = await asyncio.to_thread(self._opened, child)
         if isinstance(answer, Opened):
             self._found = answer.found
             self._hear_from(child)
@@ -189,6 +194,13 @@ class SoapyRadio:
     def _make_child(self, patience: Patience) -> RadioChild:
         rx, tx = ring_sizes(self._rate_hz, self._longest_s, self._settings.lead_s)
         return RadioChild(self._settings, rx, tx, patience)
+
+    def _opened(self, child: RadioChild) -> FromProcess | None:
+        """How its opening ends; None: it hangs, or we close. What it waits for is our trouble."""
+        while isinstance(answer := child.next_answer(OPEN_S, self._closing), Waiting):
+            self._waits_for = answer.reason or self._waits_for
+        self._waits_for = ""
+        return answer
 
     def _end(self) -> None:
         self._feed.stop()
@@ -266,35 +278,22 @@ class SoapyRadio:
     def _look_for_it(self, lost: RadioChild) -> RadioChild | None:
         """Until the device is back; None: we close before. Raises RefusalError, BackendError."""
         how = lost.how_it_ended()
-        self._on_loop(partial(self._lost, lost, how))
+        on_loop(self._loop, self._closing, partial(self._lost, lost, how))
         lost.end()
         wait_s, most_s = RETRY_S
         while not self._closing.is_set():
             child = self._make_child(Patience.THERE)
-            answer = child.first_answer(float("inf"), self._closing)
+            answer = self._opened(child)
             if isinstance(answer, Opened):
                 self._hearing.begin(child.rx, self._rate_hz)
                 child.begin()
-                self._on_loop(partial(self._came_back, child, answer.found))
+                on_loop(self._loop, self._closing, partial(self._came_back, child, answer.found))
                 return child
+            if answer is None:
+                child.give_up()
             child.end()
             if isinstance(answer, Failed) and answer.blame is not Blame.ABSENT:
                 raise answer.error()
             self._closing.wait(wait_s)
             wait_s = min(2 * wait_s, most_s)
         return None
-
-    def _on_loop(self, action: Callable[[], None]) -> None:
-        """Have the event loop do it, and wait until it has, or we close."""
-        done = threading.Event()
-
-        def act() -> None:
-            action()
-            done.set()
-
-        loop = self._loop
-        if loop is None or loop.is_closed():
-            return
-        loop.call_soon_threadsafe(act)
-        while not done.wait(LOOK_S) and not self._closing.is_set():
-            continue

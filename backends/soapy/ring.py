@@ -1,5 +1,6 @@
 """Samples in memory that daemon and radio process share."""
 
+import contextlib
 import mmap
 import os
 
@@ -42,6 +43,13 @@ class SampleRing:
     @tail.setter
     def tail(self, n: int) -> None:
         self._tail[0] = n
+
+    def close(self) -> None:
+        """Give the memory back, as soon as nobody looks at samples in it; closing twice is fine."""
+        self._tail = np.zeros(1, np.int64)
+        self._samples = np.zeros(0, np.complex64)
+        with contextlib.suppress(BufferError):
+            self._map.close()
 
     def view(self, first: int, n: int) -> Samples:
         """Up to `n` samples from the `first` ever on; fewer at the ring's end."""

@@ -16,10 +16,10 @@ from backends.soapy.library import (
 )
 from backends.soapy.orders import Orders
 from backends.soapy.outgoing import Outgoing
-from backends.soapy.protocol import Open, Opened
+from backends.soapy.protocol import Open, Opened, Waiting
 from backends.soapy.receiving import Receiving
 from backends.soapy.ring import SampleRing
-from backends.soapy.setting_up import choose_format, set_up
+from backends.soapy.setting_up import blaming, choose_format, set_up
 from backends.soapy.settings import Found, in_flight
 from backends.soapy.streaming import Sender, stream
 from backends.soapy.surface import RX, TX, DriverError, HostError, Library, Stream
@@ -65,15 +65,18 @@ class Session:
             raise HostError(refused)
         if self._patience is Patience.REPLUGGED:
             self._wait_until_away(library)
+        told = ""
         while not self._orders.is_over:
             try:
                 return Device(library, args)
             except DriverError as error:
-                reason = why_not(library, args, error)
                 if is_driver_missing(library, args, error):
-                    raise HostError(reason) from None
+                    raise HostError(why_not(library, args, error)) from None
                 if self._patience is Patience.NONE:
-                    raise DriverError(reason) from None
+                    raise DriverError(why_not(library, args, error)) from None
+                # To ask all drivers for what there is takes its time.
+                is_new, told = str(error) != told, str(error)
+                self._orders.say(Waiting(why_not(library, args, error) if is_new else ""))
             self._orders.wait(wait_s)
             wait_s = min(2 * wait_s, most_s)
         return None
@@ -81,6 +84,7 @@ class Session:
     def _wait_until_away(self, library: Library) -> None:
         """Nobody can tell a device that was replugged from one that was not, but by its absence."""
         while not self._orders.is_over and library.enumerate(self._settings.device):
+            self._orders.say(Waiting())
             self._orders.wait(AWAY_S)
 
     def _stream(self, library: Library, device: Device, stack: contextlib.ExitStack) -> None:
@@ -119,7 +123,9 @@ class Session:
     def _opened(self, device: Device, way: int, stack: contextlib.ExitStack) -> tuple[Stream, str]:
         settings = self._settings
         form = choose_format(device, settings, way)
-        opened = device.open_stream(way, settings.channel, form, settings.stream_args)
+        blames = blaming(f"soapy.stream_args: got {settings.stream_args}")
+        with blames if settings.stream_args else contextlib.nullcontext():
+            opened = device.open_stream(way, settings.channel, form, settings.stream_args)
         stack.callback(_end, opened)
         return opened, form
 

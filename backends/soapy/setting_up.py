@@ -27,7 +27,7 @@ def set_up(device: Device, settings: SoapySettings) -> dict[int, dict[str, float
         _among("clock_source", settings.clock_source, device.clock_sources())
         device.set_clock_source(settings.clock_source)
     for key, value in settings.settings.items():
-        with _blaming(f'soapy.settings.{key}: got "{value}"'):
+        with blaming(f'soapy.settings.{key}: got "{value}"'):
             device.write_setting(key, value)
     for way in ways:
         _set_channel(device, settings, way)
@@ -37,10 +37,10 @@ def set_up(device: Device, settings: SoapySettings) -> dict[int, dict[str, float
     for way in ways:
         _set_frequency(device, settings, way)
         if settings.bandwidth_hz:
-            with _blaming(f"soapy.bandwidth_hz: got {settings.bandwidth_hz:g}"):
+            with blaming(f"soapy.bandwidth_hz: got {settings.bandwidth_hz:g}"):
                 device.set_bandwidth(way, settings.channel, settings.bandwidth_hz)
         if settings.ppm:
-            with _blaming(f"soapy.ppm: got {settings.ppm:g}"):
+            with blaming(f"soapy.ppm: got {settings.ppm:g}"):
                 device.set_ppm(way, settings.channel, settings.ppm)
     return {way: _set_gains(device, settings, way) for way in ways}
 
@@ -68,7 +68,8 @@ def _set_antenna(device: Device, settings: SoapySettings, way: int) -> None:
     name = settings.rx_antenna if way == RX else settings.tx_antenna
     if name:
         _among(f"{WAYS[way]}_antenna", name, device.antennas(way, settings.channel))
-        device.set_antenna(way, settings.channel, name)
+        with blaming(f'soapy.{WAYS[way]}_antenna: got "{name}"'):
+            device.set_antenna(way, settings.channel, name)
 
 
 def _set_rate(device: Device, settings: SoapySettings, way: int) -> None:
@@ -81,7 +82,8 @@ def _set_rate(device: Device, settings: SoapySettings, way: int) -> None:
     )
     if wanted < least or (offered and not _inside(wanted, offered)):
         raise SettingError(f"{what}; allowed by this device: {allowed}")
-    got = device.set_rate(way, settings.channel, wanted)
+    with blaming(what):
+        got = device.set_rate(way, settings.channel, wanted)
     if abs(got / wanted - 1) > RATE_TOLERANCE:
         raise SettingError(
             f"{what}, and the device made it {got / 1e6:g} Msps for {WAYS[way]}; allowed: a rate "
@@ -94,13 +96,14 @@ def _set_frequency(device: Device, settings: SoapySettings, way: int) -> None:
     what = f"modem.frequency_hz: got {wanted / 1e6:g} MHz at the radio's oscillator"
     if offered and not _inside(wanted, offered):
         raise SettingError(f"{what}; allowed by this device: {_ranges(offered, 1e6)} MHz")
-    got = device.set_frequency(way, settings.channel, wanted)
+    with blaming(what):
+        got = device.set_frequency(way, settings.channel, wanted)
     if abs(got - wanted) > FREQUENCY_TOLERANCE_HZ:
         raise SettingError(f"{what}, and the device tuned {WAYS[way]} to {got / 1e6:.6f} MHz")
 
 
 @contextlib.contextmanager
-def _blaming(what: str) -> Iterator[None]:
+def blaming(what: str) -> Iterator[None]:
     """Where only the driver knows what is allowed, it says so itself."""
     try:
         yield
@@ -126,12 +129,13 @@ def _set_gains(device: Device, settings: SoapySettings, way: int) -> dict[str, f
     got = {}
     for element, gain_db in wanted.items():
         offered = device.gain_range(way, channel, element)
+        key = f"{name}_gains.{element}" if element else f"{name}_gain_db"
         if not _inside(gain_db, [offered]):
-            key = f"{name}_gains.{element}" if element else f"{name}_gain_db"
             raise SettingError(
                 f"soapy.{key}: got {gain_db:g} dB; allowed by this device: {_ranges([offered])} dB"
             )
-        got[element] = device.set_gain(way, channel, element, gain_db)
+        with blaming(f"soapy.{key}: got {gain_db:g} dB"):
+            got[element] = device.set_gain(way, channel, element, gain_db)
     return got
 
 

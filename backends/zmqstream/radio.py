@@ -70,7 +70,7 @@ class ZmqRadio:
         self._have = 0
         self._last_ns = 0
         self._is_open = False
-        self._notice = ""
+        self._notice, self._is_bad = "", False
         self._gap = 0
         self._unsent = b""
         self.counters = {
@@ -101,8 +101,8 @@ class ZmqRadio:
 
     @property
     def trouble(self) -> str:
-        """What the sockets say."""
-        return self._notice
+        """While the peer sends nothing, or nothing that can be read."""
+        return self._notice if self._is_bad or self._notice == NOT_THERE else ""
 
     @property
     def levels(self) -> Levels | None:
@@ -189,6 +189,7 @@ class ZmqRadio:
                 f"{self._type.name}; set zmq.format",
             )
             return
+        self._is_bad = False
         if self._notice == NOT_THERE:
             self._notice = ""
         self._pieces.append(samples)
@@ -196,7 +197,7 @@ class ZmqRadio:
 
     def _refuse(self, n: int, notice: str) -> None:
         self.counters["bad_messages"] += 1
-        self._notice = notice
+        self._notice, self._is_bad = notice, True
         self._gap += max(1, n)
 
     def _block(self, n: int) -> RxBlock:
@@ -207,7 +208,8 @@ class ZmqRadio:
 
     def _missing(self) -> RxBlock:
         n, self._gap = self._gap, 0
-        self.counters["samples_lost"] += n
+        if self._notice != NOT_THERE:
+            self.counters["samples_lost"] += n
         return self._heard(RxBlock(self._received, n, None, self._notice, self._last_ns))
 
     def _heard(self, block: RxBlock) -> RxBlock:

@@ -36,12 +36,12 @@ class Limiter(Generic[T]):
         return None
 
     def late(self, now: float) -> list[tuple[T, int]]:
-        """Lines held back whose time has come, and how many there were on their subject."""
+        """Lines held back whose time has come, and how many before it were not told at all."""
         told = []
         for subject, known in self._subjects.items():
             if known.untold and self._refilled(subject, now).tokens >= 1:
                 known.tokens -= 1
-                told.append((known.last, known.untold))
+                told.append((known.last, known.untold - 1))
                 known.untold, known.last = 0, None
         return told  # type: ignore[return-value]
 

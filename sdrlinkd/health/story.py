@@ -58,7 +58,7 @@ class Story:
         name, state = carrier_name(carrier), carrier.state
         if state == self._state or (state == "down" and not is_away(carrier)):
             return
-        before, self._state = self._state, state
+        self._state = state
         if state == "up":
             away = "" if self._away_at is None else f" after {span(now - self._away_at)}"
             word = "back" if self._was_up else "there"
@@ -68,18 +68,20 @@ class Story:
         if self._away_at is None:
             self._away_at = max(0.0, now - carrier.since_s)
         if state == "waiting":
-            yield Line("radio", Level.WARNING, f"no {name} yet, trying on: {carrier.reason}")
+            yield Line("radio", Level.WARNING, f"no {name}, still trying: {carrier.reason}")
         elif state == "refused":
             yield Line(
                 "radio",
                 Level.ERROR,
-                f"the settings do not fit the {name}: {carrier.reason}. Tried again after a reload "
-                "(SIGHUP), or when it was unplugged and is back",
+                f"the settings do not fit the {name}: {carrier.reason}. It is tried again after a "
+                "reload (SIGHUP)" + (", and when it is plugged in anew" if name == "radio" else ""),
             )
         elif state == "ended":
             yield Line("radio", Level.INFO, f"the {name} is over")
-        elif before == "up":
+        elif self._was_up:
             yield Line("radio", Level.WARNING, f"the {name} is away: {carrier.reason}")
+        elif state == "down":
+            yield Line("radio", Level.WARNING, f"no {name} yet: {carrier.reason}")
 
     def _robot(self, robot: NeighborReport, snapshot: Snapshot) -> Iterator[Line]:
         src, subject = robot.src, f"robot {robot.src}"

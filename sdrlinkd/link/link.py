@@ -108,6 +108,9 @@ class Link:
     def attach(self, carrier: CarrierTraits, access: AccessParams, rate: RateParams) -> None:
         """Settle access and rate for the radio that is there. Raises ConfigError."""
         self.departures.attach(carrier, access, rate)
+        if carrier.is_lockstep:
+            # Its time begins now, whatever ours was.
+            self.sender.begin_anew()
         self.clocks.resolution_s = carrier.stamp_s
 
     @property

@@ -7,7 +7,9 @@ from sdrlinkd.wire import Beacon, Registry, RegistryDigest
 
 # Weight of the newest PDU in the mean SNR.
 SNR_WEIGHT = 0.2
-GAP_DECAY = 0.99
+GAP_DECAY = 0.98
+LONGEST_GAP_S = 16.0
+"""A half-duplex robot that has nothing to say is heard this often."""
 
 
 @dataclass(slots=True)
@@ -32,8 +34,9 @@ class Neighbor:
     def heard_at(self, at: float) -> None:
         """One more PDU came."""
         if self.last_heard_at:
-            # A pause is forgotten after some hundred PDUs without one as long.
-            self.usual_gap_s = max(at - self.last_heard_at, GAP_DECAY * self.usual_gap_s)
+            # A pause is forgotten after some hundred PDUs without one as long; an outage is none.
+            gap_s = min(at - self.last_heard_at, LONGEST_GAP_S)
+            self.usual_gap_s = max(gap_s, GAP_DECAY * self.usual_gap_s)
         self.last_heard_at = at
 
     def note_snr(self, snr_db: float | None) -> None:

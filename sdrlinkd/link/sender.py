@@ -23,8 +23,8 @@ from sdrlinkd.wire import Pdu, Registry, max_message_size
 RELAYED = 256
 """Lanes of others' PDUs have this and their source in place of a topic id."""
 UNLIKELY_AGE_S = 10.0
-"""A message without a lifespan that was published so long ago comes from another clock, or from a
-recording: its age counts from now. With a lifespan it is as old as it says."""
+"""A message without a lifespan that was published so long ago comes from another clock or a
+recording: its age counts from now."""
 MAX_PDUS = 63
 """Of a burst, whatever carries it."""
 
@@ -53,6 +53,7 @@ class Sender:
             TopicState(params.dst, registry.has_control, dictionaries.get(topic.id))
             for topic in registry.topics
         ]
+        self.n_topics = len(self._topics)
         self.refused = TxTally()
         """Messages that never became a topic's: bad envelopes, unknown topics."""
         self.relayed = TxTally()
@@ -99,8 +100,8 @@ class Sender:
         """Queue another robot's PDU that came in a burst at `at`; None, or why it was refused."""
         tally = self.relayed
         tally.accepted += 1
-        known = [self._topics[e.topic_id] for e in pdu.entries if e.topic_id < len(self._topics)]
-        priority = max((topic.priority for topic in known), default=0)
+        known = [each.topic_id for each in pdu.entries if each.topic_id < len(self._topics)]
+        priority = max((self._topics[each].priority for each in known), default=0)
         message = Outgoing(
             RELAYED + pdu.src, data, CLASSES[pdu.qos], priority, pdu.dst, at, until, False, tally
         )
@@ -222,17 +223,18 @@ class Sender:
                 elif message.is_through and not message.unconfirmed:
                     self._settle_sent(message)
 
-    def shut_down(self) -> None:
-        """Drop what is still waiting or unconfirmed as tx_shutdown."""
-        for message in self.outbox.withdraw_all():
-            self._drop(message, "tx_shutdown")
-        for message in list(self.outbox.in_flight):
-            self._drop(message, "tx_shutdown")
+    def begin_anew(self) -> None:
+        """Time begins: what came before is dropped, and nothing is remembered of when."""
+        self.shut_down("tx_radio_down")
+        for topic in self._topics:
+            topic.apply(topic.policy)
 
-    @property
-    def n_topics(self) -> int:
-        """Of the registry."""
-        return len(self._topics)
+    def shut_down(self, reason: str = "tx_shutdown") -> None:
+        """Drop what is still waiting or unconfirmed."""
+        for message in self.outbox.withdraw_all():
+            self._drop(message, reason)
+        for message in list(self.outbox.in_flight):
+            self._drop(message, reason)
 
     def tally(self, topic_id: int) -> TxTally:
         """Counters of one topic."""

@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 
 import phy
 from backends import AbsentError, BackendError, LateRadio, Radio, RefusalError, RxBlock, Tuning
@@ -13,6 +13,7 @@ from sdrlinkd.errors import ConfigError, LinkAbsentError, LinkRefusedError, User
 from sdrlinkd.link import Burst, CarrierTraits, Opportunity, Outcome
 from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.clock import StreamClock
+from sdrlinkd.modem.compiled import load_phy
 from sdrlinkd.modem.ear import Ear
 from sdrlinkd.modem.plan import AirPlan, SpellPlan
 from sdrlinkd.modem.report import modem_report
@@ -33,9 +34,8 @@ class ModemLink:
     In lock-step all of it is done within the block that brought it. `listens`: someone wants to
     know whether there is a carrier on the air. `lead_grows`: whether, on a radio like that, bursts
     that must leave at a given moment are handed over earlier when the machine proves to be slow.
-    `began_s`: the link's clock has run since then (monotonic), before there was a radio; None: it
-    begins with the samples. `load` compiles the PHY, or loads what is compiled, before the radio
-    is opened; on a thread.
+    `began_s`: the link's clock has run since then (monotonic); None: it begins with the samples.
+    `load` compiles the PHY, or loads what is compiled.
     """
 
     def __init__(
@@ -47,9 +47,10 @@ class ModemLink:
         listens: bool = False,
         lead_grows: Callable[[CarrierTraits], bool] = lambda _: False,
         began_s: float | None = None,
-        load: Callable[[], None] = phy.warm_up,
+        load: Callable[[], Awaitable[None]] = load_phy,
     ) -> None:
         self._params = params
+        self._began_s = began_s
         self._radio = radio if began_s is None else LateRadio(radio, self._first_index)
         self._kind = kind
         self._airtimes = Airtimes(params, pdu_size)
@@ -80,7 +81,7 @@ class ModemLink:
     async def open(self, listener: PduListener) -> None:
         """Load the compiled code and open the radio."""
         params = self._params
-        await self._tx.warm_up(self._load)
+        await self._load()
         tuning = Tuning(params.rate_hz, params.carrier_hz)
         try:
             await self._radio.open(tuning)
@@ -94,8 +95,9 @@ class ModemLink:
         traits = carrier_traits(self._kind, can, params, self._airtimes)
         self._lead_grows = self._may_lead_grow(traits)
         if not can.paced:
-            # Time is that of the samples, from their first on.
-            self._clock = StreamClock(params.rate_hz, can.paced, can.lockstep)
+            # Time is that of the samples; where it has run before, it goes on from there.
+            began_s = None if can.lockstep else self._began_s
+            self._clock = StreamClock(params.rate_hz, can.paced, can.lockstep, began_s)
         lead, ahead = traits.lead_s * params.rate_hz, traits.ahead_s * params.rate_hz
         self._plan = AirPlan(math.ceil(lead), round(ahead))
         if can.spells is not None:
@@ -170,11 +172,13 @@ class ModemLink:
 
     @property
     def _is_gone(self) -> bool:
-        return self._state == "up" and self._can.paced and self._clock.is_gone(time.monotonic())
+        if self._state != "up" or not self._can.paced:
+            return False
+        return bool(self._radio.trouble) or self._clock.is_gone(time.monotonic())
 
     def _first_index(self) -> int:
         """Of the radio's first sample on the link's clock."""
-        return self._clock.index(time.monotonic()) if self._can.paced else 0
+        return 0 if self._can.lockstep else self._clock.index(time.monotonic())
 
     async def _receive(self, receiver: Demodulation) -> None:
         """Take blocks from the radio; when the receiver is far behind, the radio has to wait."""
@@ -241,8 +245,8 @@ class ModemLink:
         can_send = self._state == "up" and self._can.transmits
         if listener is None or self._rx is None or not can_send:
             return INFINITE
-        if self._is_gone:
-            # Until a block comes.
+        if self._is_gone or (self._began_s is not None and not self._clock.end):
+            # Until a block comes: with the first, where the stream begins on our clock is known.
             self._rx.wakes = True
             return INFINITE
         now = self.now()

@@ -3,7 +3,7 @@
 import math
 import os
 import socket
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from random import Random
 
@@ -26,6 +26,7 @@ from sdrlinkd.config import Config, SoapyParams
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.link import CarrierTraits, RateControl, may_share, settle
 from sdrlinkd.modem.airtimes import Airtimes
+from sdrlinkd.modem.compiled import load_phy
 from sdrlinkd.modem.link import ModemLink
 
 # A device's settings that are configured under the same name.
@@ -41,7 +42,7 @@ def make_modem(
     rng: Random,
     patience: Patience = Patience.NONE,
     began_s: float | None = None,
-    load: Callable[[], None] = phy.warm_up,
+    load: Callable[[], Awaitable[None]] = load_phy,
 ) -> ModemLink:
     """The modem on the radio that `config.backend` names. Raises UserError.
 

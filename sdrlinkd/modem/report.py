@@ -21,8 +21,8 @@ def modem_report(
     """`problem`: what ended the stream, if something did; `stream_end`: samples so far."""
     levels = radio.levels
     reason = problem
-    if state == "down" and not problem and stream_end:
-        reason = radio.trouble or "it delivers nothing"
+    if state == "down" and not problem:
+        reason = radio.trouble or ("it delivers nothing" if stream_end else "")
     return CarrierReport(
         kind=kind,
         state=state,

@@ -56,10 +56,6 @@ class Transmission:
         self.on_air: list[Burst] = []
         self.counters = {"bursts_slipped": 0, "samples_sent": 0}
 
-    async def warm_up(self, load: Callable[[], None] = phy.warm_up) -> None:
-        """Load the compiled code."""
-        await asyncio.get_running_loop().run_in_executor(self._thread, load)
-
     def start(self, tasks: asyncio.TaskGroup, left: Callable[[Burst, BurstReport], None]) -> None:
         """From now on bursts may be sent; `left` is told of each."""
         self._tasks, self._left = tasks, left

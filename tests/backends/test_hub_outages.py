@@ -6,8 +6,10 @@ import itertools
 
 import numpy as np
 import pytest
+import zmq
 
-from backends import BackendError, EtherRadio, RadioParams, Tuning, TxBurst, TxOutcome
+from backends import BackendError, EtherRadio, Patience, RadioParams, Tuning, TxBurst, TxOutcome
+from backends.ether.sockets import AIR
 from tests.backends.hubs import Listener, ask, serving, until
 from tests.backends.radios import BLOCK_S, RATE, TUNING, N, noise, opened, send, take
 
@@ -209,3 +211,17 @@ async def test_a_radio_a_little_behind_gets_larger_blocks_and_loses_nothing(tmp_
     where = np.flatnonzero(np.abs(line) > 1e-3)
     assert 9000 <= where[0] < where[-1] < 9300
     assert len(where) > 290
+
+
+async def test_a_radio_that_waits_for_a_hub_greets_the_next_one_too(tmp_path):
+    """The first took the greeting along when it died."""
+    radio = EtherRadio(tmp_path, 1, "the radio", Patience.THERE)
+    async with asyncio.timeout(30), closing(radio):
+        opening = asyncio.ensure_future(radio.open(TUNING))
+        with zmq.Context() as context, context.socket(zmq.ROUTER) as deaf:
+            deaf.bind(f"ipc://{tmp_path / AIR}")
+            assert await asyncio.to_thread(deaf.poll, 10_000)
+            deaf.recv_multipart()
+        with serving(tmp_path):
+            await opening
+            assert ask(tmp_path).nodes == {1: "the radio"}

@@ -41,7 +41,7 @@ def test_without_a_hub_a_daemon_stays_and_joins_when_there_is_one(
     hub = tmp_path / "hub"
     daemon = start_daemon(on_ether(hub), HASTY)
     wait_for(lambda: daemon.snapshot().carrier.state == "waiting")
-    wait_for(lambda: "no hub yet, trying on" in daemon.log())
+    wait_for(lambda: "no hub, still trying" in daemon.log())
     level, reason = verdict(daemon)
     assert level == "DOWN"
     assert f"{hub}: no hub answers there; start one: sdrlink-ether --dir {hub}" in reason

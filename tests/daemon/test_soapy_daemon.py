@@ -306,11 +306,41 @@ def test_a_radio_that_comes_late_is_waited_for(start_daemon, bus):
         assert message.age_us * 1e-6 <= waited_s + 1.0
     assert_whole(late)
     wait_for(lambda: "the radio is there after" in late.log())
-    assert "no radio yet, trying on: soapy.device" in late.log()
+    assert "no radio, still trying: soapy.device" in late.log()
 
 
 LINK_S = 5.0
 """After its device is there, a daemon sends and hears so soon."""
+
+
+def test_a_reload_that_makes_it_worse_ends_nothing(start_daemon, bus):
+    name, air_ = bus
+    air_.inject(1, "unplug")
+    robot = start_daemon(on_soapy(1, name))
+    wait_for(lambda: robot.snapshot().carrier.state == "waiting", 60)
+    good = robot.config.read_text()
+    for bad, said in (
+        (
+            good.replace("rate_hz = 1e6", "rate_hz = 1e4\nmcs = 0"),
+            "raise modem.rate_hz or modem.mcs",
+        ),
+        (good.replace("driver=loopback", "driver=hackrff"), 'no driver "hackrff"'),
+    ):
+        robot.config.write_text(bad)
+        robot.process.send_signal(signal.SIGHUP)
+        wait_for(lambda said=said: said in robot.log() + robot.snapshot().carrier.reason)
+    robot.config.write_text(good)
+    robot.process.send_signal(signal.SIGHUP)
+    air_.inject(1, "replug")
+    wait_for(lambda: robot.snapshot().carrier.state == "up", 20)
+    # While it is away after it was up, its settings may change, too.
+    air_.inject(1, "unplug")
+    wait_for(lambda: robot.snapshot().carrier.state == "down", 20)
+    robot.config.write_text(good.replace("tx_gain_db = 40.0", "tx_gain_db = 30.0"))
+    robot.process.send_signal(signal.SIGHUP)
+    wait_for(lambda: robot.snapshot().carrier.state in ("opening", "waiting"), 20)
+    air_.inject(1, "replug")
+    wait_for(lambda: "tx 30 dB" in robot.snapshot().carrier.detail, 20)
 
 
 @pytest.mark.parametrize("mended_by", ["a reload", "replugging"])

@@ -30,15 +30,15 @@ def test_a_radio_that_comes_late_goes_and_comes_back():
         snapshot(31.0, {"state": "refused", "reason": "got 99"}, []),
     ]
     assert story(*seen) == [
-        ("warning", "no radio yet, trying on: no such device"),
+        ("warning", "no radio, still trying: no such device"),
         ("info", "the radio is there after 12 s: usrp"),
         ("warning", "the radio is away: the stream failed"),
         ("info", "the radio is back after 12 s: usrp"),
         (
             "error",
             (
-                "the settings do not fit the radio: got 99. Tried again after a reload (SIGHUP), "
-                "or when it was unplugged and is back"
+                "the settings do not fit the radio: got 99. It is tried again after a reload "
+                "(SIGHUP), and when it is plugged in anew"
             ),
         ),
     ]

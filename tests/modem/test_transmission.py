@@ -4,6 +4,7 @@ import asyncio
 
 import pytest
 
+import phy
 from backends import Capabilities, TxOutcome, TxReport
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import Burst, Outcome, Qos
@@ -51,7 +52,7 @@ async def test_what_was_composed_before_a_late_one_was_known_goes_back_too(locks
 
     async with asyncio.TaskGroup() as tasks, asyncio.timeout(60):
         transmission = Transmission(ModemParams(rate_hz=1e6), radio)
-        await transmission.warm_up()
+        await asyncio.to_thread(phy.warm_up)
         transmission.start(tasks, note)
         transmission.send(made(1), 500_000)
         await radio.arrivals.get()
@@ -74,7 +75,7 @@ async def test_what_may_leave_whenever_it_can_does_not_wait_for_a_late_one():
     radio, left = Radio(lockstep=True), []
     async with asyncio.TaskGroup() as tasks, asyncio.timeout(60):
         transmission = Transmission(ModemParams(rate_hz=1e6), radio)
-        await transmission.warm_up()
+        await asyncio.to_thread(phy.warm_up)
         transmission.start(tasks, lambda burst, report: left.append(report.outcome))
         transmission.send(made(1), 500_000)
         radio.tell(0, TxOutcome.LATE, 500_000)
@@ -91,7 +92,7 @@ async def test_a_short_burst_does_not_overtake_a_long_one():
     radio = Radio(lockstep=False)
     async with asyncio.TaskGroup() as tasks, asyncio.timeout(60):
         transmission = Transmission(ModemParams(rate_hz=1e6), radio)
-        await transmission.warm_up()
+        await asyncio.to_thread(phy.warm_up)
         transmission.start(tasks, lambda *_: None)
         transmission.send(made(1), 100)
         assert len(radio.taken) == 1

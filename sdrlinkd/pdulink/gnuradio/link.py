@@ -84,19 +84,18 @@ class GnuRadioLink:
     def report(self) -> CarrierReport:
         """State and counters."""
         params, is_open = self._params, self._listener is not None
-        state, notices = "up" if is_open and self._is_taken else "down", []
-        if is_open and not self._is_taken:
-            notices.append(
-                f"no flowgraph takes PDUs at {params.send} ({params.transport}): what is to be "
-                "sent waits"
-            )
+        state = "up" if is_open and self._is_taken else "down"
+        reason = f"nobody takes PDUs at {params.send} ({params.transport})"
+        if not is_open or self._is_taken:
+            reason = ""
         return CarrierReport(
             kind="gnuradio",
             state=state,
+            reason=reason,
             detail=f"{params.rate_bit_s / 1e3:g} kbit/s, {params.transport} to {params.send}, from "
             f"{params.receive or 'the same'}",
             counters={**self._counters, **self._transport.counters},
-            notices=notices,
+            notices=[f"no flowgraph: {reason}; what is to be sent waits"] if reason else [],
         )
 
     def _airtime(self, _: int, n_pdus: int) -> float:

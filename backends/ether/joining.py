@@ -1,0 +1,52 @@
+"""Asking to be let onto a hub's air."""
+
+import contextlib
+import threading
+import time
+from pathlib import Path
+
+import zmq
+
+from backends.base import AbsentError, RefusalError
+from backends.ether import protocol
+from backends.ether.sockets import NOBLOCK
+
+LOOK_MS = 100
+AGAIN_S = 0.5
+
+
+def join(
+    down: "zmq.Socket[bytes]",
+    hello: protocol.Hello,
+    directory: Path,
+    within_s: float,
+    is_over: threading.Event,
+) -> protocol.Welcome:
+    """The hub's welcome; on a thread.
+
+    A hub that began after we asked, or died before it answered, knows nothing of us: it is asked
+    who is there, and greeted again. Raises AbsentError, RefusalError.
+    """
+    _say(down, hello)
+    asked_at = time.monotonic()
+    until = asked_at + within_s
+    while not is_over.is_set() and time.monotonic() < until:
+        if down.poll(LOOK_MS):
+            answer = protocol.from_hub(down.recv_multipart()[0])
+            if isinstance(answer, protocol.Welcome):
+                return answer
+            if isinstance(answer, protocol.Refused):
+                raise RefusalError(answer.reason)
+            if isinstance(answer, protocol.Answer) and hello.node not in answer.nodes:
+                _say(down, hello)
+        elif time.monotonic() - asked_at >= AGAIN_S:
+            asked_at = time.monotonic()
+            _say(down, protocol.Question())
+    raise AbsentError(
+        f"{directory}: no hub answers there; start one: sdrlink-ether --dir {directory}"
+    )
+
+
+def _say(down: "zmq.Socket[bytes]", message: protocol.Hello | protocol.Question) -> None:
+    with contextlib.suppress(zmq.Again):
+        down.send(protocol.encode(message), NOBLOCK)

@@ -1,0 +1,24 @@
+"""From a thread to the event loop, and back when it is done."""
+
+import asyncio
+import threading
+from collections.abc import Callable
+
+LOOK_S = 0.1
+
+
+def on_loop(
+    loop: asyncio.AbstractEventLoop | None, is_over: threading.Event, action: Callable[[], None]
+) -> None:
+    """Have the event loop do it, and wait until it has, or `is_over`."""
+    done = threading.Event()
+
+    def act() -> None:
+        action()
+        done.set()
+
+    if loop is None or loop.is_closed():
+        return
+    loop.call_soon_threadsafe(act)
+    while not done.wait(LOOK_S) and not is_over.is_set():
+        continue
