@@ -10,6 +10,9 @@ from sdrlinkd.errors import EnvelopeError
 
 VERSION_BYTE = b"\x01"
 MAX_HEADER_BYTES = 256
+MOST_LOOKED_AT = 16 * MAX_HEADER_BYTES
+"""Of a header that is too long, to answer who sent it."""
+MOST_SHOWN = 240
 
 
 class InHeader(msgspec.Struct, frozen=True, gc=False):
@@ -115,13 +118,15 @@ def wanted_of(frames: Sequence[bytes]) -> tuple[str, int | None, dict[str, objec
     can be read.
     """
     header = frames[1] if len(frames) > 1 else b""
+    if len(header) > MOST_LOOKED_AT:
+        return "", None, {}
     try:
         fields = (
             _any_msgpack.decode(header[1:])
             if header[:1] == VERSION_BYTE
             else _any_json.decode(header)
         )
-    except (msgspec.DecodeError, UnicodeDecodeError):
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
         return "", None, {}
     id_, dst = fields.get("id"), fields.get("d")
     return (
@@ -129,6 +134,12 @@ def wanted_of(frames: Sequence[bytes]) -> tuple[str, int | None, dict[str, objec
         dst if isinstance(dst, int) and 0 <= dst <= 255 else None,
         fields,
     )
+
+
+def shown(words: str) -> str:
+    """What a program sent, or an error that cites it, as a screen can bear it."""
+    plain = "".join(each if each.isprintable() else "?" for each in words[: MOST_SHOWN + 1])
+    return plain if len(plain) <= MOST_SHOWN else plain[: MOST_SHOWN - 1] + "…"
 
 
 def encode(topic: bytes, header: OutHeader, payload: bytes) -> list[bytes]:

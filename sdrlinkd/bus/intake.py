@@ -60,7 +60,7 @@ class Intake:
     @property
     def last_bad(self) -> str:
         """What was wrong with the last message that could not be taken."""
-        return self._last_bad()
+        return envelope.shown(self._last_bad())
 
     def take(self, frames: list[bytes]) -> None:
         """A message as it came."""

@@ -1,7 +1,6 @@
 """Publish from asyncio programs."""
 
 import asyncio
-import math
 import os
 from collections.abc import Callable
 from types import TracebackType
@@ -10,6 +9,7 @@ import zmq
 import zmq.asyncio
 
 from sdrlinkd.client.async_socket import AsyncSocket
+from sdrlinkd.client.deadline import Deadline
 from sdrlinkd.client.errors import no_daemon, restarted
 from sdrlinkd.client.messages import Receipt, sync_frames
 from sdrlinkd.client.paths import IN_SOCKET, OUT_SOCKET, chosen_dir, endpoint
@@ -37,7 +37,8 @@ class AsyncPublisher(AsyncSocket):
         self._told = self._context.socket(zmq.SUB)
         self._told.rcvhwm = 0
         self._told.reconnect_ivl = RECONNECT_MS
-        self._listening = asyncio.Lock()
+        self._is_listening = False
+        self._news = asyncio.Event()
         for topic in self._producer.topics:
             self._told.subscribe(topic)
         self._told.connect(endpoint(self.runtime_dir, OUT_SOCKET))
@@ -64,17 +65,17 @@ class AsyncPublisher(AsyncSocket):
         """
         producer = self._producer
         fields = wishes(qos, priority, dst, lifespan_ms, type, published_ns)
-        wait_s = self._timeout_s if timeout_s is None else timeout_s
+        deadline = Deadline(self._timeout_s if timeout_s is None else timeout_s)
         if producer.is_time_to_look():
             await self._hear()
         if not producer.takes(topic, cdr, type):
             # Nothing is refused by hearsay: the daemon may have been restarted.
-            await self._ask(wait_s)
+            await self._ask(deadline)
             producer.check(topic, cdr, type)
         name = None
         if receipt:
             if not producer.is_subscribed:
-                await self._ask(wait_s, must_answer=True)
+                await self._ask(deadline, must_answer=True)
             name = fields["id"] = producer.awaited.new_id()
         frames = producer.encode(topic, cdr, fields, published_ns)
         while True:
@@ -82,10 +83,10 @@ class AsyncPublisher(AsyncSocket):
                 await self._socket.send_multipart(frames, zmq.NOBLOCK)
                 break
             except zmq.Again:
-                if not await self._is_writable(wait_s):
+                if not await self._is_writable(deadline):
                     raise no_daemon(self.runtime_dir) from None
                 # It may be another daemon by now.
-                await self._ask(wait_s, must_answer=receipt)
+                await self._ask(deadline, must_answer=receipt)
                 producer.check(topic, cdr, type)
         self._sent = True
         if name is not None:
@@ -97,16 +98,15 @@ class AsyncPublisher(AsyncSocket):
 
         None when `timeout_s` passed first, or when no answer is owed any more.
         """
-        loop, awaited = asyncio.get_running_loop(), self._producer.awaited
-        deadline = float("inf") if timeout_s is None else loop.time() + timeout_s
+        awaited, deadline = self._producer.awaited, Deadline(timeout_s)
         while awaited:
             await self._hear()
             if (came := awaited.next(self._producer.boot)) is not None:
                 return came
-            left_s = deadline - loop.time()
-            if left_s <= 0:
+            left_s = deadline.left_s
+            if not left_s:
                 return None
-            await self._until(lambda: awaited.has_come, min(left_s, STILL_THERE_S))
+            await self._until(lambda: awaited.has_come, Deadline(min(left_s, STILL_THERE_S)))
         # Who asks again and again lets others go on.
         await asyncio.sleep(0)
         return None
@@ -116,19 +116,20 @@ class AsyncPublisher(AsyncSocket):
 
         Raises NoDaemonError.
         """
-        await self._ask(self._timeout_s if timeout_s is None else timeout_s, must_answer=True)
+        wait_s = self._timeout_s if timeout_s is None else timeout_s
+        await self._ask(Deadline(wait_s), must_answer=True)
 
     async def flush(self) -> None:
-        """Wait until the daemon has taken everything sent. Raises NoDaemonError."""
-        question = self._question()
+        """As `Publisher.flush`."""
+        deadline, question = Deadline(self._timeout_s), self._question()
         answers = self._producer.answers(question)
         try:
-            if not await self._until(lambda: bool(answers), self._timeout_s):
+            if not await self._until(lambda: bool(answers), deadline):
                 raise no_daemon(self.runtime_dir)
             await asyncio.wait_for(
-                self._socket.send_multipart(sync_frames(question)), self._timeout_s
+                self._socket.send_multipart(sync_frames(question)), deadline.left_or_none
             )
-            if not await self._until(lambda: len(answers) > 1, self._timeout_s):
+            if not await self._until(lambda: len(answers) > 1, deadline):
                 raise no_daemon(self.runtime_dir)
         except asyncio.TimeoutError:
             raise no_daemon(self.runtime_dir) from None
@@ -138,28 +139,28 @@ class AsyncPublisher(AsyncSocket):
         if len(set(answers)) > 1:
             raise restarted(self.runtime_dir)
 
-    async def _ask(self, wait_s: float, *, must_answer: bool = False) -> None:
+    async def _ask(self, deadline: Deadline, *, must_answer: bool = False) -> None:
         """Have the daemon's present word. Raises NoDaemonError when there is none in time.
 
         Where nothing may be waited for, what is known has to do, unless it `must_answer`.
         """
         producer = self._producer
-        if not wait_s:
+        if not deadline.left_s:
             await self._hear()
             if producer.known is None or (must_answer and not producer.is_subscribed):
                 raise no_daemon(self.runtime_dir)
             return
         question = self._question()
-        answered = await self._until(lambda: bool(producer.answers(question)), wait_s)
+        answered = await self._until(lambda: bool(producer.answers(question)), deadline)
         self._answered(question)
         if not answered:
             raise no_daemon(self.runtime_dir)
 
-    async def _is_writable(self, wait_s: float) -> bool:
-        """Whether the daemon takes messages, within `wait_s`."""
+    async def _is_writable(self, deadline: Deadline) -> bool:
+        """Whether the daemon takes messages in time."""
         poller = zmq.asyncio.Poller()
         poller.register(self._socket, zmq.POLLOUT)
-        return bool(await poller.poll(math.ceil(wait_s * 1000)))
+        return bool(await poller.poll(deadline.left_ms))
 
     def _question(self) -> bytes:
         topic = self._producer.ask()
@@ -170,19 +171,26 @@ class AsyncPublisher(AsyncSocket):
         self._told.unsubscribe(question)
         self._producer.forget(question)
 
-    async def _until(self, is_done: Callable[[], bool], timeout_s: float) -> bool:
+    async def _until(self, is_done: Callable[[], bool], deadline: Deadline) -> bool:
         """Hear the daemon until `is_done`; whether that was in time."""
 
         async def listen() -> None:
             while not is_done():
-                # One task listens for all. It takes nothing while it can be cancelled.
-                async with self._listening:
-                    if not is_done():
-                        await self._told.poll()
-                        await self._drain()
+                if self._is_listening:
+                    # One task listens for all, and tells all what it has heard.
+                    await self._news.wait()
+                    continue
+                self._is_listening = True
+                try:
+                    await self._told.poll()
+                    await self._drain()
+                finally:
+                    self._is_listening = False
+                    news, self._news = self._news, asyncio.Event()
+                    news.set()
 
         try:
-            await asyncio.wait_for(listen(), timeout_s)
+            await asyncio.wait_for(listen(), deadline.left_or_none)
         except asyncio.TimeoutError:
             return is_done()
         return True
@@ -190,7 +198,7 @@ class AsyncPublisher(AsyncSocket):
     async def _hear(self) -> None:
         """Take what the daemon has sent so far, unless a task listens already; does not wait."""
         # What is taken from under a listener would not wake it.
-        if not self._listening.locked():
+        if not self._is_listening:
             await self._drain()
 
     async def _drain(self) -> None:

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import zmq
 
 from sdrlinkd.client.async_socket import AsyncSocket
+from sdrlinkd.client.deadline import Deadline
 from sdrlinkd.client.errors import no_daemon
 from sdrlinkd.client.messages import Message, decode_in, new_ack_topic, topic_filter
 from sdrlinkd.client.paths import OUT_SOCKET, chosen_dir, endpoint
-from sdrlinkd.client.subscriber import RECEIVE_HWM
+from sdrlinkd.client.subscriber import ASK_AGAIN_S, RECEIVE_HWM
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -33,21 +34,29 @@ class AsyncSubscriber(AsyncSocket):
 
     async def __aenter__(self) -> "Self":
         self._socket.connect(endpoint(self.runtime_dir, OUT_SOCKET))
-        token = new_ack_topic()
         for topic in self._topics:
             self._socket.subscribe(topic_filter(topic))
-        self._socket.subscribe(token)
         try:
-            await asyncio.wait_for(self._subscribed(token), self._timeout_s)
+            await asyncio.wait_for(self._subscribed(), self._timeout_s)
         except asyncio.TimeoutError:
             await self.close()
             raise no_daemon(self.runtime_dir) from None
-        self._socket.unsubscribe(token)
         return self
 
-    async def _subscribed(self, token: bytes) -> None:
-        while (await self._socket.recv_multipart())[0] != token:
-            pass
+    async def _subscribed(self) -> None:
+        again, asked = Deadline(0), list[bytes]()
+        while True:
+            if not again.left_s:
+                # On a full stream an answer may be dropped with the messages: ask once more.
+                again = Deadline(ASK_AGAIN_S)
+                asked.append(new_ack_topic())
+                self._socket.subscribe(asked[-1])
+            if not await self._socket.poll(again.left_ms):
+                continue
+            if (await self._socket.recv_multipart())[0] in asked:
+                break
+        for token in asked:
+            self._socket.unsubscribe(token)
 
     async def receive(self) -> Message:
         """The next message."""

@@ -1,12 +1,12 @@
 """What the blocking clients have in common."""
 
-import math
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
 import zmq
 
+from sdrlinkd.client.deadline import milliseconds
 from sdrlinkd.client.errors import no_daemon
 from sdrlinkd.client.paths import endpoint
 
@@ -39,8 +39,7 @@ class Endpoint:
             raise no_daemon(self.runtime_dir) from None
 
     def _poll(self, timeout_s: float | None) -> bool:
-        timeout_ms = None if timeout_s is None else math.ceil(timeout_s * 1000)
-        return bool(self._socket.poll(timeout_ms))
+        return bool(self._socket.poll(milliseconds(timeout_s)))
 
     def close(self) -> None:
         """Close the socket; what was sent has 200 ms to leave."""

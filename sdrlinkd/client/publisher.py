@@ -1,14 +1,13 @@
 """Publish from ordinary, blocking programs."""
 
-import math
 import os
-import time
 from collections.abc import Callable
 from types import TracebackType
 
 import zmq
 
 from sdrlinkd.client.blocking_socket import Endpoint
+from sdrlinkd.client.deadline import Deadline
 from sdrlinkd.client.errors import no_daemon, restarted
 from sdrlinkd.client.messages import Receipt, sync_frames
 from sdrlinkd.client.paths import IN_SOCKET, OUT_SOCKET, chosen_dir
@@ -16,7 +15,6 @@ from sdrlinkd.client.producer import STILL_THERE_S, Producer, wishes
 
 RECONNECT_MS = 20
 """Faster than a PUSH socket's 100 ms: who takes messages should have said first which."""
-FOREVER = float("inf")
 
 
 class Publisher(Endpoint):
@@ -83,17 +81,17 @@ class Publisher(Endpoint):
         """
         producer = self._producer
         fields = wishes(qos, priority, dst, lifespan_ms, type, published_ns)
-        wait_s = self._timeout_s if timeout_s is None else timeout_s
+        deadline = Deadline(self._timeout_s if timeout_s is None else timeout_s)
         if producer.is_time_to_look():
             self._hear()
         if not producer.takes(topic, cdr, type):
             # Nothing is refused by hearsay: the daemon may have been restarted.
-            self._ask(wait_s)
+            self._ask(deadline)
             producer.check(topic, cdr, type)
         name = None
         if receipt:
             if not producer.is_subscribed:
-                self._ask(wait_s, must_answer=True)
+                self._ask(deadline, must_answer=True)
             name = fields["id"] = producer.awaited.new_id()
         frames = producer.encode(topic, cdr, fields, published_ns)
         while True:
@@ -101,10 +99,10 @@ class Publisher(Endpoint):
                 self._socket.send_multipart(frames, zmq.NOBLOCK)
                 break
             except zmq.Again:
-                if not (wait_s and self._socket.poll(math.ceil(wait_s * 1000), zmq.POLLOUT)):
+                if not (deadline.left_s and self._socket.poll(deadline.left_ms, zmq.POLLOUT)):
                     raise no_daemon(self.runtime_dir) from None
                 # It may be another daemon by now.
-                self._ask(wait_s, must_answer=receipt)
+                self._ask(deadline, must_answer=receipt)
                 producer.check(topic, cdr, type)
         self._sent = True
         if name is not None:
@@ -117,15 +115,15 @@ class Publisher(Endpoint):
         None when `timeout_s` passed first, or when no answer is owed any more. Every message is
         answered: with `unknown` where its daemon has ended, or has not answered for 6 s.
         """
-        awaited, deadline = self._producer.awaited, _after(timeout_s)
+        awaited, deadline = self._producer.awaited, Deadline(timeout_s)
         while awaited:
             self._hear()
             if (came := awaited.next(self._producer.boot)) is not None:
                 return came
-            left_s = deadline - time.monotonic()
-            if left_s <= 0:
+            left_s = deadline.left_s
+            if not left_s:
                 return None
-            self._until(lambda: awaited.has_come, min(left_s, STILL_THERE_S))
+            self._until(lambda: awaited.has_come, Deadline(min(left_s, STILL_THERE_S)))
         return None
 
     def wait_for_daemon(self, timeout_s: float | None = None) -> None:
@@ -133,25 +131,28 @@ class Publisher(Endpoint):
 
         Raises NoDaemonError.
         """
-        self._ask(self._timeout_s if timeout_s is None else timeout_s, must_answer=True)
+        wait_s = self._timeout_s if timeout_s is None else timeout_s
+        self._ask(Deadline(wait_s), must_answer=True)
 
     def flush(self, timeout_s: float = 5.0) -> None:
         """Wait until the daemon has taken everything sent. Raises NoDaemonError.
 
+        What a daemon had taken that was killed before this was called is gone with it: where that
+        matters, ask for receipts.
+
         ZeroMQ may drop the end of a long burst when the sender goes at once; who leaves the
         `with` block in peace has flushed.
         """
-        deadline = _after(timeout_s)
+        deadline = Deadline(timeout_s)
         question = self._question()
         answers = self._producer.answers(question)
         try:
-            if not self._until(lambda: bool(answers), timeout_s):
+            if not self._until(lambda: bool(answers), deadline):
                 raise no_daemon(self.runtime_dir)
-            left_s = max(deadline - time.monotonic(), 0.0)
-            if not self._socket.poll(math.ceil(left_s * 1000), zmq.POLLOUT):
+            if not self._socket.poll(deadline.left_ms, zmq.POLLOUT):
                 raise no_daemon(self.runtime_dir)
             self._socket.send_multipart(sync_frames(question), zmq.NOBLOCK)
-            if not self._until(lambda: len(answers) > 1, max(deadline - time.monotonic(), 0.0)):
+            if not self._until(lambda: len(answers) > 1, deadline):
                 raise no_daemon(self.runtime_dir)
         except zmq.Again:
             raise no_daemon(self.runtime_dir) from None
@@ -166,19 +167,19 @@ class Publisher(Endpoint):
         self._told.close()
         super().close()
 
-    def _ask(self, wait_s: float, *, must_answer: bool = False) -> None:
+    def _ask(self, deadline: Deadline, *, must_answer: bool = False) -> None:
         """Have the daemon's present word. Raises NoDaemonError when there is none in time.
 
         Where nothing may be waited for, what is known has to do, unless it `must_answer`.
         """
         producer = self._producer
-        if not wait_s:
+        if not deadline.left_s:
             self._hear()
             if producer.known is None or (must_answer and not producer.is_subscribed):
                 raise no_daemon(self.runtime_dir)
             return
         question = self._question()
-        answered = self._until(lambda: bool(producer.answers(question)), wait_s)
+        answered = self._until(lambda: bool(producer.answers(question)), deadline)
         self._answered(question)
         if not answered:
             raise no_daemon(self.runtime_dir)
@@ -192,12 +193,10 @@ class Publisher(Endpoint):
         self._told.unsubscribe(question)
         self._producer.forget(question)
 
-    def _until(self, is_done: Callable[[], bool], timeout_s: float) -> bool:
+    def _until(self, is_done: Callable[[], bool], deadline: Deadline) -> bool:
         """Hear the daemon until `is_done`; whether that was in time."""
-        deadline = time.monotonic() + timeout_s
         while not is_done():
-            left_s = max(deadline - time.monotonic(), 0.0)
-            if not self._told.poll(math.ceil(left_s * 1000)):
+            if not self._told.poll(deadline.left_ms):
                 return False
             self._hear()
         return True
@@ -226,7 +225,3 @@ class Publisher(Endpoint):
                 self.flush()
         finally:
             self.close()
-
-
-def _after(timeout_s: float | None) -> float:
-    return FOREVER if timeout_s is None else time.monotonic() + timeout_s

@@ -1,17 +1,18 @@
 """Subscribe from ordinary, blocking programs."""
 
 import os
-import time
 from collections.abc import Iterator
 
 import zmq
 
 from sdrlinkd.client.blocking_socket import Endpoint
+from sdrlinkd.client.deadline import Deadline
 from sdrlinkd.client.errors import no_daemon
 from sdrlinkd.client.messages import Message, decode_in, new_ack_topic, topic_filter
 from sdrlinkd.client.paths import OUT_SOCKET, chosen_dir
 
 RECEIVE_HWM = 1000
+ASK_AGAIN_S = 0.2
 
 
 class Subscriber(Endpoint):
@@ -42,9 +43,9 @@ class Subscriber(Endpoint):
 
     def receive(self, timeout_s: float | None = None) -> Message | None:
         """The next message; None when `timeout_s` passed without one."""
-        deadline = None if timeout_s is None else time.monotonic() + timeout_s
+        deadline = Deadline(timeout_s)
         while True:
-            if not self._poll(None if deadline is None else max(0.0, deadline - time.monotonic())):
+            if not self._poll(deadline.left_s):
                 return None
             message = decode_in(self._socket.recv_multipart())
             if message is not None:
@@ -58,12 +59,18 @@ class Subscriber(Endpoint):
 
     def _wait_until_subscribed(self, timeout_s: float) -> None:
         """The daemon answers subscriptions in order, so its answer to ours means all are active."""
-        token = new_ack_topic()
-        self._socket.subscribe(token)
-        deadline = time.monotonic() + timeout_s
-        while (left_s := deadline - time.monotonic()) > 0:
-            if self._poll(left_s) and self._socket.recv_multipart()[0] == token:
-                self._socket.unsubscribe(token)
+        deadline, again, asked = Deadline(timeout_s), Deadline(0), list[bytes]()
+        while deadline.left_s:
+            if not again.left_s:
+                # On a full stream an answer may be dropped with the messages: ask once more.
+                again = Deadline(ASK_AGAIN_S)
+                asked.append(new_ack_topic())
+                self._socket.subscribe(asked[-1])
+            if not self._poll(min(again.left_s, deadline.left_s)):
+                continue
+            if self._socket.recv_multipart()[0] in asked:
+                for token in asked:
+                    self._socket.unsubscribe(token)
                 return
         self.close()
         raise no_daemon(self.runtime_dir)
