@@ -57,6 +57,12 @@ class Running:
         return False
 
 
+@pytest.fixture(autouse=True)
+def _no_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tables are as wide as where nobody says how wide; whoever runs the tests may say it."""
+    monkeypatch.delenv("COLUMNS", raising=False)
+
+
 @pytest.fixture
 def write_config() -> Callable[..., Path]:
     """Writes a configuration whose sockets are in the given folder; further TOML may follow."""

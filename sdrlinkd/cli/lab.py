@@ -106,7 +106,8 @@ def lab(
     console.print(pair_table(report))
     for line in _summary(report, wall_s):
         console.print(line, highlight=False, markup=False, soft_wrap=True)
-    console.print(f"wrote {out}/{REPORT}, {PICTURE}", highlight=False, markup=False)
+    wrote = f"wrote {out}/{REPORT}, {PICTURE}"
+    console.print(wrote, highlight=False, markup=False, soft_wrap=True)
     if not all(robot.ledger_adds_up for robot in report.robots):
         raise typer.Exit(1)
 
