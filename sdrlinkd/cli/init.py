@@ -2,8 +2,9 @@
 
 import os
 import tempfile
+from errno import EISDIR
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -20,13 +21,11 @@ from sdrlinkd.init import (
     Team,
     choose,
     copy_of,
+    dictionaries_of,
     named,
     team_files,
     topics_of_graph,
 )
-
-if TYPE_CHECKING:
-    pass
 
 MOST_ROBOTS = 254
 
@@ -80,7 +79,7 @@ def init(
         found = _topics(questions, topic or [], bag, from_graph=from_graph)
         air, sockets = (out / "air").absolute(), _socket_folder()
         team = Team(preset, count, frequency, device, found, air, sockets)
-        files = team_files(team, ids)
+        files = {name: text.encode() for name, text in team_files(team, ids).items()}
     _write(files, out, force)
     console = Console(soft_wrap=True, highlight=False, markup=False)
     console.print(f"wrote {', '.join(str(out / name) for name in files)}")
@@ -131,7 +130,7 @@ def _tell(choice: Choice) -> None:
         console.print("choose others with --topic NAME, repeated", style="yellow")
 
 
-def _copied(questions: Questions, own: str, runtime_dir: Path | None) -> dict[str, str]:
+def _copied(questions: Questions, own: str, runtime_dir: Path | None) -> dict[str, bytes]:
     import msgspec
 
     from sdrlinkd.config import Config
@@ -139,14 +138,17 @@ def _copied(questions: Questions, own: str, runtime_dir: Path | None) -> dict[st
     with connect(runtime_dir) as control:
         config: Config = msgspec.convert(control.ask("config"), Config)
         topics = control.ask("topics")
+        own_id = control.ask("hello")["node"]
     ids = questions.own_ids(own, MOST_ROBOTS)
     if len(ids) > 1:
         raise UserError('--id: got "all"; allowed with --from-daemon: one robot')
     prefix = f"/{config.namespace.strip('/')}/" if config.namespace else "/"
     lines = "".join(f"{each['name'].removeprefix(prefix)},{each['type']}\n" for each in topics)
+    registry = "# Topic registry: the same file at all robots.\n" + lines
     return {
-        REGISTRY: "# Topic registry: the same file at all robots.\n" + lines,
-        "sdrlinkd.toml": copy_of(config, ids[0]),
+        REGISTRY: registry.encode(),
+        "sdrlinkd.toml": copy_of(config, own_id, ids[0]).encode(),
+        **dictionaries_of(config),
     }
 
 
@@ -155,31 +157,43 @@ def _socket_folder() -> Path:
     return Path(own, "sdrlinkd") if own else Path(tempfile.gettempdir(), f"sdrlinkd-{os.getuid()}")
 
 
-def _write(files: dict[str, str], out: Path, force: bool) -> None:
+def _write(files: dict[str, bytes], out: Path, force: bool) -> None:
     """All of them, or none. Raises UserError."""
-    from sdrlinkd.config import load_config, make_setup
-
     there = [name for name in files if (out / name).exists()]
     if there and not force:
         names = ", ".join(str(out / name) for name in there)
         raise UserError(f"{names}: there already; allowed: another --out, or --force to replace")
-    with tempfile.TemporaryDirectory() as trial:
-        for name, text in files.items():
-            (Path(trial) / name).write_text(text)
-        for name in files:
-            if name != REGISTRY:
-                make_setup(load_config(Path(trial) / name), Path(trial), name)
+    _try_out(files, out)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        for name, text in files.items():
-            (out / name).write_text(text)
+        for name in files:
+            if (out / name).is_dir():
+                raise IsADirectoryError(EISDIR, "it is a folder", str(out / name))
+        # On the same file system, so that they only have to be renamed.
+        with tempfile.TemporaryDirectory(dir=out, prefix=".init-") as aside:
+            for name, content in files.items():
+                (Path(aside) / name).write_bytes(content)
+            for name in files:
+                (Path(aside) / name).replace(out / name)
     except OSError as error:
-        raise UserError(f"{error.filename} cannot be written ({error.strerror})") from None
+        raise UserError(f"{error.filename or out} cannot be written ({error.strerror})") from None
 
 
-def _next(files: dict[str, str], out: Path, preset: RadioPreset | None) -> list[str]:
+def _try_out(files: dict[str, bytes], out: Path) -> None:
+    """Whether a daemon would take them. Raises UserError."""
+    from sdrlinkd.config import make_setup, parse_config
+
+    with tempfile.TemporaryDirectory() as trial:
+        for name, content in files.items():
+            (Path(trial) / name).write_bytes(content)
+        for name in files:
+            if name.endswith(".toml"):
+                make_setup(parse_config(files[name].decode(), str(out / name)), Path(trial))
+
+
+def _next(files: dict[str, bytes], out: Path, preset: RadioPreset | None) -> list[str]:
     """What to type then; `preset` is None where nobody says which radio it is."""
-    configs = [out / name for name in files if name != REGISTRY]
+    configs = [out / name for name in files if name.endswith(".toml")]
     is_real = preset is not None and preset.is_real
     is_here = len(configs) > 1 and not is_real
     lines = ["next:", f"  sdrlinkd --check --config {configs[0]}"]

@@ -104,7 +104,8 @@ def _check_sharing(config: Config) -> None:
 
 
 def with_paths(config: Config, base: Path) -> Config:
-    """`config` with file names relative to `base` made whole."""
+    """`config` with file names relative to `base` made whole, but for the registry's."""
+    base = base.absolute()
     iqfile = config.iqfile
     whole = {
         key: str(base / getattr(iqfile, key)) if getattr(iqfile, key) else ""
@@ -116,4 +117,10 @@ def with_paths(config: Config, base: Path) -> Config:
         iqfile=msgspec.structs.replace(iqfile, **whole),
         ether=msgspec.structs.replace(ether, dir=str(base / ether.dir) if ether.dir else ""),
         play=msgspec.structs.replace(play, bag=str(base / play.bag) if play.bag else ""),
+        topic={
+            name: msgspec.structs.replace(policy, dictionary=str(base / policy.dictionary))
+            if policy.dictionary
+            else policy
+            for name, policy in config.topic.items()
+        },
     )

@@ -21,9 +21,11 @@ def cite(source: str, text: str, path: KeyPath) -> str:
 def located(message: str, source: str) -> str:
     """`message`, which begins with a key, after the file and the line that it is about.
 
-    `source` is the file where there is one; its line is that of the key, of the next key that the
-    message names where the first one is not written down, or of the section.
+    Without a file, `source` is empty. The line is that of the key, of the next key that the message
+    names where the first one is not written down, or of the section.
     """
+    if not source:
+        return message
     plain = message.removeprefix(f"{source}: ")
     try:
         text = Path(source).read_text()

@@ -50,8 +50,8 @@ class Setup:
     warnings: list[str]
     topic_warnings: dict[int, str]
     """What matters of a topic, once it is used."""
-    source: str = "config"
-    """The file that all this is from."""
+    source: str = ""
+    """The file that all this is from, if any."""
 
     def republished_as(self, src: int, topic_id: int) -> str:
         """Bus topic of another robot's message."""
@@ -83,10 +83,10 @@ class Setup:
         ]
 
 
-def make_setup(config: Config, base: Path, source: str = "config") -> Setup:
+def make_setup(config: Config, base: Path, source: str = "") -> Setup:
     """Resolve `config`; file names in it are relative to `base`.
 
-    Raises UserError. An error about a key cites its line where `source` is the file.
+    Raises UserError. An error about a key cites its line in the file `source`, if any.
     """
     try:
         return _resolve(config, base, source)

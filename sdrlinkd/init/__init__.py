@@ -1,7 +1,7 @@
 """New teams: the configurations and the registry that they begin with, as text."""
 
 from sdrlinkd.init.choosing import MOST_TOPICS, Choice, FoundTopic, choose, named
-from sdrlinkd.init.copying import copy_of
+from sdrlinkd.init.copying import copy_of, dictionaries_of
 from sdrlinkd.init.graph import topics_of_graph
 from sdrlinkd.init.radios import RADIOS, RadioPreset
 from sdrlinkd.init.team import REGISTRY, Team, team_files
@@ -16,6 +16,7 @@ __all__ = [
     "Team",
     "choose",
     "copy_of",
+    "dictionaries_of",
     "named",
     "team_files",
     "topics_of_graph",

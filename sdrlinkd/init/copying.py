@@ -1,28 +1,35 @@
 """Another robot's configuration, from that of a daemon that runs."""
 
 import re
+from pathlib import Path
 
 import msgspec
 import tomli_w
 
 from sdrlinkd.config import Config
+from sdrlinkd.errors import UserError
 from sdrlinkd.init.team import REGISTRY
 
-_DIGITS = re.compile(r"\d+(?=\D*$)")
+_LAST_NUMBER = re.compile(r"[0-9]+(?=[^0-9]*$)")
 
 
-def copy_of(config: Config, number: int) -> str:
-    """`config` for robot `number`, as TOML: what differs from the defaults.
+def copy_of(config: Config, own_id: int, number: int) -> str:
+    """`config` of robot `own_id` for robot `number`, as TOML: what differs from the defaults.
 
-    Sockets are not copied: they are each daemon's own.
+    Sockets are not copied: they are each daemon's own. Dictionaries lie beside the file, under
+    their own names.
     """
-    from_namespace = config.robot_id < 0
+    namespace, told_id = _identity(config, own_id, number)
     copy = msgspec.structs.replace(
         config,
-        namespace=_DIGITS.sub(str(number), config.namespace),
-        robot_id=-1 if from_namespace else number,
+        namespace=namespace,
+        robot_id=told_id,
         registry=REGISTRY,
         bus=msgspec.structs.replace(config.bus, runtime_dir=""),
+        topic={
+            name: msgspec.structs.replace(policy, dictionary=_beside(policy.dictionary))
+            for name, policy in config.topic.items()
+        },
     )
     changed = _changed(copy, Config()) | {"namespace": copy.namespace, "registry": REGISTRY}
     top = {key: value for key, value in changed.items() if not isinstance(value, dict)}
@@ -31,6 +38,41 @@ def copy_of(config: Config, number: int) -> str:
         f"# Robot {number}, copied from a running daemon by `sdrlinkctl init`.\n"
         f"{tomli_w.dumps(top | tables)}"
     )
+
+
+def dictionaries_of(config: Config) -> dict[str, bytes]:
+    """What `copy_of` expects beside the file, by name. Raises UserError."""
+    found: dict[str, bytes] = {}
+    for name, policy in config.topic.items():
+        if not policy.dictionary:
+            continue
+        key = f"topic.{name}.dictionary"
+        try:
+            content = Path(policy.dictionary).read_bytes()
+        except OSError as error:
+            raise UserError(
+                f"{key}: {policy.dictionary} of the running daemon cannot be read "
+                f"({error.strerror}); allowed: a file that this user may read"
+            ) from None
+        if found.setdefault(_beside(policy.dictionary), content) != content:
+            raise UserError(
+                f"{key}: {policy.dictionary} has the name of another topic's dictionary; allowed: "
+                "files with names of their own"
+            )
+    return found
+
+
+def _identity(config: Config, own_id: int, number: int) -> tuple[str, int]:
+    """Namespace and robot_id. A number in the namespace changes only where it is the robot's."""
+    last = _LAST_NUMBER.search(config.namespace)
+    if last is None or int(last[0]) != own_id:
+        return config.namespace, number
+    namespace = config.namespace[: last.start()] + str(number) + config.namespace[last.end() :]
+    return namespace, -1 if config.robot_id < 0 else number
+
+
+def _beside(path: str) -> str:
+    return Path(path).name
 
 
 def _changed(struct: msgspec.Struct, default: msgspec.Struct) -> dict[str, object]:

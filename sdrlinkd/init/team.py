@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import NamedTuple
 
+import tomli_w
+
 from sdrlinkd.init.choosing import FoundTopic
 from sdrlinkd.init.radios import RadioPreset
 
@@ -52,16 +54,16 @@ def _config(team: Team, number: int, has_neighbors: bool) -> str:
     if radio.is_real:
         parts.append(
             "[soapy]\n"
-            + _line(f'device = "{team.device or radio.device}"', "sdrlinkctl radio probe shows it")
+            + _text("device", team.device or radio.device, "sdrlinkctl radio probe shows it")
             + _line("tx_enabled = false", "nothing is sent until you set this to true")
             + "".join(_line(*each) for each in radio.soapy)
         )
     if radio.backend == "ether":
-        parts.append("[ether]\n" + _line(f'dir = "{team.air}"', "sdrlink-ether --dir serves it"))
+        parts.append("[ether]\n" + _text("dir", str(team.air), "sdrlink-ether --dir serves it"))
     if radio.shares_air and team.robots > 1:
         parts.append(_access(team))
     if has_neighbors and not radio.is_real:
-        parts.append("[bus]\n" + _line(f'runtime_dir = "{team.sockets / name}"'))
+        parts.append("[bus]\n" + _text("runtime_dir", str(team.sockets / name)))
     return "\n".join(parts)
 
 
@@ -82,9 +84,7 @@ def _modem(team: Team) -> str:
         told = "the radio runs at so many times that rate"
         lines.append(_line(f"oversampling = {radio.oversampling}", told))
     if radio.is_real:
-        lines.append(
-            _line(f'frequency_hz = "{team.frequency}"', "what antenna and licence are for")
-        )
+        lines.append(_text("frequency_hz", team.frequency, "what antenna and licence are for"))
     lines.append(_line("mcs = 1", "QPSK 1/2; sdrlinkctl phy info lists them"))
     return "[modem]\n" + "".join(lines)
 
@@ -99,6 +99,11 @@ def _access(team: Team) -> str:
         told = "a turn: room for this radio to change its direction"
         lines += [_line(f'slot_s = "{team.radio.slot}"', told), _line("reuse = false")]
     return "[access]\n" + "".join(lines)
+
+
+def _text(key: str, value: str, comment: str = "") -> str:
+    """A line with a text that a person gave, quoted as TOML wants it."""
+    return _line(tomli_w.dumps({key: value}).rstrip("\n"), comment)
 
 
 def _line(assignment: str, comment: str = "") -> str:

@@ -7,13 +7,14 @@ import subprocess
 import sys
 
 import pytest
+import zstandard
 from rosbags.rosbag2 import StoragePlugin
 
 from sdrlinkd.__main__ import main
 from sdrlinkd.cli import run
 from sdrlinkd.client import Publisher, Subscriber
-from sdrlinkd.config import load_config, load_registry, make_setup
-from sdrlinkd.init import MOST_TOPICS, RADIOS, FoundTopic, choose
+from sdrlinkd.config import Config, load_config, load_registry, make_setup, parse_config
+from sdrlinkd.init import MOST_TOPICS, RADIOS, FoundTopic, choose, copy_of
 from tests.adapters.recordings import noisy_messages, ros2_bag
 from tests.waiting import wait_for
 
@@ -206,6 +207,62 @@ def test_a_running_daemon_lends_its_configuration(start_daemon, init, tmp_path, 
     assert ours.config.bus.runtime_dir == ""
     code, _, err = init(*given, "--id", "all", "--force")
     assert (code, "allowed with --from-daemon: one robot" in err) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("namespace", "robot_id", "expected"),
+    [
+        ("robot_3", -1, ("robot_7", -1)),
+        ("robot_3", 3, ("robot_7", 7)),
+        ("site7/husky", 3, ("site7/husky", 7)),
+        ("site7/husky_03", 3, ("site7/husky_7", 7)),
+        ("site3/husky_7", 3, ("site3/husky_7", 7)),
+        ("", -1, ("", 7)),
+        ("", 3, ("", 7)),
+    ],
+)
+def test_only_the_robots_own_number_changes(namespace, robot_id, expected):
+    config = Config(namespace=namespace, robot_id=robot_id)
+    copy = parse_config(copy_of(config, 3, 7))
+    assert (copy.namespace, copy.robot_id) == expected
+
+
+def test_a_copy_brings_dictionaries_and_whole_paths(start_daemon, init, tmp_path):
+    samples = [f"{i:05} odometry {i * 7919 % 1000}".encode() * 5 for i in range(500)]
+    trained = zstandard.train_dictionary(1000, samples).as_bytes()
+    theirs = tmp_path / "odom.dict"
+    theirs.write_bytes(trained)
+    daemon = start_daemon(f'[topic.odom]\ndictionary = "{theirs}"\n[play]\nbag = "ride"\n')
+    given = ("--from-daemon", "--runtime-dir", daemon.directory, "--id", "7")
+    code, _, err = init(*given)
+    assert code == 0, err
+    assert (tmp_path / "team" / "odom.dict").read_bytes() == trained
+    copy = load_config(tmp_path / "team" / "sdrlinkd.toml")
+    assert copy.topic["odom"].dictionary == "odom.dict"
+    assert copy.play.bag == str(daemon.config.parent / "ride")
+    theirs.unlink()
+    code, _, err = init(*given, out="again")
+    assert (code, "topic.odom.dictionary" in err, "cannot be read" in err) == (2, True, True)
+    assert not (tmp_path / "again").exists()
+
+
+def test_what_a_person_gives_is_quoted(init, tmp_path):
+    out = 'say "hi" \\ there'
+    code, _, err = init("--radio", "ether", "--robots", 2, "--id", "all", *ODOM, out=out)
+    assert code == 0, err
+    written = load_config(tmp_path / out / "robot_2.toml")
+    assert written.ether.dir == str(tmp_path / out / "air")
+    device = 'driver=uhd,serial="3"'
+    real = ("--radio", "usrp", "--robots", 1, "--frequency", "1 GHz", *ODOM)
+    assert init(*real, "--device", device, out="real")[0] == 0
+    assert load_config(tmp_path / "real" / "sdrlinkd.toml").soapy.device == device
+
+
+def test_all_files_or_none(init, tmp_path):
+    (tmp_path / "team" / "sdrlinkd.toml").mkdir(parents=True)
+    code, _, err = init("--radio", "direct", "--id", "1", *ODOM, "--force")
+    assert (code, "sdrlinkd.toml cannot be written (it is a folder)" in err) == (2, True)
+    assert [each.name for each in (tmp_path / "team").iterdir()] == ["sdrlinkd.toml"]
 
 
 def test_what_is_missing_is_asked_with_a_default(tmp_path, capsys):
