@@ -11,6 +11,7 @@ from sdrlinkd.link import (
     TopicPolicy,
     lifespan_of,
 )
+from sdrlinkd.plan.advice import slower
 from sdrlinkd.plan.air import Setting
 from sdrlinkd.plan.response import FOREVER, Task, worst_s
 from sdrlinkd.plan.supply import Supply, supply_of
@@ -73,6 +74,28 @@ def make_plan(
     """For every robot that sends the same."""
     given = ((load, policies.get(load.topic_id, DEFAULT_POLICY)) for load in loads)
     known = [(after_policy(load, policy), policy) for load, policy in given]
+    topics, asked = _judged(known, setting)
+    classes = [
+        ClassPlan(qos.label, sum(t.air for t in topics if t.qos == qos.label)) for qos in Qos
+    ]
+    is_carried = _is_carried(topics, asked)
+
+    def carries(changed: Sequence[Load]) -> bool:
+        pairs = zip(changed, known, strict=True)
+        return _is_carried(*_judged([(load, policy) for load, (_, policy) in pairs], setting))
+
+    advice = _late(topics) if is_carried else [slower([each for each, _ in known], asked, carries)]
+    settled = setting.settled
+    return Plan(
+        topics, classes, sum(asked), not advice, advice, setting.robots, settled.policy,
+        settled.share, list(setting.notes), list(left_out),
+    )  # fmt: skip
+
+
+def _judged(
+    known: Sequence[tuple[Load, TopicPolicy]], setting: Setting
+) -> tuple[list[TopicPlan], list[float]]:
+    """Each topic, and what all robots take for it of what the policy lets pass."""
     burst_s = min(setting.longest_s, _backlog_s(known, setting))
     supply = supply_of(setting.settled, setting.traits, setting.robots, burst_s, setting.each_s)
     tasks = [_task(load, policy, known, setting, supply) for load, policy in known]
@@ -85,17 +108,11 @@ def make_plan(
         )
         for task in tasks
     ]  # fmt: skip
-    classes = [
-        ClassPlan(qos.label, sum(t.air for t in topics if t.qos == qos.label)) for qos in Qos
-    ]
-    air = sum(topic.air for topic in topics) * (1 + supply.others) / supply.share
-    is_in_time = not any(topic.is_late or topic.worst_s == FOREVER for topic in topics)
-    fits = air <= FULL and is_in_time
-    settled = setting.settled
-    return Plan(
-        topics, classes, air, fits, [] if fits else _advice(topics, air), setting.robots,
-        settled.policy, settled.share, list(setting.notes), list(left_out),
-    )  # fmt: skip
+    return topics, [topic.air * (1 + supply.others) / supply.share for topic in topics]
+
+
+def _is_carried(topics: Sequence[TopicPlan], asked: Sequence[float]) -> bool:
+    return sum(asked) <= FULL and not any(topic.worst_s == FOREVER for topic in topics)
 
 
 def _backlog_s(known: Sequence[tuple[Load, TopicPolicy]], setting: Setting) -> float:
@@ -135,18 +152,7 @@ def _pdus(size: float, pdu_size: int, stamp: bool) -> int:
     return n + (stamp and rest + STAMP_SIZE + ENTRY_HEADER_SIZE > k)
 
 
-def _advice(topics: Sequence[TopicPlan], air: float) -> list[str]:
-    if air > FULL or any(topic.worst_s == FOREVER for topic in topics):
-        largest = max(topics, key=lambda topic: topic.air)
-        fits_hz = largest.rate_hz * min(FULL / air, FULL)
-        return [
-            (
-                f"{100 * air:.0f} % of the air is asked for. {largest.name} takes the most, "
-                f"{100 * largest.air:.0f} %: send it at {fits_hz:.3g} Hz or less "
-                f"(topic.{largest.name}.period_s = {1 / fits_hz:.3g}), make it smaller (compress), "
-                "or use a higher MCS or rate"
-            )
-        ]
+def _late(topics: Sequence[TopicPlan]) -> list[str]:
     return [
         f"{topic.name} can take {1e3 * topic.worst_s:.0f} ms and is worthless after "
         f"{1e3 * topic.lifespan_s:.0f} ms: raise its class or priority, or its lifespan_s"

@@ -15,6 +15,9 @@ HOST_S = 0.01
 with two cores that has something else to do, too."""
 
 
+LAST_ID = 254
+
+
 def setting_of(
     config: Config,
     own_id: int,
@@ -28,14 +31,18 @@ def setting_of(
     """
     radio = presume_radio(config, turnaround_s)
     access = config.access
+    guessed: list[str] = []
     if robots is not None:
         policy = access.policy if robots > 1 else "none"
         nodes, own_id = list(range(1, robots + 1)), 1
         access = msgspec.structs.replace(access, policy=policy, nodes=nodes)
+    if access.policy == "csma" and not access.nodes:
+        access = msgspec.structs.replace(access, nodes=[own_id, own_id % LAST_ID + 1])
+        guessed = ["access.nodes lists nobody: planned for two robots (--robots)"]
     n = max(1, len(set(access.nodes)))
     forced = msgspec.structs.replace(access, force=True)
     settled = settle(forced, own_id, radio.traits, radio.longest_s, Random(0))
-    notes = _notes(config, radio, settled, n, host_s)
+    notes = guessed + _notes(config, radio, settled, n, host_s)
     try:
         settle(access, own_id, radio.traits, radio.longest_s, Random(0))
     except ConfigError as error:

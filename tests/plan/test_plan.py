@@ -1,8 +1,11 @@
 """What is planned, in numbers and in words."""
 
+import re
 from pathlib import Path
+from random import Random
 
 import pytest
+from msgspec import structs
 
 from sdrlinkd.cli import run
 from sdrlinkd.config import parse_config
@@ -10,6 +13,7 @@ from sdrlinkd.errors import UserError
 from sdrlinkd.link import TopicPolicy
 from sdrlinkd.plan import Load, loads_from_bag, make_plan, parse_load, setting_of
 from sdrlinkd.wire import make_registry
+from tests.laws import trials
 
 REGISTRY = make_registry(
     [("scan", "sensor_msgs/LaserScan"), ("odom", "nav_msgs/Odometry"), ("map", "nav_msgs/Path")]
@@ -70,6 +74,43 @@ def test_too_much_is_not_feasible_and_says_what_to_change():
     (advice,) = plan.advice
     assert "map takes the most" in advice
     assert "topic.map.period_s = 0.1" in advice
+
+
+@pytest.mark.parametrize("seed", range(trials(12)))
+def test_who_follows_the_advice_has_enough(seed):
+    """Whatever the policy, the robots and which topic takes the most."""
+    rng = Random(seed)
+    policy = rng.choice(["none", "tdma", "minislot", "csma"])
+    how = {"policy": policy, "robots": 1 if policy == "none" else rng.randint(2, 4)}
+    loads = [f"{name}:{rng.uniform(1, 50):.1f}:{int(10 ** rng.uniform(2, 4.3))}"
+             for name in ("scan", "odom", "map")]  # fmt: skip
+    known = {i: TopicPolicy(qos=rng.choice(["latency", "default", "bulk"])) for i in range(3)}
+    plan = planned(*loads, policies=known, **how)
+    told = dict(re.findall(r"topic\.(\w+)\.period_s = ([0-9.e+-]+)", " ".join(plan.advice)))
+    if not told:
+        assert plan.is_feasible or "raise its class" in plan.advice[0] or plan.air > 10
+        return
+    slowed = {
+        i: structs.replace(known[i], period_s=float(told.get(REGISTRY.topics[i].name, 0)))
+        for i in range(3)
+    }
+    again = planned(*loads, policies=slowed, **how)
+    assert again.air <= 0.95
+    assert all(topic.worst_s < float("inf") for topic in again.topics), (plan.advice, again)
+
+
+def test_shares_in_the_advice_have_one_base():
+    plan = planned("scan:50:1KB", "map:20:64KiB", policy="tdma", robots=3)
+    total, largest = (int(each) for each in re.findall(r"(\d+) %", plan.advice[0])[:2])
+    assert total == pytest.approx(100 * plan.air, abs=1)
+    airs = [topic.air for topic in plan.topics]
+    assert largest / total == pytest.approx(max(airs) / sum(airs), abs=0.01)
+
+
+def test_what_no_rate_mends_is_told():
+    plan = planned("scan:60000:1KB", "map:2000:64KiB")
+    assert "fewer robots" in plan.advice[0]
+    assert "period_s" not in plan.advice[0]
 
 
 def test_a_lifespan_that_cannot_be_met_is_told():

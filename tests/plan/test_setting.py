@@ -48,6 +48,12 @@ def test_robots_turnaround_and_oversampling_come_from_the_configuration():
         assert odom(parse_config(changed)).topics[0].worst_s > alone.topics[0].worst_s + 0.1
 
 
+def test_without_a_list_csma_is_planned_for_two():
+    setting = setting_of(preset("usrp", '[access]\npolicy = "csma"\n'), 1)
+    assert setting.robots == 2
+    assert "planned for two robots" in setting.notes[0]
+
+
 def test_options_go_before_the_configuration():
     config = preset("hackrf", TWO_WAY)
     assert odom(config, robots=3).robots == 3

@@ -1,0 +1,64 @@
+"""What to change where the air cannot carry the traffic. What is told has been tried."""
+
+import math
+from collections.abc import Callable, Sequence
+
+from sdrlinkd.plan.traffic import Load
+
+LEAST = 0.02
+"""A topic that may send less than this share of what it does is not worth the advice."""
+STEPS = 10
+
+Carries = Callable[[Sequence[Load]], bool]
+"""Whether the air carries these loads."""
+
+
+def slower(loads: Sequence[Load], asked: Sequence[float], carries: Carries) -> str:
+    """Which topic to send how often.
+
+    `asked`: what each takes, as a share of what the air carries.
+    """
+    largest = max(range(len(loads)), key=asked.__getitem__)
+    name, faster = loads[largest].name, "use a higher MCS or rate"
+    told = f"{100 * sum(asked):.0f} % of what the air carries is asked for. "
+    who = f"{name} takes the most, {100 * asked[largest]:.0f} %: "
+    alone = _most(loads, {largest}, carries)
+    if alone is not None:
+        at_hz, period = alone[largest].rate_hz, _periods(alone[largest : largest + 1])
+        smaller = f"make it smaller (compress), or {faster}"
+        return f"{told}{who}send it at {at_hz:.3g} Hz or less ({period}), {smaller}"
+    every = _most(loads, set(range(len(loads))), carries)
+    if every is None:
+        never = "even at a fiftieth of the rates it does not fit"
+        return f"{told}{who}{never}; {faster}, or fewer robots"
+    smaller = f"make them smaller (compress), or {faster}"
+    return f"{told}{who}to slow it alone is not enough. Slow all ({_periods(every)}), {smaller}"
+
+
+def _periods(loads: Sequence[Load]) -> str:
+    return ", ".join(f"topic.{load.name}.period_s = {1 / load.rate_hz:.3g}" for load in loads)
+
+
+def _most(loads: Sequence[Load], which: set[int], carries: Carries) -> list[Load] | None:
+    """`loads` with `which` as often as the air carries; None: hardly ever."""
+    found, low, high = None, LEAST, 1.0
+    factor = low
+    for _ in range(STEPS):
+        tried = [
+            load._replace(rate_hz=1 / _up(1 / (load.rate_hz * factor))) if i in which else load
+            for i, load in enumerate(loads)
+        ]
+        if carries(tried):
+            found, low = tried, factor
+        elif found is None:
+            return None
+        else:
+            high = factor
+        factor = (low + high) / 2
+    return found
+
+
+def _up(value: float) -> float:
+    """To three digits, never less."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return float(f"{math.ceil(value / unit - 1e-9) * unit:.6g}")
