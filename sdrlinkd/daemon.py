@@ -97,8 +97,11 @@ async def _only_one_error() -> AsyncIterator[None]:
     """What a person has to mend is no group of errors. Raises UserError."""
     try:
         yield
-    except* UserError as group:
-        error: BaseException = group
+    except BaseExceptionGroup as group:  # Python 3.11.2 groups anew what `except*` raises.
+        mendable, rest = group.split(UserError)
+        if mendable is None or rest is not None:
+            raise
+        error: BaseException = mendable
         while isinstance(error, BaseExceptionGroup):
             error = error.exceptions[0]
         raise error from None
