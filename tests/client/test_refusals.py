@@ -16,6 +16,7 @@ from sdrlinkd.client import (
     pack_map,
     producer,
 )
+from sdrlinkd.client.messages import new_ack_topic
 from tests.conftest import ETC
 from tests.waiting import wait_for
 
@@ -282,6 +283,10 @@ def test_the_announcement_is_what_the_document_says(start_daemon):
         sub.connect(f"ipc://{daemon.directory}/out.sock")
         (first,) = sub.recv_multipart()
         told = msgspec.msgpack.decode(first[2:])
+        # The welcome comes with the connection; subscriptions are active once this is answered.
+        sub.subscribe(here := new_ack_topic())
+        assert sub.poll(20_000), "the daemon does not answer"
+        assert sub.recv_multipart() == [here, first[1:]]
         with daemon.control() as control:
             control.ask("set", {"topic": "odom", "max_bytes": 50})
         (second,) = sub.recv_multipart()
