@@ -46,6 +46,7 @@ from backends.writing import Annotation, RecordingWriter
 if TYPE_CHECKING:
     from backends.air import Channel
     from backends.ether import (
+        ETHER_LEAD_S,
         AirParams,
         AirSense,
         Answer,
@@ -70,6 +71,7 @@ if TYPE_CHECKING:
     from backends.zmqstream import ZmqRadio, open_endpoint
 
 __all__ = [
+    "ETHER_LEAD_S",
     "GAP",
     "GAP_LABEL",
     "SAMPLE_TYPES",

@@ -253,7 +253,7 @@ class Node:
         """Everything there is to know, at this moment."""
         now = self._pdu_link.now()
         carrier = self._opening.report(time.monotonic())
-        noted = link_notices(self._link, self._setup.topic_warnings)
+        noted = link_notices(self._link, now, self._setup.topic_warnings)
         snapshot = Snapshot(
             version=__version__,
             node=self._setup.node_id,

@@ -35,7 +35,7 @@ from backends.feed import BlockFeed, Fed
 from backends.outstanding import answered
 
 # From the event loop to the hub, on a busy machine.
-LEAD_S = 0.002
+ETHER_LEAD_S = 0.002
 ANSWER_MS = 5000
 # A paced hub that says nothing for so long is gone; it is asked again that often.
 QUIET_MS = 500
@@ -86,7 +86,7 @@ class EtherRadio:
     def capabilities(self) -> Capabilities:
         """As the hub says."""
         paced = self._welcome.paced
-        lead_s = LEAD_S if paced else LEAD / self._tuning.rate_hz
+        lead_s = ETHER_LEAD_S if paced else LEAD / self._tuning.rate_hz
         return self._joined.capabilities(paced, lead_s, self._welcome.block_s)
 
     @property

@@ -22,10 +22,15 @@ def load_library() -> Library:
     return OfficialLibrary()
 
 
+def named_in(args: str) -> dict[str, str]:
+    """`driver=hackrf,serial=…` by key; of two values the first."""
+    pairs = (part.partition("=") for part in reversed(args.split(",")))
+    return {key.strip(): value.strip() for key, _, value in pairs}
+
+
 def driver_of(args: str) -> str:
     """`hackrf` of `driver=hackrf,serial=…`; empty where none is named."""
-    pairs = (part.partition("=") for part in args.split(","))
-    return next((value.strip() for key, _, value in pairs if key.strip() == "driver"), "")
+    return named_in(args).get("driver", "")
 
 
 def has_module(library: Library, driver: str) -> bool | None:

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 from backends.base import Capabilities
+from backends.soapy.library import named_in
 from backends.soapy.settings import Found, SoapySettings, in_flight
 
 TRANSFERS = {"hackrf": 131_072}
@@ -24,8 +25,7 @@ def presume(settings: SoapySettings) -> Presumed:
 
     One that is not known is taken for a radio that sends while it listens, and keeps time.
     """
-    pairs = (each.partition("=") for each in settings.device.lower().split(","))
-    named = {key.strip(): value.strip() for key, _, value in pairs}
+    named = named_in(settings.device.lower())
     known = [*TRANSFERS, *HALF_DUPLEX, *STAMPED]
     driver = next((named[key] for key in ("driver", "model") if named.get(key) in known), "")
     is_half = driver in HALF_DUPLEX

@@ -87,12 +87,16 @@ class RuntimeDirectory:
         os.close(self._lock)
 
 
+def is_foreign(about: os.stat_result, uid: int) -> bool:
+    """Whether others own a directory, or may write to it, so that it could be prepared to receive
+    the sockets of user `uid`.
+    """
+    is_open = bool(about.st_mode & 0o002) and not about.st_mode & 0o1000
+    return about.st_uid not in (0, uid) or is_open
+
+
 def _refuse_foreign(path: Path) -> None:
-    """A directory that others own or may write to could be prepared to receive our sockets."""
-    about = path.stat()
-    if about.st_uid not in (0, os.getuid()) or (
-        about.st_mode & 0o002 and not about.st_mode & 0o1000
-    ):
+    if is_foreign(path.stat(), os.getuid()):
         raise BusError(
             f"bus.runtime_dir: {path} belongs to another user or is open to all; name a directory "
             "of this user's own"

@@ -89,7 +89,7 @@ def _look(setup: "Setup | None", runtime_dir: Path | None) -> tuple[list["Findin
 
 def _radio(setup: "Setup | None", device: str) -> list["Finding"]:
     from backends import BackendError, driver_of, survey
-    from sdrlinkd.doctor import ON_USB, Finding, State, check_radio, check_usb
+    from sdrlinkd.doctor import ON_USB, Finding, State, check_radio, check_usb, is_networked
 
     config = setup.config if setup is not None else None
     if config is not None and not device:
@@ -100,7 +100,8 @@ def _radio(setup: "Setup | None", device: str) -> list["Finding"]:
         to_do = "name one device with soapy.device, such as driver=hackrf, and look again"
         return [Finding("device", State.BAD, str(error), to_do)]
     driver = driver_of(device)
-    usb = check_usb(driver, ROOT) if not driver or driver in ON_USB else []
+    is_on_usb = not driver or (driver in ON_USB and not is_networked(device))
+    usb = check_usb(driver, ROOT) if is_on_usb else []
     if any(not each.problem for each in there.devices):
         # It works; that its ids are not known here, or that it is no USB device, does not matter.
         usb = [each for each in usb if each.state is State.GOOD]

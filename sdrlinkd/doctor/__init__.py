@@ -13,7 +13,7 @@ from sdrlinkd.doctor.host import HostTerm, check_host, measure_host
 from sdrlinkd.doctor.limits import Granted, check_limits, granted
 from sdrlinkd.doctor.machine import check_machine
 from sdrlinkd.doctor.radio import check_radio
-from sdrlinkd.doctor.usb import ON_USB, check_usb
+from sdrlinkd.doctor.usb import ON_USB, check_usb, is_networked
 
 __all__ = [
     "ON_USB",
@@ -34,6 +34,7 @@ __all__ = [
     "check_usb",
     "granted",
     "headroom_found",
+    "is_networked",
     "kernel_clock",
     "measure_headroom",
     "measure_host",

@@ -4,21 +4,19 @@ import os
 import stat
 from pathlib import Path
 
+from sdrlinkd.bus import MAX_DIRECTORY_BYTES, is_foreign
+from sdrlinkd.client import CONTROL_SOCKET
 from sdrlinkd.doctor.finding import Finding, bad, good, good_if
-
-MOST_BYTES = 95
-"""A Unix socket's path has 107, the longest of our names takes 12."""
-CONTROL = "ctl.sock"
 
 
 def check_directory(path: Path, uid: int) -> list[Finding]:
     """`uid`: the user who runs the daemon."""
     what = "runtime directory"
     length = len(os.fsencode(path))
-    if length > MOST_BYTES:
+    if length > MAX_DIRECTORY_BYTES:
         return [
             bad(
-                what, f"{path} has {length} bytes; a socket's path allows {MOST_BYTES}",
+                what, f"{path} has {length} bytes; a socket's path allows {MAX_DIRECTORY_BYTES}",
                 "a shorter bus.runtime_dir",
             )
         ]  # fmt: skip
@@ -34,7 +32,7 @@ def check_directory(path: Path, uid: int) -> list[Finding]:
     about = path.stat()
     if not stat.S_ISDIR(about.st_mode):
         return [bad(what, f"{path} is no directory", "another bus.runtime_dir")]
-    if about.st_uid not in (0, uid) or (about.st_mode & 0o002 and not about.st_mode & 0o1000):
+    if is_foreign(about, uid):
         return [
             bad(
                 what, f"{path} belongs to another user, or is open to all",
@@ -49,5 +47,5 @@ def check_directory(path: Path, uid: int) -> list[Finding]:
             )
         ]  # fmt: skip
     told = f"{path}, mode {stat.S_IMODE(about.st_mode):o}"
-    running = "; a daemon's sockets are there" if (path / CONTROL).exists() else ""
+    running = "; a daemon's sockets are there" if (path / CONTROL_SOCKET).exists() else ""
     return [good(what, told + running)]

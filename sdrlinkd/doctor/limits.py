@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from sdrlinkd.doctor.finding import Finding, bad, good, good_if, none
+from sdrlinkd.doctor.usb import is_networked
 
 NETWORK_BUFFER = 24_912_805
 """Bytes that UHD's manual wants for a receiving socket."""
@@ -86,7 +87,7 @@ def _buffer(device: str, root: Path) -> Finding:
     what = "radio's buffers"
     if not device:
         return none(what, "no real radio is configured")
-    if any(key in device for key in ("addr=", "remote", "hostname=", "uri=ip:")):
+    if is_networked(device):
         limit = _number(root / "proc/sys/net/core/rmem_max")
         if limit is None:
             return none(what, "net.core.rmem_max is not to be seen")

@@ -20,6 +20,13 @@ KNOWN = {
 
 
 ON_USB = tuple(KNOWN)
+NETWORKED = ("addr=", "remote", "hostname=", "uri=ip:")
+"""Of soapy.device, where the radio is behind a network."""
+
+
+def is_networked(device: str) -> bool:
+    """Whether `device`, as soapy.device, is reached by a network and not by USB."""
+    return any(key in device for key in NETWORKED)
 
 
 class _Plugged(NamedTuple):

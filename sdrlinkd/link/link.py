@@ -289,7 +289,7 @@ class Link:
             else:
                 self.access.told_of(record.node, at)
         elif isinstance(record, Beacon):
-            self.access.beacon(src)
+            self.access.beacon(src, at)
         elif isinstance(record, Frame):
             self.access.take_frame(src, record, at)
         elif isinstance(record, Clock) and src != self.own_id:

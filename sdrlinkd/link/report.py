@@ -211,7 +211,7 @@ def _per_lately(link: Link, neighbor: Neighbor, now: float) -> float | None:
     return lost / (heard + lost) if heard + lost > 0 else None
 
 
-def link_notices(link: Link, of_topics: Mapping[int, str] = NOTHING_NOTED) -> list[str]:
+def link_notices(link: Link, now: float, of_topics: Mapping[int, str] = NOTHING_NOTED) -> list[str]:
     """What a person should know about this link, in sentences.
 
     `of_topics`: what should be known of topics by id, once a producer uses them.
@@ -242,7 +242,7 @@ def link_notices(link: Link, of_topics: Mapping[int, str] = NOTHING_NOTED) -> li
                 f"{topic.name}: lifespan_s of {1e3 * lifespan_s:.3g} ms can never be met: composing"
                 f" and sending one PDU takes {1e3 * least_s:.3g} ms"
             )
-    notices += link.access.notices()
+    notices += link.access.notices(now)
     for _, neighbor in sorted(link.inbox.neighbors.items()):
         disagreement = neighbor.disagreement(link.registry, link.digest)
         if disagreement:

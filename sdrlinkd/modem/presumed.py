@@ -13,7 +13,6 @@ from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.radios import PDU_BACKENDS, soapy_settings
 from sdrlinkd.modem.traits import carrier_traits
 
-ETHER_LEAD_S = 0.002
 ETHER_TURNAROUND_S = 1e-4
 
 
@@ -81,6 +80,8 @@ def _capabilities(config: Config, turnaround_s: float | None) -> tuple[Capabilit
         told = f"{config.soapy.device}: {duplex}, {how}"
         return found.capabilities, told, bool(found.driver)
     if config.backend == "ether":
+        from backends import ETHER_LEAD_S
+
         turn_s = ETHER_TURNAROUND_S if turnaround_s is None else turnaround_s
         return (
             _simulated(config, turn_s, ETHER_LEAD_S),

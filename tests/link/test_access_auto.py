@@ -152,8 +152,8 @@ def test_spells_cost_what_is_listened_between_them():
     assert settled(auto([1]), traits).share == pytest.approx(0.8, abs=0.01)
 
 
-def notices_of(access):
-    return " ".join(access.notices())
+def notices_of(access, now=3.0):
+    return " ".join(access.notices(now))
 
 
 def test_robots_that_came_to_different_policies_are_told():
@@ -163,10 +163,15 @@ def test_robots_that_came_to_different_policies_are_told():
     assert "robot 2 takes turns by a tdma schedule" in notices_of(minislots)
     for _ in range(3):
         assert notices_of(slots) == ""
-        slots.beacon(2)
+        slots.beacon(2, 2.0)
     assert "robot 2 is heard and keeps no tdma schedule" in notices_of(slots)
+    assert notices_of(slots, 70.0) == "", "it left, or was told"
     slots.take_frame(2, Frame(2, 0, slots._schedule, 0), 1.0)
     assert notices_of(slots) == ""
+    slots.take_frame(2, Frame(2, 0, 0x1234, 0), 2.0)
+    assert "another tdma schedule" in notices_of(slots)
+    assert notices_of(slots, 70.0) == ""
+    assert notices_of(minislots, 70.0) == ""
 
 
 def test_beacons_reach_the_policy():
@@ -189,6 +194,7 @@ def test_who_takes_itself_for_alone_and_is_not_is_told():
     alone.heard(4, 1.0, False)
     assert "robot 4 sends on this air, too" in notices_of(alone)
     assert "list all robots in access.nodes" in notices_of(alone)
+    assert notices_of(alone, 70.0) == "", "it left"
     wanted = settled(params("none", []), USRP).access
     wanted.heard(4, 1.0, False)
     assert notices_of(wanted) == ""

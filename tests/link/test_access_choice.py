@@ -40,7 +40,7 @@ def test_each_policy_by_its_name(policy, traits):
     access = make(params(policy, [3, 1]), traits=traits)
     assert isinstance(access, POLICIES[policy])
     assert access.state.startswith(policy)
-    assert access.notices() == []
+    assert access.notices(1.0) == []
     assert (access.round_s > 0) == (policy in ("minislot", "tdma"))
 
 
@@ -148,10 +148,10 @@ def test_who_is_heard_too_late_is_refused_and_tdma_named_instead(policy):
 @pytest.mark.parametrize(("turnaround_s", "is_told"), [(0.0, False), (3e-4, False), (0.08, True)])
 def test_without_turns_a_radio_that_turns_round_slowly_is_told_of(turnaround_s, is_told):
     free = make(params("none", []), traits=LOCKSTEP._replace(turnaround_s=turnaround_s))
-    assert bool(free.notices()) == is_told
+    assert bool(free.notices(1.0)) == is_told
     if is_told:
-        assert "hears nothing for 160 ms" in free.notices()[0]
-        assert 'access.policy = "tdma"' in free.notices()[0]
+        assert "hears nothing for 160 ms" in free.notices(1.0)[0]
+        assert 'access.policy = "tdma"' in free.notices(1.0)[0]
 
 
 def test_a_slot_that_is_over_before_it_is_known_to_be_unused_is_not_reused():

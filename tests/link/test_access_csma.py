@@ -174,4 +174,4 @@ def test_none_sends_at_any_time_and_keeps_no_schedule():
     for sensed in (Sensed(), Sensed(1.0, 5.0)):
         assert free.slot(Wish(2.0, Qos.BULK, 0.5, sensed)) == Slot(2.0)
     assert free.slot(Wish(2.0, Qos.BULK, 0.5, Sensed())).latest(0.1) == float("inf")
-    assert (free.frame(1.0), free.notices()) == (None, [])
+    assert (free.frame(1.0), free.notices(1.0)) == (None, [])

@@ -215,5 +215,5 @@ def test_a_burst_that_did_not_leave_was_never_there(sent_before):
 def test_it_says_its_times():
     assert make(2).state == "minislot: 3 robots, 2 ms each, round in 18 ms"
     assert make(2).round_s == pytest.approx(0.018)
-    assert make(2).notices() == []
+    assert make(2).notices(1.0) == []
     assert make(2).frame(0.0) is None

@@ -143,10 +143,10 @@ def test_on_small_pdus_clocks_tell_of_as_many_robots_as_there_is_room_for():
     assert len(found) > 5
     tiny = make_link(pdu_size=32, clock=ClockParams())
     assert clocks_of(tiny, 3.0) == []
-    assert any("have no room for CLOCK" in notice for notice in link_notices(tiny))
+    assert any("have no room for CLOCK" in notice for notice in link_notices(tiny, 0.0))
     assert tiny.next_wakeup(3.0) > 3.0
     without = make_link(pdu_size=32, clock=ClockParams(period_s=0.0))
-    assert not any("CLOCK" in notice for notice in link_notices(without))
+    assert not any("CLOCK" in notice for notice in link_notices(without, 0.0))
 
 
 def test_a_stamp_that_goes_ahead_is_no_record_alone():

@@ -164,7 +164,7 @@ def test_a_topic_without_a_free_entry_id_waits_and_others_go_on():
     assert sum(1 for pdu in sent for entry in pdu if entry[0] == 0 and entry[1] == 0) == 256
     assert any(entry[0] == 1 for pdu in sent for entry in pdu)
     assert link.sender.outbox.queued == 4
-    assert any("odom had to wait" in notice for notice in link_notices(link))
+    assert any("odom had to wait" in notice for notice in link_notices(link, 0.0))
     assert link.next_wakeup(0.0) == pytest.approx(0.625)
     send_all(link, now=0.625)
     assert link.sender.outbox.queued == 0

@@ -230,6 +230,6 @@ def test_a_lifespan_that_can_never_be_met_is_told():
     traits = CarrierTraits(lead_s=0.002, pdu_burst_s=(0.0015,))
     link.attach(traits, AccessParams(), RateParams())
     link.set_policies({0: TopicPolicy(lifespan_s=0.003), 1: TopicPolicy(lifespan_s=0.004)})
-    (notice,) = link_notices(link)
+    (notice,) = link_notices(link, 0.0)
     assert "odom: lifespan_s of 3 ms can never be met" in notice
     assert "takes 3.5 ms" in notice

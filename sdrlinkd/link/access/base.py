@@ -3,6 +3,7 @@
 import math
 from typing import NamedTuple, Protocol, Self
 
+from sdrlinkd.link.access.sightings import Sightings
 from sdrlinkd.link.carrier import Sensed
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.wire import Frame
@@ -93,8 +94,8 @@ class Access(Protocol):
     def told_of(self, node: int, at: float) -> None:
         """At `at` another robot told that it hears `node`."""
 
-    def beacon(self, src: int) -> None:
-        """A beacon of `src` came, from itself."""
+    def beacon(self, src: int, at: float) -> None:
+        """A beacon of `src` came at `at`, from itself."""
 
     def frame(self, start: float) -> Frame | None:
         """What to tell others of the schedule in a burst that leaves at `start`."""
@@ -102,7 +103,7 @@ class Access(Protocol):
     def take_frame(self, src: int, frame: Frame, at: float) -> None:
         """What `src` tells of the schedule, in a burst whose preamble was at `at`."""
 
-    def notices(self) -> list[str]:
+    def notices(self, now: float) -> list[str]:
         """What a person should know."""
 
 
@@ -112,7 +113,7 @@ class Carriers:
     def __init__(self) -> None:
         self._own_ends = [NEVER]
         """Of the last bursts, ascending: some may be on their way to the radio still."""
-        self._scheduled: set[int] = set()
+        self._scheduled = Sightings()
         """Who takes turns by a schedule."""
 
     @property
@@ -163,7 +164,7 @@ class Carriers:
     def told_of(self, node: int, at: float) -> None:
         """Who hears whom does not matter."""
 
-    def beacon(self, src: int) -> None:
+    def beacon(self, src: int, at: float) -> None:
         """Who is there does not matter."""
 
     def frame(self, start: float) -> Frame | None:
@@ -171,15 +172,15 @@ class Carriers:
 
     def take_frame(self, src: int, frame: Frame, at: float) -> None:  # noqa: ARG002  # not all ask
         """Who has one has another policy."""
-        self._scheduled.add(src)
+        self._scheduled.add(src, at)
 
-    def notices(self) -> list[str]:
+    def notices(self, now: float) -> list[str]:
         """Who shares the air in another way."""
         return [
             f"robot {src} takes turns by a tdma schedule and this robot does not: what both send "
             "collides; give both the same [access], and radios of one kind where access.policy is "
             "auto"
-            for src in sorted(self._scheduled)
+            for src in self._scheduled.lately(now)
         ]
 
     @property

@@ -1,6 +1,7 @@
 """`none`: an air of our own."""
 
 from sdrlinkd.link.access.base import INFINITE, Carriers, Slot, Wish
+from sdrlinkd.link.access.sightings import Sightings
 
 DEAF_S = 0.02
 """A radio that is deaf for longer than most bursts last is no radio for several without turns."""
@@ -26,7 +27,7 @@ class Free(Carriers):
         self._gap_s = gap_s
         self._spells = spell_s, pause_s
         self._is_alone = is_alone
-        self._others: set[int] = set()
+        self._others = Sightings()
 
     @property
     def state(self) -> str:
@@ -44,16 +45,17 @@ class Free(Carriers):
         gaps = self._gap_s / (burst_s + self._gap_s) if self._gap_s else 0.0
         return (1 - gaps) * (1 - listens)
 
-    def heard(self, src: int, at: float, is_relayed: bool) -> None:  # noqa: ARG002  # not all ask
+    def heard(self, src: int, at: float, is_relayed: bool) -> None:
         """There is somebody else after all."""
         if self._is_alone and not is_relayed:
-            self._others.add(src)
+            self._others.add(src, at)
 
-    def notices(self) -> list[str]:
+    def notices(self, now: float) -> list[str]:
         """Two that are deaf so long lose most of each other's bursts."""
-        notices = super().notices()
-        if self._others and not notices:
-            who = ", ".join(map(str, sorted(self._others)))
+        notices = super().notices(now)
+        others = self._others.lately(now)
+        if others and not notices:
+            who = ", ".join(map(str, others))
             notices.append(
                 f"robot {who} sends on this air, too, and access.nodes lists nobody else: what is "
                 "sent at once collides; list all robots in access.nodes at all of them"

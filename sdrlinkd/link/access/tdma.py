@@ -2,12 +2,12 @@
 
 import math
 from binascii import crc_hqx
-from collections import Counter
 from collections.abc import Sequence
 from random import Random
 from struct import pack
 
 from sdrlinkd.link.access.base import INFINITE, Carriers, Slot, Wish, next_on_grid
+from sdrlinkd.link.access.sightings import Sightings
 from sdrlinkd.link.carrier import Sensed
 from sdrlinkd.wire import Frame
 
@@ -80,9 +80,10 @@ class Tdma(Carriers):
         self._is_running = False
         self._told_at = 0.0
         self._begins_at = LISTEN_S + sum(node < own_id for node in nodes)
-        self._strangers: dict[int, int] = {}
-        self._unscheduled: Counter[int] = Counter()
-        """Beacons of each robot since it told of a schedule: who has one tells it beside each."""
+        self._strangers = Sightings()
+        """Schedules that are not ours."""
+        self._unscheduled = Sightings()
+        """Beacons since a robot told of a schedule: who has one tells it beside each."""
         self._heard_at: dict[int, float] = {}
         self._followed_at = 0.0
         self._listens = (-INFINITE, False)
@@ -161,9 +162,9 @@ class Tdma(Carriers):
         if node != self._own_id:
             self._told_of_at[node] = at
 
-    def beacon(self, src: int) -> None:
+    def beacon(self, src: int, at: float) -> None:
         """A schedule should come with it."""
-        self._unscheduled[src] += 1
+        self._unscheduled.add(src, at)
 
     def frame(self, start: float) -> Frame | None:
         """The schedule as we keep it."""
@@ -175,11 +176,11 @@ class Tdma(Carriers):
 
     def take_frame(self, src: int, frame: Frame, at: float) -> None:
         """Follow the lowest root, by the fewest hops."""
-        self._unscheduled.pop(src, None)
+        self._unscheduled.clear(src)
         if frame.schedule != self._schedule:
-            self._strangers[src] = frame.schedule
+            self._strangers.add(src, at)
             return
-        self._strangers.pop(src, None)
+        self._strangers.clear(src)
         self._forget(at)
         origin = at - 1e-6 * frame.phase_us
         told = (frame.root, frame.level + 1)
@@ -201,18 +202,17 @@ class Tdma(Carriers):
             self._origin, self._is_running = origin, True
             self._told_at = at
 
-    def notices(self) -> list[str]:
+    def notices(self, now: float) -> list[str]:
         """Who keeps another schedule, or none."""
         return [
             f"robot {src} is heard and keeps no tdma schedule: what it sends falls into others' "
             "slots; give it the same [access], and a radio of the same kind where access.policy "
             "is auto"
-            for src, n in sorted(self._unscheduled.items())
-            if n >= UNSCHEDULED
+            for src in self._unscheduled.lately(now, UNSCHEDULED)
         ] + [
             f"robot {src} keeps another tdma schedule; give both the same nodes, slot_s, guard_s "
             f"and minislot_s in [access] (ours: {self.state})"
-            for src in sorted(self._strangers)
+            for src in self._strangers.lately(now)
         ]
 
     def _is_first(self, earliest: float, sensed: Sensed) -> bool:
