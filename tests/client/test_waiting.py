@@ -1,12 +1,19 @@
 """How long a program waits, and what it is told when its daemon is another by then."""
 
 import asyncio
+import threading
 import time
 
 import pytest
 import zmq
 
-from sdrlinkd.client import AsyncPublisher, NoDaemonError, Publisher, Subscriber
+from sdrlinkd.client import (
+    AsyncPublisher,
+    AsyncSubscriber,
+    NoDaemonError,
+    Publisher,
+    Subscriber,
+)
 from sdrlinkd.client.deadline import Deadline, milliseconds
 
 CDR = b"\0\1\0\0abcd"
@@ -54,6 +61,41 @@ async def test_who_has_the_answer_goes_on_whoever_listens(start_daemon):
         for each in waiting:
             each.cancel()
         await asyncio.gather(*waiting, return_exceptions=True)
+
+
+@pytest.fixture
+def full_stream(tmp_path):
+    """A daemon whose first answer is lost among messages; the topics that it was asked about."""
+    asked, is_over = [], threading.Event()
+
+    def serve(out):
+        while not is_over.is_set():
+            if not out.poll(20):
+                continue
+            said = out.recv()
+            if said[:1] == b"\1" and said[1:].startswith(b"\0ack\0"):
+                asked.append(said[1:])
+                if len(asked) > 1:
+                    out.send_multipart([b"/rx_robot_1/odom\0", b"{}", CDR])
+                    out.send_multipart([said[1:], b""])
+
+    with zmq.Context() as context, context.socket(zmq.XPUB) as out:
+        out.bind(f"ipc://{tmp_path}/out.sock")
+        thread = threading.Thread(target=serve, args=(out,))
+        thread.start()
+        yield asked
+        is_over.set()
+        thread.join()
+
+
+def test_a_subscriber_asks_again_where_its_answer_was_dropped(full_stream, tmp_path):
+    with Subscriber("/rx_robot_1/*", runtime_dir=tmp_path, timeout_s=20):
+        assert len(set(full_stream)) == len(full_stream) >= 2
+
+
+async def test_so_it_does_in_asyncio(full_stream, tmp_path):
+    async with AsyncSubscriber("/rx_robot_1/*", runtime_dir=tmp_path, timeout_s=20):
+        assert len(set(full_stream)) == len(full_stream) >= 2
 
 
 @pytest.mark.parametrize(

@@ -372,6 +372,38 @@ def test_settings_that_were_refused_are_tried_again(start_daemon, bus, mended_by
     wait_for(lambda: robot.snapshot().carrier.state == "refused", 20)
 
 
+def test_who_obeys_is_stopped_while_the_radio_is_refused(start_daemon, bus):
+    """No command can come, and that is when a stop is needed most."""
+    name, air_ = bus
+    robots = [
+        start_daemon(
+            on_soapy(robot, name) + '[topic.cmd_vel]\ndeadman_s = 6\n'
+            "stop = { linear = { z = -0.5 } }\n"
+        )
+        for robot in (1, 2)
+    ]  # fmt: skip
+    up(robots)
+    commander, obeying = robots
+    with (
+        Subscriber("/rx_robot_1/cmd_vel", directory=obeying.directory) as heard,
+        Publisher(commander.directory) as out,
+    ):
+        out.send("/robot_1/cmd_vel", body(0)[:52])
+        assert not heard.receive(20).is_stop
+        air_.inject(2, "unplug")
+        wait_for(lambda: obeying.snapshot().carrier.state == "down", 20)
+        text = obeying.config.read_text()
+        obeying.config.write_text(text.replace("tx_gain_db = 40.0", "tx_gain_db = 99.0"))
+        obeying.process.send_signal(signal.SIGHUP)
+        air_.inject(2, "replug")
+        wait_for(lambda: obeying.snapshot().carrier.state == "refused", 20)
+        assert heard.receive(20).is_stop
+        assert heard.receive(0.5) is None
+    assert obeying.snapshot().carrier.state == "refused"
+    assert obeying.snapshot().link.received[0].stops == 1
+    assert_whole(obeying)
+
+
 def assert_whole(robot):
     """The ledger adds up."""
     with robot.control() as control:
