@@ -44,6 +44,7 @@ async def take_gap(blocks):
     return taken
 
 
+@pytest.mark.slow
 async def test_when_a_hub_comes_back_its_radios_go_on_behind_one_gap(tmp_path, monkeypatch):
     radio = EtherRadio(tmp_path, 1, "the radio")
     async with asyncio.timeout(20), closing(radio):
@@ -144,6 +145,7 @@ async def test_a_hub_that_is_slow_has_not_been_away(tmp_path, monkeypatch):
     assert not gaps_in(taken)
 
 
+@pytest.mark.slow
 async def test_a_radio_that_does_not_read_loses_samples_and_hinders_nobody(tmp_path, monkeypatch):
     monkeypatch.setattr("backends.ether.sockets.WAITING", 100)
     with serving(tmp_path, rate_hz=10 * RATE):

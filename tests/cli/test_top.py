@@ -94,6 +94,7 @@ async def test_the_daemon_is_asked_again_and_again():
             await pilot.pause(0.01)
 
 
+@pytest.mark.slow
 async def test_rows_are_sorted_and_searched():
     app = make_app()
     async with app.run_test(size=(140, 40)) as pilot:
@@ -125,6 +126,7 @@ async def test_the_selected_topic_stays_selected():
         assert app._selected().key == before
 
 
+@pytest.mark.slow
 async def test_why_is_told_of_the_selected_topic():
     asked = Asked()
     app = make_app(asked)

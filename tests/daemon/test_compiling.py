@@ -16,6 +16,7 @@ from tests.waiting import wait_for
 ROOT = Path(__file__).parents[2]
 
 
+@pytest.mark.slow
 def test_no_kind_of_link_compiles_anything(tmp_path):
     """In one process and with signatures, not files: so it costs seconds, whatever is cached."""
     done = subprocess.run(

@@ -90,6 +90,7 @@ def test_noise_beyond_the_code_loses_messages_by_name():
     assert result.received == 0 or result.bytes_identical
 
 
+@pytest.mark.slow
 def test_every_mcs_can_be_shown(tmp_path):
     arguments = ("--link", "ofdm", "--rate", 2e6, "--duration", 0.5, "--out", tmp_path)
     assert demo("--mcs", 9, "--snr", 35, *arguments) == 0
@@ -97,6 +98,7 @@ def test_every_mcs_can_be_shown(tmp_path):
     assert (result["phy"]["mcs"], result["pdr"]) == ("256QAM 5/6", 1.0)
 
 
+@pytest.mark.slow
 def test_a_clean_link_that_loses_messages_is_a_fault(tmp_path, monkeypatch, capsys):
     def lossy(*arguments):
         path = write_config(*arguments)
@@ -116,6 +118,7 @@ def test_a_picture_that_cannot_be_written_is_told_in_words(tmp_path, capsys):
     assert "path.png" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_bag_whose_names_have_no_slash_is_sent(tmp_path):
     messages = [("fix", "std_msgs/msg/String", 1_000_000 * i, bytes(12)) for i in range(20)]
     bag = ros2_bag(tmp_path / "bag", STORAGES["mcap"], messages)

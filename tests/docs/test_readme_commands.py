@@ -111,6 +111,7 @@ def test_every_command_is_run_or_there_is_a_reason():
         assert any(re.match(pattern, each) for each in commands("README.md")), pattern
 
 
+@pytest.mark.slow
 def test_those_that_need_no_daemon(reader):
     lines = [
         each

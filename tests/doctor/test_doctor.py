@@ -70,6 +70,7 @@ def test_without_a_radio_there_is_none_to_look_at(examine):
     assert "CPU headroom" not in found, "no modem runs"
 
 
+@pytest.mark.slow
 @needs_radio
 @pytest.mark.parametrize(
     ("more", "what", "state"),
@@ -92,6 +93,7 @@ def test_a_radio_is_looked_at_and_not_sent_with(examine, monkeypatch, more, what
     assert found["device sends"]["state"] == "not applicable"
 
 
+@pytest.mark.slow
 @needs_radio
 def test_a_radio_that_is_not_there(examine, monkeypatch):
     monkeypatch.setenv("SOAPY_SDR_PLUGIN_PATH", str(module_folder()))
@@ -118,6 +120,7 @@ def test_a_daemon_that_does_not_start_is_a_finding(monkeypatch):
     assert (found.state, "no room" in found.told) == ("bad", True)
 
 
+@pytest.mark.slow
 def test_a_driver_that_crashes_is_a_finding(examine, monkeypatch):
     def crash(_):
         raise BackendError("a driver crashed (signal 11)")

@@ -24,6 +24,7 @@ from sdrlinkd.plan import Load, Setting, make_plan
 from sdrlinkd.wire import make_registry
 from tests.lab.saturated import PDU_SIZE, usrp
 
+pytestmark = pytest.mark.slow
 SETTLE_S = 4.0
 """Until all know a schedule, and each other's beats."""
 RADIOS = {

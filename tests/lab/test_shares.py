@@ -5,6 +5,7 @@ import pytest
 from sdrlinkd.link import Told
 from tests.lab.saturated import saturated, usrp
 
+pytestmark = pytest.mark.slow
 FILE = Told("robot.toml", ())
 RADIOS = {
     "slow": {},

@@ -23,6 +23,7 @@ from sdrlinkd.modem import Airtimes
 from sdrlinkd.wire import make_registry
 from tests.lab.saturated import PDU_SIZE, usrp
 
+pytestmark = pytest.mark.slow
 ROBOTS = (1, 2)
 TOPICS = (("odom", "nav_msgs/msg/Odometry"), ("image", "sensor_msgs/msg/CompressedImage"))
 ODOM, IMAGE = 0, 1

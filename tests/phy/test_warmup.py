@@ -67,6 +67,7 @@ def small(tmp_path):
     return run
 
 
+@pytest.mark.slow
 def test_who_can_write_nowhere_else_keeps_it_in_a_folder_of_his_own(small, tmp_path):
     temporary = tmp_path / "tmp"
     temporary.mkdir(mode=0o777)
@@ -77,6 +78,7 @@ def test_who_can_write_nowhere_else_keeps_it_in_a_folder_of_his_own(small, tmp_p
     assert own.stat().st_mode & 0o777 == 0o700
 
 
+@pytest.mark.slow
 def test_what_others_may_write_is_not_run(small, tmp_path):
     """Compiled code is code: whoever writes the folder would run his own."""
     temporary = tmp_path / "tmp"
@@ -94,5 +96,6 @@ def test_what_others_may_write_is_not_run(small, tmp_path):
     assert small(temporary)[2] != link
 
 
+@pytest.mark.slow
 def test_where_nothing_can_be_written_it_runs_all_the_same(small, tmp_path):
     assert [small(tmp_path / "nowhere")[1] for _ in range(2)] == [0, 0]
