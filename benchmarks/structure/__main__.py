@@ -1,0 +1,48 @@
+"""Print it."""
+
+from benchmarks.structure.sources import deep_chains, graph, writes
+from benchmarks.structure.trace import trace
+from sdrlinkd.tables import FittedTable, figure, screen_console, words
+
+ROOMS = ("sdrlinkd", "sdrlinkd.link", "sdrlinkd.bus", "backends", "backends.soapy", "phy")
+
+
+def main() -> None:
+    """Tables for people."""
+    console, steps = screen_console(), trace()
+    table = FittedTable(
+        "one message of 724 B from link to link",
+        (words("step", least=12), figure("calls"), figure("files"), figure("changes of file")),
+    )
+    for step in steps:
+        table.add(step.name, str(len(step.files)), str(len(set(step.files))), str(step.changes))
+    table.add(
+        "all",
+        str(sum(len(step.files) for step in steps)),
+        str(len({file for step in steps for file in step.files})),
+        str(sum(step.changes for step in steps)),
+    )
+    console.print(table)
+    table = FittedTable(
+        "imports between the rooms right inside a room",
+        (words("room", least=16), figure("rooms"), figure("arrows"), figure("floors"),
+         figure("upward")),
+    )  # fmt: skip
+    for room in ROOMS:
+        found = graph(room)
+        table.add(
+            room, str(len(found.rooms)), str(len(found.arrows)), str(found.floors),
+            str(len(found.upward)),
+        )  # fmt: skip
+    console.print(table)
+    written = writes("sdrlinkd.link", "Outgoing")
+    console.print(f"fields of a queued message are set in {len(written)} files: {dict(written)}")
+    chains, lines = deep_chains("sdrlinkd.link")
+    console.print(
+        f"deep chains in sdrlinkd.link: {chains} in {lines} lines, {1000 * chains / lines:.1f} "
+        "per 1000"
+    )
+
+
+if __name__ == "__main__":
+    main()

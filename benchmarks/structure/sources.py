@@ -1,0 +1,119 @@
+"""What the sources of a room say of each other: imports, deep chains, writes to foreign fields."""
+
+import ast
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[2]
+DEEP = 3
+"""Hops on one object from which on a line knows too much of others' insides."""
+
+
+def _files(room: str) -> Iterator[tuple[tuple[str, ...], ast.Module, int]]:
+    """(parts of its name below the room, syntax tree, lines) of each file of a dotted room."""
+    folder = ROOT.joinpath(*room.split("."))
+    for path in sorted(folder.rglob("*.py")):
+        text = path.read_text()
+        yield path.relative_to(folder).with_suffix("").parts, ast.parse(text), text.count("\n")
+
+
+class Graph(NamedTuple):
+    """Rooms right inside a room, and who imports whom."""
+
+    rooms: list[str]
+    arrows: list[tuple[str, str]]
+
+    @property
+    def floors(self) -> int:
+        """The longest way down, in rooms; 0 where there is a cycle."""
+        depth: dict[str, int] = {}
+        left = set(self.rooms)
+        while left:
+            ready = {
+                room
+                for room in left
+                if all(to in depth for from_, to in self.arrows if from_ == room)
+            }
+            if not ready:
+                return 0
+            for room in ready:
+                depth[room] = 1 + max(
+                    (depth[to] for from_, to in self.arrows if from_ == room), default=0
+                )
+            left -= ready
+        return max(depth.values(), default=0)
+
+    @property
+    def upward(self) -> list[tuple[str, str]]:
+        """Arrows from which a way leads back: with one of them, there is no up and down."""
+        return [(a, b) for a, b in self.arrows if self._leads(b, a)]
+
+    def _leads(self, begin: str, end: str) -> bool:
+        seen, ahead = set[str](), [begin]
+        while ahead:
+            room = ahead.pop()
+            if room == end:
+                return True
+            if room not in seen:
+                seen.add(room)
+                ahead += [to for from_, to in self.arrows if from_ == room]
+        return False
+
+
+def graph(room: str) -> Graph:
+    """Of the rooms right inside a dotted room; its own door is none."""
+    rooms, arrows = set[str](), set[tuple[str, str]]()
+    for parts, tree, _ in _files(room):
+        if parts == ("__init__",):
+            continue
+        rooms.add(parts[0])
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(f"{room}."):
+                arrows.add((parts[0], (node.module or "").removeprefix(f"{room}.").split(".")[0]))
+    return Graph(sorted(rooms), sorted((a, b) for a, b in arrows if a != b))
+
+
+def deep_chains(room: str) -> tuple[int, int]:
+    """(chains of three and more attributes on a name, lines of code and text)."""
+    found = lines = 0
+    for _, tree, n in _files(room):
+        lines += n
+        inner = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+        found += sum(
+            isinstance(node, ast.Attribute) and id(node) not in inner and _hops(node) >= DEEP
+            for node in ast.walk(tree)
+        )
+    return found, lines
+
+
+def _hops(node: ast.Attribute) -> int:
+    """Attributes one behind the other on a name; 0 where there is a call between."""
+    hops, inside = 1, node.value
+    while isinstance(inside, ast.Attribute):
+        hops, inside = hops + 1, inside.value
+    return hops if isinstance(inside, ast.Name) else 0
+
+
+def writes(room: str, class_name: str) -> Counter[str]:
+    """How often each file sets a field of that class, by the names of its slots."""
+    slots = next(
+        set(ast.literal_eval(statement.value))
+        for _, tree, _ in _files(room)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ClassDef) and node.name == class_name
+        for statement in node.body
+        if isinstance(statement, ast.Assign) and ast.unparse(statement.targets[0]) == "__slots__"
+    )
+    found = Counter[str]()
+    for parts, tree, _ in _files(room):
+        for node in ast.walk(tree):
+            if (
+                isinstance(node, ast.Attribute)
+                and isinstance(node.ctx, ast.Store)
+                and node.attr in slots
+                and not (isinstance(node.value, ast.Name) and node.value.id == "self")
+            ):
+                found["/".join(parts) + ".py"] += 1
+    return found
