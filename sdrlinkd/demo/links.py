@@ -9,6 +9,8 @@ NODE_ID = 1
 LISTENER_ID = 2
 LINKS = ("ofdm", "iqfile", "direct")
 MAX_CFO_HZ = 1e5
+LONGEST_PAUSE_S = 3.0
+N_ENTRY_IDS = 256
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,8 +39,10 @@ def write_config(
     """
     directory.mkdir(exist_ok=True)
     (directory / "registry.csv").write_text(source.registry.csv())
-    # Entry ids rest for the reassembly timeout, so faster play needs a shorter one.
-    timeout_s = max(0.02, min(0.5, 0.5 / options.speed))
+    # A machine that stands still for a moment loses nothing, as long as there are entry ids: they
+    # rest for the reassembly timeout.
+    ids_last_s = N_ENTRY_IDS / (source.fastest_hz * options.speed)
+    timeout_s = max(0.02, min(LONGEST_PAUSE_S, 0.6 * ids_last_s))
     backend = {"direct": "direct", "ofdm": "loopback", "iqfile": "iqfile"}[options.link]
     node = LISTENER_ID if role == "play" else NODE_ID
     lines = [

@@ -52,6 +52,8 @@ class Source:
     duration_s: float
     topics: list[BagTopic]
     left_out: list[str] = field(default_factory=list)
+    fastest_hz: float = 200.0
+    """No topic is more frequent, as far as is known."""
 
     def messages(self) -> Iterator[BagMessage]:
         """The messages to send, in the order of time."""
@@ -96,7 +98,11 @@ def _built_in(registry_path: Path | None, duration_s: float, seed: int, namespac
     registry = load_registry(registry_path) if registry_path else make_registry(BUILT_IN_REGISTRY)
     # The robot ends by itself.
     endless = float("inf")
-    source = Source("built-in robot", robot, registry, namespace, endless, robot.topics())
+    topics = robot.topics()
+    source = Source(
+        "built-in robot", robot, registry, namespace, endless, topics,
+        fastest_hz=max(topic.n_messages for topic in topics) / duration_s,
+    )  # fmt: skip
     _match(source)
     return source
 
