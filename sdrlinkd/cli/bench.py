@@ -23,6 +23,7 @@ NAMES = (
     "phy_per",
     "phy_speed",
     "radio",
+    "structure",
 )
 
 
