@@ -25,12 +25,14 @@ from backends.base import (
 )
 from backends.late import LateRadio
 from backends.outstanding import GAP
+from backends.params import EtherParams, IqFileParams, LoopbackParams, ZmqParams
 from backends.recording import GAP_LABEL, RecordingInfo, RecordingReader, describe, refuse_same
 from backends.samples import SAMPLE_TYPES
 from backends.soapy import (
     DeviceSurvey,
     Outlook,
     Presumed,
+    SoapyParams,
     SoapyRadio,
     SoapySettings,
     Survey,
@@ -88,13 +90,16 @@ __all__ = [
     "Channel",
     "DeviceSurvey",
     "EtherHub",
+    "EtherParams",
     "EtherRadio",
     "Flight",
     "HubWatch",
+    "IqFileParams",
     "IqFileRadio",
     "LateRadio",
     "LinkOverride",
     "LocalEther",
+    "LoopbackParams",
     "LoopbackRadio",
     "OffsetRadio",
     "Outage",
@@ -110,6 +115,7 @@ __all__ = [
     "RefusalError",
     "RxBlock",
     "Samples",
+    "SoapyParams",
     "SoapyRadio",
     "SoapySettings",
     "Spells",
@@ -121,6 +127,7 @@ __all__ = [
     "TxReport",
     "WaySurvey",
     "World",
+    "ZmqParams",
     "ZmqRadio",
     "burst_shape",
     "describe",

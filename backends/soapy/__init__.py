@@ -3,6 +3,7 @@
 from backends.soapy.library import driver_of
 from backends.soapy.natures import Presumed, presume
 from backends.soapy.outlook import Outlook, outlook
+from backends.soapy.params import SoapyParams
 from backends.soapy.radio import SoapyRadio
 from backends.soapy.setting_up import least_rate_hz
 from backends.soapy.settings import SoapySettings
@@ -12,6 +13,7 @@ __all__ = [
     "DeviceSurvey",
     "Outlook",
     "Presumed",
+    "SoapyParams",
     "SoapyRadio",
     "SoapySettings",
     "Survey",

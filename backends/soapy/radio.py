@@ -50,13 +50,12 @@ class SoapyRadio:
         self,
         settings: SoapySettings,
         longest_s: float,
-        removes_dc: bool = True,
         patience: Patience = Patience.NONE,
     ) -> None:
         self._settings = settings
         self._patience = patience
         self._longest_s = longest_s
-        self._hearing = Hearing(removes_dc)
+        self._hearing = Hearing(settings.dc_block)
         self._closing = threading.Event()
         self._child: RadioChild | None = None
         self._listened: RadioChild | None = None

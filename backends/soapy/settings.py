@@ -5,44 +5,24 @@ from typing import Protocol
 import msgspec
 
 from backends.base import Capabilities
+from backends.soapy.params import SoapyParams
 from backends.soapy.traits import IN_FLIGHT, TxTraits, keeps_time, tx_traits
 
 
-class SoapySettings(msgspec.Struct, frozen=True, kw_only=True):
-    """A device, chosen by `device` as SoapySDR's tools choose it; None: as the driver has it."""
+class SoapySettings(SoapyParams, frozen=True, kw_only=True):
+    """What a person sets of a device, and at what rate and frequency (Hz) it runs."""
 
-    device: str
     rate_hz: float
     frequency_hz: float
     block_s: float = 0.001
-    tx_enabled: bool = False
-    channel: int = 0
-    rx_antenna: str = ""
-    tx_antenna: str = ""
-    rx_gain_db: float | None = None
-    tx_gain_db: float | None = None
-    rx_gains: dict[str, float] = {}
-    """By element."""
-    tx_gains: dict[str, float] = {}
-    bandwidth_hz: float = 0.0
-    """Of the analogue filters; 0: as the driver chooses."""
-    ppm: float = 0.0
-    clock_source: str = ""
-    stream_args: dict[str, str] = {}
-    settings: dict[str, str] = {}
-    """What only the driver knows."""
-    lead_s: float = 0.02
-    """Of bursts whose time the device itself keeps."""
-    turnaround_s: float = 0.05
-    """Between receiving and sending, where it cannot do both."""
-    transfers_in_flight: int | None = None
-    """Transfers that the driver takes ahead of the antenna; None: as is known of it."""
-    leading_transfers: int = 1
-    """Zeros before the first burst where the first transfers do not get out whole."""
-    listen_s: float = 0.05
-    """So long a half-duplex device listens before it sends again."""
-    longest_tx_s: float = 1.0
-    """So long it sends without listening."""
+
+    @classmethod
+    def of(
+        cls, params: SoapyParams, rate_hz: float, frequency_hz: float, block_s: float
+    ) -> "SoapySettings":
+        """All that is in `params`, for a device at that rate and frequency, in such pieces."""
+        given = {name: getattr(params, name) for name in SoapyParams.__struct_fields__}
+        return cls(**given, rate_hz=rate_hz, frequency_hz=frequency_hz, block_s=block_s)
 
     def tx_traits(self, found: "Sending") -> TxTraits:
         """How bursts leave that device."""

@@ -22,6 +22,7 @@ from backends.base import (
 from backends.feed import BlockFeed
 from backends.line import Line
 from backends.outstanding import Outstanding, answered
+from backends.params import ZmqParams
 from backends.samples import SAMPLE_TYPES
 from backends.zmqstream.sockets import Pattern, Sink, Source, open_sink, open_source
 
@@ -40,21 +41,12 @@ class ZmqRadio:
     While a `paced` peer is away, both go on by the clock.
     """
 
-    def __init__(
-        self,
-        send: str,
-        receive: str,
-        pattern: Pattern,
-        type_name: str,
-        block_s: float,
-        lead_s: float,
-        paced: bool,
-    ) -> None:
-        self._endpoints = send, receive
-        self._pattern: Pattern = pattern
-        self._type = SAMPLE_TYPES[type_name]
-        self._block_s, self._lead_s = block_s, lead_s
-        self._paced = paced
+    def __init__(self, params: ZmqParams, block_s: float) -> None:
+        self._endpoints = params.send, params.receive
+        self._pattern: Pattern = params.pattern
+        self._type = SAMPLE_TYPES[params.format]
+        self._block_s, self._lead_s = block_s, params.lead_s
+        self._paced = params.paced
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._source: Source | None = None
         self._sink: Sink | None = None

@@ -9,7 +9,8 @@ from typing import Annotated, NamedTuple
 import typer
 from msgspec.structs import replace
 
-from sdrlinkd.config import Config, ModemParams, SoapyParams, load_config, make_setup
+from backends import SoapyParams
+from sdrlinkd.config import Config, ModemParams, load_config, make_setup
 from sdrlinkd.errors import UserError
 from sdrlinkd.units import hertz
 

@@ -5,9 +5,6 @@ from sdrlinkd.config.carriers import (
     SIMULATED_HZ,
     ChannelParams,
     DirectParams,
-    EtherParams,
-    IqFileParams,
-    LoopbackParams,
     ModemParams,
     PlayParams,
     TransformParams,
@@ -16,7 +13,7 @@ from sdrlinkd.config.load import explain_policy, load_config, parse_config, pars
 from sdrlinkd.config.not_checked import unchecked
 from sdrlinkd.config.offsets import cfo_told, cfo_warning
 from sdrlinkd.config.places import located
-from sdrlinkd.config.radios import GnuRadioParams, SoapyParams, ZmqParams
+from sdrlinkd.config.radios import GnuRadioParams
 from sdrlinkd.config.schema import BusParams, Config
 from sdrlinkd.config.setup import UNBOUNDED_TYPES, Setup, load_registry, make_setup
 
@@ -28,16 +25,11 @@ __all__ = [
     "ChannelParams",
     "Config",
     "DirectParams",
-    "EtherParams",
     "GnuRadioParams",
-    "IqFileParams",
-    "LoopbackParams",
     "ModemParams",
     "PlayParams",
     "Setup",
-    "SoapyParams",
     "TransformParams",
-    "ZmqParams",
     "cfo_told",
     "cfo_warning",
     "explain_policy",

@@ -89,39 +89,6 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         return float(self.max_cfo_hz)
 
 
-class LoopbackParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A radio that hears itself through the simulated air."""
-
-    hear_self: bool = True
-    paced: bool = True
-    """In real time, or as fast as it goes."""
-
-
-class IqFileParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A radio that is a recording."""
-
-    receive: str = ""
-    """Recording to play, SigMF or raw; empty: none."""
-    receive_format: Literal["", "cf32_le", "ci16_le", "ci8", "cu8"] = ""
-    """Sample type of `receive` where it does not tell itself."""
-    transmit: str = ""
-    """SigMF recording to write; empty: none."""
-    format: Literal["cf32_le", "ci16_le", "ci8"] = "ci16_le"
-    """Sample type of `transmit`."""
-    paced: bool = True
-    """In real time, or as fast as it goes."""
-    hear_self: bool = True
-    wait_for_consumer: bool = False
-    """Begin to play when the first consumer subscribes."""
-
-
-class EtherParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A radio on the simulated air of an `sdrlink-ether` hub."""
-
-    dir: str = ""
-    """Folder of the hub's sockets."""
-
-
 class TransformParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """/tf on a slow link."""
 

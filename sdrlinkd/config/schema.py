@@ -5,17 +5,15 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from backends import EtherParams, IqFileParams, LoopbackParams, SoapyParams, ZmqParams
 from sdrlinkd.config.carriers import (
     ChannelParams,
     DirectParams,
-    EtherParams,
-    IqFileParams,
-    LoopbackParams,
     ModemParams,
     PlayParams,
     TransformParams,
 )
-from sdrlinkd.config.radios import GnuRadioParams, SoapyParams, ZmqParams
+from sdrlinkd.config.radios import GnuRadioParams
 from sdrlinkd.link import (
     AccessParams,
     ClassesParams,

@@ -22,15 +22,12 @@ from backends import (
     SoapySettings,
     ZmqRadio,
 )
-from sdrlinkd.config import Config, SoapyParams
+from sdrlinkd.config import Config
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.link import CarrierTraits, RateControl, may_share, settle
 from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.compiled import load_phy
 from sdrlinkd.modem.link import ModemLink
-
-# A device's settings that are configured under the same name.
-_SHARED = set(SoapyParams.__struct_fields__) & set(SoapySettings.__struct_fields__)
 
 PDU_BACKENDS = ("direct", "gnuradio")
 """They carry PDUs, not samples."""
@@ -109,11 +106,7 @@ def _make_radio(
     if config.backend == "soapy":
         return _make_soapy(config, longest_s, patience)
     if config.backend == "zmq":
-        zmq = config.zmq
-        return ZmqRadio(
-            zmq.send, zmq.receive, zmq.pattern, zmq.format, config.modem.block_s, zmq.lead_s,
-            zmq.paced,
-        )  # fmt: skip
+        return ZmqRadio(config.zmq, config.modem.block_s)
     channel = _channel(config, rng.getrandbits(32))
     modem, loopback, iqfile = config.modem, config.loopback, config.iqfile
     if config.backend == "iqfile":
@@ -132,12 +125,8 @@ def _make_radio(
 def soapy_settings(config: Config) -> SoapySettings:
     """What the device is to be set to."""
     modem, soapy = config.modem, config.soapy
-    return SoapySettings(
-        # What both have is called alike.
-        **{name: getattr(soapy, name) for name in _SHARED},
-        rate_hz=modem.rate_hz * modem.oversampling,
-        frequency_hz=modem.frequency_hz,
-        block_s=modem.block_s,
+    return SoapySettings.of(
+        soapy, modem.rate_hz * modem.oversampling, modem.frequency_hz, modem.block_s
     )
 
 
@@ -146,7 +135,7 @@ def _make_soapy(config: Config, longest_s: float, patience: Patience) -> Radio:
     shifts = soapy.offset_tuning == "on" or (
         soapy.offset_tuning == "auto" and modem.oversampling > 1
     )
-    radio = SoapyRadio(soapy_settings(config), longest_s, soapy.dc_block, patience)
+    radio = SoapyRadio(soapy_settings(config), longest_s, patience)
     return OffsetRadio(radio) if shifts else radio
 
 

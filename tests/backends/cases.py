@@ -104,11 +104,11 @@ def soapy(name, stamps):
     settings = SoapySettings(
         device=f"driver=loopback,model=plain,self=yes,noise_db=-200,mtu={N},{can}",
         rate_hz=0.0, frequency_hz=0.0, block_s=BLOCK_S, tx_enabled=True, tx_gain_db=40.0,
-        rx_gain_db=20.0,
+        rx_gain_db=20.0, dc_block=False,
     )  # fmt: skip
 
     def make(_):
-        return SoapyRadio(settings, longest_s=0.1, removes_dc=False)
+        return SoapyRadio(settings, longest_s=0.1)
 
     return Case(
         name, make, paced=True, hears_self=True, begin=10_000, settles_with_blocks=False,

@@ -6,7 +6,7 @@ import threading
 
 import zmq
 
-from backends import ZmqRadio
+from backends import ZmqParams, ZmqRadio
 from tests.backends.radios import BLOCK_S
 
 ITEM = 8
@@ -76,9 +76,8 @@ class ZmqEcho(ZmqRadio):
     def __init__(self, folder, pattern):
         self._echo = Echo(folder, pattern)
         echo = self._echo
-        super().__init__(
-            echo.send, echo.receive, pattern, "cf32_le", BLOCK_S, lead_s=0.02, paced=True
-        )
+        params = ZmqParams(send=echo.send, receive=echo.receive, pattern=pattern)
+        super().__init__(params, BLOCK_S)
 
     async def close(self):
         """The echo ends, too."""

@@ -111,10 +111,9 @@ def radio(more="", model="plain", **settings):
         SoapySettings(
             device=f"driver=loopback,model={model},self=yes,noise_db=-200,mtu={N}{more}",
             rate_hz=0.0, frequency_hz=0.0, block_s=N / RATE, tx_enabled=True, tx_gain_db=40.0,
-            rx_gain_db=20.0, **settings,
+            rx_gain_db=20.0, dc_block=False, **settings,
         ),
         longest_s=0.1,
-        removes_dc=False,
     )  # fmt: skip
 
 

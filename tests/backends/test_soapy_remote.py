@@ -76,10 +76,9 @@ async def hear_a_burst():
         SoapySettings(
             device=f"{device},remote:self=yes,remote:noise_db=-200",
             rate_hz=0.0, frequency_hz=0.0, tx_enabled=True, tx_gain_db=40.0, rx_gain_db=20.0,
-            lead_s=0.1, stream_args={"remote:prot": "tcp"},
+            lead_s=0.1, stream_args={"remote:prot": "tcp"}, dc_block=False,
         ),
         longest_s=0.1,
-        removes_dc=False,
     )  # fmt: skip
     async with opened(radio, Tuning(RATE, 868e6)):
         blocks = radio.blocks()

@@ -7,11 +7,16 @@ import numpy as np
 import pytest
 import zmq
 
-from backends import BackendError, TxBurst, TxOutcome, ZmqRadio
+from backends import BackendError, TxBurst, TxOutcome, ZmqParams, ZmqRadio
 from tests.backends.echo import Echo
 from tests.backends.radios import BLOCK_S, RATE, TUNING, N, hand_over, heard, noise, opened, take
 
 QUIET = 0.25
+
+
+def zmq_radio(send, receive, **more):
+    """At these endpoints."""
+    return ZmqRadio(ZmqParams(send=send, receive=receive, **more), BLOCK_S)
 
 
 class Peer:
@@ -30,7 +35,7 @@ class Peer:
 
     def radio(self, form="cf32_le", paced=False):
         """Connected to it."""
-        return ZmqRadio(self.send, self.receive, "push", form, BLOCK_S, 0.02, paced)
+        return zmq_radio(self.send, self.receive, format=form, paced=paced)
 
     def close(self):
         """Gone."""
@@ -102,7 +107,7 @@ async def test_without_a_peer_time_goes_on_and_bursts_do_not_leave_twice(peer, t
 async def test_srsrans_requests_are_answered_too(tmp_path):
     """One byte instead of a count."""
     echo = Echo(tmp_path, "req", word=b"\xff")
-    radio = ZmqRadio(echo.send, echo.receive, "req", "cf32_le", BLOCK_S, 0.02, paced=False)
+    radio = zmq_radio(echo.send, echo.receive, pattern="req", paced=False)
     try:
         async with opened(radio):
             burst = TxBurst(5000, noise(300))
@@ -119,7 +124,7 @@ async def test_an_endpoint_that_cannot_be_had_names_its_key(tmp_path):
         ("tcp://nowhere:x", "tcp://127.0.0.1:9", "zmq.send"),
         (f"ipc://{tmp_path}/a", "nonsense", "zmq.receive"),
     ):
-        radio = ZmqRadio(send, receive, "push", "cf32_le", BLOCK_S, 0.02, paced=True)
+        radio = zmq_radio(send, receive)
         with pytest.raises(BackendError, match=key):
             await radio.open(TUNING)
         await radio.close()

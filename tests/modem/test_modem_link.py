@@ -8,11 +8,10 @@ from random import Random
 import pytest
 
 import phy
+from backends import IqFileParams, LoopbackParams
 from sdrlinkd.config import (
     ChannelParams,
     Config,
-    IqFileParams,
-    LoopbackParams,
     ModemParams,
 )
 from sdrlinkd.errors import UserError
