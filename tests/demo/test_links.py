@@ -6,7 +6,9 @@ import pytest
 
 from sdrlinkd.demo.links import Options, write_config
 from sdrlinkd.demo.source import open_source
-from sdrlinkd.link.entry_ids import REST_FACTOR
+
+RESTS = 1.25
+"""So many reassembly timeouts an entry id rests."""
 
 
 @pytest.mark.parametrize("speed", [0.1, 1.0, 7.0, 50.0])
@@ -15,4 +17,4 @@ def test_a_pause_of_the_machine_is_borne_and_entry_ids_suffice(tmp_path, speed):
     path = write_config(tmp_path / "x", source, Options(link="ofdm", speed=speed), "both", tmp_path)
     timeout_s = tomllib.loads(path.read_text())["reassembly"]["timeout_s"]
     assert timeout_s >= 3.0 / max(speed, 1.0)
-    assert REST_FACTOR * timeout_s * source.fastest_hz * speed < 256
+    assert RESTS * timeout_s * source.fastest_hz * speed < 256
