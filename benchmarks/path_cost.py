@@ -70,7 +70,7 @@ def _round(messages: list[bytes], seed: int) -> float:
     heard: list[bytes] = []
     start = time.process_time()
     now = 0.0
-    while burst := link.departures.compose(now, Allowance.of(16)):
+    while burst := link.scheduler.compose(now, Allowance.of(16)):
         pdus += burst.pdus
         link.confirm(burst, Outcome.SENT, now)
         now += BURST_S

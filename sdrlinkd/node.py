@@ -117,7 +117,7 @@ class Node:
         dst: int | None = None,
     ) -> None:
         """A message that the bus could not take."""
-        self._link.outcomes.refuse(reason, topic_id, receipt, dst)
+        self._link.delivery.refuse(reason, topic_id, receipt, dst)
         if receipt:
             self._tell_verdicts()
 
@@ -126,7 +126,7 @@ class Node:
         """The PDU link is there: fit the link to it. Raises ConfigError."""
         config = self._opening.config
         self._link.attach(traits, config.access, config.rate)
-        log.info("access %s", self._link.departures.settled.sentence)
+        log.info("access %s", self._link.scheduler.settled.sentence)
         self._is_lockstep, self._is_attached = traits.is_lockstep, True
         if self._traffic is not None:
             self._traffic.begin(self._pdu_link.now())
@@ -144,7 +144,7 @@ class Node:
                     times = local_times(link, message, age_s, now, now_ns, self._headers)
                 received_ns = now_ns - round((now - message.heard_at) * 1e9)
                 self.bus.publish(message, age_s, received_ns, times)
-        if link.outcomes.receipts.verdicts:
+        if link.delivery.receipts.verdicts:
             self._tell_verdicts()
         if self._link.relay.is_on:
             self._pdu_link.wake()
@@ -163,7 +163,7 @@ class Node:
             self._link.handle_timers(now)
             self._tell_verdicts()
             self._queue_moved.set()  # messages may have expired
-        if now >= self._link.outcomes.deadman.next_at:
+        if now >= self._link.delivery.deadman.next_at:
             self._stop_silent(now)
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
@@ -181,7 +181,7 @@ class Node:
     def settled(self, burst: Burst, outcome: Outcome, at: float) -> None:
         """A burst has left, or not."""
         self._link.confirm(burst, outcome, at)
-        if self._link.outcomes.receipts.verdicts:
+        if self._link.delivery.receipts.verdicts:
             self._tell_verdicts()
         self._queue_moved.set()
 
@@ -204,7 +204,7 @@ class Node:
     async def tick(self) -> None:
         """Let the link's time pass, and measure how late the event loop is; for ever."""
         while True:
-            silent_s = self._link.outcomes.deadman.next_at - self._pdu_link.now()
+            silent_s = self._link.delivery.deadman.next_at - self._pdu_link.now()
             tick_s = TICK_S if self._is_lockstep else min(TICK_S, max(silent_s, SHORTEST_TICK_S))
             due = time.monotonic() + tick_s
             await asyncio.sleep(tick_s)
@@ -276,12 +276,12 @@ class Node:
         return msgspec.structs.replace(snapshot, verdict=self.health.judge(snapshot))
 
     def _tell_verdicts(self) -> None:
-        for verdict in self._link.outcomes.receipts.take():
+        for verdict in self._link.delivery.receipts.take():
             self.bus.tell(verdict)
 
     def _stop_silent(self, now: float) -> None:
         """Whoever obeys a command topic that fell silent is told to stop, once."""
-        for src, topic_id in self._link.outcomes.deadman.take_due(now):
+        for src, topic_id in self._link.delivery.deadman.take_due(now):
             name = self._setup.republished_as(src, topic_id)
             stop = self._stops.get(topic_id)
             if stop is None:

@@ -82,9 +82,9 @@ def measure(case: Case, seed: int, seconds: float) -> Share:
     control_then_s, all_then_s = _sent_s(links.values())
     verdicts: dict[str, int] = {}
     for link in links.values():
-        for verdict in link.outcomes.receipts.take():
+        for verdict in link.delivery.receipts.take():
             verdicts[verdict.fate] = verdicts.get(verdict.fate, 0) + 1
-    period_s = float(np.mean([link.tellings.period_s for link in links.values()]))
+    period_s = float(np.mean([link.control_records.period_s for link in links.values()]))
     return Share(
         100 * (control_then_s - control_s) / seconds,
         100 * (all_then_s - all_s) / seconds,
@@ -95,7 +95,7 @@ def measure(case: Case, seed: int, seconds: float) -> Share:
 
 def _sent_s(links: Iterable[Link]) -> tuple[float, float]:
     """So far: (PDUs with nothing but records, all)."""
-    departures = [link.departures for link in links]
+    departures = [link.scheduler for link in links]
     return sum(each.control_airtime_s for each in departures), sum(
         each.airtime_s for each in departures
     )

@@ -40,7 +40,7 @@ def plan_of(run: Run, air: Air) -> Plan:
 
 def errors_pct(run: Run, air: Air) -> dict[str, float]:
     """Of each predicted share of the air, and each worst latency."""
-    plan, shares = plan_of(run, air), run.simulation.stations[1].link.departures.shares
+    plan, shares = plan_of(run, air), run.simulation.stations[1].link.scheduler.shares
     found = {}
     for topic, trace in zip(plan.topics, run.traces, strict=True):
         seconds = trace.flow.count * trace.flow.period_s

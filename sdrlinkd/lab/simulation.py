@@ -131,7 +131,7 @@ class Simulation:
             can = self._medium.join(node, radio)
             traits = fit(carrier_traits("ether", can, modem, airtimes))
             link.attach(traits, access, rate or RateParams())
-            self._policy = link.departures.settled.policy
+            self._policy = link.scheduler.settled.policy
             pace, coming = 1 + 1e-6 * radio.clock_ppm, iter(arrivals.get(node, ()))
             least_s = traits.turnaround_s + airtimes.airtime_s(max(link.rate.usable), 1)
             station = self.stations[node] = Station(link, traits, pace, coming, least_s)

@@ -9,18 +9,10 @@ from sdrlinkd.link.access import (
     percent,
     settle,
 )
-from sdrlinkd.link.burst import Burst, Outcome
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity, Sensed
-from sdrlinkd.link.compression import Deflated, train_dictionary
-from sdrlinkd.link.delivered import CDR_HEADER_SIZE, Delivered
-from sdrlinkd.link.flush import flush_told
-from sdrlinkd.link.ledger import RX_PDU_REASONS, RX_REASONS, TX_REASONS
-from sdrlinkd.link.lifespan import Lifespan, lifespan_of
 from sdrlinkd.link.link import Link
-from sdrlinkd.link.message import Outgoing
-from sdrlinkd.link.outbox import Outbox
+from sdrlinkd.link.packing import flush_told
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
-from sdrlinkd.link.policy import DEFAULT_POLICY, TopicPolicy
 from sdrlinkd.link.qos import (
     AS_CONFIGURED,
     MAX_PRIORITY,
@@ -28,9 +20,21 @@ from sdrlinkd.link.qos import (
     Overrides,
     Qos,
 )
-from sdrlinkd.link.rate import RateChange, RateControl, RateParams
+from sdrlinkd.link.queue import (
+    DEFAULT_POLICY,
+    RX_PDU_REASONS,
+    RX_REASONS,
+    TX_REASONS,
+    Deflated,
+    Lifespan,
+    Outbox,
+    Outgoing,
+    TopicPolicy,
+    lifespan_of,
+    train_dictionary,
+)
 from sdrlinkd.link.receipts import Verdict
-from sdrlinkd.link.relay import Relay, RelayParams
+from sdrlinkd.link.receive import CDR_HEADER_SIZE, Delivered, Relay, RelayParams
 from sdrlinkd.link.report import link_notices, link_report
 from sdrlinkd.link.schedule import (
     IDLE_SHARE,
@@ -44,8 +48,9 @@ from sdrlinkd.link.schedule import (
     LatencyParams,
     UrgentParams,
 )
+from sdrlinkd.link.status import Told
 from sdrlinkd.link.timesync import ClockParams, Clocks, DualEnvelope, PaperFilter, State, Wall
-from sdrlinkd.link.why import Told
+from sdrlinkd.link.transmit import Burst, Outcome, RateChange, RateControl, RateParams
 
 __all__ = [
     "AS_CONFIGURED",

@@ -1,9 +1,8 @@
 """What the link must know of that which carries its PDUs."""
 
 from collections.abc import Callable, Collection
+from math import inf
 from typing import NamedTuple
-
-INFINITE = float("inf")
 
 
 class CarrierTraits(NamedTuple):
@@ -29,7 +28,7 @@ class CarrierTraits(NamedTuple):
     overhead_s: float = 0.0
     """What a burst takes besides its PDUs."""
     gap_s: float = 0.0
-    spell_s: float = INFINITE
+    spell_s: float = inf
     """It sends without listening for so long at most."""
     spell_follow_s: float = 0.0
     """What is decided so long before a burst is over leaves right behind it, else in the next
@@ -59,13 +58,13 @@ class Sensed(NamedTuple):
     when its preamble came, None when only its energy was noticed.
     """
 
-    until: float = INFINITE
+    until: float = inf
     idle_since: float = 0.0
     burst_at: float | None = None
 
 
 def _of_any_length(_: float) -> float:
-    return INFINITE
+    return inf
 
 
 class Opportunity(NamedTuple):

@@ -6,28 +6,26 @@ from random import Random
 from zstandard import ZstdCompressionDict
 
 from sdrlinkd.link.access import Access, AccessParams
-from sdrlinkd.link.admission import NOT_TAKEN
-from sdrlinkd.link.air_use import AirUse
-from sdrlinkd.link.beacons import Beacons
-from sdrlinkd.link.burst import Burst, Outcome
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity
-from sdrlinkd.link.compression import Inflated
-from sdrlinkd.link.delivered import Delivered
-from sdrlinkd.link.departures import Departures
-from sdrlinkd.link.inbox import Inbox
-from sdrlinkd.link.latched import Kept, Latched
-from sdrlinkd.link.meters import RateMeter, rate_counters
-from sdrlinkd.link.outcomes import Outcomes
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
-from sdrlinkd.link.policy import DEFAULT_POLICY, TopicPolicy
 from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, Overrides, Qos
-from sdrlinkd.link.rate import RateControl, RateParams
-from sdrlinkd.link.relay import Relay, RelayParams
+from sdrlinkd.link.queue import DEFAULT_POLICY, NOT_TAKEN, Inflated, Kept, Latched, TopicPolicy
+from sdrlinkd.link.receipts import Delivery
+from sdrlinkd.link.receive import Delivered, Inbox, Relay, RelayParams
 from sdrlinkd.link.schedule import ClassesParams
-from sdrlinkd.link.sender import Sender
-from sdrlinkd.link.tellings import Tellings
+from sdrlinkd.link.status import RateMeter, Told, Why, rate_counters
 from sdrlinkd.link.timesync import ClockParams, Clocks
-from sdrlinkd.link.why import Told, Why
+from sdrlinkd.link.transmit import (
+    AirUse,
+    Beacons,
+    Burst,
+    BurstScheduler,
+    ControlRecords,
+    Outcome,
+    RateControl,
+    RateParams,
+    Sender,
+)
 from sdrlinkd.reports import RATE_WINDOW_S
 from sdrlinkd.wire import (
     CONTROL_TOPIC_ID,
@@ -92,22 +90,24 @@ class Link:
         if not registry.has_control:
             clock = NO_CLOCK
         self.clocks = Clocks(clock, beacons.boot_id, own_id)
-        spare, neighbors = self.sender.packetizer.spare, self.inbox.neighbors
+        piggyback, neighbors = self.sender.packetizer.piggyback, self.inbox.neighbors
         room = self.sender.packetizer.k_single
-        self.tellings = Tellings(clock, self.clocks, spare, neighbors, room)
-        self.departures = Departures(
-            self.sender, self.inbox, beacons, self.tellings, classes, own_id, registry.has_control,
-            rng,
+        self.control_records = ControlRecords(clock, self.clocks, piggyback, neighbors, room)
+        self.scheduler = BurstScheduler(
+            self.sender, self.inbox, beacons, self.control_records, classes, own_id,
+            registry.has_control, rng,
         )  # fmt: skip
-        self.outcomes = Outcomes(self.sender, self.tellings, neighbors, own_id, params.receipt_s)
+        self.delivery = Delivery(
+            self.sender, self.control_records, neighbors, own_id, params.receipt_s
+        )
         self._latched = Latched()
-        self.air = AirUse(self.departures)
-        self._why = Why(self.sender, self.departures.shares, self.air)
+        self.air = AirUse(self.scheduler)
+        self._why = Why(self.sender, self.scheduler.shares, self.air)
         self.relay = Relay(relay, own_id)
 
     def attach(self, carrier: CarrierTraits, access: AccessParams, rate: RateParams) -> None:
         """Settle access and rate for the radio that is there. Raises ConfigError."""
-        self.departures.attach(carrier, access, rate)
+        self.scheduler.attach(carrier, access, rate)
         if carrier.is_lockstep:
             # Its time begins now, whatever ours was.
             self.sender.begin_anew()
@@ -116,12 +116,12 @@ class Link:
     @property
     def access(self) -> Access:
         """Says when."""
-        return self.departures.access
+        return self.scheduler.access
 
     @property
     def rate(self) -> RateControl:
         """Says how fast."""
-        return self.departures.rate
+        return self.scheduler.rate
 
     def set_policies(self, policies: Mapping[int, TopicPolicy]) -> None:
         """Apply per-topic policies by topic id; the others get the defaults."""
@@ -134,7 +134,7 @@ class Link:
         if policy.durability == "volatile":
             self._latched.forget(topic_id)
         if not policy.deadman_s:
-            self.outcomes.deadman.forget(topic_id)
+            self.delivery.deadman.forget(topic_id)
         self.inbox.policies[topic_id] = policy
 
     def why(self, topic_id: int, told: Told, now: float) -> list[str]:
@@ -151,31 +151,31 @@ class Link:
         """Queue a message; None, or the ledger's reason for refusing it."""
         refused = self.sender.submit(topic_id, payload, now, overrides)
         if overrides.receipt:
-            self.outcomes.note(now)
+            self.delivery.note(now)
             if refused in NOT_TAKEN or (refused and not self.registry.has_control):
-                self.outcomes.refused(overrides.receipt, topic_id, refused, overrides.dst)
+                self.delivery.refused(overrides.receipt, topic_id, refused, overrides.dst)
             elif refused is None and not self.registry.has_control:
-                self.outcomes.unknowable(overrides.receipt, topic_id, overrides.dst)
+                self.delivery.unknowable(overrides.receipt, topic_id, overrides.dst)
         if refused is None:
             qos = overrides.qos if overrides.qos is not None else self.sender.treatment(topic_id)[0]
-            self.departures.forecasts.note((self.own_id, topic_id), qos, now)
-            self.departures.more_to_send()
+            self.scheduler.forecasts.note((self.own_id, topic_id), qos, now)
+            self.scheduler.more_to_send()
             if self.sender.policy(topic_id).durability == "transient_local":
                 self._latched.keep(topic_id, Kept(payload, now, overrides._replace(receipt="")))
         return refused
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
         """The burst that should leave next, decided now; None: nothing to send, or not yet."""
-        burst = self.departures.next_burst(opportunity)
+        burst = self.scheduler.next_burst(opportunity)
         if burst is not None and self.sender.packetizer.asking:
-            self.outcomes.note(burst.start)
+            self.delivery.note(burst.start)
         return burst
 
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
         """What the radio says became of a burst."""
-        self.departures.confirm(burst, outcome, now)
+        self.scheduler.confirm(burst, outcome, now)
         if self.sender.dropped_asking:
-            self.outcomes.note(now)
+            self.delivery.note(now)
 
     def hear(
         self,
@@ -196,22 +196,22 @@ class Link:
     def delivered(self, message: Delivered, now: float) -> float | None:
         """The age in seconds at which `message` is handed over at `now`; None when unknown."""
         policy = self.inbox.policies.get(message.topic_id, DEFAULT_POLICY)
-        return self.outcomes.delivered(message, policy, now)
+        return self.delivery.delivered(message, policy, now)
 
     def expire_queue(self, now: float) -> None:
         """Let time pass where there is nothing yet to send with: what is too old goes by name."""
         self.sender.expire(now)
-        self.outcomes.expire(now)
+        self.delivery.expire(now)
 
     def handle_timers(self, now: float) -> None:
         """Let time pass: expiries, reassembly timeouts, rate samples."""
         self.sender.expire(now)
         for offer in self._latched.due(now, self.sender.outbox.bytes_per_s):
             self.sender.offer_again(offer, now)
-            self.departures.more_to_send()
+            self.scheduler.more_to_send()
         self.inbox.expire(now)
-        self.tellings.look_round(now, self.own_id)
-        self.outcomes.expire(now)
+        self.control_records.look_round(now, self.own_id)
+        self.delivery.expire(now)
         self._why.sample(now, len(self.registry))
         if self.rates.is_due(now):
             counters = rate_counters(self.sender, self.inbox, self.air.sent_s, self.air.heard_s)
@@ -220,33 +220,33 @@ class Link:
     @property
     def has_work(self) -> bool:
         """Whether messages wait to be sent."""
-        return self.departures.has_work
+        return self.scheduler.has_work
 
     def next_wakeup(self, now: float) -> float:
         """When there may next be something to send; not after `now`: at once."""
-        return self.departures.next_wakeup(now)
+        return self.scheduler.next_wakeup(now)
 
     def drain(self) -> None:
         """Nothing more will come: partial PDUs go at once, beacons end."""
-        self.departures.drain()
+        self.scheduler.drain()
 
     def shut_down(self) -> None:
         """Drop what could not be sent any more, by name."""
-        self.departures.clear()
+        self.scheduler.clear()
         self.sender.shut_down()
-        self.outcomes.expire(float("inf"))
+        self.delivery.expire(float("inf"))
 
     def audit(self) -> list[str]:
         """Where the ledger does not add up; empty when it does."""
         return self.sender.audit() + self.inbox.audit()
 
-    # The inbox's ear.
+    # What the inbox tells.
 
     def ended(
         self, src: int, topic_id: int, entry_id: int, reason: str, age_s: float | None, now: float
     ) -> None:
         """Its sender wants to know."""
-        self.outcomes.ended(src, topic_id, entry_id, reason, age_s, now)
+        self.delivery.ended(src, topic_id, entry_id, reason, age_s, now)
 
     def pdu_from(self, pdu: Pdu, stamps: list[Stamp], at: float, is_relayed: bool) -> None:
         """A good PDU that somebody else has sent."""
@@ -265,7 +265,7 @@ class Link:
             ):
                 stamp = ages.get((entry.topic_id, entry.entry_id))
                 origin = at if stamp is None else at - 1e-6 * stamp.age_us
-                self.departures.forecasts.note((src, entry.topic_id), qos, origin)
+                self.scheduler.forecasts.note((src, entry.topic_id), qos, origin)
 
     def newcomer(self, src: int, at: float) -> None:
         """It does not have what was latched before."""
@@ -278,7 +278,7 @@ class Link:
             return False
         until = min(at + self.relay.lifespan_s, self.inbox.fresh_until(pdu))
         refused = self.sender.forward(pdu, data, at, until)
-        self.departures.more_to_send()
+        self.scheduler.more_to_send()
         return refused is None
 
     def record_from(self, src: int, record: Record, at: float) -> None:
@@ -295,6 +295,6 @@ class Link:
         elif isinstance(record, Clock) and src != self.own_id:
             self.clocks.hear(src, record, at)
         elif isinstance(record, Receipt):
-            self.outcomes.answered(src, record, at)
+            self.delivery.answered(src, record, at)
         elif isinstance(record, Waits) and record.topic_id < len(self.registry):
             self.waits[src, record.topic_id] = record

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Mapping
 
 from sdrlinkd.link.link import Link
-from sdrlinkd.link.neighbors import Neighbor
+from sdrlinkd.link.receive import Neighbor
 from sdrlinkd.link.time_report import clock_report, latency_report, waits_ms
 from sdrlinkd.reports import (
     LinkReport,
@@ -30,20 +30,20 @@ def link_report(
     return LinkReport(
         pdu_size=link.params.pdu_size,
         access=link.access.state,
-        access_policy=link.departures.settled.policy,
-        access_reason=link.departures.settled.reason,
-        access_share_pct=100 * link.departures.settled.share,
-        airtime_s=link.departures.airtime_s,
+        access_policy=link.scheduler.settled.policy,
+        access_reason=link.scheduler.settled.reason,
+        access_share_pct=100 * link.scheduler.settled.share,
+        airtime_s=link.scheduler.airtime_s,
         air_sent_pct=_air_pct(link, "sent", link.air.sent_s, now),
         air_heard_pct=_air_pct(link, "heard", link.air.heard_s, now),
-        control_airtime_s=link.departures.control_airtime_s,
-        control_period_s=link.tellings.period_s,
+        control_airtime_s=link.scheduler.control_airtime_s,
+        control_period_s=link.control_records.period_s,
         airtime_by_class_s={
-            qos.label: round(used_s, 6) for qos, used_s in link.departures.shares.used_s.items()
+            qos.label: round(used_s, 6) for qos, used_s in link.scheduler.shares.used_s.items()
         },
-        bursts_by_mcs=dict(sorted(link.departures.bursts_by_mcs.items())),
+        bursts_by_mcs=dict(sorted(link.scheduler.bursts_by_mcs.items())),
         mcs_lowest=link.rate.lowest if link.rate.adapts else None,
-        bursts_late=link.departures.bursts_late,
+        bursts_late=link.scheduler.bursts_late,
         mcs_changes=list(link.rate.changes),
         control_channel=link.registry.has_control,
         registry_digest=link.digest.overall.hex(),
@@ -53,8 +53,8 @@ def link_report(
             dropped=dict(link.sender.relayed.dropped),
         ),
         fragments_repaired=link.inbox.fragments_repaired,
-        receipts_untold=link.outcomes.receipts_untold,
-        receipts_unasked=link.outcomes.receipts.unasked,
+        receipts_untold=link.delivery.receipts_untold,
+        receipts_unasked=link.delivery.receipts.unasked,
         tx=_tx(link),
         rx=_rx(link),
         topics=_topics(link, now, names_in),
@@ -146,7 +146,7 @@ def _received(
     reports = []
     for (src, topic_id), tally in sorted(link.inbox.tallies.items()):
         topic = link.registry.by_id(topic_id)
-        ages = link.outcomes.latencies.get((src, topic_id))
+        ages = link.delivery.latencies.get((src, topic_id))
         ended = tally.delivered + sum(tally.dropped.values())
         reports.append(
             ReceivedTopicReport(
@@ -166,7 +166,7 @@ def _received(
                 age_ms_p50=ages.quantile_ms(0.5) if ages else None,
                 age_ms_p99=ages.quantile_ms(0.99) if ages else None,
                 latency=latency_report(link, src, topic_id) if ages else None,
-                stops=link.outcomes.deadman.stops.get((src, topic_id), 0),
+                stops=link.delivery.deadman.stops.get((src, topic_id), 0),
             )
         )
     return reports
@@ -222,7 +222,7 @@ def link_notices(link: Link, now: float, of_topics: Mapping[int, str] = NOTHING_
             "the registry uses all 16 topic ids, so there is no control channel: no ages, no "
             "beacons, no registry check; drop one topic to have them"
         )
-    if not link.tellings.fits:
+    if not link.control_records.fits:
         notices.append(
             f"PDUs of {link.params.pdu_size} B have no room for CLOCK records, so nobody knows "
             "anybody's clock; give all robots a larger link.pdu_size"
@@ -234,7 +234,7 @@ def link_notices(link: Link, now: float, of_topics: Mapping[int, str] = NOTHING_
             "256 in 1.25 reassembly timeouts; give all robots a larger link.pdu_size or a shorter "
             "reassembly.timeout_s"
         )
-    least_s = link.departures.least_s
+    least_s = link.scheduler.least_s
     for topic in link.registry.topics:
         lifespan_s = link.sender.lifespan(topic.id).seconds
         if lifespan_s < least_s:

@@ -7,7 +7,7 @@ from sdrlinkd.reports import ClockReport, LatencyReport
 
 def waits_ms(link: Link, topic_id: int) -> dict[str, float]:
     """Why messages of one of our topics waited, by the report's names."""
-    waits = link.departures.waits.of_topic.get(topic_id)
+    waits = link.scheduler.waits.of_topic.get(topic_id)
     if waits is None:
         return {}
     return {
@@ -19,7 +19,7 @@ def waits_ms(link: Link, topic_id: int) -> dict[str, float]:
 
 def latency_report(link: Link, src: int, topic_id: int) -> LatencyReport:
     """Of a topic heard with STAMPs."""
-    latency = link.outcomes.latencies[src, topic_id]
+    latency = link.delivery.latencies[src, topic_id]
     parts, period = latency.parts(), latency.period_ms()
     told = link.waits.get((src, topic_id))
     wait_ms = 1e3 * parts.wait_s

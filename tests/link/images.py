@@ -14,7 +14,7 @@ def pdus_of(link, payload, now=0.0, topic=0):
     """The PDUs that carry a payload as bulk."""
     link.submit(topic, payload, now, Overrides(Qos.BULK))
     pdus = []
-    while burst := link.departures.compose(now, Allowance.of(63)):
+    while burst := link.scheduler.compose(now, Allowance.of(63)):
         link.confirm(burst, Outcome.SENT, now)
         pdus += burst.pdus
     return pdus

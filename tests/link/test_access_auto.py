@@ -136,7 +136,7 @@ def test_a_link_refuses_it_at_attach_and_reports_what_it_came_to():
     assert report.access.startswith("tdma: 2 slots")
     assert (report.access_policy, round(report.access_share_pct)) == ("tdma", 97)
     assert report.access_reason.startswith("as this radio hears another begin")
-    assert link.departures.settled.sentence == (
+    assert link.scheduler.settled.sentence == (
         f"tdma, {report.access_reason}; it carries 97 % of the air"
     )
 

@@ -5,7 +5,7 @@ from random import Random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdrlinkd.link.duplicates import SequenceTrack
+from sdrlinkd.link.receive import SequenceTrack
 from tests.laws import law
 
 

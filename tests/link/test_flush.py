@@ -39,22 +39,22 @@ def waiting(flush_s, **more):
 def test_by_default_nothing_waits():
     link = no_stamps(make_link(pdu_size=220))
     link.submit(0, bytes(50), 1.0)
-    assert len(link.departures.compose(1.0, MOST).pdus) == 1
+    assert len(link.scheduler.compose(1.0, MOST).pdus) == 1
 
 
 def test_a_partial_pdu_waits_for_so_long():
     link = waiting(0.2)
     link.submit(0, bytes(50), 1.0)
-    assert link.departures.compose(1.1, MOST) is None
+    assert link.scheduler.compose(1.1, MOST) is None
     assert link.next_wakeup(1.1) == pytest.approx(1.2)
     link.submit(1, bytes(50), 1.15)
-    assert len(link.departures.compose(1.2, MOST).pdus) == 1
+    assert len(link.scheduler.compose(1.2, MOST).pdus) == 1
 
 
 def test_a_full_one_does_not():
     link = waiting(0.2)
     link.submit(0, bytes(400), 1.0)
-    assert len(link.departures.compose(1.0, Allowance.of(1)).pdus) == 1
+    assert len(link.scheduler.compose(1.0, Allowance.of(1)).pdus) == 1
 
 
 @pytest.mark.parametrize("flush_s", [NEVER, INFINITE])
@@ -62,7 +62,7 @@ class TestWithoutEnd:
     def test_a_partial_pdu_never_goes_by_time(self, flush_s):
         link = waiting(flush_s)
         link.submit(0, bytes(50), 0.0)
-        assert link.departures.compose(LATE, MOST) is None
+        assert link.scheduler.compose(LATE, MOST) is None
         assert next_burst(link, LATE) is None
         assert link.next_wakeup(LATE) == INFINITE
 
@@ -71,7 +71,7 @@ class TestWithoutEnd:
         # 4 × 50 B and the headers of 3 of them are more than 207 B.
         for i in range(4):
             link.submit(i % 2, bytes(50), 0.1 * i)
-            burst = link.departures.compose(0.1 * i, MOST)
+            burst = link.scheduler.compose(0.1 * i, MOST)
             assert (burst is None) == (i < 3)
 
     def test_at_the_end_it_goes(self, flush_s):
@@ -91,7 +91,7 @@ class TestWithoutEnd:
         link.submit(0, bytes(50), 0.0, Overrides(qos=qos))
         assert link.next_wakeup(0.0) <= 0.0
         # What may wait fills what is left.
-        assert len(layouts(link.departures.compose(0.0, MOST).pdus, 220)[0]) == 2
+        assert len(layouts(link.scheduler.compose(0.0, MOST).pdus, 220)[0]) == 2
 
     @pytest.mark.parametrize("wish", ["policy", "message"])
     def test_a_lifespan_never_waits(self, flush_s, wish):
@@ -103,16 +103,16 @@ class TestWithoutEnd:
             override = Overrides(lifespan_s=5.0)
         link.submit(0, bytes(50), 0.0, override)
         assert link.next_wakeup(0.0) <= 0.0
-        assert len(link.departures.compose(0.0, MOST).pdus) == 1
+        assert len(link.scheduler.compose(0.0, MOST).pdus) == 1
 
     def test_a_lifespan_behind_one_of_its_own_topic_that_may_wait(self, flush_s):
         link = waiting(flush_s)
         link.submit(0, bytes(50), 0.0)
-        assert link.departures.compose(0.0, MOST) is None
+        assert link.scheduler.compose(0.0, MOST) is None
         link.submit(0, bytes(50), 0.0, Overrides(lifespan_s=1.0))
-        assert layouts(link.departures.compose(0.0, MOST).pdus, 220) == [[(0, 0, 1, 50)] * 2]
+        assert layouts(link.scheduler.compose(0.0, MOST).pdus, 220) == [[(0, 0, 1, 50)] * 2]
         link.submit(0, bytes(50), 0.0)
-        assert link.departures.compose(0.0, MOST) is None
+        assert link.scheduler.compose(0.0, MOST) is None
 
     def test_the_rest_of_a_message_does_not_wait_until_receivers_give_it_up(self, flush_s):
         link, far = waiting(flush_s), no_stamps(make_link(2, pdu_size=220))
@@ -120,7 +120,7 @@ class TestWithoutEnd:
         got = []
 
         def send(now):
-            if burst := link.departures.compose(now, MOST):
+            if burst := link.scheduler.compose(now, MOST):
                 link.confirm(burst, Outcome.SENT, now)
                 got.extend(message for pdu in burst.pdus for message in far.hear(pdu, now))
 
@@ -136,7 +136,7 @@ class TestWithoutEnd:
         link = waiting(flush_s, classes=classes)
         link.submit(0, bytes(5 * 207), 0.0, Overrides(qos=Qos.BULK))
         for now in (0.0, 0.3, 0.6, 0.9):
-            if burst := link.departures.compose(now, MOST):
+            if burst := link.scheduler.compose(now, MOST):
                 link.confirm(burst, Outcome.SENT, now)
         assert link.sender.tally(0).sent == 1
         assert not link.has_work
@@ -180,7 +180,7 @@ def test_whatever_waits_goes_with_the_rest_or_at_the_end(seed, flush_s):
             rng.randrange(3), bytes(rng.randrange(4, 500)), now,
             Overrides(rng.choice((None, *Qos)), dst=rng.choice((None, 2, 3))),
         )  # fmt: skip
-        if burst := link.departures.compose(now, MOST):
+        if burst := link.scheduler.compose(now, MOST):
             link.confirm(burst, Outcome.SENT, now)
         wakes_at = link.next_wakeup(now)
         outbox = link.sender.outbox

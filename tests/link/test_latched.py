@@ -13,7 +13,7 @@ def exchange(links, now):
     """Everybody sends and hears; what each got by (to, from, payload)."""
     got = []
     for link in links:
-        while burst := link.departures.compose(now, Allowance.of(8)):
+        while burst := link.scheduler.compose(now, Allowance.of(8)):
             link.confirm(burst, Outcome.SENT, now)
             for pdu in burst.pdus:
                 for other in links:
@@ -95,7 +95,7 @@ def test_it_takes_two_per_cent_of_the_air_at_most():
         now = 0.3 * i
         guest = make_link(2 + i, pdu_size=220, seed=i)
         guest.submit(1, bytes(8), now)
-        for pdu in guest.departures.compose(now, Allowance.of(1)).pdus:
+        for pdu in guest.scheduler.compose(now, Allowance.of(1)).pdus:
             one.hear(pdu, now)
         one.handle_timers(now + 0.25)
     assert one.sender.tally(0).reoffered == pytest.approx(1 + 60 * 0.02, abs=0.5)

@@ -6,7 +6,7 @@ from random import Random
 import pytest
 
 from sdrlinkd.link import Allowance, ClockParams, Outcome, link_notices, link_report
-from sdrlinkd.link.latency import Latency, Parts
+from sdrlinkd.link.receive import Latency, Parts
 from sdrlinkd.wire import Clock, RecordType, Waits
 from tests.link.world import PDU_S, make_link, next_burst, records_in
 
@@ -18,7 +18,7 @@ def test_the_parts_make_up_the_age():
     payload = b"\0\1\0\0" + bytes(150)
     sender.submit(0, payload, 1.0)
     heard, at = [], 1.004
-    while burst := sender.departures.compose(at, Allowance.of(1)):
+    while burst := sender.scheduler.compose(at, Allowance.of(1)):
         for pdu in burst.pdus:
             heard += receiver.hear(pdu, at, None, at + 0.0025, at + 0.002)
         at += 0.01
@@ -66,12 +66,12 @@ def test_an_age_that_cannot_be_has_its_place_in_the_histogram_too(age_s):
 
 def test_why_a_message_waited_is_told_in_a_beacon():
     link = make_link(beacon_s=0.5)
-    link.departures._lead_s = 0.002
+    link.scheduler._lead_s = 0.002
     link.submit(0, bytes(20), 0.0)
     # The radio could take it at 10 ms, and its burst left 30 ms later than it was meant to.
     burst = next_burst(link, 0.012)
     link.confirm(burst._replace(start=0.042), Outcome.SENT, 0.05)
-    waits = link.departures.waits.of_topic[0]
+    waits = link.scheduler.waits.of_topic[0]
     assert (waits.queue_s, waits.access_s, waits.again_s) == pytest.approx((0.01, 0.002, 0.03))
     link.submit(1, bytes(20), 0.6)
     records = [each for pdu in next_burst(link, 0.6).pdus for each in records_in(pdu, len(pdu))]
@@ -111,14 +111,14 @@ def clocks_of(link, until, step_s=0.01, submit_s=None):
 
 def test_clocks_ride_at_their_period_and_go_alone_within_their_share():
     alone = make_link(clock=ClockParams(period_s=0.2, share=0.004))
-    alone.tellings.pdu_s = PDU_S
+    alone.control_records.pdu_s = PDU_S
     times = [at for at, is_alone in clocks_of(alone, 20.0) if is_alone]
     gaps = [later - earlier for earlier, later in pairwise(times)]
     # Two robots, 1 ms each: 2 ms / 0.004, and a twentieth more.
     assert all(0.52 < gap < 0.54 for gap in gaps), gaps
-    assert alone.departures.control_airtime_s <= 20 * 0.004 / 2 + PDU_S
+    assert alone.scheduler.control_airtime_s <= 20 * 0.004 / 2 + PDU_S
     beside = make_link(clock=ClockParams(period_s=0.2, share=0.004))
-    beside.tellings.pdu_s = PDU_S
+    beside.control_records.pdu_s = PDU_S
     found = clocks_of(beside, 20.0, submit_s=0.05)
     # They ride from three quarters of their period on.
     assert 85 < len(found) <= 20 / 0.15 + 1
@@ -132,7 +132,7 @@ def test_a_robot_that_is_alone_does_not_tell_its_clock():
         while burst := next_burst(link, i * 0.01):
             link.confirm(burst, Outcome.SENT, i * 0.01)
             assert burst.clock is None
-    assert not link.sender.packetizer.spare.holds(RecordType.CLOCK)
+    assert not link.sender.packetizer.piggyback.holds(RecordType.CLOCK)
 
 
 def test_on_small_pdus_clocks_tell_of_as_many_robots_as_there_is_room_for():
@@ -155,4 +155,4 @@ def test_a_stamp_that_goes_ahead_is_no_record_alone():
     link.submit(0, bytes(size), 0.0)
     burst = next_burst(link, 0.0)
     assert len(burst.pdus) == 2
-    assert (burst.n_records, link.departures.control_airtime_s) == (0, 0.0)
+    assert (burst.n_records, link.scheduler.control_airtime_s) == (0, 0.0)

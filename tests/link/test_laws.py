@@ -20,7 +20,7 @@ from sdrlinkd.link import (
     RelayParams,
     TopicPolicy,
 )
-from sdrlinkd.link.message import Fate
+from sdrlinkd.link.queue import Fate
 from sdrlinkd.pdulink import Impairment
 from tests.laws import law
 from tests.link.world import make_link, send_all
@@ -101,7 +101,7 @@ def test_the_ledger_holds_at_every_step_of_any_run(seed):
         elif action < 0.75:
             most = tuple(rng.randrange(6) for _ in Qos)
             owed = tuple(rng.choices(list(Qos), k=rng.choice((0, 0, 1, 3, 8))))
-            burst = link.departures.compose(now, Allowance(most, owed))
+            burst = link.scheduler.compose(now, Allowance(most, owed))
             if burst:
                 assert len(burst.pdus) <= max(1, *most), f"seed {seed}"
                 assert len({data[1] for data in burst.pdus}) == 1, f"seed {seed}"
@@ -141,7 +141,7 @@ def test_whatever_the_air_does_nothing_is_made_up(seed):
         topic = rng.randrange(3)
         sent[topic, payload] += 1
         sender.submit(topic, payload, now)
-        if burst := sender.departures.compose(now, Allowance.of(8)):
+        if burst := sender.scheduler.compose(now, Allowance.of(8)):
             sender.confirm(burst, Outcome.SENT, now)
             on_air += [
                 (now + delay_s, data) for pdu in burst.pdus for delay_s, data in air.arrivals(pdu)
@@ -170,7 +170,7 @@ def test_order_holds_within_a_topic(seed):
     for i in range(150):
         now += 0.01
         sender.submit(i % 3, i.to_bytes(4, "big") + bytes(rng.randrange(200)), now)
-        if burst := sender.departures.compose(now, Allowance.of(rng.randrange(1, 5))):
+        if burst := sender.scheduler.compose(now, Allowance.of(rng.randrange(1, 5))):
             sender.confirm(burst, Outcome.SENT, now)
             for data in burst.pdus:
                 if rng.random() < 0.95:
@@ -190,7 +190,7 @@ def test_entry_ids_are_not_used_again_before_their_rest(topics):
     for i in range(1500):
         now += 0.002
         link.submit(i % topics, bytes(120), now)
-        if burst := link.departures.compose(now, Allowance.of(8)):
+        if burst := link.scheduler.compose(now, Allowance.of(8)):
             link.confirm(burst, Outcome.SENT, now)
             for data in burst.pdus:
                 for e in parse(data, 64).entries:

@@ -1,6 +1,6 @@
 """How long a robot is silent now and then, and what is an outage."""
 
-from sdrlinkd.link.neighbors import LONGEST_GAP_S, Neighbor
+from sdrlinkd.link.receive import LONGEST_GAP_S, Neighbor
 
 
 def heard(neighbor, times):

@@ -35,7 +35,7 @@ def test_a_message_in_fragments_is_not_superseded():
     link = make_link(pdu_size=64)
     link.set_policies({0: TopicPolicy(depth=1, stamp=False)})
     link.submit(0, b"a" * 100, 0.0)
-    link.confirm(link.departures.compose(0.0, Allowance.of(1)), Outcome.SENT, 0.0)
+    link.confirm(link.scheduler.compose(0.0, Allowance.of(1)), Outcome.SENT, 0.0)
     link.submit(0, b"b" * 8, 0.0)
     link.submit(0, b"c" * 8, 0.0)
     assert payloads_left(link) == [b"a" * 49, b"c" * 8]
@@ -80,7 +80,7 @@ def test_a_message_that_is_too_old_when_it_comes_expires_at_once(age_s):
     assert link.submit(0, bytes(9), 0.0, Overrides(age_s=age_s, receipt="old")) == "tx_expired"
     assert [pdu[0][3] for pdu in layouts(send_all(link, now=0.1), 64)] == [8]
     assert dropped(link) == {("odom", "tx_expired"): 1}
-    assert [(each.receipt, each.fate) for each in link.outcomes.receipts.take()] == [
+    assert [(each.receipt, each.fate) for each in link.delivery.receipts.take()] == [
         ("old", "expired")
     ]
     assert link.audit() == []
@@ -105,8 +105,8 @@ def test_a_long_lifespan_bears_a_great_age():
 def test_the_rest_of_an_expired_message_is_withdrawn():
     link = make_link(pdu_size=64)
     link.submit(0, bytes(200), 0.0, Overrides(lifespan_s=1.0))
-    burst = link.departures.compose(0.5, Allowance.of(2))
-    assert link.departures.compose(1.5, Allowance.of(8)) is None
+    burst = link.scheduler.compose(0.5, Allowance.of(2))
+    assert link.scheduler.compose(1.5, Allowance.of(8)) is None
     assert link.audit() == []
     link.confirm(burst, Outcome.SENT, 1.6)
     assert link.sender.tally(0).sent == 0
@@ -125,9 +125,9 @@ def test_timers_expire_what_no_burst_looked_at():
 def test_a_burst_that_did_not_leave_drops_its_messages_by_name(outcome):
     link = make_link(pdu_size=64)
     link.submit(0, bytes(200), 0.0)
-    link.confirm(link.departures.compose(0.0, Allowance.of(1)), outcome, 0.1)
+    link.confirm(link.scheduler.compose(0.0, Allowance.of(1)), outcome, 0.1)
     assert dropped(link) == {("odom", "tx_radio_failed"): 1}
-    assert link.departures.compose(0.2, Allowance.of(8)) is None
+    assert link.scheduler.compose(0.2, Allowance.of(8)) is None
     assert link.audit() == []
 
 
@@ -135,7 +135,7 @@ def test_shut_down_drops_the_rest_by_name():
     link = make_link(pdu_size=64)
     for _ in range(3):
         link.submit(0, bytes(200), 0.0)
-    link.departures.compose(0.0, Allowance.of(1))
+    link.scheduler.compose(0.0, Allowance.of(1))
     link.shut_down()
     assert dropped(link) == {("odom", "tx_shutdown"): 3}
     assert link.audit() == []

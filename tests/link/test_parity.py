@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from sdrlinkd.link import Allowance, Outcome, Overrides, Qos
-from sdrlinkd.link.parity import parity_records
+from sdrlinkd.link.packing import parity_records
 from sdrlinkd.wire import Entry, Pdu, build, parse
 from tests.laws import law
 from tests.link.images import images_over, pdus_of, protected
@@ -62,7 +62,7 @@ def test_what_is_sent_is_only_sent_when_its_parity_is():
     sender = protected(0.5, pdu_size=64)
     sender.submit(0, bytes(400), 0.0, Overrides(Qos.BULK))
     bursts = []
-    while burst := sender.departures.compose(0.0, Allowance.of(1)):
+    while burst := sender.scheduler.compose(0.0, Allowance.of(1)):
         bursts.append(burst)
     for burst in bursts[:-1]:
         sender.confirm(burst, Outcome.SENT, 0.0)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link import Allowance, Outcome, Overrides, Qos, QueueParams, TopicPolicy
-from sdrlinkd.link.compression import Inflated
+from sdrlinkd.link.queue import Inflated
 from sdrlinkd.wire import Entry, Pdu, build
 from tests.laws import law
 from tests.link.world import make_link, send_all
@@ -194,7 +194,7 @@ def test_what_has_expired_is_never_handed_over(seed):
         payload = i.to_bytes(4, "big") + bytes(rng.randrange(150))
         born[payload[:4]] = now
         sender.submit(0, payload, now)
-        if rng.random() < 0.6 and (burst := sender.departures.compose(now, Allowance.of(4))):
+        if rng.random() < 0.6 and (burst := sender.scheduler.compose(now, Allowance.of(4))):
             sender.confirm(burst, Outcome.SENT, now)
             held_s = rng.random() * 0.15
             for pdu in burst.pdus:
@@ -211,9 +211,9 @@ def test_a_message_begun_and_not_gone_on_with_is_given_up():
     """Receivers wait for half a second; the rest would be sent in vain."""
     link = make_link(pdu_size=64)
     link.submit(0, bytes(400), 0.0)
-    burst = link.departures.compose(0.0, Allowance.of(2))
+    burst = link.scheduler.compose(0.0, Allowance.of(2))
     link.confirm(burst, Outcome.SENT, 0.0)
-    assert link.departures.compose(0.6, Allowance.of(9)) is None
+    assert link.scheduler.compose(0.6, Allowance.of(9)) is None
     assert reasons(link) == {"tx_stalled": 1}
     assert link.audit() == []
 

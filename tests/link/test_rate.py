@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link import Qos, RateParams
-from sdrlinkd.link.rate import (
+from sdrlinkd.link.transmit import (
     HIGH_PER,
     KEPT_CHANGES,
     LOW_PER,

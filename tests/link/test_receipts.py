@@ -21,11 +21,9 @@ from sdrlinkd.link import (
     TopicPolicy,
     link_report,
 )
-from sdrlinkd.link.draft import Draft
-from sdrlinkd.link.ledger import TxTally
-from sdrlinkd.link.message import Outgoing
-from sdrlinkd.link.spare import SpareRecords
-from sdrlinkd.link.tellings import MOST_RECEIPTS
+from sdrlinkd.link.packing import Draft, PiggybackRecords
+from sdrlinkd.link.queue import Outgoing, TxTally
+from sdrlinkd.link.transmit import MOST_RECEIPTS
 from sdrlinkd.wire import Receipt, parse, parse_records
 from tests.laws import law
 from tests.link.world import make_link, next_burst
@@ -69,7 +67,7 @@ class Air:
             for _, robot, pdu, at in due:
                 self._hear(robot, pdu, at)
             for robot, link in self.links.items():
-                self.verdicts += [(robot, each) for each in link.outcomes.receipts.take()]
+                self.verdicts += [(robot, each) for each in link.delivery.receipts.take()]
                 assert link.audit() == []
 
     def _send(self, link, burst):
@@ -148,8 +146,8 @@ def test_what_never_left_is_told_of_at_once():
     link.submit(0, message(2), 0.0, Overrides(receipt="two"))
     link.submit(0, message(3, 200), 0.0, Overrides(receipt="three"))
     link.handle_timers(1.0)
-    link.outcomes.refuse("tx_bad_envelope", 0, "four")
-    verdicts = link.outcomes.receipts.take()
+    link.delivery.refuse("tx_bad_envelope", 0, "four")
+    verdicts = link.delivery.receipts.take()
     assert [(each.receipt, each.fate, each.reason) for each in verdicts] == [
         ("one", "dropped", "tx_superseded"),
         ("three", "dropped", "tx_size_cap"),
@@ -164,9 +162,9 @@ def test_nobody_there_is_an_answer_too():
     burst = next_burst(link, 0.0)
     link.confirm(burst, Outcome.SENT, 0.001)
     link.handle_timers(0.9)
-    assert link.outcomes.receipts.take() == []
+    assert link.delivery.receipts.take() == []
     link.handle_timers(1.1)
-    (verdict,) = link.outcomes.receipts.take()
+    (verdict,) = link.delivery.receipts.take()
     assert (verdict.fate, verdict.dst) == ("unknown", 255)
 
 
@@ -174,10 +172,10 @@ def test_a_burst_that_the_radio_lost_is_no_delivery():
     link = make_link()
     link.submit(0, message(1), 0.0, Overrides(receipt="one", dst=2))
     link.confirm(next_burst(link, 0.0), Outcome.LOST, 0.001)
-    (verdict,) = link.outcomes.receipts.take()
+    (verdict,) = link.delivery.receipts.take()
     assert (verdict.fate, verdict.reason, verdict.dst) == ("dropped", "tx_radio_failed", 2)
     link.handle_timers(100.0)
-    assert link.outcomes.receipts.take() == []
+    assert link.delivery.receipts.take() == []
 
 
 def test_of_all_robots_asked_the_last_one_is_told_of_as_such():
@@ -189,7 +187,7 @@ def test_of_all_robots_asked_the_last_one_is_told_of_as_such():
     link.submit(0, message(2), 1.0, Overrides(receipt="two"))
     link.confirm(next_burst(link, 1.0), Outcome.SENT, 1.001)
     link.handle_timers(10.0)
-    told = [(each.receipt, each.dst, each.left) for each in link.outcomes.receipts.take()]
+    told = [(each.receipt, each.dst, each.left) for each in link.delivery.receipts.take()]
     assert told == [("one", 2, 1), ("one", 3, 0), ("two", 2, 1), ("two", 3, 0)]
 
 
@@ -202,7 +200,7 @@ def test_a_receipt_is_for_the_message_that_had_the_entry_id_then():
         air.run(air.now + STEP_S)
     air.run(air.now + RECEIPT_S + 0.5)
     assert Counter(each.fate for _, each in air.verdicts) == {"delivered": 600}
-    assert air.links[1].outcomes.receipts.unasked == 0
+    assert air.links[1].delivery.receipts.unasked == 0
 
 
 def test_receipts_that_reach_nobody_are_reported():
@@ -216,14 +214,14 @@ def test_receipts_that_reach_nobody_are_reported():
 
 def test_a_receipt_that_waited_is_for_the_message_of_then():
     """It says since when; the entry id is another message's by now."""
-    receipts = make_link().outcomes.receipts
+    receipts = make_link().delivery.receipts
     for name, at in (("then", 10.0), ("now", 10.5)):
         asks = Outgoing(0, b"", Qos.DEFAULT, 0, 2, at, 99.0, wants_stamp=True, tally=TxTally())
         asks.receipt, asks.entry_id = name, 7
         receipts.expect(asks, (), at)
-    spare, draft = SpareRecords(), Draft(128)
-    spare.put_receipt(Receipt(0, 7, 1, 1, 100), 0.0, 10.01)
-    spare.ride(draft, 10.6)
+    piggyback, draft = PiggybackRecords(), Draft(128)
+    piggyback.put_receipt(Receipt(0, 7, 1, 1, 100), 0.0, 10.01)
+    piggyback.ride(draft, 10.6)
     (told,) = parse_records(draft._records[0])
     assert told == Receipt(0, 7, 1, 1, 100, 5900)
     receipts.hear(2, told, 10.6)
@@ -239,10 +237,10 @@ def test_a_receipt_of_the_short_form_is_for_whom_the_pdu_is():
     link.submit(0, message(1), 0.0, Overrides(receipt="one", dst=2))
     burst = next_burst(link, 0.0)
     link.confirm(burst, Outcome.SENT, 0.001)
-    (pending,) = link.outcomes.receipts._pending.values()
+    (pending,) = link.delivery.receipts._pending.values()
     entry_id = pending[0].message.entry_id
     link.record_from(2, Receipt(0, entry_id, 1), 0.1)
-    (verdict,) = link.outcomes.receipts.take()
+    (verdict,) = link.delivery.receipts.take()
     assert (verdict.fate, verdict.took_s) == ("delivered", None)
 
 
@@ -253,13 +251,13 @@ def test_a_message_of_unknown_age_is_refused_where_age_matters(lifespan_s):
     receiver.set_policy(0, TopicPolicy(lifespan_s=lifespan_s))
     sender.submit(0, message(1), 0.0)
     got = []
-    for pdu in sender.departures.compose(0.0, Allowance.of(63)).pdus:
+    for pdu in sender.scheduler.compose(0.0, Allowance.of(63)).pdus:
         got += receiver.hear(pdu, 0.0, None, 0.01)
     assert len(got) == (lifespan_s == float("inf"))
     assert receiver.inbox.tallies[1, 0].dropped["rx_no_age"] == (lifespan_s < 1)
     receiver.set_policy(0, TopicPolicy(lifespan_s=lifespan_s, stamp=False))
     sender.submit(0, message(2), 0.1)
-    for pdu in sender.departures.compose(0.1, Allowance.of(63)).pdus:
+    for pdu in sender.scheduler.compose(0.1, Allowance.of(63)).pdus:
         assert receiver.hear(pdu, 0.1, None, 0.11), "one's own decision"
 
 
@@ -269,18 +267,18 @@ def test_a_relay_sends_on_nothing_that_is_too_old():
     relay.set_policy(0, TopicPolicy(lifespan_s=0.2))
     for number in range(2):
         sender.submit(0, message(number), 0.0)
-        for pdu in sender.departures.compose(0.05, Allowance.of(63)).pdus:
+        for pdu in sender.scheduler.compose(0.05, Allowance.of(63)).pdus:
             relay.hear(pdu, 0.05, None, 0.05)
         if number == 0:
-            assert relay.departures.compose(0.19, Allowance.of(63)).pdus
-    relay.departures.compose(0.21, Allowance.of(63))
+            assert relay.scheduler.compose(0.19, Allowance.of(63)).pdus
+    relay.scheduler.compose(0.21, Allowance.of(63))
     assert relay.sender.relayed.dropped == {"tx_expired": 1}
 
 
 def test_a_command_topic_that_falls_silent_is_due_once():
     air = Air(7, (1, 2))
     air.links[2].set_policy(0, TopicPolicy(deadman_s=0.3))
-    deadman = air.links[2].outcomes.deadman
+    deadman = air.links[2].delivery.deadman
     for number in range(5):
         air.links[1].submit(0, message(number), air.now)
         air.run(air.now + 0.1)
@@ -314,9 +312,9 @@ def test_a_relay_that_has_just_begun_sends_on_nothing_that_is_too_old_either():
     relay = make_link(own_id=2, hop_limit=2, relay=RelayParams(policy="flood"))
     relay.set_policy(0, TopicPolicy(lifespan_s=0.2))
     sender.submit(0, message(1), 5.0)
-    for pdu in sender.departures.compose(9.0, Allowance.of(63)).pdus:
+    for pdu in sender.scheduler.compose(9.0, Allowance.of(63)).pdus:
         relay.hear(pdu, 0.5, None, 0.5)
-    relay.departures.compose(0.6, Allowance.of(63))
+    relay.scheduler.compose(0.6, Allowance.of(63))
     assert relay.sender.relayed.dropped == {"tx_expired": 1}
 
 
@@ -325,21 +323,21 @@ def test_a_message_is_told_of_once_however_late_it_fails(answered):
     link = make_link(receipt_s=1.0)
     link.submit(0, message(1), 0.0, Overrides(receipt="one", dst=2))
     burst = next_burst(link, 0.0)
-    ((pending,),) = link.outcomes.receipts._pending.values()
+    ((pending,),) = link.delivery.receipts._pending.values()
     if answered:
         link.record_from(2, Receipt(0, pending.message.entry_id, 1), 0.1)
     else:
         link.handle_timers(2.0)
     link.confirm(burst, Outcome.LOST, 2.1)
     link.handle_timers(10.0)
-    (verdict,) = link.outcomes.receipts.take()
+    (verdict,) = link.delivery.receipts.take()
     assert verdict.fate == ("delivered" if answered else "unknown")
 
 
 def test_without_a_control_channel_nobody_can_know():
     link = make_link(topics=[(f"t{i}", "std_msgs/String") for i in range(16)])
     assert link.submit(0, message(1), 0.0, Overrides(receipt="one", dst=3)) is None
-    (verdict,) = link.outcomes.receipts.take()
+    (verdict,) = link.delivery.receipts.take()
     assert (verdict.fate, verdict.dst) == ("unknown", 3)
 
 
@@ -354,7 +352,7 @@ def test_without_a_control_channel_everything_is_told_once():
     link.submit(0, message(4), 1.0, Overrides(receipt="lost"))
     link.confirm(next_burst(link, 1.0), Outcome.LOST, 1.001)
     link.handle_timers(100.0)
-    told = [(each.receipt, each.fate, each.reason) for each in link.outcomes.receipts.take()]
+    told = [(each.receipt, each.fate, each.reason) for each in link.delivery.receipts.take()]
     assert told == [
         ("superseded", "unknown", ""),
         ("expired", "unknown", ""),
@@ -367,7 +365,7 @@ def test_what_is_refused_names_the_robot_it_was_for():
     link = make_link()
     link.set_policy(0, TopicPolicy(max_bytes=10))
     link.submit(0, message(1), 0.0, Overrides(receipt="one", dst=3))
-    assert link.outcomes.receipts.take()[0].dst == 3
+    assert link.delivery.receipts.take()[0].dst == 3
 
 
 def test_an_early_stamp_is_kept_while_its_message_is_still_arriving():
@@ -379,7 +377,7 @@ def test_an_early_stamp_is_kept_while_its_message_is_still_arriving():
         if i == 2:
             # Its rest leaves room for the other's age, too.
             sender.submit(1, message(2, 4), 0.0)
-        burst = sender.departures.compose(0.05 * i, Allowance.of(1))
+        burst = sender.scheduler.compose(0.05 * i, Allowance.of(1))
         pdus += [(0.05 * i, pdu) for pdu in (burst.pdus if burst else ())]
     got = []
     for at, pdu in pdus:
@@ -398,7 +396,7 @@ def test_what_parity_repairs_has_its_age():
     receiver.set_policy(0, TopicPolicy(lifespan_s=60.0))
     sender.submit(0, message(1, 1200), 0.0)
     pdus = []
-    while burst := sender.departures.compose(0.1, Allowance.of(63)):
+    while burst := sender.scheduler.compose(0.1, Allowance.of(63)):
         pdus += burst.pdus
     last = max(
         i for i, pdu in enumerate(pdus) if any(e.topic_id == 0 for e in parse(pdu, 128).entries)

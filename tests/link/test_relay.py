@@ -25,7 +25,7 @@ def node(own_id, *routes, policy="routes", **more):
 def pass_on(link, now):
     """What a link sends at `now`."""
     pdus = []
-    while burst := link.departures.compose(now, Allowance.of(8)):
+    while burst := link.scheduler.compose(now, Allowance.of(8)):
         link.confirm(burst, Outcome.SENT, now)
         pdus += burst.pdus
     return pdus
@@ -108,7 +108,7 @@ def test_relayed_pdus_go_by_class_and_priority_and_never_mix_in_a_burst():
     two.submit(0, bytes(30), 0.0, Overrides(Qos.LATENCY, priority=0))
     two.submit(0, bytes(30), 0.0, Overrides(Qos.URGENT))
     bursts = []
-    while burst := two.departures.compose(0.1, Allowance.of(8)):
+    while burst := two.scheduler.compose(0.1, Allowance.of(8)):
         two.confirm(burst, Outcome.SENT, 0.1)
         bursts.append([(parse(pdu, 64).src, parse(pdu, 64).qos) for pdu in burst.pdus])
     assert all(len({src for src, _ in burst}) == 1 for burst in bursts)
@@ -124,7 +124,7 @@ def test_a_relay_that_is_never_idle_still_tells_of_itself():
         one.submit(2, bytes(30), now, Overrides(Qos.URGENT, dst=3))
         for pdu in pass_on(one, now):
             two.hear(pdu, now)
-        burst = two.departures.compose(now, Allowance.of(4))
+        burst = two.scheduler.compose(now, Allowance.of(4))
         two.confirm(burst, Outcome.SENT, now)
         sources += [parse(pdu, 64).src for pdu in burst.pdus]
     assert 3 <= sources.count(2) <= 12
@@ -157,7 +157,7 @@ def test_in_any_mesh_messages_arrive_once_and_the_ledgers_add_up(seed):
                     bytes((0, 1, 0, 0, i)) + step.to_bytes(2, "big") + bytes(rng.randrange(90))
                 )
                 link.submit(rng.randrange(3), payload, now, Overrides(dst=rng.choice((None, 3))))
-            if rng.random() < 0.5 and (burst := link.departures.compose(now, Allowance.of(4))):
+            if rng.random() < 0.5 and (burst := link.scheduler.compose(now, Allowance.of(4))):
                 link.confirm(burst, rng.choice((Outcome.SENT, Outcome.SENT, Outcome.LOST)), now)
                 on_air += [(b, pdu) for a, b in links if a == i for pdu in burst.pdus]
         rng.shuffle(on_air)

@@ -11,7 +11,7 @@ from sdrlinkd.link import (
     RateParams,
 )
 from sdrlinkd.link.access import Slot
-from sdrlinkd.link.returned import GIVE_UP_S
+from sdrlinkd.link.transmit import GIVE_UP_S
 from sdrlinkd.wire import Beacon, Frame, Stamp, parse
 from tests.link.radios import LOCKSTEP, params
 from tests.link.world import PDU_S, airtime_s, make_link, next_burst, records_in
@@ -141,7 +141,7 @@ def test_it_waits_for_a_slot_that_it_fits_into_and_nothing_overtakes_it():
     length_s = airtime_s(0, len(burst.pdus))
     assert len(burst.pdus) == 6
     link.confirm(burst, Outcome.LATE, 0.1)
-    link.departures.access = door = Doorkeeper(
+    link.scheduler.access = door = Doorkeeper(
         None, Slot.exact(0.3, 0.3 + length_s / 2), Slot.exact(0.5, 0.5 + length_s)
     )
     link.submit(1, bytes(8), 0.1, Overrides(qos=Qos.URGENT))
@@ -218,9 +218,9 @@ def test_air_that_was_not_used_is_not_counted():
         burst = next_burst(link, now)
         link.confirm(burst, Outcome.LATE, now)
     link.confirm(next_burst(link, 0.6), Outcome.SENT, 0.7)
-    assert link.departures.bursts_late == 3
-    assert link.departures.airtime_s == pytest.approx(PDU_S)
-    assert dict(link.departures.bursts_by_mcs) == {0: 1}
+    assert link.scheduler.bursts_late == 3
+    assert link.scheduler.airtime_s == pytest.approx(PDU_S)
+    assert dict(link.scheduler.bursts_by_mcs) == {0: 1}
 
 
 def test_a_beacon_that_was_late_is_still_a_beacon():

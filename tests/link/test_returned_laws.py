@@ -39,7 +39,7 @@ def test_the_ledger_adds_up_at_every_step_of_any_run(seed):
         else:
             link.handle_timers(now)
         assert_books_balance(link, seed)
-    assert link.departures.bursts_late == n_late
+    assert link.scheduler.bursts_late == n_late
     link.shut_down()
     for burst in on_air:
         link.confirm(burst, rng.choice((Outcome.SENT, Outcome.LATE)), now)

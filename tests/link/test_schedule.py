@@ -202,7 +202,7 @@ class Later(Free):
 @pytest.mark.parametrize(("most_s", "n"), [(0.0, 1), (1.5e-3, 1), (2.9e-3, 2), (1e9, 8)])
 def test_a_burst_is_no_longer_than_what_is_made_when_its_slot_begins(most_s, n):
     link = make_link(pdu_size=64)
-    link.departures.access = Later()
+    link.scheduler.access = Later()
     for _ in range(40):
         link.submit(0, bytes(50), 0.0)
 

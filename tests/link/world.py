@@ -57,7 +57,7 @@ def make_link(
 def send_all(link, now=0.0, max_pdus=63):
     """Compose and confirm until nothing is left that may go at `now`; the PDUs."""
     pdus = []
-    while burst := link.departures.compose(now, Allowance.of(max_pdus)):
+    while burst := link.scheduler.compose(now, Allowance.of(max_pdus)):
         pdus += burst.pdus
         link.confirm(burst, Outcome.SENT, now)
     return pdus

@@ -1,6 +1,7 @@
 """The one interface of all access policies."""
 
 import math
+from math import inf
 from typing import NamedTuple, Protocol, Self
 
 from sdrlinkd.link.access.sightings import Sightings
@@ -8,7 +9,6 @@ from sdrlinkd.link.carrier import Sensed
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.wire import Frame
 
-INFINITE = float("inf")
 NEVER = -1.0
 MOST_ON_THEIR_WAY = 8
 
@@ -21,12 +21,12 @@ class Slot(NamedTuple):
     """
 
     start: float
-    end: float = INFINITE
-    late_end: float = INFINITE
+    end: float = inf
+    late_end: float = inf
     least: Qos = Qos.BULK
 
     @classmethod
-    def exact(cls, start: float, end: float = INFINITE, least: Qos = Qos.BULK) -> Self:
+    def exact(cls, start: float, end: float = inf, least: Qos = Qos.BULK) -> Self:
         """At `start` or not at all."""
         return cls(start, end, start, least)
 

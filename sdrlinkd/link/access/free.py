@@ -1,6 +1,8 @@
 """`none`: an air of our own."""
 
-from sdrlinkd.link.access.base import INFINITE, Carriers, Slot, Wish
+from math import inf
+
+from sdrlinkd.link.access.base import Carriers, Slot, Wish
 from sdrlinkd.link.access.sightings import Sightings
 
 DEAF_S = 0.02
@@ -18,7 +20,7 @@ class Free(Carriers):
         self,
         deaf_s: float = 0.0,
         gap_s: float = 0.0,
-        spell_s: float = INFINITE,
+        spell_s: float = inf,
         pause_s: float = 0.0,
         is_alone: bool = False,
     ) -> None:
@@ -41,7 +43,7 @@ class Free(Carriers):
     def carries(self, burst_s: float) -> float:
         """All but gaps, and what it listens between spells."""
         spell_s, pause_s = self._spells
-        listens = pause_s / (spell_s + pause_s) if spell_s < INFINITE else 0.0
+        listens = pause_s / (spell_s + pause_s) if spell_s < inf else 0.0
         gaps = self._gap_s / (burst_s + self._gap_s) if self._gap_s else 0.0
         return (1 - gaps) * (1 - listens)
 

@@ -3,10 +3,11 @@
 import math
 from binascii import crc_hqx
 from collections.abc import Sequence
+from math import inf
 from random import Random
 from struct import pack
 
-from sdrlinkd.link.access.base import INFINITE, Carriers, Slot, Wish, next_on_grid
+from sdrlinkd.link.access.base import Carriers, Slot, Wish, next_on_grid
 from sdrlinkd.link.access.sightings import Sightings
 from sdrlinkd.link.carrier import Sensed
 from sdrlinkd.wire import Frame
@@ -86,7 +87,7 @@ class Tdma(Carriers):
         """Beacons since a robot told of a schedule: who has one tells it beside each."""
         self._heard_at: dict[int, float] = {}
         self._followed_at = 0.0
-        self._listens = (-INFINITE, False)
+        self._listens = (-inf, False)
         """Of our latest slot: its begin, and whether we listen through it."""
         self._told_of_at: dict[int, float] = {}
 
@@ -242,7 +243,7 @@ class Tdma(Carriers):
     def _knows_of_hidden(self, now: float) -> bool:
         """Whether others hear somebody whom we do not."""
         return any(
-            now - told_at < FORGET_S and now - self._heard_at.get(node, -INFINITE) >= FORGET_S
+            now - told_at < FORGET_S and now - self._heard_at.get(node, -inf) >= FORGET_S
             for node, told_at in self._told_of_at.items()
         )
 

@@ -1,13 +1,13 @@
 """How many PDUs the next burst may hold, by the class of what goes next."""
 
 from collections.abc import Callable, Collection
+from math import inf
 from typing import NamedTuple
 
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.schedule.forecast import Forecasts
 from sdrlinkd.link.schedule.params import ClassesParams
 
-INFINITE = float("inf")
 ALIVE_S = 1.0
 """A class has something alive for so long after its last message."""
 OVERRUN = 0.25
@@ -30,7 +30,7 @@ class Allowance(NamedTuple):
 
     most: tuple[int, ...]
     owed: tuple[Qos, ...] = ()
-    until: float = INFINITE
+    until: float = inf
 
     @classmethod
     def of(cls, n_pdus: int) -> "Allowance":
@@ -52,7 +52,7 @@ class Limits:
     """Caps by class, and gaps for what is due."""
 
     def __init__(self, params: ClassesParams, forecasts: Forecasts) -> None:
-        self._cap_s = {qos: params.of(qos).max_burst_s or INFINITE for qos in Qos}
+        self._cap_s = {qos: params.of(qos).max_burst_s or inf for qos in Qos}
         self._forecasts = forecasts
         self._idle_s = MOST_IDLE_S
         self._asked_at = 0.0
@@ -79,7 +79,7 @@ class Limits:
             MOST_IDLE_S, self._idle_s + IDLE_SHARE * max(0.0, start - self._asked_at)
         )
         self._asked_at = max(start, self._asked_at)
-        most, until = [], INFINITE
+        most, until = [], inf
         for qos in Qos:
             if qos not in asked:
                 most.append(0)
@@ -92,7 +92,7 @@ class Limits:
             if due is not None and n:
                 free_s = due.due(known) - due.spread_s + ready_s - start
                 n = self._before(free_s, 2 * due.spread_s + notice_s, n, airtime_s, overrun)
-                if n == 0 and until == INFINITE:
+                if n == 0 and until == inf:
                     until = due.due(known) + due.spread_s + notice_s
             most.append(n)
         return Allowance(tuple(most), until=until)

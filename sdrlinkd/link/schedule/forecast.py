@@ -2,10 +2,10 @@
 
 from collections.abc import Hashable
 from dataclasses import dataclass
+from math import inf
 
 from sdrlinkd.link.qos import Qos
 
-INFINITE = float("inf")
 MEMORY = 16
 """So many messages are remembered, in effect."""
 LEARNED = 3
@@ -105,7 +105,7 @@ class Forecasts:
 
     def next_due(self, now: float, below: Qos) -> Forecast | None:
         """The topic more urgent than `below` that is due first; None when none is periodic."""
-        first, first_at = None, INFINITE
+        first, first_at = None, inf
         for each in self._by_key.values():
             if each.qos < below and each.is_periodic and each.is_alive(now):
                 at = each.due(now) - each.spread_s

@@ -1,0 +1,51 @@
+"""Messages that wait to be sent: who goes first, and who is not taken at all.
+
+This room owns the queue, the policies of topics, and the ledger's table of reasons. It never makes
+a PDU, and knows neither radio nor air.
+"""
+
+from sdrlinkd.link.queue.admission import NOT_TAKEN
+from sdrlinkd.link.queue.compression import Deflated, Inflated, train_dictionary
+from sdrlinkd.link.queue.latched import Kept, Latched, Offer
+from sdrlinkd.link.queue.ledger import (
+    RX_PDU_REASONS,
+    RX_REASONS,
+    TX_REASONS,
+    RxTally,
+    TxTally,
+    balance,
+    tx_balance,
+)
+from sdrlinkd.link.queue.lifespan import Lifespan, lifespan_of
+from sdrlinkd.link.queue.message import Fate, Lane, Level, Outgoing, with_first
+from sdrlinkd.link.queue.outbox import Outbox
+from sdrlinkd.link.queue.policy import DEFAULT_POLICY, TopicPolicy
+from sdrlinkd.link.queue.topic_state import TopicState
+
+__all__ = [
+    "DEFAULT_POLICY",
+    "NOT_TAKEN",
+    "RX_PDU_REASONS",
+    "RX_REASONS",
+    "TX_REASONS",
+    "Deflated",
+    "Fate",
+    "Inflated",
+    "Kept",
+    "Lane",
+    "Latched",
+    "Level",
+    "Lifespan",
+    "Offer",
+    "Outbox",
+    "Outgoing",
+    "RxTally",
+    "TopicPolicy",
+    "TopicState",
+    "TxTally",
+    "balance",
+    "lifespan_of",
+    "train_dictionary",
+    "tx_balance",
+    "with_first",
+]

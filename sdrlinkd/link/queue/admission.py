@@ -1,0 +1,39 @@
+"""What a topic's policy lets into the queue at all."""
+
+from sdrlinkd.link.queue.policy import TopicPolicy
+
+NOT_TAKEN = frozenset({"tx_size_cap", "tx_unchanged", "tx_decimated", "tx_throttled", "tx_too_big"})
+"""Reasons for which a message never was in the queue."""
+
+
+class Admission:
+    """Size cap, throttle, decimation and change detection of one topic."""
+
+    __slots__ = ("_due_at", "_last", "_number", "_policy")
+
+    def __init__(self, policy: TopicPolicy) -> None:
+        self._policy = policy
+        self._due_at = float("-inf")
+        self._number = 0
+        self._last: bytes | None = None
+
+    def refuse(self, payload: bytes, now: float) -> str | None:
+        """The ledger's reason for keeping a message out; None: it may enter, and is remembered."""
+        policy = self._policy
+        if policy.max_bytes and len(payload) > policy.max_bytes:
+            return "tx_size_cap"
+        if policy.on_change and payload == self._last:
+            return "tx_unchanged"
+        if policy.decimate > 1:
+            self._number += 1
+            if self._number % policy.decimate != 1:
+                return "tx_decimated"
+        if policy.period_s:
+            if now < self._due_at:
+                return "tx_throttled"
+            # On a grid, so that a period that is no multiple of the producer's holds on average.
+            late_s = now - self._due_at
+            self._due_at = now + policy.period_s - (late_s if late_s < policy.period_s else 0.0)
+        if policy.on_change:
+            self._last = payload
+        return None

@@ -1,0 +1,271 @@
+"""What waits to be sent, and who goes next.
+
+Service order is level by level, inside a level by earliest expiry, and among equals round robin: a
+lane that gave an entry goes to the back.
+"""
+
+from bisect import bisect_left, insort
+from collections import OrderedDict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from math import inf
+
+from sdrlinkd.link.params import QueueParams
+from sdrlinkd.link.qos import Qos
+from sdrlinkd.link.queue.message import Fate, Lane, Level, Outgoing
+from sdrlinkd.link.queue.policy import TopicPolicy
+from sdrlinkd.wire import ENTRY_HEADER_SIZE
+
+
+@dataclass(slots=True)
+class _Queued:
+    """One topic's messages of which nothing has been sent yet, the oldest first."""
+
+    messages: OrderedDict[Outgoing, None] = field(default_factory=OrderedDict)
+    n_bytes: int = 0
+
+    @property
+    def oldest(self) -> Outgoing:
+        return next(iter(self.messages))
+
+
+def _order(lane: Lane) -> tuple[float, int]:
+    return lane.order
+
+
+class Outbox:
+    """The queue of one node. Every operation costs the same with ten messages or ten thousand."""
+
+    def __init__(self, limits: QueueParams) -> None:
+        self._limits = limits
+        self._lanes: dict[tuple[int, int, int, int], Lane] = {}
+        # Levels with lanes, in service order.
+        self.levels: list[Level] = []
+        self._level_by_key: dict[tuple[int, int], Level] = {}
+        self._by_class: dict[Qos, OrderedDict[Outgoing, None]] = {q: OrderedDict() for q in Qos}
+        self._class_bytes = dict.fromkeys(Qos, 0)
+        self._by_topic: dict[int, _Queued] = {}
+        self._turn = 0
+        self.queued = 0
+        self.queued_bytes = 0
+        self._with_lifespan = 0
+        self.relays = False
+        """Whether other robots' PDUs have ever waited here."""
+        self.bytes_per_s = inf
+        """What the air carries at the moment: bounds in seconds are by this."""
+        # Begun and not yet settled; whoever settles a message takes it out.
+        self.in_flight: set[Outgoing] = set()
+
+    def __bool__(self) -> bool:
+        return bool(self.levels)
+
+    def put(self, message: Outgoing, policy: TopicPolicy) -> list[tuple[Outgoing, str]]:
+        """Queue `message`; what had to go for it, each with its reason (perhaps itself)."""
+        if not self._can_make_room(message):
+            return [(message, "tx_overflow_new")]
+        shed: list[tuple[Outgoing, str]] = []
+        topic, depth, size = self._by_topic.get(message.topic_id), policy.kept, len(message.payload)
+        if topic is not None:
+            while depth and len(topic.messages) >= depth:
+                shed.append((self._withdraw_waiting(topic.oldest), "tx_superseded"))
+            most = self._bytes_of(policy.queue_bytes or inf, policy.queue_s or inf)
+            while topic.messages and topic.n_bytes + size > most:
+                shed.append((self._withdraw_waiting(topic.oldest), "tx_topic_full"))
+        limits, most = self._limits, self._most_bytes
+        while self.queued >= limits.max_messages or self.queued_bytes + size > most:
+            victim = self._oldest_of_lowest_class()
+            shed.append((self._withdraw_waiting(victim), "tx_overflow_old"))
+        self._enqueue(message)
+        return shed
+
+    def begin(self, lane: Lane) -> Outgoing:
+        """The lane's first waiting message becomes the one being fragmented."""
+        message = lane.waiting.popleft()
+        self._forget_queued(message)
+        lane.current = message
+        message.fate = Fate.IN_FLIGHT
+        self.in_flight.add(message)
+        return message
+
+    def served(self, lane: Lane) -> None:
+        """The lane gave an entry; it goes behind its equals, or away when it is empty."""
+        head = lane.head
+        if head is None:
+            self._unlink(lane)
+            del self._lanes[lane.level.key[0], lane.level.key[1], lane.topic_id, lane.dst]
+            return
+        level = lane.level
+        if len(level.lanes) == 1:
+            lane.order = (head.expires_at, self._next_turn())
+            return
+        self._unlink(lane)
+        self._link(lane, head)
+
+    def withdraw_head(self, lane: Lane) -> Outgoing:
+        """Take the lane's head out, fragments and all."""
+        if lane.current is not None:
+            message, lane.current = lane.current, None
+        else:
+            message = lane.waiting.popleft()
+            self._forget_queued(message)
+        self.served(lane)
+        return message
+
+    def withdraw_all(self) -> Iterator[Outgoing]:
+        """Take everything out, in service order."""
+        while self.levels:
+            yield self.withdraw_head(self.levels[0].lanes[0])
+
+    def head(self) -> tuple[Qos, set[int]] | None:
+        """(class of what goes next, destinations of all that waits); None when nothing does."""
+        if not self.levels:
+            return None
+        destinations = {dst for level in self.levels for dst in level.per_dst}
+        return Qos(self.levels[0].key[0]), destinations
+
+    def waiting_classes(self) -> set[Qos]:
+        """Of which something waits."""
+        return {Qos(level.key[0]) for level in self.levels}
+
+    def oldest_arrival(self) -> float:
+        """When the longest waiting head arrived; infinity when nothing waits."""
+        return min(
+            (
+                lane.head.arrived_at
+                for level in self.levels
+                for lane in level.lanes
+                if lane.head is not None
+            ),
+            default=float("inf"),
+        )
+
+    def first_begun(self) -> float:
+        """Of messages begun and not through, when the first was last served; infinity: none is."""
+        return min((each.last_at for each in self._begun()), default=inf)
+
+    def has_lifespans(self) -> bool:
+        """Whether anything that waits, or its rest, will be worthless some day."""
+        return self._with_lifespan > 0 or any(each.expires_at < inf for each in self._begun())
+
+    def pending_bytes(self, enough: int) -> int:
+        """Bytes of all that waits, entry headers included; counting stops at `enough`."""
+        total = -ENTRY_HEADER_SIZE
+        for level in self.levels:
+            for lane in level.lanes:
+                if lane.current is not None:
+                    message = lane.current
+                    total += max(0, len(message.payload) - message.next_index * message.k)
+                    total += ENTRY_HEADER_SIZE
+                for message in lane.waiting:
+                    total += len(message.payload) + ENTRY_HEADER_SIZE
+                    if total >= enough:
+                        return total
+        return total
+
+    def queued_by_class(self) -> dict[Qos, int]:
+        """Messages of each class of which nothing has been sent yet."""
+        return {qos: len(queue) for qos, queue in self._by_class.items()}
+
+    def queued_of_topic(self, topic_id: int) -> int:
+        """Messages of one topic of which nothing has been sent yet."""
+        topic = self._by_topic.get(topic_id)
+        return len(topic.messages) if topic is not None else 0
+
+    def _begun(self) -> Iterator[Outgoing]:
+        """Messages of which something has been sent, and something has not."""
+        for level in self.levels:
+            for lane in level.lanes:
+                if lane.current is not None:
+                    yield lane.current
+
+    def _enqueue(self, message: Outgoing) -> None:
+        key = (message.qos, -message.priority, message.topic_id, message.dst)
+        lane = self._lanes.get(key)
+        if lane is None:
+            lane = self._lanes[key] = Lane(message.topic_id, message.dst, self._level(key[:2]))
+            lane.waiting.append(message)
+            self._link(lane, message)
+        else:
+            lane.waiting.append(message)
+        message.lane = lane
+        self.relays = self.relays or message.is_whole
+        self._by_class[message.qos][message] = None
+        topic = self._by_topic.get(message.topic_id)
+        if topic is None:
+            topic = self._by_topic[message.topic_id] = _Queued()
+        topic.messages[message] = None
+        topic.n_bytes += len(message.payload)
+        self.queued += 1
+        self._with_lifespan += message.expires_at < inf
+        self.queued_bytes += len(message.payload)
+        self._class_bytes[message.qos] += len(message.payload)
+
+    def _level(self, key: tuple[int, int]) -> Level:
+        level = self._level_by_key.get(key)
+        if level is None:
+            level = self._level_by_key[key] = Level(key)
+            insort(self.levels, level, key=lambda each: each.key)
+        return level
+
+    def _link(self, lane: Lane, head: Outgoing) -> None:
+        level = self._level(lane.level.key)
+        lane.level = level
+        lane.order = (head.expires_at, self._next_turn())
+        insort(level.lanes, lane, key=_order)
+        level.per_dst[lane.dst] = level.per_dst.get(lane.dst, 0) + 1
+
+    def _unlink(self, lane: Lane) -> None:
+        level = lane.level
+        del level.lanes[bisect_left(level.lanes, lane.order, key=_order)]
+        level.per_dst[lane.dst] -= 1
+        if not level.per_dst[lane.dst]:
+            del level.per_dst[lane.dst]
+        if not level.lanes:
+            del self._level_by_key[level.key]
+            del self.levels[bisect_left(self.levels, level.key, key=lambda each: each.key)]
+
+    @property
+    def _most_bytes(self) -> float:
+        return self._bytes_of(self._limits.max_bytes, self._limits.max_airtime_s)
+
+    def _bytes_of(self, n_bytes: float, seconds: float) -> float:
+        """The smaller of two bounds."""
+        return min(n_bytes, seconds * self.bytes_per_s)
+
+    def _can_make_room(self, message: Outgoing) -> bool:
+        """Whether it fits when all that waits in its class and below is shed."""
+        limits, size = self._limits, len(message.payload)
+        if self.queued < limits.max_messages and self.queued_bytes + size <= self._most_bytes:
+            return True
+        higher = [qos for qos in Qos if qos < message.qos]
+        return (
+            sum(len(self._by_class[qos]) for qos in higher) < limits.max_messages
+            and sum(self._class_bytes[qos] for qos in higher) + size <= self._most_bytes
+        )
+
+    def _oldest_of_lowest_class(self) -> Outgoing:
+        lowest = max(qos for qos, queue in self._by_class.items() if queue)
+        return next(iter(self._by_class[lowest]))
+
+    def _withdraw_waiting(self, message: Outgoing) -> Outgoing:
+        """`message` is the oldest of its class or topic, so first among its lane's waiting."""
+        lane = message.lane
+        lane.waiting.popleft()
+        self._forget_queued(message)
+        if lane.current is None:
+            self.served(lane)
+        return message
+
+    def _forget_queued(self, message: Outgoing) -> None:
+        del self._by_class[message.qos][message]
+        topic = self._by_topic[message.topic_id]
+        del topic.messages[message]
+        topic.n_bytes -= len(message.payload)
+        self.queued -= 1
+        self._with_lifespan -= message.expires_at < inf
+        self.queued_bytes -= len(message.payload)
+        self._class_bytes[message.qos] -= len(message.payload)
+
+    def _next_turn(self) -> int:
+        self._turn += 1
+        return self._turn

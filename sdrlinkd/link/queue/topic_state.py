@@ -1,0 +1,37 @@
+"""A topic on its way out: its policy, resolved once, and its tally."""
+
+import zstandard
+
+from sdrlinkd.link.qos import QOS_BY_LABEL
+from sdrlinkd.link.queue.admission import Admission
+from sdrlinkd.link.queue.compression import Deflated
+from sdrlinkd.link.queue.ledger import TxTally
+from sdrlinkd.link.queue.policy import TopicPolicy
+
+
+class TopicState:
+    """What the sender knows of one topic."""
+
+    __slots__ = (
+        "_default_dst", "_dictionary", "_has_control", "admission", "deflated", "dst", "policy",
+        "priority", "qos", "stamp", "tally",
+    )  # fmt: skip
+
+    def __init__(
+        self, dst: int, has_control: bool, dictionary: zstandard.ZstdCompressionDict | None
+    ) -> None:
+        self._default_dst = dst
+        self._has_control = has_control
+        self._dictionary = dictionary
+        self.tally = TxTally()
+        self.apply(TopicPolicy())
+
+    def apply(self, policy: TopicPolicy) -> None:
+        """From now on; messages that wait keep what they have."""
+        self.policy = policy
+        self.qos = QOS_BY_LABEL[policy.qos]
+        self.priority = policy.priority
+        self.dst = self._default_dst if policy.dst is None else policy.dst
+        self.stamp = policy.stamp and self._has_control
+        self.admission = Admission(policy)
+        self.deflated = Deflated(self._dictionary) if policy.compress == "zstd" else None

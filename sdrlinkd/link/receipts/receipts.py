@@ -1,0 +1,155 @@
+"""What became of messages whose producers want to know."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from sdrlinkd.link.queue import Outgoing
+from sdrlinkd.link.receive import DELIVERED
+from sdrlinkd.wire import BROADCAST, NO_AGE, RECEIPT_UNIT_S, Receipt
+
+EARLIER_S = 0.05
+"""So much may the far end's word of when a message was submitted be too early."""
+MOST_PENDING = 4096
+REASONS = (
+    DELIVERED, "rx_expired", "rx_partial_timeout", "rx_partial_superseded", "rx_partial_evicted",
+    "rx_partial_memory", "rx_size_cap", "rx_bad_zstd", "rx_inflates", "rx_no_dictionary",
+    "rx_bad_cdr", "rx_unknown_topic", "rx_no_age",
+)  # fmt: skip
+"""By status, from 1 (wire document, section 6.7)."""
+STATUS = {reason: number for number, reason in enumerate(REASONS, 1)}
+EXPIRED = ("rx_expired", "tx_expired")
+
+
+class Verdict(NamedTuple):
+    """For the producer: `fate` is delivered, expired, dropped or unknown; at robot `dst`.
+
+    `took_s` is the message's age when it was delivered there, where that is known; `left` robots
+    have still to answer.
+    """
+
+    receipt: str
+    topic_id: int
+    dst: int
+    fate: str
+    reason: str = ""
+    took_s: float | None = None
+    left: int = 0
+
+
+@dataclass(slots=True)
+class _Pending:
+    message: Outgoing
+    until: float
+    awaited: set[int]
+
+
+def make_receipt(
+    src: int, topic_id: int, entry_id: int, reason: str, age_s: float | None
+) -> Receipt:
+    """What robot `src` is told of its message."""
+    age = NO_AGE if age_s is None else min(max(round(age_s / RECEIPT_UNIT_S), 0), NO_AGE)
+    return Receipt(topic_id, entry_id, STATUS[reason], src, age)
+
+
+class Receipts:
+    """The sender's half: who has still to answer. Every robot asked is told of exactly once."""
+
+    def __init__(self, timeout_s: float) -> None:
+        self._timeout_s = timeout_s
+        self._pending: dict[tuple[int, int], list[_Pending]] = {}
+        self._n_pending = 0
+        self.verdicts: list[Verdict] = []
+        """For the producers; whoever tells them takes them out."""
+        self.unasked = 0
+        """RECEIPTs of which nothing was known any more."""
+
+    def expect(self, message: Outgoing, present: Iterable[int], now: float) -> None:
+        """A message has left; a broadcast one is for all robots `present`."""
+        message.is_expected = True
+        awaited = set(present) if message.dst == BROADCAST else {message.dst}
+        pending = _Pending(message, now + self._timeout_s, awaited or {BROADCAST})
+        if self._n_pending >= MOST_PENDING:
+            self._give_up(pending)
+            return
+        key = (message.topic_id, message.entry_id)
+        self._pending.setdefault(key, []).append(pending)
+        self._n_pending += 1
+
+    def hear(self, src: int, receipt: Receipt, at: float) -> None:
+        """Robot `src` answers, in a burst whose preamble came at `at`."""
+        age_s = None if receipt.age_100us == NO_AGE else RECEIPT_UNIT_S * receipt.age_100us
+        ended_at = at - RECEIPT_UNIT_S * receipt.since_100us
+        # Entry ids come again: the last one that was there in time is meant.
+        latest = ended_at + EARLIER_S - (age_s or 0.0)
+        for pending in reversed(self._pending.get((receipt.topic_id, receipt.entry_id), ())):
+            if pending.message.arrived_at > latest:
+                continue
+            if src not in pending.awaited:
+                break
+            pending.awaited.discard(src)
+            known = receipt.status <= len(REASONS) and receipt.status
+            reason = REASONS[receipt.status - 1] if known else f"rx_status_{receipt.status}"
+            self._tell(pending.message, src, reason, age_s, len(pending.awaited))
+            if not pending.awaited:
+                self._forget(pending)
+            return
+        self.unasked += 1
+
+    def dropped(self, message: Outgoing, reason: str) -> None:
+        """It did not get on the air, or not whole."""
+        for pending in self._pending.get((message.topic_id, message.entry_id), ()):
+            if pending.message is message:
+                for left, dst in _counted_down(pending.awaited):
+                    self._tell(message, dst, reason, None, left)
+                self._forget(pending)
+                return
+        if not message.is_expected:
+            self._tell(message, message.dst, reason, None)
+
+    def expire(self, now: float) -> None:
+        """Who has not answered for so long does not know, or was not heard."""
+        if not self._n_pending:
+            return
+        late = [each for of in self._pending.values() for each in of if each.until <= now]
+        for pending in late:
+            self._give_up(pending)
+            self._forget(pending)
+
+    def take(self) -> list[Verdict]:
+        """Those that nobody was told of yet."""
+        verdicts, self.verdicts = self.verdicts, []
+        return verdicts
+
+    def _tell(
+        self, message: Outgoing, dst: int, reason: str, age_s: float | None, left: int = 0
+    ) -> None:
+        fate = "dropped"
+        if reason == DELIVERED:
+            fate, reason = DELIVERED, ""
+        elif reason in EXPIRED:
+            fate = "expired"
+        self.verdicts.append(
+            Verdict(message.receipt, message.topic_id, dst, fate, reason, age_s, left)
+        )
+
+    def _give_up(self, pending: _Pending) -> None:
+        message = pending.message
+        self.verdicts += [
+            Verdict(message.receipt, message.topic_id, dst, "unknown", left=left)
+            for left, dst in _counted_down(pending.awaited)
+        ]
+
+    def _forget(self, pending: _Pending) -> None:
+        key = (pending.message.topic_id, pending.message.entry_id)
+        left = [each for each in self._pending[key] if each is not pending]
+        self._n_pending -= 1
+        if left:
+            self._pending[key] = left
+        else:
+            del self._pending[key]
+
+
+def _counted_down(robots: set[int]) -> Iterable[tuple[int, int]]:
+    """(how many come after it, robot)."""
+    return zip(range(len(robots) - 1, -1, -1), sorted(robots), strict=True)

@@ -1,0 +1,31 @@
+"""PDUs heard, and the messages that they make.
+
+This room owns the reassembly, the duplicate filter, ages, and what is known of neighbors. It never
+sends: what others want to know of a message, it hands on.
+"""
+
+from sdrlinkd.link.receive.ages import MAX_WAITING, Ages
+from sdrlinkd.link.receive.deadman import Deadman
+from sdrlinkd.link.receive.delivered import CDR_HEADER_SIZE, DELIVERED, Delivered
+from sdrlinkd.link.receive.duplicates import SequenceTrack
+from sdrlinkd.link.receive.inbox import Inbox
+from sdrlinkd.link.receive.latency import Latency, Parts
+from sdrlinkd.link.receive.neighbors import LONGEST_GAP_S, Neighbor
+from sdrlinkd.link.receive.relay import Relay, RelayParams
+
+__all__ = [
+    "CDR_HEADER_SIZE",
+    "DELIVERED",
+    "LONGEST_GAP_S",
+    "MAX_WAITING",
+    "Ages",
+    "Deadman",
+    "Delivered",
+    "Inbox",
+    "Latency",
+    "Neighbor",
+    "Parts",
+    "Relay",
+    "RelayParams",
+    "SequenceTrack",
+]

@@ -1,0 +1,69 @@
+"""Rates, sampled so that the path of a message pays nothing for them."""
+
+from collections import deque
+from collections.abc import Hashable, Mapping
+
+from sdrlinkd.link.receive import Inbox
+from sdrlinkd.link.transmit import Sender
+
+
+class RateMeter:
+    """Mean rates over a sliding window, from counters that are sampled now and then."""
+
+    def __init__(self, window_s: float, step_s: float = 0.5) -> None:
+        self._window_s = window_s
+        self._step_s = step_s
+        self._began_at = float("inf")
+        self._samples: deque[tuple[float, dict[Hashable, int]]] = deque()
+
+    def sample(self, counters: Mapping[Hashable, int], now: float) -> None:
+        """Remember the counters' values at `now`."""
+        while self._samples and now - self._samples[0][0] > self._window_s:
+            self._samples.popleft()
+        self._began_at = min(self._began_at, now)
+        self._samples.append((now, dict(counters)))
+
+    def is_due(self, now: float) -> bool:
+        """Whether the last sample is old enough for another."""
+        return not self._samples or now - self._samples[-1][0] >= self._step_s
+
+    def grown(self, key: Hashable, value: int, now: float) -> int:
+        """How much `key`, whose counter stands at `value` now, has grown within the window."""
+        if not self._samples or now - self._began_at <= self._window_s:
+            return value
+        for at, counters in self._samples:
+            if now - at <= self._window_s:
+                return value - counters.get(key, 0)
+        return 0
+
+    def per_s(self, key: Hashable, value: int, now: float) -> float:
+        """Rate of `key`, whose counter stands at `value` now."""
+        for at, counters in self._samples:
+            if now - at > self._window_s:
+                continue
+            span = now - at
+            return (value - counters.get(key, 0)) / span if span > 0 else 0.0
+        return 0.0
+
+
+def rate_counters(
+    sender: Sender, inbox: Inbox, sent_s: float, heard_s: float
+) -> dict[Hashable, int]:
+    """The counters of which the snapshot shows rates; `sent_s`, `heard_s`: time on the air, ours
+    and that of others.
+    """
+    counters: dict[Hashable, int] = {
+        ("air", "sent"): round(1e6 * sent_s),
+        ("air", "heard"): round(1e6 * heard_s),
+    }
+    for topic_id in range(sender.n_topics):
+        tally = sender.tally(topic_id)
+        counters["tx", topic_id] = tally.accepted
+        counters["accepted_bytes", topic_id] = tally.accepted_bytes
+    for key, heard in inbox.tallies.items():
+        counters["rx", *key] = heard.delivered
+        counters["delivered_bytes", *key] = heard.delivered_bytes
+    for src, neighbor in inbox.neighbors.items():
+        counters["pdus", src] = neighbor.heard
+        counters["lost", src] = neighbor.track.lost
+    return counters

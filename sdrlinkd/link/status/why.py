@@ -1,0 +1,169 @@
+"""What happens to a topic, in plain words."""
+
+from collections.abc import Collection, Hashable
+from math import inf
+from typing import NamedTuple
+
+from sdrlinkd.link.qos import Qos
+from sdrlinkd.link.queue import TX_REASONS, TopicPolicy
+from sdrlinkd.link.schedule import Shares
+from sdrlinkd.link.status.meters import RateMeter
+from sdrlinkd.link.transmit import AirUse, Sender
+from sdrlinkd.wire import BROADCAST
+
+MINUTE_S = 60.0
+STEP_S = 2.0
+FULL = 0.85
+"""No policy leaves much less than the rest idle."""
+OVERFLOW = ("tx_overflow_old", "tx_overflow_new", "tx_topic_full", "tx_superseded", "tx_expired")
+"""Reasons that more air would have cured."""
+
+
+class Told(NamedTuple):
+    """Where policies come from: the file, and keys that were set since."""
+
+    source: str
+    changed: Collection[str]
+
+
+class Why:
+    """Remembers the last minute."""
+
+    def __init__(self, sender: Sender, shares: Shares, air: AirUse) -> None:
+        self._sender = sender
+        self._shares = shares
+        self._air_use = air
+        self._began_at = float("inf")
+        self._meter = RateMeter(MINUTE_S, STEP_S)
+
+    def sample(self, now: float, n_topics: int) -> None:
+        """Now and then."""
+        self._began_at = min(self._began_at, now)
+        if self._meter.is_due(now):
+            self._meter.sample(self._counters(n_topics), now)
+
+    def explain(self, topic_id: int, name: str, told: Told, now: float) -> list[str]:
+        """Sentences for a person."""
+        policy, tally = self._sender.policy(topic_id), self._sender.tally(topic_id)
+        came = self._lately(("accepted", topic_id), tally.accepted, now)
+        sent = self._lately(("sent", topic_id), tally.sent, now)
+        lines = [self._treatment(name, policy, told, topic_id)]
+        if not came:
+            lines.append(
+                "nothing came from a producer in the last minute"
+                if tally.accepted
+                else "no producer has sent anything yet"
+            )
+        else:
+            lines.append(f"in the last minute {came} came, {sent} were sent ({_share(sent, came)})")
+        short = False
+        for reason, total in sorted(tally.dropped.items(), key=lambda each: -each[1]):
+            n = self._lately(("drop", topic_id, reason), total, now)
+            if n:
+                short = short or reason in OVERFLOW
+                said = self._said(reason, topic_id, policy, told)
+                lines.append(f"{_share(n, came)} {said} ({reason}, {n})")
+        waiting = self._sender.outbox.queued_of_topic(topic_id)
+        if waiting:
+            lines.append(f"{waiting} wait")
+        if short or waiting:
+            lines.append(self._air(Qos(self._sender.treatment(topic_id)[0]), now))
+            lines += self._idle(now)
+        return lines
+
+    def _treatment(self, name: str, policy: TopicPolicy, told: Told, topic_id: int) -> str:
+        state_dst = self._sender.destination(topic_id)
+        to = "everyone" if state_dst == BROADCAST else f"robot {state_dst}"
+        line = f"{name}: class {policy.qos}, priority {policy.priority}, to {to}"
+        lifespan = self._sender.lifespan(topic_id)
+        if lifespan.source:
+            line += f", worthless after {_seconds(lifespan.seconds)}"
+            if lifespan.source == "class":
+                line += " as its class says"
+        if policy.compress != "none":
+            line += f", compressed with {policy.compress}"
+        if policy.durability == "transient_local":
+            line += ", kept for robots that come late"
+        by = f"set while running: {', '.join(sorted(told.changed))}" if told.changed else ""
+        return f"{line} ({'; '.join(each for each in (told.source, by) if each)})"
+
+    def _said(self, reason: str, topic_id: int, policy: TopicPolicy, told: Told) -> str:
+        if reason == "tx_throttled":
+            by = "sdrlinkctl set" if "period_s" in told.changed else told.source
+            return f"throttled to {1 / policy.period_s:.3g} Hz by {by}"
+        if reason == "tx_superseded":
+            return f"gave way to newer ones: depth {policy.kept}"
+        if reason == "tx_expired":
+            return self._too_old(topic_id, policy)
+        if reason in ("tx_overflow_old", "tx_overflow_new", "tx_topic_full"):
+            return f"shed: {TX_REASONS[reason]}"
+        return f"dropped: {TX_REASONS[reason]}"
+
+    def _too_old(self, topic_id: int, policy: TopicPolicy) -> str:
+        lifespan = self._sender.lifespan(topic_id)
+        if not lifespan.source:
+            # Each message says it itself.
+            return "were older than their producer allows before their turn came"
+        of_class = lifespan.source == "class"
+        whose = f", the lifespan of class {policy.qos}," if of_class else ""
+        return f"were older than {_seconds(lifespan.seconds)}{whose} before their turn came"
+
+    def _air(self, qos: Qos, now: float) -> str:
+        used = {
+            each: self._lately(("air", each), round(1e6 * used_s), now)
+            for each, used_s in self._shares.used_s.items()
+        }
+        total = sum(used.values())
+        rate = self._sender.outbox.bytes_per_s * 8e-6
+        carries = f" of {rate:.3g} Mbit/s" if rate < inf else ""
+        if not total:
+            return f"nothing has left in the last minute{carries and ', ' + carries.strip()}"
+        others = ", ".join(
+            f"{each.label} {_share(n, total)}" for each, n in used.items() if n and each is not qos
+        )
+        return f"{qos.label} got {_share(used[qos], total)}{carries} airtime" + (
+            f" (the others: {others})" if others else ""
+        )
+
+    def _idle(self, now: float) -> list[str]:
+        """An air that is full, or idles between turns."""
+        over_s = min(MINUTE_S, now - self._began_at)
+        if over_s <= 0:
+            return []
+        sent, heard = (
+            1e-6 * self._lately(("air", each), round(1e6 * used_s), now) / over_s
+            for each, used_s in self._used_s().items()
+        )
+        busy = min(1.0, sent + heard)
+        words = self._air_use.idle_words(1 - busy)
+        if words is None:
+            words = f"the air was {'full' if busy > FULL else f'in use {100 * busy:.0f} %'}"
+        return [f"{words} (ours {100 * min(1.0, sent):.0f} %, others' {100 * heard:.0f} %)"]
+
+    def _used_s(self) -> dict[str, float]:
+        return {"sent": self._air_use.sent_s, "heard": self._air_use.heard_s}
+
+    def _lately(self, key: Hashable, value: int, now: float) -> int:
+        return self._meter.grown(key, value, now)
+
+    def _counters(self, n_topics: int) -> dict[Hashable, int]:
+        counters: dict[Hashable, int] = {
+            ("air", qos): round(1e6 * used_s) for qos, used_s in self._shares.used_s.items()
+        }
+        for each, used_s in self._used_s().items():
+            counters["air", each] = round(1e6 * used_s)
+        for topic_id in range(n_topics):
+            tally = self._sender.tally(topic_id)
+            counters["accepted", topic_id] = tally.accepted
+            counters["sent", topic_id] = tally.sent
+            for reason, n in tally.dropped.items():
+                counters["drop", topic_id, reason] = n
+        return counters
+
+
+def _share(n: int, of: int) -> str:
+    return f"{100 * n / max(1, of):.3g} %"
+
+
+def _seconds(seconds: float) -> str:
+    return f"{seconds:g} s" if seconds >= 1 else f"{1e3 * seconds:g} ms"

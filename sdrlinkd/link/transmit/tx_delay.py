@@ -1,0 +1,53 @@
+"""Why messages waited at their source: for others before them, for the air, for another chance."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from sdrlinkd.link.transmit.burst import Burst
+from sdrlinkd.wire import Waits
+
+WEIGHT = 1 / 32
+"""Of the newest message."""
+WHOLE = 255
+
+
+@dataclass(slots=True)
+class TopicWaits:
+    """Means of the last messages, in s."""
+
+    queue_s: float = 0.0
+    access_s: float = 0.0
+    again_s: float = 0.0
+    n: int = 0
+    is_told: bool = True
+
+
+class WaitMeters:
+    """One message of each burst is looked at: the first, which waited for the air."""
+
+    def __init__(self) -> None:
+        self.of_topic: dict[int, TopicWaits] = {}
+
+    def left(self, burst: Burst) -> None:
+        """A burst has left."""
+        message = burst.carried[0][0] if burst.carried[0] else None
+        if message is None or message.is_whole or message.arrived_at > burst.first_start:
+            return
+        topic = self.of_topic.setdefault(message.topic_id, TopicWaits())
+        topic.n += 1
+        topic.is_told = False
+        weight = max(WEIGHT, 1 / topic.n)
+        ready_at = min(max(burst.ready_at, message.arrived_at), burst.first_start)
+        topic.queue_s += weight * (ready_at - message.arrived_at - topic.queue_s)
+        topic.access_s += weight * (burst.first_start - ready_at - topic.access_s)
+        topic.again_s += weight * (burst.start - burst.first_start - topic.again_s)
+
+    def records(self) -> Iterable[Waits]:
+        """Of topics sent since the last call."""
+        for topic_id, topic in self.of_topic.items():
+            total_s = topic.queue_s + topic.access_s + topic.again_s
+            if topic.is_told or total_s <= 0:
+                continue
+            topic.is_told = True
+            parts = (topic.queue_s, topic.access_s, topic.again_s)
+            yield Waits(topic_id, *(round(WHOLE * each / total_s) for each in parts))
