@@ -83,7 +83,7 @@ class Link:
             max_expanded,
         )  # fmt: skip
         self.rates = RateMeter(RATE_WINDOW_S)
-        self.waits: dict[tuple[int, int], Waits] = {}
+        self.waits_records: dict[tuple[int, int], Waits] = {}
         """Why messages waited at their source, as that tells: by (source, topic id)."""
         period_s = params.beacon_s if registry.has_control else 0.0
         beacons = Beacons(period_s, params.pdu_size, self.digest, rng, own_id)
@@ -174,7 +174,7 @@ class Link:
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
         """What the radio says became of a burst."""
         self.scheduler.confirm(burst, outcome, now)
-        if self.sender.dropped_asking:
+        if self.sender.outbox.dropped_asking:
             self.delivery.note(now)
 
     def hear(
@@ -297,4 +297,4 @@ class Link:
         elif isinstance(record, Receipt):
             self.delivery.answered(src, record, at)
         elif isinstance(record, Waits) and record.topic_id < len(self.registry):
-            self.waits[src, record.topic_id] = record
+            self.waits_records[src, record.topic_id] = record

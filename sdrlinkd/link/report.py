@@ -227,7 +227,7 @@ def link_notices(link: Link, now: float, of_topics: Mapping[int, str] = NOTHING_
             f"PDUs of {link.params.pdu_size} B have no room for CLOCK records, so nobody knows "
             "anybody's clock; give all robots a larger link.pdu_size"
         )
-    for topic_id in sorted(link.sender.packetizer.entry_ids.waits):
+    for topic_id in sorted(link.sender.packetizer.entry_ids.starved):
         topic = link.registry.topics[topic_id]
         notices.append(
             f"{topic.name} had to wait for a free entry id: fragmented messages come faster than "

@@ -7,7 +7,7 @@ from sdrlinkd.reports import ClockReport, LatencyReport
 
 def waits_ms(link: Link, topic_id: int) -> dict[str, float]:
     """Why messages of one of our topics waited, by the report's names."""
-    waits = link.scheduler.waits.of_topic.get(topic_id)
+    waits = link.scheduler.tx_delays.of_topic.get(topic_id)
     if waits is None:
         return {}
     return {
@@ -21,7 +21,7 @@ def latency_report(link: Link, src: int, topic_id: int) -> LatencyReport:
     """Of a topic heard with STAMPs."""
     latency = link.delivery.latencies[src, topic_id]
     parts, period = latency.parts(), latency.period_ms()
-    told = link.waits.get((src, topic_id))
+    told = link.waits_records.get((src, topic_id))
     wait_ms = 1e3 * parts.wait_s
     split = {}
     if told is not None and (whole := sum(told[1:])):

@@ -71,7 +71,7 @@ def test_why_a_message_waited_is_told_in_a_beacon():
     # The radio could take it at 10 ms, and its burst left 30 ms later than it was meant to.
     burst = next_burst(link, 0.012)
     link.confirm(burst._replace(start=0.042), Outcome.SENT, 0.05)
-    waits = link.scheduler.waits.of_topic[0]
+    waits = link.scheduler.tx_delays.of_topic[0]
     assert (waits.queue_s, waits.access_s, waits.again_s) == pytest.approx((0.01, 0.002, 0.03))
     link.submit(1, bytes(20), 0.6)
     records = [each for pdu in next_burst(link, 0.6).pdus for each in records_in(pdu, len(pdu))]
@@ -80,14 +80,16 @@ def test_why_a_message_waited_is_told_in_a_beacon():
     receiver = make_link(own_id=2)
     for record in told:
         receiver.record_from(1, record, 0.0)
-    assert receiver.waits[1, 0] == told[0]
+    assert receiver.waits_records[1, 0] == told[0]
 
 
 def test_of_topics_that_nobody_has_nothing_is_kept():
     link = make_link(own_id=2)
     for topic_id in range(256):
         link.record_from(1, Waits(topic_id, 1, 2, 3), 0.0)
-    assert [topic_id for _, topic_id in link.waits] == [topic.id for topic in link.registry.topics]
+    assert [topic_id for _, topic_id in link.waits_records] == [
+        topic.id for topic in link.registry.topics
+    ]
 
 
 def clocks_of(link, until, step_s=0.01, submit_s=None):

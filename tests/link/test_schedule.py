@@ -222,7 +222,7 @@ def test_made_up_robots_are_forgotten():
     for i in range(5000):
         forecasts.note(i, Qos.LATENCY, 0.001 * i)
     assert len(forecasts._by_key) == 128
-    assert min(each.last_at for each in forecasts._by_key.values()) > 4.8
+    assert min(each.seen_at for each in forecasts._by_key.values()) > 4.8
 
 
 def test_a_lifespan_that_can_never_be_met_is_told():

@@ -35,6 +35,10 @@ class Draft(PduBuilder):
             self.dst == message.dst and self.is_compressed == message.is_compressed
         )
 
+    def address(self, dst: int, qos: Qos) -> None:
+        """Say where a PDU with nothing but records goes, and how urgently."""
+        self.dst, self.qos = dst, qos
+
     def join(self, message: Outgoing) -> None:
         """An entry of `message` is in it, or what goes ahead of one."""
         self.dst = message.dst

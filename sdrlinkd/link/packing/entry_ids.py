@@ -60,17 +60,15 @@ class TopicEntryIds:
         self._rng = rng
         self._rest_s = rest_s
         self._by_topic: dict[int, EntryIds] = {}
-        self.waits: Counter[int] = Counter()
+        self.starved: Counter[int] = Counter()
         """How often a topic had to wait because all its ids were at rest."""
 
-    def take(self, message: Outgoing, now: float) -> bool:
-        """Give the message an id; False while its topic has no free one."""
-        entry_id = self._of(message.topic_id).take(now)
+    def take(self, topic_id: int, now: float) -> int | None:
+        """An id for the topic's next message; None while none is free."""
+        entry_id = self._of(topic_id).take(now)
         if entry_id is None:
-            self.waits[message.topic_id] += 1
-            return False
-        message.entry_id = entry_id
-        return True
+            self.starved[topic_id] += 1
+        return entry_id
 
     def retire(self, message: Outgoing, now: float) -> None:
         """No more fragments of it will be made."""
@@ -84,13 +82,13 @@ class TopicEntryIds:
         """Fragments of these will leave later than they were made for: their ids must wait, too."""
         for message in messages:
             if not message.is_whole and not message.is_held:
-                message.is_held = self._of(message.topic_id).hold(message.entry_id)
+                message.hold_id(self._of(message.topic_id).hold(message.entry_id))
 
     def left(self, messages: Iterable[Outgoing], start: float) -> None:
         """Now they do."""
         for message in messages:
             if message.is_held:
-                message.is_held = False
+                message.hold_id(False)
                 self._of(message.topic_id).rest(message.entry_id, start)
 
     def next_free(self, message: Outgoing) -> float:

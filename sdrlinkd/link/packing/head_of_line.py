@@ -5,7 +5,7 @@ from sdrlinkd.link.queue import Lane, Outbox, Outgoing
 
 
 class HeadOfLine:
-    """Withdraws heads whose lifespan has ended, fragments and all.
+    """Drops heads whose lifespan has ended, fragments and all.
 
     Also those that receivers have given up: nothing of them was sent for `patience_s`.
     """
@@ -14,7 +14,6 @@ class HeadOfLine:
         self._outbox = outbox
         self._entry_ids = entry_ids
         self._patience_s = patience_s
-        self._withdrawn: list[tuple[Outgoing, str]] = []
 
     def live(self, lane: Lane, now: float) -> Outgoing | None:
         """The lane's next message that may still go."""
@@ -24,7 +23,7 @@ class HeadOfLine:
                 self._outbox.withdraw_head(lane)
             else:
                 self.abandon(lane, now)
-            self._withdrawn.append((head, reason))
+            self._outbox.drop(head, reason)
             head = lane.head
         return head
 
@@ -38,15 +37,10 @@ class HeadOfLine:
         return "tx_stalled" if head.k and now > head.last_at + self._patience_s else ""
 
     def expire(self, now: float) -> None:
-        """Look at all of them; see `take_withdrawn`."""
+        """Look at all of them."""
         for level in tuple(self._outbox.levels):
             for lane in tuple(level.lanes):
                 self.live(lane, now)
-
-    def take_withdrawn(self) -> list[tuple[Outgoing, str]]:
-        """Messages withdrawn since the last call, each with the ledger's reason."""
-        withdrawn, self._withdrawn = self._withdrawn, []
-        return withdrawn
 
     def abandon(self, lane: Lane, now: float) -> None:
         """Send no more of the message the lane is in the middle of."""

@@ -139,8 +139,7 @@ class Packetizer:
         self.piggyback.ride(draft, start)
         if draft.is_empty:
             return None
-        draft.dst = BROADCAST
-        draft.qos = Qos.DEFAULT
+        draft.address(BROADCAST, Qos.DEFAULT)
         return self._finish(draft)
 
     def next_wakeup(self, now: float) -> float:
@@ -209,13 +208,11 @@ class Packetizer:
         draft.add(head.topic_id, head.entry_id, head.next_index, head.total, payload)
         draft.carried.append(head)
         draft.join(head)
-        head.next_index += 1
-        head.last_at = start
-        head.unconfirmed += 1
+        head.advance(1, start)
         if is_last:
             if needs_stamp:
                 self._stamp(draft, head, start)
-            head.parity = self._parity_of(head)
+            head.follow_with(self._parity_of(head))
             self._end(lane, head, start)
         self._outbox.served(lane)
         return True
@@ -228,14 +225,14 @@ class Packetizer:
             return False
         n = len(records)
         while records and draft.add_record(records[-1]):
-            records.pop()
+            head.give_parity()
         if len(records) == n:
             return False
         if head.stamped:
             self._stamp(draft, head, start)
         draft.carried.append(head)
         draft.join(head)
-        head.unconfirmed += 1
+        head.ride()
         self._end(lane, head, start)
         self._outbox.served(lane)
         return True
@@ -244,7 +241,7 @@ class Packetizer:
         """The message is through, unless parity follows."""
         if not head.parity:
             self.entry_ids.retire(head, start)
-            lane.current = None
+            self._outbox.end(lane)
 
     def _parity_of(self, head: Outgoing) -> list[bytes]:
         """Records, the first one last; beside them the age goes again, in case it was lost, too."""
@@ -258,7 +255,7 @@ class Packetizer:
         if not self._begin(lane, head, k, start):
             return False
         self._stamp(draft, head, start)
-        head.rests_id = True
+        head.keep_id()
         draft.join(head)
         return True
 
@@ -270,13 +267,10 @@ class Packetizer:
         """Make `head` the message being fragmented; False while the topic has no free id."""
         if lane.current is not None:
             return True
-        if not self.entry_ids.take(head, start):
+        entry_id = self.entry_ids.take(head.topic_id, start)
+        if entry_id is None:
             return False
-        head.k = k
-        head.last_at = start
-        head.total = fragment_count(len(head.payload), k)
-        head.rests_id = head.total > 1
-        self._outbox.begin(lane)
+        self._outbox.begin(lane, entry_id, k, fragment_count(len(head.payload), k), start)
         return True
 
     def _stamp(self, draft: Draft, message: Outgoing, start: float) -> None:
@@ -285,6 +279,6 @@ class Packetizer:
         stamp = build_stamp(message.topic_id, message.entry_id, age_us, asks)
         if not draft.add_record(stamp):
             return
-        message.stamped = True
+        message.stamp()
         if asks and not message.is_expected:
             self.asking.append(message)

@@ -34,10 +34,9 @@ class SingleEntry:
     def relayed(self, head: Outgoing, start: float) -> BuiltPdu:
         """Another robot's PDU, which was first in its lane."""
         lane = head.lane
-        self._outbox.begin(lane)
-        head.total = head.next_index = 1
-        head.unconfirmed += 1
-        lane.current = None
+        self._outbox.begin(lane, 0, 0, 1, start)
+        head.advance(1, start)
+        self._outbox.end(lane)
         self._outbox.served(lane)
         held_us = max(0, round(1e6 * (start - head.arrived_at)))
         return BuiltPdu(forwarded(head.payload, held_us, self._has_control), [head], head.qos)
@@ -65,8 +64,6 @@ class SingleEntry:
             )
             for i, at in enumerate(range(first * k, (first + n) * k, k))
         ]  # fmt: skip
-        head.next_index += n
-        head.last_at = start
-        head.unconfirmed += n
+        head.advance(n, start)
         self._outbox.served(lane)
         return built

@@ -17,7 +17,16 @@ from sdrlinkd.link.queue.ledger import (
     tx_balance,
 )
 from sdrlinkd.link.queue.lifespan import Lifespan, lifespan_of
-from sdrlinkd.link.queue.message import Fate, Lane, Level, Outgoing, with_first
+from sdrlinkd.link.queue.message import (
+    STEPS,
+    Fate,
+    IllegalStepError,
+    Lane,
+    Level,
+    Outgoing,
+    Step,
+    with_first,
+)
 from sdrlinkd.link.queue.outbox import Outbox
 from sdrlinkd.link.queue.policy import DEFAULT_POLICY, TopicPolicy
 from sdrlinkd.link.queue.topic_state import TopicState
@@ -27,9 +36,11 @@ __all__ = [
     "NOT_TAKEN",
     "RX_PDU_REASONS",
     "RX_REASONS",
+    "STEPS",
     "TX_REASONS",
     "Deflated",
     "Fate",
+    "IllegalStepError",
     "Inflated",
     "Kept",
     "Lane",
@@ -40,6 +51,7 @@ __all__ = [
     "Outbox",
     "Outgoing",
     "RxTally",
+    "Step",
     "TopicPolicy",
     "TopicState",
     "TxTally",

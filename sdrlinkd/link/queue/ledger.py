@@ -75,6 +75,16 @@ class TxTally:
     """Of those accepted: sent again to robots that came late."""
     dropped: Counter[str] = field(default_factory=Counter)
 
+    def accept(self, n_bytes: int) -> None:
+        """Count one message that came."""
+        self.accepted += 1
+        self.accepted_bytes += n_bytes
+
+    def send(self, n_bytes: int) -> None:
+        """Count one message as sent."""
+        self.sent += 1
+        self.sent_bytes += n_bytes
+
     def drop(self, reason: str) -> None:
         """Count one message as dropped."""
         self.dropped[reason] += 1

@@ -5,7 +5,7 @@ Lanes of equal class and priority form a *level*.
 """
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import Enum, auto
 
 from sdrlinkd.link.qos import Qos
@@ -21,8 +21,33 @@ class Fate(Enum):
     DROPPED = auto()
 
 
+class Step(Enum):
+    """What can become of a message."""
+
+    BEGIN = auto()
+    """Its first fragment is cut."""
+    LEAVE = auto()
+    """The radio has sent all of it."""
+    DROP = auto()
+    """It ends under one of the ledger's reasons."""
+
+
+STEPS: Mapping[tuple[Fate, Step], Fate] = {
+    (Fate.QUEUED, Step.BEGIN): Fate.IN_FLIGHT,
+    (Fate.QUEUED, Step.DROP): Fate.DROPPED,
+    (Fate.IN_FLIGHT, Step.LEAVE): Fate.SENT,
+    (Fate.IN_FLIGHT, Step.DROP): Fate.DROPPED,
+}
+"""A message's life: the steps that are allowed, and where each leads. What entered is the sum of
+those that stand in each fate, so this is the ledger, too."""
+
+
+class IllegalStepError(Exception):
+    """A step that STEPS does not have: a bug of ours."""
+
+
 class Outgoing:
-    """One message on its way out."""
+    """One message on its way out. Everyone reads its fields; only its verbs change them."""
 
     __slots__ = (
         "arrived_at", "dst", "entry_id", "expires_at", "fate", "is_compressed", "is_expected",
@@ -42,7 +67,15 @@ class Outgoing:
         expires_at: float,
         wants_stamp: bool,
         tally: TxTally,
+        *,
+        receipt: str = "",
+        is_compressed: bool = False,
+        is_whole: bool = False,
     ) -> None:
+        """Queued. `receipt`: its producer wants to know what becomes of it, under that name.
+
+        `is_whole`: the payload is another robot's PDU, to be sent on.
+        """
         self.topic_id = topic_id
         self.payload = payload
         self.qos = qos
@@ -52,6 +85,9 @@ class Outgoing:
         self.expires_at = expires_at
         self.stamped = not wants_stamp
         self.tally = tally
+        self.receipt = receipt
+        self.is_compressed = is_compressed
+        self.is_whole = is_whole
         self.fate = Fate.QUEUED
         self.lane: Lane
         # Set when the first fragment is cut, then frozen.
@@ -63,16 +99,13 @@ class Outgoing:
         """When the burst with its last fragment so far was to leave."""
         self.rests_id = False
         self.is_held = False
+        """Its entry id waits for fragments that leave later than they were made for."""
         self.unconfirmed = 0
-        self.is_compressed = False
-        self.receipt = ""
-        """Under this name its producer wants to know what becomes of it."""
+        """PDUs with a part of it of which the radio has not told yet."""
         self.parity: list[bytes] = []
         """Control records that follow its last fragment, the first one last."""
         self.is_expected = False
         """The far ends were asked what becomes of it."""
-        self.is_whole = False
-        """The payload is another robot's PDU, to be sent on."""
 
     @property
     def src(self) -> int:
@@ -83,6 +116,60 @@ class Outgoing:
     def is_through(self) -> bool:
         """Whether all of it is in PDUs."""
         return self.next_index == self.total and not self.parity
+
+    def step(self, step: Step) -> None:
+        """Raises IllegalStepError where STEPS has no such step."""
+        fate = STEPS.get((self.fate, step))
+        if fate is None:
+            raise IllegalStepError(f"{step.name} where a message is {self.fate.name}")
+        self.fate = fate
+
+    def enter(self, lane: "Lane") -> None:
+        """It waits in `lane`."""
+        self.lane = lane
+
+    def cut(self, entry_id: int, k: int, total: int, start: float) -> None:
+        """It becomes `total` fragments of `k` bytes, for bursts from `start` on."""
+        self.entry_id, self.k, self.total, self.last_at = entry_id, k, total, start
+        self.rests_id = total > 1
+
+    def advance(self, n: int, start: float) -> None:
+        """Its next `n` fragments are in a PDU each, for a burst at `start`."""
+        self.next_index += n
+        self.unconfirmed += n
+        self.last_at = start
+
+    def follow_with(self, parity: list[bytes]) -> None:
+        """These records come behind its last fragment; the first one stands last."""
+        self.parity = parity
+
+    def give_parity(self) -> bytes:
+        """The next record, which is in a PDU now."""
+        return self.parity.pop()
+
+    def ride(self) -> None:
+        """One more PDU has a part of it that is no fragment."""
+        self.unconfirmed += 1
+
+    def stamp(self) -> None:
+        """Its age is in a PDU."""
+        self.stamped = True
+
+    def keep_id(self) -> None:
+        """Something of it has left ahead: its entry id rests, however short it is."""
+        self.rests_id = True
+
+    def hold_id(self, is_held: bool) -> None:
+        """Whether its entry id waits for fragments that leave later."""
+        self.is_held = is_held
+
+    def expect(self) -> None:
+        """The far ends have been asked."""
+        self.is_expected = True
+
+    def confirm(self) -> None:
+        """The radio has told of one PDU with a part of it."""
+        self.unconfirmed -= 1
 
 
 class Lane:

@@ -66,7 +66,7 @@ class Receipts:
 
     def expect(self, message: Outgoing, present: Iterable[int], now: float) -> None:
         """A message has left; a broadcast one is for all robots `present`."""
-        message.is_expected = True
+        message.expect()
         awaited = set(present) if message.dst == BROADCAST else {message.dst}
         pending = _Pending(message, now + self._timeout_s, awaited or {BROADCAST})
         if self._n_pending >= MOST_PENDING:

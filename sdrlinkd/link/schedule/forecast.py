@@ -30,7 +30,7 @@ class Forecast:
     """
 
     qos: Qos
-    last_at: float
+    seen_at: float
     n: int = 1
     beat_at: float = 0.0
     period_s: float = 0.0
@@ -38,7 +38,7 @@ class Forecast:
 
     def note(self, at: float) -> None:
         """A message came."""
-        step_s, self.last_at = at - self.last_at, at
+        step_s, self.seen_at = at - self.seen_at, at
         if self.n == 1 or step_s <= 0 or step_s > 2 * MISSED * max(self.period_s, FASTEST_S):
             # The first step, two at once, or a long pause: begin anew.
             self.n, self.beat_at, self.jitter_s = (2 if step_s > 0 else 1), at, 0.0
@@ -65,7 +65,7 @@ class Forecast:
 
     def is_alive(self, now: float) -> bool:
         """Whether more is to be expected."""
-        return now - self.last_at <= MISSED * self.period_s
+        return now - self.seen_at <= MISSED * self.period_s
 
     @property
     def spread_s(self) -> float:
@@ -97,9 +97,9 @@ class Forecasts:
         if found is None:
             if len(self._by_key) >= MOST:
                 # Whoever makes up robots shall not keep us busy.
-                del self._by_key[min(self._by_key, key=lambda each: self._by_key[each].last_at)]
+                del self._by_key[min(self._by_key, key=lambda each: self._by_key[each].seen_at)]
             self._by_key[key] = Forecast(qos, at)
-        elif at > found.last_at:
+        elif at > found.seen_at:
             found.qos = qos
             found.note(at)
 
@@ -117,7 +117,7 @@ class Forecasts:
         """Whether a topic more urgent than `below` is alive whose next message nobody knows."""
         return any(
             each.qos < below
-            and now - each.last_at < alive_s
+            and now - each.seen_at < alive_s
             and (not each.is_periodic or each.is_late(now))
             for each in self._by_key.values()
         )

@@ -18,7 +18,7 @@ from sdrlinkd.link.transmit.control_records import ControlRecords
 from sdrlinkd.link.transmit.rate import RateControl, RateParams
 from sdrlinkd.link.transmit.retry import RetryQueue
 from sdrlinkd.link.transmit.sender import Sender
-from sdrlinkd.link.transmit.tx_delay import WaitMeters
+from sdrlinkd.link.transmit.tx_delay import TxDelayMeters
 from sdrlinkd.wire import Frame, Record, RecordType
 
 NOTICE_S = 5e-4
@@ -63,7 +63,7 @@ class BurstScheduler:
         """No message can be younger when it arrives."""
         self._held = _NOT_HELD
         self._ready_at: float | None = None
-        self.waits = WaitMeters()
+        self.tx_delays = TxDelayMeters()
         self.access: Access = Free()
         self.settled = Settled(self.access, "none", "as there is no radio yet", {"none": 1.0})
         self.rate = RateControl(RateParams(), (0.0,), 0)
@@ -187,7 +187,7 @@ class BurstScheduler:
             return
         if outcome is Outcome.SENT:
             self._control_records.left(burst)
-            self.waits.left(burst)
+            self.tx_delays.left(burst)
             self.airtime_s += burst.airtime_s
             self.bursts_by_mcs[burst.mcs] += 1
         self._sender.confirm(burst, outcome, now)
@@ -287,7 +287,7 @@ class BurstScheduler:
 
     def _beacon_records(self, start: float) -> list[Record]:
         records = self._beacons.take(start, self._inbox.neighbors.values(), self.rate)
-        records += self.waits.records()
+        records += self.tx_delays.records()
         frame = self.access.frame(start)
         return records if frame is None else [*records, frame]
 

@@ -11,7 +11,6 @@ from sdrlinkd.link.params import LinkParams, QueueParams
 from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, Overrides, Qos
 from sdrlinkd.link.queue import (
     DEFAULT_POLICY,
-    Fate,
     Lifespan,
     Offer,
     Outbox,
@@ -69,8 +68,6 @@ class Sender:
         self.pdus_sent = 0
         self.pdus_failed = 0
         self._has_control = registry.has_control
-        self.dropped_asking: list[tuple[Outgoing, str]] = []
-        """Messages whose producers want to know that."""
         self.bursts_sent = 0
         self.bursts_failed = 0
 
@@ -83,8 +80,7 @@ class Sender:
     ) -> str | None:
         """Queue a message; None, or the ledger's reason why it was refused."""
         topic = self._topics[topic_id]
-        topic.tally.accepted += 1
-        topic.tally.accepted_bytes += len(payload)
+        topic.tally.accept(len(payload))
         refused = topic.admission.refuse(payload, now)
         if refused:
             topic.tally.drop(refused)
@@ -109,10 +105,10 @@ class Sender:
         known = [each.topic_id for each in pdu.entries if each.topic_id < len(self._topics)]
         priority = max((self._topics[each].priority for each in known), default=0)
         message = Outgoing(
-            RELAYED + pdu.src, data, CLASSES[pdu.qos], priority, pdu.dst, at, until, False, tally
-        )
-        message.is_whole = True
-        return self._put(message, DEFAULT_POLICY)
+            RELAYED + pdu.src, data, CLASSES[pdu.qos], priority, pdu.dst, at, until, False, tally,
+            is_whole=True,
+        )  # fmt: skip
+        return self.outbox.put(message, DEFAULT_POLICY)
 
     def _enqueue(
         self, topic_id: int, payload: bytes, at: float, now: float, wishes: Overrides
@@ -139,23 +135,15 @@ class Sender:
             at + lifespan_s,
             topic.stamp or (bool(receipt) and self._has_control),
             topic.tally,
+            # Without a control channel it has been answered already: nobody can know.
+            receipt=receipt if self._has_control else "",
+            is_compressed=frame is not None,
         )
-        # Without a control channel it has been answered already: nobody can know.
-        message.receipt = receipt if self._has_control else ""
-        message.is_compressed = frame is not None
         if message.expires_at <= now:
             # It must not take the place of one that is fresh.
-            self._drop(message, "tx_expired")
+            self.outbox.drop(message, "tx_expired")
             return "tx_expired"
-        return self._put(message, topic.policy)
-
-    def _put(self, message: Outgoing, policy: TopicPolicy) -> str | None:
-        refused = None
-        for shed, reason in self.outbox.put(message, policy):
-            self._drop(shed, reason)
-            if shed is message:
-                refused = reason
-        return refused
+        return self.outbox.put(message, topic.policy)
 
     def refuse(self, reason: str, topic_id: int | None = None) -> None:
         """Count a message that the bus could not hand over."""
@@ -196,13 +184,11 @@ class Sender:
                 burst.classes.append(qos)
             src = burst.pdus[0][1]
             n += len(several)
-        self._settle_withdrawn()
         return self._counted(burst)
 
     def expire(self, now: float) -> None:
         """Drop heads whose lifespan ended while no burst could go."""
         self.packetizer.head_of_line.expire(now)
-        self._settle_withdrawn()
 
     def compose_records(self, start: float) -> Burst | None:
         """A burst of one PDU for control records that found no spare room."""
@@ -216,18 +202,12 @@ class Sender:
         if outcome is Outcome.SENT:
             self.bursts_sent += 1
             self.pdus_sent += len(burst.pdus)
+            self.outbox.left(burst.carried)
         else:
             self.bursts_failed += 1
             self.pdus_failed += len(burst.pdus)
-        for messages in burst.carried:
-            for message in messages:
-                message.unconfirmed -= 1
-                if message.fate is not Fate.IN_FLIGHT:
-                    continue
-                if outcome is not Outcome.SENT:
-                    self._fail(message, now)
-                elif message.is_through and not message.unconfirmed:
-                    self._settle_sent(message)
+            for message in self.outbox.failed(burst.carried):
+                self.packetizer.head_of_line.abandon(message.lane, now)
 
     def begin_anew(self) -> None:
         """Time begins: what came before is dropped, and nothing is remembered of when."""
@@ -237,10 +217,7 @@ class Sender:
 
     def shut_down(self, reason: str = "tx_shutdown") -> None:
         """Drop what is still waiting or unconfirmed."""
-        for message in self.outbox.withdraw_all():
-            self._drop(message, reason)
-        for message in list(self.outbox.in_flight):
-            self._drop(message, reason)
+        self.outbox.drop_all(reason)
 
     def tally(self, topic_id: int) -> TxTally:
         """Counters of one topic."""
@@ -273,31 +250,12 @@ class Sender:
     def audit(self) -> list[str]:
         """What does not add up in the TX ledger; empty when all does."""
         tallies = [self.refused, self.relayed, *(topic.tally for topic in self._topics)]
-        return tx_balance(tallies, self.outbox.queued, len(self.outbox.in_flight))
+        problems = tx_balance(tallies, self.outbox.queued, len(self.outbox.in_flight))
+        if self.outbox.illegal_steps:
+            problems.append(f"tx messages: {self.outbox.illegal_steps} illegal steps")
+        return problems
 
     def _counted(self, burst: Burst) -> Burst | None:
         self.pdus_composed += len(burst.pdus)
         self.entries_composed += sum(map(len, burst.carried))
         return burst if burst.pdus else None
-
-    def _settle_withdrawn(self) -> None:
-        for message, reason in self.packetizer.head_of_line.take_withdrawn():
-            self._drop(message, reason)
-
-    def _settle_sent(self, message: Outgoing) -> None:
-        message.fate = Fate.SENT
-        self.outbox.in_flight.discard(message)
-        message.tally.sent += 1
-        message.tally.sent_bytes += len(message.payload)
-
-    def _fail(self, message: Outgoing, now: float) -> None:
-        self._drop(message, "tx_radio_failed")
-        if message.lane.current is message:
-            self.packetizer.head_of_line.abandon(message.lane, now)
-
-    def _drop(self, message: Outgoing, reason: str) -> None:
-        message.fate = Fate.DROPPED
-        self.outbox.in_flight.discard(message)
-        message.tally.drop(reason)
-        if message.receipt:
-            self.dropped_asking.append((message, reason))

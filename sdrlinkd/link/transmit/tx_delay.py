@@ -12,7 +12,7 @@ WHOLE = 255
 
 
 @dataclass(slots=True)
-class TopicWaits:
+class TopicTxDelay:
     """Means of the last messages, in s."""
 
     queue_s: float = 0.0
@@ -22,18 +22,18 @@ class TopicWaits:
     is_told: bool = True
 
 
-class WaitMeters:
+class TxDelayMeters:
     """One message of each burst is looked at: the first, which waited for the air."""
 
     def __init__(self) -> None:
-        self.of_topic: dict[int, TopicWaits] = {}
+        self.of_topic: dict[int, TopicTxDelay] = {}
 
     def left(self, burst: Burst) -> None:
         """A burst has left."""
         message = burst.carried[0][0] if burst.carried[0] else None
         if message is None or message.is_whole or message.arrived_at > burst.first_start:
             return
-        topic = self.of_topic.setdefault(message.topic_id, TopicWaits())
+        topic = self.of_topic.setdefault(message.topic_id, TopicTxDelay())
         topic.n += 1
         topic.is_told = False
         weight = max(WEIGHT, 1 / topic.n)
