@@ -6,13 +6,13 @@ Lanes of equal class and priority form a *level*.
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from enum import Enum, auto
+from enum import IntEnum, auto
 
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue.ledger import TxTally
 
 
-class Fate(Enum):
+class Fate(IntEnum):
     """Where a message stands in the ledger."""
 
     QUEUED = auto()
@@ -21,7 +21,7 @@ class Fate(Enum):
     DROPPED = auto()
 
 
-class Step(Enum):
+class Step(IntEnum):
     """What can become of a message."""
 
     BEGIN = auto()
