@@ -11,7 +11,7 @@ import msgspec
 import pytest
 
 from sdrlinkd.client import ControlClient, NoDaemonError
-from sdrlinkd.link import Outbox
+from sdrlinkd.link import Lives
 from sdrlinkd.reports import Snapshot
 from tests.tiers import (
     pytest_collection_modifyitems,
@@ -25,7 +25,7 @@ __all__ = ["pytest_collection_modifyitems", "pytest_configure", "pytest_terminal
 MAIN = "import sys; from sdrlinkd.__main__ import main; sys.exit(main(sys.argv[1:]))"
 ETC = Path(__file__).parents[1] / "etc"
 # A daemon would count it, and tell it with its ledger.
-Outbox.is_strict = True
+Lives.is_strict = True
 
 
 @dataclass

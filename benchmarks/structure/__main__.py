@@ -36,7 +36,10 @@ def main() -> None:
         )  # fmt: skip
     console.print(table)
     written = writes("sdrlinkd.link", "Outgoing")
-    console.print(f"fields of a queued message are set in {len(written)} files: {dict(written)}")
+    console.print(
+        f"fields called as a queued message's are set by others in {len(written)} files: "
+        f"{dict(written)}"
+    )
     chains, lines = deep_chains("sdrlinkd.link")
     console.print(
         f"deep chains in sdrlinkd.link: {chains} in {lines} lines, {1000 * chains / lines:.1f} "

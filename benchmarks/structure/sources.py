@@ -3,6 +3,7 @@
 import ast
 from collections import Counter
 from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,22 +29,18 @@ class Graph(NamedTuple):
     @property
     def floors(self) -> int:
         """The longest way down, in rooms; 0 where there is a cycle."""
-        depth: dict[str, int] = {}
-        left = set(self.rooms)
-        while left:
-            ready = {
-                room
-                for room in left
-                if all(to in depth for from_, to in self.arrows if from_ == room)
-            }
-            if not ready:
-                return 0
-            for room in ready:
-                depth[room] = 1 + max(
-                    (depth[to] for from_, to in self.arrows if from_ == room), default=0
-                )
-            left -= ready
-        return max(depth.values(), default=0)
+        below: dict[str, set[str]] = {room: set() for room in self.rooms}
+        for from_, to in self.arrows:
+            below[from_].add(to)
+        order, floors = TopologicalSorter(below), 0
+        try:
+            order.prepare()
+        except CycleError:
+            return 0
+        while order.is_active():
+            order.done(*order.get_ready())
+            floors += 1
+        return floors
 
     @property
     def upward(self) -> list[tuple[str, str]]:

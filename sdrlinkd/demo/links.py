@@ -11,6 +11,8 @@ LINKS = ("ofdm", "iqfile", "direct")
 MAX_CFO_HZ = 1e5
 LONGEST_PAUSE_S = 3.0
 N_ENTRY_IDS = 256
+SHARE_AT_REST = 0.6
+"""Of the time in which a topic uses up its ids; they rest for 1.25 reassembly timeouts."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +44,7 @@ def write_config(
     # A machine that stands still for a moment loses nothing, as long as there are entry ids: they
     # rest for the reassembly timeout.
     ids_last_s = N_ENTRY_IDS / (source.fastest_hz * options.speed)
-    timeout_s = max(0.02, min(LONGEST_PAUSE_S, 0.6 * ids_last_s))
+    timeout_s = max(0.02, min(LONGEST_PAUSE_S, SHARE_AT_REST * ids_last_s))
     backend = {"direct": "direct", "ofdm": "loopback", "iqfile": "iqfile"}[options.link]
     node = LISTENER_ID if role == "play" else NODE_ID
     lines = [

@@ -52,7 +52,7 @@ class Source:
     duration_s: float
     topics: list[BagTopic]
     left_out: list[str] = field(default_factory=list)
-    fastest_hz: float = 200.0
+    fastest_hz: float = 300.0
     """No topic is more frequent, as far as is known."""
 
     def messages(self) -> Iterator[BagMessage]:

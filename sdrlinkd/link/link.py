@@ -174,7 +174,7 @@ class Link:
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
         """What the radio says became of a burst."""
         self.scheduler.confirm(burst, outcome, now)
-        if self.sender.outbox.dropped_asking:
+        if self.sender.lives.dropped_asking:
             self.delivery.note(now)
 
     def hear(

@@ -80,7 +80,7 @@ def _tx(link: Link) -> TxReport:
         sent=sum(tally.sent for tally in tallies),
         queued=sender.outbox.queued,
         queued_bytes=sender.outbox.queued_bytes,
-        in_flight=len(sender.outbox.in_flight),
+        in_flight=len(sender.lives.in_flight),
         dropped=dict(sum((tally.dropped for tally in tallies), Counter())),
         queued_by_class={q.label: n for q, n in sender.outbox.queued_by_class().items()},
         entries=sender.entries_composed,

@@ -188,7 +188,7 @@ def test_whatever_waits_goes_with_the_rest_or_at_the_end(seed, flush_s):
             # Asleep for ever means: nothing is begun, and nothing of it would fill a PDU.
             assert wakes_at < INFINITE or (
                 flush_s == NEVER
-                and not outbox.in_flight
+                and not outbox.lives.in_flight
                 and outbox.pending_bytes(link.sender.packetizer.k_single) < 207
             ), f"seed {seed}"
         link.handle_timers(now)

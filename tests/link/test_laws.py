@@ -43,8 +43,8 @@ def assert_books_balance(link, seed):
     assert link.audit() == [], f"seed {seed}"
     assert outbox.queued == len(waiting) == sum(outbox.queued_by_class().values())
     assert outbox.queued_bytes == sum(len(message.payload) for message in waiting)
-    assert set(current) <= outbox.in_flight
-    assert all(message.fate is Fate.IN_FLIGHT for message in outbox.in_flight)
+    assert set(current) <= outbox.lives.in_flight
+    assert all(message.fate is Fate.IN_FLIGHT for message in outbox.lives.in_flight)
 
 
 def any_policy(rng):
@@ -118,7 +118,7 @@ def test_the_ledger_holds_at_every_step_of_any_run(seed):
     for burst in bursts:
         link.confirm(burst, Outcome.SENT, now)
     assert_books_balance(link, seed)
-    assert link.sender.outbox.queued == len(link.sender.outbox.in_flight) == 0
+    assert link.sender.outbox.queued == len(link.sender.lives.in_flight) == 0
 
 
 @law(30)

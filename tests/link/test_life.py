@@ -5,7 +5,7 @@ from random import Random
 
 import pytest
 
-from sdrlinkd.link import LinkParams, Outbox, Qos, QueueParams
+from sdrlinkd.link import LinkParams, Lives, Outbox, Qos, QueueParams
 from sdrlinkd.link.queue import (
     DEFAULT_POLICY,
     STEPS,
@@ -52,13 +52,13 @@ def test_nothing_leaves_an_end():
 
 
 def test_in_the_field_an_illegal_step_is_counted_told_and_changes_nothing(monkeypatch):
-    monkeypatch.setattr(Outbox, "is_strict", False)
+    monkeypatch.setattr(Lives, "is_strict", False)
     registry = make_registry([("odom", "nav_msgs/msg/Odometry")])
     sender = Sender(LinkParams(), QueueParams(), registry, 1, Random(1), 0.5, ClassesParams(), {})
     assert sender.audit() == []
     made = message([Step.DROP])
-    sender.outbox.drop(made, "tx_expired")
-    assert (sender.outbox.illegal_steps, made.tally.dropped) == (1, {})
+    sender.lives.drop(made, "tx_expired")
+    assert (sender.lives.illegal_steps, made.tally.dropped) == (1, {})
     assert sender.audit() == ["tx messages: 1 illegal steps"]
 
 

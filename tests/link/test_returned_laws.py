@@ -44,7 +44,7 @@ def test_the_ledger_adds_up_at_every_step_of_any_run(seed):
     for burst in on_air:
         link.confirm(burst, rng.choice((Outcome.SENT, Outcome.LATE)), now)
     assert_books_balance(link, seed)
-    assert link.sender.outbox.queued == len(link.sender.outbox.in_flight) == 0
+    assert link.sender.outbox.queued == len(link.sender.lives.in_flight) == 0
 
 
 @law(12)

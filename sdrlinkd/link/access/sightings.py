@@ -1,22 +1,22 @@
-"""Robots that did something a person should know of, for as long as they do it."""
+"""Robots that lately did something a person should know of."""
 
 FORGET_S = 60.0
-"""Robots that stopped doing it, or left, are not told of for longer."""
+"""A robot that has not done it for so long is no longer named."""
 
 
 class Sightings:
-    """Who was seen, how often, and when last (link clock, s)."""
+    """Which robots did one such thing, how often, and when last (link clock, s)."""
 
     def __init__(self) -> None:
         self._seen: dict[int, tuple[int, float]] = {}
 
     def add(self, src: int, at: float) -> None:
-        """It did so once more."""
+        """Robot `src` did it at `at`."""
         n = self._seen[src][0] if self._is_lately(src, at) else 0
         self._seen[src] = n + 1, at
 
     def clear(self, src: int) -> None:
-        """It mended its ways."""
+        """Robot `src` does it no more."""
         self._seen.pop(src, None)
 
     def lately(self, now: float, least: int = 1) -> list[int]:

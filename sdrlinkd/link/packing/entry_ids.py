@@ -85,7 +85,7 @@ class TopicEntryIds:
                 message.hold_id(self._of(message.topic_id).hold(message.entry_id))
 
     def left(self, messages: Iterable[Outgoing], start: float) -> None:
-        """Now they do."""
+        """Fragments that were held back leave in a burst at `start`: their ids rest from now on."""
         for message in messages:
             if message.is_held:
                 message.hold_id(False)

@@ -12,6 +12,7 @@ class HeadOfLine:
 
     def __init__(self, outbox: Outbox, entry_ids: TopicEntryIds, patience_s: float) -> None:
         self._outbox = outbox
+        self._lives = outbox.lives
         self._entry_ids = entry_ids
         self._patience_s = patience_s
 
@@ -23,7 +24,7 @@ class HeadOfLine:
                 self._outbox.withdraw_head(lane)
             else:
                 self.abandon(lane, now)
-            self._outbox.drop(head, reason)
+            self._lives.drop(head, reason)
             head = lane.head
         return head
 

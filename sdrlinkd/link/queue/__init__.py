@@ -17,6 +17,7 @@ from sdrlinkd.link.queue.ledger import (
     tx_balance,
 )
 from sdrlinkd.link.queue.lifespan import Lifespan, lifespan_of
+from sdrlinkd.link.queue.lives import Lives
 from sdrlinkd.link.queue.message import (
     STEPS,
     Fate,
@@ -47,6 +48,7 @@ __all__ = [
     "Latched",
     "Level",
     "Lifespan",
+    "Lives",
     "Offer",
     "Outbox",
     "Outgoing",

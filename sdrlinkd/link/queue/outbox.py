@@ -6,14 +6,14 @@ lane that gave an entry goes to the back.
 
 from bisect import bisect_left, insort
 from collections import OrderedDict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import inf
-from typing import ClassVar
 
 from sdrlinkd.link.params import QueueParams
 from sdrlinkd.link.qos import Qos
-from sdrlinkd.link.queue.message import Fate, IllegalStepError, Lane, Level, Outgoing, Step
+from sdrlinkd.link.queue.lives import Lives
+from sdrlinkd.link.queue.message import Lane, Level, Outgoing
 from sdrlinkd.link.queue.policy import TopicPolicy
 from sdrlinkd.wire import ENTRY_HEADER_SIZE
 
@@ -35,13 +35,7 @@ def _order(lane: Lane) -> tuple[float, int]:
 
 
 class Outbox:
-    """The queue of one node, and the sole owner of what becomes of its messages.
-
-    Every operation costs the same with ten messages or ten thousand.
-    """
-
-    is_strict: ClassVar[bool] = False
-    """An illegal step raises, as in tests; else it is counted."""
+    """The queue of one node. Every operation costs the same with ten messages or ten thousand."""
 
     def __init__(self, limits: QueueParams) -> None:
         self._limits = limits
@@ -60,12 +54,7 @@ class Outbox:
         """Whether other robots' PDUs have ever waited here."""
         self.bytes_per_s = inf
         """What the air carries at the moment: bounds in seconds are by this."""
-        self.in_flight: set[Outgoing] = set()
-        """Begun and not yet settled."""
-        self.dropped_asking: list[tuple[Outgoing, str]] = []
-        """Dropped, and why, where the producer wants to know; whoever tells takes them out."""
-        self.illegal_steps = 0
-        """Steps of messages that STEPS does not allow: bugs of ours, survived."""
+        self.lives = Lives()
 
     def __bool__(self) -> bool:
         return bool(self.levels)
@@ -73,19 +62,19 @@ class Outbox:
     def put(self, message: Outgoing, policy: TopicPolicy) -> str | None:
         """Queue `message`, and drop what has to go for it; None, or why it was dropped itself."""
         if not self._can_make_room(message):
-            self.drop(message, "tx_overflow_new")
+            self.lives.drop(message, "tx_overflow_new")
             return "tx_overflow_new"
         topic, depth, size = self._by_topic.get(message.topic_id), policy.kept, len(message.payload)
         if topic is not None:
             while depth and len(topic.messages) >= depth:
-                self.drop(self._withdraw_waiting(topic.oldest), "tx_superseded")
+                self.lives.drop(self._withdraw_waiting(topic.oldest), "tx_superseded")
             most = self._bytes_of(policy.queue_bytes or inf, policy.queue_s or inf)
             while topic.messages and topic.n_bytes + size > most:
-                self.drop(self._withdraw_waiting(topic.oldest), "tx_topic_full")
+                self.lives.drop(self._withdraw_waiting(topic.oldest), "tx_topic_full")
         limits, most = self._limits, self._most_bytes
         while self.queued >= limits.max_messages or self.queued_bytes + size > most:
             victim = self._oldest_of_lowest_class()
-            self.drop(self._withdraw_waiting(victim), "tx_overflow_old")
+            self.lives.drop(self._withdraw_waiting(victim), "tx_overflow_old")
         self._enqueue(message)
         return None
 
@@ -97,63 +86,17 @@ class Outbox:
         self._forget_queued(message)
         lane.current = message
         message.cut(entry_id, k, total, start)
-        self._step(message, Step.BEGIN)
-        self.in_flight.add(message)
+        self.lives.begin(message)
 
     def end(self, lane: Lane) -> None:
         """All of the lane's message is in PDUs."""
         lane.current = None
 
-    def left(self, carried: Iterable[Iterable[Outgoing]]) -> None:
-        """PDUs have left that carried parts of these messages."""
-        for messages in carried:
-            for message in messages:
-                message.confirm()
-                if (
-                    message.fate is Fate.IN_FLIGHT
-                    and not message.unconfirmed
-                    and message.is_through
-                ):
-                    self._step(message, Step.LEAVE)
-                    self.in_flight.discard(message)
-                    message.tally.send(len(message.payload))
-
-    def failed(self, carried: Iterable[Iterable[Outgoing]]) -> list[Outgoing]:
-        """PDUs did not leave that carried parts of these: drops them; those not yet through."""
-        begun: list[Outgoing] = []
-        for messages in carried:
-            for message in messages:
-                message.confirm()
-                if message.fate is Fate.IN_FLIGHT:
-                    self.drop(message, "tx_radio_failed")
-                    if message.lane.current is message:
-                        begun.append(message)
-        return begun
-
-    def drop(self, message: Outgoing, reason: str) -> None:
-        """It ends here, for a reason of the ledger; it is in no lane any more."""
-        if self._step(message, Step.DROP):
-            self.in_flight.discard(message)
-            message.tally.drop(reason)
-            if message.receipt:
-                self.dropped_asking.append((message, reason))
-
     def drop_all(self, reason: str) -> None:
         """Drop what waits, in service order, and what is in flight."""
         while self.levels:
-            self.drop(self.withdraw_head(self.levels[0].lanes[0]), reason)
-        for message in list(self.in_flight):
-            self.drop(message, reason)
-
-    def _step(self, message: Outgoing, step: Step) -> bool:
-        try:
-            message.step(step)
-        except IllegalStepError:
-            if self.is_strict:
-                raise
-            self.illegal_steps += 1
-            return False
-        return True
+            self.lives.drop(self.withdraw_head(self.levels[0].lanes[0]), reason)
+        self.lives.drop_in_flight(reason)
 
     def served(self, lane: Lane) -> None:
         """The lane gave an entry; it goes behind its equals, or away when it is empty."""

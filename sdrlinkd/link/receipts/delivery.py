@@ -79,7 +79,7 @@ class Delivery:
 
     def note(self, now: float) -> None:
         """What has just been sent, or dropped."""
-        asking, dropped = self._sender.packetizer.asking, self._sender.outbox.dropped_asking
+        asking, dropped = self._sender.packetizer.asking, self._sender.lives.dropped_asking
         if asking:
             present = [
                 each.src

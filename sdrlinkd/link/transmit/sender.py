@@ -51,6 +51,7 @@ class Sender:
         self._max_message_size = max_message_size(params.pdu_size)
         self._classes = classes
         self.outbox = Outbox(queue)
+        self.lives = self.outbox.lives
         self.packetizer = Packetizer(
             params, src, self.outbox, rng, reassembly_timeout_s, registry.has_control, classes
         )
@@ -141,7 +142,7 @@ class Sender:
         )
         if message.expires_at <= now:
             # It must not take the place of one that is fresh.
-            self.outbox.drop(message, "tx_expired")
+            self.lives.drop(message, "tx_expired")
             return "tx_expired"
         return self.outbox.put(message, topic.policy)
 
@@ -202,11 +203,11 @@ class Sender:
         if outcome is Outcome.SENT:
             self.bursts_sent += 1
             self.pdus_sent += len(burst.pdus)
-            self.outbox.left(burst.carried)
+            self.lives.left(burst.carried)
         else:
             self.bursts_failed += 1
             self.pdus_failed += len(burst.pdus)
-            for message in self.outbox.failed(burst.carried):
+            for message in self.lives.failed(burst.carried):
                 self.packetizer.head_of_line.abandon(message.lane, now)
 
     def begin_anew(self) -> None:
@@ -250,9 +251,9 @@ class Sender:
     def audit(self) -> list[str]:
         """What does not add up in the TX ledger; empty when all does."""
         tallies = [self.refused, self.relayed, *(topic.tally for topic in self._topics)]
-        problems = tx_balance(tallies, self.outbox.queued, len(self.outbox.in_flight))
-        if self.outbox.illegal_steps:
-            problems.append(f"tx messages: {self.outbox.illegal_steps} illegal steps")
+        problems = tx_balance(tallies, self.outbox.queued, len(self.lives.in_flight))
+        if self.lives.illegal_steps:
+            problems.append(f"tx messages: {self.lives.illegal_steps} illegal steps")
         return problems
 
     def _counted(self, burst: Burst) -> Burst | None:
