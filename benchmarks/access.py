@@ -133,7 +133,7 @@ def simulate(case: Case, duration_s: float, seed: int) -> Result:
     got = [each for station in stations for each in station.got]
     data = [1e3 * each.age_s for each in got if each.topic_id == DATA]
     urgent = [1e3 * each.age_s for each in got if each.topic_id == STOP]
-    policy = stations[0].link.access
+    policy = stations[0].access
     return Result(
         sent=sum(station.sent for station in stations),
         received=len(got),

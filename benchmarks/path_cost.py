@@ -9,12 +9,23 @@ import numpy as np
 
 from benchmarks.report import Row
 from sdrlinkd.adapters import BuiltInRobot, empty, to_cdr
-from sdrlinkd.link import Allowance, Link, LinkParams, Outcome, QueueParams, ReassemblyParams
+from sdrlinkd.link import (
+    AccessParams,
+    CarrierTraits,
+    Link,
+    LinkParams,
+    Opportunity,
+    Outcome,
+    QueueParams,
+    RateParams,
+    ReassemblyParams,
+)
 from sdrlinkd.wire import make_registry
 
 PDU_SIZE = 1024
 IMAGE_BYTES = 65_536
 BURST_S = 0.1  # entry ids of fragmented messages rest before they are used again
+PDU_S = 1e-3
 
 
 def path_cost_row(seed: int, rounds: int) -> Row:
@@ -64,13 +75,14 @@ def _round(messages: list[bytes], seed: int) -> float:
         Random(seed),
         hears_self=True,
     )
+    link.attach(CarrierTraits(), AccessParams(), RateParams())
     for message in messages:
         link.submit(0, message, 0.0)
     pdus: list[bytes] = []
     heard: list[bytes] = []
     start = time.process_time()
     now = 0.0
-    while burst := link.scheduler.compose(now, Allowance.of(16)):
+    while burst := link.next_burst(Opportunity(now, lambda _, n: n * PDU_S, lambda *_: 16)):
         pdus += burst.pdus
         link.confirm(burst, Outcome.SENT, now)
         now += BURST_S

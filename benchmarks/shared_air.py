@@ -79,7 +79,7 @@ class Station:
 
     def attach(self, traits: CarrierTraits) -> None:
         """What the radio is."""
-        self.link.attach(traits, self._access, RateParams())
+        self.access = self.link.attach(traits, self._access, RateParams()).settled.access
 
     def advance(self, now: float) -> None:
         """Messages that have come up to now."""

@@ -3,7 +3,7 @@
 import time
 from typing import TYPE_CHECKING
 
-from sdrlinkd.link import Clocks, State, Wall
+from sdrlinkd.link import Link, State, Wall
 from sdrlinkd.localtime import host_clocks
 
 if TYPE_CHECKING:
@@ -17,10 +17,10 @@ LEAST_ERROR_S = 5e-5
 
 
 class HostClock:
-    """Keeps `clocks.wall`, and tells `chrony` of the clock of `robot`."""
+    """Tells `link` of this host's clock, and `chrony` of the clock of `robot`."""
 
-    def __init__(self, clocks: Clocks, chrony: "ChronySocket | None", robot: int) -> None:
-        self._clocks = clocks
+    def __init__(self, link: Link, chrony: "ChronySocket | None", robot: int) -> None:
+        self._link = link
         self._chrony = chrony
         self._robot = robot
         self._chrony_at = 0.0
@@ -45,12 +45,12 @@ class HostClock:
         if self._ahead_ns is not None and 1e-9 * abs(ahead_ns - self._ahead_ns) >= SET_S:
             self.steps += 1
         self._ahead_ns = ahead_ns
-        self._clocks.wall = Wall(wall_ns, self._error_s + LEAST_ERROR_S)
+        self._link.set_wall(Wall(wall_ns, self._error_s + LEAST_ERROR_S))
         if self._chrony is not None and time.monotonic() - self._chrony_at >= CHRONY_S:
             self._chrony_at = time.monotonic()
             self._tell(self._chrony, now)
 
     def _tell(self, chrony: "ChronySocket", now: float) -> None:
-        known = self._clocks.wall_offset(self._robot, now)
-        if known is not None and self._clocks.state(self._robot, now) is State.SYNCED:
+        known = self._link.wall_offset(self._robot, now)
+        if known is not None and self._link.clock_state(self._robot, now) is State.SYNCED:
             chrony.send(time.time_ns(), -1e-9 * known[0])

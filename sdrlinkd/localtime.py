@@ -38,7 +38,7 @@ def local_times(
 
     Topics in `stamped` begin with a std_msgs/Header.
     """
-    known = link.clocks.wall_offset(message.src, now)
+    known = link.wall_offset(message.src, now)
     if known is None:
         return UNKNOWN
     offset_ns, error_s, wall_error_s = known

@@ -18,12 +18,11 @@ from sdrlinkd.link import (
     Burst,
     CarrierTraits,
     Link,
+    Names,
     Opportunity,
     Outcome,
     Overrides,
     Told,
-    link_notices,
-    link_report,
 )
 from sdrlinkd.localtime import UNKNOWN, PublishClock, host_clocks, local_times
 from sdrlinkd.opening import Opening
@@ -66,7 +65,7 @@ class Node:
         self._transforms = transforms
         self._headers = headers
         self._stops = stops
-        self._host_clock = HostClock(link.clocks, chrony, setup.config.chrony.robot)
+        self._host_clock = HostClock(link, chrony, setup.config.chrony.robot)
         self.health = Health()
         self._publish_clock = PublishClock()
         self._traffic: OwnTraffic[Due] | None = None
@@ -117,7 +116,7 @@ class Node:
         dst: int | None = None,
     ) -> None:
         """A message that the bus could not take."""
-        self._link.delivery.refuse(reason, topic_id, receipt, dst)
+        self._link.refuse(reason, topic_id, receipt, dst)
         if receipt:
             self._tell_verdicts()
 
@@ -125,8 +124,8 @@ class Node:
     def attach(self, traits: CarrierTraits) -> None:
         """The PDU link is there: fit the link to it. Raises ConfigError."""
         config = self._opening.config
-        self._link.attach(traits, config.access, config.rate)
-        log.info("access %s", self._link.scheduler.settled.sentence)
+        fit = self._link.attach(traits, config.access, config.rate)
+        log.info("access %s", fit.settled.sentence)
         self._is_lockstep, self._is_attached = traits.is_lockstep, True
         if self._traffic is not None:
             self._traffic.begin(self._pdu_link.now())
@@ -144,9 +143,8 @@ class Node:
                     times = local_times(link, message, age_s, now, now_ns, self._headers)
                 received_ns = now_ns - round((now - message.heard_at) * 1e9)
                 self.bus.publish(message, age_s, received_ns, times)
-        if link.delivery.receipts.verdicts:
-            self._tell_verdicts()
-        if self._link.relay.is_on:
+        self._tell_verdicts()
+        if link.relays:
             self._pdu_link.wake()
 
     def advance(self, now: float) -> None:
@@ -163,7 +161,7 @@ class Node:
             self._link.handle_timers(now)
             self._tell_verdicts()
             self._queue_moved.set()  # messages may have expired
-        if now >= self._link.delivery.deadman.next_at:
+        if now >= self._link.silence_at:
             self._stop_silent(now)
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
@@ -181,8 +179,7 @@ class Node:
     def settled(self, burst: Burst, outcome: Outcome, at: float) -> None:
         """A burst has left, or not."""
         self._link.confirm(burst, outcome, at)
-        if self._link.delivery.receipts.verdicts:
-            self._tell_verdicts()
+        self._tell_verdicts()
         self._queue_moved.set()
 
     # The daemon's tasks.
@@ -204,7 +201,7 @@ class Node:
     async def tick(self) -> None:
         """Let the link's time pass, and measure how late the event loop is; for ever."""
         while True:
-            silent_s = self._link.delivery.deadman.next_at - self._pdu_link.now()
+            silent_s = self._link.silence_at - self._pdu_link.now()
             tick_s = TICK_S if self._is_lockstep else min(TICK_S, max(silent_s, SHORTEST_TICK_S))
             due = time.monotonic() + tick_s
             await asyncio.sleep(tick_s)
@@ -253,7 +250,8 @@ class Node:
         """Everything there is to know, at this moment."""
         now = self._pdu_link.now()
         carrier = self._opening.report(time.monotonic())
-        noted = link_notices(self._link, now, self._setup.topic_warnings)
+        subscribed = {topic_id: name for name, topic_id in self._setup.topics_in.items()}
+        noted = self._link.notices(now, self._setup.topic_warnings)
         snapshot = Snapshot(
             version=__version__,
             node=self._setup.node_id,
@@ -265,23 +263,18 @@ class Node:
             host_clock_steps=self._host_clock.steps,
             carrier=carrier,
             bus=self.bus.report(control_requests),
-            link=link_report(
-                self._link,
-                now,
-                {topic_id: name for name, topic_id in self._setup.topics_in.items()},
-                self.bus.names_out(),
-            ),
+            link=self._link.report(now, Names(subscribed, self.bus.names_out())),
             notices=[*self._setup.warnings, *carrier.notices, *noted],
         )
         return msgspec.structs.replace(snapshot, verdict=self.health.judge(snapshot))
 
     def _tell_verdicts(self) -> None:
-        for verdict in self._link.delivery.receipts.take():
+        for verdict in self._link.take_verdicts():
             self.bus.tell(verdict)
 
     def _stop_silent(self, now: float) -> None:
         """Whoever obeys a command topic that fell silent is told to stop, once."""
-        for src, topic_id in self._link.delivery.deadman.take_due(now):
+        for src, topic_id in self._link.take_silent(now):
             name = self._setup.republished_as(src, topic_id)
             stop = self._stops.get(topic_id)
             if stop is None:

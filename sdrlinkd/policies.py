@@ -50,7 +50,7 @@ class Policies:
         for key in changes:
             if key not in known:
                 raise UserError(f"{key}: cannot be set; allowed: {', '.join(known)}")
-        old = self._link.sender.policy(topic_id)
+        old = self._link.policy(topic_id)
         merged = {**msgspec.structs.asdict(old), **changes}
         try:
             new = msgspec.convert(merged, TopicPolicy)
@@ -59,7 +59,7 @@ class Policies:
         self._link.set_policy(topic_id, new)
         self.changed.setdefault(topic_id, set()).update(changes)
         # As the link has it, not as we gave it.
-        new = self._link.sender.policy(topic_id)
+        new = self._link.policy(topic_id)
         self._announce()
         told = {key: _told(getattr(new, key)) for key in changes}
         log.info("policy of %s: %s", self._setup.registry.topics[topic_id].name, told)
@@ -72,7 +72,7 @@ class Policies:
     def _announce(self) -> None:
         if self.announce is not None:
             topics = self._setup.registry.topics
-            self.announce({topic.id: self._link.sender.policy(topic.id) for topic in topics})
+            self.announce({topic.id: self._link.policy(topic.id) for topic in topics})
 
 
 def _told(value: object) -> object:

@@ -25,7 +25,7 @@ def message(payload, src=1):
 def link():
     """One that hears itself; its clock is that of the host."""
     link = make_link(own_id=1, hears_self=True)
-    link.clocks.wall = Wall(NOW_NS - 10 * 10**9, ERROR_S)
+    link.set_wall(Wall(NOW_NS - 10 * 10**9, ERROR_S))
     return link
 
 

@@ -77,14 +77,15 @@ def measure(case: Case, seed: int, seconds: float) -> Share:
         AccessParams(policy="minislot", nodes=list(robots), force=True), arrivals, seed=seed,
     )  # fmt: skip
     simulation.run(SETTLING_S)
-    control_s, all_s = _sent_s(links.values())
+    control_s, all_s = _sent_s(links.values(), SETTLING_S)
     simulation.run(seconds + SETTLING_S)
-    control_then_s, all_then_s = _sent_s(links.values())
+    until_s = seconds + SETTLING_S
+    control_then_s, all_then_s = _sent_s(links.values(), until_s)
     verdicts: dict[str, int] = {}
     for link in links.values():
-        for verdict in link.delivery.receipts.take():
+        for verdict in link.take_verdicts():
             verdicts[verdict.fate] = verdicts.get(verdict.fate, 0) + 1
-    period_s = float(np.mean([link.control_records.period_s for link in links.values()]))
+    period_s = float(np.mean([link.report(until_s).control_period_s for link in links.values()]))
     return Share(
         100 * (control_then_s - control_s) / seconds,
         100 * (all_then_s - all_s) / seconds,
@@ -93,12 +94,10 @@ def measure(case: Case, seed: int, seconds: float) -> Share:
     )
 
 
-def _sent_s(links: Iterable[Link]) -> tuple[float, float]:
-    """So far: (PDUs with nothing but records, all)."""
-    departures = [link.scheduler for link in links]
-    return sum(each.control_airtime_s for each in departures), sum(
-        each.airtime_s for each in departures
-    )
+def _sent_s(links: Iterable[Link], now: float) -> tuple[float, float]:
+    """Airtime up to `now`, in s: (PDUs with nothing but records, all bursts)."""
+    reports = [link.report(now) for link in links]
+    return sum(each.control_airtime_s for each in reports), sum(each.airtime_s for each in reports)
 
 
 def _traffic(case: Case, seed: int, robot: int, seconds: float) -> Iterator[Arrival]:

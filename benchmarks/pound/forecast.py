@@ -7,7 +7,7 @@ import numpy as np
 from backends import GAP
 from benchmarks.pound.ours import MAX_BURST_S, MCS, PDU_SIZE, RATE_HZ, Air, Run
 from sdrlinkd.config import ModemParams
-from sdrlinkd.link import AccessParams, CarrierTraits, Qos, TopicPolicy, settle
+from sdrlinkd.link import AccessParams, CarrierTraits, TopicPolicy, settle
 from sdrlinkd.modem import Airtimes
 from sdrlinkd.plan import Load, Plan, Setting, make_plan
 
@@ -40,11 +40,12 @@ def plan_of(run: Run, air: Air) -> Plan:
 
 def errors_pct(run: Run, air: Air) -> dict[str, float]:
     """Of each predicted share of the air, and each worst latency."""
-    plan, shares = plan_of(run, air), run.simulation.stations[1].link.scheduler.shares
+    plan, simulation = plan_of(run, air), run.simulation
+    used_s = simulation.stations[1].link.report(simulation.now).airtime_by_class_s
     found = {}
     for topic, trace in zip(plan.topics, run.traces, strict=True):
         seconds = trace.flow.count * trace.flow.period_s
-        used = shares.used_s[next(q for q in Qos if q.label == topic.qos)] / seconds
+        used = used_s[topic.qos] / seconds
         worst_s = float(np.nanmax((trace.heard_at - trace.sent_at)[LEARNING:]))
         found[f"{topic.name}_air"] = 100 * (topic.air / used - 1)
         found[f"{topic.name}_worst"] = 100 * (topic.worst_s / worst_s - 1)

@@ -69,7 +69,7 @@ async def _measure(seed: int, seconds: float) -> SampleClocks:
 def _look(station: Station, other: int, found: SampleClocks) -> None:
     own = station.link.own_id
     now = station.modem.now()
-    estimate = station.link.clocks.peers[other].estimate(now)
+    estimate = station.link.clock_estimate(other, now)
     if estimate is None:
         raise RuntimeError(f"robot {own} knows nothing of robot {other}'s clock")
     # Both began to count at the air's 0.

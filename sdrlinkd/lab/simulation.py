@@ -23,6 +23,7 @@ from sdrlinkd.link import (
     Overrides,
     RateParams,
     Sensed,
+    Settled,
 )
 from sdrlinkd.modem import Airtimes, carrier_traits
 
@@ -66,6 +67,7 @@ class Station:
 
     link: Link
     traits: CarrierTraits
+    settled: Settled
     pace: float
     """Of its own crystal, by which its link's times are."""
     arrivals: Iterator[Arrival]
@@ -130,11 +132,11 @@ class Simulation:
             link = links[node]
             can = self._medium.join(node, radio)
             traits = fit(carrier_traits("ether", can, modem, airtimes))
-            link.attach(traits, access, rate or RateParams())
-            self._policy = link.scheduler.settled.policy
+            settled, control, *_ = link.attach(traits, access, rate or RateParams())
+            self._policy = settled.policy
             pace, coming = 1 + 1e-6 * radio.clock_ppm, iter(arrivals.get(node, ()))
-            least_s = traits.turnaround_s + airtimes.airtime_s(max(link.rate.usable), 1)
-            station = self.stations[node] = Station(link, traits, pace, coming, least_s)
+            least_s = traits.turnaround_s + airtimes.airtime_s(max(control.usable), 1)
+            station = self.stations[node] = Station(link, traits, settled, pace, coming, least_s)
             self._await_arrival(station)
             self._look(station, 0)
         self._at(self._block(TICK_S), _ARRIVE, self._tick)
@@ -251,13 +253,13 @@ class Simulation:
                     pair.age_sum_s += age_s
                     pair.ages_s.append(age_s)
                 self._listen(node, message, self.now)
-            if link.relay.is_on:
+            if link.relays:
                 self._look(station, self._block(self.now))
 
     def _tick(self) -> None:
         for station in self.stations.values():
             link = station.link
-            waits = link.has_work or link.inbox.reassembly.held
+            waits = link.has_work or link.holds_parts
             if waits or self.now - station.ticked_at >= IDLE_TICK_S:
                 station.ticked_at = self.now
                 link.handle_timers(self.now * station.pace)
@@ -272,7 +274,7 @@ def _next_chance(
     All by the station's clock. In tdma: its own slot; with reuse, also those before that, so many
     mini-slots after their begin, or the end of a burst in them, as they are before.
     """
-    policy, traits = station.link.access, station.traits
+    policy, traits = station.settled.access, station.traits
     frame = policy.frame(t + traits.lead_s)
     carrier_end = -INFINITE if sensed.burst_at is None else sensed.idle_since
     if name in ("csma", "minislot"):

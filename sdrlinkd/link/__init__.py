@@ -36,7 +36,7 @@ from sdrlinkd.link.queue import (
 )
 from sdrlinkd.link.receipts import Verdict
 from sdrlinkd.link.receive import CDR_HEADER_SIZE, Delivered, Relay, RelayParams
-from sdrlinkd.link.report import link_notices, link_report
+from sdrlinkd.link.report import Names
 from sdrlinkd.link.schedule import (
     IDLE_SHARE,
     OVERRUN,
@@ -50,8 +50,16 @@ from sdrlinkd.link.schedule import (
     UrgentParams,
 )
 from sdrlinkd.link.status import Told
-from sdrlinkd.link.timesync import ClockParams, Clocks, DualEnvelope, PaperFilter, State, Wall
-from sdrlinkd.link.transmit import Burst, Outcome, RateChange, RateControl, RateParams
+from sdrlinkd.link.timesync import (
+    ClockParams,
+    Clocks,
+    DualEnvelope,
+    Estimate,
+    PaperFilter,
+    State,
+    Wall,
+)
+from sdrlinkd.link.transmit import Burst, Fit, Outcome, RateChange, RateControl, RateParams
 
 __all__ = [
     "AS_CONFIGURED",
@@ -78,11 +86,14 @@ __all__ = [
     "Deflated",
     "Delivered",
     "DualEnvelope",
+    "Estimate",
+    "Fit",
     "LatencyParams",
     "Lifespan",
     "Link",
     "LinkParams",
     "Lives",
+    "Names",
     "Opportunity",
     "Outbox",
     "Outcome",
@@ -108,8 +119,6 @@ __all__ = [
     "check_access",
     "flush_told",
     "lifespan_of",
-    "link_notices",
-    "link_report",
     "make_access",
     "may_share",
     "percent",

@@ -63,20 +63,17 @@ class Sensed(NamedTuple):
     burst_at: float | None = None
 
 
-def _of_any_length(_: float) -> float:
-    return inf
-
-
 class Opportunity(NamedTuple):
     """The carrier can take a burst that leaves at `earliest` or later.
 
     `airtime_s(mcs, n_pdus)` is a burst's length; `most_pdus(mcs, airtime_s)` how many PDUs fit, 0
     when not even one does; the carrier's own limit is heeded. What begins at `start` is no longer
-    than `made_by(start)`, or one PDU: a longer burst would not be there in time.
+    than `made_by(start)`, or one PDU: a longer burst would not be there in time. None: any length
+    is.
     """
 
     earliest: float
     airtime_s: Callable[[int, int], float]
     most_pdus: Callable[[int, float], int]
     sensed: Sensed = Sensed()
-    made_by: Callable[[float], float] = _of_any_length
+    made_by: Callable[[float], float] | None = None

@@ -1,57 +1,70 @@
 """The link: one node's whole traffic, as a calculator over bytes and `now`."""
 
 from collections.abc import Mapping
+from math import inf
 from random import Random
 
 from zstandard import ZstdCompressionDict
 
-from sdrlinkd.link.access import Access, AccessParams
+from sdrlinkd.link.access import AccessParams
 from sdrlinkd.link.carrier import CarrierTraits, Opportunity
+from sdrlinkd.link.packing import Composer, PiggybackRecords
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
-from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, Overrides, Qos
-from sdrlinkd.link.queue import DEFAULT_POLICY, NOT_TAKEN, Inflated, Kept, Latched, TopicPolicy
-from sdrlinkd.link.receipts import Delivery
-from sdrlinkd.link.receive import Delivered, Inbox, Relay, RelayParams
-from sdrlinkd.link.schedule import ClassesParams
-from sdrlinkd.link.status import RateMeter, Told, Why, rate_counters
-from sdrlinkd.link.timesync import ClockParams, Clocks
+from sdrlinkd.link.qos import AS_CONFIGURED, Overrides
+from sdrlinkd.link.queue import (
+    DEFAULT_POLICY,
+    NOT_TAKEN,
+    Inflated,
+    Intake,
+    Kept,
+    Latched,
+    Outbox,
+    TopicPolicy,
+)
+from sdrlinkd.link.receipts import Receipts, Verdict, make_receipt
+from sdrlinkd.link.receive import (
+    Delivered,
+    Ended,
+    Event,
+    Newcomer,
+    PduHeard,
+    PduToRelay,
+    Reception,
+    RecordHeard,
+    RelayParams,
+)
+from sdrlinkd.link.report import NO_NAMES, Names, Reporter
+from sdrlinkd.link.schedule import ClassesParams, Forecasts
+from sdrlinkd.link.status import AirUse, Told, Why
+from sdrlinkd.link.timesync import ClockParams, Clocks, Estimate, State, Wall
 from sdrlinkd.link.transmit import (
-    AirUse,
     Beacons,
     Burst,
     BurstScheduler,
     ControlRecords,
+    Fit,
+    NoRadio,
     Outcome,
-    RateControl,
     RateParams,
-    Sender,
+    TxDelayMeters,
+    fit_to,
 )
-from sdrlinkd.reports import RATE_WINDOW_S
-from sdrlinkd.wire import (
-    CONTROL_TOPIC_ID,
-    Beacon,
-    Clock,
-    Frame,
-    LinkReport,
-    Pdu,
-    Receipt,
-    Record,
-    Registry,
-    Stamp,
-    Waits,
-)
+from sdrlinkd.reports import LinkReport
+from sdrlinkd.wire import Clock, Receipt, Registry, Waits
 
 NO_DICTIONARIES: Mapping[int, ZstdCompressionDict] = {}
 NO_RELAY = RelayParams()
 NO_CLOCK = ClockParams(period_s=0.0)
 DEFAULT_CLASSES = ClassesParams()
+NOTHING_NOTED: Mapping[int, str] = {}
 
 
 class Link:
-    """Joins sender and inbox, access and rate. Never waits, never reads a clock.
+    """Joins the queue, the burst scheduler and the inbox. Never waits, never reads a clock.
 
     `now`, `start` and `at` are seconds on one clock of the caller's choice; `rng` is all chance.
     `hears_self`: the paper's loopback experiment. A compressed message may grow to `max_expanded`.
+    Messages may be submitted from the start; what needs a radio is made by `attach`.
     """
 
     def __init__(
@@ -70,112 +83,80 @@ class Link:
         hears_self: bool = False,
         max_expanded: int = 1 << 20,
     ) -> None:
+        has_control = registry.has_control
         self.params = params
         self.registry = registry
         self.own_id = own_id
-        self._own_src = bytes((own_id,))
-        self.digest = registry.digest({i: each.dict_id() for i, each in dictionaries.items()})
-        self.sender = Sender(
-            params, queue, registry, own_id, rng, reassembly.timeout_s, classes, dictionaries
-        )
-        self.inbox = Inbox(
-            params, reassembly, registry, own_id, hears_self, self, Inflated(dictionaries),
-            max_expanded,
-        )  # fmt: skip
-        self.rates = RateMeter(RATE_WINDOW_S)
-        self.waits_records: dict[tuple[int, int], Waits] = {}
-        """Why messages waited at their source, as that tells: by (source, topic id)."""
-        period_s = params.beacon_s if registry.has_control else 0.0
-        beacons = Beacons(period_s, params.pdu_size, self.digest, rng, own_id)
-        if not registry.has_control:
-            clock = NO_CLOCK
-        self.clocks = Clocks(clock, beacons.boot_id, own_id)
-        piggyback, neighbors = self.sender.packetizer.piggyback, self.inbox.neighbors
-        room = self.sender.packetizer.k_single
-        self.control_records = ControlRecords(clock, self.clocks, piggyback, neighbors, room)
-        self.scheduler = BurstScheduler(
-            self.sender, self.inbox, beacons, self.control_records, classes, own_id,
-            registry.has_control, rng,
-        )  # fmt: skip
-        self.delivery = Delivery(
-            self.sender, self.control_records, neighbors, own_id, params.receipt_s
-        )
+        self._rng = rng
+        self._classes = classes
+        digest = registry.digest({i: each.dict_id() for i, each in dictionaries.items()})
+        self._outbox = Outbox(queue)
+        self._intake = Intake(params, registry, self._outbox, classes, dictionaries)
         self._latched = Latched()
-        self.air = AirUse(self.scheduler)
-        self._why = Why(self.sender, self.scheduler.shares, self.air)
-        self.relay = Relay(relay, own_id)
+        self._piggyback = PiggybackRecords()
+        self._composer = Composer(
+            params, own_id, self._outbox, self._piggyback, rng, reassembly.timeout_s, has_control,
+            classes,
+        )  # fmt: skip
+        self._reception = Reception(
+            params, reassembly, registry, own_id, relay, Inflated(dictionaries), max_expanded,
+            hears_self,
+        )  # fmt: skip
+        self._receipts = Receipts(own_id, params.receipt_s)
+        beacons = Beacons(params.beacon_s if has_control else 0.0, params.pdu_size, digest, rng)
+        clock = clock if has_control else NO_CLOCK
+        self._clocks = Clocks(clock, beacons.boot_id, own_id)
+        self._tx_delays = TxDelayMeters()
+        self._control_records = ControlRecords(
+            clock, self._clocks, beacons, self._tx_delays, self._piggyback,
+            self._reception.neighbors, self._composer.k_single,
+        )  # fmt: skip
+        self._forecasts = Forecasts()
+        self._scheduler: BurstScheduler | NoRadio = NoRadio()
+        self._why = Why(self._intake, self._outbox)
+        self._reporter = Reporter(
+            params, registry, digest, self._outbox, self._intake, self._composer,
+            self._control_records, self._tx_delays, self._reception, self._receipts, self._clocks,
+        )  # fmt: skip
 
-    def attach(self, carrier: CarrierTraits, access: AccessParams, rate: RateParams) -> None:
-        """Settle access and rate for the radio that is there. Raises ConfigError."""
-        self.scheduler.attach(carrier, access, rate)
-        if carrier.is_lockstep:
+    # The radio.
+
+    def attach(self, carrier: CarrierTraits, access: AccessParams, rate: RateParams) -> Fit:
+        """Fit the link to the radio that is there. Raises ConfigError, changing nothing."""
+        fit = fit_to(carrier, access, rate, self.own_id, self._rng)
+        self.use(fit)
+        return fit
+
+    def use(self, fit: Fit) -> None:
+        """Send and hear by a radio as `fit` says, from now on."""
+        if isinstance(self._scheduler, NoRadio):
+            self._scheduler = BurstScheduler(
+                fit, self._outbox, self._composer, self._control_records, self._tx_delays,
+                self._forecasts, self._classes, self.own_id, self.registry.has_control,
+            )  # fmt: skip
+        else:
+            self._scheduler.refit(fit)
+        if fit.is_lockstep:
             # Its time begins now, whatever ours was.
-            self.sender.begin_anew()
-        self.clocks.resolution_s = carrier.stamp_s
-
-    @property
-    def access(self) -> Access:
-        """Says when."""
-        return self.scheduler.access
-
-    @property
-    def rate(self) -> RateControl:
-        """Says how fast."""
-        return self.scheduler.rate
-
-    def set_policies(self, policies: Mapping[int, TopicPolicy]) -> None:
-        """Apply per-topic policies by topic id; the others get the defaults."""
-        for topic in self.registry.topics:
-            self.set_policy(topic.id, policies.get(topic.id, DEFAULT_POLICY))
-
-    def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
-        """Change one, from now on."""
-        self.sender.set_policy(topic_id, policy)
-        if policy.durability == "volatile":
-            self._latched.forget(topic_id)
-        if not policy.deadman_s:
-            self.delivery.deadman.forget(topic_id)
-        self.inbox.policies[topic_id] = policy
-
-    def why(self, topic_id: int, told: Told, now: float) -> list[str]:
-        """What happens to a topic, in plain words."""
-        return self._why.explain(topic_id, self.registry.topics[topic_id].name, told, now)
-
-    def submit(
-        self,
-        topic_id: int,
-        payload: bytes,
-        now: float,
-        overrides: Overrides = AS_CONFIGURED,
-    ) -> str | None:
-        """Queue a message; None, or the ledger's reason for refusing it."""
-        refused = self.sender.submit(topic_id, payload, now, overrides)
-        if overrides.receipt:
-            self.delivery.note(now)
-            if refused in NOT_TAKEN or (refused and not self.registry.has_control):
-                self.delivery.refused(overrides.receipt, topic_id, refused, overrides.dst)
-            elif refused is None and not self.registry.has_control:
-                self.delivery.unknowable(overrides.receipt, topic_id, overrides.dst)
-        if refused is None:
-            qos = overrides.qos if overrides.qos is not None else self.sender.treatment(topic_id)[0]
-            self.scheduler.forecasts.note((self.own_id, topic_id), qos, now)
-            self.scheduler.more_to_send()
-            if self.sender.policy(topic_id).durability == "transient_local":
-                self._latched.keep(topic_id, Kept(payload, now, overrides._replace(receipt="")))
-        return refused
+            self._outbox.drop_all("tx_radio_down")
+            self._intake.begin_anew()
+        self._clocks.set_resolution(fit.stamp_s)
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
-        """The burst that should leave next, decided now; None: nothing to send, or not yet."""
-        burst = self.scheduler.next_burst(opportunity)
-        if burst is not None and self.sender.packetizer.asking:
-            self.delivery.note(burst.start)
+        """The burst that should leave next; None: nothing to send, or not yet."""
+        burst = self._scheduler.next_burst(opportunity)
+        if burst is not None and self._composer.asking:
+            self._expect_receipts(burst.start)
         return burst
 
+    def next_wakeup(self, now: float) -> float:
+        """When there may next be something to send; not after `now`: at once."""
+        return self._scheduler.next_wakeup(now)
+
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
-        """What the radio says became of a burst."""
-        self.scheduler.confirm(burst, outcome, now)
-        if self.sender.lives.dropped_asking:
-            self.delivery.note(now)
+        """Settle a burst by what the radio says became of it."""
+        self._scheduler.confirm(burst, outcome, now)
+        self._tell_dropped()
 
     def hear(
         self,
@@ -189,112 +170,222 @@ class Link:
         (absent: `at`, as is `now`); the messages that it completed.
         """
         now, ended_at = at if now is None else now, at if ended_at is None else ended_at
-        if data[1:2] != self._own_src:
-            self.air.heard(at, ended_at)
-        return self.inbox.hear(data, at, snr_db, now, ended_at)
+        return self._dispatch(self._reception.hear(data, at, snr_db, now, ended_at))
+
+    # The bus.
+
+    def submit(
+        self,
+        topic_id: int,
+        payload: bytes,
+        now: float,
+        overrides: Overrides = AS_CONFIGURED,
+    ) -> str | None:
+        """Queue a message; None, or the ledger's reason for refusing it."""
+        intake, bytes_per_s = self._intake, self._scheduler.bytes_per_s
+        refused = intake.submit(topic_id, payload, now, overrides, bytes_per_s)
+        if overrides.receipt:
+            self._tell_dropped()
+            if refused in NOT_TAKEN or (refused and not self.registry.has_control):
+                self._refused(overrides.receipt, topic_id, refused, overrides.dst)
+            elif refused is None and not self.registry.has_control:
+                dst = overrides.dst
+                dst = intake.destination(topic_id) if dst is None else dst
+                self._receipts.unknowable(overrides.receipt, topic_id, dst)
+        if refused is None:
+            qos = overrides.qos if overrides.qos is not None else intake.treatment(topic_id)[0]
+            self._forecasts.note((self.own_id, topic_id), qos, now)
+            self._scheduler.more_to_send()
+            if intake.policy(topic_id).durability == "transient_local":
+                self._latched.keep(topic_id, Kept(payload, now, overrides._replace(receipt="")))
+        return refused
+
+    def refuse(
+        self, reason: str, topic_id: int | None = None, receipt: str = "", dst: int | None = None
+    ) -> None:
+        """Count a message that the bus could not hand over, and tell its producer who asked."""
+        self._intake.refuse(reason, topic_id)
+        if receipt and topic_id is not None:
+            self._refused(receipt, topic_id, reason, dst)
 
     def delivered(self, message: Delivered, now: float) -> float | None:
         """The age in seconds at which `message` is handed over at `now`; None when unknown."""
-        policy = self.inbox.policies.get(message.topic_id, DEFAULT_POLICY)
-        return self.delivery.delivered(message, policy, now)
+        return self._reception.deliver(message, now)
+
+    def take_verdicts(self) -> list[Verdict]:
+        """What became of messages whose producers want to know, since the last call."""
+        return self._receipts.take()
+
+    @property
+    def silence_at(self) -> float:
+        """When the first command topic falls silent, if nothing comes before; s."""
+        return self._reception.silence_at
+
+    def take_silent(self, now: float) -> list[tuple[int, int]]:
+        """(source, topic id) of command topics that fell silent, each once."""
+        return self._reception.take_silent(now)
+
+    # Policies and clocks.
+
+    def set_policies(self, policies: Mapping[int, TopicPolicy]) -> None:
+        """Apply per-topic policies by topic id; the others get the defaults."""
+        for topic in self.registry.topics:
+            self.set_policy(topic.id, policies.get(topic.id, DEFAULT_POLICY))
+
+    def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
+        """Change a topic's policy from now on."""
+        self._intake.set_policy(topic_id, policy)
+        if policy.durability == "volatile":
+            self._latched.forget(topic_id)
+        self._reception.set_policy(topic_id, policy)
+
+    def policy(self, topic_id: int) -> TopicPolicy:
+        """The policy of a topic that is in force."""
+        return self._intake.policy(topic_id)
+
+    def set_wall(self, wall: Wall) -> None:
+        """Tell others what our host's clock is ahead of the link's."""
+        self._clocks.set_wall(wall)
+
+    def wall_offset(self, src: int, now: float) -> tuple[int, float, float] | None:
+        """Our host's time since 1970 less that of robot `src`; see `Clocks.wall_offset`."""
+        return self._clocks.wall_offset(src, now)
+
+    def clock_state(self, src: int, now: float) -> State:
+        """How well a robot's clock is known; our own is."""
+        return self._clocks.state(src, now)
+
+    def clock_estimate(self, src: int, now: float) -> Estimate | None:
+        """Our link's clock less that of robot `src`; None: not known."""
+        return self._clocks.estimate(src, now)
+
+    # Time.
 
     def expire_queue(self, now: float) -> None:
         """Let time pass where there is nothing yet to send with: what is too old goes by name."""
-        self.sender.expire(now)
-        self.delivery.expire(now)
+        self._composer.expire(now)
+        self._tell_dropped()
+        self._receipts.expire(now)
 
     def handle_timers(self, now: float) -> None:
         """Let time pass: expiries, reassembly timeouts, rate samples."""
-        self.sender.expire(now)
-        for offer in self._latched.due(now, self.sender.outbox.bytes_per_s):
-            self.sender.offer_again(offer, now)
-            self.scheduler.more_to_send()
-        self.inbox.expire(now)
-        self.control_records.look_round(now, self.own_id)
-        self.delivery.expire(now)
-        self._why.sample(now, len(self.registry))
-        if self.rates.is_due(now):
-            counters = rate_counters(self.sender, self.inbox, self.air.sent_s, self.air.heard_s)
-            self.rates.sample(counters, now)
+        scheduler = self._scheduler
+        self._composer.expire(now)
+        for offer in self._latched.due(now, scheduler.bytes_per_s):
+            self._intake.offer_again(offer, now, scheduler.bytes_per_s)
+            scheduler.more_to_send()
+        self._dispatch(self._reception.expire(now))
+        self._control_records.look_round(now, scheduler.record_pdu_s)
+        self._tell_dropped()
+        self._receipts.expire(now)
+        if self._why.is_due(now):
+            self._why.sample(now, len(self.registry), self._air_use)
+        self._reporter.sample(now, scheduler)
 
     @property
     def has_work(self) -> bool:
         """Whether messages wait to be sent."""
-        return self.scheduler.has_work
+        return bool(self._outbox) or self._scheduler.has_work
 
-    def next_wakeup(self, now: float) -> float:
-        """When there may next be something to send; not after `now`: at once."""
-        return self.scheduler.next_wakeup(now)
+    @property
+    def holds_parts(self) -> bool:
+        """Whether messages of others wait for the rest of them."""
+        return self._reception.holds_parts
+
+    @property
+    def relays(self) -> bool:
+        """Whether PDUs of others are forwarded."""
+        return self._reception.relays
 
     def drain(self) -> None:
         """Nothing more will come: partial PDUs go at once, beacons end."""
-        self.scheduler.drain()
+        self._control_records.end()
+        self._composer.end_flush()
 
     def shut_down(self) -> None:
         """Drop what could not be sent any more, by name."""
-        self.scheduler.clear()
-        self.sender.shut_down()
-        self.delivery.expire(float("inf"))
+        self._scheduler.clear()
+        self._outbox.drop_all("tx_shutdown")
+        self._tell_dropped()
+        self._receipts.expire(inf)
+
+    # What people ask.
+
+    def why(self, topic_id: int, told: Told, now: float) -> list[str]:
+        """What happens to a topic, in plain words."""
+        name = self.registry.topics[topic_id].name
+        return self._why.explain(topic_id, name, told, now, self._air_use)
+
+    def report(self, now: float, names: Names = NO_NAMES) -> LinkReport:
+        """Everything the link knows, at `now`."""
+        return self._reporter.report(now, names, self._scheduler)
+
+    def notices(self, now: float, of_topics: Mapping[int, str] = NOTHING_NOTED) -> list[str]:
+        """What a person should know about this link, in sentences.
+
+        `of_topics`: what should be known of topics by id, once a producer uses them.
+        """
+        return self._reporter.notices(now, of_topics, self._scheduler)
 
     def audit(self) -> list[str]:
         """Where the ledger does not add up; empty when it does."""
-        return self.sender.audit() + self.inbox.audit()
+        return self._intake.audit() + self._reception.audit()
 
-    # What the inbox tells.
+    # Inside.
 
-    def ended(
-        self, src: int, topic_id: int, entry_id: int, reason: str, age_s: float | None, now: float
-    ) -> None:
-        """Its sender wants to know."""
-        self.delivery.ended(src, topic_id, entry_id, reason, age_s, now)
+    @property
+    def _air_use(self) -> AirUse:
+        return AirUse(self._scheduler.report(), self._reception.heard_s)
 
-    def pdu_from(self, pdu: Pdu, stamps: list[Stamp], at: float, is_relayed: bool) -> None:
-        """A good PDU that somebody else has sent."""
-        src = pdu.src
-        self.access.heard(src, at, is_relayed)
-        if not is_relayed:
-            self.rate.heard(src, at)
-        qos = CLASSES[pdu.qos]
-        if not self.access.others_follow or qos > Qos.LATENCY or src == self.own_id:
-            return
-        # What others send at their beat needs the air then, too.
-        ages = {} if is_relayed else {(each.topic_id, each.entry_id): each for each in stamps}
-        for entry in pdu.entries:
-            if not entry.index and not (
-                entry.topic_id == CONTROL_TOPIC_ID and self.registry.has_control
-            ):
-                stamp = ages.get((entry.topic_id, entry.entry_id))
-                origin = at if stamp is None else at - 1e-6 * stamp.age_us
-                self.scheduler.forecasts.note((src, entry.topic_id), qos, origin)
+    def _dispatch(self, events: list[Event]) -> list[Delivered]:
+        """Do what the inbox found to be done, in order; the messages to be handed over."""
+        delivered = []
+        for event in events:
+            match event:
+                case Delivered():
+                    delivered.append(event)
+                case PduHeard():
+                    self._scheduler.pdu_heard(event)
+                case RecordHeard():
+                    self._record_heard(event)
+                case Newcomer():
+                    # It does not have what was latched before.
+                    self._latched.newcomer(event.src, event.at)
+                case Ended(src, topic_id, entry_id, reason, age_s, at):
+                    receipt = make_receipt(src, topic_id, entry_id, reason, age_s)
+                    self._control_records.receipt(receipt, at)
+                case PduToRelay():
+                    self._forward(event)
+        return delivered
 
-    def newcomer(self, src: int, at: float) -> None:
-        """It does not have what was latched before."""
-        if src != self.own_id:
-            self._latched.newcomer(src, at)
-
-    def sends_on(self, pdu: Pdu, data: bytes, at: float) -> bool:
-        """Forward it, if that is our part."""
-        if not self.relay.wants(pdu):
-            return False
-        until = min(at + self.relay.lifespan_s, self.inbox.fresh_until(pdu))
-        refused = self.sender.forward(pdu, data, at, until)
-        self.scheduler.more_to_send()
-        return refused is None
-
-    def record_from(self, src: int, record: Record, at: float) -> None:
-        """A control record that is not about messages."""
-        if isinstance(record, LinkReport):
-            if record.node == self.own_id:
-                self.rate.take(src, record, at)
-            else:
-                self.access.told_of(record.node, at)
-        elif isinstance(record, Beacon):
-            self.access.beacon(src, at)
-        elif isinstance(record, Frame):
-            self.access.take_frame(src, record, at)
-        elif isinstance(record, Clock) and src != self.own_id:
-            self.clocks.hear(src, record, at)
+    def _record_heard(self, event: RecordHeard) -> None:
+        src, record, at = event
+        if isinstance(record, Clock):
+            self._clocks.hear(src, record, at)
         elif isinstance(record, Receipt):
-            self.delivery.answered(src, record, at)
-        elif isinstance(record, Waits) and record.topic_id < len(self.registry):
-            self.waits_records[src, record.topic_id] = record
+            self._receipts.hear(src, record, at)
+        elif isinstance(record, Waits):
+            if record.topic_id < len(self.registry):
+                self._reception.take_waits(src, record)
+        else:
+            self._scheduler.record_heard(src, record, at)
+
+    def _forward(self, event: PduToRelay) -> None:
+        pdu, data, at, until, is_ours_too = event
+        refused = self._intake.forward(pdu, data, at, until, self._scheduler.bytes_per_s)
+        if refused and not is_ours_too:
+            self._reception.not_relayed()
+        self._scheduler.more_to_send()
+
+    def _refused(self, receipt: str, topic_id: int, reason: str, dst: int | None) -> None:
+        dst = self._intake.destination(topic_id) if dst is None else dst
+        self._receipts.refused(receipt, topic_id, dst, reason)
+
+    def _expect_receipts(self, start: float) -> None:
+        present = self._reception.neighbors.present(start)
+        for message in self._composer.take_asking():
+            self._receipts.expect(message, present, start)
+
+    def _tell_dropped(self) -> None:
+        for message, reason in self._outbox.lives.take_dropped_asking():
+            self._receipts.dropped(message, reason)

@@ -49,7 +49,6 @@ from sdrlinkd.wire.control import (
     Stamp,
     Waits,
     build_records,
-    build_stamp,
     parse_records,
 )
 from sdrlinkd.wire.later import forwarded, lasting_identity, postponed
@@ -119,7 +118,6 @@ __all__ = [
     "build",
     "build_full",
     "build_records",
-    "build_stamp",
     "entry_budget",
     "equal_payload",
     "flags",

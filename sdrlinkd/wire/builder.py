@@ -5,7 +5,7 @@ import struct
 from functools import lru_cache
 
 from sdrlinkd.wire.capacity import CRC_SIZE, ENTRY_HEADER_SIZE, MAX_ENTRIES, entry_budget
-from sdrlinkd.wire.control import STAMP_SIZE
+from sdrlinkd.wire.control import ASKS, STAMP_RECORD, STAMP_SIZE, TLV_HEADER_SIZE, RecordType
 from sdrlinkd.wire.registry import CONTROL_TOPIC_ID
 
 VERSION = 0
@@ -78,6 +78,15 @@ class PduBuilder:
         self._records_size = size
         self._note_room()
         return True
+
+    def add_stamp(self, topic_id: int, entry_id: int, age_us: int, asks: bool = False) -> bool:
+        """Add a STAMP record if it fits; `asks`: its sender wants a RECEIPT.
+
+        Every message has one, so it is built without the detour by `build_records`.
+        """
+        value_size = STAMP_SIZE - TLV_HEADER_SIZE + asks
+        record = STAMP_RECORD.pack(RecordType.STAMP, value_size, topic_id, entry_id, age_us)
+        return self.add_record(record + ASKS if asks else record)
 
     def _note_room(self) -> None:
         """Bring `room` and `room_beside_stamp` up to date."""

@@ -132,7 +132,7 @@ _FORMATS = {
     RecordType.WAITS: struct.Struct(">BBBB"),
 }
 # Fields behind those that a record always has.
-_ASKS = b"\x01"
+ASKS = b"\x01"
 _WHOSE = struct.Struct(">BHH")
 # What the parser needs of a type, by its number: the fields' class and format.
 _KNOWN = {int(number): (kind, _FORMATS[number]) for kind, number in _TYPES.items()}
@@ -141,8 +141,8 @@ _PARITY = struct.Struct(">BBBBBHHI")
 PARITY_OVERHEAD = TLV_HEADER_SIZE + _PARITY.size
 """Of a record, beside the octets of parity."""
 STAMP_SIZE = TLV_HEADER_SIZE + _FORMATS[RecordType.STAMP].size
-_STAMP_RECORD = struct.Struct(">BBBBI")
-ASKING_STAMP_SIZE = STAMP_SIZE + len(_ASKS)
+STAMP_RECORD = struct.Struct(">BBBBI")
+ASKING_STAMP_SIZE = STAMP_SIZE + len(ASKS)
 # Octets that a record's value always has, by its type's number.
 _LEAST = {
     **{int(number): fields.size for number, fields in _FORMATS.items()},
@@ -155,13 +155,6 @@ _LEAST = {
 def build_records(records: Iterable[Record]) -> bytes:
     """The payload of one control entry. Raises ValueError when a field is out of range."""
     return b"".join(_build(record) for record in records)
-
-
-def build_stamp(topic_id: int, entry_id: int, age_us: int, asks: bool = False) -> bytes:
-    """A STAMP record: every message has one, so it is built without detours."""
-    value_size = STAMP_SIZE - TLV_HEADER_SIZE + asks
-    record = _STAMP_RECORD.pack(RecordType.STAMP, value_size, topic_id, entry_id, age_us)
-    return bytes(record + _ASKS if asks else record)
 
 
 def record_spans(octets: bytes | bytearray, begin: int, end: int) -> list[tuple[int, int, int]]:
@@ -238,7 +231,7 @@ def _build(record: Record) -> bytes:
 def _fixed(record: FixedRecord, number: RecordType) -> bytes:
     fields = _FORMATS[number]
     if isinstance(record, Stamp):
-        return fields.pack(*record[:3]) + _ASKS * record.asks
+        return fields.pack(*record[:3]) + ASKS * record.asks
     if isinstance(record, Receipt):
         is_whole = record[3:] != (BROADCAST, NO_AGE, 0)
         return fields.pack(*record[:3]) + (_WHOSE.pack(*record[3:]) if is_whole else b"")
@@ -248,7 +241,7 @@ def _fixed(record: FixedRecord, number: RecordType) -> bytes:
 def _with_more(record: FixedRecord, more: bytes) -> FixedRecord:
     """With the fields behind those that its type always has; what is not known is left out."""
     if isinstance(record, Stamp):
-        return record._replace(asks=bool(more[0] & _ASKS[0]))
+        return record._replace(asks=bool(more[0] & ASKS[0]))
     if isinstance(record, Receipt) and len(more) >= _WHOSE.size:
         return Receipt(*record[:3], *_WHOSE.unpack_from(more))
     return record

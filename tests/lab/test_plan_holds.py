@@ -71,7 +71,7 @@ def set_up(policy, robots, n_topics=1, qos=(), arrivals=None, listen=lambda *_: 
     one, sharing = sim.stations[1], robots if policy == "none" else len(nodes)
     return sim, Setting(
         airtimes, PDU_SIZE, modem.mcs, one.traits.longest_burst_s[modem.mcs], ClassesParams(),
-        sharing, one.link.scheduler.settled, one.traits, host_s=0.0,
+        sharing, one.settled, one.traits, host_s=0.0,
     )  # fmt: skip
 
 

@@ -23,7 +23,7 @@ CLOSE = {"minislot": 0.05, "tdma": 0.08, "csma": 0.5}
 def test_the_share_that_is_told_is_the_share_that_is_carried(policy, radio):
     n = 3
     sim, carried = saturated(policy, n, seed=n, **RADIOS[radio])
-    told = sim.stations[1].link.scheduler.settled.share
+    told = sim.stations[1].settled.share
     assert carried == pytest.approx(told, rel=CLOSE[policy])
     assert [line for each in sim.stations.values() for line in each.link.audit()] == []
 

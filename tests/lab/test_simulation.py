@@ -166,7 +166,7 @@ def test_24_robots_with_tdma_for_ten_minutes():
     assert min(sum(each.sent.values()) for each in sim.stations.values()) > 40
     assert audit(sim) == []
     assert overlaps.found == []
-    round_s = sim.stations[1].link.access.round_s
+    round_s = sim.stations[1].settled.access.round_s
     assert max(age_s for _, age_s in got(sim).values()) < round_s
 
 
@@ -184,7 +184,7 @@ def test_12_robots_with_minislots_for_two_minutes():
     assert len(got(sim)) == n * (n - 1)
     assert audit(sim) == []
     assert overlaps.found == []
-    assert max(age_s for _, age_s in got(sim).values()) < 2 * sim.stations[1].link.access.round_s
+    assert max(age_s for _, age_s in got(sim).values()) < 2 * sim.stations[1].settled.access.round_s
 
 
 @pytest.mark.parametrize(("policy", "least", "most"), [("minislot", 0.3, 0.9), ("tdma", 1, 1)])
@@ -214,7 +214,7 @@ def test_a_chain_keeps_one_schedule():
         seed=seed, links=hears_only_neighbors(5),
     )  # fmt: skip
     sim.run(20.0)
-    told = {node: each.link.access.frame(20.0)[:2] for node, each in sim.stations.items()}
+    told = {node: each.settled.access.frame(20.0)[:2] for node, each in sim.stations.items()}
     assert told == {1: (1, 0), 2: (1, 1), 3: (1, 2), 4: (1, 3), 5: (1, 4)}
 
 
@@ -240,7 +240,7 @@ def outcome(seed):
     assert audit(sim) == []
     counters = Counter()
     for each in sim.stations.values():
-        counters.update(each.link.inbox.pdus_dropped)
+        counters.update(each.link.report(sim.now).rx.pdus_dropped)
     return got(sim), counters, [each.bursts for each in sim.stations.values()]
 
 

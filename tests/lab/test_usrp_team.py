@@ -67,7 +67,7 @@ def team(policy, rate_hz, mcs, seed=1):
 def test_auto_carries_all_of_it(rate_hz, mcs):
     sim = team("auto", rate_hz, mcs)
     for sender, receiver in ((1, 2), (2, 1)):
-        assert sim.stations[sender].link.scheduler.settled.policy == "tdma"
+        assert sim.stations[sender].settled.policy == "tdma"
         for topic_id, count in ((ODOM, 30 * SECONDS), (IMAGE, SECONDS)):
             assert sim.pairs[sender, receiver, topic_id].received == count
         odometry_s = sim.pairs[sender, receiver, ODOM].ages_s

@@ -1,7 +1,7 @@
 """Links whose bulk has parity, and images sent over them."""
 
-from sdrlinkd.link import Allowance, ClassesParams, ClassParams, Outcome, Overrides, Qos
-from tests.link.world import make_link
+from sdrlinkd.link import ClassesParams, ClassParams, Outcome, Overrides, Qos
+from tests.link.world import compose, make_link, rx
 
 
 def protected(share, own_id=1, **more):
@@ -14,7 +14,7 @@ def pdus_of(link, payload, now=0.0, topic=0):
     """The PDUs that carry a payload as bulk."""
     link.submit(topic, payload, now, Overrides(Qos.BULK))
     pdus = []
-    while burst := link.scheduler.compose(now, Allowance.of(63)):
+    while burst := compose(link, now):
         link.confirm(burst, Outcome.SENT, now)
         pdus += burst.pdus
     return pdus
@@ -30,6 +30,6 @@ def images_over(lost, share):
                 got += len(receiver.hear(pdu, i * 0.3))
             at += 1
         receiver.handle_timers(i * 0.3)
-        assert receiver.inbox.reassembly.held_bytes <= 1 << 20
+        assert rx(receiver).held_bytes <= 1 << 20
         assert receiver.audit() == sender.audit() == []
     return got

@@ -11,7 +11,6 @@ from sdrlinkd.link import (
     Qos,
     RateParams,
     check_access,
-    link_report,
     may_share,
     settle,
 )
@@ -131,14 +130,12 @@ def test_a_link_refuses_it_at_attach_and_reports_what_it_came_to():
     link = make_link(1)
     with pytest.raises(ConfigError, match=r"access\.force"):
         link.attach(USRP, params("minislot", [1, 2], force=False), RateParams())
-    link.attach(USRP, auto([1, 2]), RateParams())
-    report = link_report(link, 0.0, {}, {})
+    settled = link.attach(USRP, auto([1, 2]), RateParams()).settled
+    report = link.report(0.0)
     assert report.access.startswith("tdma: 2 slots")
     assert (report.access_policy, round(report.access_share_pct)) == ("tdma", 97)
     assert report.access_reason.startswith("as this radio hears another begin")
-    assert link.scheduler.settled.sentence == (
-        f"tdma, {report.access_reason}; it carries 97 % of the air"
-    )
+    assert settled.sentence == (f"tdma, {report.access_reason}; it carries 97 % of the air")
 
 
 def test_minislots_wait_for_those_of_the_higher_level_and_say_so():
@@ -177,14 +174,14 @@ def test_robots_that_came_to_different_policies_are_told():
 def test_beacons_reach_the_policy():
     """Of a robot that has no schedule; those that come by a relay tell nothing."""
     teller, hearer = make_link(2, beacon_s=1.0), make_link(1)
-    hearer.attach(USRP, auto([1, 2]), RateParams())
+    access = hearer.attach(USRP, auto([1, 2]), RateParams()).settled.access
     for number in range(3):
-        assert notices_of(hearer.access) == ""
+        assert notices_of(access) == ""
         now = 1.2 * number
         burst = next_burst(teller, now)
         teller.confirm(burst, Outcome.SENT, now)
         hearer.hear(burst.pdus[0], now)
-    assert "robot 2 is heard and keeps no tdma schedule" in notices_of(hearer.access)
+    assert "robot 2 is heard and keeps no tdma schedule" in notices_of(access)
 
 
 def test_who_takes_itself_for_alone_and_is_not_is_told():

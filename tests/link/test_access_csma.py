@@ -29,7 +29,7 @@ def first_start(access, idle_since, qos=Qos.DEFAULT, earliest=0.0):
         wish = Wish(max(earliest, until + SLOT / 4), qos, 0.001, Sensed(until, idle_since))
         slot = access.slot(wish)
         if slot is not None:
-            assert slot.latest(0.001) == slot.start
+            assert slot.late_end == slot.start
             assert slot.start >= wish.earliest
             return slot.start
         until += SLOT / 8
@@ -173,5 +173,5 @@ def test_none_sends_at_any_time_and_keeps_no_schedule():
     free.sent(9.0, None)
     for sensed in (Sensed(), Sensed(1.0, 5.0)):
         assert free.slot(Wish(2.0, Qos.BULK, 0.5, sensed)) == Slot(2.0)
-    assert free.slot(Wish(2.0, Qos.BULK, 0.5, Sensed())).latest(0.1) == float("inf")
+    assert free.slot(Wish(2.0, Qos.BULK, 0.5, Sensed())).late_end == float("inf")
     assert (free.frame(1.0), free.notices(1.0)) == (None, [])

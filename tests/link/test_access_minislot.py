@@ -36,7 +36,7 @@ def first_start(access, idle_since, burst_at, qos=Qos.DEFAULT):
         wish = Wish(until + MS / 4, qos, 0.001, Sensed(until, idle_since, burst_at))
         slot = access.slot(wish)
         if slot is not None:
-            assert slot.latest(0.001) == slot.start
+            assert slot.late_end == slot.start
             return slot.start
         until += MS / 8
     raise AssertionError("it waits for ever")

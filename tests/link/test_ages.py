@@ -2,10 +2,9 @@
 
 import pytest
 
-from sdrlinkd.link import Allowance
 from sdrlinkd.link.receive import MAX_WAITING, Ages
 from sdrlinkd.wire import Stamp
-from tests.link.world import make_link, send_all
+from tests.link.world import compose, make_link, send_all
 
 
 def carry(sender, receiver, sent_at, heard_at, **kwargs):
@@ -25,8 +24,8 @@ def test_age_grows_between_the_stamp_and_the_last_fragment():
     sender, receiver = make_link(1, pdu_size=64), make_link(2, pdu_size=64)
     sender.submit(0, bytes(80), 0.0)
     first, second = (
-        sender.scheduler.compose(0.010, Allowance.of(1)).pdus[0],
-        sender.scheduler.compose(0.030, Allowance.of(1)).pdus[0],
+        compose(sender, 0.010, 1).pdus[0],
+        compose(sender, 0.030, 1).pdus[0],
     )
     assert receiver.hear(second, 5.030) == []
     (message,) = receiver.hear(first, 5.040)

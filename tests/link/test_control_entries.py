@@ -4,7 +4,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sdrlinkd.errors import PduError
-from sdrlinkd.link import link_report
 from sdrlinkd.wire import (
     CONTROL_TOPIC_ID,
     Beacon,
@@ -13,13 +12,12 @@ from sdrlinkd.wire import (
     Stamp,
     build,
     build_records,
-    build_stamp,
     forwarded,
     parse,
     parse_records,
     postponed,
 )
-from tests.link.world import make_link
+from tests.link.world import make_link, neighbors, rx
 
 SIZE = 220
 MESSAGE = b"\0\1\0\0data"
@@ -69,16 +67,16 @@ def test_whatever_is_said_on_topic_15_the_message_beside_it_is_delivered(cases, 
         assert [each.payload for each in got] == [message.payload]
         bad += sum(not readable(each) for each in foreigners)
         assert link.audit() == []
-    rx = link_report(link, 0.0, {}, {}).rx
+    rx = link.report(0.0).rx
     assert (rx.pdus_used, rx.delivered, rx.control_bad) == (len(cases), len(cases), bad)
 
 
 def test_a_good_control_entry_beside_a_bad_one_is_used():
     link = make_link(2, pdu_size=SIZE)
-    good = control(build_stamp(0, 9, 250_000))
+    good = control(build_records([Stamp(0, 9, 250_000)]))
     (got,) = link.hear(pdu([control(SPOILT), data(), good]), 1.0)
     assert got.origin_at == 1.0 - 0.25
-    assert link.inbox.control_bad == 1
+    assert rx(link).control_bad == 1
 
 
 def test_of_a_bad_entry_no_record_is_used():
@@ -87,15 +85,15 @@ def test_of_a_bad_entry_no_record_is_used():
     # Neither its STAMP nor its BEACON.
     assert got.origin_at is None
     link.hear(pdu([control(build_records([Beacon(8, 1)]))], seq=1), 1.1)
-    assert link.inbox.neighbors[1].reboots == 0
+    assert neighbors(link)[1].reboots == 0
 
 
 def test_copies_do_not_count_again():
     link = make_link(2, pdu_size=SIZE)
     for _ in range(2):
         link.hear(pdu([data(), control(SPOILT)]), 1.0)
-    assert link.inbox.control_bad == 1
-    assert dict(link.inbox.pdus_dropped) == {"rx_dup": 1}
+    assert rx(link).control_bad == 1
+    assert dict(rx(link).pdus_dropped) == {"rx_dup": 1}
 
 
 def test_pdus_of_control_entries_alone():
@@ -103,8 +101,8 @@ def test_pdus_of_control_entries_alone():
     good = control(build_records([Beacon(7, 1)]))
     for seq, entries in enumerate(([control(SPOILT)] * 2, [control(SPOILT), good], [good] * 2)):
         assert link.hear(pdu(entries, seq), 0.0) == []
-    assert dict(link.inbox.pdus_dropped) == {"rx_control_bad": 1, "rx_control": 2}
-    assert link.inbox.control_bad == 3
+    assert dict(rx(link).pdus_dropped) == {"rx_control_bad": 1, "rx_control": 2}
+    assert rx(link).control_bad == 3
     assert link.audit() == []
 
 
@@ -112,7 +110,7 @@ def test_with_sixteen_topics_there_is_nothing_to_be_read():
     link = make_link(2, pdu_size=SIZE, topics=[(f"t{i}", "a/B") for i in range(16)])
     got = link.hear(pdu([control(SPOILT), data()]), 0.0)
     assert [each.topic_id for each in got] == [15, 0]
-    assert link.inbox.control_bad == 0
+    assert rx(link).control_bad == 0
 
 
 @settings(derandomize=True, deadline=None, max_examples=200)
@@ -127,4 +125,4 @@ def test_a_relay_sends_on_as_it_is_what_it_cannot_read(foreigners, by_us):
     link = make_link(2, pdu_size=SIZE, hop_limit=3)
     assert len(link.hear(octets, 0.0)) == 1
     assert link.hear(forwarded(octets, by_us, has_control=True), 0.1) == []
-    assert link.inbox.pdus_dropped["rx_dup"] == 1
+    assert rx(link).pdus_dropped["rx_dup"] == 1

@@ -7,7 +7,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sdrlinkd.link import (
-    Allowance,
     ClassesParams,
     ClassParams,
     ClockParams,
@@ -17,14 +16,22 @@ from sdrlinkd.link import (
     TopicPolicy,
     flush_told,
 )
-from sdrlinkd.wire import Beacon, Clock, Receipt
-from tests.link.world import layouts, make_link, next_burst, records_in, send_all
+from sdrlinkd.wire import ENTRY_HEADER_SIZE, Beacon, Clock, Receipt, equal_payload
+from tests.link.world import (
+    compose,
+    layouts,
+    make_link,
+    next_burst,
+    records_in,
+    send_all,
+    topic_of,
+    tx,
+)
 
 INFINITE = float("inf")
 NEVER = 0.0
 """By time, as in the paper."""
 LATE = 1e6
-MOST = Allowance.of(8)
 
 
 def no_stamps(link):
@@ -39,22 +46,22 @@ def waiting(flush_s, **more):
 def test_by_default_nothing_waits():
     link = no_stamps(make_link(pdu_size=220))
     link.submit(0, bytes(50), 1.0)
-    assert len(link.scheduler.compose(1.0, MOST).pdus) == 1
+    assert len(compose(link, 1.0).pdus) == 1
 
 
 def test_a_partial_pdu_waits_for_so_long():
     link = waiting(0.2)
     link.submit(0, bytes(50), 1.0)
-    assert link.scheduler.compose(1.1, MOST) is None
+    assert compose(link, 1.1) is None
     assert link.next_wakeup(1.1) == pytest.approx(1.2)
     link.submit(1, bytes(50), 1.15)
-    assert len(link.scheduler.compose(1.2, MOST).pdus) == 1
+    assert len(compose(link, 1.2).pdus) == 1
 
 
 def test_a_full_one_does_not():
     link = waiting(0.2)
     link.submit(0, bytes(400), 1.0)
-    assert len(link.scheduler.compose(1.0, Allowance.of(1)).pdus) == 1
+    assert len(compose(link, 1.0, 1).pdus) == 1
 
 
 @pytest.mark.parametrize("flush_s", [NEVER, INFINITE])
@@ -62,7 +69,7 @@ class TestWithoutEnd:
     def test_a_partial_pdu_never_goes_by_time(self, flush_s):
         link = waiting(flush_s)
         link.submit(0, bytes(50), 0.0)
-        assert link.scheduler.compose(LATE, MOST) is None
+        assert compose(link, LATE) is None
         assert next_burst(link, LATE) is None
         assert link.next_wakeup(LATE) == INFINITE
 
@@ -71,7 +78,7 @@ class TestWithoutEnd:
         # 4 × 50 B and the headers of 3 of them are more than 207 B.
         for i in range(4):
             link.submit(i % 2, bytes(50), 0.1 * i)
-            burst = link.scheduler.compose(0.1 * i, MOST)
+            burst = compose(link, 0.1 * i)
             assert (burst is None) == (i < 3)
 
     def test_at_the_end_it_goes(self, flush_s):
@@ -91,7 +98,7 @@ class TestWithoutEnd:
         link.submit(0, bytes(50), 0.0, Overrides(qos=qos))
         assert link.next_wakeup(0.0) <= 0.0
         # What may wait fills what is left.
-        assert len(layouts(link.scheduler.compose(0.0, MOST).pdus, 220)[0]) == 2
+        assert len(layouts(compose(link, 0.0).pdus, 220)[0]) == 2
 
     @pytest.mark.parametrize("wish", ["policy", "message"])
     def test_a_lifespan_never_waits(self, flush_s, wish):
@@ -103,16 +110,16 @@ class TestWithoutEnd:
             override = Overrides(lifespan_s=5.0)
         link.submit(0, bytes(50), 0.0, override)
         assert link.next_wakeup(0.0) <= 0.0
-        assert len(link.scheduler.compose(0.0, MOST).pdus) == 1
+        assert len(compose(link, 0.0).pdus) == 1
 
     def test_a_lifespan_behind_one_of_its_own_topic_that_may_wait(self, flush_s):
         link = waiting(flush_s)
         link.submit(0, bytes(50), 0.0)
-        assert link.scheduler.compose(0.0, MOST) is None
+        assert compose(link, 0.0) is None
         link.submit(0, bytes(50), 0.0, Overrides(lifespan_s=1.0))
-        assert layouts(link.scheduler.compose(0.0, MOST).pdus, 220) == [[(0, 0, 1, 50)] * 2]
+        assert layouts(compose(link, 0.0).pdus, 220) == [[(0, 0, 1, 50)] * 2]
         link.submit(0, bytes(50), 0.0)
-        assert link.scheduler.compose(0.0, MOST) is None
+        assert compose(link, 0.0) is None
 
     def test_the_rest_of_a_message_does_not_wait_until_receivers_give_it_up(self, flush_s):
         link, far = waiting(flush_s), no_stamps(make_link(2, pdu_size=220))
@@ -120,7 +127,7 @@ class TestWithoutEnd:
         got = []
 
         def send(now):
-            if burst := link.scheduler.compose(now, MOST):
+            if burst := compose(link, now):
                 link.confirm(burst, Outcome.SENT, now)
                 got.extend(message for pdu in burst.pdus for message in far.hear(pdu, now))
 
@@ -136,9 +143,9 @@ class TestWithoutEnd:
         link = waiting(flush_s, classes=classes)
         link.submit(0, bytes(5 * 207), 0.0, Overrides(qos=Qos.BULK))
         for now in (0.0, 0.3, 0.6, 0.9):
-            if burst := link.scheduler.compose(now, MOST):
+            if burst := compose(link, now):
                 link.confirm(burst, Outcome.SENT, now)
-        assert link.sender.tally(0).sent == 1
+        assert topic_of(link, 0).sent == 1
         assert not link.has_work
 
     def test_beacons_clocks_and_receipts_do_not_wait(self, flush_s):
@@ -163,7 +170,7 @@ class TestWithoutEnd:
         assert kinds.count(Beacon) >= 2
         assert kinds.count(Clock) >= 5
         assert kinds.count(Receipt) == 1
-        assert link.sender.outbox.queued == 1
+        assert tx(link).queued == 1
         assert link.audit() == far.audit() == []
 
 
@@ -180,16 +187,15 @@ def test_whatever_waits_goes_with_the_rest_or_at_the_end(seed, flush_s):
             rng.randrange(3), bytes(rng.randrange(4, 500)), now,
             Overrides(rng.choice((None, *Qos)), dst=rng.choice((None, 2, 3))),
         )  # fmt: skip
-        if burst := link.scheduler.compose(now, MOST):
+        if burst := compose(link, now):
             link.confirm(burst, Outcome.SENT, now)
         wakes_at = link.next_wakeup(now)
-        outbox = link.sender.outbox
-        if outbox:
+        ledger = tx(link)
+        if link.has_work:
             # Asleep for ever means: nothing is begun, and nothing of it would fill a PDU.
+            pending = ledger.queued_bytes + (ledger.queued - 1) * ENTRY_HEADER_SIZE
             assert wakes_at < INFINITE or (
-                flush_s == NEVER
-                and not outbox.lives.in_flight
-                and outbox.pending_bytes(link.sender.packetizer.k_single) < 207
+                flush_s == NEVER and not ledger.in_flight and pending < equal_payload(220, 1)
             ), f"seed {seed}"
         link.handle_timers(now)
     link.drain()

@@ -4,9 +4,8 @@ from random import Random
 
 import pytest
 
-from sdrlinkd.link import link_report
 from sdrlinkd.wire import Entry, Pdu, build
-from tests.link.world import TOPICS, make_link, send_all
+from tests.link.world import TOPICS, make_link, neighbors, received, rx, send_all
 
 
 def pdu(src=1, dst=255, seq=0, topic_id=0, payload=b"\0\1\0\0data", total=1, hop=1):
@@ -29,7 +28,7 @@ def pdu(src=1, dst=255, seq=0, topic_id=0, payload=b"\0\1\0\0data", total=1, hop
 def test_refused_by_name(data, reason):
     link = make_link(2, pdu_size=64)
     assert link.hear(data, 0.0) == []
-    assert dict(link.inbox.pdus_dropped) == {reason: 1}
+    assert dict(rx(link).pdus_dropped) == {reason: 1}
     assert link.audit() == []
 
 
@@ -38,7 +37,7 @@ def test_duplicates_are_refused_also_from_a_relay():
     assert len(link.hear(pdu(hop=3), 0.0)) == 1
     assert link.hear(pdu(hop=3), 0.1) == []
     assert link.hear(pdu(hop=2), 0.2) == []
-    assert link.inbox.pdus_dropped["rx_dup"] == 2
+    assert rx(link).pdus_dropped["rx_dup"] == 2
 
 
 def test_what_is_for_us_arrives():
@@ -50,8 +49,8 @@ def test_messages_of_unknown_topics_and_without_cdr_are_named():
     link = make_link(2, pdu_size=64)
     link.hear(pdu(topic_id=9), 0.0)
     link.hear(pdu(seq=1, payload=b"abc"), 0.0)
-    assert link.inbox.tallies[1, 9].dropped["rx_unknown_topic"] == 1
-    assert link.inbox.tallies[1, 0].dropped["rx_bad_cdr"] == 1
+    assert received(link)[1, 9].dropped["rx_unknown_topic"] == 1
+    assert received(link)[1, 0].dropped["rx_bad_cdr"] == 1
     assert link.audit() == []
 
 
@@ -65,7 +64,7 @@ def test_the_snr_in_the_report_is_not_that_of_one_burst_alone():
     link = make_link(2, pdu_size=64)
     for seq in range(30):
         link.hear(pdu(seq=seq), 0.0, 15.0 + (-1) ** seq)
-    (neighbor,) = link_report(link, 0.0, {}, {}).neighbors
+    (neighbor,) = link.report(0.0).neighbors
     assert abs(neighbor.snr_db - 15) < 0.2
 
 
@@ -76,22 +75,22 @@ def test_a_different_registry_is_named_on_both_sides():
         for data in send_all(a):
             b.hear(data, 0.0)
     for link, src in ((one, 2), (two, 1)):
-        neighbor = link.inbox.neighbors[src]
-        assert "topic id 2" in neighbor.disagreement(link.registry, link.digest)
+        assert neighbors(link)[src].registry == "differs"
+        (notice,) = link.notices(0.0)
+        assert notice.startswith(f"robot {src} has another registry, differing in topic id 2")
 
 
 def test_a_reboot_is_seen_and_its_pdus_are_not_taken_for_duplicates():
-    before, after, receiver = (make_link(1, seed=s, beacon_s=1.0) for s in (1, 2, 3))
+    before, after = make_link(1, seed=1, beacon_s=1.0), make_link(1, seed=2, beacon_s=1.0)
     receiver = make_link(2, beacon_s=1.0)
-    after.sender.packetizer._seq = before.sender.packetizer._seq
     for link in (before, after):
         for second in range(40):
             link.submit(0, bytes(30), float(second))
             for data in send_all(link, now=float(second)):
                 receiver.hear(data, 0.0)
-    assert receiver.inbox.neighbors[1].reboots == 1
-    assert receiver.inbox.tallies[1, 0].delivered == 80
-    assert receiver.inbox.pdus_dropped["rx_dup"] == 0
+    assert neighbors(receiver)[1].reboots == 1
+    assert received(receiver)[1, 0].delivered == 80
+    assert rx(receiver).pdus_dropped["rx_dup"] == 0
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -109,4 +108,4 @@ def test_any_bytes_keep_the_ledger(seed):
             data[-2:] = binascii.crc_hqx(bytes(data[:-2]), 0).to_bytes(2, "big")
         link.hear(bytes(data[: rng.choice((64, 64, 64, rng.randrange(64)))]), rng.random())
         assert link.audit() == [], f"seed {seed}"
-    assert link.inbox.pdus_used > 100
+    assert rx(link).pdus_used > 100

@@ -2,8 +2,8 @@
 
 import pytest
 
-from sdrlinkd.link import Allowance, Outcome, TopicPolicy
-from tests.link.world import make_link
+from sdrlinkd.link import Outcome, TopicPolicy
+from tests.link.world import compose, compose_at, make_link, topic_of
 
 LATCHED = TopicPolicy(durability="transient_local")
 MAP = b"\0\1\0\0map"
@@ -13,7 +13,7 @@ def exchange(links, now):
     """Everybody sends and hears; what each got by (to, from, payload)."""
     got = []
     for link in links:
-        while burst := link.scheduler.compose(now, Allowance.of(8)):
+        while burst := compose(link, now, 8):
             link.confirm(burst, Outcome.SENT, now)
             for pdu in burst.pdus:
                 for other in links:
@@ -40,7 +40,7 @@ def test_a_robot_that_comes_late_gets_the_last_message_and_no_one_else_does():
     one.submit(0, MAP, 0.0)
     assert [each[2] for each in run([one, two], 0.0, 10)][:2] == [b"\0\1\0\0old", MAP]
     assert run([one, two, late], 2.0, 10) == [(3, 1, MAP)]
-    assert one.sender.tally(0).reoffered == 2  # to 2, whom it had not heard, and to 3
+    assert topic_of(one, 0).reoffered == 2  # to 2, whom it had not heard, and to 3
     assert one.audit() == late.audit() == []
 
 
@@ -58,7 +58,7 @@ def test_several_who_come_together_are_served_at_once():
     run(links[:1], 0.0, 5)
     got = run(links, 2.0, 10)
     assert sorted(each[0] for each in got) == [2, 3, 4, 5]
-    assert links[0].sender.tally(0).reoffered == 1
+    assert topic_of(links[0], 0).reoffered == 1
 
 
 def test_a_topic_that_is_volatile_is_not_offered_again():
@@ -89,13 +89,13 @@ def test_it_takes_two_per_cent_of_the_air_at_most():
     """A robot comes every 300 ms; the map takes a second on the air."""
     one = make_link(1, pdu_size=220, beacon_s=0.0)
     one.set_policies({0: LATCHED})
-    one.sender.outbox.bytes_per_s = 10_000
+    compose_at(one, 10_000)
     one.submit(0, bytes(10_000), 0.0)
     for i in range(200):
         now = 0.3 * i
         guest = make_link(2 + i, pdu_size=220, seed=i)
         guest.submit(1, bytes(8), now)
-        for pdu in guest.scheduler.compose(now, Allowance.of(1)).pdus:
+        for pdu in compose(guest, now, 1).pdus:
             one.hear(pdu, now)
         one.handle_timers(now + 0.25)
-    assert one.sender.tally(0).reoffered == pytest.approx(1 + 60 * 0.02, abs=0.5)
+    assert topic_of(one, 0).reoffered == pytest.approx(1 + 60 * 0.02, abs=0.5)

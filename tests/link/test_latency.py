@@ -5,10 +5,19 @@ from random import Random
 
 import pytest
 
-from sdrlinkd.link import Allowance, ClockParams, Outcome, link_notices, link_report
+from sdrlinkd.link import AccessParams, CarrierTraits, ClockParams, Outcome, RateParams
 from sdrlinkd.link.receive import Latency, Parts
-from sdrlinkd.wire import Clock, RecordType, Waits
-from tests.link.world import PDU_S, make_link, next_burst, records_in
+from sdrlinkd.wire import Clock, Waits, equal_payload
+from tests.link.world import (
+    PDU_S,
+    compose,
+    make_link,
+    next_burst,
+    received,
+    records_in,
+    tell,
+    topic_of,
+)
 
 SEED = 4
 
@@ -18,7 +27,7 @@ def test_the_parts_make_up_the_age():
     payload = b"\0\1\0\0" + bytes(150)
     sender.submit(0, payload, 1.0)
     heard, at = [], 1.004
-    while burst := sender.scheduler.compose(at, Allowance.of(1)):
+    while burst := compose(sender, at, 1):
         for pdu in burst.pdus:
             heard += receiver.hear(pdu, at, None, at + 0.0025, at + 0.002)
         at += 0.01
@@ -30,7 +39,7 @@ def test_the_parts_make_up_the_age():
     assert parts == pytest.approx((0.004, 0.01 * n, 0.002, 0.0005))
     assert receiver.delivered(message, now) == pytest.approx(sum(parts))
     assert sum(parts) == pytest.approx(now - 1.0)
-    (report,) = link_report(receiver, now, {}, {}).received
+    (report,) = receiver.report(now).received
     told = report.latency
     assert (told.wait_ms, told.air_ms) == pytest.approx((4.0, 2.0))
     assert told.queue_ms is None, "the source has not told"
@@ -66,30 +75,30 @@ def test_an_age_that_cannot_be_has_its_place_in_the_histogram_too(age_s):
 
 def test_why_a_message_waited_is_told_in_a_beacon():
     link = make_link(beacon_s=0.5)
-    link.scheduler._lead_s = 0.002
+    link.attach(CarrierTraits(lead_s=0.002), AccessParams(), RateParams())
     link.submit(0, bytes(20), 0.0)
     # The radio could take it at 10 ms, and its burst left 30 ms later than it was meant to.
     burst = next_burst(link, 0.012)
     link.confirm(burst._replace(start=0.042), Outcome.SENT, 0.05)
-    waits = link.scheduler.tx_delays.of_topic[0]
-    assert (waits.queue_s, waits.access_s, waits.again_s) == pytest.approx((0.01, 0.002, 0.03))
+    waits = topic_of(link, 0)
+    assert (waits.queue_ms, waits.access_ms, waits.again_ms) == pytest.approx((10, 2, 30))
     link.submit(1, bytes(20), 0.6)
     records = [each for pdu in next_burst(link, 0.6).pdus for each in records_in(pdu, len(pdu))]
     told = [each for each in records if isinstance(each, Waits)]
     assert told == [Waits(0, 61, 12, 182)]
-    receiver = make_link(own_id=2)
-    for record in told:
-        receiver.record_from(1, record, 0.0)
-    assert receiver.waits_records[1, 0] == told[0]
 
 
-def test_of_topics_that_nobody_has_nothing_is_kept():
-    link = make_link(own_id=2)
-    for topic_id in range(256):
-        link.record_from(1, Waits(topic_id, 1, 2, 3), 0.0)
-    assert [topic_id for _, topic_id in link.waits_records] == [
-        topic.id for topic in link.registry.topics
-    ]
+def test_what_a_source_tells_of_its_waits_splits_the_wait_of_its_messages():
+    sender, receiver = make_link(1), make_link(2)
+    # Numbers of topics that nobody has are of no use, and do no harm.
+    tell(receiver, 1, *(Waits(topic_id, 1, 2, 3) for topic_id in range(16)), at=0.0)
+    tell(receiver, 1, Waits(0, 60, 20, 20), at=0.0)
+    sender.submit(0, bytes(20), 0.0)
+    for pdu in compose(sender, 0.1).pdus:
+        for message in receiver.hear(pdu, 0.1):
+            receiver.delivered(message, 0.1)
+    told = received(receiver)[1, 0].latency
+    assert (told.wait_ms, told.queue_ms, told.access_ms) == pytest.approx((100, 60, 20))
 
 
 def clocks_of(link, until, step_s=0.01, submit_s=None):
@@ -100,7 +109,7 @@ def clocks_of(link, until, step_s=0.01, submit_s=None):
         if submit_s is not None and now >= next_at:
             next_at += submit_s
             link.submit(0, bytes(20), now)
-        link.inbox._new_neighbor(9, now).last_heard_at = now
+        tell(link, 9, at=now)
         link.handle_timers(now)
         while burst := next_burst(link, now):
             link.confirm(burst, Outcome.SENT, now + PDU_S)
@@ -113,14 +122,14 @@ def clocks_of(link, until, step_s=0.01, submit_s=None):
 
 def test_clocks_ride_at_their_period_and_go_alone_within_their_share():
     alone = make_link(clock=ClockParams(period_s=0.2, share=0.004))
-    alone.control_records.pdu_s = PDU_S
+    alone.attach(CarrierTraits(pdu_burst_s=(PDU_S,)), AccessParams(), RateParams())
     times = [at for at, is_alone in clocks_of(alone, 20.0) if is_alone]
     gaps = [later - earlier for earlier, later in pairwise(times)]
     # Two robots, 1 ms each: 2 ms / 0.004, and a twentieth more.
     assert all(0.52 < gap < 0.54 for gap in gaps), gaps
-    assert alone.scheduler.control_airtime_s <= 20 * 0.004 / 2 + PDU_S
+    assert alone.report(0.0).control_airtime_s <= 20 * 0.004 / 2 + PDU_S
     beside = make_link(clock=ClockParams(period_s=0.2, share=0.004))
-    beside.control_records.pdu_s = PDU_S
+    beside.attach(CarrierTraits(pdu_burst_s=(PDU_S,)), AccessParams(), RateParams())
     found = clocks_of(beside, 20.0, submit_s=0.05)
     # They ride from three quarters of their period on.
     assert 85 < len(found) <= 20 / 0.15 + 1
@@ -134,27 +143,28 @@ def test_a_robot_that_is_alone_does_not_tell_its_clock():
         while burst := next_burst(link, i * 0.01):
             link.confirm(burst, Outcome.SENT, i * 0.01)
             assert burst.clock is None
-    assert not link.sender.packetizer.piggyback.holds(RecordType.CLOCK)
+            records = [each for pdu in burst.pdus for each in records_in(pdu, len(pdu))]
+            assert not any(isinstance(each, Clock) for each in records)
 
 
 def test_on_small_pdus_clocks_tell_of_as_many_robots_as_there_is_room_for():
     link = make_link(pdu_size=64, clock=ClockParams())
     for src in range(2, 12):
-        link.clocks.hear(src, Clock(1, 1, 1, 1), 0.5)
+        tell(link, src, Clock(1, 1, 1, 1), at=0.5)
     found = clocks_of(link, 3.0)
     assert len(found) > 5
     tiny = make_link(pdu_size=32, clock=ClockParams())
     assert clocks_of(tiny, 3.0) == []
-    assert any("have no room for CLOCK" in notice for notice in link_notices(tiny, 0.0))
+    assert any("have no room for CLOCK" in notice for notice in tiny.notices(0.0))
     assert tiny.next_wakeup(3.0) > 3.0
     without = make_link(pdu_size=32, clock=ClockParams(period_s=0.0))
-    assert not any("CLOCK" in notice for notice in link_notices(without, 0.0))
+    assert not any("CLOCK" in notice for notice in without.notices(0.0))
 
 
 def test_a_stamp_that_goes_ahead_is_no_record_alone():
     link = make_link(pdu_size=64, clock=ClockParams())
-    size = link.sender.packetizer.k_single
+    size = equal_payload(64, 1)
     link.submit(0, bytes(size), 0.0)
     burst = next_burst(link, 0.0)
     assert len(burst.pdus) == 2
-    assert (burst.n_records, link.scheduler.control_airtime_s) == (0, 0.0)
+    assert (burst.n_records, link.report(0.0).control_airtime_s) == (0, 0.0)

@@ -11,9 +11,8 @@ from sdrlinkd.link import (
     Qos,
     Told,
     TopicPolicy,
-    link_report,
 )
-from tests.link.world import make_link, next_burst, send_all
+from tests.link.world import make_link, next_burst, send_all, tell, topic_of
 
 INFINITE = float("inf")
 BY_CLASS = {Qos.URGENT: 1.0, Qos.LATENCY: 2.0, Qos.DEFAULT: INFINITE, Qos.BULK: INFINITE}
@@ -26,7 +25,7 @@ def outlives(link, after_s, **wishes):
     link.handle_timers(after_s)
     sent = bool(send_all(link, after_s))
     assert link.audit() == []
-    assert link.sender.tally(0).dropped == ({} if sent else {"tx_expired": 1})
+    assert topic_of(link, 0).dropped == ({} if sent else {"tx_expired": 1})
     return sent
 
 
@@ -63,13 +62,13 @@ def test_the_class_says_nothing_of_what_is_kept_for_those_who_come_late():
     link.set_policies({0: kept})
     link.submit(0, bytes(40), 0.0)
     assert len(send_all(link, 0.0)) == 1
-    link.newcomer(2, 60.0)
+    tell(link, 2, at=60.0)
     for now in (60.0, 61.0, 62.0, 63.0):
         link.handle_timers(now)
     assert len(send_all(link, 63.0)) == 1
     # Its topic does.
     link.set_policy(0, TopicPolicy(qos="latency", durability="transient_local", lifespan_s=5.0))
-    link.newcomer(3, 70.0)
+    tell(link, 3, at=70.0)
     for now in (70.0, 71.0, 72.0, 73.0):
         link.handle_timers(now)
     assert send_all(link, 73.0) == []
@@ -80,7 +79,7 @@ def test_what_the_producer_allows_holds_for_newcomers_too():
     link.set_policies({0: TopicPolicy(durability="transient_local", lifespan_s=5.0)})
     link.submit(0, bytes(40), 0.0, Overrides(lifespan_s=100.0))
     send_all(link, 0.0)
-    link.newcomer(2, 60.0)
+    tell(link, 2, at=60.0)
     for now in (60.0, 61.0, 62.0, 63.0):
         link.handle_timers(now)
     assert len(send_all(link, 63.0)) == 1
@@ -144,7 +143,7 @@ def test_why_and_the_report_tell_which():
     asked = link.why(2, FILE, 4.0)
     assert "worthless" not in asked[0]
     assert any("were older than their producer allows" in line for line in asked)
-    report = link_report(link, 4.0, {}, {})
+    report = link.report(4.0)
     assert [(each.lifespan_s, each.lifespan_from) for each in report.topics] == [
         (2.0, "class"),
         (0.5, "topic"),
@@ -170,5 +169,5 @@ def test_an_overloaded_air_hands_over_nothing_old_of_class_latency():
             ages += [receiver.delivered(each, now) for each in receiver.hear(pdu, now)]
     assert len(ages) > 1000
     assert 1.9 < max(ages) <= 2.0
-    assert sender.sender.tally(0).dropped["tx_expired"] > 0
+    assert topic_of(sender, 0).dropped["tx_expired"] > 0
     assert sender.audit() == []

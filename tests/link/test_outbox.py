@@ -2,14 +2,14 @@
 
 import pytest
 
-from sdrlinkd.link import Allowance, Outcome, Overrides, Qos, QueueParams, TopicPolicy, link_notices
-from tests.link.world import layouts, make_link, records_in, send_all
+from sdrlinkd.link import Outcome, Overrides, Qos, QueueParams, TopicPolicy
+from tests.link.world import compose, layouts, make_link, records_in, send_all, topic_of, tx
 
 
 def dropped(link):
     counts = {}
     for topic in link.registry.topics:
-        for reason, count in link.sender.tally(topic.id).dropped.items():
+        for reason, count in topic_of(link, topic.id).dropped.items():
             counts[topic.name, reason] = count
     return counts
 
@@ -35,7 +35,7 @@ def test_a_message_in_fragments_is_not_superseded():
     link = make_link(pdu_size=64)
     link.set_policies({0: TopicPolicy(depth=1, stamp=False)})
     link.submit(0, b"a" * 100, 0.0)
-    link.confirm(link.scheduler.compose(0.0, Allowance.of(1)), Outcome.SENT, 0.0)
+    link.confirm(compose(link, 0.0, 1), Outcome.SENT, 0.0)
     link.submit(0, b"b" * 8, 0.0)
     link.submit(0, b"c" * 8, 0.0)
     assert payloads_left(link) == [b"a" * 49, b"c" * 8]
@@ -58,9 +58,9 @@ def test_bytes_are_bounded_too():
     link = make_link(queue=QueueParams(max_bytes=1000))
     for _ in range(5):
         link.submit(0, bytes(400), 0.0)
-    assert link.sender.outbox.queued_bytes == 800
+    assert tx(link).queued_bytes == 800
     assert link.submit(0, bytes(1001), 0.0) == "tx_overflow_new"
-    assert link.sender.outbox.queued_bytes == 800
+    assert tx(link).queued_bytes == 800
 
 
 def test_expired_messages_are_not_sent():
@@ -80,9 +80,7 @@ def test_a_message_that_is_too_old_when_it_comes_expires_at_once(age_s):
     assert link.submit(0, bytes(9), 0.0, Overrides(age_s=age_s, receipt="old")) == "tx_expired"
     assert [pdu[0][3] for pdu in layouts(send_all(link, now=0.1), 64)] == [8]
     assert dropped(link) == {("odom", "tx_expired"): 1}
-    assert [(each.receipt, each.fate) for each in link.delivery.receipts.take()] == [
-        ("old", "expired")
-    ]
+    assert [(each.receipt, each.fate) for each in link.take_verdicts()] == [("old", "expired")]
     assert link.audit() == []
 
 
@@ -105,11 +103,11 @@ def test_a_long_lifespan_bears_a_great_age():
 def test_the_rest_of_an_expired_message_is_withdrawn():
     link = make_link(pdu_size=64)
     link.submit(0, bytes(200), 0.0, Overrides(lifespan_s=1.0))
-    burst = link.scheduler.compose(0.5, Allowance.of(2))
-    assert link.scheduler.compose(1.5, Allowance.of(8)) is None
+    burst = compose(link, 0.5, 2)
+    assert compose(link, 1.5, 8) is None
     assert link.audit() == []
     link.confirm(burst, Outcome.SENT, 1.6)
-    assert link.sender.tally(0).sent == 0
+    assert topic_of(link, 0).sent == 0
     assert dropped(link) == {("odom", "tx_expired"): 1}
     assert link.audit() == []
 
@@ -118,16 +116,16 @@ def test_timers_expire_what_no_burst_looked_at():
     link = make_link()
     link.submit(0, bytes(8), 0.0, Overrides(lifespan_s=1.0))
     link.handle_timers(1.5)
-    assert link.sender.outbox.queued == 0
+    assert tx(link).queued == 0
 
 
 @pytest.mark.parametrize("outcome", [Outcome.UNDERFLOW, Outcome.LOST])
 def test_a_burst_that_did_not_leave_drops_its_messages_by_name(outcome):
     link = make_link(pdu_size=64)
     link.submit(0, bytes(200), 0.0)
-    link.confirm(link.scheduler.compose(0.0, Allowance.of(1)), outcome, 0.1)
+    link.confirm(compose(link, 0.0, 1), outcome, 0.1)
     assert dropped(link) == {("odom", "tx_radio_failed"): 1}
-    assert link.scheduler.compose(0.2, Allowance.of(8)) is None
+    assert compose(link, 0.2, 8) is None
     assert link.audit() == []
 
 
@@ -135,7 +133,7 @@ def test_shut_down_drops_the_rest_by_name():
     link = make_link(pdu_size=64)
     for _ in range(3):
         link.submit(0, bytes(200), 0.0)
-    link.scheduler.compose(0.0, Allowance.of(1))
+    compose(link, 0.0, 1)
     link.shut_down()
     assert dropped(link) == {("odom", "tx_shutdown"): 3}
     assert link.audit() == []
@@ -163,11 +161,11 @@ def test_a_topic_without_a_free_entry_id_waits_and_others_go_on():
     sent = layouts(send_all(link, now=0.0), 64)
     assert sum(1 for pdu in sent for entry in pdu if entry[0] == 0 and entry[1] == 0) == 256
     assert any(entry[0] == 1 for pdu in sent for entry in pdu)
-    assert link.sender.outbox.queued == 4
-    assert any("odom had to wait" in notice for notice in link_notices(link, 0.0))
+    assert tx(link).queued == 4
+    assert any("odom had to wait" in notice for notice in link.notices(0.0))
     assert link.next_wakeup(0.0) == pytest.approx(0.625)
     send_all(link, now=0.625)
-    assert link.sender.outbox.queued == 0
+    assert tx(link).queued == 0
 
 
 def test_nothing_is_shed_for_a_message_that_cannot_fit_anyway():
@@ -175,11 +173,11 @@ def test_nothing_is_shed_for_a_message_that_cannot_fit_anyway():
     link.submit(0, bytes(10), 0.0, Overrides(qos=Qos.BULK))
     link.submit(0, bytes(950), 0.0, Overrides(qos=Qos.URGENT))
     assert link.submit(0, bytes(500), 0.0) == "tx_overflow_new"
-    assert link.sender.outbox.queued == 2
+    assert tx(link).queued == 2
     link.set_policies({1: TopicPolicy(depth=1)})
     link.submit(1, bytes(8), 0.0)
     assert link.submit(1, bytes(1001), 0.0) == "tx_overflow_new"
-    assert link.sender.outbox.queued == 3
+    assert tx(link).queued == 3
 
 
 def test_lanes_that_wait_for_ids_hold_up_no_lower_level():
@@ -188,7 +186,7 @@ def test_lanes_that_wait_for_ids_hold_up_no_lower_level():
     for i in range(340):
         link.submit(0, bytes(60), 0.0, Overrides(priority=100, dst=i % 255))
     send_all(link)
-    assert link.sender.outbox.queued == 84
+    assert tx(link).queued == 84
     link.submit(1, bytes(20), 0.0, Overrides(qos=Qos.BULK))
     assert len(send_all(link)) == 1
     assert link.next_wakeup(0.0) == pytest.approx(0.625)

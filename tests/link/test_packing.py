@@ -2,9 +2,9 @@
 
 import pytest
 
-from sdrlinkd.link import Allowance, Outcome, Overrides, Qos, TopicPolicy
+from sdrlinkd.link import Outcome, Overrides, Qos, TopicPolicy
 from sdrlinkd.wire import BROADCAST, Beacon, RegistryDigest, Stamp, parse, parse_records
-from tests.link.world import layouts, make_link, send_all
+from tests.link.world import compose, layouts, make_link, send_all, tx
 
 
 def no_stamps(link):
@@ -38,7 +38,7 @@ def test_min_fragment_outweighs_the_share_of_two():
 def test_k_freezes_at_the_first_fragment():
     link = no_stamps(make_link(pdu_size=220, greedy=False))
     link.submit(0, bytes(600), 0.0)
-    link.confirm(link.scheduler.compose(0.0, Allowance.of(1)), Outcome.SENT, 0.0)
+    link.confirm(compose(link, 0.0, 1), Outcome.SENT, 0.0)
     link.submit(1, bytes(202), 0.0)
     rest = [entry for pdu in layouts(send_all(link), 220) for entry in pdu if entry[0] == 0]
     assert rest == [(0, 1, 3, 207), (0, 2, 3, 186)]
@@ -127,7 +127,7 @@ class TestStamp:
     def test_rides_in_spare_room_with_the_age_at_the_preamble(self):
         link = make_link(pdu_size=220)
         link.submit(0, bytes(100), 1.0)
-        (pdu,) = link.scheduler.compose(1.25, Allowance.of(8)).pdus
+        (pdu,) = compose(link, 1.25, 8).pdus
         assert [record.age_us for record in records_of(pdu, 220)] == [250_000]
 
     def test_of_a_fragmented_message_needs_no_pdu_more(self):
@@ -162,9 +162,9 @@ class TestBeacon:
         (pdu,) = send_all(link, now=5.0)
         beacon, digest = records_of(pdu, 220)
         assert isinstance(beacon, Beacon)
-        assert digest == link.digest
+        assert digest.overall.hex() == link.report(5.0).registry_digest
         assert link.next_wakeup(5.0) == pytest.approx(6.0, abs=0.1)
-        assert link.scheduler.compose(5.9, Allowance.of(8)) is None
+        assert compose(link, 5.9, 8) is None
         assert len(send_all(link, now=6.0)) == 1
 
     def test_in_spare_room_of_a_broadcast_pdu(self):
@@ -183,9 +183,10 @@ class TestBeacon:
         for second in range(6):
             link.submit(0, bytes(pdu_size - 13), float(second))
             pdus = send_all(link, now=float(second))
-            assert link.sender.outbox.queued == 0
+            assert tx(link).queued == 0
             seen += [record for pdu in pdus for record in records_of(pdu, pdu_size)]
         assert sum(isinstance(record, Beacon) for record in seen) >= 4
         digests = [record for record in seen if isinstance(record, RegistryDigest)]
         assert len(digests) >= 4
-        assert {digest.overall for digest in digests} == {link.digest.overall}
+        overall = link.report(0.0).registry_digest
+        assert {digest.overall.hex() for digest in digests} == {overall}

@@ -8,11 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from sdrlinkd.link import Allowance, Outcome, Overrides, Qos
+from sdrlinkd.link import Outcome, Overrides, Qos
 from sdrlinkd.link.packing import parity_records
 from sdrlinkd.wire import Entry, Pdu, build, parse
 from tests.laws import law
 from tests.link.images import images_over, pdus_of, protected
+from tests.link.world import compose, received, rx, topic_of
 
 
 @law(60)
@@ -28,7 +29,7 @@ def test_any_pattern_of_lost_fragments_that_parity_can_tell_is_repaired(
     sender, receiver = protected(share, pdu_size=pdu_size), protected(0.0, 2, pdu_size=pdu_size)
     pdus = pdus_of(sender, payload)
     if not pdus:
-        assert sender.sender.tally(0).dropped["tx_too_big"]
+        assert topic_of(sender, 0).dropped["tx_too_big"]
         return
     data = [pdu for pdu in pdus if any(e.topic_id == 0 for e in parse(pdu, pdu_size).entries)]
     total = parse(data[0], pdu_size).entries[0].total
@@ -37,7 +38,7 @@ def test_any_pattern_of_lost_fragments_that_parity_can_tell_is_repaired(
     got = [m for pdu in pdus if pdu not in lost for m in receiver.hear(pdu, 0.0)]
     assert [m.payload for m in got] == [payload]
     assert receiver.audit() == sender.audit() == []
-    assert receiver.inbox.reassembly.held == 0
+    assert rx(receiver).held == 0
 
 
 def test_one_more_lost_than_there_is_parity_is_too_many():
@@ -45,7 +46,7 @@ def test_one_more_lost_than_there_is_parity_is_too_many():
     pdus = pdus_of(sender, bytes(64_000))
     assert [m for pdu in pdus[8:] for m in receiver.hear(pdu, 0.0)] == []
     receiver.handle_timers(1.0)
-    assert receiver.inbox.tallies[1, 0].dropped == {"rx_partial_timeout": 1}
+    assert received(receiver)[1, 0].dropped == {"rx_partial_timeout": 1}
 
 
 def test_parity_costs_what_was_asked_for_and_without_it_there_is_none():
@@ -62,13 +63,13 @@ def test_what_is_sent_is_only_sent_when_its_parity_is():
     sender = protected(0.5, pdu_size=64)
     sender.submit(0, bytes(400), 0.0, Overrides(Qos.BULK))
     bursts = []
-    while burst := sender.scheduler.compose(0.0, Allowance.of(1)):
+    while burst := compose(sender, 0.0, 1):
         bursts.append(burst)
     for burst in bursts[:-1]:
         sender.confirm(burst, Outcome.SENT, 0.0)
-    assert sender.sender.tally(0).sent == 0
+    assert topic_of(sender, 0).sent == 0
     sender.confirm(bursts[-1], Outcome.SENT, 0.0)
-    assert sender.sender.tally(0).sent == 1
+    assert topic_of(sender, 0).sent == 1
     assert sender.audit() == []
 
 
@@ -110,7 +111,7 @@ def test_parity_of_a_message_that_is_complete_is_no_part_of_the_next():
         lost = set(rng.sample(range(8), 2)) if i % 2 else set()
         heard = [pdu for number, pdu in enumerate(pdus) if number not in lost]
         assert [m.payload for pdu in heard for m in receiver.hear(pdu, now)] == [payload]
-        assert receiver.inbox.reassembly.held_bytes == 0
+        assert rx(receiver).held_bytes == 0
         receiver.handle_timers(now)
 
 
@@ -120,7 +121,7 @@ def test_memory_is_bounded_whatever_comes():
         sender = protected(1.0, src, pdu_size=2047)
         for pdu in pdus_of(sender, bytes(60_000))[20:40]:
             receiver.hear(pdu, 0.0)
-    assert 4 << 20 < receiver.inbox.reassembly.held_bytes <= 8 << 20
+    assert 4 << 20 < rx(receiver).held_bytes <= 8 << 20
     assert receiver.audit() == []
 
 

@@ -8,11 +8,21 @@ import zstandard
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sdrlinkd.link import Allowance, Outcome, Overrides, Qos, QueueParams, TopicPolicy
+from sdrlinkd.link import Outcome, Overrides, Qos, QueueParams, TopicPolicy
 from sdrlinkd.link.queue import Inflated
 from sdrlinkd.wire import Entry, Pdu, build
 from tests.laws import law
-from tests.link.world import make_link, send_all
+from tests.link.world import (
+    classes_queued,
+    compose,
+    compose_at,
+    make_link,
+    neighbors,
+    received,
+    send_all,
+    topic_of,
+    tx,
+)
 
 CDR = b"\0\1\0\0"
 TEXT = CDR + b"the same words over and over " * 40
@@ -25,7 +35,7 @@ def link_with(policy, **more):
 
 
 def reasons(link):
-    return dict(link.sender.tally(0).dropped)
+    return dict(topic_of(link, 0).dropped)
 
 
 def test_a_throttled_topic_goes_at_its_period_on_average():
@@ -60,7 +70,7 @@ def test_latest_wins_unless_all_are_to_be_kept():
         link = link_with(TopicPolicy(depth=2, history=history))
         for i in range(9):
             link.submit(0, bytes([i]) * 30, 0.0)
-        assert link.sender.outbox.queued == kept
+        assert tx(link).queued == kept
 
 
 def test_a_topics_own_bound_sheds_its_oldest_and_nobody_elses():
@@ -69,19 +79,19 @@ def test_a_topics_own_bound_sheds_its_oldest_and_nobody_elses():
     for i in range(9):
         link.submit(0, bytes([i]) * 300, 0.0)
     assert reasons(link) == {"tx_topic_full": 6}
-    assert link.sender.outbox.queued == 4
+    assert tx(link).queued == 4
     assert link.submit(0, bytes(1001), 0.0) is None
-    assert link.sender.outbox.queued_of_topic(0) == 1
+    assert topic_of(link, 0).queued == 1
 
 
 def test_bounds_in_seconds_follow_what_the_air_carries():
     link = link_with(TopicPolicy(queue_s=0.5), queue=QueueParams(max_airtime_s=2.0))
-    link.sender.outbox.bytes_per_s = 1000
+    compose_at(link, 1000)
     for _ in range(10):
         link.submit(0, bytes(200), 0.0)
         link.submit(1, bytes(200), 0.0)
-    assert link.sender.outbox.queued_of_topic(0) == 2
-    assert link.sender.outbox.queued_bytes <= 2000
+    assert topic_of(link, 0).queued == 2
+    assert tx(link).queued_bytes <= 2000
     assert link.audit() == []
 
 
@@ -130,9 +140,9 @@ def test_a_dictionary_shrinks_small_messages_and_is_part_of_the_digest():
     two = make_link(2, pdu_size=220, dictionaries={0: made})
     assert [m.payload for pdu in pdus for m in two.hear(pdu, 0.0)] == samples[:20]
     assert [m for pdu in pdus for m in three.hear(pdu, 0.0)] == []
-    assert three.inbox.tallies[1, 0].dropped["rx_no_dictionary"] == 20
-    assert "topic id 0" in three.inbox.neighbors[1].disagreement(three.registry, three.digest)
-    assert two.inbox.neighbors[1].disagreement(two.registry, two.digest) is None
+    assert received(three)[1, 0].dropped["rx_no_dictionary"] == 20
+    assert any("differing in topic id 0" in each for each in three.notices(0.0))
+    assert neighbors(two)[1].registry == "same"
 
 
 def compressed(payload, seq=0):
@@ -152,7 +162,7 @@ def compressed(payload, seq=0):
 def test_a_frame_that_cannot_be_used_is_dropped_by_name(frame, reason):
     link = make_link(2, pdu_size=220)
     assert link.hear(compressed(frame), 0.0) == []
-    assert link.inbox.tallies[1, 0].dropped == {reason: 1}
+    assert received(link)[1, 0].dropped == {reason: 1}
     assert link.audit() == []
 
 
@@ -172,11 +182,11 @@ def test_lifespan_and_size_hold_where_messages_arrive():
         sender.submit(topic, TEXT[:90], 0.0)
     (pdu,) = send_all(sender, 0.3)
     assert [m.topic_id for m in receiver.hear(pdu, 10.0, None, 10.19)] == [0]
-    assert receiver.inbox.tallies[1, 1].dropped["rx_size_cap"] == 1
+    assert received(receiver)[1, 1].dropped["rx_size_cap"] == 1
     sender.submit(0, TEXT[:90], 1.0)
     (late,) = send_all(sender, 1.3)
     assert receiver.hear(late, 10.0, None, 10.21) == []
-    assert receiver.inbox.tallies[1, 0].dropped["rx_expired"] == 1
+    assert received(receiver)[1, 0].dropped["rx_expired"] == 1
     assert receiver.audit() == []
 
 
@@ -194,7 +204,7 @@ def test_what_has_expired_is_never_handed_over(seed):
         payload = i.to_bytes(4, "big") + bytes(rng.randrange(150))
         born[payload[:4]] = now
         sender.submit(0, payload, now)
-        if rng.random() < 0.6 and (burst := sender.scheduler.compose(now, Allowance.of(4))):
+        if rng.random() < 0.6 and (burst := compose(sender, now, 4)):
             sender.confirm(burst, Outcome.SENT, now)
             held_s = rng.random() * 0.15
             for pdu in burst.pdus:
@@ -211,9 +221,9 @@ def test_a_message_begun_and_not_gone_on_with_is_given_up():
     """Receivers wait for half a second; the rest would be sent in vain."""
     link = make_link(pdu_size=64)
     link.submit(0, bytes(400), 0.0)
-    burst = link.scheduler.compose(0.0, Allowance.of(2))
+    burst = compose(link, 0.0, 2)
     link.confirm(burst, Outcome.SENT, 0.0)
-    assert link.scheduler.compose(0.6, Allowance.of(9)) is None
+    assert compose(link, 0.6, 9) is None
     assert reasons(link) == {"tx_stalled": 1}
     assert link.audit() == []
 
@@ -223,6 +233,6 @@ def test_a_policy_that_changes_applies_to_what_comes():
     link.submit(0, bytes(20), 0.0)
     link.set_policy(0, TopicPolicy(qos="urgent", dst=7))
     link.submit(0, bytes(20), 0.0)
-    assert link.sender.outbox.queued_by_class()[Qos.URGENT] == 1
-    assert link.sender.outbox.queued_by_class()[Qos.DEFAULT] == 1
+    assert classes_queued(link)[Qos.URGENT] == 1
+    assert classes_queued(link)[Qos.DEFAULT] == 1
     assert link.submit(0, bytes(20), 0.0, Overrides(Qos.BULK)) is None

@@ -144,7 +144,7 @@ def test_a_neighbor_that_says_nothing_of_us_may_not_hear_us():
     assert choice(rate) == 1
     assert choice(rate, to={3}) == 1
     assert choice(rate, to={2}) == 6
-    assert rate.told(3) is None
+    assert rate.heard_there(3) == (None, None, 1)
 
 
 def test_nobody_there_gets_the_lowest():
@@ -166,7 +166,7 @@ def test_a_broadcast_suits_the_worst_and_a_unicast_its_own(snrs):
     assert choice(rate, to={BROADCAST, min(snrs)}) == min(alone.values())
     for src, other in zip(snrs, reversed(snrs), strict=True):
         assert choice(rate, to={src, other}) == min(alone[src], alone[other])
-        assert rate.chosen(src) == alone[src]
+        assert rate.heard_there(src).mcs == alone[src]
 
 
 @law(60)
@@ -195,7 +195,7 @@ def test_a_fixed_mcs_stays_whatever_is_said():
     for snr_db in (-20, 30):
         tell(rate, 2, snr_db, per=1.0)
         assert {choice(rate, qos=qos) for qos in Qos} == {4}
-    assert rate.chosen(2) == 4
+    assert rate.heard_there(2).mcs == 4
     assert not rate.changes
     assert make(fixed=12, adapt=False).lowest == 6
 
@@ -208,9 +208,8 @@ def test_it_suggests_what_it_would_like_to_hear():
 def test_what_was_told_can_be_asked_for():
     rate = make()
     tell(rate, 2, 7.25, per=0.2)
-    assert rate.told(2) == (7.25, pytest.approx(0.2, abs=1 / 255))
-    assert rate.told(9) is None
-    assert rate.chosen(9) == rate.lowest
+    assert rate.heard_there(2)[:2] == (7.25, pytest.approx(0.2, abs=1 / 255))
+    assert rate.heard_there(9) == (None, None, rate.lowest)
 
 
 def test_a_report_alone_makes_a_neighbor():

@@ -11,10 +11,9 @@ from sdrlinkd.link import (
     Outcome,
     Overrides,
     RateParams,
-    link_report,
 )
 from sdrlinkd.wire import BROADCAST, LinkReport, parse
-from tests.link.world import make_link, records_in
+from tests.link.world import make_link, neighbors, records_in
 
 SIZE = 220
 NEEDED = (1.0, 4.0, 7.0, 10.0, 13.0, 17.0, 19.0)
@@ -85,6 +84,12 @@ def chatter(to=BROADCAST, src=1, size=100):
     return submit
 
 
+def there(world, node, src):
+    """(SNR in dB, PER) at which `src` says it hears `node`."""
+    report = neighbors(world.links[node])[src]
+    return report.snr_there_db, report.per_there
+
+
 def test_a_link_report_says_how_well_the_other_is_heard():
     world = World([1, 2], lambda to, src, now: 12.0 if src == 1 else 8.0)
     world.run(6.0, chatter())
@@ -97,8 +102,8 @@ def test_a_link_report_says_how_well_the_other_is_heard():
     }
     assert told[2] == LinkReport(1, 48, 0, 3)
     assert told[1] == LinkReport(2, 32, 0, 1)
-    assert world.links[1].rate.told(2) == (12.0, 0.0)
-    assert world.links[2].rate.told(1) == (8.0, 0.0)
+    assert there(world, 1, 2) == (12.0, 0.0)
+    assert there(world, 2, 1) == (8.0, 0.0)
 
 
 def test_nobody_knows_anybody_so_the_first_burst_is_the_slowest():
@@ -120,7 +125,7 @@ def test_the_mcs_follows_a_falling_and_a_rising_snr(to):
     assert set(falling) == set(rising) == set(range(7))
     assert falling == sorted(falling, reverse=True)
     assert rising == sorted(rising)
-    steps = [change.mcs for change in world.links[1].rate.changes]
+    steps = [change.mcs for change in world.links[1].report(world.now).mcs_changes]
     assert steps == [6, 5, 4, 3, 2, 1, 0, 1, 2, 3, 4, 5, 6]
 
 
@@ -134,7 +139,7 @@ def test_losses_that_snr_does_not_tell_make_it_cautious():
     world = World([1, 2], snr_db)
     world.run(15.0, chatter())
     assert max(world.mcs(1, 13.0)) < 4
-    assert world.links[1].rate.told(2)[1] > 0.1
+    assert there(world, 1, 2)[1] > 0.1
 
 
 def test_a_robot_that_falls_silent_is_spoken_to_slowly():
@@ -171,13 +176,14 @@ def test_beacons_are_for_all_also_beside_messages_for_one(size):
     for at, src, burst in world.bursts:
         if src == 1 and at > 5 and any(parse(pdu, SIZE).dst == BROADCAST for pdu in burst.pdus):
             assert burst.mcs <= 1, at
-    assert world.now - world.links[3].inbox.neighbors[1].last_heard_at < 3
+    (heard,) = (n for n in world.links[3].report(world.now).neighbors if n.src == 1)
+    assert heard.last_heard_s_ago < 3
 
 
 def test_all_of_it_is_in_the_report():
     world = World([1, 2], lambda *_: 25.0)
     world.run(5.0, chatter())
-    report = link_report(world.links[1], world.now, {}, {})
+    report = world.links[1].report(world.now)
     assert sum(report.bursts_by_mcs.values()) == sum(src == 1 for _, src, _ in world.bursts)
     assert set(report.bursts_by_mcs) == {0, 6}
     assert [change.mcs for change in report.mcs_changes] == [6]

@@ -8,8 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link import (
-    DEFAULT_POLICY,
-    Allowance,
     ClassesParams,
     ClassParams,
     ClockParams,
@@ -19,14 +17,14 @@ from sdrlinkd.link import (
     QueueParams,
     RelayParams,
     TopicPolicy,
-    link_report,
 )
-from sdrlinkd.link.packing import Draft, PiggybackRecords
+from sdrlinkd.link.packing import PiggybackRecords
 from sdrlinkd.link.queue import Outgoing, TxTally
+from sdrlinkd.link.receipts import Receipts
 from sdrlinkd.link.transmit import MOST_RECEIPTS
-from sdrlinkd.wire import Receipt, parse, parse_records
+from sdrlinkd.wire import PduBuilder, Receipt, build_records, parse
 from tests.laws import law
-from tests.link.world import make_link, next_burst
+from tests.link.world import compose, make_link, next_burst, received, records_in, tell
 
 STEP_S = 0.01
 AIR_S = 0.001
@@ -67,7 +65,7 @@ class Air:
             for _, robot, pdu, at in due:
                 self._hear(robot, pdu, at)
             for robot, link in self.links.items():
-                self.verdicts += [(robot, each) for each in link.delivery.receipts.take()]
+                self.verdicts += [(robot, each) for each in link.take_verdicts()]
                 assert link.audit() == []
 
     def _send(self, link, burst):
@@ -87,7 +85,7 @@ class Air:
         for message in link.hear(pdu, at, 20.0, self.now):
             self.delivered[robot, message.payload] += 1
             age_s = link.delivered(message, self.now)
-            lifespan_s = link.inbox.policies.get(message.topic_id, DEFAULT_POLICY).own_lifespan_s
+            lifespan_s = link.policy(message.topic_id).own_lifespan_s
             if age_s is None or age_s > lifespan_s + 1e-5:
                 self.expired.append((robot, age_s))
 
@@ -146,8 +144,8 @@ def test_what_never_left_is_told_of_at_once():
     link.submit(0, message(2), 0.0, Overrides(receipt="two"))
     link.submit(0, message(3, 200), 0.0, Overrides(receipt="three"))
     link.handle_timers(1.0)
-    link.delivery.refuse("tx_bad_envelope", 0, "four")
-    verdicts = link.delivery.receipts.take()
+    link.refuse("tx_bad_envelope", 0, "four")
+    verdicts = link.take_verdicts()
     assert [(each.receipt, each.fate, each.reason) for each in verdicts] == [
         ("one", "dropped", "tx_superseded"),
         ("three", "dropped", "tx_size_cap"),
@@ -162,9 +160,9 @@ def test_nobody_there_is_an_answer_too():
     burst = next_burst(link, 0.0)
     link.confirm(burst, Outcome.SENT, 0.001)
     link.handle_timers(0.9)
-    assert link.delivery.receipts.take() == []
+    assert link.take_verdicts() == []
     link.handle_timers(1.1)
-    (verdict,) = link.delivery.receipts.take()
+    (verdict,) = link.take_verdicts()
     assert (verdict.fate, verdict.dst) == ("unknown", 255)
 
 
@@ -172,22 +170,22 @@ def test_a_burst_that_the_radio_lost_is_no_delivery():
     link = make_link()
     link.submit(0, message(1), 0.0, Overrides(receipt="one", dst=2))
     link.confirm(next_burst(link, 0.0), Outcome.LOST, 0.001)
-    (verdict,) = link.delivery.receipts.take()
+    (verdict,) = link.take_verdicts()
     assert (verdict.fate, verdict.reason, verdict.dst) == ("dropped", "tx_radio_failed", 2)
     link.handle_timers(100.0)
-    assert link.delivery.receipts.take() == []
+    assert link.take_verdicts() == []
 
 
 def test_of_all_robots_asked_the_last_one_is_told_of_as_such():
     link = make_link()
     for robot in (2, 3):
-        link.inbox._new_neighbor(robot, 0.0).last_heard_at = 0.0
+        tell(link, robot, at=0.0)
     link.submit(0, message(1), 0.0, Overrides(receipt="one"))
     link.confirm(next_burst(link, 0.0), Outcome.LOST, 0.001)
     link.submit(0, message(2), 1.0, Overrides(receipt="two"))
     link.confirm(next_burst(link, 1.0), Outcome.SENT, 1.001)
     link.handle_timers(10.0)
-    told = [(each.receipt, each.dst, each.left) for each in link.delivery.receipts.take()]
+    told = [(each.receipt, each.dst, each.left) for each in link.take_verdicts()]
     assert told == [("one", 2, 1), ("one", 3, 0), ("two", 2, 1), ("two", 3, 0)]
 
 
@@ -200,29 +198,34 @@ def test_a_receipt_is_for_the_message_that_had_the_entry_id_then():
         air.run(air.now + STEP_S)
     air.run(air.now + RECEIPT_S + 0.5)
     assert Counter(each.fate for _, each in air.verdicts) == {"delivered": 600}
-    assert air.links[1].delivery.receipts.unasked == 0
+    assert air.links[1].report(air.now).receipts_unasked == 0
 
 
 def test_receipts_that_reach_nobody_are_reported():
-    link = make_link()
+    sender, link = make_link(2), make_link(1)
     for number in range(300):
-        link.ended(2, number // 256, number % 256, "delivered", 0.1, 1.0)
-    link.record_from(2, Receipt(0, 5, 1), 1.0)
-    report = link_report(link, 1.0, {}, {})
+        sender.submit(number % 2, message(number), 0.9, Overrides(receipt="one"))
+    while burst := compose(sender, 1.0):
+        for pdu in burst.pdus:
+            link.hear(pdu, 1.0)
+    tell(link, 2, Receipt(0, 5, 1, 1), at=1.0)
+    report = link.report(1.0)
     assert (report.receipts_untold, report.receipts_unasked) == (300 - MOST_RECEIPTS, 1)
 
 
 def test_a_receipt_that_waited_is_for_the_message_of_then():
     """It says since when; the entry id is another message's by now."""
-    receipts = make_link().delivery.receipts
+    receipts = Receipts(1, RECEIPT_S)
     for name, at in (("then", 10.0), ("now", 10.5)):
-        asks = Outgoing(0, b"", Qos.DEFAULT, 0, 2, at, 99.0, wants_stamp=True, tally=TxTally())
-        asks.receipt, asks.entry_id = name, 7
+        asks = Outgoing(
+            0, b"", Qos.DEFAULT, 0, 2, at, 99.0, wants_stamp=True, tally=TxTally(), receipt=name
+        )
+        asks.cut(7, 10, 1, at)
         receipts.expect(asks, (), at)
-    piggyback, draft = PiggybackRecords(), Draft(128)
+    piggyback, draft = PiggybackRecords(), PduBuilder(128)
     piggyback.put_receipt(Receipt(0, 7, 1, 1, 100), 0.0, 10.01)
     piggyback.ride(draft, 10.6)
-    (told,) = parse_records(draft._records[0])
+    (told,) = records_in(draft.build(0, 1, 255, 0, 1), 128)
     assert told == Receipt(0, 7, 1, 1, 100, 5900)
     receipts.hear(2, told, 10.6)
     (verdict,) = receipts.take()
@@ -237,10 +240,12 @@ def test_a_receipt_of_the_short_form_is_for_whom_the_pdu_is():
     link.submit(0, message(1), 0.0, Overrides(receipt="one", dst=2))
     burst = next_burst(link, 0.0)
     link.confirm(burst, Outcome.SENT, 0.001)
-    (pending,) = link.delivery.receipts._pending.values()
-    entry_id = pending[0].message.entry_id
-    link.record_from(2, Receipt(0, entry_id, 1), 0.1)
-    (verdict,) = link.delivery.receipts.take()
+    ((asks,),) = burst.carried
+    answer = build_records([Receipt(0, asks.entry_id, 1)])
+    builder = PduBuilder(link.params.pdu_size)
+    assert builder.add_record(answer)
+    link.hear(builder.build(0, 2, link.own_id, 0, 1), 0.1)
+    (verdict,) = link.take_verdicts()
     assert (verdict.fate, verdict.took_s) == ("delivered", None)
 
 
@@ -251,13 +256,13 @@ def test_a_message_of_unknown_age_is_refused_where_age_matters(lifespan_s):
     receiver.set_policy(0, TopicPolicy(lifespan_s=lifespan_s))
     sender.submit(0, message(1), 0.0)
     got = []
-    for pdu in sender.scheduler.compose(0.0, Allowance.of(63)).pdus:
+    for pdu in compose(sender, 0.0).pdus:
         got += receiver.hear(pdu, 0.0, None, 0.01)
     assert len(got) == (lifespan_s == float("inf"))
-    assert receiver.inbox.tallies[1, 0].dropped["rx_no_age"] == (lifespan_s < 1)
+    assert received(receiver)[1, 0].dropped["rx_no_age"] == (lifespan_s < 1)
     receiver.set_policy(0, TopicPolicy(lifespan_s=lifespan_s, stamp=False))
     sender.submit(0, message(2), 0.1)
-    for pdu in sender.scheduler.compose(0.1, Allowance.of(63)).pdus:
+    for pdu in compose(sender, 0.1).pdus:
         assert receiver.hear(pdu, 0.1, None, 0.11), "one's own decision"
 
 
@@ -267,38 +272,38 @@ def test_a_relay_sends_on_nothing_that_is_too_old():
     relay.set_policy(0, TopicPolicy(lifespan_s=0.2))
     for number in range(2):
         sender.submit(0, message(number), 0.0)
-        for pdu in sender.scheduler.compose(0.05, Allowance.of(63)).pdus:
+        for pdu in compose(sender, 0.05).pdus:
             relay.hear(pdu, 0.05, None, 0.05)
         if number == 0:
-            assert relay.scheduler.compose(0.19, Allowance.of(63)).pdus
-    relay.scheduler.compose(0.21, Allowance.of(63))
-    assert relay.sender.relayed.dropped == {"tx_expired": 1}
+            assert compose(relay, 0.19).pdus
+    compose(relay, 0.21)
+    assert relay.report(0.0).relayed.dropped == {"tx_expired": 1}
 
 
 def test_a_command_topic_that_falls_silent_is_due_once():
     air = Air(7, (1, 2))
     air.links[2].set_policy(0, TopicPolicy(deadman_s=0.3))
-    deadman = air.links[2].delivery.deadman
+    link = air.links[2]
     for number in range(5):
         air.links[1].submit(0, message(number), air.now)
         air.run(air.now + 0.1)
-        assert deadman.take_due(air.now) == []
-    assert deadman.next_at == pytest.approx(air.now + 0.2, abs=0.03)
+        assert link.take_silent(air.now) == []
+    assert link.silence_at == pytest.approx(air.now + 0.2, abs=0.03)
     air.run(air.now + 0.3)
-    assert deadman.take_due(air.now) == [(1, 0)]
+    assert link.take_silent(air.now) == [(1, 0)]
     air.run(air.now + 1.0)
-    assert deadman.take_due(air.now) == []
+    assert link.take_silent(air.now) == []
     air.links[1].submit(0, message(9), air.now)
     air.run(air.now + 0.1)
     air.links[2].set_policy(0, TopicPolicy())
     air.run(air.now + 1.0)
-    assert deadman.take_due(air.now) == [], "the policy has changed"
-    assert deadman.stops == {(1, 0): 1}
+    assert link.take_silent(air.now) == [], "the policy has changed"
+    assert received(link)[1, 0].stops == 1
 
 
 def test_the_yardstick_sees_a_receipt_that_lies():
     air = Air(1, (1, 2))
-    air.links[2].inbox._verdict = lambda *_: (b"", "rx_size_cap")
+    air.links[2].set_policy(0, TopicPolicy(max_bytes=1))
     air.run(1.5)
     air.links[1].submit(0, message(1), air.now, Overrides(receipt="one", dst=2))
     air.run(air.now + 1.0)
@@ -312,10 +317,10 @@ def test_a_relay_that_has_just_begun_sends_on_nothing_that_is_too_old_either():
     relay = make_link(own_id=2, hop_limit=2, relay=RelayParams(policy="flood"))
     relay.set_policy(0, TopicPolicy(lifespan_s=0.2))
     sender.submit(0, message(1), 5.0)
-    for pdu in sender.scheduler.compose(9.0, Allowance.of(63)).pdus:
+    for pdu in compose(sender, 9.0).pdus:
         relay.hear(pdu, 0.5, None, 0.5)
-    relay.scheduler.compose(0.6, Allowance.of(63))
-    assert relay.sender.relayed.dropped == {"tx_expired": 1}
+    compose(relay, 0.6)
+    assert relay.report(0.0).relayed.dropped == {"tx_expired": 1}
 
 
 @pytest.mark.parametrize("answered", [True, False])
@@ -323,21 +328,21 @@ def test_a_message_is_told_of_once_however_late_it_fails(answered):
     link = make_link(receipt_s=1.0)
     link.submit(0, message(1), 0.0, Overrides(receipt="one", dst=2))
     burst = next_burst(link, 0.0)
-    ((pending,),) = link.delivery.receipts._pending.values()
+    ((asks,),) = burst.carried
     if answered:
-        link.record_from(2, Receipt(0, pending.message.entry_id, 1), 0.1)
+        tell(link, 2, Receipt(0, asks.entry_id, 1, link.own_id), at=0.1)
     else:
         link.handle_timers(2.0)
     link.confirm(burst, Outcome.LOST, 2.1)
     link.handle_timers(10.0)
-    (verdict,) = link.delivery.receipts.take()
+    (verdict,) = link.take_verdicts()
     assert verdict.fate == ("delivered" if answered else "unknown")
 
 
 def test_without_a_control_channel_nobody_can_know():
     link = make_link(topics=[(f"t{i}", "std_msgs/String") for i in range(16)])
     assert link.submit(0, message(1), 0.0, Overrides(receipt="one", dst=3)) is None
-    (verdict,) = link.delivery.receipts.take()
+    (verdict,) = link.take_verdicts()
     assert (verdict.fate, verdict.dst) == ("unknown", 3)
 
 
@@ -352,7 +357,7 @@ def test_without_a_control_channel_everything_is_told_once():
     link.submit(0, message(4), 1.0, Overrides(receipt="lost"))
     link.confirm(next_burst(link, 1.0), Outcome.LOST, 1.001)
     link.handle_timers(100.0)
-    told = [(each.receipt, each.fate, each.reason) for each in link.delivery.receipts.take()]
+    told = [(each.receipt, each.fate, each.reason) for each in link.take_verdicts()]
     assert told == [
         ("superseded", "unknown", ""),
         ("expired", "unknown", ""),
@@ -365,7 +370,7 @@ def test_what_is_refused_names_the_robot_it_was_for():
     link = make_link()
     link.set_policy(0, TopicPolicy(max_bytes=10))
     link.submit(0, message(1), 0.0, Overrides(receipt="one", dst=3))
-    assert link.delivery.receipts.take()[0].dst == 3
+    assert link.take_verdicts()[0].dst == 3
 
 
 def test_an_early_stamp_is_kept_while_its_message_is_still_arriving():
@@ -377,14 +382,14 @@ def test_an_early_stamp_is_kept_while_its_message_is_still_arriving():
         if i == 2:
             # Its rest leaves room for the other's age, too.
             sender.submit(1, message(2, 4), 0.0)
-        burst = sender.scheduler.compose(0.05 * i, Allowance.of(1))
+        burst = compose(sender, 0.05 * i, 1)
         pdus += [(0.05 * i, pdu) for pdu in (burst.pdus if burst else ())]
     got = []
     for at, pdu in pdus:
         receiver.handle_timers(at)
         got += receiver.hear(pdu, at, None, at)
     assert len(got) == 2
-    assert receiver.inbox.tallies[1, 0].dropped == {}
+    assert received(receiver)[1, 0].dropped == {}
 
 
 def test_what_parity_repairs_has_its_age():
@@ -396,7 +401,7 @@ def test_what_parity_repairs_has_its_age():
     receiver.set_policy(0, TopicPolicy(lifespan_s=60.0))
     sender.submit(0, message(1, 1200), 0.0)
     pdus = []
-    while burst := sender.scheduler.compose(0.1, Allowance.of(63)):
+    while burst := compose(sender, 0.1):
         pdus += burst.pdus
     last = max(
         i for i, pdu in enumerate(pdus) if any(e.topic_id == 0 for e in parse(pdu, 128).entries)
@@ -407,4 +412,4 @@ def test_what_parity_repairs_has_its_age():
             got += receiver.hear(pdu, 0.1, None, 0.11)
     (heard,) = got
     assert heard.origin_at == pytest.approx(0.0, abs=1e-5)
-    assert receiver.inbox.fragments_repaired >= 1
+    assert receiver.report(0.0).fragments_repaired >= 1

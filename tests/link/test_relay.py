@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.errors import ConfigError
-from sdrlinkd.link import Allowance, Outcome, Overrides, Qos, Relay, RelayParams, TopicPolicy
+from sdrlinkd.link import Outcome, Overrides, Qos, Relay, RelayParams, TopicPolicy
 from sdrlinkd.wire import parse
 from tests.laws import law
-from tests.link.world import make_link, send_all
+from tests.link.world import compose, make_link, rx, send_all, tx
 
 HOPS = 3
 
@@ -25,7 +25,7 @@ def node(own_id, *routes, policy="routes", **more):
 def pass_on(link, now):
     """What a link sends at `now`."""
     pdus = []
-    while burst := link.scheduler.compose(now, Allowance.of(8)):
+    while burst := compose(link, now, 8):
         link.confirm(burst, Outcome.SENT, now)
         pdus += burst.pdus
     return pdus
@@ -44,7 +44,7 @@ def test_a_message_crosses_a_chain_and_its_age_adds_up():
     assert message.payload == bytes(120)
     assert now + 1000 - message.origin_at == pytest.approx(0.21, abs=2e-6)
     assert message.hops_left == HOPS - 2
-    assert two.inbox.pdus_dropped["rx_relayed"] == three.inbox.pdus_dropped["rx_relayed"] == 3
+    assert rx(two).pdus_dropped["rx_relayed"] == rx(three).pdus_dropped["rx_relayed"] == 3
     assert two.audit() == three.audit() == four.audit() == []
 
 
@@ -58,9 +58,9 @@ def test_what_a_relay_sends_on_is_known_to_who_heard_it_before():
     assert again != pdu
     assert len(three.hear(pdu, 0.0)) == 1
     assert three.hear(again, 0.3) == []
-    assert three.inbox.pdus_dropped["rx_dup"] == 1
+    assert rx(three).pdus_dropped["rx_dup"] == 1
     assert one.hear(again, 0.3) == []
-    assert one.inbox.pdus_dropped["rx_own"] == 1
+    assert rx(one).pdus_dropped["rx_own"] == 1
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ def test_relayed_pdus_go_by_class_and_priority_and_never_mix_in_a_burst():
     two.submit(0, bytes(30), 0.0, Overrides(Qos.LATENCY, priority=0))
     two.submit(0, bytes(30), 0.0, Overrides(Qos.URGENT))
     bursts = []
-    while burst := two.scheduler.compose(0.1, Allowance.of(8)):
+    while burst := compose(two, 0.1, 8):
         two.confirm(burst, Outcome.SENT, 0.1)
         bursts.append([(parse(pdu, 64).src, parse(pdu, 64).qos) for pdu in burst.pdus])
     assert all(len({src for src, _ in burst}) == 1 for burst in bursts)
@@ -124,7 +124,7 @@ def test_a_relay_that_is_never_idle_still_tells_of_itself():
         one.submit(2, bytes(30), now, Overrides(Qos.URGENT, dst=3))
         for pdu in pass_on(one, now):
             two.hear(pdu, now)
-        burst = two.scheduler.compose(now, Allowance.of(4))
+        burst = compose(two, now, 4)
         two.confirm(burst, Outcome.SENT, now)
         sources += [parse(pdu, 64).src for pdu in burst.pdus]
     assert 3 <= sources.count(2) <= 12
@@ -137,7 +137,7 @@ def test_a_relay_does_not_keep_what_is_old():
     (pdu,) = pass_on(one, 0.0)
     two.hear(pdu, 0.0)
     assert pass_on(two, 1.5) == []
-    assert two.sender.relayed.dropped["tx_expired"] == 1
+    assert two.report(0.0).relayed.dropped["tx_expired"] == 1
     assert two.audit() == []
 
 
@@ -157,7 +157,7 @@ def test_in_any_mesh_messages_arrive_once_and_the_ledgers_add_up(seed):
                     bytes((0, 1, 0, 0, i)) + step.to_bytes(2, "big") + bytes(rng.randrange(90))
                 )
                 link.submit(rng.randrange(3), payload, now, Overrides(dst=rng.choice((None, 3))))
-            if rng.random() < 0.5 and (burst := link.scheduler.compose(now, Allowance.of(4))):
+            if rng.random() < 0.5 and (burst := compose(link, now, 4)):
                 link.confirm(burst, rng.choice((Outcome.SENT, Outcome.SENT, Outcome.LOST)), now)
                 on_air += [(b, pdu) for a, b in links if a == i for pdu in burst.pdus]
         rng.shuffle(on_air)
@@ -182,5 +182,5 @@ def test_the_list_of_what_is_relayed_is_bounded_by_the_queue():
         one.submit(0, bytes(30), i * 0.01, Overrides(dst=3))
         for pdu in send_all(one, i * 0.01):
             two.hear(pdu, 0.0)
-    tally = two.sender.relayed
-    assert tally.accepted == 400 == two.sender.outbox.queued
+    tally = two.report(0.0).relayed
+    assert tally.accepted == 400 == tx(two).queued

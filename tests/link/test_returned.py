@@ -14,7 +14,7 @@ from sdrlinkd.link.access import Slot
 from sdrlinkd.link.transmit import GIVE_UP_S
 from sdrlinkd.wire import Beacon, Frame, Stamp, parse
 from tests.link.radios import LOCKSTEP, params
-from tests.link.world import PDU_S, airtime_s, make_link, next_burst, records_in
+from tests.link.world import PDU_S, airtime_s, make_link, next_burst, records_in, topic_of, tx, use
 
 SIZE = 64
 
@@ -41,12 +41,13 @@ class Doorkeeper:
     def __init__(self, *slots):
         self.slots, self.told = list(slots), []
 
+    state = "kept"
     pause_s = 0.0
+    others_follow = False
+    keeps_schedule = False
 
     def slot(self, wish):
         return self.slots.pop(0)
-
-    others_follow = False
 
     def sent(self, end, src):
         self.told.append(("sent", end))
@@ -70,7 +71,7 @@ def test_it_goes_again_as_it_was_but_older():
     assert [without_ages(pdu) for pdu in again.pdus] == [without_ages(pdu) for pdu in first.pdus]
     assert (stamps(first), stamps(again)) == ([250_000], [750_000])
     link.confirm(again, Outcome.SENT, 0.8)
-    assert link.sender.tally(0).sent == 1
+    assert topic_of(link, 0).sent == 1
     assert link.audit() == []
 
 
@@ -89,7 +90,8 @@ def test_ages_stay_true_however_often_it_is_late():
 
 def test_a_tdma_phase_moves_too():
     link = make_link(pdu_size=SIZE, beacon_s=1.0)
-    link.attach(LOCKSTEP._replace(longest_burst_s=(0.01,)), params("tdma", [1]), RateParams())
+    traits = LOCKSTEP._replace(longest_burst_s=(0.01,))
+    access = link.attach(traits, params("tdma", [1]), RateParams()).settled.access
 
     def granted(since):
         return next(b for i in range(999) if (b := next_burst(link, since + 1e-3 * i)))
@@ -106,7 +108,7 @@ def test_a_tdma_phase_moves_too():
         1e6 * (again.start - first.start), abs=1
     )
     # It may be more than a frame; who hears it reckons from its start.
-    kept_us, frame_us = link.access.frame(again.start).phase_us, 1e6 * link.access.round_s
+    kept_us, frame_us = access.frame(again.start).phase_us, 1e6 * access.round_s
     off_us = (phase_us(again) - kept_us) % frame_us
     assert min(off_us, frame_us - off_us) < 2
 
@@ -141,9 +143,8 @@ def test_it_waits_for_a_slot_that_it_fits_into_and_nothing_overtakes_it():
     length_s = airtime_s(0, len(burst.pdus))
     assert len(burst.pdus) == 6
     link.confirm(burst, Outcome.LATE, 0.1)
-    link.scheduler.access = door = Doorkeeper(
-        None, Slot.exact(0.3, 0.3 + length_s / 2), Slot.exact(0.5, 0.5 + length_s)
-    )
+    door = Doorkeeper(None, Slot.exact(0.3, 0.3 + length_s / 2), Slot.exact(0.5, 0.5 + length_s))
+    use(link, door)
     link.submit(1, bytes(8), 0.1, Overrides(qos=Qos.URGENT))
     assert next_burst(link, 0.2) is None
     assert next_burst(link, 0.3) is None
@@ -166,9 +167,9 @@ def test_after_a_while_it_is_given_up_by_name():
         now += 0.3
     assert GIVE_UP_S < now < GIVE_UP_S + 1
     assert tries == round(now / 0.3)
-    assert dict(link.sender.tally(0).dropped) == {"tx_radio_failed": 1}
+    assert dict(topic_of(link, 0).dropped) == {"tx_radio_failed": 1}
     assert not link.has_work
-    assert (link.sender.bursts_failed, link.sender.pdus_failed) == (1, 1)
+    assert (tx(link).bursts_failed, tx(link).pdus_failed) == (1, 1)
 
 
 def test_the_rest_of_a_message_that_is_given_up_is_not_sent():
@@ -179,7 +180,7 @@ def test_the_rest_of_a_message_that_is_given_up_is_not_sent():
         link.confirm(burst, Outcome.LATE, now)
         now += 1.5
     assert now == 4.5
-    assert dict(link.sender.tally(0).dropped) == {"tx_radio_failed": 1}
+    assert dict(topic_of(link, 0).dropped) == {"tx_radio_failed": 1}
     assert link.audit() == []
 
 
@@ -190,7 +191,7 @@ def test_only_what_did_not_leave_at_all_goes_again(outcome):
     link.submit(0, bytes(30), 0.0)
     link.confirm(next_burst(link, 0.0), outcome, 0.1)
     assert next_burst(link, 0.2) is None
-    assert dict(link.sender.tally(0).dropped) == {"tx_radio_failed": 1}
+    assert dict(topic_of(link, 0).dropped) == {"tx_radio_failed": 1}
 
 
 def test_shut_down_leaves_nothing_to_send():
@@ -203,7 +204,7 @@ def test_shut_down_leaves_nothing_to_send():
     link.drain()
     assert link.has_work, "drained is what was sent, not what waits for a slot"
     link.shut_down()
-    assert dict(link.sender.tally(0).dropped) == {"tx_shutdown": 3}
+    assert dict(topic_of(link, 0).dropped) == {"tx_shutdown": 3}
     assert link.audit() == []
     assert not link.has_work
     assert next_burst(link, 0.2) is None
@@ -218,9 +219,9 @@ def test_air_that_was_not_used_is_not_counted():
         burst = next_burst(link, now)
         link.confirm(burst, Outcome.LATE, now)
     link.confirm(next_burst(link, 0.6), Outcome.SENT, 0.7)
-    assert link.scheduler.bursts_late == 3
-    assert link.scheduler.airtime_s == pytest.approx(PDU_S)
-    assert dict(link.scheduler.bursts_by_mcs) == {0: 1}
+    assert link.report(0.0).bursts_late == 3
+    assert link.report(0.0).airtime_s == pytest.approx(PDU_S)
+    assert dict(link.report(0.0).bursts_by_mcs) == {0: 1}
 
 
 def test_a_beacon_that_was_late_is_still_a_beacon():

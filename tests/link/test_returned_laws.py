@@ -10,7 +10,7 @@ from sdrlinkd.link import Outcome, TopicPolicy
 from sdrlinkd.wire import parse
 from tests.laws import law
 from tests.link.test_laws import assert_books_balance
-from tests.link.world import make_link, next_burst
+from tests.link.world import make_link, next_burst, rx, tx
 
 SIZE = 64
 
@@ -39,12 +39,12 @@ def test_the_ledger_adds_up_at_every_step_of_any_run(seed):
         else:
             link.handle_timers(now)
         assert_books_balance(link, seed)
-    assert link.scheduler.bursts_late == n_late
+    assert link.report(0.0).bursts_late == n_late
     link.shut_down()
     for burst in on_air:
         link.confirm(burst, rng.choice((Outcome.SENT, Outcome.LATE)), now)
     assert_books_balance(link, seed)
-    assert link.sender.outbox.queued == len(link.sender.lives.in_flight) == 0
+    assert tx(link).queued == tx(link).in_flight == 0
 
 
 @law(12)
@@ -72,7 +72,7 @@ def test_every_message_arrives_once_and_in_order_however_many_come_late(seed):
     assert len(got) > 120, f"seed {seed}"
     for (_, origin_at), (_, submitted_at) in zip(got, sent, strict=False):
         assert origin_at == pytest.approx(submitted_at, abs=2e-5), f"seed {seed}"
-    assert receiver.inbox.pdus_dropped["rx_dup"] == 0
+    assert rx(receiver).pdus_dropped["rx_dup"] == 0
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -17,12 +17,11 @@ from sdrlinkd.link import (
     Qos,
     RateParams,
     TopicPolicy,
-    link_notices,
 )
 from sdrlinkd.link.access import Free, Slot
 from sdrlinkd.link.schedule import Allowance, Forecasts, Limits, Shares
 from tests.laws import law
-from tests.link.world import PDU_S, airtime_s, make_link, most_pdus, next_burst
+from tests.link.world import PDU_S, airtime_s, classes_queued, make_link, most_pdus, next_burst, use
 
 PERIOD_S = 0.02
 
@@ -139,7 +138,7 @@ def test_no_class_with_a_share_starves(seed):
     now, total_s, used_s = 0.0, 0.0, dict.fromkeys(Qos, 0.0)
     for _ in range(400):
         for qos in Qos:
-            while link.sender.outbox.queued_by_class()[qos] < 20:
+            while classes_queued(link)[qos] < 20:
                 link.submit(rng.randrange(3), bytes(rng.randrange(4, 300)), now, Overrides(qos))
         burst = next_burst(link, now)
         link.confirm(burst, Outcome.SENT, now)
@@ -202,7 +201,7 @@ class Later(Free):
 @pytest.mark.parametrize(("most_s", "n"), [(0.0, 1), (1.5e-3, 1), (2.9e-3, 2), (1e9, 8)])
 def test_a_burst_is_no_longer_than_what_is_made_when_its_slot_begins(most_s, n):
     link = make_link(pdu_size=64)
-    link.scheduler.access = Later()
+    use(link, Later())
     for _ in range(40):
         link.submit(0, bytes(50), 0.0)
 
@@ -230,6 +229,6 @@ def test_a_lifespan_that_can_never_be_met_is_told():
     traits = CarrierTraits(lead_s=0.002, pdu_burst_s=(0.0015,))
     link.attach(traits, AccessParams(), RateParams())
     link.set_policies({0: TopicPolicy(lifespan_s=0.003), 1: TopicPolicy(lifespan_s=0.004)})
-    (notice,) = link_notices(link, 0.0)
+    (notice,) = link.notices(0.0)
     assert "odom: lifespan_s of 3 ms can never be met" in notice
     assert "takes 3.5 ms" in notice

@@ -7,7 +7,7 @@ from sdrlinkd.link.access import Slot
 from sdrlinkd.wire import Frame
 from tests.link.radios import LOCKSTEP, params
 from tests.link.test_returned import Doorkeeper
-from tests.link.world import make_link, most_pdus, next_burst, records_in
+from tests.link.world import make_link, most_pdus, next_burst, records_in, use
 
 SIZE = 64
 
@@ -16,9 +16,7 @@ def test_a_burst_may_begin_late_as_long_as_it_is_over_in_time():
     link = make_link(pdu_size=SIZE, greedy=False)
     for i in range(4):
         link.submit(0, bytes([i]) * 20, 0.0)
-    link.scheduler.access = Doorkeeper(
-        *[Slot(0.5, 0.502, 0.6), Slot(0.7, 0.702, 0.7015), Slot(0.9)]
-    )
+    use(link, Doorkeeper(Slot(0.5, 0.502, 0.6), Slot(0.7, 0.702, 0.7015), Slot(0.9)))
     first = next_burst(link, 0.5)
     assert (len(first.pdus), first.latest) == (2, pytest.approx(0.598))
     link.confirm(first, Outcome.LATE, 0.6)
@@ -56,7 +54,7 @@ def test_who_has_the_air_for_being_urgent_keeps_it_for_nothing_less(least):
     for i in range(4):
         for qos in reversed(Qos):
             link.submit(0, bytes([i]) * 30, 0.0, Overrides(qos=qos))
-    link.scheduler.access = Doorkeeper(Slot.exact(0.5, 0.54, least))
+    use(link, Doorkeeper(Slot.exact(0.5, 0.54, least)))
     burst = next_burst(link, 0.5)
     assert [message.qos for (message,) in burst.carried] == sorted(
         [qos for qos in Qos if qos <= least] * 4
@@ -67,5 +65,5 @@ def test_the_first_is_always_taken():
     link = make_link(pdu_size=SIZE, greedy=False)
     for _ in range(3):
         link.submit(0, bytes(40), 0.0, Overrides(qos=Qos.BULK))
-    link.scheduler.access = Doorkeeper(Slot.exact(0.5, least=Qos.URGENT))
+    use(link, Doorkeeper(Slot.exact(0.5, least=Qos.URGENT)))
     assert len(next_burst(link, 0.5).pdus) == 1

@@ -1,9 +1,15 @@
 """Links for tests: small to make, with their times written down."""
 
+from collections import Counter
+from itertools import count
 from random import Random
 
+import msgspec
+
 from sdrlinkd.link import (
-    Allowance,
+    QOS_BY_LABEL,
+    AccessParams,
+    CarrierTraits,
     ClassesParams,
     ClockParams,
     Link,
@@ -11,12 +17,26 @@ from sdrlinkd.link import (
     Opportunity,
     Outcome,
     QueueParams,
+    RateParams,
     ReassemblyParams,
     RelayParams,
 )
-from sdrlinkd.wire import CONTROL_TOPIC_ID, make_registry, parse, parse_records
+from sdrlinkd.wire import (
+    BROADCAST,
+    CONTROL_TOPIC_ID,
+    Beacon,
+    PduBuilder,
+    build_records,
+    equal_payload,
+    flags,
+    make_registry,
+    parse,
+    parse_records,
+)
 
 PDU_S = 0.001
+MAX_PDUS = 63
+NUMBERS = count()
 TOPICS = (
     ("odom", "nav_msgs/Odometry"),
     ("scan", "sensor_msgs/LaserScan"),
@@ -38,8 +58,8 @@ def make_link(
     clock=None,
     **params,
 ):
-    """A link; `params` are LinkParams. No beacons unless asked for."""
-    return Link(
+    """A link on an air of its own; `params` are LinkParams. No beacons unless asked for."""
+    link = Link(
         LinkParams(beacon_s=beacon_s, **params),
         queue or QueueParams(),
         reassembly or ReassemblyParams(),
@@ -52,12 +72,64 @@ def make_link(
         dictionaries=dictionaries or {},
         clock=clock or ClockParams(period_s=0.0),
     )
+    link.attach(CarrierTraits(), AccessParams(), RateParams())
+    return link
+
+
+def compose(link, now, max_pdus=MAX_PDUS):
+    """The burst that leaves at `now` over a carrier that takes no time; None: nothing goes."""
+    return link.next_burst(Opportunity(now, lambda _mcs, _n: 0.0, lambda _mcs, _s: max_pdus))
+
+
+def compose_at(link, bytes_per_s):
+    """Have the link send something of topic 2 on an air that carries so much."""
+    link.submit(2, b"", 0.0)
+    each_s = equal_payload(link.params.pdu_size, 1) / bytes_per_s
+    burst = link.next_burst(Opportunity(0.0, lambda _, n: n * each_s, lambda *_: 8))
+    link.confirm(burst, Outcome.SENT, 0.0)
+
+
+def tx(link):
+    """The TX half of the ledger."""
+    return link.report(0.0).tx
+
+
+def rx(link):
+    """The RX half of the ledger; of what never came, 0."""
+    report = link.report(0.0).rx
+    return msgspec.structs.replace(
+        report, dropped=Counter(report.dropped), pdus_dropped=Counter(report.pdus_dropped)
+    )
+
+
+def topic_of(link, topic_id):
+    """A topic on its way out; of what never came, 0."""
+    report = link.report(0.0).topics[topic_id]
+    return msgspec.structs.replace(report, dropped=Counter(report.dropped))
+
+
+def received(link):
+    """What came, by (source, topic id)."""
+    return {
+        (each.src, each.topic_id): msgspec.structs.replace(each, dropped=Counter(each.dropped))
+        for each in link.report(0.0).received
+    }
+
+
+def neighbors(link):
+    """Who is heard, by robot."""
+    return {each.src: each for each in link.report(0.0).neighbors}
+
+
+def classes_queued(link):
+    """Messages that wait, by class."""
+    return {QOS_BY_LABEL[label]: n for label, n in tx(link).queued_by_class.items()}
 
 
 def send_all(link, now=0.0, max_pdus=63):
     """Compose and confirm until nothing is left that may go at `now`; the PDUs."""
     pdus = []
-    while burst := link.scheduler.compose(now, Allowance.of(max_pdus)):
+    while burst := compose(link, now, max_pdus):
         pdus += burst.pdus
         link.confirm(burst, Outcome.SENT, now)
     return pdus
@@ -88,6 +160,22 @@ def most_pdus(_mcs, longest_s):
 def next_burst(link, now):
     """What the link sends when it is asked at `now`."""
     return link.next_burst(Opportunity(now, airtime_s, most_pdus))
+
+
+def tell(link, src, *records, at):
+    """Have `link` hear a PDU of robot `src` with nothing but `records`; of BEACON by default."""
+    builder = PduBuilder(link.params.pdu_size)
+    for record in records or (Beacon(src, 0),):
+        assert builder.add_record(build_records([record]))
+    number = next(NUMBERS)
+    pdu = builder.build(flags(0), src, BROADCAST, number & 0xFF, link.params.hop_limit, number >> 8)
+    link.hear(pdu, at)
+
+
+def use(link, access, **traits):
+    """Have `link` ask `access` when it may send."""
+    fit = link.attach(CarrierTraits(**traits), AccessParams(), RateParams())
+    link.use(fit._replace(settled=fit.settled._replace(access=access)))
 
 
 def records_in(pdu, pdu_size):

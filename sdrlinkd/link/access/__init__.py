@@ -4,6 +4,7 @@ from sdrlinkd.link.access.auto import Settled, may_share, percent, settle
 from sdrlinkd.link.access.base import Access, Slot, Wish
 from sdrlinkd.link.access.choice import check_access, make_access
 from sdrlinkd.link.access.free import Free
+from sdrlinkd.link.access.idle import idle_words
 from sdrlinkd.link.access.minislot import MiniSlots
 from sdrlinkd.link.access.params import AccessParams
 
@@ -16,6 +17,7 @@ __all__ = [
     "Slot",
     "Wish",
     "check_access",
+    "idle_words",
     "make_access",
     "may_share",
     "percent",

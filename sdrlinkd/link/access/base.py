@@ -30,10 +30,6 @@ class Slot(NamedTuple):
         """At `start` or not at all."""
         return cls(start, end, start, least)
 
-    def latest(self, airtime_s: float) -> float:
-        """When a burst of that length begins at the latest."""
-        return max(self.start, self.late_end - airtime_s)
-
 
 class Wish(NamedTuple):
     """A burst of class `qos` that takes `need_s` or more wants to leave at `earliest` or later."""
@@ -67,6 +63,14 @@ class Access(Protocol):
     def step_s(self) -> float:
         """In a turn that was not used from its begin, bursts begin so far apart; 0: anywhere."""
 
+    @property
+    def others_follow(self) -> bool:
+        """Whether the air that we leave free can be another's."""
+
+    @property
+    def keeps_schedule(self) -> bool:
+        """Whether it ever tells others of a schedule."""
+
     def mean_wait_s(self, qos: Qos) -> float:
         """From the end of a carrier to a burst of that class, on average."""
 
@@ -77,10 +81,6 @@ class Access(Protocol):
 
     def slot(self, wish: Wish) -> Slot | None:
         """Where it may leave; None: not now."""
-
-    @property
-    def others_follow(self) -> bool:
-        """Whether the air that we leave free can be another's."""
 
     def sent(self, end: float, src: int | None) -> None:
         """A burst of ours will be on the air until `end`; `src`: whose PDUs it forwards, if any."""
@@ -108,7 +108,17 @@ class Access(Protocol):
 
 
 class Carriers:
-    """What policies have in common: the last carrier on the air, another's or our own."""
+    """What policies have in common: the last carrier on the air, another's or our own.
+
+    As it stands: no turns, no pauses, nobody in our way, no schedule.
+    """
+
+    round_s = 0.0
+    pause_s = 0.0
+    share = 1.0
+    step_s = 0.0
+    others_follow = False
+    keeps_schedule = False
 
     def __init__(self) -> None:
         self._own_ends = [NEVER]
@@ -116,41 +126,16 @@ class Carriers:
         self._scheduled = Sightings()
         """Who takes turns by a schedule."""
 
-    @property
-    def round_s(self) -> float:
-        """No turns."""
-        return 0.0
-
-    @property
-    def pause_s(self) -> float:
-        """None."""
-        return 0.0
-
-    @property
-    def share(self) -> float:
-        """All of it."""
-        return 1.0
-
-    @property
-    def step_s(self) -> float:
-        """Anywhere."""
-        return 0.0
-
     def mean_wait_s(self, qos: Qos) -> float:  # noqa: ARG002  # not all ask for it
-        """None."""
+        """From the end of a carrier to a burst of that class, on average: none."""
         return 0.0
-
-    @property
-    def others_follow(self) -> bool:
-        """Nobody is in our way, or has to be let in."""
-        return False
 
     def sent(self, end: float, src: int | None) -> None:  # noqa: ARG002  # not all ask for it
-        """A burst of ours will be on the air until `end`."""
+        """Remember a burst of ours that will be on the air until `end`."""
         self._own_ends = [*self._own_ends[-MOST_ON_THEIR_WAY:], end]
 
     def not_sent(self, start: float) -> None:
-        """It was not."""
+        """Forget the burst that was to begin at `start`: it did not leave."""
         for end in self._own_ends:
             if end > start:
                 self._own_ends.remove(end)
@@ -159,19 +144,19 @@ class Carriers:
             self._own_ends = [NEVER]
 
     def heard(self, src: int, at: float, is_relayed: bool) -> None:
-        """Whose it was does not matter."""
+        """Ignore whose burst was heard."""
 
     def told_of(self, node: int, at: float) -> None:
-        """Who hears whom does not matter."""
+        """Ignore who hears whom."""
 
     def beacon(self, src: int, at: float) -> None:
-        """Who is there does not matter."""
+        """Ignore who is there."""
 
     def frame(self, start: float) -> Frame | None:
-        """No schedule."""
+        """None: there is no schedule to tell of."""
 
     def take_frame(self, src: int, frame: Frame, at: float) -> None:  # noqa: ARG002  # not all ask
-        """Who has one has another policy."""
+        """Remember that robot `src` keeps a schedule, and so has another policy."""
         self._scheduled.add(src, at)
 
     def notices(self, now: float) -> list[str]:

@@ -21,6 +21,8 @@ class Csma(Carriers):
     Two that choose the same slot collide; nothing tells them.
     """
 
+    others_follow = True
+
     def __init__(
         self,
         dwait_s: float,
@@ -32,7 +34,7 @@ class Csma(Carriers):
     ) -> None:
         super().__init__()
         self._robots = robots
-        self._dwait_s = dwait_s
+        self.pause_s = self._dwait_s = dwait_s
         self._slottime_s = slottime_s
         self._persist = persist
         self._detect_s = detect_s
@@ -49,11 +51,6 @@ class Csma(Carriers):
             f"PERSIST {self._persist:g}; {self._backoffs} backoffs"
         )
 
-    @property
-    def pause_s(self) -> float:
-        """DWAIT."""
-        return self._dwait_s
-
     def mean_wait_s(self, qos: Qos) -> float:
         """DWAIT, the class's own wait, and slots until chance has it."""
         waits, eagerness = WINDOWS[qos]
@@ -68,11 +65,6 @@ class Csma(Carriers):
         nobody_else = n * chance * (1 - chance) ** (n - 1) / anybody
         idle_s = self._dwait_s + (waits + 1 / anybody - 1) * self._slottime_s
         return nobody_else * burst_s / (burst_s + idle_s)
-
-    @property
-    def others_follow(self) -> bool:
-        """Anybody."""
-        return True
 
     def slot(self, wish: Wish) -> Slot | None:
         """The slot drawn, once all before it were heard to be idle."""

@@ -33,22 +33,25 @@ class Free(Carriers):
 
     @property
     def state(self) -> str:
-        """For people."""
+        """The policy's name, for people."""
         return "none"
 
     def slot(self, wish: Wish) -> Slot | None:
-        """At once."""
+        """Where it is wanted: at once."""
         return Slot(wish.earliest)
 
     def carries(self, burst_s: float) -> float:
-        """All but gaps, and what it listens between spells."""
+        """All of the air but gaps, and what the radio listens between two spells."""
         spell_s, pause_s = self._spells
         listens = pause_s / (spell_s + pause_s) if spell_s < inf else 0.0
         gaps = self._gap_s / (burst_s + self._gap_s) if self._gap_s else 0.0
         return (1 - gaps) * (1 - listens)
 
+    def sent(self, end: float, src: int | None) -> None:
+        """Forget it at once: on an air of our own, no burst of ours is in anybody's way."""
+
     def heard(self, src: int, at: float, is_relayed: bool) -> None:
-        """There is somebody else after all."""
+        """Remember that somebody else is on this air after all."""
         if self._is_alone and not is_relayed:
             self._others.add(src, at)
 

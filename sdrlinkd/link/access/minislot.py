@@ -24,13 +24,16 @@ class MiniSlots(Carriers):
     when it has heard the one before its own pass.
     """
 
+    others_follow = True
+
     def __init__(
         self, own_id: int, nodes: Sequence[int], minislot_s: float, detect_s: float
     ) -> None:
         super().__init__()
         self._nodes = list(nodes)
         self._rank = self._nodes.index(own_id)
-        self._minislot_s = minislot_s
+        self.pause_s = self._minislot_s = minislot_s
+        self.round_s = SECTIONS * len(nodes) * minislot_s
         self._detect_s = detect_s
         self._last = (-1, NEVER, False)
         """(source, when its burst began, whether it was relayed) of the last PDU."""
@@ -48,16 +51,6 @@ class MiniSlots(Carriers):
             f"{self.round_s * 1e3:.3g} ms"
         )
 
-    @property
-    def round_s(self) -> float:
-        """All mini-slots."""
-        return self._n_slots * self._minislot_s
-
-    @property
-    def pause_s(self) -> float:
-        """Up to the first mini-slot."""
-        return self._minislot_s
-
     def mean_wait_s(self, qos: Qos) -> float:
         """Half the robots of a level come before, and all of the higher one."""
         n = len(self._nodes)
@@ -71,11 +64,6 @@ class MiniSlots(Carriers):
     def carries(self, burst_s: float) -> float:
         """Whoever is next in order begins when all of the higher level were passed."""
         return burst_s / (burst_s + self.turn_s)
-
-    @property
-    def others_follow(self) -> bool:
-        """In their mini-slots."""
-        return True
 
     def slot(self, wish: Wish) -> Slot | None:
         """Our next mini-slot, once all before it were heard to be idle."""

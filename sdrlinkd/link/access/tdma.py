@@ -44,6 +44,8 @@ class Tdma(Carriers):
     others are.
     """
 
+    keeps_schedule = True
+
     def __init__(
         self,
         own_id: int,
@@ -70,7 +72,10 @@ class Tdma(Carriers):
         self._look_s = look_s
         self._detect_s = detect_s
         self._gap_s = gap_s
-        self._frame_s = slot_s * len(nodes)
+        self.round_s = self._frame_s = slot_s * len(nodes)
+        self.share = (slot_s - guard_s) / self._frame_s
+        # With reuse, others may have begun.
+        self.step_s = reuse * minislot_s * len(nodes)
         # Micro-seconds are what travels.
         times = (round(1e6 * slot_s), round(1e6 * guard_s), round(1e6 * minislot_s) * reuse)
         self._schedule = crc_hqx(pack(">III", *times) + bytes(nodes), 0)
@@ -103,21 +108,6 @@ class Tdma(Carriers):
             f"tdma: {len(self._nodes)} slots of {self._slot_s * 1e3:.3g} ms, guard "
             f"{self._guard_s * 1e3:.3g} ms; {doing}"
         )
-
-    @property
-    def round_s(self) -> float:
-        """A frame."""
-        return self._frame_s
-
-    @property
-    def share(self) -> float:
-        """Our slot, but for its guard."""
-        return (self._slot_s - self._guard_s) / self._frame_s
-
-    @property
-    def step_s(self) -> float:
-        """With reuse, others may have begun."""
-        return self._reuse * self._minislot_s * len(self._nodes)
 
     def carries(self, burst_s: float) -> float:
         """All but guards and gaps."""

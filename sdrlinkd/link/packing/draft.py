@@ -1,10 +1,19 @@
 """One PDU while it is being filled."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
+from sdrlinkd.link.packing.entry_ids import TopicEntryIds
+from sdrlinkd.link.packing.parity import parity_records
 from sdrlinkd.link.qos import Qos
-from sdrlinkd.link.queue import Outgoing
-from sdrlinkd.wire import PduBuilder
+from sdrlinkd.link.queue import Lane, Level, Outbox, Outgoing
+from sdrlinkd.wire import (
+    ASKING_STAMP_SIZE,
+    MAX_AGE_US,
+    MAX_FRAGMENTS,
+    PduBuilder,
+    fragment_count,
+)
 
 NO_DST = -1
 
@@ -15,6 +24,11 @@ class BuiltPdu(NamedTuple):
     data: bytes
     carried: list[Outgoing]
     qos: Qos
+
+    @property
+    def src(self) -> int:
+        """The robot that its source field names."""
+        return self.data[1]
 
 
 class Draft(PduBuilder):
@@ -39,9 +53,127 @@ class Draft(PduBuilder):
         """Say where a PDU with nothing but records goes, and how urgently."""
         self.dst, self.qos = dst, qos
 
+    def take(self, message: Outgoing, payload: bytes) -> None:
+        """Add the next fragment of `message`, which is `payload`."""
+        self.add(message.topic_id, message.entry_id, message.next_index, message.total, payload)
+        self.carried.append(message)
+        self.join(message)
+
     def join(self, message: Outgoing) -> None:
-        """An entry of `message` is in it, or what goes ahead of one."""
+        """Note that an entry of `message` is in it, or what goes ahead of one."""
         self.dst = message.dst
         self.is_compressed = message.is_compressed
         if message.qos < self.qos:
             self.qos = message.qos
+
+
+class EntryWriter:
+    """Cuts what goes next in a lane into entries, and puts them into a draft with its age.
+
+    `parity`: fragments of parity for each one of a large message, by class. `k_single` and
+    `k_shared` are the payload bytes of an entry that has a PDU to itself, or shares one.
+    """
+
+    def __init__(
+        self, outbox: Outbox, entry_ids: TopicEntryIds, k_single: int, k_shared: int,
+        parity: Mapping[Qos, float],
+    ) -> None:  # fmt: skip
+        self._outbox = outbox
+        self._entry_ids = entry_ids
+        self._k_single = k_single
+        self._k_shared = k_shared
+        self._parity = parity
+        self.asking: list[Outgoing] = []
+        """Messages just stamped whose producers want to know what becomes of them."""
+
+    def place(self, lane: Lane, head: Outgoing, level: Level, draft: Draft, start: float) -> bool:
+        """Put the lane's next entry into the draft if it fits."""
+        if head.parity:
+            return self._place_parity(lane, head, draft, start)
+        size = len(head.payload)
+        k = head.k or self._fragment_size(size, level.per_dst[lane.dst])
+        at = head.next_index * k
+        length = min(k, size - at)
+        is_last = at + length >= size
+        needs_stamp = is_last and not head.stamped
+        if needs_stamp and length + bool(head.receipt) > draft.room_beside_stamp:
+            # The age goes ahead in a PDU of its own only where even an empty one is too small.
+            return draft.is_empty and self._send_stamp_ahead(lane, head, k, draft, start)
+        if length > draft.room or not (lane.current or self._begin(lane, head, k, start)):
+            return False
+        draft.take(head, head.payload if length == size else head.payload[at : at + length])
+        head.advance(1, start)
+        if is_last:
+            if needs_stamp:
+                self.stamp(draft, head, start)
+            if self._parity[head.qos]:
+                head.follow_with(self._parity_of(head))
+            self._end(lane, head, start)
+        self._outbox.served(lane)
+        return True
+
+    def _place_parity(self, lane: Lane, head: Outgoing, draft: Draft, start: float) -> bool:
+        """Put parity of the message whose fragments have all gone into the draft, if it fits."""
+        records = head.parity
+        if head in draft.carried:
+            # One PDU must not take both with it.
+            return False
+        n = len(records)
+        while records and draft.add_record(records[-1]):
+            head.give_parity()
+        if len(records) == n:
+            return False
+        if head.stamped:
+            self.stamp(draft, head, start)
+        draft.carried.append(head)
+        draft.join(head)
+        head.ride()
+        self._end(lane, head, start)
+        self._outbox.served(lane)
+        return True
+
+    def _end(self, lane: Lane, head: Outgoing, start: float) -> None:
+        """The message is through, unless parity follows."""
+        if not head.parity:
+            self._entry_ids.retire(head, start)
+            self._outbox.end(lane)
+
+    def _parity_of(self, head: Outgoing) -> list[bytes]:
+        """Records, the first one last; beside them the age goes again, in case it was lost, too."""
+        ids, room = (head.topic_id, head.entry_id), self._k_single - ASKING_STAMP_SIZE
+        share = self._parity[head.qos]
+        return parity_records(head.payload, head.k, head.total, ids, share, room)[::-1]
+
+    def _send_stamp_ahead(
+        self, lane: Lane, head: Outgoing, k: int, draft: Draft, start: float
+    ) -> bool:
+        if not (lane.current or self._begin(lane, head, k, start)):
+            return False
+        self.stamp(draft, head, start)
+        head.keep_id()
+        draft.join(head)
+        return True
+
+    def _fragment_size(self, size: int, topics_pending: int) -> int:
+        k = self._k_shared if topics_pending >= 2 else self._k_single
+        return max(k, fragment_count(size, MAX_FRAGMENTS)) if size > k * MAX_FRAGMENTS else k
+
+    def _begin(self, lane: Lane, head: Outgoing, k: int, start: float) -> bool:
+        """Make `head` the message being fragmented; False while the topic has no free id."""
+        entry_id = self._entry_ids.take(head.topic_id, start)
+        if entry_id is None:
+            return False
+        size = len(head.payload)
+        total = 1 if size <= k else fragment_count(size, k)
+        self._outbox.begin(lane, entry_id, k, total, start)
+        return True
+
+    def stamp(self, draft: Draft, message: Outgoing, start: float) -> None:
+        """Add the message's age to `draft` where it fits."""
+        age_us = min(max(round((start - message.arrived_at) * 1e6), 0), MAX_AGE_US)
+        asks = bool(message.receipt)
+        if not draft.add_stamp(message.topic_id, message.entry_id, age_us, asks):
+            return
+        message.stamp()
+        if asks and not message.is_expected:
+            self.asking.append(message)

@@ -20,37 +20,34 @@ class EntryIds:
     """
 
     def __init__(self, rng: Random, rest_s: float) -> None:
-        self._idle = deque(rng.sample(range(256), 256))
-        self._resting: deque[tuple[float, int]] = deque()
+        self.idle = deque(rng.sample(range(256), 256))
+        """Ids that are free, the longest free first."""
+        self.resting: deque[tuple[float, int]] = deque()
+        """(until when, id), in the order in which they will be free."""
         self._rest_s = rest_s
 
-    def take(self, now: float) -> int | None:
-        """An id that is free at `now`, or None when all are at rest."""
-        while self._resting and self._resting[0][0] <= now:
-            self._idle.append(self._resting.popleft()[1])
-        return self._idle.popleft() if self._idle else None
-
-    def give_back(self, entry_id: int) -> None:
-        """The id was used for a message in one entry, or not at all."""
-        self._idle.append(entry_id)
+    def wake(self, now: float) -> None:
+        """Make ids free that have rested for long enough at `now`."""
+        while self.resting and self.resting[0][0] <= now:
+            self.idle.append(self.resting.popleft()[1])
 
     def rest(self, entry_id: int, now: float) -> None:
         """The last fragment under the id went at `now`."""
-        self._resting.append((now + self._rest_s, entry_id))
+        self.resting.append((now + self._rest_s, entry_id))
 
     def hold(self, entry_id: int) -> bool:
         """Its last fragment has not left after all; whether it was at rest. See `rest`."""
-        for i, (_, resting) in enumerate(self._resting):
+        for i, (_, resting) in enumerate(self.resting):
             if resting == entry_id:
-                del self._resting[i]
+                del self.resting[i]
                 return True
         return False
 
     def next_free(self) -> float:
-        """When `take` will succeed: −inf at once, +inf never until an id comes back."""
-        if self._idle:
+        """When an id will be free: −inf at once, +inf never until one comes back."""
+        if self.idle:
             return float("-inf")
-        return self._resting[0][0] if self._resting else float("inf")
+        return self.resting[0][0] if self.resting else float("inf")
 
 
 class TopicEntryIds:
@@ -65,38 +62,42 @@ class TopicEntryIds:
 
     def take(self, topic_id: int, now: float) -> int | None:
         """An id for the topic's next message; None while none is free."""
-        entry_id = self._of(topic_id).take(now)
-        if entry_id is None:
-            self.starved[topic_id] += 1
-        return entry_id
+        ids = self._by_topic.get(topic_id) or self._new(topic_id)
+        if ids.resting:
+            ids.wake(now)
+        if ids.idle:
+            return ids.idle.popleft()
+        self.starved[topic_id] += 1
+        return None
 
     def retire(self, message: Outgoing, now: float) -> None:
-        """No more fragments of it will be made."""
-        ids = self._of(message.topic_id)
+        """Let its id rest, or go on at once: no more fragments of `message` will be made."""
+        ids = self._by_topic[message.topic_id]
         if message.rests_id:
             ids.rest(message.entry_id, now)
         else:
-            ids.give_back(message.entry_id)
+            ids.idle.append(message.entry_id)
 
     def not_left(self, messages: Iterable[Outgoing]) -> None:
-        """Fragments of these will leave later than they were made for: their ids must wait, too."""
+        """Keep the ids of `messages`: fragments of them leave later than they were made for."""
         for message in messages:
             if not message.is_whole and not message.is_held:
-                message.hold_id(self._of(message.topic_id).hold(message.entry_id))
+                message.hold_id(self._by_topic[message.topic_id].hold(message.entry_id))
 
     def left(self, messages: Iterable[Outgoing], start: float) -> None:
-        """Fragments that were held back leave in a burst at `start`: their ids rest from now on."""
+        """Let ids rest whose fragments were held back, and leave in a burst at `start`."""
         for message in messages:
             if message.is_held:
                 message.hold_id(False)
-                self._of(message.topic_id).rest(message.entry_id, start)
+                self._by_topic[message.topic_id].rest(message.entry_id, start)
 
     def next_free(self, message: Outgoing) -> float:
-        """When it can have one; −inf: at once."""
-        return float("-inf") if message.is_whole else self._of(message.topic_id).next_free()
+        """When `message` can have one; −inf: at once."""
+        if message.is_whole:
+            return float("-inf")
+        ids = self._by_topic.get(message.topic_id) or self._new(message.topic_id)
+        return ids.next_free()
 
-    def _of(self, topic_id: int) -> EntryIds:
-        ids = self._by_topic.get(topic_id)
-        if ids is None:
-            ids = self._by_topic[topic_id] = EntryIds(self._rng, self._rest_s)
+    def _new(self, topic_id: int) -> EntryIds:
+        ids = self._by_topic[topic_id] = EntryIds(self._rng, self._rest_s)
         return ids

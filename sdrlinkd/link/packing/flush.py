@@ -36,18 +36,19 @@ class Flush:
         self._outbox = outbox
         self._size = size
         self._begun_s = BEGUN_PART * patience_s
-        self._waits = flush_s != NOW
+        self.is_on = flush_s != NOW
+        """Whether anything ever waits."""
         # The paper's 0.0: never by time.
         self._longest_s = float(flush_s or inf) if flush_s != NOW else 0.0
 
     def end(self) -> None:
-        """From now on nothing waits."""
-        self._waits = False
+        """Let nothing wait from now on."""
+        self.is_on = False
 
     def must_wait(self, now: float) -> bool:
         """Whether all that is there waits for more; the outbox is not empty."""
         return (
-            self._waits
+            self.is_on
             and now < self.due_at()
             and self._outbox.pending_bytes(self._size) < self._size
         )
@@ -55,6 +56,6 @@ class Flush:
     def due_at(self) -> float:
         """When it goes even so; infinity: never by time."""
         outbox = self._outbox
-        if outbox.levels[0].key[0] <= Qos.LATENCY or outbox.has_lifespans():
+        if outbox.levels[0].qos <= Qos.LATENCY or outbox.has_lifespans():
             return -inf
         return min(outbox.oldest_arrival() + self._longest_s, outbox.first_begun() + self._begun_s)

@@ -30,68 +30,66 @@ class PiggybackRecords:
     """What waits for a PDU with room; each record knows from when on it deserves one of its own."""
 
     def __init__(self) -> None:
-        self._waiting: dict[tuple[int, ...], _Waiting] = {}
-
-    def __bool__(self) -> bool:
-        return bool(self._waiting)
-
-    @property
-    def due_at(self) -> float:
+        self.waiting: dict[tuple[int, ...], _Waiting] = {}
+        """Records by type, and by what tells two of one type apart."""
+        self.due_at = inf
         """When the first of them deserves a PDU of its own."""
-        return min((each.due_at for each in self._waiting.values()), default=inf)
-
-    def is_due(self, now: float) -> bool:
-        """Whether one does."""
-        return bool(self._waiting) and self.due_at <= now
 
     def holds(self, kind: RecordType) -> bool:
         """Whether a record of that type waits."""
-        return any(key[0] == kind for key in self._waiting)
+        return any(key[0] == kind for key in self.waiting)
 
     def count(self, kind: RecordType) -> int:
         """How many records of that type wait."""
-        return sum(key[0] == kind for key in self._waiting)
+        return sum(key[0] == kind for key in self.waiting)
 
     def offer(self, records: Iterable[Record], due_at: float = -inf) -> None:
-        """A beacon, in place of the one before."""
-        kept = {key: each for key, each in self._waiting.items() if key[0] in LASTING}
+        """Add a beacon's records, in place of those of the beacon before."""
+        kept = {key: each for key, each in self.waiting.items() if key[0] in LASTING}
         built = (build_records([record]) for record in records)
         # Two octets behind the header tell one from another of its type.
-        self._waiting = {(*each[:1], *each[2:4]): _Waiting(each, due_at) for each in built}
-        self._waiting |= kept
+        self.waiting = {(*each[:1], *each[2:4]): _Waiting(each, due_at) for each in built}
+        self.waiting |= kept
+        self._note_due()
 
     def put(self, record: Record, due_at: float) -> None:
-        """One more, in place of one of its type."""
+        """Add a record, in place of one of its type, which keeps the time it is due."""
         built = build_records([record])
-        known = self._waiting.get((built[0],))
-        self._waiting[built[0],] = _Waiting(built, due_at if known is None else known.due_at)
+        known = self.waiting.get((built[0],))
+        self.waiting[built[0],] = _Waiting(built, due_at if known is None else known.due_at)
+        self._note_due()
 
     def put_receipt(self, receipt: Receipt, due_at: float, since: float) -> None:
-        """One more, of what came about at `since`."""
+        """Add a RECEIPT of what came about at `since`."""
         built = build_records([receipt])
         key = (built[0], receipt.node, receipt.topic_id, receipt.entry_id)
-        self._waiting[key] = _Waiting(built, due_at, receipt, since)
+        self.waiting[key] = _Waiting(built, due_at, receipt, since)
+        self._note_due()
 
     def renew(self, record: Record) -> None:
-        """Where a record of its type still waits, this one goes in its place."""
+        """Put `record` in place of one of its type that still waits; add nothing."""
         built = build_records([record])
-        for key, each in self._waiting.items():
+        for key, each in self.waiting.items():
             if key[0] == built[0]:
-                self._waiting[key] = each._replace(built=built)
+                self.waiting[key] = each._replace(built=built)
 
     def ride(self, pdu: PduBuilder, start: float) -> None:
-        """As many as `pdu`, whose burst leaves at `start`, has room for.
+        """Move into `pdu`, whose burst leaves at `start`, as many as it has room for.
 
         A receipt that is older than its field can say would be taken for another message's.
         """
         oldest = start - MAX_SINCE * RECEIPT_UNIT_S
         for key in [
-            key for key, each in self._waiting.items() if each.receipt and each.since < oldest
+            key for key, each in self.waiting.items() if each.receipt and each.since < oldest
         ]:
-            del self._waiting[key]
-        rides = [key for key, each in self._waiting.items() if pdu.add_record(_as_of(each, start))]
+            del self.waiting[key]
+        rides = [key for key, each in self.waiting.items() if pdu.add_record(_as_of(each, start))]
         for key in rides:
-            del self._waiting[key]
+            del self.waiting[key]
+        self._note_due()
+
+    def _note_due(self) -> None:
+        self.due_at = min((each.due_at for each in self.waiting.values()), default=inf)
 
 
 def _as_of(waiting: _Waiting, start: float) -> bytes:

@@ -1,35 +1,21 @@
 """PDUs that hold one thing alone: another robot's PDU, or a fragment that fills one."""
 
 from sdrlinkd.link.packing.draft import BuiltPdu
-from sdrlinkd.link.packing.head_of_line import HeadOfLine
 from sdrlinkd.link.params import LinkParams
 from sdrlinkd.link.qos import WIRE_BITS
-from sdrlinkd.link.queue import Level, Outbox, Outgoing
+from sdrlinkd.link.queue import Lane, Outbox, Outgoing
 from sdrlinkd.wire import build_full, equal_payload, flags, forwarded
 
 
 class SingleEntry:
-    """Where there is nothing to be packed, there is nothing to be weighed."""
+    """Makes the PDUs in which nothing has to be packed, so nothing has to be weighed."""
 
-    def __init__(
-        self,
-        outbox: Outbox,
-        head_of_line: HeadOfLine,
-        params: LinkParams,
-        src: int,
-        has_control: bool,
-    ) -> None:
+    def __init__(self, outbox: Outbox, params: LinkParams, src: int, has_control: bool) -> None:
         self._outbox = outbox
-        self._head_of_line = head_of_line
         self._k = equal_payload(params.pdu_size, 1)
         self._hop_limit = params.hop_limit
         self._src = src
         self._has_control = has_control
-
-    def next_whole(self, level: Level, start: float) -> Outgoing | None:
-        """Another robot's PDU, if that is what goes next of a level."""
-        lane = level.lanes[0]
-        return self._head_of_line.live(lane, start) if lane.head and lane.head.is_whole else None
 
     def relayed(self, head: Outgoing, start: float) -> BuiltPdu:
         """Another robot's PDU, which was first in its lane."""
@@ -41,16 +27,18 @@ class SingleEntry:
         held_us = max(0, round(1e6 * (start - head.arrived_at)))
         return BuiltPdu(forwarded(head.payload, held_us, self._has_control), [head], head.qos)
 
-    def filled(self, level: Level, start: float, seq: int, most: int) -> list[BuiltPdu]:
-        """The next fragments, `most` or fewer, of a message that has its level to itself."""
-        lane = level.lanes[0]
+    def filled(self, lane: Lane, start: float, seq: int, most: int) -> list[BuiltPdu]:
+        """The next fragments, `most` or fewer, of the message that `lane` is in the middle of.
+
+        The lane has its level to itself. Empty where no fragment fills a PDU.
+        """
         head, k = lane.current, self._k
-        if head is None or head.k != k or len(level.lanes) > 1:
+        if head is None or head.k != k:
             return []
         payload, first = head.payload, head.next_index
         # The last one is another matter: its age may be due, and there may be room.
         n = min(most, (len(payload) - 1) // k - first)
-        if n < 1 or self._head_of_line.live(lane, start) is not head:
+        if n < 1:
             return []
         bits, qos = flags(WIRE_BITS[head.qos], head.is_compressed), head.qos
         built = [

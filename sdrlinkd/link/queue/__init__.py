@@ -6,6 +6,7 @@ a PDU, and knows neither radio nor air.
 
 from sdrlinkd.link.queue.admission import NOT_TAKEN
 from sdrlinkd.link.queue.compression import Deflated, Inflated, train_dictionary
+from sdrlinkd.link.queue.intake import Intake
 from sdrlinkd.link.queue.latched import Kept, Latched, Offer
 from sdrlinkd.link.queue.ledger import (
     RX_PDU_REASONS,
@@ -14,14 +15,12 @@ from sdrlinkd.link.queue.ledger import (
     RxTally,
     TxTally,
     balance,
-    tx_balance,
 )
 from sdrlinkd.link.queue.lifespan import Lifespan, lifespan_of
-from sdrlinkd.link.queue.lives import Lives
+from sdrlinkd.link.queue.lives import IllegalStepError, Lives
 from sdrlinkd.link.queue.message import (
     STEPS,
     Fate,
-    IllegalStepError,
     Lane,
     Level,
     Outgoing,
@@ -30,7 +29,6 @@ from sdrlinkd.link.queue.message import (
 )
 from sdrlinkd.link.queue.outbox import Outbox
 from sdrlinkd.link.queue.policy import DEFAULT_POLICY, TopicPolicy
-from sdrlinkd.link.queue.topic_state import TopicState
 
 __all__ = [
     "DEFAULT_POLICY",
@@ -43,6 +41,7 @@ __all__ = [
     "Fate",
     "IllegalStepError",
     "Inflated",
+    "Intake",
     "Kept",
     "Lane",
     "Latched",
@@ -55,11 +54,9 @@ __all__ = [
     "RxTally",
     "Step",
     "TopicPolicy",
-    "TopicState",
     "TxTally",
     "balance",
     "lifespan_of",
     "train_dictionary",
-    "tx_balance",
     "with_first",
 ]

@@ -3,7 +3,11 @@
 from collections.abc import Iterable
 from typing import ClassVar
 
-from sdrlinkd.link.queue.message import Fate, IllegalStepError, Outgoing, Step
+from sdrlinkd.link.queue.message import Fate, Outgoing, Step
+
+
+class IllegalStepError(Exception):
+    """A step that STEPS does not have: a bug of ours."""
 
 
 class Lives:
@@ -15,15 +19,16 @@ class Lives:
     def __init__(self) -> None:
         self.in_flight: set[Outgoing] = set()
         """Begun, and neither sent nor dropped yet."""
-        self.dropped_asking: list[tuple[Outgoing, str]] = []
-        """Dropped, and why, where the producer wants to know; whoever tells takes them out."""
+        self._dropped_asking: list[tuple[Outgoing, str]] = []
         self.illegal_steps = 0
         """Steps that STEPS does not have: bugs of ours, survived."""
 
     def begin(self, message: Outgoing) -> None:
         """The first fragment of `message` is about to be made."""
-        if self._step(message, Step.BEGIN):
+        if message.step(Step.BEGIN):
             self.in_flight.add(message)
+        else:
+            self._refuse(message, Step.BEGIN)
 
     def left(self, carried: Iterable[Iterable[Outgoing]]) -> None:
         """Settle what `carried` lists: for each PDU that left, the messages with a part in it."""
@@ -34,7 +39,7 @@ class Lives:
                     message.fate is Fate.IN_FLIGHT
                     and not message.unconfirmed
                     and message.is_through
-                    and self._step(message, Step.LEAVE)
+                    and message.step(Step.LEAVE)
                 ):
                     self.in_flight.discard(message)
                     message.tally.send(len(message.payload))
@@ -53,23 +58,28 @@ class Lives:
 
     def drop(self, message: Outgoing, reason: str) -> None:
         """End `message` under a reason of the ledger; the caller takes it out of its lane."""
-        if self._step(message, Step.DROP):
-            self.in_flight.discard(message)
-            message.tally.drop(reason)
-            if message.receipt:
-                self.dropped_asking.append((message, reason))
+        if not message.step(Step.DROP):
+            self._refuse(message, Step.DROP)
+            return
+        self.in_flight.discard(message)
+        message.tally.drop(reason)
+        if message.receipt:
+            self._dropped_asking.append((message, reason))
 
     def drop_in_flight(self, reason: str) -> None:
         """Drop all that is begun and not settled."""
         for message in list(self.in_flight):
             self.drop(message, reason)
 
-    def _step(self, message: Outgoing, step: Step) -> bool:
-        try:
-            message.step(step)
-        except IllegalStepError:
-            if self.is_strict:
-                raise
-            self.illegal_steps += 1
-            return False
-        return True
+    def take_dropped_asking(self) -> list[tuple[Outgoing, str]]:
+        """Messages dropped since the last call whose producers want to know, and why each was."""
+        dropped = self._dropped_asking
+        if dropped:
+            self._dropped_asking = []
+        return dropped
+
+    def _refuse(self, message: Outgoing, step: Step) -> None:
+        """Count a step that STEPS does not have, or raise IllegalStepError."""
+        if self.is_strict:
+            raise IllegalStepError(f"{step.name} where a message is {message.fate.name}")
+        self.illegal_steps += 1

@@ -42,10 +42,6 @@ STEPS: Mapping[tuple[Fate, Step], Fate] = {
 those that stand in each fate, so this is the ledger, too."""
 
 
-class IllegalStepError(Exception):
-    """A step that STEPS does not have: a bug of ours."""
-
-
 class Outgoing:
     """One message on its way out. Everyone reads its fields; only its verbs change them."""
 
@@ -117,12 +113,25 @@ class Outgoing:
         """Whether all of it is in PDUs."""
         return self.next_index == self.total and not self.parity
 
-    def step(self, step: Step) -> None:
-        """Raises IllegalStepError where STEPS has no such step."""
+    def in_vain(self, now: float, patience_s: float) -> str:
+        """The ledger's reason for sending no more of it; empty while it is worth sending.
+
+        Receivers give up a message of which nothing came for `patience_s`. What has gone whole but
+        for its parity is never in vain: somebody may lack just that.
+        """
+        if self.parity:
+            return ""
+        if self.expires_at <= now:
+            return "tx_expired"
+        return "tx_stalled" if self.k and now > self.last_at + patience_s else ""
+
+    def step(self, step: Step) -> bool:
+        """Take a step of its life; False where STEPS has no such step, and nothing changes."""
         fate = STEPS.get((self.fate, step))
         if fate is None:
-            raise IllegalStepError(f"{step.name} where a message is {self.fate.name}")
+            return False
         self.fate = fate
+        return True
 
     def enter(self, lane: "Lane") -> None:
         """It waits in `lane`."""
@@ -194,14 +203,15 @@ class Lane:
 class Level:
     """The non-empty lanes of one class and priority, in service order."""
 
-    __slots__ = ("key", "lanes", "per_dst")
+    __slots__ = ("key", "lanes", "per_dst", "qos")
 
     def __init__(self, key: tuple[int, int]) -> None:
         self.key = key
+        self.qos = Qos(key[0])
         self.lanes: list[Lane] = []
         self.per_dst: dict[int, int] = {}
 
 
 def with_first(levels: Sequence[Level], first: Qos) -> list[Level]:
     """In service order, but those of class `first` before all others."""
-    return sorted(levels, key=lambda level: (level.key[0] != first, level.key))
+    return sorted(levels, key=lambda level: (level.qos is not first, level.key))

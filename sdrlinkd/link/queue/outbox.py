@@ -52,26 +52,28 @@ class Outbox:
         self._with_lifespan = 0
         self.relays = False
         """Whether other robots' PDUs have ever waited here."""
-        self.bytes_per_s = inf
-        """What the air carries at the moment: bounds in seconds are by this."""
         self.lives = Lives()
 
     def __bool__(self) -> bool:
         return bool(self.levels)
 
-    def put(self, message: Outgoing, policy: TopicPolicy) -> str | None:
-        """Queue `message`, and drop what has to go for it; None, or why it was dropped itself."""
-        if not self._can_make_room(message):
+    def put(self, message: Outgoing, policy: TopicPolicy, bytes_per_s: float) -> str | None:
+        """Queue `message`, and drop what has to go for it; None, or why it was dropped itself.
+
+        Bounds in seconds are by `bytes_per_s`, what the air carries at the moment.
+        """
+        limits, size = self._limits, len(message.payload)
+        most = min(limits.max_bytes, limits.max_airtime_s * bytes_per_s)
+        if not self._can_make_room(message, most):
             self.lives.drop(message, "tx_overflow_new")
             return "tx_overflow_new"
-        topic, depth, size = self._by_topic.get(message.topic_id), policy.kept, len(message.payload)
+        topic, depth = self._by_topic.get(message.topic_id), policy.kept
         if topic is not None:
             while depth and len(topic.messages) >= depth:
                 self.lives.drop(self._withdraw_waiting(topic.oldest), "tx_superseded")
-            most = self._bytes_of(policy.queue_bytes or inf, policy.queue_s or inf)
-            while topic.messages and topic.n_bytes + size > most:
+            of_topic = min(policy.queue_bytes or inf, (policy.queue_s or inf) * bytes_per_s)
+            while topic.messages and topic.n_bytes + size > of_topic:
                 self.lives.drop(self._withdraw_waiting(topic.oldest), "tx_topic_full")
-        limits, most = self._limits, self._most_bytes
         while self.queued >= limits.max_messages or self.queued_bytes + size > most:
             victim = self._oldest_of_lowest_class()
             self.lives.drop(self._withdraw_waiting(victim), "tx_overflow_old")
@@ -100,10 +102,10 @@ class Outbox:
 
     def served(self, lane: Lane) -> None:
         """The lane gave an entry; it goes behind its equals, or away when it is empty."""
-        head = lane.head
+        head = lane.current or (lane.waiting[0] if lane.waiting else None)
         if head is None:
             self._unlink(lane)
-            del self._lanes[lane.level.key[0], lane.level.key[1], lane.topic_id, lane.dst]
+            del self._lanes[*lane.level.key, lane.topic_id, lane.dst]
             return
         level = lane.level
         if len(level.lanes) == 1:
@@ -122,16 +124,17 @@ class Outbox:
         self.served(lane)
         return message
 
-    def head(self) -> tuple[Qos, set[int]] | None:
-        """(class of what goes next, destinations of all that waits); None when nothing does."""
-        if not self.levels:
-            return None
-        destinations = {dst for level in self.levels for dst in level.per_dst}
-        return Qos(self.levels[0].key[0]), destinations
+    def next_class(self) -> Qos | None:
+        """The class of what goes next; None when nothing waits."""
+        return self.levels[0].qos if self.levels else None
+
+    def destinations(self) -> set[int]:
+        """The robots that something waits for, BROADCAST among them."""
+        return {dst for level in self.levels for dst in level.per_dst}
 
     def waiting_classes(self) -> set[Qos]:
-        """Of which something waits."""
-        return {Qos(level.key[0]) for level in self.levels}
+        """The classes of which something waits."""
+        return {level.qos for level in self.levels}
 
     def oldest_arrival(self) -> float:
         """When the longest waiting head arrived; infinity when nothing waits."""
@@ -167,6 +170,11 @@ class Outbox:
                     if total >= enough:
                         return total
         return total
+
+    @property
+    def in_flight(self) -> int:
+        """Messages begun, and neither sent nor dropped yet."""
+        return len(self.lives.in_flight)
 
     def queued_by_class(self) -> dict[Qos, int]:
         """Messages of each class of which nothing has been sent yet."""
@@ -222,7 +230,8 @@ class Outbox:
 
     def _unlink(self, lane: Lane) -> None:
         level = lane.level
-        del level.lanes[bisect_left(level.lanes, lane.order, key=_order)]
+        alone = len(level.lanes) == 1
+        del level.lanes[0 if alone else bisect_left(level.lanes, lane.order, key=_order)]
         level.per_dst[lane.dst] -= 1
         if not level.per_dst[lane.dst]:
             del level.per_dst[lane.dst]
@@ -230,23 +239,15 @@ class Outbox:
             del self._level_by_key[level.key]
             del self.levels[bisect_left(self.levels, level.key, key=lambda each: each.key)]
 
-    @property
-    def _most_bytes(self) -> float:
-        return self._bytes_of(self._limits.max_bytes, self._limits.max_airtime_s)
-
-    def _bytes_of(self, n_bytes: float, seconds: float) -> float:
-        """The smaller of two bounds."""
-        return min(n_bytes, seconds * self.bytes_per_s)
-
-    def _can_make_room(self, message: Outgoing) -> bool:
+    def _can_make_room(self, message: Outgoing, most_bytes: float) -> bool:
         """Whether it fits when all that waits in its class and below is shed."""
         limits, size = self._limits, len(message.payload)
-        if self.queued < limits.max_messages and self.queued_bytes + size <= self._most_bytes:
+        if self.queued < limits.max_messages and self.queued_bytes + size <= most_bytes:
             return True
         higher = [qos for qos in Qos if qos < message.qos]
         return (
             sum(len(self._by_class[qos]) for qos in higher) < limits.max_messages
-            and sum(self._class_bytes[qos] for qos in higher) + size <= self._most_bytes
+            and sum(self._class_bytes[qos] for qos in higher) + size <= most_bytes
         )
 
     def _oldest_of_lowest_class(self) -> Outgoing:

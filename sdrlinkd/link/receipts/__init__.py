@@ -1,9 +1,13 @@
-"""What became of messages: receipts both ways, latencies, and command topics that fell silent."""
+"""What became of messages whose producers want to know.
 
-from sdrlinkd.link.receipts.delivery import Delivery
-from sdrlinkd.link.receipts.receipts import Verdict
+This room owns the table of messages that robots have still to answer, and the verdicts for their
+producers. It never sends: a RECEIPT for another robot is made here and handed to `transmit`.
+"""
+
+from sdrlinkd.link.receipts.receipts import Receipts, Verdict, make_receipt
 
 __all__ = [
-    "Delivery",
+    "Receipts",
     "Verdict",
+    "make_receipt",
 ]

@@ -55,17 +55,17 @@ def make_receipt(
 class Receipts:
     """The sender's half: who has still to answer. Every robot asked is told of exactly once."""
 
-    def __init__(self, timeout_s: float) -> None:
+    def __init__(self, own_id: int, timeout_s: float) -> None:
+        self._own_id = own_id
         self._timeout_s = timeout_s
         self._pending: dict[tuple[int, int], list[_Pending]] = {}
         self._n_pending = 0
-        self.verdicts: list[Verdict] = []
-        """For the producers; whoever tells them takes them out."""
+        self._verdicts: list[Verdict] = []
         self.unasked = 0
         """RECEIPTs of which nothing was known any more."""
 
     def expect(self, message: Outgoing, present: Iterable[int], now: float) -> None:
-        """A message has left; a broadcast one is for all robots `present`."""
+        """Await answers to a message in a burst at `now`; a broadcast one is for all `present`."""
         message.expect()
         awaited = set(present) if message.dst == BROADCAST else {message.dst}
         pending = _Pending(message, now + self._timeout_s, awaited or {BROADCAST})
@@ -77,7 +77,13 @@ class Receipts:
         self._n_pending += 1
 
     def hear(self, src: int, receipt: Receipt, at: float) -> None:
-        """Robot `src` answers, in a burst whose preamble came at `at`."""
+        """Take the answer of robot `src`, in a burst whose preamble came at `at`.
+
+        An answer names the robot whose message it was; one that names none (BROADCAST) is for the
+        robot that its PDU is for.
+        """
+        if receipt.node not in (self._own_id, BROADCAST):
+            return
         age_s = None if receipt.age_100us == NO_AGE else RECEIPT_UNIT_S * receipt.age_100us
         ended_at = at - RECEIPT_UNIT_S * receipt.since_100us
         # Entry ids come again: the last one that was there in time is meant.
@@ -97,7 +103,7 @@ class Receipts:
         self.unasked += 1
 
     def dropped(self, message: Outgoing, reason: str) -> None:
-        """It did not get on the air, or not whole."""
+        """Tell of a message that did not get on the air, or not whole."""
         for pending in self._pending.get((message.topic_id, message.entry_id), ()):
             if pending.message is message:
                 for left, dst in _counted_down(pending.awaited):
@@ -108,7 +114,9 @@ class Receipts:
             self._tell(message, message.dst, reason, None)
 
     def expire(self, now: float) -> None:
-        """Who has not answered for so long does not know, or was not heard."""
+        """Give up robots that have not answered for the timeout: they do not know, or were not
+        heard.
+        """
         if not self._n_pending:
             return
         late = [each for of in self._pending.values() for each in of if each.until <= now]
@@ -116,9 +124,19 @@ class Receipts:
             self._give_up(pending)
             self._forget(pending)
 
+    def refused(self, receipt: str, topic_id: int, dst: int, reason: str) -> None:
+        """Tell of a message that was not taken."""
+        self._verdicts.append(Verdict(receipt, topic_id, dst, "dropped", reason))
+
+    def unknowable(self, receipt: str, topic_id: int, dst: int) -> None:
+        """Tell of a message that nobody can answer for want of a control channel."""
+        self._verdicts.append(Verdict(receipt, topic_id, dst, "unknown"))
+
     def take(self) -> list[Verdict]:
-        """Those that nobody was told of yet."""
-        verdicts, self.verdicts = self.verdicts, []
+        """The verdicts since the last call, for the producers."""
+        verdicts = self._verdicts
+        if verdicts:
+            self._verdicts = []
         return verdicts
 
     def _tell(
@@ -129,13 +147,13 @@ class Receipts:
             fate, reason = DELIVERED, ""
         elif reason in EXPIRED:
             fate = "expired"
-        self.verdicts.append(
+        self._verdicts.append(
             Verdict(message.receipt, message.topic_id, dst, fate, reason, age_s, left)
         )
 
     def _give_up(self, pending: _Pending) -> None:
         message = pending.message
-        self.verdicts += [
+        self._verdicts += [
             Verdict(message.receipt, message.topic_id, dst, "unknown", left=left)
             for left, dst in _counted_down(pending.awaited)
         ]

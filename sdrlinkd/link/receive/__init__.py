@@ -1,16 +1,24 @@
 """PDUs heard, and the messages that they make.
 
 This room owns the reassembly, the duplicate filter, ages, and what is known of neighbors. It never
-sends: what others want to know of a message, it hands on.
+sends: what others want to know of a PDU, it returns as events.
 """
 
 from sdrlinkd.link.receive.ages import MAX_WAITING, Ages
 from sdrlinkd.link.receive.deadman import Deadman
 from sdrlinkd.link.receive.delivered import CDR_HEADER_SIZE, DELIVERED, Delivered
 from sdrlinkd.link.receive.duplicates import SequenceTrack
-from sdrlinkd.link.receive.inbox import Inbox
+from sdrlinkd.link.receive.events import (
+    Ended,
+    Event,
+    Newcomer,
+    PduHeard,
+    PduToRelay,
+    RecordHeard,
+)
 from sdrlinkd.link.receive.latency import Latency, Parts
-from sdrlinkd.link.receive.neighbors import LONGEST_GAP_S, Neighbor
+from sdrlinkd.link.receive.neighbors import LONGEST_GAP_S, PRESENT_S, Neighbor, Neighbors
+from sdrlinkd.link.receive.reception import Reception
 from sdrlinkd.link.receive.relay import Relay, RelayParams
 
 __all__ = [
@@ -18,13 +26,21 @@ __all__ = [
     "DELIVERED",
     "LONGEST_GAP_S",
     "MAX_WAITING",
+    "PRESENT_S",
     "Ages",
     "Deadman",
     "Delivered",
-    "Inbox",
+    "Ended",
+    "Event",
     "Latency",
     "Neighbor",
+    "Neighbors",
+    "Newcomer",
     "Parts",
+    "PduHeard",
+    "PduToRelay",
+    "Reception",
+    "RecordHeard",
     "Relay",
     "RelayParams",
     "SequenceTrack",

@@ -1,8 +1,10 @@
 """Who is heard, how well, and whether both mean the same by a topic id."""
 
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, field
 
 from sdrlinkd.link.receive.duplicates import SequenceTrack
+from sdrlinkd.reports import NeighborReport
 from sdrlinkd.wire import Beacon, Registry, RegistryDigest
 
 # Weight of the newest PDU in the mean SNR.
@@ -10,6 +12,8 @@ SNR_WEIGHT = 0.2
 GAP_DECAY = 0.98
 LONGEST_GAP_S = 16.0
 """A half-duplex robot that has nothing to say is heard this often."""
+PRESENT_S = 10.0
+"""A robot not heard for so long takes no share of the air, and answers nothing."""
 
 
 @dataclass(slots=True)
@@ -79,3 +83,79 @@ class Neighbor:
             f"ours {own.overall.hex()[:8]}, theirs {self.digest.overall.hex()[:8]}. "
             "Give both the same registry file"
         )
+
+
+class Neighbors:
+    """All robots heard, by their ids; `own_id` is among them where a robot hears itself."""
+
+    def __init__(self, own_id: int) -> None:
+        self._own_id = own_id
+        self._by_src: dict[int, Neighbor] = {}
+
+    def __iter__(self) -> Iterator[Neighbor]:
+        return iter(self._by_src.values())
+
+    def get(self, src: int) -> Neighbor | None:
+        """What is known of robot `src`; None: it was never heard."""
+        return self._by_src.get(src)
+
+    def meet(self, src: int) -> Neighbor:
+        """Begin to follow robot `src`, which was not heard before."""
+        neighbor = self._by_src[src] = Neighbor(src)
+        return neighbor
+
+    def present(self, now: float) -> list[int]:
+        """The other robots that were heard within PRESENT_S, in the order of their first PDU."""
+        return [
+            each.src
+            for each in self
+            if each.src != self._own_id and now - each.last_heard_at < PRESENT_S
+        ]
+
+    def take_qualities(self) -> Iterator[tuple[int, float, float]]:
+        """(robot, mean SNR in dB, share of its PDUs lost) of the others heard since the last call.
+
+        Each is taken as it is asked for.
+        """
+        for each in self:
+            quality = each.take_quality() if each.src != self._own_id else None
+            if quality is not None:
+                yield each.src, *quality
+
+    def report(self, now: float, own: RegistryDigest) -> list[NeighborReport]:
+        """Each of them in ascending order of ids, but for clocks and what they tell of us."""
+        reports = []
+        for src, each in sorted(self._by_src.items()):
+            lost, registry = each.track.lost, "unknown"
+            if each.digest is not None:
+                registry = "same" if each.digest.overall == own.overall else "differs"
+            reports.append(
+                NeighborReport(
+                    src=src,
+                    is_self=src == self._own_id,
+                    last_heard_s_ago=max(0.0, now - each.last_heard_at),
+                    pdus_heard=each.heard,
+                    pdus_lost=lost,
+                    per=lost / (each.heard + lost) if each.heard + lost else 0.0,
+                    usual_gap_s=each.usual_gap_s,
+                    duplicates=each.duplicates,
+                    hops_left=each.hops_left,
+                    reboots=each.reboots,
+                    snr_db=each.mean_snr_db,
+                    registry=registry,
+                )
+            )
+        return reports
+
+    def counters(self) -> dict[Hashable, int]:
+        """The counters of which people are shown rates."""
+        found: dict[Hashable, int] = {}
+        for src, each in self._by_src.items():
+            found["pdus", src] = each.heard
+            found["lost", src] = each.track.lost
+        return found
+
+    def disagreements(self, registry: Registry, own: RegistryDigest) -> list[str]:
+        """In words, whose registry differs from ours, in ascending order of ids."""
+        told = (each.disagreement(registry, own) for _, each in sorted(self._by_src.items()))
+        return [each for each in told if each is not None]

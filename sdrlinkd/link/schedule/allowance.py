@@ -73,6 +73,7 @@ class Limits:
         `ready_s` after a message is due, it can leave at the earliest; up to `notice_s` after it
         has come, nobody knows. Classes that nobody `asked` about get none.
         """
+        forecasts = self._forecasts
         overrun = SHARED_OVERRUN if is_shared else OVERRUN
         known = start - notice_s
         self._idle_s = min(
@@ -84,11 +85,15 @@ class Limits:
             if qos not in asked:
                 most.append(0)
                 continue
+            if qos <= forecasts.most_urgent:
+                # Nothing goes before it, so nothing shortens its bursts.
+                most.append(most_pdus(longest_s))
+                continue
             cap_s = longest_s
-            if self._forecasts.is_unforeseen(known, qos, ALIVE_S):
+            if forecasts.is_unforeseen(known, qos, ALIVE_S):
                 cap_s = min(cap_s, max(self._cap_s[qos], airtime_s(1)))
             n = most_pdus(cap_s)
-            due = self._forecasts.next_due(known, qos)
+            due = forecasts.next_due(known, qos)
             if due is not None and n:
                 free_s = due.due(known) - due.spread_s + ready_s - start
                 n = self._before(free_s, 2 * due.spread_s + notice_s, n, airtime_s, overrun)

@@ -36,8 +36,9 @@ class Forecast:
     period_s: float = 0.0
     jitter_s: float = 0.0
 
-    def note(self, at: float) -> None:
-        """A message came."""
+    def note(self, qos: Qos, at: float) -> None:
+        """Move the line on by a message of class `qos` that came at `at`."""
+        self.qos = qos
         step_s, self.seen_at = at - self.seen_at, at
         if self.n == 1 or step_s <= 0 or step_s > 2 * MISSED * max(self.period_s, FASTEST_S):
             # The first step, two at once, or a long pause: begin anew.
@@ -90,9 +91,13 @@ class Forecasts:
 
     def __init__(self) -> None:
         self._by_key: dict[Hashable, Forecast] = {}
+        self.most_urgent = Qos.BULK
+        """Nothing that is followed is more urgent than this."""
 
     def note(self, key: Hashable, qos: Qos, at: float) -> None:
         """A message of that class was submitted, here or elsewhere, at `at` of our time."""
+        if qos < self.most_urgent:
+            self.most_urgent = qos
         found = self._by_key.get(key)
         if found is None:
             if len(self._by_key) >= MOST:
@@ -100,8 +105,7 @@ class Forecasts:
                 del self._by_key[min(self._by_key, key=lambda each: self._by_key[each].seen_at)]
             self._by_key[key] = Forecast(qos, at)
         elif at > found.seen_at:
-            found.qos = qos
-            found.note(at)
+            found.note(qos, at)
 
     def next_due(self, now: float, below: Qos) -> Forecast | None:
         """The topic more urgent than `below` that is due first; None when none is periodic."""

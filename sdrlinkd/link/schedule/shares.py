@@ -1,6 +1,6 @@
 """Guaranteed shares of the air, so that no class starves."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Sequence
 
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.schedule.params import ClassesParams
@@ -16,26 +16,25 @@ class Shares:
     def __init__(self, params: ClassesParams) -> None:
         self._share = {qos: params.of(qos).share for qos in Qos}
         self._credit_s = dict.fromkeys(Qos, 0.0)
-        self.used_s = dict.fromkeys(Qos, 0.0)
-        """On the air so far, by class."""
+        self.is_owed = False
+        """Whether any class has credit."""
 
-    def spend(self, airtime_s: float, used: Iterable[Qos], waiting: Collection[Qos]) -> None:
-        """A burst of that length was composed: the class of each PDU, and what still waits."""
-        classes = list(used)
+    def spend(self, airtime_s: float, classes: Sequence[Qos], waiting: Collection[Qos]) -> None:
+        """Settle a burst of that length: the class of each of its PDUs, and what still waits."""
         each_s = airtime_s / max(1, len(classes))
-        for qos in classes:
-            self.used_s[qos] += each_s
         for qos, share in self._share.items():
             if qos not in waiting:
                 self._credit_s[qos] = 0.0
                 continue
             earned_s = share * airtime_s - each_s * classes.count(qos)
             self._credit_s[qos] = max(0.0, self._credit_s[qos] + earned_s)
+        self.is_owed = any(self._credit_s.values())
 
     def idle(self, passed_s: float, waiting: Collection[Qos]) -> None:
-        """The air was kept free for so long, while these waited."""
+        """Credit classes that waited while the air was kept free for so long."""
         for qos in waiting:
             self._credit_s[qos] += self._share[qos] * passed_s
+        self.is_owed = any(self._credit_s.values())
 
     def owed(self, pdu_s: float) -> list[Qos]:
         """A class for each PDU of that length that it has earned and did not get."""

@@ -3,9 +3,6 @@
 from collections import deque
 from collections.abc import Hashable, Mapping
 
-from sdrlinkd.link.receive import Inbox
-from sdrlinkd.link.transmit import Sender
-
 
 class RateMeter:
     """Mean rates over a sliding window, from counters that are sampled now and then."""
@@ -36,6 +33,10 @@ class RateMeter:
                 return value - counters.get(key, 0)
         return 0
 
+    def all_per_s(self, counters: Mapping[Hashable, int], now: float) -> dict[Hashable, float]:
+        """Rates of all `counters`, which stand there now."""
+        return {key: self.per_s(key, value, now) for key, value in counters.items()}
+
     def per_s(self, key: Hashable, value: int, now: float) -> float:
         """Rate of `key`, whose counter stands at `value` now."""
         for at, counters in self._samples:
@@ -44,26 +45,3 @@ class RateMeter:
             span = now - at
             return (value - counters.get(key, 0)) / span if span > 0 else 0.0
         return 0.0
-
-
-def rate_counters(
-    sender: Sender, inbox: Inbox, sent_s: float, heard_s: float
-) -> dict[Hashable, int]:
-    """The counters of which the snapshot shows rates; `sent_s`, `heard_s`: time on the air, ours
-    and that of others.
-    """
-    counters: dict[Hashable, int] = {
-        ("air", "sent"): round(1e6 * sent_s),
-        ("air", "heard"): round(1e6 * heard_s),
-    }
-    for topic_id in range(sender.n_topics):
-        tally = sender.tally(topic_id)
-        counters["tx", topic_id] = tally.accepted
-        counters["accepted_bytes", topic_id] = tally.accepted_bytes
-    for key, heard in inbox.tallies.items():
-        counters["rx", *key] = heard.delivered
-        counters["delivered_bytes", *key] = heard.delivered_bytes
-    for src, neighbor in inbox.neighbors.items():
-        counters["pdus", src] = neighbor.heard
-        counters["lost", src] = neighbor.track.lost
-    return counters

@@ -4,11 +4,11 @@ from collections.abc import Collection, Hashable
 from math import inf
 from typing import NamedTuple
 
+from sdrlinkd.link.access import idle_words
 from sdrlinkd.link.qos import Qos
-from sdrlinkd.link.queue import TX_REASONS, TopicPolicy
-from sdrlinkd.link.schedule import Shares
+from sdrlinkd.link.queue import TX_REASONS, Intake, Outbox, TopicPolicy
 from sdrlinkd.link.status.meters import RateMeter
-from sdrlinkd.link.transmit import AirUse, Sender
+from sdrlinkd.link.transmit import TransmitReport
 from sdrlinkd.wire import BROADCAST
 
 MINUTE_S = 60.0
@@ -26,25 +26,34 @@ class Told(NamedTuple):
     changed: Collection[str]
 
 
-class Why:
-    """Remembers the last minute."""
+class AirUse(NamedTuple):
+    """What was used of the air since the start: what we sent, and others' bursts in s."""
 
-    def __init__(self, sender: Sender, shares: Shares, air: AirUse) -> None:
-        self._sender = sender
-        self._shares = shares
-        self._air_use = air
+    sent: TransmitReport
+    heard_s: float
+
+
+class Why:
+    """Remembers the last minute of each topic, and of the air."""
+
+    def __init__(self, intake: Intake, outbox: Outbox) -> None:
+        self._intake = intake
+        self._outbox = outbox
         self._began_at = float("inf")
         self._meter = RateMeter(MINUTE_S, STEP_S)
 
-    def sample(self, now: float, n_topics: int) -> None:
-        """Now and then."""
-        self._began_at = min(self._began_at, now)
-        if self._meter.is_due(now):
-            self._meter.sample(self._counters(n_topics), now)
+    def is_due(self, now: float) -> bool:
+        """Whether the last sample is old enough for another."""
+        return self._meter.is_due(now)
 
-    def explain(self, topic_id: int, name: str, told: Told, now: float) -> list[str]:
-        """Sentences for a person."""
-        policy, tally = self._sender.policy(topic_id), self._sender.tally(topic_id)
+    def sample(self, now: float, n_topics: int, air: AirUse) -> None:
+        """Remember where all counters stand at `now`."""
+        self._began_at = min(self._began_at, now)
+        self._meter.sample(self._counters(n_topics, air), now)
+
+    def explain(self, topic_id: int, name: str, told: Told, now: float, air: AirUse) -> list[str]:
+        """What happens to a topic, in sentences for a person."""
+        policy, tally = self._intake.policy(topic_id), self._intake.tally(topic_id)
         came = self._lately(("accepted", topic_id), tally.accepted, now)
         sent = self._lately(("sent", topic_id), tally.sent, now)
         lines = [self._treatment(name, policy, told, topic_id)]
@@ -63,19 +72,19 @@ class Why:
                 short = short or reason in OVERFLOW
                 said = self._said(reason, topic_id, policy, told)
                 lines.append(f"{_share(n, came)} {said} ({reason}, {n})")
-        waiting = self._sender.outbox.queued_of_topic(topic_id)
+        waiting = self._outbox.queued_of_topic(topic_id)
         if waiting:
             lines.append(f"{waiting} wait")
         if short or waiting:
-            lines.append(self._air(Qos(self._sender.treatment(topic_id)[0]), now))
-            lines += self._idle(now)
+            lines.append(self._air(self._intake.treatment(topic_id)[0], now, air))
+            lines += self._idle(now, air)
         return lines
 
     def _treatment(self, name: str, policy: TopicPolicy, told: Told, topic_id: int) -> str:
-        state_dst = self._sender.destination(topic_id)
+        state_dst = self._intake.destination(topic_id)
         to = "everyone" if state_dst == BROADCAST else f"robot {state_dst}"
         line = f"{name}: class {policy.qos}, priority {policy.priority}, to {to}"
-        lifespan = self._sender.lifespan(topic_id)
+        lifespan = self._intake.lifespan(topic_id)
         if lifespan.source:
             line += f", worthless after {_seconds(lifespan.seconds)}"
             if lifespan.source == "class":
@@ -100,7 +109,7 @@ class Why:
         return f"dropped: {TX_REASONS[reason]}"
 
     def _too_old(self, topic_id: int, policy: TopicPolicy) -> str:
-        lifespan = self._sender.lifespan(topic_id)
+        lifespan = self._intake.lifespan(topic_id)
         if not lifespan.source:
             # Each message says it itself.
             return "were older than their producer allows before their turn came"
@@ -108,13 +117,13 @@ class Why:
         whose = f", the lifespan of class {policy.qos}," if of_class else ""
         return f"were older than {_seconds(lifespan.seconds)}{whose} before their turn came"
 
-    def _air(self, qos: Qos, now: float) -> str:
+    def _air(self, qos: Qos, now: float, air: AirUse) -> str:
         used = {
             each: self._lately(("air", each), round(1e6 * used_s), now)
-            for each, used_s in self._shares.used_s.items()
+            for each, used_s in air.sent.used_s.items()
         }
         total = sum(used.values())
-        rate = self._sender.outbox.bytes_per_s * 8e-6
+        rate = air.sent.bytes_per_s * 8e-6
         carries = f" of {rate:.3g} Mbit/s" if rate < inf else ""
         if not total:
             return f"nothing has left in the last minute{carries and ', ' + carries.strip()}"
@@ -125,40 +134,42 @@ class Why:
             f" (the others: {others})" if others else ""
         )
 
-    def _idle(self, now: float) -> list[str]:
+    def _idle(self, now: float, air: AirUse) -> list[str]:
         """An air that is full, or idles between turns."""
         over_s = min(MINUTE_S, now - self._began_at)
         if over_s <= 0:
             return []
         sent, heard = (
             1e-6 * self._lately(("air", each), round(1e6 * used_s), now) / over_s
-            for each, used_s in self._used_s().items()
+            for each, used_s in _both(air).items()
         )
         busy = min(1.0, sent + heard)
-        words = self._air_use.idle_words(1 - busy)
+        words = idle_words(air.sent.settled, 1 - busy)
         if words is None:
             words = f"the air was {'full' if busy > FULL else f'in use {100 * busy:.0f} %'}"
         return [f"{words} (ours {100 * min(1.0, sent):.0f} %, others' {100 * heard:.0f} %)"]
 
-    def _used_s(self) -> dict[str, float]:
-        return {"sent": self._air_use.sent_s, "heard": self._air_use.heard_s}
-
     def _lately(self, key: Hashable, value: int, now: float) -> int:
         return self._meter.grown(key, value, now)
 
-    def _counters(self, n_topics: int) -> dict[Hashable, int]:
+    def _counters(self, n_topics: int, air: AirUse) -> dict[Hashable, int]:
         counters: dict[Hashable, int] = {
-            ("air", qos): round(1e6 * used_s) for qos, used_s in self._shares.used_s.items()
+            ("air", qos): round(1e6 * used_s) for qos, used_s in air.sent.used_s.items()
         }
-        for each, used_s in self._used_s().items():
+        for each, used_s in _both(air).items():
             counters["air", each] = round(1e6 * used_s)
         for topic_id in range(n_topics):
-            tally = self._sender.tally(topic_id)
+            tally = self._intake.tally(topic_id)
             counters["accepted", topic_id] = tally.accepted
             counters["sent", topic_id] = tally.sent
             for reason, n in tally.dropped.items():
                 counters["drop", topic_id, reason] = n
         return counters
+
+
+def _both(air: AirUse) -> dict[str, float]:
+    """Airtime in s, ours and that of others."""
+    return {"sent": air.sent.airtime_s, "heard": air.heard_s}
 
 
 def _share(n: int, of: int) -> str:

@@ -1,7 +1,7 @@
 """Clocks of other robots, from when bursts were sent and heard. Nothing here reads a clock."""
 
 from sdrlinkd.link.timesync.clocks import ClockParams, Clocks
-from sdrlinkd.link.timesync.envelope import DualEnvelope
+from sdrlinkd.link.timesync.envelope import DualEnvelope, Estimate
 from sdrlinkd.link.timesync.paper import PaperFilter
 from sdrlinkd.link.timesync.peer import PeerClock, State, Wall
 
@@ -9,6 +9,7 @@ __all__ = [
     "ClockParams",
     "Clocks",
     "DualEnvelope",
+    "Estimate",
     "PaperFilter",
     "PeerClock",
     "State",

@@ -6,7 +6,9 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
+from sdrlinkd.link.timesync.envelope import Estimate
 from sdrlinkd.link.timesync.peer import PeerClock, State, Wall
+from sdrlinkd.reports import ClockReport
 from sdrlinkd.wire import (
     CLOCK_NUMBERS,
     MAX_ARRIVALS,
@@ -45,10 +47,20 @@ class Clocks:
         self._left: OrderedDict[int, float] = OrderedDict()
         self.due_at = 0.0 if params.period_s else float("inf")
         self.peers: dict[int, PeerClock] = {}
-        self.wall: Wall | None = None
-        """Of our own host."""
-        self.resolution_s = 2e-5
+        self._wall: Wall | None = None
+        """Our own host's."""
+        self._resolution_s = 2e-5
         """How exact times of bursts are."""
+
+    def set_resolution(self, resolution_s: float) -> None:
+        """Take times of bursts to be exact to this from now on; clocks already known are not
+        looked at again.
+        """
+        self._resolution_s = resolution_s
+
+    def set_wall(self, wall: Wall) -> None:
+        """Tell others what our host's clock is ahead of our link's."""
+        self._wall = wall
 
     def end(self) -> None:
         """No more."""
@@ -62,9 +74,9 @@ class Clocks:
             stamped, left_s = next(reversed(self._left.items()))
         left_ns = max(0, round(1e9 * left_s))
         wall_ns, error_us = UNKNOWN_WALL, 0
-        if self.wall is not None:
-            wall_ns = self.wall.ns
-            error_us = min(round(1e6 * self.wall.error_s), MAX_WALL_ERROR_US)
+        if self._wall is not None:
+            wall_ns = self._wall.ns
+            error_us = min(round(1e6 * self._wall.error_s), MAX_WALL_ERROR_US)
         told = [
             peer.arrival(1e-9 * left_ns)
             for peer in self.peers.values()
@@ -96,8 +108,26 @@ class Clocks:
         """Another robot's."""
         peer = self.peers.get(src)
         if peer is None:
-            peer = self.peers[src] = PeerClock(src, self.resolution_s)
+            peer = self.peers[src] = PeerClock(src, self._resolution_s)
         peer.hear(clock, at, self._own_id, self._left)
+
+    def report(self, src: int, now: float) -> ClockReport | None:
+        """What is known of a robot's clock; None: nothing, or it is our own."""
+        peer = self.peers.get(src)
+        if peer is None:
+            return None
+        wall = self.wall_offset(src, now)
+        report = peer.report(now)
+        if wall is None:
+            return report
+        return msgspec.structs.replace(
+            report, wall_offset_ms=1e-6 * wall[0], wall_bound_us=1e6 * wall[1]
+        )
+
+    def estimate(self, src: int, now: float) -> Estimate | None:
+        """Our link's clock less that of robot `src`; None: not known."""
+        peer = self.peers.get(src)
+        return None if peer is None else peer.estimate(now)
 
     def wall_offset(self, src: int, now: float) -> tuple[int, float, float] | None:
         """Our host's time since 1970 less that of robot `src`.
@@ -105,18 +135,18 @@ class Clocks:
         (difference in ns, bound of its error in s, of that what the two hosts' clocks have to
         answer for); None: not known.
         """
-        if self.wall is None:
+        if self._wall is None:
             return None
         if src == self._own_id:
-            return 0, self.wall.error_s, self.wall.error_s
+            return 0, self._wall.error_s, self._wall.error_s
         peer = self.peers.get(src)
         if peer is None or peer.wall is None or peer.state(now) is State.UNSYNCED:
             return None
         known = peer.estimate(now)
         if known is None:
             return None
-        hosts_s = self.wall.error_s + peer.wall.error_s + HOST_DRIFT * max(0.0, now - peer.last_at)
-        offset_ns = self.wall.ns - peer.wall.ns + round(1e9 * known.offset(now))
+        hosts_s = self._wall.error_s + peer.wall.error_s + HOST_DRIFT * max(0.0, now - peer.last_at)
+        offset_ns = self._wall.ns - peer.wall.ns + round(1e9 * known.offset(now))
         return offset_ns, known.bound(now) + hosts_s, hosts_s
 
     def state(self, src: int, now: float) -> State:

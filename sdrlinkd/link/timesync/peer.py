@@ -5,6 +5,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from sdrlinkd.link.timesync.envelope import WINDOW_S, DualEnvelope, Estimate
+from sdrlinkd.reports import ClockReport
 from sdrlinkd.wire import CLOCK_NUMBERS, UNKNOWN_WALL, Arrival, Clock
 
 COARSE_S = 0.005
@@ -110,6 +111,23 @@ class PeerClock:
         if now - self.last_at > max(SILENT_S, SILENT_PERIODS * self.period_s):
             return State.HOLDOVER
         return State.COARSE if known.bound(now) > COARSE_S else State.SYNCED
+
+    def report(self, now: float) -> ClockReport:
+        """How well its clock is known, and what its records were like."""
+        state, known, envelope = self.state(now), self.estimate(now), self.envelope
+        is_known = known is not None and state is not State.UNSYNCED
+        return ClockReport(
+            state=state.value,
+            offset_ms=1e3 * known.offset(now) if known and is_known else None,
+            bound_us=1e6 * known.bound(now) if known and is_known else None,
+            skew_ppm=1e6 * known.skew if known and is_known else None,
+            period_s=self.period_s,
+            samples=envelope.samples,
+            steps=envelope.steps,
+            contradicted=envelope.contradicted,
+            refused=self.refused,
+            resets=self.resets,
+        )
 
     def _is_acceptable(self, clock: Clock, at: float) -> bool:
         if self._boot_id is None:

@@ -4,10 +4,11 @@ This room owns the burst scheduler, the choice of MCS, the retry queue and the p
 records. It asks `access` when the air is ours, and `packing` for PDUs.
 """
 
-from sdrlinkd.link.transmit.air_use import AirUse
 from sdrlinkd.link.transmit.beacons import Beacons
 from sdrlinkd.link.transmit.burst import Burst, Outcome
-from sdrlinkd.link.transmit.control_records import MOST_RECEIPTS, PRESENT_S, ControlRecords
+from sdrlinkd.link.transmit.control_records import MOST_RECEIPTS, ControlRecords
+from sdrlinkd.link.transmit.fit import Fit, fit_to
+from sdrlinkd.link.transmit.no_radio import NoRadio
 from sdrlinkd.link.transmit.rate import (
     HIGH_PER,
     KEPT_CHANGES,
@@ -19,9 +20,10 @@ from sdrlinkd.link.transmit.rate import (
     RateControl,
     RateParams,
 )
+from sdrlinkd.link.transmit.report import TransmitReport
 from sdrlinkd.link.transmit.retry import GIVE_UP_S
 from sdrlinkd.link.transmit.scheduler import BurstScheduler
-from sdrlinkd.link.transmit.sender import Sender
+from sdrlinkd.link.transmit.tx_delay import TxDelayMeters
 
 __all__ = [
     "GIVE_UP_S",
@@ -32,15 +34,17 @@ __all__ = [
     "MOST_RECEIPTS",
     "PENALTY_DECAY_DB",
     "PENALTY_STEP_DB",
-    "PRESENT_S",
-    "AirUse",
     "Beacons",
     "Burst",
     "BurstScheduler",
     "ControlRecords",
+    "Fit",
+    "NoRadio",
     "Outcome",
     "RateChange",
     "RateControl",
     "RateParams",
-    "Sender",
+    "TransmitReport",
+    "TxDelayMeters",
+    "fit_to",
 ]

@@ -1,10 +1,9 @@
 """What a node tells of itself and of others, about once a second."""
 
-from collections.abc import Iterable
 from math import inf
 from random import Random
 
-from sdrlinkd.link.receive import Neighbor
+from sdrlinkd.link.receive import Neighbors
 from sdrlinkd.link.transmit.rate import RateControl
 from sdrlinkd.wire import Beacon, LinkReport, Record, RegistryDigest, build_records, equal_payload
 
@@ -16,12 +15,9 @@ SNR_RANGE = (-128, 127)
 class Beacons:
     """When the next is due, and what is in it."""
 
-    def __init__(
-        self, period_s: float, pdu_size: int, digest: RegistryDigest, rng: Random, own_id: int
-    ) -> None:
+    def __init__(self, period_s: float, pdu_size: int, digest: RegistryDigest, rng: Random) -> None:
         self._period_s = period_s
         self._rng = rng
-        self._own_id = own_id
         self._digest = digest
         if len(build_records([digest])) > equal_payload(pdu_size, 1):
             self._digest = digest.shortened()
@@ -30,21 +26,18 @@ class Beacons:
         self.due_at = 0.0 if period_s > 0 else inf
 
     def end(self) -> None:
-        """No more."""
+        """Make no more of them."""
         self.due_at = inf
 
-    def take(self, start: float, neighbors: Iterable[Neighbor], rate: RateControl) -> list[Record]:
-        """The records of a burst that leaves at `start`."""
+    def take(self, start: float, neighbors: Neighbors, rate: RateControl) -> list[Record]:
+        """The records of a beacon in a burst that leaves at `start`: who we are, and how well we
+        hear each of `neighbors`.
+        """
         records: list[Record] = [Beacon(self.boot_id, self._number), self._digest]
         self._number = (self._number + 1) & 0xFFFF
         self.due_at = start + self._period_s * self._rng.uniform(1 - JITTER, 1 + JITTER)
-        for neighbor in neighbors:
-            quality = neighbor.take_quality() if neighbor.src != self._own_id else None
-            if quality is not None:
-                snr_db, per = quality
-                low, high = SNR_RANGE
-                quarters = min(max(round(4 * snr_db), low), high)
-                records.append(
-                    LinkReport(neighbor.src, quarters, round(255 * per), rate.suggested(snr_db))
-                )
+        for src, snr_db, per in neighbors.take_qualities():
+            low, high = SNR_RANGE
+            quarters = min(max(round(4 * snr_db), low), high)
+            records.append(LinkReport(src, quarters, round(255 * per), rate.suggested(snr_db)))
         return records

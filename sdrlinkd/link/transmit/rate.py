@@ -47,6 +47,16 @@ class RateChange(NamedTuple):
     mcs: int
 
 
+class HeardThere(NamedTuple):
+    """A neighbor's word of us: SNR in dB and PER, None while it has told nothing; and what we send
+    to it with.
+    """
+
+    snr_db: float | None
+    per: float | None
+    mcs: int
+
+
 @dataclass(slots=True)
 class _Peer:
     """What one neighbor says of us."""
@@ -71,26 +81,15 @@ class RateControl:
         self._fixed = min(fixed, len(needed_snr_db) - 1)
         self._highest = min(params.max_mcs, len(needed_snr_db) - 1)
         self._lowest = min(params.min_mcs, self._highest)
+        self.adapts = params.adapt
+        """Whether reports decide."""
+        self.lowest = self._lowest if params.adapt else self._fixed
+        """The MCS of what everybody should be able to read."""
+        self.usable = range(self.lowest, (self._highest if params.adapt else self._fixed) + 1)
+        """The MCS that may be chosen."""
         self._peers: dict[int, _Peer] = {}
         self.changes: deque[RateChange] = deque(maxlen=KEPT_CHANGES)
         """The last ones, for default and bulk."""
-
-    @property
-    def lowest(self) -> int:
-        """For what everybody should be able to read."""
-        return self._lowest if self._params.adapt else self._fixed
-
-    @property
-    def adapts(self) -> bool:
-        """Whether reports decide."""
-        return self._params.adapt
-
-    @property
-    def usable(self) -> range:
-        """The MCS that may be chosen."""
-        if not self._params.adapt:
-            return range(self._fixed, self._fixed + 1)
-        return range(self._lowest, self._highest + 1)
 
     def heard(self, src: int, now: float) -> None:
         """A neighbor is there."""
@@ -116,7 +115,7 @@ class RateControl:
 
     def mcs(self, destinations: Iterable[int], qos: Qos, now: float) -> int:
         """For a burst to `destinations` that leaves at `now`."""
-        if not self._params.adapt:
+        if not self.adapts:
             return self._fixed
         wanted = set(destinations)
         present = {
@@ -135,15 +134,15 @@ class RateControl:
         """What we would like a neighbor heard at `snr_db` to send with."""
         return self._best(snr_db - self._params.margin_db)
 
-    def told(self, src: int) -> tuple[float, float] | None:
-        """(SNR in dB, PER) at which `src` says it hears us."""
+    def heard_there(self, src: int) -> HeardThere:
+        """How robot `src` says it hears us, and the MCS last used for it, for default and bulk."""
         peer = self._peers.get(src)
-        return None if peer is None or peer.told_at < 0 else (peer.snr_db, peer.per)
-
-    def chosen(self, src: int) -> int:
-        """The MCS last used for `src`, for default and bulk."""
-        peer = self._peers.get(src)
-        return self.lowest if peer is None else peer.chosen.get(False, self.lowest)
+        if peer is None:
+            return HeardThere(None, None, self.lowest)
+        mcs = peer.chosen.get(False, self.lowest)
+        if peer.told_at < 0:
+            return HeardThere(None, None, mcs)
+        return HeardThere(peer.snr_db, peer.per, mcs)
 
     def _choose(self, src: int, peer: _Peer, is_urgent: bool, now: float) -> int:
         params = self._params

@@ -14,32 +14,26 @@ class RetryQueue:
 
     def __init__(self, has_control: bool) -> None:
         self._has_control = has_control
-        self._waiting: list[Burst] = []
+        self.waiting: list[Burst] = []
+        """The bursts that go again, in the order in which they were composed."""
         self.count = 0
-
-    def __bool__(self) -> bool:
-        return bool(self._waiting)
+        """Bursts that were given back so far."""
 
     def give_back(self, burst: Burst) -> bool:
         """Keep a burst that did not leave; False when it has been tried for long enough."""
         self.count += 1
         if burst.start - burst.first_start > GIVE_UP_S:
             return False
-        insort(self._waiting, burst, key=lambda each: each.number)
+        insort(self.waiting, burst, key=lambda each: each.number)
         return True
 
     def clear(self) -> None:
-        """Nothing goes again."""
-        self._waiting.clear()
-
-    @property
-    def head(self) -> Burst:
-        """The one that goes next."""
-        return self._waiting[0]
+        """Send nothing again."""
+        self.waiting.clear()
 
     def take(self, start: float) -> Burst:
-        """It, as it leaves at `start`."""
-        burst = self._waiting.pop(0)
+        """The burst that goes next, as it leaves at `start`."""
+        burst = self.waiting.pop(0)
         pdus = burst.pdus
         by_us = round(1e6 * (start - burst.start))
         if self._has_control and by_us > 0:

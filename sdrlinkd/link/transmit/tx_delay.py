@@ -26,14 +26,14 @@ class TxDelayMeters:
     """One message of each burst is looked at: the first, which waited for the air."""
 
     def __init__(self) -> None:
-        self.of_topic: dict[int, TopicTxDelay] = {}
+        self._of_topic: dict[int, TopicTxDelay] = {}
 
     def left(self, burst: Burst) -> None:
-        """A burst has left."""
+        """Look at a burst that has left."""
         message = burst.carried[0][0] if burst.carried[0] else None
         if message is None or message.is_whole or message.arrived_at > burst.first_start:
             return
-        topic = self.of_topic.setdefault(message.topic_id, TopicTxDelay())
+        topic = self._of_topic.setdefault(message.topic_id, TopicTxDelay())
         topic.n += 1
         topic.is_told = False
         weight = max(WEIGHT, 1 / topic.n)
@@ -42,9 +42,20 @@ class TxDelayMeters:
         topic.access_s += weight * (burst.first_start - ready_at - topic.access_s)
         topic.again_s += weight * (burst.start - burst.first_start - topic.again_s)
 
+    def report_ms(self, topic_id: int) -> dict[str, float]:
+        """Why messages of a topic waited, lately, by the names of `TopicReport`; empty: unknown."""
+        topic = self._of_topic.get(topic_id)
+        if topic is None:
+            return {}
+        return {
+            "queue_ms": 1e3 * topic.queue_s,
+            "access_ms": 1e3 * topic.access_s,
+            "again_ms": 1e3 * topic.again_s,
+        }
+
     def records(self) -> Iterable[Waits]:
         """Of topics sent since the last call."""
-        for topic_id, topic in self.of_topic.items():
+        for topic_id, topic in self._of_topic.items():
             total_s = topic.queue_s + topic.access_s + topic.again_s
             if topic.is_told or total_s <= 0:
                 continue

@@ -22,7 +22,7 @@ class Pair:
         self.one = Clocks(ClockParams(), 0xA, 1)
         self.two = Clocks(ClockParams(), 0xB, 2)
         for clocks in (self.one, self.two):
-            clocks.resolution_s = 1e-6
+            clocks.set_resolution(1e-6)
         self.at = 10.0
         """By the clock of robot 1."""
         self.sent = []
@@ -137,14 +137,15 @@ def test_a_crystal_that_is_far_off_is_followed(ppm):
 
 def test_a_host_clock_that_is_set_is_followed_at_once():
     pair = Pair()
-    pair.one.wall, pair.two.wall = Wall(10**18, 1e-4), Wall(10**18 + 7 * 10**9, 1e-4)
+    pair.one.set_wall(Wall(10**18, 1e-4))
+    pair.two.set_wall(Wall(10**18 + 7 * 10**9, 1e-4))
     pair.run(50)
     offset_ns, error_s, _ = pair.one.wall_offset(2, pair.at)
     assert abs(offset_ns - pair.skew * pair.at * 1e9) < 1e4
     assert 2e-4 < error_s < 3e-4
-    pair.one.wall = Wall(10**18 + 3600 * 10**9, 1e-4)
+    pair.one.set_wall(Wall(10**18 + 3600 * 10**9, 1e-4))
     assert pair.one.wall_offset(2, pair.at)[0] - offset_ns == 3600 * 10**9
-    pair.two.wall = Wall(10**18 - 3593 * 10**9, 1e-4)
+    pair.two.set_wall(Wall(10**18 - 3593 * 10**9, 1e-4))
     pair.period()
     assert pair.one.wall_offset(2, pair.at)[0] - offset_ns == pytest.approx(7.2e12, rel=1e-9)
 
@@ -153,7 +154,7 @@ def test_without_a_host_clock_nothing_is_said_of_it():
     pair = Pair()
     pair.run(10)
     assert pair.one.wall_offset(2, pair.at) is None
-    pair.one.wall = Wall(0, 0.0)
+    pair.one.set_wall(Wall(0, 0.0))
     assert pair.one.wall_offset(2, pair.at) is None, "theirs is not known"
     assert pair.one.record(5.0, 10).wall_ns == 0
     assert pair.two.record(5.0, 10).wall_ns == UNKNOWN_WALL
@@ -211,7 +212,8 @@ def test_where_there_is_little_room_everybody_is_told_of_in_turn():
 
 def test_a_host_clock_not_heard_of_for_long_is_known_less_well():
     pair = Pair()
-    pair.one.wall, pair.two.wall = Wall(0, 1e-4), Wall(0, 1e-4)
+    pair.one.set_wall(Wall(0, 1e-4))
+    pair.two.set_wall(Wall(0, 1e-4))
     pair.run(20)
     errors = [pair.one.wall_offset(2, pair.at + wait_s)[1] for wait_s in (0.2, 60.0)]
     assert errors[1] > errors[0] + 5e-3

@@ -1,0 +1,48 @@
+"""Why the air was idle while messages waited, by what the access policy makes of it."""
+
+from sdrlinkd.link.access.auto import Settled, percent
+from sdrlinkd.link.access.minislot import MiniSlots
+
+IDLE = 0.3
+"""An air that is idle for more than this while messages wait is not what they wait for."""
+MORE = 1.25
+"""A policy that carries so many times as much is worth naming."""
+NOT_OTHERS = "what waits does not wait for others, but for this radio"
+
+
+def idle_words(settled: Settled | None, idle: float) -> str | None:
+    """Why the air was idle for that share of the time while messages waited; None: it was not.
+
+    `settled` is the policy in force; None while there is no radio.
+    """
+    if idle < IDLE:
+        return None
+    why = NOT_OTHERS if settled is None else _why_idle(settled) + _what_is_better(settled)
+    return f"the air was idle {100 * idle:.0f} % of the time: {why}"
+
+
+def _why_idle(settled: Settled) -> str:
+    access = settled.access
+    if isinstance(access, MiniSlots):
+        return (
+            f"minislot waits up to {1e3 * access.turn_s:.3g} ms after every burst on this radio "
+            f"and carries {percent(settled.share)} of the air"
+        )
+    if settled.policy == "csma":
+        waits = f"csma waits {1e3 * access.pause_s:.3g} ms and more after every burst"
+        return f"{waits} on this radio and carries {percent(settled.share)} of the air"
+    if settled.policy == "tdma":
+        own = 100 * access.share
+        return (
+            f"of the schedule's {1e3 * access.round_s:.3g} ms, {own:.2g} % are this robot's, and "
+            "others left theirs unused"
+        )
+    return NOT_OTHERS
+
+
+def _what_is_better(settled: Settled) -> str:
+    best = settled.best
+    if best == settled.policy or settled.shares[best] < MORE * settled.share:
+        return ""
+    times = settled.shares[best] / max(1e-6, settled.share)
+    return f"; {best} would carry {times:.2g} times as much"

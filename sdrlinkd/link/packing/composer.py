@@ -1,0 +1,279 @@
+"""From queued messages to PDUs: the paper's packing policy (section 5.2), class by class.
+
+Among topics of equal class and priority: with two or more pending, PDUs of two entries, a fragment
+having k = max(k*(2), k_min) bytes, round robin; with one, a single entry of k = P_max − 13. k
+freezes at a message's first fragment. Greedy: further entries of the same topics while they fit.
+Lower classes fill what is left over.
+"""
+
+from collections.abc import Sequence
+from random import Random
+from typing import NamedTuple
+
+from sdrlinkd.link.packing.draft import BuiltPdu, Draft, EntryWriter
+from sdrlinkd.link.packing.entry_ids import REST_FACTOR, TopicEntryIds
+from sdrlinkd.link.packing.flush import Flush
+from sdrlinkd.link.packing.head_of_line import HeadOfLine
+from sdrlinkd.link.packing.piggyback import PiggybackRecords
+from sdrlinkd.link.packing.single_entry import SingleEntry
+from sdrlinkd.link.params import LinkParams
+from sdrlinkd.link.qos import WIRE_BITS, Qos
+from sdrlinkd.link.queue import Lane, Level, Outbox, Outgoing, with_first
+from sdrlinkd.link.schedule import Allowance, ClassesParams
+from sdrlinkd.wire import (
+    BROADCAST,
+    ENTRY_HEADER_SIZE,
+    MAX_ENTRIES,
+    STAMP_SIZE,
+    equal_payload,
+    flags,
+)
+
+MAX_PDUS = 63
+"""PDUs of a burst, whatever carries it."""
+# Lanes looked at while one PDU is filled; past that the room left is not worth the search.
+MAX_LANES_PER_PDU = 4 * MAX_ENTRIES
+# Less room for one more entry than this, and a STAMP does not even fit behind other records.
+MIN_ROOM_FOR_STAMP = STAMP_SIZE - ENTRY_HEADER_SIZE - 1
+FLAGS = {(qos, z): flags(WIRE_BITS[qos], z) for qos in Qos for z in (False, True)}
+"""A PDU's first octet, by (class, whether its messages are compressed)."""
+
+
+class ComposerReport(NamedTuple):
+    """What was composed since the start."""
+
+    entries: int
+    pdus: int
+    starved: list[int]
+    """Topic ids that had to wait for a free entry id."""
+
+
+class Composer:
+    """Fills PDUs from the outbox. Chance (sequence start, entry ids) comes from `rng`."""
+
+    def __init__(
+        self,
+        params: LinkParams,
+        src: int,
+        outbox: Outbox,
+        piggyback: PiggybackRecords,
+        rng: Random,
+        reassembly_timeout_s: float,
+        has_control: bool,
+        classes: ClassesParams,
+    ) -> None:
+        self._pdu_size = params.pdu_size
+        self._hop_limit = params.hop_limit
+        self._is_greedy = params.greedy
+        self._src = src
+        self._outbox = outbox
+        self._piggyback = piggyback
+        self._seq = rng.randrange(256)
+        self._control_entry_id = rng.randrange(256)
+        self._patience_s = reassembly_timeout_s
+        self.entry_ids = TopicEntryIds(rng, REST_FACTOR * reassembly_timeout_s)
+        self.k_single = equal_payload(params.pdu_size, 1)
+        """Payload bytes of a PDU with one entry."""
+        self._k_shared = min(
+            max(equal_payload(params.pdu_size, 2), params.min_fragment), self.k_single
+        )
+        parity = {qos: classes.of(qos).parity * has_control for qos in Qos}
+        self._writer = EntryWriter(outbox, self.entry_ids, self.k_single, self._k_shared, parity)
+        self.asking = self._writer.asking
+        """Messages just stamped whose producers want to know what becomes of them."""
+        self._head_of_line = HeadOfLine(outbox, self.entry_ids, reassembly_timeout_s)
+        self._single_entry = SingleEntry(outbox, params, src, has_control)
+        self._flush = Flush(params.flush_s, outbox, self.k_single, reassembly_timeout_s)
+        self._pdus = 0
+        self._entries = 0
+
+    def fill(self, start: float, allowance: Allowance, source: int | None = None) -> list[BuiltPdu]:
+        """The PDUs of a burst whose preamble leaves at `start`; empty when nothing is to be sent.
+
+        All are of one source, `source` if given: who hears the burst knows by that who may follow.
+        """
+        built: list[BuiltPdu] = []
+        levels, most_of = self._outbox.levels, allowance.most
+        # What a class is owed takes room from others; it makes no burst longer.
+        owed = list(allowance.owed[: max(1, max(most_of) - 1)])
+        while levels and len(built) < MAX_PDUS:
+            n, first, most = len(built), None, most_of[levels[0].qos]
+            if built:
+                source = built[0].src
+            if owed and n + len(owed) >= most and (n or most < 2):
+                first = owed.pop(0)
+            elif owed and not n and self._next_src(owed[0]) != self._next_src():
+                # It cannot join, so it goes alone.
+                first, owed, most = owed[0], [], 0
+            elif n >= most:
+                break
+            several: Sequence[BuiltPdu] = ()
+            if first is None and levels[0].lanes[0].current is not None:
+                several = self._next_full(
+                    start, max(1, min(most, MAX_PDUS) - n - len(owed)), source
+                )
+            if not several:
+                pdu = self._next_pdu(start, first, source)
+                if pdu is None:
+                    break
+                several = (pdu,)
+            built += several
+        self._pdus += len(built)
+        for pdu in built:
+            self._entries += len(pdu.carried)
+        return built
+
+    def fill_with_records(self, start: float) -> list[BuiltPdu]:
+        """A PDU of its own for the records that wait, in a burst at `start`; empty: none does."""
+        draft = Draft(self._pdu_size)
+        self._piggyback.ride(draft, start)
+        if draft.is_empty:
+            return []
+        draft.address(BROADCAST, Qos.DEFAULT)
+        self._pdus += 1
+        return [self._finish(draft)]
+
+    def next_wakeup(self, now: float) -> float:
+        """When `fill` may next have something to send; −inf: now; infinity: nothing waits."""
+        if not self._outbox.levels:
+            return float("inf")
+        if self._flush.is_on and self._flush.must_wait(now):
+            return self._flush.due_at()
+        return min(
+            self.entry_ids.next_free(lane.waiting[0]) if lane.current is None else float("-inf")
+            for level in self._outbox.levels
+            for lane in level.lanes
+        )
+
+    def take_asking(self) -> list[Outgoing]:
+        """The messages of `asking`, each told once."""
+        asking = [*self.asking]
+        self.asking.clear()
+        return asking
+
+    def report(self) -> ComposerReport:
+        """What was composed so far."""
+        return ComposerReport(self._entries, self._pdus, sorted(self.entry_ids.starved))
+
+    def expire(self, now: float) -> None:
+        """Drop what is in vain by now, though no burst could go."""
+        self._head_of_line.expire(now)
+
+    def abandon(self, lane: Lane, now: float) -> None:
+        """Send no more of the message that `lane` is in the middle of."""
+        self._head_of_line.abandon(lane, now)
+
+    def end_flush(self) -> None:
+        """Let no PDU wait for more from now on."""
+        self._flush.end()
+
+    def _next_pdu(
+        self, start: float, first: Qos | None = None, source: int | None = None
+    ) -> BuiltPdu | None:
+        """The next PDU of a burst whose preamble leaves at `start`, or None.
+
+        The most urgent comes first, or class `first`; None also where that is not of `source`.
+        What is in vain is withdrawn; see `HeadOfLine`.
+        """
+        outbox = self._outbox
+        levels = outbox.levels
+        if not levels or (self._flush.is_on and self._flush.must_wait(start)):
+            return None
+        may_be_own = source is None or source == self._src
+        draft = Draft(self._pdu_size)
+        looked_at = 0
+        order = levels if first is None else with_first(levels, first)
+        for level in tuple(order):
+            if outbox.relays and draft.is_empty and (whole := self._next_whole(level, start)):
+                if source in (None, whole.src):
+                    return self._single_entry.relayed(whole, start)
+                return None
+            if not may_be_own:
+                return None
+            looked_at += len(level.lanes)
+            if draft.room >= self._k_shared or self._may_fit(level, draft.room):
+                self._fill_from(level, draft, start)
+            if draft.room <= 0 or (looked_at > MAX_LANES_PER_PDU and not draft.is_empty):
+                break
+        if draft.is_empty:
+            return None
+        if draft.room >= MIN_ROOM_FOR_STAMP:
+            for message in draft.carried:
+                if not message.stamped:
+                    self._writer.stamp(draft, message, start)
+        if self._piggyback.waiting and draft.dst == BROADCAST:
+            self._piggyback.ride(draft, start)
+        return self._finish(draft)
+
+    def _next_full(self, start: float, most: int, source: int | None) -> list[BuiltPdu]:
+        """The next `most` PDUs or fewer, where they are alike: fragments that fill them.
+
+        What `_next_pdu` would give one after another, without looking round after each.
+        """
+        if source is not None and source != self._src:
+            return []
+        if self._flush.is_on and self._flush.must_wait(start):
+            return []
+        level = self._outbox.levels[0]
+        lane = level.lanes[0]
+        if len(level.lanes) > 1 or self._live(lane, start) is not lane.current:
+            return []
+        built = self._single_entry.filled(lane, start, self._seq, most)
+        self._seq = (self._seq + len(built)) & 0xFF
+        return built
+
+    def _next_src(self, first: Qos | None = None) -> int:
+        """Whose PDU goes next, or next of a class, as far as one can tell."""
+        levels = self._outbox.levels if self._outbox.relays else []
+        for level in [each for each in levels if first is None or each.qos is first][:1]:
+            head = level.lanes[0].head
+            if head is not None and head.is_whole:
+                return head.src
+        return self._src
+
+    def _next_whole(self, level: Level, start: float) -> Outgoing | None:
+        """Another robot's PDU, if that is what goes next of a level."""
+        lane = level.lanes[0]
+        return self._live(lane, start) if lane.head and lane.head.is_whole else None
+
+    def _live(self, lane: Lane, start: float) -> Outgoing | None:
+        """The lane's next message that may still go."""
+        head = lane.current or (lane.waiting[0] if lane.waiting else None)
+        if head is not None and head.in_vain(start, self._patience_s):
+            return self._head_of_line.next_live(lane, start)
+        return head
+
+    def _finish(self, draft: Draft) -> BuiltPdu:
+        data = draft.build(
+            FLAGS[draft.qos, draft.is_compressed], self._src, draft.dst, self._seq,
+            self._hop_limit, self._control_entry_id,
+        )  # fmt: skip
+        self._seq = (self._seq + 1) & 0xFF
+        self._control_entry_id = (self._control_entry_id + 1) & 0xFF
+        return BuiltPdu(data, draft.carried, draft.qos)
+
+    def _may_fit(self, level: Level, room: int) -> bool:
+        """Whether some lane's next entry may fit: a quick no spares the look at each.
+
+        A fragment that is not its message's last has at least k_shared bytes.
+        """
+        if room >= self._k_shared or room <= 0:
+            return room > 0
+        for lane in level.lanes:
+            head = lane.current or lane.waiting[0]
+            if len(head.payload) - head.next_index * head.k <= room:
+                return True
+        return False
+
+    def _fill_from(self, level: Level, draft: Draft, start: float) -> None:
+        lanes = tuple(level.lanes)
+        more = True
+        while more:
+            more = False
+            for lane in lanes:
+                head = self._live(lane, start)
+                if head is None or head.is_whole or not draft.suits(head):
+                    continue
+                if self._writer.place(lane, head, level, draft, start):
+                    more = self._is_greedy
+            more = more and bool(level.lanes) and self._may_fit(level, draft.room)

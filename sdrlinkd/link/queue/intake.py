@@ -1,0 +1,233 @@
+"""How messages enter the queue: by their topic's policy, or as another robot's PDU."""
+
+from collections import Counter
+from collections.abc import Hashable, Mapping
+from math import inf
+
+from zstandard import ZstdCompressionDict
+
+from sdrlinkd.link.params import LinkParams
+from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, Overrides, Qos
+from sdrlinkd.link.queue.latched import Offer
+from sdrlinkd.link.queue.ledger import TxTally, tx_balance
+from sdrlinkd.link.queue.lifespan import Lifespan, lifespan_of
+from sdrlinkd.link.queue.message import Outgoing
+from sdrlinkd.link.queue.outbox import Outbox
+from sdrlinkd.link.queue.policy import DEFAULT_POLICY, TopicPolicy
+from sdrlinkd.link.queue.topic_state import TopicState
+from sdrlinkd.link.schedule import ClassesParams
+from sdrlinkd.reports import RelayReport, TopicReport
+from sdrlinkd.wire import Pdu, Registry, Topic, max_message_size
+
+RELAYED = 256
+"""Lanes of others' PDUs have this and their source in place of a topic id."""
+UNLIKELY_AGE_S = 10.0
+"""A message without a lifespan that was published so long ago comes from another clock or a
+recording: its age counts from now."""
+
+
+class Intake:
+    """Every topic's policy and tally, and the way into `outbox`.
+
+    `bytes_per_s` is what the air carries at the moment; infinity while nobody knows.
+    """
+
+    def __init__(
+        self,
+        params: LinkParams,
+        registry: Registry,
+        outbox: Outbox,
+        classes: ClassesParams,
+        dictionaries: Mapping[int, ZstdCompressionDict],
+    ) -> None:
+        self._max_message_size = max_message_size(params.pdu_size)
+        self._has_control = registry.has_control
+        self._classes = classes
+        self._outbox = outbox
+        self._topics = [
+            TopicState(params.dst, registry.has_control, dictionaries.get(topic.id))
+            for topic in registry.topics
+        ]
+        self._refused = TxTally()
+        """Messages that never became a topic's: bad envelopes, unknown topics."""
+        self._relayed = TxTally()
+        """PDUs of others; each counts as a message."""
+
+    def submit(
+        self,
+        topic_id: int,
+        payload: bytes,
+        now: float,
+        overrides: Overrides = AS_CONFIGURED,
+        bytes_per_s: float = inf,
+    ) -> str | None:
+        """Queue a message; None, or the ledger's reason why it was refused."""
+        topic = self._topics[topic_id]
+        topic.tally.accept(len(payload))
+        refused = topic.admission.refuse(payload, now)
+        if refused:
+            topic.tally.drop(refused)
+            return refused
+        return self._enqueue(topic_id, payload, now, now, overrides, bytes_per_s)
+
+    def offer_again(self, offer: Offer, now: float, bytes_per_s: float) -> None:
+        """Queue a latched message for a robot that came late, as old as it is."""
+        topic_id, (payload, at, overrides), dst = offer
+        topic = self._topics[topic_id]
+        lifespan_s = overrides.lifespan_s or self.lifespan(topic_id, overrides.qos).seconds
+        if at + lifespan_s <= now:
+            return
+        topic.tally.accepted += 1
+        topic.tally.reoffered += 1
+        self._enqueue(topic_id, payload, at, now, overrides._replace(dst=dst), bytes_per_s)
+
+    def forward(
+        self, pdu: Pdu, data: bytes, at: float, until: float, bytes_per_s: float
+    ) -> str | None:
+        """Queue another robot's PDU that came at `at` and is worthless after `until`.
+
+        It has the highest priority of the topics inside. None, or why it was refused.
+        """
+        tally = self._relayed
+        tally.accepted += 1
+        known = [each.topic_id for each in pdu.entries if each.topic_id < len(self._topics)]
+        priority = max((self._topics[each].priority for each in known), default=0)
+        message = Outgoing(
+            RELAYED + pdu.src, data, CLASSES[pdu.qos], priority, pdu.dst, at, until, False, tally,
+            is_whole=True,
+        )  # fmt: skip
+        return self._outbox.put(message, DEFAULT_POLICY, bytes_per_s)
+
+    def refuse(self, reason: str, topic_id: int | None = None) -> None:
+        """Count a message that the bus could not hand over."""
+        tally = self._refused if topic_id is None else self._topics[topic_id].tally
+        tally.accepted += 1
+        tally.drop(reason)
+
+    def begin_anew(self) -> None:
+        """Forget when messages came: another clock begins."""
+        for topic in self._topics:
+            topic.apply(topic.policy)
+
+    def tally(self, topic_id: int) -> TxTally:
+        """Counters of one topic."""
+        return self._topics[topic_id].tally
+
+    def policy(self, topic_id: int) -> TopicPolicy:
+        """The policy of a topic that is in force."""
+        return self._topics[topic_id].policy
+
+    def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
+        """Change a topic's policy from now on."""
+        topic = self._topics[topic_id]
+        if policy != topic.policy:
+            topic.apply(policy)
+
+    def destination(self, topic_id: int) -> int:
+        """The robot that a topic's messages go to by default."""
+        return self._topics[topic_id].dst
+
+    def treatment(self, topic_id: int) -> tuple[Qos, int]:
+        """Class and priority that a topic's messages get by default."""
+        topic = self._topics[topic_id]
+        return topic.qos, topic.priority
+
+    def lifespan(self, topic_id: int, qos: Qos | None = None) -> Lifespan:
+        """Lifespan of a topic's messages that name none; of class `qos`, else of the topic's."""
+        topic = self._topics[topic_id]
+        return lifespan_of(topic.policy, topic.qos if qos is None else qos, self._classes)
+
+    def report_relayed(self) -> RelayReport:
+        """PDUs of others on their way through this robot."""
+        tally = self._relayed
+        return RelayReport(accepted=tally.accepted, sent=tally.sent, dropped=dict(tally.dropped))
+
+    def report(self, topic: Topic) -> TopicReport:
+        """One topic on its way out, but for rates and names on the bus."""
+        tally, (qos, priority) = self.tally(topic.id), self.treatment(topic.id)
+        lifespan = self.lifespan(topic.id)
+        return TopicReport(
+            topic_id=topic.id,
+            name="/" + topic.name,
+            type=topic.type,
+            subscribed=False,
+            qos=qos.label,
+            priority=priority,
+            lifespan_s=lifespan.seconds if lifespan.source else None,
+            lifespan_from=lifespan.source,
+            accepted=tally.accepted,
+            sent=tally.sent,
+            sent_bytes=tally.sent_bytes,
+            reoffered=tally.reoffered,
+            queued=self._outbox.queued_of_topic(topic.id),
+            dropped=dict(tally.dropped),
+        )
+
+    def totals(self) -> tuple[int, int, dict[str, int]]:
+        """(messages accepted, sent, dropped by reason), relayed PDUs among them."""
+        tallies = self._tallies()
+        return (
+            sum(tally.accepted for tally in tallies),
+            sum(tally.sent for tally in tallies),
+            dict(sum((tally.dropped for tally in tallies), Counter())),
+        )
+
+    def counters(self) -> dict[Hashable, int]:
+        """The counters of which people are shown rates."""
+        found: dict[Hashable, int] = {}
+        for topic_id, topic in enumerate(self._topics):
+            found["tx", topic_id] = topic.tally.accepted
+            found["accepted_bytes", topic_id] = topic.tally.accepted_bytes
+        return found
+
+    def audit(self) -> list[str]:
+        """What does not add up in the TX ledger; empty when all does."""
+        outbox, lives = self._outbox, self._outbox.lives
+        problems = tx_balance(self._tallies(), outbox.queued, outbox.in_flight)
+        if lives.illegal_steps:
+            problems.append(f"tx messages: {lives.illegal_steps} illegal steps")
+        return problems
+
+    def _tallies(self) -> list[TxTally]:
+        return [self._refused, self._relayed, *(topic.tally for topic in self._topics)]
+
+    def _enqueue(
+        self,
+        topic_id: int,
+        payload: bytes,
+        at: float,
+        now: float,
+        wishes: Overrides,
+        bytes_per_s: float,
+    ) -> str | None:
+        qos, priority, dst, lifespan_s, age_s, receipt = wishes
+        topic = self._topics[topic_id]
+        if lifespan_s is None:
+            lifespan_s = self.lifespan(topic_id, qos).seconds
+        if age_s <= UNLIKELY_AGE_S or lifespan_s < inf:
+            at -= age_s
+        frame = topic.deflated.shrink(payload) if topic.deflated else None
+        if frame is not None:
+            payload = frame
+        if len(payload) > self._max_message_size:
+            topic.tally.drop("tx_too_big")
+            return "tx_too_big"
+        message = Outgoing(
+            topic_id,
+            payload,
+            topic.qos if qos is None else qos,
+            topic.priority if priority is None else priority,
+            topic.dst if dst is None else dst,
+            at,
+            at + lifespan_s,
+            topic.stamp or (bool(receipt) and self._has_control),
+            topic.tally,
+            # Without a control channel it has been answered already: nobody can know.
+            receipt=receipt if self._has_control else "",
+            is_compressed=frame is not None,
+        )
+        if message.expires_at <= now:
+            # It must not take the place of one that is fresh.
+            self._outbox.lives.drop(message, "tx_expired")
+            return "tx_expired"
+        return self._outbox.put(message, topic.policy, bytes_per_s)

@@ -1,0 +1,70 @@
+"""Whether a whole message is handed over, by its topic's policy."""
+
+from math import inf
+
+from sdrlinkd.link.queue import DEFAULT_POLICY, Inflated, TopicPolicy
+from sdrlinkd.link.receive.delivered import CDR_HEADER_SIZE
+from sdrlinkd.wire import Registry
+
+
+class Acceptance:
+    """Policies of topics where their messages arrive.
+
+    A compressed message may grow to its topic's `max_bytes`, else to `max_expanded`.
+    """
+
+    def __init__(self, registry: Registry, inflated: Inflated, max_expanded: int) -> None:
+        self._n_topics = len(registry)
+        self._has_control = registry.has_control
+        self._inflated = inflated
+        self._max_expanded = max_expanded
+        self._policies: dict[int, TopicPolicy] = {}
+
+    def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
+        """Treat messages of a topic by `policy` from now on."""
+        self._policies[topic_id] = policy
+
+    def policy(self, topic_id: int) -> TopicPolicy:
+        """The policy of a topic; the default one where nobody set another."""
+        return self._policies.get(topic_id, DEFAULT_POLICY)
+
+    def judge(
+        self,
+        topic_id: int,
+        payload: bytes,
+        is_compressed: bool,
+        origin_at: float | None,
+        now: float,
+    ) -> tuple[bytes, str | None]:
+        """(the message as it was submitted, the ledger's reason for dropping it or None).
+
+        `origin_at` is when it was submitted, None where no STAMP told.
+        """
+        if topic_id >= self._n_topics:
+            return payload, "rx_unknown_topic"
+        policy, reason = self.policy(topic_id), None
+        if is_compressed:
+            most = policy.max_bytes or self._max_expanded
+            payload, reason = self._inflated.expand(payload, most)
+        if reason is None:
+            reason = _refusal(payload, policy, origin_at, now)
+        # Without a control channel nobody can know.
+        if reason == "rx_no_age" and not self._has_control:
+            reason = None
+        return payload, reason
+
+
+def _refusal(
+    payload: bytes, policy: TopicPolicy, origin_at: float | None, now: float
+) -> str | None:
+    """Why a whole message is not handed over."""
+    if len(payload) < CDR_HEADER_SIZE:
+        return "rx_bad_cdr"
+    if policy.max_bytes and len(payload) > policy.max_bytes:
+        return "rx_size_cap"
+    if policy.own_lifespan_s < inf:
+        if origin_at is None:
+            return "rx_no_age" if policy.stamp else None
+        if now - origin_at > policy.own_lifespan_s:
+            return "rx_expired"
+    return None

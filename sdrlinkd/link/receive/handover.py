@@ -1,0 +1,95 @@
+"""Messages at the moment that they are handed over: how old they are, and who falls silent."""
+
+from typing import NamedTuple
+
+from sdrlinkd.link.queue import TopicPolicy
+from sdrlinkd.link.receive.deadman import Deadman
+from sdrlinkd.link.receive.delivered import Delivered
+from sdrlinkd.link.receive.latency import Latency
+from sdrlinkd.reports import LatencyReport
+from sdrlinkd.wire import Waits
+
+
+class AgeReport(NamedTuple):
+    """How late messages of one topic of one source came; None: no STAMP has told.
+
+    `stops`: stop messages published because nothing came.
+    """
+
+    last_ms: float | None = None
+    p50_ms: float | None = None
+    p99_ms: float | None = None
+    latency: LatencyReport | None = None
+    stops: int = 0
+
+
+class Handover:
+    """Latencies and dead-man timers, by (source, topic id)."""
+
+    def __init__(self) -> None:
+        self._latencies: dict[tuple[int, int], Latency] = {}
+        self._waits: dict[tuple[int, int], Waits] = {}
+        """Why messages waited at their source, as that tells."""
+        self._deadman = Deadman()
+
+    def deliver(self, message: Delivered, policy: TopicPolicy, now: float) -> float | None:
+        """Note that `message` is handed over at `now`; its age in s, None when unknown."""
+        key = message.src, message.topic_id
+        if policy.deadman_s:
+            self._deadman.fresh(*key, now, policy.deadman_s)
+        if message.origin_at is None:
+            return None
+        latency = self._latencies.get(key)
+        if latency is None:
+            latency = self._latencies[key] = Latency()
+        return latency.add(message.parts(now), now)
+
+    def take_waits(self, src: int, waits: Waits) -> None:
+        """Remember what robot `src` tells of the waits of one of its topics."""
+        self._waits[src, waits.topic_id] = waits
+
+    @property
+    def silence_at(self) -> float:
+        """When the first command topic falls silent, if nothing comes before; s."""
+        return self._deadman.next_at
+
+    def take_silent(self, now: float) -> list[tuple[int, int]]:
+        """(source, topic id) of command topics that fell silent, each once."""
+        return self._deadman.take_due(now)
+
+    def forget(self, topic_id: int) -> None:
+        """Let a topic be silent."""
+        self._deadman.forget(topic_id)
+
+    def report(self, src: int, topic_id: int) -> AgeReport:
+        """How late messages of a topic of robot `src` came, and why."""
+        key, stops = (src, topic_id), self._deadman.stops.get((src, topic_id), 0)
+        latency = self._latencies.get(key)
+        if latency is None:
+            return AgeReport(stops=stops)
+        return AgeReport(
+            latency.last_ms(),
+            latency.quantile_ms(0.5),
+            latency.quantile_ms(0.99),
+            _latency_report(latency, self._waits.get(key)),
+            stops,
+        )
+
+
+def _latency_report(latency: Latency, waits: Waits | None) -> LatencyReport:
+    parts, period = latency.parts(), latency.period_ms()
+    wait_ms = 1e3 * parts.wait_s
+    split = {}
+    if waits is not None and (whole := sum(waits[1:])):
+        names = ("queue_ms", "access_ms", "again_ms")
+        split = {n: wait_ms * share / whole for n, share in zip(names, waits[1:], strict=True)}
+    return LatencyReport(
+        wait_ms=wait_ms,
+        reassembly_ms=1e3 * parts.reassembly_s,
+        air_ms=1e3 * parts.air_s,
+        handover_ms=1e3 * parts.handover_s,
+        period_ms=period[0] if period else None,
+        jitter_ms=period[1] if period else None,
+        percentiles_ms=latency.percentiles_ms(),
+        **split,
+    )

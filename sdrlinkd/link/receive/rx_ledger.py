@@ -1,0 +1,123 @@
+"""The receive half of the ledger: every PDU and every message ends under one name."""
+
+from collections import Counter
+from collections.abc import Hashable
+from typing import NamedTuple
+
+from sdrlinkd.link.queue import RxTally, balance
+from sdrlinkd.reports import ReceivedTopicReport, RxReport
+from sdrlinkd.wire import Registry
+
+
+class Held(NamedTuple):
+    """Messages begun since the start, and those of them that wait for the rest."""
+
+    started: int
+    held: int
+    held_bytes: int
+
+
+class RxLedger:
+    """Counts PDUs heard, and messages by (source, topic id)."""
+
+    def __init__(self, registry: Registry) -> None:
+        self._registry = registry
+        self._tallies: dict[tuple[int, int], RxTally] = {}
+        self._pdus_heard = 0
+        self._pdus_used = 0
+        self._pdus_dropped: Counter[str] = Counter()
+        self._control_bad = 0
+        self.fragments_repaired = 0
+        """Fragments computed from parity."""
+
+    def hear(self) -> None:
+        """Count a PDU that came."""
+        self._pdus_heard += 1
+
+    def use(self) -> None:
+        """Count a PDU that brought entries."""
+        self._pdus_used += 1
+
+    def drop_pdu(self, reason: str) -> None:
+        """Count a PDU that ended under a reason of RX_PDU_REASONS."""
+        self._pdus_dropped[reason] += 1
+
+    def not_relayed(self) -> None:
+        """Count the last PDU to be forwarded as one for others: the queue did not take it."""
+        self._pdus_dropped["rx_relayed"] -= 1
+        self._pdus_dropped["rx_not_for_us"] += 1
+
+    def skip_records(self, n: int) -> None:
+        """Count control entries that could not be read (rx_control_bad)."""
+        self._control_bad += n
+
+    def repair(self, n: int) -> None:
+        """Count fragments computed from parity."""
+        self.fragments_repaired += n
+
+    def tally(self, src: int, topic_id: int) -> RxTally:
+        """The messages of one topic of one source."""
+        tally = self._tallies.get((src, topic_id))
+        if tally is None:
+            tally = self._tallies[src, topic_id] = RxTally()
+        return tally
+
+    def report(self, held: Held) -> RxReport:
+        """The sums over all topics."""
+        return RxReport(
+            pdus_heard=self._pdus_heard,
+            pdus_used=self._pdus_used,
+            pdus_dropped=dict(+self._pdus_dropped),
+            started=held.started,
+            delivered=self._delivered,
+            held=held.held,
+            held_bytes=held.held_bytes,
+            dropped=dict(self._dropped),
+            control_bad=self._control_bad,
+        )
+
+    def report_topics(self) -> list[ReceivedTopicReport]:
+        """Each topic of each source, but for rates, ages, and names on the bus."""
+        reports = []
+        for (src, topic_id), tally in sorted(self._tallies.items()):
+            topic = self._registry.by_id(topic_id)
+            ended = tally.delivered + sum(tally.dropped.values())
+            reports.append(
+                ReceivedTopicReport(
+                    src=src,
+                    topic_id=topic_id,
+                    name="/" + topic.name if topic else f"(topic id {topic_id})",
+                    republished_as="",
+                    delivered=tally.delivered,
+                    delivered_bytes=tally.delivered_bytes,
+                    dropped=dict(tally.dropped),
+                    pdr=tally.delivered / ended if ended else None,
+                )
+            )
+        return reports
+
+    def counters(self) -> dict[Hashable, int]:
+        """The counters of which people are shown rates."""
+        found: dict[Hashable, int] = {}
+        for key, tally in self._tallies.items():
+            found["rx", *key] = tally.delivered
+            found["delivered_bytes", *key] = tally.delivered_bytes
+        return found
+
+    def audit(self, held: Held) -> list[str]:
+        """What does not add up; empty when all does."""
+        return balance(
+            "rx pdus", self._pdus_heard, {"used": self._pdus_used, **self._pdus_dropped}
+        ) + balance(
+            "rx messages",
+            held.started,
+            {"delivered": self._delivered, "held": held.held, **self._dropped},
+        )
+
+    @property
+    def _delivered(self) -> int:
+        return sum(tally.delivered for tally in self._tallies.values())
+
+    @property
+    def _dropped(self) -> Counter[str]:
+        return sum((tally.dropped for tally in self._tallies.values()), Counter())

@@ -1,0 +1,47 @@
+"""What others' traffic means for ours: whose turn it is, how fast to send, and what is due next."""
+
+from sdrlinkd.link.qos import CLASSES, Qos
+from sdrlinkd.link.receive import PduHeard
+from sdrlinkd.link.schedule import Forecasts
+from sdrlinkd.link.transmit.fit import Fit
+from sdrlinkd.wire import CONTROL_TOPIC_ID, Beacon, Frame, LinkReport, Record
+
+
+class Overheard:
+    """Hands what was heard to the access policy, to rate control, and to the forecasts."""
+
+    def __init__(self, fit: Fit, forecasts: Forecasts, own_id: int, has_control: bool) -> None:
+        self._access, self._rate = fit.settled.access, fit.rate
+        self._forecasts = forecasts
+        self._own_id = own_id
+        self._has_control = has_control
+
+    def pdu(self, event: PduHeard) -> None:
+        """Take note of a good PDU that somebody else has sent."""
+        pdu, stamps, at, is_relayed = event
+        src = pdu.src
+        self._access.heard(src, at, is_relayed)
+        if not is_relayed:
+            self._rate.heard(src, at)
+        qos = CLASSES[pdu.qos]
+        if not self._access.others_follow or qos > Qos.LATENCY or src == self._own_id:
+            return
+        # What others send at their beat needs the air then, too.
+        ages = {} if is_relayed else {(each.topic_id, each.entry_id): each for each in stamps}
+        for entry in pdu.entries:
+            if not entry.index and not (entry.topic_id == CONTROL_TOPIC_ID and self._has_control):
+                stamp = ages.get((entry.topic_id, entry.entry_id))
+                origin = at if stamp is None else at - 1e-6 * stamp.age_us
+                self._forecasts.note((src, entry.topic_id), qos, origin)
+
+    def record(self, src: int, record: Record, at: float) -> None:
+        """Take note of what robot `src` tells of who hears whom, and of its schedule."""
+        if isinstance(record, LinkReport):
+            if record.node == self._own_id:
+                self._rate.take(src, record, at)
+            else:
+                self._access.told_of(record.node, at)
+        elif isinstance(record, Beacon):
+            self._access.beacon(src, at)
+        elif isinstance(record, Frame):
+            self._access.take_frame(src, record, at)
