@@ -1,4 +1,4 @@
-"""Acquisition: from the detector's peak to a header that is read and a channel that is known."""
+"""Acquisition leads from the detector's peak to a header that is read and a known channel."""
 
 import math
 from typing import NamedTuple
@@ -23,7 +23,7 @@ from phy.reference.transmitter import header_samples
 
 
 class Acquired(NamedTuple):
-    """A burst whose header was read, and what its payload is to be equalised with.
+    """A burst was acquired: its header is read, and its payload can be equalised.
 
     `origin` is the absolute index at which samples turned back by `frequency` have phase 0, and
     `window` that at which the first payload symbol's FFT begins.
@@ -44,17 +44,17 @@ class Missed(NamedTuple):
 
 
 def before(grid: Numerology) -> int:
-    """Acquisition needs so many samples before the nominal start of the first long symbol."""
+    """Acquisition needs this many samples before the nominal start of the first long symbol."""
     return preamble.long_start(grid) + SEARCH + BACKOFF
 
 
 def needed_after(grid: Numerology) -> int:
-    """Acquisition needs so many samples from there on."""
+    """Acquisition needs this many samples from the nominal start of the first long symbol on."""
     return SEARCH + preamble.N_LONG * grid.n_fft + n_symbols(grid) * grid.n_symbol
 
 
 class Acquisition:
-    """Acquisition on one grid, for offsets up to `max_frequency` cycles a sample.
+    """Acquisition works on one grid, for offsets up to `max_frequency` cycles a sample.
 
     `carrier_cycles` is how many cycles a carrier that is made by the same crystal makes in a
     sample; 0 says that nothing is known of it.
@@ -72,7 +72,7 @@ class Acquisition:
     def acquire(
         self, x: NDArray[np.complex64], base: int, coarse: float, dc: complex
     ) -> Acquired | Missed:
-        """A burst is read whose first long symbol is nominally at `x[before(grid)]`.
+        """The method reads the burst whose first long symbol is nominally at `x[before(grid)]`.
 
         `base` is the absolute index of `x[0]`, `coarse` the frequency that the peak tells, modulo
         1/16 cycles a sample.
@@ -141,17 +141,17 @@ class Acquisition:
 
 
 def header_carriers(header: BurstHeader, grid: Numerology) -> Carriers:
-    """A header's carriers as sent, its peaks cut off `[n, n_used]`."""
+    """A header is sent on these carriers `[n, n_used]`; its cut peaks have moved them a little."""
     samples: Samples = header_samples(header, grid)
     starts = grid.n_cp + grid.n_symbol * np.arange(n_symbols(grid))
     return to_carriers(samples, starts, 0.0, 0j, grid)
 
 
 def _snr_db(channel: Channel, grid: Numerology) -> float:
-    """SNR over the band: noise is in 64 carriers, the signal in 52."""
+    """The SNR counts noise in all 64 carriers and the signal in 52, in dB."""
     return decibel(channel.gain / channel.no * grid.n_used / grid.n_fft)
 
 
 def decibel(ratio: float) -> float:
-    """A ratio of powers is told in dB, to three places."""
+    """The function returns a ratio of powers in dB, rounded to three places."""
     return math.floor(1e4 * math.log10(max(ratio, 1e-30)) + 0.5) / 1e3

@@ -1,4 +1,4 @@
-"""A burst's channel, as far as the receiver knows it; the simulated air is `phy.channel`."""
+"""The channel is what the receiver knows of a burst's way; the simulated air is `phy.channel`."""
 
 from dataclasses import dataclass, field
 
@@ -13,7 +13,7 @@ LEAST_NOISE = 1e-4
 
 @dataclass
 class Channel:
-    """The gains, the noise, and how well each group of the smoother is known.
+    """A channel holds gains, noise, and how well each group of the smoother is known.
 
     Gains are in the order of `grid.used`. A group's numbers are a variance and a power, each for
     one dimension of it; the last group is what is in no other.
@@ -36,5 +36,5 @@ class Channel:
 
     @property
     def noise(self) -> float:
-        """The noise that certainty is told by is N, but not less than there always is."""
+        """The noise that LLRs count with is N, or the least there always is if that is more."""
         return max(self.no, LEAST_NOISE * self.gain)

@@ -33,7 +33,7 @@ SLOWEST = 1 / 64
 
 
 def sums(x: NDArray[np.complexfloating], dc: complex) -> tuple[Samples, NDArray[np.float64]]:
-    """Samples `[191 + n]` have (P, E) at their last n samples.
+    """The function returns P and E `[n]` of the last n of the samples `[191 + n]`.
 
     P[n] = Σ_{k=0}^{10} b_k Σ_{m=0}^{15} y[n−16(10−k)−m] y*[n−16(11−k)−m]
     E[n] = 11/12 Σ_{m=0}^{191} |y[n−m]|²
@@ -49,7 +49,7 @@ def sums(x: NDArray[np.complexfloating], dc: complex) -> tuple[Samples, NDArray[
 
 
 def _neighbours(x: NDArray[np.complexfloating], dc: complex) -> Samples:
-    """Entry i is Σ_{m=0}^{15} y[i+16+m] y*[i+m]: a segment against the one before it."""
+    """Entry i compares a segment with the one before it: Σ_{m=0}^{15} y[i+16+m] y*[i+m]."""
     y = x.astype(np.complex128) - dc
     products = y[SEGMENT:] * y[:-SEGMENT].conj()
     total: Samples = sliding_window_view(products, SEGMENT).sum(axis=-1)
@@ -57,7 +57,7 @@ def _neighbours(x: NDArray[np.complexfloating], dc: complex) -> Samples:
 
 
 class Detector:
-    """The detector remembers of a stream its DC and how wary false alarms have made it."""
+    """The detector remembers the DC of a stream, and how wary false alarms have made it."""
 
     def __init__(self, start: int) -> None:
         self.dc = 0j
@@ -65,7 +65,7 @@ class Detector:
         self._excess, self._raised_at = 0.0, start
 
     def crossing(self, x: NDArray[np.complexfloating], at: int) -> int | None:
-        """The first of 512 samples with |P| > threshold · E is returned, None if there is none.
+        """The method returns the first of 512 samples with |P| > threshold · E, or None.
 
         `x` `[191 + 512]` ends with those samples, of which the first has the absolute index `at`.
         The result is an absolute index. A hop without a crossing tells the DC.
@@ -81,7 +81,7 @@ class Detector:
         return None
 
     def strongest(self, x: NDArray[np.complexfloating]) -> tuple[int, float | None]:
-        """The largest |P| / E after 191 samples of `x` is returned: (its offset, frequency).
+        """The method finds the largest |P| / E after 191 samples of `x`: (its offset, frequency).
 
             f = arg P / (2π16), modulo 1/16 cycles a sample
 
@@ -105,4 +105,5 @@ class Detector:
         self._raised_at = peak
 
     def _excess_at(self, index: int) -> float:
+        """The threshold is raised by this much at an absolute index."""
         return self._excess * math.exp((self._raised_at - index) / FORGETS)

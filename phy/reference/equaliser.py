@@ -22,7 +22,7 @@ LEAST_MASS = BLOCK / 4
 
 
 class Decided(NamedTuple):
-    """What was probably sent on the data carriers of a symbol."""
+    """The LLRs decide what was probably sent on the data carriers of a symbol."""
 
     mean: Carriers
     """E s `[n_data]`."""
@@ -42,12 +42,12 @@ class Equaliser:
     def equalise(
         self, y: Carriers, number: int, modulation: Modulation
     ) -> tuple[NDArray[np.int16], Carriers]:
-        """A symbol `[n_used]` becomes (LLRs in the order of the code, equalised points `[n_data]`).
+        """The method makes LLRs in the order of the code, and points, of a symbol `[n_used]`.
 
             u = Y exp(−j(φ + sk)) / Ĥ;  L = |Ĥ|²/N (min_{x: bit 1} |u − x|² − min_{x: bit 0} …)
 
-        LLRs `[n_data · bits]` are in eighths, positive for 0. The header's first symbol is number
-        0, and symbols follow one another.
+        LLRs `[n_data · bits]` are in eighths, positive for 0; the equalised points are `[n_data]`.
+        The header's first symbol has `number` 0, and symbols follow one another.
         """
         sign = float(polarity(1, number)[0])
         self.tracking.predict()
@@ -92,6 +92,7 @@ class Equaliser:
         self._forget_block()
 
     def _forget_block(self) -> None:
+        """A new block begins with empty sums."""
         self._sums = np.zeros(self._grid.n_used, np.complex128)
         self._masses = np.zeros(self._grid.n_used)
         self._certain, self._n_heard = 0.0, 0
@@ -100,7 +101,7 @@ class Equaliser:
 def demap(
     u: Carriers, certainty: NDArray[np.float64], modulation: Modulation
 ) -> tuple[NDArray[np.int16], Decided]:
-    """Points `[n]` become (LLRs `[n · bits]` point by point, what was probably sent).
+    """The function makes LLRs `[n · bits]` of points `[n]`, and decides what was sent.
 
     `certainty` `[n]` is |Ĥ|²/N. Quantised LLRs are eighths, cut towards 0. BPSK has no imaginary
     axis.

@@ -1,4 +1,4 @@
-"""The burst header: which fields its bits are, how they are coded, and how they are read again.
+"""The header tells a burst's MCS, PDUs and network; it is coded and read again here.
 
     mcs 4 · PDUs 6 · PDU length 11 · network 3 · CRC-8, then 6 zeros, rate 1/2: 76 bits
 
@@ -26,7 +26,7 @@ def header_bits(header: BurstHeader, n_coded: int) -> NDArray[np.uint8]:
 
 
 def folded(llr: NDArray[np.int16]) -> NDArray[np.int16]:
-    """LLRs of a bit and of its repetitions are added up: `[n]` to `[76]`, at most ±MAX_LLR."""
+    """The LLRs of a bit and of its repetitions add up: `[n]` become `[76]`, at most ±MAX_LLR."""
     padded = np.zeros(-(-len(llr) // N_CODED) * N_CODED, np.int64)
     padded[: len(llr)] = llr
     total = padded.reshape(-1, N_CODED).sum(axis=0)

@@ -1,4 +1,4 @@
-"""The LDPC code: what a block of a PDU is coded to, and how it is decoded again.
+"""The LDPC code protects the blocks of PDUs; this module codes and decodes them.
 
 A parity-check matrix is made of Z × Z blocks, each zero or the identity shifted right by s: check z
 of a block row takes bit (z + s) mod Z of the block column (IEEE 802.11-2020, Annex F; `phy.ldpc`
@@ -25,7 +25,7 @@ WEIGHT = 14
 
 
 def taken(code: QuasiCyclic) -> NDArray[np.int64]:
-    """Row e is which bit of its block column each check takes on edge e `[edges, Z]`."""
+    """Row e tells which bit of its block column each check takes on edge e `[edges, Z]`."""
     return (np.arange(code.z) + code.shifts[:, None]) % code.z
 
 
@@ -104,7 +104,7 @@ def decode_blocks(
 def decode_codeword(
     llr: NDArray[np.int16], code: QuasiCyclic, max_iterations: int
 ) -> tuple[int, NDArray[np.int32]]:
-    """Layered min-sum: (iterations until all checks held or 0, posteriors `[24, Z]`).
+    """Layered min-sum returns (iterations until all checks held or 0, posteriors `[24, Z]`).
 
         rest = posterior − message;  message' = f(rest of the others);  posterior' = rest + message'
 
@@ -131,7 +131,7 @@ def decode_codeword(
 
 
 def check_messages(told: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Each check tells each of its bits this, from what the bits told it `[bits, checks]`.
+    """Each check answers each of its bits from what its other bits told it `[bits, checks]`.
 
         message_i = 14/16 · min_{j ≠ i} |told_j| · Π_{j ≠ i} sign told_j
 

@@ -1,4 +1,4 @@
-"""OFDM: an inverse FFT makes samples of carriers, an FFT makes carriers of samples.
+"""OFDM makes samples of carriers with an inverse FFT, and carriers of samples with an FFT.
 
 The cyclic prefix makes the echoes' convolution circular. So a window that begins inside the prefix
 sees every carrier times one complex gain, and echoes never mix carriers.

@@ -1,4 +1,4 @@
-"""Offset again: the whole preamble, re-made with the channel, tells the likeliest frequency."""
+"""The whole preamble, re-made with the channel, tells the likeliest offset of the carrier."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ FREQUENCIES = np.linspace(-0.12, 0.12, 25) / 64
 
 
 def refine(z: Samples, h: Carriers, grid: Numerology) -> float:
-    """The likeliest correction of the frequency is returned, in cycles a sample.
+    """The function returns the likeliest correction of the frequency, in cycles a sample.
 
         z_i = Σ_m z[t+m] w*[t+m];  f maximises |Σ_i z_i exp(−j2πft_i)|
 

@@ -1,4 +1,4 @@
-"""A burst's payload: which symbols are in, and which PDUs they hold."""
+"""The payload of a burst keeps count of its symbols and of the PDUs in them."""
 
 import math
 
@@ -36,7 +36,7 @@ class Payload:
 
     @property
     def n_done(self) -> int:
-        """So many PDUs were decoded, well or badly."""
+        """This many PDUs were decoded, well or badly."""
         return self.n_good + self.n_bad
 
     def window(self, symbol: int) -> int:
@@ -48,7 +48,7 @@ class Payload:
         return self.window(n) - self._grid.n_cp
 
     def take(self, samples: NDArray[np.complex64], dc: complex) -> NDArray[np.complex128]:
-        """The next symbol's FFT window `[n_fft]` is taken in; its points `[n_data]` are told."""
+        """The method takes in the next symbol's FFT window `[n_fft]`, and returns its points."""
         found, grid, number = self.acquired, self._grid, self.n_symbols_in
         origin = self.window(number) - found.origin
         y = to_carriers(samples, np.array([0]), found.frequency, dc, grid, origin)[0]
@@ -59,12 +59,12 @@ class Payload:
         return points
 
     def is_next_in(self) -> bool:
-        """The symbols of the next PDU are all in."""
+        """The answer is True when the symbols of the next PDU are all in."""
         plan = self.plan
         return self.n_done < plan.n_pdus and len(self._llr) >= plan.coded_bits
 
     def decode(self) -> bytes | None:
-        """The next PDU is returned, None when its CRC-32 is wrong."""
+        """The method returns the next PDU, or None when its CRC-32 is wrong."""
         plan, size = self.plan, self.plan.block_bytes
         bits = decode_blocks(self._llr[: plan.coded_bits], plan.form)
         block = np.packbits(bits) ^ whitening(size, self.n_done * size)
@@ -75,13 +75,13 @@ class Payload:
         return data
 
     def is_gone(self) -> bool:
-        """The symbols since the last PDU have too little power above the noise to be a burst's."""
+        """The answer is True when the symbols since the last PDU had no power of a burst."""
         channel = self.acquired.equaliser.channel
         powers = self._powers
         return bool(powers) and float(np.mean(powers)) < channel.no + FADED * channel.gain
 
-    def go_on(self) -> None:
-        """What was taken in is dealt with: powers count anew, and windows may slip."""
+    def count_powers_anew(self) -> None:
+        """The powers of symbols count from here on for the next PDU."""
         self._powers = []
 
     def slip(self) -> None:

@@ -1,4 +1,4 @@
-"""The receiver: a stream of samples in, PDUs out, in the order of "What is received".
+"""The receiver takes a stream of samples and tells PDUs, in the order of "What is received".
 
 SEARCH → ALIGN → ACQUIRE → PAYLOAD. Each state waits until the samples it needs are there. What it
 makes of a sample never depends on how many came with it: any chunking yields the same events.
@@ -80,7 +80,7 @@ class Receiver:
         return self._first + len(self._samples)
 
     def push(self, samples: NDArray[np.complex64]) -> list[Event]:
-        """The next samples `[n]` are taken; what they complete is returned."""
+        """The receiver takes the next samples `[n]`, and returns the events that they complete."""
         x = np.array(samples, np.complex64)
         with np.errstate(invalid="ignore"):
             good = (np.abs(x.real) < LARGEST_SAMPLE) & (np.abs(x.imag) < LARGEST_SAMPLE)
@@ -128,7 +128,7 @@ class Receiver:
         self._at = self._began = index
 
     def _view(self, first: int, last: int) -> NDArray[np.complex64] | None:
-        """Samples from absolute index `first` up to before `last`; None while some are missing."""
+        """The samples from `first` to before `last` are returned, or None if some are missing."""
         if last > self.next_index:
             return None
         return self._samples[first - self._first : last - self._first]
@@ -227,7 +227,7 @@ class Receiver:
                 if burst.n_done < burst.plan.n_pdus and burst.is_gone():
                     self._end(burst, events, "faded")
                     return True
-            burst.go_on()
+            burst.count_powers_anew()
         if burst.n_done == burst.plan.n_pdus:
             self._end(burst, events, "whole")
         else:

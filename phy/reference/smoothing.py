@@ -22,23 +22,23 @@ DRIFT_RISE, DRIFT_FALL = 0.5, 0.1
 
 @cache
 def basis(grid: Numerology) -> tuple[NDArray[np.float64], ...]:
-    """1, cos k, sin k, cos 2k, … (2πk/64), made orthonormal, are rows in groups `[m, n_used]`."""
+    """The basis is 1, cos k, sin k, cos 2k, … (2πk/64), orthonormal, in groups `[m, n_used]`."""
     angle = 2 * np.pi * grid.used / grid.n_fft
     outermost = tuple(range(GROUPS[-1][-1] + 1, grid.n_cp + 1))
     rows: list[NDArray[np.float64]] = []
     ends = []
     for group in filter(None, (*GROUPS, outermost)):
         for delay in group:
-            rows += (
-                [np.cos(delay * angle), np.sin(delay * angle)] if delay else [np.ones_like(angle)]
-            )
+            rows.append(np.cos(delay * angle))
+            if delay:
+                rows.append(np.sin(delay * angle))
         ends.append(len(rows))
     orthonormal, _ = np.linalg.qr(np.array(rows).T)
     return tuple(np.split(orthonormal.T, ends[:-1]))
 
 
 def sizes(grid: Numerology) -> NDArray[np.int64]:
-    """The groups and what is in none have so many dimensions each `[groups + 1]`."""
+    """Each group, and at last what is in none, has this many dimensions `[groups + 1]`."""
     own = [len(rows) for rows in basis(grid)]
     return np.array([*own, grid.n_used - sum(own)])
 
@@ -55,7 +55,7 @@ def centred(h: Carriers, delay: float, grid: Numerology) -> Carriers:
 
 
 def split(x: Carriers, wanted: NDArray[np.bool_], grid: Numerology) -> Carriers:
-    """`x` is the sum of these parts `[groups + 1, n_used]`.
+    """The function splits `x` `[n_used]` into parts of each group `[groups + 1, n_used]`.
 
     What is in none of the groups `wanted` `[groups + 1]` is the last part.
     """
@@ -92,13 +92,14 @@ def smooth(h: Carriers, variance: float, channel: Channel, grid: Numerology) -> 
 
 
 def follow(error: Carriers, variance: float, channel: Channel, grid: Numerology) -> None:
-    """Gains that later symbols contradict by `error` `[n_used]`, noisy by `variance`, are mended.
+    """The channel moves towards later symbols, which contradict it by `error` `[n_used]`.
 
         p' = p + drift · power;  weight = p' / (p' + v);  p = p' (1 − weight)
 
-    That is a Kalman filter for each group, p being what is unknown of a dimension. The drift
-    follows how much the errors exceed, by two standard deviations, what noise and ignorance
-    explain. Groups in which nothing was found count as noise, all together.
+    That is a Kalman filter for each group, p being what is unknown of a dimension and v the
+    `variance` of the error. The drift follows how much the errors exceed, by two standard
+    deviations, what noise and ignorance explain. Groups in which nothing was found count as noise,
+    all together.
     """
     m, power = sizes(grid), channel.power
     parts = split(centred(error, channel.delay, grid), power > 0, grid)

@@ -1,4 +1,4 @@
-"""Timing: the long training is correlated with what was sent, at each frequency in reach."""
+"""Timing correlates the long training with what was sent, at each frequency in reach."""
 
 import math
 from functools import cache
@@ -28,9 +28,9 @@ COARSE_ERROR = 0.008
 
 @cache
 def templates(grid: Numerology, max_frequency: float) -> Samples:
-    """The long symbol l, shifted by each multiple a/16 that offsets up to `max_frequency` need.
+    """The long symbol l is shifted by each multiple a/16 that offsets up to `max_frequency` need.
 
-    The shape is `[2A + 1, n_fft]`, from −A/16 to A/16.
+    The shape is `[2A + 1, n_fft]`, from −A/16 to A/16 cycles a sample.
     """
     reach = (max_frequency + COARSE_ERROR - AMBIGUITY / 2) / AMBIGUITY
     n_aliases = max(0, math.ceil(reach))
@@ -40,7 +40,7 @@ def templates(grid: Numerology, max_frequency: float) -> Samples:
 
 
 def strengths(z: Samples, shifted: Samples, n_offsets: int) -> NDArray[np.float64]:
-    """Samples match two long symbols in a row at each offset by S `[aliases, n_offsets]`.
+    """S `[aliases, n_offsets]` tells how well samples match two long symbols from each offset on.
 
         c[a, o] = Σ_m z[o+m] l*[a, m];  S[a, o] = |c[a, o] + c[a, o+64]|²
 
@@ -56,12 +56,13 @@ def strengths(z: Samples, shifted: Samples, n_offsets: int) -> NDArray[np.float6
 
 
 def locate(z: Samples, shifted: Samples) -> tuple[int, float] | None:
-    """(first sample of the long training's first echo, frequency in cycles a sample) is found.
+    """The function finds (first sample of the long training, frequency in cycles a sample).
 
         S > 0.12 · 128 · Σ|y|² over the 128 samples;  f = a/16 + arg Σ_i r_i r*_{i−1} / (2π64)
 
-    r_i is how well the i-th 64 samples match. `z` is turned back by what the peak tells, and begins
-    SEARCH samples before the nominal place. None says that no long training is there.
+    r_i is how well the i-th 64 samples match. The first sample is that of the first echo. `z` is
+    turned back by what the peak tells, and begins SEARCH samples before the nominal place. None
+    says that no long training is there.
     """
     n = shifted.shape[1]
     s = strengths(z, shifted, 2 * SEARCH)

@@ -1,4 +1,4 @@
-"""Tracking: two Kalman filters follow the phase of all carriers and its slope over them.
+"""Tracking follows the phase of all carriers and its slope over them by two Kalman filters.
 
 The phase turns with the offset that is left and with the oscillators' noise. The slope grows as the
 sender's sampling clock runs away from ours.
@@ -25,7 +25,7 @@ _MOVE = np.array([[1.0, 1.0], [0.0, 1.0]])
 
 
 class Kalman:
-    """A Kalman filter with the state (value, rate), one symbol a step."""
+    """A Kalman filter follows the state (value, rate), one symbol a step."""
 
     def __init__(self, noise: tuple[float, float], rate: float, rate_deviation: float) -> None:
         self.state = np.array([0.0, rate])
@@ -51,7 +51,7 @@ class Kalman:
 
 
 class Tracking:
-    """Phase φ and slope s of a burst, as its pilots tell them symbol by symbol.
+    """The pilots of a burst tell its phase φ and slope s, symbol by symbol.
 
     `clock_error` is the share by which the sender's sampling clock is fast as far as the carrier
     tells it, None where nobody knows.
@@ -67,7 +67,7 @@ class Tracking:
         self.slope = Kalman(SLOPE_NOISE, turn * (clock_error or 0.0), turn * doubt)
 
     def predict(self) -> None:
-        """A symbol passes."""
+        """A symbol passes: φ and s move by their rates."""
         self.phase.predict()
         self.slope.predict()
 
@@ -77,7 +77,7 @@ class Tracking:
         return np.asarray(y * np.exp(-1j * angle))
 
     def correct(self, y: Carriers, polarity: float, channel: Channel) -> float:
-        """A symbol `y` `[n_used]` corrects φ and s; the noise power that its pilots show is told.
+        """A symbol `y` `[n_used]` corrects φ and s; the result is the noise that its pilots show.
 
         θ_p = arg(Y_p Ĥ*_p P_p) − φ − s k_p;  S_i = Σ|Ĥ_p|² k_p^i
         Var(φ) = N/2 · S₂ / (S₀S₂ − S₁²),  Var(s) = N/2 · S₀ / (S₀S₂ − S₁²)
@@ -90,10 +90,11 @@ class Tracking:
     def correct_by(
         self, turned: Carriers, weight: NDArray[np.float64], k: NDArray[np.int64], no: float
     ) -> float:
-        """What pilots came as, times the conjugate of what they should be, corrects φ and s.
+        """The pilots correct φ and s by weighted least squares over their angles.
 
-        `turned`, `weight` |Ĥ_p|² and carriers `k` are `[n]`. The noise power is returned: `no`, or
-        what the pilots' disagreement shows where it is far more than that.
+        `turned` is what came, turned back as predicted, times the conjugate of what should have
+        come; `weight` is |Ĥ_p|², `k` are the carriers, each `[n]`. The result is the noise power on
+        a carrier: `no`, or where pilots disagree by far more than that, what they show.
         """
         total = turned.sum()
         if total == 0:
@@ -107,12 +108,13 @@ class Tracking:
         if disagreement > SURPRISE * len(turned) * no:
             no = float(disagreement / len(turned))
         s0, s1, s2 = (float(np.sum(weight * k**i)) for i in range(3))
-        t0, t1 = float(np.sum(weighted_theta)), float(np.sum(weighted_theta * k))
+        # Of the weighted angles, Σ θ is 0: that is how the common phase was chosen.
+        t1 = float(np.sum(weighted_theta * k))
         det = s0 * s2 - s1 * s1
         if not det > 0:
             return no
-        self.phase.correct(common + (s2 * t0 - s1 * t1) / det, no / 2 * s2 / det)
-        self.slope.correct((s0 * t1 - s1 * t0) / det, no / 2 * s0 / det)
+        self.phase.correct(common - s1 * t1 / det, no / 2 * s2 / det)
+        self.slope.correct(s0 * t1 / det, no / 2 * s0 / det)
         return no
 
     def slip(self, early: int) -> None:

@@ -1,4 +1,4 @@
-"""Training: symbols that the receiver knows tell the gain of every carrier, and the noise."""
+"""Training is what the receiver knows was sent; it tells the gain of every carrier."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ def least_squares(
 def estimate(
     y: Carriers, sent: Carriers, amplitude: NDArray[np.float64], grid: Numerology
 ) -> Channel:
-    """Known symbols tell the channel: least squares, less what must be noise of it.
+    """Known symbols tell the channel by least squares, less what must be noise of it.
 
     The noise of a gain is v = N / Σ_s a_s².
     """

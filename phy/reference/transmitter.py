@@ -44,7 +44,7 @@ class Transmitter:
         self._boost = 10 ** (preamble_boost_db / 20)
 
     def modulate(self, pdus: Sequence[bytes], mcs: int) -> NDArray[np.complex64]:
-        """A burst of 1 to 63 PDUs of equal size is returned `[n_samples]`, at mean power 1.
+        """The method returns the burst of 1 to 63 PDUs of one size `[n_samples]`, at mean power 1.
 
         ValueError tells an MCS, a number or a size of PDUs that no header can tell.
         """

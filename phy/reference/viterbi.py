@@ -1,4 +1,4 @@
-"""The K = 7 code, generators 133 and 171 (octal), and the decoder that Viterbi found (1967).
+"""The K = 7 code has the generators 133 and 171 (octal); Viterbi's algorithm decodes it (1967).
 
 A state is the last six bits, the newest highest. Each step of the trellis takes a new bit u: state
 s goes to (u·64 + s) >> 1 and sends two bits, parities of the seven-bit register u·64 + s under the
@@ -26,7 +26,7 @@ _REGISTER = (_STATE >> 5)[:, None] << 6 | _CAME_FROM
 
 
 def _sent(generator: int) -> NDArray[np.int64]:
-    """+1 where a transition `[64, 2]` sends 0, −1 where it sends 1."""
+    """A transition `[64, 2]` has +1 where it sends 0, and −1 where it sends 1."""
     tapped = _REGISTER & generator
     parity = sum(tapped >> i & 1 for i in range(7)) % 2
     return np.asarray(1 - 2 * parity, np.int64)

@@ -171,13 +171,13 @@ def test_wide_searches_find_the_same(max_frequency):
 def test_streams_with_every_kind_of_burst_are_told_alike():
     """Own and foreign bursts, false starts, bursts cut short, spoilt samples, DC."""
     all_endings, n_odd = set(), 0
-    for seed in range(40):
+    for seed in range(25):
         x, *_ = make_stream(seed)
         events = agree(x)
         all_endings |= set(endings(events))
         n_odd += sum(ending != "whole" for ending in endings(events))
     assert all_endings >= {"whole", "faded", "foreign"}
-    assert n_odd > 20
+    assert n_odd > 10
 
 
 @pytest.mark.parametrize("name", ["aeroplanes", "wifi-24", "wifi-n"])
@@ -195,7 +195,7 @@ def received(x, gap_at, gap, sizes, **settings):
     return events + receiver.flush(), receiver.counters
 
 
-@law(30)
+@law(20)
 @given(st.integers(0, 2**32), chunk_sizes, st.booleans())
 def test_any_chunking_yields_the_same_events_and_counts(seed, sizes, with_gap):
     x, gap_at, gap, _ = make_stream(seed)
@@ -280,7 +280,7 @@ def losses(mcs, snr_db, n):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("mcs", "less_db"), [(0, 0.1), (1, 0.3), (4, 0.5), (6, 0.7), (9, 0.9)])
+@pytest.mark.parametrize(("mcs", "less_db"), [(0, 0.1), (4, 0.5), (9, 0.9)])
 def test_near_threshold_as_many_are_lost(mcs, less_db):
     """Where about half are lost; noise is the same for both, so that few bursts part them."""
     n = often(40)
