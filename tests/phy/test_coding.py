@@ -1,4 +1,4 @@
-"""The convolutional code: against a plain decoder, its distances, and the union bound."""
+"""The convolutional code: against the reference, its distances, and the union bound."""
 
 from math import erfc, sqrt
 
@@ -16,6 +16,7 @@ from phy.convolutional import (
     decode,
     encode,
 )
+from phy.reference import viterbi
 from tests.laws import law
 
 SEED = 11
@@ -38,48 +39,20 @@ def decode_one(llr, n_bytes, code):
     return decode(llr[None, :], n_bytes, code, WORK)[0]
 
 
-def plain_encoder(data):
-    """802.11's figure 17-8, bit by bit."""
-    register = [0] * 7
-    out = []
-    for bit in [*np.unpackbits(data), *[0] * 6]:
-        register = [int(bit), *register[:6]]
-        out.append(sum(register[i] for i in (0, 2, 3, 5, 6)) % 2)
-        out.append(sum(register[i] for i in (0, 1, 2, 3, 6)) % 2)
-    return out
-
-
 def plain_viterbi(llr, n_bytes, pattern):
-    """Wide integers, all 64 states, no trick; of equals, the path from the even state wins."""
+    """The reference's decoder; bits that were not sent tell nothing."""
     n_steps = 8 * n_bytes + 6
     sent = np.flatnonzero(np.resize(pattern, 2 * n_steps))
     mother = np.zeros(2 * n_steps, np.int64)
     mother[sent] = llr
-    state = np.arange(64)
-    came_from = np.stack((2 * state % 64, 2 * state % 64 + 1))
-    register = (state >> 5) << 6 | came_from
-    signs = [
-        1 - 2 * np.array([[int(r & g).bit_count() & 1 for r in row] for row in register])
-        for g in (0o133, 0o171)
-    ]
-    metric = np.where(state == 0, 0, -(10**9))
-    decisions = []
-    for a, b in mother.reshape(-1, 2):
-        candidates = metric[came_from] + signs[0] * a + signs[1] * b
-        decisions.append(candidates[1] > candidates[0])
-        metric = candidates.max(axis=0)
-    at, bits = 0, []
-    for decision in reversed(decisions):
-        bits.append(at >> 5)
-        at = came_from[int(decision[at]), at]
-    return np.packbits(bits[:5:-1])
+    return np.packbits(viterbi.decode(mother)[0, : 8 * n_bytes])
 
 
-def test_the_encoder_is_the_standards():
+def test_the_encoder_is_the_references():
     data = random_blocks(np.random.default_rng(SEED), 3, 40)
     coded = encode(data, HALF)
     for row, block in zip(coded, data, strict=True):
-        assert list(row) == plain_encoder(block)
+        assert np.array_equal(row, viterbi.encode(np.unpackbits(block)))
 
 
 @pytest.mark.parametrize(
@@ -141,7 +114,7 @@ def test_five_errors_inside_a_lightest_codeword_are_too_many():
 
 @every_rate
 @pytest.mark.parametrize("kind", ["noise", "random", "extremes", "zeros", "ties"])
-def test_the_vector_decoder_agrees_with_a_plain_one(code, kind):
+def test_the_vector_decoder_agrees_with_the_reference(code, kind):
     rng = np.random.default_rng(SEED)
     for n_bytes in (1, 2, 17, 40):
         coded = encode(random_blocks(rng, 1, n_bytes), code)[0]

@@ -1,18 +1,20 @@
-"""Kernels against the formulas of their docstrings, written plainly in numpy."""
+"""Kernels against the reference, or where it has none of theirs against their formulas."""
 
 import numpy as np
 import pytest
 from numba import njit
 
-from phy import OFDM_64_16, Modulation, points
-from phy.interleaver import order
+from phy import OFDM_64_16, Modulation
 from phy.kernels.detector import FORGETS, HISTORY, detector_sums, sanitise, search
 from phy.kernels.resampler import interpolate
 from phy.kernels.rotation import lean, lean_more
 from phy.mapping import mapping
 from phy.numerology import GRIDS
-from phy.preamble import BARKER, preamble
-from phy.sequences import polarity
+from phy.preamble import preamble
+from phy.reference import detection
+from phy.reference.mapping import to_carriers
+from phy.reference.ofdm import to_samples
+from phy.reference.smoothing import centred
 from phy.stream import SampleStream
 from tests.phy.signals import noise, silence, turned
 
@@ -21,19 +23,6 @@ SEED = 47
 
 def rng():
     return np.random.default_rng(SEED)
-
-
-def plain_sums(x, dc, n):
-    """P and E of `detector_sums` for the last sample of each 192, term by term."""
-    x = x.astype(np.complex128) - dc
-    p, e = np.zeros(n, np.complex128), np.zeros(n)
-    for i in range(n):
-        at = HISTORY + i
-        for k, sign in enumerate(BARKER):
-            for m in range(16):
-                p[i] += sign * x[at - 16 * (10 - k) - m] * np.conj(x[at - 16 * (11 - k) - m])
-        e[i] = 11 / 12 * np.sum(np.abs(x[at - 191 : at + 1]) ** 2)
-    return p, e
 
 
 def sums(x, dc, n):
@@ -48,7 +37,7 @@ def test_the_detectors_sums_are_their_formula(n, dc):
     x = noise(rng(), HISTORY + n)
     x[20 : 20 + 192] += preamble()[: len(x[20 : 20 + 192])]
     p, e = sums(x, dc, n)
-    wanted_p, wanted_e = plain_sums(x, dc, n)
+    wanted_p, wanted_e = detection.sums(x, dc)
     assert p == pytest.approx(wanted_p, abs=2e-4)
     assert e == pytest.approx(wanted_e, rel=1e-5)
 
@@ -109,43 +98,17 @@ def test_numbers_too_large_or_none_become_0_and_are_counted():
     assert list(x) == [1, 0, 2j, 0, 0, 0, 99, 0, 0, 0]
 
 
-def tones_of(samples, grid):
-    """Carriers in use `[n, n_used]` of whole symbols."""
-    spectrum = np.fft.fft(samples.reshape(-1, grid.n_symbol)[:, grid.n_cp :]) / grid.scale
-    return spectrum[:, grid.bins[grid.tones]]
-
-
 @pytest.mark.parametrize("modulation", Modulation)
-def test_every_bit_is_where_the_interleaver_says(modulation):
-    grid, bits = OFDM_64_16, modulation.bits
-    coded = rng().integers(0, 2, 3 * 48 * bits, np.uint8)
-    signs = polarity(3, 7)
-    y = tones_of(mapping(modulation, grid).to_samples(coded, 7, np.inf), grid)
-    for row, block in enumerate(coded.reshape(3, -1)):
-        sent = np.empty_like(block)
-        sent[order(48 * bits, bits)] = block
-        numbers = sent.reshape(48, bits) @ (1 << np.arange(bits)[::-1])
-        assert y[row, :48] == pytest.approx(points(modulation)[numbers], abs=3e-6)
-        assert y[row, 48:] == pytest.approx(signs[row] * np.array([1, 1, 1, -1]), abs=3e-6)
-
-
 @pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS)
 @pytest.mark.parametrize("n", [1, 7, 8, 19])
-def test_symbols_are_inverse_ffts_with_prefix_and_cut_peaks(grid, n):
-    by = mapping(Modulation.QAM16, grid)
+def test_coded_bits_become_the_references_symbols(grid, modulation, n):
+    """Interleaved, mapped, with pilots, prefix and cut peaks."""
+    by = mapping(modulation, grid)
     coded = rng().integers(0, 2, n * by.symbol_bits, np.uint8)
-    sent = np.empty((n, by.symbol_bits), np.uint8)
-    sent[:, order(by.symbol_bits, 4)] = coded.reshape(n, -1)
-    numbers = sent.reshape(n, -1, 4) @ (1 << np.arange(4)[::-1])
-    spectrum = np.zeros((n, grid.n_fft), np.complex128)
-    spectrum[:, grid.bins[grid.data_at]] = points(Modulation.QAM16)[numbers]
-    pilots = polarity(n, 2)[:, None] * grid.pilot_values
-    spectrum[:, grid.bins[grid.pilots_at]] = pilots
-    body = np.fft.ifft(spectrum) * grid.scale
+    carriers = to_carriers(coded, modulation, grid, 7)
     for peak in (np.inf, 1.5):
-        cut = body * np.minimum(1, peak / np.maximum(np.abs(body), 1e-9))
-        wanted = np.concatenate((cut[:, -grid.n_cp :], cut), axis=1).reshape(-1)
-        assert by.to_samples(coded, 2, peak) == pytest.approx(wanted, abs=3e-6)
+        wanted = to_samples(carriers, grid, peak)
+        assert by.to_samples(coded, 7, peak) == pytest.approx(wanted, abs=3e-6)
 
 
 def test_interpolate_is_a_sum_of_its_filters_taps():
@@ -197,5 +160,6 @@ def test_leaning_more_adds_up(slope):
     for _ in range(100):
         _lean_more(slope, numbers, turns)
     lean(0.2 + 100 * slope, carriers, at_once)
-    assert at_once[0, :52] == pytest.approx(np.cos((0.2 + 100 * slope) * carriers), abs=1e-6)
+    wanted = centred(np.ones(52), -0.2 - 100 * slope, OFDM_64_16)[OFDM_64_16.tones]
+    assert at_once[0, :52] + 1j * at_once[1, :52] == pytest.approx(wanted, abs=1e-6)
     assert turns[:, :52] == pytest.approx(at_once[:, :52], abs=2e-5)

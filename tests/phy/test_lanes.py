@@ -1,4 +1,4 @@
-"""Eight at a time: every operation, FFTs, and what the demapper makes of carriers, by numpy."""
+"""Eight at a time: every operation by numpy, FFTs and the demapper by the reference."""
 
 import numpy as np
 import pytest
@@ -8,10 +8,11 @@ from phy import Modulation, points
 from phy.kernels import lanes
 from phy.kernels.decisions import expected_level
 from phy.kernels.demapper import axis_llrs
-from phy.kernels.demapper_plain import axis_llrs_plain, expected_level_plain
 from phy.kernels.lanes import N_LANES, load, splat, store, store_int16
 from phy.numerology import GRIDS
 from phy.ofdm import to_tones
+from phy.reference import demapper as reference
+from phy.reference.ofdm import to_carriers
 from tests.phy.signals import noise
 
 SEED = 49
@@ -68,15 +69,13 @@ def test_whole_numbers_are_cut_towards_zero():
 
 
 @pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS)
-def test_tones_are_those_of_an_fft(grid):
+def test_tones_are_those_of_the_references_fft(grid):
     x = noise(rng(), 5000)
     frequency, dc, at = 0.0173, 0.1 + 0.2j, 7
     for n in (1, 2, 7, 8, 9, 31):
         starts = np.sort(rng().integers(0, len(x) - grid.n_fft + 1, n))
         starts[-1] = len(x) - grid.n_fft
-        index = starts[:, None] + np.arange(grid.n_fft)
-        windows = (x[index] - dc) * np.exp(-2j * np.pi * frequency * (index + at)) / grid.scale
-        expected = np.fft.fft(windows)[:, grid.bins[grid.tones]]
+        expected = to_carriers(x, starts, frequency, dc, grid, at)[:, grid.tones]
         y = to_tones(x, starts, frequency, dc, grid, at)
         assert y[:, 0, : grid.n_used] + 1j * y[:, 1, : grid.n_used] == pytest.approx(
             expected, abs=2e-6
@@ -106,17 +105,17 @@ def _means(llr, axis_bits, n, mean, square):
 
 
 @pytest.mark.parametrize("axis_bits", [1, 2, 3, 4])
-def test_the_demapper_does_what_the_plain_one_says_bit_for_bit(axis_bits):
+def test_the_demapper_does_what_the_reference_says_bit_for_bit(axis_bits):
     draws, n = rng(), 800
     level = (draws.standard_normal(n) * 2**axis_bits).astype(np.float32)
     level[:4] = 0, -0.0, 1, -(2**axis_bits)
     weight = (10 ** draws.uniform(-3, 3, n)).astype(np.float32)
     llr = np.empty((axis_bits, n), np.float32)
     _llrs(level, weight, axis_bits, llr.reshape(-1))
-    assert llr.tobytes() == axis_llrs_plain(level, weight, axis_bits).tobytes()
+    assert llr.tobytes() == reference.axis_llrs(level, weight, axis_bits).tobytes()
     mean, square = np.empty((2, n), np.float32)
     _means(llr.reshape(-1), axis_bits, n, mean, square)
-    plain_mean, plain_square = expected_level_plain(llr)
+    plain_mean, plain_square = reference.expected_levels(llr)
     assert mean.tobytes() == plain_mean.tobytes()
     assert square.tobytes() == plain_square.tobytes()
 
@@ -127,7 +126,7 @@ def test_decisions_are_means_over_the_points(modulation):
     axis_bits = modulation.axis_bits
     n = 1 << axis_bits
     llr = rng().integers(-60, 61, (axis_bits, 48)).astype(np.float32)
-    mean, square = expected_level_plain(llr)
+    mean, square = reference.expected_levels(llr)
     bits = np.arange(n)[:, None] >> np.arange(axis_bits)[::-1] & 1
     of_one = 1 / (1 + np.exp(llr / 8.0))
     chance = np.prod(np.where(bits[..., None], of_one, 1 - of_one), axis=1)

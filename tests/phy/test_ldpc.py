@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phy.kernels.bits import get, put, put_signs, to_octets
-from phy.kernels.ldpc import SURE, decode_codeword
-from phy.kernels.ldpc_plain import decode_codeword_plain
+from phy.kernels.ldpc import decode_codeword
 from phy.kernels.ldpc_rows import MAX_POSTERIOR
 from phy.ldpc import (
     LIFTINGS,
@@ -23,6 +22,7 @@ from phy.ldpc import (
     new_workspace,
     segmentation,
 )
+from phy.reference import ldpc as reference
 from tests.laws import law, often
 
 RATES = [Fraction(1, 2), Fraction(2, 3), Fraction(3, 4), Fraction(5, 6)]
@@ -129,7 +129,7 @@ def test_every_check_holds_for_every_codeword(code):
 
 
 @codes
-def test_the_vectors_do_what_the_plain_decoder_says_bit_for_bit(code):
+def test_the_vectors_do_what_the_reference_says_bit_for_bit(code):
     """In noise from little to hopeless, and with values at the edges of the range."""
     rng = np.random.default_rng(SEED)
     work, form = new_workspace().content, whole(code).parcel.content
@@ -141,7 +141,7 @@ def test_the_vectors_do_what_the_plain_decoder_says_bit_for_bit(code):
         llr[rng.integers(0, code.n, at_edges)] = edges
         for n in (1, 2, 12):
             took = decode_codeword(llr, form, n, work)
-            expected, posteriors = decode_codeword_plain(llr, form, n)
+            expected, posteriors = reference.decode_codeword(llr, code, n)
             assert took == expected, (SEED, ebn0_db, n)
             assert np.array_equal(work.posteriors[:, : code.z], posteriors), (SEED, ebn0_db, n)
             outcomes.add(took > 0)
@@ -177,24 +177,16 @@ def test_blocks_of_any_size_come_back(n_bytes, rate, more, seed):
     st.floats(0, 12),
     st.integers(0, 2**32 - 1),
 )
-def test_blocks_are_decoded_as_the_plain_decoder_does_codeword_by_codeword(
-    n_bytes, rate, more, ebn0_db, seed
-):
+def test_blocks_are_coded_and_decoded_as_the_reference_does(n_bytes, rate, more, ebn0_db, seed):
     """Those too whose signs are a codeword, which are not decoded at all."""
     rng = np.random.default_rng(seed)
     form = segmentation(8 * n_bytes, rate, round(least_coded(8 * n_bytes, rate) * (1 + more)))
-    code, most = form.code, 12
-    llr = noisy(rng, encode(random_bits(rng, 1, form.n_bits), form), ebn0_db, rate)
-    expected = []
-    for share, begin, end in zip(form.shares, form.ends, form.ends[1:], strict=False):
-        word = np.zeros(code.n, np.int16)
-        word[share : code.k] = SURE
-        word[:share] = llr[0, begin : begin + share]
-        word[code.k : code.k + end - begin - share] = llr[0, begin + share : end]
-        _, posteriors = decode_codeword_plain(word, form.parcel.content, most)
-        expected.append((posteriors.reshape(-1) < 0)[:share])
-    bits = np.unpackbits(decode(llr, form, new_workspace(), most), axis=1)[0]
-    assert np.array_equal(bits, np.concatenate(expected)), seed
+    bits, most = random_bits(rng, 1, form.n_bits), 12
+    coded = encode(bits, form)
+    assert np.array_equal(coded, reference.encode_blocks(bits, form)), seed
+    llr = noisy(rng, coded, ebn0_db, rate)
+    found = np.unpackbits(decode(llr, form, new_workspace(), most), axis=1)
+    assert np.array_equal(found, reference.decode_blocks(llr, form, most)), seed
 
 
 @law()

@@ -11,6 +11,9 @@ from phy.kernels.smoothing import smooth
 from phy.kernels.timing import correlate
 from phy.kernels.training import estimate, learn, least_squares, turn_back
 from phy.numerology import GRIDS
+from phy.reference import smoothing, timing, training, viterbi
+from phy.reference.channel import Channel
+from phy.reference.ofdm import turned_back
 from tests.phy.signals import noise
 
 SEED = 48
@@ -28,15 +31,13 @@ def planes_of(x):
     return np.stack((x.real, x.imag)).astype(np.float32)
 
 
-def test_correlation_with_two_templates_in_a_row():
-    z, templates = noise(rng(), 2 * 16 + 8), noise(rng(), 3 * 16).reshape(3, 16)
+@pytest.mark.parametrize("n", [16, 64, 128])
+def test_correlation_with_two_templates_in_a_row(n):
+    """Those longer than 64 samples add up as powers."""
+    z, templates = noise(rng(), 2 * n + 8), noise(rng(), 3 * n).reshape(3, n)
     out = np.empty((3, 8), np.float32)
     correlate(planes_of(z), templates, out)
-    wanted = [
-        [np.abs(np.vdot(t, z[o : o + 16]) + np.vdot(t, z[o + 16 : o + 32])) ** 2 for o in range(8)]
-        for t in templates
-    ]
-    assert out == pytest.approx(np.array(wanted), rel=1e-4)
+    assert out == pytest.approx(timing.strengths(z, templates, 8), rel=1e-4)
 
 
 @pytest.mark.parametrize("frequency", [0.0, 0.0173, -0.49])
@@ -44,7 +45,7 @@ def test_samples_are_turned_back(frequency):
     x = noise(rng(), 679)
     out = np.empty((2, 700), np.float32)
     turn_back(x, 0.1 - 0.2j, frequency, out)
-    wanted = (x - (0.1 - 0.2j)) * np.exp(-2j * np.pi * frequency * np.arange(679))
+    wanted = turned_back(x, 0.1 - 0.2j, frequency)
     assert out[0, :679] + 1j * out[1, :679] == pytest.approx(wanted, abs=1e-5)
 
 
@@ -60,6 +61,9 @@ def test_least_squares_tells_gains_and_noise():
     assert found[0, :4] + 1j * found[1, :4] == pytest.approx(h, abs=0.03)
     assert noise_power == pytest.approx(4 * 0.3, rel=0.03)
     assert power == pytest.approx(np.sum(np.abs(h) ** 2), rel=0.03)
+    wanted, no = training.least_squares(y, sent, amplitude)
+    assert found[0, :4] + 1j * found[1, :4] == pytest.approx(wanted, abs=1e-4)
+    assert noise_power == pytest.approx(4 * no, rel=1e-3)
 
 
 @pytest.mark.slow
@@ -86,6 +90,11 @@ def smoothed(h, no, grid=OFDM_64_16):
     channel = new_channel(grid).content
     channel.h[:] = in_planes(rough[None])[0]
     smooth(no, tones(grid).content, channel, new_scratch(grid).content)
+    in_order = np.empty_like(rough)
+    in_order[grid.tones] = rough
+    other = Channel(in_order, no, 1.0)
+    smoothing.smooth(in_order, no, other, grid)
+    assert gains(channel, len(h)) == pytest.approx(other.h[grid.tones], abs=1e-4)
     return gains(channel, len(h)), channel.unknown
 
 
@@ -131,6 +140,7 @@ def test_the_likeliest_code_words_come_first():
         best = np.argsort(-score, kind="stable")[:n_list]
         out = np.empty((n_list, padded.shape[1]), np.uint8)
         list_decode(llr, out)
+        assert np.array_equal(viterbi.decode(llr, n_list), out), seed
         found = np.packbits(out[:, :n_bits], axis=1)[:, 0]
         assert list(score[found]) == list(score[best]), seed
         assert len(set(found)) == n_list

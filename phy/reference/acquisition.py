@@ -1,0 +1,157 @@
+"""Acquisition leads from the detector's peak to a header that is read and a known channel."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phy import preamble
+from phy.constellation import Modulation
+from phy.header import BurstHeader, n_symbols
+from phy.numerology import Numerology
+from phy.quality import BurstQuality
+from phy.reference.channel import Channel
+from phy.reference.equaliser import Equaliser
+from phy.reference.header import folded, parse_header
+from phy.reference.ofdm import Carriers, Samples, to_carriers, turned_back
+from phy.reference.offset import BACKOFF, refine
+from phy.reference.timing import SEARCH, locate, templates
+from phy.reference.tracking import Tracking
+from phy.reference.training import estimate, learn
+from phy.reference.transmitter import header_samples
+
+
+class Acquired(NamedTuple):
+    """A burst was acquired: its header is read, and its payload can be equalised.
+
+    `origin` is the absolute index at which samples turned back by `frequency` have phase 0, and
+    `window` that at which the first payload symbol's FFT begins.
+    """
+
+    header: BurstHeader
+    quality: BurstQuality
+    origin: int
+    window: int
+    frequency: float
+    equaliser: Equaliser
+
+
+class Missed(NamedTuple):
+    """Nothing was acquired: there was no "preamble", or its "header" could not be read."""
+
+    stage: str
+
+
+def before(grid: Numerology) -> int:
+    """Acquisition needs this many samples before the nominal start of the first long symbol."""
+    return preamble.long_start(grid) + SEARCH + BACKOFF
+
+
+def needed_after(grid: Numerology) -> int:
+    """Acquisition needs this many samples from the nominal start of the first long symbol on."""
+    return SEARCH + preamble.N_LONG * grid.n_fft + n_symbols(grid) * grid.n_symbol
+
+
+class Acquisition:
+    """Acquisition works on one grid, for offsets up to `max_frequency` cycles a sample.
+
+    `carrier_cycles` is how many cycles a carrier that is made by the same crystal makes in a
+    sample; 0 says that nothing is known of it.
+    """
+
+    def __init__(self, grid: Numerology, max_frequency: float, carrier_cycles: float = 0.0) -> None:
+        self._grid = grid
+        self._carrier_cycles = carrier_cycles
+        self._templates = templates(grid, max_frequency)
+        long = preamble.long_start(grid) + grid.n_fft * np.arange(preamble.N_LONG)
+        header = preamble.length(grid) + grid.n_cp + grid.n_symbol * np.arange(n_symbols(grid))
+        self._windows = np.concatenate((long, header))
+        self._long = np.tile(preamble.long_carriers(grid), (preamble.N_LONG, 1)).astype(complex)
+
+    def acquire(
+        self, x: NDArray[np.complex64], base: int, coarse: float, dc: complex
+    ) -> Acquired | Missed:
+        """The method reads the burst whose first long symbol is nominally at `x[before(grid)]`.
+
+        `base` is the absolute index of `x[0]`, `coarse` the frequency that the peak tells, modulo
+        1/16 cycles a sample.
+        """
+        grid = self._grid
+        # 2. Timing and offset.
+        first = before(grid) - SEARCH
+        found = locate(turned_back(x[first:], dc, coarse), self._templates)
+        if found is None:
+            return Missed("preamble")
+        early, correction = found
+        begin = first + early - preamble.long_start(grid) - BACKOFF
+        frequency = coarse + correction
+        burst = x[begin:]
+        # 3. Channel, 4. offset again, and with it the channel.
+        y = to_carriers(burst, self._windows, frequency, dc, grid)
+        channel = self._of_training(y)
+        frequency += refine(turned_back(burst, dc, frequency), channel.h, grid)
+        y = to_carriers(burst, self._windows, frequency, dc, grid)
+        channel = self._of_training(y)
+        # 5. Header.
+        clock_error = frequency / self._carrier_cycles if self._carrier_cycles else None
+        equaliser = Equaliser(grid, channel, Tracking(grid, channel, clock_error))
+        llr, points = self._read(y[preamble.N_LONG :], equaliser)
+        header = parse_header(folded(llr))
+        if header is None:
+            return Missed("header")
+        sent = header_carriers(header, grid)
+        self._learn(y, sent, equaliser)
+        training = burst[self._windows[0] :][: preamble.N_LONG * grid.n_fft]
+        quality = BurstQuality(
+            base + begin + BACKOFF,
+            *header,
+            snr_db=_snr_db(equaliser.channel, grid),
+            rssi_dbfs=decibel(float(np.mean(np.abs(training - dc) ** 2))),
+            evm_db=decibel(float(np.mean(np.abs(points - sent[:, grid.data_at]) ** 2))),
+            cfo=frequency,
+        )
+        origin = base + begin
+        window = origin + int(self._windows[-1]) + grid.n_symbol
+        return Acquired(header, quality, origin, window, frequency, equaliser)
+
+    def _of_training(self, y: Carriers) -> Channel:
+        """Both long symbols tell the channel."""
+        n = preamble.N_LONG
+        return estimate(y[:n], self._long, np.ones(n), self._grid)
+
+    def _read(
+        self, y: Carriers, equaliser: Equaliser
+    ) -> tuple[NDArray[np.int16], NDArray[np.complex128]]:
+        """The header's symbols `[n, n_used]` become (LLRs `[n · n_data]`, points `[n, n_data]`)."""
+        read = [equaliser.equalise(each, i, Modulation.BPSK) for i, each in enumerate(y)]
+        return np.concatenate([llr for llr, _ in read]), np.array([points for _, points in read])
+
+    def _learn(self, y: Carriers, sent: Carriers, equaliser: Equaliser) -> None:
+        """The header, known now, tells the channel once more, with four symbols instead of two.
+
+        Its symbols have turned by the phase that is tracked, less the rate for each that followed.
+        """
+        phase, rate = equaliser.tracking.phase.state
+        rotation = phase - rate * np.arange(len(sent))[::-1]
+        known = np.concatenate((self._long, sent))
+        equaliser.channel = learn(
+            y, known, preamble.N_LONG, rotation, equaliser.channel, self._grid
+        )
+
+
+def header_carriers(header: BurstHeader, grid: Numerology) -> Carriers:
+    """A header is sent on these carriers `[n, n_used]`; its cut peaks have moved them a little."""
+    samples: Samples = header_samples(header, grid)
+    starts = grid.n_cp + grid.n_symbol * np.arange(n_symbols(grid))
+    return to_carriers(samples, starts, 0.0, 0j, grid)
+
+
+def _snr_db(channel: Channel, grid: Numerology) -> float:
+    """The SNR counts noise in all 64 carriers and the signal in 52, in dB."""
+    return decibel(channel.gain / channel.no * grid.n_used / grid.n_fft)
+
+
+def decibel(ratio: float) -> float:
+    """The function returns a ratio of powers in dB, rounded to three places."""
+    return math.floor(1e4 * math.log10(max(ratio, 1e-30)) + 0.5) / 1e3

@@ -1,0 +1,109 @@
+"""Detection finds the short training: a window of 192 samples that is our code, at any strength.
+
+Segment i of the short training is segment i − 1 times b_i. So the product of each sample with the
+one 16 before it, times b_i, has the same phase throughout, whatever the channel: that of 16 samples
+of carrier offset. What repeats itself without the code adds up to little.
+"""
+
+import cmath
+import math
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from phy.preamble import BARKER, SEGMENT, SHORT
+from phy.reference.ofdm import Samples
+
+HISTORY = SHORT - 1
+"""The metric of a sample needs so many samples before it."""
+HOP = 512
+"""The threshold and the DC are the same for so many samples."""
+THRESHOLD = 0.25
+MOST = 0.5
+"""False alarms raise the threshold at most up to here."""
+WARIER = 0.1
+"""Each of them raises it by so much."""
+FORGETS = 4096
+"""A raised threshold sinks by a factor e in so many samples."""
+PLAINEST = 0.7
+"""A peak whose sum without the code is more than this share of it is none."""
+SLOWEST = 1 / 64
+"""The DC follows the mean of each hop by at least this share."""
+
+
+def sums(x: NDArray[np.complexfloating], dc: complex) -> tuple[Samples, NDArray[np.float64]]:
+    """The function returns P and E `[n]` of the last n of the samples `[191 + n]`.
+
+    P[n] = Σ_{k=0}^{10} b_k Σ_{m=0}^{15} y[n−16(10−k)−m] y*[n−16(11−k)−m]
+    E[n] = 11/12 Σ_{m=0}^{191} |y[n−m]|²
+    """
+    q = _neighbours(x, dc)
+    n = len(x) - HISTORY
+    p = np.zeros(n, np.complex128)
+    for k, sign in enumerate(BARKER):
+        p += sign * q[SEGMENT * k : SEGMENT * k + n]
+    power = np.abs(x.astype(np.complex128) - dc) ** 2
+    e = (SHORT - SEGMENT) / SHORT * sliding_window_view(power, SHORT).sum(axis=-1)
+    return p, e
+
+
+def _neighbours(x: NDArray[np.complexfloating], dc: complex) -> Samples:
+    """Entry i compares a segment with the one before it: Σ_{m=0}^{15} y[i+16+m] y*[i+m]."""
+    y = x.astype(np.complex128) - dc
+    products = y[SEGMENT:] * y[:-SEGMENT].conj()
+    total: Samples = sliding_window_view(products, SEGMENT).sum(axis=-1)
+    return total
+
+
+class Detector:
+    """The detector remembers the DC of a stream, and how wary false alarms have made it."""
+
+    def __init__(self, start: int) -> None:
+        self.dc = 0j
+        self._hops_seen = 0
+        self._excess, self._raised_at = 0.0, start
+
+    def crossing(self, x: NDArray[np.complexfloating], at: int) -> int | None:
+        """The method returns the first of 512 samples with |P| > threshold · E, or None.
+
+        `x` `[191 + 512]` ends with those samples, of which the first has the absolute index `at`.
+        The result is an absolute index. A hop without a crossing tells the DC.
+        """
+        level = THRESHOLD + self._excess_at(at)
+        p, e = sums(x, self.dc)
+        over = np.abs(p) ** 2 > level**2 * e**2
+        if over.any():
+            return at + int(over.argmax())
+        self._hops_seen += 1
+        weight = max(SLOWEST, 1 / self._hops_seen)
+        self.dc += weight * (complex(x[HISTORY:].astype(np.complex128).mean()) - self.dc)
+        return None
+
+    def strongest(self, x: NDArray[np.complexfloating]) -> tuple[int, float | None]:
+        """The method finds the largest |P| / E after 191 samples of `x`: (its offset, frequency).
+
+            f = arg P / (2π16), modulo 1/16 cycles a sample
+
+        The frequency is None where |Σ_k Σ_m …|, P without the code, is more than 0.7 |P|: such are
+        Wi-Fi, levels and slow neighbours.
+        """
+        p, e = sums(x, self.dc)
+        metric = np.divide(np.abs(p) ** 2, e**2, out=np.full(len(p), -1.0), where=e > 0)
+        best = int(metric.argmax())
+        if metric[best] <= 0:
+            return best, None
+        q = _neighbours(x, self.dc)
+        plain = abs(q[best : best + SHORT - SEGMENT : SEGMENT].sum())
+        if plain > PLAINEST * abs(p[best]):
+            return best, None
+        return best, cmath.phase(p[best]) / (2 * math.pi * SEGMENT)
+
+    def was_nothing(self, peak: int) -> None:
+        """A false alarm at `peak` raises the threshold: who made it must do better next time."""
+        self._excess = min(self._excess_at(peak) + WARIER, MOST - THRESHOLD)
+        self._raised_at = peak
+
+    def _excess_at(self, index: int) -> float:
+        """The threshold is raised by this much at an absolute index."""
+        return self._excess * math.exp((self._raised_at - index) / FORGETS)

@@ -1,0 +1,243 @@
+"""The receiver takes a stream of samples and tells PDUs, in the order of "What is received".
+
+SEARCH → ALIGN → ACQUIRE → PAYLOAD. Each state waits until the samples it needs are there. What it
+makes of a sample never depends on how many came with it: any chunking yields the same events.
+"""
+
+from collections import Counter
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phy import preamble
+from phy.constellation import Modulation
+from phy.header import N_NETWORKS, n_symbols
+from phy.layout import layout
+from phy.numerology import OFDM_64_16, Numerology
+from phy.quality import BurstOver, Event, PduHeard
+from phy.reference.acquisition import Acquisition, Missed, before, needed_after
+from phy.reference.detection import HISTORY, HOP, Detector
+from phy.reference.offset import BACKOFF
+from phy.reference.payload import Payload
+
+ALIGN_SPAN = preamble.SHORT
+"""The peak is looked for so many samples from the first crossing on."""
+RETRY_AFTER = 16
+"""After a false alarm, the search goes on so many samples later."""
+LARGEST_SAMPLE = 1e6
+"""Larger values are a fault and count as 0, as do those that are no numbers."""
+
+
+class Receiver:
+    """A receiver finds bursts in a stream and decodes them; `phy.Receiver` has the same face.
+
+    `max_frequency` is the largest carrier offset expected, in cycles a sample. Bursts of other
+    networks than `network` are told but not decoded; None takes all. `carrier_cycles` is how many
+    cycles the carrier makes in a sample, for senders with one crystal; 0 says nothing. `on_points`
+    gets the equalised points `[n, n_data]`. ValueError tells a network that cannot be.
+    """
+
+    # The samples kept, and the absolute index of the first of them.
+    _samples: NDArray[np.complex64]
+    _first: int
+    # Absolute indices at which the search stands, and at which it began.
+    _at: int
+    _began: int
+
+    def __init__(
+        self,
+        network: int | None = 0,
+        max_frequency: float = 0.02,
+        grid: Numerology = OFDM_64_16,
+        start: int = 0,
+        carrier_cycles: float = 0.0,
+        on_points: Callable[[NDArray[np.complex64], Modulation], None] | None = None,
+    ) -> None:
+        if network is not None and not 0 <= network < N_NETWORKS:
+            raise ValueError(f"network: got {network}; allowed: 0 to {N_NETWORKS - 1}")
+        self._network = network
+        self._grid = grid
+        self._on_points = on_points
+        self._acquisition = Acquisition(grid, max_frequency, carrier_cycles)
+        self._detector = Detector(start)
+        # From the peak back to where acquisition wants its samples to begin.
+        self._before = before(grid) - 1 - preamble.guard(grid)
+        self._span = before(grid) + needed_after(grid)
+        # For acquisition and detection, before the sample at which the search stands.
+        self._kept = before(grid) + preamble.SHORT + HISTORY
+        self._burst: Payload | None = None
+        self._crossing: int | None = None
+        self._peak: tuple[int, float] | None = None
+        self.carrier = (start, start)
+        """The last burst whose header was read begins and should end at these indices."""
+        self.counters: Counter[str] = Counter()
+        self._begin(start)
+
+    @property
+    def next_index(self) -> int:
+        """The next sample to push has this absolute index."""
+        return self._first + len(self._samples)
+
+    def push(self, samples: NDArray[np.complex64]) -> list[Event]:
+        """The receiver takes the next samples `[n]`, and returns the events that they complete."""
+        x = np.array(samples, np.complex64)
+        with np.errstate(invalid="ignore"):
+            good = (np.abs(x.real) < LARGEST_SAMPLE) & (np.abs(x.imag) < LARGEST_SAMPLE)
+        x[~good] = 0
+        self.counters["samples_bad"] += int(np.count_nonzero(~good))
+        self.counters["samples"] += len(x)
+        self._samples = np.concatenate((self._samples, x))
+        events: list[Event] = []
+        while self._step(events):
+            pass
+        # What lies long before the search is not needed any more.
+        n_old = max(0, self._at - self._kept - self._first)
+        self._samples, self._first = self._samples[n_old:], self._first + n_old
+        return events
+
+    def gap(self, n: int) -> list[Event]:
+        """`n` samples are missing: a burst that they cut is over, the search begins behind them."""
+        if n < 0:
+            raise ValueError(f"gap: got {n} samples; allowed: 0 or more")
+        self.counters["gaps"] += 1
+        end = self.next_index
+        events: list[Event] = []
+        if self._burst is not None:
+            self._end(self._burst, events, "cut")
+        elif end > self._at:
+            events = self.flush()
+        self._begin(end + n)
+        return events
+
+    def flush(self) -> list[Event]:
+        """The stream has ended: what its last samples hold is told, as if silence followed."""
+        n = self._grid.n_symbol + HOP + ALIGN_SPAN + needed_after(self._grid)
+        counted, self._began = self.counters["samples"], self.next_index + n
+        events = self.push(np.zeros(n, np.complex64))
+        self.counters["samples"] = counted
+        if self._burst is not None:
+            self._end(self._burst, events, "cut")
+        return events
+
+    def _begin(self, index: int) -> None:
+        """The search begins at `index`, with silence before it."""
+        self._crossing = self._peak = None
+        self._samples = np.zeros(self._kept, np.complex64)
+        self._first = index - self._kept
+        self._at = self._began = index
+
+    def _view(self, first: int, last: int) -> NDArray[np.complex64] | None:
+        """The samples from `first` to before `last` are returned, or None if some are missing."""
+        if last > self.next_index:
+            return None
+        return self._samples[first - self._first : last - self._first]
+
+    def _step(self, events: list[Event]) -> bool:
+        """The receiver goes one step on; False says that samples are missing for it."""
+        if self._burst is not None:
+            return self._payload(self._burst, events)
+        if self._peak is not None:
+            return self._acquire(*self._peak, events)
+        if self._crossing is not None:
+            return self._align(self._crossing)
+        return self._search()
+
+    def _search(self) -> bool:
+        """A hop is searched for the first sample over the threshold."""
+        x = self._view(self._at - HISTORY, self._at + HOP)
+        if x is None:
+            return False
+        self._crossing = self._detector.crossing(x, self._at)
+        if self._crossing is None:
+            self._at += HOP
+        else:
+            self.counters["triggers"] += 1
+            self._at = self._crossing
+        return True
+
+    def _align(self, crossing: int) -> bool:
+        """The peak is the metric's maximum within a short training's length of the crossing."""
+        x = self._view(crossing - HISTORY, crossing + ALIGN_SPAN)
+        if x is None:
+            return False
+        offset, frequency = self._detector.strongest(x)
+        peak = self._at = crossing + offset
+        self._crossing = None
+        if frequency is None:
+            self._was_nothing(peak)
+        else:
+            self._peak = (peak, frequency)
+        return True
+
+    def _was_nothing(self, peak: int) -> None:
+        """The search goes on behind a false alarm, and is warier."""
+        self._at = peak + RETRY_AFTER
+        # Where noise begins, its first samples resemble anything.
+        if peak >= self._began + preamble.SHORT:
+            self._detector.was_nothing(peak)
+
+    def _acquire(self, peak: int, coarse: float, events: list[Event]) -> bool:
+        """A burst's header is read, if there is one."""
+        base = peak - self._before
+        x = self._view(base, base + self._span)
+        if x is None:
+            return False
+        found = self._acquisition.acquire(x, base, coarse, self._detector.dc)
+        self._peak = None
+        if isinstance(found, Missed):
+            if found.stage == "preamble":
+                self._was_nothing(peak)
+                return True
+            self._at = peak + RETRY_AFTER
+            self.counters["preambles"] += 1
+            self.counters["headers_bad"] += 1
+            return True
+        self.counters["preambles"] += 1
+        told = found.header
+        plan = layout(self._grid, told.mcs, told.n_pdus, told.pdu_bytes)
+        self._burst = burst = Payload(found, plan, self._grid, n_symbols(self._grid))
+        self.carrier = (found.quality.start, burst.end_of(plan.n_symbols) + BACKOFF)
+        if self._network is not None and told.network != self._network:
+            # Searched on, not skipped: a header that lies must not make us deaf.
+            self._end(burst, events, "foreign")
+        else:
+            self.counters["bursts"] += 1
+            self._at = found.window
+        return True
+
+    def _payload(self, burst: Payload, events: list[Event]) -> bool:
+        """The next symbol is taken in, and the PDUs that it completes are told."""
+        number = burst.n_symbols_in
+        x = self._view(burst.window(number), burst.end_of(number + 1))
+        if x is None:
+            return False
+        points = burst.take(x, self._detector.dc)
+        if self._on_points is not None:
+            self._on_points(points[None].astype(np.complex64), burst.plan.mcs.modulation)
+        self._at = burst.end_of(number + 1)
+        while burst.is_next_in():
+            data = burst.decode()
+            if data is not None:
+                self.counters["pdus_good"] += 1
+                at = burst.end_of(number + 1) + BACKOFF
+                events.append(PduHeard(data, burst.n_done - 1, at, burst.acquired.quality))
+            else:
+                self.counters["pdus_bad"] += 1
+                if burst.n_done < burst.plan.n_pdus and burst.is_gone():
+                    self._end(burst, events, "faded")
+                    return True
+            burst.count_powers_anew()
+        if burst.n_done == burst.plan.n_pdus:
+            self._end(burst, events, "whole")
+        else:
+            burst.slip()
+        return True
+
+    def _end(self, burst: Payload, events: list[Event], ending: str) -> None:
+        """The burst is over, and the search goes on behind what was taken in of it."""
+        self._burst = None
+        if ending != "whole":
+            self.counters[f"bursts_{ending}"] += 1
+        events.append(BurstOver(burst.acquired.quality, burst.n_good, ending))
+        self._at = burst.end_of(burst.n_symbols_in)

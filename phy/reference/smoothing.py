@@ -1,0 +1,116 @@
+"""Smoothing takes off the channel's estimate what must be noise, and follows the channel later.
+
+A channel is a few echoes. Turned back by its mean delay, its gains are smooth over the carriers, so
+that most of their power is in few of the functions 1, cos k, sin k, cos 2k, … Noise is in all of
+them alike.
+"""
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phy.numerology import Numerology
+from phy.reference.channel import Channel
+from phy.reference.ofdm import Carriers
+
+GROUPS = ((0,), (1,), (2, 3), (4, 5, 6, 7, 8))
+"""Delays of a group's echoes, from the mean delay; all else up to a prefix is one group more."""
+DRIFT_RISE, DRIFT_FALL = 0.5, 0.1
+"""The guess of a channel's drift follows what is seen of it by these shares."""
+
+
+@cache
+def basis(grid: Numerology) -> tuple[NDArray[np.float64], ...]:
+    """The basis is 1, cos k, sin k, cos 2k, … (2πk/64), orthonormal, in groups `[m, n_used]`."""
+    angle = 2 * np.pi * grid.used / grid.n_fft
+    outermost = tuple(range(GROUPS[-1][-1] + 1, grid.n_cp + 1))
+    rows: list[NDArray[np.float64]] = []
+    ends = []
+    for group in filter(None, (*GROUPS, outermost)):
+        for delay in group:
+            rows.append(np.cos(delay * angle))
+            if delay:
+                rows.append(np.sin(delay * angle))
+        ends.append(len(rows))
+    orthonormal, _ = np.linalg.qr(np.array(rows).T)
+    return tuple(np.split(orthonormal.T, ends[:-1]))
+
+
+def sizes(grid: Numerology) -> NDArray[np.int64]:
+    """Each group, and at last what is in none, has this many dimensions `[groups + 1]`."""
+    own = [len(rows) for rows in basis(grid)]
+    return np.array([*own, grid.n_used - sum(own)])
+
+
+def mean_delay(h: Carriers, grid: Numerology) -> float:
+    """Gains turn by this from a carrier to the next, in radians: arg Σ_k Ĥ_{k+1} Ĥ*_k."""
+    next_to = np.flatnonzero(np.diff(grid.used) == 1)
+    return float(np.angle(np.sum(h[next_to + 1] * h[next_to].conj())))
+
+
+def centred(h: Carriers, delay: float, grid: Numerology) -> Carriers:
+    """Gains `[n_used]` are turned back by `delay` radians a carrier."""
+    return np.asarray(h * np.exp(-1j * delay * grid.used))
+
+
+def split(x: Carriers, wanted: NDArray[np.bool_], grid: Numerology) -> Carriers:
+    """The function splits `x` `[n_used]` into parts of each group `[groups + 1, n_used]`.
+
+    What is in none of the groups `wanted` `[groups + 1]` is the last part.
+    """
+    parts = np.zeros((len(wanted), grid.n_used), np.complex128)
+    for group, rows in enumerate(basis(grid)):
+        if wanted[group]:
+            parts[group] = (rows @ x) @ rows
+    parts[-1] = x - parts.sum(axis=0)
+    return parts
+
+
+def energies(parts: Carriers) -> NDArray[np.float64]:
+    """Each part `[groups + 1, n_used]` has this energy `[groups + 1]`."""
+    return np.asarray(np.sum(np.abs(parts) ** 2, axis=1))
+
+
+def smooth(h: Carriers, variance: float, channel: Channel, grid: Numerology) -> None:
+    """The channel's gains become `h`, measured with noise of `variance`, less most of that noise.
+
+        kept of a group = max(0, 1 − v (m + √m) / E)   (James and Stein 1961; 1 − v/E where m = 1)
+
+    m is the group's size and E its energy. What is left unknown of a group is kept · v a dimension,
+    and what was found in it kept · E/m.
+    """
+    channel.delay = mean_delay(h, grid)
+    m = sizes(grid)
+    parts = split(centred(h, channel.delay, grid), np.ones(len(m), bool), grid)
+    e = energies(parts)
+    expected = variance * (m + np.where(m > 1, np.sqrt(m), 0))
+    kept = np.maximum(0, 1 - expected / np.maximum(e, 1e-300))
+    channel.unknown = kept * variance
+    channel.power = kept * e / m
+    channel.h = centred(kept @ parts, -channel.delay, grid)
+
+
+def follow(error: Carriers, variance: float, channel: Channel, grid: Numerology) -> None:
+    """The channel moves towards later symbols, which contradict it by `error` `[n_used]`.
+
+        p' = p + drift · power;  weight = p' / (p' + v);  p = p' (1 − weight)
+
+    That is a Kalman filter for each group, p being what is unknown of a dimension and v the
+    `variance` of the error. The drift follows how much the errors exceed, by two standard
+    deviations, what noise and ignorance explain. Groups in which nothing was found count as noise,
+    all together.
+    """
+    m, power = sizes(grid), channel.power
+    parts = split(centred(error, channel.delay, grid), power > 0, grid)
+    expected = variance + channel.unknown
+    excess = np.sum(energies(parts) - m * expected)
+    chance = np.sqrt(np.sum(m * expected**2))
+    if np.sum(m * power) > 0:
+        seen = max(0.0, float((excess - 2 * chance) / np.sum(m * power)))
+        share = DRIFT_RISE if seen > channel.drift else DRIFT_FALL
+        channel.drift += share * (seen - channel.drift)
+    before = channel.unknown + channel.drift * power
+    weight = before / (before + variance)
+    channel.unknown = before * (1 - weight)
+    channel.h = channel.h + centred(weight @ parts, -channel.delay, grid)

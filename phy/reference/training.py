@@ -1,0 +1,68 @@
+"""Training is what the receiver knows was sent; it tells the gain of every carrier."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phy.numerology import Numerology
+from phy.reference.channel import Channel
+from phy.reference.ofdm import Carriers
+from phy.reference.smoothing import smooth
+
+SURELY = 4.0
+"""A difference in strength of so many standard deviations is no chance."""
+LARGEST_BOOST = 3.0
+
+
+def least_squares(
+    y: Carriers, sent: Carriers, amplitude: NDArray[np.float64]
+) -> tuple[Carriers, float]:
+    """Received symbols `[n, n_used]`, n ≥ 2, tell (gains `[n_used]`, noise power on a carrier).
+
+        Ĥ_k = Σ_s a_s Y_sk/X_sk / Σ_s a_s²;  N = mean_k Σ_s |Y_sk/X_sk − a_s Ĥ_k|² / (n − 1)
+
+    Symbol s was `sent` a_s times as strong. |X| is 1 or close to it: Y/X is Y X*.
+    """
+    ratio, a = y / sent, amplitude[:, None]
+    h = np.sum(a * ratio, axis=0) / np.sum(amplitude**2)
+    noise = np.sum(np.abs(ratio - a * h) ** 2) / (len(y) - 1)
+    return h, float(noise / y.shape[1])
+
+
+def estimate(
+    y: Carriers, sent: Carriers, amplitude: NDArray[np.float64], grid: Numerology
+) -> Channel:
+    """Known symbols tell the channel by least squares, less what must be noise of it.
+
+    The noise of a gain is v = N / Σ_s a_s².
+    """
+    h, no = least_squares(y, sent, amplitude)
+    no = max(no, 1e-20)
+    power, v = float(np.mean(np.abs(h) ** 2)), no / float(np.sum(amplitude**2))
+    channel = Channel(h, no, max(power - v, 1e-3 * power, 1e-20))
+    smooth(h, v, channel, grid)
+    return channel
+
+
+def learn(
+    y: Carriers, sent: Carriers, n_training: int, rotation: NDArray[np.float64],
+    before: Channel, grid: Numerology,
+) -> Channel:  # fmt: skip
+    """A header that was read tells the channel once more, as further training.
+
+        strength = Σ|Ĥ|² / Re Σ (Y/X) Ĥ*, over the header
+
+    The first `n_training` symbols of `y` and `sent` `[n, n_used]` are the preamble's, the others
+    have turned by `rotation` radians `[n − n_training]`. The preamble may have been sent stronger
+    than the rest by `strength`: it counts as 1 where it differs from 1 by chance.
+    """
+    y = y.copy()
+    y[n_training:] *= np.exp(-1j * rotation)[:, None]
+    ratio = (y / sent)[n_training:]
+    seen = float(np.sum((ratio * before.h.conj()).real))
+    expected = float(np.sum(np.abs(before.h) ** 2)) * len(ratio)
+    amplitude = np.ones(len(y))
+    if seen > 0:
+        strength = expected / seen
+        if abs(1 / strength - 1) > SURELY * np.sqrt(0.5 * before.no / expected):
+            amplitude[:n_training] = np.clip(strength, 1 / LARGEST_BOOST, LARGEST_BOOST)
+    return estimate(y, sent, amplitude, grid)

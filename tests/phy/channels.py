@@ -1,0 +1,57 @@
+"""Channels as kernels and as the reference hold them, for tests that compare the two."""
+
+import numpy as np
+import pytest
+
+from phy.estimation import in_planes, new_channel, new_scratch, tones
+from phy.kernels.burst import DRIFT, GAIN, NO
+from phy.kernels.training import estimate
+from phy.reference import training
+from tests.phy.signals import noise
+
+
+def gains_of(channel, grid):
+    """A kernel's gains in the order of `grid.used`."""
+    h = np.empty(grid.n_used, np.complex128)
+    h[grid.tones] = (channel.h[0] + 1j * channel.h[1])[: grid.n_used]
+    return h
+
+
+def in_tones(y, grid):
+    """Symbols `[n, n_used]` as kernels take them."""
+    return in_planes(y[:, grid.tones].astype(np.complex64))
+
+
+def echoed(draws, grid, n_echoes=3):
+    """Gains of a channel with some echoes, of mean power 1 or so."""
+    delays = draws.uniform(0, grid.n_cp / 2, n_echoes)
+    gains = noise(draws, n_echoes, 1 / n_echoes)
+    return np.exp(-2j * np.pi * grid.used[:, None] * delays / grid.n_fft) @ gains
+
+
+def assert_same(channel, other, grid, error=2e-4):
+    """A kernel's channel and the reference's are the same."""
+    power = other.gain + other.no
+    assert gains_of(channel, grid) == pytest.approx(other.h, abs=error * np.sqrt(power))
+    assert channel.figures[NO] == pytest.approx(other.no, rel=2e-3)
+    assert channel.figures[GAIN] == pytest.approx(other.gain, rel=2e-3, abs=1e-6 * power)
+    assert channel.figures[DRIFT] == pytest.approx(other.drift, rel=0.02, abs=1e-5)
+    assert channel.unknown == pytest.approx(other.unknown, rel=0.02, abs=0.01 * other.no)
+    assert channel.power == pytest.approx(other.power, rel=0.01, abs=1e-3 * power)
+
+
+def trained(draws, grid, no, n=2, amplitude=None):
+    """(symbols received, sent, gains) of `n` symbols of ±1."""
+    sent = draws.choice([-1.0, 1.0], (n, grid.n_used)).astype(np.complex64)
+    h = echoed(draws, grid)
+    y = (np.ones(n) if amplitude is None else amplitude)[:, None] * h * sent
+    return y + noise(draws, n * grid.n_used, no).reshape(n, -1), sent, h
+
+
+def both_estimates(grid, y, sent):
+    """(the kernel's channel, its parcel, the reference's) from known symbols."""
+    parcel, scratch = new_channel(grid), new_scratch(grid)
+    table, n = tones(grid).content, len(sent)
+    known = in_tones(sent, grid), np.ones(n, np.float32)
+    estimate(in_tones(y, grid), known[1], known[0], table, parcel.content, scratch.content)
+    return parcel, training.estimate(y, sent, np.ones(n), grid)

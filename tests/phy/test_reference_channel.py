@@ -1,0 +1,203 @@
+"""Kernels that learn and follow a burst's channel, against the reference.
+
+What single precision rounds, and what a kernel leaves out on purpose, is all that may part them.
+Others are compared in `test_reference_acquisition`, and where their own tests are: detector and
+modulator in `test_kernels`, FFT and demapper in `test_lanes`, LDPC in `test_ldpc`, training in
+`test_training`, the K=7 code in `test_coding`.
+"""
+
+import numpy as np
+import pytest
+from numba import njit
+
+from phy import GRIDS, OFDM_64_16, Modulation
+from phy.estimation import new_scratch, tones
+from phy.kernels import equaliser as equaliser_kernel
+from phy.kernels import tracking as tracking_kernel
+from phy.kernels.burst import DELAY, SLOPE_USED
+from phy.kernels.demodulator import slip
+from phy.kernels.smoothing import follow
+from phy.kernels.tracking import PHASE, SLOPE
+from phy.kernels.training import learn
+from phy.mapping import axes
+from phy.reference import mapping, ofdm, smoothing, training
+from phy.reference.channel import Channel
+from phy.reference.equaliser import BLOCK, Equaliser
+from phy.reference.tracking import Tracking
+from phy.sequences import polarity
+from tests.phy.channels import assert_same, both_estimates, gains_of, in_tones, trained
+from tests.phy.signals import noise
+
+SEED = 79
+
+every_grid = pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS)
+every_modulation = pytest.mark.parametrize("modulation", Modulation)
+
+
+def rng(more=0):
+    return np.random.default_rng(SEED + more)
+
+
+@every_grid
+@pytest.mark.parametrize("no", [1.0, 0.03, 1e-4])
+def test_the_channel_that_training_tells_is_the_same(grid, no):
+    for seed in range(5):
+        y, sent, _ = trained(rng(seed), grid, no)
+        parcel, other = both_estimates(grid, y, sent)
+        assert_same(parcel.content, other, grid)
+        assert parcel.content.figures[DELAY] == pytest.approx(other.delay, abs=1e-4)
+
+
+@every_grid
+@pytest.mark.parametrize("boost", [0.8, 1.0, 1.41, 5.0])
+def test_what_a_header_tells_besides_is_the_same(grid, boost):
+    for seed in range(4):
+        amplitude = np.array([boost, boost, 1, 1])
+        y, sent, _ = trained(rng(seed), grid, 0.02, 4, amplitude)
+        parcel, before = both_estimates(grid, y[:2], sent[:2])
+        rotation = 0.3 + 0.1 * np.arange(2)
+        y[2:] *= np.exp(1j * rotation)[:, None]
+        learn(
+            in_tones(y, grid), in_tones(sent, grid), 2, rotation[-1], 0.1,
+            tones(grid).content, parcel.content, new_scratch(grid).content,
+        )  # fmt: skip
+        assert_same(parcel.content, training.learn(y, sent, 2, rotation, before, grid), grid)
+
+
+@every_grid
+def test_a_channel_that_moves_is_followed_alike(grid):
+    """Ten corrections: first noise, then a step, then noise again."""
+    draws, scratch = rng(), new_scratch(grid).content
+    y, sent, _ = trained(draws, grid, 0.02)
+    parcel, channel = both_estimates(grid, y, sent)
+    for number in range(10):
+        error = noise(draws, grid.n_used, 0.005) + (0.3 if number == 4 else 0)
+        follow(in_tones(error[None], grid)[0], 0.005, tones(grid).content, parcel.content, scratch)
+        smoothing.follow(error, 0.005, channel, grid)
+        assert_same(parcel.content, channel, grid)
+    assert channel.drift > 0
+
+
+@njit
+def _predict(tracking):
+    tracking_kernel.predict(tracking)
+
+
+@njit
+def _correct(turned_by, power, carriers, no, tracking):
+    return tracking_kernel.correct(turned_by, power, carriers, no, tracking)
+
+
+def state_of(kalman):
+    """Value, rate, their variances and covariance, as the kernel has them."""
+    (value, cov), (_, rate) = kalman.covariance
+    return [*kalman.state, value, cov, rate]
+
+
+@every_grid
+@pytest.mark.parametrize("clock_error", [None, 1.7e-5])
+def test_pilots_are_tracked_alike(grid, clock_error):
+    """Through a turn, a lean, a symbol that others hit, one without power, pilots all of noise."""
+    draws = rng()
+    parcel, channel = both_estimates(grid, *trained(draws, grid, 0.02)[:2])
+    told = clock_error is not None
+    # The kernel's own channel, so that nothing else parts them.
+    channel.no, channel.gain = parcel.content.no, parcel.content.gain
+    equaliser_kernel.start_tracking(tones(grid).content, parcel.content, clock_error or 0.0, told)
+    ours, other = parcel.content.tracking, Tracking(grid, channel, clock_error)
+    carriers = grid.used[grid.pilots_at]
+    for number in range(40):
+        _predict(ours)
+        other.predict()
+        angle = 0.02 * number + 1e-3 * number * carriers / grid.n_fft
+        angle = angle - ours[PHASE, 0] - ours[SLOPE, 0] * carriers
+        weight = draws.uniform(0.2, 2, len(carriers))
+        came = weight * np.exp(1j * angle) + noise(draws, len(carriers), 0.02)
+        came = came * (number != 7) + noise(draws, len(carriers), 3.0) * (number == 20)
+        came = came.astype(np.complex128)
+        shown = _correct(came, weight, carriers, channel.no, ours)
+        assert other.correct_by(came, weight, carriers, channel.no) == pytest.approx(shown)
+        assert (shown > 6 * channel.no) == (number == 20)
+        assert state_of(other.phase) == pytest.approx(ours[PHASE], rel=1e-6, abs=1e-12)
+        assert state_of(other.slope) == pytest.approx(ours[SLOPE], rel=1e-6, abs=1e-15)
+    slip(2, tones(grid).words, parcel.words)
+    other.slip(2)
+    assert other.slope.value == pytest.approx(ours[SLOPE, 0])
+
+
+def equalised(grid, modulation, n, lean, no):
+    """(the kernel's LLRs, points, channel; the reference's LLRs, points, equaliser).
+
+    `n` symbols that turn, and that lean more and more, the last by `lean` radians a carrier.
+    """
+    draws, n_bits = rng(modulation.bits), grid.n_data * modulation.bits
+    parcel, channel = both_estimates(grid, *trained(draws, grid, no)[:2])
+    coded = draws.integers(0, 2, n * n_bits, np.uint8)
+    # The same to the last bit: carriers in a fade would tell the difference.
+    channel.h, channel.no, channel.gain = (
+        gains_of(parcel.content, grid),
+        *parcel.content.figures[:2],
+    )
+    y = mapping.to_carriers(coded, modulation, grid, 2) * channel.h
+    angle = 0.01 * np.arange(n)[:, None] + lean / n * np.arange(n)[:, None] * grid.used
+    y = y * np.exp(1j * angle)
+    y[:, grid.data_at] += noise(draws, n * grid.n_data, no).reshape(n, -1)
+    y = y.astype(np.complex64)
+    equaliser_kernel.start_tracking(tones(grid).content, parcel.content, 0.0, False)
+    llr, points = np.empty(n * n_bits, np.int16), np.empty((n, grid.n_data), np.complex64)
+    equaliser_kernel.equalise(
+        in_tones(y, grid), n, 2, tones(grid).content, axes(modulation, grid).content,
+        parcel.content, new_scratch(grid).content, points, llr, 0,
+    )  # fmt: skip
+    equaliser = Equaliser(grid, channel, Tracking(grid, channel, None))
+    made = [equaliser.equalise(each, 2 + i, modulation) for i, each in enumerate(y)]
+    other = np.concatenate([each for each, _ in made]), np.array([each for _, each in made])
+    return (llr, points, parcel.content), (*other, equaliser)
+
+
+@every_modulation
+@every_grid
+@pytest.mark.parametrize("noise_share", [0.3, 0.03, 1e-3])
+def test_symbols_are_equalised_alike(grid, modulation, noise_share):
+    """A block of them, and the channel after it as both have learned it."""
+    no = noise_share / modulation.bits**2
+    ours, other = equalised(grid, modulation, BLOCK, 0.0, no)
+    # Near a step of the quantiser, single precision decides.
+    difference = np.abs(ours[0].astype(int) - other[0])
+    assert difference.max() <= 1
+    assert np.mean(difference > 0) < 0.01
+    assert ours[1] == pytest.approx(other[1], abs=1e-5 * np.abs(other[1]).max())
+    assert_same(ours[2], other[2].channel, grid)
+    assert ours[2].tracking[PHASE, 0] == pytest.approx(other[2].tracking.phase.value, abs=1e-6)
+
+
+@every_grid
+def test_symbols_that_lean_are_equalised_alike(grid):
+    """The kernel lets the slope lag by 0.01 rad at the outermost carriers, the reference not."""
+    ours, other = equalised(grid, Modulation.QAM16, 3 * BLOCK, 0.3 / grid.n_fft, 1e-3)
+    assert abs(ours[2].figures[SLOPE_USED]) > 0
+    assert np.abs(ours[1] - other[1]).max() < 0.015 * np.abs(other[1]).max()
+    slopes = ours[2].tracking[SLOPE, 0], other[2].tracking.slope.value
+    assert grid.edge * slopes[0] == pytest.approx(grid.edge * slopes[1], abs=0.005)
+
+
+@every_grid
+def test_a_carrier_sent_as_1_comes_back_as_1(grid):
+    """The control of the reference itself: its FFT undoes its inverse FFT, with signs of pilots."""
+    coded = rng().integers(0, 2, 5 * grid.n_data * 4, np.uint8)
+    sent = mapping.to_carriers(coded, Modulation.QAM16, grid, 9)
+    samples = ofdm.to_samples(sent, grid)
+    assert np.mean(np.abs(samples) ** 2) == pytest.approx(1, abs=0.1)
+    starts = grid.n_cp + grid.n_symbol * np.arange(5)
+    assert ofdm.to_carriers(samples, starts, 0.0, 0j, grid) == pytest.approx(sent, abs=1e-12)
+    pilots = sent[:, grid.pilots_at] * grid.pilot_values
+    assert np.array_equal(pilots.real, np.repeat(polarity(5, 9)[:, None], pilots.shape[1], 1))
+    # A window that begins within the prefix sees each carrier turned, and nothing else.
+    early = ofdm.to_carriers(samples, starts - 3, 0.0, 0j, grid)
+    lean = np.exp(-2j * np.pi * 3 * grid.used / OFDM_64_16.n_fft * 64 / grid.n_fft)
+    assert early == pytest.approx(sent * lean, abs=1e-12)
+
+
+def test_a_channel_has_noise_however_strong_it_is():
+    assert Channel(np.ones(52), 1e-9, 2.0).noise == 2e-4
+    assert Channel(np.ones(52), 0.1, 2.0).noise == 0.1
