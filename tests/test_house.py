@@ -9,6 +9,7 @@ from pathlib import Path
 import backends
 import phy
 import sdrlinkd
+from benchmarks.structure import deep_chains, graph, trace, writes
 from sdrlinkd.link import RX_PDU_REASONS, RX_REASONS, TX_REASONS
 
 ROOT = Path(__file__).parents[1]
@@ -89,3 +90,20 @@ def test_the_readme_shows_what_the_documents_are_called():
     text = (ROOT / "README.md").read_text()
     for link in re.findall(r"\]\(([^)#:]+)\)", text):
         assert (ROOT / link).exists(), link
+
+
+def test_one_burst_is_decided_in_few_calls_and_files():
+    steps = {step.name: step for step in trace(with_beacon=False)}
+    decided = steps["next_burst"].files
+    assert (len(decided), len(set(decided))) <= (50, 12)
+
+
+def test_a_queued_messages_fields_are_written_by_itself_alone():
+    assert not writes("sdrlinkd.link", "Outgoing")
+
+
+def test_rooms_of_the_link_import_down_and_reach_into_nobody():
+    found = graph("sdrlinkd.link")
+    assert (len(found.rooms), found.upward) == (14, [])
+    chains, lines = deep_chains("sdrlinkd.link")
+    assert 1000 * chains / lines < 3

@@ -2,3 +2,13 @@
 
 `python -m benchmarks.structure` prints all of it; none of it depends on the machine.
 """
+
+from benchmarks.structure.sources import deep_chains, graph, writes
+from benchmarks.structure.trace import trace
+
+__all__ = [
+    "deep_chains",
+    "graph",
+    "trace",
+    "writes",
+]

@@ -1,7 +1,9 @@
 """Print it."""
 
+from rich.console import Console
+
 from benchmarks.structure.sources import deep_chains, graph, writes
-from benchmarks.structure.trace import trace
+from benchmarks.structure.trace import Step, trace
 from sdrlinkd.tables import FittedTable, figure, screen_console, words
 
 ROOMS = ("sdrlinkd", "sdrlinkd.link", "sdrlinkd.bus", "backends", "backends.soapy", "phy")
@@ -9,20 +11,9 @@ ROOMS = ("sdrlinkd", "sdrlinkd.link", "sdrlinkd.bus", "backends", "backends.soap
 
 def main() -> None:
     """Tables for people."""
-    console, steps = screen_console(), trace()
-    table = FittedTable(
-        "one message of 724 B from link to link",
-        (words("step", least=12), figure("calls"), figure("files"), figure("changes of file")),
-    )
-    for step in steps:
-        table.add(step.name, str(len(step.files)), str(len(set(step.files))), str(step.changes))
-    table.add(
-        "all",
-        str(sum(len(step.files) for step in steps)),
-        str(len({file for step in steps for file in step.files})),
-        str(sum(step.changes for step in steps)),
-    )
-    console.print(table)
+    console = screen_console()
+    for with_beacon, beside in ((False, "between two beacons"), (True, "a beacon rides with it")):
+        _print_trace(console, trace(with_beacon), f"one message of 724 B, {beside}")
     table = FittedTable(
         "imports between the rooms right inside a room",
         (words("room", least=16), figure("rooms"), figure("arrows"), figure("floors"),
@@ -45,6 +36,22 @@ def main() -> None:
         f"deep chains in sdrlinkd.link: {chains} in {lines} lines, {1000 * chains / lines:.1f} "
         "per 1000"
     )
+
+
+def _print_trace(console: Console, steps: list[Step], title: str) -> None:
+    table = FittedTable(
+        title,
+        (words("step", least=12), figure("calls"), figure("files"), figure("changes of file")),
+    )
+    for step in steps:
+        table.add(step.name, str(len(step.files)), str(len(set(step.files))), str(step.changes))
+    table.add(
+        "all",
+        str(sum(len(step.files) for step in steps)),
+        str(len({file for step in steps for file in step.files})),
+        str(sum(step.changes for step in steps)),
+    )
+    console.print(table)
 
 
 if __name__ == "__main__":

@@ -18,19 +18,20 @@ from sdrlinkd.link import (
     RateParams,
     ReassemblyParams,
 )
-from sdrlinkd.wire import make_registry
+from sdrlinkd.wire import CONTROL_TOPIC_ID, Beacon, make_registry, parse, parse_records
 
 P = ParamSpec("P")
 T = TypeVar("T")
 ROOT = Path(__file__).parents[2]
 ROOMS = tuple(str(ROOT / "sdrlinkd" / room) for room in ("link", "wire"))
 MESSAGE = bytes(724)
+PDU_SIZE = 1024
 PERIOD_S = 0.1
 PDU_S = 1.4e-3
 OVERHEAD_S = 1e-4
 MOST_PDUS = 64
-WARM = 10
-"""So many messages go first: beats are learned, records sent, caches filled."""
+MESSAGES = 40
+"""Of these, the first ones warm everything up: beats are learned, caches filled."""
 
 
 class Step(NamedTuple):
@@ -70,7 +71,7 @@ class _Recorder:
 
 def _link(own_id: int) -> Link:
     link = Link(
-        LinkParams(pdu_size=1024),
+        LinkParams(pdu_size=PDU_SIZE),
         QueueParams(),
         ReassemblyParams(),
         make_registry([("odom", "nav_msgs/msg/Odometry")]),
@@ -93,12 +94,12 @@ def _most_pdus(_: int, airtime_s: float) -> int:
     return int(min(MOST_PDUS, max(0.0, (airtime_s - OVERHEAD_S) / PDU_S)))
 
 
-def trace() -> list[Step]:
-    """The steps of one message, after others like it."""
+def trace(with_beacon: bool) -> list[Step]:
+    """The steps of one message after others like it; a beacon rides with it, or none does."""
     sender, receiver = _link(1), _link(2)
-    record = _Recorder()
-    for number in range(WARM + 1):
-        record.steps.clear()
+    record, found = _Recorder(), list[Step]()
+    for number in range(MESSAGES):
+        record.steps = []
         now = 0.05 + number * PERIOD_S
         sender.handle_timers(now)
         receiver.handle_timers(now)
@@ -116,4 +117,13 @@ def trace() -> list[Step]:
             record("delivered", receiver.delivered, message, now + 2 * PDU_S)
         if [message.payload for message in heard] != [MESSAGE]:
             raise RuntimeError("the message did not come whole")
-    return record.steps
+        entries = [entry for pdu in burst.pdus for entry in parse(pdu, PDU_SIZE).entries]
+        records = [
+            each
+            for entry in entries
+            if entry.topic_id == CONTROL_TOPIC_ID
+            for each in parse_records(entry.payload)
+        ]
+        if any(isinstance(each, Beacon) for each in records) == with_beacon:
+            found = record.steps
+    return found
