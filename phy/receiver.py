@@ -1,13 +1,13 @@
 """The streaming receiver: samples in, PDUs out.
 
-SEARCH → ALIGN → ACQUIRE → PAYLOAD. Every step waits until the samples it needs are there, and what
+Its states stand in `phy/states.py`. Every step waits until the samples it needs are there, and what
 it makes of a sample does not depend on how many came with it: any chunking yields the same events.
 """
 
 import cmath
 import math
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from phy.kernels.detector import FORGETS, HISTORY, search, strongest
 from phy.layout import layout
 from phy.numerology import OFDM_64_16, Numerology
 from phy.quality import BurstOver, Event, PduHeard
+from phy.states import Found, State, after
 from phy.stream import SampleStream
 
 HOP = 512
@@ -78,9 +79,16 @@ class Receiver:
         # For acquisition, before the sample at which the search stands.
         self._kept = before(grid) + preamble.SHORT + HISTORY
         self._stream = SampleStream(start, 1 << 16)
+        self._state = State.SEARCH
+        self._steps: Mapping[State, Callable[[list[Event]], bool]] = {
+            State.SEARCH: self._search,
+            State.ALIGN: self._align,
+            State.ACQUIRE: self._acquire,
+            State.PAYLOAD: self._payload,
+        }
+        # Of the burst in question, as far as it is known in that state.
         self._burst: IncomingBurst | None = None
-        self._crossing: int | None = None
-        self._peak: tuple[int, float] | None = None
+        self._crossing, self._peak, self._coarse = start, start, 0.0
         self._excess, self._raised_at, self._began = 0.0, start, start
         self._at = start
         self.carrier = (start, start)
@@ -100,7 +108,7 @@ class Receiver:
             piece = samples[first : first + PIECE]
             self.counters["samples_bad"] += self._stream.append(piece)
             self.counters["samples"] += len(piece)
-            while self._step(events):
+            while self._steps[self._state](events):
                 pass
             self._stream.forget_before(self._at - self._kept)
         return events
@@ -116,6 +124,7 @@ class Receiver:
             self._end(self._burst, events, "cut")
         elif end > self._at:
             events = self.flush()
+        self._go(Found.CUT)
         self._begin(end + n)
         return events
 
@@ -127,26 +136,23 @@ class Receiver:
         self.counters["samples"] = samples
         if self._burst is not None:
             self._end(self._burst, events, "cut")
+            self._go(Found.CUT)
         return events
 
     def _begin(self, index: int) -> None:
         """Search from `index`, with silence before it."""
-        self._crossing = self._peak = None
         self._stream.restart(index - self._kept)
         self._stream.append(np.zeros(self._kept, np.complex64))
         self._at = self._began = index
 
-    def _step(self, events: list[Event]) -> bool:
-        """Go one step on; False when samples are missing for it."""
-        if self._burst is not None:
-            return self._payload(self._burst, events)
-        if self._peak is not None:
-            return self._acquire(*self._peak, events)
-        if self._crossing is not None:
-            return self._align(self._crossing)
-        return self._search()
+    def _go(self, found: Found) -> None:
+        """Go over to the next state."""
+        self._state = after(self._state, found)
 
-    def _search(self) -> bool:
+    # One step for each state. False: samples are missing for it.
+
+    def _search(self, _: list[Event]) -> bool:
+        """Slide the metric over whole hops of samples, up to the first crossing."""
         n_hops = (self._stream.end - self._at) // HOP
         if n_hops < 1:
             return False
@@ -159,24 +165,27 @@ class Receiver:
         else:
             self.counters["triggers"] += 1
             self._at = self._crossing = first + found
+            self._go(Found.CROSSING)
         return True
 
-    def _align(self, crossing: int) -> bool:
-        """The metric's maximum within a preamble's length of the first crossing."""
+    def _align(self, _: list[Event]) -> bool:
+        """Find the metric's maximum within a preamble's length of the first crossing."""
+        crossing = self._crossing
         if self._stream.end < crossing + ALIGN_SPAN:
             return False
         x = self._stream.view(crossing - HISTORY, crossing + ALIGN_SPAN)
         offset, p, plain = strongest(x, ALIGN_SPAN, self._dc_value, self._work)
-        peak = self._at = crossing + offset
-        self._crossing = None
+        self._peak = self._at = crossing + offset
         if plain > PLAINEST:
-            self._was_nothing(peak)
+            self._was_nothing(self._peak)
         else:
-            self._peak = (peak, cmath.phase(p) / (2 * math.pi * preamble.SEGMENT))
+            self._coarse = cmath.phase(p) / (2 * math.pi * preamble.SEGMENT)
+            self._go(Found.PEAK)
         return True
 
     def _was_nothing(self, peak: int) -> None:
         """Whoever makes such peaks and sends no preamble must do better to be looked at again."""
+        self._go(Found.NOTHING)
         self._at = peak + RETRY_AFTER
         # Where noise begins, its first samples resemble anything.
         if peak >= self._began + preamble.SHORT:
@@ -184,17 +193,19 @@ class Receiver:
             self._excess = min(left + _WARIER, MOST - THRESHOLD)
             self._raised_at = peak
 
-    def _acquire(self, peak: int, coarse: float, events: list[Event]) -> bool:
+    def _acquire(self, events: list[Event]) -> bool:
+        """Read training and header of the burst whose preamble peaked."""
+        peak = self._peak
         base = peak - self._before
         if self._stream.end < base + self._span:
             return False
         x = self._stream.view(base, base + self._span)
-        found = self._acquisition.acquire(x, base, coarse, self._dc_value)
-        self._peak = None
+        found = self._acquisition.acquire(x, base, self._coarse, self._dc_value)
         if isinstance(found, Missed):
             if found.stage == "preamble":
                 self._was_nothing(peak)
                 return True
+            self._go(Found.BAD_HEADER)
             self._at = peak + RETRY_AFTER
             self.counters["preambles"] += 1
             self.counters["headers_bad"] += 1
@@ -208,14 +219,17 @@ class Receiver:
         if self._network is not None and told.network != self._network:
             # Searched on, not skipped: a header that lies must not make us deaf.
             self._end(burst, events, "foreign")
+            self._go(Found.FOREIGN)
         else:
+            self._go(Found.HEADER)
             self.counters["bursts"] += 1
             self._at = found.window
         return True
 
-    def _payload(self, burst: IncomingBurst, events: list[Event]) -> bool:
-        """The symbols that complete PDUs, or those up to where the windows may slip."""
-        if self._stream.end < burst.next_end:
+    def _payload(self, events: list[Event]) -> bool:
+        """Decode the symbols that complete PDUs, or those up to where the windows may slip."""
+        burst = self._burst
+        if burst is None or self._stream.end < burst.next_end:
             return False
         plan, found, first = burst.plan, burst.acquired, burst.n_symbols_in
         last, n_pdus = burst.complete(self._stream.end)
@@ -252,14 +266,17 @@ class Receiver:
                 if number + 1 < plan.n_pdus and self._is_gone(own, found):
                     burst.n_symbols_in = through
                     self._end(burst, events, "faded")
+                    self._go(Found.OVER)
                     return True
             burst.n_symbols_in = through
         burst.n_symbols_in = last
         self._at = burst.end_of(last)
         if burst.n_good + burst.n_bad == plan.n_pdus:
             self._end(burst, events, "whole")
+            self._go(Found.OVER)
         else:
             burst.go_on()
+            self._go(Found.PDUS)
         return True
 
     def _is_gone(self, powers: NDArray[np.float32], found: Acquired) -> bool:

@@ -1,9 +1,19 @@
-"""`csma`: listen before talk, p-persistent."""
+"""`csma`: listen before talk, p-persistent.
+
+Stations that wait for the same carrier to end would all begin at its end. So each lets DWAIT pass,
+then its class's own slots, then draws in how many further slots chance has it: the geometric
+distribution that a throw with PERSIST in every idle slot gives. The draw is kept while the air
+stays idle, for drawing anew at every look would favour who looks most often; another carrier, a
+message of another class, or a start that has passed makes it void.
+"""
 
 import math
+from collections.abc import Mapping
+from enum import Enum, auto
 from random import Random
 
-from sdrlinkd.link.access.base import Carriers, Slot, Wish, next_on_grid
+from sdrlinkd.link.access.base import NEVER, Carriers, Slot, Wish, next_on_grid
+from sdrlinkd.link.access.steps import after
 from sdrlinkd.link.qos import Qos
 
 # Slots that a class lets pass after a carrier, and how much more eager than PERSIST it is.
@@ -12,6 +22,29 @@ WINDOWS = {
     Qos.LATENCY: (1, 4.0),
     Qos.DEFAULT: (2, 1.0),
     Qos.BULK: (3, 0.5),
+}
+
+
+class State(Enum):
+    """Whether a start is drawn."""
+
+    OPEN = auto()
+    DRAWN = auto()
+
+
+class Happens(Enum):
+    """What changes that."""
+
+    DRAWS = auto()
+    """A start is drawn, in place of one that is void."""
+    BEGINS = auto()
+    """The burst begins at its start."""
+
+
+STEPS: Mapping[tuple[State, Happens], State] = {
+    (State.OPEN, Happens.DRAWS): State.DRAWN,
+    (State.DRAWN, Happens.DRAWS): State.DRAWN,
+    (State.DRAWN, Happens.BEGINS): State.OPEN,
 }
 
 
@@ -39,7 +72,9 @@ class Csma(Carriers):
         self._persist = persist
         self._detect_s = detect_s
         self._rng = rng
-        self._drawn: tuple[float, Qos, float] | None = None
+        self.backoff = State.OPEN
+        """Whether a start is drawn."""
+        self._drawn = (NEVER, Qos.BULK, NEVER)
         """(end of the carrier it follows, class, start)."""
         self._backoffs = 0
 
@@ -72,15 +107,14 @@ class Csma(Carriers):
         idle_since = self.idle_since(sensed)
         if idle_since is None:
             return None
-        drawn = self._drawn
-        if drawn is None or drawn[:2] != (idle_since, qos) or drawn[2] < earliest:
+        *of, start = self._drawn
+        if self.backoff is State.OPEN or of != [idle_since, qos] or start < earliest:
             start = self._draw(idle_since, earliest, qos)
+            self.backoff = after(STEPS, self.backoff, Happens.DRAWS)
             self._drawn = (idle_since, qos, start)
-        else:
-            start = drawn[2]
         if start > sensed.until + self._slottime_s - self._detect_s:
             return None
-        self._drawn = None
+        self.backoff = after(STEPS, self.backoff, Happens.BEGINS)
         return Slot.exact(start)
 
     def _draw(self, idle_since: float, earliest: float, qos: Qos) -> float:

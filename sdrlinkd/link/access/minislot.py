@@ -1,6 +1,15 @@
-"""`minislot`: after a carrier, each node may begin only in a mini-slot of its own."""
+"""`minislot`: after a carrier, each node may begin only in a mini-slot of its own.
 
-from collections.abc import Sequence
+All who hear a carrier end count from the same moment, so one mini-slot a robot is enough for no two
+to begin at once; it must be as long as it takes to hear another begin and to hold back. The order
+turns with who sent last, or the first robot of the list would have the air for itself. That order
+is known to who read the last burst's header. Who did not comes after all who did, in the order of
+the list. What ended the carrier is all the state there is (FIRST), besides the round that we are
+in since.
+"""
+
+from collections.abc import Mapping, Sequence
+from enum import Enum, auto
 
 from sdrlinkd.link.access.base import NEVER, Carriers, Slot, Wish
 from sdrlinkd.link.carrier import Sensed
@@ -12,6 +21,31 @@ SECTIONS = LEVELS + 1
 """Last come those who could not read who sent last, and so do not know the order."""
 DRIFT = 4e-5
 """Two clocks of 20 ppm part by that much a second since they heard the same carrier end."""
+
+
+class Ended(Enum):
+    """What the last carrier was, as far as a robot can tell."""
+
+    OWN = auto()
+    """Our own burst."""
+    FORWARDED = auto()
+    """Our burst, with PDUs of another."""
+    READ = auto()
+    """A burst that we read, from its source."""
+    RELAYED = auto()
+    """A burst that we read, from a relay: nobody else knows from which."""
+    UNREAD = auto()
+    """Energy alone, or a robot that is not listed."""
+
+
+FIRST: Mapping[Ended, int] = {
+    Ended.OWN: 1,
+    Ended.FORWARDED: 0,
+    Ended.READ: 1,
+    Ended.RELAYED: 0,
+}
+"""So many places after the source of its PDUs is the robot that comes first then. After a carrier
+that is not here, the order is not known."""
 
 
 class MiniSlots(Carriers):
@@ -100,15 +134,21 @@ class MiniSlots(Carriers):
         """Number of our mini-slot after this carrier."""
         n = len(self._nodes)
         level = 0 if qos <= Qos.LATENCY else 1
+        ended, src = self._what_ended(idle_since, sensed)
+        if ended not in FIRST:
+            return LEVELS * n + self._rank
+        first = self._nodes.index(src) + FIRST[ended]
+        return level * n + (self._rank - first) % n
+
+    def _what_ended(self, idle_since: float, sensed: Sensed) -> tuple[Ended, int]:
+        """(what the carrier that ended then was, the source of its PDUs)."""
         src, at, is_relayed = self._last
         if idle_since == self.own_end:
-            if self._own_src is None:
-                return level * n + n - 1
-            src, is_relayed = self._own_src, True
+            ended, src = Ended.OWN, self._nodes[self._rank]
+            if self._own_src is not None:
+                ended, src = Ended.FORWARDED, self._own_src
         elif sensed.burst_at != at:
-            return LEVELS * n + self._rank
-        if src not in self._nodes:
-            return LEVELS * n + self._rank
-        # Nobody else knows which relay it was: its source comes first then.
-        first = self._nodes.index(src) + (not is_relayed)
-        return level * n + (self._rank - first) % n
+            ended = Ended.UNREAD
+        else:
+            ended = Ended.RELAYED if is_relayed else Ended.READ
+        return (ended, src) if src in self._nodes else (Ended.UNREAD, src)

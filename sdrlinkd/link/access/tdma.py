@@ -9,6 +9,8 @@ from struct import pack
 
 from sdrlinkd.link.access.base import Carriers, Slot, Wish, next_on_grid
 from sdrlinkd.link.access.sightings import Sightings
+from sdrlinkd.link.access.steps import after
+from sdrlinkd.link.access.tdma_states import STEPS, Happens, State
 from sdrlinkd.link.carrier import Sensed
 from sdrlinkd.wire import Frame
 
@@ -83,7 +85,8 @@ class Tdma(Carriers):
         self._root, self._level, self._parent = own_id, 0, own_id
         self._lost = (-1, 0, 0.0)
         """(root, level at which we followed it, until when it is not believed)."""
-        self._is_running = False
+        self.schedule = State.LISTENING
+        """Whose schedule is kept."""
         self._told_at = 0.0
         self._begins_at = LISTEN_S + sum(node < own_id for node in nodes)
         self._strangers = Sightings()
@@ -100,9 +103,9 @@ class Tdma(Carriers):
     def state(self) -> str:
         """For people."""
         doing = "listening for a schedule"
-        if self._is_running:
+        if self.schedule is not State.LISTENING:
             doing = f"schedule of robot {self._root}"
-            if self._level:
+            if self.schedule is State.FOLLOWER:
                 doing += f", {self._level} hops away"
         return (
             f"tdma: {len(self._nodes)} slots of {self._slot_s * 1e3:.3g} ms, guard "
@@ -117,11 +120,11 @@ class Tdma(Carriers):
     def slot(self, wish: Wish) -> Slot | None:
         """In our own slot, or in one that nobody uses."""
         earliest, _, need_s, sensed = wish
-        if not self._is_running:
+        if self.schedule is State.LISTENING:
             if earliest < self._begins_at and not self._is_first(earliest, sensed):
                 return None
-            self._is_running, self._origin = True, earliest
-            self._followed_at = earliest
+            self._go(Happens.BEGINS)
+            self._origin = self._followed_at = earliest
         self._forget(earliest)
         number = math.floor((earliest - self._origin) / self._slot_s)
         for each in (number, number + 1):
@@ -159,7 +162,7 @@ class Tdma(Carriers):
 
     def frame(self, start: float) -> Frame | None:
         """The schedule as we keep it."""
-        if not self._is_running:
+        if self.schedule is State.LISTENING:
             return None
         self._forget(start)
         phase_s = (start - self._origin) % self._frame_s
@@ -179,19 +182,23 @@ class Tdma(Carriers):
             self._followed_at = at
         if frame.root >= self._own_id:
             # They will follow us; until then we go on where they are.
-            if not self._is_running:
-                self._is_running, self._origin, self._followed_at = True, origin, at
+            if self.schedule is State.LISTENING:
+                self._go(Happens.ADOPTS)
+                self._origin, self._followed_at = origin, at
             elif self._is_alone(at):
+                self._go(Happens.ADOPTS)
                 self._origin = origin
         elif frame.root == self._lost[0] and told[1] > self._lost[1] and at < self._lost[2]:
             # Somebody who has not forgotten it yet.
             return
         elif frame.level < MAX_LEVEL and (
-            src == self._parent or told < (self._root, self._level) or not self._is_running
+            src == self._parent
+            or told < (self._root, self._level)
+            or self.schedule is State.LISTENING
         ):
+            self._go(Happens.FOLLOWS)
             self._root, self._level, self._parent = *told, src
-            self._origin, self._is_running = origin, True
-            self._told_at = at
+            self._origin, self._told_at = origin, at
 
     def notices(self, now: float) -> list[str]:
         """Who keeps another schedule, or none."""
@@ -206,21 +213,26 @@ class Tdma(Carriers):
             for src in self._strangers.lately(now)
         ]
 
+    def _go(self, happens: Happens) -> None:
+        self.schedule = after(STEPS, self.schedule, happens)
+
     def _is_first(self, earliest: float, sensed: Sensed) -> bool:
         """Whether we are the lowest, and nobody seems to be there."""
         lowest = self._own_id == min(self._nodes)
         return lowest and earliest >= max(QUIET_S, self._frame_s) and sensed.idle_since <= 0
 
     def _forget(self, now: float) -> None:
-        """A root that nobody has heard for long is gone: go on by our own clock."""
-        if self._level and now - self._told_at > FORGET_S:
+        """Go on by our own clock where nobody has heard our root for long."""
+        if self.schedule is State.FOLLOWER and now - self._told_at > FORGET_S:
+            self._go(Happens.LOSES)
             self._lost = (self._root, self._level, now + 2 * FORGET_S)
             self._root, self._level, self._parent = self._own_id, 0, self._own_id
             self._followed_at = now
 
     def _is_alone(self, now: float) -> bool:
         """Whether nobody keeps our schedule, nor we another's; a root is given some time."""
-        return not self._level and now - self._followed_at >= FORGET_S
+        is_root = self.schedule is not State.FOLLOWER
+        return is_root and now - self._followed_at >= FORGET_S
 
     def _listens_through(self, begin: float, now: float) -> bool:
         """Whether our slot that begins then stays empty, to hear who else sends in it."""

@@ -1,0 +1,20 @@
+"""State machines written as a table: (state, what happens) → state."""
+
+from collections.abc import Mapping
+from enum import Enum
+from typing import TypeVar
+
+S = TypeVar("S", bound=Enum)
+H = TypeVar("H", bound=Enum)
+
+
+class IllegalStepError(Exception):
+    """A step that a policy's table does not have: a bug of ours."""
+
+
+def after(table: Mapping[tuple[S, H], S], state: S, happens: H) -> S:
+    """The state that follows. Raises IllegalStepError."""
+    following = table.get((state, happens))
+    if following is None:
+        raise IllegalStepError(f"{happens.name} in {state.name}")
+    return following

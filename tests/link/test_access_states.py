@@ -1,0 +1,98 @@
+"""Access policies as tables: every step is allowed or refused, and robots take each allowed one."""
+
+import itertools
+from random import Random
+
+import pytest
+
+from sdrlinkd.link import AccessParams, Qos, Sensed
+from sdrlinkd.link.access import (
+    CSMA_STEPS,
+    TDMA_STEPS,
+    IllegalStepError,
+    Wish,
+    after,
+    make_access,
+)
+from sdrlinkd.wire import Frame
+from tests.link.radios import LOCKSTEP, params
+
+TABLES = {"csma": CSMA_STEPS, "tdma": TDMA_STEPS}
+
+
+def steps_of(table):
+    """Every pair of a state and of what may happen."""
+    states, happenings = ({key[i] for key in table} for i in (0, 1))
+    states |= set(table.values())
+    return [*itertools.product(*(sorted(each, key=str) for each in (states, happenings)))]
+
+
+@pytest.mark.parametrize(
+    ("policy", "state", "happens"),
+    [(policy, *step) for policy, table in TABLES.items() for step in steps_of(table)],
+)
+def test_every_step_is_allowed_or_refused(policy, state, happens):
+    table = TABLES[policy]
+    if (state, happens) in table:
+        assert after(table, state, happens) is table[state, happens]
+        return
+    with pytest.raises(IllegalStepError, match=f"{happens.name} in {state.name}"):
+        after(table, state, happens)
+
+
+@pytest.fixture
+def taken(monkeypatch):
+    """The steps that policies take."""
+    found = {policy: set() for policy in TABLES}
+    for policy in TABLES:
+
+        def spy(table, state, happens, policy=policy):
+            found[policy].add((state, happens))
+            return after(table, state, happens)
+
+        monkeypatch.setattr(f"sdrlinkd.link.access.{policy}.after", spy)
+    return found
+
+
+def wish(at):
+    return Wish(at, Qos.DEFAULT, 0.001, Sensed(at - 0.001, 0.0))
+
+
+def test_robots_take_every_step_of_csma(taken):
+    access = make_access(AccessParams(policy="csma", persist=0.3), 1, LOCKSTEP, 0.01, Random(1))
+    for i in range(400):
+        access.slot(wish(1.0 + 1e-3 * i))
+        if i % 50 == 0:
+            access.sent(1.0 + 1e-3 * i + 5e-3, None)
+    assert taken["csma"] == set(CSMA_STEPS)
+
+
+def test_robots_take_every_step_of_tdma(taken):
+    """Alone, beside a later robot, below an earlier one, and after that has fallen silent."""
+
+    def robot():
+        return make_access(params("tdma", [1, 2, 3]), 2, LOCKSTEP, 0.01, Random(1))
+
+    def frame_of(access, root, level):
+        schedule = next(f for i in range(9999) if (f := begun(access, i)) is not None).schedule
+        return Frame(root, level, schedule, 1000)
+
+    def begun(access, i):
+        access.slot(wish(1e-2 * i))
+        return access.frame(1e-2 * i)
+
+    above, below = frame_of(robot(), 1, 0), frame_of(robot(), 3, 0)
+    follower = robot()
+    follower.take_frame(1, above, 1.0)
+    follower.take_frame(1, above, 1.5)
+    assert "schedule of robot 1, 1 hops away" in follower.state
+    follower.slot(wish(60.0))
+    assert follower.state.endswith("schedule of robot 2")
+    root = robot()
+    root.take_frame(3, below, 1.0)
+    root.slot(wish(30.0))
+    root.take_frame(3, below, 30.0)
+    assert root.state.endswith("schedule of robot 2")
+    root.take_frame(1, above, 31.0)
+    assert "1 hops away" in root.state
+    assert taken["tdma"] == set(TDMA_STEPS)

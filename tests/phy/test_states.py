@@ -1,0 +1,55 @@
+"""The receiver's states: every step is allowed or refused, and signals take every allowed one."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from phy import Receiver
+from phy.states import NEXT, Found, IllegalStepError, State, after
+from tests.phy.signals import noise
+from tests.phy.test_chunking import make_stream
+
+PIECE = 700
+
+
+@pytest.mark.parametrize(("state", "found"), [*itertools.product(State, Found)])
+def test_every_step_is_allowed_or_refused(state, found):
+    if (state, found) in NEXT:
+        assert after(state, found) is NEXT[state, found]
+        return
+    with pytest.raises(IllegalStepError, match=f"{found.name} in {state.name}"):
+        after(state, found)
+
+
+def test_every_state_can_be_reached_and_left():
+    reached = {State.SEARCH}
+    for _ in State:
+        reached |= {following for (state, _), following in NEXT.items() if state in reached}
+    assert reached == {*State}
+    assert all((state, Found.CUT) in NEXT for state in State)
+
+
+def test_signals_take_every_allowed_step(monkeypatch):
+    """Bursts, foreign ones, tones, headers that fail, fades, and gaps at any moment."""
+    taken = set()
+
+    def spy(state, found):
+        taken.add((state, found))
+        return after(state, found)
+
+    monkeypatch.setattr("phy.receiver.after", spy)
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        x = make_stream(seed)[0]
+        tone = np.exp(2j * np.pi * 0.003 * np.arange(4000)) + noise(rng, 4000, 0.01)
+        x = np.concatenate((x, tone.astype(np.complex64), x))
+        receiver = Receiver(max_frequency=0.03)
+        for at in range(0, len(x), PIECE):
+            receiver.push(x[at : at + PIECE])
+            if rng.random() < 0.2:
+                receiver.gap(int(rng.integers(0, 300)))
+        receiver.flush()
+    # A gap takes in what can be told of the samples before it, so only a burst is left to be cut.
+    rare = {(State.ALIGN, Found.CUT), (State.ACQUIRE, Found.CUT)}
+    assert set(NEXT) - rare <= taken <= set(NEXT)
