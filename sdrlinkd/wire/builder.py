@@ -48,7 +48,7 @@ class PduBuilder:
 
     @property
     def is_empty(self) -> bool:
-        """Neither entries nor records yet."""
+        """Whether there are neither entries nor records yet."""
         return not self._topic_ids and not self._records
 
     def add(self, topic_id: int, entry_id: int, index: int, total: int, payload: bytes) -> None:

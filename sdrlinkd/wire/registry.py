@@ -40,7 +40,7 @@ class RegistryDigest:
 
     @classmethod
     def from_bytes(cls, value: bytes) -> "RegistryDigest":
-        """From the value of a DIGEST record."""
+        """The digest in the value of a DIGEST record."""
         return cls(value[: cls.OVERALL_SIZE], value[cls.OVERALL_SIZE :])
 
     def shortened(self) -> "RegistryDigest":

@@ -33,7 +33,7 @@ class Settled(NamedTuple):
 
     @property
     def share(self) -> float:
-        """That of the policy in force."""
+        """The share of the air that the policy in force carries."""
         return self.shares[self.policy]
 
     @property
@@ -43,7 +43,7 @@ class Settled(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """For people."""
+        """The policy in force, why, and what it carries, in a sentence for people."""
         return f"{self.policy}, {self.reason}; it carries {percent(self.share)} of the air"
 
 
@@ -106,7 +106,7 @@ def air_shares(
 
 
 def percent(share: float) -> str:
-    """`93 %`, `6.6 %`."""
+    """A share as people write it: `93 %`, `6.6 %`."""
     return f"{100 * share:.2g} %" if share < 0.995 else "100 %"
 
 
@@ -117,7 +117,7 @@ def _others(params: AccessParams, own_id: int) -> set[int]:
 def _chosen(
     params: AccessParams, own_id: int, traits: CarrierTraits, shares: Mapping[str, float]
 ) -> tuple[Policy, str]:
-    """(policy, why) where it is auto."""
+    """The (policy, reason) that `auto` comes to on this radio."""
     if traits.kind in ALONE or not traits.senses:
         return "none", f'as no other robot shares the air of the backend "{traits.kind}"'
     if not _others(params, own_id):

@@ -27,7 +27,7 @@ class Slot(NamedTuple):
 
     @classmethod
     def exact(cls, start: float, end: float = inf, least: Qos = Qos.BULK) -> Self:
-        """At `start` or not at all."""
+        """A slot whose burst leaves at `start` or not at all."""
         return cls(start, end, start, least)
 
 
@@ -86,7 +86,7 @@ class Access(Protocol):
         """A burst of ours will be on the air until `end`; `src`: whose PDUs it forwards, if any."""
 
     def not_sent(self, start: float) -> None:
-        """It was not."""
+        """The burst that was to begin at `start` did not leave."""
 
     def heard(self, src: int, at: float, is_relayed: bool) -> None:
         """A PDU of `src` came in a burst whose preamble was at `at`, perhaps from a relay."""
@@ -104,7 +104,7 @@ class Access(Protocol):
         """What `src` tells of the schedule, in a burst whose preamble was at `at`."""
 
     def notices(self, now: float) -> list[str]:
-        """What a person should know."""
+        """What a person should know of how the air is shared, in sentences."""
 
 
 class Carriers:
@@ -144,16 +144,16 @@ class Carriers:
             self._own_ends = [NEVER]
 
     def heard(self, src: int, at: float, is_relayed: bool) -> None:
-        """Ignore whose burst was heard."""
+        """Ignore whose burst was heard: no turn depends on it."""
 
     def told_of(self, node: int, at: float) -> None:
-        """Ignore who hears whom."""
+        """Ignore who hears whom: no turn depends on it."""
 
     def beacon(self, src: int, at: float) -> None:
-        """Ignore who is there."""
+        """Ignore who is there: no turn depends on it."""
 
     def frame(self, start: float) -> Frame | None:
-        """None: there is no schedule to tell of."""
+        """The schedule to tell others of: none is kept."""
 
     def take_frame(self, src: int, frame: Frame, at: float) -> None:  # noqa: ARG002  # not all ask
         """Remember that robot `src` keeps a schedule, and so has another policy."""

@@ -26,14 +26,14 @@ WINDOWS = {
 
 
 class State(Enum):
-    """Whether a start is drawn."""
+    """Whether the start of the next burst is drawn."""
 
     OPEN = auto()
     DRAWN = auto()
 
 
 class Happens(Enum):
-    """What changes that."""
+    """What changes whether a start is drawn."""
 
     DRAWS = auto()
     """A start is drawn, in place of one that is void."""
@@ -80,7 +80,7 @@ class Csma(Carriers):
 
     @property
     def state(self) -> str:
-        """For people."""
+        """Policy, times and backoffs so far, for people."""
         return (
             f"csma: DWAIT {self._dwait_s * 1e3:.3g} ms, SLOTTIME {self._slottime_s * 1e3:.3g} ms, "
             f"PERSIST {self._persist:g}; {self._backoffs} backoffs"

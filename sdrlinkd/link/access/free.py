@@ -37,7 +37,7 @@ class Free(Carriers):
         return "none"
 
     def slot(self, wish: Wish) -> Slot | None:
-        """Where it is wanted: at once."""
+        """A slot where it is wanted, at once."""
         return Slot(wish.earliest)
 
     def carries(self, burst_s: float) -> float:

@@ -79,7 +79,7 @@ class MiniSlots(Carriers):
 
     @property
     def state(self) -> str:
-        """For people."""
+        """Policy, robots and times, for people."""
         return (
             f"minislot: {len(self._nodes)} robots, {self._minislot_s * 1e3:.3g} ms each, round in "
             f"{self.round_s * 1e3:.3g} ms"

@@ -11,12 +11,12 @@ class Sightings:
         self._seen: dict[int, tuple[int, float]] = {}
 
     def add(self, src: int, at: float) -> None:
-        """Robot `src` did it at `at`."""
+        """Note that robot `src` was seen at `at`."""
         n = self._seen[src][0] if self._is_lately(src, at) else 0
         self._seen[src] = n + 1, at
 
     def clear(self, src: int) -> None:
-        """Robot `src` does it no more."""
+        """Forget robot `src`: what was seen of it has ended."""
         self._seen.pop(src, None)
 
     def lately(self, now: float, least: int = 1) -> list[int]:

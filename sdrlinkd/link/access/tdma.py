@@ -101,7 +101,7 @@ class Tdma(Carriers):
 
     @property
     def state(self) -> str:
-        """For people."""
+        """Policy, times, and whose schedule is kept, for people."""
         doing = "listening for a schedule"
         if self.schedule is not State.LISTENING:
             doing = f"schedule of robot {self._root}"
@@ -113,7 +113,7 @@ class Tdma(Carriers):
         )
 
     def carries(self, burst_s: float) -> float:
-        """All but guards and gaps."""
+        """The share of the air that bursts take of slots less guards and gaps."""
         open_s = self._slot_s - self._guard_s
         return open_s / self._slot_s * burst_s / (burst_s + self._gap_s)
 
@@ -147,21 +147,21 @@ class Tdma(Carriers):
         return None
 
     def heard(self, src: int, at: float, is_relayed: bool) -> None:
-        """It is not hidden from us."""
+        """Note that robot `src` is not hidden from us."""
         if not is_relayed:
             self._heard_at[src] = at
 
     def told_of(self, node: int, at: float) -> None:
-        """It is there, whether we hear it or not."""
+        """Note that robot `node` is there, whether we hear it or not."""
         if node != self._own_id:
             self._told_of_at[node] = at
 
     def beacon(self, src: int, at: float) -> None:
-        """A schedule should come with it."""
+        """Note a beacon of robot `src`: a schedule should come with it."""
         self._unscheduled.add(src, at)
 
     def frame(self, start: float) -> Frame | None:
-        """The schedule as we keep it."""
+        """The schedule as we keep it, for a burst that leaves at `start`; None while listening."""
         if self.schedule is State.LISTENING:
             return None
         self._forget(start)
@@ -201,7 +201,7 @@ class Tdma(Carriers):
             self._origin, self._told_at = origin, at
 
     def notices(self, now: float) -> list[str]:
-        """Who keeps another schedule, or none."""
+        """Robots that keep another schedule, or none, in sentences."""
         return [
             f"robot {src} is heard and keeps no tdma schedule: what it sends falls into others' "
             "slots; give it the same [access], and a radio of the same kind where access.policy "

@@ -110,7 +110,7 @@ class Intake:
             topic.apply(topic.policy)
 
     def tally(self, topic_id: int) -> TxTally:
-        """Counters of one topic."""
+        """The counters of one topic."""
         return self._topics[topic_id].tally
 
     def policy(self, topic_id: int) -> TopicPolicy:

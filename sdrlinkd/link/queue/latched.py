@@ -50,7 +50,7 @@ class Latched:
         self._topics[topic_id] = _Topic(kept)
 
     def forget(self, topic_id: int) -> None:
-        """The topic is volatile."""
+        """Keep no message of a topic that is volatile now."""
         self._topics.pop(topic_id, None)
 
     def newcomer(self, node: int, now: float) -> None:

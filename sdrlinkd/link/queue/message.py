@@ -134,22 +134,22 @@ class Outgoing:
         return True
 
     def enter(self, lane: "Lane") -> None:
-        """It waits in `lane`."""
+        """Note the lane that the message waits in."""
         self.lane = lane
 
     def cut(self, entry_id: int, k: int, total: int, start: float) -> None:
-        """It becomes `total` fragments of `k` bytes, for bursts from `start` on."""
+        """Note that it becomes `total` fragments of `k` bytes, for bursts from `start` on."""
         self.entry_id, self.k, self.total, self.last_at = entry_id, k, total, start
         self.rests_id = total > 1
 
     def advance(self, n: int, start: float) -> None:
-        """Its next `n` fragments are in a PDU each, for a burst at `start`."""
+        """Note that the next `n` fragments are in a PDU each, for a burst at `start`."""
         self.next_index += n
         self.unconfirmed += n
         self.last_at = start
 
     def follow_with(self, parity: list[bytes]) -> None:
-        """These records come behind its last fragment; the first one stands last."""
+        """Have records of parity follow the last fragment; the first record stands last."""
         self.parity = parity
 
     def give_parity(self) -> bytes:
@@ -157,27 +157,27 @@ class Outgoing:
         return self.parity.pop()
 
     def ride(self) -> None:
-        """One more PDU has a part of it that is no fragment."""
+        """Note that one more PDU has a part of the message that is no fragment."""
         self.unconfirmed += 1
 
     def stamp(self) -> None:
-        """Its age is in a PDU."""
+        """Note that the message's age is in a PDU."""
         self.stamped = True
 
     def keep_id(self) -> None:
-        """Something of it has left ahead: its entry id rests, however short it is."""
+        """Have the entry id rest, however short the message is: something of it has left ahead."""
         self.rests_id = True
 
     def hold_id(self, is_held: bool) -> None:
-        """Whether its entry id waits for fragments that leave later."""
+        """Note whether the entry id waits for fragments that leave later."""
         self.is_held = is_held
 
     def expect(self) -> None:
-        """The far ends have been asked."""
+        """Note that the far ends have been asked what becomes of the message."""
         self.is_expected = True
 
     def confirm(self) -> None:
-        """The radio has told of one PDU with a part of it."""
+        """Note that the radio has told of one PDU with a part of the message."""
         self.unconfirmed -= 1
 
 

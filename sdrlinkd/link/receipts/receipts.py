@@ -169,5 +169,5 @@ class Receipts:
 
 
 def _counted_down(robots: set[int]) -> Iterable[tuple[int, int]]:
-    """(how many come after it, robot)."""
+    """Pairs of (how many robots come after it, robot)."""
     return zip(range(len(robots) - 1, -1, -1), sorted(robots), strict=True)

@@ -34,7 +34,7 @@ class Ages:
         self._origins: OrderedDict[tuple[int, int, int], Origin] = OrderedDict()
 
     def stamp(self, src: int, stamp: Stamp, at: float) -> None:
-        """A STAMP record arrived in a burst whose preamble was at `at`."""
+        """Note a STAMP record that came in a burst whose preamble was at `at`."""
         topic_id, entry_id, age_us, asks = stamp
         key = (src, topic_id, entry_id)
         self._origins[key] = Origin(at - age_us * 1e-6, at, asks)
@@ -43,13 +43,15 @@ class Ages:
             self._origins.popitem(last=False)
 
     def take(self, src: int, topic_id: int, entry_id: int) -> Origin:
-        """Of a message that is now complete, or given up; `at` is None when no stamp came."""
+        """The origin of a message that is now complete, or given up; `at` is None when no stamp
+        came.
+        """
         if not self._origins:
             return UNKNOWN
         return self._origins.pop((src, topic_id, entry_id), UNKNOWN)
 
     def look(self, src: int, topic_id: int, entry_id: int) -> Origin:
-        """Of one that is not."""
+        """The origin of a message that is not complete yet."""
         return self._origins.get((src, topic_id, entry_id), UNKNOWN)
 
     def expire(self, now: float, is_held: Callable[[int, int, int], bool]) -> None:

@@ -15,11 +15,11 @@ class Deadman:
         return min(self._due_at.values(), default=float("inf"))
 
     def fresh(self, src: int, topic_id: int, now: float, deadman_s: float) -> None:
-        """A message of a topic that must not fall silent for `deadman_s`."""
+        """Note a message of a topic that must not fall silent for `deadman_s`."""
         self._due_at[src, topic_id] = now + deadman_s
 
     def forget(self, topic_id: int) -> None:
-        """The topic may be silent."""
+        """Let a topic be silent from now on."""
         for key in [key for key in self._due_at if key[1] == topic_id]:
             del self._due_at[key]
 

@@ -58,7 +58,7 @@ class Handover:
         return self._deadman.take_due(now)
 
     def forget(self, topic_id: int) -> None:
-        """Let a topic be silent."""
+        """Let a topic be silent from now on."""
         self._deadman.forget(topic_id)
 
     def report(self, src: int, topic_id: int) -> AgeReport:

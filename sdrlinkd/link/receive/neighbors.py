@@ -18,7 +18,7 @@ PRESENT_S = 10.0
 
 @dataclass(slots=True)
 class Neighbor:
-    """One source of PDUs."""
+    """One source of PDUs, as it is heard here."""
 
     src: int
     track: SequenceTrack = field(default_factory=SequenceTrack)
@@ -36,7 +36,7 @@ class Neighbor:
     _reported: tuple[int, int] = (0, 0)
 
     def heard_at(self, at: float) -> None:
-        """One more PDU came."""
+        """Note when one more PDU came."""
         if self.last_heard_at:
             # A pause is forgotten after some hundred PDUs without one as long; an outage is none.
             gap_s = min(at - self.last_heard_at, LONGEST_GAP_S)
@@ -44,7 +44,7 @@ class Neighbor:
         self.last_heard_at = at
 
     def note_snr(self, snr_db: float | None) -> None:
-        """SNR of one more PDU."""
+        """Note the SNR of one more PDU, in dB."""
         self.snr_db = snr_db
         if snr_db is None or self.mean_snr_db is None:
             self.mean_snr_db = snr_db

@@ -34,7 +34,7 @@ class Allowance(NamedTuple):
 
     @classmethod
     def of(cls, n_pdus: int) -> "Allowance":
-        """The same for all."""
+        """An allowance of `n_pdus` for every class."""
         return cls((n_pdus,) * len(Qos))
 
     def above(self, qos: Qos) -> "Allowance":

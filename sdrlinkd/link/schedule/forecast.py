@@ -65,7 +65,7 @@ class Forecast:
         )
 
     def is_alive(self, now: float) -> bool:
-        """Whether more is to be expected."""
+        """Whether more messages of the topic are to be expected."""
         return now - self.seen_at <= MISSED * self.period_s
 
     @property

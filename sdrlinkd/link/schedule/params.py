@@ -41,19 +41,19 @@ class LatencyParams(ClassParams, frozen=True, kw_only=True, forbid_unknown_field
 
 
 class DefaultParams(ClassParams, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What names no class."""
+    """The class of messages that name none."""
 
     share: Share = 0.05
 
 
 class BulkParams(ClassParams, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What fills the air."""
+    """The class of messages that may fill the air."""
 
     share: Share = 0.05
 
 
 class ClassesParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """By class."""
+    """What every class is given."""
 
     urgent: UrgentParams = UrgentParams()
     latency: LatencyParams = LatencyParams()
@@ -61,6 +61,6 @@ class ClassesParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     bulk: BulkParams = BulkParams()
 
     def of(self, qos: Qos) -> ClassParams:
-        """That of a class."""
+        """What one class is given."""
         params: ClassParams = getattr(self, qos.label)
         return params

@@ -63,7 +63,7 @@ class Clocks:
         self._wall = wall
 
     def end(self) -> None:
-        """No more."""
+        """Make no more CLOCK records."""
         self.due_at = float("inf")
 
     def record(self, start: float, room: int) -> Clock:
@@ -93,19 +93,19 @@ class Clocks:
         )
 
     def rode(self) -> int:
-        """The record went into a burst; its number."""
+        """Note that the record went into a burst; its number."""
         number, self._number = self._number, (self._number + 1) % CLOCK_NUMBERS
         return number
 
     def left(self, number: int, at: float) -> None:
-        """The burst with CLOCK `number` left at `at`."""
+        """Note that the burst with CLOCK `number` left at `at`."""
         self._left[number] = at
         self._left.move_to_end(number)
         if len(self._left) > REMEMBERED:
             self._left.popitem(last=False)
 
     def hear(self, src: int, clock: Clock, at: float) -> None:
-        """Another robot's."""
+        """Take a CLOCK record of robot `src` that came at `at`."""
         peer = self.peers.get(src)
         if peer is None:
             peer = self.peers[src] = PeerClock(src, self._resolution_s)

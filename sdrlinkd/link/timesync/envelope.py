@@ -48,11 +48,11 @@ class Estimate(NamedTuple):
     skew_bound: float
 
     def offset(self, now: float) -> float:
-        """Extrapolated to `now`."""
+        """The offset in s, extrapolated to `now`."""
         return self.offset_s + self.skew * (now - self.at)
 
     def bound(self, now: float) -> float:
-        """The same of the bound."""
+        """How wrong the offset may be at `now`, in s."""
         return self.bound_s + self.skew_bound * max(0.0, now - self.at)
 
 
@@ -104,7 +104,7 @@ class DualEnvelope:
         return None
 
     def forget(self) -> None:
-        """The other clock is another one."""
+        """Forget all samples: the other clock is another one now."""
         for side, running in self._running.items():
             side.clear()
             running.clear()

@@ -38,7 +38,7 @@ class PaperFilter:
 
     @property
     def converged(self) -> bool:
-        """Equation 6."""
+        """Whether enough samples have come (Equation 6)."""
         return self.n >= CONVERGENCE_WINDOW
 
     def update(self, t_packet_creation: float, t_remote_stamp: float, t_current: float) -> None:
@@ -53,11 +53,11 @@ class PaperFilter:
         self._take(((t1 + t4) - (t2 + t3)) / 2, (t4 - t1) - (t3 - t2))
 
     def synced(self, t_remote: float) -> float | None:
-        """A remote time in local time; None until converged."""
+        """A remote time in local time; None until the filter has converged."""
         return t_remote + self.offset_estimated if self.converged else None
 
     def reset_filter(self) -> None:
-        """Algorithm 3, RESET_FILTER."""
+        """Begin anew (Algorithm 3, RESET_FILTER)."""
         self.resets += 1
         self.n = 0
         self.offset_estimated = 0.0
@@ -82,7 +82,7 @@ class PaperFilter:
         self.high_rtt_count = 0
 
     def _add_sample(self, offset_observed: float) -> None:
-        """Equations 2 and 3."""
+        """Move offset and skew on by one sample (Equations 2 and 3)."""
         before = self.offset_estimated
         if self.n == 0:
             self.offset_estimated = offset_observed

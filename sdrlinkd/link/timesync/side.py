@@ -25,12 +25,12 @@ class Side:
 
     @property
     def x(self) -> NDArray[np.float64]:
-        """Times in s."""
+        """Times of the samples in s."""
         return self._rows[0, self._begin : self._end]
 
     @property
     def v(self) -> NDArray[np.float64]:
-        """Bounds in s."""
+        """Bounds that the samples give, in s."""
         return self._rows[1, self._begin : self._end]
 
     def lowest(self, steepest: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -69,10 +69,10 @@ class Side:
         self._bucket = bucket
 
     def forget_before(self, x: float) -> None:
-        """What is older."""
+        """Forget samples older than `x`, in s."""
         self._begin += int(np.searchsorted(self.x, x))
 
     def clear(self) -> None:
-        """All of it."""
+        """Forget all samples."""
         self._begin = self._end = 0
         self._bucket = -math.inf

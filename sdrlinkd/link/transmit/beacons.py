@@ -13,7 +13,7 @@ SNR_RANGE = (-128, 127)
 
 
 class Beacons:
-    """When the next is due, and what is in it."""
+    """When the next beacon is due, and what is in it."""
 
     def __init__(self, period_s: float, pdu_size: int, digest: RegistryDigest, rng: Random) -> None:
         self._period_s = period_s
@@ -26,7 +26,7 @@ class Beacons:
         self.due_at = 0.0 if period_s > 0 else inf
 
     def end(self) -> None:
-        """Make no more of them."""
+        """Make no more beacons."""
         self.due_at = inf
 
     def take(self, start: float, neighbors: Neighbors, rate: RateControl) -> list[Record]:

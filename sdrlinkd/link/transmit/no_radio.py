@@ -20,35 +20,35 @@ class NoRadio:
     has_work = False
 
     def more_to_send(self) -> None:
-        """Nothing is decided, so nothing has to be decided anew."""
+        """Ignore what has come: nothing is decided, so nothing has to be decided anew."""
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
-        """None: there is nothing to send with."""
+        """The next burst: none, as there is nothing to send with."""
 
     def next_wakeup(self, now: float) -> float:  # noqa: ARG002  # the same at any time
-        """Infinity: the radio has to come first."""
+        """When there may next be something to send: never, the radio has to come first."""
         return inf
 
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
-        """No burst of ours can have left."""
+        """Ignore a burst: none of ours can have left."""
 
     def pdu_heard(self, event: PduHeard) -> None:
-        """Who is heard says nothing of an air that we have no radio for."""
+        """Ignore who is heard: there is no policy to tell."""
 
     def record_heard(self, src: int, record: Record, at: float) -> None:
-        """What others tell of their schedule is of no use without a radio."""
+        """Ignore what others tell: there is no policy to tell it to."""
 
     def clear(self) -> None:
-        """Nothing waits to go again."""
+        """Forget bursts that go again: there are none."""
 
     def access_notices(self, now: float) -> list[str]:  # noqa: ARG002  # the same at any time
-        """Empty: no policy is in force."""
+        """Notices of the access policy: none, as none is in force."""
         return []
 
     def heard_by(self, src: int) -> HeardThere:  # noqa: ARG002  # the same for all
-        """Nobody hears us."""
+        """How robot `src` hears us: it does not."""
         return HeardThere(None, None, 0)
 
     def report(self) -> TransmitReport:
-        """Nothing was sent."""
+        """What was sent: nothing."""
         return TransmitReport()

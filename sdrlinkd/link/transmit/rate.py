@@ -92,7 +92,7 @@ class RateControl:
         """The last ones, for default and bulk."""
 
     def heard(self, src: int, now: float) -> None:
-        """A neighbor is there."""
+        """Note that robot `src` was heard at `now`."""
         peer = self._peers.get(src)
         if peer is None:
             self._peers[src] = _Peer(now)
@@ -100,7 +100,7 @@ class RateControl:
             peer.heard_at = now
 
     def take(self, src: int, report: LinkReport, now: float) -> None:
-        """`src` tells how well it hears us."""
+        """Take the report of robot `src` on how well it hears us."""
         peer = self._peers.setdefault(src, _Peer(now))
         if now - peer.told_at > self._params.stale_s:
             # What went wrong before tells nothing of now.
@@ -114,7 +114,7 @@ class RateControl:
             peer.penalty_db = max(0.0, peer.penalty_db - PENALTY_DECAY_DB)
 
     def mcs(self, destinations: Iterable[int], qos: Qos, now: float) -> int:
-        """For a burst to `destinations` that leaves at `now`."""
+        """The MCS for a burst to `destinations` that leaves at `now`."""
         if not self.adapts:
             return self._fixed
         wanted = set(destinations)
@@ -131,7 +131,7 @@ class RateControl:
         )
 
     def suggested(self, snr_db: float) -> int:
-        """What we would like a neighbor heard at `snr_db` to send with."""
+        """The MCS that we would like a neighbor heard at `snr_db` to send with."""
         return self._best(snr_db - self._params.margin_db)
 
     def heard_there(self, src: int) -> HeardThere:

@@ -28,7 +28,7 @@ class RetryQueue:
         return True
 
     def clear(self) -> None:
-        """Send nothing again."""
+        """Forget the bursts that go again."""
         self.waiting.clear()
 
     def take(self, start: float) -> Burst:

@@ -191,7 +191,7 @@ class BurstScheduler:
         return min(self._control_records.due_at, wakes_at)
 
     def clear(self) -> None:
-        """Send nothing again."""
+        """Forget the bursts that go again."""
         self._retry.clear()
 
     @property

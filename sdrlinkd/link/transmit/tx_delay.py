@@ -54,7 +54,7 @@ class TxDelayMeters:
         }
 
     def records(self) -> Iterable[Waits]:
-        """Of topics sent since the last call."""
+        """WAITS records of topics sent since the last call."""
         for topic_id, topic in self._of_topic.items():
             total_s = topic.queue_s + topic.access_s + topic.again_s
             if topic.is_told or total_s <= 0:
