@@ -4,6 +4,13 @@ Among topics of equal class and priority: with two or more pending, PDUs of two 
 having k = max(k*(2), k_min) bytes, round robin; with one, a single entry of k = P_max − 13. k
 freezes at a message's first fragment. Greedy: further entries of the same topics while they fit.
 Lower classes fill what is left over.
+
+Why so: a header costs 8 bytes and an entry 5, so one large entry wastes least; but a topic that had
+every PDU for itself would hold up its equals for as long as its message is. k freezes because a
+receiver puts fragments back by index · k. All PDUs of a burst are of one source: a relay that mixed
+its own with those that it forwards would leave its hearers in doubt whose burst it was, and
+mini-slots are ordered by just that. The age goes with a message's last fragment, where it is known
+best: earlier fragments may have waited since.
 """
 
 from collections.abc import Sequence
