@@ -8,12 +8,12 @@ both know.
 Geometry: over local time x, each sample of one direction is a point above the line of the true
 offset, each of the other a point below it. Clocks drift, so the line has a slope, the skew, of at
 most MOST. All lines that pass between the two clouds are possible. For one slope, the highest and
-the lowest of them are those that touch a cloud; their mean is the best guess and half their distance
-the bound, because delays are positive and their least values are not known (`_bounds`). Over slopes,
-a line is the likelier the closer the samples lie to it: with delays that are exponential beyond
-their least, the likelihood of a slope is the product of 1/(mean excess)^n of both directions
-(`_weights`), times a prior of what crystals are like. The offset is the mean over slopes by that
-weight; its bound covers every possible line, however unlikely.
+the lowest of them are those that touch a cloud; their mean is the best guess and half their
+distance the bound, because delays are positive and their least values are not known (`_bounds`).
+Over slopes, a line is the likelier the closer the samples lie to it: with delays that are
+exponential beyond their least, the likelihood of a slope is the product of 1/(mean excess)^n of
+both directions (`_weights`), times a prior of what crystals are like. The offset is the mean over
+slopes by that weight; its bound covers every possible line, however unlikely.
 """
 
 from collections import deque
