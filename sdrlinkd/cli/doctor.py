@@ -88,14 +88,14 @@ def _look(setup: "Setup | None", runtime_dir: Path | None) -> tuple[list["Findin
 
 
 def _radio(setup: "Setup | None", device: str) -> list["Finding"]:
-    from backends import BackendError, driver_of, survey
+    from backends import BackendError, driver_of, probe_devices
     from sdrlinkd.doctor import ON_USB, Finding, State, check_radio, check_usb, is_networked
 
     config = setup.config if setup is not None else None
     if config is not None and not device:
         return check_radio(config, None)
     try:
-        there = survey(device)
+        there = probe_devices(device)
     except BackendError as error:
         to_do = "name one device with soapy.device, such as driver=hackrf, and look again"
         return [Finding("device", State.BAD, str(error), to_do)]
