@@ -31,7 +31,7 @@ class Patience(Enum):
     """What a radio does when it is opened and is not there."""
 
     NONE = "none"
-    """It fails at once."""
+    """It fails at once, and says why."""
     THERE = "there"
     """It waits until it is there."""
     REPLUGGED = "replugged"
@@ -116,7 +116,7 @@ class TxBurst(NamedTuple):
 
 
 class TxOutcome(Enum):
-    """What became of a burst."""
+    """What became of a burst that was handed over."""
 
     SENT = "sent"
     LATE = "late"
@@ -163,7 +163,7 @@ class Radio(Protocol):
         """How strong what it hears is, before any filter of ours; None: that is not known."""
 
     async def open(self, tuning: Tuning) -> None:
-        """Begin. Raises BackendError."""
+        """Begin to receive at this rate and frequency. Raises BackendError."""
 
     def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
         """Contiguous blocks from index 0 on; gaps are blocks too. Ends with the recording.

@@ -84,14 +84,14 @@ class EtherRadio:
 
     @property
     def capabilities(self) -> Capabilities:
-        """As the hub says."""
+        """What this radio can do, as the hub says."""
         paced = self._welcome.paced
         lead_s = ETHER_LEAD_S if paced else LEAD / self._tuning.rate_hz
         return self._joined.capabilities(paced, lead_s, self._welcome.block_s)
 
     @property
     def detail(self) -> str:
-        """For people."""
+        """The hub's air, and whether the hub is there, in one line for people."""
         if self._antenna is None:
             return "no hub yet"
         parts = [self._welcome.air, "the hub is away" if self._is_away else "", self._notice]
@@ -99,12 +99,12 @@ class EtherRadio:
 
     @property
     def trouble(self) -> str:
-        """While the hub is away."""
+        """Why nothing comes while the hub is away; else empty."""
         return "it answers no more; it is asked until it is back" if self._is_away else ""
 
     @property
     def levels(self) -> Levels | None:
-        """Of the blocks so far."""
+        """How strong the blocks so far were; None before the first look."""
         return self._feed.levels
 
     async def open(self, tuning: Tuning) -> None:
@@ -164,7 +164,7 @@ class EtherRadio:
         return answer
 
     async def close(self) -> None:
-        """Leave the air."""
+        """Leave the air; closing twice is fine."""
         if self._closing.is_set():
             return
         self._closing.set()
@@ -211,7 +211,7 @@ class EtherRadio:
             self._is_idle.set()
 
     def _next_block(self) -> RxBlock | None:
-        """In the feed's thread."""
+        """Wait for the next block. Runs on the feed's thread."""
         while not self._closing.is_set():
             try:
                 message, samples = self._downlink.next()
