@@ -7,11 +7,14 @@ the radio process, and others that only move samples, never do.
 import importlib
 from typing import TYPE_CHECKING
 
+from backends.backend import Backend, ModemNeeds, Presumption, RadioRequest
 from backends.base import (
     SENDING,
     AbsentError,
     BackendError,
     Capabilities,
+    Hear,
+    Levels,
     Patience,
     Radio,
     RefusalError,
@@ -27,20 +30,18 @@ from backends.late import LateRadio
 from backends.outstanding import GAP
 from backends.params import EtherParams, IqFileParams, LoopbackParams, ZmqParams
 from backends.recording import GAP_LABEL, RecordingInfo, RecordingReader, describe, refuse_same
+from backends.registry import BUILT_IN, find_backend, installed_names
 from backends.samples import SAMPLE_TYPES
 from backends.soapy import (
     Assessment,
     DeviceProbe,
     DirectionProbe,
-    Presumed,
     ProbeReport,
     SoapyParams,
     SoapyRadio,
     SoapySettings,
     assess_device,
     driver_of,
-    least_rate_hz,
-    presume,
     probe_devices,
 )
 from backends.writing import Annotation, RecordingWriter
@@ -48,7 +49,6 @@ from backends.writing import Annotation, RecordingWriter
 if TYPE_CHECKING:
     from backends.air import Channel
     from backends.ether import (
-        ETHER_LEAD_S,
         AirParams,
         AirSense,
         Answer,
@@ -73,7 +73,7 @@ if TYPE_CHECKING:
     from backends.zmqstream import ZmqRadio, open_endpoint
 
 __all__ = [
-    "ETHER_LEAD_S",
+    "BUILT_IN",
     "GAP",
     "GAP_LABEL",
     "SAMPLE_TYPES",
@@ -84,6 +84,7 @@ __all__ = [
     "Annotation",
     "Answer",
     "Assessment",
+    "Backend",
     "BackendError",
     "BurstMedium",
     "BurstShape",
@@ -95,22 +96,26 @@ __all__ = [
     "EtherParams",
     "EtherRadio",
     "Flight",
+    "Hear",
     "HubWatch",
     "IqFileParams",
     "IqFileRadio",
     "LateRadio",
+    "Levels",
     "LinkOverride",
     "LocalEther",
     "LoopbackParams",
     "LoopbackRadio",
+    "ModemNeeds",
     "OffsetRadio",
     "Outage",
     "OversampledRadio",
     "Patience",
-    "Presumed",
+    "Presumption",
     "ProbeReport",
     "Radio",
     "RadioParams",
+    "RadioRequest",
     "RecordingInfo",
     "RecordingReader",
     "RecordingWriter",
@@ -133,9 +138,9 @@ __all__ = [
     "burst_shape",
     "describe",
     "driver_of",
-    "least_rate_hz",
+    "find_backend",
+    "installed_names",
     "open_endpoint",
-    "presume",
     "probe_devices",
     "refuse_same",
 ]

@@ -59,7 +59,8 @@ class Capabilities:
     before has been done. `block_s`: samples come in pieces of this length. `lead_s`: how long
     before its start a burst must be handed over. `turnaround_s`: for so long before and after a
     burst a half-duplex radio hears nothing. `index_error_s`: how wrong indices may be after a gap,
-    where there are no `timestamps`. `spells`: it sends in such.
+    where there are no `timestamps`. `shares_air`: other robots may hear
+    what it sends. `spells`: it sends in such.
     """
 
     receives: bool
@@ -72,6 +73,7 @@ class Capabilities:
     lockstep: bool = False
     index_error_s: float = 0.0
     block_s: float = 0.001
+    shares_air: bool = True
     spells: Spells | None = None
 
 

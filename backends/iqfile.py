@@ -70,6 +70,7 @@ class IqFileRadio:
             timestamps=True,
             paced=self._paced,
             block_s=self._block_s,
+            shares_air=False,
         )
 
     @property

@@ -61,6 +61,7 @@ class LoopbackRadio:
             timestamps=True,
             paced=self._paced,
             block_s=self._block_s,
+            shares_air=False,
         )
 
     @property

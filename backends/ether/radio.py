@@ -32,10 +32,9 @@ from backends.ether.joining import join
 from backends.ether.medium import LEAD, Piece
 from backends.ether.sockets import AIR, NOBLOCK, SKY, connect
 from backends.feed import BlockFeed, Fed
+from backends.known import ETHER_LEAD_S
 from backends.outstanding import answered
 
-# From the event loop to the hub, on a busy machine.
-ETHER_LEAD_S = 0.002
 ANSWER_MS = 5000
 # A paced hub that says nothing for so long is gone; it is asked again that often.
 QUIET_MS = 500

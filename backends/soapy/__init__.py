@@ -15,25 +15,25 @@ from backends.soapy.probe import (
 )
 from backends.soapy.radio import SoapyRadio
 from backends.soapy.settings import (
-    Presumed,
     SoapyParams,
     SoapySettings,
-    least_rate_hz,
-    presume,
+    soapy_presumption,
+    soapy_problem,
+    soapy_unchecked,
 )
 
 __all__ = [
     "Assessment",
     "DeviceProbe",
     "DirectionProbe",
-    "Presumed",
     "ProbeReport",
     "SoapyParams",
     "SoapyRadio",
     "SoapySettings",
     "assess_device",
     "driver_of",
-    "least_rate_hz",
-    "presume",
     "probe_devices",
+    "soapy_presumption",
+    "soapy_problem",
+    "soapy_unchecked",
 ]

@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from backends import DeviceProbe, DirectionProbe, ProbeReport
-from sdrlinkd.config import Config
+from backends import BUILT_IN, DeviceProbe, DirectionProbe, ProbeReport
+from sdrlinkd.config import WITHOUT_AIR, Config
 from sdrlinkd.doctor.finding import Finding, bad, good, good_if, none
 
 FIRST_SOCKET = "air.sock"
@@ -46,7 +46,9 @@ def _without(config: Config) -> Finding:
         path = Path(config.iqfile.receive)
         is_there = any(Path(f"{path}{end}").is_file() for end in ("", ".sigmf-meta"))
         return good_if(is_there, "recording", str(path), "name one that is there: iqfile.receive")
-    return none("radio", f'backend = "{config.backend}" has none')
+    if config.backend in BUILT_IN or config.backend in WITHOUT_AIR:
+        return none("radio", f'backend = "{config.backend}" has none')
+    return none("radio", f'backend = "{config.backend}" is another package\'s: not looked at')
 
 
 def _of_device(device: DeviceProbe, config: Config | None) -> list[Finding]:

@@ -5,6 +5,7 @@ from a device's nature to its lead, turnaround and spells. It only computes: it 
 device, loads no library and starts nothing.
 """
 
+from backends.soapy.settings.checks import soapy_presumption, soapy_problem, soapy_unchecked
 from backends.soapy.settings.device_info import DeviceInfo
 from backends.soapy.settings.driver_profiles import least_rate_hz
 from backends.soapy.settings.params import SoapyParams
@@ -32,6 +33,9 @@ __all__ = [
     "in_flight",
     "least_rate_hz",
     "presume",
+    "soapy_presumption",
+    "soapy_problem",
+    "soapy_unchecked",
     "timestamped_tx",
     "timing_of",
 ]
