@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from backends.soapy.binding import Range
 from backends.soapy.probe.report import DeviceProbe
-from backends.soapy.settings import SoapySettings, in_flight, least_rate_hz
+from backends.soapy.settings import SoapySettings, in_flight, profile_of
 
 FACTORS = (1, 2, 4)
 """The values that modem.oversampling may have."""
@@ -43,7 +43,7 @@ class Assessment(NamedTuple):
 def assess_device(device: DeviceProbe, rate_hz: float) -> Assessment:
     """How a daemon whose modem runs at `rate_hz` would drive the device."""
     rx, tx, defaults = device.rx, device.tx, SoapySettings(device="", rate_hz=0, frequency_hz=0)
-    least = least_rate_hz(f"driver={device.driver}")
+    least = profile_of(device.driver).least_rate_hz
     directions = [direction for direction in (rx, tx) if direction is not None]
     fitting = [
         factor

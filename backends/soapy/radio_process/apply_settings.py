@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Iterator, Sequence
 
 from backends.soapy.binding import DIRECTIONS, RX, SAMPLE_BYTES, TX, Device, DriverError, Range
-from backends.soapy.settings import SettingError, SoapySettings, least_rate_hz
+from backends.soapy.settings import SettingError, SoapySettings, profile_of
 
 RATE_TOLERANCE = 1e-3
 """OFDM bears far less between two robots, but both would be off alike."""
@@ -76,7 +76,7 @@ def _set_antenna(device: Device, settings: SoapySettings, direction: int) -> Non
 
 def _set_rate(device: Device, settings: SoapySettings, direction: int) -> None:
     wanted, offered = settings.rate_hz, device.rates(direction, settings.channel)
-    least = least_rate_hz(f"driver={device.driver}")
+    least = profile_of(device.driver).least_rate_hz
     allowed = f"{_ranges(offered, 1e6)} Msps" + (f", from {least / 1e6:g} on" if least else "")
     what = (
         f"modem.rate_hz: got {wanted / 1e6:g} Msps at the radio (modem.rate_hz × "

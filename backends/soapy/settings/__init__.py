@@ -7,7 +7,7 @@ device, loads no library and starts nothing.
 
 from backends.soapy.settings.checks import soapy_presumption, soapy_problem, soapy_unchecked
 from backends.soapy.settings.device_info import DeviceInfo
-from backends.soapy.settings.driver_profiles import least_rate_hz
+from backends.soapy.settings.driver_profiles import profile_of
 from backends.soapy.settings.params import SoapyParams
 from backends.soapy.settings.presumed import Presumed, presume
 from backends.soapy.settings.soapy_settings import SettingError, SoapySettings, in_flight
@@ -31,8 +31,8 @@ __all__ = [
     "TxHardware",
     "TxTiming",
     "in_flight",
-    "least_rate_hz",
     "presume",
+    "profile_of",
     "soapy_presumption",
     "soapy_problem",
     "soapy_unchecked",

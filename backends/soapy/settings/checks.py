@@ -3,7 +3,8 @@
 import msgspec
 
 from backends.backend import ModemNeeds, Presumption
-from backends.soapy.settings.driver_profiles import least_rate_hz
+from backends.soapy.binding import driver_of
+from backends.soapy.settings.driver_profiles import profile_of
 from backends.soapy.settings.params import SoapyParams
 from backends.soapy.settings.presumed import presume
 from backends.soapy.settings.soapy_settings import SoapySettings
@@ -21,7 +22,7 @@ def soapy_problem(soapy: SoapyParams, needs: ModemNeeds) -> str:
             f'soapy.device: got "{soapy.device}"; allowed: KEY=VALUE, with commas between, such as '
             f'"driver={soapy.device}"; those here are shown by: sdrlinkctl radio probe'
         )
-    least_hz = least_rate_hz(soapy.device)
+    least_hz = profile_of(driver_of(soapy.device)).least_rate_hz
     if needs.radio_rate_hz < least_hz:
         return (
             f"modem.rate_hz: got {needs.rate_hz / 1e6:g} Msps with modem.oversampling = "

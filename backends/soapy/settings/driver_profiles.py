@@ -2,8 +2,6 @@
 
 from typing import NamedTuple
 
-from backends.soapy.binding import driver_of
-
 
 class DriverProfile(NamedTuple):
     """What a driver does that it does not tell, or not before its device is open."""
@@ -34,8 +32,3 @@ UNKNOWN = DriverProfile()
 def profile_of(driver: str) -> DriverProfile:
     """The profile of a driver by its name in any case; UNKNOWN where there is none."""
     return PROFILES.get(driver.lower(), UNKNOWN)
-
-
-def least_rate_hz(args: str) -> float:
-    """The slowest rate (Hz) of the driver that device `args` name, as far as is known here."""
-    return profile_of(driver_of(args)).least_rate_hz
