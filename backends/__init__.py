@@ -7,11 +7,14 @@ the radio process, and others that only move samples, never do.
 import importlib
 from typing import TYPE_CHECKING
 
+from backends.backend import Backend, ModemNeeds, Presumption, RadioRequest
 from backends.base import (
     SENDING,
     AbsentError,
     BackendError,
     Capabilities,
+    Hear,
+    Levels,
     Patience,
     Radio,
     RefusalError,
@@ -27,28 +30,25 @@ from backends.late import LateRadio
 from backends.outstanding import GAP
 from backends.params import EtherParams, IqFileParams, LoopbackParams, ZmqParams
 from backends.recording import GAP_LABEL, RecordingInfo, RecordingReader, describe, refuse_same
+from backends.registry import BUILT_IN, find_backend, installed_names
 from backends.samples import SAMPLE_TYPES
 from backends.soapy import (
-    DeviceSurvey,
-    Outlook,
-    Presumed,
+    Assessment,
+    DeviceProbe,
+    DirectionProbe,
+    ProbeReport,
     SoapyParams,
     SoapyRadio,
     SoapySettings,
-    Survey,
-    WaySurvey,
+    assess_device,
     driver_of,
-    least_rate_hz,
-    outlook,
-    presume,
-    survey,
+    probe_devices,
 )
 from backends.writing import Annotation, RecordingWriter
 
 if TYPE_CHECKING:
     from backends.air import Channel
     from backends.ether import (
-        ETHER_LEAD_S,
         AirParams,
         AirSense,
         Answer,
@@ -73,7 +73,7 @@ if TYPE_CHECKING:
     from backends.zmqstream import ZmqRadio, open_endpoint
 
 __all__ = [
-    "ETHER_LEAD_S",
+    "BUILT_IN",
     "GAP",
     "GAP_LABEL",
     "SAMPLE_TYPES",
@@ -83,32 +83,39 @@ __all__ = [
     "AirSense",
     "Annotation",
     "Answer",
+    "Assessment",
+    "Backend",
     "BackendError",
     "BurstMedium",
     "BurstShape",
     "Capabilities",
     "Channel",
-    "DeviceSurvey",
+    "DeviceProbe",
+    "DirectionProbe",
     "EtherHub",
     "EtherParams",
     "EtherRadio",
     "Flight",
+    "Hear",
     "HubWatch",
     "IqFileParams",
     "IqFileRadio",
     "LateRadio",
+    "Levels",
     "LinkOverride",
     "LocalEther",
     "LoopbackParams",
     "LoopbackRadio",
+    "ModemNeeds",
     "OffsetRadio",
     "Outage",
-    "Outlook",
     "OversampledRadio",
     "Patience",
-    "Presumed",
+    "Presumption",
+    "ProbeReport",
     "Radio",
     "RadioParams",
+    "RadioRequest",
     "RecordingInfo",
     "RecordingReader",
     "RecordingWriter",
@@ -119,25 +126,23 @@ __all__ = [
     "SoapyRadio",
     "SoapySettings",
     "Spells",
-    "Survey",
     "Track",
     "Tuning",
     "TxBurst",
     "TxOutcome",
     "TxReport",
-    "WaySurvey",
     "World",
     "ZmqParams",
     "ZmqRadio",
+    "assess_device",
     "burst_shape",
     "describe",
     "driver_of",
-    "least_rate_hz",
+    "find_backend",
+    "installed_names",
     "open_endpoint",
-    "outlook",
-    "presume",
+    "probe_devices",
     "refuse_same",
-    "survey",
 ]
 
 _LATER = {

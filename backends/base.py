@@ -31,7 +31,7 @@ class Patience(Enum):
     """What a radio does when it is opened and is not there."""
 
     NONE = "none"
-    """It fails at once."""
+    """It fails at once, and says why."""
     THERE = "there"
     """It waits until it is there."""
     REPLUGGED = "replugged"
@@ -59,7 +59,8 @@ class Capabilities:
     before has been done. `block_s`: samples come in pieces of this length. `lead_s`: how long
     before its start a burst must be handed over. `turnaround_s`: for so long before and after a
     burst a half-duplex radio hears nothing. `index_error_s`: how wrong indices may be after a gap,
-    where there are no `timestamps`. `spells`: it sends in such.
+    where there are no `timestamps`. `shares_air`: other robots may hear
+    what it sends. `spells`: it sends in such.
     """
 
     receives: bool
@@ -72,6 +73,7 @@ class Capabilities:
     lockstep: bool = False
     index_error_s: float = 0.0
     block_s: float = 0.001
+    shares_air: bool = True
     spells: Spells | None = None
 
 
@@ -116,7 +118,7 @@ class TxBurst(NamedTuple):
 
 
 class TxOutcome(Enum):
-    """What became of a burst."""
+    """What became of a burst that was handed over."""
 
     SENT = "sent"
     LATE = "late"
@@ -163,7 +165,7 @@ class Radio(Protocol):
         """How strong what it hears is, before any filter of ours; None: that is not known."""
 
     async def open(self, tuning: Tuning) -> None:
-        """Begin. Raises BackendError."""
+        """Begin to receive at this rate and frequency. Raises BackendError."""
 
     def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
         """Contiguous blocks from index 0 on; gaps are blocks too. Ends with the recording.

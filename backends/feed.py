@@ -46,7 +46,7 @@ class BlockFeed:
 
     @property
     def levels(self) -> Levels | None:
-        """Of the blocks so far."""
+        """How strong the blocks so far were; None before the first look."""
         return self._meter.levels if self._meter else None
 
     async def blocks(self, hear: Hear | None) -> AsyncIterator[Fed]:

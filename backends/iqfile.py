@@ -70,6 +70,7 @@ class IqFileRadio:
             timestamps=True,
             paced=self._paced,
             block_s=self._block_s,
+            shares_air=False,
         )
 
     @property
@@ -79,7 +80,7 @@ class IqFileRadio:
 
     @property
     def detail(self) -> str:
-        """For people."""
+        """The recordings in one line for people."""
         parts = []
         if self._receive is not None:
             parts.append(f"from {self._receive}")
@@ -91,12 +92,12 @@ class IqFileRadio:
 
     @property
     def trouble(self) -> str:
-        """It has none."""
+        """Always empty: a recording is there or is refused when it is opened."""
         return ""
 
     @property
     def levels(self) -> Levels | None:
-        """Of the blocks so far."""
+        """How strong the blocks so far were; None before the first look."""
         return self._feed.levels
 
     async def open(self, tuning: Tuning) -> None:

@@ -23,31 +23,31 @@ class LateRadio:
 
     @property
     def capabilities(self) -> Capabilities:
-        """The radio's."""
+        """What the radio within can do."""
         return self._radio.capabilities
 
     @property
     def counters(self) -> dict[str, int]:
-        """The radio's."""
+        """What the radio within counts."""
         return self._radio.counters
 
     @property
     def detail(self) -> str:
-        """The radio's."""
+        """The line that the radio within has for people."""
         return self._radio.detail
 
     @property
     def trouble(self) -> str:
-        """The radio's."""
+        """Why nothing comes from the radio within, where it knows."""
         return self._radio.trouble
 
     @property
     def levels(self) -> Levels | None:
-        """The radio's."""
+        """How strong what the radio within hears is."""
         return self._radio.levels
 
     async def open(self, tuning: Tuning) -> None:
-        """Begin. Raises BackendError."""
+        """Open the radio within. Raises BackendError."""
         await self._radio.open(tuning)
 
     async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
@@ -70,7 +70,7 @@ class LateRadio:
         return self._report(answer, first)
 
     async def close(self) -> None:
-        """Stop."""
+        """Close the radio within; closing twice is fine."""
         await self._radio.close()
 
     def _shifted(self, block: RxBlock) -> Iterator[RxBlock]:

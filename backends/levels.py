@@ -21,7 +21,7 @@ class LevelMeter:
         self._weight = 0.0
 
     def push(self, samples: Samples) -> None:
-        """A block."""
+        """Look at a block, where it is time to."""
         self._blocks += 1
         if self._blocks % EVERY or not len(samples):
             return
@@ -34,7 +34,7 @@ class LevelMeter:
 
     @property
     def levels(self) -> Levels | None:
-        """None before the first look."""
+        """What the latest look found; None before the first."""
         weight, power = self._weight, self._power
         if not weight:
             return None

@@ -6,7 +6,7 @@ from backends.base import Samples
 
 
 class Line:
-    """What overlaps adds up."""
+    """Samples to come, by index; those that overlap add up."""
 
     def __init__(self) -> None:
         self._laid: list[tuple[int, Samples]] = []

@@ -61,25 +61,26 @@ class LoopbackRadio:
             timestamps=True,
             paced=self._paced,
             block_s=self._block_s,
+            shares_air=False,
         )
 
     @property
     def detail(self) -> str:
-        """For people."""
+        """The simulated air in one line for people."""
         return f"{self._profile} channel" + ("" if self._paced else ", unpaced")
 
     @property
     def trouble(self) -> str:
-        """It has none."""
+        """Always empty: nothing can be wrong with this radio."""
         return ""
 
     @property
     def levels(self) -> Levels | None:
-        """Of the blocks so far."""
+        """How strong the blocks so far were; None before the first look."""
         return self._feed.levels
 
     async def open(self, tuning: Tuning) -> None:
-        """Begin at index 0."""
+        """Begin at index 0, at the rate of `tuning`."""
         self._n = max(1, round(self._block_s * tuning.rate_hz))
         self._max_behind = round(MAX_BEHIND_S * tuning.rate_hz)
         self._pace = Pace(tuning.rate_hz, self._paced)
@@ -104,7 +105,7 @@ class LoopbackRadio:
         return self._outstanding.left(start, len(burst.samples))
 
     async def close(self) -> None:
-        """Stop."""
+        """Stop the feed; bursts on their way are lost."""
         if self._is_open:
             self._is_open = False
             self._pace.end()
@@ -112,7 +113,7 @@ class LoopbackRadio:
         self._outstanding.lose()
 
     def _next_block(self) -> RxBlock:
-        """In the feed's thread."""
+        """Make the next block. Runs on the feed's thread."""
         first, n = self._next, self._n
         behind = self._pace.wait_for(first + n)
         samples: Samples | None = None

@@ -34,36 +34,36 @@ class OffsetRadio:
 
     @property
     def capabilities(self) -> Capabilities:
-        """The radio's."""
+        """What the radio within can do."""
         return self._radio.capabilities
 
     @property
     def counters(self) -> dict[str, int]:
-        """The radio's."""
+        """What the radio within counts."""
         return self._radio.counters
 
     @property
     def detail(self) -> str:
-        """The radio's."""
+        """The line that the radio within has for people."""
         return self._radio.detail
 
     @property
     def trouble(self) -> str:
-        """The radio's."""
+        """Why nothing comes from the radio within, where it knows."""
         return self._radio.trouble
 
     @property
     def levels(self) -> Levels | None:
-        """The radio's."""
+        """How strong what the radio within hears is."""
         return self._radio.levels
 
     async def open(self, tuning: Tuning) -> None:
-        """Begin. Raises BackendError."""
+        """Open the radio within, its oscillator beside the channel. Raises BackendError."""
         beside_hz = tuning.frequency_hz - tuning.rate_hz / 4
         await self._radio.open(replace(tuning, frequency_hz=beside_hz))
 
     async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
-        """Blocks of the channel."""
+        """The blocks of the radio within, shifted to the middle of the channel."""
 
         def hear_shifted(block: RxBlock) -> None:
             if hear is not None:
@@ -78,7 +78,7 @@ class OffsetRadio:
         return self._radio.send(burst._replace(samples=samples))
 
     async def close(self) -> None:
-        """Stop."""
+        """Close the radio within; closing twice is fine."""
         await self._radio.close()
 
     def _shifted(self, block: RxBlock) -> RxBlock:

@@ -19,7 +19,7 @@ def answered(report: TxReport) -> asyncio.Future[TxReport]:
 
 
 class Places:
-    """Lays bursts one after another."""
+    """Lays bursts one after another, so that none overlaps."""
 
     def __init__(self) -> None:
         self._free_from = 0

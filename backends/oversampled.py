@@ -51,16 +51,16 @@ class OversampledRadio:
 
     @property
     def trouble(self) -> str:
-        """The radio's."""
+        """Why nothing comes from the radio within, where it knows."""
         return self._radio.trouble
 
     @property
     def levels(self) -> Levels | None:
-        """The radio's."""
+        """How strong what the radio within hears is, before our filter."""
         return self._radio.levels
 
     async def open(self, tuning: Tuning) -> None:
-        """Begin. Raises BackendError."""
+        """Open the radio within at `factor` times the rate. Raises BackendError."""
         self._tuning = tuning
         await self._radio.open(replace(tuning, rate_hz=tuning.rate_hz * self._factor))
 
@@ -114,7 +114,7 @@ class OversampledRadio:
         return TxReport(report.outcome, start, max(start, end))
 
     async def close(self) -> None:
-        """Stop."""
+        """Close the radio within; closing twice is fine."""
         await self._radio.close()
 
     @property

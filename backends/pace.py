@@ -14,7 +14,7 @@ class Pace:
         self._ended = threading.Event()
 
     def restart(self) -> None:
-        """Index 0 is now."""
+        """Set index 0 to now."""
         self._origin_ns = time.monotonic_ns()
 
     def host_ns(self, index: int) -> int:
@@ -34,5 +34,5 @@ class Pace:
         return round(-ahead_s * self._rate_hz)
 
     def end(self) -> None:
-        """Wake who waits."""
+        """Wake up whoever waits; nobody waits any more."""
         self._ended.set()

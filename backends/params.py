@@ -24,7 +24,7 @@ class IqFileParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     transmit: str = ""
     """SigMF recording to write; empty: none."""
     format: Literal["cf32_le", "ci16_le", "ci8"] = "ci16_le"
-    """Sample type of `transmit`."""
+    """Sample type of the recording `transmit`."""
     paced: bool = True
     """In real time, or as fast as it goes."""
     hear_self: bool = True

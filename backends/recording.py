@@ -53,7 +53,7 @@ class RecordingReader:
         return self.info.type.decode(data[: len(data) - len(data) % size])
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file of samples."""
         self._file.close()
 
 

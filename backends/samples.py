@@ -19,11 +19,11 @@ class SampleType:
 
     @property
     def size(self) -> int:
-        """Bytes of a complex sample."""
+        """The number of bytes of one complex sample."""
         return 2 * self.dtype.itemsize
 
     def decode(self, data: bytes | memoryview) -> Samples:
-        """Whole samples in `data`."""
+        """The whole samples that lie in `data`, at ±1 full scale."""
         parts = np.frombuffer(data, self.dtype).astype(np.float32)
         if self.offset:
             parts -= np.float32(self.offset)

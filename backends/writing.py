@@ -13,7 +13,7 @@ from backends.recording import reason, sigmf_paths
 from backends.samples import sample_type
 
 VERSION = "1.2.0"
-"""Of SigMF."""
+"""The version of SigMF that recordings are written in."""
 
 
 class Annotation(NamedTuple):
@@ -85,7 +85,7 @@ class RecordingWriter:
             raise _refusal(self._file.name, error) from None
 
     def read(self, first: int, n: int) -> Samples:
-        """What was written. Raises BackendError."""
+        """The samples written so far. Raises BackendError."""
         try:
             self._file.seek(first * self._type.size)
             data = self._file.read(n * self._type.size)

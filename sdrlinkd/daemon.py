@@ -19,7 +19,7 @@ from backends import Patience
 from sdrlinkd import __version__
 from sdrlinkd.bus import Bus, RuntimeDirectory
 from sdrlinkd.client import runtime_dir
-from sdrlinkd.config import WITHOUT_AIR, Config, Setup, located
+from sdrlinkd.config import WITHOUT_AIR, Config, Setup, backend_of, located
 from sdrlinkd.control import Control
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.health import Level
@@ -51,7 +51,6 @@ START_S = 120.0
 """Loading what the daemon is made of may take so long on a small computer."""
 STOP_S = 30.0
 """A radio takes so long to be let go at the most, and so does a kernel that is being compiled."""
-NOTICES_REPLUG = ("soapy", "ether")
 
 Reload = Callable[[], Setup]
 
@@ -131,7 +130,9 @@ async def _open(
     policies = Policies(setup, link)
     loading = Loading()
     make = partial(_make_pdu_link, rng, loading)
-    opening = Opening(setup, make, config.backend in NOTICES_REPLUG, lambda: loading.told)
+    radio = backend_of(config)
+    notices_replug = radio is not None and radio.heeds_patience
+    opening = Opening(setup, make, notices_replug, lambda: loading.told)
     context = zmq.Context()
     # Closes what a part that failed half-way left open; term() would wait for it for ever.
     stack.callback(context.destroy)

@@ -127,6 +127,7 @@ class Node:
         fit = self._link.attach(traits, config.access, config.rate)
         log.info("access %s", fit.settled.sentence)
         self._is_lockstep, self._is_attached = traits.is_lockstep, True
+        self.health.shares_air = traits.shares_air
         if self._traffic is not None:
             self._traffic.begin(self._pdu_link.now())
 
@@ -190,11 +191,10 @@ class Node:
 
     async def carry(self) -> None:
         """Bring the PDU link up and let it run; for ever. Raises UserError."""
-        config = self._setup.config
+        waits = self._setup.config.waits_for_consumer
         while True:
             await self._opening.until_up(self)
-            waits = config.backend == "iqfile" and config.iqfile.wait_for_consumer
-            if waits or config.play.wait_for_consumer:
+            if waits:
                 await self.bus.has_consumer.wait()
             await self._opening.run()
 

@@ -3,15 +3,17 @@
 import logging
 from collections.abc import Callable
 
-from sdrlinkd.config import Config, Setup
+from backends import BUILT_IN
+from sdrlinkd.config import Config, Setup, backend_of
 from sdrlinkd.errors import UserError
 from sdrlinkd.opening import Opening
 from sdrlinkd.policies import Policies
 
 log = logging.getLogger("sdrlinkd")
 
-OF_THE_RADIO = ("modem", "soapy", "ether", "zmq", "gnuradio", "channel", "access", "rate")
-"""Sections that nobody has used while there is no radio."""
+OF_THE_RADIO = ("modem", "gnuradio", "channel", "access", "rate")
+"""Sections that nobody has used while there is no radio, besides those of radios that may be away.
+"""
 ANYTIME = ("topic",)
 
 
@@ -44,8 +46,8 @@ class Reloading:
                 "the topic registry has changed, and topic ids with it; restart the daemon"
             )
         is_same = all(
-            getattr(changed.config, key) == getattr(self._opening.config, key)
-            for key in OF_THE_RADIO
+            getattr(changed.config, key) == getattr(self._opening.config, key, None)
+            for key in _of_the_radio(changed.config)
         )
         if self._opening.is_working or (self._opening.is_up and is_same):
             self._policies.reload(changed.policies)
@@ -69,9 +71,16 @@ class Reloading:
 
     def _fixed(self, config: Config) -> list[str]:
         """Keys that have changed and may not."""
+        free = {*_of_the_radio(config), *ANYTIME}
         return [
             key
-            for key in Config.__struct_fields__
-            if key not in (*OF_THE_RADIO, *ANYTIME)
-            and getattr(config, key) != getattr(self._setup.config, key)
+            for key in config.__struct_fields__
+            if key not in free and getattr(config, key) != getattr(self._setup.config, key, None)
         ]
+
+
+def _of_the_radio(config: Config) -> list[str]:
+    """The sections that nobody has used while there is no radio."""
+    own = backend_of(config)
+    radios = [*BUILT_IN.values(), *([own] if own is not None and own.name not in BUILT_IN else [])]
+    return [*OF_THE_RADIO, *(each.name for each in radios if each.may_be_away)]

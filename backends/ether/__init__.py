@@ -5,7 +5,7 @@ from backends.ether.hub import EtherHub
 from backends.ether.local import LocalEther, LocalRadio
 from backends.ether.medium import Medium, Piece
 from backends.ether.protocol import Answer
-from backends.ether.radio import ETHER_LEAD_S, EtherRadio
+from backends.ether.radio import EtherRadio
 from backends.ether.twin import AirSense, BurstMedium
 from backends.ether.watch import HubWatch
 from backends.ether.world import (
@@ -19,7 +19,6 @@ from backends.ether.world import (
 )
 
 __all__ = [
-    "ETHER_LEAD_S",
     "AirParams",
     "AirSense",
     "Answer",

@@ -125,7 +125,7 @@ class Antenna:
         return self._first_end <= index
 
     def settle(self, index: int) -> None:
-        """All before `index` has left."""
+        """Answer the bursts that ended before `index`: all before it has left."""
         self.end = index
         if not self.is_due(index):
             return
@@ -138,7 +138,7 @@ class Antenna:
         self._first_end = min(ends, default=NEVER)
 
     def lose(self) -> None:
-        """Nothing that waits will leave."""
+        """Answer all bursts that wait as lost: none of them will leave."""
         waiting, self._waiting = self._waiting, {}
         for report, answer in waiting.values():
             if not answer.done():

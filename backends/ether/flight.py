@@ -37,7 +37,7 @@ class Flight:
     sender: int
     start_s: float
     over_s: float
-    """When it has passed all."""
+    """The time in s at which it has passed all nodes."""
     shape: BurstShape
     hops: dict[int, Hop]
     arrives: dict[int, float]

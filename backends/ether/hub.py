@@ -22,7 +22,7 @@ LOOK_AFTER_MS = 500
 
 @dataclass
 class _Member:
-    """One radio."""
+    """One radio on the air of the hub."""
 
     node: int
     identity: bytes
@@ -78,7 +78,7 @@ class EtherHub:
         self._is_stopped = True
 
     def run(self, ready: Callable[[], None] = lambda: None) -> None:
-        """Serve until stopped."""
+        """Serve the air until the hub is stopped."""
         ready()
         try:
             if self._paced:

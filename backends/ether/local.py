@@ -68,24 +68,24 @@ class LocalRadio:
 
     @property
     def capabilities(self) -> Capabilities:
-        """As its parameters say."""
+        """What this radio can do, as its parameters say."""
         return self.antenna.capabilities(
             paced=False, lead_s=LEAD / self._ether.air.rate_hz, block_s=self._ether.air.block_s
         )
 
     @property
     def detail(self) -> str:
-        """For people."""
+        """The kind of air in one line for people."""
         return "simulated air in this process"
 
     @property
     def trouble(self) -> str:
-        """It has none."""
+        """Always empty: the air is in this process."""
         return ""
 
     @property
     def levels(self) -> None:
-        """Nobody asks here."""
+        """Always None: nobody asks for levels of this radio."""
         return None
 
     async def open(self, tuning: Tuning) -> None:
@@ -121,7 +121,7 @@ class LocalRadio:
         return answer
 
     async def close(self) -> None:
-        """Stop."""
+        """Leave the air; closing twice is fine."""
         if self._is_open:
             self._is_open = False
             self._ether.leave(self._node_id)

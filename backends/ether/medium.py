@@ -34,7 +34,7 @@ class Piece(NamedTuple):
 class _Node:
     radio: RadioParams
     rate_hz: float
-    """By its own crystal."""
+    """The node's sample rate by its own crystal."""
     joined_at: float
     timeline: Timeline = field(default_factory=Timeline)
     next_index: int = 0
@@ -73,7 +73,7 @@ class Medium:
         self._nodes.pop(node_id, None)
 
     def time(self, node_id: int, index: int) -> float:
-        """When a node's sample is."""
+        """The time in s at which a node's sample is."""
         return self._nodes[node_id].time(index)
 
     def next_index(self, node_id: int) -> int:

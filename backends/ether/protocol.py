@@ -37,7 +37,7 @@ class Welcome(msgspec.Struct, tag=True, frozen=True, kw_only=True):
     seed: int
     block_s: float
     host_ns: int
-    """When its index 0 is."""
+    """The time of its index 0 by the monotonic clock."""
     paced: bool
     air: str
 
@@ -88,7 +88,7 @@ class Done(msgspec.Struct, tag=True, frozen=True, kw_only=True):
 
 
 class Bye(msgspec.Struct, tag=True, frozen=True, kw_only=True):
-    """The radio is closed."""
+    """The radio is closed and leaves the air."""
 
     token: int
 
@@ -98,7 +98,7 @@ class Question(msgspec.Struct, tag=True, frozen=True, kw_only=True):
 
 
 class Answer(msgspec.Struct, tag=True, frozen=True, kw_only=True):
-    """The hub's state."""
+    """The state of the hub, for whoever asks."""
 
     now_s: float
     nodes: dict[int, str]
@@ -119,7 +119,7 @@ _from_radio: msgspec.msgpack.Decoder[FromRadio] = msgspec.msgpack.Decoder(FromRa
 
 
 def encode(message: msgspec.Struct) -> bytes:
-    """One message as bytes."""
+    """The bytes of one message."""
     return _encoder.encode(message)
 
 

@@ -32,10 +32,9 @@ from backends.ether.joining import join
 from backends.ether.medium import LEAD, Piece
 from backends.ether.sockets import AIR, NOBLOCK, SKY, connect
 from backends.feed import BlockFeed, Fed
+from backends.known import ETHER_LEAD_S
 from backends.outstanding import answered
 
-# From the event loop to the hub, on a busy machine.
-ETHER_LEAD_S = 0.002
 ANSWER_MS = 5000
 # A paced hub that says nothing for so long is gone; it is asked again that often.
 QUIET_MS = 500
@@ -84,14 +83,14 @@ class EtherRadio:
 
     @property
     def capabilities(self) -> Capabilities:
-        """As the hub says."""
+        """What this radio can do, as the hub says."""
         paced = self._welcome.paced
         lead_s = ETHER_LEAD_S if paced else LEAD / self._tuning.rate_hz
         return self._joined.capabilities(paced, lead_s, self._welcome.block_s)
 
     @property
     def detail(self) -> str:
-        """For people."""
+        """The hub's air, and whether the hub is there, in one line for people."""
         if self._antenna is None:
             return "no hub yet"
         parts = [self._welcome.air, "the hub is away" if self._is_away else "", self._notice]
@@ -99,12 +98,12 @@ class EtherRadio:
 
     @property
     def trouble(self) -> str:
-        """While the hub is away."""
+        """Why nothing comes while the hub is away; else empty."""
         return "it answers no more; it is asked until it is back" if self._is_away else ""
 
     @property
     def levels(self) -> Levels | None:
-        """Of the blocks so far."""
+        """How strong the blocks so far were; None before the first look."""
         return self._feed.levels
 
     async def open(self, tuning: Tuning) -> None:
@@ -164,7 +163,7 @@ class EtherRadio:
         return answer
 
     async def close(self) -> None:
-        """Leave the air."""
+        """Leave the air; closing twice is fine."""
         if self._closing.is_set():
             return
         self._closing.set()
@@ -211,7 +210,7 @@ class EtherRadio:
             self._is_idle.set()
 
     def _next_block(self) -> RxBlock | None:
-        """In the feed's thread."""
+        """Wait for the next block. Runs on the feed's thread."""
         while not self._closing.is_set():
             try:
                 message, samples = self._downlink.next()

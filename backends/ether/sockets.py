@@ -62,7 +62,7 @@ class HubSockets:
         from_radio: Callable[[list[bytes]], None],
         request: Callable[[list[bytes]], None],
     ) -> None:
-        """All that is there."""
+        """Hand over all messages that are there now."""
         _drain(self._sky, from_radio)
         _drain(self._air, request)
 
@@ -88,7 +88,7 @@ class HubSockets:
         return True
 
     def close(self) -> None:
-        """Close; the folder is free."""
+        """Close the sockets and free the folder."""
         self._context.destroy(linger=100)
         for name in (AIR, SKY):
             (self._directory / name).unlink(missing_ok=True)
@@ -110,7 +110,7 @@ class HubSockets:
 
 
 def is_readable(socket: "zmq.Socket[bytes]") -> bool:
-    """Whether a message is there."""
+    """Whether a message is there to be read."""
     return bool(int(socket.getsockopt(_EVENTS)) & _POLLIN)
 
 

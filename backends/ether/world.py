@@ -25,14 +25,14 @@ class AirParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     snr_db: Decibel = 20.0
     """Between nodes without positions, where no link says otherwise."""
     snr_db_at_1m: Decibel = 60.0
-    """Between nodes with positions."""
+    """SNR at 1 m, between nodes that have positions."""
     path_loss_exponent: Annotated[float, Meta(ge=0, le=8)] = 2.0
     block_s: Annotated[float, Meta(ge=1e-5, le=0.1)] = 0.001
     """Samples are handed out in pieces of this length."""
 
 
 class RadioParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One node's radio."""
+    """The radio of one node, as its scenario sets it."""
 
     full_duplex: bool = True
     turnaround_s: Annotated[float, Meta(ge=0, le=1)] = 0.0
@@ -81,7 +81,7 @@ class Track:
         self._places = [(x, y) for _, x, y in waypoints]
 
     def at(self, t: float) -> tuple[float, float]:
-        """Position in m."""
+        """The position in m at a time in s."""
         after = bisect_right(self._times, t)
         if after == 0:
             return self._places[0]
@@ -94,7 +94,7 @@ class Track:
 
 
 class World:
-    """All pairs, at any time."""
+    """The air between all pairs of nodes, at any time."""
 
     def __init__(
         self,

@@ -1,26 +1,39 @@
-"""Real radios, through SoapySDR (https://github.com/pothosware/SoapySDR)."""
+"""Real radios, through SoapySDR (https://github.com/pothosware/SoapySDR).
 
-from backends.soapy.library import driver_of
-from backends.soapy.natures import Presumed, presume
-from backends.soapy.outlook import Outlook, outlook
-from backends.soapy.params import SoapyParams
+The daemon's side stands in this folder: SoapyRadio and what it keeps of its radio process. It never
+loads SoapySDR or a driver itself: `radio_process` and `probe` do, in processes of their own.
+"""
+
+from backends.soapy.binding import driver_of
+from backends.soapy.probe import (
+    Assessment,
+    DeviceProbe,
+    DirectionProbe,
+    ProbeReport,
+    assess_device,
+    probe_devices,
+)
 from backends.soapy.radio import SoapyRadio
-from backends.soapy.setting_up import least_rate_hz
-from backends.soapy.settings import SoapySettings
-from backends.soapy.survey import DeviceSurvey, Survey, WaySurvey, survey
+from backends.soapy.settings import (
+    SoapyParams,
+    SoapySettings,
+    soapy_presumption,
+    soapy_problem,
+    soapy_unchecked,
+)
 
 __all__ = [
-    "DeviceSurvey",
-    "Outlook",
-    "Presumed",
+    "Assessment",
+    "DeviceProbe",
+    "DirectionProbe",
+    "ProbeReport",
     "SoapyParams",
     "SoapyRadio",
     "SoapySettings",
-    "Survey",
-    "WaySurvey",
+    "assess_device",
     "driver_of",
-    "least_rate_hz",
-    "outlook",
-    "presume",
-    "survey",
+    "probe_devices",
+    "soapy_presumption",
+    "soapy_problem",
+    "soapy_unchecked",
 ]

@@ -12,9 +12,17 @@ import msgspec
 
 from backends.base import Patience, Samples
 from backends.soapy import protocol
-from backends.soapy.chatter import Chatter
-from backends.soapy.protocol import Begin, Failed, FromProcess, Open, Order, Stretch
-from backends.soapy.ring import SampleRing, make_shared
+from backends.soapy.driver_log import DriverLog
+from backends.soapy.protocol import (
+    Begin,
+    Failed,
+    FromProcess,
+    Open,
+    RxChunk,
+    SampleRing,
+    TxCommand,
+    make_shared,
+)
 from backends.soapy.settings import SoapySettings
 
 END_S = 2.0
@@ -32,37 +40,38 @@ class RadioChild:
         kind = socket.SOCK_SEQPACKET
         self._control, control = socket.socketpair(socket.AF_UNIX, kind)
         self.control_fd = self._control.fileno()
-        """Readable when there is an answer."""
-        self._air, air = socket.socketpair(socket.AF_UNIX, kind)
-        for end in (self._control, control, air):
+        """A descriptor that is readable when there is an answer."""
+        self._rx_socket, rx_socket = socket.socketpair(socket.AF_UNIX, kind)
+        for end in (self._control, control, rx_socket):
             end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SOCKET_BYTES)
         memory = [make_shared(rx_samples, "rx"), make_shared(tx_samples, "tx")]
         self.rx = SampleRing(memory[0], rx_samples)
         self.tx = SampleRing(memory[1], tx_samples)
-        self._chatter = Chatter()
-        inherited = [control.fileno(), air.fileno(), *memory]
+        self._driver_log = DriverLog()
+        inherited = [control.fileno(), rx_socket.fileno(), *memory]
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "backends.soapy.process", *map(str, inherited)],
+            [sys.executable, "-m", "backends.soapy.radio_process", *map(str, inherited)],
             stdin=subprocess.DEVNULL,
-            stdout=self._chatter.fd,
-            stderr=self._chatter.fd,
+            stdout=self._driver_log.fd,
+            stderr=self._driver_log.fd,
             pass_fds=inherited,
         )
-        self._chatter.begin()
+        self._driver_log.begin()
         control.close()
-        air.close()
+        rx_socket.close()
         for each in memory:
             os.close(each)
         self._poll = select.poll()
-        self._poll.register(self._air, select.POLLIN)
+        self._poll.register(self._rx_socket, select.POLLIN)
         self._control.send(protocol.encode(Open(settings, rx_samples, tx_samples, patience)))
         self._control.setblocking(False)
         self._tx_at = 0
         self._hangs = False
 
     def next_answer(self, within_s: float, is_over: threading.Event) -> FromProcess | None:
-        """What it says next, or of one that has ended, that; None: nothing in time, or until
-        `is_over`.
+        """Wait for what the process says next; None: nothing in time, or before `is_over`.
+
+        Of a process that has ended, the answer is Failed and says how.
         """
         poll = select.poll()
         poll.register(self._control, select.POLLIN)
@@ -89,40 +98,40 @@ class RadioChild:
         return protocol.from_process(data)
 
     def begin(self) -> None:
-        """Have it receive from now on."""
+        """Have the process receive from now on."""
         self._say(Begin())
 
-    def stretch(self, timeout_s: float) -> Stretch | None:
-        """The next, if one comes in time. Raises EOFError when none will."""
+    def next_chunk(self, timeout_s: float) -> RxChunk | None:
+        """The next chunk received, if one comes in time. Raises EOFError when none will."""
         if not self._poll.poll(1e3 * timeout_s):
             return None
         try:
-            data = self._air.recv(protocol.STRETCH_BYTES)
+            data = self._rx_socket.recv(protocol.RX_CHUNK_BYTES)
         except OSError:
             data = b""
         if not data:
             raise EOFError
-        return protocol.unpack_stretch(data)
+        return protocol.unpack_rx_chunk(data)
 
-    def order(self, number: int, start: int, samples: Samples, latest: int | None) -> bool:
-        """Have samples sent; False when it cannot take them."""
+    def send_burst(self, number: int, start: int, samples: Samples, latest: int | None) -> bool:
+        """Have samples sent as burst `number`; False when the process cannot take them."""
         n = len(samples)
         at = self.tx.whole(self._tx_at, n)
         if n > self.tx.capacity or at + n - self.tx.tail > self.tx.capacity:
             return False
         self.tx.view(at, n)[:] = samples
-        if not self._say(Order(number, start, n, at, latest)):
+        if not self._say(TxCommand(number, start, n, at, latest)):
             return False
         self._tx_at = at + n
         return True
 
     def give_up(self) -> None:
-        """It hangs."""
+        """Kill a process that hangs."""
         self._hangs = True
         self._process.kill()
 
     def wait(self) -> None:
-        """Until it has ended, for at most END_S."""
+        """Wait until it has ended, for at most END_S; then kill it."""
         try:
             self._process.wait(END_S)
         except subprocess.TimeoutExpired:
@@ -130,10 +139,10 @@ class RadioChild:
             self._process.wait()
 
     def end(self) -> None:
-        """End it; ending twice is fine."""
+        """End the process and free what it shared; ending twice is fine."""
         self._control.close()
         self.wait()
-        self._air.close()
+        self._rx_socket.close()
         for ring in (self.rx, self.tx):
             ring.close()
 
@@ -145,12 +154,12 @@ class RadioChild:
         return True
 
     def how_it_ended(self) -> str:
-        """In words; waits until it has."""
+        """How the process ended, in words; waits until it has."""
         self.wait()
         code = self._process.returncode
         if self._hangs:
             return "the driver hung"
         if code < 0:
             return f"the driver crashed (signal {-code})"
-        last = self._chatter.last_line() if code else ""
+        last = self._driver_log.last_line() if code else ""
         return f"the radio process ended{f' ({last})' if last else ''}"

@@ -1,4 +1,4 @@
-"""From a thread to the event loop, and back when it is done."""
+"""A call from a thread to the event loop, which the thread waits for."""
 
 import asyncio
 import threading
@@ -10,7 +10,7 @@ LOOK_S = 0.1
 def on_loop(
     loop: asyncio.AbstractEventLoop | None, is_over: threading.Event, action: Callable[[], None]
 ) -> None:
-    """Have the event loop do it, and wait until it has, or `is_over`."""
+    """Have the event loop do `action`, and wait until it has, or `is_over`."""
     done = threading.Event()
 
     def act() -> None:

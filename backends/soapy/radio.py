@@ -2,7 +2,6 @@
 
 import asyncio
 import threading
-from collections import Counter
 from collections.abc import AsyncIterator, Awaitable
 from functools import partial
 
@@ -24,12 +23,21 @@ from backends.base import (
 from backends.feed import BlockFeed
 from backends.outstanding import Places, answered
 from backends.soapy.child import RadioChild
-from backends.soapy.handed import Handed
-from backends.soapy.hearing import Hearing
+from backends.soapy.device_status import DeviceStatus
+from backends.soapy.in_flight_tx import InFlightTx
 from backends.soapy.on_loop import on_loop
-from backends.soapy.protocol import Blame, Counted, Failed, FromProcess, Left, Opened, Waiting
-from backends.soapy.ring import ring_sizes
-from backends.soapy.settings import Found, SoapySettings
+from backends.soapy.protocol import (
+    Blame,
+    CountersReport,
+    Failed,
+    FromProcess,
+    Opened,
+    TxDone,
+    Waiting,
+    ring_sizes,
+)
+from backends.soapy.rx_assembler import RxAssembler
+from backends.soapy.settings import DeviceInfo, SoapySettings
 
 OPEN_S = 60.0
 """Some devices load their firmware first."""
@@ -55,38 +63,35 @@ class SoapyRadio:
         self._settings = settings
         self._patience = patience
         self._longest_s = longest_s
-        self._hearing = Hearing(settings.dc_block)
+        self._assembler = RxAssembler(settings.dc_block)
         self._closing = threading.Event()
         self._child: RadioChild | None = None
         self._listened: RadioChild | None = None
-        self._found: Found | None = None
+        self._found: DeviceInfo | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._places = Places()
-        self._handed = Handed()
-        self._feed = BlockFeed(self._next_block, "soapy", self._handed.is_due, measures=False)
+        self._in_flight_tx = InFlightTx()
+        self._feed = BlockFeed(self._next_block, "soapy", self._in_flight_tx.is_due, measures=False)
         self._rate_hz = 0.0
         self._yielded = 0
         self._is_over = False
-        self._away = self._notice = self._waits_for = ""
-        self._before: Counter[str] = Counter()
-        self._counted: Counter[str] = Counter(overflows=0, samples_lost=0)
-        self._outages = 0
+        self._status = DeviceStatus()
 
     @property
     def capabilities(self) -> Capabilities:
-        """As the device is."""
+        """What the open device can do, set as it is. Raises RuntimeError before it is open."""
         return self._settings.capabilities(self._known)
 
     @property
     def counters(self) -> dict[str, int]:
-        """Those of all processes so far, and ours."""
-        total = Counter(self._before)
-        total.update(self._counted)
-        return {**total, **self._handed.counters, "outages": self._outages}
+        """The counts of all radio processes so far, and of bursts that were late or torn."""
+        return {
+            **self._status.counters, **self._in_flight_tx.counters, "outages": self._status.outages,
+        }  # fmt: skip
 
     @property
     def detail(self) -> str:
-        """For people."""
+        """The device in one line for people: what it is, and whether it is away."""
         found = self._found
         if found is None:
             return f"{self._settings.device}, not open"
@@ -94,21 +99,19 @@ class SoapyRadio:
             found.described,
             "" if self._settings.tx_enabled else "tx_enabled = false",
             found.binding,
-            f"away ({self._away}), looked for until it is back" if self._away else self._notice,
+            self._status.told,
         ]
         return ", ".join(part for part in parts if part)
 
     @property
     def trouble(self) -> str:
-        """While the device is away, or not there yet."""
-        if self._away:
-            return f"{self._away}; it is looked for until it is back"
-        return self._waits_for
+        """Why nothing comes from the device, while it is away or not there yet."""
+        return self._status.trouble
 
     @property
     def levels(self) -> Levels | None:
-        """As the device delivers it."""
-        return self._hearing.meter.levels
+        """How strong the samples are as the device delivers them; None before the first look."""
+        return self._assembler.meter.levels
 
     async def open(self, tuning: Tuning) -> None:
         """Start the process and open the device. Raises BackendError."""
@@ -136,49 +139,49 @@ class SoapyRadio:
 
     async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
         """What the antenna hears. Raises BackendError when the device will not have us any more."""
-        self._hearing.is_heard_at_once = hear is not None
+        self._assembler.is_heard_at_once = hear is not None
         if self._child is not None:
-            self._hearing.begin(self._child.rx, self._rate_hz)
+            self._assembler.begin(self._child.rx, self._rate_hz)
             self._child.begin()
         try:
             async for block, is_heard in self._feed.blocks(hear):
                 self._yielded = block.index + block.n
-                self._handed.settle(self._yielded)
+                self._in_flight_tx.settle(self._yielded)
                 if not is_heard:
                     yield block
         finally:
             self._is_over = True
-            self._handed.lose()
+            self._in_flight_tx.lose()
 
     def send(self, burst: TxBurst) -> Awaitable[TxReport]:
         """Hand a burst to the radio process; while the device is away it is lost."""
-        child, hearing = self._child, self._hearing
+        child, assembler = self._child, self._assembler
         lost = TxReport(TxOutcome.LOST, burst.start, burst.start)
-        is_open = self._found is not None and not self._away and not self._is_over
+        is_open = self._found is not None and not self._status.away and not self._is_over
         if child is None or not is_open or not self._settings.tx_enabled:
             return answered(lost)
-        start = self._places.place(burst, hearing.next_index + self._least_lead)
+        start = self._places.place(burst, assembler.next_index + self._least_lead)
         if start is None:
-            self._handed.counters["late"] += 1
+            self._in_flight_tx.counters["late"] += 1
             return answered(lost._replace(outcome=TxOutcome.LATE))
-        number = self._handed.next_number()
+        number = self._in_flight_tx.next_number()
         samples = np.ascontiguousarray(burst.samples, np.complex64)
-        latest = None if burst.latest is None else burst.latest - hearing.base
-        if not child.order(number, start - hearing.base, samples, latest):
+        latest = None if burst.latest is None else burst.latest - assembler.base
+        if not child.send_burst(number, start - assembler.base, samples, latest):
             return answered(lost)
-        return self._handed.wait(number, start, len(samples))
+        return self._in_flight_tx.wait(number, start, len(samples))
 
     async def close(self) -> None:
-        """Let go of the device."""
+        """End the radio process and give the device back; closing twice is fine."""
         if not self._closing.is_set():
             self._closing.set()
             if self._child is not None:
                 self._unlisten(self._child)
                 await asyncio.to_thread(self._end)
-            self._handed.lose()
+            self._in_flight_tx.lose()
 
     @property
-    def _known(self) -> Found:
+    def _known(self) -> DeviceInfo:
         if self._found is None:
             raise RuntimeError("not open")
         return self._found
@@ -186,7 +189,7 @@ class SoapyRadio:
     @property
     def _least_lead(self) -> int:
         """So many samples after the last one heard, nothing can leave any more."""
-        if not self._known.keeps_time:
+        if not self._known.timestamped_tx:
             return 0
         return round(0.5 * self._settings.lead_s * self._rate_hz)
 
@@ -197,8 +200,8 @@ class SoapyRadio:
     def _opened(self, child: RadioChild) -> FromProcess | None:
         """How its opening ends; None: it hangs, or we close. What it waits for is our trouble."""
         while isinstance(answer := child.next_answer(OPEN_S, self._closing), Waiting):
-            self._waits_for = answer.reason or self._waits_for
-        self._waits_for = ""
+            self._status.waits_for = answer.reason or self._status.waits_for
+        self._status.waits_for = ""
         return answer
 
     def _end(self) -> None:
@@ -209,7 +212,7 @@ class SoapyRadio:
     # On the event loop.
 
     def _listen(self, child: RadioChild) -> None:
-        """What the process has said."""
+        """Take all that the process has said so far."""
         try:
             while (answer := child.answer()) is not None:
                 self._told(child, answer)
@@ -218,12 +221,12 @@ class SoapyRadio:
             self._unlisten(child)
 
     def _told(self, child: RadioChild, answer: FromProcess) -> None:
-        if isinstance(answer, Left):
-            self._handed.left(answer, self._hearing.base)
-            heard = self._hearing.is_heard_at_once
-            self._handed.settle(self._hearing.next_index if heard else self._yielded)
-        elif isinstance(answer, Counted):
-            self._counted, self._notice = Counter(answer.counters), answer.notice
+        if isinstance(answer, TxDone):
+            self._in_flight_tx.completed(answer, self._assembler.base)
+            heard = self._assembler.is_heard_at_once
+            self._in_flight_tx.settle(self._assembler.next_index if heard else self._yielded)
+        elif isinstance(answer, CountersReport):
+            self._status.counted(answer)
         elif isinstance(answer, Failed):
             self._went(child, answer.reason)
 
@@ -233,23 +236,18 @@ class SoapyRadio:
             self._listened = None
 
     def _went(self, child: RadioChild, reason: str) -> None:
-        """The device is gone."""
+        """Give up what was on its way to a device that is gone."""
         self._unlisten(child)
-        if self._away:
-            return
-        self._away = reason
-        self._outages += 1
-        self._before.update(self._counted)
-        self._counted.clear()
-        self._handed.lose()
+        if self._status.went(reason):
+            self._in_flight_tx.lose()
 
     def _lost(self, child: RadioChild, how: str) -> None:
         """It has ended: what it had still to say, and if that does not tell, how."""
         self._listen(child)
         self._went(child, how)
 
-    def _came_back(self, child: RadioChild, found: Found) -> None:
-        self._child, self._found, self._away = child, found, ""
+    def _came_back(self, child: RadioChild, found: DeviceInfo) -> None:
+        self._child, self._found, self._status.away = child, found, ""
         if not self._closing.is_set():
             self._hear_from(child)
 
@@ -261,20 +259,20 @@ class SoapyRadio:
     # On the feed's thread.
 
     def _next_block(self) -> RxBlock | None:
-        child, hearing = self._child, self._hearing
+        child, assembler = self._child, self._assembler
         while child is not None and not self._closing.is_set():
             try:
-                block = hearing.next(child, LOOK_S)
+                block = assembler.next(child, LOOK_S)
             except EOFError:
-                child = self._look_for_it(child)
-                return None if child is None else hearing.gap("the radio was away", self._known)
+                child = self._reopen(child)
+                return None if child is None else assembler.gap("the radio was away", self._known)
             if block is not None:
                 return block
-            if hearing.quiet_s > HUNG_S + self._settings.longest_tx_s:
+            if assembler.quiet_s > HUNG_S + self._settings.longest_tx_s:
                 child.give_up()
         return None
 
-    def _look_for_it(self, lost: RadioChild) -> RadioChild | None:
+    def _reopen(self, lost: RadioChild) -> RadioChild | None:
         """Until the device is back; None: we close before. Raises RefusalError, BackendError."""
         how = lost.how_it_ended()
         on_loop(self._loop, self._closing, partial(self._lost, lost, how))
@@ -284,7 +282,7 @@ class SoapyRadio:
             child = self._make_child(Patience.THERE)
             answer = self._opened(child)
             if isinstance(answer, Opened):
-                self._hearing.begin(child.rx, self._rate_hz)
+                self._assembler.begin(child.rx, self._rate_hz)
                 child.begin()
                 on_loop(self._loop, self._closing, partial(self._came_back, child, answer.found))
                 return child

@@ -85,7 +85,7 @@ class ZmqRadio:
 
     @property
     def detail(self) -> str:
-        """For people."""
+        """The two endpoints in one line for people."""
         send, receive = self._endpoints
         kinds = {"push": "PUSH/PULL", "pub": "PUB/SUB", "req": "REQ/REP"}
         text = f"{self._type.name} by {kinds[self._pattern]}, to {send}, from {receive}"
@@ -98,11 +98,11 @@ class ZmqRadio:
 
     @property
     def levels(self) -> Levels | None:
-        """Of the blocks so far."""
+        """How strong the blocks so far were; None before the first look."""
         return self._feed.levels
 
     async def open(self, tuning: Tuning) -> None:
-        """Open the sockets. Raises BackendError."""
+        """Open the sockets, at the modem's rate. Raises BackendError."""
         send, receive = self._endpoints
         rate = tuning.rate_hz
         self._rate_hz = rate
@@ -116,7 +116,7 @@ class ZmqRadio:
         self._is_open = True
 
     def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
-        """What the peer sends."""
+        """The samples that the peer sends, as blocks."""
         self._last_ns = time.monotonic_ns()
         return self._outstanding.blocks(self._feed, hear)
 
@@ -133,7 +133,7 @@ class ZmqRadio:
         return self._outstanding.left(start, len(burst.samples))
 
     async def close(self) -> None:
-        """Close the sockets."""
+        """Close the sockets; closing twice is fine."""
         if self._is_open:
             self._is_open = False
             self._closing.set()

@@ -15,7 +15,7 @@ WAITING = 16
 
 
 class Source(Protocol):
-    """Where samples come from."""
+    """The socket that samples come from."""
 
     socket: Socket
 
@@ -24,7 +24,7 @@ class Source(Protocol):
 
 
 class Sink(Protocol):
-    """Where samples go."""
+    """The socket that samples go to."""
 
     socket: Socket
 
@@ -89,7 +89,7 @@ class _Asking(_Listening):
 
 
 class _Telling:
-    """PUSH or PUB."""
+    """A sink that sends without being asked, by PUSH or PUB."""
 
     def __init__(self, socket: Socket) -> None:
         self.socket = socket

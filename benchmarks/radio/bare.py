@@ -13,8 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from backends.soapy.native import NativeLibrary
-from backends.soapy.surface import HAS_TIME, OVERFLOW, RX, TIMEOUT
+from backends.soapy.binding import HAS_TIME, OVERFLOW, RX, TIMEOUT, load_native_library
 from benchmarks.radio.driver import ROOT, a_bus
 
 WAYS = {"thread": (4096, 5e-3), "tuned_thread": (65536, 5e-4)}
@@ -65,7 +64,7 @@ class _Counting:
     def __init__(self, device: str, rate_hz: float, chunk: int) -> None:
         self._rate_hz = rate_hz
         self._chunk = chunk
-        self._handle = NativeLibrary().make(device)
+        self._handle = load_native_library().make(device)
         self._handle.call("setSampleRate", RX, 0, rate_hz)
         self.lost = 0
 
@@ -77,13 +76,13 @@ class _Counting:
         until = time.monotonic() + seconds
         first_ns, read = 0, 0
         while time.monotonic() < until:
-            moved = stream.read(into, TIMEOUT_US)
-            if moved.n > 0 and moved.flags & HAS_TIME:
-                first_ns = first_ns or moved.time_ns
-                self.lost = round(1e-9 * (moved.time_ns - first_ns) * self._rate_hz) - read
-                read += moved.n
-            elif moved.n not in (OVERFLOW, TIMEOUT):
-                raise RuntimeError(f"the stream failed: {moved}")
+            result = stream.read(into, TIMEOUT_US)
+            if result.n > 0 and result.flags & HAS_TIME:
+                first_ns = first_ns or result.time_ns
+                self.lost = round(1e-9 * (result.time_ns - first_ns) * self._rate_hz) - read
+                read += result.n
+            elif result.n not in (OVERFLOW, TIMEOUT):
+                raise RuntimeError(f"the stream failed: {result}")
         stream.deactivate()
         stream.close()
         self._handle.close()

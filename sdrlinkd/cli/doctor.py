@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from sdrlinkd.doctor import Finding, HostTerm
 
 MARKS = {"good": ("✓", "green"), "bad": ("✗", "bold red"), "not applicable": ("–", "dim")}
-TIMED = ("soapy", "ether", "loopback", "zmq")
-"""Backends whose samples come by the clock."""
 ROOT = Path("/")
 MODEM_S = 2.0
 WAKES = 1000
@@ -59,15 +57,15 @@ def doctor(
 
 def _look(setup: "Setup | None", runtime_dir: Path | None) -> tuple[list["Finding"], "HostTerm"]:
     from sdrlinkd import doctor as checks
-    from sdrlinkd.config import WITHOUT_AIR, Config
+    from sdrlinkd.config import Config, backend_of
 
     config = setup.config if setup is not None else Config()
-    backend = config.backend
-    device = config.soapy.device if backend == "soapy" else ""
+    radio = backend_of(config)
+    device = config.soapy.device if config.backend == "soapy" else ""
     # Before we are a load ourselves.
     load, stat, wall, monotonic = os.getloadavg()[0], _stat(), time.time_ns(), time.monotonic_ns()
     headroom = []
-    if backend not in WITHOUT_AIR or setup is None:
+    if radio is not None or setup is None:
         headroom = [checks.headroom_found(config.modem, config.link.pdu_size, MODEM_S)]
     host = asyncio.run(checks.measure_host(WAKES))
     step_s = 1e-9 * (time.time_ns() - wall - (time.monotonic_ns() - monotonic))
@@ -75,7 +73,7 @@ def _look(setup: "Setup | None", runtime_dir: Path | None) -> tuple[list["Findin
     found = [
         *checks.check_machine(
             os.cpu_count() or 1, load, (stat, _stat()), ROOT / "sys/devices/system/cpu",
-            is_timed=backend in TIMED,
+            is_timed=radio is not None and radio.is_timed,
         ),
         *_environment(),
         *checks.check_directory(chosen_dir(given), os.getuid()),
@@ -88,14 +86,14 @@ def _look(setup: "Setup | None", runtime_dir: Path | None) -> tuple[list["Findin
 
 
 def _radio(setup: "Setup | None", device: str) -> list["Finding"]:
-    from backends import BackendError, driver_of, survey
+    from backends import BackendError, driver_of, probe_devices
     from sdrlinkd.doctor import ON_USB, Finding, State, check_radio, check_usb, is_networked
 
     config = setup.config if setup is not None else None
     if config is not None and not device:
         return check_radio(config, None)
     try:
-        there = survey(device)
+        there = probe_devices(device)
     except BackendError as error:
         to_do = "name one device with soapy.device, such as driver=hackrf, and look again"
         return [Finding("device", State.BAD, str(error), to_do)]

@@ -131,12 +131,10 @@ def _tell(choice: Choice) -> None:
 
 
 def _copied(questions: Questions, own: str, runtime_dir: Path | None) -> dict[str, bytes]:
-    import msgspec
-
-    from sdrlinkd.config import Config
+    from sdrlinkd.config import typed_config
 
     with connect(runtime_dir) as control:
-        config: Config = msgspec.convert(control.ask("config"), Config)
+        config = typed_config(control.ask("config"))
         topics = control.ask("topics")
         own_id = control.ask("hello")["node"]
     ids = questions.own_ids(own, MOST_ROBOTS)

@@ -12,7 +12,7 @@ from sdrlinkd.errors import UserError
 from sdrlinkd.tables import FittedTable, screen_console, words
 
 if TYPE_CHECKING:
-    from backends import DeviceSurvey, Outlook, WaySurvey
+    from backends import Assessment, DeviceProbe, DirectionProbe
 
 radios = typer.Typer(help="Radios of this machine, by SoapySDR.", no_args_is_help=True)
 app.add_typer(radios, name="radio")
@@ -29,12 +29,12 @@ def probe(
     json: AsJson = False,
 ) -> None:
     """Devices found, and what the daemon would do with each. Nothing is sent."""
-    from backends import BackendError, outlook, survey
+    from backends import BackendError, assess_device, probe_devices
 
     console = screen_console()
     try:
         with Console(stderr=True).status("looking at radios"):
-            found = survey(device)
+            found = probe_devices(device)
     except BackendError as error:
         raise UserError(str(error)) from None
     if json:
@@ -44,14 +44,14 @@ def probe(
         names = ", ".join(sorted(each.rsplit("/", 1)[-1] for each in found.modules)) or "none"
         console.print(f"{found.binding}; driver modules: {names}", highlight=False, soft_wrap=True)
     for each in found.devices:
-        console.print(table_of(each, outlook(each, rate), rate))
+        console.print(table_of(each, assess_device(each, rate), rate))
     for note in found.notes:
         console.print(note, highlight=False, soft_wrap=True)
     if not found.devices or all(each.problem for each in found.devices):
         raise typer.Exit(2)
 
 
-def table_of(device: "DeviceSurvey", ahead: "Outlook", rate_hz: float) -> FittedTable:
+def table_of(device: "DeviceProbe", ahead: "Assessment", rate_hz: float) -> FittedTable:
     """What it is, what it can do, and what a daemon would do with it."""
     table = FittedTable(
         device.label or device.device, (words("", least=20), words("")), heads=False
@@ -61,8 +61,8 @@ def table_of(device: "DeviceSurvey", ahead: "Outlook", rate_hz: float) -> Fitted
         table.add("cannot be used", device.problem)
         return table
     table.add("radio", f"{device.driver} {device.hardware}")
-    for does, way in (("receives", device.rx), ("sends", device.tx)):
-        table.add(does, _way(way) if way is not None else "no")
+    for does, direction in (("receives", device.rx), ("sends", device.tx)):
+        table.add(does, _direction(direction) if direction is not None else "no")
     if device.clock_sources:
         table.add("soapy.clock_source", ", ".join(device.clock_sources))
     modem = f"modem.rate_hz = {rate_hz:g}" + (
@@ -81,12 +81,12 @@ def table_of(device: "DeviceSurvey", ahead: "Outlook", rate_hz: float) -> Fitted
     return table
 
 
-def _way(way: "WaySurvey") -> str:
-    gains = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in way.gains_db.items())
+def _direction(can: "DirectionProbe") -> str:
+    gains = ", ".join(f"{name} {low:g} to {high:g}" for name, (low, high) in can.gains_db.items())
     return (
-        f"{_spans(way.rates_hz)} Msps, {_spans(way.frequencies_hz)} MHz\n"
-        f"gain {way.gain_db.low:g} to {way.gain_db.high:g} dB ({gains or 'no elements'}); "
-        f"antennas {', '.join(way.antennas) or 'one'}; transfers of {way.transfer} samples"
+        f"{_spans(can.rates_hz)} Msps, {_spans(can.frequencies_hz)} MHz\n"
+        f"gain {can.gain_db.low:g} to {can.gain_db.high:g} dB ({gains or 'no elements'}); "
+        f"antennas {', '.join(can.antennas) or 'one'}; transfers of {can.transfer} samples"
     )
 
 

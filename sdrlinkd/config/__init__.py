@@ -1,6 +1,6 @@
 """Configuration: TOML → types → what the parts are built with."""
 
-from sdrlinkd.config.carrier_checks import WITHOUT_AIR
+from sdrlinkd.config.backends import backend_of, typed_config
 from sdrlinkd.config.carriers import (
     SIMULATED_HZ,
     ChannelParams,
@@ -14,7 +14,7 @@ from sdrlinkd.config.not_checked import unchecked
 from sdrlinkd.config.offsets import cfo_told, cfo_warning
 from sdrlinkd.config.places import located
 from sdrlinkd.config.radios import GnuRadioParams
-from sdrlinkd.config.schema import BusParams, Config
+from sdrlinkd.config.schema import WITHOUT_AIR, BusParams, Config
 from sdrlinkd.config.setup import UNBOUNDED_TYPES, Setup, load_registry, make_setup
 
 __all__ = [
@@ -30,6 +30,7 @@ __all__ = [
     "PlayParams",
     "Setup",
     "TransformParams",
+    "backend_of",
     "cfo_told",
     "cfo_warning",
     "explain_policy",
@@ -39,5 +40,6 @@ __all__ = [
     "make_setup",
     "parse_config",
     "parse_toml",
+    "typed_config",
     "unchecked",
 ]

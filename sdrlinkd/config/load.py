@@ -11,6 +11,7 @@ import msgspec
 from msgspec import inspect
 
 from sdrlinkd.config import describe, quantities
+from sdrlinkd.config.backends import config_type
 from sdrlinkd.config.places import KeyPath, cite
 from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError
@@ -36,15 +37,28 @@ def load_config(path: Path) -> Config:
 
 def parse_config(text: str, source: str = "config") -> Config:
     """The configuration in TOML `text`. Raises ConfigError that cites `source`."""
-    return parse_toml(text, source, Config)
+    raw = _read(text, source)
+    try:
+        kind = config_type(raw)
+    except ConfigError as error:
+        told = str(error).removeprefix("backend")
+        raise ConfigError(cite(source, text, ["backend"]) + told) from None
+    return _typed(raw, text, source, kind)
 
 
 def parse_toml(text: str, source: str, kind: type[S]) -> S:
     """TOML `text` as a struct. Raises ConfigError that cites `source`, key, given and allowed."""
+    return _typed(_read(text, source), text, source, kind)
+
+
+def _read(text: str, source: str) -> dict[str, object]:
     try:
-        raw = tomllib.loads(text)
+        return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise ConfigError(f"{source}: not TOML: {error}") from None
+
+
+def _typed(raw: dict[str, object], text: str, source: str, kind: type[S]) -> S:
     _refuse_unknown(raw, describe.type_of(kind), [], text, source)
     try:
         return msgspec.convert(quantities.as_numbers(raw, describe.type_of(kind)), kind)

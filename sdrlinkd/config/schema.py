@@ -1,11 +1,19 @@
 """The configuration file as types: the parts' own parameters, composed."""
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
-from backends import EtherParams, IqFileParams, LoopbackParams, SoapyParams, ZmqParams
+from backends import (
+    BUILT_IN,
+    EtherParams,
+    IqFileParams,
+    LoopbackParams,
+    ModemNeeds,
+    SoapyParams,
+    ZmqParams,
+)
 from sdrlinkd.config.carriers import (
     ChannelParams,
     DirectParams,
@@ -25,6 +33,16 @@ from sdrlinkd.link import (
     RelayParams,
     TopicPolicy,
 )
+
+WITHOUT_AIR = ("direct", "gnuradio")
+"""Backends that carry PDUs, not samples."""
+BACKENDS = ("direct", *BUILT_IN, "gnuradio")
+"""All that the key `backend` takes, but for radios of other packages."""
+
+if TYPE_CHECKING:
+    BackendName = str
+else:
+    BackendName = Literal[BACKENDS]
 
 
 class BusParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -60,7 +78,7 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """Namespace under which another robot's topics are republished."""
     rx_depth: Annotated[int, Meta(ge=0)] = 256
     """Messages kept for a consumer that does not read; 0: without bound."""
-    backend: Literal["direct", "loopback", "iqfile", "ether", "soapy", "zmq", "gnuradio"] = "direct"
+    backend: BackendName = "direct"
     drain_s: Annotated[float, Meta(ge=0, le=60)] = 1.0
     """Time to send what is queued when the daemon is stopped."""
     seed: int | None = None
@@ -90,11 +108,24 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """Policies by registry name: `[topic.odom]`."""
 
     @property
+    def backend_settings(self) -> msgspec.Struct:
+        """The section of the backend in use."""
+        settings: msgspec.Struct = getattr(self, self.backend)
+        return settings
+
+    @property
+    def radio_needs(self) -> ModemNeeds:
+        """What the modem asks of its radio."""
+        modem = self.modem
+        return ModemNeeds(modem.rate_hz, modem.oversampling, modem.frequency_hz, modem.block_s)
+
+    @property
     def hears_self(self) -> bool:
         """Whether this node takes its own PDUs (the paper's experiment)."""
-        return {
-            "direct": self.direct.hear_self,
-            "loopback": self.loopback.hear_self,
-            "iqfile": self.iqfile.hear_self,
-            "gnuradio": self.gnuradio.hear_self,
-        }.get(self.backend, False)
+        return bool(getattr(self.backend_settings, "hear_self", False))
+
+    @property
+    def waits_for_consumer(self) -> bool:
+        """Whether the radio's time begins when the first consumer subscribes."""
+        own = getattr(self.backend_settings, "wait_for_consumer", False)
+        return bool(own) or self.play.wait_for_consumer

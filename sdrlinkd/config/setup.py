@@ -6,13 +6,13 @@ from pathlib import Path
 
 from zstandard import ZstdCompressionDict
 
-from sdrlinkd.config.carrier_checks import WITHOUT_AIR, check_carrier, with_paths
+from sdrlinkd.config.carrier_checks import check_carrier, with_paths
 from sdrlinkd.config.link_checks import check_relay, load_dictionaries
 from sdrlinkd.config.not_checked import unchecked
 from sdrlinkd.config.offsets import cfo_told, cfo_warning
 from sdrlinkd.config.places import located
 from sdrlinkd.config.robot_id import robot_id
-from sdrlinkd.config.schema import Config
+from sdrlinkd.config.schema import WITHOUT_AIR, Config
 from sdrlinkd.errors import ConfigError, RegistryError
 from sdrlinkd.link import TopicPolicy, check_access, flush_told
 from sdrlinkd.wire import Registry, equal_payload, max_message_size, parse_registry

@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from backends import DeviceSurvey, Survey, WaySurvey
-from sdrlinkd.config import Config
+from backends import BUILT_IN, DeviceProbe, DirectionProbe, ProbeReport
+from sdrlinkd.config import WITHOUT_AIR, Config
 from sdrlinkd.doctor.finding import Finding, bad, good, good_if, none
 
 FIRST_SOCKET = "air.sock"
@@ -12,7 +12,7 @@ LISTENERS = ("csma", "minislot")
 """Policies that live of hearing others begin."""
 
 
-def check_radio(config: Config | None, found: Survey | None) -> list[Finding]:
+def check_radio(config: Config | None, found: ProbeReport | None) -> list[Finding]:
     """`config`: None where only what is here is asked for. `found`: by SoapySDR, of the configured
     device or all; None where no radio is to be looked at."""
     if config is not None and config.backend != "soapy":
@@ -46,24 +46,26 @@ def _without(config: Config) -> Finding:
         path = Path(config.iqfile.receive)
         is_there = any(Path(f"{path}{end}").is_file() for end in ("", ".sigmf-meta"))
         return good_if(is_there, "recording", str(path), "name one that is there: iqfile.receive")
-    return none("radio", f'backend = "{config.backend}" has none')
+    if config.backend in BUILT_IN or config.backend in WITHOUT_AIR:
+        return none("radio", f'backend = "{config.backend}" has none')
+    return none("radio", f'backend = "{config.backend}" is another package\'s: not looked at')
 
 
-def _of_device(device: DeviceSurvey, config: Config | None) -> list[Finding]:
+def _of_device(device: DeviceProbe, config: Config | None) -> list[Finding]:
     if device.problem:
         return [bad("device", f'"{device.device}": {device.problem}', "see the text")]
     findings = [good("device", f"{device.driver} {device.hardware}, {_duplex(device)}")]
     if config is None:
         return findings
     modem, soapy = config.modem, config.soapy
-    ways = [("receives", device.rx)] + [("sends", device.tx)] * soapy.tx_enabled
-    for name, way in ways:
-        if way is None:
+    directions = [("receives", device.rx)] + [("sends", device.tx)] * soapy.tx_enabled
+    for name, direction in directions:
+        if direction is None:
             key = "soapy.tx_enabled = false" if name == "sends" else "another device"
             findings.append(bad(f"device {name}", "no", key))
             continue
-        findings += _of_way(
-            name, way, modem.rate_hz * modem.oversampling, modem.frequency_hz,
+        findings += _of_direction(
+            name, direction, modem.rate_hz * modem.oversampling, modem.frequency_hz,
             soapy.tx_gains if name == "sends" else soapy.rx_gains,
             soapy.tx_gain_db if name == "sends" else soapy.rx_gain_db,
             soapy.tx_antenna if name == "sends" else soapy.rx_antenna,
@@ -81,26 +83,26 @@ def _of_device(device: DeviceSurvey, config: Config | None) -> list[Finding]:
     return findings
 
 
-def _of_way(
-    name: str, way: WaySurvey, rate_hz: float, frequency_hz: float, gains: dict[str, float],
+def _of_direction(
+    name: str, can: DirectionProbe, rate_hz: float, frequency_hz: float, gains: dict[str, float],
     total_db: float | None, antenna: str,
 ) -> list[Finding]:  # fmt: skip
     findings = [
         good_if(
-            _within(rate_hz, way.rates_hz), f"{name} at", f"{rate_hz / 1e6:g} Msps",
-            f"modem.rate_hz × modem.oversampling: {_spans(way.rates_hz)} Msps",
+            _within(rate_hz, can.rates_hz), f"{name} at", f"{rate_hz / 1e6:g} Msps",
+            f"modem.rate_hz × modem.oversampling: {_spans(can.rates_hz)} Msps",
         ),
         good_if(
-            _within(frequency_hz, way.frequencies_hz), f"{name} on", f"{frequency_hz / 1e6:g} MHz",
-            f"modem.frequency_hz: {_spans(way.frequencies_hz)} MHz",
+            _within(frequency_hz, can.frequencies_hz), f"{name} on", f"{frequency_hz / 1e6:g} MHz",
+            f"modem.frequency_hz: {_spans(can.frequencies_hz)} MHz",
         ),
     ]  # fmt: skip
     wanted = {} if total_db is None else {"all together": total_db}
     for element, gain_db in (wanted | gains).items():
-        offered = way.gain_db if element == "all together" else way.gains_db.get(element)
+        offered = can.gain_db if element == "all together" else can.gains_db.get(element)
         what = f"{name} with {element}"
         if offered is None:
-            findings.append(bad(what, "no such gain", f"one of {', '.join(way.gains_db)}"))
+            findings.append(bad(what, "no such gain", f"one of {', '.join(can.gains_db)}"))
             continue
         low, high = offered
         findings.append(
@@ -109,13 +111,16 @@ def _of_way(
     if antenna:
         findings.append(
             good_if(
-                antenna in way.antennas, f"{name} by", antenna, f"one of {', '.join(way.antennas)}"
+                antenna in can.antennas,
+                f"{name} by",
+                antenna,
+                f"one of {', '.join(can.antennas)}",
             )
         )
     return findings
 
 
-def _duplex(device: DeviceSurvey) -> str:
+def _duplex(device: DeviceProbe) -> str:
     if not device.full_duplex:
         return "half duplex"
     return "full duplex" + (", keeps time" if device.has_time else "")

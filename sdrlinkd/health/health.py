@@ -14,10 +14,12 @@ class Health:
         self._lately = Lately()
         self._story = Story()
         self._limiter: Limiter[Line] = Limiter()
+        self.shares_air = False
+        """Whether other robots may be on the air of what carries the PDUs."""
 
     def judge(self, snapshot: Snapshot) -> VerdictReport:
         """The verdict on any snapshot; changes nothing."""
-        return judge(snapshot, self._lately)
+        return judge(snapshot, self._lately, self.shares_air)
 
     def look(self, snapshot: Snapshot) -> list[Line]:
         """What a log should tell that was not so at the last look; about once a second."""

@@ -14,8 +14,6 @@ LOSSY = 0.03
 AWAY_S = 1.0
 CLIPPED_PCT = 0.1
 LATE_LOOP_MS = 250.0
-HEARS_OTHERS = ("soapy", "ether", "zmq", "gnuradio")
-"""Kinds with an air that other robots should be on."""
 
 
 def is_away(carrier: CarrierReport) -> bool:
@@ -29,13 +27,13 @@ def is_silent(robot: NeighborReport) -> bool:
     return robot.last_heard_s_ago > patience_s
 
 
-def judge(snapshot: Snapshot, lately: Lately) -> VerdictReport:
-    """The verdict on `snapshot`."""
+def judge(snapshot: Snapshot, lately: Lately, shares_air: bool) -> VerdictReport:
+    """The verdict on `snapshot`; with `shares_air`, other robots should be heard."""
     down = _down(snapshot)
     if down:
         return VerdictReport(level="DOWN", reasons=[down])
     reasons = [
-        *_robots(snapshot),
+        *_robots(snapshot, shares_air),
         *_queue(snapshot, lately),
         *_machine(snapshot, lately),
     ]
@@ -60,11 +58,11 @@ def _down(snapshot: Snapshot) -> str:
     return ""
 
 
-def _robots(snapshot: Snapshot) -> list[str]:
+def _robots(snapshot: Snapshot, shares_air: bool) -> list[str]:
     """What is wrong with whom we hear, and who hears us."""
     robots = [each for each in snapshot.link.neighbors if not each.is_self]
     reasons = []
-    if not robots and snapshot.carrier.kind in HEARS_OTHERS:
+    if not robots and shares_air:
         return ["no robot heard yet"]
     for robot in robots:
         if is_silent(robot):

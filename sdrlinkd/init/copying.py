@@ -31,7 +31,7 @@ def copy_of(config: Config, own_id: int, number: int) -> str:
             for name, policy in config.topic.items()
         },
     )
-    changed = _changed(copy, Config()) | {"namespace": copy.namespace, "registry": REGISTRY}
+    changed = _changed(copy, type(copy)()) | {"namespace": copy.namespace, "registry": REGISTRY}
     top = {key: value for key, value in changed.items() if not isinstance(value, dict)}
     tables = {key: value for key, value in changed.items() if isinstance(value, dict)}
     return (

@@ -19,6 +19,8 @@ class CarrierTraits(NamedTuple):
     """Time is that of the samples, and waits for everybody."""
     transmits: bool = True
     senses: bool = False
+    shares_air: bool = False
+    """Other robots may be on its air."""
     turnaround_s: float = 0.0
     index_error_s: float = 0.0
     """How wrong times may be after a gap."""

@@ -3,7 +3,7 @@
 from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.link import ModemLink
 from sdrlinkd.modem.presumed import PresumedRadio, access_words, presume_radio
-from sdrlinkd.modem.radios import check_airtime, make_modem, make_radio, soapy_settings
+from sdrlinkd.modem.radios import check_airtime, make_modem, make_radio
 from sdrlinkd.modem.traits import carrier_traits
 
 __all__ = [
@@ -16,5 +16,4 @@ __all__ = [
     "make_modem",
     "make_radio",
     "presume_radio",
-    "soapy_settings",
 ]

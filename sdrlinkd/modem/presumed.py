@@ -3,17 +3,11 @@
 from random import Random
 from typing import NamedTuple
 
-import msgspec
-
-from backends import Capabilities, presume
-from sdrlinkd.config import Config
+from sdrlinkd.config import WITHOUT_AIR, Config, backend_of
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.link import CarrierTraits, RateControl, settle
 from sdrlinkd.modem.airtimes import Airtimes
-from sdrlinkd.modem.radios import PDU_BACKENDS, soapy_settings
 from sdrlinkd.modem.traits import carrier_traits
-
-ETHER_TURNAROUND_S = 1e-4
 
 
 class PresumedRadio(NamedTuple):
@@ -31,14 +25,17 @@ class PresumedRadio(NamedTuple):
 
 def presume_radio(config: Config, turnaround_s: float | None = None) -> PresumedRadio:
     """`turnaround_s`: another than is configured. Raises UserError where there is no radio."""
-    if config.backend in PDU_BACKENDS:
+    backend = backend_of(config)
+    if backend is None:
         raise UserError(
             f'backend: got "{config.backend}", which has no air to plan for: it hands PDUs on as '
             'they are; allowed: backend = "soapy", with [soapy] device = "driver=hackrf", or '
             '"ether", with [ether] dir = "FOLDER", or "zmq"; examples: etc/radios/hackrf.toml, '
             "etc/radios/usrp.toml"
         )
-    can, presumption, is_sure = _capabilities(config, turnaround_s)
+    can, presumption, is_sure = backend.presume(
+        config.backend_settings, config.radio_needs, turnaround_s
+    )
     airtimes = Airtimes(config.modem, config.link.pdu_size)
     traits = carrier_traits(config.backend, can, config.modem, airtimes)
     usable = RateControl(config.rate, traits.needed_snr_db, traits.mcs).usable
@@ -49,7 +46,7 @@ def presume_radio(config: Config, turnaround_s: float | None = None) -> Presumed
 
 def access_words(config: Config, own_id: int) -> list[str]:
     """What access comes to, for `--check`. Raises ConfigError where it is sure to be refused."""
-    if config.backend in PDU_BACKENDS:
+    if config.backend in WITHOUT_AIR:
         return [f'access none, as no other robot shares the air of the backend "{config.backend}"']
     radio = presume_radio(config)
     unsure = "" if radio.is_sure else "; what is not known without the radio: the radio itself"
@@ -61,48 +58,3 @@ def access_words(config: Config, own_id: int) -> list[str]:
             raise
         return [f"warning: the daemon may refuse this: {error}{how}"]
     return [f"access {settled.sentence}{how}"]
-
-
-def _capabilities(config: Config, turnaround_s: float | None) -> tuple[Capabilities, str, bool]:
-    """(what it can do, what of that is presumed, whether that is sure)."""
-    modem = config.modem
-    if config.backend == "soapy":
-        # Of sending, where it is switched off as yet.
-        settings = msgspec.structs.replace(soapy_settings(config), tx_enabled=True)
-        if turnaround_s is not None:
-            settings = msgspec.structs.replace(settings, turnaround_s=turnaround_s)
-        found = presume(settings)
-        how = f"as drivers of the kind {found.driver} are known to be"
-        if not found.driver:
-            how = "taken for one that sends while it listens and keeps time, for its driver is not"
-            how += " known here"
-        duplex = "full duplex" if found.capabilities.full_duplex else "half duplex"
-        told = f"{config.soapy.device}: {duplex}, {how}"
-        return found.capabilities, told, bool(found.driver)
-    if config.backend == "ether":
-        from backends import ETHER_LEAD_S
-
-        turn_s = ETHER_TURNAROUND_S if turnaround_s is None else turnaround_s
-        return (
-            _simulated(config, turn_s, ETHER_LEAD_S),
-            (
-                f"ether: taken for half duplex, turnaround {1e3 * turn_s:g} ms, in blocks of "
-                f"{1e3 * modem.block_s:g} ms: the hub tells when the daemon is there"
-            ),
-            False,
-        )
-    lead_s = config.zmq.lead_s + modem.block_s if config.backend == "zmq" else 0.0
-    return _simulated(config, turnaround_s, lead_s), "", True
-
-
-def _simulated(config: Config, turnaround_s: float | None, lead_s: float) -> Capabilities:
-    return Capabilities(
-        receives=True,
-        transmits=True,
-        full_duplex=turnaround_s is None,
-        timestamps=True,
-        paced=True,
-        lead_s=lead_s,
-        turnaround_s=turnaround_s or 0.0,
-        block_s=config.modem.block_s,
-    )

@@ -1,36 +1,25 @@
 """From the configuration to a radio, and to a modem with one."""
 
 import math
-import os
-import socket
 from collections.abc import Awaitable, Callable
-from pathlib import Path
 from random import Random
 
 import phy
 from backends import (
+    BUILT_IN,
     BackendError,
     Channel,
-    EtherRadio,
-    IqFileRadio,
-    LoopbackRadio,
-    OffsetRadio,
     OversampledRadio,
     Patience,
     Radio,
-    SoapyRadio,
-    SoapySettings,
-    ZmqRadio,
+    RadioRequest,
 )
-from sdrlinkd.config import Config
+from sdrlinkd.config import Config, backend_of
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.link import CarrierTraits, RateControl, may_share, settle
 from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.compiled import load_phy
 from sdrlinkd.modem.link import ModemLink
-
-PDU_BACKENDS = ("direct", "gnuradio")
-"""They carry PDUs, not samples."""
 
 
 def make_modem(
@@ -47,7 +36,7 @@ def make_modem(
     since then (monotonic); `load` compiles the PHY, or loads it.
     """
     check_airtime(config)
-    access = config.access
+    access, backend = config.access, backend_of(config)
     return ModemLink(
         config.modem,
         config.link.pdu_size,
@@ -56,7 +45,7 @@ def make_modem(
         listens=may_share(access, node_id),
         lead_grows=lambda traits: _has_slots(config, node_id, traits),
         # In a recording, time begins with its first sample.
-        began_s=None if config.backend == "iqfile" else began_s,
+        began_s=None if backend is None or backend.starts_time else began_s,
         load=load,
     )
 
@@ -73,13 +62,22 @@ def make_radio(
     `longest_s`: no burst that it is given is longer. `patience`: of one that is not there when it
     is opened.
     """
-    if config.backend in PDU_BACKENDS:
+    backend = backend_of(config)
+    if backend is None:
+        *names, last = (f'"{name}"' for name in BUILT_IN)
         raise ConfigError(
-            f'backend: got "{config.backend}", which has no radio; allowed: "loopback", "iqfile", '
-            '"ether", "zmq" or "soapy"'
+            f'backend: got "{config.backend}", which has no radio; allowed: {", ".join(names)} or '
+            f"{last}"
         )
+    request = RadioRequest(
+        config.radio_needs,
+        node_id,
+        longest_s,
+        patience,
+        lambda: _channel(config, rng.getrandbits(32)),
+    )
     try:
-        radio = _make_radio(config, node_id, rng, longest_s, patience)
+        radio = backend.radio(config.backend_settings, request)
     except BackendError as error:
         raise UserError(str(error)) from None
     factor = config.modem.oversampling
@@ -95,48 +93,6 @@ def _has_slots(config: Config, node_id: int, traits: CarrierTraits) -> bool:
         return settle(config.access, node_id, traits, longest_s, Random(0)).policy == "tdma"
     except ConfigError:
         return False
-
-
-def _make_radio(
-    config: Config, node_id: int, rng: Random, longest_s: float, patience: Patience
-) -> Radio:
-    if config.backend == "ether":
-        who = f"process {os.getpid()} on {socket.gethostname()}"
-        return EtherRadio(Path(config.ether.dir), node_id, who, patience)
-    if config.backend == "soapy":
-        return _make_soapy(config, longest_s, patience)
-    if config.backend == "zmq":
-        return ZmqRadio(config.zmq, config.modem.block_s)
-    channel = _channel(config, rng.getrandbits(32))
-    modem, loopback, iqfile = config.modem, config.loopback, config.iqfile
-    if config.backend == "iqfile":
-        return IqFileRadio(
-            Path(iqfile.receive) if iqfile.receive else None,
-            Path(iqfile.transmit) if iqfile.transmit else None,
-            channel,
-            modem.block_s,
-            paced=iqfile.paced,
-            type_name=iqfile.format,
-            receive_type=iqfile.receive_format,
-        )
-    return LoopbackRadio(channel, modem.block_s, paced=loopback.paced, hear_self=loopback.hear_self)
-
-
-def soapy_settings(config: Config) -> SoapySettings:
-    """What the device is to be set to."""
-    modem, soapy = config.modem, config.soapy
-    return SoapySettings.of(
-        soapy, modem.rate_hz * modem.oversampling, modem.frequency_hz, modem.block_s
-    )
-
-
-def _make_soapy(config: Config, longest_s: float, patience: Patience) -> Radio:
-    modem, soapy = config.modem, config.soapy
-    shifts = soapy.offset_tuning == "on" or (
-        soapy.offset_tuning == "auto" and modem.oversampling > 1
-    )
-    radio = SoapyRadio(soapy_settings(config), longest_s, patience)
-    return OffsetRadio(radio) if shifts else radio
 
 
 def _longest_burst_s(config: Config) -> float:

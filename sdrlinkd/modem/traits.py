@@ -26,6 +26,7 @@ def carrier_traits(
         is_lockstep=can.lockstep,
         transmits=can.transmits,
         senses=can.receives,
+        shares_air=can.shares_air,
         turnaround_s=can.turnaround_s,
         index_error_s=can.index_error_s,
         stamp_s=STAMP_SAMPLES / params.rate_hz + can.index_error_s,

@@ -44,6 +44,11 @@ class Case:
         return self.name
 
     @property
+    def backend(self):
+        """Its name in the table of radios."""
+        return self.name.split("-")[0]
+
+    @property
     def noise(self):
         """What no sample of noise alone exceeds."""
         return self.gap_noise if self.snr_db is None else 7 * 10 ** (NOISE_DBFS / 20)

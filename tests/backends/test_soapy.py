@@ -4,20 +4,29 @@ import asyncio
 import os
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backends import BackendError, SoapyRadio, SoapySettings, Tuning, TxBurst, TxOutcome, survey
-from backends.soapy.chatter import Chatter
-from backends.soapy.clock import SampleTime
-from backends.soapy.library import driver_of
-from backends.soapy.outgoing import Outgoing
-from backends.soapy.ring import SampleRing, make_shared
-from backends.soapy.surface import DriverError, Moved, check_buffer, check_moved
-from backends.soapy.traits import tx_traits
+from backends import (
+    BackendError,
+    SoapyRadio,
+    SoapySettings,
+    Tuning,
+    TxBurst,
+    TxOutcome,
+    probe_devices,
+)
+from backends.soapy.binding import driver_of
+from backends.soapy.binding.api import DriverError, StreamResult, check_buffer, check_result
+from backends.soapy.driver_log import DriverLog
+from backends.soapy.protocol.ring import SampleRing, make_shared
+from backends.soapy.radio_process.clock import SampleClock
+from backends.soapy.radio_process.tx_stream import TxStream
+from backends.soapy.settings.tx_timing import timing_of
 from tests.backends.radios import RATE, TUNING, N, noise, opened, take, turn
 from tests.soapy_loopback import Bus, missing
 
@@ -29,19 +38,19 @@ rates = st.one_of(
 
 @given(rates, st.integers(0, 1 << 50), st.integers(0, 1 << 40))
 def test_indices_become_times_and_the_same_indices_again(rate_hz, zero_ns, index):
-    clock = SampleTime(rate_hz, is_stamped=True)
+    clock = SampleClock(rate_hz, is_stamped=True)
     assert not clock.has_begun
     clock.begin(zero_ns)
     assert clock.has_begun
     assert clock.index_at(clock.time_ns(index)) == index
-    later = SampleTime(rate_hz, is_stamped=True)
+    later = SampleClock(rate_hz, is_stamped=True)
     later.begin(clock.time_ns(index), index)
     assert abs(later.time_ns(0) - zero_ns) <= 1
 
 
 @given(rates, st.integers(1, 1 << 40), st.integers(0, 1 << 40), st.integers(0, 1 << 35))
 def test_the_index_goes_on_by_the_hosts_clock_between_pieces(rate_hz, seen_ns, end, later_ns):
-    clock = SampleTime(rate_hz, is_stamped=False)
+    clock = SampleClock(rate_hz, is_stamped=False)
     clock.saw(end, seen_ns)
     assert clock.has_begun
     assert clock.now(seen_ns) == end
@@ -75,12 +84,12 @@ def test_buffers_that_a_driver_must_not_get_are_refused():
     with pytest.raises(ValueError, match="must not be written"):
         check_buffer(good, 8, writeable=True)
     with pytest.raises(DriverError, match="9 samples of 8"):
-        check_moved(Moved(9, 0, 0), 8)
+        check_result(StreamResult(9, 0, 0), 8)
 
 
 @pytest.mark.parametrize(("form", "full"), [("CS16", 32767), ("CS8", 127)])
 def test_other_formats_are_scaled_and_clipped(form, full):
-    values = Outgoing(None, form).converted(np.array([0.5 - 1j, 3 + 0j], np.complex64))
+    values = TxStream(None, form).converted(np.array([0.5 - 1j, 3 + 0j], np.complex64))
     assert values.dtype.itemsize == {"CS16": 4, "CS8": 2}[form]
     parts = np.frombuffer(values.tobytes(), {"CS16": "i2", "CS8": "i1"}[form])
     assert parts.tolist() == [round(0.5 * full), -full, full, 0]
@@ -92,14 +101,22 @@ def test_a_device_is_named_as_soapysdrs_tools_do():
     assert driver_of("serial=1") == ""
 
 
+def timing(has_time, full_duplex, transfer_s, in_flight=0):
+    """How bursts leave such a device, at settings that are all the same here."""
+    hardware = SimpleNamespace(
+        has_time=has_time, full_duplex=full_duplex, tx_transfer_s=transfer_s, in_flight=in_flight
+    )
+    return timing_of(hardware, 1, 0.02, 0.05, 0.05, 1.0)
+
+
 def test_what_counts_samples_hands_over_earlier_and_sends_in_spells():
-    timed = tx_traits(True, True, 1e-3, 0, 1, 0.02, 0.05, 0.05, 1.0)
+    timed = timing(True, True, 1e-3)
     assert (timed.lead_s, timed.turnaround_s, timed.spells) == (0.02, 0, None)
-    counted = tx_traits(False, True, 0.01, 0, 1, 0.02, 0.05, 0.05, 1.0)
+    counted = timing(False, True, 0.01)
     assert counted.lead_s > 0.02
     assert counted.spells is None
-    half = tx_traits(False, False, 0.01, 0, 1, 0.02, 0.05, 0.05, 1.0)
-    ahead = tx_traits(False, False, 0.01, 4, 1, 0.02, 0.05, 0.05, 1.0)
+    half = timing(False, False, 0.01)
+    ahead = timing(False, False, 0.01, in_flight=4)
     assert half.turnaround_s == pytest.approx(0.05 + 2 * 0.01)
     assert ahead.lead_s == pytest.approx(half.lead_s + 4 * 0.01)
     assert half.spells.pause_s > half.lead_s + half.turnaround_s + 0.05
@@ -184,17 +201,17 @@ async def test_what_drivers_print_is_shown_to_those_who_ask(monkeypatch, tmp_pat
 
 
 def test_of_what_a_process_prints_the_last_line_is_kept():
-    chatter = Chatter()
+    driver_log = DriverLog()
     code = (
         "import sys; print('first'); print('last', file=sys.stderr); sys.stdout.write(5000 * 'U')"
     )
     with subprocess.Popen(
-        [sys.executable, "-u", "-c", code], stdout=chatter.fd, stderr=chatter.fd
+        [sys.executable, "-u", "-c", code], stdout=driver_log.fd, stderr=driver_log.fd
     ) as process:
-        chatter.begin()
+        driver_log.begin()
         process.wait()
-    assert chatter.last_line().startswith("UUU")
-    assert list(chatter._lines)[:2] == ["first", "last"]
+    assert driver_log.last_line().startswith("UUU")
+    assert list(driver_log._lines)[:2] == ["first", "last"]
 
 
 @needs_radio
@@ -211,21 +228,21 @@ async def test_a_rate_that_the_device_does_not_offer_is_refused():
 
 
 @needs_radio
-def test_a_survey_tells_what_devices_can_do_and_which_module_is_missing():
-    (found,) = survey("driver=loopback,model=hackrf").devices
-    assert (found.full_duplex, found.has_time, found.keeps_time) == (False, False, False)
+def test_a_probe_tells_what_devices_can_do_and_which_module_is_missing():
+    (found,) = probe_devices("driver=loopback,model=hackrf").devices
+    assert (found.full_duplex, found.has_time, found.timestamped_tx) == (False, False, False)
     assert found.tx.transfer == 131072
     assert found.rx.rates_hz[0].low == 2e6
     assert set(found.rx.gains_db) == {"LNA", "VGA", "AMP"}
-    nothing = survey("driver=lime")
+    nothing = probe_devices("driver=lime")
     assert not nothing.devices
     assert 'no driver "lime"' in nothing.notes[0]
     assert "soapysdr-module-lms7" in nothing.notes[0]
     for args in ("driver=null", "driver=null,type=null"):
-        no_radio = survey(args)
+        no_radio = probe_devices(args)
         assert not no_radio.devices
         assert "is built into SoapySDR and is no radio" in no_radio.notes[0]
-    absent = survey("driver=loopback,serial=X")
+    absent = probe_devices("driver=loopback,serial=X")
     assert not absent.devices
     assert "there is no such device" in absent.notes[0]
 

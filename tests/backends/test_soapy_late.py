@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from backends import SoapyRadio, SoapySettings, TxBurst, TxOutcome
-from backends.soapy.clock import SampleTime
-from backends.soapy.outgoing import Outgoing
-from backends.soapy.protocol import Order
-from backends.soapy.surface import END_BURST, NOT_SUPPORTED, Moved
-from backends.soapy.timed import TimedSender
+from backends.soapy.binding.api import END_BURST, NOT_SUPPORTED, StreamResult
+from backends.soapy.protocol.control import TxCommand
+from backends.soapy.radio_process.clock import SampleClock
+from backends.soapy.radio_process.timestamped_tx import TimestampedTransmitter
+from backends.soapy.radio_process.tx_stream import TxStream
 from tests.backends.radios import RATE, N, noise, opened, take, turn
 from tests.soapy_loopback import Bus, missing
 
@@ -110,22 +110,22 @@ def test_the_last_sample_of_a_burst_is_zero():
         mtu=100,
         activate=lambda: 0,
         deactivate=lambda: 0,
-        status=lambda _: Moved(NOT_SUPPORTED, 0, 0),
+        status=lambda _: StreamResult(NOT_SUPPORTED, 0, 0),
         write=lambda values, flags, *_: (
-            written.append((values.copy(), flags)) or Moved(len(values), 0, 0)
+            written.append((values.copy(), flags)) or StreamResult(len(values), 0, 0)
         ),
     )
-    orders = SimpleNamespace(
-        waiting=deque([Order(1, 1000, 250, 0, None)]),
+    commands = SimpleNamespace(
+        waiting=deque([TxCommand(1, 1000, 250, 0, None)]),
         is_over=False,
         wait=lambda _: None,
-        samples=lambda order: np.ones(order.n, np.complex64),
+        samples=lambda command: np.ones(command.n, np.complex64),
         done=lambda *_: None,
     )
-    clock = SampleTime(RATE, is_stamped=True)
+    clock = SampleClock(RATE, is_stamped=True)
     clock.begin(0)
     clock.saw(0, time.monotonic_ns())
-    TimedSender(orders, Outgoing(stream, "CF32"), clock).step()
+    TimestampedTransmitter(commands, TxStream(stream, "CF32"), clock).step()
     sent = np.concatenate([values for values, _ in written])
     assert np.array_equal(sent[:250], np.ones(250))
     assert not sent[250:].any()

@@ -7,7 +7,7 @@ import msgspec
 import pytest
 from rich.text import Text
 
-from backends import DeviceSurvey, Outlook, WaySurvey
+from backends import Assessment, DeviceProbe, DirectionProbe
 from benchmarks.report import Row, table_of
 from sdrlinkd.adapters import BagSummary, TopicSummary
 from sdrlinkd.cli import bag, phy, plan, radio, topics
@@ -62,7 +62,7 @@ def planned(topic: str) -> Plan:
     return Plan(topics_of, [], 0.658, True, [], robots=3, policy="tdma", notes=notes)
 
 
-def surveyed(device: str) -> tuple[DeviceSurvey, Outlook]:
+def probed(device: str) -> tuple[DeviceProbe, Assessment]:
     """A radio that never was."""
     way = msgspec.convert(
         {
@@ -71,10 +71,12 @@ def surveyed(device: str) -> tuple[DeviceSurvey, Outlook]:
             "gains_db": {"AMP": (0, 14), "LNA": (0, 40)}, "antennas": ["TX/RX"],
             "formats": ["CF32"], "transfer": 131_072,
         },
-        WaySurvey,
+        DirectionProbe,
     )  # fmt: skip
-    found = DeviceSurvey(device=device, label=device, driver="hackrf", rx=way, tx=way)
-    return found, Outlook("at 2 Msps", 2e6, 2, 0.0655, 0.25, 0.05, ["this one is only half duplex"])
+    found = DeviceProbe(device=device, label=device, driver="hackrf", rx=way, tx=way)
+    return found, Assessment(
+        "at 2 Msps", 2e6, 2, 0.0655, 0.25, 0.05, ["this one is only half duplex"]
+    )
 
 
 def bench_rows() -> list[Row]:
@@ -103,7 +105,7 @@ def everything(width: int) -> dict[str, list[object]]:
         "lab": [live_table(LONG, state), pair_table(few), pair_table(many)],
         "plan": [*plan.lines(planned(LONG))],
         "phy info": [phy.table_of(modem_info(5e6, 1024, 0.005))],
-        "radio probe": [radio.table_of(*surveyed(f"driver=hackrf,serial={LONG}"), 2e6)],
+        "radio probe": [radio.table_of(*probed(f"driver=hackrf,serial={LONG}"), 2e6)],
         "bag info": [bag.table_of(SUMMARY)],
         "topics": [*topics.tables(at.link)],
         "list": [daemons_table(listed)],

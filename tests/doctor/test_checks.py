@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from backends import DeviceSurvey, Survey, WaySurvey
+from backends import DeviceProbe, DirectionProbe, ProbeReport
 from sdrlinkd.config import parse_config
 from sdrlinkd.doctor import (
     Granted,
@@ -199,18 +199,20 @@ def test_radios_on_usb(tmp_path, monkeypatch):
     assert (closed.state, bool(closed.to_do)) == (BAD, True)
 
 
-WAY = WaySurvey(
+WAY = DirectionProbe(
     rates_hz=[(2e6, 20e6)], frequencies_hz=[(1e6, 6e9)], gain_db=(0, 61),
     gains_db={"AMP": (0, 14), "VGA": (0, 47)}, antennas=["TX/RX"], formats=["CS8"], transfer=131072,
 )  # fmt: skip
-HACKRF = DeviceSurvey(device="driver=hackrf", driver="HackRF", hardware="One", rx=WAY, tx=WAY)
+HACKRF = DeviceProbe(device="driver=hackrf", driver="HackRF", hardware="One", rx=WAY, tx=WAY)
 
 
 def radio(text, found=HACKRF, binding="SoapySDR 0.8"):
     config = parse_config(text) if text is not None else None
     devices = [found] if found else []
-    survey = Survey(binding=binding, modules=["/x/libHackRF.so"], devices=devices, notes=["none"])
-    return by_name(check_radio(config, survey))
+    report = ProbeReport(
+        binding=binding, modules=["/x/libHackRF.so"], devices=devices, notes=["none"]
+    )
+    return by_name(check_radio(config, report))
 
 
 SOAPY = 'backend = "soapy"\n[soapy]\ndevice = "driver=hackrf"\n'
@@ -248,7 +250,7 @@ def test_radios_that_are_not_there():
     assert radio(None, None)["device"].state is NONE
     assert radio(SOAPY, None, "")["SoapySDR"].state is BAD
     assert radio(None, None, "")["SoapySDR"].state is NONE
-    busy = DeviceSurvey(device="driver=hackrf", problem="in use")
+    busy = DeviceProbe(device="driver=hackrf", problem="in use")
     assert "in use" in radio(SOAPY, busy)["device"].told
     assert radio(None)["device"].told == "HackRF One, half duplex"
 

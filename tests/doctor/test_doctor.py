@@ -125,7 +125,7 @@ def test_a_driver_that_crashes_is_a_finding(examine, monkeypatch):
     def crash(_):
         raise BackendError("a driver crashed (signal 11)")
 
-    monkeypatch.setattr("backends.survey", crash)
+    monkeypatch.setattr("backends.probe_devices", crash)
     code, found = examine(SOAPY)
     assert code == 1
     assert "signal 11" in found["device"]["told"]

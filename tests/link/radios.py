@@ -12,6 +12,7 @@ AHEAD_S = 0.005
 _SHARED = CarrierTraits(
     kind="ether",
     senses=True,
+    shares_air=True,
     turnaround_s=50e-6,
     detect_s=DETECT_S,
     gap_s=32 / RATE,

@@ -49,8 +49,10 @@ def test_alone_it_is_none(nodes, traits):
 
 @pytest.mark.parametrize("kind", ["direct", "gnuradio", "iqfile", "loopback"])
 def test_without_an_air_that_robots_share_it_is_none(kind):
-    found = settled(auto([1, 2]), LOCKSTEP._replace(kind=kind, senses=kind == "loopback"))
-    assert found.policy == "none"
+    deaf, alone = {"senses": False}, {"shares_air": False}
+    for lacks in (deaf, alone, deaf | alone):
+        found = settled(auto([1, 2]), LOCKSTEP._replace(kind=kind, **lacks))
+        assert found.policy == "none"
     assert f'"{kind}"' in found.reason
 
 

@@ -1,11 +1,13 @@
 """What stands in `[soapy]` is what the device is set to, key by key."""
 
+from random import Random
+
 import msgspec
 import pytest
 
 from backends import SoapyParams
 from sdrlinkd.config import Config, ModemParams
-from sdrlinkd.modem import soapy_settings
+from sdrlinkd.modem import make_radio
 
 OTHERS = {
     "device": "driver=hackrf", "tx_enabled": True, "tx_gain_db": 7.0, "rx_gain_db": 8.0,
@@ -25,8 +27,15 @@ def test_each_key_is_tried():
 
 @pytest.mark.parametrize("key", OTHERS)
 def test_what_is_configured_reaches_the_device(key):
-    config = Config(soapy=SoapyParams(**{key: OTHERS[key]}), modem=ModemParams(frequency_hz=868e6))
-    told = msgspec.structs.asdict(soapy_settings(config))
+    config = Config(
+        backend="soapy",
+        soapy=SoapyParams(**{key: OTHERS[key]}),
+        modem=ModemParams(frequency_hz=868e6),
+    )
+    radio = make_radio(config, 1, Random(0), 0.1)
+    # With its oscillator beside the channel, it stands in another one.
+    device = getattr(radio, "_radio", radio)
+    told = msgspec.structs.asdict(device._settings)
     assert told == {
         **msgspec.structs.asdict(SoapyParams()), "rate_hz": 5e6, "frequency_hz": 868e6,
         "block_s": 0.001, key: OTHERS[key],

@@ -16,8 +16,6 @@ SOON_S = 0.001
 """Mini-slots are for radios that hear another begin, and hold back, within this."""
 FAIR = 0.5
 """A policy that carries less than this of what the best one does is not taken."""
-ALONE = ("direct", "gnuradio", "iqfile", "loopback")
-"""Backends without an air that robots share."""
 
 
 Policy = Literal["auto", "none", "csma", "minislot", "tdma"]
@@ -66,7 +64,7 @@ def settle(
     if policy == "auto":
         policy, reason = _chosen(params, own_id, traits, shares)
     if policy == "none":
-        is_alone = params.policy == "auto" and traits.senses and traits.kind not in ALONE
+        is_alone = params.policy == "auto" and traits.senses and traits.shares_air
         access: Access = make_free(traits, is_alone)
         shares = {}
     else:
@@ -118,7 +116,7 @@ def _chosen(
     params: AccessParams, own_id: int, traits: CarrierTraits, shares: Mapping[str, float]
 ) -> tuple[Policy, str]:
     """The (policy, reason) that `auto` comes to on this radio."""
-    if traits.kind in ALONE or not traits.senses:
+    if not (traits.shares_air and traits.senses):
         return "none", f'as no other robot shares the air of the backend "{traits.kind}"'
     if not _others(params, own_id):
         return "none", "as access.nodes lists nobody else"

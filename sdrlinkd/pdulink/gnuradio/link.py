@@ -42,8 +42,8 @@ class GnuRadioLink:
         await self._transport.open(self._heard)
         airtime_s = self._airtime_s
         traits = CarrierTraits(
-            kind="gnuradio", longest_burst_s=(airtime_s,), pdu_burst_s=(airtime_s,),
-            stamp_s=PACE_S + self._params.delay_s,
+            kind="gnuradio", shares_air=True, longest_burst_s=(airtime_s,),
+            pdu_burst_s=(airtime_s,), stamp_s=PACE_S + self._params.delay_s,
         )  # fmt: skip
         listener.attach(traits)
 

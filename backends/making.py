@@ -1,0 +1,62 @@
+"""How each radio of ours is made from its settings; the code of one is loaded with the first."""
+
+import os
+import socket
+from pathlib import Path
+
+from backends.backend import RadioRequest
+from backends.base import Radio
+from backends.params import EtherParams, IqFileParams, LoopbackParams, ZmqParams
+from backends.soapy import SoapyParams, SoapyRadio, SoapySettings
+
+
+def make_loopback(loopback: LoopbackParams, request: RadioRequest) -> Radio:
+    """Make a radio that hears itself through the simulated air."""
+    from backends.loopback import LoopbackRadio
+
+    return LoopbackRadio(
+        request.make_channel(), request.needs.block_s, loopback.paced, loopback.hear_self
+    )
+
+
+def make_iqfile(iqfile: IqFileParams, request: RadioRequest) -> Radio:
+    """Make a radio that plays a recording, writes one, or both."""
+    from backends.iqfile import IqFileRadio
+
+    return IqFileRadio(
+        Path(iqfile.receive) if iqfile.receive else None,
+        Path(iqfile.transmit) if iqfile.transmit else None,
+        request.make_channel(),
+        request.needs.block_s,
+        paced=iqfile.paced,
+        type_name=iqfile.format,
+        receive_type=iqfile.receive_format,
+    )
+
+
+def make_ether(ether: EtherParams, request: RadioRequest) -> Radio:
+    """Make a radio on the air of a hub, which gets to know this process by its number."""
+    from backends.ether import EtherRadio
+
+    who = f"process {os.getpid()} on {socket.gethostname()}"
+    return EtherRadio(Path(ether.dir), request.node_id, who, request.patience)
+
+
+def make_soapy(soapy: SoapyParams, request: RadioRequest) -> Radio:
+    """Make a radio behind SoapySDR, its oscillator beside the channel where that is wanted."""
+    from backends.offset import OffsetRadio
+
+    needs = request.needs
+    settings = SoapySettings.of(soapy, needs.radio_rate_hz, needs.frequency_hz, needs.block_s)
+    radio = SoapyRadio(settings, request.longest_s, request.patience)
+    shifts = soapy.offset_tuning == "on" or (
+        soapy.offset_tuning == "auto" and needs.oversampling > 1
+    )
+    return OffsetRadio(radio) if shifts else radio
+
+
+def make_zmq(zmq: ZmqParams, request: RadioRequest) -> Radio:
+    """Make a radio that is another program, by samples over ZeroMQ."""
+    from backends.zmqstream import ZmqRadio
+
+    return ZmqRadio(zmq, request.needs.block_s)

@@ -1,0 +1,72 @@
+"""What is wrong where a device cannot be had, in sentences that say what to do."""
+
+from pathlib import Path
+
+from backends.soapy.binding.api import DriverError, Library
+from backends.soapy.binding.device_args import driver_of
+from backends.soapy.binding.library import MODULES, has_module
+
+
+def is_driver_missing(library: Library, args: str, error: DriverError) -> bool:
+    """Whether a device could not be opened because no module has its driver."""
+    driver = driver_of(args)
+    return bool(driver) and not has_module(library, driver) and "no match" in str(error)
+
+
+def no_radio(args: str) -> str:
+    """Why what `args` names is no radio; empty where it may be one."""
+    if driver_of(args) != "null":
+        return ""
+    return (
+        f'soapy.device: got "{args}", which is built into SoapySDR and is no radio: it neither '
+        "sends nor receives; allowed: a radio's driver, such as driver=hackrf; those here are "
+        "shown by: sdrlinkctl radio probe"
+    )
+
+
+def why_not(library: Library, args: str, error: DriverError) -> str:
+    """Why no device could be opened by `args`, and what to do."""
+    driver = driver_of(args)
+    text = str(error)
+    if is_driver_missing(library, args, error):
+        there = ", ".join(sorted(Path(each).name for each in library.modules())) or "none"
+        return (
+            f'soapy.device: got "{args}", but SoapySDR has no driver "{driver}" (its modules: '
+            f"{there}); install its module{_package(driver)}, or name another driver"
+        )
+    if any(word in text.lower() for word in ("busy", "in use", "claimed")):
+        return (
+            f'soapy.device: got "{args}", but the device is in use ({text}); stop the other '
+            "program, or name another device by its serial"
+        )
+    others = [_named(each) for each in _found(library)]
+    offered = f"; found here: {'; '.join(others)}" if others else "; no device was found here"
+    return (
+        f'soapy.device: got "{args}", but there is no such device ({text}){offered}. Plug it in, '
+        "see that you may open it (udev rules), and look with: sdrlinkctl radio probe"
+    )
+
+
+def not_installed(error: DriverError) -> str:
+    """Why there is no SoapySDR, and what to do."""
+    return (
+        f"SoapySDR is not installed ({error}); on Debian: apt-get install libsoapysdr0.8 "
+        "soapysdr-tools and the radio's soapysdr-module-…"
+    )
+
+
+def _package(driver: str) -> str:
+    name = MODULES.get(driver, "").lower()
+    return f" (on Debian: apt-get install soapysdr-module-{name})" if name else ""
+
+
+def _found(library: Library) -> list[dict[str, str]]:
+    try:
+        return library.enumerate("")
+    except DriverError:
+        return []
+
+
+def _named(device: dict[str, str]) -> str:
+    keys = ("driver", "serial", "label")
+    return ",".join(f"{key}={device[key]}" for key in keys if device.get(key))

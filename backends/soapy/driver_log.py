@@ -1,0 +1,46 @@
+"""What drivers print: kept from the daemon's screen, and the last of it told where it matters."""
+
+import os
+import threading
+from collections import deque
+
+DEBUG = "SDRLINKD_DEBUG"
+"""With this in the environment all of it is shown."""
+KEPT = 20
+_PIECE = 4096
+_JOIN_S = 0.5
+
+
+class DriverLog:
+    """A pipe for a process's output, read by a thread of its own until the process has ended."""
+
+    def __init__(self) -> None:
+        self._lines: deque[str] = deque(maxlen=KEPT)
+        self._shown = bool(os.environ.get(DEBUG))
+        self._read_fd, self._write_fd = os.pipe()
+        self._thread = threading.Thread(target=self._read, daemon=True)
+
+    @property
+    def fd(self) -> int | None:
+        """The descriptor that the process is to write to; None: where we do."""
+        return None if self._shown else self._write_fd
+
+    def begin(self) -> None:
+        """Read from now on: the process has its end of the pipe."""
+        os.close(self._write_fd)
+        self._thread.start()
+
+    def last_line(self) -> str:
+        """The last line that was printed, or empty; the process has ended."""
+        self._thread.join(_JOIN_S)
+        return next((line for line in reversed(self._lines) if line), "")
+
+    def _read(self) -> None:
+        rest = ""
+        while piece := os.read(self._read_fd, _PIECE):
+            *lines, rest = (rest + piece.decode(errors="replace")).split("\n")
+            self._lines.extend(line.strip() for line in lines)
+            # Some drivers print a letter now and then, and never a line's end.
+            rest = rest[-_PIECE:]
+        self._lines.append(rest.strip())
+        os.close(self._read_fd)

@@ -1,0 +1,51 @@
+"""The radio process from start to end: signals, priority, and what it says when it fails."""
+
+import contextlib
+import os
+import resource
+import signal
+import socket
+import sys
+
+from backends.soapy.binding import DriverError, HostError
+from backends.soapy.protocol import MOST_BYTES, Blame, Failed, SampleRing, to_open
+from backends.soapy.radio_process.session import Session
+from backends.soapy.radio_process.tx_commands import TxCommands
+from backends.soapy.settings import SettingError
+
+REALTIME, NICE = 10, -10
+"""Priorities, where they may be had: samples do not wait."""
+SWITCH_INTERVAL_S = 5e-4
+"""Two threads that mostly wait in the driver should not wait for each other."""
+
+
+def main() -> None:
+    """Run with CONTROL, RX, RX_MEMORY, TX_MEMORY as arguments: numbers of descriptors."""
+    # Whoever stops the daemon, by Ctrl-C or systemd, lets it send what is queued and then end us.
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    _raise_priority()
+    control, rx, rx_memory, tx_memory = (int(each) for each in sys.argv[1:5])
+    with socket.socket(fileno=control) as control_socket, socket.socket(fileno=rx) as rx_socket:
+        rx_socket.setblocking(False)
+        request = to_open(control_socket.recv(MOST_BYTES))
+        commands = TxCommands(control_socket, SampleRing(tx_memory, request.tx_samples))
+        try:
+            Session(request, commands, rx_socket, SampleRing(rx_memory, request.rx_samples)).run()
+        except SettingError as error:
+            commands.say(Failed(str(error), Blame.SETTINGS))
+        except HostError as error:
+            commands.say(Failed(str(error), Blame.HOST))
+        except DriverError as error:
+            commands.say(Failed(str(error), Blame.ABSENT))
+
+
+def _raise_priority() -> None:
+    """Run before others, as far as this process may."""
+    may, _ = resource.getrlimit(resource.RLIMIT_RTPRIO)
+    with contextlib.suppress(PermissionError):
+        if may >= REALTIME:
+            os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(REALTIME))
+        else:
+            os.setpriority(os.PRIO_PROCESS, 0, NICE)

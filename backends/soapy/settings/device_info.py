@@ -1,0 +1,34 @@
+"""What an open device is; the radio process tells the daemon."""
+
+import msgspec
+
+from backends.soapy.settings.tx_timing import timestamped_tx
+
+
+class DeviceInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """An open device: its names, its rate and frequency (Hz), and how it moves samples."""
+
+    driver: str
+    hardware: str
+    binding: str
+    rate_hz: float
+    frequency_hz: float
+    full_duplex: bool
+    has_time: bool
+    """Its samples are stamped by its own clock."""
+    receives_in_s: float
+    """Samples come in pieces of this length."""
+    tx_transfer_s: float = 0.0
+    in_flight: int = 0
+    gains: str = ""
+
+    @property
+    def described(self) -> str:
+        """The device in one line for people: driver, hardware, frequency and gains."""
+        parts = [f"{self.driver} {self.hardware}, {self.frequency_hz / 1e6:g} MHz", self.gains]
+        return ", ".join(part for part in parts if part)
+
+    @property
+    def timestamped_tx(self) -> bool:
+        """Whether bursts leave at times that the device itself keeps."""
+        return timestamped_tx(self.has_time, self.full_duplex)

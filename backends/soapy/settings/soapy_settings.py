@@ -1,0 +1,56 @@
+"""What a device is to be set to: a person's wishes, and the modem's rate and frequency."""
+
+from backends.base import Capabilities
+from backends.soapy.settings.device_info import DeviceInfo
+from backends.soapy.settings.driver_profiles import profile_of
+from backends.soapy.settings.params import SoapyParams
+from backends.soapy.settings.tx_timing import TxHardware, TxTiming, timing_of
+
+
+class SettingError(Exception):
+    """Settings that the device does not take; the message cites key, given and allowed."""
+
+
+class SoapySettings(SoapyParams, frozen=True, kw_only=True):
+    """What a person sets of a device, and at what rate and frequency (Hz) it runs."""
+
+    rate_hz: float
+    frequency_hz: float
+    block_s: float = 0.001
+
+    @classmethod
+    def of(
+        cls, params: SoapyParams, rate_hz: float, frequency_hz: float, block_s: float
+    ) -> "SoapySettings":
+        """All that is in `params`, for a device at that rate and frequency, in such pieces."""
+        given = {name: getattr(params, name) for name in SoapyParams.__struct_fields__}
+        return cls(**given, rate_hz=rate_hz, frequency_hz=frequency_hz, block_s=block_s)
+
+    def tx_timing(self, hardware: TxHardware) -> TxTiming:
+        """How bursts leave a device that is like `hardware` and set like this."""
+        return timing_of(
+            hardware, self.leading_transfers, self.lead_s, self.turnaround_s, self.listen_s,
+            self.longest_tx_s,
+        )  # fmt: skip
+
+    def capabilities(self, found: DeviceInfo) -> Capabilities:
+        """What a radio can do that is that device, set so."""
+        tx = self.tx_timing(found)
+        return Capabilities(
+            receives=True,
+            transmits=self.tx_enabled,
+            full_duplex=found.full_duplex,
+            timestamps=found.has_time,
+            paced=True,
+            lead_s=tx.lead_s,
+            turnaround_s=tx.turnaround_s,
+            spells=tx.spells,
+            index_error_s=0.0 if found.has_time else found.receives_in_s,
+            block_s=found.receives_in_s,
+        )
+
+
+def in_flight(settings: SoapyParams, driver: str) -> int:
+    """Transfers that this driver takes ahead of the antenna, as set or as is known of it."""
+    given = settings.transfers_in_flight
+    return profile_of(driver).in_flight if given is None else given
