@@ -20,11 +20,11 @@ from backends.base import (
     RefusalError,
     RxBlock,
     Samples,
-    Spells,
     Tuning,
     TxBurst,
     TxOutcome,
     TxReport,
+    TxWindows,
 )
 from backends.late import LateRadio
 from backends.outstanding import GAP
@@ -125,12 +125,12 @@ __all__ = [
     "SoapyParams",
     "SoapyRadio",
     "SoapySettings",
-    "Spells",
     "Track",
     "Tuning",
     "TxBurst",
     "TxOutcome",
     "TxReport",
+    "TxWindows",
     "World",
     "ZmqParams",
     "ZmqRadio",

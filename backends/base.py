@@ -38,11 +38,12 @@ class Patience(Enum):
     """It waits until it has been away and is back: it refused its settings before."""
 
 
-class Spells(NamedTuple):
+class TxWindows(NamedTuple):
     """How a radio sends that must stop receiving for it, in s.
 
-    A burst follows the one before in the same spell when it is handed over `follow_s` before that
-    one ends, and the spell is shorter than `longest_s` then; else it begins `pause_s` after it.
+    A burst follows the one before in the same TX window when it is handed over `follow_s` before
+    that one ends, and the window is shorter than `longest_s` then; else it begins `pause_s` after
+    it.
     """
 
     follow_s: float
@@ -60,7 +61,7 @@ class Capabilities:
     before its start a burst must be handed over. `turnaround_s`: for so long before and after a
     burst a half-duplex radio hears nothing. `index_error_s`: how wrong indices may be after a gap,
     where there are no `timestamps`. `shares_air`: other robots may hear
-    what it sends. `spells`: it sends in such.
+    what it sends. `tx_windows`: it sends in those.
     """
 
     receives: bool
@@ -74,7 +75,7 @@ class Capabilities:
     index_error_s: float = 0.0
     block_s: float = 0.001
     shares_air: bool = True
-    spells: Spells | None = None
+    tx_windows: TxWindows | None = None
 
 
 @dataclass(frozen=True)

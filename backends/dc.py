@@ -9,7 +9,7 @@ FOLLOWS = 0.02
 
 
 class DcBlocker:
-    """Subtracts a slow mean. OFDM has no carrier at 0 Hz: nothing that was sent goes with it."""
+    """Subtracts a slow mean. OFDM has no subcarrier at 0 Hz: nothing that was sent goes with it."""
 
     def __init__(self) -> None:
         self._mean: np.complex64 | None = None

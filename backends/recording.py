@@ -141,9 +141,9 @@ def _from_sigmf(
     if not data_path.is_file():
         raise BackendError(f"{data_path}: no such file; {meta_path.name} describes it")
     kind = sample_type(stated_type, f"{meta_path}: core:datatype")
-    carrier = _number(frequency, f"{meta_path}: core:frequency")
+    centre_hz = _number(frequency, f"{meta_path}: core:frequency")
     begins = [_number(each, f"{meta_path}: core:sample_start") or 0.0 for each in starts]
-    described = _described(data_path, kind, stated_rate or rate_hz, carrier, begins)
+    described = _described(data_path, kind, stated_rate or rate_hz, centre_hz, begins)
     return replace(described, gaps=gaps)
 
 

@@ -11,11 +11,11 @@ from benchmarks.report import Row
 from sdrlinkd.adapters import BuiltInRobot, empty, to_cdr
 from sdrlinkd.link import (
     AccessParams,
-    CarrierTraits,
     Link,
     LinkParams,
     Opportunity,
     Outcome,
+    PduLinkTraits,
     QueueParams,
     RateParams,
     ReassemblyParams,
@@ -75,7 +75,7 @@ def _round(messages: list[bytes], seed: int) -> float:
         Random(seed),
         hears_self=True,
     )
-    link.attach(CarrierTraits(), AccessParams(), RateParams())
+    link.attach(PduLinkTraits(), AccessParams(), RateParams())
     for message in messages:
         link.submit(0, message, 0.0)
     pdus: list[bytes] = []

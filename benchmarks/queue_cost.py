@@ -8,12 +8,12 @@ from random import Random
 from benchmarks.report import Row
 from sdrlinkd.link import (
     AccessParams,
-    CarrierTraits,
     Link,
     LinkParams,
     Opportunity,
     Outcome,
     Overrides,
+    PduLinkTraits,
     Qos,
     QueueParams,
     RateParams,
@@ -47,7 +47,7 @@ def make_queue(seed: int) -> Link:
         1,
         Random(seed),
     )
-    link.attach(CarrierTraits(), AccessParams(), RateParams())
+    link.attach(PduLinkTraits(), AccessParams(), RateParams())
     return link
 
 

@@ -14,13 +14,13 @@ from sdrlinkd.config import ModemParams
 from sdrlinkd.link import (
     AccessParams,
     Burst,
-    CarrierTraits,
     ClockParams,
     Link,
     LinkParams,
     Opportunity,
     Outcome,
     Overrides,
+    PduLinkTraits,
     Qos,
     QueueParams,
     RateParams,
@@ -77,7 +77,7 @@ class Station:
         """Open the radio."""
         await self.modem.open(self)
 
-    def attach(self, traits: CarrierTraits) -> None:
+    def attach(self, traits: PduLinkTraits) -> None:
         """What the radio is."""
         self.access = self.link.attach(traits, self._access, RateParams()).settled.access
 

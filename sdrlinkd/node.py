@@ -16,12 +16,12 @@ from sdrlinkd.hostclock import HostClock
 from sdrlinkd.link import (
     AS_CONFIGURED,
     Burst,
-    CarrierTraits,
     Link,
     Names,
     Opportunity,
     Outcome,
     Overrides,
+    PduLinkTraits,
     Told,
 )
 from sdrlinkd.localtime import UNKNOWN, PublishClock, host_clocks, local_times
@@ -121,7 +121,7 @@ class Node:
             self._tell_verdicts()
 
     # The PDU link's listener.
-    def attach(self, traits: CarrierTraits) -> None:
+    def attach(self, traits: PduLinkTraits) -> None:
         """The PDU link is there: fit the link to it. Raises ConfigError."""
         config = self._opening.config
         fit = self._link.attach(traits, config.access, config.rate)

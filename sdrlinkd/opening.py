@@ -13,7 +13,7 @@ from backends import Patience
 from sdrlinkd.config import Config, Setup
 from sdrlinkd.errors import LinkAbsentError, LinkRefusedError, UserError
 from sdrlinkd.pdulink import PduLink, PduListener
-from sdrlinkd.reports import CarrierReport
+from sdrlinkd.reports import PduLinkReport
 
 RETRY_S = 0.25, 2.0
 """What is not there is tried again after so long; more each time."""
@@ -110,7 +110,7 @@ class Opening:
         self._wait("opening", BEING_OPENED, Patience.THERE, knows_when=True)
         self._told_to.set()
 
-    def report(self, at: float) -> CarrierReport:
+    def report(self, at: float) -> PduLinkReport:
         """What the PDU link tells, or why there is none; since when, on the clock of `at`."""
         told = self.pdu_link.report()
         if not self.is_up:

@@ -221,7 +221,7 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     neighbors: list[NeighborReport]
 
 
-class CarrierReport(msgspec.Struct, frozen=True, kw_only=True):
+class PduLinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """What carries the PDUs, and how it fares."""
 
     kind: str
@@ -278,7 +278,7 @@ class Snapshot(msgspec.Struct, frozen=True, kw_only=True):
     host_clock_steps: int = 0
     """Times that this host's clock was set, by more than it strays."""
     verdict: VerdictReport = VerdictReport()
-    carrier: CarrierReport
+    carrier: PduLinkReport
     bus: BusReport
     link: LinkReport
     notices: list[str] = []

@@ -1,8 +1,8 @@
 """A burst on its way, and how likely its parts are lost where it arrives.
 
 White noise only. What others send meanwhile is noise too: their powers add up. A codeword has of
-each of its parts the information that a carrier gives at that part's SINR, and fails as often as at
-the one SNR that gives as much on average; a PDU fails with any of its codewords.
+each of its parts the information that a subcarrier gives at that part's SINR, and fails as often as
+at the one SNR that gives as much on average; a PDU fails with any of its codewords.
 """
 
 import math
@@ -120,7 +120,7 @@ def lost_rate_in(flight: Flight, node: int, begin: float, end: float) -> float:
 
 
 def _mean_snr_db(flight: Flight, node: int, parts: list[tuple[float, float]]) -> float:
-    """The one SNR at which a carrier gives as much information as in all parts, by their shares.
+    """The one SNR at which a subcarrier gives as much information as in all parts, by their shares.
 
     Others' power counts as more than the same of white noise: a receiver has four pilots in a
     symbol to tell it by.

@@ -31,10 +31,11 @@ KEEP_S = 1.0
 
 
 class AirSense(NamedTuple):
-    """A receiver has listened up to `until`; the last carrier it knows of ended at `idle_since`.
+    """A receiver has listened up to `until`; as far as it knows, the channel is idle since
+    `idle_since`.
 
-    One that goes on ends later than `until`. `burst_at`: when that carrier's first sample arrived;
-    None when its header was not read, negative before the first.
+    While it is busy, that is later than `until`. `burst_at`: when the last burst's first sample
+    arrived; None when its header was not read, negative before the first.
     """
 
     until: float

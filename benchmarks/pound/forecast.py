@@ -7,7 +7,7 @@ import numpy as np
 from backends import GAP
 from benchmarks.pound.ours import MAX_BURST_S, MCS, PDU_SIZE, RATE_HZ, Air, Run
 from sdrlinkd.config import ModemParams
-from sdrlinkd.link import AccessParams, CarrierTraits, TopicPolicy, settle
+from sdrlinkd.link import AccessParams, PduLinkTraits, TopicPolicy, settle
 from sdrlinkd.modem import Airtimes
 from sdrlinkd.plan import Load, Plan, Setting, make_plan
 
@@ -25,7 +25,7 @@ def plan_of(run: Run, air: Air) -> Plan:
         for i, flow in enumerate(flows)
     ]
     # In lock-step composing takes no time.
-    traits = CarrierTraits(is_lockstep=True, gap_s=GAP / RATE_HZ, react_s=air.block_s)
+    traits = PduLinkTraits(is_lockstep=True, gap_s=GAP / RATE_HZ, react_s=air.block_s)
     settled = settle(AccessParams(policy="none"), 1, traits, air.max_burst_s, Random(0))
     setting = Setting(
         Airtimes(modem, PDU_SIZE), PDU_SIZE, MCS, air.max_burst_s, air.classes, 1, settled, traits,

@@ -9,11 +9,11 @@ from typing import NamedTuple, ParamSpec, TypeVar
 
 from sdrlinkd.link import (
     AccessParams,
-    CarrierTraits,
     Link,
     LinkParams,
     Opportunity,
     Outcome,
+    PduLinkTraits,
     QueueParams,
     RateParams,
     ReassemblyParams,
@@ -78,7 +78,7 @@ def _link(own_id: int) -> Link:
         own_id,
         Random(own_id),
     )
-    link.attach(CarrierTraits(), AccessParams(), RateParams())
+    link.attach(PduLinkTraits(), AccessParams(), RateParams())
     return link
 
 

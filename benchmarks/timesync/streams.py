@@ -17,7 +17,7 @@ WANDER = 2e-8
 """Random walk of the frequency, per √s."""
 FARTHEST_S = 5.0
 LONGEST_WAIT_S = 0.02
-SPELL_S = 5.0
+SPAN_S = 5.0
 
 Waits = Callable[[Generator, int, float], tuple[np.ndarray, np.ndarray]]
 
@@ -47,9 +47,9 @@ def _busy(rng: Generator, n: int, share: float, least_s: float = 0.0) -> np.ndar
     return (rng.random(n) < share) * rng.uniform(least_s, LONGEST_WAIT_S, n)
 
 
-def _in_spells(rng: Generator, n: int, hz: float) -> tuple[np.ndarray, np.ndarray]:
-    spells = np.arange(n) / hz // SPELL_S + rng.integers(2)
-    is_busy = spells % 2 == 1
+def _in_spans(rng: Generator, n: int, hz: float) -> tuple[np.ndarray, np.ndarray]:
+    spans = np.arange(n) / hz // SPAN_S + rng.integers(2)
+    is_busy = spans % 2 == 1
     return is_busy * _busy(rng, n, 1.0), is_busy * _busy(rng, n, 1.0)
 
 
@@ -59,7 +59,7 @@ SCENARIOS: dict[str, Waits] = {
     "C": lambda rng, n, _: (_busy(rng, n, 1.0, 0.002), rng.uniform(0, 0.005, n)),
     "D": lambda rng, n, _: (_busy(rng, n, 1.0), _busy(rng, n, 1.0)),
     "J": lambda rng, n, _: (_busy(rng, n, 1.0), _busy(rng, n, 1.0)),
-    "L": _in_spells,
+    "L": _in_spans,
 }
 """What messages wait each way: A 40 % idle; B busy and quiet; C never idle, lopsided; D never idle;
 J with 1 ms of jitter, too; L busy and idle by turns."""

@@ -1,7 +1,10 @@
 """Configuration: TOML → types → what the parts are built with."""
 
 from sdrlinkd.config.backends import backend_of, typed_config
-from sdrlinkd.config.carriers import (
+from sdrlinkd.config.load import explain_policy, load_config, parse_config, parse_toml
+from sdrlinkd.config.not_checked import unchecked
+from sdrlinkd.config.offsets import cfo_told, cfo_warning
+from sdrlinkd.config.pdu_links import (
     SIMULATED_HZ,
     ChannelParams,
     DirectParams,
@@ -9,9 +12,6 @@ from sdrlinkd.config.carriers import (
     PlayParams,
     TransformParams,
 )
-from sdrlinkd.config.load import explain_policy, load_config, parse_config, parse_toml
-from sdrlinkd.config.not_checked import unchecked
-from sdrlinkd.config.offsets import cfo_told, cfo_warning
 from sdrlinkd.config.places import located
 from sdrlinkd.config.radios import GnuRadioParams
 from sdrlinkd.config.schema import WITHOUT_AIR, BusParams, Config

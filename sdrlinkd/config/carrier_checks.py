@@ -14,7 +14,7 @@ from sdrlinkd.errors import ConfigError
 S = TypeVar("S", bound=msgspec.Struct)
 
 
-def check_carrier(config: Config) -> None:
+def check_pdu_link(config: Config) -> None:
     """Raises ConfigError that begins with the key, and says what was given and what is allowed."""
     _check_sharing(config)
     if config.backend == "gnuradio":

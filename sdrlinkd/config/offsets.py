@@ -1,6 +1,6 @@
 """How far off in frequency bursts are looked for, in words."""
 
-from sdrlinkd.config.carriers import ModemParams
+from sdrlinkd.config.pdu_links import ModemParams
 
 
 def cfo_told(modem: ModemParams) -> str:

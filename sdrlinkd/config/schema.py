@@ -14,7 +14,7 @@ from backends import (
     SoapyParams,
     ZmqParams,
 )
-from sdrlinkd.config.carriers import (
+from sdrlinkd.config.pdu_links import (
     ChannelParams,
     DirectParams,
     ModemParams,

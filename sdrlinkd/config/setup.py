@@ -6,10 +6,10 @@ from pathlib import Path
 
 from zstandard import ZstdCompressionDict
 
-from sdrlinkd.config.carrier_checks import check_carrier, with_paths
 from sdrlinkd.config.link_checks import check_relay, load_dictionaries
 from sdrlinkd.config.not_checked import unchecked
 from sdrlinkd.config.offsets import cfo_told, cfo_warning
+from sdrlinkd.config.pdu_link_checks import check_pdu_link, with_paths
 from sdrlinkd.config.places import located
 from sdrlinkd.config.robot_id import robot_id
 from sdrlinkd.config.schema import WITHOUT_AIR, Config
@@ -97,7 +97,7 @@ def make_setup(config: Config, base: Path, source: str = "") -> Setup:
 def _resolve(config: Config, base: Path, source: str) -> Setup:
     registry = load_registry(base / config.registry)
     _check_texts(config)
-    check_carrier(config)
+    check_pdu_link(config)
     config = with_paths(config, base)
     topics_in = _topics_in(config, registry)
     node_id = robot_id(config, topics_in)

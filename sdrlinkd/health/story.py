@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from sdrlinkd.health.lately import Lately, shed_by_topic
 from sdrlinkd.health.verdict import is_away, is_silent
-from sdrlinkd.health.words import carrier_name, span
+from sdrlinkd.health.words import pdu_link_name, span
 from sdrlinkd.reports import NeighborReport, Snapshot
 
 
@@ -55,7 +55,7 @@ class Story:
 
     def _radio(self, snapshot: Snapshot) -> Iterator[Line]:
         carrier, now = snapshot.carrier, snapshot.uptime_s
-        name, state = carrier_name(carrier), carrier.state
+        name, state = pdu_link_name(carrier), carrier.state
         if state == self._state or (state == "down" and not is_away(carrier)):
             return
         self._state = state

@@ -1,8 +1,8 @@
 """OK, DEGRADED or DOWN, and why, the worst first."""
 
 from sdrlinkd.health.lately import Lately
-from sdrlinkd.health.words import carrier_name, percent, span
-from sdrlinkd.reports import RATE_WINDOW_S, CarrierReport, NeighborReport, Snapshot, VerdictReport
+from sdrlinkd.health.words import pdu_link_name, percent, span
+from sdrlinkd.reports import RATE_WINDOW_S, NeighborReport, PduLinkReport, Snapshot, VerdictReport
 
 SILENT_S = 5.0
 """A robot that is not heard for so long, and for much longer than usual, is missed."""
@@ -16,7 +16,7 @@ CLIPPED_PCT = 0.1
 LATE_LOOP_MS = 250.0
 
 
-def is_away(carrier: CarrierReport) -> bool:
+def is_away(carrier: PduLinkReport) -> bool:
     """Whether what carried PDUs does not; a moment's pause is none."""
     return carrier.state == "down" and carrier.since_s >= AWAY_S
 
@@ -44,7 +44,7 @@ def judge(snapshot: Snapshot, lately: Lately, shares_air: bool) -> VerdictReport
 
 def _down(snapshot: Snapshot) -> str:
     carrier = snapshot.carrier
-    name, since = carrier_name(carrier), span(carrier.since_s)
+    name, since = pdu_link_name(carrier), span(carrier.since_s)
     if carrier.state == "opening":
         return f"no {name} yet: {carrier.reason}"
     if carrier.state == "waiting":

@@ -1,6 +1,6 @@
 """What carries the PDUs, and spans of time, as people say them."""
 
-from sdrlinkd.reports import CarrierReport
+from sdrlinkd.reports import PduLinkReport
 
 _NAMES = {
     "ether": "hub",
@@ -10,7 +10,7 @@ _NAMES = {
 }
 
 
-def carrier_name(carrier: CarrierReport) -> str:
+def pdu_link_name(carrier: PduLinkReport) -> str:
     """Of the thing that may be missing."""
     return _NAMES.get(carrier.kind, "radio")
 

@@ -15,17 +15,17 @@ from sdrlinkd.link import (
     AS_CONFIGURED,
     AccessParams,
     Burst,
-    CarrierTraits,
     Delivered,
     Link,
     Opportunity,
     Outcome,
     Overrides,
+    PduLinkTraits,
     RateParams,
     Sensed,
     Settled,
 )
-from sdrlinkd.modem import Airtimes, carrier_traits
+from sdrlinkd.modem import Airtimes, pdu_link_traits
 
 INFINITE = float("inf")
 TICK_S = 0.05
@@ -66,7 +66,7 @@ class Station:
     """A robot: its link, and the little that a modem adds to it."""
 
     link: Link
-    traits: CarrierTraits
+    traits: PduLinkTraits
     settled: Settled
     pace: float
     """Of its own crystal, by which its link's times are."""
@@ -111,7 +111,7 @@ class Simulation:
         rate: RateParams | None = None,
         seed: int = 0,
         keep_s: float = 0.0,
-        fit: Callable[[CarrierTraits], CarrierTraits] = lambda traits: traits,
+        fit: Callable[[PduLinkTraits], PduLinkTraits] = lambda traits: traits,
         watch: Callable[[Flight], None] = lambda _: None,
         listen: Callable[[int, Delivered, float], None] = lambda *_: None,
     ) -> None:
@@ -131,7 +131,7 @@ class Simulation:
         for node, radio in radios.items():
             link = links[node]
             can = self._medium.join(node, radio)
-            traits = fit(carrier_traits("ether", can, modem, airtimes))
+            traits = fit(pdu_link_traits("ether", can, modem, airtimes))
             settled, control, *_ = link.attach(traits, access, rate or RateParams())
             self._policy = settled.policy
             pace, coming = 1 + 1e-6 * radio.clock_ppm, iter(arrivals.get(node, ()))

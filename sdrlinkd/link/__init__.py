@@ -9,7 +9,6 @@ from sdrlinkd.link.access import (
     percent,
     settle,
 )
-from sdrlinkd.link.carrier import CarrierTraits, Opportunity, Sensed
 from sdrlinkd.link.link import Link
 from sdrlinkd.link.packing import flush_told
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
@@ -59,6 +58,7 @@ from sdrlinkd.link.timesync import (
     State,
     Wall,
 )
+from sdrlinkd.link.traits import Opportunity, PduLinkTraits, Sensed
 from sdrlinkd.link.transmit import Burst, Fit, Outcome, RateChange, RateControl, RateParams
 
 __all__ = [
@@ -77,7 +77,6 @@ __all__ = [
     "Allowance",
     "BulkParams",
     "Burst",
-    "CarrierTraits",
     "ClassParams",
     "ClassesParams",
     "ClockParams",
@@ -100,6 +99,7 @@ __all__ = [
     "Outgoing",
     "Overrides",
     "PaperFilter",
+    "PduLinkTraits",
     "Qos",
     "QueueParams",
     "RateChange",

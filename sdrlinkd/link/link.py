@@ -7,7 +7,6 @@ from random import Random
 from zstandard import ZstdCompressionDict
 
 from sdrlinkd.link.access import AccessParams
-from sdrlinkd.link.carrier import CarrierTraits, Opportunity
 from sdrlinkd.link.packing import Composer, PiggybackRecords
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
 from sdrlinkd.link.qos import AS_CONFIGURED, Overrides
@@ -37,6 +36,7 @@ from sdrlinkd.link.report import NO_NAMES, Names, Reporter
 from sdrlinkd.link.schedule import ClassesParams, Forecasts
 from sdrlinkd.link.status import AirUse, Told, Why
 from sdrlinkd.link.timesync import ClockParams, Clocks, Estimate, State, Wall
+from sdrlinkd.link.traits import Opportunity, PduLinkTraits
 from sdrlinkd.link.transmit import (
     Beacons,
     Burst,
@@ -121,9 +121,9 @@ class Link:
 
     # The radio.
 
-    def attach(self, carrier: CarrierTraits, access: AccessParams, rate: RateParams) -> Fit:
+    def attach(self, traits: PduLinkTraits, access: AccessParams, rate: RateParams) -> Fit:
         """Fit the link to the radio that is there. Raises ConfigError, changing nothing."""
-        fit = fit_to(carrier, access, rate, self.own_id, self._rng)
+        fit = fit_to(traits, access, rate, self.own_id, self._rng)
         self.use(fit)
         return fit
 

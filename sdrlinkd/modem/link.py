@@ -10,18 +10,18 @@ import phy
 from backends import AbsentError, BackendError, LateRadio, Radio, RefusalError, RxBlock, Tuning
 from sdrlinkd.config import ModemParams
 from sdrlinkd.errors import ConfigError, LinkAbsentError, LinkRefusedError, UserError
-from sdrlinkd.link import Burst, CarrierTraits, Opportunity, Outcome
+from sdrlinkd.link import Burst, Opportunity, Outcome, PduLinkTraits
 from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.clock import StreamClock
 from sdrlinkd.modem.compiled import load_phy
 from sdrlinkd.modem.ear import Ear
-from sdrlinkd.modem.plan import AirPlan, SpellPlan
+from sdrlinkd.modem.plan import AirPlan, TxWindowPlan
 from sdrlinkd.modem.report import modem_report
 from sdrlinkd.modem.rx_thread import Demodulation, ReceiverHere, ReceiverThread
-from sdrlinkd.modem.traits import carrier_traits
+from sdrlinkd.modem.traits import pdu_link_traits
 from sdrlinkd.modem.transmission import BurstReport, Transmission
 from sdrlinkd.pdulink import Heard, PduListener
-from sdrlinkd.reports import CarrierReport
+from sdrlinkd.reports import PduLinkReport
 
 TIMER_S = 0.001
 """The event loop's timers count in this; shorter waits would be busy ones."""
@@ -45,7 +45,7 @@ class ModemLink:
         radio: Radio,
         kind: str,
         listens: bool = False,
-        lead_grows: Callable[[CarrierTraits], bool] = lambda _: False,
+        lead_grows: Callable[[PduLinkTraits], bool] = lambda _: False,
         began_s: float | None = None,
         load: Callable[[], Awaitable[None]] = load_phy,
     ) -> None:
@@ -92,7 +92,7 @@ class ModemLink:
         except BackendError as error:
             raise UserError(str(error)) from None
         can = self._can = self._radio.capabilities
-        traits = carrier_traits(self._kind, can, params, self._airtimes)
+        traits = pdu_link_traits(self._kind, can, params, self._airtimes)
         self._lead_grows = self._may_lead_grow(traits)
         if not can.paced:
             # Time is that of the samples; where it has run before, it goes on from there.
@@ -100,8 +100,8 @@ class ModemLink:
             self._clock = StreamClock(params.rate_hz, can.paced, can.lockstep, began_s)
         lead, ahead = traits.lead_s * params.rate_hz, traits.ahead_s * params.rate_hz
         self._plan = AirPlan(math.ceil(lead), round(ahead))
-        if can.spells is not None:
-            self._plan = SpellPlan(math.ceil(lead), round(ahead), can.spells, params.rate_hz)
+        if can.tx_windows is not None:
+            self._plan = TxWindowPlan(math.ceil(lead), round(ahead), can.tx_windows, params.rate_hz)
         if can.lockstep:
             self._rx = ReceiverHere(self._ear, params.rate_hz, self._step)
         else:
@@ -153,7 +153,7 @@ class ModemLink:
             self._rx.stop()
         self._tx.close()
 
-    def report(self) -> CarrierReport:
+    def report(self) -> PduLinkReport:
         """State, counters of radio and receiver, and whether the PHY keeps up."""
         return modem_report(
             self._kind,

@@ -1,6 +1,6 @@
 """When the next burst may leave, in samples."""
 
-from backends import GAP, Spells
+from backends import GAP, TxWindows
 
 EASE = 64
 """After so many bursts in time, most of what was added to the lead is gone."""
@@ -40,12 +40,14 @@ class AirPlan:
         self._free_at = max(self._free_at, start + n_samples + GAP)
 
 
-class SpellPlan(AirPlan):
-    """The same for a radio that sends in spells: in the one that goes on, or in the next."""
+class TxWindowPlan(AirPlan):
+    """When bursts may leave on a radio that sends in TX windows: in the one that is open, or the
+    next.
+    """
 
-    def __init__(self, lead: int, ahead: int, spells: Spells, rate_hz: float) -> None:
+    def __init__(self, lead: int, ahead: int, tx_windows: TxWindows, rate_hz: float) -> None:
         super().__init__(lead, ahead)
-        self._follow, self._pause, self._longest = (round(each * rate_hz) for each in spells)
+        self._follow, self._pause, self._longest = (round(each * rate_hz) for each in tx_windows)
         self._begun_at = 0
         # None goes on before the first.
         self._free_at = -self._pause

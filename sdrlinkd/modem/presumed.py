@@ -5,15 +5,15 @@ from typing import NamedTuple
 
 from sdrlinkd.config import WITHOUT_AIR, Config, backend_of
 from sdrlinkd.errors import ConfigError, UserError
-from sdrlinkd.link import CarrierTraits, RateControl, settle
+from sdrlinkd.link import PduLinkTraits, RateControl, settle
 from sdrlinkd.modem.airtimes import Airtimes
-from sdrlinkd.modem.traits import carrier_traits
+from sdrlinkd.modem.traits import pdu_link_traits
 
 
 class PresumedRadio(NamedTuple):
     """Its traits, and those of what it carries; `presumption` says what only the radio can tell."""
 
-    traits: CarrierTraits
+    traits: PduLinkTraits
     airtimes: Airtimes
     longest_s: float
     """The longest burst of any MCS in use."""
@@ -37,7 +37,7 @@ def presume_radio(config: Config, turnaround_s: float | None = None) -> Presumed
         config.backend_settings, config.radio_needs, turnaround_s
     )
     airtimes = Airtimes(config.modem, config.link.pdu_size)
-    traits = carrier_traits(config.backend, can, config.modem, airtimes)
+    traits = pdu_link_traits(config.backend, can, config.modem, airtimes)
     usable = RateControl(config.rate, traits.needed_snr_db, traits.mcs).usable
     return PresumedRadio(
         traits, airtimes, traits.longest_in_use_s(usable), can.full_duplex, presumption, is_sure

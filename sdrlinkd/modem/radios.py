@@ -16,7 +16,7 @@ from backends import (
 )
 from sdrlinkd.config import Config, backend_of
 from sdrlinkd.errors import ConfigError, UserError
-from sdrlinkd.link import CarrierTraits, RateControl, may_share, settle
+from sdrlinkd.link import PduLinkTraits, RateControl, may_share, settle
 from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.compiled import load_phy
 from sdrlinkd.modem.link import ModemLink
@@ -84,7 +84,7 @@ def make_radio(
     return OversampledRadio(radio, factor) if factor > 1 else radio
 
 
-def _has_slots(config: Config, node_id: int, traits: CarrierTraits) -> bool:
+def _has_slots(config: Config, node_id: int, traits: PduLinkTraits) -> bool:
     """Whether access comes to tdma; what is refused is so where the link is fitted to the radio."""
     longest_s = traits.longest_in_use_s(
         RateControl(config.rate, traits.needed_snr_db, traits.mcs).usable

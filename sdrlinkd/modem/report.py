@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import phy
 from backends import Radio
 from sdrlinkd.config import ModemParams
-from sdrlinkd.reports import CarrierReport
+from sdrlinkd.reports import PduLinkReport
 
 
 def modem_report(
@@ -17,13 +17,13 @@ def modem_report(
     counters: Mapping[str, int],
     realtime_ratio: float,
     stream_end: int,
-) -> CarrierReport:
+) -> PduLinkReport:
     """`problem`: what ended the stream, if something did; `stream_end`: samples so far."""
     levels = radio.levels
     reason = problem
     if state == "down" and not problem:
         reason = radio.trouble or ("it delivers nothing" if stream_end else "")
-    return CarrierReport(
+    return PduLinkReport(
         kind=kind,
         state=state,
         detail=f"{phy.MCS_TABLE[params.mcs].name}, {params.rate_hz / 1e6:g} Msps, {radio.detail}, "

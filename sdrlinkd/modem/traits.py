@@ -3,9 +3,9 @@
 import math
 
 import phy
-from backends import GAP, Capabilities, Spells
+from backends import GAP, Capabilities, TxWindows
 from sdrlinkd.config import ModemParams
-from sdrlinkd.link import CarrierTraits
+from sdrlinkd.link import PduLinkTraits
 from sdrlinkd.modem.airtimes import Airtimes
 
 HANDOVER_S = 5e-4
@@ -16,12 +16,12 @@ REACTION_S = 0.002
 """From the last sample of a block to a decision, beyond the block itself."""
 
 
-def carrier_traits(
+def pdu_link_traits(
     kind: str, can: Capabilities, params: ModemParams, airtimes: Airtimes
-) -> CarrierTraits:
+) -> PduLinkTraits:
     """In lock-step composing takes no time, but it happens only when there is a block."""
-    follow_s, pause_s, longest_s = can.spells or Spells(0.0, 0.0, math.inf)
-    return CarrierTraits(
+    follow_s, pause_s, longest_s = can.tx_windows or TxWindows(0.0, 0.0, math.inf)
+    return PduLinkTraits(
         kind=kind,
         is_lockstep=can.lockstep,
         transmits=can.transmits,
@@ -35,9 +35,9 @@ def carrier_traits(
         detect_s=2 * phy.SENSE_WINDOW / params.rate_hz,
         overhead_s=airtimes.overhead_s,
         gap_s=GAP / params.rate_hz,
-        spell_s=longest_s,
-        spell_follow_s=follow_s,
-        spell_pause_s=pause_s,
+        tx_window_s=longest_s,
+        tx_window_follow_s=follow_s,
+        rx_window_s=pause_s,
         ahead_s=can.block_s if can.lockstep else params.tx_lead_s,
         longest_burst_s=airtimes.longest_s(),
         pdu_burst_s=airtimes.shortest_s(),

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
-from sdrlinkd.link import Burst, CarrierTraits, Opportunity, Outcome
-from sdrlinkd.reports import CarrierReport
+from sdrlinkd.link import Burst, Opportunity, Outcome, PduLinkTraits
+from sdrlinkd.reports import PduLinkReport
 
 
 class Heard(NamedTuple):
@@ -22,7 +22,7 @@ class Heard(NamedTuple):
 class PduListener(Protocol):
     """Whom a PDU link tells and asks. Called on the event loop; must not wait."""
 
-    def attach(self, traits: CarrierTraits) -> None:
+    def attach(self, traits: PduLinkTraits) -> None:
         """The PDU link is there, and what it is. Raises ConfigError when it does not do."""
 
     def heard(self, pdus: Sequence[Heard]) -> None:
@@ -72,5 +72,5 @@ class PduLink(Protocol):
     async def close(self) -> None:
         """Stop; closing twice is fine. What has not left is settled as lost."""
 
-    def report(self) -> CarrierReport:
+    def report(self) -> PduLinkReport:
         """State and counters."""

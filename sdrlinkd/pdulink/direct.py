@@ -7,11 +7,11 @@ from functools import partial
 from random import Random
 
 from sdrlinkd.config import DirectParams
-from sdrlinkd.link import Burst, CarrierTraits, Opportunity, Outcome
+from sdrlinkd.link import Burst, Opportunity, Outcome, PduLinkTraits
 from sdrlinkd.pdulink.base import Heard, PduListener
 from sdrlinkd.pdulink.bell import Bell
 from sdrlinkd.pdulink.impairment import Impairment
-from sdrlinkd.reports import CarrierReport
+from sdrlinkd.reports import PduLinkReport
 
 
 class DirectLink:
@@ -39,7 +39,7 @@ class DirectLink:
     async def open(self, listener: PduListener) -> None:
         """Begin to listen."""
         self._listener = listener
-        listener.attach(CarrierTraits())
+        listener.attach(PduLinkTraits())
 
     async def run(self) -> None:
         """Ask for a burst when the one before has left, but never without a turn of the loop."""
@@ -97,7 +97,7 @@ class DirectLink:
         self._on_air.clear()
         self._all_settled.set()
 
-    def report(self) -> CarrierReport:
+    def report(self) -> PduLinkReport:
         """State and counters."""
         rate = f"{self._params.rate_bit_s / 1e6:g} Mbit/s" if self._params.rate_bit_s else "no pace"
         faults = [
@@ -111,7 +111,7 @@ class DirectLink:
             )
             if value
         ]
-        return CarrierReport(
+        return PduLinkReport(
             kind="direct",
             state="up" if self._listener is not None else "down",
             detail=", ".join([rate, *faults]),

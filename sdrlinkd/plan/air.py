@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from sdrlinkd.link import CarrierTraits, ClassesParams, Settled
+from sdrlinkd.link import ClassesParams, PduLinkTraits, Settled
 from sdrlinkd.modem import Airtimes
 
 
@@ -19,7 +19,7 @@ class Setting(NamedTuple):
     classes: ClassesParams
     robots: int
     settled: Settled
-    traits: CarrierTraits
+    traits: PduLinkTraits
     host_s: float
     notes: tuple[str, ...] = ()
     """What a person should know of how this was planned."""

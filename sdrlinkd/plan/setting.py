@@ -6,7 +6,7 @@ import msgspec
 
 from sdrlinkd.config import Config
 from sdrlinkd.errors import ConfigError
-from sdrlinkd.link import CarrierTraits, Settled, percent, settle
+from sdrlinkd.link import PduLinkTraits, Settled, percent, settle
 from sdrlinkd.modem import PresumedRadio, presume_radio
 from sdrlinkd.plan.air import Setting
 
@@ -76,12 +76,12 @@ def _notes(
     return notes
 
 
-def _times(traits: CarrierTraits, host_s: float) -> str:
-    spell = ""
-    if traits.spell_s < float("inf"):
-        spell = f", {1e3 * traits.spell_pause_s:.0f} ms between two spells of sending"
+def _times(traits: PduLinkTraits, host_s: float) -> str:
+    windows = ""
+    if traits.tx_window_s < float("inf"):
+        windows = f", {1e3 * traits.rx_window_s:.0f} ms between two TX windows"
     return (
-        f"in each worst case: lead {1e3 * traits.lead_s:.3g} ms{spell}, "
+        f"in each worst case: lead {1e3 * traits.lead_s:.3g} ms{windows}, "
         f"reception {1e3 * traits.react_s:.3g} ms, the machines {1e3 * host_s:.3g} ms "
         "(--host; `sdrlinkctl doctor` measures it)"
     )

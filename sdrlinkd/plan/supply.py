@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from sdrlinkd.link import CarrierTraits, Qos, Settled
+from sdrlinkd.link import PduLinkTraits, Qos, Settled
 
 INFINITE = float("inf")
 SECTIONS = 2
@@ -42,7 +42,7 @@ class Supply(NamedTuple):
 
 
 def supply_of(
-    settled: Settled, traits: CarrierTraits, robots: int, burst_s: float, pdu_s: float
+    settled: Settled, traits: PduLinkTraits, robots: int, burst_s: float, pdu_s: float
 ) -> Supply:
     """For one of `robots`; `burst_s`: the longest burst of its own, `pdu_s`: one PDU in it."""
     access = settled.access
@@ -50,15 +50,15 @@ def supply_of(
     if settled.policy == "tdma":
         slot_s = access.share * access.round_s
         open_s = max(burst_s, slot_s - 2 * pdu_s)
-        if traits.spell_s < INFINITE:
-            return _one_spell_a_slot(traits, access.round_s, open_s, burst_s)
+        if traits.tx_window_s < INFINITE:
+            return _one_window_a_slot(traits, access.round_s, open_s, burst_s)
         missed_s = max(burst_s, access.step_s)
         gap_s = access.round_s - slot_s + missed_s + decided_s + traits.react_s
         return Supply(gap_s, open_s, access.round_s - open_s)
-    if traits.spell_s < INFINITE:
-        # Too late for a spell is who comes `follow` before it ends.
-        closed_s = traits.spell_follow_s + traits.spell_pause_s
-        return Supply(closed_s, traits.spell_s, closed_s)
+    if traits.tx_window_s < INFINITE:
+        # Too late for a TX window is who comes `follow` before it ends.
+        closed_s = traits.tx_window_follow_s + traits.rx_window_s
+        return Supply(closed_s, traits.tx_window_s, closed_s)
     if settled.policy == "minislot":
         slot_s = access.pause_s
         pauses = tuple(slot_s * (1 + robots * (qos > Qos.LATENCY)) for qos in Qos)
@@ -71,12 +71,14 @@ def supply_of(
     return Supply(decided_s)
 
 
-def _one_spell_a_slot(
-    traits: CarrierTraits, round_s: float, open_s: float, burst_s: float
+def _one_window_a_slot(
+    traits: PduLinkTraits, round_s: float, open_s: float, burst_s: float
 ) -> Supply:
-    """Where the pause between spells is longer than what others have in between, turns are lost."""
-    frames = max(1, math.ceil((burst_s + traits.spell_pause_s) / round_s))
-    return Supply(frames * round_s + traits.spell_follow_s, open_s, frames * round_s - open_s)
+    """Where the pause between TX windows is longer than what others have in between, turns are
+    lost.
+    """
+    frames = max(1, math.ceil((burst_s + traits.rx_window_s) / round_s))
+    return Supply(frames * round_s + traits.tx_window_follow_s, open_s, frames * round_s - open_s)
 
 
 def _by_chance(settled: Settled, robots: int, decided_s: float) -> Supply:

@@ -109,17 +109,17 @@ def timing(has_time, full_duplex, transfer_s, in_flight=0):
     return timing_of(hardware, 1, 0.02, 0.05, 0.05, 1.0)
 
 
-def test_what_counts_samples_hands_over_earlier_and_sends_in_spells():
+def test_what_counts_samples_hands_over_earlier_and_sends_in_tx_windows():
     timed = timing(True, True, 1e-3)
-    assert (timed.lead_s, timed.turnaround_s, timed.spells) == (0.02, 0, None)
+    assert (timed.lead_s, timed.turnaround_s, timed.tx_windows) == (0.02, 0, None)
     counted = timing(False, True, 0.01)
     assert counted.lead_s > 0.02
-    assert counted.spells is None
+    assert counted.tx_windows is None
     half = timing(False, False, 0.01)
     ahead = timing(False, False, 0.01, in_flight=4)
     assert half.turnaround_s == pytest.approx(0.05 + 2 * 0.01)
     assert ahead.lead_s == pytest.approx(half.lead_s + 4 * 0.01)
-    assert half.spells.pause_s > half.lead_s + half.turnaround_s + 0.05
+    assert half.tx_windows.pause_s > half.lead_s + half.turnaround_s + 0.05
 
 
 def radio(more="", model="plain", **settings):
@@ -139,7 +139,7 @@ async def test_without_stamps_and_acknowledgements_bursts_are_counted_in():
     """Where they leave is only as sure as the host's clock; that they do, and once, is sure."""
     async with opened(radio(",time=no,ack=no")) as each:
         can = each.capabilities
-        assert (can.timestamps, can.full_duplex, can.spells) == (False, True, None)
+        assert (can.timestamps, can.full_duplex, can.tx_windows) == (False, True, None)
         assert can.index_error_s > 0
         blocks = each.blocks()
         begin = (await take(blocks, 10 * N))[-1].index

@@ -4,11 +4,11 @@ import msgspec
 
 from sdrlinkd.reports import (
     BusReport,
-    CarrierReport,
     ClockReport,
     LatencyReport,
     LinkReport,
     NeighborReport,
+    PduLinkReport,
     ReceivedTopicReport,
     RxReport,
     Snapshot,
@@ -29,7 +29,7 @@ SNAPSHOT = Snapshot(
         level="DEGRADED",
         reasons=["robot 2 has another registry", "robot 2 hears us at 3 dB, 4 % lost"],
     ),
-    carrier=CarrierReport(
+    carrier=PduLinkReport(
         kind="direct", state="up", detail="1 Mbit/s, loss 0.1", level_dbfs=-31.25, clipped_pct=0.5
     ),
     bus=BusReport(

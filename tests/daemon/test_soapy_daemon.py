@@ -156,7 +156,7 @@ def test_faults_of_streams_are_counted_and_survived(start_daemon, bus):
         assert_whole(robot)
 
 
-def test_a_half_duplex_radio_sends_in_spells(start_daemon, bus):
+def test_a_half_duplex_radio_sends_in_tx_windows(start_daemon, bus):
     name, air_ = bus
     half = {
         "model": "hackrf",
@@ -176,9 +176,9 @@ def test_a_half_duplex_radio_sends_in_spells(start_daemon, bus):
     # The radio process counts when it listens again.
     wait_for(lambda: robots[0].snapshot().carrier.counters["tx_spells"])
     wait_for(lambda: not air_.stats(1).is_transmitting)
-    spells = [robot.snapshot().carrier.counters["tx_spells"] for robot in robots]
-    assert spells[0] <= 4, "many bursts share a spell"
-    assert spells[1] == 0
+    tx_windows = [robot.snapshot().carrier.counters["tx_spells"] for robot in robots]
+    assert tx_windows[0] <= 4, "many bursts share a TX window"
+    assert tx_windows[1] == 0
     for robot in robots:
         assert_whole(robot)
 

@@ -4,9 +4,9 @@ from msgspec.structs import replace
 
 from sdrlinkd.reports import (
     BusReport,
-    CarrierReport,
     LinkReport,
     NeighborReport,
+    PduLinkReport,
     RxReport,
     Snapshot,
     TopicReport,
@@ -55,7 +55,7 @@ def snapshot(at=10.0, carrier=None, robots=None, topics=(), notices=(), **more):
     whole = Snapshot(
         version="1", node=1, namespace="robot_1", state="running", taken_at_unix_ns=0,
         uptime_s=at, loop_lag_ms=0.4,
-        carrier=CarrierReport(kind="soapy", state="up", detail="usrp", since_s=9.0),
+        carrier=PduLinkReport(kind="soapy", state="up", detail="usrp", since_s=9.0),
         bus=BusReport(runtime_dir="/run", received=0, published=0, control_requests=0),
         link=replace(link, **{key: more.pop(key) for key in ("mcs_lowest",) if key in more}),
         notices=list(notices), **more,

@@ -10,9 +10,9 @@ from sdrlinkd.lab import LabReport
 from sdrlinkd.lab.report import pair_result, robot_result
 from sdrlinkd.reports import (
     BusReport,
-    CarrierReport,
     LinkReport,
     NeighborReport,
+    PduLinkReport,
     RxReport,
     Snapshot,
     TxReport,
@@ -159,7 +159,7 @@ def snapshot_of(**link):
     return Snapshot(
         version="0", node=4, namespace="robot_4", state="running", taken_at_unix_ns=1,
         uptime_s=1.0, loop_lag_ms=0.0,
-        carrier=CarrierReport(kind="ether", state="up", detail="QPSK", counters=counters),
+        carrier=PduLinkReport(kind="ether", state="up", detail="QPSK", counters=counters),
         bus=BusReport(runtime_dir="/x", received=0, published=7, control_requests=1),
         link=LinkReport(**{**given, **link}),
     )  # fmt: skip

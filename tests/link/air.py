@@ -18,7 +18,7 @@ LEAST_S = 0.0005
 """The shortest burst."""
 BEACON_S = 1.0
 _LOOKED_AT = 12
-"""So many bursts back is the last carrier, whatever overlaps."""
+"""So many bursts back the channel may be busy, whatever overlaps."""
 _begin = attrgetter("begin")
 _end = attrgetter("end")
 

@@ -1,6 +1,6 @@
 """Radios as access policies see them."""
 
-from sdrlinkd.link import AccessParams, CarrierTraits
+from sdrlinkd.link import AccessParams, PduLinkTraits
 
 RATE = 5e6
 LOOK_S = 0.001
@@ -9,7 +9,7 @@ DETECT_S = 128 / RATE
 AHEAD_S = 0.005
 """A node's next burst is asked for so long before its last one is over."""
 
-_SHARED = CarrierTraits(
+_SHARED = PduLinkTraits(
     kind="ether",
     senses=True,
     shares_air=True,
@@ -21,7 +21,7 @@ _SHARED = CarrierTraits(
 LOCKSTEP = _SHARED._replace(is_lockstep=True, lead_s=50e-6 + 17 / RATE, react_s=LOOK_S)
 PACED = _SHARED._replace(lead_s=50e-6 + 0.003, react_s=LOOK_S + 0.002, ahead_s=AHEAD_S)
 
-SPELLS = _SHARED._replace(
+TX_WINDOWS = _SHARED._replace(
     kind="soapy", turnaround_s=0.08, index_error_s=0.001, lead_s=0.15, react_s=0.02
 )
 """It takes long to turn round."""

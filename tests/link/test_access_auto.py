@@ -15,7 +15,7 @@ from sdrlinkd.link import (
     settle,
 )
 from sdrlinkd.wire import Frame
-from tests.link.radios import LOCKSTEP, PACED, SPELLS, params
+from tests.link.radios import LOCKSTEP, PACED, TX_WINDOWS, params
 from tests.link.world import make_link, next_burst
 
 LONGEST_S = 0.005
@@ -39,7 +39,7 @@ def test_auto_is_the_default():
 
 
 @pytest.mark.parametrize("nodes", [[], [1]])
-@pytest.mark.parametrize("traits", [LOCKSTEP, PACED, SOON, USRP, SPELLS])
+@pytest.mark.parametrize("traits", [LOCKSTEP, PACED, SOON, USRP, TX_WINDOWS])
 def test_alone_it_is_none(nodes, traits):
     found = settled(auto(nodes), traits)
     assert (found.policy, found.reason) == ("none", "as access.nodes lists nobody else")
@@ -81,7 +81,7 @@ def test_slots_where_so_many_take_part_that_minislots_carry_less_than_half():
     assert "with 60 robots mini-slots carry" in many.reason
 
 
-@pytest.mark.parametrize("traits", [SOON, PACED, USRP, SPELLS])
+@pytest.mark.parametrize("traits", [SOON, PACED, USRP, TX_WINDOWS])
 def test_all_robots_of_a_team_come_to_the_same(traits):
     nodes = [3, 1, 7]
     found = {own: settled(auto(nodes), traits, own) for own in nodes}
@@ -146,8 +146,8 @@ def test_minislots_wait_for_those_of_the_higher_level_and_say_so():
     assert access.mean_wait_s(Qos.DEFAULT) >= access.turn_s
 
 
-def test_spells_cost_what_is_listened_between_them():
-    traits = SPELLS._replace(spell_s=1.0, spell_pause_s=0.25)
+def test_tx_windows_cost_what_is_listened_between_them():
+    traits = TX_WINDOWS._replace(tx_window_s=1.0, rx_window_s=0.25)
     assert settled(auto([1]), traits).share == pytest.approx(0.8, abs=0.01)
 
 

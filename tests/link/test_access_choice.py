@@ -5,7 +5,7 @@ from random import Random
 import pytest
 
 from sdrlinkd.errors import ConfigError
-from sdrlinkd.link import AccessParams, CarrierTraits, Qos, RateParams, Sensed, check_access
+from sdrlinkd.link import AccessParams, PduLinkTraits, Qos, RateParams, Sensed, check_access
 from sdrlinkd.link.access import Free, Wish, make_access
 from sdrlinkd.link.access.choice import CLOCK_ERROR_S, LONGEST_APART_S, LONGEST_ROUND_S, MARGIN_S
 from sdrlinkd.link.access.csma import Csma
@@ -17,7 +17,7 @@ from tests.link.world import make_link
 POLICIES = {"none": Free, "csma": Csma, "minislot": MiniSlots, "tdma": Tdma}
 SHARED = ["csma", "minislot", "tdma"]
 LONGEST_S = 0.004
-DEAF = CarrierTraits()
+DEAF = PduLinkTraits()
 RECEIVER = LOCKSTEP._replace(kind="iqfile", transmits=False)
 SLOW = PACED._replace(kind="usb", lead_s=0.5, react_s=0.2)
 
@@ -216,7 +216,7 @@ def test_the_longest_burst_is_that_of_any_mcs_in_use():
     assert lengths["any"] > 2 * 0.02
 
 
-def test_a_link_without_a_carrier_sends_at_any_time():
+def test_a_link_without_an_air_to_share_sends_at_any_time():
     link = make_link(1)
     assert isinstance(link.attach(DEAF, AccessParams(), RateParams()).settled.access, Free)
     with pytest.raises(ConfigError, match=r"access\.policy"):

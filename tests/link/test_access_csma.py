@@ -38,7 +38,7 @@ def first_start(access, idle_since, qos=Qos.DEFAULT, earliest=0.0):
 
 @radios
 @pytest.mark.parametrize("n", [2, 4])
-def test_nobody_begins_on_a_carrier_that_could_be_sensed(traits, n):
+def test_nobody_begins_on_a_busy_channel_that_could_be_sensed(traits, n):
     """What began less than it takes to hear of it before the decision is chance."""
     late = 0
     for seed in range(2):
@@ -114,7 +114,7 @@ def test_each_slot_has_the_same_chance(qos, persist):
     assert passed.count(0) / len(passed) == pytest.approx(chance, rel=0.2)
 
 
-def test_it_waits_until_the_carrier_is_over():
+def test_it_waits_until_the_channel_is_idle():
     access = make()
     for until, idle_since in ((5.0, 5.1), (5.05, 5.1), (5.09, 5.091)):
         wish = Wish(until + 0.001, Qos.URGENT, 0.001, Sensed(until, idle_since))
@@ -140,7 +140,7 @@ def test_a_slot_is_kept_to_while_nothing_changes():
             until += SLOT / 8
 
 
-def test_a_new_carrier_or_class_draws_anew():
+def test_a_busy_channel_or_another_class_draws_anew():
     access = make(3, persist=0.01)
     assert access.slot(Wish(5.001, Qos.BULK, 0.001, Sensed(5.0, 5.0))) is None
     slow = access._drawn[2]

@@ -185,7 +185,7 @@ def test_a_robot_that_is_not_of_ours_makes_nobody_first():
     assert first_start(access, 5.0, 4.9) >= 5.0 + LEVELS * len(NODES) * MS
 
 
-def test_nobody_begins_while_there_is_a_carrier_or_before_those_ahead_have_passed():
+def test_nobody_begins_while_the_channel_is_busy_or_before_those_ahead_have_passed():
     access = make(7)
     access.heard(5, 4.9, False)
     start = 5.0 + MS

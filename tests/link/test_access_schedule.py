@@ -9,7 +9,7 @@ from sdrlinkd.link.access import Wish, make_access
 from sdrlinkd.link.access.tdma import FORGET_S, LISTEN_S
 from sdrlinkd.wire import Frame
 from tests.link.air import Air
-from tests.link.radios import LOCKSTEP, PACED, SPELLS, params
+from tests.link.radios import LOCKSTEP, PACED, TX_WINDOWS, params
 from tests.link.slots import LONGEST_S, SETTLED_S, make_air, places
 
 radios = pytest.mark.parametrize("traits", [LOCKSTEP, PACED], ids=["lockstep", "paced"])
@@ -89,8 +89,8 @@ def test_a_lower_root_that_appears_is_followed_by_all(traits):
 @pytest.mark.parametrize("n", [2, 4], ids=["two", "two groups of two"])
 @pytest.mark.parametrize(
     ("traits", "slot_s", "longest_s", "within_s"),
-    [(LOCKSTEP, 0.0, 0.004, 10), (PACED, 0.0, 0.004, 10), (SPELLS, 0.4, 0.04, 20)],
-    ids=["lockstep", "paced", "spells"],
+    [(LOCKSTEP, 0.0, 0.004, 10), (PACED, 0.0, 0.004, 10), (TX_WINDOWS, 0.4, 0.04, 20)],
+    ids=["lockstep", "paced", "tx windows"],
 )
 def test_who_come_back_into_reach_find_each_other_whatever_they_send(
     traits, slot_s, longest_s, within_s, n

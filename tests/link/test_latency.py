@@ -5,7 +5,7 @@ from random import Random
 
 import pytest
 
-from sdrlinkd.link import AccessParams, CarrierTraits, ClockParams, Outcome, RateParams
+from sdrlinkd.link import AccessParams, ClockParams, Outcome, PduLinkTraits, RateParams
 from sdrlinkd.link.receive import Latency, Parts
 from sdrlinkd.wire import Clock, Waits, equal_payload
 from tests.link.world import (
@@ -75,7 +75,7 @@ def test_an_age_that_cannot_be_has_its_place_in_the_histogram_too(age_s):
 
 def test_why_a_message_waited_is_told_in_a_beacon():
     link = make_link(beacon_s=0.5)
-    link.attach(CarrierTraits(lead_s=0.002), AccessParams(), RateParams())
+    link.attach(PduLinkTraits(lead_s=0.002), AccessParams(), RateParams())
     link.submit(0, bytes(20), 0.0)
     # The radio could take it at 10 ms, and its burst left 30 ms later than it was meant to.
     burst = next_burst(link, 0.012)
@@ -122,14 +122,14 @@ def clocks_of(link, until, step_s=0.01, submit_s=None):
 
 def test_clocks_ride_at_their_period_and_go_alone_within_their_share():
     alone = make_link(clock=ClockParams(period_s=0.2, share=0.004))
-    alone.attach(CarrierTraits(pdu_burst_s=(PDU_S,)), AccessParams(), RateParams())
+    alone.attach(PduLinkTraits(pdu_burst_s=(PDU_S,)), AccessParams(), RateParams())
     times = [at for at, is_alone in clocks_of(alone, 20.0) if is_alone]
     gaps = [later - earlier for earlier, later in pairwise(times)]
     # Two robots, 1 ms each: 2 ms / 0.004, and a twentieth more.
     assert all(0.52 < gap < 0.54 for gap in gaps), gaps
     assert alone.report(0.0).control_airtime_s <= 20 * 0.004 / 2 + PDU_S
     beside = make_link(clock=ClockParams(period_s=0.2, share=0.004))
-    beside.attach(CarrierTraits(pdu_burst_s=(PDU_S,)), AccessParams(), RateParams())
+    beside.attach(PduLinkTraits(pdu_burst_s=(PDU_S,)), AccessParams(), RateParams())
     found = clocks_of(beside, 20.0, submit_s=0.05)
     # They ride from three quarters of their period on.
     assert 85 < len(found) <= 20 / 0.15 + 1

@@ -6,10 +6,10 @@ import pytest
 
 from sdrlinkd.link import (
     AccessParams,
-    CarrierTraits,
     Opportunity,
     Outcome,
     Overrides,
+    PduLinkTraits,
     RateParams,
 )
 from sdrlinkd.wire import BROADCAST, LinkReport, parse
@@ -18,7 +18,7 @@ from tests.link.world import make_link, neighbors, records_in
 SIZE = 220
 NEEDED = (1.0, 4.0, 7.0, 10.0, 13.0, 17.0, 19.0)
 RATES = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 9.0)
-TRAITS = CarrierTraits(longest_burst_s=(0.01,) * 7, needed_snr_db=NEEDED, mcs=1)
+TRAITS = PduLinkTraits(longest_burst_s=(0.01,) * 7, needed_snr_db=NEEDED, mcs=1)
 STEP_S = 0.04
 INFINITE = float("inf")
 

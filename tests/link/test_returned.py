@@ -4,9 +4,9 @@ import pytest
 
 from sdrlinkd.link import (
     AccessParams,
-    CarrierTraits,
     Outcome,
     Overrides,
+    PduLinkTraits,
     Qos,
     RateParams,
 )
@@ -213,7 +213,7 @@ def test_shut_down_leaves_nothing_to_send():
 def test_air_that_was_not_used_is_not_counted():
     """What is told to people: time on the air and bursts by MCS are of those that left."""
     link = make_link(pdu_size=SIZE)
-    link.attach(CarrierTraits(), AccessParams(), RateParams())
+    link.attach(PduLinkTraits(), AccessParams(), RateParams())
     link.submit(0, bytes(30), 0.0)
     for now in (0.0, 0.2, 0.4):
         burst = next_burst(link, now)

@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 
 from sdrlinkd.link import (
     AccessParams,
-    CarrierTraits,
     ClassesParams,
     ClassParams,
     Opportunity,
     Outcome,
     Overrides,
+    PduLinkTraits,
     Qos,
     RateParams,
     TopicPolicy,
@@ -226,7 +226,7 @@ def test_made_up_robots_are_forgotten():
 
 def test_a_lifespan_that_can_never_be_met_is_told():
     link = make_link(pdu_size=64)
-    traits = CarrierTraits(lead_s=0.002, pdu_burst_s=(0.0015,))
+    traits = PduLinkTraits(lead_s=0.002, pdu_burst_s=(0.0015,))
     link.attach(traits, AccessParams(), RateParams())
     link.set_policies({0: TopicPolicy(lifespan_s=0.003), 1: TopicPolicy(lifespan_s=0.004)})
     (notice,) = link.notices(0.0)

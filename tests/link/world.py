@@ -9,13 +9,13 @@ import msgspec
 from sdrlinkd.link import (
     QOS_BY_LABEL,
     AccessParams,
-    CarrierTraits,
     ClassesParams,
     ClockParams,
     Link,
     LinkParams,
     Opportunity,
     Outcome,
+    PduLinkTraits,
     QueueParams,
     RateParams,
     ReassemblyParams,
@@ -72,12 +72,12 @@ def make_link(
         dictionaries=dictionaries or {},
         clock=clock or ClockParams(period_s=0.0),
     )
-    link.attach(CarrierTraits(), AccessParams(), RateParams())
+    link.attach(PduLinkTraits(), AccessParams(), RateParams())
     return link
 
 
 def compose(link, now, max_pdus=MAX_PDUS):
-    """The burst that leaves at `now` over a carrier that takes no time; None: nothing goes."""
+    """The burst that leaves at `now` over an air that takes no time; None: nothing goes."""
     return link.next_burst(Opportunity(now, lambda _mcs, _n: 0.0, lambda _mcs, _s: max_pdus))
 
 
@@ -148,7 +148,7 @@ def layouts(pdus, pdu_size):
 
 
 def airtime_s(_mcs, n_pdus):
-    """As of a carrier without preambles."""
+    """As of an air without preambles."""
     return PDU_S * n_pdus
 
 
@@ -174,7 +174,7 @@ def tell(link, src, *records, at):
 
 def use(link, access, **traits):
     """Have `link` ask `access` when it may send."""
-    fit = link.attach(CarrierTraits(**traits), AccessParams(), RateParams())
+    fit = link.attach(PduLinkTraits(**traits), AccessParams(), RateParams())
     link.use(fit._replace(settled=fit.settled._replace(access=access)))
 
 

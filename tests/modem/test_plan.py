@@ -3,9 +3,9 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from backends import GAP, Spells
+from backends import GAP, TxWindows
 from sdrlinkd.modem.load import LoadMeter
-from sdrlinkd.modem.plan import AirPlan, SpellPlan
+from sdrlinkd.modem.plan import AirPlan, TxWindowPlan
 
 
 def test_an_idle_air_takes_a_burst_after_the_lead():
@@ -52,15 +52,15 @@ def test_the_load_is_a_mean_over_about_a_second():
     assert abs(load.realtime_ratio - 4) < 0.1
 
 
-SPELLS = Spells(follow_s=0.03, pause_s=0.2, longest_s=0.5)
+TX_WINDOWS = TxWindows(follow_s=0.03, pause_s=0.2, longest_s=0.5)
 
 
-def test_a_burst_joins_the_spell_that_goes_on_or_waits_for_the_next():
-    plan = SpellPlan(lead=100, ahead=10, spells=SPELLS, rate_hz=1000.0)
+def test_a_burst_joins_the_window_that_is_open_or_waits_for_the_next():
+    plan = TxWindowPlan(lead=100, ahead=10, tx_windows=TX_WINDOWS, rate_hz=1000.0)
     assert plan.start(now=0) == 100
     plan.commit(100, 50)
     free = 150 + GAP
-    # In time for the same spell: right behind.
+    # In time for the same TX window: right behind.
     assert plan.wait(now=60) == 12
     assert plan.start(now=free - 30) == free
     # Too late for it: a pause, in which it listens.
@@ -68,8 +68,8 @@ def test_a_burst_joins_the_spell_that_goes_on_or_waits_for_the_next():
     assert plan.wait(now=free - 29) == 200 + 29 - 100
 
 
-def test_a_spell_is_not_longer_than_it_may_be():
-    plan = SpellPlan(lead=100, ahead=10, spells=SPELLS, rate_hz=1000.0)
+def test_a_tx_window_is_not_longer_than_it_may_be():
+    plan = TxWindowPlan(lead=100, ahead=10, tx_windows=TX_WINDOWS, rate_hz=1000.0)
     now, begun = 0, plan.start(0)
     start = begun
     while start - begun < 500:

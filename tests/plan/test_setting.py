@@ -58,8 +58,11 @@ def test_options_go_before_the_configuration():
     config = preset("hackrf", TWO_WAY)
     assert odom(config, robots=3).robots == 3
     assert odom(config, robots=1).policy == "none"
-    spells = preset("hackrf")
-    assert odom(spells, turnaround_s=0.3).topics[0].worst_s > odom(spells).topics[0].worst_s + 0.2
+    tx_windows = preset("hackrf")
+    assert (
+        odom(tx_windows, turnaround_s=0.3).topics[0].worst_s
+        > odom(tx_windows).topics[0].worst_s + 0.2
+    )
 
 
 def test_the_machines_are_a_term_of_their_own():

@@ -77,7 +77,7 @@ def _how(device: DeviceProbe) -> str:
     if device.tx is None:
         return "receives only"
     if not device.full_duplex:
-        return "half duplex: listens, and sends in spells between"
+        return "half duplex: listens, and sends in TX windows between"
     if device.has_time:
         return "full duplex; bursts leave at times that the device keeps"
     return "full duplex; bursts are placed by counting samples"

@@ -11,7 +11,7 @@ READ_US = 5_000
 
 
 class HalfDuplex:
-    """Receives, and between that sends in spells. The driver must never see two threads."""
+    """Receives, and between that sends in TX windows. The driver must never see two threads."""
 
     def __init__(
         self,
@@ -32,6 +32,6 @@ class HalfDuplex:
         self._commands.wait(0)
         if self._transmitter.is_due() and time.monotonic_ns() >= self._listens_until_ns:
             self._rx_stream.pause()
-            self._transmitter.send_spell()
+            self._transmitter.send_window()
             self._rx_stream.resume()
             self._listens_until_ns = time.monotonic_ns() + self._listen_ns

@@ -27,7 +27,7 @@ class _BurstOut:
 
 
 class SampleCountedTransmitter:
-    """Sends in spells: zeros, bursts where they belong, zeros up to whole transfers, off again.
+    """Sends in TX windows: zeros, bursts where they belong, zeros up to whole transfers, off again.
 
     Such devices send only whole transfers, whatever END_BURST says, and cut off what has not left
     when they are told to stop. Indices are as good as the moment at which the first sample leaves
@@ -65,13 +65,13 @@ class SampleCountedTransmitter:
         self.counters = {"tx_spells": 0}
 
     def step(self) -> None:
-        """Wait for commands a little; if there are any, send for a spell."""
+        """Wait for commands a little; if there are any, send for a TX window."""
         self._commands.wait(BUSY_S if self._commands.waiting else QUIET_S)
         if self.is_due():
-            self.send_spell()
+            self.send_window()
 
     def stop(self) -> None:
-        """Do nothing: between spells the transmitter is off."""
+        """Do nothing: between TX windows the transmitter is off."""
 
     def is_due(self) -> bool:
         """Whether the first command has to go on its way now."""
@@ -80,7 +80,7 @@ class SampleCountedTransmitter:
             return False
         return waiting[0].start <= self._clock.now(time.monotonic_ns()) + self._ahead
 
-    def send_spell(self) -> None:
+    def send_window(self) -> None:
         """Send all that is due, and what comes meanwhile; the transmitter is off afterwards."""
         self.counters["tx_spells"] += 1
         self._tx_stream.activate()
@@ -99,7 +99,7 @@ class SampleCountedTransmitter:
             self._stream.deactivate()
 
     def _next_command(self) -> bool:
-        """Whether another burst goes in this spell; waits as long as there is time to."""
+        """Whether another burst goes in this TX window; waits as long as there is time to."""
         while not self._commands.is_over and self._written < self._longest:
             if self._commands.waiting:
                 return self._commands.waiting[0].start <= self._end + self._ahead

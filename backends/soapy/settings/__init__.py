@@ -1,7 +1,7 @@
 """What a device is to be set to, what is known of its driver, and what follows for sending.
 
 This room owns the section `[soapy]` of a configuration, the table of drivers, and the arithmetic
-from a device's nature to its lead, turnaround and spells. It only computes: it never opens a
+from a device's nature to its lead, turnaround and TX windows. It only computes: it never opens a
 device, loads no library and starts nothing.
 """
 

@@ -44,7 +44,7 @@ class SoapySettings(SoapyParams, frozen=True, kw_only=True):
             paced=True,
             lead_s=tx.lead_s,
             turnaround_s=tx.turnaround_s,
-            spells=tx.spells,
+            tx_windows=tx.tx_windows,
             index_error_s=0.0 if found.has_time else found.receives_in_s,
             block_s=found.receives_in_s,
         )

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple, Protocol
 
-from backends.base import Spells
+from backends.base import TxWindows
 
 HANDOVER_S = 0.01
 """Before a transfer begins to leave, all of it must have been with the driver for so long."""
@@ -42,7 +42,7 @@ class TxTiming(NamedTuple):
 
     lead_s: float
     turnaround_s: float
-    spells: Spells | None
+    tx_windows: TxWindows | None
 
 
 def timestamped_tx(has_time: bool, full_duplex: bool) -> bool:
@@ -63,7 +63,7 @@ def timing_of(
         return TxTiming(handover_s + leading * transfer_s + MARGIN_S, 0.0, None)
     # Before the first sample, and after the last.
     deaf_s = turnaround_s + (1 + leading) * transfer_s
-    spells = Spells(
+    tx_windows = TxWindows(
         follow_s=handover_s + MARGIN_S,
         pause_s=turnaround_s
         + (1 + TRAILING) * transfer_s
@@ -73,4 +73,4 @@ def timing_of(
         + MARGIN_S,
         longest_s=longest_s,
     )
-    return TxTiming(handover_s + MARGIN_S, deaf_s, spells)
+    return TxTiming(handover_s + MARGIN_S, deaf_s, tx_windows)

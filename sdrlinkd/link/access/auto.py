@@ -10,7 +10,7 @@ from sdrlinkd.errors import ConfigError
 from sdrlinkd.link.access.base import Access
 from sdrlinkd.link.access.choice import check_access, make_access, make_free, reaction_s
 from sdrlinkd.link.access.params import AccessParams
-from sdrlinkd.link.carrier import CarrierTraits
+from sdrlinkd.link.traits import PduLinkTraits
 
 SOON_S = 0.001
 """Mini-slots are for radios that hear another begin, and hold back, within this."""
@@ -46,7 +46,7 @@ class Settled(NamedTuple):
 
 
 def settle(
-    params: AccessParams, own_id: int, traits: CarrierTraits, longest_burst_s: float, rng: Random
+    params: AccessParams, own_id: int, traits: PduLinkTraits, longest_burst_s: float, rng: Random
 ) -> Settled:
     """What access comes to on this radio, for bursts of at most `longest_burst_s`.
 
@@ -85,7 +85,7 @@ def may_share(params: AccessParams, own_id: int) -> bool:
 
 
 def air_shares(
-    params: AccessParams, own_id: int, traits: CarrierTraits, longest_burst_s: float
+    params: AccessParams, own_id: int, traits: PduLinkTraits, longest_burst_s: float
 ) -> dict[str, float]:
     """Of the air, what each policy carries with times made from the radio; 0: it cannot."""
     shares: dict[str, float] = {}
@@ -113,7 +113,7 @@ def _others(params: AccessParams, own_id: int) -> set[int]:
 
 
 def _chosen(
-    params: AccessParams, own_id: int, traits: CarrierTraits, shares: Mapping[str, float]
+    params: AccessParams, own_id: int, traits: PduLinkTraits, shares: Mapping[str, float]
 ) -> tuple[Policy, str]:
     """The (policy, reason) that `auto` comes to on this radio."""
     if not (traits.shares_air and traits.senses):

@@ -5,8 +5,8 @@ from math import inf
 from typing import NamedTuple, Protocol, Self
 
 from sdrlinkd.link.access.sightings import Sightings
-from sdrlinkd.link.carrier import Sensed
 from sdrlinkd.link.qos import Qos
+from sdrlinkd.link.traits import Sensed
 from sdrlinkd.wire import Frame
 
 NEVER = -1.0
@@ -53,7 +53,7 @@ class Access(Protocol):
 
     @property
     def pause_s(self) -> float:
-        """After every carrier the air stays free for so long at least."""
+        """The channel stays idle for so long at least after each burst."""
 
     @property
     def share(self) -> float:
@@ -72,7 +72,7 @@ class Access(Protocol):
         """Whether it ever tells others of a schedule."""
 
     def mean_wait_s(self, qos: Qos) -> float:
-        """From the end of a carrier to a burst of that class, on average."""
+        """From when the channel falls idle to a burst of that class, on average."""
 
     def carries(self, burst_s: float) -> float:
         """Share of the air that bursts of that length take, of all robots together, when each
@@ -107,8 +107,8 @@ class Access(Protocol):
         """What a person should know of how the air is shared, in sentences."""
 
 
-class Carriers:
-    """What policies have in common: the last carrier on the air, another's or our own.
+class BusyChannel:
+    """What policies have in common: when the channel was busy last, by others or by us.
 
     As it stands: no turns, no pauses, nobody in our way, no schedule.
     """
@@ -127,7 +127,7 @@ class Carriers:
         """Who takes turns by a schedule."""
 
     def mean_wait_s(self, qos: Qos) -> float:  # noqa: ARG002  # not all ask for it
-        """From the end of a carrier to a burst of that class, on average: none."""
+        """From when the channel falls idle to a burst of that class, on average: none."""
         return 0.0
 
     def sent(self, end: float, src: int | None) -> None:  # noqa: ARG002  # not all ask for it
@@ -174,7 +174,7 @@ class Carriers:
         return self._own_ends[-1]
 
     def idle_since(self, sensed: Sensed) -> float | None:
-        """When the last carrier ended; None while there is one."""
+        """Since when the channel is idle; None while it is busy."""
         end = max(sensed.idle_since, self.own_end)
         return end if end <= sensed.until else None
 

@@ -10,7 +10,7 @@ from sdrlinkd.link.access.free import Free
 from sdrlinkd.link.access.minislot import SECTIONS, MiniSlots
 from sdrlinkd.link.access.params import AccessParams
 from sdrlinkd.link.access.tdma import Tdma
-from sdrlinkd.link.carrier import CarrierTraits
+from sdrlinkd.link.traits import PduLinkTraits
 
 GUARD_SHARE = 0.1
 """A tdma slot is so long that its guard takes no more than this."""
@@ -37,7 +37,7 @@ def check_access(params: AccessParams, own_id: int) -> None:
 
 
 def make_access(
-    params: AccessParams, own_id: int, traits: CarrierTraits, longest_burst_s: float, rng: Random
+    params: AccessParams, own_id: int, traits: PduLinkTraits, longest_burst_s: float, rng: Random
 ) -> Access:
     """The policy, any but auto, for bursts of at most `longest_burst_s`.
 
@@ -76,14 +76,14 @@ def make_access(
     return _make_tdma(params, own_id, traits, longest_burst_s, apart_s, rng)
 
 
-def make_free(traits: CarrierTraits, is_alone: bool = False) -> Free:
+def make_free(traits: PduLinkTraits, is_alone: bool = False) -> Free:
     """No policy; `is_alone`: and nobody to share the air with."""
     return Free(
-        2 * traits.turnaround_s, traits.gap_s, traits.spell_s, traits.spell_pause_s, is_alone
+        2 * traits.turnaround_s, traits.gap_s, traits.tx_window_s, traits.rx_window_s, is_alone
     )
 
 
-def reaction_s(traits: CarrierTraits) -> float:
+def reaction_s(traits: PduLinkTraits) -> float:
     """So far apart must two begin that the second can hear the first and still hold back."""
     return traits.lead_s + traits.react_s + traits.detect_s + MARGIN_S
 
@@ -91,12 +91,12 @@ def reaction_s(traits: CarrierTraits) -> float:
 def _make_tdma(
     params: AccessParams,
     own_id: int,
-    traits: CarrierTraits,
+    traits: PduLinkTraits,
     longest_burst_s: float,
     apart_s: float,
     rng: Random,
 ) -> Tdma:
-    # Here two do not count from the same carrier, but each from its own clock.
+    # Here two do not count from the end of the same burst, but each from its own clock.
     apart_s += CLOCK_ERROR_S
     minislot_s = params.minislot_s or apart_s
     least_s = traits.turnaround_s + CLOCK_ERROR_S + MARGIN_S + 2 * traits.index_error_s
@@ -127,7 +127,7 @@ def _make_tdma(
     )
 
 
-def _refuse_deaf(params: AccessParams, traits: CarrierTraits) -> None:
+def _refuse_deaf(params: AccessParams, traits: PduLinkTraits) -> None:
     if not traits.senses:
         raise ConfigError(
             f'access.policy: got "{params.policy}", but the backend "{traits.kind}" does not hear '
@@ -135,7 +135,7 @@ def _refuse_deaf(params: AccessParams, traits: CarrierTraits) -> None:
         )
 
 
-def _refuse_short(key: str, given_s: float, least_s: float, traits: CarrierTraits) -> None:
+def _refuse_short(key: str, given_s: float, least_s: float, traits: PduLinkTraits) -> None:
     if given_s < least_s * (1 - 1e-6):
         raise ConfigError(
             f"access.{key}: got {given_s:g}; this radio ({traits.kind}: turnaround "

@@ -1,10 +1,10 @@
 """`csma`: listen before talk, p-persistent.
 
-Stations that wait for the same carrier to end would all begin at its end. So each lets DWAIT pass,
-then its class's own slots, then draws in how many further slots chance has it: the geometric
+Stations that wait for the same busy channel would all begin when it falls idle. So each lets DWAIT
+pass, then its class's own slots, then draws in how many further slots chance has it: the geometric
 distribution that a throw with PERSIST in every idle slot gives. The draw is kept while the air
-stays idle, for drawing anew at every look would favour who looks most often; another carrier, a
-message of another class, or a start that has passed makes it void.
+stays idle, for drawing anew at every look would favour who looks most often; a channel that was
+busy since, a message of another class, or a start that has passed makes it void.
 """
 
 import math
@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from enum import Enum, auto
 from random import Random
 
-from sdrlinkd.link.access.base import NEVER, Carriers, Slot, Wish, next_on_grid
+from sdrlinkd.link.access.base import NEVER, BusyChannel, Slot, Wish, next_on_grid
 from sdrlinkd.link.access.steps import after
 from sdrlinkd.link.qos import Qos
 
@@ -48,8 +48,9 @@ STEPS: Mapping[tuple[State, Happens], State] = {
 }
 
 
-class Csma(Carriers):
-    """After a carrier: DWAIT, the class's own wait, then in each SLOTTIME a chance of PERSIST.
+class Csma(BusyChannel):
+    """Once the channel is idle: DWAIT, the class's own wait, then in each SLOTTIME a chance of
+    PERSIST.
 
     Two that choose the same slot collide; nothing tells them.
     """
@@ -75,7 +76,7 @@ class Csma(Carriers):
         self.backoff = State.OPEN
         """Whether a start is drawn."""
         self._drawn = (NEVER, Qos.BULK, NEVER)
-        """(end of the carrier it follows, class, start)."""
+        """(since when the channel is idle, class, start)."""
         self._backoffs = 0
 
     @property

@@ -2,32 +2,32 @@
 
 from math import inf
 
-from sdrlinkd.link.access.base import Carriers, Slot, Wish
+from sdrlinkd.link.access.base import BusyChannel, Slot, Wish
 from sdrlinkd.link.access.sightings import Sightings
 
 DEAF_S = 0.02
 """A radio that is deaf for longer than most bursts last is no radio for several without turns."""
 
 
-class Free(Carriers):
+class Free(BusyChannel):
     """Sends whenever there is something to send.
 
     `deaf_s`: then it hears nothing for longer; `gap_s` stays free between two bursts, and `pause_s`
-    after it has sent for `spell_s`. `is_alone`: nobody else should be on this air.
+    after it has sent for `tx_window_s`. `is_alone`: nobody else should be on this air.
     """
 
     def __init__(
         self,
         deaf_s: float = 0.0,
         gap_s: float = 0.0,
-        spell_s: float = inf,
+        tx_window_s: float = inf,
         pause_s: float = 0.0,
         is_alone: bool = False,
     ) -> None:
         super().__init__()
         self._deaf_s = deaf_s
         self._gap_s = gap_s
-        self._spells = spell_s, pause_s
+        self._tx_windows = tx_window_s, pause_s
         self._is_alone = is_alone
         self._others = Sightings()
 
@@ -41,9 +41,9 @@ class Free(Carriers):
         return Slot(wish.earliest)
 
     def carries(self, burst_s: float) -> float:
-        """All of the air but gaps, and what the radio listens between two spells."""
-        spell_s, pause_s = self._spells
-        listens = pause_s / (spell_s + pause_s) if spell_s < inf else 0.0
+        """All of the air but gaps, and what the radio listens between two TX windows."""
+        tx_window_s, pause_s = self._tx_windows
+        listens = pause_s / (tx_window_s + pause_s) if tx_window_s < inf else 0.0
         gaps = self._gap_s / (burst_s + self._gap_s) if self._gap_s else 0.0
         return (1 - gaps) * (1 - listens)
 

@@ -1,30 +1,30 @@
-"""`minislot`: after a carrier, each node may begin only in a mini-slot of its own.
+"""`minislot`: once the channel falls idle, each node may begin only in a mini-slot of its own.
 
-All who hear a carrier end count from the same moment, so one mini-slot a robot is enough for no two
-to begin at once; it must be as long as it takes to hear another begin and to hold back. The order
-turns with who sent last, or the first robot of the list would have the air for itself. That order
-is known to who read the last burst's header. Who did not comes after all who did, in the order of
-the list. What ended the carrier is all the state there is (FIRST), besides the round that we are
-in since.
+All who hear the channel fall idle count from the same moment, so one mini-slot a robot is enough
+for no two to begin at once; it must be as long as it takes to hear another begin and to hold back.
+The order turns with who sent last, or the first robot of the list would have the air for itself.
+That order is known to who read the last burst's header. Who did not comes after all who did, in the
+order of the list. What kept the channel busy is all the state there is (FIRST), besides the round
+that we are in since.
 """
 
 from collections.abc import Mapping, Sequence
 from enum import Enum, auto
 
-from sdrlinkd.link.access.base import NEVER, Carriers, Slot, Wish
-from sdrlinkd.link.carrier import Sensed
+from sdrlinkd.link.access.base import NEVER, BusyChannel, Slot, Wish
 from sdrlinkd.link.qos import Qos
+from sdrlinkd.link.traits import Sensed
 
 LEVELS = 2
 """Urgent and latency begin before default and bulk."""
 SECTIONS = LEVELS + 1
 """Last come those who could not read who sent last, and so do not know the order."""
 DRIFT = 4e-5
-"""Two clocks of 20 ppm part by that much a second since they heard the same carrier end."""
+"""Two clocks of 20 ppm part by that much a second since they heard the channel fall idle."""
 
 
 class Ended(Enum):
-    """What the last carrier was, as far as a robot can tell."""
+    """What kept the channel busy last, as far as a robot can tell."""
 
     OWN = auto()
     """Our own burst."""
@@ -44,18 +44,18 @@ FIRST: Mapping[Ended, int] = {
     Ended.READ: 1,
     Ended.RELAYED: 0,
 }
-"""So many places after the source of its PDUs is the robot that comes first then. After a carrier
-that is not here, the order is not known."""
+"""So many places after the source of its PDUs is the robot that comes first then. After what is
+not here, the order is not known."""
 
 
-class MiniSlots(Carriers):
+class MiniSlots(BusyChannel):
     """Collision-free among nodes that hear each other, and the more urgent class first.
 
-    Mini-slot 0 begins `minislot_s` after the carrier's end. First come those of the higher level,
-    one a node, then those of the lower; in a level, the one whose PDUs were sent last comes last,
-    or, when a relay has sent them, first. When all are
-    passed they begin anew, a little wider the longer it is quiet: clocks part. A node begins only
-    when it has heard the one before its own pass.
+    Mini-slot 0 begins `minislot_s` after the channel falls idle. First come those of the higher
+    level, one a node, then those of the lower; in a level, the one whose PDUs were sent last comes
+    last, or, when a relay has sent them, first. When all are passed they begin anew, a little wider
+    the longer it is quiet: clocks part. A node begins only when it has heard the one before its own
+    pass.
     """
 
     others_follow = True
@@ -75,7 +75,7 @@ class MiniSlots(Carriers):
         """Whose PDUs we sent last, if we forwarded them."""
         self._n_slots = SECTIONS * len(nodes)
         self._round = (NEVER, 0.0)
-        """(end of the carrier it follows, when it began after that) of the round we are in."""
+        """(since when the channel is idle, when it began after that) of the round we are in."""
 
     @property
     def state(self) -> str:
@@ -92,7 +92,7 @@ class MiniSlots(Carriers):
 
     @property
     def turn_s(self) -> float:
-        """From a carrier's end to the first of the lower level."""
+        """From when the channel falls idle to the first of the lower level, in s."""
         return self._minislot_s * (1 + len(self._nodes))
 
     def carries(self, burst_s: float) -> float:
@@ -131,7 +131,7 @@ class MiniSlots(Carriers):
         self._last = (src, at, is_relayed)
 
     def _place(self, idle_since: float, qos: Qos, sensed: Sensed) -> int:
-        """Number of our mini-slot after this carrier."""
+        """Number of our mini-slot after what kept the channel busy."""
         n = len(self._nodes)
         level = 0 if qos <= Qos.LATENCY else 1
         ended, src = self._what_ended(idle_since, sensed)
@@ -141,7 +141,7 @@ class MiniSlots(Carriers):
         return level * n + (self._rank - first) % n
 
     def _what_ended(self, idle_since: float, sensed: Sensed) -> tuple[Ended, int]:
-        """(what the carrier that ended then was, the source of its PDUs)."""
+        """(what kept the channel busy up to then, the source of its PDUs)."""
         src, at, is_relayed = self._last
         if idle_since == self.own_end:
             ended, src = Ended.OWN, self._nodes[self._rank]

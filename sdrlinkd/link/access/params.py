@@ -21,7 +21,7 @@ class AccessParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     persist: Annotated[float, Meta(gt=0, le=1)] = 0.05
     """csma: chance to send in an idle slot (PERSIST)."""
     dwait_s: Seconds = 0.0
-    """csma: pause after a carrier (DWAIT)."""
+    """csma: pause after the channel was busy (DWAIT)."""
     slottime_s: Seconds = 0.0
     """csma: SLOTTIME; shorter than it takes to hear each other, it is none."""
     minislot_s: Seconds = 0.0

@@ -7,11 +7,11 @@ from math import inf
 from random import Random
 from struct import pack
 
-from sdrlinkd.link.access.base import Carriers, Slot, Wish, next_on_grid
+from sdrlinkd.link.access.base import BusyChannel, Slot, Wish, next_on_grid
 from sdrlinkd.link.access.sightings import Sightings
 from sdrlinkd.link.access.steps import after
 from sdrlinkd.link.access.tdma_states import STEPS, Happens, State
-from sdrlinkd.link.carrier import Sensed
+from sdrlinkd.link.traits import Sensed
 from sdrlinkd.wire import Frame
 
 LISTEN_S = 2.5
@@ -29,7 +29,7 @@ UNSCHEDULED = 3
 """After so many beacons without a schedule, a robot has none."""
 
 
-class Tdma(Carriers):
+class Tdma(BusyChannel):
     """Slots in the order of `nodes`, over and over; the last `guard_s` of each is silent.
 
     No burst goes on over two thirds of a slot: an urgent message that comes while its robot has the

@@ -4,7 +4,7 @@ from random import Random
 from typing import NamedTuple
 
 from sdrlinkd.link.access import AccessParams, Settled, settle
-from sdrlinkd.link.carrier import CarrierTraits
+from sdrlinkd.link.traits import PduLinkTraits
 from sdrlinkd.link.transmit.rate import RateControl, RateParams
 
 NOTICE_S = 5e-4
@@ -32,23 +32,23 @@ class Fit(NamedTuple):
 
 
 def fit_to(
-    carrier: CarrierTraits, access: AccessParams, rate: RateParams, own_id: int, rng: Random
+    traits: PduLinkTraits, access: AccessParams, rate: RateParams, own_id: int, rng: Random
 ) -> Fit:
     """Settle access and rate for the radio that is there. Raises ConfigError."""
-    control = RateControl(rate, carrier.needed_snr_db, carrier.mcs)
-    longest_s = carrier.longest_in_use_s(control.usable)
-    settled = settle(access, own_id, carrier, longest_s, rng)
+    control = RateControl(rate, traits.needed_snr_db, traits.mcs)
+    longest_s = traits.longest_in_use_s(control.usable)
+    settled = settle(access, own_id, traits, longest_s, rng)
     lengths_s = [
-        length_s for mcs, length_s in enumerate(carrier.pdu_burst_s) if mcs in control.usable
+        length_s for mcs, length_s in enumerate(traits.pdu_burst_s) if mcs in control.usable
     ]
     return Fit(
         settled,
         control,
-        carrier.lead_s,
-        carrier.lead_s + min(lengths_s, default=0.0),
+        traits.lead_s,
+        traits.lead_s + min(lengths_s, default=0.0),
         # A burst on its own makes a half-duplex radio deaf for much longer than it lasts.
-        max(lengths_s, default=0.0) + 2 * carrier.turnaround_s,
-        carrier.ahead_s if carrier.is_lockstep else NOTICE_S,
-        carrier.stamp_s,
-        carrier.is_lockstep,
+        max(lengths_s, default=0.0) + 2 * traits.turnaround_s,
+        traits.ahead_s if traits.is_lockstep else NOTICE_S,
+        traits.stamp_s,
+        traits.is_lockstep,
     )

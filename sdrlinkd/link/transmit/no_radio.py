@@ -2,8 +2,8 @@
 
 from math import inf
 
-from sdrlinkd.link.carrier import Opportunity
 from sdrlinkd.link.receive import PduHeard
+from sdrlinkd.link.traits import Opportunity
 from sdrlinkd.link.transmit.burst import Burst, Outcome
 from sdrlinkd.link.transmit.rate import HeardThere
 from sdrlinkd.link.transmit.report import TransmitReport

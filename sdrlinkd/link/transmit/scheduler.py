@@ -16,12 +16,12 @@ from math import inf
 from typing import NamedTuple
 
 from sdrlinkd.link.access import Slot, Wish
-from sdrlinkd.link.carrier import Opportunity
 from sdrlinkd.link.packing import BuiltPdu, Composer
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue import Outbox
 from sdrlinkd.link.receive import PduHeard
 from sdrlinkd.link.schedule import Allowance, ClassesParams, Forecasts, Limits, Shares
+from sdrlinkd.link.traits import Opportunity
 from sdrlinkd.link.transmit.burst import Burst, Outcome
 from sdrlinkd.link.transmit.control_records import ControlRecords
 from sdrlinkd.link.transmit.fit import Fit

@@ -4,11 +4,11 @@ import asyncio
 import time
 
 from sdrlinkd.config import GnuRadioParams
-from sdrlinkd.link import Burst, CarrierTraits, Opportunity, Outcome
+from sdrlinkd.link import Burst, Opportunity, Outcome, PduLinkTraits
 from sdrlinkd.pdulink.base import Heard, PduListener
 from sdrlinkd.pdulink.bell import Bell
 from sdrlinkd.pdulink.gnuradio.transport import Transport
-from sdrlinkd.reports import CarrierReport
+from sdrlinkd.reports import PduLinkReport
 
 LOOK_S = 0.02
 """A flowgraph that takes nothing is asked again after so long."""
@@ -41,7 +41,7 @@ class GnuRadioLink:
         self._listener = listener
         await self._transport.open(self._heard)
         airtime_s = self._airtime_s
-        traits = CarrierTraits(
+        traits = PduLinkTraits(
             kind="gnuradio", shares_air=True, longest_burst_s=(airtime_s,),
             pdu_burst_s=(airtime_s,), stamp_s=PACE_S + self._params.delay_s,
         )  # fmt: skip
@@ -81,14 +81,14 @@ class GnuRadioLink:
         self._listener = None
         self._transport.close()
 
-    def report(self) -> CarrierReport:
+    def report(self) -> PduLinkReport:
         """State and counters."""
         params, is_open = self._params, self._listener is not None
         state = "up" if is_open and self._is_taken else "down"
         reason = f"nobody takes PDUs at {params.send} ({params.transport})"
         if not is_open or self._is_taken:
             reason = ""
-        return CarrierReport(
+        return PduLinkReport(
             kind="gnuradio",
             state=state,
             reason=reason,

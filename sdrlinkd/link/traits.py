@@ -5,11 +5,11 @@ from math import inf
 from typing import NamedTuple
 
 
-class CarrierTraits(NamedTuple):
+class PduLinkTraits(NamedTuple):
     """A radio as access policies and rate control see it; times in s.
 
     `lead_s`: a burst decided now leaves so much later at the earliest. `react_s`: so long after a
-    sample was on the air can a decision follow from it. `detect_s`: so long must a carrier last to
+    sample was on the air can a decision follow from it. `detect_s`: so long must a burst last to
     be noticed. `gap_s` stays free between two bursts of one node. `needed_snr_db` and
     `longest_burst_s` are those of each MCS, `pdu_burst_s` is a burst of one PDU.
     """
@@ -30,13 +30,13 @@ class CarrierTraits(NamedTuple):
     overhead_s: float = 0.0
     """What a burst takes besides its PDUs."""
     gap_s: float = 0.0
-    spell_s: float = inf
+    tx_window_s: float = inf
     """It sends without listening for so long at most."""
-    spell_follow_s: float = 0.0
+    tx_window_follow_s: float = 0.0
     """What is decided so long before a burst is over leaves right behind it, else in the next
-    spell."""
-    spell_pause_s: float = 0.0
-    """Between two spells."""
+    TX window."""
+    rx_window_s: float = 0.0
+    """It listens for so long between two TX windows."""
     ahead_s: float = 0.0
     """A burst whose time is fixed may be decided so much before it has to be."""
     longest_burst_s: tuple[float, ...] = (0.0,)
@@ -56,8 +56,8 @@ class CarrierTraits(NamedTuple):
 class Sensed(NamedTuple):
     """What the receiver knows of the air: it has listened up to `until`.
 
-    The last carrier ended at `idle_since`; one that goes on ends later than `until`. `burst_at` is
-    when its preamble came, None when only its energy was noticed.
+    The channel is idle since `idle_since`; while it is busy, that is later than `until`. `burst_at`
+    is when the last burst's preamble came, None when only its energy was noticed.
     """
 
     until: float = inf
@@ -66,10 +66,10 @@ class Sensed(NamedTuple):
 
 
 class Opportunity(NamedTuple):
-    """The carrier can take a burst that leaves at `earliest` or later.
+    """The PDU link can take a burst that leaves at `earliest` or later.
 
     `airtime_s(mcs, n_pdus)` is a burst's length; `most_pdus(mcs, airtime_s)` how many PDUs fit, 0
-    when not even one does; the carrier's own limit is heeded. What begins at `start` is no longer
+    when not even one does; the PDU link's own limit is heeded. What begins at `start` is no longer
     than `made_by(start)`, or one PDU: a longer burst would not be there in time. None: any length
     is.
     """
