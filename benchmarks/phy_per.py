@@ -15,7 +15,7 @@ import numpy as np
 
 from backends import RecordingReader, describe
 from benchmarks.bound import needed_es_n0_db
-from benchmarks.peers import GnuRadio, Liquid
+from benchmarks.peers.modems import GnuRadio, Liquid
 from benchmarks.report import Row, main
 from benchmarks.trials import Air, ErrorRate, bursts, error_rate, needed_snr_db
 from phy import MCS_TABLE, OFDM_64_16, FrontEnd, FrontEndParams, PduHeard, Receiver, layout

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.peers import GnuRadio, Liquid
+from benchmarks.peers.modems import GnuRadio, Liquid
 from benchmarks.report import Row, main
 from phy import MCS_TABLE, FrontEnd, FrontEndParams, Receiver, Transmitter
 

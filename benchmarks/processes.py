@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import NamedTuple, Self
 
-from benchmarks.pound.peers.environments import interpreter, variables
+from benchmarks.environments import interpreter, variables
 
 REAL_TIME_PRIORITY = 10
 NICE = -10

@@ -8,7 +8,7 @@ docs/figures/latency_*.png.
 import sys
 
 from benchmarks.latency import pictures, rows
-from benchmarks.latency.peers.table import unavailable
+from benchmarks.peers.latency.table import unavailable
 from benchmarks.report import Row, main
 
 

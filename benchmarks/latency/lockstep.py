@@ -9,7 +9,7 @@ import numpy as np
 
 from backends import AirParams, RadioParams
 from benchmarks import shared_air
-from benchmarks.latency.daemons import Air
+from benchmarks.peers.latency.daemons import Air
 from benchmarks.shared_air import DATA, Arrival, Station
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import AccessParams, ClockParams

@@ -7,8 +7,8 @@ import numpy as np
 
 from benchmarks.latency import airtime, clocks, control, lockstep
 from benchmarks.latency.correction import Direction
-from benchmarks.latency.peers.table import PEERS, unavailable
 from benchmarks.latency.session import Session, run
+from benchmarks.peers.latency.table import PEERS, unavailable
 from benchmarks.report import Row
 from sdrlinkd.config import ModemParams
 from sdrlinkd.modem import Airtimes

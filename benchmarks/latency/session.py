@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.latency.clock import Clock
 from benchmarks.latency.correction import Direction, Seconds, Stamps, direction
-from benchmarks.latency.job import MOST_TOPICS, STAMP, Job
-from benchmarks.latency.peers.table import PEERS, unavailable
-from benchmarks.latency.peers.way import Way
+from benchmarks.peers.latency.clock import Clock
+from benchmarks.peers.latency.job import MOST_TOPICS, STAMP, Job
+from benchmarks.peers.latency.table import PEERS, unavailable
+from benchmarks.peers.latency.way import Way
 from benchmarks.processes import Child, PeerError, busy_cores
 
 START_S = 0.3
@@ -81,7 +81,7 @@ def run(
 
 def _start(job: Job, way: Way) -> Child:
     environment = way.ends[job.side].environment
-    child = Child(job.side, "benchmarks.latency.endpoint", environment=environment)
+    child = Child(job.side, "benchmarks.peers.latency.endpoint", environment=environment)
     child.precede(real_time=job.side == "fcu")
     child.tell(job.to_json())
     return child

@@ -8,12 +8,12 @@ import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
-from benchmarks.pound.flows import Figures, Flow
-from benchmarks.pound.peers import PEERS, unavailable
-from benchmarks.pound.peers.control import control_loop, local_loop
-from benchmarks.pound.peers.ends import PeerError
-from benchmarks.pound.peers.namespaces import NetworkError, available, network
-from benchmarks.pound.peers.runs import outage, run_peer, saturate
+from benchmarks.flows import Figures, Flow
+from benchmarks.peers.pound import PEERS, unavailable
+from benchmarks.peers.pound.control import control_loop, local_loop
+from benchmarks.peers.pound.ends import PeerError
+from benchmarks.peers.pound.namespaces import NetworkError, available, network
+from benchmarks.peers.pound.runs import outage, run_peer, saturate
 from benchmarks.pound.tables import by_flow
 
 QUICK = ("tcp_nodelay", "udp", "pound_like")

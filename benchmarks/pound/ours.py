@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from backends import AirParams, LinkOverride, RadioParams, World
-from benchmarks.pound.flows import Flow, Times, Trace
+from benchmarks.flows import Flow, Times, Trace
 from sdrlinkd.config import ModemParams
 from sdrlinkd.lab import Arrival, Simulation
 from sdrlinkd.link import (

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.flows import Figures
+from benchmarks.peers.pound.control import local_loop
 from benchmarks.pound import limits, loop, tables
 from benchmarks.pound.beside import LOOP_S
-from benchmarks.pound.flows import Figures
-from benchmarks.pound.peers.control import local_loop
 
 FOLDER = Path(__file__).parents[2] / "docs/figures"
 

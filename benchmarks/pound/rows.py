@@ -5,8 +5,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from benchmarks.flows import Figures
 from benchmarks.pound import beside, cost, limits, loop, tables
-from benchmarks.pound.flows import Figures
 from benchmarks.pound.forecast import errors_pct
 from benchmarks.pound.ours import Air
 from benchmarks.report import Row

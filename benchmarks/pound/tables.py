@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from backends import LinkOverride
-from benchmarks.pound.flows import Figures, Flow, Trace, figures
+from benchmarks.flows import Figures, Flow, Trace, figures
 from benchmarks.pound.ours import Air, Run, Sent, run
 
 LASERS = 1000

@@ -7,8 +7,8 @@ a device would do by itself. 2 where it cannot be compiled.
 
 import sys
 
+from benchmarks.loopback_radio import NoDriverError, use_driver
 from benchmarks.radio import load, odometry
-from benchmarks.radio.driver import NoDriverError, use_driver
 from benchmarks.report import Row, main
 
 

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.peers.radio import bare
 from benchmarks.processes import Stolen
-from benchmarks.radio import bare
 from benchmarks.radio.pair import ROBOTS, Look, pair
 from benchmarks.report import Row
 from sdrlinkd.client import ControlClient, Publisher, Subscriber

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import daemons
+from benchmarks.loopback_radio import a_bus
 from benchmarks.processes import Child, PeerError
-from benchmarks.radio.driver import a_bus
 from sdrlinkd.client import ControlClient
 
 ROBOTS = (1, 2)

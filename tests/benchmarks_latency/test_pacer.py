@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks.latency.peers.pacer import BUFFER, PIECE, Pacer
-from benchmarks.latency.peers.table import BAUD
+from benchmarks.peers.latency.pacer import BUFFER, PIECE, Pacer
+from benchmarks.peers.latency.table import BAUD
 from benchmarks.processes import Child
 
 BYTE_S = 10 / BAUD
@@ -71,7 +71,7 @@ def test_a_busy_line_drops_what_its_buffer_cannot_hold():
 
 def test_the_line_carries_any_bytes_both_ways_no_faster_than_its_rate():
     data = bytes(range(256)) * 4
-    with Child("line", "benchmarks.latency.peers.wire", str(BAUD)) as line:
+    with Child("line", "benchmarks.peers.latency.wire", str(BAUD)) as line:
         devices = [os.open(path, os.O_RDWR | os.O_NOCTTY) for path in json.loads(line.line())]
         for source, sink in (devices, devices[::-1]):
             begin, got = time.monotonic(), b""

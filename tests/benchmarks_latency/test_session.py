@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from benchmarks.daemons import running
-from benchmarks.latency.peers.table import BAUD, PEERS, unavailable
 from benchmarks.latency.session import run
+from benchmarks.peers.latency.table import BAUD, PEERS, unavailable
 from benchmarks.processes import PeerError
 
 FRAME = 134

@@ -2,7 +2,7 @@
 
 import random
 
-from benchmarks.latency.job import FIRST_TOPIC, REQUEST, Job
+from benchmarks.peers.latency.job import FIRST_TOPIC, REQUEST, Job
 
 WARMUP_REQUESTS_HZ = 100.0
 """So that the paper's filter has its 500 samples soon."""

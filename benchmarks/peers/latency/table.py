@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from typing import NamedTuple
 
-from benchmarks.latency.job import Address
-from benchmarks.latency.peers import daemon
-from benchmarks.latency.peers.way import End, Way
-from benchmarks.pound.peers import environments
+from benchmarks import environments
+from benchmarks.peers.latency import ours
+from benchmarks.peers.latency.job import Address
+from benchmarks.peers.latency.way import End, Way
 from benchmarks.processes import Child
 
 BAUD = 921_600
@@ -34,14 +34,14 @@ def serial(
     @contextmanager
     def open_way(size: int) -> Iterator[Way]:
         with ExitStack() as stack:
-            line = stack.enter_context(Child("line", "benchmarks.latency.peers.wire", str(BAUD)))
+            line = stack.enter_context(Child("line", "benchmarks.peers.latency.wire", str(BAUD)))
             line.precede(real_time=True)
             near, far = (Address(transport, device) for device in json.loads(line.line()))
             ends = {"companion": End(near, environment), "fcu": End(far, environment)}
             between = [line]
             if hop:
                 arguments = (transport, near.place, str(size))
-                module = "benchmarks.latency.peers.bridge"
+                module = "benchmarks.peers.latency.bridge"
                 bridge = Child(hop, module, *arguments, environment=environment)
                 between.append(stack.enter_context(bridge))
                 bridge.precede(real_time=False)
@@ -56,8 +56,8 @@ PEERS: dict[str, Peer] = {
     "mavros": Peer(
         "MAVLink 2, MAVROS between line and node", serial("mavlink", "mavlink", "mavros"), "mavlink"
     ),
-    "direct": Peer("sdrlinkd, PDUs straight back", daemon.direct),
-    "ether": Peer("sdrlinkd, two daemons on a simulated air", daemon.ether),
+    "direct": Peer("sdrlinkd, PDUs straight back", ours.direct),
+    "ether": Peer("sdrlinkd, two daemons on a simulated air", ours.ether),
     "xrce": Peer("Micro XRCE-DDS, its agent between line and node", serial("xrce", hop="agent")),
 }
 

@@ -1,7 +1,7 @@
 """Peers: who receives in a thread of a busy process, by SoapySDR's C library; and GNU Radio.
 
-`python -m benchmarks.radio.bare DEVICE SECONDS CHUNK SWITCH_S RATE_HZ…` prints the samples lost at
-each rate.
+`python -m benchmarks.peers.radio.bare DEVICE SECONDS CHUNK SWITCH_S RATE_HZ…` prints the samples
+lost at each rate.
 """
 
 import subprocess
@@ -15,7 +15,7 @@ import numpy as np
 
 from backends.soapy.native import NativeLibrary
 from backends.soapy.surface import HAS_TIME, OVERFLOW, RX, TIMEOUT
-from benchmarks.radio.driver import ROOT, a_bus
+from benchmarks.loopback_radio import ROOT, a_bus
 
 WAYS = {"thread": (4096, 5e-3), "tuned_thread": (65536, 5e-4)}
 """Samples of a read, and how long Python lets a thread run."""
@@ -31,7 +31,7 @@ FLOWGRAPH = Path(__file__).with_name("flowgraph.py")
 
 def lost_in_threads(rates_msps: Sequence[int], seconds: float) -> dict[str, dict[int, float]]:
     """Samples a second that each loses, by rate."""
-    module = [sys.executable, "-m", "benchmarks.radio.bare"]
+    module = [sys.executable, "-m", "benchmarks.peers.radio.bare"]
     lost = {}
     for name, numbers in WAYS.items():
         told = _told(module, rates_msps, seconds, *numbers)

@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from benchmarks.latency.daemons import Air, running
-from benchmarks.latency.job import ANSWERED, ASKED, FIRST_TOPIC, REPLY, REQUEST, Address
-from benchmarks.latency.peers.way import End, Way
+from benchmarks.peers.latency.daemons import Air, running
+from benchmarks.peers.latency.job import ANSWERED, ASKED, FIRST_TOPIC, REPLY, REQUEST, Address
+from benchmarks.peers.latency.way import End, Way
 from sdrlinkd.client import Publisher, Subscriber
 
 AIR = Air()

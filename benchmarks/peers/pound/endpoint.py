@@ -1,4 +1,4 @@
-"""One end of an experiment, as a process of its own: `python -m benchmarks.pound.peers.endpoint`.
+"""One end of an experiment, as a process of its own: `python -m benchmarks.peers.pound.endpoint`.
 
 It reads a Job (one line of JSON), joins up with the other end, says "ready", reads when to start
 (monotonic s; both ends share the machine's clock), and tells in the end what it heard, as JSON.
@@ -13,10 +13,10 @@ import struct
 import sys
 import time
 
-from benchmarks.pound.peers.job import CONTACT_S, Job, Loop, NoContactError, Transport
-from benchmarks.pound.peers.sockets import Sockets
-from benchmarks.pound.peers.table import PEERS
-from benchmarks.pound.peers.wire import HEAD
+from benchmarks.peers.pound.job import CONTACT_S, Job, Loop, NoContactError, Transport
+from benchmarks.peers.pound.sockets import Sockets
+from benchmarks.peers.pound.table import PEERS
+from benchmarks.peers.pound.wire import HEAD
 
 VALUE = struct.Struct("<d")
 Y, U = 0, 1
@@ -109,11 +109,11 @@ def open_transport(job: Job, player: Player) -> Transport:
     """This end of the peer."""
     peer = PEERS[job.peer]
     if peer.environment == "zenoh":
-        from benchmarks.pound.peers.zenoh_end import Zenoh
+        from benchmarks.peers.pound.zenoh_end import Zenoh
 
         return Zenoh(job, peer.carriers["default"], player.hear)
     if peer.environment == "rclpy":
-        from benchmarks.pound.peers.fastdds_end import FastDds
+        from benchmarks.peers.pound.fastdds_end import FastDds
 
         return FastDds(job, peer.carriers["default"], player.hear)
     return Sockets(job, peer.carriers, player.hear)

@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Protocol
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[1]
 """What has the package `benchmarks`."""
 
 PACKAGES = {

@@ -1,6 +1,6 @@
 """A serial line: two pairs of pseudo-terminals and a pacer each way, in a process of its own.
 
-`python -m benchmarks.latency.peers.wire BAUD` tells the two devices as JSON, carries bytes until
+`python -m benchmarks.peers.latency.wire BAUD` tells the two devices as JSON, carries bytes until
 its input ends, and then tells how late it was with each piece, in s.
 """
 
@@ -11,7 +11,7 @@ import sys
 import time
 import tty
 
-from benchmarks.latency.peers.pacer import Pacer
+from benchmarks.peers.latency.pacer import Pacer
 
 CHUNK = 1024
 SPIN_S = 250e-6

@@ -10,9 +10,9 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from typing import Protocol
 
-from benchmarks.pound.peers.job import Hear, Job, Topic
-from benchmarks.pound.peers.reactor import Reactor
-from benchmarks.pound.peers.wire import (
+from benchmarks.peers.pound.job import Hear, Job, Topic
+from benchmarks.peers.pound.reactor import Reactor
+from benchmarks.peers.pound.wire import (
     NimbroJoin,
     PoundJoin,
     UdpRosJoin,

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from benchmarks.latency.job import Address
+from benchmarks.peers.latency.job import Address
 from benchmarks.processes import Child
 
 

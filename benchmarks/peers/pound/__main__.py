@@ -1,4 +1,4 @@
-"""Laser and image through each peer: `python -m benchmarks.pound.peers [--peer NAME] [--json]`."""
+"""Laser and image through each peer: `python -m benchmarks.peers.pound [--peer NAME] [--json]`."""
 
 import argparse
 import json
@@ -10,11 +10,11 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
-from benchmarks.pound.flows import Figures, Flow, figures
-from benchmarks.pound.peers.ends import PeerError
-from benchmarks.pound.peers.namespaces import NetworkError, network
-from benchmarks.pound.peers.runs import run_peer
-from benchmarks.pound.peers.table import PEERS
+from benchmarks.flows import Figures, Flow, figures
+from benchmarks.peers.pound.ends import PeerError
+from benchmarks.peers.pound.namespaces import NetworkError, network
+from benchmarks.peers.pound.runs import run_peer
+from benchmarks.peers.pound.table import PEERS
 
 IMAGE_PERIOD_S = {False: 0.15, True: 0.3}
 """By whether there is a relay: the channel then carries half as much."""
@@ -62,7 +62,7 @@ def table(results: dict[str, dict[str, Figures]]) -> Table:
 
 def main() -> int:
     """Parse, measure, print; 1 where no peer could be measured."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.pound.peers", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.peers.pound", description=__doc__)
     parser.add_argument("--peer", action="append", choices=[*PEERS], help="only this one; repeat")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--lasers", type=int, default=1000, help="messages, 20 ms apart")

@@ -1,10 +1,10 @@
 """Opens one end of a transport by its name."""
 
-from benchmarks.latency.job import Address, Transport
-from benchmarks.latency.peers.local import Local
-from benchmarks.latency.peers.mavlink import Mavlink
-from benchmarks.latency.peers.serial_port import SerialPort
-from benchmarks.latency.peers.xrce import Xrce
+from benchmarks.peers.latency.job import Address, Transport
+from benchmarks.peers.latency.local import Local
+from benchmarks.peers.latency.mavlink import Mavlink
+from benchmarks.peers.latency.serial_port import SerialPort
+from benchmarks.peers.latency.xrce import Xrce
 
 
 def open_transport(address: Address, side: str, size: int) -> Transport:
@@ -13,7 +13,7 @@ def open_transport(address: Address, side: str, size: int) -> Transport:
         return Local(int(address.place))
     if address.transport in ("direct", "ether"):
         # What it needs is not in other environments.
-        from benchmarks.latency.peers.daemon import BusEnd
+        from benchmarks.peers.latency.ours import BusEnd
 
         return BusEnd(address, side)
     return open_serial(address, side, size)

@@ -13,7 +13,7 @@ import struct
 from collections.abc import Iterator
 from typing import Any
 
-from benchmarks.latency.job import ANSWERED, ASKED, FIRST_TOPIC, MOST_TOPICS, REPLY, REQUEST
+from benchmarks.peers.latency.job import ANSWERED, ASKED, FIRST_TOPIC, MOST_TOPICS, REPLY, REQUEST
 
 COMPONENTS = {"fcu": 1, "companion": 191}
 """MAV_COMP_ID_AUTOPILOT1, MAV_COMP_ID_ONBOARD_COMPUTER."""

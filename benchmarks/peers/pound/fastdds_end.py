@@ -11,7 +11,7 @@ import tempfile
 import time
 from typing import Any
 
-from benchmarks.pound.peers.job import CONTACT_S, Hear, Job, NoContactError
+from benchmarks.peers.pound.job import CONTACT_S, Hear, Job, NoContactError
 
 CDR = struct.Struct("<4sIII")
 """Encapsulation; an empty layout: dimensions, data_offset; then how many bytes follow."""

@@ -8,10 +8,10 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from typing import IO, NamedTuple
 
-from benchmarks.pound.peers.environments import interpreter, variables
-from benchmarks.pound.peers.job import Job, Loop, Topic
-from benchmarks.pound.peers.namespaces import Network, Node
-from benchmarks.pound.peers.table import PEERS, unavailable
+from benchmarks.environments import interpreter, variables
+from benchmarks.peers.pound.job import Job, Loop, Topic
+from benchmarks.peers.pound.namespaces import Network, Node
+from benchmarks.peers.pound.table import PEERS, unavailable
 
 START_S = 0.3
 """From both ends being ready to the beginning of the experiment."""
@@ -81,7 +81,7 @@ class _End:
         self._name = f"{job.peer}, end {job.side}"
         self._errors = errors
         environment = PEERS[job.peer].environment
-        program = [interpreter(environment), "-m", "benchmarks.pound.peers.endpoint"]
+        program = [interpreter(environment), "-m", "benchmarks.peers.pound.endpoint"]
         self._process = subprocess.Popen(
             node.command(*program),
             stdin=subprocess.PIPE,

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from benchmarks.pound.peers.ends import Plan, run_ends
-from benchmarks.pound.peers.job import Loop, Topic
-from benchmarks.pound.peers.namespaces import Network, network
+from benchmarks.peers.pound.ends import Plan, run_ends
+from benchmarks.peers.pound.job import Loop, Topic
+from benchmarks.peers.pound.namespaces import Network, network
 
 Voltages = NDArray[np.float64]
 

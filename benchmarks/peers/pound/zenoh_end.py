@@ -5,7 +5,7 @@ import queue
 import time
 from typing import Any
 
-from benchmarks.pound.peers.job import CONTACT_S, Hear, Job, NoContactError
+from benchmarks.peers.pound.job import CONTACT_S, Hear, Job, NoContactError
 
 PORT = 7447
 PRIORITIES = {"latency": "REAL_TIME", "default": "DATA", "bulk": "BACKGROUND"}

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import NamedTuple, Protocol
 
-from benchmarks.latency.clock import Clock
+from benchmarks.peers.latency.clock import Clock
 
 REQUEST, REPLY = 0, 1
 """The kinds of time synchronisation."""

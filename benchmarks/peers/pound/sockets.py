@@ -4,10 +4,10 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
-from benchmarks.pound.peers.job import CONTACT_S, Hear, Job, Topic
-from benchmarks.pound.peers.reactor import Reactor
-from benchmarks.pound.peers.tcp import NimbroTcpTopic, tcp_topic
-from benchmarks.pound.peers.udp import NimbroTopic, PoundNode, PoundTopic, UdpRosTopic
+from benchmarks.peers.pound.job import CONTACT_S, Hear, Job, Topic
+from benchmarks.peers.pound.reactor import Reactor
+from benchmarks.peers.pound.tcp import NimbroTcpTopic, tcp_topic
+from benchmarks.peers.pound.udp import NimbroTopic, PoundNode, PoundTopic, UdpRosTopic
 
 
 class Carrier(Protocol):

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from benchmarks.pound.peers import environments
+from benchmarks import environments
 
 
 class Peer(NamedTuple):

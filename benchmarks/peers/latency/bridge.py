@@ -1,15 +1,15 @@
 """The hop on the companion computer: between the serial line and the nodes' own middleware.
 
-`python -m benchmarks.latency.peers.bridge TRANSPORT DEVICE SIZE`, as the XRCE agent and MAVROS are
+`python -m benchmarks.peers.latency.bridge TRANSPORT DEVICE SIZE`, as the XRCE agent and MAVROS are
 processes of their own. Tells the port where it is to be found, and ends when its input does.
 """
 
 import select
 import sys
 
-from benchmarks.latency.job import Address
-from benchmarks.latency.peers.local import Local
-from benchmarks.latency.peers.transports import open_serial
+from benchmarks.peers.latency.job import Address
+from benchmarks.peers.latency.local import Local
+from benchmarks.peers.latency.transports import open_serial
 
 
 def main() -> None:

@@ -5,9 +5,9 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-from benchmarks.pound.peers.job import Hear, Job, NoContactError, Topic
-from benchmarks.pound.peers.reactor import Reactor
-from benchmarks.pound.peers.wire import NimbroTcpJoin, TcpRosJoin, cut_nimbro_tcp, cut_tcpros
+from benchmarks.peers.pound.job import Hear, Job, NoContactError, Topic
+from benchmarks.peers.pound.reactor import Reactor
+from benchmarks.peers.pound.wire import NimbroTcpJoin, TcpRosJoin, cut_nimbro_tcp, cut_tcpros
 
 PORT = 45000
 PIECE = 1 << 16

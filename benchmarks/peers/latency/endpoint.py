@@ -1,4 +1,4 @@
-"""One end, as a process of its own: `python -m benchmarks.latency.endpoint`.
+"""One end, as a process of its own: `python -m benchmarks.peers.latency.endpoint`.
 
 It reads a Job (one line of JSON), says "ready", reads when to start (monotonic s), and tells in the
 end the stamps of all that it heard, as JSON. What the stamps mean is for others to compute.
@@ -11,7 +11,7 @@ import signal
 import sys
 import time
 
-from benchmarks.latency.job import (
+from benchmarks.peers.latency.job import (
     ANSWERED,
     ASKED,
     FIRST_TOPIC,
@@ -21,8 +21,8 @@ from benchmarks.latency.job import (
     Job,
     Transport,
 )
-from benchmarks.latency.peers.transports import open_transport
-from benchmarks.latency.schedule import schedule
+from benchmarks.peers.latency.schedule import schedule
+from benchmarks.peers.latency.transports import open_transport
 
 DRAIN_S = 0.3
 """After the last message, for what is still under way."""

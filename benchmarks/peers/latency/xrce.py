@@ -8,8 +8,8 @@ TIMESTAMP and TIMESTAMP_REPLY, and unlike eProsima's agent, either side asks.
 import struct
 from collections.abc import Iterator
 
-from benchmarks.latency.job import ANSWERED, ASKED, REPLY, REQUEST
-from benchmarks.latency.peers.xrce_framing import Deframer, frame
+from benchmarks.peers.latency.job import ANSWERED, ASKED, REPLY, REQUEST
+from benchmarks.peers.latency.xrce_framing import Deframer, frame
 
 ADDRESSES = {"companion": 0, "fcu": 1}
 """The agent's and the client's, as eProsima's have them."""

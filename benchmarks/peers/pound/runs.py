@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.pound.flows import Flow, Trace
-from benchmarks.pound.peers.ends import Plan, run_ends
-from benchmarks.pound.peers.job import Topic
-from benchmarks.pound.peers.namespaces import Network
+from benchmarks.flows import Flow, Trace
+from benchmarks.peers.pound.ends import Plan, run_ends
+from benchmarks.peers.pound.job import Topic
+from benchmarks.peers.pound.namespaces import Network
 
 DRAIN_S = 5.0
 OFFERED_BPS = 6.5e6
