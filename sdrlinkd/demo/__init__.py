@@ -4,7 +4,6 @@ from sdrlinkd.demo.folder import run_folder
 from sdrlinkd.demo.hearing import Hearing
 from sdrlinkd.demo.links import LINKS, Options
 from sdrlinkd.demo.nodes import daemon_process, problems_of, snapshot_of, wait_until_up
-from sdrlinkd.demo.processes import Process
 from sdrlinkd.demo.rate import Found, find_rate
 from sdrlinkd.demo.report import DemoReport, RunResult, TopicResult, latency_ms
 from sdrlinkd.demo.run import run_demo
@@ -20,7 +19,6 @@ __all__ = [
     "Hearing",
     "Options",
     "Pair",
-    "Process",
     "RunResult",
     "Sample",
     "Source",
