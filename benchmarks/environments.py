@@ -14,6 +14,8 @@ from functools import cache
 from pathlib import Path
 from typing import Protocol
 
+from benchmarks.absent import PeerError
+
 ROOT = Path(__file__).parents[1]
 """What has the package `benchmarks`."""
 
@@ -32,7 +34,7 @@ WHEELS = (3, 11)
 INSTALL_S = 600.0
 
 
-class EnvironmentLackingError(Exception):
+class EnvironmentLackingError(PeerError):
     """An environment cannot be had; the message says why."""
 
 

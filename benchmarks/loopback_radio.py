@@ -8,11 +8,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from benchmarks.absent import PeerError
+
 ROOT = Path(__file__).parents[1]
 SHARED_MEMORY = Path("/dev/shm")
 
 
-class NoDriverError(Exception):
+class NoDriverError(PeerError):
     """It cannot be compiled here; the message is the reason."""
 
 

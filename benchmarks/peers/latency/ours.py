@@ -57,7 +57,7 @@ def direct(_: int) -> Iterator[Way]:
     names = [f"{side}{i}" for side in "cf" for i in range(TOPICS[SHARED])]
     with running(AIR._replace(backend=SHARED), [1], names) as daemons:
         address = Address(SHARED, str(daemons.folders[1]))
-        yield Way({side: End(address) for side in ROBOT}, daemons.children)
+        yield Way({side: End(address) for side in ROBOT}, daemons.processes)
 
 
 @contextmanager
@@ -69,4 +69,4 @@ def ether(_: int) -> Iterator[Way]:
             side: End(Address("ether", str(daemons.folders[robot])))
             for side, robot in ROBOT.items()
         }
-        yield Way(ends, daemons.children)
+        yield Way(ends, daemons.processes)

@@ -9,7 +9,8 @@ from benchmarks import environments
 from benchmarks.peers.latency import ours
 from benchmarks.peers.latency.job import Address
 from benchmarks.peers.latency.way import End, Way
-from benchmarks.processes import Child
+from benchmarks.processes import precede, start_module
+from sdrlinkd.process import Process
 
 BAUD = 921_600
 """What PX4's TELEM2 is set to for a companion computer."""
@@ -34,21 +35,28 @@ def serial(
     @contextmanager
     def open_way(size: int) -> Iterator[Way]:
         with ExitStack() as stack:
-            line = stack.enter_context(Child("line", "benchmarks.peers.latency.wire", str(BAUD)))
-            line.precede(real_time=True)
+            line = start_module(stack, "line", "benchmarks.peers.latency.wire", str(BAUD))
+            precede(line, real_time=True)
             near, far = (Address(transport, device) for device in json.loads(line.line()))
             ends = {"companion": End(near, environment), "fcu": End(far, environment)}
             between = [line]
             if hop:
                 arguments = (transport, near.place, str(size))
                 module = "benchmarks.peers.latency.bridge"
-                bridge = Child(hop, module, *arguments, environment=environment)
-                between.append(stack.enter_context(bridge))
-                bridge.precede(real_time=False)
+                bridge = start_module(stack, hop, module, *arguments, environment=environment)
+                between.append(bridge)
+                precede(bridge, real_time=False)
                 ends["companion"] = End(Address("local", bridge.line()))
-            yield Way(ends, between, lambda: json.loads(line.finish()))
+            yield Way(ends, between, lambda: _late_s(line))
 
     return open_way
+
+
+def _late_s(line: Process) -> list[float]:
+    """What the line tells when it is done."""
+    line.close_input()
+    late_s: list[float] = json.loads(line.line())
+    return late_s
 
 
 PEERS: dict[str, Peer] = {

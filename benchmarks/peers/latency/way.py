@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from benchmarks.peers.latency.job import Address
-from benchmarks.processes import Child
+from sdrlinkd.process import Process
 
 
 class End(NamedTuple):
@@ -24,7 +24,7 @@ class Way(NamedTuple):
 
     ends: dict[str, End]
     """Of "companion" and "fcu"."""
-    between: list[Child]
+    between: list[Process]
     """Processes whose load counts too."""
     line_late_s: Callable[[], list[float]] = no_line
     """Called once, in the end."""

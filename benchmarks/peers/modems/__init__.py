@@ -1,6 +1,6 @@
 """Other OFDM modems, built or found when first asked for: GNU Radio's and liquid-dsp's.
 
-Each modem says by `is_there` whether it can be measured on this machine.
+Where one cannot be measured, whoever asks for a figure gets a PeerError that says why.
 """
 
 from benchmarks.peers.modems.gnu_radio import GnuRadio

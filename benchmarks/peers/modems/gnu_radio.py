@@ -1,26 +1,21 @@
 """GNU Radio: `gnu_radio_ofdm.py` beside this file, run by the system's interpreter."""
 
-import functools
-import subprocess
 from pathlib import Path
+
+from benchmarks.absent import PeerError
+from benchmarks.processes import told_by
 
 PYTHON = "/usr/bin/python3"
 SCRIPT = Path(__file__).with_name("gnu_radio_ofdm.py")
 
 
 class GnuRadio:
-    """Its OFDM modem has no error correction; `bits` a carrier, 1 or 2."""
+    """Its OFDM modem has no error correction; `bits` a carrier, 1 or 2.
+
+    Every measurement raises PeerError and ProcessError where it is not there (Debian: gnuradio).
+    """
 
     name = "GNU Radio"
-
-    @functools.cached_property
-    def is_there(self) -> bool:
-        """Whether it can be measured."""
-        try:
-            asked = [PYTHON, "-c", "import gnuradio.digital"]
-            return subprocess.run(asked, check=False, capture_output=True).returncode == 0
-        except OSError:
-            return False
 
     def errors(self, bits: int, n_bytes: int, snr_db: float, n: int, seed: int) -> int:
         """Of `n` frames, how many are not heard."""
@@ -36,6 +31,7 @@ class GnuRadio:
         return float(self._run("noise", n_samples, seed))
 
     def _run(self, *arguments: object) -> str:
-        command = [PYTHON, str(SCRIPT), *map(str, arguments)]
-        done = subprocess.run(command, check=True, capture_output=True, text=True)
-        return done.stdout.strip().splitlines()[-1]
+        lines = told_by(self.name, PYTHON, SCRIPT, *arguments).strip().splitlines()
+        if not lines:
+            raise PeerError(f"{self.name}: it printed nothing")
+        return lines[-1]

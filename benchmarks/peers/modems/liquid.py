@@ -2,22 +2,23 @@
 
 import functools
 import shutil
-import subprocess
 import tempfile
 from pathlib import Path
+
+from benchmarks.absent import PeerError
+from benchmarks.processes import told_by
 
 SOURCE = Path(__file__).with_name("liquid.c")
 
 
 class Liquid:
-    """Codes are named as liquid-dsp does: "none", "h128", "g2412"."""
+    """Codes are named as liquid-dsp does: "none", "h128", "g2412".
+
+    Every measurement raises PeerError and ProcessError where it is not there (Debian:
+    libliquid-dev).
+    """
 
     name = "liquid-dsp"
-
-    @functools.cached_property
-    def is_there(self) -> bool:
-        """Whether it can be measured."""
-        return self._program is not None
 
     def errors(self, code: str, bits: int, n_bytes: int, snr_db: float, n: int, seed: int) -> int:
         """Of `n` frames, how many are not heard."""
@@ -37,17 +38,14 @@ class Liquid:
         return float(self._run("noise", n_samples, seed).split()[0])
 
     def _run(self, *arguments: object) -> str:
-        command = [str(self._program), *map(str, arguments)]
-        done = subprocess.run(command, check=True, capture_output=True, text=True)
-        return done.stdout
+        return told_by(self.name, self._program, *arguments)
 
     @functools.cached_property
-    def _program(self) -> Path | None:
+    def _program(self) -> Path:
         compiler = shutil.which("gcc") or shutil.which("cc")
         if compiler is None:
-            return None
+            raise PeerError(f"{self.name}: no C compiler (Debian: gcc)")
         program = Path(tempfile.mkdtemp(prefix="sdrlink-bench-")) / "liquid"
         flags = ["-O3", "-march=native", "-std=gnu11"]
-        command = [compiler, *flags, str(SOURCE), "-o", str(program), "-lliquid", "-lm"]
-        built = subprocess.run(command, check=False, capture_output=True)
-        return program if built.returncode == 0 else None
+        told_by(self.name, compiler, *flags, SOURCE, "-o", program, "-lliquid", "-lm")
+        return program

@@ -10,9 +10,9 @@ from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
+from benchmarks.absent import FAILURES
 from benchmarks.flows import Figures, Flow, figures
-from benchmarks.peers.pound.ends import PeerError
-from benchmarks.peers.pound.namespaces import NetworkError, network
+from benchmarks.peers.pound.namespaces import available, network
 from benchmarks.peers.pound.runs import run_peer
 from benchmarks.peers.pound.table import PEERS
 
@@ -39,7 +39,7 @@ def measure(names: list[str], options: argparse.Namespace) -> Iterator[tuple[str
             with network(shared=options.shared, relay=options.relay) as on:
                 told = run_peer(name, flows(options.lasers, options.relay), on, options.seed)
             yield name, {trace.flow.name: figures(trace) for trace in told}
-        except PeerError as error:
+        except FAILURES as error:
             yield name, str(error)
 
 
@@ -75,15 +75,14 @@ def main() -> int:
     names = options.peer or [*PEERS]
     results: dict[str, Result] = {}
     console = Console(stderr=True)
-    try:
-        with Progress(console=console, transient=True) as progress:
-            bar = progress.add_task(names[0], total=len(names))
-            for i, (name, result) in enumerate(measure(names, options), 1):
-                results[name] = result
-                progress.update(bar, completed=i, description=names[min(i, len(names) - 1)])
-    except NetworkError as error:
-        console.print(f"no test network: {error}")
+    if reason := available():
+        console.print(f"no test network: {reason}")
         return 1
+    with Progress(console=console, transient=True) as progress:
+        bar = progress.add_task(names[0], total=len(names))
+        for i, (name, result) in enumerate(measure(names, options), 1):
+            results[name] = result
+            progress.update(bar, completed=i, description=names[min(i, len(names) - 1)])
     measured = {name: result for name, result in results.items() if not isinstance(result, str)}
     if options.json:
         told = {

@@ -23,6 +23,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from benchmarks.absent import PeerError
+
 DEVICE = "air"
 NET = "10.77.0"
 BURST = 4600
@@ -33,7 +35,7 @@ TCP = ("congctl", "cubic")
 _COUNT = itertools.count()
 
 
-class NetworkError(Exception):
+class NetworkError(PeerError):
     """The test network cannot be built here; the message says why."""
 
 

@@ -4,7 +4,6 @@
 lost at each rate.
 """
 
-import subprocess
 import sys
 import threading
 import time
@@ -15,7 +14,9 @@ import numpy as np
 
 from backends.soapy.native import NativeLibrary
 from backends.soapy.surface import HAS_TIME, OVERFLOW, RX, TIMEOUT
-from benchmarks.loopback_radio import ROOT, a_bus
+from benchmarks.absent import attempt
+from benchmarks.loopback_radio import a_bus
+from benchmarks.processes import told_by
 
 WAYS = {"thread": (4096, 5e-3), "tuned_thread": (65536, 5e-4)}
 """Samples of a read, and how long Python lets a thread run."""
@@ -34,17 +35,17 @@ def lost_in_threads(rates_msps: Sequence[int], seconds: float) -> dict[str, dict
     module = [sys.executable, "-m", "benchmarks.peers.radio.bare"]
     lost = {}
     for name, numbers in WAYS.items():
-        told = _told(module, rates_msps, seconds, *numbers)
-        lost[name] = {each: n / seconds for each, n in told.items()}
+        with attempt(f"SoapySDR in a {name}"):
+            told = _told(module, rates_msps, seconds, *numbers)
+            lost[name] = {each: n / seconds for each, n in told.items()}
     return lost
 
 
 def flowgraph_cpu_pct(rates_msps: Sequence[int], seconds: float) -> dict[int, float]:
     """Of one core for each radio, by rate; empty without GNU Radio."""
-    try:
+    with attempt("GNU Radio"):
         return _told([SYSTEM_PYTHON, str(FLOWGRAPH)], rates_msps, seconds)
-    except (OSError, subprocess.CalledProcessError):
-        return {}
+    return {}
 
 
 def _told(
@@ -54,8 +55,8 @@ def _told(
     given = map(str, (seconds, *numbers, *(1e6 * each for each in rates_msps)))
     with a_bus() as bus:
         command = [*program, DEVICE.format(bus=bus), *given]
-        done = subprocess.run(command, check=True, capture_output=True, text=True, cwd=ROOT)
-    figures = done.stdout.splitlines()[-1].split()
+        lines = told_by(Path(program[-1]).name, *command).splitlines()
+    figures = (lines or [""])[-1].split()
     return dict(zip(rates_msps, map(float, figures), strict=True))
 
 
