@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from backends import AirParams, RadioParams
-from benchmarks import shared_air
 from benchmarks.peers.latency.daemons import Air
-from benchmarks.shared_air import DATA, Arrival, Station
+from benchmarks.worlds.arrivals import Arrival
+from benchmarks.worlds.samples import DATA, Station, play
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import AccessParams, ClockParams
 from sdrlinkd.modem import Airtimes
@@ -91,4 +91,4 @@ async def _run(
             ClockParams(), pace=pace,
         )  # fmt: skip
 
-    return await shared_air.play(air, radios, make, seconds + 0.1, seed)
+    return await play(air, radios, make, seconds + 0.1, seed)

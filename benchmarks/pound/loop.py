@@ -21,7 +21,7 @@ from benchmarks.peers.pound.control import (
 )
 from benchmarks.pound.ours import CDR, Air, simulate
 from benchmarks.pound.tables import BLOCK_3N_S
-from sdrlinkd.lab import Arrival
+from benchmarks.worlds.arrivals import Arrival
 from sdrlinkd.link import (
     BulkParams,
     ClassesParams,

@@ -9,8 +9,9 @@ import numpy as np
 
 from backends import AirParams, LinkOverride, RadioParams, World
 from benchmarks.flows import Flow, Times, Trace
+from benchmarks.worlds.arrivals import Arrival
+from benchmarks.worlds.bursts import Simulation
 from sdrlinkd.config import ModemParams
-from sdrlinkd.lab import Arrival, Simulation
 from sdrlinkd.link import (
     AccessParams,
     BulkParams,

@@ -3,13 +3,12 @@ its bus.
 """
 
 import asyncio
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from random import Random
 from typing import NamedTuple, TypeVar
 
-import numpy as np
-
 from backends import AirParams, LocalEther, Radio, RadioParams, World
+from benchmarks.worlds.arrivals import Arrival
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import (
     AccessParams,
@@ -20,8 +19,6 @@ from sdrlinkd.link import (
     LinkParams,
     Opportunity,
     Outcome,
-    Overrides,
-    Qos,
     QueueParams,
     RateParams,
     ReassemblyParams,
@@ -35,14 +32,6 @@ TOPICS = (("data", "std_msgs/msg/ByteMultiArray"), ("stop", "std_msgs/msg/Empty"
 DATA, STOP = 0, 1
 TICK_S = 0.05
 NO_CLOCK = ClockParams(period_s=0.0)
-
-
-class Arrival(NamedTuple):
-    """A message that a robot has to send."""
-
-    at: float
-    topic_id: int
-    payload: bytes
 
 
 class Got(NamedTuple):
@@ -84,9 +73,8 @@ class Station:
     def advance(self, now: float) -> None:
         """Messages that have come up to now."""
         while self._next is not None and self._next.at <= now:
-            at, topic_id, payload = self._next
-            urgent = Overrides(qos=Qos.URGENT) if topic_id == STOP else Overrides()
-            self.link.submit(topic_id, payload, at, urgent)
+            at, topic_id, payload, overrides = self._next
+            self.link.submit(topic_id, payload, at, overrides)
             self.sent += 1
             self._next = next(self._arrivals, None)
         if now - self._ticked_at >= TICK_S:
@@ -118,18 +106,6 @@ class Station:
 AnyStation = TypeVar("AnyStation", bound=Station)
 
 
-def poisson(
-    rng: np.random.Generator, topic_id: int, per_s: float, size: int, duration_s: float
-) -> Iterator[Arrival]:
-    """Messages of `size` bytes that come at random times."""
-    at = 0.0
-    while per_s:
-        at += rng.exponential(1 / per_s)
-        if at >= duration_s:
-            return
-        yield Arrival(at, topic_id, b"\0\1\0\0" + rng.bytes(size - 4))
-
-
 async def run(
     air: AirParams,
     radios: dict[int, RadioParams],
@@ -154,14 +130,19 @@ async def play(
     make: Callable[[int, Radio], AnyStation],
     until_s: float,
     seed: int,
+    look: Callable[[Sequence[AnyStation]], None] = lambda _: None,
+    looks_at_s: Iterable[float] = (),
 ) -> list[AnyStation]:
-    """The same with stations of one's own kind."""
+    """The same with stations of one's own kind; `look` is called at the times `looks_at_s`."""
     ether = LocalEther(air, radios, World(air, {}), seed)
     stations = [make(each, ether.radios[each]) for each in radios]
     for station in stations:
         await station.open()
     async with asyncio.TaskGroup() as tasks:
         running = [tasks.create_task(station.modem.run()) for station in stations]
+        for at_s in looks_at_s:
+            await ether.run(at_s)
+            look(stations)
         await ether.run(until_s)
         for station in stations:
             await station.modem.close()

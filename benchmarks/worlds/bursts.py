@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 from itertools import count
-from typing import NamedTuple
 
 import phy
 from backends import AirParams, BurstMedium, Flight, RadioParams, World
+from benchmarks.worlds.arrivals import Arrival
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import (
     AS_CONFIGURED,
@@ -36,28 +36,15 @@ ROUNDING = 1e-3
 """So much of a block is nothing: clocks are not quite the same."""
 
 
-class Arrival(NamedTuple):
-    """A message that a robot has to send from `at` on."""
-
-    at: float
-    topic_id: int
-    payload: bytes
-    overrides: Overrides = AS_CONFIGURED
-
-
 @dataclass(slots=True)
 class Pair:
     """What one robot got of another's topic, with ages in s."""
 
     received: int = 0
     age_sum_s: float = 0.0
+    """Over all of them."""
     ages_s: deque[float] = field(default_factory=lambda: deque(maxlen=KEPT_AGES))
     """The last ones."""
-
-    @property
-    def age_mean_s(self) -> float:
-        """Over all; 0 before the first."""
-        return self.age_sum_s / max(1, self.received)
 
 
 @dataclass(slots=True, eq=False)
