@@ -146,10 +146,6 @@ class Reassembly:
             if not source.partials:
                 del self._sources[src]
 
-    def next_expiry(self) -> float:
-        """When `expire` may next have something to do; infinity when nothing is held."""
-        return self._next_expiry if self.held else float("inf")
-
     def holds(self, src: int, topic_id: int, entry_id: int) -> bool:
         """Whether fragments of that message are kept."""
         source = self._sources.get(src)
