@@ -56,7 +56,7 @@ class Result(NamedTuple):
 
     @property
     def pdr(self) -> float:
-        """Delivered over sent."""
+        """Messages delivered over messages sent."""
         return self.received / self.sent
 
 

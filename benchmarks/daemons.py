@@ -43,7 +43,7 @@ def hears_one(daemon: ControlClient) -> bool:
 
 
 def is_up(daemon: ControlClient) -> bool:
-    """Whether its radio works."""
+    """Whether the radio of this daemon works."""
     return bool(daemon.ask("status")["carrier"]["state"] == "up")
 
 

@@ -43,7 +43,7 @@ class NeedsEnvironment(Protocol):
 
     @property
     def environment(self) -> str:
-        """By name."""
+        """The name of the virtual environment that it needs."""
 
 
 def unavailable(peers: Mapping[str, NeedsEnvironment], peer: str) -> str | None:

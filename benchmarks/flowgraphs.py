@@ -34,7 +34,7 @@ PATIENCE_MS = 3000
 
 
 class Ends(NamedTuple):
-    """The daemon's sockets."""
+    """The sockets at which a daemon would be."""
 
     out: "zmq.Socket[bytes]"
     back: "zmq.Socket[bytes]"
@@ -105,7 +105,7 @@ def _rows(name: str, size: int, n: int, rng: Random) -> list[Row]:
 
 
 def measure(seed: int, quick: bool) -> Iterator[Row]:
-    """All modems and sizes."""
+    """The rows of all modems and sizes."""
     rng = Random(seed)
     n = 20 if quick else 400
     for name in PHYS:

@@ -48,7 +48,7 @@ class _Peers:
 
 
 def measure(seed: int, quick: bool) -> Iterator[Row]:
-    """All rows."""
+    """The rows of receiver, transmitter and latency."""
     rounds = 3 if quick else 20
     peers = _measure_peers(seed)
     yield _search("search_msps_noise", 200.0, _noise(seed), rounds, peers)

@@ -17,7 +17,7 @@ from benchmarks.report import Row, main
 
 
 def measure(seed: int, quick: bool, no_peers: bool = False) -> Iterator[Row]:
-    """All rows."""
+    """The rows of the paper's table, of clocks and of ages."""
     seconds, passes = (3.0, 1) if quick else (15.0, 3)
     beside = () if no_peers else rows.BESIDE
     found = rows.sessions(seed, seconds, passes, of=rows.OURS if no_peers else rows.TOLD)

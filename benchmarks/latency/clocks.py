@@ -23,7 +23,7 @@ _AT = struct.Struct("<q")
 
 
 class Found(NamedTuple):
-    """Errors in s."""
+    """Errors of clocks and ages, in s."""
 
     offsets_s: np.ndarray
     ages_s: np.ndarray

@@ -24,7 +24,7 @@ _AT = struct.Struct("<d")
 
 
 class LockStep(NamedTuple):
-    """In s."""
+    """Latencies and errors of ages, in s."""
 
     latencies_s: np.ndarray
     age_errors_s: np.ndarray
@@ -42,7 +42,7 @@ class _Stamped(Station):
         self.errors_s: list[float] = []
 
     def heard(self, pdus: Sequence[Heard]) -> None:
-        """PDUs from the air."""
+        """Take PDUs from the air, and note how late their messages are."""
         now = self.modem.now()
         for data, at, snr_db, ended_at in pdus:
             for message in self.link.hear(data, at, snr_db, now, ended_at):

@@ -134,7 +134,7 @@ def by_the_clock(seconds: float) -> Iterator[Row]:
 
 
 def shares(seed: int, seconds: float) -> Iterator[Row]:
-    """Of the air."""
+    """The share of the air that CLOCKs and RECEIPTs take."""
     for name, case in (
         ("control_airtime_pct_5nodes", airtime.FAST),
         ("control_airtime_pct_5nodes_1msps", airtime.SLOW),

@@ -24,7 +24,7 @@ CLOCKS = {"companion": Clock(0.0, 0.0), "fcu": Clock(3.7, 20.0)}
 
 
 class Session(NamedTuple):
-    """What came of it."""
+    """What came of one assessment."""
 
     forward: Direction
     """Companion computer to FCU."""

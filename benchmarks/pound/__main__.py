@@ -17,7 +17,7 @@ PHASES, QUICK_PHASES = 10, 2
 
 
 def measure(seed: int, quick: bool, no_peers: bool = False, figures: bool = False) -> Iterator[Row]:
-    """All rows."""
+    """The rows of all experiments of the paper."""
     peers = [] if no_peers else beside.find(quick)
     n = tables.LASERS // 5 if quick else tables.LASERS
     flows = [

@@ -20,7 +20,7 @@ def draw(
     loops: Mapping[str, float],
     phase_s: float,
 ) -> None:
-    """Write docs/figures/pound_*.png."""
+    """Draw this benchmark's figures into docs/figures/pound_*.png."""
     import matplotlib.pyplot as plt
 
     FOLDER.mkdir(parents=True, exist_ok=True)

@@ -15,7 +15,7 @@ from benchmarks.report import Row, main
 
 
 def measure(seed: int, quick: bool) -> Iterator[Row]:
-    """All rows. Raises NoDriverError."""
+    """The rows of load and odometry. Raises NoDriverError."""
     use_driver()
     with attempt("radios like a USRP"):
         yield from load.rows(seed, quick)

@@ -1,4 +1,4 @@
-"""Print it."""
+"""Prints how the code is built."""
 
 from benchmarks.structure.sources import deep_chains, graph, writes
 from benchmarks.structure.trace import trace
@@ -8,7 +8,7 @@ ROOMS = ("sdrlinkd", "sdrlinkd.link", "sdrlinkd.bus", "backends", "backends.soap
 
 
 def main() -> None:
-    """Tables for people."""
+    """Print the figures as tables for people."""
     console, steps = screen_console(), trace()
     table = FittedTable(
         "one message of 724 B from link to link",

@@ -13,7 +13,7 @@ HZ = 5.0
 
 
 def measure(seed: int, quick: bool) -> Iterator[Row]:
-    """All rows."""
+    """The rows of all filters and scenarios."""
     runs, stepped = (4, 1) if quick else (40, 8)
     held = rows.Tally()
     found = rows.precision(seed, runs, HZ, held)

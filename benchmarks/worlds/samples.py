@@ -63,11 +63,11 @@ class Station:
         self.bursts = 0
 
     async def open(self) -> None:
-        """Open the radio."""
+        """Open the radio of this robot."""
         await self.modem.open(self)
 
     def attach(self, traits: CarrierTraits) -> None:
-        """What the radio is."""
+        """Learn what the radio is, and tell the link."""
         self.link.attach(traits, self._access, RateParams())
 
     def advance(self, now: float) -> None:
@@ -82,7 +82,7 @@ class Station:
             self.link.handle_timers(now)
 
     def heard(self, pdus: Sequence[Heard]) -> None:
-        """PDUs from the air."""
+        """Take PDUs from the air, and note what they carried."""
         for data, at, snr_db, _ in pdus:
             for message in self.link.hear(data, at, snr_db):
                 age_s = self.link.delivered(message, self.modem.now())
@@ -90,7 +90,7 @@ class Station:
                     self.got.append(Got(message.src, message.topic_id, age_s))
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
-        """What goes next."""
+        """The burst that goes next, if any."""
         return self.link.next_burst(opportunity)
 
     def next_wakeup(self, now: float) -> float:

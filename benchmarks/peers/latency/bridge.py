@@ -13,7 +13,7 @@ from benchmarks.peers.latency.transports import open_serial
 
 
 def main() -> None:
-    """For the command line."""
+    """Carry messages for the command line, until its input ends."""
     transport, device, size = sys.argv[1:]
     line = open_serial(Address(transport, device), "companion", int(size))
     nodes = Local()

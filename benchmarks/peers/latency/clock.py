@@ -16,7 +16,7 @@ class Clock(NamedTuple):
         return 1 + self.ppm * 1e-6
 
     def now(self) -> float:
-        """In s."""
+        """What this clock shows now, in s."""
         return time.monotonic() * self.rate + self.offset_s
 
     def now_ns(self) -> int:

@@ -43,7 +43,7 @@ class Address(NamedTuple):
 
 @dataclass(frozen=True)
 class Job:
-    """One end's part."""
+    """What one end has to do."""
 
     side: str
     """ "companion" or "fcu"."""
@@ -71,12 +71,12 @@ class Job:
         return round(self.seconds * self.rate_hz)
 
     def to_json(self) -> str:
-        """On one line."""
+        """The job as JSON on one line."""
         return json.dumps(asdict(self))
 
     @classmethod
     def from_json(cls, text: str) -> "Job":
-        """What `to_json` made."""
+        """The job that `to_json` put on a line."""
         told = json.loads(text)
         told["address"] = Address(*told["address"])
         told["clock"] = Clock(*told["clock"])

@@ -24,16 +24,16 @@ class Local:
             self._socket.sendto(HELLO, self._peer)
 
     def fileno(self) -> int:
-        """What to wait for."""
+        """The file that shows when there is something to receive."""
         return self._socket.fileno()
 
     def send(self, kind: int, payload: bytes) -> None:
-        """At once."""
+        """Send a message at once, if the peer is known."""
         if self._peer:
             self._socket.sendto(bytes([kind]) + payload, self._peer)
 
     def receive(self, timeout_s: float) -> Iterator[tuple[int, bytes]]:
-        """One message."""
+        """Wait for one message, and tell it."""
         if select.select([self._socket], [], [], timeout_s)[0]:
             datagram, self._peer = self._socket.recvfrom(DATAGRAM)
             if datagram:

@@ -33,12 +33,12 @@ class BusEnd:
         self._skip = len(f"/rx_robot_{other}/{theirs}")
 
     def send(self, kind: int, payload: bytes) -> None:
-        """To the daemon."""
+        """Hand a message to the daemon."""
         number = max(0, kind - FIRST_TOPIC)
         self._out.send(f"{self._prefix}{number}", payload)
 
     def receive(self, timeout_s: float) -> Iterator[tuple[int, bytes]]:
-        """One message."""
+        """Wait for one message from the daemon, and tell it."""
         message = self._heard.receive(timeout_s)
         if message is None:
             return

@@ -26,14 +26,14 @@ class SerialPort:
         self._codec = codec
 
     def fileno(self) -> int:
-        """What to wait for."""
+        """The device that shows when there is something to receive."""
         return self._device
 
     def send(self, kind: int, payload: bytes) -> None:
-        """At once."""
+        """Write a message to the line at once."""
         os.write(self._device, self._codec.encode(kind, payload))
 
     def receive(self, timeout_s: float) -> Iterator[tuple[int, bytes]]:
-        """One chunk's messages."""
+        """Wait for one chunk, and tell the messages that end in it."""
         if select.select([self._device], [], [], timeout_s)[0]:
             yield from self._codec.decode(os.read(self._device, CHUNK))

@@ -52,7 +52,7 @@ class Wire:
 
 
 def main() -> None:
-    """For the command line."""
+    """Be a line for the command line, until its input ends."""
     wire = Wire(int(sys.argv[1]))
     print(json.dumps(wire.devices), flush=True)
     wire.run(sys.stdin.fileno())

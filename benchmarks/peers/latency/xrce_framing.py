@@ -35,7 +35,7 @@ CRC_TABLE = _crc_table()
 
 
 def crc16(data: bytes) -> int:
-    """CRC-16/ARC."""
+    """The CRC-16/ARC of these bytes."""
     crc = 0
     for byte in data:
         crc = crc >> 8 ^ CRC_TABLE[(crc ^ byte) & 0xFF]
@@ -43,7 +43,7 @@ def crc16(data: bytes) -> int:
 
 
 def stuff(data: bytes) -> bytes:
-    """Without a 0x7E."""
+    """The same bytes escaped, so that none is 0x7E."""
     return data.replace(ESCAPE, b"\x7d\x5d").replace(BEGIN, b"\x7d\x5e")
 
 

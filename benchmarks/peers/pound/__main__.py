@@ -44,7 +44,7 @@ def measure(names: list[str], options: argparse.Namespace) -> Iterator[tuple[str
 
 
 def table(results: dict[str, dict[str, Figures]]) -> Table:
-    """For people."""
+    """All figures as a table for people."""
     made = Table(title="laser and image through each peer", title_justify="left")
     for column in ("peer", "in the manner of", "flow"):
         made.add_column(column)

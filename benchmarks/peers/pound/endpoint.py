@@ -69,7 +69,7 @@ class Plant(Player):
             (self._u,) = VALUE.unpack_from(message, HEAD.size)
 
     def play(self, transport: Transport) -> None:
-        """All ticks."""
+        """Step through all ticks of the loop."""
         (a00, a01), (a10, a11) = self._loop.a
         b0, b1 = self._loop.b
         x0 = x1 = 0.0
@@ -99,7 +99,7 @@ class Controller(Player):
 
 
 def part(job: Job) -> Player:
-    """What this end does."""
+    """The player of what this end does."""
     if job.loop is None:
         return Player(job)
     return Plant(job, job.loop) if job.side == "a" else Controller(job, job.loop)

@@ -20,7 +20,7 @@ LATE_S = 30.0
 
 
 class Told(NamedTuple):
-    """What one end tells."""
+    """What one end tells when it is done."""
 
     heard: dict[int, dict[int, float]]
     """Of each topic's messages that came, by number: s after the start."""

@@ -73,11 +73,11 @@ class FastDds:
         self.run(time.monotonic() + 0.5)
 
     def send(self, topic: int, message: bytes) -> None:
-        """Publish."""
+        """Publish a message on its topic."""
         self._publishers[topic].publish(CDR.pack(LITTLE_ENDIAN, 0, 0, len(message)) + message)
 
     def run(self, until: float) -> None:
-        """Spin."""
+        """Spin until then, and hand over what has come."""
         while (left := until - time.monotonic()) > 0:
             self._executor.spin_once(left)
 

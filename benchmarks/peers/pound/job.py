@@ -71,12 +71,12 @@ class Job:
         return [topic for topic in self.topics if topic.sender != self.side]
 
     def to_json(self) -> str:
-        """On one line."""
+        """The job as JSON on one line."""
         return json.dumps(asdict(self))
 
     @classmethod
     def from_json(cls, text: str) -> "Job":
-        """What `to_json` made."""
+        """The job that `to_json` put on a line."""
         told = json.loads(text)
         told["topics"] = [Topic(*topic) for topic in told["topics"]]
         told["sends"] = [tuple(send) for send in told["sends"]]

@@ -17,7 +17,7 @@ class Carrier(Protocol):
         """Wait for the other end."""
 
     def send(self, message: bytes) -> None:
-        """Take a message."""
+        """Take a message for its topic's carrier."""
 
 
 Open = Callable[[Reactor, Topic, Job, Hear], Carrier]
@@ -54,13 +54,13 @@ class Sockets:
             carrier.meet(deadline)
 
     def send(self, topic: int, message: bytes) -> None:
-        """By that topic's carrier."""
+        """Take a message for its topic's carrier."""
         self._carriers[topic].send(message)
 
     def run(self, until: float) -> None:
-        """Serve all sockets."""
+        """Serve all sockets until that time."""
         self._reactor.run(until)
 
     def close(self) -> None:
-        """Close them."""
+        """Close the sockets of all topics."""
         self._reactor.close()

@@ -34,7 +34,7 @@ RANKS = {"latency": 0, "default": 1, "bulk": 2}
 
 
 class Join(Protocol):
-    """See `wire`."""
+    """Joins datagrams to messages; `wire` has one for each protocol."""
 
     def feed(self, datagram: bytes) -> Iterator[bytes]:
         """Messages that this datagram completes."""
@@ -60,7 +60,7 @@ class UdpTopic:
             reactor.when_readable(self._socket, lambda: drain(self._socket, join, hear))
 
     def meet(self, deadline: float) -> None:
-        """Nothing to wait for."""
+        """Do nothing: there is nobody to wait for."""
 
 
 class UdpRosTopic(UdpTopic):
@@ -132,7 +132,7 @@ class PoundNode:
         reactor.when_readable(self._socket, lambda: drain(self._socket, join, hear))
 
     def send(self, topic: int, message: bytes) -> None:
-        """Queue its fragments."""
+        """Put the message's fragments into the node's queue."""
         if len(message) > POUND_LARGE and len(self._queue) > POUND_QUEUE:
             return
         rank = self._ranks[topic]
@@ -159,10 +159,10 @@ class PoundTopic:
         self._node, self._number = node, topic.number
 
     def meet(self, deadline: float) -> None:
-        """Nothing to wait for."""
+        """Do nothing: there is nobody to wait for."""
 
     def send(self, message: bytes) -> None:
-        """Into the node's queue."""
+        """Put the message's fragments into the node's queue."""
         self._node.send(self._number, message)
 
 
@@ -182,7 +182,7 @@ def put(sock: socket.socket, datagram: bytes, to: tuple[str, int] | None = None)
 
 
 def drain(sock: socket.socket, join: Join, hear: Hear) -> None:
-    """All that has come."""
+    """Hand over all messages that have come."""
     while True:
         try:
             datagram = sock.recv(1 << 16)

@@ -128,7 +128,7 @@ def cut_nimbro(message: bytes, number: int, topic: bytes) -> list[bytes]:
 
 
 class NimbroJoin:
-    """Fragments in any order."""
+    """Joins nimbro_network's fragments, which come in any order."""
 
     def __init__(self) -> None:
         self.under_way: dict[int, dict[int, bytes]] = {}
@@ -157,7 +157,7 @@ def cut_pound(message: bytes, number: int, priority: int, port: int) -> list[byt
 
 
 class PoundJoin:
-    """Fragments in any order."""
+    """Joins Pound's fragments, which come in any order."""
 
     def __init__(self) -> None:
         self.under_way: dict[int, dict[int, bytes]] = {}

@@ -69,7 +69,7 @@ class Zenoh:
             self._hear(message, at)
 
     def close(self) -> None:
-        """Close the session."""
+        """Close the session with the other end."""
         self._session.close()
 
     def _come_in(self, sample: Any) -> None:  # noqa: ANN401

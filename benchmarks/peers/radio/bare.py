@@ -71,7 +71,7 @@ class _Counting:
         self.lost = 0
 
     def run(self, seconds: float) -> None:
-        """Until then."""
+        """Receive for so many seconds, and count what is missing."""
         stream = self._handle.open_stream(RX, 0, "CF32", {})
         into = np.zeros(self._chunk, np.complex64)
         stream.activate()

@@ -37,7 +37,7 @@ def cpu_pct(device, rate_hz, seconds):
 
 
 def main():
-    """Each rate after another."""
+    """Print the figure of each rate, one after the other."""
     device, seconds = sys.argv[1], float(sys.argv[2])
     print(*(cpu_pct(device, float(each), seconds) for each in sys.argv[3:]))
 
