@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import absent, phy_speed, report
+from benchmarks import absent, environments, phy_speed, report
 from benchmarks.absent import PeerError, attempt
 from benchmarks.latency import rows
 from benchmarks.peers.modems import gnu_radio
@@ -141,6 +141,18 @@ def test_a_peer_that_fails_in_its_second_pass_keeps_its_first(monkeypatch, capsy
         "not measured: mavlink: pip install: no network\n"
         "not measured: xrce: fcu has ended: not a word, exit code 1\n"
     )
+
+
+def test_a_peer_whose_environment_cannot_be_made_is_left_out(monkeypatch, capsys, tmp_path):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    # What is known of this machine's own environments stays known to other tests.
+    monkeypatch.setattr(environments, "_lacking", environments._lacking.__wrapped__)
+    assert rows.sessions(1, 1.0, 1, of=("mavlink", "mavros")) == {}
+    mavlink, mavros = capsys.readouterr().err.splitlines()
+    assert mavlink.startswith("not measured: mavlink: ")
+    assert mavros.startswith("not measured: mavros: ")
+    assert "Not a directory" in mavlink
 
 
 def test_peers_of_pound_go_on_without_one(capsys):
