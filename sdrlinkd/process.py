@@ -35,7 +35,7 @@ def module(name: str, *arguments: object) -> list[str]:
 class Process:
     """A program that runs by itself once started; what it says is kept, and shown when it fails.
 
-    `log` is a file that all it says is added to; without one, output and errors are kept apart. It
+    `log` is a file for all that it says; without one, output and errors are kept apart. It
     ends with us, also when we are killed, where it calls `end_with_parent` or reads its input.
     Ctrl-C does not reach it: that is ours to pass on, in the right order. Without a `session` of
     its own, a scheduler that groups by sessions weighs it as one of ours; so it is where time is
@@ -70,6 +70,7 @@ class Process:
             self._output = self._errors = self._kept(self._log_path)
             if self._log_path is None:
                 self._errors = self._kept(None)
+                self._read_to = 0
             given = os.environ if self._environment is None else self._environment
             self._process = subprocess.Popen(
                 self._command,
@@ -187,7 +188,9 @@ class Process:
     def _kept(self, path: Path | None) -> int:
         """A file to write to and to read from, for as long as this object is there."""
         if path is not None:
-            file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+            # What it said before it was started again stays.
+            begin = os.O_TRUNC if self._process is None else 0
+            file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | begin, 0o644)
         else:
             file, name = tempfile.mkstemp(prefix="sdrlinkd-said-")
             Path(name).unlink()

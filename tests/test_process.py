@@ -39,6 +39,15 @@ def test_all_that_it_says_is_in_its_log(tmp_path):
     assert process.log() == process.out() == (tmp_path / "log").read_text() == "1\n2\n"
 
 
+def test_a_log_begins_anew_with_a_process_and_goes_on_when_it_is_started_again(tmp_path):
+    (tmp_path / "log").write_text("of another one\n")
+    process = program("print(1)", log=tmp_path / "log")
+    for said in ("1\n", "1\n1\n"):
+        with process:
+            process.wait()
+        assert process.log() == said
+
+
 def test_what_it_is_told_it_reads_and_the_end_of_its_input_too():
     with program("print(*(line.strip() for line in sys.stdin))") as process:
         process.tell("a")
