@@ -66,15 +66,7 @@ format: $(DEV_STAMP)
 	$(BIN)/ruff check --fix .
 
 bench: $(DEV_STAMP)
-	$(BIN)/python -m benchmarks.bus
-	$(BIN)/python -m benchmarks.modem_path
-	$(BIN)/python -m benchmarks.phy_per
-	$(BIN)/python -m benchmarks.phy_speed
-	$(BIN)/python -m benchmarks.access
-	$(BIN)/python -m benchmarks.ether
-	$(BIN)/python -m benchmarks.radio
-	$(BIN)/python -m benchmarks.flowgraphs
-	$(BIN)/python -m benchmarks.pound
+	$(BIN)/python -m benchmarks
 
 system-packages:
 	@sh etc/install-apt-packages.sh

@@ -10,9 +10,10 @@ import numpy as np
 import phy
 from backends import AirParams, RadioParams
 from benchmarks.report import Row, main
-from benchmarks.shared_air import DATA, STOP, poisson, run
+from benchmarks.worlds.arrivals import poisson
+from benchmarks.worlds.samples import DATA, STOP, run
 from sdrlinkd.config import ModemParams
-from sdrlinkd.link import AccessParams
+from sdrlinkd.link import AccessParams, Overrides, Qos
 
 RATE_HZ = 5e6
 MCS = 3
@@ -23,6 +24,7 @@ SNR_DB = 25.0
 NODES = 2
 STOPS_PER_S = 10.0
 STOP_SIZE = 16
+URGENT = Overrides(qos=Qos.URGENT)
 SETTLE_S = 1.5
 AIRTIME_S = phy.layout(phy.OFDM_64_16, MCS, 1, PDU_SIZE).n_samples / RATE_HZ
 
@@ -54,7 +56,7 @@ class Result(NamedTuple):
 
     @property
     def pdr(self) -> float:
-        """Delivered over sent."""
+        """Messages delivered over messages sent."""
         return self.received / self.sent
 
 
@@ -123,7 +125,9 @@ def simulate(case: Case, duration_s: float, seed: int) -> Result:
         node: sorted(
             [
                 *poisson(rng, DATA, case.load / AIRTIME_S, MESSAGE, duration_s),
-                *poisson(rng, STOP, STOPS_PER_S * (node <= case.stopping), STOP_SIZE, duration_s),
+                *poisson(
+                    rng, STOP, STOPS_PER_S * (node <= case.stopping), STOP_SIZE, duration_s, URGENT
+                ),
             ]
         )
         for node in radios

@@ -40,7 +40,7 @@ class _Counted:
         overrides: Overrides = AS_CONFIGURED,
         published_ns: int | None = None,  # noqa: ARG002  # producers here do not say
     ) -> None:
-        """Queue a message."""
+        """Queue a message, and count it."""
         self._link.submit(topic_id, payload, time.monotonic(), overrides)
         self.count += 1
         if self.count == self._expected:

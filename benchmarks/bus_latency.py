@@ -1,7 +1,5 @@
 """How long a message takes from a producer through one daemon to a consumer."""
 
-import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -11,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import zmq
 
+from benchmarks.daemons import daemon_at_work
 from benchmarks.report import Row
 from sdrlinkd.client import Publisher, Subscriber
 
@@ -37,22 +36,16 @@ def _through_daemon(messages: int) -> list[float]:
         (directory / "registry.csv").write_text("odom,nav_msgs/Odometry\n")
         config = directory / "sdrlinkd.toml"
         config.write_text(f'[bus]\nruntime_dir = "{folder}"\n')
-        daemon = subprocess.Popen(
-            [sys.executable, "-m", "sdrlinkd", "--config", str(config), "--log-level", "error"]
-        )
-        try:
-            with (
-                Subscriber("/rx_robot_1/odom", runtime_dir=folder, timeout_s=30) as subscriber,
-                Publisher(folder) as publisher,
-            ):
-                return _paced(
-                    messages,
-                    lambda: publisher.send("/robot_1/odom", PAYLOAD),
-                    lambda: subscriber.receive(5) is not None,
-                )
-        finally:
-            daemon.terminate()
-            daemon.wait()
+        with (
+            daemon_at_work(config) as runtime_dir,
+            Subscriber("/rx_robot_1/odom", runtime_dir=runtime_dir) as subscriber,
+            Publisher(runtime_dir) as publisher,
+        ):
+            return _paced(
+                messages,
+                lambda: publisher.send("/robot_1/odom", PAYLOAD),
+                lambda: subscriber.receive(5) is not None,
+            )
 
 
 def _through_forwarder(messages: int) -> list[float]:

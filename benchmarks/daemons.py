@@ -1,16 +1,19 @@
 """Daemons of a benchmark, and the hub of their air, as programs of their own."""
 
-import time
+import contextlib
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from benchmarks.processes import Child, PeerError
+from benchmarks import processes
+from benchmarks.absent import PeerError
 from sdrlinkd.client import ControlClient, NoDaemonError
+from sdrlinkd.process import Process, ProcessError, wait_until
 
 START_S = 90.0
+LOOK_S = 0.2
 QUIET = ("--log-level", "warning")
 TYPE = "std_msgs/UInt8MultiArray"
 TYPES = {"odom": "nav_msgs/Odometry"}
@@ -31,7 +34,7 @@ class Running(NamedTuple):
 
     folders: dict[int, Path]
     air: Path
-    children: list[Child]
+    processes: list[Process]
 
 
 def hears_one(daemon: ControlClient) -> bool:
@@ -40,7 +43,7 @@ def hears_one(daemon: ControlClient) -> bool:
 
 
 def is_up(daemon: ControlClient) -> bool:
-    """Whether its radio works."""
+    """Whether the radio of this daemon works."""
     return bool(daemon.ask("status")["carrier"]["state"] == "up")
 
 
@@ -75,32 +78,44 @@ def running(
             text = DAEMON.format(robot=robot, folder=folder, backend=backend) + config
             path.write_text(text + (own or {}).get(robot, ""))
             programs[f"daemon_{robot}"] = ("sdrlinkd", "--config", str(path), *QUIET)
-        children = []
+        started = []
         for program, arguments in programs.items():
-            children.append(stack.enter_context(Child(program, *arguments)))
+            started.append(processes.start_module(stack, program, *arguments))
             if precede:
-                children[-1].precede(real_time=False)
+                processes.precede(started[-1], real_time=False)
         folders = {robot: folder / str(robot) for robot in robots}
-        _wait_for(folders, children, ready)
-        yield Running(folders, folder / "air", children)
+        _wait_for(folders, started, ready)
+        yield Running(folders, folder / "air", started)
+
+
+@contextmanager
+def daemon_at_work(config: Path) -> Iterator[Path]:
+    """One daemon, once its link is up; `config` has its sockets beside it. Raises PeerError."""
+    with ExitStack() as stack:
+        daemon = processes.start_module(
+            stack, "daemon", "sdrlinkd", "--config", str(config), *QUIET
+        )
+        _wait_for({1: config.parent}, [daemon], is_up)
+        yield config.parent
 
 
 def _wait_for(
-    folders: dict[int, Path], children: list[Child], ready: Callable[[ControlClient], bool]
+    folders: dict[int, Path], started: list[Process], ready: Callable[[ControlClient], bool]
 ) -> None:
-    until = time.monotonic() + START_S
     waiting = list(folders.values())
-    while time.monotonic() < until and not any(child.has_ended for child in children):
-        try:
+
+    def are_ready() -> bool:
+        # One after the other: none goes back.
+        with contextlib.suppress(NoDaemonError, OSError):
             while waiting:
                 with ControlClient(waiting[-1]) as control:
                     if not ready(control):
                         break
                 waiting.pop()
-            else:
-                return
-        except (NoDaemonError, OSError):
-            pass
-        time.sleep(0.2)
-    words = "\n".join(f"{child.name}: {child.words()}" for child in children)
-    raise PeerError(f"the daemons do not get ready; {words}")
+        return not waiting
+
+    try:
+        wait_until(are_ready, START_S, *started, every_s=LOOK_S)
+    except ProcessError:
+        words = "\n".join(f"{each.name}: {each.log().strip()}" for each in started)
+        raise PeerError(f"the daemons do not get ready; {words}") from None

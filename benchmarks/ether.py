@@ -21,14 +21,14 @@ class Speed:
         self._last = (0.0, 0.0)
 
     def __call__(self, state: LabState) -> None:
-        """Look."""
+        """Note how far the air is by now."""
         if state.now_s < state.until_s and state.now_s > 0:
             self._last = (time.monotonic(), state.now_s)
             self._first = self._first or self._last
 
     @property
     def ratio(self) -> float:
-        """1: real time."""
+        """Seconds of the air in one of the clock; 1 is real time."""
         if self._first is None or self._last == self._first:
             return 0.0
         return (self._last[1] - self._first[1]) / (self._last[0] - self._first[0])

@@ -5,7 +5,6 @@ of a lone PDU; the pace is that of many with eight under way.
 """
 
 import argparse
-import subprocess
 import sys
 import tempfile
 import time
@@ -17,8 +16,10 @@ from typing import NamedTuple
 
 import zmq
 
+from benchmarks.absent import PeerError, attempt
 from benchmarks.report import Row, main
 from sdrlinkd.pdulink import from_gnu_radio, to_gnu_radio
+from sdrlinkd.process import Process
 
 PYTHON = "/usr/bin/python3"
 FLOWGRAPHS = Path(__file__).parents[1] / "etc" / "gnuradio"
@@ -33,7 +34,7 @@ PATIENCE_MS = 3000
 
 
 class Ends(NamedTuple):
-    """The daemon's sockets."""
+    """The sockets at which a daemon would be."""
 
     out: "zmq.Socket[bytes]"
     back: "zmq.Socket[bytes]"
@@ -52,24 +53,18 @@ def _running(command: tuple[str, ...], size: int) -> Iterator[Ends]:
     with tempfile.TemporaryDirectory() as folder, zmq.Context() as context:
         send, receive = f"ipc://{folder}/send", f"ipc://{folder}/receive"
         name, *options = command
-        process = subprocess.Popen(
-            [PYTHON, str(FLOWGRAPHS / f"{name}.py"), *options, "--pdu-size", str(size),
-             "--snr-db", "25", "--loop", send, receive],
-            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
-        )  # fmt: skip
-        try:
-            if process.stdout is None or process.stdout.readline().strip() != "ready":
-                sys.exit("needs GNU Radio 3.10 (Debian: gnuradio)")
+        words = [
+            PYTHON, str(FLOWGRAPHS / f"{name}.py"), *options, "--pdu-size", str(size),
+            "--snr-db", "25", "--loop", send, receive,
+        ]  # fmt: skip
+        with Process(words, name=name, session=False) as flowgraph:
+            if (said := flowgraph.line()) != "ready":
+                raise PeerError(f"{name} says {said!r}")
             with context.socket(zmq.PUSH) as out, context.socket(zmq.PULL) as back:
                 out.setsockopt(zmq.LINGER, 0)
                 out.bind(send)
                 back.connect(receive)
                 yield Ends(out, back)
-        finally:
-            process.terminate()
-            process.wait()
-            if process.stdout is not None:
-                process.stdout.close()
 
 
 def _pass(ends: Ends, pdus: list[bytes], under_way: int) -> Told:
@@ -109,11 +104,14 @@ def _rows(name: str, size: int, n: int, rng: Random) -> list[Row]:
     ]
 
 
-def measure(seed: int, quick: bool) -> list[Row]:
-    """All modems and sizes."""
+def measure(seed: int, quick: bool) -> Iterator[Row]:
+    """The rows of all modems and sizes."""
     rng = Random(seed)
     n = 20 if quick else 400
-    return [row for name in PHYS for size in SIZES for row in _rows(name, size, n, rng)]
+    for name in PHYS:
+        with attempt(f"{name} (Debian: gnuradio)"):
+            for size in SIZES:
+                yield from _rows(name, size, n, rng)
 
 
 if __name__ == "__main__":

@@ -1,17 +1,17 @@
 """The modem in a daemon: latency in real time, and how much faster than real time it works."""
 
-import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 
 import phy
+from benchmarks.daemons import daemon_at_work
 from benchmarks.report import Row, main
-from sdrlinkd.client import ControlClient, Publisher, Subscriber
+from sdrlinkd.client import Publisher, Subscriber
 
 RATE_HZ = 5e6
 MCS = 1
@@ -23,14 +23,12 @@ SNR_DB = 15.0
 CLOCK_PPM = 10.0
 
 
-def measure(seed: int, quick: bool) -> list[Row]:
+def measure(seed: int, quick: bool) -> Iterator[Row]:
     """All rows; `quick` takes about a tenth of the trials."""
     phy.warm_up()
-    return [
-        *latency_rows(seed, 40 if quick else 600),
-        rx_row(seed, 15 if quick else 150),
-        tx_row(seed, 15 if quick else 150),
-    ]
+    yield from latency_rows(seed, 40 if quick else 600)
+    yield rx_row(seed, 15 if quick else 150)
+    yield tx_row(seed, 15 if quick else 150)
 
 
 def latency_rows(seed: int, messages: int) -> list[Row]:
@@ -94,25 +92,12 @@ def _latencies(seed: int, messages: int, backend: str) -> list[float]:
             f"[modem]\nrate_hz = {RATE_HZ}\nmcs = {MCS}\n"
             f"[channel]\nsnr_db = {SNR_DB}\nclock_ppm = {CLOCK_PPM}\n"
         )
-        daemon = subprocess.Popen(
-            [sys.executable, "-m", "sdrlinkd", "--config", str(config), "--log-level", "error"]
-        )
-        try:
-            with (
-                Subscriber("/rx_robot_1/odom", runtime_dir=folder, timeout_s=120) as subscriber,
-                Publisher(folder) as publisher,
-            ):
-                _wait_until_up(directory)
-                return _paced(publisher, subscriber, messages)
-        finally:
-            daemon.terminate()
-            daemon.wait()
-
-
-def _wait_until_up(directory: Path) -> None:
-    with ControlClient(directory) as control:
-        while control.ask("status")["carrier"]["state"] != "up":
-            time.sleep(0.05)
+        with (
+            daemon_at_work(config) as runtime_dir,
+            Subscriber("/rx_robot_1/odom", runtime_dir=runtime_dir) as subscriber,
+            Publisher(runtime_dir) as publisher,
+        ):
+            return _paced(publisher, subscriber, messages)
 
 
 def _paced(publisher: Publisher, subscriber: Subscriber, messages: int) -> list[float]:

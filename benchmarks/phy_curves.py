@@ -21,7 +21,7 @@ BOUNDS = (0.5, 0.1, 0.01, 0.001)
 
 
 def main() -> int:
-    """Measure and draw."""
+    """Measure all curves, and draw them."""
     figure, axes = plt.subplots(figsize=(10, 5))
     for mcs in MCS_TABLE:
         colour = f"C{mcs.index}"

@@ -6,7 +6,7 @@ SNR is a burst's mean power over the noise power in the sample band. "impaired":
 
 import argparse
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -14,8 +14,9 @@ from pathlib import Path
 import numpy as np
 
 from backends import RecordingReader, describe
+from benchmarks.absent import attempt
 from benchmarks.bound import needed_es_n0_db
-from benchmarks.peers import GnuRadio, Liquid
+from benchmarks.peers.modems import GnuRadio, Liquid
 from benchmarks.report import Row, main
 from benchmarks.trials import Air, ErrorRate, bursts, error_rate, needed_snr_db
 from phy import MCS_TABLE, OFDM_64_16, FrontEnd, FrontEndParams, PduHeard, Receiver, layout
@@ -37,20 +38,22 @@ _KNEES = (
 )
 
 
-def measure(seed: int, quick: bool, recordings: Path | None = None) -> list[Row]:
+def measure(seed: int, quick: bool, recordings: Path | None = None) -> Iterator[Row]:
     """All rows; that of recordings where there are any."""
     n = 500 if quick else 10_000
-    rows = [_knee(*knee, seed, n) for knee in _KNEES]
-    rows[0].peers |= _peers_at_64_bytes(seed, 60 if quick else 1000)
-    return [
-        *rows,
-        _tdl_a(seed, n),
-        _gap_to_bound(seed, n),
-        _headers(seed, n),
-        _doppler(seed, n // 10),
-        _false_pdus(seed, 10**6 if quick else 10**9),
-        *([false_pdus_in(recordings)] if recordings else []),
-    ]
+    peers = _peers_at_64_bytes(seed, 60 if quick else 1000)
+    for knee in _KNEES:
+        row = _knee(*knee, seed, n)
+        row.peers |= peers
+        yield row
+        peers = {}  # They are measured at the first knee only.
+    yield _tdl_a(seed, n)
+    yield _gap_to_bound(seed, n)
+    yield _headers(seed, n)
+    yield _doppler(seed, n // 10)
+    yield _false_pdus(seed, 10**6 if quick else 10**9)
+    if recordings:
+        yield false_pdus_in(recordings)
 
 
 def _knee(name: str, mcs: int, n_bytes: int, target_db: float, seed: int, n: int) -> Row:
@@ -75,11 +78,11 @@ def _peers_at_64_bytes(seed: int, n: int) -> dict[str, float]:
     """Where others lose 1 % of 64 B on QPSK; their carriers are off, nothing else is."""
     found: dict[str, float] = {}
     liquid, gnuradio = Liquid(), GnuRadio()
-    if liquid.is_there:
+    with attempt(liquid.name):
         for code, guess_db in (("none", 11.0), ("g2412", 7.0)):
             lost = partial(liquid.errors, code, 2, 64)
             found[f"{liquid.name} {code}"] = _peer_knee(lost, guess_db, seed, n)
-    if gnuradio.is_there:
+    with attempt(gnuradio.name):
         lost = partial(gnuradio.errors, 2, 64)
         found[f"{gnuradio.name} uncoded"] = _peer_knee(lost, 18.5, seed, n)
     return found
@@ -136,7 +139,7 @@ def _headers(seed: int, n: int) -> Row:
     receiver.flush()
     row = Row("header_ok_at_-2db", receiver.counters["bursts"] / n, "share", 0.98, "more", n)
     liquid = Liquid()
-    if liquid.is_there:
+    with attempt(liquid.name):
         row.peers[f"{liquid.name} at -1 dB"] = liquid.headers(-1.0, 500, seed) / 500
     return row
 

@@ -7,13 +7,14 @@ did on the machine that the targets were set on.
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.peers import GnuRadio, Liquid
+from benchmarks.absent import attempt
+from benchmarks.peers.modems import GnuRadio, Liquid
 from benchmarks.report import Row, main
 from phy import MCS_TABLE, FrontEnd, FrontEndParams, Receiver, Transmitter
 
@@ -46,29 +47,27 @@ class _Peers:
         return here[way] / _LIQUID_THERE[bits, n_bytes][way] if here else None
 
 
-def measure(seed: int, quick: bool) -> list[Row]:
-    """All rows."""
+def measure(seed: int, quick: bool) -> Iterator[Row]:
+    """The rows of receiver, transmitter and latency."""
     rounds = 3 if quick else 20
     peers = _measure_peers(seed)
-    return [
-        _search("search_msps_noise", 200.0, _noise(seed), rounds, peers),
-        _search("search_msps_gfsk_+20db", 40.0, _neighbours(seed), rounds, peers),
-        _receive("rx_msps_16x220B_qpsk12", QPSK12, 16, 220, 80.0, seed, rounds, peers),
-        _receive("rx_msps_16x220B_64qam34", QAM64_34, 16, 220, 35.0, seed, rounds, peers),
-        _receive("rx_msps_1x64B_qpsk12", QPSK12, 1, 64, 30.0, seed, rounds, peers),
-        _transmit(seed, rounds, peers),
-        _latency(seed, 20 * rounds, peers),
-    ]
+    yield _search("search_msps_noise", 200.0, _noise(seed), rounds, peers)
+    yield _search("search_msps_gfsk_+20db", 40.0, _neighbours(seed), rounds, peers)
+    yield _receive("rx_msps_16x220B_qpsk12", QPSK12, 16, 220, 80.0, seed, rounds, peers)
+    yield _receive("rx_msps_16x220B_64qam34", QAM64_34, 16, 220, 35.0, seed, rounds, peers)
+    yield _receive("rx_msps_1x64B_qpsk12", QPSK12, 1, 64, 30.0, seed, rounds, peers)
+    yield _transmit(seed, rounds, peers)
+    yield _latency(seed, 20 * rounds, peers)
 
 
 def _measure_peers(seed: int) -> _Peers:
     liquid, gnuradio = Liquid(), GnuRadio()
     peers = _Peers({}, {}, {})
-    if liquid.is_there:
+    with attempt(liquid.name):
         for bits, n_bytes in _LIQUID_THERE:
             peers.liquid[bits, n_bytes] = liquid.speed("none", bits, n_bytes)
         peers.noise[liquid.name] = liquid.noise_msps(10**7, seed)
-    if gnuradio.is_there:
+    with attempt(gnuradio.name):
         for n_bytes in (64, 220):
             peers.gnuradio[2, n_bytes] = gnuradio.speed(2, n_bytes, 1000, seed)
         peers.noise[gnuradio.name] = gnuradio.noise_msps(2 * 10**6, seed)

@@ -9,7 +9,7 @@ class Notifier:
 
     def __init__(self) -> None:
         address = os.environ.pop("NOTIFY_SOCKET", "")
-        # An abstract socket's name begins with NUL, which the environment spells "@".
+        # An abstract socket's name begins with NUL, which the environment tx_windows "@".
         self._address = "\0" + address[1:] if address.startswith("@") else address
         interval_us = os.environ.pop("WATCHDOG_USEC", "")
         for_us = os.environ.pop("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())

@@ -1,6 +1,7 @@
 """The benchmarks run and print their rows; how fast a machine is, is not a test's business."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 
 from benchmarks.phy_per import false_pdus_in
 from phy import Transmitter
+from sdrlinkd.cli.benchmarks import BENCHMARKS
 from tests.pdulink.gnu_radio import no_gnu_radio
 from tests.soapy_loopback import missing as no_test_radio
 
@@ -126,7 +128,27 @@ ROWS = {
         "lockstep_8nodes_1msps_realtime_ratio",
         "realtime_2nodes_5msps_lost_blocks",
     },
-}
+    "latency": {
+        *(
+            f"{way}_115B_200hz_{what}_ms_{to}"
+            for way in ("direct", "ether") for what in ("mean", "std") for to in ("fwd", "bwd")
+        ),
+        "direct_cpu_share",
+        "direct_rss_mib",
+        "ether_115B_200hz_beyond_air_mean_ms",
+        "ether_115B_200hz_beyond_air_p99_ms",
+        "ether_115B_200hz_lockstep_std_ms",
+        "age_rms_us_lockstep",
+        "e2e_offset_rms_us_5hz",
+        "e2e_offset_rms_us_50hz",
+        "age_rms_us_realtime",
+        "control_airtime_pct_5nodes",
+        "control_airtime_pct_5nodes_1msps",
+        "direct_under_stress_mean_ms",
+        "direct_topics_at_once_mean_ms",
+        "loop_error_corrected_ratio",
+    },
+}  # fmt: skip
 
 
 # Those of recordings that are not everywhere.
@@ -134,7 +156,27 @@ OPTIONAL = {"ptp_over_wifi_strays_ms"}
 # Why one cannot run here, if so.
 LACKING = {"radio": no_test_radio, "flowgraphs": no_gnu_radio}
 # Peers take their time, and a machine of their own to themselves.
-MORE = {"pound": ("--no-peers",)}
+MORE = {"pound": ("--no-peers",), "latency": ("--no-peers",)}
+
+
+def modules_that_run():
+    """All below `benchmarks` that are called by name, but for the ends of peers."""
+    for path in sorted((ROOT / "benchmarks").rglob("*.py")):
+        name = path.relative_to(ROOT / "benchmarks").with_suffix("").as_posix().replace("/", ".")
+        if name.endswith("__main__"):
+            yield name.removesuffix("__main__").removesuffix(".")
+        elif '__name__ == "__main__"' in path.read_text() and not name.startswith("peers."):
+            yield name
+
+
+def test_every_benchmark_is_in_the_list():
+    """The one that `make bench` and `sdrlinkctl bench` go by; "" runs them all."""
+    assert {*modules_that_run()} - {""} == set(BENCHMARKS)
+    assert set(ROWS) == {name for name, each in BENCHMARKS.items() if each.has_rows}
+    texts = [path.read_text() for path in (ROOT / "benchmarks").rglob("*.py")]
+    printing = [name for text in texts for name in re.findall(r'main\("(\w+)", measure', text)]
+    assert sorted(ROWS) == sorted(printing)
+    assert set(LACKING) == {name for name in ROWS if BENCHMARKS[name].needs}
 
 
 @pytest.mark.slow

@@ -1,12 +1,7 @@
-"""Other processes: waiting for them to get somewhere, and none of them outlives its test."""
+"""Waiting for what has no event of its own."""
 
-import contextlib
-import os
-import signal
-import subprocess
 import time
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable
 
 
 def wait_for(condition: Callable[[], bool], timeout_s: float = 20.0) -> None:
@@ -15,14 +10,3 @@ def wait_for(condition: Callable[[], bool], timeout_s: float = 20.0) -> None:
     while not condition():
         assert time.monotonic() < deadline, "waited in vain"
         time.sleep(0.01)
-
-
-@contextlib.contextmanager
-def group(command: list[Any], **options: Any) -> Iterator[subprocess.Popen[Any]]:
-    """A process and all that it starts, killed together when the `with` ends."""
-    with subprocess.Popen(command, start_new_session=True, **options) as process:
-        try:
-            yield process
-        finally:
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from backends import AirParams, RadioParams, World
+from benchmarks.worlds.arrivals import Arrival
+from benchmarks.worlds.bursts import Simulation
 from sdrlinkd.config import ModemParams
-from sdrlinkd.lab import Arrival, Simulation
 from sdrlinkd.link import (
     AccessParams,
     ClockParams,

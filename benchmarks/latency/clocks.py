@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.latency.daemons import Air, running
+from benchmarks.peers.latency.daemons import Air, running
 from sdrlinkd.client import ControlClient, Publisher, Subscriber
 
 AIR = Air(rate_hz=1e6, mcs=1, pdu_size=512, share=0.5)
@@ -23,7 +23,7 @@ _AT = struct.Struct("<q")
 
 
 class Found(NamedTuple):
-    """Errors in s."""
+    """Errors of clocks and ages, in s."""
 
     offsets_s: np.ndarray
     ages_s: np.ndarray

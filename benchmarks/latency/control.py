@@ -7,7 +7,7 @@ it computes from the age where the plant is by now, and will be when its answer 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.pound.peers.control import GAIN, PERIOD_S, SETPOINT, local_loop, plant
+from benchmarks.peers.pound.control import GAIN, PERIOD_S, SETPOINT, local_loop, plant
 
 LEAST_S = 0.002
 

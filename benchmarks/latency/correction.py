@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.latency.clock import Clock
-from benchmarks.latency.job import Job
+from benchmarks.peers.latency.clock import Clock
+from benchmarks.peers.latency.job import Job
 from sdrlinkd.link import PaperFilter
 
 Seconds = NDArray[np.float64]

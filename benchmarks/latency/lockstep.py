@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from backends import AirParams, RadioParams
-from benchmarks import shared_air
-from benchmarks.latency.daemons import Air
-from benchmarks.shared_air import DATA, Arrival, Station
+from benchmarks.peers.latency.daemons import Air
+from benchmarks.worlds.arrivals import Arrival
+from benchmarks.worlds.samples import DATA, Station, play
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import AccessParams, ClockParams
 from sdrlinkd.modem import Airtimes
@@ -24,7 +24,7 @@ _AT = struct.Struct("<d")
 
 
 class LockStep(NamedTuple):
-    """In s."""
+    """Latencies and errors of ages, in s."""
 
     latencies_s: np.ndarray
     age_errors_s: np.ndarray
@@ -42,7 +42,7 @@ class _Stamped(Station):
         self.errors_s: list[float] = []
 
     def heard(self, pdus: Sequence[Heard]) -> None:
-        """PDUs from the air."""
+        """Take PDUs from the air, and note how late their messages are."""
         now = self.modem.now()
         for data, at, snr_db, ended_at in pdus:
             for message in self.link.hear(data, at, snr_db, now, ended_at):
@@ -91,4 +91,4 @@ async def _run(
             ClockParams(), pace=pace,
         )  # fmt: skip
 
-    return await shared_air.play(air, radios, make, seconds + 0.1, seed)
+    return await play(air, radios, make, seconds + 0.1, seed)

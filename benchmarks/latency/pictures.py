@@ -17,7 +17,7 @@ LONGEST_MS = 8.0
 
 
 def draw(found: dict[str, list[Session]]) -> None:
-    """All of them."""
+    """Draw all figures of this benchmark."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     for way, title in (("fwd", "odometry, companion to FCU"), ("bwd", "IMU, FCU to companion")):
         figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.6))

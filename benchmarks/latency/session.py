@@ -7,12 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.latency.clock import Clock
+from benchmarks.absent import PeerError
 from benchmarks.latency.correction import Direction, Seconds, Stamps, direction
-from benchmarks.latency.job import MOST_TOPICS, STAMP, Job
-from benchmarks.latency.peers.table import PEERS, unavailable
-from benchmarks.latency.peers.way import Way
-from benchmarks.processes import Child, PeerError, busy_cores
+from benchmarks.peers.latency.clock import Clock
+from benchmarks.peers.latency.job import MOST_TOPICS, STAMP, Job
+from benchmarks.peers.latency.table import PEERS, unavailable
+from benchmarks.peers.latency.way import Way
+from benchmarks.processes import busy_cores, precede, start_module, usage
+from sdrlinkd.process import Process
 
 START_S = 0.3
 """From both ends being ready to the start."""
@@ -22,7 +24,7 @@ CLOCKS = {"companion": Clock(0.0, 0.0), "fcu": Clock(3.7, 20.0)}
 
 
 class Session(NamedTuple):
-    """What came of it."""
+    """What came of one assessment."""
 
     forward: Direction
     """Companion computer to FCU."""
@@ -49,7 +51,7 @@ def run(
     seed: int = 1,
     warmup_s: float = WARMUP_S,
 ) -> Session:
-    """Measure a peer, for so long after the warm-up. Raises PeerError."""
+    """Measure a peer, for so long after the warm-up. Raises PeerError and ProcessError."""
     if (reason := unavailable(transport_name)) is not None:
         raise PeerError(f"{transport_name}: {reason}")
     if not 1 <= n_topics <= MOST_TOPICS or size <= STAMP.size:
@@ -71,7 +73,7 @@ def run(
             )
             for side, end in way.ends.items()
         }
-        ends = {side: stack.enter_context(_start(job, way)) for side, job in jobs.items()}
+        ends = {side: _start(stack, job, way) for side, job in jobs.items()}
         for end in ends.values():
             end.line()
         if stress:
@@ -79,24 +81,25 @@ def run(
         return _measure(way, jobs, ends)
 
 
-def _start(job: Job, way: Way) -> Child:
+def _start(stack: ExitStack, job: Job, way: Way) -> Process:
     environment = way.ends[job.side].environment
-    child = Child(job.side, "benchmarks.latency.endpoint", environment=environment)
-    child.precede(real_time=job.side == "fcu")
-    child.tell(job.to_json())
-    return child
+    module = "benchmarks.peers.latency.endpoint"
+    end = start_module(stack, job.side, module, environment=environment)
+    precede(end, real_time=job.side == "fcu")
+    end.tell(job.to_json())
+    return end
 
 
-def _measure(way: Way, jobs: dict[str, Job], ends: dict[str, Child]) -> Session:
+def _measure(way: Way, jobs: dict[str, Job], ends: dict[str, Process]) -> Session:
     companion, fcu = jobs["companion"], jobs["fcu"]
-    processes = ends | {child.name: child for child in way.between}
+    processes = ends | {each.name: each for each in way.between}
     start = time.monotonic() + START_S
     for end in ends.values():
         end.tell(repr(start))
     _sleep_until(start + companion.warmup_s)
-    before = {name: child.usage() for name, child in processes.items()}
+    before = {name: usage(each.pid) for name, each in processes.items()}
     _sleep_until(start + companion.warmup_s + companion.seconds)
-    after = {name: child.usage() for name, child in processes.items()}
+    after = {name: usage(each.pid) for name, each in processes.items()}
     told = {side: _stamps(end.line()) for side, end in ends.items()}
     forward = direction(companion, fcu, told["fcu"])
     backward = direction(fcu, companion, told["companion"])
@@ -104,7 +107,7 @@ def _measure(way: Way, jobs: dict[str, Job], ends: dict[str, Child]) -> Session:
         forward,
         backward,
         {name: (after[name].cpu_s - before[name].cpu_s) / companion.seconds for name in processes},
-        {name: usage.rss_mib for name, usage in after.items()},
+        {name: taken.rss_mib for name, taken in after.items()},
         np.concatenate([forward.filter_error_s, backward.filter_error_s]),
         np.array(way.line_late_s()),
     )

@@ -1,6 +1,8 @@
-"""Other modems, measured in the same run where they are installed."""
+"""Other people's systems, measured beside ours in the same run.
 
-from benchmarks.peers.gnu_radio import GnuRadio
-from benchmarks.peers.liquid import Liquid
-
-__all__ = ["GnuRadio", "Liquid"]
+`pound` is what a robot team would use instead of our link; `latency` is what joins a companion
+computer to a flight controller; `modems` are other OFDM modems; `radio` is how others read a radio.
+Each room belongs to the benchmark of its name, `modems` to `phy_per` and `phy_speed`. A benchmark
+imports its peers; a peer imports no benchmark. Some ends run by another interpreter than ours:
+therefore this file needs nothing but the standard library.
+"""

@@ -5,19 +5,20 @@ A whole run, peers and all, draws its figures into docs/figures.
 
 import argparse
 import sys
+from collections.abc import Iterator
 
 import numpy as np
-from rich.console import Console
 
+from benchmarks.absent import attempt
 from benchmarks.pound import beside, limits, pictures, realtime, rows, tables
 from benchmarks.report import Row, main
 
 PHASES, QUICK_PHASES = 10, 2
 
 
-def measure(seed: int, quick: bool, no_peers: bool = False, figures: bool = False) -> list[Row]:
-    """All rows."""
-    peers = beside.Peers([], {}) if no_peers else beside.find(quick)
+def measure(seed: int, quick: bool, no_peers: bool = False, figures: bool = False) -> Iterator[Row]:
+    """The rows of all experiments of the paper."""
+    peers = [] if no_peers else beside.find(quick)
     n = tables.LASERS // 5 if quick else tables.LASERS
     flows = [
         [tables.flows(hops, tables.EXACT, seed, quick)[0]._replace(count=n),
@@ -33,22 +34,18 @@ def measure(seed: int, quick: bool, no_peers: bool = False, figures: bool = Fals
     two_hops = beside.tables(peers, flows[1], True, seed)
     mbps = beside.bandwidths(peers, sizes, 2.0 if quick else 4.0)
     loops = beside.loops(peers, phases)
-    made = [
-        *rows.two_nodes(seed, quick, one_hop),
-        *rows.three_nodes(seed, quick, two_hops),
-        *rows.bandwidth(seed, quick, mbps),
-        *rows.outage(seed, quick, {} if quick else beside.recoveries(peers)),
-        *rows.control_loop(seed, phases, loops),
-        *rows.urgent(seed, quick),
-        *rows.costs(seed, quick),
-        *rows.plan(seed, quick),
-        *realtime.rows(seed, quick),
-    ]
+    yield from rows.two_nodes(seed, quick, one_hop)
+    yield from rows.three_nodes(seed, quick, two_hops)
+    yield from rows.bandwidth(seed, quick, mbps)
+    yield from rows.outage(seed, quick, {} if quick else beside.recoveries(peers))
+    yield from rows.control_loop(seed, phases, loops)
+    yield from rows.urgent(seed, quick)
+    yield from rows.costs(seed, quick)
+    yield from rows.plan(seed, quick)
+    with attempt("daemons in real time"):
+        yield from realtime.rows(seed, quick)
     if figures or not (quick or no_peers):
         pictures.draw(seed, one_hop, mbps, loops, phases[len(phases) // 2])
-    for name, reason in peers.absent.items():
-        Console(stderr=True).print(f"not measured: {name}: {reason}", highlight=False)
-    return made
 
 
 if __name__ == "__main__":

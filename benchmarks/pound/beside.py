@@ -2,18 +2,18 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
-from benchmarks.pound.flows import Figures, Flow
-from benchmarks.pound.peers import PEERS, unavailable
-from benchmarks.pound.peers.control import control_loop, local_loop
-from benchmarks.pound.peers.ends import PeerError
-from benchmarks.pound.peers.namespaces import NetworkError, available, network
-from benchmarks.pound.peers.runs import outage, run_peer, saturate
+from benchmarks.absent import attempt, tell
+from benchmarks.flows import Figures, Flow
+from benchmarks.peers.pound import PEERS, unavailable
+from benchmarks.peers.pound.control import control_loop, local_loop
+from benchmarks.peers.pound.namespaces import available, network
+from benchmarks.peers.pound.runs import outage, run_peer, saturate
 from benchmarks.pound.tables import by_flow
 
 QUICK = ("tcp_nodelay", "udp", "pound_like")
@@ -24,25 +24,22 @@ LOOP_S = 3.0
 T = TypeVar("T")
 
 
-class Peers(NamedTuple):
-    """Whom we measure beside, and why not the others."""
-
-    names: list[str]
-    absent: dict[str, str]
-
-
-def find(quick: bool) -> Peers:
-    """All that can run here."""
-    reason = available()
-    if reason:
-        return Peers([], dict.fromkeys(PEERS, reason))
-    wanted = QUICK if quick else tuple(PEERS)
-    absent = {name: why for name in wanted if (why := unavailable(name))}
-    return Peers([name for name in wanted if name not in absent], absent)
+def find(quick: bool) -> list[str]:
+    """Those that can run here, by name; why not the others is told."""
+    if reason := available():
+        tell("the peers", reason)
+        return []
+    found = []
+    for name in QUICK if quick else PEERS:
+        if reason := unavailable(name):
+            tell(name, reason)
+        else:
+            found.append(name)
+    return found
 
 
 def tables(
-    peers: Peers, flows: Sequence[Flow], relay: bool, seed: int
+    peers: Sequence[str], flows: Sequence[Flow], relay: bool, seed: int
 ) -> dict[str, dict[str, Figures]]:
     """By peer and flow: Tables I to IV."""
 
@@ -53,21 +50,23 @@ def tables(
     return _each(peers, f"{'two hops' if relay else 'one hop'}", one)
 
 
-def bandwidths(peers: Peers, sizes: Sequence[int], seconds: float) -> dict[str, dict[int, float]]:
+def bandwidths(
+    peers: Sequence[str], sizes: Sequence[int], seconds: float
+) -> dict[str, dict[int, float]]:
     """By peer and size, in Mbit/s: Fig. 19."""
 
     def one(name: str) -> dict[int, float]:
         found = {}
         for size in sizes:
             # What is still on its way in one is no part of another.
-            with network() as on:
+            with attempt(f"{name}, bandwidth at {size} B"), network() as on:
                 found[size] = saturate(name, size, seconds, on)
         return found
 
     return _each(peers, "bandwidth", one)
 
 
-def recoveries(peers: Peers) -> dict[str, float]:
+def recoveries(peers: Sequence[str]) -> dict[str, float]:
     """By peer, in s, the later of two flows: Table V."""
 
     def one(name: str) -> float:
@@ -77,7 +76,7 @@ def recoveries(peers: Peers) -> dict[str, float]:
     return _each(peers, "outage", one)
 
 
-def loops(peers: Peers, phases: Sequence[float]) -> dict[str, float]:
+def loops(peers: Sequence[str], phases: Sequence[float]) -> dict[str, float]:
     """By peer, the mean RMS difference to the local run in mV: Fig. 21."""
     local = local_loop(round(LOOP_S / 0.02))
 
@@ -88,14 +87,12 @@ def loops(peers: Peers, phases: Sequence[float]) -> dict[str, float]:
     return _each(peers, "control loop", one)
 
 
-def _each(peers: Peers, what: str, one: Callable[[str], T]) -> dict[str, T]:
+def _each(peers: Sequence[str], what: str, one: Callable[[str], T]) -> dict[str, T]:
     found = {}
-    with _progress(what, len(peers.names)) as advance:
-        for name in peers.names:
-            try:
+    with _progress(what, len(peers)) as advance:
+        for name in peers:
+            with attempt(f"{name}, {what}"):
                 found[name] = one(name)
-            except (PeerError, NetworkError) as error:
-                peers.absent[f"{name}, {what}"] = str(error)
             advance()
     return found
 

@@ -15,7 +15,7 @@ MOST = 14
 
 
 def rows(seed: int, rounds: int) -> list[Row]:
-    """Both of them."""
+    """Both rows of what deciding costs."""
     over = [_over_crc_and_join(seed + i) for i in range(rounds)]
     return [
         queue_cost_row("scheduler_cost_ratio_10_to_10000_queued", seed, rounds),

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.pound.flows import Flow, Times, Trace
+from benchmarks.flows import Flow, Times, Trace
 from benchmarks.pound.ours import Air, Sent, prepare, run
 from sdrlinkd.link import TopicPolicy
 

@@ -9,8 +9,7 @@ import struct
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.pound.ours import CDR, Air, simulate
-from benchmarks.pound.peers.control import (
+from benchmarks.peers.pound.control import (
     GAIN,
     LARGE,
     LARGE_PERIOD_S,
@@ -20,8 +19,9 @@ from benchmarks.pound.peers.control import (
     local_loop,
     plant,
 )
+from benchmarks.pound.ours import CDR, Air, simulate
 from benchmarks.pound.tables import BLOCK_3N_S
-from sdrlinkd.lab import Arrival
+from benchmarks.worlds.arrivals import Arrival
 from sdrlinkd.link import (
     BulkParams,
     ClassesParams,

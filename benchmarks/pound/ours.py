@@ -8,9 +8,10 @@ import msgspec
 import numpy as np
 
 from backends import AirParams, LinkOverride, RadioParams, World
-from benchmarks.pound.flows import Flow, Times, Trace
+from benchmarks.flows import Flow, Times, Trace
+from benchmarks.worlds.arrivals import Arrival
+from benchmarks.worlds.bursts import Simulation
 from sdrlinkd.config import ModemParams
-from sdrlinkd.lab import Arrival, Simulation
 from sdrlinkd.link import (
     AccessParams,
     BulkParams,
@@ -64,7 +65,7 @@ class Air(NamedTuple):
 
 
 class Run(NamedTuple):
-    """What came of it."""
+    """What came of all flows."""
 
     traces: list[Trace]
     simulation: Simulation
@@ -91,7 +92,7 @@ class Experiment(NamedTuple):
 
 
 def by_class(flow: Flow) -> TopicPolicy:
-    """Every message counts."""
+    """A policy of the flow's class, by which every message counts."""
     return TopicPolicy(qos=flow.qos)  # type: ignore[arg-type]
 
 
@@ -131,7 +132,7 @@ def prepare(
 
 
 def modem_on(air: Air) -> ModemParams:
-    """Every robot has it."""
+    """The modem that every robot has."""
     return ModemParams(rate_hz=RATE_HZ, mcs=MCS, max_burst_s=air.max_burst_s, block_s=air.block_s)
 
 

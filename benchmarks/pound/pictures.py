@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.flows import Figures
+from benchmarks.peers.pound.control import local_loop
 from benchmarks.pound import limits, loop, tables
 from benchmarks.pound.beside import LOOP_S
-from benchmarks.pound.flows import Figures
-from benchmarks.pound.peers.control import local_loop
 
 FOLDER = Path(__file__).parents[2] / "docs/figures"
 
@@ -20,7 +20,7 @@ def draw(
     loops: Mapping[str, float],
     phase_s: float,
 ) -> None:
-    """Write docs/figures/pound_*.png."""
+    """Draw this benchmark's figures into docs/figures/pound_*.png."""
     import matplotlib.pyplot as plt
 
     FOLDER.mkdir(parents=True, exist_ok=True)

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from backends import HubWatch
-from benchmarks.pound.flows import Flow, Times, Trace, figures
+from benchmarks.flows import Flow, Times, Trace, figures
 from benchmarks.pound.limits import BULK_BYTES, FRESH_IMAGE_S, FRESH_S, OUTAGE_S, SLACK_RT_MS
 from benchmarks.pound.ours import CDR, MCS, PDU_SIZE, Air, modem_on
 from benchmarks.pound.programs import BULK_BURST_S, Ends, running

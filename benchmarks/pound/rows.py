@@ -5,8 +5,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from benchmarks.flows import Figures
 from benchmarks.pound import beside, cost, limits, loop, tables
-from benchmarks.pound.flows import Figures
 from benchmarks.pound.forecast import errors_pct
 from benchmarks.pound.ours import Air
 from benchmarks.report import Row
@@ -91,7 +91,7 @@ def bandwidth(seed: int, quick: bool, peers: Mapping[str, Mapping[int, float]]) 
 
 
 def outage(seed: int, quick: bool, peers: Mapping[str, float]) -> list[Row]:
-    """Table V."""
+    """The rows of Table V: recovery after an outage."""
     found = limits.recovery(seed, quick)
     worst = max(found.images_s)
     known = {name: seconds for name, seconds in peers.items() if not math.isnan(seconds)}
@@ -106,7 +106,7 @@ def outage(seed: int, quick: bool, peers: Mapping[str, float]) -> list[Row]:
 
 
 def control_loop(seed: int, phases: list[float], peers: Mapping[str, float]) -> list[Row]:
-    """Fig. 21."""
+    """The row of Fig. 21: a control loop beside other traffic."""
     seconds = beside.LOOP_S
     ours = [loop.rms_vs_local_mv(phase, seed + i, seconds) for i, phase in enumerate(phases)]
     fifo = [rms for name, rms in peers.items() if name in beside.FIFO]
@@ -128,7 +128,7 @@ def urgent(seed: int, quick: bool) -> list[Row]:
 
 
 def costs(seed: int, quick: bool) -> list[Row]:
-    """What deciding costs."""
+    """The rows of what deciding costs."""
     return cost.rows(seed, 5 if quick else 25)
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from backends import LinkOverride
-from benchmarks.pound.flows import Figures, Flow, Trace, figures
+from benchmarks.flows import Figures, Flow, Trace, figures
 from benchmarks.pound.ours import Air, Run, Sent, run
 
 LASERS = 1000
@@ -47,7 +47,7 @@ def flows(n_hops: int, case: Case, seed: int, quick: bool) -> tuple[Flow, Flow]:
 
 
 def two_nodes(seed: int, quick: bool, case: Case = EXACT) -> Run:
-    """Tables I and II."""
+    """The run of Tables I and II."""
     laser, image = flows(1, case, seed, quick)
     return run([Sent(laser, 1, 2), Sent(image, 1, 2)], Air(), seed)
 
@@ -69,7 +69,7 @@ def chain(n_nodes: int) -> Air:
 
 
 def three_nodes(seed: int, quick: bool, case: Case = EXACT) -> Run:
-    """Tables III and IV."""
+    """The run of Tables III and IV."""
     laser, image = flows(2, case, seed, quick)
     return run([Sent(laser, 1, 3), Sent(image, 1, 3)], chain(3), seed)
 
@@ -99,5 +99,5 @@ def opposing(seed: int, quick: bool) -> Run:
 
 
 def by_flow(traces: list[Trace]) -> dict[str, Figures]:
-    """A table's rows."""
+    """The rows of a table, by flow."""
     return {trace.flow.name: figures(trace) for trace in traces}

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.peers.radio import bare
 from benchmarks.processes import Stolen
-from benchmarks.radio import bare
 from benchmarks.radio.pair import ROBOTS, Look, pair
 from benchmarks.report import Row
 from sdrlinkd.client import ControlClient, Publisher, Subscriber
@@ -38,7 +38,7 @@ qos = "bulk"
 
 
 class Times(NamedTuple):
-    """At each rate."""
+    """How long is spent at each rate."""
 
     warm_up_s: float
     measured_s: float
@@ -59,7 +59,7 @@ class Span:
 
     @property
     def seconds(self) -> float:
-        """How long."""
+        """How long the span is."""
         return self.last.at - self.first.at
 
     def count(self, name: str) -> int:
@@ -76,7 +76,7 @@ class Span:
 
 
 def rows(seed: int, quick: bool) -> Iterator[Row]:
-    """Four of each rate."""
+    """The four rows of each rate."""
     times = QUICK if quick else WHOLE
     threads = bare.lost_in_threads(RATES_MSPS, times.peer_s)
     flowgraphs = {} if quick else bare.flowgraph_cpu_pct(RATES_MSPS, times.peer_s)

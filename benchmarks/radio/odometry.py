@@ -52,17 +52,17 @@ class Flow:
     heard: dict[bytes, int] = field(default_factory=dict)
 
     def latencies_ms(self) -> list[float]:
-        """Of those that came."""
+        """The latencies of the messages that came."""
         return [1e-6 * (self.heard[each] - at) for each, at in self.sent.items()
                 if each in self.heard]  # fmt: skip
 
     @property
     def is_complete(self) -> bool:
-        """Whether all came."""
+        """Whether all messages have come."""
         return self.sent.keys() <= self.heard.keys()
 
     def listen(self, ear: Subscriber, until: float) -> None:
-        """Note what comes."""
+        """Note what comes until that time."""
         while (left_s := until - time.monotonic()) > 0:
             message = ear.receive(left_s)
             if message is not None:

@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import daemons
-from benchmarks.processes import Child, PeerError
-from benchmarks.radio.driver import a_bus
+from benchmarks.absent import PeerError
+from benchmarks.loopback_radio import a_bus
+from benchmarks.processes import usage, usage_below
 from sdrlinkd.client import ControlClient
+from sdrlinkd.process import Process
 
 ROBOTS = (1, 2)
 CONFIG = """{tables}
@@ -32,7 +34,7 @@ class Look:
     cpu_s: dict[str, float]
 
     def counter(self, name: str) -> int:
-        """One of its carrier's."""
+        """The count of one of its carrier's counters."""
         return int(self.status["carrier"]["counters"][name])
 
 
@@ -41,17 +43,17 @@ class Pair:
     """Their sockets' folders and the daemons, by robot."""
 
     folders: dict[int, Path]
-    daemons: dict[int, Child]
+    daemons: dict[int, Process]
 
     def look(self, robot: int) -> Look:
         """As it is now. Raises PeerError when its radio process is not there."""
         daemon = self.daemons[robot]
         with ControlClient(self.folders[robot]) as control:
             status = control.ask("status")
-        radio = daemon.usage_below()
+        radio = usage_below(daemon.pid)
         if len(radio) != 1:
-            raise PeerError(f"{daemon.name} has {len(radio)} radio processes; {daemon.words()}")
-        cpu_s = {"daemon": daemon.usage().cpu_s, "radio_process": radio[0].cpu_s}
+            raise PeerError(f"{daemon.name} has {len(radio)} radio processes; {daemon.log()}")
+        cpu_s = {"daemon": usage(daemon.pid).cpu_s, "radio_process": radio[0].cpu_s}
         return Look(time.monotonic(), status, cpu_s)
 
 
@@ -72,4 +74,4 @@ def pair(
         with daemons.running(
             "soapy", ROBOTS, topics, config, "", own=own, ready=daemons.is_up
         ) as running:
-            yield Pair(running.folders, dict(zip(ROBOTS, running.children, strict=True)))
+            yield Pair(running.folders, dict(zip(ROBOTS, running.processes, strict=True)))

@@ -15,7 +15,7 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.radio.driver import NoDriverError, use_driver
+from benchmarks.loopback_radio import NoDriverError, use_driver
 from benchmarks.radio.pair import ROBOTS, Pair, pair
 from sdrlinkd.client import ControlClient, Publisher, Subscriber
 

@@ -1,4 +1,4 @@
-"""Print it."""
+"""Prints how the code is built."""
 
 from rich.console import Console
 
@@ -10,7 +10,7 @@ ROOMS = ("sdrlinkd", "sdrlinkd.link", "sdrlinkd.bus", "backends", "backends.soap
 
 
 def main() -> None:
-    """Tables for people."""
+    """Print the figures as tables for people."""
     console = screen_console()
     for with_beacon, beside in ((False, "between two beacons"), (True, "a beacon rides with it")):
         _print_trace(console, trace(with_beacon), f"one message of 724 B, {beside}")

@@ -4,6 +4,7 @@ A whole run draws docs/figures/timesync_*.png.
 """
 
 import sys
+from collections.abc import Iterator
 
 from benchmarks.report import Row, main
 from benchmarks.timesync import pictures, rows
@@ -11,23 +12,20 @@ from benchmarks.timesync import pictures, rows
 HZ = 5.0
 
 
-def measure(seed: int, quick: bool) -> list[Row]:
-    """All rows."""
+def measure(seed: int, quick: bool) -> Iterator[Row]:
+    """The rows of all filters and scenarios."""
     runs, stepped = (4, 1) if quick else (40, 8)
     held = rows.Tally()
     found = rows.precision(seed, runs, HZ, held)
-    told = [*rows.precision_rows(found, HZ)]
-    told.append(rows.steps(seed, stepped, HZ, held))
-    told += rows.hostile(seed, runs, HZ, held)
-    told.append(
-        Row("bound_holds_pct", held.percent, "%", 99.9, "more", held.all,
-            note="all scenarios, 5 s after steps left out")
-    )  # fmt: skip
-    told.append(rows.sample_clocks(seed, 15.0 if quick else 60.0))
-    told += rows.recorded()
+    yield from rows.precision_rows(found, HZ)
+    yield rows.steps(seed, stepped, HZ, held)
+    yield from rows.hostile(seed, runs, HZ, held)
+    yield Row("bound_holds_pct", held.percent, "%", 99.9, "more", held.all,
+              note="all scenarios, 5 s after steps left out")  # fmt: skip
+    yield rows.sample_clocks(seed, 15.0 if quick else 60.0)
+    yield from rows.recorded()
     if not quick:
         pictures.draw(found, HZ)
-    return told
 
 
 if __name__ == "__main__":

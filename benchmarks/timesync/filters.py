@@ -35,12 +35,12 @@ class Ours:
         self.envelope.solve(max(t1, t4 or t1))
 
     def offset(self, now: float) -> float | None:
-        """Extrapolated."""
+        """The last estimate, extrapolated to now."""
         found = self.envelope.estimate
         return None if found is None else found.offset(now)
 
     def bound(self, now: float) -> float:
-        """No error is larger."""
+        """A bound that no error exceeds."""
         found = self.envelope.estimate
         return float("inf") if found is None else found.bound(now)
 
@@ -52,7 +52,7 @@ class Paper:
         self.filter = PaperFilter()
 
     def take(self, exchange: Exchange) -> None:
-        """Whole exchanges only."""
+        """Take an exchange, if it is whole."""
         t1, t2, t3, t4 = exchange
         if t2 is not None and t3 is not None and t4 is not None:
             self.filter.update_four(1e6 * t1, 1e6 * t2, 1e6 * t3, 1e6 * t4)
@@ -66,7 +66,7 @@ class Px4(Paper):
     """Algorithm 3 with three stamps, as printed and as PX4 has it."""
 
     def take(self, exchange: Exchange) -> None:
-        """Whole exchanges only."""
+        """Take an exchange, if it is whole."""
         t1, t2, _, t4 = exchange
         if t2 is not None and t4 is not None:
             # Remote stamps count from a start long ago, so that none is negative.
@@ -88,7 +88,7 @@ class NtpLike:
         self._skew = 0.0
 
     def take(self, exchange: Exchange) -> None:
-        """Whole exchanges only."""
+        """Take an exchange, if it is whole."""
         t1, t2, t3, t4 = exchange
         if t2 is None or t3 is None or t4 is None:
             return
@@ -105,7 +105,7 @@ class NtpLike:
         self._at = at
 
     def offset(self, now: float) -> float | None:
-        """Extrapolated."""
+        """The last estimate, extrapolated to now."""
         return None if self._offset is None else self._offset + self._skew * (now - self._at)
 
 

@@ -1,4 +1,4 @@
-"""Figures of clock filters."""
+"""The pictures of how clock filters err."""
 
 from pathlib import Path
 

@@ -27,7 +27,7 @@ class Trace(NamedTuple):
 
 
 def traces() -> Iterator[Trace]:
-    """Those that are there."""
+    """The recordings that are on this machine."""
     for path in sorted(FOLDER.glob("ptp_log_*.csv")):
         rows, last = [], None
         with path.open() as file:

@@ -28,13 +28,13 @@ class Tally:
         self.good = self.all = 0
 
     def add(self, course: Course, step_at: float = np.inf) -> None:
-        """One more run."""
+        """Count the bounds of one more run."""
         good, n = course.held(step_at)
         self.good, self.all = self.good + good, self.all + n
 
     @property
     def percent(self) -> float:
-        """Of all."""
+        """The share of all that held, in percent."""
         return 100 * self.good / max(1, self.all)
 
 

@@ -21,7 +21,7 @@ class Course(NamedTuple):
 
     @property
     def last_error_s(self) -> float:
-        """At the end."""
+        """The error at the end, in s."""
         return float(self.error_s[-1])
 
     def settled_s(self, near_s: float = NEAR_S, since: float = 0.0) -> float:
@@ -43,7 +43,7 @@ class Course(NamedTuple):
 
 
 def follow(filter_: Filter, stream: Stream) -> Course:
-    """Everything that `filter_` said."""
+    """The course of all that `filter_` said."""
     n = len(stream.exchanges) - 1
     error_s, bound_s = np.full(n, np.nan), np.full(n, np.nan)
     for i, exchange in enumerate(stream.exchanges[:-1]):

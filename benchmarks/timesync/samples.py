@@ -1,11 +1,12 @@
 """Sample clocks of two robots on the simulated air: what the link says of them, and the truth."""
 
 import asyncio
+from collections.abc import Sequence
 
 import numpy as np
 
-from backends import AirParams, LocalEther, RadioParams, World
-from benchmarks.shared_air import Station
+from backends import AirParams, Radio, RadioParams
+from benchmarks.worlds.samples import Station, play
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import AccessParams, ClockParams
 
@@ -33,36 +34,21 @@ class SampleClocks:
 
 def measure(seed: int, seconds: float) -> SampleClocks:
     """From 5 s on, twice a second, both robots' opinion of each other."""
-    return asyncio.run(_measure(seed, seconds))
-
-
-async def _measure(seed: int, seconds: float) -> SampleClocks:
     air = AirParams(rate_hz=RATE_HZ, snr_db=SNR_DB, block_s=0.002)
     radios = {node: RadioParams(full_duplex=True, clock_ppm=ppm) for node, ppm in PPM.items()}
     modem = ModemParams(rate_hz=RATE_HZ, mcs=1, block_s=air.block_s)
-    ether = LocalEther(air, radios, World(air, {}), seed)
     clock = ClockParams(period_s=1 / HZ, share=0.5)
-    stations = [
-        Station(
-            node, ether.radios[node], AccessParams(), modem, PDU_SIZE, (), 100 * seed + node, clock
-        )
-        for node in radios
-    ]
     found = SampleClocks()
-    for station in stations:
-        await station.open()
-    async with asyncio.TaskGroup() as tasks:
-        running = [tasks.create_task(station.modem.run()) for station in stations]
-        at = SETTLING_S
-        while at <= seconds:
-            await ether.run(at)
-            for station, other in zip(stations, reversed(stations), strict=True):
-                _look(station, other.link.own_id, found)
-            at += EACH_S
-        for station in stations:
-            await station.modem.close()
-        for task in running:
-            task.cancel()
+
+    def make(node: int, radio: Radio) -> Station:
+        return Station(node, radio, AccessParams(), modem, PDU_SIZE, (), 100 * seed + node, clock)
+
+    def look(stations: Sequence[Station]) -> None:
+        for station, other in zip(stations, reversed(stations), strict=True):
+            _look(station, other.link.own_id, found)
+
+    at_s = np.arange(SETTLING_S, seconds + EACH_S / 2, EACH_S).tolist()
+    asyncio.run(play(air, radios, make, seconds, seed, look, at_s))
     return found
 
 

@@ -14,6 +14,7 @@ from sdrlinkd import __version__
 from sdrlinkd.cli.commands import COMMANDS
 from sdrlinkd.client import ControlClient, MessageRefusedError, NoDaemonError, RefusedError
 from sdrlinkd.errors import UserError
+from sdrlinkd.parent import end_with_parent
 
 DEBUG_VARIABLE = "SDRLINKD_DEBUG"
 
@@ -58,6 +59,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")
 
 def main() -> None:
     """Run sdrlinkctl; exit code 2 for what a person can mend, 130 after Ctrl-C."""
+    end_with_parent()
     # A closed terminal or a kill unwinds like Ctrl-C, so that nothing is left running.
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda got, _: sys.exit(128 + got))

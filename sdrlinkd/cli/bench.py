@@ -8,33 +8,21 @@ from typing import Annotated
 import typer
 
 from sdrlinkd.cli.app import app
+from sdrlinkd.cli.benchmarks import BENCHMARKS
 from sdrlinkd.errors import UserError
-
-NAMES = (
-    "pound",
-    "timesync",
-    "latency",
-    "access",
-    "bus",
-    "ether",
-    "flowgraphs",
-    "modem_path",
-    "phy_curves",
-    "phy_per",
-    "phy_speed",
-    "radio",
-    "structure",
-)
 
 
 @app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
 def bench(
     context: typer.Context,
-    name: Annotated[str, typer.Argument(help="; ".join(NAMES), autocompletion=lambda: NAMES)],
+    name: Annotated[
+        str,
+        typer.Argument(help="; ".join(BENCHMARKS), autocompletion=lambda: list(BENCHMARKS)),
+    ],
 ) -> None:
     """Measure beside peers: `bench pound --quick`; further options are the benchmark's own."""
-    if name not in NAMES:
-        raise UserError(f"bench: got {name}; allowed: {', '.join(NAMES)}")
+    if name not in BENCHMARKS:
+        raise UserError(f"bench: got {name}; allowed: {', '.join(BENCHMARKS)}")
     if importlib.util.find_spec("benchmarks") is None:
         raise UserError("the benchmarks are in the source tree only; run this in a checkout of it")
     done = subprocess.run([sys.executable, "-m", f"benchmarks.{name}", *context.args], check=False)  # noqa: S603

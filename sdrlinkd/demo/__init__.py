@@ -2,9 +2,8 @@
 
 from sdrlinkd.demo.folder import run_folder
 from sdrlinkd.demo.hearing import Hearing
-from sdrlinkd.demo.links import LINKS, Options
+from sdrlinkd.demo.links import Options
 from sdrlinkd.demo.nodes import daemon_process, problems_of, snapshot_of, wait_until_up
-from sdrlinkd.demo.processes import Process
 from sdrlinkd.demo.rate import Found, find_rate
 from sdrlinkd.demo.report import DemoReport, RunResult, TopicResult, latency_ms
 from sdrlinkd.demo.run import run_demo
@@ -14,13 +13,11 @@ from sdrlinkd.demo.trace import Pair, Sample, Trace
 from sdrlinkd.demo.verdict import is_good, verdict
 
 __all__ = [
-    "LINKS",
     "DemoReport",
     "Found",
     "Hearing",
     "Options",
     "Pair",
-    "Process",
     "RunResult",
     "Sample",
     "Source",

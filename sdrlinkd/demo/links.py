@@ -7,7 +7,6 @@ from sdrlinkd.demo.source import Source
 
 NODE_ID = 1
 LISTENER_ID = 2
-LINKS = ("ofdm", "iqfile", "direct")
 MAX_CFO_HZ = 1e5
 LONGEST_PAUSE_S = 3.0
 N_ENTRY_IDS = 256

@@ -10,9 +10,9 @@ import msgspec
 from sdrlinkd.client import ControlClient, Message, NoDaemonError
 from sdrlinkd.demo.hearing import Hearing
 from sdrlinkd.demo.links import NODE_ID
-from sdrlinkd.demo.processes import Process
 from sdrlinkd.demo.trace import Sample, Trace
 from sdrlinkd.errors import UserError
+from sdrlinkd.process import Process, module
 from sdrlinkd.reports import Snapshot
 
 # Compiling the modem from nothing takes a while on a small machine.
@@ -21,7 +21,7 @@ START_TIMEOUT_S = 120.0
 
 def daemon_process(config: Path) -> Process:
     """A daemon that is yet to be started."""
-    return Process("sdrlinkd", ["--config", str(config)], config.parent / "log")
+    return Process(module("sdrlinkd", "--config", config), log=config.parent / "log")
 
 
 @contextlib.contextmanager

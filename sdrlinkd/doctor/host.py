@@ -14,8 +14,6 @@ from sdrlinkd.doctor.finding import Finding, good, good_if
 
 PERIOD_S = 0.001
 """A radio's blocks come so often."""
-LATE_S = 0.02
-"""Bursts are handed over to a radio so long ahead; a machine that is later makes them late."""
 
 
 class HostTerm(NamedTuple):

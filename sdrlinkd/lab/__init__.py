@@ -5,20 +5,15 @@ from sdrlinkd.lab.report import LabReport, PairResult, RobotResult
 from sdrlinkd.lab.run import LabOptions, LabState, run_lab
 from sdrlinkd.lab.scenario import Scenario, load_scenario
 from sdrlinkd.lab.shipped import find_scenario, shipped_scenarios
-from sdrlinkd.lab.simulation import Arrival, Pair, Simulation, Station
 from sdrlinkd.lab.table import live_table, pair_table
 
 __all__ = [
-    "Arrival",
     "LabOptions",
     "LabReport",
     "LabState",
-    "Pair",
     "PairResult",
     "RobotResult",
     "Scenario",
-    "Simulation",
-    "Station",
     "find_scenario",
     "live_table",
     "load_scenario",

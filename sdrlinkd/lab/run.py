@@ -8,7 +8,6 @@ from pathlib import Path
 
 from backends import Answer, BackendError, HubWatch
 from sdrlinkd.demo import (
-    Process,
     Sample,
     Source,
     daemon_process,
@@ -22,6 +21,7 @@ from sdrlinkd.lab.report import LabReport, pair_result, robot_result
 from sdrlinkd.lab.robots import open_sources, write_daemon_config
 from sdrlinkd.lab.scenario import Scenario, outages_of
 from sdrlinkd.lab.traffic import Listener, Player, plan, trace_of
+from sdrlinkd.process import Process, module
 from sdrlinkd.reports import Snapshot
 
 POLL_S = 0.5
@@ -99,7 +99,7 @@ def _start_hub(stack: contextlib.ExitStack, directory: Path, options: LabOptions
     arguments += ["--duration", str(scenario.duration_s), "--pace", scenario.pace]
     if options.traces is not None:
         arguments += ["--traces", str(options.traces)]
-    hub = Process("sdrlinkd.cli.ether", arguments, directory / "log")
+    hub = Process(module("sdrlinkd.cli.ether", *arguments), log=directory / "log")
     stack.callback(hub.stop)
     hub.start()
     deadline = time.monotonic() + START_TIMEOUT_S

@@ -72,7 +72,6 @@ class Reassembly:
         self.started = 0
         self.began_at = 0.0
         """When the first fragment came of the message that `add` returned last."""
-        self.duplicate_fragments = 0
 
     def add(self, src: int, entry: Entry, now: float) -> bytes | None:
         """Take one entry; the whole message when it is the last missing one, else None."""
@@ -99,7 +98,6 @@ class Reassembly:
         if partial is None:
             partial = self._start(source, key, total, now)
         elif index in partial.parts:
-            self.duplicate_fragments += 1
             return None
         if len(partial.parts) == total - 1:
             partial.parts[index] = payload
@@ -145,10 +143,6 @@ class Reassembly:
                 self._give_up(src, source, key, "rx_partial_timeout")
             if not source.partials:
                 del self._sources[src]
-
-    def next_expiry(self) -> float:
-        """When `expire` may next have something to do; infinity when nothing is held."""
-        return self._next_expiry if self.held else float("inf")
 
     def holds(self, src: int, topic_id: int, entry_id: int) -> bool:
         """Whether fragments of that message are kept."""

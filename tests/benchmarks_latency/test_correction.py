@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from benchmarks.latency.clock import Clock
 from benchmarks.latency.correction import Stamps, direction
-from benchmarks.latency.job import FIRST_TOPIC, REQUEST, Address, Job
-from benchmarks.latency.schedule import REQUESTS_HZ, WARMUP_REQUESTS_HZ, schedule
+from benchmarks.peers.latency.clock import Clock
+from benchmarks.peers.latency.job import FIRST_TOPIC, REQUEST, Address, Job
+from benchmarks.peers.latency.schedule import REQUESTS_HZ, WARMUP_REQUESTS_HZ, schedule
 
 HERE, THERE = Clock(0.0, 0.0), Clock(3.7, 20.0)
 DELAY_S = 0.0016

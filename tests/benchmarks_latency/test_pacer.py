@@ -1,5 +1,6 @@
 """The serial line: by the calculator, and through the pseudo-terminals."""
 
+import contextlib
 import json
 import os
 import time
@@ -8,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks.latency.peers.pacer import BUFFER, PIECE, Pacer
-from benchmarks.latency.peers.table import BAUD
-from benchmarks.processes import Child
+from benchmarks.peers.latency.pacer import BUFFER, PIECE, Pacer
+from benchmarks.peers.latency.table import BAUD
+from benchmarks.processes import start_module
 
 BYTE_S = 10 / BAUD
 chunks = st.lists(st.tuples(st.floats(0, 0.01), st.binary(min_size=1, max_size=400)), max_size=30)
@@ -71,7 +72,8 @@ def test_a_busy_line_drops_what_its_buffer_cannot_hold():
 
 def test_the_line_carries_any_bytes_both_ways_no_faster_than_its_rate():
     data = bytes(range(256)) * 4
-    with Child("line", "benchmarks.latency.peers.wire", str(BAUD)) as line:
+    with contextlib.ExitStack() as stack:
+        line = start_module(stack, "line", "benchmarks.peers.latency.wire", str(BAUD))
         devices = [os.open(path, os.O_RDWR | os.O_NOCTTY) for path in json.loads(line.line())]
         for source, sink in (devices, devices[::-1]):
             begin, got = time.monotonic(), b""
@@ -82,5 +84,6 @@ def test_the_line_carries_any_bytes_both_ways_no_faster_than_its_rate():
             assert time.monotonic() - begin >= len(data) * BYTE_S
         for device in devices:
             os.close(device)
-        late = json.loads(line.finish())
+        line.close_input()
+        late = json.loads(line.line())
     assert min(late) >= 0

@@ -5,8 +5,8 @@ import pytest
 
 from benchmarks.latency import rows
 from benchmarks.latency.correction import Direction, Stamps
-from benchmarks.latency.peers import daemon, table
 from benchmarks.latency.session import Session, run
+from benchmarks.peers.latency import ours, table
 
 
 @pytest.mark.slow
@@ -62,4 +62,4 @@ def test_our_own_daemon_is_measured_like_the_others():
         assert way.true_s.min() > 0
     assert set(session.cpu_share) == {"companion", "fcu", "daemon_1"}
     assert {"direct", "ether"} <= set(table.PEERS)
-    assert daemon.TOPICS["ether"] == 15
+    assert ours.TOPICS["ether"] == 15

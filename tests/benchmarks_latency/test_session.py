@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from benchmarks.absent import PeerError
 from benchmarks.daemons import running
-from benchmarks.latency.peers.table import BAUD, PEERS, unavailable
 from benchmarks.latency.session import run
-from benchmarks.processes import PeerError
+from benchmarks.peers.latency.table import BAUD, PEERS, unavailable
 
 FRAME = 134
 """Bytes at least."""

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks.latency.job import ANSWERED, ASKED, FIRST_TOPIC, REPLY, REQUEST
-from benchmarks.latency.peers.xrce import Xrce
-from benchmarks.latency.peers.xrce_framing import (
+from benchmarks.peers.latency.job import ANSWERED, ASKED, FIRST_TOPIC, REPLY, REQUEST
+from benchmarks.peers.latency.xrce import Xrce
+from benchmarks.peers.latency.xrce_framing import (
     BEGIN,
     ESCAPE,
     MOST,

@@ -14,14 +14,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import cont2discrete
 
-from benchmarks.pound.flows import Flow, Trace, figures
-from benchmarks.pound.peers import PEERS, namespaces, unavailable
-from benchmarks.pound.peers.control import local_loop, plant
-from benchmarks.pound.peers.environments import ROOT
-from benchmarks.pound.peers.job import Job, Loop, Topic
-from benchmarks.pound.peers.runs import Recovery, recovery, run_peer
-from benchmarks.pound.peers.sockets import Sockets
-from benchmarks.pound.peers.wire import (
+from benchmarks.environments import ROOT
+from benchmarks.flows import Flow, Trace, figures
+from benchmarks.peers.pound import PEERS, namespaces, unavailable
+from benchmarks.peers.pound.control import local_loop, plant
+from benchmarks.peers.pound.job import Job, Loop, Topic
+from benchmarks.peers.pound.runs import Recovery, recovery, run_peer
+from benchmarks.peers.pound.sockets import Sockets
+from benchmarks.peers.pound.wire import (
     HEAD,
     NIMBRO_DATAGRAM,
     UDPROS_DATAGRAM,
@@ -113,7 +113,7 @@ def test_a_job_comes_back_from_its_line():
 
 def test_an_endpoint_needs_the_standard_library_only():
     """It is run by interpreters that have nothing of ours."""
-    code = "import benchmarks.pound.peers.endpoint"
+    code = "import benchmarks.peers.pound.endpoint"
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     subprocess.run([sys.executable, "-S", "-c", code], check=True, env=environment)
 

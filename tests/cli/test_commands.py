@@ -3,8 +3,6 @@
 import contextlib
 import json
 import re
-import subprocess
-import sys
 import threading
 
 import msgspec
@@ -16,6 +14,7 @@ from sdrlinkd.cli import run
 from sdrlinkd.client import Publisher, Subscriber
 from sdrlinkd.reports import Snapshot
 from tests.adapters.recordings import ros2_bag
+from tests.programs import sdrlinkctl
 from tests.waiting import wait_for
 from tests.wire.vectors import DOCUMENTED
 
@@ -73,11 +72,6 @@ def test_topics_check_reload(start_daemon, ctl):
 def test_pub_and_echo(start_daemon, ctl):
     daemon = start_daemon()
     dir_ = ("--runtime-dir", daemon.directory)
-    echo = subprocess.Popen(
-        [sys.executable, "-m", "sdrlinkd.cli", "echo", "/rx_robot_1/*", "-n", "1", "--timeout",
-         "20", "--runtime-dir", str(daemon.directory)],
-        stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
     done = threading.Event()
 
     def repeat():
@@ -85,13 +79,15 @@ def test_pub_and_echo(start_daemon, ctl):
             ctl("pub", "/robot_1/cmd_vel", "{linear: {x: 0.5}}", "--qos", "urgent", *dir_)
 
     thread = threading.Thread(target=repeat)
-    thread.start()
-    out, _ = echo.communicate(timeout=30)
-    done.set()
-    thread.join()
-    assert echo.returncode == 0
-    assert "/rx_robot_1/cmd_vel from robot 1" in out
-    assert "linear: {x: 0.5, y: 0.0, z: 0.0}" in out
+    with sdrlinkctl("echo", "/rx_robot_1/*", "-n", "1", "--timeout", "20", *dir_) as echo:
+        thread.start()
+        try:
+            assert echo.wait(30) == 0
+        finally:
+            done.set()
+            thread.join()
+    assert "/rx_robot_1/cmd_vel from robot 1" in echo.out()
+    assert "linear: {x: 0.5, y: 0.0, z: 0.0}" in echo.out()
 
 
 def test_pub_says_what_became_of_each_message(start_daemon, ctl):
@@ -154,19 +150,15 @@ def test_what_others_send_is_shown_as_it_is(start_daemon, tmp_path):
     registry = tmp_path / "own.csv"
     registry.write_text("say,std_msgs/String\n")
     daemon = start_daemon(f'registry = "{registry}"\n')
-    echo = subprocess.Popen(
-        [sys.executable, "-m", "sdrlinkd.cli", "echo", "-n", "1", "--runtime-dir",
-         str(daemon.directory)],
-        stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
     message = empty("std_msgs/msg/String")
     message.data = "[bold]not[/odom] markup"
-    with Publisher(daemon.directory) as out:
-        while echo.poll() is None:
+    with (
+        sdrlinkctl("echo", "-n", "1", "--runtime-dir", daemon.directory) as echo,
+        Publisher(daemon.directory) as out,
+    ):
+        while echo.is_running:
             out.send("/robot_1/say", to_cdr(message, "std_msgs/msg/String"))
-            wait_for(lambda: True)
-    assert "[bold]not[/odom] markup" in echo.stdout.read()
-    echo.stdout.close()
+    assert "[bold]not[/odom] markup" in echo.out()
 
 
 def test_a_bag_with_another_type_is_left_out_by_name(start_daemon, ctl, recorded, tmp_path):
@@ -184,16 +176,11 @@ def test_a_bag_with_another_type_is_left_out_by_name(start_daemon, ctl, recorded
 
 def test_pdu_watch_ends_with_the_daemon(start_daemon):
     daemon = start_daemon("[link]\nbeacon_s = 0\n")
-    watch = subprocess.Popen(
-        [sys.executable, "-m", "sdrlinkd.cli", "pdu", "watch", "--runtime-dir",
-         str(daemon.directory)],
-        stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    wait_for(lambda: daemon.snapshot().bus.control_requests > 2)
-    daemon.process.terminate()
-    assert watch.wait(15) == 2
-    assert "no sdrlinkd answers" in watch.stderr.read()
-    watch.stderr.close()
+    with sdrlinkctl("pdu", "watch", "--runtime-dir", daemon.directory) as watch:
+        wait_for(lambda: daemon.snapshot().bus.control_requests > 2)
+        daemon.stop()
+        assert watch.wait(15) == 2
+    assert "no sdrlinkd answers" in watch.err()
 
 
 def test_echo_says_when_nothing_comes(start_daemon, ctl):
@@ -329,17 +316,11 @@ def test_pdu_decode_shows_the_layout(ctl, tmp_path):
 
 def test_pdu_watch_shows_both_directions(start_daemon):
     daemon = start_daemon()
-    watch = subprocess.Popen(
-        [sys.executable, "-m", "sdrlinkd.cli", "pdu", "watch", "-n", "4", "--runtime-dir",
-         str(daemon.directory)],
-        stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    while watch.poll() is None:
-        publish(daemon, 1)
-    out = watch.stdout.read()
-    watch.stdout.close()
-    assert "→ src 1 dst all" in out
-    assert "← src 1 dst all" in out
+    with sdrlinkctl("pdu", "watch", "-n", "4", "--runtime-dir", daemon.directory) as watch:
+        while watch.is_running:
+            publish(daemon, 1)
+    assert "→ src 1 dst all" in watch.out()
+    assert "← src 1 dst all" in watch.out()
 
 
 def test_a_bug_of_ours_is_one_line_too(ctl, monkeypatch):

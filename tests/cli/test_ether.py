@@ -2,7 +2,6 @@
 
 import gc
 import signal
-import subprocess
 import sys
 from contextlib import ExitStack
 from pathlib import Path
@@ -14,6 +13,7 @@ from sdrlinkd.cli.ether import main
 from sdrlinkd.client import Publisher, Subscriber
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.lab import load_scenario, make_hub
+from sdrlinkd.process import Process, module
 from tests.backends.hubs import ask
 from tests.lab.scenarios import write_scenario
 from tests.waiting import wait_for
@@ -28,14 +28,9 @@ def start_hub(tmp_path):
 
         def start(directory, *arguments):
             scenario = write_scenario(tmp_path, pace="realtime")
-            hub = subprocess.Popen(
-                [sys.executable, "-m", "sdrlinkd.cli.ether", scenario, "--dir", directory,
-                 *arguments],
-                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-            )  # fmt: skip
-            stack.enter_context(hub)
-            stack.callback(hub.kill)
-            return hub, hub.stdout.readline()
+            command = module("sdrlinkd.cli.ether", scenario, "--dir", directory, *arguments)
+            hub = stack.enter_context(Process(command, name="hub"))
+            return hub, hub.line()
 
         yield start
 
@@ -60,16 +55,15 @@ def refused(monkeypatch, capsys):
 def test_a_hub_tells_where_it_is_and_serves_its_folder_alone(start_hub, refused, tmp_path):
     folder = tmp_path / "air"
     hub, line = start_hub(folder)
-    assert line == f"sdrlink-ether {__version__}: Two small robots; sockets in {folder}\n"
+    assert line == f"sdrlink-ether {__version__}: Two small robots; sockets in {folder}"
     err = refused("--dir", folder)
     assert f"{folder}: another hub serves this folder; stop it, or name another one" in err
     assert err.count("\n") == 1
     now_s = ask(folder).now_s
     wait_for(lambda: ask(folder).now_s > now_s)
-    hub.terminate()
-    assert hub.wait(20) == 0
+    assert hub.stop() == 0
     assert list(folder.glob("*.sock")) == []
-    assert hub.stderr.read() == ""
+    assert hub.err() == ""
 
 
 @pytest.mark.slow
@@ -213,7 +207,6 @@ def test_daemons_outlive_their_hub(start_hub, start_daemon, tmp_path_factory):
         talk(b"before")
         before = {robot: carrier(node).counters for robot, node in nodes.items()}
         hub.kill()
-        hub.wait()
         wait_for(lambda: all("hub is away" in carrier(node).detail for node in nodes.values()), 60)
         for node in nodes.values():
             assert carrier(node).state == "down"
@@ -222,10 +215,10 @@ def test_daemons_outlive_their_hub(start_hub, start_daemon, tmp_path_factory):
         say[1].send("/robot_1/cmd_vel", CDR + b"meanwhile")
         wait_for(lambda: nodes[1].snapshot().link.tx.queued == 1)
         # Whoever is back first sends at once: robot 2 is, or it would not hear what waited.
-        nodes[1].process.send_signal(signal.SIGSTOP)
+        nodes[1].send_signal(signal.SIGSTOP)
         start_hub(folder)
         wait_for(lambda: carrier(nodes[2]).state == "up", 60)
-        nodes[1].process.send_signal(signal.SIGCONT)
+        nodes[1].send_signal(signal.SIGCONT)
         wait_for(lambda: all(carrier(node).state == "up" for node in nodes.values()), 60)
         for robot, node in nodes.items():
             counted = carrier(node).counters

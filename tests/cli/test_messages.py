@@ -1,13 +1,13 @@
 """`pub` and `echo`: names, sizes, and messages that cannot be read."""
 
-import subprocess
-import sys
+import contextlib
 
 import pytest
 
 from sdrlinkd.adapters import empty, to_cdr
 from sdrlinkd.cli import run
 from sdrlinkd.client import Publisher
+from tests.programs import sdrlinkctl
 from tests.waiting import wait_for
 
 ODOM = "nav_msgs/msg/Odometry"
@@ -29,21 +29,13 @@ def ctl(capsys):
 @pytest.fixture
 def echo():
     """`sdrlinkctl echo` in a process of its own, once it has subscribed."""
-    started = []
+    with contextlib.ExitStack() as stack:
 
-    def start(daemon, *arguments):
-        process = subprocess.Popen(
-            [sys.executable, "-m", "sdrlinkd.cli", "echo", *arguments, "--runtime-dir",
-             str(daemon.directory)],
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
-        started.append(process)
-        return process
+        def start(daemon, *arguments):
+            process = sdrlinkctl("echo", *arguments, "--runtime-dir", daemon.directory)
+            return stack.enter_context(process)
 
-    yield start
-    for process in started:
-        process.kill()
-        process.communicate()
+        yield start
 
 
 def test_a_bad_message_is_shown_as_bad_and_the_next_one_as_it_is(start_daemon, echo):
@@ -51,12 +43,12 @@ def test_a_bad_message_is_shown_as_bad_and_the_next_one_as_it_is(start_daemon, e
     watch = echo(daemon, "/rx_robot_1/*", "-n", "4", "--timeout", "60")
     bad, good = bytes([0, 1, 0, 0]) + b"hello", to_cdr(empty(ODOM), ODOM)
     with Publisher(daemon.directory) as out:
-        while watch.poll() is None:
+        while watch.is_running:
             out.send("/robot_1/odom", bad)
             out.send("/robot_1/odom", good)
             out.flush()
-    shown, err = watch.communicate()
-    assert (watch.returncode, err) == (0, "")
+    shown = watch.out()
+    assert (watch.code, watch.err()) == (0, "")
     assert shown.count("(bad message of 9 bytes, not valid CDR of nav_msgs/msg/Odometry: ") == 2
     assert shown.count("; --raw shows them)\n---") == 2
     assert shown.count("child_frame_id: ''") == 2

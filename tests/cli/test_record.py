@@ -2,16 +2,15 @@
 
 import re
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 import sigmf
 
 from sdrlinkd.cli import run
+from sdrlinkd.process import wait_until
 from tests.iq.recordings import write_bursts
-from tests.waiting import group, wait_for
+from tests.programs import sdrlinkctl
 
 REGISTRY = Path(__file__).parents[2] / "etc/registry.csv"
 DEVICE = ("--device", "driver=none", "--frequency", "433e6", "--rate", "2e6")
@@ -189,15 +188,12 @@ def test_files_that_cannot_be_written_are_named(ctl, config, tmp_path):
 @pytest.mark.slow
 def test_ctrl_c_ends_a_recording_well(config, tmp_path):
     path = config("loopback")
-    with group(
-        [sys.executable, "-m", "sdrlinkd.cli", "record", tmp_path / "rec", "--config", path],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    ) as process:  # fmt: skip
-        data = tmp_path / "rec.sigmf-data"
-        wait_for(lambda: data.exists() and data.stat().st_size > 100_000, timeout_s=60)
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
-    assert (process.returncode, err) == (0, "")
+    data = tmp_path / "rec.sigmf-data"
+    with sdrlinkctl("record", tmp_path / "rec", "--config", path) as record:
+        wait_until(lambda: data.exists() and data.stat().st_size > 100_000, 60, record)
+        code = record.stop(signal.SIGINT, 60)
+    out = record.out()
+    assert (code, record.err()) == (0, "")
     assert "bursts    0, 0 PDUs good, 0 bad" in out
     theirs = sigmf.fromfile(f"{tmp_path}/rec.sigmf-meta")
     theirs.validate()

@@ -3,8 +3,6 @@
 import asyncio
 import contextlib
 import signal
-import subprocess
-import sys
 import uuid
 
 import numpy as np
@@ -15,9 +13,10 @@ import phy
 from backends import SoapyRadio, SoapySettings, Tuning, TxBurst, TxOutcome
 from sdrlinkd.cli import run
 from sdrlinkd.iq import Capture, CaptureWish, IqRecording, Replay, plan_replay
+from sdrlinkd.process import wait_until
 from tests.iq.recordings import pdu, write_bursts
+from tests.programs import sdrlinkctl
 from tests.soapy_loopback import Bus, missing, module_folder
-from tests.waiting import wait_for
 
 RATE_HZ, FREQUENCY_HZ = 1e6, 2.4e9
 TUNING = Tuning(RATE_HZ, FREQUENCY_HZ)
@@ -192,25 +191,21 @@ async def test_what_is_heard_is_annotated_to_the_sample_and_heard_again_when_rep
 def test_the_commands_do_the_same(device, tmp_path, capsys):
     sent = write_bursts(tmp_path / "made")
     given = ("--frequency", "2.4e9", "--rate", "2e6", "--gain")
-    process = subprocess.Popen(
-        [sys.executable, "-m", "sdrlinkd.cli", "record", tmp_path / "rec", "--device", device(1),
-         *given, "20"],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
     data = tmp_path / "rec.sigmf-data"
-    wait_for(lambda: data.exists() and data.stat().st_size > 10_000, PATIENCE_S)
-    replay = ["replay", str(tmp_path / "made"), "--device", device(0), *given, "40"]
-    assert run([*replay, "--transmit"]) == 0
-    assert capsys.readouterr().out.startswith(
-        "sent 3 of 3 stretches; between them is silence, below -"
-    )
-    # What was sent is in it when it is as much longer as may be on its way.
-    size = data.stat().st_size
-    wait_for(lambda: data.stat().st_size > size + 4 * round(0.3 * 2e6), PATIENCE_S)
-    process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=PATIENCE_S)
-    assert (process.returncode, err) == (0, "")
-    assert "bursts    3, 6 PDUs good, 0 bad" in out
+    with sdrlinkctl("record", tmp_path / "rec", "--device", device(1), *given, "20") as record:
+        wait_until(lambda: data.exists() and data.stat().st_size > 10_000, PATIENCE_S, record)
+        replay = ["replay", str(tmp_path / "made"), "--device", device(0), *given, "40"]
+        assert run([*replay, "--transmit"]) == 0
+        assert capsys.readouterr().out.startswith(
+            "sent 3 of 3 stretches; between them is silence, below -"
+        )
+        # What was sent is in it when it is as much longer as may be on its way.
+        size = data.stat().st_size
+        enough = size + 4 * round(0.3 * 2e6)
+        wait_until(lambda: data.stat().st_size > enough, PATIENCE_S, record)
+        code = record.stop(signal.SIGINT, PATIENCE_S)
+    assert (code, record.err()) == (0, "")
+    assert "bursts    3, 6 PDUs good, 0 bad" in record.out()
     assert decoded(tmp_path / "rec") == sent
     assert len(annotated(tmp_path / "rec")) == 3
     assert "loopback usrp, 2400 MHz, rx 20 dB, tx_enabled = false" in sigmf.fromfile(

@@ -12,9 +12,10 @@ import pytest
 
 from sdrlinkd.adapters import empty, to_cdr
 from sdrlinkd.cli import run
-from sdrlinkd.cli.bench import NAMES
 from sdrlinkd.cli.spans import Bandwidth, Delay, Rate
 from sdrlinkd.client import Publisher
+from sdrlinkd.process import Process, module, wait_until
+from tests.programs import sdrlinkctl
 from tests.waiting import wait_for
 
 ODOM = "/robot_1/odom"
@@ -54,19 +55,15 @@ def test_delay_leaves_out_what_it_does_not_know():
 
 def measuring(daemon, *arguments):
     """`topic …` while messages come, until it ends; what it printed."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "sdrlinkd.cli", "topic", *arguments, "--runtime-dir",
-         str(daemon.directory)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
     message = to_cdr(empty(KIND), KIND)
-    with Publisher(daemon.directory) as out:
-        while process.poll() is None:
+    with (
+        sdrlinkctl("topic", *arguments, "--runtime-dir", daemon.directory) as topic,
+        Publisher(daemon.directory) as out,
+    ):
+        while topic.is_running:
             out.send(ODOM, message)
-            wait_for(lambda: True)
-    told, err = process.communicate()
-    assert process.returncode == 0, err
-    return told, len(message)
+    assert topic.code == 0, topic.err()
+    return topic.out(), len(message)
 
 
 @pytest.mark.parametrize(("what", "pattern"), [
@@ -82,18 +79,12 @@ def test_a_topic_heard_is_measured(start_daemon, what, pattern):
 
 def test_ctrl_c_ends_with_a_summary(start_daemon):
     daemon = start_daemon()
-    process = subprocess.Popen(
-        [sys.executable, "-m", "sdrlinkd.cli", "topic", "hz", HEARD, "--runtime-dir",
-         str(daemon.directory)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    # It says so when a second has passed without any.
-    assert process.stdout.readline() == "no new messages\n"
-    process.send_signal(signal.SIGINT)
-    told, err = process.communicate(timeout=20)
-    assert process.returncode == 130
-    assert f"{HEARD}: 0 messages in" in told
-    assert "Traceback" not in err
+    with sdrlinkctl("topic", "hz", HEARD, "--runtime-dir", daemon.directory) as topic:
+        # It says so when a second has passed without any.
+        assert topic.line() == "no new messages"
+        assert topic.stop(signal.SIGINT) == 130
+    assert f"{HEARD}: 0 messages in" in topic.out()
+    assert "Traceback" not in topic.err()
 
 
 def test_what_is_not_heard_is_told(start_daemon, capsys):
@@ -110,11 +101,10 @@ def test_list_finds_a_daemon_wherever_its_directory_is(start_daemon, capsys):
     found = {each["runtime_dir"]: each for each in json.loads(capsys.readouterr().out)}
     mine = found[str(daemon.directory)]
     assert (mine["node"], mine["namespace"], mine["backend"]) == (1, "robot_1", "direct")
-    assert mine["pid"] == daemon.process.pid
+    assert mine["pid"] == daemon.pid
     assert run(["list"]) == 0
-    assert str(daemon.process.pid) in capsys.readouterr().out
-    daemon.process.terminate()
-    assert daemon.process.wait(20) == 0
+    assert str(daemon.pid) in capsys.readouterr().out
+    assert daemon.stop(within_s=20) == 0
     run(["list", "--json"])
     assert str(daemon.directory) not in capsys.readouterr().out
 
@@ -124,21 +114,17 @@ def test_list_finds_a_directory_that_is_named_from_where_the_daemon_was_started(
 ):
     config = write_config(tmp_path).read_text().replace(f'"{tmp_path}"', '"here"')
     (tmp_path / "relative.toml").write_text(config)
-    process = subprocess.Popen(
-        [sys.executable, "-m", "sdrlinkd", "--config", "relative.toml"], cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)}, stderr=subprocess.DEVNULL,
-    )  # fmt: skip
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = module("sdrlinkd", "--config", "relative.toml")
 
     def is_listed():
         run(["list", "--json"])
         found = json.loads(capsys.readouterr().out)
         return str(tmp_path / "here") in {each["runtime_dir"] for each in found if each["node"]}
 
-    try:
-        wait_for(is_listed)
-    finally:
-        process.terminate()
-        assert process.wait(20) == 0
+    with Process(command, environment=environment, folder=tmp_path) as daemon:
+        wait_until(is_listed, 20, daemon)
+        assert daemon.stop() == 0
 
 
 def completed(words, directory):
@@ -173,13 +159,3 @@ def test_tab_knows_live_names(start_daemon):
 
 def test_tab_is_silent_where_there_is_no_daemon(tmp_path):
     assert completed("sdrlinkctl set /rob", tmp_path) == []
-
-
-def test_bench_names_every_benchmark():
-    """A module that can be run, or a package with a door for that."""
-    there = {
-        path.stem if path.name != "__main__.py" else path.parent.name
-        for path in [*ROOT.glob("benchmarks/*.py"), *ROOT.glob("benchmarks/*/__main__.py")]
-        if path.name == "__main__.py" or '__name__ == "__main__"' in path.read_text()
-    }
-    assert set(NAMES) == there

@@ -98,24 +98,14 @@ def test_a_field_that_is_not_there_is_refused(told, field, says):
     assert says in err
 
 
-def restarted(daemon):
-    """The same daemon again."""
-    with daemon.log_path.open("ab") as log:
-        daemon.process = subprocess.Popen(
-            [sys.executable, "-m", "sdrlinkd", "--config", str(daemon.config)],
-            stdout=log, stderr=log,
-        )  # fmt: skip
-
-
 def test_a_follower_waits_for_a_daemon_that_is_restarted(start_daemon):
     daemon = start_daemon()
     with Follower(daemon.directory) as follower:
         assert follower.look().node == 1
-        daemon.process.terminate()
-        assert daemon.process.wait(20) == 0
+        assert daemon.stop(within_s=20) == 0
         assert follower.look() is None
         assert f"waiting for sdrlinkd in {daemon.directory} (" in follower.waiting
-        restarted(daemon)
+        daemon.start()
         wait_for(lambda: follower.look() is not None)
 
 
@@ -174,11 +164,10 @@ def test_a_watch_waits_for_a_daemon_that_is_restarted(start_daemon):
     daemon = start_daemon()
     terminal = Terminal("status", "--watch", "--runtime-dir", daemon.directory)
     wait_for(lambda: terminal.shows("0 in = 0 sent"), 60)
-    daemon.process.terminate()
-    assert daemon.process.wait(20) == 0
+    assert daemon.stop(within_s=20) == 0
     wait_for(lambda: terminal.shows("waiting for sdrlinkd in"))
     before = len(terminal.text)
-    restarted(daemon)
+    daemon.start()
     wait_for(lambda: "sent + " in terminal.text[before:])
     terminal.process.send_signal(signal.SIGINT)
     assert terminal.end() == 130

@@ -1,11 +1,8 @@
 """Daemons that end and come back while a program goes on."""
 
-import subprocess
-import sys
-
 import pytest
 
-from tests.conftest import Running
+from tests.programs import Daemon
 from tests.waiting import wait_for
 
 
@@ -15,21 +12,14 @@ def spawn_again():
     started = []
 
     def spawn(daemon):
-        log_path = daemon.directory / f"log{len(started) + 2}"
-        with log_path.open("wb") as log:
-            process = subprocess.Popen(
-                [sys.executable, "-m", "sdrlinkd", "--config", str(daemon.config)],
-                stdout=log, stderr=log,
-            )  # fmt: skip
-        started.append(Running(process, daemon.directory, daemon.config, log_path))
+        log = daemon.directory / f"log{len(started) + 2}"
+        started.append(Daemon(daemon.directory, daemon.config, log))
+        started[-1].start()
         return started[-1]
 
     yield spawn
-    for running in started:
-        running.process.terminate()
-        code = running.process.wait(20)
-        assert "Traceback" not in running.log(), running.log()
-        assert code == 0, running.log()
+    for daemon in started:
+        daemon.ends_well(20)
 
 
 @pytest.fixture
@@ -37,8 +27,7 @@ def stop():
     """Ends a daemon in peace."""
 
     def end(daemon):
-        daemon.process.terminate()
-        assert daemon.process.wait(20) == 0
+        assert daemon.stop() == 0
 
     return end
 

@@ -2,8 +2,6 @@
 
 import asyncio
 import json
-import subprocess
-import sys
 import time
 from collections import Counter
 
@@ -20,7 +18,8 @@ from sdrlinkd.client import (
     producer,
 )
 from sdrlinkd.client.messages import new_ack_topic
-from tests.conftest import ETC, Running
+from tests.conftest import ETC
+from tests.programs import Daemon
 from tests.waiting import wait_for
 
 CDR = b"\0\1\0\0"
@@ -67,20 +66,12 @@ def module_daemon(tmp_path_factory):
         "[topic.imu]\nmax_bytes = 8\n[topic.map]\nperiod_s = 1000\n"
         "[topic.clock]\non_change = true\n"
     )
-    log_path = directory / "log"
-    with log_path.open("wb") as log:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "sdrlinkd", "--config", str(config)], stdout=log, stderr=log
-        )
-    running = Running(process, directory, config, log_path)
-    wait_for(running.is_up)
+    daemon = Daemon(directory, config, directory / "log").at_work()
     with Publisher(directory) as out:
         out.send("/robot_1/map", CDR)
         out.send("/robot_1/clock", CDR)
-    yield running
-    process.terminate()
-    assert process.wait(10) == 0, running.log()
-    assert "Traceback" not in running.log()
+    yield daemon
+    daemon.ends_well()
 
 
 @pytest.fixture
@@ -165,8 +156,7 @@ def test_a_daemon_that_is_restarted_owes_nothing(start_daemon, spawn_again):
     daemon = start_daemon("[link]\nreceipt_s = 60\n[direct]\nhear_self = false\n")
     with Publisher(daemon.directory) as out:
         names = [out.send(ODOM, CDR, dst=2, receipt=True) for _ in range(3)]
-        daemon.process.kill()
-        daemon.process.wait()
+        daemon.kill()
         daemon.expected_exit = -9
         wait_for(spawn_again(daemon).is_up)
         later = out.send("/robot_1/scan", CDR, dst=3, lifespan_ms=1e-3, receipt=True)
@@ -189,8 +179,7 @@ def test_a_daemon_that_never_comes_back_owes_nothing(start_daemon, impatient):
     daemon = start_daemon("[link]\nreceipt_s = 60\n[direct]\nhear_self = false\n")
     out = Publisher(daemon.directory)
     name = out.send(ODOM, CDR, dst=2, receipt=True)
-    daemon.process.kill()
-    daemon.process.wait()
+    daemon.kill()
     daemon.expected_exit = -9
     # Also for who never waits for long.
     deadline = time.monotonic() + 60
@@ -205,8 +194,7 @@ async def test_a_daemon_that_is_gone_owes_nothing_in_asyncio(start_daemon, impat
     daemon = start_daemon("[link]\nreceipt_s = 60\n[direct]\nhear_self = false\n")
     out = AsyncPublisher(daemon.directory)
     name = await out.send(ODOM, CDR, dst=2, receipt=True)
-    daemon.process.kill()
-    daemon.process.wait()
+    daemon.kill()
     daemon.expected_exit = -9
     told = await asyncio.wait_for(out.receipt(), 60)
     assert (told.id, told.fate, told.reason) == (name, "unknown", DAEMON_GONE)

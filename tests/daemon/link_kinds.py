@@ -6,7 +6,6 @@ Prints each kernel that was given a new signature after the warm-up; run by a te
 import contextlib
 import os
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -18,6 +17,7 @@ from numba.core.dispatcher import Dispatcher
 import phy
 from sdrlinkd.__main__ import main
 from sdrlinkd.client import NoDaemonError, Publisher, Subscriber
+from sdrlinkd.process import Process, module
 from tests.backends.hubs import serving
 from tests.conftest import ETC
 
@@ -103,15 +103,11 @@ def two_on_ether() -> None:
     config.write_text(
         f'registry = "{ETC / "registry.csv"}"\n{on_ether(2)}[bus]\nruntime_dir = "{FOLDER}"\n'
     )
-    with serving(FOLDER / "hub", rate_hz=1e6, frequency_hz=2.45e9, block_s=0.001):
-        other = subprocess.Popen(
-            [sys.executable, "-m", "sdrlinkd", "--config", str(config), "--log-level", "warning"]
-        )
-        try:
-            run("ether", on_ether(1), hears=1, hearer=FOLDER)
-        finally:
-            other.terminate()
-            other.wait()
+    with (
+        serving(FOLDER / "hub", rate_hz=1e6, frequency_hz=2.45e9, block_s=0.001),
+        Process(module("sdrlinkd", "--config", config), log=FOLDER / "other.log"),
+    ):
+        run("ether", on_ether(1), hears=1, hearer=FOLDER)
 
 
 phy.warm_up()

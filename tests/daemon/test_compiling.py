@@ -45,12 +45,11 @@ def test_a_daemon_with_a_cold_cache_takes_messages_says_so_and_can_be_stopped(
     assert snapshot.link.tx.queued == 1
     assert not list(tmp_path.glob("radio*"))
     # A reload begins the opening anew, but not the compiling; and nobody has to wait for it.
-    daemon.process.send_signal(signal.SIGHUP)
+    daemon.send_signal(signal.SIGHUP)
     wait_for(lambda: "re-read: " in daemon.log())
     assert daemon.is_up()
     assert "the modem is being compiled, once" in daemon.snapshot().carrier.reason
-    daemon.process.terminate()
-    assert daemon.process.wait(60) == 0
+    assert daemon.stop(within_s=60) == 0
     assert "compiled the modem in" not in daemon.log()
 
 

@@ -1,7 +1,5 @@
 """Real daemons on a simulated air: whom its hub takes, and what they play by its time."""
 
-import subprocess
-import sys
 import time
 
 import pytest
@@ -10,6 +8,7 @@ from backends import RadioParams
 from backends.ether import protocol
 from sdrlinkd.adapters import BuiltInRobot, due_messages
 from sdrlinkd.client import Publisher, Subscriber
+from sdrlinkd.process import Process, module
 from tests.adapters.recordings import STORAGES, noisy_messages, ros2_bag
 from tests.backends.hubs import RawRadio, ask, serving
 from tests.waiting import wait_for
@@ -74,15 +73,14 @@ def test_a_second_robot_of_one_id_is_refused_and_the_first_is_told(start_daemon,
         wait_for(lambda: second.snapshot().carrier.state == "refused", 60)
         level, reason = verdict(second)
         assert level == "DOWN"
-        assert f"robot 1 is on this air already: process {first.process.pid} on " in reason
+        assert f"robot 1 is on this air already: process {first.pid} on " in reason
         assert "another robot_id" in reason
         wait_for(lambda: "the settings do not fit the hub: " in second.log())
-        told = f"asked for our id 1 on this air and was refused: process {second.process.pid} on "
+        told = f"asked for our id 1 on this air and was refused: process {second.pid} on "
         wait_for(lambda: told in first.snapshot().carrier.detail)
         assert first.snapshot().carrier.state == "up"
         assert list(ask(hub).nodes) == [1]
-        first.process.terminate()
-        assert first.process.wait(20) == 0
+        assert first.stop(within_s=20) == 0
         # The air is free for the other.
         wait_for(lambda: second.snapshot().carrier.state == "up", 20)
 
@@ -169,11 +167,7 @@ def test_a_daemon_plays_the_topics_of_a_bag_that_it_knows(start_daemon, tmp_path
 
 def test_a_bag_that_cannot_be_played_is_refused_in_one_line(write_config, tmp_path):
     config = write_config(tmp_path, '[play]\nbag = "none.mcap"\nduration_s = 1.0\n')
-    daemon = subprocess.Popen(
-        [sys.executable, "-m", "sdrlinkd", "--config", str(config)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    _, err = daemon.communicate(timeout=60)
-    assert daemon.returncode == 2
-    assert "none.mcap: no such file" in err
-    assert err.count("\n") == 1
+    with Process(module("sdrlinkd", "--config", config)) as daemon:
+        assert daemon.wait() == 2
+    assert "none.mcap: no such file" in daemon.err()
+    assert daemon.err().count("\n") == 1

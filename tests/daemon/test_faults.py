@@ -13,18 +13,17 @@ import pytest
 import zmq
 
 from sdrlinkd.client import Publisher, RefusedError, Subscriber
-from tests.waiting import group, wait_for
+from sdrlinkd.process import Process, wait_until
+from tests.programs import sdrlinkctl
+from tests.waiting import wait_for
 
 CDR = b"\0\1\0\0"
 
 
 def spawn(code, directory):
     """A Python program that finds the daemon in `directory`; prints a line when it is ready."""
-    return subprocess.Popen(
-        [sys.executable, "-c", textwrap.dedent(code)],
-        stdout=subprocess.PIPE,
-        env={**os.environ, "SDRLINKD_RUNTIME_DIR": str(directory)},
-    )
+    environment = {**os.environ, "SDRLINKD_RUNTIME_DIR": str(directory)}
+    return Process([sys.executable, "-c", textwrap.dedent(code)], environment=environment)
 
 
 def problems(daemon):
@@ -89,15 +88,13 @@ def test_a_producer_killed_in_mid_message_harms_nobody(start_daemon):
     """
     with Subscriber("/rx_robot_1/*", directory=daemon.directory, depth=0) as heard:
         for round_ in range(5):
-            producer = spawn(flood, daemon.directory)
-            producer.stdout.readline()
-            with Publisher(daemon.directory) as out:
-                out.send("/robot_1/odom", CDR + bytes([round_]), qos="urgent")
-            enough = 50 * (round_ + 1)
-            wait_for(lambda enough=enough: daemon.snapshot().link.tx.accepted > enough)
-            producer.send_signal(signal.SIGKILL)
-            producer.wait()
-            producer.stdout.close()
+            with spawn(flood, daemon.directory) as producer:
+                producer.line()
+                with Publisher(daemon.directory) as out:
+                    out.send("/robot_1/odom", CDR + bytes([round_]), qos="urgent")
+                enough = 50 * (round_ + 1)
+                wait_for(lambda enough=enough: daemon.snapshot().link.tx.accepted > enough)
+                producer.kill()
             assert problems(daemon) == []
         got = []
         while len([m for m in got if m.topic.endswith("odom")]) < 5:
@@ -111,44 +108,40 @@ def test_a_producer_killed_in_mid_message_harms_nobody(start_daemon):
 def test_a_frozen_consumer_sees_its_own_gap_and_others_lose_nothing(start_daemon):
     daemon = start_daemon()
     count = 3000
-    frozen = spawn(
-        """
+    code = """
         from sdrlinkd.client import Subscriber
         with Subscriber("/rx_robot_1/odom", depth=50) as heard:
             print("ready", flush=True)
             for message in heard:
                 print(message.number, flush=True)
-        """,
-        daemon.directory,
-    )
-    assert frozen.stdout.readline() == b"ready\n"
-    frozen.send_signal(signal.SIGSTOP)
-    healthy_numbers = []
-    with Subscriber("/rx_robot_1/odom", directory=daemon.directory, depth=0) as healthy:
+    """
+    with spawn(code, daemon.directory) as frozen:
+        assert frozen.line() == "ready"
+        frozen.send_signal(signal.SIGSTOP)
+        healthy_numbers = []
+        with Subscriber("/rx_robot_1/odom", directory=daemon.directory, depth=0) as healthy:
 
-        def take():
-            while len(healthy_numbers) < count and (message := healthy.receive(10)):
-                healthy_numbers.append(message.number)
+            def take():
+                while len(healthy_numbers) < count and (message := healthy.receive(10)):
+                    healthy_numbers.append(message.number)
 
-        taker = threading.Thread(target=take)
-        taker.start()
+            taker = threading.Thread(target=take)
+            taker.start()
+            with Publisher(daemon.directory) as out:
+                for i in range(count):
+                    out.send("/robot_1/odom", CDR + bytes(900))
+                    if i % 20 == 19:
+                        wait_for(lambda i=i: len(healthy_numbers) > i - 40)
+            taker.join()
+        assert healthy_numbers == list(range(1, count + 1))
+        assert problems(daemon) == []
+        frozen.send_signal(signal.SIGCONT)
         with Publisher(daemon.directory) as out:
-            for i in range(count):
-                out.send("/robot_1/odom", CDR + bytes(900))
-                if i % 20 == 19:
-                    wait_for(lambda i=i: len(healthy_numbers) > i - 40)
-        taker.join()
-    assert healthy_numbers == list(range(1, count + 1))
-    assert problems(daemon) == []
-    frozen.send_signal(signal.SIGCONT)
-    with Publisher(daemon.directory) as out:
-        numbers = [0]
-        while numbers[-1] < count:
-            out.send("/robot_1/odom", CDR)
-            numbers.append(int(frozen.stdout.readline()))
-    frozen.kill()
-    frozen.wait()
-    frozen.stdout.close()
+            numbers = [0]
+            while numbers[-1] < count:
+                out.send("/robot_1/odom", CDR)
+                numbers.append(int(frozen.line()))
+        frozen.kill()
     steps = [b - a for a, b in pairwise(numbers)]
     assert min(steps) == 1
     assert max(steps) > 1, "the frozen consumer must see its own gap"
@@ -178,8 +171,8 @@ def test_sigterm_drains_the_queue_and_names_what_is_left(start_daemon):
     with Publisher(daemon.directory) as out:
         for _ in range(200):
             out.send("/robot_1/odom", CDR + bytes(700))
-    daemon.process.send_signal(signal.SIGTERM)
-    assert daemon.process.wait(5) == 0
+    daemon.send_signal(signal.SIGTERM)
+    assert daemon.wait(5) == 0
     assert "dropped" in daemon.log()
     assert "ledger:" not in daemon.log()
     assert not list(daemon.directory.glob("*.sock"))
@@ -192,14 +185,14 @@ def test_what_has_arrived_before_sigterm_is_in_the_ledger(start_daemon):
         push.connect(f"ipc://{daemon.directory}/in.sock")
         push.send_multipart([b"/robot_1/odom\0", b"{}", CDR])
         wait_for(lambda: daemon.snapshot().link.tx.accepted == 1)
-        daemon.process.send_signal(signal.SIGSTOP)
+        daemon.send_signal(signal.SIGSTOP)
         for _ in range(299):
             push.send_multipart([b"/robot_1/odom\0", b"{}", CDR + bytes(100)])
         # The pipe is written by ZeroMQ's own thread; what it holds when the daemon wakes counts.
         time.sleep(0.3)
-        daemon.process.send_signal(signal.SIGTERM)
-        daemon.process.send_signal(signal.SIGCONT)
-        assert daemon.process.wait(10) == 0
+        daemon.send_signal(signal.SIGTERM)
+        daemon.send_signal(signal.SIGCONT)
+        assert daemon.wait(10) == 0
     context.destroy(linger=0)
     assert "/300 sent" in daemon.log()
 
@@ -211,22 +204,11 @@ def test_what_has_arrived_before_sigterm_is_in_the_ledger(start_daemon):
 )
 def test_a_demo_that_is_ended_leaves_nothing_behind(tmp_path, number, link):
     environment = {**os.environ, "TMPDIR": str(tmp_path)}
-    command = [
-        sys.executable,
-        "-m",
-        "sdrlinkd.cli",
-        "demo",
-        "--link",
-        link,
-        "--out",
-        tmp_path / "out",
-    ]
-    with group(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as demo:
-        wait_for(lambda: list(tmp_path.glob("sdrlink-*/*/ctl.sock")), 60)
-        demo.send_signal(number)
-        _, err = demo.communicate(timeout=60)
-    assert demo.returncode != 0
-    assert b"Traceback" not in err
+    arguments = ("demo", "--link", link, "--out", tmp_path / "out")
+    with sdrlinkctl(*arguments, environment=environment) as demo:
+        wait_until(lambda: list(tmp_path.glob("sdrlink-*/*/ctl.sock")), 60, demo)
+        assert demo.stop(number, 60) != 0
+    assert "Traceback" not in demo.err()
     assert not list(tmp_path.glob("sdrlink-*"))
 
 
@@ -237,7 +219,7 @@ def test_a_second_instance_exits_with_2_and_the_first_is_unharmed(start_daemon):
         capture_output=True, text=True, timeout=30,
     )  # fmt: skip
     assert second.returncode == 2
-    assert f"pid {daemon.process.pid}" in second.stderr
+    assert f"pid {daemon.pid}" in second.stderr
     assert "Traceback" not in second.stderr
     assert daemon.snapshot().state == "running"
 
@@ -269,10 +251,10 @@ def test_sighup_rereads_policies_and_keeps_the_old_on_error(start_daemon):
 
     assert qos() == "default"
     daemon.config.write_text(text + '[topic.odom]\nqos = "urgent"\n')
-    daemon.process.send_signal(signal.SIGHUP)
+    daemon.send_signal(signal.SIGHUP)
     wait_for(lambda: qos() == "urgent")
     daemon.config.write_text(text + '[topic.odom]\nqos = "fastest"\n')
-    daemon.process.send_signal(signal.SIGHUP)
+    daemon.send_signal(signal.SIGHUP)
     wait_for(lambda: "not reloaded" in daemon.log())
     assert qos() == "urgent"
     with daemon.control() as control, pytest.raises(RefusedError, match="fastest"):

@@ -83,8 +83,7 @@ def test_stopping_sends_what_is_queued_first(start_daemon):
         for payload in payloads(30):
             out.send("/robot_1/odom", payload)
         out.flush()
-    node.process.terminate()
-    assert node.process.wait(20) == 0
+    assert node.stop(within_s=20) == 0
     assert "out 30/30 sent, 0 queued, 0 dropped" in node.log()
 
 
@@ -100,7 +99,7 @@ def test_a_receiver_too_slow_for_its_rate_says_so_and_stays_small(start_daemon):
     counters = snapshot.carrier.counters
     assert counters["gaps"] > 0
     assert counters["samples_lost"] > 1e7
-    status = Path(f"/proc/{node.process.pid}/status").read_text()
+    status = Path(f"/proc/{node.pid}/status").read_text()
     resident_kb = int(re.search(r"VmRSS:\s*(\d+) kB", status)[1])
     assert resident_kb < 1_500_000
 

@@ -327,17 +327,17 @@ def test_a_reload_that_makes_it_worse_ends_nothing(start_daemon, bus):
         (good.replace("driver=loopback", "driver=hackrff"), 'no driver "hackrff"'),
     ):
         robot.config.write_text(bad)
-        robot.process.send_signal(signal.SIGHUP)
+        robot.send_signal(signal.SIGHUP)
         wait_for(lambda said=said: said in robot.log() + robot.snapshot().carrier.reason)
     robot.config.write_text(good)
-    robot.process.send_signal(signal.SIGHUP)
+    robot.send_signal(signal.SIGHUP)
     air_.inject(1, "replug")
     wait_for(lambda: robot.snapshot().carrier.state == "up", 20)
     # While it is away after it was up, its settings may change, too.
     air_.inject(1, "unplug")
     wait_for(lambda: robot.snapshot().carrier.state == "down", 20)
     robot.config.write_text(good.replace("tx_gain_db = 40.0", "tx_gain_db = 30.0"))
-    robot.process.send_signal(signal.SIGHUP)
+    robot.send_signal(signal.SIGHUP)
     wait_for(lambda: robot.snapshot().carrier.state in ("opening", "waiting"), 20)
     air_.inject(1, "replug")
     wait_for(lambda: "tx 30 dB" in robot.snapshot().carrier.detail, 20)
@@ -353,7 +353,7 @@ def test_settings_that_were_refused_are_tried_again(start_daemon, bus, mended_by
     if mended_by == "a reload":
         text = robot.config.read_text()
         robot.config.write_text(text.replace("tx_gain_db = 99.0", "tx_gain_db = 40.0"))
-        robot.process.send_signal(signal.SIGHUP)
+        robot.send_signal(signal.SIGHUP)
         wait_for(lambda: robot.snapshot().carrier.state == "up", 20)
         assert "tx 40 dB" in robot.snapshot().carrier.detail
         assert "re-read: topic policies and the radio's settings" in robot.log()
@@ -394,7 +394,7 @@ def test_who_obeys_is_stopped_while_the_radio_is_refused(start_daemon, bus):
         wait_for(lambda: obeying.snapshot().carrier.state == "down", 20)
         text = obeying.config.read_text()
         obeying.config.write_text(text.replace("tx_gain_db = 40.0", "tx_gain_db = 99.0"))
-        obeying.process.send_signal(signal.SIGHUP)
+        obeying.send_signal(signal.SIGHUP)
         air_.inject(2, "replug")
         wait_for(lambda: obeying.snapshot().carrier.state == "refused", 20)
         assert heard.receive(20).is_stop

@@ -1,6 +1,5 @@
 """The service units, and what the daemon tells the service manager."""
 
-import contextlib
 import os
 import re
 import shutil
@@ -15,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from sdrlinkd.process import Process, module
 from tests.machine import lacks
 
 ROOT = Path(__file__).parents[2]
@@ -140,18 +140,13 @@ class Manager:
         name = sock.getsockname()
         self._address = name if isinstance(name, str) else "@" + name[1:].decode()
 
-    @contextlib.contextmanager
-    def daemon(self) -> Iterator[subprocess.Popen[bytes]]:
+    def daemon(self) -> Process:
         environment = os.environ | {
             "NOTIFY_SOCKET": self._address,
             "WATCHDOG_USEC": str(round(WATCHDOG_S * 1e6)),
         }
-        command = [sys.executable, "-m", "sdrlinkd", "--config", self._config]
-        with subprocess.Popen(command, cwd=ROOT, env=environment, umask=0o007) as process:
-            try:
-                yield process
-            finally:
-                process.kill()
+        command = module("sdrlinkd", "--config", self._config)
+        return Process(command, environment=environment, folder=ROOT, umask=0o007)
 
     def wait_for(self, start: str) -> str:
         """The next state that begins so."""

@@ -1,14 +1,14 @@
 """A demonstration or a lab that is killed leaves no process, and the next run takes its folder."""
 
-import os
 import signal
-import subprocess
 import sys
 
 import pytest
 
 from sdrlinkd.demo import run_folder
+from sdrlinkd.process import Process, wait_until
 from tests.lab.scenarios import processes_of, write_scenario
+from tests.programs import sdrlinkctl
 from tests.waiting import wait_for
 
 
@@ -20,18 +20,11 @@ def killed(tmp_path, tmp_path_factory, monkeypatch):
     monkeypatch.setenv("TMPDIR", str(temporary))
 
     def call(is_up, *arguments):
-        process = subprocess.Popen(
-            [sys.executable, "-m", "sdrlinkd.cli", *map(str, arguments)],
-            cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
-        )  # fmt: skip
-        try:
-            wait_for(lambda: process.poll() is not None or is_up(temporary), 120)
-            assert process.poll() is None, process.stderr.read()
+        with sdrlinkctl(*arguments, folder=tmp_path) as process:
+            wait_until(lambda: is_up(temporary), 120, process)
             assert len(processes_of(temporary)) > 0
-        finally:
             process.send_signal(signal.SIGKILL)
             process.wait()
-            process.stderr.close()
         return temporary
 
     return call
@@ -82,11 +75,7 @@ def test_a_daemon_that_does_not_stop_is_killed_in_the_end(tmp_path):
         "signal.signal(signal.SIGTERM, signal.SIG_IGN); parent.end_with_parent();"
         "print('.', flush=True); signal.pause()"
     )
-    process = subprocess.Popen(
-        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        env={**os.environ, "SDRLINKD_ENDS_WITH_STDIN": "1"},
-    )  # fmt: skip
-    process.stdout.readline()
-    process.stdin.close()
-    assert process.wait(20) == -signal.SIGKILL
-    process.stdout.close()
+    with Process([sys.executable, "-c", code]) as process:
+        process.line()
+        process.close_input()
+        assert process.wait(20) == -signal.SIGKILL

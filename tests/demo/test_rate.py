@@ -1,8 +1,6 @@
 """The demonstration takes the rate that this machine carries, and says what it found."""
 
-import os
 import signal
-import subprocess
 import sys
 from pathlib import Path
 
@@ -11,6 +9,7 @@ import pytest
 from sdrlinkd.demo import Options, find_rate, open_source
 from sdrlinkd.demo.load import LoadOf
 from sdrlinkd.demo.rate import Tried, tried_out
+from sdrlinkd.process import Process
 from tests.waiting import wait_for
 
 OPTIONS = Options(link="direct")
@@ -55,19 +54,15 @@ def test_what_is_measured_is_a_daemon_with_this_traffic():
 
 def test_of_a_process_the_busiest_thread_counts():
     code = "import sys, threading; print('.', flush=True)\nwhile True: pass"
-    busy = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
-    still = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
-    try:
+    command = [sys.executable, "-c", code]
+    with Process(command) as busy, Process(command) as still:
         for each in (busy, still):
-            each.stdout.readline()
-        os.kill(still.pid, signal.SIGSTOP)
+            each.line()
+        still.send_signal(signal.SIGSTOP)
         wait_for(lambda: " T " in Path(f"/proc/{still.pid}/stat").read_text())
         loads = [LoadOf(each.pid) for each in (busy, still)]
         wait_for(lambda: loads[0].read().busy > 0.9)
         assert loads[1].read().busy < 0.1
         assert 0 <= loads[0].read().waited < 1
-    finally:
-        for each in (busy, still):
-            each.kill()
-            each.wait()
-            each.stdout.close()
+        # What is stopped does not hear that it shall end.
+        still.kill()

@@ -3,7 +3,6 @@
 import contextlib
 import os
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -12,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from sdrlinkd.process import Process, wait_until
 from tests.docs.pages import commands_of, missing_words
 from tests.soapy_loopback import Bus, missing, module_folder
-from tests.waiting import wait_for
 
 ROOT = Path(__file__).parents[2]
 PAGES = ROOT / "docs" / "radios"
@@ -67,30 +66,20 @@ class Laptop:
         return done.stdout
 
     def _leave_running(self, line, shown):
-        log = self.folder / f"log{len(self._behind)}"
-        with log.open("wb") as out:
-            process = subprocess.Popen(
-                f"exec {line}", shell=True, cwd=self.folder, env=self.environment,
-                stdin=subprocess.DEVNULL, stdout=out, stderr=out,
-            )  # fmt: skip
-        self._behind.append((process, log))
-
-        def is_shown():
-            assert process.poll() is None, log.read_text()
-            return not missing_words(shown, log.read_text())
-
-        wait_for(is_shown, PATIENCE_S)
-        return log.read_text()
+        process = Process(
+            ["/bin/sh", "-c", f"exec {line}"], name=line, environment=self.environment,
+            folder=self.folder,
+        )  # fmt: skip
+        self._behind.append(process)
+        process.start()
+        wait_until(lambda: not missing_words(shown, process.log()), PATIENCE_S, process)
+        return process.log()
 
     def close(self):
         """Ends what was left running, the last first: in good order, and without a traceback."""
-        for process, log in reversed(self._behind):
-            process.send_signal(signal.SIGTERM)
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                process.wait(30)
-            process.kill()
-            process.wait()
-            assert "Traceback" not in log.read_text(), log.read_text()
+        for process in reversed(self._behind):
+            process.stop(within_s=30)
+            assert "Traceback" not in process.log(), process.log()
 
 
 @contextlib.contextmanager

@@ -3,7 +3,6 @@
 import contextlib
 import os
 import re
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -11,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from sdrlinkd.client import ControlClient, NoDaemonError
+from sdrlinkd.process import Process, wait_until
 from tests.soapy_loopback import Bus, missing
-from tests.waiting import wait_for
 
 ROOT = Path(__file__).parents[2]
 BIN = Path(sys.executable).parent
@@ -65,16 +64,14 @@ def reader(tmp_path):
             environment[key] = value
             return 0, ""
         if "sdrlinkd --config" in line:
-            log = (tmp_path / "log").open("wb")
-            behind.append(
-                subprocess.Popen(
-                    ["/bin/sh", "-c", f"exec {line.removesuffix('&')}"],
-                    cwd=tmp_path, env=environment, stdout=log, stderr=log,
-                )
+            daemon = Process(
+                ["/bin/sh", "-c", f"exec {line.removesuffix('&')}"], name=line,
+                environment=environment, folder=tmp_path,
             )  # fmt: skip
-            log.close()
-            wait_for(lambda: answers(tmp_path / "run", behind[-1]), PATIENCE_S)
-            return 0, (tmp_path / "log").read_text()
+            behind.append(daemon)
+            daemon.start()
+            wait_until(lambda: is_up(tmp_path / "run"), PATIENCE_S, daemon)
+            return 0, daemon.log()
         done = subprocess.run(
             line, shell=True, cwd=tmp_path, env=environment, stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=PATIENCE_S,
@@ -83,14 +80,12 @@ def reader(tmp_path):
         return done.returncode, done.stdout
 
     yield shell
-    for process in behind:
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(30) == 0, (tmp_path / "log").read_text()
+    for daemon in behind:
+        assert daemon.stop(within_s=30) == 0, daemon.log()
 
 
-def answers(directory, process):
+def is_up(directory):
     """Whether the daemon is up."""
-    assert process.poll() is None
     with contextlib.suppress(NoDaemonError), ControlClient(directory, 0.5) as control:
         return control.ask("status")["carrier"]["state"] == "up"
     return False

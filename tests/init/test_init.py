@@ -15,8 +15,8 @@ from sdrlinkd.cli import run
 from sdrlinkd.client import Publisher, Subscriber
 from sdrlinkd.config import Config, load_config, load_registry, make_setup, parse_config
 from sdrlinkd.init import MOST_TOPICS, RADIOS, FoundTopic, choose, copy_of
+from sdrlinkd.process import Process, module, wait_until
 from tests.adapters.recordings import noisy_messages, ros2_bag
-from tests.waiting import wait_for
 
 ODOM = ("--topic", "odom:nav_msgs/msg/Odometry")
 
@@ -293,22 +293,16 @@ def test_a_team_on_the_ether_talks_at_once(init, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     monkeypatch.chdir(tmp_path)
     assert init("--radio", "ether", "--robots", 2, "--id", "all", *ODOM)[0] == 0
-    logs = [(tmp_path / name).open("w+") for name in ("air", "1", "2")]
     lines = [
         ("sdrlinkd.cli.ether", "--dir", "team/air"),
         ("sdrlinkd", "--config", "team/robot_1.toml"),
         ("sdrlinkd", "--config", "team/robot_2.toml"),
     ]
     with contextlib.ExitStack() as stack:
-        for line, log in zip(lines, logs, strict=True):
-            stack.enter_context(log)
-            process = stack.enter_context(
-                subprocess.Popen([sys.executable, "-m", *line], stdout=log, stderr=log)
-            )
-            stack.callback(process.terminate)
+        team = [stack.enter_context(Process(module(*line))) for line in lines]
         sockets = [tmp_path / "sdrlinkd" / f"robot_{number}" for number in (1, 2)]
         for each in sockets:
-            wait_for((each / "out.sock").exists, 60)
+            wait_until((each / "out.sock").exists, 60, *team)
         with (
             Publisher(sockets[0]) as out,
             Subscriber("/rx_robot_1/odom", directory=sockets[1]) as heard,
@@ -318,4 +312,4 @@ def test_a_team_on_the_ether_talks_at_once(init, tmp_path, monkeypatch):
                 out.send("/robot_1/odom", bytes(700))
                 return heard.receive(0.1)
 
-            wait_for(is_heard, 60)
+            wait_until(is_heard, 60, *team)

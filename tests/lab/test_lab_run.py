@@ -3,7 +3,6 @@
 import os
 import signal
 import subprocess
-import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
@@ -14,8 +13,9 @@ import pytest
 from sdrlinkd.client import Subscriber
 from sdrlinkd.errors import UserError
 from sdrlinkd.lab import LabOptions, load_scenario, run_lab
+from sdrlinkd.process import wait_until
 from tests.lab.scenarios import processes_of, write_scenario
-from tests.waiting import group, wait_for
+from tests.programs import sdrlinkctl
 
 MESSAGES = 30
 """What each robot sends: 3 s of velocity commands at 10 Hz."""
@@ -147,7 +147,7 @@ def test_an_interrupt_while_a_process_starts_leaves_none(run_small, nothing_left
     stand_in = SimpleNamespace(
         Popen=start, PIPE=subprocess.PIPE, TimeoutExpired=subprocess.TimeoutExpired
     )
-    monkeypatch.setattr("sdrlinkd.demo.processes.subprocess", stand_in)
+    monkeypatch.setattr("sdrlinkd.process.subprocess", stand_in)
     try:
         with pytest.raises(KeyboardInterrupt):
             run_small()
@@ -163,19 +163,15 @@ def test_an_interrupt_while_a_process_starts_leaves_none(run_small, nothing_left
 def test_a_lab_that_is_interrupted_leaves_nothing_behind(tmp_path_factory):
     folder = tmp_path_factory.mktemp("end")
     path = write_scenario(folder, pace="realtime")
-    command = [sys.executable, "-m", "sdrlinkd.cli", "lab", path, "--out", folder / "out"]
-    with group(
-        [*command, "--duration", "600"], env={**os.environ, "TMPDIR": str(folder)},
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-    ) as lab:  # fmt: skip
-        wait_for(lambda: len(list(folder.glob("sdrlink-*/robot_*/ctl.sock"))) == 2, 60)
+    arguments = ("lab", path, "--out", folder / "out", "--duration", "600")
+    with sdrlinkctl(*arguments, environment={**os.environ, "TMPDIR": str(folder)}) as lab:
+        wait_until(lambda: len(list(folder.glob("sdrlink-*/robot_*/ctl.sock"))) == 2, 60, lab)
         for robot in folder.glob("sdrlink-*/robot_*"):
             with Subscriber(directory=robot, timeout_s=60) as heard:
                 assert heard.receive(60)
         assert len(processes_of(folder)) == 4
-        lab.send_signal(signal.SIGINT)
-        out, _ = lab.communicate(timeout=60)
-    assert lab.returncode == 130, out
-    assert "Traceback" not in out
+        code = lab.stop(signal.SIGINT, 60)
+    assert code == 130, lab.log()
+    assert "Traceback" not in lab.log()
     assert processes_of(folder) == []
     assert list(folder.glob("sdrlink-*")) == []

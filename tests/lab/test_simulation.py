@@ -10,9 +10,10 @@ import pytest
 
 import phy
 from backends import AirParams, LinkOverride, RadioParams, World
-from benchmarks import shared_air
+from benchmarks.worlds import arrivals as messages
+from benchmarks.worlds import samples
+from benchmarks.worlds.bursts import Simulation
 from sdrlinkd.config import ModemParams
-from sdrlinkd.lab import Arrival, Simulation
 from sdrlinkd.link import AccessParams, Link, LinkParams, QueueParams, ReassemblyParams
 from sdrlinkd.modem import Airtimes
 from sdrlinkd.wire import make_registry
@@ -37,20 +38,20 @@ def radios(n, seed):
 def poisson(node, per_s, size, until_s, seed):
     """Messages of `size` bytes at random times."""
     rng = np.random.default_rng([seed, node])
-    return list(shared_air.poisson(rng, shared_air.DATA, per_s, size, until_s))
+    return list(messages.poisson(rng, samples.DATA, per_s, size, until_s))
 
 
 def simulation(
     policy, arrivals, *, air, pdu_size, seed, links=(), mcs=MCS, beacons_s=None, keep_s=INFINITE,
     **more,
 ):  # fmt: skip
-    """Robots 1 to n, as benchmarks.shared_air makes them; `beacons_s` by robot, else 1."""
+    """Robots 1 to n, as benchmarks.worlds.samples makes them; `beacons_s` by robot, else 1."""
     ids = list(arrivals)
     modem = ModemParams(rate_hz=air.rate_hz, mcs=mcs)
     made = {
         node: Link(
             LinkParams(pdu_size=pdu_size, beacon_s=(beacons_s or {}).get(node, 1.0)),
-            QueueParams(), ReassemblyParams(), make_registry(shared_air.TOPICS), node,
+            QueueParams(), ReassemblyParams(), make_registry(samples.TOPICS), node,
             Random(100 * seed + node),
         )
         for node in ids
@@ -58,14 +59,16 @@ def simulation(
     return Simulation(
         air, World(air, {}, links), radios(len(ids), seed), made, modem, Airtimes(modem, pdu_size),
         AccessParams(policy=policy, nodes=[] if policy == "none" else ids, force=True),
-        {node: [Arrival(*each) for each in arrivals[node]] for node in ids},
+        arrivals,
         seed=seed, keep_s=keep_s, **more,
     )  # fmt: skip
 
 
 def got(sim):
     """(sender, receiver): messages received, mean age in s."""
-    return {key[:2]: (pair.received, pair.age_mean_s) for key, pair in sim.pairs.items()}
+    return {
+        key[:2]: (pair.received, pair.age_sum_s / pair.received) for key, pair in sim.pairs.items()
+    }
 
 
 def delivered(sim):
@@ -97,7 +100,7 @@ def two_at_40_percent(policy, n_nodes=2, seconds=1.0, seed=3):
     access = AccessParams(policy=policy, nodes=nodes if policy != "none" else [], force=True)
     modem = ModemParams(rate_hz=RATE, mcs=MCS)
     stations = asyncio.run(
-        shared_air.run(air, radios(n_nodes, seed), access, modem, pdu_size, arrivals, until_s, seed)
+        samples.run(air, radios(n_nodes, seed), access, modem, pdu_size, arrivals, until_s, seed)
     )
     by_samples = {}
     for receiver, station in zip(nodes, stations, strict=True):
@@ -225,7 +228,7 @@ def test_looking_only_when_it_may_matter_loses_nothing(policy, monkeypatch):
     ends = []
     for how in ("now and then", "every block"):
         if how == "every block":
-            monkeypatch.setattr("sdrlinkd.lab.simulation._next_chance", lambda *given: given[-1])
+            monkeypatch.setattr("benchmarks.worlds.bursts._next_chance", lambda *given: given[-1])
         arrivals = small_messages(5, 15.0, 4.0, 11)
         sim = simulation(policy, arrivals, air=AirParams(snr_db=25.0), pdu_size=128, seed=11)
         sim.run(5.0)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from backends import AirParams, RadioParams, World
+from benchmarks.worlds.arrivals import Arrival
+from benchmarks.worlds.bursts import Simulation
 from sdrlinkd.config import ModemParams
-from sdrlinkd.lab import Arrival, Simulation
 from sdrlinkd.link import (
     AccessParams,
     Link,

@@ -7,12 +7,12 @@ import pytest
 from sdrlinkd.link import (
     AccessParams,
     Opportunity,
-    Outcome,
     Overrides,
     PduLinkTraits,
     RateParams,
 )
 from sdrlinkd.wire import BROADCAST, LinkReport, parse
+from tests.link.steps import Steps
 from tests.link.world import make_link, neighbors, records_in
 
 SIZE = 220
@@ -31,42 +31,24 @@ def most_pdus(mcs, longest_s):
     return min(4, int(longest_s / airtime_s(mcs, 1))) if longest_s != INFINITE else 4
 
 
-class World:
-    """Links that hear each other as `snr_db(to, src, now)` says: a burst below its need is lost.
+def next_burst(link, now):
+    return link.next_burst(Opportunity(now, airtime_s, most_pdus))
 
-    Each can send `most_bursts` every STEP_S.
-    """
+
+class World(Steps):
+    """Links that hear each other as `snr_db(to, src, now)` says: a burst below its need is lost."""
 
     def __init__(self, ids, snr_db, most_bursts=10, **rate):
-        self.most_bursts = most_bursts
         self.snr_db = snr_db
-        self.now = 0.0
-        self.bursts = []
-        self.links = {}
-        for own_id in ids:
-            link = self.links[own_id] = make_link(own_id, seed=own_id, pdu_size=SIZE, beacon_s=1.0)
+        links = {each: make_link(each, seed=each, pdu_size=SIZE, beacon_s=1.0) for each in ids}
+        for link in links.values():
             link.attach(TRAITS, AccessParams(), RateParams(adapt=True, **rate))
+        super().__init__(links, STEP_S, next_burst, most_bursts)
 
-    def run(self, until, each_step=lambda world: None):
-        while self.now < until:
-            each_step(self)
-            for own_id, link in self.links.items():
-                opportunity = Opportunity(self.now, airtime_s, most_pdus)
-                for _ in range(self.most_bursts):
-                    if burst := link.next_burst(opportunity):
-                        self._carry(own_id, burst)
-                        link.confirm(burst, Outcome.SENT, self.now)
-                assert link.audit() == []
-                link.handle_timers(self.now)
-            self.now += STEP_S
-
-    def _carry(self, src, burst):
-        self.bursts.append((self.now, src, burst))
-        for to, link in self.links.items():
-            snr_db = self.snr_db(to, src, self.now)
-            if to != src and snr_db >= NEEDED[burst.mcs]:
-                for pdu in burst.pdus:
-                    link.hear(pdu, self.now, snr_db)
+    def arrivals(self, to, src, burst):
+        snr_db = self.snr_db(to, src, self.now)
+        if snr_db >= NEEDED[burst.mcs]:
+            yield from ((0.0, snr_db, pdu) for pdu in burst.pdus)
 
     def mcs(self, src, since, until=INFINITE):
         """The MCS of its bursts of messages in that time."""

@@ -24,6 +24,7 @@ from sdrlinkd.link.receipts import Receipts
 from sdrlinkd.link.transmit import MOST_RECEIPTS
 from sdrlinkd.wire import PduBuilder, Receipt, build_records, parse
 from tests.laws import law
+from tests.link.steps import Steps
 from tests.link.world import compose, make_link, next_burst, received, records_in, tell
 
 STEP_S = 0.01
@@ -32,62 +33,52 @@ RECEIPT_S = 2.0
 N = 60
 
 
-class Air:
+class Air(Steps):
     """Robots that all hear each other, by chance; PDUs may be lost, doubled and overtaken."""
 
     def __init__(self, seed, robots, loss=0.0, doubled=0.0, late=0.0, **params):
         self.rng = Random(seed)
         self.loss, self.doubled, self.late = loss, doubled, late
-        self.now = 0.0
-        self.links = {
+        links = {
             robot: make_link(
                 own_id=robot, seed=100 * seed + robot, receipt_s=RECEIPT_S, beacon_s=1.0,
                 clock=ClockParams(), **params,
             )
             for robot in robots
         }  # fmt: skip
-        self.under_way = []
+        super().__init__(links, STEP_S, next_burst)
         self.delivered = Counter()
         """(robot, payload): times it was handed over."""
         self.expired = []
         self.verdicts = []
 
-    def run(self, until):
-        while self.now < until:
-            self.now += STEP_S
-            for link in self.links.values():
-                link.handle_timers(self.now)
-                while burst := next_burst(link, self.now):
-                    self._send(link, burst)
-            due = [each for each in self.under_way if each[0] <= self.now]
-            self.under_way = [each for each in self.under_way if each[0] > self.now]
-            self.rng.shuffle(due)
-            for _, robot, pdu, at in due:
-                self._hear(robot, pdu, at)
-            for robot, link in self.links.items():
-                self.verdicts += [(robot, each) for each in link.take_verdicts()]
-                assert link.audit() == []
-
-    def _send(self, link, burst):
-        link.confirm(burst, Outcome.SENT, burst.start + AIR_S)
-        for robot in self.links:
-            if robot == link.own_id:
+    def arrivals(self, to, src, burst):
+        for pdu in burst.pdus:
+            if self.rng.random() < self.loss:
                 continue
-            for pdu in burst.pdus:
-                if self.rng.random() < self.loss:
-                    continue
-                for _ in range(1 + (self.rng.random() < self.doubled)):
-                    delay_s = AIR_S + (self.rng.random() < self.late) * self.rng.uniform(0, 0.3)
-                    self.under_way.append((burst.start + delay_s, robot, pdu, burst.start))
+            for _ in range(1 + (self.rng.random() < self.doubled)):
+                delay_s = AIR_S + (self.rng.random() < self.late) * self.rng.uniform(0, 0.3)
+                yield delay_s, 20.0, pdu
 
-    def _hear(self, robot, pdu, at):
+    def confirmed_s(self):
+        return AIR_S
+
+    def order(self, due):
+        self.rng.shuffle(due)
+        return due
+
+    def take(self, robot, message):
+        self.delivered[robot, message.payload] += 1
         link = self.links[robot]
-        for message in link.hear(pdu, at, 20.0, self.now):
-            self.delivered[robot, message.payload] += 1
-            age_s = link.delivered(message, self.now)
-            lifespan_s = link.policy(message.topic_id).own_lifespan_s
-            if age_s is None or age_s > lifespan_s + 1e-5:
-                self.expired.append((robot, age_s))
+        age_s = link.delivered(message, self.now)
+        lifespan_s = link.policy(message.topic_id).own_lifespan_s
+        if age_s is None or age_s > lifespan_s + 1e-5:
+            self.expired.append((robot, age_s))
+
+    def step(self):
+        super().step()
+        for robot, link in self.links.items():
+            self.verdicts += [(robot, each) for each in link.take_verdicts()]
 
 
 def message(number, size=40):

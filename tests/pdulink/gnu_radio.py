@@ -5,6 +5,7 @@ import functools
 import subprocess
 from pathlib import Path
 
+from sdrlinkd.process import Process
 from tests.machine import lacks
 
 PYTHON = "/usr/bin/python3"
@@ -28,16 +29,7 @@ def no_gnu_radio():
 @contextlib.contextmanager
 def flowgraph(name, *arguments):
     """etc/gnuradio/NAME.py at work."""
-    process = subprocess.Popen(
-        [PYTHON, str(FLOWGRAPHS / f"{name}.py"), *map(str, arguments)],
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        line = process.stdout.readline().strip()
+    with Process([PYTHON, FLOWGRAPHS / f"{name}.py", *arguments], name=name) as process:
+        line = process.line()
         assert line == "ready", f"{name} says {line!r}"
         yield process
-    finally:
-        process.terminate()
-        process.wait(20)
-        process.stdout.close()

@@ -1,0 +1,51 @@
+"""What cannot be measured here: it is told in one line, and the others go on.
+
+Ends of peers import this by other interpreters than ours: it needs the standard library only.
+"""
+
+import subprocess
+import sys
+from typing import Self
+
+from sdrlinkd.process import ProcessError
+
+_told: dict[str, str] = {}
+
+
+class PeerError(Exception):
+    """A peer could not be measured; the message names it and the reason."""
+
+
+# Not installed, ended, silent, or not understood: anything else is a bug of ours.
+FAILURES = (PeerError, ProcessError, OSError, subprocess.SubprocessError, ValueError)
+
+
+class attempt:  # noqa: N801  # it reads as a verb
+    """A block whose failure is told as that of `what`; then it goes on behind the block."""
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+        self.failed = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> bool:
+        self.failed = isinstance(error, FAILURES)
+        if self.failed:
+            tell(self._what, error)
+        return self.failed
+
+
+def tell(what: str, reason: object) -> None:
+    """Say in one line, once, why `what` is not measured."""
+    line = " ".join(str(reason).split()) or type(reason).__name__
+    line = line.removeprefix(f"{what}: ")
+    if _told.get(what) != line:
+        _told[what] = line
+        sys.stderr.write(f"not measured: {what}: {line}\n")
+
+
+def told() -> dict[str, str]:
+    """All that was told so far: what was not measured, and why."""
+    return dict(_told)

@@ -1,0 +1,132 @@
+"""Virtual environments for peers with packages of their own, made when first asked for.
+
+They are kept in the user's cache. An rclpy from wheels starts each interpreter of its environment
+twice, with other library paths, so it must not share one with anything of ours.
+"""
+
+import fcntl
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Protocol
+
+from benchmarks.absent import PeerError
+
+ROOT = Path(__file__).parents[1]
+"""What has the package `benchmarks`."""
+
+PACKAGES = {
+    "zenoh": ["eclipse-zenoh"],
+    "rclpy": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-std-msgs"],
+    "mavlink": ["pymavlink==2.4.50"],
+}
+CHECKS = {
+    "zenoh": "import zenoh",
+    "rclpy": "import rclpy, std_msgs.msg; rclpy.init()",
+    "mavlink": "import pymavlink.dialects.v20.common",
+}
+WHEELS = (3, 11)
+"""The one Python that the rclpy wheels are built for."""
+INSTALL_S = 600.0
+
+
+class EnvironmentLackingError(PeerError):
+    """An environment cannot be had; the message says why."""
+
+
+class NeedsEnvironment(Protocol):
+    """A peer; "" is our own environment."""
+
+    @property
+    def environment(self) -> str:
+        """The name of the virtual environment that it needs."""
+
+
+def unavailable(peers: Mapping[str, NeedsEnvironment], peer: str) -> str | None:
+    """None where this one can run, else why not; makes the environment that it needs."""
+    if peer not in peers:
+        return f"no peer is called {peer!r}; there are {', '.join(peers)}"
+    return _lacking(peers[peer].environment)
+
+
+@cache
+def _lacking(environment: str) -> str | None:
+    try:
+        interpreter(environment)
+    except EnvironmentLackingError as error:
+        return str(error)
+    return None
+
+
+def interpreter(environment: str) -> str:
+    """The Python to run endpoints with; "" is ours. Makes what is not there, which takes long."""
+    if not environment:
+        return sys.executable
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "sdrlinkd-bench"
+    folder = cache / environment
+    python, made = folder / "bin" / "python", folder / ".made"
+    try:
+        cache.mkdir(parents=True, exist_ok=True)
+        with (cache / f"{environment}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not made.exists():
+                _make(environment, folder)
+                made.touch()
+    except OSError as error:
+        raise EnvironmentLackingError(f"{environment}: {error}") from None
+    return str(python)
+
+
+def variables() -> dict[str, str]:
+    """The environment variables of an endpoint: nothing that would change what is measured."""
+    # What an rclpy environment leaves to its children breaks any other.
+    kept = {
+        key: value
+        for key, value in os.environ.items()
+        if key not in ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE", "VIRTUAL_ENV")
+        and not key.startswith(("PYTHON", "ROS_", "RMW_", "FASTDDS_", "FASTRTPS_", "ZENOH_"))
+    }
+    return kept | {"PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}
+
+
+def _make(environment: str, folder: Path) -> None:
+    base = _base(environment)
+    steps = [
+        [base, "-m", "venv", "--clear", str(folder)],
+        [str(folder / "bin" / "pip"), "install", "--quiet", "--no-compile", *PACKAGES[environment]],
+        [str(folder / "bin" / "python"), "-c", CHECKS[environment]],
+    ]
+    for step in steps:
+        try:
+            done = subprocess.run(
+                step,
+                check=False,
+                capture_output=True,
+                text=True,
+                env=variables(),
+                timeout=INSTALL_S,
+            )
+        except subprocess.TimeoutExpired:
+            took = f"not done within {INSTALL_S:.0f} s"
+            raise EnvironmentLackingError(f"{environment}: {_what(step)}: {took}") from None
+        if done.returncode:
+            said = (done.stderr.strip().splitlines() or ["no reason given"])[-1]
+            raise EnvironmentLackingError(f"{environment}: {_what(step)}: {said}")
+
+
+def _what(step: list[str]) -> str:
+    return " ".join([Path(step[0]).name, *step[1:]])
+
+
+def _base(environment: str) -> str:
+    if environment != "rclpy" or sys.version_info[:2] == WHEELS:
+        return sys.executable
+    version = ".".join(map(str, WHEELS))
+    found = shutil.which(f"python{version}")
+    if found is None:
+        raise EnvironmentLackingError(f"rclpy: its wheels need Python {version}, which is not here")
+    return found

@@ -1,0 +1,72 @@
+"""Our own daemons as a peer: programs on the bus, and between them PDUs straight back or an air."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from benchmarks.peers.latency.daemons import Air, running
+from benchmarks.peers.latency.job import ANSWERED, ASKED, FIRST_TOPIC, REPLY, REQUEST, Address
+from benchmarks.peers.latency.way import End, Way
+from sdrlinkd.client import Publisher, Subscriber
+
+AIR = Air()
+ROBOT = {"companion": 1, "fcu": 2}
+SHARED = "direct"
+"""Here both ends are programs of one robot."""
+TOPICS = {SHARED: 7, "ether": 15}
+"""So many each way: of one registry both ways, or of one each."""
+
+
+class BusEnd:
+    """One end's program. Messages for time synchronisation are told from others by their length."""
+
+    def __init__(self, address: Address, side: str) -> None:
+        robot = ROBOT[side]
+        other = next(each for each in ROBOT.values() if each != robot)
+        if address.transport == SHARED:
+            robot = other = 1
+        ours, theirs = ("c", "f") if side == "companion" else ("f", "c")
+        if address.transport != SHARED:
+            ours = theirs = "t"
+        self._out = Publisher(address.place)
+        self._heard = Subscriber(f"/rx_robot_{other}/{theirs}*", runtime_dir=address.place)
+        self._prefix = f"/robot_{robot}/{ours}"
+        self._skip = len(f"/rx_robot_{other}/{theirs}")
+
+    def send(self, kind: int, payload: bytes) -> None:
+        """Hand a message to the daemon."""
+        number = max(0, kind - FIRST_TOPIC)
+        self._out.send(f"{self._prefix}{number}", payload)
+
+    def receive(self, timeout_s: float) -> Iterator[tuple[int, bytes]]:
+        """Wait for one message from the daemon, and tell it."""
+        message = self._heard.receive(timeout_s)
+        if message is None:
+            return
+        payload = message.payload
+        if len(payload) == ASKED.size:
+            yield REQUEST, payload
+        elif len(payload) == ANSWERED.size:
+            yield REPLY, payload
+        else:
+            yield FIRST_TOPIC + int(message.topic[self._skip :]), payload
+
+
+@contextmanager
+def direct(_: int) -> Iterator[Way]:
+    """Both ends at one daemon, whose PDUs come straight back."""
+    names = [f"{side}{i}" for side in "cf" for i in range(TOPICS[SHARED])]
+    with running(AIR._replace(backend=SHARED), [1], names) as daemons:
+        address = Address(SHARED, str(daemons.folders[1]))
+        yield Way({side: End(address) for side in ROBOT}, daemons.processes)
+
+
+@contextmanager
+def ether(_: int) -> Iterator[Way]:
+    """A daemon for each end, and the hub of their air."""
+    names = [f"t{i}" for i in range(TOPICS["ether"])]
+    with running(AIR, list(ROBOT.values()), names) as daemons:
+        ends = {
+            side: End(Address("ether", str(daemons.folders[robot])))
+            for side, robot in ROBOT.items()
+        }
+        yield Way(ends, daemons.processes)

@@ -1,0 +1,31 @@
+"""When an end sends what: topics at a fixed rate, requests for the time at chance moments."""
+
+import random
+
+from benchmarks.peers.latency.job import FIRST_TOPIC, REQUEST, Job
+
+WARMUP_REQUESTS_HZ = 100.0
+"""So that the paper's filter has its 500 samples soon."""
+REQUESTS_HZ = 10.0
+"""As MAVROS asks."""
+
+
+def schedule(job: Job) -> list[tuple[float, int, int]]:
+    """(s after the start, kind, number), in order of time.
+
+    Each topic has a phase of its own, by the seed. Requests go at a moment by chance within their
+    period: in runs as short as these, timers do not drift through each other as they do in flight.
+    """
+    rng = random.Random(f"{job.seed} {job.side}")
+    period = 1 / job.rate_hz
+    sends: list[tuple[float, int, int]] = []
+    for topic in range(FIRST_TOPIC, FIRST_TOPIC + job.n_topics):
+        phase = rng.random() * period
+        count = job.n_warmup + job.n_counted
+        sends += [(phase + number * period, topic, number) for number in range(count)]
+    at, number = 0.0, 0
+    while at < job.warmup_s + job.seconds:
+        gap = 1 / (WARMUP_REQUESTS_HZ if at < job.warmup_s else REQUESTS_HZ)
+        sends.append((at + rng.random() * gap, REQUEST, number))
+        at, number = at + gap, number + 1
+    return sorted(sends)

@@ -1,0 +1,51 @@
+"""liquid-dsp: `liquid.c` beside this file, built when the library and a compiler are there."""
+
+import functools
+import shutil
+import tempfile
+from pathlib import Path
+
+from benchmarks.absent import PeerError
+from benchmarks.processes import told_by
+
+SOURCE = Path(__file__).with_name("liquid.c")
+
+
+class Liquid:
+    """Codes are named as liquid-dsp does: "none", "h128", "g2412".
+
+    Every measurement raises PeerError and ProcessError where it is not there (Debian:
+    libliquid-dev).
+    """
+
+    name = "liquid-dsp"
+
+    def errors(self, code: str, bits: int, n_bytes: int, snr_db: float, n: int, seed: int) -> int:
+        """Of `n` frames, how many are not heard."""
+        return int(self._run("errors", code, bits, n_bytes, snr_db, n, seed))
+
+    def headers(self, snr_db: float, n: int, seed: int) -> int:
+        """Of `n` frames, how many headers are read."""
+        return int(self._run("headers", snr_db, n, seed))
+
+    def speed(self, code: str, bits: int, n_bytes: int) -> tuple[float, float]:
+        """Msps of CPU time, (transmitter, receiver at 30 dB with gaps of 400 samples)."""
+        sends, hears = self._run("speed", code, bits, n_bytes).split()
+        return float(sends), float(hears)
+
+    def noise_msps(self, n_samples: int, seed: int) -> float:
+        """Msps of CPU time of a receiver that hears nothing."""
+        return float(self._run("noise", n_samples, seed).split()[0])
+
+    def _run(self, *arguments: object) -> str:
+        return told_by(self.name, self._program, *arguments)
+
+    @functools.cached_property
+    def _program(self) -> Path:
+        compiler = shutil.which("gcc") or shutil.which("cc")
+        if compiler is None:
+            raise PeerError(f"{self.name}: no C compiler (Debian: gcc)")
+        program = Path(tempfile.mkdtemp(prefix="sdrlink-bench-")) / "liquid"
+        flags = ["-O3", "-march=native", "-std=gnu11"]
+        told_by(self.name, compiler, *flags, SOURCE, "-o", program, "-lliquid", "-lm")
+        return program

@@ -1,0 +1,13 @@
+"""What a robot team would use instead, through two network namespaces and a slow channel.
+
+    from benchmarks.peers.pound.namespaces import available, network
+    from benchmarks.peers.pound.runs import outage, run_peer, saturate
+    from benchmarks.peers.pound.control import control_loop, local_loop
+
+Each end of a peer is a process of its own, some by another interpreter than ours: therefore this
+file, and what `endpoint` imports, needs nothing but the standard library.
+"""
+
+from benchmarks.peers.pound.table import PEERS, unavailable
+
+__all__ = ["PEERS", "unavailable"]

@@ -1,0 +1,78 @@
+"""The control loop of section VI-G: an RLC circuit at A, its controller at B, one channel between.
+
+    G(s) = 1 / (L C s² + R C s + 1),  L = C = 0.1, R = 1,  u = K (Vi - y),  K = 1, Vi = 1 V, 20 ms
+
+Every 20 ms A samples and sends y, and holds for that period the last u that it heard by then, at
+best what B made of the y before; B answers each y at once. Beside u, B sends 64 KB every 200 ms.
+Both directions share the channel.
+"""
+
+import contextlib
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+
+from benchmarks.peers.pound.ends import Plan, run_ends
+from benchmarks.peers.pound.job import Loop, Topic
+from benchmarks.peers.pound.namespaces import Network, network
+
+Voltages = NDArray[np.float64]
+
+INDUCTANCE = CAPACITANCE = 0.1
+RESISTANCE = 1.0
+GAIN = SETPOINT = 1.0
+PERIOD_S = 0.02
+SMALL = 60
+"""Bytes of a y or a u."""
+LARGE = 65536
+LARGE_PERIOD_S = 0.2
+
+
+def plant() -> tuple[Voltages, Voltages]:
+    """A `[2, 2]` and b `[2]` of x(k+1) = A x(k) + b u(k), u held for a period; x = (Vc, Vc')."""
+    lc = INDUCTANCE * CAPACITANCE
+    # exp of [[F, g], [0, 0]] T holds exp(F T) and the integral of exp(F t) g beside it.
+    whole = np.zeros((3, 3))
+    whole[0, 1] = 1.0
+    whole[1] = [-1 / lc, -RESISTANCE * CAPACITANCE / lc, 1 / lc]
+    whole = expm(whole * PERIOD_S)
+    return whole[:2, :2], whole[:2, 2]
+
+
+def local_loop(ticks: int) -> Voltages:
+    """Vc(k) in V, `[ticks]`, where u(k) is made from y(k-1): what no network can better."""
+    a, b = plant()
+    x, u, vc = np.zeros(2), 0.0, np.zeros(ticks)
+    for k in range(ticks):
+        vc[k] = x[0]
+        x = a @ x + b * u
+        u = GAIN * (SETPOINT - vc[k])
+    return vc
+
+
+def control_loop(
+    peer: str,
+    phase_s: float,
+    seconds: float = 3.0,
+    perturbation: bool = True,
+    over: Network | None = None,
+) -> Voltages:
+    """Vc(k) in V at each tick, through `peer` over `over` (else a shared channel of its own).
+
+    The first large message leaves `phase_s` after the first tick.
+    """
+    ticks = round(seconds / PERIOD_S)
+    a, b = plant()
+    topics = [
+        Topic(0, "y", SMALL, "latency", "a"),
+        Topic(1, "u", SMALL, "latency", "b"),
+        Topic(2, "perturbation", LARGE, "bulk", "b"),
+    ]
+    loads = np.arange(phase_s, seconds if perturbation else phase_s, LARGE_PERIOD_S)
+    sends = {"b": [(float(at), 2, n) for n, at in enumerate(loads)]}
+    loop = Loop(PERIOD_S, ticks, a.tolist(), b.tolist(), GAIN, SETPOINT)
+    with contextlib.ExitStack() as stack:
+        channel = over or stack.enter_context(network(shared=True))
+        told = run_ends(peer, Plan(topics, sends, seconds + 0.1, loop), channel)
+    return np.array(told["a"].values)

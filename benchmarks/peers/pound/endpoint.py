@@ -1,0 +1,150 @@
+"""One end of an experiment, as a process of its own: `python -m benchmarks.peers.pound.endpoint`.
+
+It reads a Job (one line of JSON), joins up with the other end, says "ready", reads when to start
+(monotonic s; both ends share the machine's clock), and tells in the end what it heard, as JSON.
+"""
+
+import gc
+import json
+import math
+import os
+import signal
+import struct
+import sys
+import time
+
+from benchmarks.peers.pound.job import CONTACT_S, Job, Loop, NoContactError, Transport
+from benchmarks.peers.pound.sockets import Sockets
+from benchmarks.peers.pound.table import PEERS
+from benchmarks.peers.pound.wire import HEAD
+
+VALUE = struct.Struct("<d")
+Y, U = 0, 1
+NICE = -10
+"""So that what else this machine does is not measured as jitter."""
+
+
+class Player:
+    """Sends by a schedule, and notes when messages come."""
+
+    def __init__(self, job: Job) -> None:
+        self._job = job
+        self._filler = {topic.number: os.urandom(topic.size) for topic in job.out}
+        self.heard: dict[int, dict[int, float]] = {topic.number: {} for topic in job.into}
+        self.values: list[float] = []
+        self.start = math.inf
+
+    def hear(self, message: bytes, at: float) -> None:
+        """Note a message; when it came is told in s after the start."""
+        topic, number = HEAD.unpack_from(message)
+        self.heard[topic].setdefault(number, at - self.start)
+
+    def play(self, transport: Transport) -> None:
+        """The schedule, then until the end."""
+        end = self.start + self._job.seconds
+        for after, topic, number in self._job.sends:
+            transport.run(min(self.start + after, end))
+            if time.monotonic() > end:
+                return
+            self.send(transport, topic, number)
+        transport.run(end)
+
+    def send(self, transport: Transport, topic: int, number: int, value: float = 0.0) -> None:
+        """One message with these numbers; random bytes fill it up."""
+        head = HEAD.pack(topic, number) + VALUE.pack(value)
+        transport.send(topic, head + self._filler[topic][len(head) :])
+
+
+class Plant(Player):
+    """Sends its output once a period, and steps with the input it had heard by then."""
+
+    def __init__(self, job: Job, loop: Loop) -> None:
+        super().__init__(job)
+        self._loop, self._u = loop, 0.0
+
+    def hear(self, message: bytes, at: float) -> None:
+        """Hold an input; anything else only shares the channel."""
+        super().hear(message, at)
+        if HEAD.unpack_from(message)[0] == U:
+            (self._u,) = VALUE.unpack_from(message, HEAD.size)
+
+    def play(self, transport: Transport) -> None:
+        """Step through all ticks of the loop."""
+        (a00, a01), (a10, a11) = self._loop.a
+        b0, b1 = self._loop.b
+        x0 = x1 = 0.0
+        for tick in range(self._loop.ticks):
+            transport.run(self.start + tick * self._loop.period_s)
+            u = self._u
+            self.values.append(x0)
+            self.send(transport, Y, tick, x0)
+            x0, x1 = a00 * x0 + a01 * x1 + b0 * u, a10 * x0 + a11 * x1 + b1 * u
+
+
+class Controller(Player):
+    """Answers each output with an input, and plays its schedule beside that."""
+
+    def __init__(self, job: Job, loop: Loop) -> None:
+        super().__init__(job)
+        self._loop = loop
+        self.transport: Transport | None = None
+
+    def hear(self, message: bytes, at: float) -> None:
+        """u = gain (setpoint - y)."""
+        super().hear(message, at)
+        topic, number = HEAD.unpack_from(message)
+        if topic == Y and self.transport:
+            (y,) = VALUE.unpack_from(message, HEAD.size)
+            self.send(self.transport, U, number, self._loop.gain * (self._loop.setpoint - y))
+
+
+def part(job: Job) -> Player:
+    """The player of what this end does."""
+    if job.loop is None:
+        return Player(job)
+    return Plant(job, job.loop) if job.side == "a" else Controller(job, job.loop)
+
+
+def open_transport(job: Job, player: Player) -> Transport:
+    """This end of the peer."""
+    peer = PEERS[job.peer]
+    if peer.environment == "zenoh":
+        from benchmarks.peers.pound.zenoh_end import Zenoh
+
+        return Zenoh(job, peer.carriers["default"], player.hear)
+    if peer.environment == "rclpy":
+        from benchmarks.peers.pound.fastdds_end import FastDds
+
+        return FastDds(job, peer.carriers["default"], player.hear)
+    return Sockets(job, peer.carriers, player.hear)
+
+
+def main() -> dict[str, object]:
+    """What is to be told."""
+    job = Job.from_json(sys.stdin.readline())
+    os.nice(NICE)
+    # Whatever hangs, the process ends.
+    signal.alarm(int(2 * CONTACT_S + job.seconds + 20))
+    player = part(job)
+    try:
+        transport = open_transport(job, player)
+        if isinstance(player, Controller):
+            player.transport = transport
+        transport.meet()
+    except (NoContactError, OSError) as error:
+        return {"error": str(error)}
+    print("ready", flush=True)
+    player.start = float(sys.stdin.readline())
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    player.play(transport)
+    heard = {topic: list(times.items()) for topic, times in player.heard.items()}
+    transport.close()
+    return {"heard": heard, "values": player.values}
+
+
+if __name__ == "__main__":
+    print(json.dumps(main()), flush=True)
+    # Not through the interpreter's own end: threads of middleware would hold it up.
+    os._exit(0)

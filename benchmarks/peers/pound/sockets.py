@@ -1,0 +1,66 @@
+"""The peers that are plain sockets: a carrier for each topic, by its class."""
+
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+from benchmarks.peers.pound.job import CONTACT_S, Hear, Job, Topic
+from benchmarks.peers.pound.reactor import Reactor
+from benchmarks.peers.pound.tcp import NimbroTcpTopic, tcp_topic
+from benchmarks.peers.pound.udp import NimbroTopic, PoundNode, PoundTopic, UdpRosTopic
+
+
+class Carrier(Protocol):
+    """What takes one topic's messages across."""
+
+    def meet(self, deadline: float) -> None:
+        """Wait for the other end."""
+
+    def send(self, message: bytes) -> None:
+        """Take a message for its topic's carrier."""
+
+
+Open = Callable[[Reactor, Topic, Job, Hear], Carrier]
+
+CARRIERS: dict[str, Open] = {
+    "tcp_nagle": tcp_topic(nodelay=False),
+    "tcp_delayed_ack": tcp_topic(nodelay=False, delayed_ack=True),
+    "tcp_nodelay": tcp_topic(nodelay=True),
+    "udpros": UdpRosTopic,
+    "nimbro_udp": NimbroTopic,
+    "nimbro_tcp": NimbroTcpTopic,
+}
+
+
+class Sockets:
+    """One end of such a peer."""
+
+    def __init__(self, job: Job, carriers: dict[str, str], hear: Hear) -> None:
+        self._reactor = Reactor()
+        self._carriers: dict[int, Carrier] = {}
+        node: PoundNode | None = None
+        for topic in job.topics:
+            name = carriers.get(topic.qos, carriers["default"])
+            if name == "pound":
+                node = node or PoundNode(self._reactor, job, hear)
+                self._carriers[topic.number] = PoundTopic(node, topic)
+            else:
+                self._carriers[topic.number] = CARRIERS[name](self._reactor, topic, job, hear)
+
+    def meet(self) -> None:
+        """Topic by topic, in the same order at both ends."""
+        deadline = time.monotonic() + CONTACT_S
+        for carrier in self._carriers.values():
+            carrier.meet(deadline)
+
+    def send(self, topic: int, message: bytes) -> None:
+        """Take a message for its topic's carrier."""
+        self._carriers[topic].send(message)
+
+    def run(self, until: float) -> None:
+        """Serve all sockets until that time."""
+        self._reactor.run(until)
+
+    def close(self) -> None:
+        """Close the sockets of all topics."""
+        self._reactor.close()

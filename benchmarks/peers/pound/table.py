@@ -1,0 +1,39 @@
+"""The peers by name, and which of them can run here."""
+
+from typing import NamedTuple
+
+from benchmarks import environments
+
+
+class Peer(NamedTuple):
+    """What a team would use."""
+
+    of: str
+    """The software whose manner this is."""
+    carriers: dict[str, str]
+    """The carrier of each class of topics; "default" is that of those not named."""
+    environment: str = ""
+    """The virtual environment it needs; see `environments`."""
+
+
+PEERS: dict[str, Peer] = {
+    "tcp_nagle": Peer("ROS 1, TCPROS", {"default": "tcp_nagle"}),
+    "tcp_delayed_ack": Peer("ROS 1, TCPROS, kernels before 2024", {"default": "tcp_delayed_ack"}),
+    "tcp_nodelay": Peer("ROS 1, TCPROS without Nagle", {"default": "tcp_nodelay"}),
+    "udp": Peer("ROS 1, UDPROS", {"default": "udpros"}),
+    "udp_nod": Peer("ROS 1, both", {"latency": "udpros", "default": "tcp_nodelay"}),
+    "nimbro_udp": Peer("nimbro_network", {"default": "nimbro_udp"}),
+    "nimbro_udp_tcp": Peer(
+        "nimbro_network, both", {"latency": "nimbro_udp", "default": "nimbro_tcp"}
+    ),
+    "pound_like": Peer("Pound", {"default": "pound"}),
+    "zenoh_drop": Peer("Zenoh", {"default": "drop"}, "zenoh"),
+    "zenoh_block": Peer("Zenoh", {"default": "block"}, "zenoh"),
+    "fastdds_reliable": Peer("ROS 2, Fast DDS", {"default": "reliable"}, "rclpy"),
+    "fastdds_best_effort": Peer("ROS 2, Fast DDS", {"default": "best_effort"}, "rclpy"),
+}
+
+
+def unavailable(peer: str) -> str | None:
+    """None where this peer can run, else why not; makes the environment that it needs."""
+    return environments.unavailable(PEERS, peer)

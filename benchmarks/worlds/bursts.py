@@ -1,0 +1,284 @@
+"""Hours of many robots in seconds: real links on an air of bursts, in virtual time."""
+
+import math
+from collections import Counter, defaultdict, deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from heapq import heappop, heappush
+from itertools import count
+
+import phy
+from backends import AirParams, BurstMedium, Flight, RadioParams, World
+from benchmarks.worlds.arrivals import Arrival
+from sdrlinkd.config import ModemParams
+from sdrlinkd.link import (
+    AS_CONFIGURED,
+    AccessParams,
+    Burst,
+    Delivered,
+    Link,
+    Opportunity,
+    Outcome,
+    Overrides,
+    PduLinkTraits,
+    RateParams,
+    Sensed,
+    Settled,
+)
+from sdrlinkd.modem import Airtimes, pdu_link_traits
+
+INFINITE = float("inf")
+TICK_S = 0.05
+"""Timers of a link in which something waits run so often."""
+IDLE_TICK_S = 1.0
+"""And those of others."""
+KEPT_AGES = 1000
+ROUNDING = 1e-3
+"""So much of a block is nothing: clocks are not quite the same."""
+
+
+@dataclass(slots=True)
+class Pair:
+    """What one robot got of another's topic, with ages in s."""
+
+    received: int = 0
+    age_sum_s: float = 0.0
+    """Over all of them."""
+    ages_s: deque[float] = field(default_factory=lambda: deque(maxlen=KEPT_AGES))
+    """The last ones."""
+
+
+@dataclass(slots=True, eq=False)
+class Station:
+    """A robot: its link, and the little that a modem adds to it."""
+
+    link: Link
+    traits: PduLinkTraits
+    settled: Settled
+    pace: float
+    """Of its own crystal, by which its link's times are."""
+    arrivals: Iterator[Arrival]
+    least_s: float
+    """No burst with what follows it takes less."""
+    look_at: float = INFINITE
+    """In blocks."""
+    free_at: float = 0.0
+    ticked_at: float = 0.0
+    sent: Counter[int] = field(default_factory=Counter)
+    """Messages handed over, by topic id."""
+    bursts: int = 0
+
+
+_Event = tuple[int, int, int, Callable[..., None], tuple[object, ...]]
+# What is done in this order after a block.
+_HEAR, _SETTLE, _ARRIVE, _LOOK = range(4)
+
+
+class Simulation:
+    """One BurstMedium and a real link for each of `radios`; `arrivals` come in order of time.
+
+    Decisions fall at the ends of blocks of `air.block_s`, as in a simulation of samples in
+    lock-step. `watch` is told of every burst, `listen` of what
+    a node gets, and when. `keep_s`: see BurstMedium. Raises ConfigError where
+    the radios cannot carry the access policy. `fit` makes another radio's traits of the air's own,
+    such as one that wants its bursts earlier.
+    """
+
+    def __init__(
+        self,
+        air: AirParams,
+        world: World,
+        radios: Mapping[int, RadioParams],
+        links: Mapping[int, Link],
+        modem: ModemParams,
+        airtimes: Airtimes,
+        access: AccessParams,
+        arrivals: Mapping[int, Iterable[Arrival]],
+        *,
+        rate: RateParams | None = None,
+        seed: int = 0,
+        keep_s: float = 0.0,
+        fit: Callable[[PduLinkTraits], PduLinkTraits] = lambda traits: traits,
+        watch: Callable[[Flight], None] = lambda _: None,
+        listen: Callable[[int, Delivered, float], None] = lambda *_: None,
+    ) -> None:
+        self.now = 0.0
+        self.pairs: defaultdict[tuple[int, int, int], Pair] = defaultdict(Pair)
+        """By sender, receiver and topic id."""
+        self._block_s = air.block_s
+        self._airtimes = airtimes
+        self._access = access
+        self._watch = watch
+        self._listen = listen
+        grid = phy.GRIDS[modem.grid]
+        self._medium = BurstMedium(air, world, seed, modem.carrier_db, keep_s, grid)
+        self._events: list[_Event] = []
+        self._numbers = count()
+        self.stations: dict[int, Station] = {}
+        for node, radio in radios.items():
+            link = links[node]
+            can = self._medium.join(node, radio)
+            traits = fit(pdu_link_traits("ether", can, modem, airtimes))
+            settled, control, *_ = link.attach(traits, access, rate or RateParams())
+            self._policy = settled.policy
+            pace, coming = 1 + 1e-6 * radio.clock_ppm, iter(arrivals.get(node, ()))
+            least_s = traits.turnaround_s + airtimes.airtime_s(max(control.usable), 1)
+            station = self.stations[node] = Station(link, traits, settled, pace, coming, least_s)
+            self._await_arrival(station)
+            self._look(station, 0)
+        self._at(self._block(TICK_S), _ARRIVE, self._tick)
+
+    def run(self, until_s: float) -> None:
+        """Let time pass up to `until_s`."""
+        events, last = self._events, math.floor(until_s / self._block_s + ROUNDING)
+        while events and events[0][0] <= last:
+            block, _, _, what, arguments = heappop(events)
+            self.now = block * self._block_s
+            what(*arguments)
+        self.now = until_s
+
+    def call(self, at_s: float, what: Callable[[], None]) -> None:
+        """Have `what` done at `at_s`, before that block's decisions."""
+        self._at(self._block(at_s), _ARRIVE, what)
+
+    def submit(
+        self, node: int, topic_id: int, payload: bytes, overrides: Overrides = AS_CONFIGURED
+    ) -> None:
+        """A message that has just been made."""
+        station = self.stations[node]
+        station.link.submit(topic_id, payload, self.now * station.pace, overrides)
+        station.sent[topic_id] += 1
+        self._look(station, self._block(self.now))
+
+    def silence(self, node: int, until_s: float) -> None:
+        """A radio that sends nothing until then."""
+        station = self.stations[node]
+        station.free_at = max(station.free_at, until_s * station.pace)
+        self._look(station, self._block(until_s))
+
+    def _block(self, t: float) -> int:
+        """That at whose end `t` is past."""
+        return math.ceil(t / self._block_s - ROUNDING)
+
+    def _at(self, block: int, order: int, what: Callable[..., None], *arguments: object) -> None:
+        heappush(self._events, (block, order, next(self._numbers), what, arguments))
+
+    def _await_arrival(self, station: Station) -> None:
+        arrival = next(station.arrivals, None)
+        if arrival is not None:
+            self._at(self._block(arrival.at), _ARRIVE, self._arrive, station, arrival)
+
+    def _arrive(self, station: Station, arrival: Arrival) -> None:
+        at, topic_id, payload, overrides = arrival
+        station.link.submit(topic_id, payload, at * station.pace, overrides)
+        station.sent[topic_id] += 1
+        self._look(station, self._block(at))
+        self._await_arrival(station)
+
+    def _look(self, station: Station, block: int) -> None:
+        """Ask the link for a burst after this block, or before."""
+        if block < station.look_at:
+            station.look_at = block
+            self._at(block, _LOOK, self._turn, station, block)
+
+    def _turn(self, station: Station, block: int) -> None:
+        """As the modem does after a block."""
+        if station.look_at != block:
+            return
+        station.look_at = INFINITE
+        link, traits, pace = station.link, station.traits, station.pace
+        now, airtimes = self.now * pace, self._airtimes
+        while True:
+            looks_at = max(link.next_wakeup(now), station.free_at - traits.lead_s - traits.ahead_s)
+            if looks_at > now:
+                break
+            until, idle_since, burst_at = self._medium.sensed(link.own_id, self.now)
+            burst_at = None if burst_at is None else burst_at * pace
+            sensed = Sensed(until * pace, idle_since * pace, burst_at)
+            looks_at = _next_chance(station, self._policy, self._access, sensed, now)
+            if looks_at > now:
+                break
+            earliest = max(now + traits.lead_s, station.free_at)
+            burst = link.next_burst(
+                Opportunity(earliest, airtimes.airtime_s, airtimes.most_pdus, sensed)
+            )
+            if burst is None:
+                looks_at = max(now, link.next_wakeup(now))
+                break
+            self._send(station, burst)
+        if looks_at < INFINITE:
+            self._look(station, max(self._block(looks_at / pace), block + 1))
+
+    def _send(self, station: Station, burst: Burst) -> None:
+        link, pace, n_pdus = station.link, station.pace, len(burst.pdus)
+        start_s, size = burst.start / pace, link.params.pdu_size
+        flight = self._medium.send(link.own_id, start_s, burst.mcs, n_pdus, size)
+        station.free_at = (flight.end_s + station.traits.gap_s) * pace
+        station.bursts += 1
+        for number, (_, end_s) in enumerate(flight.shape.pdus):
+            by_block = defaultdict(list)
+            for node, at in flight.arrives.items():
+                by_block[self._block(at + end_s)].append(node)
+            for block, nodes in by_block.items():
+                self._at(block, _HEAR, self._hear, flight, number, burst.pdus[number], nodes)
+        left = self._block(flight.end_s)
+        self._at(left, _HEAR, link.confirm, burst, Outcome.SENT, flight.end_s * pace)
+        self._at(self._block(flight.over_s), _SETTLE, self._medium.settle, flight)
+        self._watch(flight)
+
+    def _hear(self, flight: Flight, number: int, pdu: bytes, nodes: list[int]) -> None:
+        for node, snr_db in self._medium.readers(flight, number, nodes):
+            station = self.stations[node]
+            link, pace = station.link, station.pace
+            at = flight.arrives[node]
+            ended_at = (at + flight.shape.pdus[number][1]) * pace
+            for message in link.hear(pdu, at * pace, snr_db, self.now * pace, ended_at):
+                age_s = link.delivered(message, self.now * pace)
+                pair = self.pairs[message.src, node, message.topic_id]
+                pair.received += 1
+                if age_s is not None:
+                    pair.age_sum_s += age_s
+                    pair.ages_s.append(age_s)
+                self._listen(node, message, self.now)
+            if link.relays:
+                self._look(station, self._block(self.now))
+
+    def _tick(self) -> None:
+        for station in self.stations.values():
+            link = station.link
+            waits = link.has_work or link.holds_parts
+            if waits or self.now - station.ticked_at >= IDLE_TICK_S:
+                station.ticked_at = self.now
+                link.handle_timers(self.now * station.pace)
+        self._at(self._block(self.now + TICK_S), _ARRIVE, self._tick)
+
+
+def _next_chance(
+    station: Station, name: str, access: AccessParams, sensed: Sensed, t: float
+) -> float:
+    """Before this, and `t`, the link will not say anything else, if nothing new comes.
+
+    All by the station's clock. In tdma: its own slot; with reuse, also those before that, so many
+    mini-slots after their begin, or the end of a burst in them, as they are before.
+    """
+    policy, traits = station.settled.access, station.traits
+    frame = policy.frame(t + traits.lead_s)
+    carrier_end = -INFINITE if sensed.burst_at is None else sensed.idle_since
+    if name in ("csma", "minislot"):
+        return max(t, carrier_end, station.free_at - traits.gap_s)
+    if frame is None:
+        return t
+    n, phase_s = len(access.nodes), 1e-6 * frame.phase_us
+    rank, slot_s = access.nodes.index(station.link.own_id), policy.round_s / n
+    minislot_s = access.minislot_s or traits.lead_s + traits.react_s + traits.detect_s
+    first = int(phase_s / slot_s)
+    begin = t + traits.lead_s - phase_s + first * slot_s
+    turns = (rank - first) % n
+    own = begin + turns * slot_s - traits.lead_s - traits.react_s - traits.ahead_s
+    for turn in range(turns, 0, -1):
+        look = max(begin - minislot_s, carrier_end) + turn * minislot_s
+        begin += slot_s
+        soonest = max(t + traits.lead_s, look + minislot_s)
+        if access.reuse and soonest + station.least_s < begin:
+            return max(t, min(look, own))
+    return max(t, own)

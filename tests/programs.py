@@ -1,0 +1,63 @@
+"""Programs of ours as processes of their own, as tests start them."""
+
+import contextlib
+import sys
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from sdrlinkd.client import ControlClient, NoDaemonError
+from sdrlinkd.process import Process, module
+from sdrlinkd.reports import Snapshot
+from tests.waiting import wait_for
+
+MAIN = "import sys; from sdrlinkd.__main__ import main; sys.exit(main(sys.argv[1:]))"
+
+
+def sdrlinkctl(*arguments: object, **more: Any) -> Process:
+    """A command that is yet to be started; `more` as for a Process."""
+    return Process(module("sdrlinkd.cli", *arguments), name=f"sdrlinkctl {arguments[0]}", **more)
+
+
+class Daemon(Process):
+    """A daemon with the configuration `config`, whose sockets are in `directory`.
+
+    `before` is Python that it runs first.
+    """
+
+    def __init__(self, directory: Path, config: Path, log: Path, before: str = "") -> None:
+        command = [sys.executable, "-c", before + MAIN, "--config", config]
+        super().__init__(command, name="sdrlinkd", log=log)
+        self.directory = directory
+        self.config = config
+        self.expected_exit = 0
+
+    def control(self) -> ControlClient:
+        """A connection to its control socket."""
+        return ControlClient(self.directory)
+
+    def snapshot(self) -> Snapshot:
+        """Its snapshot."""
+        with self.control() as control:
+            return msgspec.convert(control.ask("status"), Snapshot)
+
+    def is_up(self) -> bool:
+        """Whether it answers."""
+        assert self.is_running, self.log()
+        with contextlib.suppress(NoDaemonError), ControlClient(self.directory, 0.2) as control:
+            control.ask("hello")
+            return True
+        return False
+
+    def at_work(self) -> "Daemon":
+        """The same, started, once it answers."""
+        self.start()
+        wait_for(self.is_up)
+        return self
+
+    def ends_well(self, within_s: float = 10.0) -> None:
+        """Stop it; it must end as expected, without a traceback."""
+        code = self.stop(within_s=within_s)
+        assert "Traceback" not in self.log(), self.log()
+        assert code == self.expected_exit, self.log()
