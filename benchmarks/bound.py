@@ -16,14 +16,16 @@ from phy import Mcs, points
 N_NODES = 24
 
 
-def needed_es_n0_db(mcs: Mcs, n_bits: int, n_carriers: float, error_rate: float) -> float:
-    """Es/N0 on a carrier at which `n_bits` in `n_carriers` uses fail as often as `error_rate`."""
+def needed_es_n0_db(mcs: Mcs, n_bits: int, n_subcarriers: float, error_rate: float) -> float:
+    """Es/N0 on a subcarrier at which `n_bits` in `n_subcarriers` uses fail as often as
+    `error_rate`.
+    """
     distance = norm.isf(error_rate)
 
     def surplus(es_n0_db: float) -> float:
         information, dispersion = _moments(mcs, es_n0_db)
-        reach = n_carriers * information - math.sqrt(n_carriers * dispersion) * distance
-        return float(reach + 0.5 * math.log2(n_carriers) - n_bits)
+        reach = n_subcarriers * information - math.sqrt(n_subcarriers * dispersion) * distance
+        return float(reach + 0.5 * math.log2(n_subcarriers) - n_bits)
 
     return float(brentq(surplus, -10.0, 45.0, xtol=1e-3))
 

@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from benchmarks.bound import needed_es_n0_db
-from benchmarks.phy_per import PER_CARRIER_DB
+from benchmarks.phy_per import PER_SUBCARRIER_DB
 from benchmarks.trials import Air, error_rate
 from phy import MCS_TABLE, OFDM_64_16, layout, needed_snr_db
 
@@ -35,7 +35,9 @@ def main() -> int:
         axes.semilogy(at, np.maximum(rates, 1e-4), "o-", color=colour, ms=3, label=mcs.name)
         plan = layout(OFDM_64_16, mcs.index, 1, N_BYTES)
         uses = plan.n_symbols * OFDM_64_16.n_data
-        bound = [needed_es_n0_db(mcs, 8 * N_BYTES, uses, each) - PER_CARRIER_DB for each in BOUNDS]
+        bound = [
+            needed_es_n0_db(mcs, 8 * N_BYTES, uses, each) - PER_SUBCARRIER_DB for each in BOUNDS
+        ]
         axes.semilogy(bound, BOUNDS, ":", color=colour)
     axes.set(
         xlabel="SNR in the sample band, dB", ylabel="share of PDUs lost", ylim=(8e-4, 1.1),

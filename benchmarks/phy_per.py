@@ -22,8 +22,8 @@ from benchmarks.trials import Air, ErrorRate, bursts, error_rate, needed_snr_db
 from phy import MCS_TABLE, OFDM_64_16, FrontEnd, FrontEndParams, PduHeard, Receiver, layout
 from phy.ldpc import decode, encode, new_workspace
 
-PER_CARRIER_DB = 10 * np.log10(OFDM_64_16.n_fft / OFDM_64_16.n_used)
-"""Es/N0 of a carrier over the SNR in the sample band."""
+PER_SUBCARRIER_DB = 10 * np.log10(OFDM_64_16.n_fft / OFDM_64_16.n_used)
+"""Es/N0 of a subcarrier over the SNR in the sample band."""
 
 BPSK12, QPSK12, QPSK34, QAM16_12, QAM64_34 = 0, 1, 2, 3, 6
 
@@ -67,15 +67,15 @@ def _knee(name: str, mcs: int, n_bytes: int, target_db: float, seed: int, n: int
 
 
 def _bound_db(mcs: int, n_bytes: int, rate: float) -> float:
-    """SNR that a PDU needs in the data carriers of its burst, whatever the code."""
+    """SNR that a PDU needs in the data subcarriers of its burst, whatever the code."""
     plan = layout(OFDM_64_16, mcs, 1, n_bytes)
-    n_carriers = plan.n_symbols * OFDM_64_16.n_data
-    es_n0_db = needed_es_n0_db(MCS_TABLE[mcs], 8 * n_bytes, n_carriers, rate)
-    return float(es_n0_db - PER_CARRIER_DB)
+    n_subcarriers = plan.n_symbols * OFDM_64_16.n_data
+    es_n0_db = needed_es_n0_db(MCS_TABLE[mcs], 8 * n_bytes, n_subcarriers, rate)
+    return float(es_n0_db - PER_SUBCARRIER_DB)
 
 
 def _peers_at_64_bytes(seed: int, n: int) -> dict[str, float]:
-    """Where others lose 1 % of 64 B on QPSK; their carriers are off, nothing else is."""
+    """Where others lose 1 % of 64 B on QPSK; they have a frequency offset and nothing else."""
     found: dict[str, float] = {}
     liquid, gnuradio = Liquid(), GnuRadio()
     with attempt(liquid.name):
@@ -110,7 +110,7 @@ def _gap_to_bound(seed: int, n: int) -> Row:
     """The code alone: bits over a channel that is known exactly."""
     plan = layout(OFDM_64_16, QPSK34, 1, 220)
     rng, work = np.random.default_rng(seed), new_workspace()
-    n_carriers = plan.coded_bits / plan.mcs.modulation.bits
+    n_subcarriers = plan.coded_bits / plan.mcs.modulation.bits
 
     def rate_at(es_n0_db: float, most: int, enough: int) -> ErrorRate:
         no, tried, errors = 10 ** (-es_n0_db / 10), 0, 0
@@ -125,14 +125,14 @@ def _gap_to_bound(seed: int, n: int) -> Row:
         return ErrorRate(tried, errors)
 
     needed_db, trials = needed_snr_db(rate_at, 4.75, 1e-3, 10 * n)
-    bound_db = needed_es_n0_db(plan.mcs, 8 * 220, n_carriers, 1e-3)
+    bound_db = needed_es_n0_db(plan.mcs, 8 * 220, n_subcarriers, 1e-3)
     name = "gap_to_bound_db_220B_qpsk34_per1e-3"
     note = f"Es/N0 {needed_db:.2f} dB, bound {bound_db:.2f} dB"
     return Row(name, needed_db - bound_db, "dB", 1.2, "less", trials, note=note)
 
 
 def _headers(seed: int, n: int) -> Row:
-    receiver = Receiver(max_frequency=Air().carrier_hz * 40e-6 / Air().rate_hz)
+    receiver = Receiver(max_frequency=Air().centre_hz * 40e-6 / Air().rate_hz)
     stream = bursts(Air(), BPSK12, 9, -2.0, seed)
     for _, (_, x) in zip(range(n), stream, strict=False):
         receiver.push(x)

@@ -29,7 +29,7 @@ _LIQUID_NOISE_THERE = 67.0
 
 @dataclass(frozen=True)
 class _Peers:
-    """Msps of other modems, measured once; (tx, rx) by bits a carrier and bytes."""
+    """Msps of other modems, measured once; (tx, rx) by bits a subcarrier and bytes."""
 
     liquid: dict[tuple[int, int], tuple[float, float]]
     gnuradio: dict[tuple[int, int], tuple[float, float]]

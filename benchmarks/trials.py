@@ -21,13 +21,13 @@ CONFIDENCE = 0.95
 class Air:
     """What is between a transmitter and a receiver of bursts of one PDU.
 
-    Crystals ±40 ppm apart, moving carrier and samples; image -36 dB and leak -35 dBc of the
+    Crystals ±40 ppm apart, moving centre frequency and samples; image -36 dB and leak -35 dBc of the
     transmitter, image -34 dB and DC -25 dBc of the receiver, 8 bits with bursts at -15 dBFS,
     oscillators of -90 dBc/Hz at 10 kHz.
     """
 
     rate_hz: float = 5e6
-    carrier_hz: float = 2.4e9
+    centre_hz: float = 2.4e9
     profile: str = "awgn"
     doppler_hz: float = 0.0
 
@@ -50,7 +50,7 @@ def bursts(
         pdu = rng.bytes(n_bytes)
         params = PathParams(
             rate_hz=air.rate_hz,
-            carrier_hz=air.carrier_hz,
+            centre_hz=air.centre_hz,
             profile=air.profile,
             doppler_hz=air.doppler_hz,
             clock_ppm=rng.uniform(-PPM, PPM),
@@ -88,7 +88,7 @@ def error_rate(
     air: Air, mcs: int, n_bytes: int, snr_db: float, seed: int, n: int, enough: int
 ) -> ErrorRate:
     """Trials until `enough` errors, at most `n`."""
-    receiver = Receiver(max_frequency=PPM * 1e-6 * air.carrier_hz / air.rate_hz)
+    receiver = Receiver(max_frequency=PPM * 1e-6 * air.centre_hz / air.rate_hz)
     tried, errors, missing = 0, 0, b""
     for pdu, x in bursts(air, mcs, n_bytes, snr_db, seed):
         heard = {event.data for event in receiver.push(x) if isinstance(event, PduHeard)}

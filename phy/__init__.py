@@ -17,7 +17,7 @@ from phy.oversampling import REACH, Downsampler, upsample
 from phy.quality import COUNTERS, BurstOver, BurstQuality, Event, PduHeard
 from phy.receiver import Receiver
 from phy.sensing import WINDOW as SENSE_WINDOW
-from phy.sensing import CarrierSense
+from phy.sensing import EnergyDetector
 from phy.transmitter import Transmitter
 from phy.warmup import warm_up
 
@@ -36,8 +36,8 @@ __all__ = [
     "BurstLayout",
     "BurstOver",
     "BurstQuality",
-    "CarrierSense",
     "Downsampler",
+    "EnergyDetector",
     "Event",
     "FrontEnd",
     "FrontEndParams",

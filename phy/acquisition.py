@@ -63,9 +63,9 @@ class Missed(NamedTuple):
 class Acquisition:
     """Tables and room of acquisition on one grid. Not for several threads at once."""
 
-    def __init__(self, grid: Numerology, max_frequency: float, carrier_cycles: float = 0.0) -> None:
+    def __init__(self, grid: Numerology, max_frequency: float, centre_cycles: float = 0.0) -> None:
         self._grid = grid
-        self._carrier_cycles = carrier_cycles
+        self._centre_cycles = centre_cycles
         self._nominal = before(grid)
         self._training = _training(grid, n_aliases(max_frequency))
         self._payload_at = int(self._training.content.windows[-1]) + grid.n_symbol
@@ -84,7 +84,7 @@ class Acquisition:
         """
         grid, room = self._grid, self._room.content
         start, frequency = kernel.acquire(
-            x, self._nominal, coarse, dc, self._carrier_cycles,
+            x, self._nominal, coarse, dc, self._centre_cycles,
             self._training.words, self._tones.words, self._axes.words,
             self._channel.words, self._scratch.words, self._room.words,
         )  # fmt: skip
@@ -112,13 +112,13 @@ def n_aliases(max_frequency: float) -> int:
 @lru_cache(maxsize=8)
 def _training(grid: Numerology, aliases: int) -> Parcel[Training]:
     n_fft, n_header = grid.n_fft, header.n_symbols(grid)
-    time, carriers = np.arange(n_fft)[:, None], tones(grid).content.carriers
+    time, subcarriers = np.arange(n_fft)[:, None], tones(grid).content.subcarriers
     shift = np.exp(2j * np.pi * AMBIGUITY * np.arange(-aliases, aliases + 1)[:, None] * time[:, 0])
-    inverse = np.exp(2j * np.pi * carriers * time / n_fft) * (grid.scale / n_fft)
-    short_wave = inverse[: preamble.SEGMENT] * preamble.short_carriers(grid)[grid.tones]
+    inverse = np.exp(2j * np.pi * subcarriers * time / n_fft) * (grid.scale / n_fft)
+    short_wave = inverse[: preamble.SEGMENT] * preamble.short_subcarriers(grid)[grid.tones]
     clean = np.roll(short_wave, -kernel.FIRST_CLEAN, axis=0)
     clean[kernel.N_CLEAN :] = 0
-    long = preamble.long_carriers(grid)[grid.tones].astype(np.complex64)
+    long = preamble.long_subcarriers(grid)[grid.tones].astype(np.complex64)
     long_start = preamble.long_start(grid)
     header_start = preamble.length(grid) + grid.n_cp
     segments = preamble.SEGMENT * np.arange(preamble.N_SEGMENTS)
@@ -176,7 +176,7 @@ def _sent(told: BurstHeader, grid: Numerology) -> NDArray[np.float32]:
     Each is 1 / x* of a tone x, so that what is divided by x is multiplied by its conjugate: where
     the header's peaks were cut off, no x is exactly ±1.
     """
-    long = preamble.long_carriers(grid)[grid.tones].astype(np.complex64)
+    long = preamble.long_subcarriers(grid)[grid.tones].astype(np.complex64)
     samples = header_samples(told, grid)
     starts = grid.n_cp + grid.n_symbol * np.arange(header.n_symbols(grid))
     re, im = ofdm.to_tones(samples, starts, 0.0, 0j, grid)[:, :, : grid.n_used].swapaxes(0, 1)

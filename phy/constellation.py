@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 
 class Modulation(Enum):
-    """How many bits a carrier takes."""
+    """How many bits a subcarrier takes."""
 
     BPSK = 1
     QPSK = 2
@@ -18,7 +18,7 @@ class Modulation(Enum):
 
     @property
     def bits(self) -> int:
-        """Coded bits on one carrier."""
+        """Coded bits on one subcarrier."""
         return self.value
 
     @property

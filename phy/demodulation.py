@@ -44,8 +44,8 @@ class Demodulator:
 
         The first one's FFT window begins with `samples`, which have turned by `frequency` cycles a
         sample since `origin` samples before. The header's first symbol is number 0. `channel` moves
-        on. `powers` `[≥ n]` gets the mean power on a carrier of each symbol, `points` `[n, n_data]`
-        the equalised points, if they are wanted.
+        on. `powers` `[≥ n]` gets the mean power on a subcarrier of each symbol, `points` `[n,
+        n_data]` the equalised points, if they are wanted.
         """
         grid = self._grid
         n = (len(samples) - grid.n_fft) // grid.n_symbol + 1

@@ -7,8 +7,9 @@ codewords with k bits of it each, with x = sqrt(900 / k),
 
     PER = 1 − found · (1 − p)^n        p = Q((snr − half − 0.50 (x − 1)) / (spread x^1.03))
 
-Measured with the modem itself: ±5 kHz of carrier offset at 1 Msps, its clock error with it, random
-phase; every 0.4 dB, 200 to 2000 PDUs each. SNR in dB at PER 50, 10 and 1 %, by bytes of the PDU:
+Measured with the modem itself: ±5 kHz of frequency offset at 1 Msps, its clock error with it,
+random phase; every 0.4 dB, 200 to 2000 PDUs each. SNR in dB at PER 50, 10 and 1 %, by bytes of the
+PDU:
 
     MCS        64              220             1024
      0    −2.8 −2.3 −1.9   −2.7 −2.4 −2.0   −2.5 −2.3 −2.0

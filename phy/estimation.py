@@ -76,13 +76,13 @@ def in_planes(y: NDArray[np.complex64]) -> NDArray[np.float32]:
 
 @cache
 def tones(grid: Numerology) -> Parcel[Tones]:
-    """The tables of a grid and its carriers."""
-    carriers = grid.used[grid.tones]
-    basis, ends = _basis(carriers, grid)
-    position = {int(k): i for i, k in enumerate(carriers)}
+    """The tables of a grid and its subcarriers."""
+    subcarriers = grid.used[grid.tones]
+    basis, ends = _basis(subcarriers, grid)
+    position = {int(k): i for i, k in enumerate(subcarriers)}
     pairs = [(i, position[k + 1]) for k, i in position.items() if k + 1 in position]
     numbers = np.zeros(whole_lanes(grid.n_used), np.float32)
-    numbers[: grid.n_used] = carriers
+    numbers[: grid.n_used] = subcarriers
     circle = np.exp(-2j * np.pi * np.arange(grid.n_fft) / grid.n_fft)
     return Parcel(
         Tones(
@@ -90,8 +90,8 @@ def tones(grid: Numerology) -> Parcel[Tones]:
             n_symbol=grid.n_symbol,
             gain=1 / grid.scale,
             n_data=grid.n_data,
-            bins=carriers % grid.n_fft,
-            carriers=carriers,
+            bins=subcarriers % grid.n_fft,
+            subcarriers=subcarriers,
             numbers=numbers,
             pilots=grid.pilot_values,
             polarity=POLARITY,
@@ -104,7 +104,7 @@ def tones(grid: Numerology) -> Parcel[Tones]:
 
 
 def _basis(
-    carriers: NDArray[np.int64], grid: Numerology
+    subcarriers: NDArray[np.int64], grid: Numerology
 ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     """Orthonormal rows `[n, width]` in groups, and where each group ends."""
     rows: list[NDArray[np.float64]] = []
@@ -112,8 +112,8 @@ def _basis(
     outermost = tuple(range(_GROUPS[-1][-1] + 1, grid.n_cp + 1))
     for group in filter(None, (*_GROUPS, outermost)):
         for delay in group:
-            angle = 2 * np.pi * delay * carriers / grid.n_fft
-            rows += [np.cos(angle), np.sin(angle)] if delay else [np.ones(len(carriers))]
+            angle = 2 * np.pi * delay * subcarriers / grid.n_fft
+            rows += [np.cos(angle), np.sin(angle)] if delay else [np.ones(len(subcarriers))]
         ends.append(len(rows))
     orthonormal, _ = np.linalg.qr(np.array(rows).T)
     out = np.zeros((len(rows), whole_lanes(grid.n_used)), np.float32)

@@ -1,4 +1,4 @@
-"""The burst header: what follows, in 38 bits on BPSK symbols, two of them on 64 carriers.
+"""The burst header: what follows, in 38 bits on BPSK symbols, two of them on 64 subcarriers.
 
 mcs 4, PDUs 6, PDU length 11, network 3, CRC-8, 6 tail zeros; K=7 rate 1/2; the 76 coded bits are
 repeated from the first on until the symbols are full.

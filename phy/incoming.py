@@ -55,7 +55,7 @@ class IncomingBurst:
         self.next_end = self.end_of(min(through, self._limit))
 
     def _slip(self) -> None:
-        """Follow the sender's clock by whole samples, as the slope over carriers tells."""
+        """Follow the sender's clock by whole samples, as the slope over subcarriers tells."""
         channel, grid = self.acquired.channel, self._grid
         slope = float(channel.content.tracking[SLOPE, 0])
         early = round(slope * grid.n_fft / (2 * math.pi))

@@ -1,4 +1,4 @@
-"""Spreads neighbouring coded bits over carriers and over strong and weak bits of a point.
+"""Spreads neighbouring coded bits over subcarriers and over strong and weak bits of a point.
 
 IEEE 802.11-2020, 17.3.5.7, one OFDM symbol at a time.
 """
@@ -12,9 +12,9 @@ N_COLUMNS = 16
 
 
 @cache
-def order(n_bits: int, bits_per_carrier: int) -> NDArray[np.int32]:
+def order(n_bits: int, bits_per_subcarrier: int) -> NDArray[np.int32]:
     """Where each coded bit of a symbol goes: bit k to position `order[k]` `[n_bits]`."""
-    s = max(bits_per_carrier // 2, 1)
+    s = max(bits_per_subcarrier // 2, 1)
     k = np.arange(n_bits)
     i = n_bits // N_COLUMNS * (k % N_COLUMNS) + k // N_COLUMNS
     j = s * (i // s) + (i + n_bits - N_COLUMNS * i // n_bits) % s

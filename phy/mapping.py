@@ -1,4 +1,4 @@
-"""Coded bits to the carriers of OFDM symbols: interleaver, constellation, pilots, FFT."""
+"""Coded bits to the subcarriers of OFDM symbols: interleaver, constellation, pilots, FFT."""
 
 from functools import cache
 
@@ -72,7 +72,7 @@ def mapping(modulation: Modulation, grid: Numerology) -> Mapping:
 def axes(modulation: Modulation, grid: Numerology) -> Parcel[Axes]:
     """The way back, as the equaliser wants it."""
     order = mapping(modulation, grid).order
-    plane, carrier = order % modulation.bits, order // modulation.bits
-    gather = (plane * grid.n_data + carrier).astype(np.uint32)
+    plane, subcarrier = order % modulation.bits, order // modulation.bits
+    gather = (plane * grid.n_data + subcarrier).astype(np.uint32)
     imag_bits = modulation.bits - modulation.axis_bits
     return Parcel(Axes(modulation.axis_bits, imag_bits, modulation.unit, gather))

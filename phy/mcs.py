@@ -32,8 +32,8 @@ class Mcs:
         return float(10 ** (self.peak_db / 20))
 
     @property
-    def bits_per_carrier(self) -> Fraction:
-        """Information bits on one data carrier."""
+    def bits_per_subcarrier(self) -> Fraction:
+        """Information bits on one data subcarrier."""
         return self.modulation.bits * self.rate
 
 

@@ -1,4 +1,4 @@
-"""Which carriers an OFDM symbol has, and what each is for (64: IEEE 802.11-2020, 17.3.5.10)."""
+"""Which subcarriers an OFDM symbol has, and what each is for (64: IEEE 802.11-2020, 17.3.5.10)."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -6,17 +6,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-Carriers = NDArray[np.int64]
+Subcarriers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
 class Numerology:
-    """An OFDM grid, one object each. Carriers are numbered from -n_fft/2; 0 is DC: nothing."""
+    """An OFDM grid, one object each. Subcarriers are numbered from -n_fft/2; 0 is DC: nothing."""
 
     n_fft: int
     n_cp: int
     edge: int
-    """Outermost carrier in use."""
+    """Outermost subcarrier in use."""
     pilots: tuple[int, ...]
     pilot_signs: tuple[int, ...]
 
@@ -27,37 +27,37 @@ class Numerology:
 
     @cached_property
     def n_data(self) -> int:
-        """Data carriers."""
+        """Data subcarriers."""
         return self.n_used - len(self.pilots)
 
     @property
     def n_used(self) -> int:
-        """Carriers that are on."""
+        """Subcarriers that are on."""
         return 2 * self.edge
 
     @cached_property
-    def used(self) -> Carriers:
-        """Numbers of the carriers that are on, ascending `[n_used]`."""
+    def used(self) -> Subcarriers:
+        """Numbers of the subcarriers that are on, ascending `[n_used]`."""
         return np.array([k for k in range(-self.edge, self.edge + 1) if k], np.int64)
 
     @cached_property
-    def bins(self) -> Carriers:
+    def bins(self) -> Subcarriers:
         """FFT bins of `used` `[n_used]`."""
         return self.used % self.n_fft
 
     @cached_property
-    def data_at(self) -> Carriers:
-        """Positions of the data carriers in `used` `[n_data]`."""
+    def data_at(self) -> Subcarriers:
+        """Positions of the data subcarriers in `used` `[n_data]`."""
         return np.flatnonzero(~np.isin(self.used, self.pilots))
 
     @cached_property
-    def pilots_at(self) -> Carriers:
+    def pilots_at(self) -> Subcarriers:
         """Positions of the pilots in `used` `[n_pilots]`."""
         return np.flatnonzero(np.isin(self.used, self.pilots))
 
     @cached_property
-    def tones(self) -> Carriers:
-        """Positions in `used` of the data carriers, then of the pilots `[n_used]`."""
+    def tones(self) -> Subcarriers:
+        """Positions in `used` of the data subcarriers, then of the pilots `[n_used]`."""
         return np.concatenate((self.data_at, self.pilots_at))
 
     @cached_property
@@ -76,7 +76,7 @@ def _map_of_802_11(n_cp: int) -> Numerology:
 
 
 OFDM_64_16 = _map_of_802_11(16)
-"""The default: 48 data carriers and 4 pilots, a quarter of the time for echoes."""
+"""The default: 48 data subcarriers and 4 pilots, a quarter of the time for echoes."""
 OFDM_64_8 = _map_of_802_11(8)
 """For rates of a few Msps, where echoes last less than 8 samples."""
 OFDM_128_16 = Numerology(

@@ -1,4 +1,4 @@
-"""Samples to carriers: one FFT a symbol."""
+"""Samples to subcarriers: one FFT a symbol."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,8 @@ def to_tones(
     """Tones `[n, 2, width]`, real and imaginary parts, of the windows that begin at `starts`.
 
     Before, `dc` is taken off and the samples are turned back by `frequency` cycles a sample, with
-    phase 0 `origin` samples before `samples[0]`. A carrier sent as 1 arrives as 1 through a channel
-    of gain 1.
+    phase 0 `origin` samples before `samples[0]`. A subcarrier sent as 1 arrives as 1 through a
+    channel of gain 1.
     """
     out = np.empty((len(starts), 2, whole_lanes(grid.n_used)), np.float32)
     scratch = new_scratch(grid)

@@ -1,7 +1,7 @@
 """To twice or four times the rate and back, for radios that are faster than the modem.
 
-A linear-phase low-pass (Kaiser, 60 dB) that passes the carriers in use and takes off their images:
-802.11's outermost carrier is at 0.41 of the modem's rate, its first image at 0.59.
+A linear-phase low-pass (Kaiser, 60 dB) that passes the subcarriers in use and takes off their
+images: 802.11's outermost subcarrier is at 0.41 of the modem's rate, its first image at 0.59.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from phy.kernels.resampler import filter_strided
 
 REACH = 16
 """Samples of the slow side before and after one that have a part in it."""
-# Of the slow side's rate: half way between outermost carrier and first image.
+# Of the slow side's rate: half way between outermost subcarrier and first image.
 _CUTOFF = 0.5
 _KAISER_BETA = 5.65
 # Behind samples that are filtered, for the last lanes.

@@ -1,8 +1,8 @@
-"""What every burst begins with, which a receiver knows: 352 samples on a grid of 64 carriers.
+"""What every burst begins with, which a receiver knows: 352 samples on a grid of 64 subcarriers.
 
 Twelve short segments of 16 samples, each the one before times ±1 by the Barker code of length 11
-(the cover): DC, a carrier and the plain repetition of 802.11 do not look like it. Then a prefix and
-twice the long training symbol: on 64 carriers that of 802.11 (IEEE 802.11-2020, 17.3.3).
+(the cover): DC, a tone and the plain repetition of 802.11 do not look like it. Then a prefix and
+twice the long training symbol: on 64 subcarriers that of 802.11 (IEEE 802.11-2020, 17.3.3).
 """
 
 from functools import cache
@@ -32,7 +32,7 @@ _LONG_POSITIVE = (
 # Where the register of x^9 + x^5 + 1 begins: of all, those with the lowest peaks.
 _LONG_SEEDS = {128: 293, 256: 246}
 
-# Signs of (1 + j) on the carriers that are multiples of 4, of 64.
+# Signs of (1 + j) on the subcarriers that are multiples of 4, of 64.
 _SHORT_SIGNS = {
     -24: 1, -20: -1, -16: 1, -12: -1, -8: -1, -4: 1,
     4: -1, 8: -1, 12: 1, 16: 1, 20: 1, 24: 1,
@@ -55,15 +55,15 @@ def length(grid: Numerology = OFDM_64_16) -> int:
 
 
 @cache
-def long_carriers(grid: Numerology = OFDM_64_16) -> NDArray[np.float32]:
-    """The long training symbol on the carriers in use, ±1 `[n_used]`."""
+def long_subcarriers(grid: Numerology = OFDM_64_16) -> NDArray[np.float32]:
+    """The long training symbol on the subcarriers in use, ±1 `[n_used]`."""
     if grid.n_fft == OFDM_64_16.n_fft:
         return np.array(_LONG_NEGATIVE + _LONG_POSITIVE, np.float32)
     return 1 - 2 * lfsr((5, 9), _LONG_SEEDS[grid.n_fft], grid.n_used).astype(np.float32)
 
 
-def short_carriers(grid: Numerology = OFDM_64_16) -> NDArray[np.complex64]:
-    """A short segment on the carriers in use, at mean power 1 in time `[n_used]`.
+def short_subcarriers(grid: Numerology = OFDM_64_16) -> NDArray[np.complex64]:
+    """A short segment on the subcarriers in use, at mean power 1 in time `[n_used]`.
 
     In time it is the same on every grid.
     """
@@ -74,21 +74,21 @@ def short_carriers(grid: Numerology = OFDM_64_16) -> NDArray[np.complex64]:
     return values
 
 
-def in_time(carriers: NDArray[np.complex64], grid: Numerology) -> NDArray[np.complex64]:
+def in_time(subcarriers: NDArray[np.complex64], grid: Numerology) -> NDArray[np.complex64]:
     """One period of a symbol, without prefix `[n_fft]`."""
     spectrum = np.zeros(grid.n_fft, np.complex128)
-    spectrum[grid.bins] = carriers
+    spectrum[grid.bins] = subcarriers
     return (np.fft.ifft(spectrum) * grid.scale).astype(np.complex64)
 
 
 def long_symbol(grid: Numerology = OFDM_64_16) -> NDArray[np.complex64]:
     """The long training symbol `[n_fft]`."""
-    return in_time(long_carriers(grid).astype(np.complex64), grid)
+    return in_time(long_subcarriers(grid).astype(np.complex64), grid)
 
 
 def preamble(grid: Numerology = OFDM_64_16) -> NDArray[np.complex64]:
     """The whole preamble at mean power 1 `[length(grid)]`."""
-    segment = in_time(short_carriers(grid), grid)[:SEGMENT]
+    segment = in_time(short_subcarriers(grid), grid)[:SEGMENT]
     long = long_symbol(grid)
     short = (COVER[:, None] * segment).reshape(-1)
     return np.concatenate((short, long[-guard(grid) :], long, long)).astype(np.complex64)

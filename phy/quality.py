@@ -19,7 +19,7 @@ class BurstQuality(NamedTuple):
     rssi_dbfs: float
     evm_db: float
     cfo: float
-    """Carrier offset in cycles a sample."""
+    """Frequency offset in cycles a sample."""
 
 
 class PduHeard(NamedTuple):

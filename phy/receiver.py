@@ -45,11 +45,12 @@ _FADED = 0.25
 class Receiver:
     """Finds bursts in a stream and decodes them. Not for several threads at once.
 
-    `max_frequency` is the largest carrier offset expected, in cycles a sample. Bursts of other
-    networks than `network` are told but not decoded; None takes all. `carrier_cycles` is how many
-    cycles the carrier makes in a sample, for senders whose carrier and samples come from one
-    crystal: then the carrier's offset tells that of the sampling clock; 0: nothing is known of it.
-    `on_points` gets the equalised points `[n, n_data]` of payload symbols, for pictures.
+    `max_frequency` is the largest frequency offset expected, in cycles a sample. Bursts of other
+    networks than `network` are told but not decoded; None takes all. `centre_cycles` is how many
+    cycles the centre frequency makes in a sample, for senders whose centre frequency and samples
+    come from one crystal: then the frequency offset tells that of the sampling clock; 0: nothing is
+    known of it. `on_points` gets the equalised points `[n, n_data]` of payload symbols, for
+    pictures.
     """
 
     def __init__(
@@ -58,7 +59,7 @@ class Receiver:
         max_frequency: float = 0.02,
         grid: Numerology = OFDM_64_16,
         start: int = 0,
-        carrier_cycles: float = 0.0,
+        centre_cycles: float = 0.0,
         on_points: Callable[[NDArray[np.complex64], Modulation], None] | None = None,
     ) -> None:
         if network is not None and not 0 <= network < N_NETWORKS:
@@ -66,7 +67,7 @@ class Receiver:
         self._network = network
         self._grid = grid
         self._on_points = on_points
-        self._acquisition = Acquisition(grid, max_frequency, carrier_cycles)
+        self._acquisition = Acquisition(grid, max_frequency, centre_cycles)
         self._demodulator = Demodulator(grid)
         self._powers = np.empty(SLIP_EVERY, np.float32)
         self._decoder = PduDecoder()
@@ -91,7 +92,7 @@ class Receiver:
         self._crossing, self._peak, self._coarse = start, start, 0.0
         self._excess, self._raised_at, self._began = 0.0, start, start
         self._at = start
-        self.carrier = (start, start)
+        self.last_burst = (start, start)
         """Where the last burst of which the header was read begins, and where it should end."""
         self.counters: Counter[str] = Counter()
         self._begin(start)
@@ -215,7 +216,7 @@ class Receiver:
         plan = layout(self._grid, told.mcs, told.n_pdus, told.pdu_bytes)
         burst = self._burst = IncomingBurst(found, plan, self._grid)
         self._decoder.start(plan)
-        self.carrier = (found.quality.start, burst.end_of(plan.n_symbols) + BACKOFF)
+        self.last_burst = (found.quality.start, burst.end_of(plan.n_symbols) + BACKOFF)
         if self._network is not None and told.network != self._network:
             # Searched on, not skipped: a header that lies must not make us deaf.
             self._end(burst, events, "foreign")

@@ -1,4 +1,4 @@
-"""Carrier sense: whether anybody is on the air, also those whose bursts cannot be read."""
+"""Energy detection: whether anybody is on the air, also those whose bursts cannot be read."""
 
 import math
 
@@ -17,14 +17,14 @@ from phy.kernels.sensing import (
 )
 from phy.stream import LARGEST_SAMPLE
 
-__all__ = ["WINDOW", "CarrierSense"]
+__all__ = ["WINDOW", "EnergyDetector"]
 
 
-class CarrierSense:
-    """Whether there is a carrier: energy above the noise floor, in windows of WINDOW samples.
+class EnergyDetector:
+    """Whether the channel is busy: energy above the noise floor, in windows of WINDOW samples.
 
     The floor begins as the first window's power, follows quiet windows (down to less than a half
-    at once, else by 1/64 of the difference), and doubles in 2^17 busy windows, so that a carrier
+    at once, else by 1/64 of the difference), and doubles in 2^17 busy windows, so that a signal
     that never ends becomes noise. Windows follow one another from `start` on.
     """
 
@@ -42,7 +42,7 @@ class CarrierSense:
 
     @property
     def busy_until(self) -> int:
-        """Absolute index after the last window with a carrier; `start` if there was none."""
+        """Absolute index after the last busy window; `start` if there was none."""
         return int(self._state[BUSY_UNTIL])
 
     @property

@@ -2,7 +2,7 @@
 
 A burst begins with a preamble that repeats a segment under a code of signs. SEARCH slides the
 normalised autocorrelation of segments over the stream: it costs a few operations a sample, knows
-no carrier offset, and crosses its threshold somewhere within the preamble. ALIGN looks for the
+no frequency offset, and crosses its threshold somewhere within the preamble. ALIGN looks for the
 maximum within a preamble's length of that crossing, because only there all segments take part, and
 tells a tone or another network's signal by a peak that needs no code. ACQUIRE correlates with the
 long training at all offsets that may be, which tells start and frequency, estimates the channel,

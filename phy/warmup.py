@@ -17,12 +17,12 @@ from phy.mcs import MCS_TABLE
 from phy.numerology import OFDM_64_16
 from phy.oversampling import Downsampler, upsample
 from phy.receiver import Receiver
-from phy.sensing import CarrierSense
+from phy.sensing import EnergyDetector
 from phy.transmitter import Transmitter
 
 Progress = Callable[[int, int], None]
 
-RATE_HZ, CARRIER_HZ, CLOCK_PPM = 1e6, 1e8, 40.0
+RATE_HZ, CENTRE_HZ, CLOCK_PPM = 1e6, 1e8, 40.0
 """As far apart as crystals are; 0.004 cycles a sample, which a receiver expects."""
 LONG = 2000
 """Octets of a PDU through which two clocks drift apart by a sample."""
@@ -79,8 +79,8 @@ def _kernels() -> set[Any]:
 
 def _run() -> None:
     rng = np.random.default_rng(0)
-    transmitter, receiver, sense = Transmitter(), Receiver(), CarrierSense()
-    path = Path(PathParams(rate_hz=RATE_HZ, carrier_hz=CARRIER_HZ, clock_ppm=CLOCK_PPM), rng)
+    transmitter, receiver, sense = Transmitter(), Receiver(), EnergyDetector()
+    path = Path(PathParams(rate_hz=RATE_HZ, centre_hz=CENTRE_HZ, clock_ppm=CLOCK_PPM), rng)
     front_end = FrontEnd(FrontEndParams(noise_dbfs=-30.0), rng)
 
     def hear(burst: NDArray[np.complex64]) -> None:

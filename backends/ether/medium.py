@@ -130,7 +130,7 @@ class Medium:
         power_db = 10 * math.log10(float(np.vdot(samples, samples).real) / len(samples) + 1e-30)
         params = PathParams(
             rate_hz=self._air.rate_hz,
-            carrier_hz=self._air.frequency_hz,
+            centre_hz=self._air.frequency_hz,
             profile=self._air.profile,
             delay_spread_s=self._air.delay_spread_s,
             loss_db=power_db - NOISE_DBFS - hop.snr_db,

@@ -41,7 +41,7 @@ class RadioParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     index_error_s: Annotated[float, Meta(ge=0, le=0.1)] = 0.0
     """Without time stamps: how wrong the sample count may be after each burst."""
     clock_ppm: Annotated[float, Meta(ge=-200, le=200)] = 0.0
-    """Error of its crystal: carrier and sampling clock."""
+    """Error of its crystal: centre frequency and sampling clock."""
     image_db: Decibel = 300.0
     dc_dbfs: Annotated[float, Meta(ge=-300, le=0)] = -300.0
     adc_bits: Annotated[int, Meta(ge=0, le=24)] = 0

@@ -63,7 +63,7 @@ class Span:
         return self.last.at - self.first.at
 
     def count(self, name: str) -> int:
-        """What a counter of its carrier has grown by."""
+        """What a counter of its PDU link has grown by."""
         return self.last.counter(name) - self.first.counter(name)
 
     def cpu_pct(self, part: str) -> float:

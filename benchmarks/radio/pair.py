@@ -34,7 +34,7 @@ class Look:
     cpu_s: dict[str, float]
 
     def counter(self, name: str) -> int:
-        """The count of one of its carrier's counters."""
+        """The count of one of its PDU link's counters."""
         return int(self.status["carrier"]["counters"][name])
 
 

@@ -17,15 +17,15 @@ SPIN = 128
 class PathParams:
     """Frequencies in Hz, times in s, `clock_ppm` the sender's crystal against the receiver's.
 
-    One crystal makes carrier and samples: at `carrier_hz` it moves both. `image_db` and `leak_db`
-    are the transmitter's IQ imbalance and LO leakage below the signal (inf: none). `doppler_hz` is
-    the largest shift of an echo, v / c times the carrier, on channels that fade.
-    `phase_noise_dbc_hz` is that of both oscillators 10 kHz from the carrier, falling as 1 / f²
+    One crystal makes centre frequency and samples: at `centre_hz` it moves both. `image_db` and
+    `leak_db` are the transmitter's IQ imbalance and LO leakage below the signal (inf: none).
+    `doppler_hz` is the largest shift of an echo, v / c times the centre frequency, on channels that
+    fade. `phase_noise_dbc_hz` is that of both oscillators 10 kHz from the centre, falling as 1 / f²
     (-inf: none).
     """
 
     rate_hz: float
-    carrier_hz: float = 0.0
+    centre_hz: float = 0.0
     profile: str = "awgn"
     delay_spread_s: float = 100e-9
     loss_db: float = 0.0
@@ -56,7 +56,7 @@ class Path:
     def carry(self, burst: NDArray[np.complex64]) -> tuple[int, NDArray[np.complex64]]:
         """(index relative to the burst's own, samples) of a burst as it arrives, mean gain −loss.
 
-        Its carrier phase is drawn from the path's chance.
+        Its phase is drawn from the path's chance.
         """
         params = self._params
         offset = 0
@@ -74,7 +74,7 @@ class Path:
         turn = np.exp(2j * np.pi * self._rng.random()) * 10 ** (-params.loss_db / 20)
         if params.phase_noise_dbc_hz > -np.inf:
             x = x * self._phase_noise(len(x))
-        frequency = params.carrier_hz * error / params.rate_hz
+        frequency = params.centre_hz * error / params.rate_hz
         if frequency:
             return offset, x * _spin(frequency, turn, len(x))
         return offset, x * np.complex64(turn)

@@ -173,7 +173,7 @@ def acquire(
     nominal: int,
     coarse: float,
     dc: complex,
-    carrier_cycles: float,
+    centre_cycles: float,
     training_in: Packed,
     tones_in: Packed,
     axes_in: Packed,
@@ -184,7 +184,7 @@ def acquire(
     """(first sample of the burst or −1, its frequency) of the burst in `x`; its header to the room.
 
     The first long symbol is nominally at `nominal`; `coarse` is the frequency modulo 1/16, and
-    `carrier_cycles` those of the carrier in a sample, if one crystal makes both, or 0.
+    `centre_cycles` those of the centre frequency in a sample, if one crystal makes both, or 0.
     """
     training, tones, axes = open_training(training_in), open_tones(tones_in), open_axes(axes_in)
     channel, scratch, room = open_channel(channel_in), open_scratch(scratch_in), open_room(room_in)
@@ -205,8 +205,8 @@ def acquire(
     frequency += refine(training, channel.h, room)
     windows_to_tones(burst, windows, frequency, dc, _0, tones, scratch, y)
     estimate(y, amplitude, training.long, tones, channel, scratch)
-    clock_error = frequency / carrier_cycles if carrier_cycles else 0.0
-    start_tracking(tones, channel, clock_error, carrier_cycles > 0)
+    clock_error = frequency / centre_cycles if centre_cycles else 0.0
+    start_tracking(tones, channel, clock_error, centre_cycles > 0)
     n_header = room.points.shape[0]
     equalise(y[2:], n_header, _0, tones, axes, channel, scratch, room.points, room.llr, _0)
     fold(room.llr, room.folded)

@@ -16,15 +16,15 @@ Planes = NDArray[np.float32]
 
 
 class Tones(NamedTuple):
-    """A grid, and its carriers in use, data first, then pilots `[n_used]`."""
+    """A grid, and its subcarriers in use, data first, then pilots `[n_used]`."""
 
     n_fft: int
     n_symbol: int
     gain: float
-    """What carriers of samples of mean power 1 are taken times."""
+    """What subcarriers of samples of mean power 1 are taken times."""
     n_data: int
     bins: NDArray[np.int64]
-    carriers: NDArray[np.int64]
+    subcarriers: NDArray[np.int64]
     numbers: Row
     """The same as float32 `[width]`."""
     pilots: Row
@@ -63,7 +63,7 @@ class Channel(NamedTuple):
     centre: Planes
     """What turns gains back by their mean delay `[2, width]`."""
     turns: Planes
-    """What turns a symbol's carriers back by the slope that is used `[2, width]`."""
+    """What turns a symbol's subcarriers back by the slope that is used `[2, width]`."""
     inverse: Planes
     """1 / h `[2, width]`; 0 where nothing arrives."""
     certainty: Row
@@ -81,7 +81,7 @@ class Channel(NamedTuple):
 
     @property
     def no(self) -> float:
-        """Noise power on a carrier."""
+        """Noise power on a subcarrier."""
         return float(self.figures[NO])
 
     @property
@@ -94,8 +94,8 @@ open_channel = opener(Channel, "f4[2] f4[2] f4[2] f4[2] f4[1] f4[2] f4[1] f8[1] 
 
 N_FIGURES = 7
 NO, GAIN, DELAY, DRIFT, N_HEARD, CERTAIN, SLOPE_USED = range(N_FIGURES)
-"""Of `figures`: noise on a carrier, mean |h|², phase a carrier, drift; symbols since a correction
-and what was certain in them, Σ |E s|²; the slope that carriers are turned back by."""
+"""Of `figures`: noise on a subcarrier, mean |h|², phase a subcarrier, drift; symbols since a
+correction and what was certain in them, Σ |E s|²; the slope that subcarriers are turned back by."""
 
 
 class Scratch(NamedTuple):

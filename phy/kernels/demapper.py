@@ -1,4 +1,4 @@
-"""Points to LLRs: exact max-log for Gray-coded axes of any size, eight carriers at a time."""
+"""Points to LLRs: exact max-log for Gray-coded axes of any size, eight subcarriers at a time."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -71,7 +71,7 @@ def to_tones(
 
 @njit(nogil=True, cache=True)
 def slip(early: int, tones_in: Packed, channel_in: Packed) -> None:
-    """Let windows begin `early` samples earlier: carriers lean less by that."""
+    """Let windows begin `early` samples earlier: subcarriers lean less by that."""
     tones, channel = open_tones(tones_in), open_channel(channel_in)
     lean = early * 2 * math.pi / tones.n_fft
     channel.tracking[SLOPE, 0] -= lean

@@ -1,4 +1,4 @@
-"""Carriers to LLRs: follow phase, timing and channel, equalise, demap, de-interleave."""
+"""Subcarriers to LLRs: follow phase, timing and channel, equalise, demap, de-interleave."""
 
 import math
 
@@ -31,16 +31,17 @@ BLOCK = 8
 """Symbols from one correction of the channel to the next."""
 _LEAST_MASS = BLOCK / 4
 """Of what must have been certain in a block, or it teaches nothing: others were on the air."""
-# However strong a signal, echoes and converters leave so much on a carrier.
+# However strong a signal, echoes and converters leave so much on a subcarrier.
 _LEAST_NOISE = 1e-4
-# Frequency error of the preamble's estimate, in carrier spacings: at 0 dB, and at best.
+# Frequency error of the preamble's estimate, in subcarrier spacings: at 0 dB, and at best.
 _FREQUENCY_ERROR_0_DB = 0.006
 _FREQUENCY_ERROR_MIN = 0.0005
-# Sampling clocks differ by so much, and by so much if the carrier tells it (standard deviations).
+# Sampling clocks differ by so much, and by so much if the centre frequency tells it (standard
+# deviations).
 _CLOCK_ERROR, _CLOCK_DOUBT = 40e-6, 5e-6
-# Radians by which the outermost carriers may lag the slope before their turn is made anew.
+# Radians by which the outermost subcarriers may lag the slope before their turn is made anew.
 _LAG = 0.01
-# Twice the turn of the outermost carriers below which a series will do.
+# Twice the turn of the outermost subcarriers below which a series will do.
 _SMALL = 0.2
 
 
@@ -66,19 +67,19 @@ def start_tracking(tones: Tones, channel: Channel, clock_error: float, is_known:
     channel.sums[:] = 0
     channel.masses[:] = 0
     figures[DRIFT] = figures[N_HEARD] = figures[CERTAIN] = figures[SLOPE_USED] = 0
-    lean(0.0, tones.carriers, channel.turns)
+    lean(0.0, tones.subcarriers, channel.turns)
     renew(channel)
 
 
 @step
 def use_slope(slope: float, tones: Tones, channel: Channel) -> None:
-    """Turn carriers back by `slope` from now on."""
+    """Turn subcarriers back by `slope` from now on."""
     more = channel.figures[SLOPE_USED] - slope
     channel.figures[SLOPE_USED] = slope
     if abs(more) * tones.n_fft < _SMALL:
         lean_more(more, tones.numbers, channel.turns)
     else:
-        lean(-slope, tones.carriers, channel.turns)
+        lean(-slope, tones.subcarriers, channel.turns)
 
 
 @step
@@ -100,7 +101,7 @@ def renew(channel: Channel) -> None:
 def _pilots(
     re: Row, im: Row, polarity: float, tones: Tones, channel: Channel, scratch: Scratch
 ) -> float:
-    """Follow phase and slope to this symbol; its noise power on a carrier."""
+    """Follow phase and slope to this symbol; its noise power on a subcarrier."""
     tracking, turned, power = channel.tracking, scratch.turned, scratch.pilot_power
     predict(tracking)
     back = complex(math.cos(tracking[PHASE, 0]), -math.sin(tracking[PHASE, 0])) * polarity
@@ -109,11 +110,11 @@ def _pilots(
         at = tones.n_data + p
         h = complex(channel.h[0, at], channel.h[1, at])
         turn = complex(channel.turns[0, at], channel.turns[1, at])
-        turn *= complex(1.0, behind * tones.carriers[at]) * (back * tones.pilots[p])
+        turn *= complex(1.0, behind * tones.subcarriers[at]) * (back * tones.pilots[p])
         turned[p] = complex(re[at], im[at]) * h.conjugate() * turn
         power[p] = h.real * h.real + h.imag * h.imag
-    carriers = tones.carriers[tones.n_data :]
-    return correct(turned, power, carriers, _noise(channel), tracking)
+    subcarriers = tones.subcarriers[tones.n_data :]
+    return correct(turned, power, subcarriers, _noise(channel), tracking)
 
 
 @step
@@ -121,7 +122,7 @@ def _data(
     re: Row, im: Row, c: float, s: float, trust: float, axes: Axes, channel: Channel,
     scratch: Scratch, n: int,
 ) -> float:  # fmt: skip
-    """The `n` data carriers of a symbol: to levels, and to LLRs plane by plane.
+    """The `n` data subcarriers of a symbol: to levels, and to LLRs plane by plane.
 
     Turned by c + js and by the slope in use, they and what they probably are go to the channel's
     sums and masses, times `trust`. What is certain of them is returned.
@@ -163,7 +164,7 @@ def _learn_pilots(
     re: Row, im: Row, turned_by: complex, trust: float, polarity: float, tones: Tones,
     channel: Channel,
 ) -> None:  # fmt: skip
-    """What the pilots say of their carriers' gains."""
+    """What the pilots say of their subcarriers' gains."""
     for p in range(tones.pilots.size):
         at = tones.n_data + p
         turn = complex(channel.turns[0, at], channel.turns[1, at])

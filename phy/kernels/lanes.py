@@ -2,7 +2,7 @@
 
 numba leaves it to LLVM to find vectors in loops over arrays. It finds none where too many arrays
 may overlap, and none across a loop inside. Code in `Lanes` says what it means: `load` eight
-carriers, calculate with + - * /, `store` eight results. LLVM lowers each operation to what the
+subcarriers, calculate with + - * /, `store` eight results. LLVM lowers each operation to what the
 machine has (one instruction of AVX, two of NEON); nothing is contracted or put in another order, so
 that numpy's float32 gives the same bits.
 """

@@ -20,7 +20,7 @@ class Map(NamedTuple):
 
     bits: int
     source: NDArray[np.uint32]
-    """Which coded bit of a symbol each carrier's bits are, highest first `[n_data · bits]`."""
+    """Which coded bit of a symbol each subcarrier's bits are, highest first `[n_data · bits]`."""
     real: Row
     imag: Row
     """Of the points, by number."""

@@ -1,4 +1,4 @@
-"""Phases that grow evenly over carriers."""
+"""Phases that grow evenly over subcarriers."""
 
 import math
 
@@ -11,10 +11,10 @@ from phy.kernels.lanes import N_LANES, load, splat, store
 
 
 @njit(nogil=True, cache=True)
-def lean(slope: float, carriers: NDArray[np.int64], out: NDArray[np.float32]) -> None:
-    """exp(j · slope · k) for each of `carriers` `[n]` to `out` `[2, ≥ n]`."""
+def lean(slope: float, subcarriers: NDArray[np.int64], out: NDArray[np.float32]) -> None:
+    """exp(j · slope · k) for each of `subcarriers` `[n]` to `out` `[2, ≥ n]`."""
     edge = np.int64(0)
-    for k in carriers:
+    for k in subcarriers:
         edge = max(edge, abs(k))
     step = complex(math.cos(slope), math.sin(slope))
     turns = np.empty(edge + 1, np.complex64)
@@ -22,8 +22,8 @@ def lean(slope: float, carriers: NDArray[np.int64], out: NDArray[np.float32]) ->
     for k in range(edge + 1):
         turns[k] = np.complex64(turn)
         turn *= step
-    for i in range(carriers.size):
-        k = carriers[i]
+    for i in range(subcarriers.size):
+        k = subcarriers[i]
         out[0, i] = turns[abs(k)].real
         out[1, i] = turns[abs(k)].imag if k >= 0 else -turns[-k].imag
 

@@ -15,7 +15,7 @@ FLOOR, BUSY_UNTIL, NEXT, FILLED, POWERS = 0, 1, 2, 3, 4
 N_STATE = POWERS + WINDOW
 
 LEAST_FLOOR = 1e-12
-# A carrier that never ends is noise after a while: the floor doubles in so many busy windows.
+# A signal that never ends is noise after a while: the floor doubles in so many busy windows.
 DOUBLING = 1 << 17
 _CREEP = 2 ** (1 / DOUBLING)
 _WEIGHT = 1 / 64

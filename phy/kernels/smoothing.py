@@ -1,8 +1,9 @@
 """What training tells of the channel, less what must be noise.
 
-A channel is a few echoes, its gains over the carriers are smooth: centred on their mean delay, most
-of their power is in few of the functions 1, cos k, sin k, cos 2k, … (k: carriers over n_fft), made
-orthonormal. They come in groups, from the mean delay outwards; what is in none is the last group.
+A channel is a few echoes, its gains over the subcarriers are smooth: centred on their mean delay,
+most of their power is in few of the functions 1, cos k, sin k, cos 2k, … (k: subcarriers over
+n_fft), made orthonormal. They come in groups, from the mean delay outwards; what is in none is the
+last group.
 
 Of each group as much is kept as its energy exceeds what noise alone would have (James and Stein
 1961): on a link in sight that is one dimension of 52, among many echoes almost all, and nobody
@@ -26,7 +27,7 @@ _DRIFT_RISE, _DRIFT_FALL = 0.5, 0.1
 
 @njit(nogil=True, cache=True)
 def mean_delay(h: Planes, neighbours: NDArray[np.int64]) -> float:
-    """Phase from a carrier to the next, radians; `neighbours` `[2, n]` are positions in `h`."""
+    """Phase from a subcarrier to the next, radians; `neighbours` `[2, n]` are positions in `h`."""
     turn = 0j
     for i in range(neighbours.shape[1]):
         first, second = neighbours[0, i], neighbours[1, i]
@@ -121,7 +122,7 @@ def smooth(variance: float, tones: Tones, channel: Channel, scratch: Scratch) ->
     `unknown` gets the variance a dimension that is left, `power` what is in it, both of each group.
     """
     channel.figures[DELAY] = mean_delay(channel.h, tones.neighbours)
-    lean(-channel.figures[DELAY], tones.carriers, channel.centre)
+    lean(-channel.figures[DELAY], tones.subcarriers, channel.centre)
     multiply(channel.h, channel.centre, False, scratch.rest)
     channel.power[:] = 1
     _split(tones, channel.power, scratch)

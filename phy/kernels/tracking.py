@@ -1,6 +1,6 @@
-"""Two Kalman filters on the pilots: the phase common to all carriers, and its slope over them.
+"""Two Kalman filters on the pilots: the phase common to all subcarriers, and its slope over them.
 
-The phase turns with what is left of the carrier's offset and with the oscillators' noise; the slope
+The phase turns with what is left of the frequency offset and with the oscillators' noise; the slope
 grows as the sender's sampling clock runs away from ours.
 """
 
@@ -52,11 +52,11 @@ def _correct(state: NDArray[np.float64], innovation: float, variance: float) -> 
 def correct(
     turned: NDArray[np.complex128],
     power: NDArray[np.float64],
-    carriers: NDArray[np.int64],
+    subcarriers: NDArray[np.int64],
     no: float,
     tracking: NDArray[np.float64],
 ) -> float:
-    """Correct phase and slope by pilots; the noise power on a carrier, as far as they show it.
+    """Correct phase and slope by pilots; the noise power on a subcarrier, as far as they show it.
 
     `turned` `[n]`: what came, turned back as predicted, times the conjugate of what should have
     come, of which `power` is the squared magnitude. Where pilots disagree by more than `no`
@@ -75,7 +75,7 @@ def correct(
     # Weighted least squares of the pilots' phases: w (θ − a − b k)², small angles.
     s0 = s1 = s2 = t0 = t1 = 0.0
     for p in range(n):
-        k, weight = carriers[p], power[p]
+        k, weight = subcarriers[p], power[p]
         aligned = turned[p] * common
         theta = aligned.imag
         s0 += weight

@@ -14,7 +14,7 @@ from phy.quality import BurstQuality
 from phy.reference.channel import Channel
 from phy.reference.equaliser import Equaliser
 from phy.reference.header import folded, parse_header
-from phy.reference.ofdm import Carriers, Samples, to_carriers, turned_back
+from phy.reference.ofdm import Samples, Subcarriers, to_subcarriers, turned_back
 from phy.reference.offset import BACKOFF, refine
 from phy.reference.timing import SEARCH, locate, templates
 from phy.reference.tracking import Tracking
@@ -56,18 +56,18 @@ def needed_after(grid: Numerology) -> int:
 class Acquisition:
     """Acquisition works on one grid, for offsets up to `max_frequency` cycles a sample.
 
-    `carrier_cycles` is how many cycles a carrier that is made by the same crystal makes in a
-    sample; 0 says that nothing is known of it.
+    `centre_cycles` is how many cycles a centre frequency that is made by the same crystal makes in
+    a sample; 0 says that nothing is known of it.
     """
 
-    def __init__(self, grid: Numerology, max_frequency: float, carrier_cycles: float = 0.0) -> None:
+    def __init__(self, grid: Numerology, max_frequency: float, centre_cycles: float = 0.0) -> None:
         self._grid = grid
-        self._carrier_cycles = carrier_cycles
+        self._centre_cycles = centre_cycles
         self._templates = templates(grid, max_frequency)
         long = preamble.long_start(grid) + grid.n_fft * np.arange(preamble.N_LONG)
         header = preamble.length(grid) + grid.n_cp + grid.n_symbol * np.arange(n_symbols(grid))
         self._windows = np.concatenate((long, header))
-        self._long = np.tile(preamble.long_carriers(grid), (preamble.N_LONG, 1)).astype(complex)
+        self._long = np.tile(preamble.long_subcarriers(grid), (preamble.N_LONG, 1)).astype(complex)
 
     def acquire(
         self, x: NDArray[np.complex64], base: int, coarse: float, dc: complex
@@ -88,19 +88,19 @@ class Acquisition:
         frequency = coarse + correction
         burst = x[begin:]
         # 3. Channel, 4. offset again, and with it the channel.
-        y = to_carriers(burst, self._windows, frequency, dc, grid)
+        y = to_subcarriers(burst, self._windows, frequency, dc, grid)
         channel = self._of_training(y)
         frequency += refine(turned_back(burst, dc, frequency), channel.h, grid)
-        y = to_carriers(burst, self._windows, frequency, dc, grid)
+        y = to_subcarriers(burst, self._windows, frequency, dc, grid)
         channel = self._of_training(y)
         # 5. Header.
-        clock_error = frequency / self._carrier_cycles if self._carrier_cycles else None
+        clock_error = frequency / self._centre_cycles if self._centre_cycles else None
         equaliser = Equaliser(grid, channel, Tracking(grid, channel, clock_error))
         llr, points = self._read(y[preamble.N_LONG :], equaliser)
         header = parse_header(folded(llr))
         if header is None:
             return Missed("header")
-        sent = header_carriers(header, grid)
+        sent = header_subcarriers(header, grid)
         self._learn(y, sent, equaliser)
         training = burst[self._windows[0] :][: preamble.N_LONG * grid.n_fft]
         quality = BurstQuality(
@@ -115,19 +115,19 @@ class Acquisition:
         window = origin + int(self._windows[-1]) + grid.n_symbol
         return Acquired(header, quality, origin, window, frequency, equaliser)
 
-    def _of_training(self, y: Carriers) -> Channel:
+    def _of_training(self, y: Subcarriers) -> Channel:
         """Both long symbols tell the channel."""
         n = preamble.N_LONG
         return estimate(y[:n], self._long, np.ones(n), self._grid)
 
     def _read(
-        self, y: Carriers, equaliser: Equaliser
+        self, y: Subcarriers, equaliser: Equaliser
     ) -> tuple[NDArray[np.int16], NDArray[np.complex128]]:
         """The header's symbols `[n, n_used]` become (LLRs `[n · n_data]`, points `[n, n_data]`)."""
         read = [equaliser.equalise(each, i, Modulation.BPSK) for i, each in enumerate(y)]
         return np.concatenate([llr for llr, _ in read]), np.array([points for _, points in read])
 
-    def _learn(self, y: Carriers, sent: Carriers, equaliser: Equaliser) -> None:
+    def _learn(self, y: Subcarriers, sent: Subcarriers, equaliser: Equaliser) -> None:
         """The header, known now, tells the channel once more, with four symbols instead of two.
 
         Its symbols have turned by the phase that is tracked, less the rate for each that followed.
@@ -140,15 +140,15 @@ class Acquisition:
         )
 
 
-def header_carriers(header: BurstHeader, grid: Numerology) -> Carriers:
-    """A header is sent on these carriers `[n, n_used]`; its cut peaks have moved them a little."""
+def header_subcarriers(header: BurstHeader, grid: Numerology) -> Subcarriers:
+    """A header is sent on these subcarriers `[n, n_used]`; its cut peaks have moved them."""
     samples: Samples = header_samples(header, grid)
     starts = grid.n_cp + grid.n_symbol * np.arange(n_symbols(grid))
-    return to_carriers(samples, starts, 0.0, 0j, grid)
+    return to_subcarriers(samples, starts, 0.0, 0j, grid)
 
 
 def _snr_db(channel: Channel, grid: Numerology) -> float:
-    """The SNR counts noise in all 64 carriers and the signal in 52, in dB."""
+    """The SNR counts noise in all 64 subcarriers and the signal in 52, in dB."""
     return decibel(channel.gain / channel.no * grid.n_used / grid.n_fft)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from phy.reference.ofdm import Carriers
+from phy.reference.ofdm import Subcarriers
 
 LEAST_NOISE = 1e-4
 """However strong a signal is, echoes and converters leave this share of it as noise."""
@@ -19,14 +19,14 @@ class Channel:
     one dimension of it; the last group is what is in no other.
     """
 
-    h: Carriers
-    """Ĥ, a gain for each carrier `[n_used]`."""
+    h: Subcarriers
+    """Ĥ, a gain for each subcarrier `[n_used]`."""
     no: float
-    """N, the noise power on a carrier."""
+    """N, the noise power on a subcarrier."""
     gain: float
     """The mean of |H|², without noise."""
     delay: float = 0.0
-    """The mean phase of Ĥ from a carrier to the next, in radians."""
+    """The mean phase of Ĥ from a subcarrier to the next, in radians."""
     unknown: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
     """What is not known of each group `[groups + 1]`."""
     power: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))

@@ -2,7 +2,7 @@
 
 Segment i of the short training is segment i − 1 times b_i. So the product of each sample with the
 one 16 before it, times b_i, has the same phase throughout, whatever the channel: that of 16 samples
-of carrier offset. What repeats itself without the code adds up to little.
+of frequency offset. What repeats itself without the code adds up to little.
 """
 
 import cmath

@@ -1,4 +1,4 @@
-"""The equaliser makes LLRs of a symbol's carriers, and learns the channel from what it decides."""
+"""The equaliser makes LLRs of a symbol's subcarriers, and learns the channel from its decisions."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from phy.numerology import Numerology
 from phy.reference.channel import Channel
 from phy.reference.demapper import LLR_SCALE, axis_llrs, expected_levels
 from phy.reference.mapping import deinterleaved
-from phy.reference.ofdm import Carriers
+from phy.reference.ofdm import Subcarriers
 from phy.reference.smoothing import follow
 from phy.reference.tracking import Tracking
 from phy.sequences import polarity
@@ -22,9 +22,9 @@ LEAST_MASS = BLOCK / 4
 
 
 class Decided(NamedTuple):
-    """The LLRs decide what was probably sent on the data carriers of a symbol."""
+    """The LLRs decide what was probably sent on the data subcarriers of a symbol."""
 
-    mean: Carriers
+    mean: Subcarriers
     """E s `[n_data]`."""
     square: NDArray[np.float64]
     """E|s|² `[n_data]`."""
@@ -40,8 +40,8 @@ class Equaliser:
         self._forget_block()
 
     def equalise(
-        self, y: Carriers, number: int, modulation: Modulation
-    ) -> tuple[NDArray[np.int16], Carriers]:
+        self, y: Subcarriers, number: int, modulation: Modulation
+    ) -> tuple[NDArray[np.int16], Subcarriers]:
         """The method makes LLRs in the order of the code, and points, of a symbol `[n_used]`.
 
             u = Y exp(−j(φ + sk)) / Ĥ;  L = |Ĥ|²/N (min_{x: bit 1} |u − x|² − min_{x: bit 0} …)
@@ -60,7 +60,7 @@ class Equaliser:
         self._learn(turned, decided, sign, self.channel.noise / no)
         return deinterleaved(llr, modulation, self._grid), u
 
-    def _learn(self, turned: Carriers, decided: Decided, sign: float, trust: float) -> None:
+    def _learn(self, turned: Subcarriers, decided: Decided, sign: float, trust: float) -> None:
         """A symbol adds to the block's sums: Σ Y (E s)*, Σ E|s|², Σ|E s|².
 
         Pilots are certain. A symbol that interference has hit counts less, by `trust` = N over its
@@ -82,8 +82,8 @@ class Equaliser:
 
             ΔĤ = (Σ Y (E s)* − Ĥ Σ E|s|²) / Σ|E s|²
 
-        The last sum is the mean over the carriers. It is less than Σ E|s|², so that the step is as
-        long as what was uncertain would make it too short. The error has the noise N / Σ|E s|².
+        The last sum is the mean over the subcarriers. It is less than Σ E|s|², so that the step is
+        as long as what was uncertain would make it too short. The error has the noise N / Σ|E s|².
         """
         mass = self._certain / self._grid.n_used
         if mass > LEAST_MASS:
@@ -99,7 +99,7 @@ class Equaliser:
 
 
 def demap(
-    u: Carriers, certainty: NDArray[np.float64], modulation: Modulation
+    u: Subcarriers, certainty: NDArray[np.float64], modulation: Modulation
 ) -> tuple[NDArray[np.int16], Decided]:
     """The function makes LLRs `[n · bits]` of points `[n]`, and decides what was sent.
 

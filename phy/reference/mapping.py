@@ -1,4 +1,4 @@
-"""The mapping owns the way from coded bits to carriers: interleaver, constellation, pilots.
+"""The mapping owns the way from coded bits to subcarriers: interleaver, constellation, pilots.
 
 The way back is in `equaliser` and `demapper`; only `deinterleaved` is here, beside its inverse.
 """
@@ -15,7 +15,7 @@ Bits = NDArray[np.uint8]
 
 
 def to_points(coded: Bits, modulation: Modulation, grid: Numerology) -> NDArray[np.complex128]:
-    """Coded bits `[n · n_data · bits]` become the points of the data carriers `[n, n_data]`.
+    """Coded bits `[n · n_data · bits]` become the points of the data subcarriers `[n, n_data]`.
 
     Bit k of a symbol goes to place `order[k]`; every `bits` places are the number of a point, first
     bit highest (IEEE 802.11-2020, 17.3.5.7 and 17.3.5.8).
@@ -28,21 +28,21 @@ def to_points(coded: Bits, modulation: Modulation, grid: Numerology) -> NDArray[
     return points(modulation)[numbers].astype(np.complex128)
 
 
-def to_carriers(
+def to_subcarriers(
     coded: Bits, modulation: Modulation, grid: Numerology, first_symbol: int
 ) -> NDArray[np.complex128]:
     """Coded bits become whole symbols `[n, n_used]`: points, and pilots with their polarity.
 
-        X_k = a point on a data carrier, p_i P_k on a pilot
+        X_k = a point on a data subcarrier, p_i P_k on a pilot
 
     The header's first symbol has number 0; the first one here has number `first_symbol`.
     """
     data = to_points(coded, modulation, grid)
-    carriers = np.empty((len(data), grid.n_used), np.complex128)
-    carriers[:, grid.data_at] = data
+    subcarriers = np.empty((len(data), grid.n_used), np.complex128)
+    subcarriers[:, grid.data_at] = data
     signs = polarity(len(data), first_symbol)
-    carriers[:, grid.pilots_at] = signs[:, None] * grid.pilot_values
-    return carriers
+    subcarriers[:, grid.pilots_at] = signs[:, None] * grid.pilot_values
+    return subcarriers
 
 
 def deinterleaved(

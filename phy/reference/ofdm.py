@@ -1,7 +1,7 @@
-"""OFDM makes samples of carriers with an inverse FFT, and carriers of samples with an FFT.
+"""OFDM makes samples of subcarriers with an inverse FFT, and subcarriers of samples with an FFT.
 
 The cyclic prefix makes the echoes' convolution circular. So a window that begins inside the prefix
-sees every carrier times one complex gain, and echoes never mix carriers.
+sees every subcarrier times one complex gain, and echoes never mix subcarriers.
 """
 
 import numpy as np
@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 from phy.numerology import Numerology
 
 Samples = NDArray[np.complex128]
-Carriers = NDArray[np.complex128]
+Subcarriers = NDArray[np.complex128]
 
 
-def to_samples(carriers: Carriers, grid: Numerology, peak: float = np.inf) -> Samples:
+def to_samples(subcarriers: Subcarriers, grid: Numerology, peak: float = np.inf) -> Samples:
     """Symbols `[n, n_used]` become samples `[n · n_symbol]` of mean power 1, none beyond `peak`.
 
         x[n] = (1/√52) Σ_k X_k exp(j2πkn/64), its last 16 samples before it
 
-    Carriers are in the order of `grid.used`. A sample beyond `peak` is shortened to that magnitude:
-    the error of −34 dB and less is below the noise at which the MCS works (`phy.mcs`).
+    Subcarriers are in the order of `grid.used`. A sample beyond `peak` is shortened to that
+    magnitude: the error of −34 dB and less is below the noise at which the MCS works (`phy.mcs`).
     """
-    spectrum = np.zeros((len(carriers), grid.n_fft), np.complex128)
-    spectrum[:, grid.bins] = carriers
+    spectrum = np.zeros((len(subcarriers), grid.n_fft), np.complex128)
+    spectrum[:, grid.bins] = subcarriers
     # NumPy's inverse FFT divides by 64; `scale` is 64/√52.
     body = np.fft.ifft(spectrum) * grid.scale
     size = np.maximum(np.abs(body), 1e-30)
@@ -33,7 +33,7 @@ def to_samples(carriers: Carriers, grid: Numerology, peak: float = np.inf) -> Sa
 def turned_back(
     samples: NDArray[np.complexfloating], dc: complex, frequency: float, origin: int = 0
 ) -> Samples:
-    """Samples `[n]` lose their DC and their carrier offset of `frequency` cycles a sample.
+    """Samples `[n]` lose their DC and their frequency offset of `frequency` cycles a sample.
 
         z[n] = (y[n] − d) exp(−j2πfn)
 
@@ -44,22 +44,22 @@ def turned_back(
     return z
 
 
-def to_carriers(
+def to_subcarriers(
     samples: NDArray[np.complexfloating],
     starts: NDArray[np.int64],
     frequency: float,
     dc: complex,
     grid: Numerology,
     origin: int = 0,
-) -> Carriers:
-    """FFT windows that begin at `starts` `[n]` become carriers `[n, n_used]`.
+) -> Subcarriers:
+    """FFT windows that begin at `starts` `[n]` become subcarriers `[n, n_used]`.
 
         Y_k = (√52/64) Σ_n z[n] exp(−j2πkn/64)
 
     The samples are turned back first, with phase 0 at `origin` samples before `samples[0]`. A
-    carrier sent as 1 arrives as 1 through a channel of gain 1.
+    subcarrier sent as 1 arrives as 1 through a channel of gain 1.
     """
     z = turned_back(samples, dc, frequency, origin)
     windows = z[np.asarray(starts)[:, None] + np.arange(grid.n_fft)]
-    spectrum: Carriers = np.fft.fft(windows) / grid.scale
+    spectrum: Subcarriers = np.fft.fft(windows) / grid.scale
     return spectrum[:, grid.bins]

@@ -1,11 +1,11 @@
-"""The whole preamble, re-made with the channel, tells the likeliest offset of the carrier."""
+"""The whole preamble, re-made with the channel, tells the likeliest frequency offset."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from phy import preamble
 from phy.numerology import Numerology
-from phy.reference.ofdm import Carriers, Samples
+from phy.reference.ofdm import Samples, Subcarriers
 
 BACKOFF = 3
 """FFT windows begin so many samples before the first echo: earlier ones still do no harm."""
@@ -18,7 +18,7 @@ FREQUENCIES = np.linspace(-0.12, 0.12, 25) / 64
 """These corrections are tried, in cycles a sample."""
 
 
-def refine(z: Samples, h: Carriers, grid: Numerology) -> float:
+def refine(z: Samples, h: Subcarriers, grid: Numerology) -> float:
     """The function returns the likeliest correction of the frequency, in cycles a sample.
 
         z_i = Σ_m z[t+m] w*[t+m];  f maximises |Σ_i z_i exp(−j2πft_i)|
@@ -28,8 +28,8 @@ def refine(z: Samples, h: Carriers, grid: Numerology) -> float:
     the middles of the parts. A grid of frequencies is tried; a parabola through the best and its
     neighbours tells what is between them.
     """
-    short = _in_time(h * preamble.short_carriers(grid), grid)[: preamble.SEGMENT]
-    long = _in_time(h * preamble.long_carriers(grid), grid)
+    short = _in_time(h * preamble.short_subcarriers(grid), grid)[: preamble.SEGMENT]
+    long = _in_time(h * preamble.long_subcarriers(grid), grid)
     parts, times = [], []
     for s, sign in enumerate(preamble.COVER):
         at = preamble.SEGMENT * s + FIRST_CLEAN + np.arange(N_CLEAN)
@@ -43,10 +43,10 @@ def refine(z: Samples, h: Carriers, grid: Numerology) -> float:
     return peak_of_parabola(FREQUENCIES, np.abs(turns @ np.array(parts)) ** 2)
 
 
-def _in_time(carriers: Carriers, grid: Numerology) -> Samples:
-    """One period of a symbol `[n_fft]` has these carriers `[n_used]`."""
+def _in_time(subcarriers: Subcarriers, grid: Numerology) -> Samples:
+    """One period of a symbol `[n_fft]` has these subcarriers `[n_used]`."""
     spectrum = np.zeros(grid.n_fft, np.complex128)
-    spectrum[grid.bins] = carriers
+    spectrum[grid.bins] = subcarriers
     return np.fft.ifft(spectrum) * grid.scale
 
 

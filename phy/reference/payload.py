@@ -10,7 +10,7 @@ from phy.layout import BurstLayout
 from phy.numerology import Numerology
 from phy.reference.acquisition import Acquired
 from phy.reference.ldpc import decode_blocks
-from phy.reference.ofdm import to_carriers
+from phy.reference.ofdm import to_subcarriers
 from phy.sequences import whitening
 
 SLIP_EVERY = 256
@@ -51,7 +51,7 @@ class Payload:
         """The method takes in the next symbol's FFT window `[n_fft]`, and returns its points."""
         found, grid, number = self.acquired, self._grid, self.n_symbols_in
         origin = self.window(number) - found.origin
-        y = to_carriers(samples, np.array([0]), found.frequency, dc, grid, origin)[0]
+        y = to_subcarriers(samples, np.array([0]), found.frequency, dc, grid, origin)[0]
         self._powers.append(float(np.mean(np.abs(y) ** 2)))
         llr, points = found.equaliser.equalise(y, self._n_header + number, self.plan.mcs.modulation)
         self._llr = np.concatenate((self._llr, llr))
@@ -85,7 +85,8 @@ class Payload:
         self._powers = []
 
     def slip(self) -> None:
-        """Every 256 symbols, windows follow the sender's clock, as the slope over carriers tells.
+        """Every 256 symbols, windows follow the sender's clock, as the slope over subcarriers
+        tells.
 
         early = s · 64 / 2π samples, to the nearest
         """

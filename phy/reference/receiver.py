@@ -32,10 +32,10 @@ LARGEST_SAMPLE = 1e6
 class Receiver:
     """A receiver finds bursts in a stream and decodes them; `phy.Receiver` has the same face.
 
-    `max_frequency` is the largest carrier offset expected, in cycles a sample. Bursts of other
-    networks than `network` are told but not decoded; None takes all. `carrier_cycles` is how many
-    cycles the carrier makes in a sample, for senders with one crystal; 0 says nothing. `on_points`
-    gets the equalised points `[n, n_data]`. ValueError tells a network that cannot be.
+    `max_frequency` is the largest frequency offset expected, in cycles a sample. Bursts of other
+    networks than `network` are told but not decoded; None takes all. `centre_cycles` is how many
+    cycles the centre frequency makes in a sample, for senders with one crystal; 0 says nothing.
+    `on_points` gets the equalised points `[n, n_data]`. ValueError tells a network that cannot be.
     """
 
     # The samples kept, and the absolute index of the first of them.
@@ -51,7 +51,7 @@ class Receiver:
         max_frequency: float = 0.02,
         grid: Numerology = OFDM_64_16,
         start: int = 0,
-        carrier_cycles: float = 0.0,
+        centre_cycles: float = 0.0,
         on_points: Callable[[NDArray[np.complex64], Modulation], None] | None = None,
     ) -> None:
         if network is not None and not 0 <= network < N_NETWORKS:
@@ -59,7 +59,7 @@ class Receiver:
         self._network = network
         self._grid = grid
         self._on_points = on_points
-        self._acquisition = Acquisition(grid, max_frequency, carrier_cycles)
+        self._acquisition = Acquisition(grid, max_frequency, centre_cycles)
         self._detector = Detector(start)
         # From the peak back to where acquisition wants its samples to begin.
         self._before = before(grid) - 1 - preamble.guard(grid)
@@ -69,7 +69,7 @@ class Receiver:
         self._burst: Payload | None = None
         self._crossing: int | None = None
         self._peak: tuple[int, float] | None = None
-        self.carrier = (start, start)
+        self.last_burst = (start, start)
         """The last burst whose header was read begins and should end at these indices."""
         self.counters: Counter[str] = Counter()
         self._begin(start)
@@ -197,7 +197,7 @@ class Receiver:
         told = found.header
         plan = layout(self._grid, told.mcs, told.n_pdus, told.pdu_bytes)
         self._burst = burst = Payload(found, plan, self._grid, n_symbols(self._grid))
-        self.carrier = (found.quality.start, burst.end_of(plan.n_symbols) + BACKOFF)
+        self.last_burst = (found.quality.start, burst.end_of(plan.n_symbols) + BACKOFF)
         if self._network is not None and told.network != self._network:
             # Searched on, not skipped: a header that lies must not make us deaf.
             self._end(burst, events, "foreign")

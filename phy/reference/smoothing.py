@@ -1,7 +1,7 @@
 """Smoothing takes off the channel's estimate what must be noise, and follows the channel later.
 
-A channel is a few echoes. Turned back by its mean delay, its gains are smooth over the carriers, so
-that most of their power is in few of the functions 1, cos k, sin k, cos 2k, … Noise is in all of
+A channel is a few echoes. Turned back by its mean delay, its gains are smooth over the subcarriers,
+so that most of their power is in few of the functions 1, cos k, sin k, cos 2k, … Noise is in all of
 them alike.
 """
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from phy.numerology import Numerology
 from phy.reference.channel import Channel
-from phy.reference.ofdm import Carriers
+from phy.reference.ofdm import Subcarriers
 
 GROUPS = ((0,), (1,), (2, 3), (4, 5, 6, 7, 8))
 """Delays of a group's echoes, from the mean delay; all else up to a prefix is one group more."""
@@ -43,18 +43,18 @@ def sizes(grid: Numerology) -> NDArray[np.int64]:
     return np.array([*own, grid.n_used - sum(own)])
 
 
-def mean_delay(h: Carriers, grid: Numerology) -> float:
-    """Gains turn by this from a carrier to the next, in radians: arg Σ_k Ĥ_{k+1} Ĥ*_k."""
+def mean_delay(h: Subcarriers, grid: Numerology) -> float:
+    """Gains turn by this from a subcarrier to the next, in radians: arg Σ_k Ĥ_{k+1} Ĥ*_k."""
     next_to = np.flatnonzero(np.diff(grid.used) == 1)
     return float(np.angle(np.sum(h[next_to + 1] * h[next_to].conj())))
 
 
-def centred(h: Carriers, delay: float, grid: Numerology) -> Carriers:
-    """Gains `[n_used]` are turned back by `delay` radians a carrier."""
+def centred(h: Subcarriers, delay: float, grid: Numerology) -> Subcarriers:
+    """Gains `[n_used]` are turned back by `delay` radians a subcarrier."""
     return np.asarray(h * np.exp(-1j * delay * grid.used))
 
 
-def split(x: Carriers, wanted: NDArray[np.bool_], grid: Numerology) -> Carriers:
+def split(x: Subcarriers, wanted: NDArray[np.bool_], grid: Numerology) -> Subcarriers:
     """The function splits `x` `[n_used]` into parts of each group `[groups + 1, n_used]`.
 
     What is in none of the groups `wanted` `[groups + 1]` is the last part.
@@ -67,12 +67,12 @@ def split(x: Carriers, wanted: NDArray[np.bool_], grid: Numerology) -> Carriers:
     return parts
 
 
-def energies(parts: Carriers) -> NDArray[np.float64]:
+def energies(parts: Subcarriers) -> NDArray[np.float64]:
     """Each part `[groups + 1, n_used]` has this energy `[groups + 1]`."""
     return np.asarray(np.sum(np.abs(parts) ** 2, axis=1))
 
 
-def smooth(h: Carriers, variance: float, channel: Channel, grid: Numerology) -> None:
+def smooth(h: Subcarriers, variance: float, channel: Channel, grid: Numerology) -> None:
     """The channel's gains become `h`, measured with noise of `variance`, less most of that noise.
 
         kept of a group = max(0, 1 − v (m + √m) / E)   (James and Stein 1961; 1 − v/E where m = 1)
@@ -91,7 +91,7 @@ def smooth(h: Carriers, variance: float, channel: Channel, grid: Numerology) -> 
     channel.h = centred(kept @ parts, -channel.delay, grid)
 
 
-def follow(error: Carriers, variance: float, channel: Channel, grid: Numerology) -> None:
+def follow(error: Subcarriers, variance: float, channel: Channel, grid: Numerology) -> None:
     """The channel moves towards later symbols, which contradict it by `error` `[n_used]`.
 
         p' = p + drift · power;  weight = p' / (p' + v);  p = p' (1 − weight)

@@ -1,4 +1,4 @@
-"""Tracking follows the phase of all carriers and its slope over them by two Kalman filters.
+"""Tracking follows the phase of all subcarriers and its slope over them by two Kalman filters.
 
 The phase turns with the offset that is left and with the oscillators' noise. The slope grows as the
 sender's sampling clock runs away from ours.
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from phy.numerology import Numerology
 from phy.reference.channel import Channel
-from phy.reference.ofdm import Carriers
+from phy.reference.ofdm import Subcarriers
 
 PHASE_NOISE = (5e-5, 1e-10)
 SLOPE_NOISE = (1e-10, 1e-15)
@@ -17,9 +17,11 @@ SLOPE_NOISE = (1e-10, 1e-15)
 SURPRISE = 6.0
 """Pilots that disagree by so many times what N explains are doubted, and so is their symbol."""
 FREQUENCY_ERROR_0_DB, FREQUENCY_ERROR_MIN = 0.006, 0.0005
-"""Error of the preamble's offset in carrier spacings: at 0 dB, and at best."""
+"""Error of the preamble's offset in subcarrier spacings: at 0 dB, and at best."""
 CLOCK_ERROR, CLOCK_DOUBT = 40e-6, 5e-6
-"""Standard deviations of a clock's error: of one unknown, and of one that the carrier tells."""
+"""Standard deviations of a clock's error: of one unknown, and of one that the centre frequency
+tells.
+"""
 
 _MOVE = np.array([[1.0, 1.0], [0.0, 1.0]])
 
@@ -34,7 +36,7 @@ class Kalman:
 
     @property
     def value(self) -> float:
-        """The value is in radians, or radians a carrier."""
+        """The value is in radians, or radians a subcarrier."""
         return float(self.state[0])
 
     def predict(self) -> None:
@@ -53,13 +55,13 @@ class Kalman:
 class Tracking:
     """The pilots of a burst tell its phase φ and slope s, symbol by symbol.
 
-    `clock_error` is the share by which the sender's sampling clock is fast as far as the carrier
-    tells it, None where nobody knows.
+    `clock_error` is the share by which the sender's sampling clock is fast as far as the centre
+    frequency tells it, None where nobody knows.
     """
 
     def __init__(self, grid: Numerology, channel: Channel, clock_error: float | None) -> None:
         self._grid = grid
-        # A turn of one carrier spacing is so much a symbol.
+        # A turn of one subcarrier spacing is so much a symbol.
         turn = 2 * np.pi * grid.n_symbol / grid.n_fft
         offset = max(FREQUENCY_ERROR_0_DB * np.sqrt(channel.no / channel.gain), FREQUENCY_ERROR_MIN)
         doubt = CLOCK_ERROR if clock_error is None else CLOCK_DOUBT
@@ -71,12 +73,12 @@ class Tracking:
         self.phase.predict()
         self.slope.predict()
 
-    def turned_back(self, y: Carriers) -> Carriers:
-        """A symbol's carriers `[n_used]` are turned back: Y exp(−j(φ + sk))."""
+    def turned_back(self, y: Subcarriers) -> Subcarriers:
+        """A symbol's subcarriers `[n_used]` are turned back: Y exp(−j(φ + sk))."""
         angle = self.phase.value + self.slope.value * self._grid.used
         return np.asarray(y * np.exp(-1j * angle))
 
-    def correct(self, y: Carriers, polarity: float, channel: Channel) -> float:
+    def correct(self, y: Subcarriers, polarity: float, channel: Channel) -> float:
         """A symbol `y` `[n_used]` corrects φ and s; the result is the noise that its pilots show.
 
         θ_p = arg(Y_p Ĥ*_p P_p) − φ − s k_p;  S_i = Σ|Ĥ_p|² k_p^i
@@ -88,13 +90,13 @@ class Tracking:
         return self.correct_by(turned, weight, self._grid.used[at], channel.noise)
 
     def correct_by(
-        self, turned: Carriers, weight: NDArray[np.float64], k: NDArray[np.int64], no: float
+        self, turned: Subcarriers, weight: NDArray[np.float64], k: NDArray[np.int64], no: float
     ) -> float:
         """The pilots correct φ and s by weighted least squares over their angles.
 
         `turned` is what came, turned back as predicted, times the conjugate of what should have
-        come; `weight` is |Ĥ_p|², `k` are the carriers, each `[n]`. The result is the noise power on
-        a carrier: `no`, or where pilots disagree by far more than that, what they show.
+        come; `weight` is |Ĥ_p|², `k` are the subcarriers, each `[n]`. The result is the noise power
+        on a subcarrier: `no`, or where pilots disagree by far more than that, what they show.
         """
         total = turned.sum()
         if total == 0:
@@ -118,5 +120,5 @@ class Tracking:
         return no
 
     def slip(self, early: int) -> None:
-        """Windows that begin `early` samples earlier let carriers lean less by that."""
+        """Windows that begin `early` samples earlier let subcarriers lean less by that."""
         self.slope.state[0] -= early * 2 * np.pi / self._grid.n_fft

@@ -1,11 +1,11 @@
-"""Training is what the receiver knows was sent; it tells the gain of every carrier."""
+"""Training is what the receiver knows was sent; it tells the gain of every subcarrier."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from phy.numerology import Numerology
 from phy.reference.channel import Channel
-from phy.reference.ofdm import Carriers
+from phy.reference.ofdm import Subcarriers
 from phy.reference.smoothing import smooth
 
 SURELY = 4.0
@@ -14,9 +14,9 @@ LARGEST_BOOST = 3.0
 
 
 def least_squares(
-    y: Carriers, sent: Carriers, amplitude: NDArray[np.float64]
-) -> tuple[Carriers, float]:
-    """Received symbols `[n, n_used]`, n ≥ 2, tell (gains `[n_used]`, noise power on a carrier).
+    y: Subcarriers, sent: Subcarriers, amplitude: NDArray[np.float64]
+) -> tuple[Subcarriers, float]:
+    """Received symbols `[n, n_used]`, n ≥ 2, tell (gains `[n_used]`, noise power on a subcarrier).
 
         Ĥ_k = Σ_s a_s Y_sk/X_sk / Σ_s a_s²;  N = mean_k Σ_s |Y_sk/X_sk − a_s Ĥ_k|² / (n − 1)
 
@@ -29,7 +29,7 @@ def least_squares(
 
 
 def estimate(
-    y: Carriers, sent: Carriers, amplitude: NDArray[np.float64], grid: Numerology
+    y: Subcarriers, sent: Subcarriers, amplitude: NDArray[np.float64], grid: Numerology
 ) -> Channel:
     """Known symbols tell the channel by least squares, less what must be noise of it.
 
@@ -44,7 +44,7 @@ def estimate(
 
 
 def learn(
-    y: Carriers, sent: Carriers, n_training: int, rotation: NDArray[np.float64],
+    y: Subcarriers, sent: Subcarriers, n_training: int, rotation: NDArray[np.float64],
     before: Channel, grid: Numerology,
 ) -> Channel:  # fmt: skip
     """A header that was read tells the channel once more, as further training.

@@ -14,7 +14,7 @@ from phy.mcs import HEADER_MCS, MCS_TABLE
 from phy.numerology import OFDM_64_16, Numerology
 from phy.reference.header import header_bits
 from phy.reference.ldpc import encode_blocks
-from phy.reference.mapping import to_carriers
+from phy.reference.mapping import to_subcarriers
 from phy.reference.ofdm import Samples, to_samples
 from phy.sequences import PADDING, whitening
 
@@ -60,8 +60,8 @@ class Transmitter:
         coded = encode_blocks(white, plan.form).reshape(-1)
         coded = np.concatenate((coded, PADDING[: plan.n_symbols * plan.symbol_bits - len(coded)]))
         # 5. and 6. Symbols, OFDM.
-        carriers = to_carriers(coded, plan.mcs.modulation, grid, n_symbols(grid))
-        payload = to_samples(carriers, grid, plan.mcs.peak)
+        subcarriers = to_subcarriers(coded, plan.mcs.modulation, grid, n_symbols(grid))
+        payload = to_samples(subcarriers, grid, plan.mcs.peak)
         told = BurstHeader(mcs, plan.n_pdus, plan.pdu_bytes, self._network)
         start = self._boost * preamble.preamble(grid)
         burst = np.concatenate((start, header_samples(told, grid), payload))
@@ -73,8 +73,8 @@ class Transmitter:
 def header_samples(told: BurstHeader, grid: Numerology) -> Samples:
     """The header becomes BPSK symbols, its peaks cut off as its MCS says `[n · n_symbol]`."""
     coded = header_bits(told, n_symbols(grid) * grid.n_data)
-    carriers = to_carriers(coded, Modulation.BPSK, grid, 0)
-    return to_samples(carriers, grid, MCS_TABLE[HEADER_MCS].peak)
+    subcarriers = to_subcarriers(coded, Modulation.BPSK, grid, 0)
+    return to_samples(subcarriers, grid, MCS_TABLE[HEADER_MCS].peak)
 
 
 def ramp(n: int) -> NDArray[np.float64]:

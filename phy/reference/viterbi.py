@@ -16,7 +16,7 @@ GENERATORS = (0o133, 0o171)
 N_STATES = 64
 N_TAIL = 6
 MAX_LLR = 511
-"""LLRs are clipped to this: a single carrier must not outvote all others."""
+"""LLRs are clipped to this: a single subcarrier must not outvote all others."""
 UNREACHED = -(1 << 30)
 
 _STATE = np.arange(N_STATES)

@@ -174,7 +174,7 @@ def _long_training(
 def _channel(samples: NDArray[np.complex64], window: int, frequency: float) -> Parcel[Channel]:
     starts = _GRID.n_fft * np.arange(preamble.N_LONG)
     y = ofdm.to_tones(samples[window:], starts, frequency, 0j, _GRID)
-    sent = preamble.long_carriers(_GRID)[_GRID.tones].astype(np.complex64)
+    sent = preamble.long_subcarriers(_GRID)[_GRID.tones].astype(np.complex64)
     channel, known = new_channel(_GRID), in_planes(np.tile(sent, (preamble.N_LONG, 1)))
     learn_channel(y, known, tones(_GRID).words, channel.words, new_scratch(_GRID).words)
     return channel

@@ -130,7 +130,7 @@ async def _capture(radio: OneRadio, wish: "CaptureWish") -> "CaptureReport":
                     completed=state.recorded_s, told=told,
                 )  # fmt: skip
 
-        async with Capture(made, Tuning(modem.rate_hz, modem.carrier_hz), wish) as capture:
+        async with Capture(made, Tuning(modem.rate_hz, modem.centre_hz), wish) as capture:
             with stopped_by_signals(capture.stop):
                 return await capture.run(watch)
 

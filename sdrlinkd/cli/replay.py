@@ -103,7 +103,7 @@ async def _replay(
 
     modem = radio.config.modem
     made = make_radio(radio.config, radio.node_id, Random(radio.config.seed), plan.room_s)
-    tuning = Tuning(modem.rate_hz, modem.carrier_hz)
+    tuning = Tuning(modem.rate_hz, modem.centre_hz)
     told = TextColumn("{task.fields[told]}")
     console = Console(stderr=True)
     with Progress(

@@ -10,7 +10,7 @@ def cfo_told(modem: ModemParams) -> str:
         return f"{searched} (modem.max_cfo_hz)"
     return (
         f"{searched}: two crystals of ±{modem.crystal_ppm:g} ppm (modem.crystal_ppm) at "
-        f"{modem.carrier_hz / 1e6:g} MHz can be {modem.apart_hz / 1e3:.3g} kHz apart"
+        f"{modem.centre_hz / 1e6:g} MHz can be {modem.apart_hz / 1e3:.3g} kHz apart"
     )
 
 

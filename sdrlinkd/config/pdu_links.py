@@ -67,14 +67,14 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """The radio runs at so many times `rate_hz`: for those that are not made for slow rates."""
 
     @property
-    def carrier_hz(self) -> float:
+    def centre_hz(self) -> float:
         """The middle of the channel, also where none is set."""
         return self.frequency_hz or SIMULATED_HZ
 
     @property
     def apart_hz(self) -> float:
         """How far two radios' carriers may be apart, both crystals off as far as they may be."""
-        return 2e-6 * self.crystal_ppm * self.carrier_hz
+        return 2e-6 * self.crystal_ppm * self.centre_hz
 
     @property
     def most_cfo_hz(self) -> float:

@@ -92,7 +92,7 @@ def _mcs_info(
     return McsInfo(
         mcs=mcs.index,
         name=mcs.name,
-        rate_bit_s=float(mcs.bits_per_carrier) * grid.n_data * rate_hz / grid.n_symbol,
+        rate_bit_s=float(mcs.bits_per_subcarrier) * grid.n_data * rate_hz / grid.n_symbol,
         one_pdu_ms=one.n_samples / rate_hz * 1e3,
         burst_pdus=n_pdus,
         burst_ms=burst_s * 1e3,

@@ -14,7 +14,7 @@ class Ear:
     """Samples in; events and the state of the air out. Hears in one thread."""
 
     def __init__(
-        self, receiver: phy.Receiver, sense: phy.CarrierSense | None, rate_hz: float
+        self, receiver: phy.Receiver, sense: phy.EnergyDetector | None, rate_hz: float
     ) -> None:
         self._receiver = receiver
         self._sense = sense
@@ -49,10 +49,10 @@ class Ear:
         """The index after the last sample heard."""
         return self._receiver.next_index
 
-    def _sense_air(self, sense: phy.CarrierSense) -> Sensed:
+    def _sense_air(self, sense: phy.EnergyDetector) -> Sensed:
         rate = self._rate_hz
         until, energy_end = sense.next_index, sense.busy_until
-        begin, end = self._receiver.carrier
+        begin, end = self._receiver.last_burst
         burst_at: float | None = begin / rate
         if self._unheard_until > max(end, energy_end):
             return Sensed(until / rate, (self._unheard_until + 1) / rate)

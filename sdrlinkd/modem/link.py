@@ -58,9 +58,9 @@ class ModemLink:
             params.network,
             params.searched_cfo_hz / params.rate_hz,
             phy.GRIDS[params.grid],
-            carrier_cycles=params.carrier_hz / params.rate_hz if params.one_crystal else 0.0,
+            centre_cycles=params.centre_hz / params.rate_hz if params.one_crystal else 0.0,
         )
-        sense = phy.CarrierSense(params.carrier_db) if listens else None
+        sense = phy.EnergyDetector(params.carrier_db) if listens else None
         self._ear = Ear(self._receiver, sense, params.rate_hz)
         self._may_lead_grow = lead_grows
         self._lead_grows = False
@@ -82,7 +82,7 @@ class ModemLink:
         """Load the compiled code and open the radio."""
         params = self._params
         await self._load()
-        tuning = Tuning(params.rate_hz, params.carrier_hz)
+        tuning = Tuning(params.rate_hz, params.centre_hz)
         try:
             await self._radio.open(tuning)
         except AbsentError as error:

@@ -123,7 +123,7 @@ def _channel(config: Config, seed: int) -> Channel:
     return Channel(
         phy.PathParams(
             rate_hz=modem.rate_hz * modem.oversampling,
-            carrier_hz=modem.carrier_hz,
+            centre_hz=modem.centre_hz,
             profile=air.profile,
             delay_spread_s=air.delay_spread_s,
             loss_db=air.loss_db,

@@ -7,7 +7,7 @@ from backends.ether import Medium
 from tests.backends.radios import noise
 
 RATE = 1e6
-CARRIER_HZ = 2.4e9
+CENTRE_HZ = 2.4e9
 SEED = 31
 PLAIN = RadioParams()
 
@@ -18,7 +18,7 @@ def half_duplex(turnaround_s=0.0, **more):
 
 def air(**params):
     """An air of this rate and carrier."""
-    return AirParams(**{"rate_hz": RATE, "frequency_hz": CARRIER_HZ, **params})
+    return AirParams(**{"rate_hz": RATE, "frequency_hz": CENTRE_HZ, **params})
 
 
 def medium(radios, seed=SEED, tracks=(), links=(), outages=(), **params):

@@ -7,11 +7,11 @@ import numpy as np
 
 from backends import LocalEther, Tuning, TxBurst, World
 from backends.ether.medium import NOISE_DBFS
-from tests.backends.airs import CARRIER_HZ, RATE, SEED, air
+from tests.backends.airs import CENTRE_HZ, RATE, SEED, air
 
 BLOCK_S = 0.001
 N = 1000
-TUNING = Tuning(RATE, CARRIER_HZ)
+TUNING = Tuning(RATE, CENTRE_HZ)
 TIMEOUT_S = 10
 
 

@@ -78,7 +78,7 @@ async def sent_into_one_block(radio, wanted):
 async def test_a_recording_holds_what_a_loopback_hears(tmp_path, profile):
     warm_up()
     path = PathParams(
-        rate_hz=RATE, profile=profile, delay_s=33e-6, clock_ppm=20, carrier_hz=1e9, loss_db=3
+        rate_hz=RATE, profile=profile, delay_s=33e-6, clock_ppm=20, centre_hz=1e9, loss_db=3
     )
     channel, wanted = Channel(path, seed=8), [TxBurst(0, noise(500)), TxBurst(1000, noise(700))]
     loopback = LoopbackRadio(channel, 0.05, paced=False)

@@ -8,7 +8,7 @@ import pytest
 
 from backends import GAP, BackendError, LinkOverride, RadioParams, Tuning, TxBurst, TxOutcome
 from backends.ether.medium import LEAD, NOISE_DBFS
-from tests.backends.airs import CARRIER_HZ, PLAIN, RATE, burst, half_duplex, power_db
+from tests.backends.airs import CENTRE_HZ, PLAIN, RATE, burst, half_duplex, power_db
 from tests.backends.nodes import (
     BLOCK_S,
     N,
@@ -209,7 +209,7 @@ async def test_a_radio_that_is_not_open_sends_nothing():
 async def test_another_rate_is_refused_with_the_one_of_the_air():
     ether = ether_of({0: PLAIN})
     with pytest.raises(BackendError, match="rate_hz: got 2e\\+06; allowed: 1e\\+06"):
-        await ether.radios[0].open(Tuning(2 * RATE, CARRIER_HZ))
+        await ether.radios[0].open(Tuning(2 * RATE, CENTRE_HZ))
 
 
 def test_a_radio_can_what_its_parameters_say():

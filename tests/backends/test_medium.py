@@ -7,7 +7,7 @@ from backends import LinkOverride, Outage, RadioParams, Track, TxBurst
 from backends.ether.medium import NOISE_DBFS
 from phy import PROFILES, PduHeard, Receiver, Transmitter
 from tests.backends.airs import (
-    CARRIER_HZ,
+    CENTRE_HZ,
     PLAIN,
     RATE,
     burst,
@@ -148,7 +148,7 @@ def test_crystals_move_the_carrier_by_their_difference(sends_ppm, hears_ppm):
     made = medium(radios)
     made.send(0, TxBurst(1000, np.full(4000, 0.3, np.complex64)))
     got = heard(made, 1, 0.006)[1100:4900]
-    wanted = CARRIER_HZ * (sends_ppm - hears_ppm) * 1e-6 / RATE
+    wanted = CENTRE_HZ * (sends_ppm - hears_ppm) * 1e-6 / RATE
     assert frequency_of(got) == pytest.approx(wanted, abs=2e-6)
 
 
@@ -162,7 +162,7 @@ def test_movement_moves_the_carrier(towards):
     made = medium(2, tracks=tracks, snr_db_at_1m=120.0)
     made.send(0, TxBurst(1000, np.full(4000, 0.3, np.complex64)))
     got = heard(made, 1, 0.006)[1300:5000]
-    wanted = towards * speed / SPEED_OF_LIGHT * CARRIER_HZ / RATE
+    wanted = towards * speed / SPEED_OF_LIGHT * CENTRE_HZ / RATE
     assert frequency_of(got) == pytest.approx(wanted, abs=2e-6)
 
 

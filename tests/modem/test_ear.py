@@ -20,7 +20,7 @@ COARSE = WINDOW + 1
 
 
 def make_ear(network=0):
-    return Ear(phy.Receiver(network), phy.CarrierSense(), RATE)
+    return Ear(phy.Receiver(network), phy.EnergyDetector(), RATE)
 
 
 def a_burst(seed, n_pdus=4, mcs=1, network=0):

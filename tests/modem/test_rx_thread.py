@@ -13,7 +13,7 @@ from sdrlinkd.modem.rx_thread import MAX_BLOCKS, ReceiverHere, ReceiverThread
 
 
 def make_ear(senses=False):
-    return Ear(phy.Receiver(), phy.CarrierSense() if senses else None, 1e6)
+    return Ear(phy.Receiver(), phy.EnergyDetector() if senses else None, 1e6)
 
 
 def blocks(samples, size):

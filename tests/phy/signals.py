@@ -22,7 +22,7 @@ def noisy(rng, x, snr_db):
 
 
 def turned(x, frequency, phase=0.0):
-    """`x` with a carrier offset in cycles a sample."""
+    """`x` with a frequency offset in cycles a sample."""
     turn = np.exp(2j * np.pi * (frequency * np.arange(len(x)) + phase))
     return (x * turn).astype(np.complex64)
 

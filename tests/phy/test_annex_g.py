@@ -8,7 +8,7 @@ from phy.interleaver import order
 from phy.kernels.convolution import convolve
 from phy.mapping import mapping
 from phy.ofdm import to_tones
-from phy.preamble import BARKER, SEGMENT, SHORT, length, long_symbol, preamble, short_carriers
+from phy.preamble import BARKER, SEGMENT, SHORT, length, long_symbol, preamble, short_subcarriers
 
 # The standard's samples carry the inverse FFT's 1/64; ours have mean power 1.
 OURS = OFDM_64_16.scale
@@ -19,10 +19,10 @@ SIGNAL = "b13000"  # table G.7, the six tail bits included
 SIGNAL_CODED = "d1a1023e7000"  # G.8
 SIGNAL_INTERLEAVED = "94d014832494"  # G.9
 
-# G.11, carriers -26 to 26 with pilots at ±7 and ±21; 0 is DC.
+# G.11, subcarriers -26 to 26 with pilots at ±7 and ±21; 0 is DC.
 SIGNAL_CARRIERS = "+--+-++--++-+------+-+-+--0+-----+++--+--+--+---+-+--"
 
-# G.12 from sample 16 on, half a period; all carriers are real, so the other half mirrors it.
+# G.12 from sample 16 on, half a period; all subcarriers are real, so the other half mirrors it.
 SIGNAL_TIME = (
     -0.219, -0.069 - 0.027j, 0.018 + 0.083j, 0.008j, 0.010 - 0.097j, -0.060 - 0.124j,
     -0.033 - 0.044j, 0.011 + 0.002j, 0.098 + 0.044j, 0.136 + 0.105j, -0.021 + 0.005j,
@@ -32,7 +32,7 @@ SIGNAL_TIME = (
     0.099 + 0.100j, 0.034 - 0.148j, -0.003 - 0.094j, -0.120 + 0.042j, -0.136 - 0.070j, -0.031,
 )  # fmt: skip
 
-# G.5, carriers -26 to 26.
+# G.5, subcarriers -26 to 26.
 LONG_CARRIERS = "++--++-+-++++++--++-+-++++0+--++-+-+-----++--+-+-++++"
 
 # G.6 from sample 32 on, half a period.
@@ -58,8 +58,8 @@ def bits(hexadecimal):
     return np.unpackbits(np.frombuffer(bytes.fromhex(hexadecimal), np.uint8))
 
 
-def carriers(signs):
-    """FFT bins `[64]` of signs for carriers -26 to 26."""
+def subcarriers(signs):
+    """FFT bins `[64]` of signs for subcarriers -26 to 26."""
     spectrum = np.zeros(64)
     spectrum[np.arange(-26, 27) % 64] = ["-0+".index(sign) - 1 for sign in signs]
     return spectrum
@@ -80,12 +80,12 @@ def test_the_signal_field_is_interleaved():
 def test_the_signal_field_is_mapped_with_its_pilots():
     samples = mapping(Modulation.BPSK, OFDM_64_16).to_samples(bits(SIGNAL_CODED), 0, np.inf)
     re, im = to_tones(samples, np.array([16]), 0.0, 0j, OFDM_64_16)[0, :, :52]
-    expected = carriers(SIGNAL_CARRIERS)[OFDM_64_16.bins[OFDM_64_16.tones]]
+    expected = subcarriers(SIGNAL_CARRIERS)[OFDM_64_16.bins[OFDM_64_16.tones]]
     assert re + 1j * im == pytest.approx(expected, abs=3e-6)
 
 
 def mirrored(half):
-    """A period `[64]` of which one half `[33]` is known, all carriers being real."""
+    """A period `[64]` of which one half `[33]` is known, all subcarriers being real."""
     half = np.array(half)
     return OURS * np.concatenate((half, half[31:0:-1].conj()))
 
@@ -99,13 +99,13 @@ def test_the_signal_field_in_time():
 def test_the_signal_field_back_from_time():
     samples = mirrored(SIGNAL_TIME).astype(np.complex64)
     re, im = to_tones(samples, np.array([0]), 0.0, 0j, OFDM_64_16)[0, :, :52]
-    expected = carriers(SIGNAL_CARRIERS)[OFDM_64_16.bins[OFDM_64_16.tones]]
+    expected = subcarriers(SIGNAL_CARRIERS)[OFDM_64_16.bins[OFDM_64_16.tones]]
     assert re + 1j * im == pytest.approx(expected, abs=0.02)
 
 
 def test_the_long_training_symbol():
     spectrum = np.fft.fft(long_symbol()) / OURS
-    assert spectrum == pytest.approx(carriers(LONG_CARRIERS), abs=1e-5)
+    assert spectrum == pytest.approx(subcarriers(LONG_CARRIERS), abs=1e-5)
     assert long_symbol() == pytest.approx(mirrored(LONG_TIME), abs=ROUNDING)
 
 
@@ -115,7 +115,7 @@ def test_the_short_training_is_the_standards_under_a_cover():
     signs = np.sum(segments[1:] * segments[:-1].conj(), axis=1).real
     assert np.array_equal(np.sign(signs), [1, 1, 1, -1, -1, -1, 1, -1, -1, 1, -1])
     assert np.array_equal(np.sign(signs), BARKER)
-    values = short_carriers()[short_carriers() != 0]
+    values = short_subcarriers()[short_subcarriers() != 0]
     assert np.abs(values.real) == pytest.approx(1.472, abs=5e-4)
 
 

@@ -45,7 +45,7 @@ def test_bursts_without_a_pause_are_all_heard(pause):
     for mcs in (0, 6, 1, 3, 5, 2, 4):
         sent, burst = a_burst(rng, mcs, n_pdus=int(rng.integers(1, 6)))
         pdus += sent
-        # Every sender has its own carrier.
+        # Every sender has its own frequency offset.
         parts += [turned(burst, rng.uniform(-0.015, 0.015), rng.random()), pause]
     events, counters = hear(stream(*parts))
     assert heard(events) == pdus

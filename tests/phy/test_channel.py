@@ -104,7 +104,7 @@ def test_any_chunking_of_a_front_end_gives_the_same_samples(sizes, bits):
 
 @pytest.mark.parametrize("profile", PROFILES)
 def test_the_same_seed_gives_the_same_path(profile):
-    params = PathParams(rate_hz=RATE, carrier_hz=1e9, profile=profile, clock_ppm=3, delay_s=1e-5)
+    params = PathParams(rate_hz=RATE, centre_hz=1e9, profile=profile, clock_ppm=3, delay_s=1e-5)
     x = noise(rng(), 500)
     one, other = (Path(params, rng()) for _ in range(2))
     for _ in range(3):
@@ -137,7 +137,7 @@ def test_the_phase_is_any_phase():
 
 @pytest.mark.parametrize("ppm", [-40, -1, 25])
 def test_the_carrier_is_off_as_asked(ppm):
-    _, y = carry(np.ones(10_000), carrier_hz=2.4e9, clock_ppm=ppm)
+    _, y = carry(np.ones(10_000), centre_hz=2.4e9, clock_ppm=ppm)
     step = np.vdot(y[100:9000], y[101:9001])
     assert np.angle(step) / (2 * np.pi) * RATE == pytest.approx(2400 * ppm, abs=0.5)
 
@@ -145,7 +145,7 @@ def test_the_carrier_is_off_as_asked(ppm):
 @pytest.mark.parametrize("delay", [0.0, 0.1, 0.25, 0.5, 0.777, 0.999])
 @pytest.mark.parametrize("clock_error", [0.0, 40e-6, -40e-6, 1e-3])
 def test_samples_between_samples_are_right_in_band(delay, clock_error):
-    """To -50 dB at all frequencies of the grid's carriers."""
+    """To -50 dB at all frequencies of the grid's subcarriers."""
     n = 4000
     y = stretch(band_limited(np.arange(n)).astype(np.complex64), delay, clock_error)
     inner = np.arange(50, n - 50)

@@ -15,8 +15,8 @@ from tests.phy.signals import endings, heard, noise, payloads, silence, turned
 def make_stream(seed):
     """(samples, a place for a gap, its length, PDUs of the bursts that are not spoilt).
 
-    Own and foreign bursts of any MCS with their own carriers and strengths, close to one another or
-    not, false starts, samples that are no numbers, DC, noise.
+    Own and foreign bursts of any MCS with their own frequency offsets and strengths, close together
+    or not, false starts, samples that are no numbers, DC, noise.
     """
     rng = np.random.default_rng(seed)
     parts, sent = [silence(int(rng.integers(0, 1500)))], []

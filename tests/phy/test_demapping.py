@@ -21,7 +21,7 @@ every_modulation = pytest.mark.parametrize("modulation", Modulation)
 
 
 def channel_of(h, no):
-    """A channel known exactly: gains of the carriers in use, noise power."""
+    """A channel known exactly: gains of the subcarriers in use, noise power."""
     parcel = new_channel(GRID)
     channel = parcel.content
     channel.h[:, : GRID.n_used] = h[GRID.tones].real, h[GRID.tones].imag
@@ -49,13 +49,13 @@ def flat():
 
 
 def selective(rng):
-    """Carriers between a fade of 30 dB and a gain of 6."""
+    """Subcarriers between a fade of 30 dB and a gain of 6."""
     gain = 10 ** (rng.uniform(-30, 6, GRID.n_used) / 20)
     return gain * np.exp(2j * np.pi * rng.random(GRID.n_used))
 
 
 def with_pilots(data, h, first_symbol=2):
-    """Bins of received data carriers `[n, 48]` and undisturbed pilots."""
+    """Bins of received data subcarriers `[n, 48]` and undisturbed pilots."""
     n = len(data)
     used = np.zeros((n, GRID.n_used), np.complex128)
     used[:, GRID.data_at] = data
@@ -117,7 +117,7 @@ def test_clean_symbols_give_back_their_bits(modulation):
     bins[:, GRID.bins] *= h
     channel = channel_of(h, 1e-4)
     llr, equalised = demap(modulation, bins, channel, 5)
-    # On a carrier that hardly arrives, the finest points tell nothing.
+    # On a subcarrier that hardly arrives, the finest points tell nothing.
     assert np.count_nonzero(llr) > 0.95 * len(llr)
     assert np.array_equal(llr[llr != 0] < 0, coded[llr != 0])
     nearest = np.abs(equalised[..., None] - points(modulation)).min(-1)
@@ -138,7 +138,9 @@ def test_symbols_one_by_one_are_the_same_as_together(modulation):
 
 
 def turned_symbols(n, phase, slope):
-    """QPSK points sent, and bins whose carriers turn by phase + slope · carrier, radians `[n]`."""
+    """QPSK points sent, and bins whose subcarriers turn by phase + slope · subcarrier, radians
+    `[n]`.
+    """
     rng = np.random.default_rng(SEED)
     sent = points(Modulation.QPSK)[rng.integers(0, 4, (n, 48))]
     bins = with_pilots(sent, np.ones(GRID.n_used))
@@ -214,12 +216,12 @@ def test_a_channel_that_fades_is_followed(modulation):
 
 def error_of(channel, h):
     """Mean square, whatever phase and slope: those the pilots follow."""
-    carriers = GRID.used[GRID.tones]
+    subcarriers = GRID.used[GRID.tones]
     h_hat = (channel.content.h[0] + 1j * channel.content.h[1])[: GRID.n_used]
-    leaning = h_hat * np.exp(1j * np.linspace(-0.05, 0.05, 101)[:, None] * carriers)
+    leaning = h_hat * np.exp(1j * np.linspace(-0.05, 0.05, 101)[:, None] * subcarriers)
     match = np.abs(leaning @ h[GRID.tones].conj()).max()
     power = np.sum(np.abs(h_hat) ** 2) + np.sum(np.abs(h) ** 2)
-    return (power - 2 * match) / len(carriers)
+    return (power - 2 * match) / len(subcarriers)
 
 
 @pytest.mark.parametrize(

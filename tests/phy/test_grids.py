@@ -54,7 +54,7 @@ def test_bursts_below_the_noise_are_heard(grid):
 def test_a_clock_40_ppm_off_is_followed_through_a_long_burst(grid):
     rng = np.random.default_rng(SEED)
     pdus = payloads(rng, 20, 1000)
-    params = PathParams(rate_hz=5e6, carrier_hz=5e8, clock_ppm=40)
+    params = PathParams(rate_hz=5e6, centre_hz=5e8, clock_ppm=40)
     _, x = Path(params, rng).carry(Transmitter(grid=grid).modulate(pdus, 1))
     receiver = Receiver(grid=grid)
     x = noisy(rng, np.concatenate((silence(400), x)), 12)
@@ -63,7 +63,7 @@ def test_a_clock_40_ppm_off_is_followed_through_a_long_burst(grid):
 
 @every_grid
 def test_training_is_of_magnitude_1_and_low_peaks(grid):
-    assert np.abs(preamble.long_carriers(grid)) == pytest.approx(1)
+    assert np.abs(preamble.long_subcarriers(grid)) == pytest.approx(1)
     assert len(preamble.preamble(grid)) == preamble.length(grid)
     long = preamble.long_symbol(grid)
     assert np.mean(np.abs(long) ** 2) == pytest.approx(1, rel=1e-5)

@@ -1,4 +1,4 @@
-"""Neighbours that send all the time, and clocks that the carrier tells, or does not."""
+"""Neighbours that send all the time, and clocks that the centre frequency tells, or does not."""
 
 import numpy as np
 import pytest
@@ -51,19 +51,19 @@ def test_when_the_neighbour_is_gone_weak_bursts_are_found_as_before():
 
 
 def n_lost_of_20(ppm, one_crystal, snr_db):
-    """Long bursts whose carrier, and with one crystal also whose samples, are off by `ppm`.
+    """Long bursts whose subcarrier, and with one crystal also whose samples, are off by `ppm`.
 
     The receiver takes it for granted that one crystal makes both.
     """
-    rng, carrier_hz, rate_hz = np.random.default_rng(SEED), 2.4e9, 5e6
-    params = PathParams(rate_hz, carrier_hz if one_crystal else 0.0, clock_ppm=ppm * one_crystal)
+    rng, centre_hz, rate_hz = np.random.default_rng(SEED), 2.4e9, 5e6
+    params = PathParams(rate_hz, centre_hz if one_crystal else 0.0, clock_ppm=ppm * one_crystal)
     n_lost = 0
     for _ in range(20):
         pdu = rng.bytes(1500)
         _, x = Path(params, rng).carry(Transmitter().modulate([pdu], 1))
         if not one_crystal:
-            x = turned(x, carrier_hz * ppm * 1e-6 / rate_hz)
-        receiver = Receiver(max_frequency=0.03, carrier_cycles=carrier_hz / rate_hz)
+            x = turned(x, centre_hz * ppm * 1e-6 / rate_hz)
+        receiver = Receiver(max_frequency=0.03, centre_cycles=centre_hz / rate_hz)
         events = receiver.push(noisy(rng, np.concatenate((silence(400), x)), snr_db))
         n_lost += heard(events + receiver.flush()) != [pdu]
     return n_lost

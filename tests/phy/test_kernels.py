@@ -12,7 +12,7 @@ from phy.mapping import mapping
 from phy.numerology import GRIDS
 from phy.preamble import preamble
 from phy.reference import detection
-from phy.reference.mapping import to_carriers
+from phy.reference.mapping import to_subcarriers
 from phy.reference.ofdm import to_samples
 from phy.reference.smoothing import centred
 from phy.stream import SampleStream
@@ -105,9 +105,9 @@ def test_coded_bits_become_the_references_symbols(grid, modulation, n):
     """Interleaved, mapped, with pilots, prefix and cut peaks."""
     by = mapping(modulation, grid)
     coded = rng().integers(0, 2, n * by.symbol_bits, np.uint8)
-    carriers = to_carriers(coded, modulation, grid, 7)
+    subcarriers = to_subcarriers(coded, modulation, grid, 7)
     for peak in (np.inf, 1.5):
-        wanted = to_samples(carriers, grid, peak)
+        wanted = to_samples(subcarriers, grid, peak)
         assert by.to_samples(coded, 7, peak) == pytest.approx(wanted, abs=3e-6)
 
 
@@ -153,13 +153,13 @@ def _lean_more(slope, numbers, turns):
 def test_leaning_more_adds_up(slope):
     """A hundred small steps are one large one."""
     numbers = np.zeros(56, np.float32)
-    carriers = OFDM_64_16.used[OFDM_64_16.tones]
-    numbers[:52] = carriers
+    subcarriers = OFDM_64_16.used[OFDM_64_16.tones]
+    numbers[:52] = subcarriers
     turns, at_once = np.zeros((2, 2, 56), np.float32)
-    lean(0.2, carriers, turns)
+    lean(0.2, subcarriers, turns)
     for _ in range(100):
         _lean_more(slope, numbers, turns)
-    lean(0.2 + 100 * slope, carriers, at_once)
+    lean(0.2 + 100 * slope, subcarriers, at_once)
     wanted = centred(np.ones(52), -0.2 - 100 * slope, OFDM_64_16)[OFDM_64_16.tones]
     assert at_once[0, :52] + 1j * at_once[1, :52] == pytest.approx(wanted, abs=1e-6)
     assert turns[:, :52] == pytest.approx(at_once[:, :52], abs=2e-5)

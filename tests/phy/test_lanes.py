@@ -12,7 +12,7 @@ from phy.kernels.lanes import N_LANES, load, splat, store, store_int16
 from phy.numerology import GRIDS
 from phy.ofdm import to_tones
 from phy.reference import demapper as reference
-from phy.reference.ofdm import to_carriers
+from phy.reference.ofdm import to_subcarriers
 from tests.phy.signals import noise
 
 SEED = 49
@@ -75,7 +75,7 @@ def test_tones_are_those_of_the_references_fft(grid):
     for n in (1, 2, 7, 8, 9, 31):
         starts = np.sort(rng().integers(0, len(x) - grid.n_fft + 1, n))
         starts[-1] = len(x) - grid.n_fft
-        expected = to_carriers(x, starts, frequency, dc, grid, at)[:, grid.tones]
+        expected = to_subcarriers(x, starts, frequency, dc, grid, at)[:, grid.tones]
         y = to_tones(x, starts, frequency, dc, grid, at)
         assert y[:, 0, : grid.n_used] + 1j * y[:, 1, : grid.n_used] == pytest.approx(
             expected, abs=2e-6

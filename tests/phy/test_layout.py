@@ -101,7 +101,7 @@ def test_most_pdus_is_the_largest_number_that_fits(grid, mcs, size, n_samples):
 def test_rates_of_long_bursts_approach_the_tables():
     for mcs in MCS_TABLE:
         plan = layout(OFDM_64_16, mcs.index, 63, 2047)
-        least = ceil(63 * 8 * 2051 / (48 * mcs.bits_per_carrier))
+        least = ceil(63 * 8 * 2051 / (48 * mcs.bits_per_subcarrier))
         assert 0 <= Fraction(plan.n_symbols - least, least) < Fraction(1, 1000)
 
 

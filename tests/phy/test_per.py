@@ -16,7 +16,7 @@ SEED = 41
 
 
 def n_lost(n, mcs, size, snr_db, max_frequency=0.02, **settings):
-    """Of `n` bursts of one PDU, each with a carrier of its own, how many are not heard."""
+    """Of `n` bursts of one PDU, each with a subcarrier of its own, how many are not heard."""
     rng = np.random.default_rng(SEED)
     transmitter, receiver = Transmitter(), Receiver(max_frequency=max_frequency, **settings)
     sent, events = [], []

@@ -78,7 +78,7 @@ def test_the_fullest_burst_comes_back():
 def test_crystals_20_ppm_off_on_both_sides_at_2_4_ghz(mcs, ppm, rate_hz, settings):
     pdus = payloads(np.random.default_rng(SEED), 4, 220)
     burst = Transmitter().modulate(pdus, mcs)
-    samples = carried(burst, rate_hz=rate_hz, carrier_hz=2.4e9, clock_ppm=ppm)
+    samples = carried(burst, rate_hz=rate_hz, centre_hz=2.4e9, clock_ppm=ppm)
     events, _ = hear(samples, **settings)
     assert heard(events) == pdus
     assert events[0].burst.cfo == pytest.approx(2.4e9 * ppm * 1e-6 / rate_hz, abs=4e-5)
@@ -139,7 +139,7 @@ def test_a_front_end_that_is_not_perfect(mcs, front_end):
     """A burst at -15 dBFS after some time of noise, at 4 ppm."""
     pdus = payloads(np.random.default_rng(SEED), 4, 220)
     rng = np.random.default_rng(SEED)
-    params = PathParams(rate_hz=1e6, carrier_hz=2.4e9, clock_ppm=4, loss_db=15)
+    params = PathParams(rate_hz=1e6, centre_hz=2.4e9, clock_ppm=4, loss_db=15)
     _, samples = Path(params, rng).carry(Transmitter().modulate(pdus, mcs))
     events, _ = hear(FrontEnd(front_end, rng).receive(framed(samples, 40_000)))
     assert heard(events) == pdus
@@ -150,7 +150,7 @@ def test_a_front_end_that_is_not_perfect(mcs, front_end):
 def test_a_transmitter_that_is_not_perfect(mcs):
     pdus = payloads(np.random.default_rng(SEED), 4, 220)
     burst = Transmitter().modulate(pdus, mcs)
-    samples = carried(burst, rate_hz=1e6, carrier_hz=2.4e9, clock_ppm=3, image_db=30, leak_db=25)
+    samples = carried(burst, rate_hz=1e6, centre_hz=2.4e9, clock_ppm=3, image_db=30, leak_db=25)
     assert heard(hear(samples)[0]) == pdus
 
 
@@ -178,7 +178,7 @@ def test_estimates_are_close(snr_db, gain_db):
     assert np.mean(rssi) == pytest.approx(
         gain_db + 10 * np.log10(1 + 10 ** (-snr_db / 10)), abs=0.2
     )
-    # The carriers in use hold 52 of the noise's 64 parts; estimating them costs up to 3 dB.
+    # The subcarriers in use hold 52 of the noise's 64 parts; estimating them costs up to 3 dB.
     assert 0 < np.mean(evm) + snr_db + 10 * np.log10(64 / 52) < 3
     assert np.sqrt(np.mean(np.square(cfo))) < 1.5e-4 * 10 ** (-snr_db / 20) + 1e-6
 

@@ -113,11 +113,11 @@ def test_the_likeliest_offset_is_the_same(grid):
 
 
 @every_grid
-@pytest.mark.parametrize("carrier_cycles", [0.0, 500.0])
-def test_a_burst_is_acquired_alike(grid, carrier_cycles):
+@pytest.mark.parametrize("centre_cycles", [0.0, 500.0])
+def test_a_burst_is_acquired_alike(grid, centre_cycles):
     """Start, offset, header, what is told of it, and the channel that its payload begins with."""
-    ours = acquisition.Acquisition(grid, 0.1, carrier_cycles)
-    other = plain_acquisition.Acquisition(grid, 0.1, carrier_cycles)
+    ours = acquisition.Acquisition(grid, 0.1, centre_cycles)
+    other = plain_acquisition.Acquisition(grid, 0.1, centre_cycles)
     n_read = n_missed = 0
     for seed in range(10):
         draws = rng(seed)

@@ -84,8 +84,8 @@ def _predict(tracking):
 
 
 @njit
-def _correct(turned_by, power, carriers, no, tracking):
-    return tracking_kernel.correct(turned_by, power, carriers, no, tracking)
+def _correct(turned_by, power, subcarriers, no, tracking):
+    return tracking_kernel.correct(turned_by, power, subcarriers, no, tracking)
 
 
 def state_of(kalman):
@@ -105,18 +105,18 @@ def test_pilots_are_tracked_alike(grid, clock_error):
     channel.no, channel.gain = parcel.content.no, parcel.content.gain
     equaliser_kernel.start_tracking(tones(grid).content, parcel.content, clock_error or 0.0, told)
     ours, other = parcel.content.tracking, Tracking(grid, channel, clock_error)
-    carriers = grid.used[grid.pilots_at]
+    subcarriers = grid.used[grid.pilots_at]
     for number in range(40):
         _predict(ours)
         other.predict()
-        angle = 0.02 * number + 1e-3 * number * carriers / grid.n_fft
-        angle = angle - ours[PHASE, 0] - ours[SLOPE, 0] * carriers
-        weight = draws.uniform(0.2, 2, len(carriers))
-        came = weight * np.exp(1j * angle) + noise(draws, len(carriers), 0.02)
-        came = came * (number != 7) + noise(draws, len(carriers), 3.0) * (number == 20)
+        angle = 0.02 * number + 1e-3 * number * subcarriers / grid.n_fft
+        angle = angle - ours[PHASE, 0] - ours[SLOPE, 0] * subcarriers
+        weight = draws.uniform(0.2, 2, len(subcarriers))
+        came = weight * np.exp(1j * angle) + noise(draws, len(subcarriers), 0.02)
+        came = came * (number != 7) + noise(draws, len(subcarriers), 3.0) * (number == 20)
         came = came.astype(np.complex128)
-        shown = _correct(came, weight, carriers, channel.no, ours)
-        assert other.correct_by(came, weight, carriers, channel.no) == pytest.approx(shown)
+        shown = _correct(came, weight, subcarriers, channel.no, ours)
+        assert other.correct_by(came, weight, subcarriers, channel.no) == pytest.approx(shown)
         assert (shown > 6 * channel.no) == (number == 20)
         assert state_of(other.phase) == pytest.approx(ours[PHASE], rel=1e-6, abs=1e-12)
         assert state_of(other.slope) == pytest.approx(ours[SLOPE], rel=1e-6, abs=1e-15)
@@ -128,17 +128,17 @@ def test_pilots_are_tracked_alike(grid, clock_error):
 def equalised(grid, modulation, n, lean, no):
     """(the kernel's LLRs, points, channel; the reference's LLRs, points, equaliser).
 
-    `n` symbols that turn, and that lean more and more, the last by `lean` radians a carrier.
+    `n` symbols that turn, and that lean more and more, the last by `lean` radians a subcarrier.
     """
     draws, n_bits = rng(modulation.bits), grid.n_data * modulation.bits
     parcel, channel = both_estimates(grid, *trained(draws, grid, no)[:2])
     coded = draws.integers(0, 2, n * n_bits, np.uint8)
-    # The same to the last bit: carriers in a fade would tell the difference.
+    # The same to the last bit: subcarriers in a fade would tell the difference.
     channel.h, channel.no, channel.gain = (
         gains_of(parcel.content, grid),
         *parcel.content.figures[:2],
     )
-    y = mapping.to_carriers(coded, modulation, grid, 2) * channel.h
+    y = mapping.to_subcarriers(coded, modulation, grid, 2) * channel.h
     angle = 0.01 * np.arange(n)[:, None] + lean / n * np.arange(n)[:, None] * grid.used
     y = y * np.exp(1j * angle)
     y[:, grid.data_at] += noise(draws, n * grid.n_data, no).reshape(n, -1)
@@ -173,7 +173,7 @@ def test_symbols_are_equalised_alike(grid, modulation, noise_share):
 
 @every_grid
 def test_symbols_that_lean_are_equalised_alike(grid):
-    """The kernel lets the slope lag by 0.01 rad at the outermost carriers, the reference not."""
+    """The kernel lets the slope lag by 0.01 rad at the outermost subcarriers, the reference not."""
     ours, other = equalised(grid, Modulation.QAM16, 3 * BLOCK, 0.3 / grid.n_fft, 1e-3)
     assert abs(ours[2].figures[SLOPE_USED]) > 0
     assert np.abs(ours[1] - other[1]).max() < 0.015 * np.abs(other[1]).max()
@@ -185,15 +185,15 @@ def test_symbols_that_lean_are_equalised_alike(grid):
 def test_a_carrier_sent_as_1_comes_back_as_1(grid):
     """The control of the reference itself: its FFT undoes its inverse FFT, with signs of pilots."""
     coded = rng().integers(0, 2, 5 * grid.n_data * 4, np.uint8)
-    sent = mapping.to_carriers(coded, Modulation.QAM16, grid, 9)
+    sent = mapping.to_subcarriers(coded, Modulation.QAM16, grid, 9)
     samples = ofdm.to_samples(sent, grid)
     assert np.mean(np.abs(samples) ** 2) == pytest.approx(1, abs=0.1)
     starts = grid.n_cp + grid.n_symbol * np.arange(5)
-    assert ofdm.to_carriers(samples, starts, 0.0, 0j, grid) == pytest.approx(sent, abs=1e-12)
+    assert ofdm.to_subcarriers(samples, starts, 0.0, 0j, grid) == pytest.approx(sent, abs=1e-12)
     pilots = sent[:, grid.pilots_at] * grid.pilot_values
     assert np.array_equal(pilots.real, np.repeat(polarity(5, 9)[:, None], pilots.shape[1], 1))
-    # A window that begins within the prefix sees each carrier turned, and nothing else.
-    early = ofdm.to_carriers(samples, starts - 3, 0.0, 0j, grid)
+    # A window that begins within the prefix sees each subcarrier turned, and nothing else.
+    early = ofdm.to_subcarriers(samples, starts - 3, 0.0, 0j, grid)
     lean = np.exp(-2j * np.pi * 3 * grid.used / OFDM_64_16.n_fft * 64 / grid.n_fft)
     assert early == pytest.approx(sent * lean, abs=1e-12)
 

@@ -63,7 +63,7 @@ def agree(x, **settings):
         assert its[1:5] == mine[1:5]
         assert its.snr_db == pytest.approx(mine.snr_db, abs=0.05)
         assert its.rssi_dbfs == pytest.approx(mine.rssi_dbfs, abs=0.01)
-        # The equaliser's kernel lets the slope lag by 0.01 rad at the outermost carriers.
+        # The equaliser's kernel lets the slope lag by 0.01 rad at the outermost subcarriers.
         assert its.evm_db == pytest.approx(mine.evm_db, abs=0.5)
         assert its.cfo == pytest.approx(mine.cfo, abs=1e-6)
     return other
@@ -79,7 +79,7 @@ def told(event):
 @every_mcs
 @transmitters
 def test_bursts_somewhat_above_threshold_are_heard_by_both(mcs, transmitter):
-    """Five bursts with carriers of their own, 2 dB above where one in a hundred is lost."""
+    """Five bursts with frequency offsets of their own, 2 dB above where one in a hundred is lost."""
     rng = np.random.default_rng(SEED + mcs)
     snr_db = needed_snr_db(mcs, 60) + 2
     parts, sent, starts, offsets, at = [], [], [], [], 0
@@ -134,17 +134,17 @@ def test_echoes_change_nothing_between_them(grid, profile, rate_hz, doppler_hz):
 
 
 @pytest.mark.parametrize("ppm", [-40, 40])
-@pytest.mark.parametrize("carrier_cycles", [0.0, 100.0])
-def test_windows_slip_along_with_the_senders_clock(ppm, carrier_cycles):
+@pytest.mark.parametrize("centre_cycles", [0.0, 100.0])
+def test_windows_slip_along_with_the_senders_clock(ppm, centre_cycles):
     """Over 74 000 samples, the clocks part by 3."""
     rng = np.random.default_rng(SEED)
     pdus = payloads(rng, 4, 2047)
     burst = Transmitter().modulate(pdus, 1)
     assert len(burst) * 40e-6 > 2
-    params = PathParams(1e6, 1e6 * carrier_cycles, clock_ppm=ppm)
+    params = PathParams(1e6, 1e6 * centre_cycles, clock_ppm=ppm)
     _, x = Path(params, rng).carry(burst)
     x = noisy(rng, np.concatenate((silence(400), x, silence(400))), 15)
-    assert heard(agree(x, carrier_cycles=carrier_cycles)) == pdus
+    assert heard(agree(x, centre_cycles=centre_cycles)) == pdus
 
 
 @pytest.mark.parametrize("boost_db", [1.0, 3.0])
@@ -233,7 +233,7 @@ def test_indices_count_from_the_start_that_was_given():
     ours, other = Receiver(start=10**12), reference.Receiver(start=10**12)
     assert other.next_index == 10**12
     assert other.push(burst)[0].at == ours.push(burst)[0].at
-    assert (other.next_index, other.carrier) == (ours.next_index, ours.carrier)
+    assert (other.next_index, other.subcarrier) == (ours.next_index, ours.subcarrier)
     assert other.gap(5) == ours.gap(5) == []
     assert other.next_index == 10**12 + len(burst) + 5 == ours.next_index
 

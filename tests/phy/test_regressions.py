@@ -46,7 +46,7 @@ def test_a_faster_crystal_raises_the_carrier_and_shortens_the_burst():
     """The sender's clock against the receiver's: both from one crystal."""
     n = 100_000
     burst = turned(np.ones(n), 0.01)
-    params = PathParams(rate_hz=1e6, carrier_hz=0.0, clock_ppm=100)
+    params = PathParams(rate_hz=1e6, centre_hz=0.0, clock_ppm=100)
     _, y = Path(params, np.random.default_rng(0)).carry(burst)
     inner = y[100 : n - 200]
     frequency = np.angle(np.vdot(inner[:-1], inner[1:])) / (2 * np.pi)

@@ -1,4 +1,4 @@
-"""Carrier sense: bursts are sensed from end to end, noise is not, and the floor recovers."""
+"""Subcarrier sense: bursts are sensed from end to end, noise is not, and the floor recovers."""
 
 from itertools import pairwise
 
@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phy import CarrierSense, Transmitter
+from phy import EnergyDetector, Transmitter
 from phy.kernels.sensing import DOUBLING, LEAST_FLOOR, WINDOW
 from tests.laws import law
 from tests.phy.signals import noise, noisy, payloads, silence, turned
@@ -25,7 +25,7 @@ def a_burst(draws, mcs=1, n_pdus=3):
 
 
 def sensed(samples, **settings):
-    sense = CarrierSense(**settings)
+    sense = EnergyDetector(**settings)
     sense.push(samples)
     return sense
 
@@ -65,7 +65,7 @@ def test_it_follows_the_law(threshold_db):
     draws = rng()
     strength = np.repeat(10 ** draws.uniform(-1, 1, 400), draws.integers(1, 900, 400))
     x = (strength * noise(draws, len(strength))).astype(np.complex64)
-    sense = CarrierSense(threshold_db)
+    sense = EnergyDetector(threshold_db)
     ends, floor = plainly(x, threshold_db)
     assert len(ends) > 100
     assert busy_windows(sense, x) == ends
@@ -73,7 +73,7 @@ def test_it_follows_the_law(threshold_db):
 
 
 def test_before_any_sample_nothing_is_known():
-    sense = CarrierSense(start=700)
+    sense = EnergyDetector(start=700)
     assert (sense.next_index, sense.busy_until, sense.noise_dbfs) == (700, 700, -120)
 
 
@@ -98,7 +98,7 @@ def test_a_burst_at_10_db_is_sensed_from_end_to_end(seed):
     burst = a_burst(draws, mcs=seed % 7)
     end = begin + len(burst)
     x = noisy(draws, np.concatenate((silence(begin), burst, silence(20_000))), 10)
-    sense = CarrierSense()
+    sense = EnergyDetector()
     ends = busy_windows(sense, x)
     assert abs(ends[0] - WINDOW - begin) < WINDOW
     assert abs(ends[-1] - end) < WINDOW
@@ -110,7 +110,7 @@ def test_the_yardstick_tells_strong_from_weak():
     """The control: 10 dB below the noise, a burst is nothing."""
     draws = rng()
     x = noisy(draws, np.concatenate((silence(20_000), a_burst(draws))), -10)
-    assert busy_windows(CarrierSense(), x) == []
+    assert busy_windows(EnergyDetector(), x) == []
 
 
 def test_a_start_within_a_burst_is_over_when_the_burst_is():
@@ -119,7 +119,7 @@ def test_a_start_within_a_burst_is_over_when_the_burst_is():
     first, second = a_burst(draws), a_burst(draws)
     x = np.concatenate((first[1000:], silence(2000), second, silence(2000)))
     begin = len(first) + 1000
-    ends = busy_windows(CarrierSense(), noisy(draws, x, 20))
+    ends = busy_windows(EnergyDetector(), noisy(draws, x, 20))
     assert abs(ends[0] - WINDOW - begin) < WINDOW
     assert abs(ends[-1] - begin - len(second)) < WINDOW
 
@@ -132,8 +132,8 @@ def test_a_carrier_that_never_ends_becomes_noise():
     """
     draws = rng()
     sense = sensed(noise(draws, 6400))
-    carrier = noise(draws, WINDOW * DOUBLING // 8, 11.0)
-    n = next(n for n in range(24) if busy_after(sense, carrier) < sense.next_index)
+    subcarrier = noise(draws, WINDOW * DOUBLING // 8, 11.0)
+    n = next(n for n in range(24) if busy_after(sense, subcarrier) < sense.next_index)
     assert 4 <= n <= 16
     assert sense.noise_dbfs == pytest.approx(10.4, abs=0.3)
     sense.push(noise(draws, 64 * WINDOW))
@@ -168,7 +168,7 @@ def test_a_burst_with_bad_samples_is_still_a_burst():
     x = noisy(draws, np.concatenate((silence(6400), a_burst(draws))), 10)
     x[::9] = np.nan
     x[:6400] = noise(draws, 6400, 0.1)
-    assert len(busy_windows(CarrierSense(), x)) == (len(x) - 6400) // WINDOW
+    assert len(busy_windows(EnergyDetector(), x)) == (len(x) - 6400) // WINDOW
 
 
 def test_a_stream_that_begins_with_bad_samples_has_no_floor_yet():
@@ -214,9 +214,9 @@ def test_windows_begin_behind_a_gap_and_the_floor_is_kept():
 def test_what_makes_no_sense_is_refused():
     for threshold_db in (0, -3, np.nan, np.inf):
         with pytest.raises(ValueError, match="allowed: more than 0"):
-            CarrierSense(threshold_db)
+            EnergyDetector(threshold_db)
     with pytest.raises(ValueError, match="allowed: 0 or more"):
-        CarrierSense().gap(-1)
+        EnergyDetector().gap(-1)
 
 
 def make_stream(seed):
@@ -234,7 +234,7 @@ def make_stream(seed):
 
 def told(x, cuts, gaps):
     """All that is told of `x` cut at `cuts`, with 100 samples missing at each of `gaps`."""
-    sense = CarrierSense()
+    sense = EnergyDetector()
     for first, last in pairwise([0, *cuts, len(x)]):
         if first in gaps:
             sense.gap(100)

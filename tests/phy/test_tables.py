@@ -66,8 +66,8 @@ def test_the_standards_deinterleaver_undoes_the_interleaver(modulation):
 
 @pytest.mark.parametrize("modulation", Modulation)
 def test_neighbouring_coded_bits_are_three_carriers_apart_at_least(modulation):
-    carrier = order(48 * modulation.bits, modulation.bits) // modulation.bits
-    assert np.abs(np.diff(carrier)).min() >= 3
+    subcarrier = order(48 * modulation.bits, modulation.bits) // modulation.bits
+    assert np.abs(np.diff(subcarrier)).min() >= 3
 
 
 # IEEE 802.11-2020, tables 17-12 to 17-15: levels of an axis by the bits as they are sent.
@@ -108,7 +108,7 @@ def test_points_have_power_1_and_neighbours_differ_in_one_bit(modulation):
 
 
 def test_the_mcs_table():
-    assert [(mcs.index, mcs.name, float(mcs.bits_per_carrier)) for mcs in MCS_TABLE] == [
+    assert [(mcs.index, mcs.name, float(mcs.bits_per_subcarrier)) for mcs in MCS_TABLE] == [
         (0, "BPSK 1/2", 0.5),
         (1, "QPSK 1/2", 1),
         (2, "QPSK 3/4", 1.5),

@@ -72,7 +72,7 @@ def test_a_header_tells_how_much_stronger_the_preamble_was(boost):
     """The channel is that of the header, with all four symbols' help."""
     draws, grid = rng(), OFDM_64_16
     table, scratch = tones(grid).content, new_scratch(grid).content
-    h = np.exp(-2j * np.pi * 3 * table.carriers / 64) * (1 + 0.3j)
+    h = np.exp(-2j * np.pi * 3 * table.subcarriers / 64) * (1 + 0.3j)
     sent = draws.choice([-1, 1], (4, 52)).astype(np.complex64)
     amplitude = np.array([boost, boost, 1, 1], np.float32)
     y = noise(draws, 4 * 52, 0.01).reshape(4, 52) + amplitude[:, None] * h * sent
@@ -101,8 +101,8 @@ def smoothed(h, no, grid=OFDM_64_16):
 @pytest.mark.parametrize("delay", [0.0, 3.0, 3.4, -7.5])
 @pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS)
 def test_of_one_path_hardly_any_noise_is_left(grid, delay):
-    carriers = tones(grid).content.carriers
-    h = 0.8 * np.exp(-2j * np.pi * delay * carriers / grid.n_fft)
+    subcarriers = tones(grid).content.subcarriers
+    h = 0.8 * np.exp(-2j * np.pi * delay * subcarriers / grid.n_fft)
     for no in (0.5, 0.01, 1e-4):
         error = np.mean(np.abs(smoothed(h, no, grid)[0] - h) ** 2)
         assert error < 0.2 * no
@@ -110,10 +110,10 @@ def test_of_one_path_hardly_any_noise_is_left(grid, delay):
 
 def test_of_many_echoes_no_more_is_lost_than_smoothing_is_worth():
     """However the gains vary, even as no channel's do, it never does harm."""
-    draws, carriers = rng(), tones(OFDM_64_16).content.carriers
+    draws, subcarriers = rng(), tones(OFDM_64_16).content.subcarriers
     for echoes in (2, 8, 16, 60):
         taps = noise(draws, echoes)
-        h = np.exp(-2j * np.pi * carriers[:, None] * np.arange(echoes) / 64) @ taps
+        h = np.exp(-2j * np.pi * subcarriers[:, None] * np.arange(echoes) / 64) @ taps
         for no in (1.0, 0.01, 1e-4):
             power = np.mean(np.abs(h) ** 2)
             error = np.mean(np.abs(smoothed(h, no)[0] - h) ** 2)

@@ -5,18 +5,18 @@ import zlib
 import numpy as np
 
 
-def signs(carriers, text):
-    """±1 by carrier, 0 left out."""
+def signs(subcarriers, text):
+    """±1 by subcarrier, 0 left out."""
     values = [1 if sign == "+" else -1 for sign in text]
-    return dict(zip([k for k in carriers if k], values, strict=True))
+    return dict(zip([k for k in subcarriers if k], values, strict=True))
 
 
-# Signs of (1 + j) on carriers -24, -20, … 24 but 0, and the long training on -26 … 26 (17.3.3).
+# Signs of (1 + j) on subcarriers -24, -20, … 24 but 0, and the long training on -26 … 26 (17.3.3).
 SHORT_SIGNS = "+-+--+--++++"
 LONG_SIGNS = "++--++-+-++++++--++-+-++++" + "+--++-+-+-----++--+-+-++++"
 SHORT = signs(range(-24, 25, 4), SHORT_SIGNS)
 LONG = signs(range(-26, 27), LONG_SIGNS)
-# SIGNAL's bits, bits a carrier, puncturing of A and B (table 17-6).
+# SIGNAL's bits, bits a subcarrier, puncturing of A and B (table 17-6).
 RATES = {
     6: (0b1101, 1, "11"), 9: (0b1111, 1, "111001"), 12: (0b0101, 2, "11"),
     18: (0b0111, 2, "111001"), 24: (0b1001, 4, "11"), 36: (0b1011, 4, "111001"),
@@ -68,10 +68,10 @@ def point(bits):
     return scale * complex(*(levels[half][each] for each in number))
 
 
-def in_time(carriers):
+def in_time(subcarriers):
     """64 samples, of the standard's scale."""
     bins = np.zeros(64, complex)
-    for k, value in carriers.items():
+    for k, value in subcarriers.items():
         bins[k] = value
     return np.fft.ifft(bins)
 
@@ -80,15 +80,15 @@ def symbol(bits, per_carrier, number, turn=1):
     """One OFDM symbol with its prefix; SIGNAL is number 0. Data are turned by `turn`."""
     spread = interleaved(bits, per_carrier)
     groups = [spread[i : i + per_carrier] for i in range(0, len(spread), per_carrier)]
-    carriers = {k: turn * point(group) for k, group in zip(DATA, groups, strict=True)}
+    subcarriers = {k: turn * point(group) for k, group in zip(DATA, groups, strict=True)}
     polarity = 1 - 2 * register([1] * 7, 127)[number % 127]
-    carriers |= {k: polarity * sign for k, sign in PILOTS.items()}
-    return prefixed(carriers)
+    subcarriers |= {k: polarity * sign for k, sign in PILOTS.items()}
+    return prefixed(subcarriers)
 
 
-def prefixed(carriers):
-    """A symbol of these carriers behind its prefix."""
-    body = in_time(carriers)
+def prefixed(subcarriers):
+    """A symbol of these subcarriers behind its prefix."""
+    body = in_time(subcarriers)
     return np.concatenate((body[-16:], body))
 
 

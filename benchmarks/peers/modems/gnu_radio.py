@@ -10,7 +10,7 @@ SCRIPT = Path(__file__).with_name("gnu_radio_ofdm.py")
 
 
 class GnuRadio:
-    """Its OFDM modem has no error correction; `bits` a carrier, 1 or 2.
+    """Its OFDM modem has no error correction; `bits` a subcarrier, 1 or 2.
 
     Every measurement raises PeerError and ProcessError where it is not there (Debian: gnuradio).
     """

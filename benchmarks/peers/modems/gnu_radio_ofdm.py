@@ -4,9 +4,9 @@
     python3 gnu_radio_ofdm.py speed BITS BYTES FRAMES SEED           Msps of CPU time: tx, rx
     python3 gnu_radio_ofdm.py noise SAMPLES SEED                     Msps of CPU time on noise
 
-`digital.ofdm_tx` and `ofdm_rx` with 64 carriers, prefix 16, no code. SNR is a frame's mean power
-over that of the noise in the sample band; before each are 200 to 599 samples of noise, its carrier
-is off by up to 0.02 radians a sample. CPU time is that of all threads of the flow graph.
+`digital.ofdm_tx` and `ofdm_rx` with 64 subcarriers, prefix 16, no code. SNR is a frame's mean power
+over that of the noise in the sample band; before each are 200 to 599 samples of noise, its
+frequency is off by up to 0.02 radians a sample. CPU time is that of all threads of the flow graph.
 """
 
 import sys

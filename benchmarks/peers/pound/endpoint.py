@@ -111,12 +111,12 @@ def open_transport(job: Job, player: Player) -> Transport:
     if peer.environment == "zenoh":
         from benchmarks.peers.pound.zenoh_end import Zenoh
 
-        return Zenoh(job, peer.carriers["default"], player.hear)
+        return Zenoh(job, peer.transports["default"], player.hear)
     if peer.environment == "rclpy":
         from benchmarks.peers.pound.fastdds_end import FastDds
 
-        return FastDds(job, peer.carriers["default"], player.hear)
-    return Sockets(job, peer.carriers, player.hear)
+        return FastDds(job, peer.transports["default"], player.hear)
+    return Sockets(job, peer.transports, player.hear)
 
 
 def main() -> dict[str, object]:

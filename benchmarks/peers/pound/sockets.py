@@ -1,4 +1,4 @@
-"""The peers that are plain sockets: a carrier for each topic, by its class."""
+"""The peers that are plain sockets: a transport for each topic, by its class."""
 
 import time
 from collections.abc import Callable
@@ -10,19 +10,19 @@ from benchmarks.peers.pound.tcp import NimbroTcpTopic, tcp_topic
 from benchmarks.peers.pound.udp import NimbroTopic, PoundNode, PoundTopic, UdpRosTopic
 
 
-class Carrier(Protocol):
+class Transport(Protocol):
     """What takes one topic's messages across."""
 
     def meet(self, deadline: float) -> None:
         """Wait for the other end."""
 
     def send(self, message: bytes) -> None:
-        """Take a message for its topic's carrier."""
+        """Take a message for its topic's transport."""
 
 
-Open = Callable[[Reactor, Topic, Job, Hear], Carrier]
+Open = Callable[[Reactor, Topic, Job, Hear], Transport]
 
-CARRIERS: dict[str, Open] = {
+TRANSPORTS: dict[str, Open] = {
     "tcp_nagle": tcp_topic(nodelay=False),
     "tcp_delayed_ack": tcp_topic(nodelay=False, delayed_ack=True),
     "tcp_nodelay": tcp_topic(nodelay=True),
@@ -35,27 +35,27 @@ CARRIERS: dict[str, Open] = {
 class Sockets:
     """One end of such a peer."""
 
-    def __init__(self, job: Job, carriers: dict[str, str], hear: Hear) -> None:
+    def __init__(self, job: Job, transports: dict[str, str], hear: Hear) -> None:
         self._reactor = Reactor()
-        self._carriers: dict[int, Carrier] = {}
+        self._transports: dict[int, Transport] = {}
         node: PoundNode | None = None
         for topic in job.topics:
-            name = carriers.get(topic.qos, carriers["default"])
+            name = transports.get(topic.qos, transports["default"])
             if name == "pound":
                 node = node or PoundNode(self._reactor, job, hear)
-                self._carriers[topic.number] = PoundTopic(node, topic)
+                self._transports[topic.number] = PoundTopic(node, topic)
             else:
-                self._carriers[topic.number] = CARRIERS[name](self._reactor, topic, job, hear)
+                self._transports[topic.number] = TRANSPORTS[name](self._reactor, topic, job, hear)
 
     def meet(self) -> None:
         """Topic by topic, in the same order at both ends."""
         deadline = time.monotonic() + CONTACT_S
-        for carrier in self._carriers.values():
-            carrier.meet(deadline)
+        for transport in self._transports.values():
+            transport.meet(deadline)
 
     def send(self, topic: int, message: bytes) -> None:
-        """Take a message for its topic's carrier."""
-        self._carriers[topic].send(message)
+        """Take a message for its topic's transport."""
+        self._transports[topic].send(message)
 
     def run(self, until: float) -> None:
         """Serve all sockets until that time."""

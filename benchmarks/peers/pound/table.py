@@ -10,8 +10,8 @@ class Peer(NamedTuple):
 
     of: str
     """The software whose manner this is."""
-    carriers: dict[str, str]
-    """The carrier of each class of topics; "default" is that of those not named."""
+    transports: dict[str, str]
+    """The transport of each class of topics; "default" is that of those not named."""
     environment: str = ""
     """The virtual environment it needs; see `environments`."""
 
