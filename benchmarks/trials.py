@@ -21,8 +21,8 @@ CONFIDENCE = 0.95
 class Air:
     """What is between a transmitter and a receiver of bursts of one PDU.
 
-    Crystals ±40 ppm apart, moving centre frequency and samples; image -36 dB and leak -35 dBc of the
-    transmitter, image -34 dB and DC -25 dBc of the receiver, 8 bits with bursts at -15 dBFS,
+    Crystals ±40 ppm apart, moving centre frequency and samples; image -36 dB and leak -35 dBc of
+    the transmitter, image -34 dB and DC -25 dBc of the receiver, 8 bits with bursts at -15 dBFS,
     oscillators of -90 dBc/Hz at 10 kHz.
     """
 

@@ -14,9 +14,9 @@ from phy.estimation import in_planes, new_channel, new_scratch, tones
 from phy.header import BurstHeader, parse_header
 from phy.kernels import acquisition as kernel
 from phy.kernels.acquisition import BACKOFF, Room, Training
+from phy.kernels.argument_block import ArgumentBlock
 from phy.kernels.burst import Channel
 from phy.kernels.lanes import whole_lanes
-from phy.kernels.parcel import Parcel
 from phy.kernels.timing import AMBIGUITY, SEARCH
 from phy.mapping import axes
 from phy.numerology import Numerology
@@ -51,7 +51,7 @@ class Acquired(NamedTuple):
     origin: int
     window: int
     frequency: float
-    channel: Parcel[Channel]
+    channel: ArgumentBlock[Channel]
 
 
 class Missed(NamedTuple):
@@ -85,8 +85,8 @@ class Acquisition:
         grid, room = self._grid, self._room.content
         start, frequency = kernel.acquire(
             x, self._nominal, coarse, dc, self._centre_cycles,
-            self._training.words, self._tones.words, self._axes.words,
-            self._channel.words, self._scratch.words, self._room.words,
+            self._training.packed, self._tones.packed, self._axes.packed,
+            self._channel.packed, self._scratch.packed, self._room.packed,
         )  # fmt: skip
         if start < 0:
             return Missed("preamble")
@@ -94,8 +94,8 @@ class Acquisition:
         if told is None:
             return Missed("header")
         snr_db, rssi_dbfs, evm_db = kernel.settle(
-            _sent(told, grid), self._training.words, self._tones.words,
-            self._channel.words, self._scratch.words, self._room.words,
+            _sent(told, grid), self._training.packed, self._tones.packed,
+            self._channel.packed, self._scratch.packed, self._room.packed,
         )  # fmt: skip
         quality = BurstQuality(
             base + start, *told, snr_db=snr_db, rssi_dbfs=rssi_dbfs, evm_db=evm_db, cfo=frequency
@@ -110,7 +110,7 @@ def n_aliases(max_frequency: float) -> int:
 
 
 @lru_cache(maxsize=8)
-def _training(grid: Numerology, aliases: int) -> Parcel[Training]:
+def _training(grid: Numerology, aliases: int) -> ArgumentBlock[Training]:
     n_fft, n_header = grid.n_fft, header.n_symbols(grid)
     time, subcarriers = np.arange(n_fft)[:, None], tones(grid).content.subcarriers
     shift = np.exp(2j * np.pi * AMBIGUITY * np.arange(-aliases, aliases + 1)[:, None] * time[:, 0])
@@ -133,7 +133,7 @@ def _training(grid: Numerology, aliases: int) -> Parcel[Training]:
         long_start + n_fft * np.arange(preamble.N_LONG),
         header_start + grid.n_symbol * np.arange(n_header),
     )
-    return Parcel(
+    return ArgumentBlock(
         Training(
             templates=(preamble.long_symbol(grid) * shift).astype(np.complex64),
             long=in_planes(np.tile(long, (preamble.N_LONG, 1))),
@@ -151,10 +151,10 @@ def _parts_of(x: NDArray[np.complex128]) -> NDArray[np.float32]:
     return np.ascontiguousarray(np.stack((x.real, x.imag), axis=1), np.float32)
 
 
-def _new_room(grid: Numerology) -> Parcel[Room]:
+def _new_room(grid: Numerology) -> ArgumentBlock[Room]:
     n, n_steps = header.n_symbols(grid), header.N_BITS + N_TAIL
     training = _training(grid, 0).content
-    return Parcel(
+    return ArgumentBlock(
         Room(
             planes=np.empty((2, before(grid) + needed_after(grid)), np.float32),
             wave=np.empty(training.waves.shape[1:], np.float32),

@@ -7,8 +7,8 @@ from phy.constellation import Modulation
 from phy.crc import checked
 from phy.estimation import new_scratch, tones
 from phy.kernels import demodulator as kernel
+from phy.kernels.argument_block import ArgumentBlock
 from phy.kernels.burst import Channel
-from phy.kernels.parcel import Parcel
 from phy.layout import BurstLayout
 from phy.ldpc import decode, new_workspace
 from phy.mapping import axes
@@ -34,7 +34,7 @@ class Demodulator:
         dc: complex,
         origin: int,
         modulation: Modulation,
-        channel: Parcel[Channel],
+        channel: ArgumentBlock[Channel],
         first_symbol: int,
         llr: NDArray[np.int16],
         powers: NDArray[np.float32],
@@ -52,7 +52,7 @@ class Demodulator:
         to = self._no_points if points is None else points
         kernel.demodulate(
             samples, n, frequency, dc, origin, first_symbol,
-            tones(grid).words, axes(modulation, grid).words, channel.words, self._scratch.words,
+            tones(grid).packed, axes(modulation, grid).packed, channel.packed, self._scratch.packed,
             to, llr, powers,
         )  # fmt: skip
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phy.constellation import Modulation
+from phy.kernels.argument_block import ArgumentBlock
 from phy.kernels.burst import N_FIGURES, Channel, Scratch, Tones
 from phy.kernels.lanes import N_LANES, whole_lanes
-from phy.kernels.parcel import Parcel
 from phy.numerology import Numerology
 from phy.sequences import POLARITY
 
@@ -21,11 +21,11 @@ from phy.sequences import POLARITY
 _GROUPS = ((0,), (1,), (2, 3), (4, 5, 6, 7, 8))
 
 
-def new_channel(grid: Numerology) -> Parcel[Channel]:
+def new_channel(grid: Numerology) -> ArgumentBlock[Channel]:
     """Room for a channel of which nothing is known."""
     n_groups, width = len(tones(grid).content.ends) + 1, whole_lanes(grid.n_used)
     h, centre, turns, inverse, sums = np.zeros((5, 2, width), np.float32)
-    return Parcel(
+    return ArgumentBlock(
         Channel(
             h=h,
             centre=centre,
@@ -42,11 +42,11 @@ def new_channel(grid: Numerology) -> Parcel[Channel]:
     )
 
 
-def new_scratch(grid: Numerology) -> Parcel[Scratch]:
+def new_scratch(grid: Numerology) -> ArgumentBlock[Scratch]:
     """Room to work in: one for each thread."""
     table, width = tones(grid).content, whole_lanes(grid.n_used)
     n_bits, n_groups = max(each.bits for each in Modulation), len(table.ends) + 1
-    return Parcel(
+    return ArgumentBlock(
         Scratch(
             windows=np.empty((4, N_LANES * grid.n_fft), np.float32),
             starts=np.empty(N_LANES, np.int64),
@@ -75,7 +75,7 @@ def in_planes(y: NDArray[np.complex64]) -> NDArray[np.float32]:
 
 
 @cache
-def tones(grid: Numerology) -> Parcel[Tones]:
+def tones(grid: Numerology) -> ArgumentBlock[Tones]:
     """The tables of a grid and its subcarriers."""
     subcarriers = grid.used[grid.tones]
     basis, ends = _basis(subcarriers, grid)
@@ -84,7 +84,7 @@ def tones(grid: Numerology) -> Parcel[Tones]:
     numbers = np.zeros(whole_lanes(grid.n_used), np.float32)
     numbers[: grid.n_used] = subcarriers
     circle = np.exp(-2j * np.pi * np.arange(grid.n_fft) / grid.n_fft)
-    return Parcel(
+    return ArgumentBlock(
         Tones(
             n_fft=grid.n_fft,
             n_symbol=grid.n_symbol,

@@ -61,4 +61,4 @@ class IncomingBurst:
         early = round(slope * grid.n_fft / (2 * math.pi))
         if early:
             self._window -= early
-            slip(early, tones(grid).words, channel.words)
+            slip(early, tones(grid).packed, channel.packed)

@@ -8,10 +8,10 @@ from functools import cache, cached_property, lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from phy.kernels.argument_block import ArgumentBlock
 from phy.kernels.ldpc import Workspace, decode_blocks, new_workspace
 from phy.kernels.ldpc_encoder import encode_blocks
 from phy.kernels.ldpc_form import N_COLUMNS, Form
-from phy.kernels.parcel import Parcel
 from phy.ldpc_80211n import BASE
 
 LIFTINGS = (27, 54, 81)
@@ -102,10 +102,10 @@ class Segmentation:
         return np.concatenate(([0], np.cumsum(self.shares + parity))).astype(np.int32)
 
     @cached_property
-    def parcel(self) -> Parcel[Form]:
+    def arguments(self) -> ArgumentBlock[Form]:
         """The same for the kernels."""
         code = self.code
-        return Parcel(
+        return ArgumentBlock(
             Form(
                 z=code.z,
                 middle=code.middle,
@@ -148,14 +148,14 @@ def _shares(n: int, n_codewords: int) -> NDArray[np.int32]:
 def encode(bits: NDArray[np.uint8], form: Segmentation) -> NDArray[np.uint8]:
     """Coded bits `[blocks, n_coded]` of blocks of bits `[blocks, n_bits]`."""
     out = np.empty((len(bits), form.n_coded), np.uint8)
-    encode_blocks(bits, form.parcel.words, out)
+    encode_blocks(bits, form.arguments.packed, out)
     return out
 
 
 def decode(
     llr: NDArray[np.int16],
     form: Segmentation,
-    work: Parcel[Workspace],
+    work: ArgumentBlock[Workspace],
     max_iterations: int = MAX_ITERATIONS,
     white: NDArray[np.uint8] | None = None,
 ) -> NDArray[np.uint8]:
@@ -167,5 +167,5 @@ def decode(
     out = np.empty((llr.size // form.n_coded, form.n_bits // 8), np.uint8)
     if white is None:
         white = np.zeros(out.size, np.uint8)
-    decode_blocks(llr.reshape(-1), max_iterations, form.parcel.words, work.words, white, out)
+    decode_blocks(llr.reshape(-1), max_iterations, form.arguments.packed, work.packed, white, out)
     return out

@@ -9,10 +9,10 @@ from phy import interleaver
 from phy.constellation import Modulation, points
 from phy.estimation import tones
 from phy.kernels import modulator as kernel
+from phy.kernels.argument_block import ArgumentBlock
 from phy.kernels.burst import Axes
 from phy.kernels.ldpc_form import Form
 from phy.kernels.modulator import Map
-from phy.kernels.parcel import Parcel
 from phy.numerology import Numerology
 from phy.sequences import PADDING
 
@@ -25,7 +25,7 @@ class Mapping:
         self.symbol_bits = grid.n_data * modulation.bits
         self.order = interleaver.order(self.symbol_bits, modulation.bits)
         table = points(modulation)
-        self._map = Parcel(
+        self._map = ArgumentBlock(
             Map(
                 bits=modulation.bits,
                 source=np.argsort(self.order).astype(np.uint32),
@@ -43,14 +43,14 @@ class Mapping:
         """
         grid = self.grid
         out = np.empty(len(coded) // self.symbol_bits * grid.n_symbol, np.complex64)
-        kernel.modulate_bits(coded, first_symbol, peak, tones(grid).words, self._map.words, out)
+        kernel.modulate_bits(coded, first_symbol, peak, tones(grid).packed, self._map.packed, out)
         return out
 
     def modulate(
         self,
         blocks: NDArray[np.uint8],
         n_blocks: int,
-        form: Parcel[Form],
+        form: ArgumentBlock[Form],
         first_symbol: int,
         peak: float,
         out: NDArray[np.complex64],
@@ -58,7 +58,7 @@ class Mapping:
         """The same of `n_blocks` blocks of bytes, coded by `form`; `out` are whole symbols."""
         kernel.modulate(
             blocks, n_blocks, PADDING, first_symbol, peak,
-            form.words, tones(self.grid).words, self._map.words, out,
+            form.packed, tones(self.grid).packed, self._map.packed, out,
         )  # fmt: skip
 
 
@@ -69,10 +69,10 @@ def mapping(modulation: Modulation, grid: Numerology) -> Mapping:
 
 
 @cache
-def axes(modulation: Modulation, grid: Numerology) -> Parcel[Axes]:
+def axes(modulation: Modulation, grid: Numerology) -> ArgumentBlock[Axes]:
     """The way back, as the equaliser wants it."""
     order = mapping(modulation, grid).order
     plane, subcarrier = order % modulation.bits, order // modulation.bits
     gather = (plane * grid.n_data + subcarrier).astype(np.uint32)
     imag_bits = modulation.bits - modulation.axis_bits
-    return Parcel(Axes(modulation.axis_bits, imag_bits, modulation.unit, gather))
+    return ArgumentBlock(Axes(modulation.axis_bits, imag_bits, modulation.unit, gather))

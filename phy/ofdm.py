@@ -25,5 +25,5 @@ def to_tones(
     """
     out = np.empty((len(starts), 2, whole_lanes(grid.n_used)), np.float32)
     scratch = new_scratch(grid)
-    kernel.to_tones(samples, starts, frequency, dc, origin, tones(grid).words, scratch.words, out)
+    kernel.to_tones(samples, starts, frequency, dc, origin, tones(grid).packed, scratch.packed, out)
     return out

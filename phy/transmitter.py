@@ -60,7 +60,7 @@ class Transmitter:
         payload = burst[len(opening) :]
         by, first = mapping(plan.mcs.modulation, self._grid), header.n_symbols(self._grid)
         white = blocks ^ whitening(len(blocks))
-        by.modulate(white, plan.n_pdus, plan.form.parcel, first, plan.mcs.peak, payload)
+        by.modulate(white, plan.n_pdus, plan.form.arguments, first, plan.mcs.peak, payload)
         payload[-_FALL:] *= _ramp(_FALL)[::-1]
         return burst
 

@@ -8,7 +8,7 @@ from heapq import heappop, heappush
 from itertools import count
 
 import phy
-from backends import AirParams, BurstMedium, Flight, RadioParams, World
+from backends import AirParams, BurstChannel, Flight, RadioParams, World
 from benchmarks.worlds.arrivals import Arrival
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import (
@@ -75,11 +75,11 @@ _HEAR, _SETTLE, _ARRIVE, _LOOK = range(4)
 
 
 class Simulation:
-    """One BurstMedium and a real link for each of `radios`; `arrivals` come in order of time.
+    """One BurstChannel and a real link for each of `radios`; `arrivals` come in order of time.
 
     Decisions fall at the ends of blocks of `air.block_s`, as in a simulation of samples in
     lock-step. `watch` is told of every burst, `listen` of what
-    a node gets, and when. `keep_s`: see BurstMedium. Raises ConfigError where
+    a node gets, and when. `keep_s`: see BurstChannel. Raises ConfigError where
     the radios cannot carry the access policy. `fit` makes another radio's traits of the air's own,
     such as one that wants its bursts earlier.
     """
@@ -111,7 +111,7 @@ class Simulation:
         self._watch = watch
         self._listen = listen
         grid = phy.GRIDS[modem.grid]
-        self._medium = BurstMedium(air, world, seed, modem.carrier_db, keep_s, grid)
+        self._medium = BurstChannel(air, world, seed, modem.carrier_db, keep_s, grid)
         self._events: list[_Event] = []
         self._numbers = count()
         self.stations: dict[int, Station] = {}

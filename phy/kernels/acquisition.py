@@ -16,6 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from phy.kernels.argument_block import PackedArguments, opener
 from phy.kernels.burst import (
     GAIN,
     NO,
@@ -30,7 +31,6 @@ from phy.kernels.equaliser import equalise, renew, start_tracking
 from phy.kernels.fft import windows_to_tones
 from phy.kernels.inline import step
 from phy.kernels.lanes import N_LANES, Lanes, load, splat, store, total
-from phy.kernels.parcel import Packed, opener
 from phy.kernels.timing import SEARCH, locate
 from phy.kernels.tracking import PHASE
 from phy.kernels.training import estimate, learn, turn_back
@@ -174,12 +174,12 @@ def acquire(
     coarse: float,
     dc: complex,
     centre_cycles: float,
-    training_in: Packed,
-    tones_in: Packed,
-    axes_in: Packed,
-    channel_in: Packed,
-    scratch_in: Packed,
-    room_in: Packed,
+    training_in: PackedArguments,
+    tones_in: PackedArguments,
+    axes_in: PackedArguments,
+    channel_in: PackedArguments,
+    scratch_in: PackedArguments,
+    room_in: PackedArguments,
 ) -> tuple[int, float]:
     """(first sample of the burst or −1, its frequency) of the burst in `x`; its header to the room.
 
@@ -217,11 +217,11 @@ def acquire(
 @njit(nogil=True, cache=True)
 def settle(
     sent: NDArray[np.float32],
-    training_in: Packed,
-    tones_in: Packed,
-    channel_in: Packed,
-    scratch_in: Packed,
-    room_in: Packed,
+    training_in: PackedArguments,
+    tones_in: PackedArguments,
+    channel_in: PackedArguments,
+    scratch_in: PackedArguments,
+    room_in: PackedArguments,
 ) -> tuple[float, float, float]:
     """Learn from a header that was read: what was `sent`, long training and header.
 

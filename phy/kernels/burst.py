@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from phy.kernels.parcel import opener
+from phy.kernels.argument_block import opener
 
 Row = NDArray[np.float32]
 Planes = NDArray[np.float32]

@@ -1,4 +1,4 @@
-"""From samples to LLRs, as the interpreter calls it: parcels in, arrays filled."""
+"""From samples to LLRs, as the interpreter calls it: argument blocks in, arrays filled."""
 
 import math
 
@@ -6,11 +6,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from phy.kernels.argument_block import PackedArguments
 from phy.kernels.burst import SLOPE_USED, open_axes, open_channel, open_scratch, open_tones
 from phy.kernels.equaliser import equalise, start_tracking, use_slope
 from phy.kernels.fft import circle, eight_windows, windows_to_tones
 from phy.kernels.lanes import N_LANES, Lanes, load, splat, total
-from phy.kernels.parcel import Packed
 from phy.kernels.tracking import SLOPE
 from phy.kernels.training import estimate
 
@@ -23,10 +23,10 @@ def demodulate(
     dc: complex,
     origin: int,
     number: int,
-    tones_in: Packed,
-    axes_in: Packed,
-    channel_in: Packed,
-    scratch_in: Packed,
+    tones_in: PackedArguments,
+    axes_in: PackedArguments,
+    channel_in: PackedArguments,
+    scratch_in: PackedArguments,
     points: NDArray[np.complex64],
     llr: NDArray[np.int16],
     powers: NDArray[np.float32],
@@ -60,8 +60,8 @@ def to_tones(
     frequency: float,
     dc: complex,
     origin: int,
-    tones_in: Packed,
-    scratch_in: Packed,
+    tones_in: PackedArguments,
+    scratch_in: PackedArguments,
     out: NDArray[np.float32],
 ) -> None:
     """As `windows_to_tones`."""
@@ -70,7 +70,7 @@ def to_tones(
 
 
 @njit(nogil=True, cache=True)
-def slip(early: int, tones_in: Packed, channel_in: Packed) -> None:
+def slip(early: int, tones_in: PackedArguments, channel_in: PackedArguments) -> None:
     """Let windows begin `early` samples earlier: subcarriers lean less by that."""
     tones, channel = open_tones(tones_in), open_channel(channel_in)
     lean = early * 2 * math.pi / tones.n_fft
@@ -82,9 +82,9 @@ def slip(early: int, tones_in: Packed, channel_in: Packed) -> None:
 def learn_channel(
     y: NDArray[np.float32],
     sent: NDArray[np.float32],
-    tones_in: Packed,
-    channel_in: Packed,
-    scratch_in: Packed,
+    tones_in: PackedArguments,
+    channel_in: PackedArguments,
+    scratch_in: PackedArguments,
 ) -> None:
     """A channel from known symbols, as of `estimate`, ready to be followed."""
     tones, channel = open_tones(tones_in), open_channel(channel_in)

@@ -34,11 +34,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from phy.kernels.argument_block import ArgumentBlock, PackedArguments, opener
 from phy.kernels.bits import Words, get, low_ones, put, put_signs, to_octets
 from phy.kernels.ldpc_encoder import parity_of
 from phy.kernels.ldpc_form import N_COLUMNS, Form, open_form
 from phy.kernels.ldpc_rows import LANES, ldpc_row
-from phy.kernels.parcel import Packed, Parcel, opener
 
 SURE = 4000
 """LLR of a bit that is known to be 0."""
@@ -59,10 +59,10 @@ class Workspace(NamedTuple):
 open_workspace = opener(Workspace, "i2[1] i2[2] i2[2] i2[2] i2[2]")
 
 
-def new_workspace(max_z: int = 81, max_edges: int = 96) -> Parcel[Workspace]:
+def new_workspace(max_z: int = 81, max_edges: int = 96) -> ArgumentBlock[Workspace]:
     """Room for codes up to that size."""
     lanes = -(-max_z // LANES) * LANES
-    return Parcel(
+    return ArgumentBlock(
         Workspace(
             llr=np.zeros(N_COLUMNS * max_z, np.int16),
             posteriors=np.zeros((N_COLUMNS, 3 * lanes + 2 * LANES), np.int16),
@@ -106,8 +106,8 @@ def decode_codeword(
 def decode_blocks(
     llr: NDArray[np.int16],
     max_iterations: int,
-    form_in: Packed,
-    work_in: Packed,
+    form_in: PackedArguments,
+    work_in: PackedArguments,
     white: NDArray[np.uint8],
     out: NDArray[np.uint8],
 ) -> None:

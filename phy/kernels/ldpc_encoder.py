@@ -8,10 +8,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from phy.kernels.argument_block import PackedArguments
 from phy.kernels.bits import ONE, Words, from_octets, get, low_ones
 from phy.kernels.inline import step
 from phy.kernels.ldpc_form import N_COLUMNS, Form, open_form
-from phy.kernels.parcel import Packed
 
 _63 = np.uint64(63)
 
@@ -107,7 +107,9 @@ def encode_codeword(
 
 
 @njit(nogil=True, cache=True)
-def encode_blocks(blocks: NDArray[np.uint8], form_in: Packed, out: NDArray[np.uint8]) -> None:
+def encode_blocks(
+    blocks: NDArray[np.uint8], form_in: PackedArguments, out: NDArray[np.uint8]
+) -> None:
     """Coded bits `[blocks, n_coded]` of `blocks` of bits `[blocks, n_bits]`."""
     form = open_form(form_in)
     n_rows = form.row_ends.size - 1

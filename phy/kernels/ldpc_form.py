@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from phy.kernels.parcel import opener
+from phy.kernels.argument_block import opener
 
 N_COLUMNS = 24
 """Block columns of a code."""

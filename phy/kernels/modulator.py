@@ -6,13 +6,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from phy.kernels.argument_block import PackedArguments, opener
 from phy.kernels.burst import Row, Tones, open_tones
 from phy.kernels.fft import transform, transpose
 from phy.kernels.inline import step
 from phy.kernels.lanes import N_LANES, least, load, root, splat, store
 from phy.kernels.ldpc_encoder import encode_octets
 from phy.kernels.ldpc_form import open_form
-from phy.kernels.parcel import Packed, opener
 
 
 class Map(NamedTuple):
@@ -106,9 +106,9 @@ def modulate(
     padding: NDArray[np.uint8],
     number: int,
     peak: float,
-    form_in: Packed,
-    tones_in: Packed,
-    map_in: Packed,
+    form_in: PackedArguments,
+    tones_in: PackedArguments,
+    map_in: PackedArguments,
     out: NDArray[np.complex64],
 ) -> None:
     """Blocks of bytes, whitened, to samples of whole symbols; the first is symbol `number`.
@@ -130,8 +130,8 @@ def modulate_bits(
     coded: NDArray[np.uint8],
     number: int,
     peak: float,
-    tones_in: Packed,
-    map_in: Packed,
+    tones_in: PackedArguments,
+    map_in: PackedArguments,
     out: NDArray[np.complex64],
 ) -> None:
     """The same of coded bits, as many as whole symbols hold."""

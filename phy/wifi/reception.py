@@ -14,9 +14,9 @@ from phy.constellation import Modulation
 from phy.demodulation import Demodulator
 from phy.estimation import in_planes, new_channel, new_scratch, tones
 from phy.kernels.acquisition import BACKOFF
+from phy.kernels.argument_block import ArgumentBlock
 from phy.kernels.burst import Channel
 from phy.kernels.demodulator import learn_channel
-from phy.kernels.parcel import Parcel
 from phy.numerology import OFDM_64_16
 from phy.wifi.bits import Rate, Signal, has_right_fcs, parse_data, parse_signal
 from phy.wifi.high_throughput import HT_SIG_SYMBOLS, HtSignal, parse_ht_signal
@@ -171,12 +171,14 @@ def _long_training(
     return begin + start, coarse + cmath.phase(lag) / (2 * math.pi * n)
 
 
-def _channel(samples: NDArray[np.complex64], window: int, frequency: float) -> Parcel[Channel]:
+def _channel(
+    samples: NDArray[np.complex64], window: int, frequency: float
+) -> ArgumentBlock[Channel]:
     starts = _GRID.n_fft * np.arange(preamble.N_LONG)
     y = ofdm.to_tones(samples[window:], starts, frequency, 0j, _GRID)
     sent = preamble.long_subcarriers(_GRID)[_GRID.tones].astype(np.complex64)
     channel, known = new_channel(_GRID), in_planes(np.tile(sent, (preamble.N_LONG, 1)))
-    learn_channel(y, known, tones(_GRID).words, channel.words, new_scratch(_GRID).words)
+    learn_channel(y, known, tones(_GRID).packed, channel.packed, new_scratch(_GRID).packed)
     return channel
 
 
@@ -186,7 +188,7 @@ def _llrs(
     window: int,
     n_symbols: int,
     frequency: float,
-    channel: Parcel[Channel],
+    channel: ArgumentBlock[Channel],
     modulation: Modulation,
     first_symbol: int,
     points: NDArray[np.complex64] | None = None,
@@ -212,7 +214,7 @@ def _psdu(
     origin: int,
     window: int,
     frequency: float,
-    channel: Parcel[Channel],
+    channel: ArgumentBlock[Channel],
     signal: Signal,
 ) -> bytes | None:
     rate, n_symbols = signal.rate, signal.rate.n_symbols(signal.n_bytes)

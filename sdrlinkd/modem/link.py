@@ -14,10 +14,10 @@ from sdrlinkd.link import Burst, Opportunity, Outcome, PduLinkTraits
 from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.clock import StreamClock
 from sdrlinkd.modem.compiled import load_phy
-from sdrlinkd.modem.ear import Ear
 from sdrlinkd.modem.plan import AirPlan, TxWindowPlan
 from sdrlinkd.modem.report import modem_report
 from sdrlinkd.modem.rx_thread import Demodulation, ReceiverHere, ReceiverThread
+from sdrlinkd.modem.sensing_receiver import SensingReceiver
 from sdrlinkd.modem.traits import pdu_link_traits
 from sdrlinkd.modem.transmission import BurstReport, Transmission
 from sdrlinkd.pdulink import Heard, PduListener
@@ -61,7 +61,7 @@ class ModemLink:
             centre_cycles=params.centre_hz / params.rate_hz if params.one_crystal else 0.0,
         )
         sense = phy.EnergyDetector(params.carrier_db) if listens else None
-        self._ear = Ear(self._receiver, sense, params.rate_hz)
+        self._receiving = SensingReceiver(self._receiver, sense, params.rate_hz)
         self._may_lead_grow = lead_grows
         self._lead_grows = False
         self._clock = StreamClock(params.rate_hz, paced=True, began_s=began_s)
@@ -103,9 +103,11 @@ class ModemLink:
         if can.tx_windows is not None:
             self._plan = TxWindowPlan(math.ceil(lead), round(ahead), can.tx_windows, params.rate_hz)
         if can.lockstep:
-            self._rx = ReceiverHere(self._ear, params.rate_hz, self._step)
+            self._rx = ReceiverHere(self._receiving, params.rate_hz, self._step)
         else:
-            self._rx = ReceiverThread(self._ear, params.rate_hz, self._deliver, wakes=not can.paced)
+            self._rx = ReceiverThread(
+                self._receiving, params.rate_hz, self._deliver, wakes=not can.paced
+            )
         try:
             listener.attach(traits)
         except ConfigError as error:
@@ -262,7 +264,7 @@ class ModemLink:
             self._plan.start(index) / rate,
             airtimes.airtime_s,
             airtimes.most_pdus,
-            self._ear.sensed,
+            self._receiving.sensed,
         )
         if self._can.paced:
             tempo = self._tx.tempo

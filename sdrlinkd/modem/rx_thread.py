@@ -9,8 +9,8 @@ from typing import Protocol
 
 import phy
 from backends import RxBlock
-from sdrlinkd.modem.ear import Ear
 from sdrlinkd.modem.load import LoadMeter
+from sdrlinkd.modem.sensing_receiver import SensingReceiver
 
 # Blocks that may wait for the receiver.
 MAX_BLOCKS = 16
@@ -41,8 +41,8 @@ class Demodulation(Protocol):
 class ReceiverHere:
     """Demodulates in `put`: in lock-step nothing goes on until it has."""
 
-    def __init__(self, ear: Ear, rate_hz: float, deliver: Deliver) -> None:
-        self._ear = ear
+    def __init__(self, receiving: SensingReceiver, rate_hz: float, deliver: Deliver) -> None:
+        self._receiving = receiving
         self._rate_hz = rate_hz
         self._deliver = deliver
         self.load = LoadMeter()
@@ -55,14 +55,14 @@ class ReceiverHere:
     def hear(self, block: RxBlock) -> None:
         """The same."""
         began = time.thread_time()
-        events = self._ear.hear(block)
+        events = self._receiving.hear(block)
         self.load.add(time.thread_time() - began, block.n / self._rate_hz)
         self._deliver(events, block.index + block.n)
 
     async def finish(self) -> None:
         """The last samples."""
-        end = self._ear.next_index
-        self._deliver(self._ear.flush(), end)
+        end = self._receiving.next_index
+        self._deliver(self._receiving.flush(), end)
 
     def stop(self) -> None:
         """Nothing to end."""
@@ -75,8 +75,10 @@ class ReceiverThread:
     demodulated on a thread of our own. A stream is heard, or put, as a whole.
     """
 
-    def __init__(self, ear: Ear, rate_hz: float, deliver: Deliver, wakes: bool) -> None:
-        self._ear = ear
+    def __init__(
+        self, receiving: SensingReceiver, rate_hz: float, deliver: Deliver, wakes: bool
+    ) -> None:
+        self._receiving = receiving
         self._rate_hz = rate_hz
         self._deliver = deliver
         self.wakes = wakes
@@ -91,7 +93,7 @@ class ReceiverThread:
     def hear(self, block: RxBlock) -> None:
         """Demodulate a block on the thread that calls."""
         began = time.thread_time()
-        events = self._ear.hear(block)
+        events = self._receiving.hear(block)
         if block.samples is not None:
             self.load.add(time.thread_time() - began, block.n / self._rate_hz)
         if events or self.wakes:
@@ -132,8 +134,8 @@ class ReceiverThread:
             if self._is_waited_for and self._blocks.qsize() <= MAX_BLOCKS // 2:
                 self._is_waited_for = False
                 self._call(self._has_room.set)
-        end = self._ear.next_index
-        self._call(self._deliver, self._ear.flush(), end)
+        end = self._receiving.next_index
+        self._call(self._deliver, self._receiving.flush(), end)
         self._call(self._ended.set)
 
     def _call(self, what: Callable[..., None], *arguments: object) -> None:

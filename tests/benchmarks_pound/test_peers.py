@@ -123,12 +123,12 @@ def test_pound_sends_what_is_urgent_between_the_parts_of_what_is_not():
     heard = []
     a = Sockets(
         Job("pound_like", "a", "127.0.0.1", "127.0.0.2", 60e6, topics, [], 1.0),
-        PEERS["pound_like"].carriers,
+        PEERS["pound_like"].transports,
         lambda message, at: None,
     )
     b = Sockets(
         Job("pound_like", "b", "127.0.0.2", "127.0.0.1", 60e6, topics, [], 1.0),
-        PEERS["pound_like"].carriers,
+        PEERS["pound_like"].transports,
         lambda message, at: heard.append(HEAD.unpack_from(message)[0]),
     )
     for topic in topics:

@@ -8,12 +8,12 @@ import pytest
 import phy
 from backends import RxBlock
 from sdrlinkd.link import Sensed
-from sdrlinkd.modem.ear import Ear
 from sdrlinkd.modem.rx_thread import MAX_BLOCKS, ReceiverHere, ReceiverThread
+from sdrlinkd.modem.sensing_receiver import SensingReceiver
 
 
-def make_ear(senses=False):
-    return Ear(phy.Receiver(), phy.EnergyDetector() if senses else None, 1e6)
+def make_receiving(senses=False):
+    return SensingReceiver(phy.Receiver(), phy.EnergyDetector() if senses else None, 1e6)
 
 
 def blocks(samples, size):
@@ -46,7 +46,7 @@ class Told:
 async def test_every_event_comes_in_order_however_fast_blocks_come(size):
     samples, sent = make_air(1, 12)
     told = Told()
-    receiver = ReceiverThread(make_ear(), 1e6, told, wakes=True)
+    receiver = ReceiverThread(make_receiving(), 1e6, told, wakes=True)
     for _ in range(3):
         pending = list(blocks(samples, size))
         for block in pending:
@@ -62,7 +62,7 @@ async def test_every_event_comes_in_order_however_fast_blocks_come(size):
 async def test_only_blocks_with_events_wake_the_loop_unless_all_shall():
     samples, sent = make_air(2, 3)
     told = Told()
-    receiver = ReceiverThread(make_ear(), 1e6, told, wakes=False)
+    receiver = ReceiverThread(make_receiving(), 1e6, told, wakes=False)
     for block in blocks(samples, 100):
         await receiver.put(block)
     await receiver.finish()
@@ -72,7 +72,7 @@ async def test_only_blocks_with_events_wake_the_loop_unless_all_shall():
 
 
 async def test_it_stops_with_blocks_waiting():
-    receiver = ReceiverThread(make_ear(), 1e6, lambda *_: None, wakes=False)
+    receiver = ReceiverThread(make_receiving(), 1e6, lambda *_: None, wakes=False)
     for block in blocks(np.zeros(8 * 4096, np.complex64), 4096):
         await receiver.put(block)
     receiver.stop()
@@ -82,13 +82,13 @@ async def test_it_stops_with_blocks_waiting():
 @pytest.mark.parametrize("size", [64, 700])
 async def test_in_lock_step_all_is_told_before_put_returns(size):
     samples, sent = make_air(3, 4)
-    told, ear = Told(), make_ear(senses=True)
-    receiver = ReceiverHere(ear, 1e6, told)
+    told, receiving = Told(), make_receiving(senses=True)
+    receiver = ReceiverHere(receiving, 1e6, told)
     pending = list(blocks(samples, size))
     for n, block in enumerate(pending, start=1):
         await receiver.put(block)
         assert told.ends == [each.index + each.n for each in pending[:n]]
-        assert told.ends[-1] / 1e6 - 64e-6 < ear.sensed.until <= told.ends[-1] / 1e6
+        assert told.ends[-1] / 1e6 - 64e-6 < receiving.sensed.until <= told.ends[-1] / 1e6
     assert told.heard == sent
     await receiver.finish()
     assert receiver.load.realtime_ratio > 0
@@ -98,9 +98,11 @@ async def test_in_lock_step_all_is_told_before_put_returns(size):
 @pytest.mark.parametrize("is_threaded", [True, False])
 async def test_what_the_last_samples_hold_is_told_at_the_end_of_the_stream(is_threaded):
     samples, sent = make_air(5, 2)
-    told, ear = Told(), make_ear()
+    told, receiving = Told(), make_receiving()
     receiver = (
-        ReceiverThread(ear, 1e6, told, wakes=False) if is_threaded else ReceiverHere(ear, 1e6, told)
+        ReceiverThread(receiving, 1e6, told, wakes=False)
+        if is_threaded
+        else ReceiverHere(receiving, 1e6, told)
     )
     samples = samples[:-500]
     for block in blocks(samples, 300):
@@ -114,7 +116,7 @@ async def test_what_the_last_samples_hold_is_told_at_the_end_of_the_stream(is_th
 async def test_thread_and_lock_step_tell_the_same():
     samples, _ = make_air(4, 4)
     threaded, here = Told(), Told()
-    ears = make_ear(senses=True), make_ear(senses=True)
+    ears = make_receiving(senses=True), make_receiving(senses=True)
     on_thread = ReceiverThread(ears[0], 1e6, threaded, wakes=True)
     in_place = ReceiverHere(ears[1], 1e6, here)
     for block in blocks(samples, 333):

@@ -49,9 +49,9 @@ def trained(draws, grid, no, n=2, amplitude=None):
 
 
 def both_estimates(grid, y, sent):
-    """(the kernel's channel, its parcel, the reference's) from known symbols."""
-    parcel, scratch = new_channel(grid), new_scratch(grid)
+    """(the kernel's channel, its argument block, the reference's) from known symbols."""
+    block, scratch = new_channel(grid), new_scratch(grid)
     table, n = tones(grid).content, len(sent)
     known = in_tones(sent, grid), np.ones(n, np.float32)
-    estimate(in_tones(y, grid), known[1], known[0], table, parcel.content, scratch.content)
-    return parcel, training.estimate(y, sent, np.ones(n), grid)
+    estimate(in_tones(y, grid), known[1], known[0], table, block.content, scratch.content)
+    return block, training.estimate(y, sent, np.ones(n), grid)

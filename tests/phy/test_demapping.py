@@ -22,14 +22,14 @@ every_modulation = pytest.mark.parametrize("modulation", Modulation)
 
 def channel_of(h, no):
     """A channel known exactly: gains of the subcarriers in use, noise power."""
-    parcel = new_channel(GRID)
-    channel = parcel.content
+    block = new_channel(GRID)
+    channel = block.content
     channel.h[:, : GRID.n_used] = h[GRID.tones].real, h[GRID.tones].imag
     channel.centre[0] = 1
     channel.figures[[NO, GAIN]] = no, np.mean(np.abs(h) ** 2)
     channel.power[:] = channel.gain
     start_tracking(tones(GRID).content, channel, 0.0, False)
-    return parcel
+    return block
 
 
 def demap(modulation, bins, channel, first_symbol=2):

@@ -132,7 +132,7 @@ def test_every_check_holds_for_every_codeword(code):
 def test_the_vectors_do_what_the_reference_says_bit_for_bit(code):
     """In noise from little to hopeless, and with values at the edges of the range."""
     rng = np.random.default_rng(SEED)
-    work, form = new_workspace().content, whole(code).parcel.content
+    work, form = new_workspace().content, whole(code).arguments.content
     outcomes = set()
     for ebn0_db, at_edges in ((9.0, 0), (6.0, 0), (3.0, 0), (2.0, 20), (-3.0, 5)):
         word = encoded(code, random_bits(rng, code.k))

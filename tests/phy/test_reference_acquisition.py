@@ -105,10 +105,10 @@ def test_the_likeliest_offset_is_the_same(grid):
         h = echoed(draws, grid)
         z = turned(preamble.preamble(grid), draws.uniform(-1e-3, 1e-3))
         z = np.concatenate((silence(offset.BACKOFF), z)) + noise(draws, len(z) + 3, 0.3)
-        # The parcel holds the room's arrays; it must outlive them.
-        parcel = acquisition._new_room(grid)
-        parcel.content.planes[:, : len(z)] = planes_of(z)
-        found = kernel.refine(table, in_tones(h[None], grid)[0], parcel.content)
+        # The argument block holds the room's arrays; it must outlive them.
+        block = acquisition._new_room(grid)
+        block.content.planes[:, : len(z)] = planes_of(z)
+        found = kernel.refine(table, in_tones(h[None], grid)[0], block.content)
         assert offset.refine(z.astype(np.complex128), h, grid) == pytest.approx(found, abs=1e-7)
 
 

@@ -43,9 +43,9 @@ def rng(more=0):
 def test_the_channel_that_training_tells_is_the_same(grid, no):
     for seed in range(5):
         y, sent, _ = trained(rng(seed), grid, no)
-        parcel, other = both_estimates(grid, y, sent)
-        assert_same(parcel.content, other, grid)
-        assert parcel.content.figures[DELAY] == pytest.approx(other.delay, abs=1e-4)
+        block, other = both_estimates(grid, y, sent)
+        assert_same(block.content, other, grid)
+        assert block.content.figures[DELAY] == pytest.approx(other.delay, abs=1e-4)
 
 
 @every_grid
@@ -54,14 +54,14 @@ def test_what_a_header_tells_besides_is_the_same(grid, boost):
     for seed in range(4):
         amplitude = np.array([boost, boost, 1, 1])
         y, sent, _ = trained(rng(seed), grid, 0.02, 4, amplitude)
-        parcel, before = both_estimates(grid, y[:2], sent[:2])
+        block, before = both_estimates(grid, y[:2], sent[:2])
         rotation = 0.3 + 0.1 * np.arange(2)
         y[2:] *= np.exp(1j * rotation)[:, None]
         learn(
             in_tones(y, grid), in_tones(sent, grid), 2, rotation[-1], 0.1,
-            tones(grid).content, parcel.content, new_scratch(grid).content,
+            tones(grid).content, block.content, new_scratch(grid).content,
         )  # fmt: skip
-        assert_same(parcel.content, training.learn(y, sent, 2, rotation, before, grid), grid)
+        assert_same(block.content, training.learn(y, sent, 2, rotation, before, grid), grid)
 
 
 @every_grid
@@ -69,12 +69,12 @@ def test_a_channel_that_moves_is_followed_alike(grid):
     """Ten corrections: first noise, then a step, then noise again."""
     draws, scratch = rng(), new_scratch(grid).content
     y, sent, _ = trained(draws, grid, 0.02)
-    parcel, channel = both_estimates(grid, y, sent)
+    block, channel = both_estimates(grid, y, sent)
     for number in range(10):
         error = noise(draws, grid.n_used, 0.005) + (0.3 if number == 4 else 0)
-        follow(in_tones(error[None], grid)[0], 0.005, tones(grid).content, parcel.content, scratch)
+        follow(in_tones(error[None], grid)[0], 0.005, tones(grid).content, block.content, scratch)
         smoothing.follow(error, 0.005, channel, grid)
-        assert_same(parcel.content, channel, grid)
+        assert_same(block.content, channel, grid)
     assert channel.drift > 0
 
 
@@ -99,12 +99,12 @@ def state_of(kalman):
 def test_pilots_are_tracked_alike(grid, clock_error):
     """Through a turn, a lean, a symbol that others hit, one without power, pilots all of noise."""
     draws = rng()
-    parcel, channel = both_estimates(grid, *trained(draws, grid, 0.02)[:2])
+    block, channel = both_estimates(grid, *trained(draws, grid, 0.02)[:2])
     told = clock_error is not None
     # The kernel's own channel, so that nothing else parts them.
-    channel.no, channel.gain = parcel.content.no, parcel.content.gain
-    equaliser_kernel.start_tracking(tones(grid).content, parcel.content, clock_error or 0.0, told)
-    ours, other = parcel.content.tracking, Tracking(grid, channel, clock_error)
+    channel.no, channel.gain = block.content.no, block.content.gain
+    equaliser_kernel.start_tracking(tones(grid).content, block.content, clock_error or 0.0, told)
+    ours, other = block.content.tracking, Tracking(grid, channel, clock_error)
     subcarriers = grid.used[grid.pilots_at]
     for number in range(40):
         _predict(ours)
@@ -120,7 +120,7 @@ def test_pilots_are_tracked_alike(grid, clock_error):
         assert (shown > 6 * channel.no) == (number == 20)
         assert state_of(other.phase) == pytest.approx(ours[PHASE], rel=1e-6, abs=1e-12)
         assert state_of(other.slope) == pytest.approx(ours[SLOPE], rel=1e-6, abs=1e-15)
-    slip(2, tones(grid).words, parcel.words)
+    slip(2, tones(grid).packed, block.packed)
     other.slip(2)
     assert other.slope.value == pytest.approx(ours[SLOPE, 0])
 
@@ -131,28 +131,28 @@ def equalised(grid, modulation, n, lean, no):
     `n` symbols that turn, and that lean more and more, the last by `lean` radians a subcarrier.
     """
     draws, n_bits = rng(modulation.bits), grid.n_data * modulation.bits
-    parcel, channel = both_estimates(grid, *trained(draws, grid, no)[:2])
+    block, channel = both_estimates(grid, *trained(draws, grid, no)[:2])
     coded = draws.integers(0, 2, n * n_bits, np.uint8)
     # The same to the last bit: subcarriers in a fade would tell the difference.
     channel.h, channel.no, channel.gain = (
-        gains_of(parcel.content, grid),
-        *parcel.content.figures[:2],
+        gains_of(block.content, grid),
+        *block.content.figures[:2],
     )
     y = mapping.to_subcarriers(coded, modulation, grid, 2) * channel.h
     angle = 0.01 * np.arange(n)[:, None] + lean / n * np.arange(n)[:, None] * grid.used
     y = y * np.exp(1j * angle)
     y[:, grid.data_at] += noise(draws, n * grid.n_data, no).reshape(n, -1)
     y = y.astype(np.complex64)
-    equaliser_kernel.start_tracking(tones(grid).content, parcel.content, 0.0, False)
+    equaliser_kernel.start_tracking(tones(grid).content, block.content, 0.0, False)
     llr, points = np.empty(n * n_bits, np.int16), np.empty((n, grid.n_data), np.complex64)
     equaliser_kernel.equalise(
         in_tones(y, grid), n, 2, tones(grid).content, axes(modulation, grid).content,
-        parcel.content, new_scratch(grid).content, points, llr, 0,
+        block.content, new_scratch(grid).content, points, llr, 0,
     )  # fmt: skip
     equaliser = Equaliser(grid, channel, Tracking(grid, channel, None))
     made = [equaliser.equalise(each, 2 + i, modulation) for i, each in enumerate(y)]
     other = np.concatenate([each for each, _ in made]), np.array([each for _, each in made])
-    return (llr, points, parcel.content), (*other, equaliser)
+    return (llr, points, block.content), (*other, equaliser)
 
 
 @every_modulation

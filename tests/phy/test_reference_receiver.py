@@ -79,7 +79,7 @@ def told(event):
 @every_mcs
 @transmitters
 def test_bursts_somewhat_above_threshold_are_heard_by_both(mcs, transmitter):
-    """Five bursts with frequency offsets of their own, 2 dB above where one in a hundred is lost."""
+    """Five bursts, each with its own offset, 2 dB above where one in a hundred is lost."""
     rng = np.random.default_rng(SEED + mcs)
     snr_db = needed_snr_db(mcs, 60) + 2
     parts, sent, starts, offsets, at = [], [], [], [], 0
@@ -233,7 +233,7 @@ def test_indices_count_from_the_start_that_was_given():
     ours, other = Receiver(start=10**12), reference.Receiver(start=10**12)
     assert other.next_index == 10**12
     assert other.push(burst)[0].at == ours.push(burst)[0].at
-    assert (other.next_index, other.subcarrier) == (ours.next_index, ours.subcarrier)
+    assert (other.next_index, other.last_burst) == (ours.next_index, ours.last_burst)
     assert other.gap(5) == ours.gap(5) == []
     assert other.next_index == 10**12 + len(burst) + 5 == ours.next_index
 

@@ -1,4 +1,4 @@
-"""Arrays in a parcel reach the kernel as they are, and a changed kernel is compiled anew."""
+"""Arrays in an argument block reach the kernel unchanged; a changed kernel is compiled anew."""
 
 import gc
 import re
@@ -13,7 +13,7 @@ import pytest
 from numba import njit
 
 import phy
-from phy.kernels.parcel import Parcel, opener
+from phy.kernels.argument_block import ArgumentBlock, opener
 
 
 class Content(NamedTuple):
@@ -40,14 +40,14 @@ def content():
     return Content(-3, 0.25, row, planes, np.arange(16, dtype=np.int16).reshape(2, 2, 4))
 
 
-def test_a_kernel_sees_what_is_in_a_parcel_and_may_change_it():
-    parcel = Parcel(content())
-    assert _read(parcel.words) == (-3, 0.25, 14.0, 5j, 11, (2, 2, 4))
-    assert list(parcel.content.row) == [0, 9, 2, 3]
+def test_a_kernel_sees_what_is_in_an_argument_block_and_may_change_it():
+    block = ArgumentBlock(content())
+    assert _read(block.packed) == (-3, 0.25, 14.0, 5j, 11, (2, 2, 4))
+    assert list(block.content.row) == [0, 9, 2, 3]
 
 
 def test_who_has_the_words_keeps_the_arrays():
-    words = [Parcel(content()).words for _ in range(100)]
+    words = [ArgumentBlock(content()).packed for _ in range(100)]
     gc.collect()
     _ = [np.full(4, 7.0, np.float32) for _ in range(1000)]
     assert all(_read(each)[2] == 14.0 for each in words)
@@ -64,7 +64,7 @@ def test_who_has_the_words_keeps_the_arrays():
 )
 def test_what_a_kernel_does_not_expect_is_refused(field, value, told):
     with pytest.raises(TypeError, match=re.escape(told)):
-        Parcel(content()._replace(**{field: value}))
+        ArgumentBlock(content()._replace(**{field: value}))
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 
 numba looks at every array that crosses from the interpreter, and at every field of a tuple; a short
 burst takes hardly longer than that. What stays the same from call to call is packed once instead: a
-`Parcel` holds the addresses, and the kernel opens it into the tuple that it was.
+`ArgumentBlock` holds the addresses, and the kernel opens it into the tuple that it was.
 """
 
 import ctypes
@@ -20,15 +20,15 @@ from numpy.typing import NDArray
 
 _I64 = ir.IntType(64)
 
-Packed = NDArray[np.int64]
-"""A parcel as kernels are given it."""
+PackedArguments = NDArray[np.int64]
+"""an argument block as kernels are given it."""
 
 _Content = TypeVar("_Content", bound=tuple[Any, ...])
 _FIELDS: dict[type[Any], list[Any]] = {}
 
 
-class Parcel(Generic[_Content]):
-    """A named tuple of arrays and numbers; `words` is what kernels are given.
+class ArgumentBlock(Generic[_Content]):
+    """A named tuple of arrays and numbers; `packed` is what kernels are given.
 
     TypeError when a field is not as its opener expects it: kernels would not notice.
     """
@@ -45,14 +45,14 @@ class Parcel(Generic[_Content]):
                 words.append(int(np.array(value).view(np.int64)))
             if found != kind:
                 raise TypeError(f"{type(content).__name__}: got {found}; allowed: {kind}")
-        # Who has the words keeps alive what they point to.
+        # Who has the packed form keeps alive what it points to.
         buffer: Any = (ctypes.c_int64 * len(words))(*words)
         buffer.content = content
-        self.words: Packed = np.frombuffer(buffer, np.int64)
+        self.packed: PackedArguments = np.frombuffer(buffer, np.int64)
 
 
 def opener(kind: type[Any], fields: str) -> Any:
-    """For kernels: the words of a parcel to the tuple `kind` again.
+    """For kernels: the packed form of an argument block to the tuple `kind` again.
 
     `fields` tells in order what each is: a scalar's dtype, and for an array its dimensions in
     brackets, as in "i8 f4[2] c8[1]".
@@ -74,7 +74,7 @@ def opener(kind: type[Any], fields: str) -> Any:
 
         return result(words), generate
 
-    typed.__doc__ = f"The `{kind.__name__}` in a parcel."
+    typed.__doc__ = f"The `{kind.__name__}` in an argument block."
     return intrinsic(typed)
 
 

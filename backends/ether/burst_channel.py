@@ -53,7 +53,7 @@ class _Node:
     """Begin and end of the last one whose header was read."""
 
 
-class BurstMedium:
+class BurstChannel:
     """N nodes on one air, all by the same clock in s. `carrier_db`: so much above noise is noticed.
 
     A pair's SNR and delay are kept for `keep_s`, inf: for ever; outages hold at once. Raises

@@ -10,7 +10,7 @@ from sdrlinkd.link import Sensed
 TAIL = 2 * phy.SENSE_WINDOW
 
 
-class Ear:
+class SensingReceiver:
     """Samples in; events and the state of the air out. Hears in one thread."""
 
     def __init__(

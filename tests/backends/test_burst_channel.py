@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import phy
-from backends import AirParams, BurstMedium, Flight, LinkOverride, Outage, RadioParams, World
-from backends.ether.twin import KEEP_S
+from backends import AirParams, BurstChannel, Flight, LinkOverride, Outage, RadioParams, World
+from backends.ether.burst_channel import KEEP_S
 from tests.backends.airs import PLAIN, air, half_duplex
 
 MCS, SIZE = 3, 264
@@ -23,7 +23,7 @@ def medium(radios, links=(), outages=(), seed=1, snr_db=25.0, **more):
         radios = dict.fromkeys(range(radios), PLAIN)
     shared = air(snr_db=snr_db)
     overrides = [LinkOverride(sender=a, receiver=b, snr_db=db, one_way=True) for a, b, db in links]
-    made = BurstMedium(shared, World(shared, {}, overrides, outages), seed, **more)
+    made = BurstChannel(shared, World(shared, {}, overrides, outages), seed, **more)
     for node, radio in radios.items():
         made.join(node, radio)
     return made
@@ -166,7 +166,7 @@ def test_many_weak_ones_add_up():
 def test_what_is_near_comes_first_and_stands_with_its_own_delay():
     shared = air(snr_db=25.0)
     links = [LinkOverride(sender=0, receiver=1, delay_s=0.25)]
-    made = BurstMedium(shared, World(shared, {}, links), 1)
+    made = BurstChannel(shared, World(shared, {}, links), 1)
     for node in range(3):
         made.join(node, PLAIN)
     flight = send(made, 0, 1.0)
@@ -260,7 +260,7 @@ def test_a_burst_begins_when_the_one_before_is_over():
 def test_an_air_that_fades_is_refused():
     fading = AirParams(profile="rayleigh")
     with pytest.raises(ValueError, match='got "rayleigh"; allowed in bursts: "awgn"'):
-        BurstMedium(fading, World(fading, {}), 1)
+        BurstChannel(fading, World(fading, {}), 1)
 
 
 def crowded(seed, n=300):

@@ -8,7 +8,7 @@ import pytest
 import phy
 from backends import RxBlock
 from sdrlinkd.link import Sensed
-from sdrlinkd.modem.ear import TAIL, Ear
+from sdrlinkd.modem.sensing_receiver import TAIL, SensingReceiver
 
 RATE = 1e6
 WINDOW = phy.SENSE_WINDOW
@@ -19,8 +19,8 @@ HEADER_WITHIN = 2000
 COARSE = WINDOW + 1
 
 
-def make_ear(network=0):
-    return Ear(phy.Receiver(network), phy.EnergyDetector(), RATE)
+def make_receiving(network=0):
+    return SensingReceiver(phy.Receiver(network), phy.EnergyDetector(), RATE)
 
 
 def a_burst(seed, n_pdus=4, mcs=1, network=0):
@@ -45,14 +45,14 @@ def gap(index, n, reason):
     return RxBlock(index, n, None, reason, 0)
 
 
-def listen(ear, samples, size, index=0):
+def listen(receiving, samples, size, index=0):
     """[(index after a block, what is sensed then, PDUs it brought)]"""
     story = []
     for first in range(0, len(samples), size):
         piece = samples[first : first + size]
-        events = ear.hear(RxBlock(index + first, len(piece), piece, "", 0))
+        events = receiving.hear(RxBlock(index + first, len(piece), piece, "", 0))
         pdus = [event for event in events if isinstance(event, phy.PduHeard)]
-        story.append((index + first + len(piece), ear.sensed, pdus))
+        story.append((index + first + len(piece), receiving.sensed, pdus))
     return story
 
 
@@ -61,8 +61,8 @@ def is_busy(sensed):
 
 
 def test_it_has_listened_up_to_the_last_sample():
-    ear = make_ear()
-    for end, sensed, _ in listen(ear, on_air(5000), 77):
+    receiving = make_receiving()
+    for end, sensed, _ in listen(receiving, on_air(5000), 77):
         assert sensed.until == end / RATE
         assert not is_busy(sensed)
         assert sensed.idle_since == 0
@@ -70,12 +70,12 @@ def test_it_has_listened_up_to_the_last_sample():
 
 def test_before_the_first_block_it_has_not_listened_at_all():
     """Else a burst could be decided for an air that nobody has heard."""
-    assert make_ear().sensed.until == 0
+    assert make_receiving().sensed.until == 0
 
 
 def test_without_a_sense_it_knows_nothing_and_holds_nobody_back():
-    ear = Ear(phy.Receiver(), None, RATE)
-    story = listen(ear, on_air(QUIET, a_burst(1), QUIET), 500)
+    receiving = SensingReceiver(phy.Receiver(), None, RATE)
+    story = listen(receiving, on_air(QUIET, a_burst(1), QUIET), 500)
     assert {sensed for _, sensed, _ in story} == {Sensed()}
     assert sum(len(pdus) for _, _, pdus in story) == 4
 
@@ -84,7 +84,7 @@ def test_without_a_sense_it_knows_nothing_and_holds_nobody_back():
 def test_a_burst_is_busy_from_its_first_windows_to_its_end(seed):
     burst = a_burst(seed, mcs=seed)
     begin, end = QUIET, QUIET + len(burst)
-    for now, sensed, _ in listen(make_ear(), on_air(QUIET, burst, QUIET, seed=seed), 50):
+    for now, sensed, _ in listen(make_receiving(), on_air(QUIET, burst, QUIET, seed=seed), 50):
         if begin + TAIL <= now < end - 2:
             assert is_busy(sensed), (seed, now)
         elif now < begin or now > end + TAIL:
@@ -95,7 +95,7 @@ def test_a_burst_is_busy_from_its_first_windows_to_its_end(seed):
 def test_the_header_tells_the_end_ahead(seed):
     burst = a_burst(seed)
     begin, end = QUIET, QUIET + len(burst)
-    story = listen(make_ear(), on_air(QUIET, burst, QUIET, seed=seed), 50)
+    story = listen(make_receiving(), on_air(QUIET, burst, QUIET, seed=seed), 50)
     told = [sensed for now, sensed, _ in story if begin + HEADER_WITHIN <= now]
     assert len(told) > 100
     assert len({each[1:] for each in told}) == 1, "it does not change any more"
@@ -108,7 +108,7 @@ def test_the_preamble_time_is_the_same_number_that_its_pdus_bear(size):
     """Access policies ask whether the last carrier was that of the last PDU."""
     x = on_air(QUIET + 13, a_burst(1), 3 * WINDOW, a_burst(2), QUIET)
     n_pdus = n_same = 0
-    for _, sensed, pdus in listen(make_ear(), x, size):
+    for _, sensed, pdus in listen(make_receiving(), x, size):
         n_pdus += len(pdus)
         if pdus and sensed.burst_at is not None:
             assert sensed.burst_at in {event.burst.start / RATE for event in pdus}
@@ -122,7 +122,7 @@ def test_energy_without_a_header_is_nobodys_burst(seed):
     n = 5000 + 17 * seed
     x = on_air(QUIET, no_burst(seed, n), QUIET, seed=seed)
     begin, end = QUIET, QUIET + n
-    for now, sensed, pdus in listen(make_ear(), x, 50):
+    for now, sensed, pdus in listen(make_receiving(), x, 50):
         assert not pdus
         if begin + TAIL <= now < end:
             assert is_busy(sensed), (seed, now)
@@ -135,7 +135,7 @@ def test_energy_without_a_header_is_nobodys_burst(seed):
 
 def test_a_burst_whose_preamble_was_missed_is_nobodys():
     burst = a_burst(3)
-    story = listen(make_ear(), on_air(QUIET, burst[600:], QUIET), 50)
+    story = listen(make_receiving(), on_air(QUIET, burst[600:], QUIET), 50)
     end = QUIET + len(burst) - 600
     assert is_busy(story[(end - 200) // 50][1])
     _, sensed, _ = story[-1]
@@ -145,7 +145,7 @@ def test_a_burst_whose_preamble_was_missed_is_nobodys():
 
 def test_another_networks_burst_has_an_end_too():
     burst = a_burst(4, network=3)
-    story = listen(make_ear(network=0), on_air(QUIET, burst, QUIET), 50)
+    story = listen(make_receiving(network=0), on_air(QUIET, burst, QUIET), 50)
     _, sensed, _ = story[-1]
     assert not any(pdus for _, _, pdus in story)
     assert sensed.idle_since * RATE == pytest.approx(QUIET + len(burst), abs=4)
@@ -155,7 +155,7 @@ def test_another_networks_burst_has_an_end_too():
 def test_echoes_behind_a_burst_do_not_make_another_carrier_of_it(tail):
     burst = a_burst(5)
     end = QUIET + len(burst)
-    story = listen(make_ear(), on_air(QUIET, burst, no_burst(5, tail), QUIET), 50)
+    story = listen(make_receiving(), on_air(QUIET, burst, no_burst(5, tail), QUIET), 50)
     for now, sensed, _ in story:
         if now >= QUIET + HEADER_WITHIN:
             assert sensed.idle_since * RATE == pytest.approx(end, abs=4)
@@ -165,7 +165,7 @@ def test_echoes_behind_a_burst_do_not_make_another_carrier_of_it(tail):
 def test_energy_that_goes_on_behind_a_burst_is_another_carrier():
     burst, more = a_burst(6), 4000
     end = QUIET + len(burst)
-    story = listen(make_ear(), on_air(QUIET, burst, no_burst(6, more), QUIET), 50)
+    story = listen(make_receiving(), on_air(QUIET, burst, no_burst(6, more), QUIET), 50)
     for now, sensed, _ in story:
         if end + TAIL + WINDOW < now < end + more:
             assert is_busy(sensed), now
@@ -178,7 +178,7 @@ def test_a_burst_behind_another_is_the_last_one():
     first, second = a_burst(7), a_burst(8, n_pdus=2)
     pause = 3 * WINDOW
     begin = QUIET + len(first) + pause
-    story = listen(make_ear(), on_air(QUIET, first, pause, second, QUIET), 50)
+    story = listen(make_receiving(), on_air(QUIET, first, pause, second, QUIET), 50)
     assert all(is_busy(s) for now, s, _ in story if begin + TAIL <= now < begin + len(second) - 2)
     sensed = story[-1][1]
     assert sensed.burst_at * RATE == pytest.approx(begin, abs=4)
@@ -192,32 +192,32 @@ def test_it_senses_the_same_however_samples_come(seed):
     marks = sorted(int(each) for each in rng.integers(0, len(x), 12))
     told = []
     for _ in range(2):
-        ear, sensed = make_ear(), []
+        receiving, sensed = make_receiving(), []
         cuts = sorted({0, *marks, len(x), *(int(c) for c in rng.integers(0, len(x), 40))})
         for first, last in pairwise(cuts):
-            ear.hear(RxBlock(first, last - first, x[first:last], "", 0))
+            receiving.hear(RxBlock(first, last - first, x[first:last], "", 0))
             if last in marks:
-                sensed.append(ear.sensed)
+                sensed.append(receiving.sensed)
         told.append(sensed)
     assert told[0] == told[1], f"seed {seed}"
 
 
 def test_while_we_send_we_hear_nothing_and_that_is_no_carrier():
-    ear = make_ear()
+    receiving = make_receiving()
     burst = a_burst(1)
-    listen(ear, on_air(QUIET, burst, QUIET), 100)
-    before, index = ear.sensed, 2 * QUIET + len(burst)
-    assert ear.hear(gap(index, 5000, "sending")) == []
-    assert ear.sensed == before._replace(until=(index + 5000) / RATE)
+    listen(receiving, on_air(QUIET, burst, QUIET), 100)
+    before, index = receiving.sensed, 2 * QUIET + len(burst)
+    assert receiving.hear(gap(index, 5000, "sending")) == []
+    assert receiving.sensed == before._replace(until=(index + 5000) / RATE)
 
 
 def test_what_was_lost_is_not_taken_for_silence():
     """It has not listened there: others may have begun, and may be on the air still."""
-    ear = make_ear()
-    listen(ear, on_air(QUIET), 100)
-    ear.hear(gap(QUIET, 5000, "the reader was too slow"))
-    assert is_busy(ear.sensed) or ear.sensed.until <= QUIET / RATE
-    listen(ear, on_air(QUIET), 100, index=QUIET + 5000)
-    assert not is_busy(ear.sensed)
-    assert ear.sensed.idle_since >= (QUIET + 5000) / RATE - 1e-9
-    assert ear.sensed.burst_at is None
+    receiving = make_receiving()
+    listen(receiving, on_air(QUIET), 100)
+    receiving.hear(gap(QUIET, 5000, "the reader was too slow"))
+    assert is_busy(receiving.sensed) or receiving.sensed.until <= QUIET / RATE
+    listen(receiving, on_air(QUIET), 100, index=QUIET + 5000)
+    assert not is_busy(receiving.sensed)
+    assert receiving.sensed.idle_since >= (QUIET + 5000) / RATE - 1e-9
+    assert receiving.sensed.burst_at is None
