@@ -1,9 +1,8 @@
 """A simulated air that many nodes share: its world, its medium, a hub process, its radios."""
 
-from backends.ether.burst_channel import AirSense, BurstChannel
-from backends.ether.flight import BurstShape, Flight, burst_shape
+from backends.ether.antenna import Antenna
 from backends.ether.hub import EtherHub
-from backends.ether.local import LocalEther, LocalRadio
+from backends.ether.local import LocalEther, LocalRadio, lockstep_capabilities
 from backends.ether.medium import Medium, Piece
 from backends.ether.protocol import Answer
 from backends.ether.radio import EtherRadio
@@ -20,13 +19,10 @@ from backends.ether.world import (
 
 __all__ = [
     "AirParams",
-    "AirSense",
     "Answer",
-    "BurstChannel",
-    "BurstShape",
+    "Antenna",
     "EtherHub",
     "EtherRadio",
-    "Flight",
     "Hop",
     "HubWatch",
     "LinkOverride",
@@ -38,5 +34,5 @@ __all__ = [
     "RadioParams",
     "Track",
     "World",
-    "burst_shape",
+    "lockstep_capabilities",
 ]

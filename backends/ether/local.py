@@ -19,6 +19,11 @@ from backends.ether.world import AirParams, RadioParams, World
 from backends.outstanding import answered
 
 
+def lockstep_capabilities(antenna: Antenna, air: AirParams) -> Capabilities:
+    """What a radio with that antenna can do where nobody goes on before all have heard a block."""
+    return antenna.capabilities(paced=False, lead_s=LEAD / air.rate_hz, block_s=air.block_s)
+
+
 class LocalEther:
     """Radios on one air. Time goes on by a block when all of them have done with the one before."""
 
@@ -69,9 +74,7 @@ class LocalRadio:
     @property
     def capabilities(self) -> Capabilities:
         """What this radio can do, as its parameters say."""
-        return self.antenna.capabilities(
-            paced=False, lead_s=LEAD / self._ether.air.rate_hz, block_s=self._ether.air.block_s
-        )
+        return lockstep_capabilities(self.antenna, self._ether.air)
 
     @property
     def detail(self) -> str:

@@ -6,5 +6,6 @@
 
 `bursts` has an air of bursts instead of samples: hours of many robots in seconds. `samples` has the
 modem and the radio of a daemon, too, sample by sample: it is what `bursts` is checked against. Both
-take the same arrivals.
+take the same arrivals. `burst_channel` and `flight` say who hears which burst, by the modem's error
+rates: no daemon runs on them.
 """

@@ -8,8 +8,10 @@ from heapq import heappop, heappush
 from itertools import count
 
 import phy
-from backends import AirParams, BurstChannel, Flight, RadioParams, World
+from backends import AirParams, RadioParams, World
 from benchmarks.worlds.arrivals import Arrival
+from benchmarks.worlds.burst_channel import BurstChannel
+from benchmarks.worlds.flight import Flight
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import (
     AS_CONFIGURED,

@@ -8,9 +8,17 @@ from typing import NamedTuple
 import numpy as np
 
 import phy
-from backends.base import Capabilities
-from backends.ether.antenna import Antenna
-from backends.ether.flight import (
+from backends import (
+    GAP,
+    AirParams,
+    Antenna,
+    Capabilities,
+    Hop,
+    RadioParams,
+    World,
+    lockstep_capabilities,
+)
+from benchmarks.worlds.flight import (
     Flight,
     burst_shape,
     decibel,
@@ -19,9 +27,6 @@ from backends.ether.flight import (
     lost_rate,
     lost_rate_in,
 )
-from backends.ether.medium import LEAD
-from backends.ether.world import AirParams, Hop, RadioParams, World
-from backends.outstanding import GAP
 
 NEVER = -1.0
 TAIL = 2 * phy.SENSE_WINDOW
@@ -86,8 +91,7 @@ class BurstChannel:
         """A node is there from now on; what its radio can do."""
         self._nodes[node] = _Node(radio)
         self._hops.clear()
-        rate_hz = self._air.rate_hz
-        return Antenna(radio, 0, rate_hz).capabilities(False, LEAD / rate_hz, self._air.block_s)
+        return lockstep_capabilities(Antenna(radio, 0, self._air.rate_hz), self._air)
 
     def send(self, node: int, start_s: float, mcs: int, n_pdus: int, pdu_bytes: int) -> Flight:
         """Put a burst on the air, ahead of `start_s` by the turnaround or more.

@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import phy
-from backends.ether.world import Hop
+from backends import Hop
 
 
 class BurstShape(NamedTuple):
@@ -73,7 +73,7 @@ def burst_shape(
     return BurstShape(mcs, pdu_bytes, plan.form.n_codewords, airtime_s, head_s, pdus)
 
 
-# As measured with the modem (tests/backends/test_burst_channel.py).
+# As measured with the modem (tests/lab/test_burst_channel.py).
 _STRANGE = 1.5
 
 lost_rate = lru_cache(maxsize=4096)(phy.pdu_lost_rate)

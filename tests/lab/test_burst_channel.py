@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import phy
-from backends import AirParams, BurstChannel, Flight, LinkOverride, Outage, RadioParams, World
-from backends.ether.burst_channel import KEEP_S
+from backends import AirParams, LinkOverride, Outage, RadioParams, World
+from benchmarks.worlds.burst_channel import KEEP_S, BurstChannel
+from benchmarks.worlds.flight import Flight
 from tests.backends.airs import PLAIN, air, half_duplex
 
 MCS, SIZE = 3, 264
