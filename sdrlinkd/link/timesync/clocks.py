@@ -1,13 +1,14 @@
 """This robot's CLOCK records, and the clocks of all others."""
 
 from collections import OrderedDict
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
 
-from sdrlinkd.link.timesync.envelope import Estimate
-from sdrlinkd.link.timesync.peer import PeerClock, State, Wall
+from sdrlinkd.link.timesync.envelope import DualEnvelope, Estimate
+from sdrlinkd.link.timesync.paper_clock import PaperClock
+from sdrlinkd.link.timesync.peer import Offset, PeerClock, State, Wall
 from sdrlinkd.reports import ClockReport
 from sdrlinkd.wire import (
     CLOCK_NUMBERS,
@@ -32,6 +33,8 @@ class ClockParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     period_s: Annotated[float, Meta(ge=0, le=10)] = 0.2
     """Between CLOCK records, where there is room for them; 0: none."""
+    filter: Literal["envelope", "paper"] = "envelope"
+    """How an offset is made of the times of bursts; paper: as the Sensors 2023 paper has it."""
     share: Annotated[float, Meta(gt=0, le=0.5)] = 0.02
     """Of all airtime, for PDUs with nothing but CLOCK and RECEIPT records, all robots together."""
 
@@ -41,6 +44,7 @@ class Clocks:
 
     def __init__(self, params: ClockParams, boot_id: int, own_id: int) -> None:
         self._period_s = params.period_s
+        self._filter = params.filter
         self._boot_id = boot_id
         self._own_id = own_id
         self._number = 0
@@ -108,7 +112,7 @@ class Clocks:
         """Take a CLOCK record of robot `src` that came at `at`."""
         peer = self.peers.get(src)
         if peer is None:
-            peer = self.peers[src] = PeerClock(src, self._resolution_s)
+            peer = self.peers[src] = PeerClock(src, self._new_offset())
         peer.hear(clock, at, self._own_id, self._left)
 
     def report(self, src: int, now: float) -> ClockReport | None:
@@ -128,6 +132,9 @@ class Clocks:
         """Our link's clock less that of robot `src`; None: not known."""
         peer = self.peers.get(src)
         return None if peer is None else peer.estimate(now)
+
+    def _new_offset(self) -> Offset:
+        return PaperClock() if self._filter == "paper" else DualEnvelope(self._resolution_s)
 
     def wall_offset(self, src: int, now: float) -> tuple[int, float, float] | None:
         """Our host's time since 1970 less that of robot `src`.

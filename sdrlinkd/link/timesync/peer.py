@@ -5,6 +5,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from sdrlinkd.link.timesync.envelope import WINDOW_S, DualEnvelope, Estimate
+from sdrlinkd.link.timesync.paper_clock import PaperClock
 from sdrlinkd.reports import ClockReport
 from sdrlinkd.wire import CLOCK_NUMBERS, UNKNOWN_WALL, Arrival, Clock
 
@@ -17,6 +18,10 @@ SILENT_S = 5.0
 SILENT_PERIODS = 4
 SOLVE_S = 0.2
 REMEMBERED = 16
+
+
+Offset = DualEnvelope | PaperClock
+"""What makes an estimate of the times of bursts each way."""
 
 
 class State(Enum):
@@ -36,11 +41,14 @@ class Wall(NamedTuple):
 
 
 class PeerClock:
-    """One robot's CLOCK records and when they came. Times in s of our own link's clock."""
+    """One robot's CLOCK records and when they came. Times in s of our own link's clock.
 
-    def __init__(self, src: int, resolution_s: float) -> None:
+    `offset` estimates what its clock is behind ours.
+    """
+
+    def __init__(self, src: int, offset: Offset) -> None:
         self.src = src
-        self.envelope = DualEnvelope(resolution_s)
+        self.offset = offset
         self.wall: Wall | None = None
         self.refused = 0
         """Records with another boot id, or a number that was not newer: not used."""
@@ -67,7 +75,7 @@ class PeerClock:
         left_there = 1e-9 * clock.left_ns
         came = self._arrivals.get(clock.stamped)
         if came is not None:
-            self.envelope.heard(left_there, came, 0.0)
+            self.offset.heard(left_there, came, 0.0)
             # What it tells again of the same CLOCK, or of those before, is nothing new.
             while clock.stamped in self._arrivals:
                 self._arrivals.popitem(last=False)
@@ -82,7 +90,7 @@ class PeerClock:
             if left_at > self._told_left_at:
                 self._told_left_at = left_at
                 came_there = 1e-9 * (clock.left_ns + after_ns)
-                self.envelope.was_heard(left_at, came_there, 0.0)
+                self.offset.was_heard(left_at, came_there, 0.0)
                 self._has_news = True
                 # One of ours in each of its: more would be a lie.
                 break
@@ -97,11 +105,11 @@ class PeerClock:
 
     def estimate(self, now: float) -> Estimate | None:
         """Own minus its link's clock; made anew where there is something new."""
-        is_due = now - self._solved_at >= SOLVE_S or self.envelope.estimate is None
+        is_due = now - self._solved_at >= SOLVE_S or self.offset.estimate is None
         if self._has_news and is_due:
             self._has_news, self._solved_at = False, now
-            self.envelope.solve(now)
-        return self.envelope.estimate
+            self.offset.solve(now)
+        return self.offset.estimate
 
     def state(self, now: float) -> State:
         """How well its clock is known."""
@@ -114,7 +122,7 @@ class PeerClock:
 
     def report(self, now: float) -> ClockReport:
         """How well its clock is known, and what its records were like."""
-        state, known, envelope = self.state(now), self.estimate(now), self.envelope
+        state, known, offset = self.state(now), self.estimate(now), self.offset
         is_known = known is not None and state is not State.UNSYNCED
         return ClockReport(
             state=state.value,
@@ -122,9 +130,9 @@ class PeerClock:
             bound_us=1e6 * known.bound(now) if known and is_known else None,
             skew_ppm=1e6 * known.skew if known and is_known else None,
             period_s=self.period_s,
-            samples=envelope.samples,
-            steps=envelope.steps,
-            contradicted=envelope.contradicted,
+            samples=offset.samples,
+            steps=offset.steps,
+            contradicted=offset.contradicted,
             refused=self.refused,
             resets=self.resets,
         )
@@ -149,6 +157,6 @@ class PeerClock:
         self._told_left_at = -float("inf")
         self.wall = None
         self.period_s = 0.0
-        self.envelope.forget()
+        self.offset.forget()
         self.resets += 1
         return True

@@ -16,11 +16,11 @@ DELAY_S = 2e-6
 class Pair:
     """Two robots whose clocks differ; both CLOCKs of a period go each way."""
 
-    def __init__(self, offset_s=7.0, skew=2e-5, delay_s=DELAY_S, seed=SEED):
+    def __init__(self, offset_s=7.0, skew=2e-5, delay_s=DELAY_S, seed=SEED, **params):
         self.offset_s, self.skew, self.delay_s = offset_s, skew, delay_s
         self.rng = Random(seed)
-        self.one = Clocks(ClockParams(), 0xA, 1)
-        self.two = Clocks(ClockParams(), 0xB, 2)
+        self.one = Clocks(ClockParams(**params), 0xA, 1)
+        self.two = Clocks(ClockParams(**params), 0xB, 2)
         for clocks in (self.one, self.two):
             clocks.set_resolution(1e-6)
         self.at = 10.0
@@ -89,11 +89,11 @@ def test_replayed_and_duplicated_clocks_are_counted_and_change_nothing():
     pair = Pair()
     pair.run(50)
     peer = pair.one.peers[2]
-    before = (peer.envelope.samples, peer.estimate(pair.at))
+    before = (peer.offset.samples, peer.estimate(pair.at))
     for record, _ in pair.sent[:20] + pair.sent[-1:]:
         pair.one.hear(2, record, pair.at + 0.06)
     assert peer.refused == 21
-    assert (peer.envelope.samples, peer.estimate(pair.at)) == before
+    assert (peer.offset.samples, peer.estimate(pair.at)) == before
 
 
 def test_another_boot_id_is_believed_when_it_is_said_twice():
@@ -123,7 +123,7 @@ def test_stamps_from_the_future_are_not_believed():
                                   left_ns=record.left_ns + 10**9)  # fmt: skip
             pair.one.hear(2, lie, came + 0.01)
             pair.two.rode()
-    assert peer.envelope.contradicted == 2
+    assert peer.offset.contradicted == 2
     assert abs(pair.error_s()) < 3e-6
 
 
@@ -175,13 +175,13 @@ def test_numbers_wrap_and_records_tell_of_so_many_as_there_is_room_for():
 def test_who_tells_of_many_of_our_clocks_at_once_or_of_old_ones_is_believed_one():
     pair = Pair()
     pair.run(50)
-    peer, samples = pair.one.peers[2], pair.one.peers[2].envelope.samples
+    peer, samples = pair.one.peers[2], pair.one.peers[2].offset.samples
     record, came = pair.sent[-1]
     numbers = (40, 41, 10, 42, 11, 43, 12, 49, 13)
     arrivals = tuple(Arrival(1, number, 10 * number) for number in numbers)
     lie = record._replace(number=record.number + 1, stamped=0, arrivals=arrivals)
     pair.one.hear(2, lie, came + 0.01)
-    assert peer.envelope.samples == samples
+    assert peer.offset.samples == samples
     pair.two.rode()
     pair.run(20)
     assert abs(pair.error_s()) < 3e-6
