@@ -96,3 +96,33 @@ def test_robots_take_every_step_of_tdma(taken):
     root.take_frame(1, above, 31.0)
     assert "1 hops away" in root.state
     assert taken["tdma"] == set(TDMA_STEPS)
+
+
+AT = 5.0
+MINISLOT_S = 0.004
+
+
+@pytest.mark.parametrize(
+    ("ended", "place"),
+    [("own", 5), ("forwarded 3", 5), ("read 1", 3), ("relayed 1", 4), ("unread", 7), ("read 9", 7)],
+)
+def test_what_kept_the_channel_busy_tells_a_robots_mini_slot(ended, place):
+    """Of robot 2 of three, for a message of class default: FIRST and the theory above it."""
+    kind, _, src = ended.partition(" ")
+    access = make_access(
+        params("minislot", [1, 2, 3], minislot_s=MINISLOT_S), 2, LOCKSTEP, 0.01, Random(1)
+    )
+    burst_at = None
+    if kind == "own":
+        access.sent(AT, None)
+    elif kind == "forwarded":
+        access.sent(AT, int(src))
+    elif kind != "unread":
+        burst_at = AT - 0.01
+        access.heard(int(src), burst_at, kind == "relayed")
+    starts = (
+        access.slot(Wish(at, Qos.DEFAULT, 0.001, Sensed(at, AT, burst_at)))
+        for at in (AT + 1e-3 * i for i in range(99))
+    )
+    begun = next(slot.start for slot in starts if slot is not None)
+    assert begun == pytest.approx(AT + (1 + place) * MINISLOT_S, abs=MINISLOT_S / 10)
