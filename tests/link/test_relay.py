@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.errors import ConfigError
-from sdrlinkd.link import Outcome, Overrides, Qos, Relay, RelayParams, TopicPolicy
+from sdrlinkd.link import Outcome, Overrides, Qos, QueueParams, Relay, RelayParams, TopicPolicy
 from sdrlinkd.wire import parse
 from tests.laws import law
 from tests.link.world import compose, make_link, rx, send_all, tx
@@ -184,3 +184,18 @@ def test_the_list_of_what_is_relayed_is_bounded_by_the_queue():
             two.hear(pdu, 0.0)
     tally = two.report(0.0).relayed
     assert tally.accepted == 400 == tx(two).queued
+
+
+def test_a_pdu_that_the_full_queue_does_not_take_is_not_counted_as_forwarded():
+    """The queue holds one message, and that one is more urgent."""
+    sender = make_link(1, hop_limit=2)
+    relay = make_link(
+        2, hop_limit=2, relay=RelayParams(policy="flood"), queue=QueueParams(max_messages=1)
+    )
+    relay.submit(0, bytes(9), 0.0, Overrides(qos=Qos.URGENT))
+    sender.submit(0, bytes(9), 0.0, Overrides(dst=3))
+    for pdu in compose(sender, 0.0).pdus:
+        relay.hear(pdu, 0.1)
+    assert rx(relay).pdus_dropped == {"rx_not_for_us": 1}
+    assert relay.report(0.0).relayed.dropped == {"tx_overflow_new": 1}
+    assert relay.audit() == []
