@@ -30,7 +30,8 @@ def expected_level(
 
 @step
 def _tanh(x: Lanes) -> Lanes:
-    """To 2 %."""
+    """The hyperbolic tangent, to within 2 %."""
+    # At ±3 the quotient is ±1.
     x = least(most(x, splat(-3)), splat(3))
     square = x * x
     value: Lanes = x * (splat(27) + square) / (splat(27) + splat(9) * square)

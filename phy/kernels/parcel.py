@@ -30,7 +30,7 @@ _FIELDS: dict[type[Any], list[Any]] = {}
 class Parcel(Generic[_Content]):
     """A named tuple of arrays and numbers; `words` is what kernels are given.
 
-    TypeError when a field is not as its opener expects it: kernels would not notice.
+    Raises TypeError when a field is not as its opener expects it: kernels would not notice.
     """
 
     def __init__(self, content: _Content) -> None:
@@ -52,7 +52,7 @@ class Parcel(Generic[_Content]):
 
 
 def opener(kind: type[Any], fields: str) -> Any:
-    """For kernels: the words of a parcel to the tuple `kind` again.
+    """An intrinsic for kernels that opens the words of a parcel as the tuple `kind`.
 
     `fields` tells in order what each is: a scalar's dtype, and for an array its dimensions in
     brackets, as in "i8 f4[2] c8[1]".
