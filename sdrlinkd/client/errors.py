@@ -2,7 +2,7 @@
 
 
 class NoDaemonError(ConnectionError):
-    """No sdrlinkd listens there."""
+    """No sdrlinkd listens in the runtime directory."""
 
 
 class MessageRefusedError(ValueError):
