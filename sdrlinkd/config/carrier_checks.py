@@ -13,7 +13,10 @@ WITHOUT_AIR = ("direct", "gnuradio")
 
 
 def check_carrier(config: Config) -> None:
-    """Raises ConfigError that begins with the key, and says what was given and what is allowed."""
+    """Check what modem, radios and simulated air must agree on.
+
+    Raises ConfigError that begins with the key, and says what was given and what is allowed.
+    """
     _check_sharing(config)
     if config.backend in ("zmq", "gnuradio"):
         _check_endpoints(config)
@@ -104,7 +107,7 @@ def _check_sharing(config: Config) -> None:
 
 
 def with_paths(config: Config, base: Path) -> Config:
-    """`config` with file names relative to `base` made whole, but for the registry's."""
+    """`config` with file names made whole that are relative to `base`; the registry's stays."""
     base = base.absolute()
     iqfile = config.iqfile
     whole = {

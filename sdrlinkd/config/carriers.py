@@ -60,7 +60,7 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Carrier and samples of every radio come from the same crystal: the offset of the one tells
     that of the other."""
     carrier_db: Annotated[float, Meta(ge=3, le=40)] = 6.0
-    """So much energy above the noise is a carrier; for access policies that listen."""
+    """Energy above the noise from which on there is a carrier; for access policies that listen."""
     block_s: Annotated[float, Meta(ge=1e-4, le=0.1)] = 0.001
     """Samples are received in pieces of this length."""
     oversampling: Literal[1, 2, 4] = 1
@@ -68,12 +68,12 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     @property
     def carrier_hz(self) -> float:
-        """The middle of the channel, also where none is set."""
+        """The middle of the channel in Hz; SIMULATED_HZ where none is set."""
         return self.frequency_hz or SIMULATED_HZ
 
     @property
     def apart_hz(self) -> float:
-        """How far two radios' carriers may be apart, both crystals off as far as they may be."""
+        """How far apart two radios' carriers may be in Hz, with both crystals at their worst."""
         return 2e-6 * self.crystal_ppm * self.carrier_hz
 
     @property
@@ -90,7 +90,7 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 class TransformParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """/tf on a slow link."""
+    """What of /tf is sent over a slow link, and how."""
 
     topics: list[str] = []
     """Registry names of type tf2_msgs/TFMessage, such as tf and tf_static."""
@@ -112,9 +112,9 @@ class PlayParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     bag: str = ""
     """Recording to play; empty, with `duration_s`: a built-in robot."""
     duration_s: Annotated[float, Meta(ge=0, le=1e6)] = 0.0
-    """So much of it; 0: nothing."""
+    """How much of the recording is sent; 0: nothing."""
     begin_s: Annotated[float, Meta(ge=0, le=1e6)] = 0.0
-    """When the first message goes."""
+    """When the first message is sent."""
     wait_for_consumer: bool = False
     """The radio's time begins when the first consumer subscribes."""
 

@@ -4,7 +4,7 @@ from sdrlinkd.config.schema import Config
 
 
 def unchecked(config: Config) -> list[str]:
-    """In words, one thing each; empty where the file alone decides."""
+    """What the file alone does not decide, in words, one thing each."""
     backend, policy = config.backend, config.access.policy
     found = {
         "soapy": _of_device(config),

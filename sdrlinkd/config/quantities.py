@@ -52,7 +52,7 @@ def as_numbers(raw: object, kind: inspect.Type | None, key: str = "") -> object:
 
 
 def example(key: str | int, kind: inspect.Type) -> str:
-    """For error messages: how the value of `key` may be written with its unit."""
+    """How the value of `key` may be written with its unit, for error messages; else empty."""
     quantity = _quantity_of(str(key), kind)
     return f", or with its unit, such as {quantity.example}" if quantity else ""
 
@@ -64,7 +64,7 @@ def _quantity_of(key: str, kind: inspect.Type | None) -> _Quantity | None:
 
 
 def _words(kind: inspect.Type | None) -> set[object]:
-    """Text that means itself."""
+    """Words that a key of `kind` takes as they are."""
     literals = [each for each in _kinds(kind) if isinstance(each, inspect.LiteralType)]
     return {value for each in literals for value in each.values}
 
