@@ -17,7 +17,10 @@ ETHER_TURNAROUND_S = 1e-4
 
 
 class PresumedRadio(NamedTuple):
-    """Its traits, and those of what it carries; `presumption` says what only the radio can tell."""
+    """The traits of a radio, and of what it carries, as far as they are known.
+
+    `presumption` says what only the radio can tell.
+    """
 
     traits: CarrierTraits
     airtimes: Airtimes
@@ -30,7 +33,10 @@ class PresumedRadio(NamedTuple):
 
 
 def presume_radio(config: Config, turnaround_s: float | None = None) -> PresumedRadio:
-    """`turnaround_s`: another than is configured. Raises UserError where there is no radio."""
+    """The radio of `config`. Raises UserError where that has none.
+
+    `turnaround_s` is taken in place of the one that is configured.
+    """
     if config.backend in PDU_BACKENDS:
         raise UserError(
             f'backend: got "{config.backend}", which has no air to plan for: it hands PDUs on as '
@@ -48,7 +54,7 @@ def presume_radio(config: Config, turnaround_s: float | None = None) -> Presumed
 
 
 def access_words(config: Config, own_id: int) -> list[str]:
-    """What access comes to, for `--check`. Raises ConfigError where it is sure to be refused."""
+    """What access comes to, in words. Raises ConfigError where it is sure to be refused."""
     if config.backend in PDU_BACKENDS:
         return [f'access none, as no other robot shares the air of the backend "{config.backend}"']
     radio = presume_radio(config)
@@ -64,10 +70,10 @@ def access_words(config: Config, own_id: int) -> list[str]:
 
 
 def _capabilities(config: Config, turnaround_s: float | None) -> tuple[Capabilities, str, bool]:
-    """(what it can do, what of that is presumed, whether that is sure)."""
+    """(what the radio can do, what of that is presumed, whether that is sure)."""
     modem = config.modem
     if config.backend == "soapy":
-        # Of sending, where it is switched off as yet.
+        # Access is planned for sending, also where that is switched off as yet.
         settings = msgspec.structs.replace(soapy_settings(config), tx_enabled=True)
         if turnaround_s is not None:
             settings = msgspec.structs.replace(settings, turnaround_s=turnaround_s)

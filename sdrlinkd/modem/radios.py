@@ -30,7 +30,7 @@ from sdrlinkd.modem.compiled import load_phy
 from sdrlinkd.modem.link import ModemLink
 
 PDU_BACKENDS = ("direct", "gnuradio")
-"""They carry PDUs, not samples."""
+"""Backends that carry PDUs, not samples."""
 
 
 def make_modem(
@@ -70,8 +70,8 @@ def make_radio(
 ) -> Radio:
     """The radio that `config.backend` names, at the modem's rate. Raises UserError.
 
-    `longest_s`: no burst that it is given is longer. `patience`: of one that is not there when it
-    is opened.
+    No burst that it is given is longer than `longest_s`. `patience`: of a radio that is not there
+    when it is opened.
     """
     if config.backend in PDU_BACKENDS:
         raise ConfigError(
@@ -87,7 +87,7 @@ def make_radio(
 
 
 def _has_slots(config: Config, node_id: int, traits: CarrierTraits) -> bool:
-    """Whether access comes to tdma; what is refused is so where the link is fitted to the radio."""
+    """Whether access comes to tdma; what is refused shows when the link is fitted to the radio."""
     longest_s = traits.longest_in_use_s(
         RateControl(config.rate, traits.needed_snr_db, traits.mcs).usable
     )
@@ -123,7 +123,7 @@ def _make_radio(
 
 
 def soapy_settings(config: Config) -> SoapySettings:
-    """What the device is to be set to."""
+    """The settings for the SoapySDR device of `config`."""
     modem, soapy = config.modem, config.soapy
     return SoapySettings.of(
         soapy, modem.rate_hz * modem.oversampling, modem.frequency_hz, modem.block_s
@@ -145,7 +145,7 @@ def _longest_burst_s(config: Config) -> float:
 
 
 def check_airtime(config: Config) -> None:
-    """Raises ConfigError where a PDU is so long on the air that fragments would be given up."""
+    """Raise ConfigError where one PDU is on the air for so long that fragments are given up."""
     modem, size = config.modem, config.link.pdu_size
     airtime_s = phy.layout(phy.GRIDS[modem.grid], modem.mcs, 1, size).n_samples / modem.rate_hz
     if airtime_s > config.reassembly.timeout_s / 2:
@@ -160,7 +160,7 @@ def check_airtime(config: Config) -> None:
 def _channel(config: Config, seed: int) -> Channel:
     """The simulated air; its noise is `snr_db` below bursts of the modem's own power.
 
-    In the modem's band: a faster radio hears more of it.
+    That is in the modem's band: a faster radio hears more of it.
     """
     modem, air = config.modem, config.channel
     more_db = 10 * math.log10(modem.oversampling)
