@@ -55,7 +55,7 @@ THREE_QUARTERS = CodeRate("3/4", Fraction(3, 4), (1, 1, 1, 0, 0, 1))
 
 
 def encode(data: NDArray[np.uint8], code: CodeRate) -> NDArray[np.uint8]:
-    """Coded bits `[n, n_coded]` of `n` blocks of bytes `[n, n_bytes]`, each ended by a tail."""
+    """Coded bits `[n, n_coded]` of `n` blocks of bytes `[n, n_bytes]`, each followed by a tail."""
     n_bits = 8 * data.shape[1]
     bits = np.zeros((len(data), n_bits + N_TAIL), np.uint8)
     bits[:, :n_bits] = np.unpackbits(data, axis=1)

@@ -29,7 +29,7 @@ class IncomingBurst:
         self._look_ahead()
 
     def window(self, symbol: int) -> int:
-        """Absolute index at which the FFT of a payload symbol begins."""
+        """Absolute index at which the FFT of payload symbol `symbol` begins."""
         return self._window + symbol * self._n_symbol
 
     def end_of(self, n: int) -> int:

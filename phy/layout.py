@@ -48,12 +48,12 @@ class BurstLayout:
 
     @cached_property
     def n_symbols(self) -> int:
-        """Payload symbols of the burst."""
+        """Number of payload symbols of the burst."""
         return -(-self.n_pdus * self.least_bits // self.symbol_bits)
 
     @cached_property
     def n_samples(self) -> int:
-        """Samples of the whole burst, preamble and header included."""
+        """Number of samples of the whole burst, preamble and header included."""
         n_symbols = header.n_symbols(self.grid) + self.n_symbols
         return preamble.length(self.grid) + n_symbols * self.grid.n_symbol
 

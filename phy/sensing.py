@@ -51,7 +51,7 @@ class CarrierSense:
         return 10 * math.log10(max(float(self._state[FLOOR]), LEAST_FLOOR))
 
     def push(self, samples: NDArray[np.complex64]) -> None:
-        """Take the next samples `[n]`, complex64."""
+        """Take the next samples `[n]`, complex64, and judge the windows that they complete."""
         # Read-only and in one piece, whatever came: else numba compiles anew for every kind.
         x = np.ascontiguousarray(samples, np.complex64).view()
         x.setflags(write=False)

@@ -178,7 +178,7 @@ def _make_pdu_link(
 
 
 def _types_of(setup: Setup) -> tuple[frozenset[int], dict[int, bytes]]:
-    """(topics with a header, stop messages by topic id)."""
+    """(ids of topics with a header, stop messages by topic id). Raises ConfigError."""
     # These bring the message types.
     from sdrlinkd.adapters import header_topics, stop_messages
 

@@ -25,7 +25,7 @@ class UserError(SdrlinkError):
 
 
 class ConfigError(UserError):
-    """A configuration key; the message cites key, given and allowed."""
+    """A configuration key that cannot be used; the message cites key, given and allowed."""
 
 
 class RegistryError(UserError):

@@ -122,7 +122,7 @@ class Node:
 
     # The PDU link's listener.
     def attach(self, traits: CarrierTraits) -> None:
-        """The PDU link is there: fit the link to it. Raises ConfigError."""
+        """Fit the link to the PDU link, which is there now. Raises ConfigError."""
         config = self._opening.config
         fit = self._link.attach(traits, config.access, config.rate)
         log.info("access %s", fit.settled.sentence)

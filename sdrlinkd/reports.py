@@ -151,7 +151,7 @@ class TxReport(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RxReport(msgspec.Struct, frozen=True, kw_only=True):
-    """The receive ledgers.
+    """The receive ledgers, of PDUs and of messages.
 
     pdus_heard = pdus_used + every reason of `pdus_dropped`;
     started = delivered + held + every reason of `dropped`.

@@ -41,7 +41,7 @@ def _part(repeated: Words, first: int) -> np.uint64:
 
 @njit(nogil=True, cache=True)
 def parity_of(bits: Words, form: Form, parity: Words) -> None:
-    """The parity `[rows, 2]` of the information `bits` `[K z / 64 + 1]`, a row for each block.
+    """Write the parity `[rows, 2]`, a row for each block, of information `bits` `[K z / 64 + 1]`.
 
     Parity columns 1, 2, … are a staircase; column 0 has three blocks, in the first and last row
     with shift 1 and in row `middle` with 0. In the sum of all rows only the latter remains.

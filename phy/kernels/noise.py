@@ -39,7 +39,7 @@ def add_noise(
     radii: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
-    """out = x + noise of `scale` per part; both `[2n]`, real and imaginary parts in turn.
+    """Write x + noise of `scale` per part to `out`; both `[2n]`, real and imaginary parts in turn.
 
     `first` is the number of the first sample; `bits` and `radii` `[CHUNK]` are working space.
     """

@@ -1,4 +1,4 @@
-"""`bag play`: a recording into a running daemon."""
+"""`bag info` and `bag play`: what is in a recording, and a recording into a running daemon."""
 
 from collections.abc import Iterator
 from pathlib import Path

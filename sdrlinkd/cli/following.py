@@ -37,7 +37,7 @@ class Follower:
         return snapshot
 
     def ask(self, verb: str, arguments: dict[str, Any] | None = None) -> Any:  # noqa: ANN401
-        """The daemon's answer. Raises NoDaemonError and RefusedError."""
+        """The daemon's answer to `verb`. Raises NoDaemonError and RefusedError."""
         if self._control is None:
             self._control = connect(self.directory, PATIENCE_S)
         try:

@@ -7,7 +7,7 @@ FOREVER = float("inf")
 
 
 class Deadline:
-    """`seconds` from now; None and infinity: never. What is below 0 has passed."""
+    """A point in time `seconds` from now; None and infinity: never. Below 0 it has passed."""
 
     def __init__(self, seconds: float | None) -> None:
         self._at = FOREVER if seconds is None else time.monotonic() + seconds

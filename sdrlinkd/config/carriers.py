@@ -28,7 +28,7 @@ class DirectParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
 
 class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The OFDM modem, on every radio."""
+    """Parameters of the OFDM modem, on every radio."""
 
     rate_hz: Annotated[float, Meta(ge=1e4, le=2e8)] = 5e6
     """Samples a second, and the width of the channel; the same at all nodes."""
@@ -78,12 +78,12 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     @property
     def most_cfo_hz(self) -> float:
-        """The largest carrier offset that a receiver can search at this rate."""
+        """The largest carrier offset in Hz that a receiver can search at this rate."""
         return self.rate_hz / 4
 
     @property
     def searched_cfo_hz(self) -> float:
-        """The carrier offset up to which bursts are looked for."""
+        """The carrier offset in Hz up to which bursts are looked for."""
         if self.max_cfo_hz == "auto":
             return min(self.apart_hz, self.most_cfo_hz)
         return float(self.max_cfo_hz)

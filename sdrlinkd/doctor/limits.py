@@ -1,4 +1,4 @@
-"""What the system grants: going before others, memory, buffers of sockets and USB."""
+"""What the system grants: real-time priority, memory, buffers of sockets and USB."""
 
 import os
 import resource

@@ -62,7 +62,7 @@ class Keeper:
         self._is_given_up = True
 
     def finish(self) -> None:
-        """No block will come: find the bursts that are left, and complete the files."""
+        """Find the bursts that are left and complete the files, as no block will come."""
         self._blocks.put(None)
         self._thread.join()
 

@@ -42,7 +42,7 @@ class StreamClock:
         return 0 if self._seen is None else self._seen[0]
 
     def observe(self, end: int, host_s: float) -> None:
-        """Samples up to before `end` were there at `host_s`; told by one thread after another."""
+        """Note that samples before `end` were there at `host_s`; by one thread after another."""
         late_s = host_s - end / self._rate_hz
         if host_s >= self._until:
             self._before, self._least = self._least, late_s

@@ -14,7 +14,7 @@ def milliseconds(value: float | None) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A time span as people say it."""
+    """A time span as people say it, from a number of seconds."""
     if seconds < 60:
         return f"{seconds:.1f} s"
     if seconds < 3600:

@@ -207,7 +207,7 @@ def _dropped(snapshot: Snapshot, width: int) -> list[Text]:
 
 
 def _idle(snapshot: Snapshot, width: int) -> list[Text]:
-    """Topics on which nothing moves, in a line."""
+    """A line that names the topics on which nothing moves; none where all move."""
     link = snapshot.link
     out = [each.name.rsplit("/", 1)[-1] for each in link.topics if is_idle(each)]
     into = [each.republished_as or each.name for each in link.received if is_idle(each)]
