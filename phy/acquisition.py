@@ -173,6 +173,7 @@ def _new_room(grid: Numerology) -> Parcel[Room]:
     )
 
 
+# Most headers are like one before, as most bursts are.
 @lru_cache(maxsize=64)
 def _sent(told: BurstHeader, grid: Numerology) -> NDArray[np.float32]:
     """The tones of long training and header as sent `[2 + n_header, 2, width]`.

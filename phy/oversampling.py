@@ -44,7 +44,7 @@ def upsample(burst: NDArray[np.complex64], factor: int) -> NDArray[np.complex64]
 
 
 class Downsampler:
-    """Brings a stream at `factor` times the modem's rate down to it; chunking is no matter."""
+    """Brings a stream at `factor` times the modem's rate down to it, however it is chunked."""
 
     def __init__(self, factor: int) -> None:
         self._factor = factor

@@ -105,7 +105,7 @@ class _Row:
             self.store(posterior, self.posteriors, self.place(edge, at))
 
     def unless_turned(self, rest: Any, place: Any) -> Any:
-        """What a check is told, and stored as told: `rest`, or 0 where that has turned its sign."""
+        """What a check is told, and stored as told: `rest`, or 0 where its sign has turned."""
         builder = self.builder
         before = self.load(self.told, place)
         turned = builder.and_(

@@ -13,7 +13,7 @@ HANDOVER_S = 5e-4
 STAMP_SAMPLES = 1.0
 """Samples by which a preamble may be from where it is found."""
 REACTION_S = 0.002
-"""Seconds from the last sample of a block to a decision."""
+"""Seconds from the last sample of a block to a decision that it leads to."""
 
 
 def carrier_traits(

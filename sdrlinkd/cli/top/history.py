@@ -69,7 +69,7 @@ class History:
         ]
 
     def _pdr(self, snapshot: Snapshot) -> float | None:
-        """Share of the messages ended since the last snapshot that arrived, in %; None of none."""
+        """Share in % of messages lately ended that were delivered; None where none has ended."""
         rx = snapshot.link.rx
         now = (rx.delivered, sum(rx.dropped.values()))
         before, self._before = self._before, now
