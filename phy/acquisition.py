@@ -25,6 +25,8 @@ from phy.transmitter import header_samples
 
 # What noise may add to the offset that the peak tells, in cycles a sample.
 _COARSE_ERROR = 0.008
+# Corrections that the last step tries, in cycles a sample: up to 0.12 of 1/64, the unit of the
+# phase that was measured over 64 samples. A parabola finds what lies between them.
 _FREQUENCIES = np.linspace(-0.12, 0.12, 25) / 64
 
 
@@ -34,16 +36,17 @@ def before(grid: Numerology) -> int:
 
 
 def needed_after(grid: Numerology) -> int:
-    """Samples that it needs from there on."""
+    """Samples that acquisition needs from the nominal start of the first long symbol on."""
     n_header = header.n_symbols(grid) * grid.n_symbol
     return SEARCH + preamble.N_LONG * grid.n_fft + n_header
 
 
 class Acquired(NamedTuple):
-    """A burst that can be decoded. `window` is where the first payload symbol's FFT begins.
+    """A burst whose header was read and whose channel is known.
 
-    The samples before have turned by `frequency` since `origin`, and `channel` is as it was there;
-    it is the receiver's only one, until the next burst.
+    `window` is the absolute index at which the FFT of the first payload symbol begins. `frequency`
+    is the frequency offset in cycles a sample, with phase 0 at index `origin`; `channel` is as seen
+    with that phase. A receiver has one channel: the next burst overwrites it.
     """
 
     header: BurstHeader
@@ -55,13 +58,13 @@ class Acquired(NamedTuple):
 
 
 class Missed(NamedTuple):
-    """No burst: "preamble" (no long training found) or "header" (its check failed)."""
+    """A peak without a burst: "preamble" (no long training found) or "header" (no valid one)."""
 
     stage: str
 
 
 class Acquisition:
-    """Tables and room of acquisition on one grid. Not for several threads at once."""
+    """Acquires bursts on one grid, with its tables and working memory. For one thread at a time."""
 
     def __init__(self, grid: Numerology, max_frequency: float, centre_cycles: float = 0.0) -> None:
         self._grid = grid
@@ -80,7 +83,8 @@ class Acquisition:
     ) -> Acquired | Missed:
         """Read the burst whose first long symbol is nominally at `x[before(grid)]`.
 
-        `base` is the absolute index of `x[0]`; `coarse` the frequency that the peak tells.
+        `base` is the absolute index of `x[0]`; `coarse` is the frequency that the detector's peak
+        tells, in cycles a sample, modulo 1/16.
         """
         grid, room = self._grid, self._room.content
         start, frequency = kernel.acquire(
@@ -105,7 +109,7 @@ class Acquisition:
 
 
 def n_aliases(max_frequency: float) -> int:
-    """Multiples of 1/16 to try on either side for offsets up to `max_frequency`."""
+    """Multiples of 1/16 cycle a sample to try on either side, for offsets up to `max_frequency`."""
     return max(0, math.ceil((max_frequency + _COARSE_ERROR - AMBIGUITY / 2) / AMBIGUITY))
 
 
@@ -147,7 +151,7 @@ def _training(grid: Numerology, aliases: int) -> ArgumentBlock[Training]:
 
 
 def _parts_of(x: NDArray[np.complex128]) -> NDArray[np.float32]:
-    """Real and imaginary parts `[n, 2, m]` of `[n, m]`."""
+    """Real and imaginary parts `[n, 2, m]` of complex rows `[n, m]`."""
     return np.ascontiguousarray(np.stack((x.real, x.imag), axis=1), np.float32)
 
 
@@ -169,12 +173,13 @@ def _new_room(grid: Numerology) -> ArgumentBlock[Room]:
     )
 
 
+# Most headers are like one before, as most bursts are.
 @lru_cache(maxsize=64)
 def _sent(told: BurstHeader, grid: Numerology) -> NDArray[np.float32]:
-    """Long training and header as sent `[2 + n_header, 2, width]`.
+    """The tones of long training and header as sent `[2 + n_header, 2, width]`.
 
-    Each is 1 / x* of a tone x, so that what is divided by x is multiplied by its conjugate: where
-    the header's peaks were cut off, no x is exactly ±1.
+    Each tone x is stored as 1 / x*, so that kernels divide by x when they multiply by the
+    conjugate: the header's peaks are cut off, and so its tones are not exactly ±1.
     """
     long = preamble.long_subcarriers(grid)[grid.tones].astype(np.complex64)
     samples = header_samples(told, grid)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 
 class Modulation(Enum):
-    """How many bits a subcarrier takes."""
+    """The modulation of a subcarrier; its value is the number of coded bits on a subcarrier."""
 
     BPSK = 1
     QPSK = 2
@@ -23,25 +23,25 @@ class Modulation(Enum):
 
     @property
     def label(self) -> str:
-        """As people say it: `16QAM`."""
+        """The modulation's usual name, such as `16QAM`."""
         return f"{1 << self.bits}QAM" if self.bits > 2 else self.name
 
     @property
     def unit(self) -> float:
-        """Half the distance of neighbouring points, at mean power 1."""
+        """Half the distance between neighbouring points, at mean power 1."""
         levels = _levels(self.axis_bits)
         axes = 1 if self is Modulation.BPSK else 2
         return float(1 / np.sqrt(axes * np.mean(levels**2)))
 
     @property
     def axis_bits(self) -> int:
-        """Coded bits on one axis; BPSK has the real one only."""
+        """Coded bits on one axis; BPSK has the real axis only."""
         return max(1, self.bits // 2)
 
 
 @cache
 def points(modulation: Modulation) -> NDArray[np.complex64]:
-    """Points of mean power 1 by the number that their bits make, first bit highest `[2^bits]`."""
+    """Points of mean power 1, by the number that their bits make, first bit highest `[2^bits]`."""
     levels = _levels(modulation.axis_bits) * modulation.unit
     if modulation is Modulation.BPSK:
         return levels.astype(np.complex64)
@@ -49,7 +49,7 @@ def points(modulation: Modulation) -> NDArray[np.complex64]:
 
 
 def _levels(axis_bits: int) -> NDArray[np.float64]:
-    """Odd numbers by the Gray code of their rank `[2^axis_bits]`."""
+    """Levels of an axis, odd numbers, by the number that their Gray code makes `[2^axis_bits]`."""
     n = 1 << axis_bits
     rank = np.arange(n)
     levels = np.empty(n)

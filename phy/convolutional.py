@@ -28,18 +28,18 @@ __all__ = [
 
 @dataclass(frozen=True)
 class CodeRate:
-    """A rate, as which of the mother code's bits are sent: 1 in `pattern`, A and B in turn."""
+    """A rate of the punctured code: `pattern` is 1 where a bit is sent, outputs A and B in turn."""
 
     name: str
     rate: Fraction
     pattern: tuple[int, ...]
 
     def n_coded(self, n_bits: int) -> int:
-        """Coded bits for `n_bits` of information and the tail."""
+        """Coded bits that `n_bits` of information and the tail take."""
         return len(self.kept(n_bits))
 
     def kept(self, n_bits: int) -> NDArray[np.int32]:
-        """Which of the 2 (n_bits + 6) bits of the mother code are sent, ascending."""
+        """Which of the mother code's 2 (n_bits + 6) bits are sent, as ascending positions."""
         return _kept(self.pattern, n_bits)
 
 
@@ -55,7 +55,7 @@ THREE_QUARTERS = CodeRate("3/4", Fraction(3, 4), (1, 1, 1, 0, 0, 1))
 
 
 def encode(data: NDArray[np.uint8], code: CodeRate) -> NDArray[np.uint8]:
-    """Coded bits `[n, n_coded]` of `n` blocks of bytes `[n, n_bytes]`, each ended by a tail."""
+    """Coded bits `[n, n_coded]` of `n` blocks of bytes `[n, n_bytes]`, each followed by a tail."""
     n_bits = 8 * data.shape[1]
     bits = np.zeros((len(data), n_bits + N_TAIL), np.uint8)
     bits[:, :n_bits] = np.unpackbits(data, axis=1)
@@ -70,12 +70,12 @@ def decode(
     code: CodeRate,
     workspace: ViterbiWorkspace,
 ) -> NDArray[np.uint8]:
-    """The likeliest bytes `[n, n_bytes]` behind LLRs `[n, n_coded]`, positive for 0, ±MAX_LLR."""
+    """The likeliest bytes `[n, n_bytes]` behind LLRs `[n, n_coded]`, at most ±MAX_LLR, + for 0."""
     return decode_terminated(llr, code.kept(8 * n_bytes), n_bytes, workspace)
 
 
 def decode_list(llr: NDArray[np.int16], n_bytes: int, n_list: int) -> NDArray[np.uint8]:
-    """The `n_list` likeliest blocks `[n_list, n_bytes]`, best first, at rate 1/2; `llr` of one."""
+    """The `n_list` likeliest blocks `[n_list, n_bytes]`, best first, of one block at rate 1/2."""
     bits = np.empty((n_list, 8 * n_bytes + N_TAIL), np.uint8)
     list_decode(llr, bits)
     return np.packbits(bits[:, : 8 * n_bytes], axis=1)

@@ -1,4 +1,4 @@
-"""Symbols to LLRs, and LLRs to PDUs."""
+"""From samples to LLRs, and from LLRs to PDUs."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ _ROOM = 1 << 14
 
 
 class Demodulator:
-    """Samples to LLRs on one grid. Not for several threads at once."""
+    """Turns samples into LLRs on one grid. For one thread at a time."""
 
     def __init__(self, grid: Numerology) -> None:
         self._grid = grid
@@ -40,7 +40,7 @@ class Demodulator:
         powers: NDArray[np.float32],
         points: NDArray[np.complex64] | None = None,
     ) -> None:
-        """LLRs of symbols in the code's order to `llr` `[n · n_data · bits]`.
+        """Write the LLRs of OFDM symbols, in the code's order, to `llr` `[n · n_data · bits]`.
 
         The first one's FFT window begins with `samples`, which have turned by `frequency` cycles a
         sample since `origin` samples before. The header's first symbol is number 0. `channel` moves
@@ -58,7 +58,7 @@ class Demodulator:
 
 
 class PduDecoder:
-    """Collects LLRs of bursts and decodes each PDU when its symbols are in. One for each thread."""
+    """Collects a burst's LLRs and decodes each PDU when its symbols are in. One for each thread."""
 
     def __init__(self) -> None:
         self._workspace = new_workspace()
@@ -68,12 +68,12 @@ class PduDecoder:
         self._n_decoded = 0
 
     def start(self, plan: BurstLayout) -> None:
-        """A new burst."""
+        """Begin a new burst; LLRs of the last one are dropped."""
         self._plan = plan
         self._n_kept = self._n_filled = self._n_decoded = 0
 
     def room(self, n_symbols: int) -> NDArray[np.int16]:
-        """Where the LLRs of the next `n_symbols` symbols belong; decode them before the next."""
+        """Room for the LLRs of the next `n_symbols` symbols; call `decode` before asking anew."""
         n = self._n_kept + n_symbols * self._plan.symbol_bits
         if n > len(self._llr):
             larger = np.empty(2 * n, np.int16)
@@ -83,7 +83,7 @@ class PduDecoder:
         return self._llr[self._n_kept : n]
 
     def decode(self, n_pdus: int) -> list[bytes | None]:
-        """The next `n_pdus` PDUs, whose symbols are all in; None where a check fails."""
+        """The next `n_pdus` PDUs, whose symbols are all in; None for each whose CRC-32 is wrong."""
         plan = self._plan
         found: list[bytes | None] = []
         size, n_bits = plan.block_bytes, n_pdus * plan.coded_bits

@@ -73,13 +73,19 @@ def pdu_lost_rate(mcs: int, snr_db: float, pdu_bytes: int) -> float:
 
 
 def pdu_error_rate(mcs: int, snr_db: float, pdu_bytes: int) -> float:
-    """Probability that a PDU is not heard, 0 … 1; ValueError as there."""
+    """Probability that a PDU is not heard, 0 … 1, even because its burst is not found.
+
+    Raises ValueError for an MCS or size that no header can tell.
+    """
     lost, missed = pdu_lost_rate(mcs, snr_db, pdu_bytes), _tail(snr_db, *HALF_FOUND)
     return missed + (1 - missed) * lost
 
 
 def needed_snr_db(mcs: int, pdu_bytes: int, per: float = 0.01) -> float:
-    """SNR in dB at which `pdu_error_rate` is `per`; ValueError as there."""
+    """SNR in dB at which `pdu_error_rate` is `per`.
+
+    Raises ValueError for an MCS or size that no header can tell, and for a `per` outside 0 … 1.
+    """
     if not 0 < per < 1:
         raise ValueError(f"packet error rate: got {per}; allowed: more than 0 and less than 1")
     low, high = _LOWEST_DB, _HIGHEST_DB
@@ -103,5 +109,5 @@ def _threshold(mcs: int, pdu_bytes: int) -> tuple[float, float, int]:
 
 
 def _tail(snr_db: float, half_db: float, spread: float) -> float:
-    """Q((snr − half) / spread)."""
+    """Tail of the normal law, Q((snr − half) / spread)."""
     return 0.5 * math.erfc((snr_db - half_db) / (spread * math.sqrt(2)))

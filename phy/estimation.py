@@ -1,4 +1,4 @@
-"""A burst's channel, and the tables with which it is learned.
+"""A burst's channel, and the tables with which it is estimated.
 
 Window convention: every FFT window begins BACKOFF samples before the first echo, so that echoes a
 little earlier than it stay inside the prefix; the channel estimate holds the resulting slope.
@@ -16,8 +16,8 @@ from phy.kernels.lanes import N_LANES, whole_lanes
 from phy.numerology import Numerology
 from phy.sequences import POLARITY
 
-# Groups of the smoother, by how many samples their echoes are from the mean delay; beyond, up to a
-# prefix, the last.
+# Groups of the smoother, by how many samples their echoes are from the mean delay. One more, made
+# in _basis, holds what is farther, up to a prefix.
 _GROUPS = ((0,), (1,), (2, 3), (4, 5, 6, 7, 8))
 
 
@@ -43,7 +43,7 @@ def new_channel(grid: Numerology) -> ArgumentBlock[Channel]:
 
 
 def new_scratch(grid: Numerology) -> ArgumentBlock[Scratch]:
-    """Room to work in: one for each thread."""
+    """Working memory of the receiver's kernels on one grid: one for each thread."""
     table, width = tones(grid).content, whole_lanes(grid.n_used)
     n_bits, n_groups = max(each.bits for each in Modulation), len(table.ends) + 1
     return ArgumentBlock(
@@ -67,7 +67,7 @@ def new_scratch(grid: Numerology) -> ArgumentBlock[Scratch]:
 
 
 def in_planes(y: NDArray[np.complex64]) -> NDArray[np.float32]:
-    """Tones `[n, n_used]` as kernels take them: `[n, 2, width]`."""
+    """Tones `[n, n_used]` as kernels take them, real and imaginary parts apart `[n, 2, width]`."""
     n, n_used = y.shape
     out = np.zeros((n, 2, whole_lanes(n_used)), np.float32)
     out[:, 0, :n_used], out[:, 1, :n_used] = y.real, y.imag
@@ -76,7 +76,7 @@ def in_planes(y: NDArray[np.complex64]) -> NDArray[np.float32]:
 
 @cache
 def tones(grid: Numerology) -> ArgumentBlock[Tones]:
-    """The tables of a grid and its subcarriers."""
+    """The tables of a grid and its subcarriers, made once."""
     subcarriers = grid.used[grid.tones]
     basis, ends = _basis(subcarriers, grid)
     position = {int(k): i for i, k in enumerate(subcarriers)}
@@ -106,7 +106,7 @@ def tones(grid: Numerology) -> ArgumentBlock[Tones]:
 def _basis(
     subcarriers: NDArray[np.int64], grid: Numerology
 ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """Orthonormal rows `[n, width]` in groups, and where each group ends."""
+    """The smoother's orthonormal rows `[n, width]` in groups, and where each group ends."""
     rows: list[NDArray[np.float64]] = []
     ends = []
     outermost = tuple(range(_GROUPS[-1][-1] + 1, grid.n_cp + 1))
@@ -115,6 +115,7 @@ def _basis(
             angle = 2 * np.pi * delay * subcarriers / grid.n_fft
             rows += [np.cos(angle), np.sin(angle)] if delay else [np.ones(len(subcarriers))]
         ends.append(len(rows))
+    # QR keeps the order: what a group adds is orthogonal to the groups nearer to the mean delay.
     orthonormal, _ = np.linalg.qr(np.array(rows).T)
     out = np.zeros((len(rows), whole_lanes(grid.n_used)), np.float32)
     out[:, : grid.n_used] = orthonormal.T

@@ -17,14 +17,14 @@ from phy.numerology import Numerology
 
 N_BITS = 32
 N_CODED = 96
-"""Coded bits it takes at least."""
+"""Coded bits that a header takes at least."""
 MAX_PDUS = 63
 MAX_PDU_BYTES = 2047
 N_NETWORKS = 8
 
 CODE: CodeRate = HALF
 N_CANDIDATES = 8
-"""So many code words are tried when the likeliest fails its check."""
+"""Code words that are tried when the likeliest fails its check."""
 
 
 class BurstHeader(NamedTuple):
@@ -37,12 +37,12 @@ class BurstHeader(NamedTuple):
 
 
 def n_symbols(grid: Numerology) -> int:
-    """Symbols that a header takes."""
+    """OFDM symbols that a header takes on `grid`."""
     return -(-N_CODED // grid.n_data)
 
 
 def header_bits(header: BurstHeader, n_coded: int) -> NDArray[np.uint8]:
-    """The coded bits of a header `[n_coded]`."""
+    """The coded bits of a header `[n_coded]`, repeated until there are so many."""
     mcs, n_pdus, pdu_bytes, network = header
     fields = (mcs << 20 | n_pdus << 14 | pdu_bytes << 3 | network).to_bytes(3, "big")
     data = np.frombuffer(fields + bytes([crc8(fields)]), np.uint8)
@@ -50,7 +50,7 @@ def header_bits(header: BurstHeader, n_coded: int) -> NDArray[np.uint8]:
 
 
 def parse_header(likeliest: NDArray[np.uint8], llr: NDArray[np.int16]) -> BurstHeader | None:
-    """The header in `likeliest` `[4]`, or in other likely words of its LLRs `[76]`; or None."""
+    """The header in `likeliest` `[4]`, or in other likely words of its LLRs `[76]`, or None."""
     header = _checked(likeliest.tobytes())
     if header is not None:
         return header

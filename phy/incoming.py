@@ -14,7 +14,7 @@ SLIP_EVERY = 256
 
 
 class IncomingBurst:
-    """Where its symbols are, and what has become of its PDUs so far."""
+    """A burst being received: where its symbols are, and how many PDUs are through."""
 
     def __init__(self, acquired: Acquired, plan: BurstLayout, grid: Numerology) -> None:
         self.acquired = acquired
@@ -25,11 +25,11 @@ class IncomingBurst:
         self._window = acquired.window
         self._limit = SLIP_EVERY
         self.next_end = 0
-        """What is there before this sample completes nothing."""
+        """Absolute index up to which samples must be there for the burst to go on."""
         self._look_ahead()
 
     def window(self, symbol: int) -> int:
-        """Absolute index at which the FFT of a payload symbol begins."""
+        """Absolute index at which the FFT of payload symbol `symbol` begins."""
         return self._window + symbol * self._n_symbol
 
     def end_of(self, n: int) -> int:
@@ -37,14 +37,16 @@ class IncomingBurst:
         return self._window + n * self._n_symbol - self._n_cp
 
     def complete(self, end: int) -> tuple[int, int]:
-        """(symbols to take in all, PDUs that they complete) when samples are there up to `end`."""
+        """(symbols to take in all, PDUs that they complete) when the stream reaches index `end`."""
         plan, done = self.plan, self.n_good + self.n_bad
         here = min((end - self.end_of(0)) // self._n_symbol, plan.n_symbols, self._limit)
         n_pdus = min(here * plan.symbol_bits // plan.coded_bits, plan.n_pdus) - done
+        # At the limit all symbols are taken, also those of a PDU that is not complete: the windows
+        # slip there.
         return (here if here == self._limit else plan.symbols_through(done + n_pdus)), n_pdus
 
     def go_on(self) -> None:
-        """What there was is taken in."""
+        """Prepare for the next symbols after those so far: slip the windows if it is time."""
         if self.n_symbols_in == self._limit:
             self._limit += SLIP_EVERY
             self._slip()
@@ -55,7 +57,7 @@ class IncomingBurst:
         self.next_end = self.end_of(min(through, self._limit))
 
     def _slip(self) -> None:
-        """Follow the sender's clock by whole samples, as the slope over subcarriers tells."""
+        """Move the FFT windows by whole samples, as the slope over subcarriers tells."""
         channel, grid = self.acquired.channel, self._grid
         slope = float(channel.content.tracking[SLOPE, 0])
         early = round(slope * grid.n_fft / (2 * math.pi))

@@ -21,7 +21,7 @@ class BurstLayout:
 
     @cached_property
     def block_bytes(self) -> int:
-        """A PDU with its CRC-32."""
+        """Bytes of a PDU with its CRC-32."""
         return self.pdu_bytes + CRC32_SIZE
 
     @cached_property
@@ -33,12 +33,12 @@ class BurstLayout:
 
     @cached_property
     def coded_bits(self) -> int:
-        """Coded bits of a PDU."""
+        """Coded bits of one PDU, all its parity included."""
         return self.form.n_coded
 
     @cached_property
     def least_bits(self) -> int:
-        """What they would be at the code's rate."""
+        """Coded bits that a PDU takes at exactly the rate of its MCS."""
         return least_coded(8 * self.block_bytes, self.mcs.rate)
 
     @cached_property
@@ -48,12 +48,12 @@ class BurstLayout:
 
     @cached_property
     def n_symbols(self) -> int:
-        """Payload symbols of the burst."""
+        """Number of payload symbols of the burst."""
         return -(-self.n_pdus * self.least_bits // self.symbol_bits)
 
     @cached_property
     def n_samples(self) -> int:
-        """Samples of the whole burst, preamble and header included."""
+        """Number of samples of the whole burst, preamble and header included."""
         n_symbols = header.n_symbols(self.grid) + self.n_symbols
         return preamble.length(self.grid) + n_symbols * self.grid.n_symbol
 
@@ -64,7 +64,7 @@ class BurstLayout:
 
 @lru_cache(maxsize=256)
 def layout(grid: Numerology, mcs: int, n_pdus: int, pdu_bytes: int) -> BurstLayout:
-    """The layout of a burst. Raises ValueError, naming what is allowed."""
+    """The layout of a burst. Raises ValueError for what no header can tell."""
     for name, value, low, high in (
         ("MCS", mcs, 0, len(MCS_TABLE) - 1),
         ("PDUs in a burst", n_pdus, 1, header.MAX_PDUS),
@@ -76,7 +76,7 @@ def layout(grid: Numerology, mcs: int, n_pdus: int, pdu_bytes: int) -> BurstLayo
 
 
 def most_pdus(grid: Numerology, mcs: int, pdu_bytes: int, n_samples: int) -> int:
-    """How many PDUs a burst of at most `n_samples` holds; at least 1, at most 63."""
+    """Number of PDUs that a burst of at most `n_samples` holds; at least 1, at most 63."""
     one = layout(grid, mcs, 1, pdu_bytes)
     fixed = preamble.length(grid) + header.n_symbols(grid) * grid.n_symbol
     symbols = max(0, n_samples - fixed) // grid.n_symbol

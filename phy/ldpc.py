@@ -45,12 +45,12 @@ class QuasiCyclic:
 
     @property
     def n(self) -> int:
-        """Bits of a codeword."""
+        """Bits of a codeword, 24 Z."""
         return N_COLUMNS * self.z
 
     @property
     def k(self) -> int:
-        """Its bits of information, which come first."""
+        """Information bits of a codeword, which come first."""
         return self.n - len(self.base) * self.z
 
     @cached_property
@@ -66,7 +66,7 @@ class QuasiCyclic:
 
     @cached_property
     def shifts(self) -> NDArray[np.int32]:
-        """Shift of each edge `[edges]`."""
+        """Shift of each edge `[edges]`, row by row."""
         found: NDArray[np.int32] = self.base[self.base >= 0]
         return found
 
@@ -119,15 +119,16 @@ class Segmentation:
 
 
 def least_coded(n_bits: int, rate: Fraction) -> int:
-    """Bits that a block of `n_bits` takes at `rate`."""
+    """Coded bits that a block of `n_bits` takes at exactly `rate`."""
     return math.ceil(n_bits / rate)
 
 
 @lru_cache(maxsize=256)
 def segmentation(n_bits: int, rate: Fraction, room: int) -> Segmentation:
-    """A block of `n_bits` in as much of `room` coded bits as the code can use.
+    """How to put a block of `n_bits` into at most `room` coded bits.
 
-    The fewest codewords, and of those the shortest. `room` is at least `least_coded`.
+    It takes the fewest codewords, and of those the shortest. `room` is at least `least_coded`; what
+    the codewords cannot use of it is left.
     """
     n_codewords = -(-n_bits // _code(LIFTINGS[-1], rate).k)
     code = next(each for z in LIFTINGS if n_codewords * (each := _code(z, rate)).k >= n_bits)
@@ -161,8 +162,8 @@ def decode(
 ) -> NDArray[np.uint8]:
     """The likeliest bytes `[blocks, n_bits / 8]` behind LLRs `[blocks · n_coded]`, positive for 0.
 
-    A block whose checks do not hold after `max_iterations` is given as it stands then. The bytes of
-    all are XORed with `white`.
+    A block whose checks do not hold after `max_iterations` is returned as it stands then. The bytes
+    of all blocks are XORed with `white`.
     """
     out = np.empty((llr.size // form.n_coded, form.n_bits // 8), np.uint8)
     if white is None:

@@ -121,4 +121,4 @@ BASE = {
         16 29 36 41 44 56 59 37 50 24  . 65  4 65 52  .  4  . 73 52  1  .  .  0
     """,
 }
-"""By lifting size Z and code rate."""
+"""Base matrices by lifting size Z and code rate."""

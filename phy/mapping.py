@@ -1,4 +1,4 @@
-"""Coded bits to the subcarriers of OFDM symbols: interleaver, constellation, pilots, FFT."""
+"""From coded bits to samples of OFDM symbols: interleaver, constellation, pilots, inverse FFT."""
 
 from functools import cache
 
@@ -18,7 +18,7 @@ from phy.sequences import PADDING
 
 
 class Mapping:
-    """The tables of one modulation on one grid."""
+    """Maps coded bits to samples, with one modulation on one grid."""
 
     def __init__(self, modulation: Modulation, grid: Numerology) -> None:
         self.grid = grid
@@ -37,9 +37,10 @@ class Mapping:
     def to_samples(
         self, coded: NDArray[np.uint8], first_symbol: int, peak: float
     ) -> NDArray[np.complex64]:
-        """Samples `[n · n_symbol]` of coded bits `[n · symbol_bits]`, the header's symbol being 0.
+        """Samples `[n · n_symbol]` of coded bits `[n · symbol_bits]`, at mean power 1.
 
-        At mean power 1, none beyond `peak`.
+        The first symbol is number `first_symbol`, the header's first being 0. No magnitude exceeds
+        `peak`.
         """
         grid = self.grid
         out = np.empty(len(coded) // self.symbol_bits * grid.n_symbol, np.complex64)
@@ -55,7 +56,11 @@ class Mapping:
         peak: float,
         out: NDArray[np.complex64],
     ) -> None:
-        """The same of `n_blocks` blocks of bytes, coded by `form`; `out` are whole symbols."""
+        """Write `n_blocks` blocks of bytes, coded by `form`, as samples of whole symbols to `out`.
+
+        The first symbol is number `first_symbol`, the header's first being 0. No magnitude exceeds
+        `peak`.
+        """
         kernel.modulate(
             blocks, n_blocks, PADDING, first_symbol, peak,
             form.packed, tones(self.grid).packed, self._map.packed, out,
@@ -64,13 +69,13 @@ class Mapping:
 
 @cache
 def mapping(modulation: Modulation, grid: Numerology) -> Mapping:
-    """The tables, made once."""
+    """The `Mapping` of a modulation on a grid, made once."""
     return Mapping(modulation, grid)
 
 
 @cache
 def axes(modulation: Modulation, grid: Numerology) -> ArgumentBlock[Axes]:
-    """The way back, as the equaliser wants it."""
+    """The way from points back to coded bits, as tables for the equaliser."""
     order = mapping(modulation, grid).order
     plane, subcarrier = order % modulation.bits, order // modulation.bits
     gather = (plane * grid.n_data + subcarrier).astype(np.uint32)

@@ -10,7 +10,7 @@ HEADER_MCS = 0
 
 @dataclass(frozen=True)
 class Mcs:
-    """A modulation and a code rate, by the number that the burst header carries."""
+    """A modulation and a code rate, with the index that the burst header carries."""
 
     index: int
     modulation: Modulation
@@ -18,22 +18,22 @@ class Mcs:
 
     @property
     def name(self) -> str:
-        """As people say it: `QPSK 1/2`."""
+        """The scheme's usual name, such as `QPSK 1/2`."""
         return f"{self.modulation.label} {self.rate}"
 
     @property
     def peak_db(self) -> float:
-        """Peaks over the mean power that are sent; what is cut off errs less than noise does."""
+        """Largest peak over the mean power in dB; what is cut off beyond is less than the noise."""
         return _PEAKS_DB[self.modulation]
 
     @property
     def peak(self) -> float:
-        """The same as a factor of the mean amplitude."""
+        """Largest magnitude of a sample, as a factor of the rms amplitude."""
         return float(10 ** (self.peak_db / 20))
 
     @property
     def bits_per_subcarrier(self) -> Fraction:
-        """Information bits on one data subcarrier."""
+        """Information bits on one data subcarrier of a symbol."""
         return self.modulation.bits * self.rate
 
 

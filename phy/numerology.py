@@ -11,7 +11,10 @@ Subcarriers = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Numerology:
-    """An OFDM grid, one object each. Subcarriers are numbered from -n_fft/2; 0 is DC: nothing."""
+    """An OFDM grid, of which there is one object each.
+
+    Subcarriers are numbered from −n_fft/2; subcarrier 0, at DC, is unused.
+    """
 
     n_fft: int
     n_cp: int
@@ -27,22 +30,22 @@ class Numerology:
 
     @cached_property
     def n_data(self) -> int:
-        """Data subcarriers."""
+        """Number of data subcarriers of a symbol."""
         return self.n_used - len(self.pilots)
 
     @property
     def n_used(self) -> int:
-        """Subcarriers that are on."""
+        """Number of subcarriers in use, data and pilots."""
         return 2 * self.edge
 
     @cached_property
     def used(self) -> Subcarriers:
-        """Numbers of the subcarriers that are on, ascending `[n_used]`."""
+        """Numbers of the subcarriers in use, ascending `[n_used]`."""
         return np.array([k for k in range(-self.edge, self.edge + 1) if k], np.int64)
 
     @cached_property
     def bins(self) -> Subcarriers:
-        """FFT bins of `used` `[n_used]`."""
+        """FFT bins of the subcarriers in use, in the order of `used` `[n_used]`."""
         return self.used % self.n_fft
 
     @cached_property
@@ -82,7 +85,7 @@ OFDM_64_8 = _map_of_802_11(8)
 OFDM_128_16 = Numerology(
     128, 16, 52, (-45, -32, -19, -6, 6, 19, 32, 45), (1, 1, -1, 1, 1, 1, 1, -1)
 )
-"""As long echoes at half the price, for who moves slowly."""
+"""Echoes as long as on OFDM_64_16 at half the price, for robots that move slowly."""
 OFDM_256_32 = Numerology(
     256, 32, 104,
     (-97, -84, -71, -58, -45, -32, -19, -6, 6, 19, 32, 45, 58, 71, 84, 97),

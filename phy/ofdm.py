@@ -1,4 +1,4 @@
-"""Samples to subcarriers: one FFT a symbol."""
+"""From samples to subcarriers: one FFT for each symbol."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ def to_tones(
     grid: Numerology,
     origin: int = 0,
 ) -> NDArray[np.float32]:
-    """Tones `[n, 2, width]`, real and imaginary parts, of the windows that begin at `starts`.
+    """Tones `[n, 2, width]`, real and imaginary parts, of the FFT windows that begin at `starts`.
 
     Before, `dc` is taken off and the samples are turned back by `frequency` cycles a sample, with
     phase 0 `origin` samples before `samples[0]`. A subcarrier sent as 1 arrives as 1 through a

@@ -19,7 +19,7 @@ _REST = np.zeros(4, np.complex64)
 
 
 def low_pass(factor: int) -> NDArray[np.float32]:
-    """The filter's taps on the fast side `[2 factor REACH + 1]`, their sum 1."""
+    """The filter's taps on the fast side `[2 factor REACH + 1]`; their sum is 1."""
     n = np.arange(-factor * REACH, factor * REACH + 1)
     taps = np.sinc(2 * _CUTOFF * n / factor) * np.kaiser(len(n), _KAISER_BETA)
     unit: NDArray[np.float32] = (taps / taps.sum()).astype(np.float32)
@@ -27,9 +27,9 @@ def low_pass(factor: int) -> NDArray[np.float32]:
 
 
 def upsample(burst: NDArray[np.complex64], factor: int) -> NDArray[np.complex64]:
-    """A burst `[n]` at `factor` times its rate, with the filter's rise and fall around it.
+    """A burst `[n]` at `factor` times its rate `[(n + 2 REACH) · factor]`.
 
-    Sample `i` of it is at `(i + REACH) · factor`; `[(n + 2 REACH) · factor]`.
+    The filter's rise and fall are around it: sample `i` of the burst is at `(i + REACH) · factor`.
     """
     n = len(burst) + 2 * REACH
     padded = np.zeros(len(burst) + 4 * REACH + len(_REST), np.complex64)
@@ -44,7 +44,7 @@ def upsample(burst: NDArray[np.complex64], factor: int) -> NDArray[np.complex64]
 
 
 class Downsampler:
-    """A stream at `factor` times the modem's rate to the modem's. Any chunking gives the same."""
+    """Brings a stream at `factor` times the modem's rate down to it, however it is chunked."""
 
     def __init__(self, factor: int) -> None:
         self._factor = factor
@@ -53,7 +53,7 @@ class Downsampler:
         self.restart(0)
 
     def restart(self, index: int) -> None:
-        """The next sample to be pushed has this index on the fast side; silence came before it."""
+        """Begin anew: the next sample has this index on the fast side, with silence before it."""
         reach = self._factor * REACH
         self.next_index = -(-index // self._factor)
         """Index on the slow side of the next sample to come out."""
@@ -61,7 +61,7 @@ class Downsampler:
         self._kept = np.zeros(index - self.next_index * self._factor + reach, np.complex64)
 
     def push(self, samples: NDArray[np.complex64]) -> NDArray[np.complex64]:
-        """The next samples `[n]`; what can be told of the slow side, REACH samples behind."""
+        """Take the next samples `[n]`; the slow side's samples that they complete, REACH behind."""
         factor, reach = self._factor, self._factor * REACH
         x = np.concatenate((self._kept, samples, _REST))
         self._end += len(samples)
@@ -73,12 +73,12 @@ class Downsampler:
         return out
 
     def flush(self) -> NDArray[np.complex64]:
-        """The last samples, as if silence followed."""
+        """The slow side's last samples, as if silence followed."""
         return self.push(np.zeros(self._factor * REACH, np.complex64))
 
 
 def _twice(taps: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Each tap for real and imaginary part, up to whole lanes."""
+    """Each of `taps` twice, for real and imaginary part, with zeros up to whole lanes."""
     out = np.zeros(-(-2 * len(taps) // 8) * 8, np.float32)
     out[: 2 * len(taps)] = np.repeat(taps, 2)
     return out

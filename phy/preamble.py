@@ -1,4 +1,4 @@
-"""What every burst begins with, which a receiver knows: 352 samples on a grid of 64 subcarriers.
+"""What every burst begins with and every receiver knows: 352 samples on a grid of 64 subcarriers.
 
 Twelve short segments of 16 samples, each the one before times ±1 by the Barker code of length 11
 (the cover): DC, a tone and the plain repetition of 802.11 do not look like it. Then a prefix and
@@ -40,7 +40,7 @@ _SHORT_SIGNS = {
 
 
 def guard(grid: Numerology = OFDM_64_16) -> int:
-    """Samples of the prefix before the long training."""
+    """Samples of the prefix before the long training symbols."""
     return max(32, 2 * grid.n_cp)
 
 
@@ -63,7 +63,7 @@ def long_subcarriers(grid: Numerology = OFDM_64_16) -> NDArray[np.float32]:
 
 
 def short_subcarriers(grid: Numerology = OFDM_64_16) -> NDArray[np.complex64]:
-    """A short segment on the subcarriers in use, at mean power 1 in time `[n_used]`.
+    """A short segment on the subcarriers in use `[n_used]`, at mean power 1 in time.
 
     In time it is the same on every grid.
     """
@@ -75,14 +75,14 @@ def short_subcarriers(grid: Numerology = OFDM_64_16) -> NDArray[np.complex64]:
 
 
 def in_time(subcarriers: NDArray[np.complex64], grid: Numerology) -> NDArray[np.complex64]:
-    """One period of a symbol, without prefix `[n_fft]`."""
+    """One period of a symbol in time `[n_fft]`, without a prefix."""
     spectrum = np.zeros(grid.n_fft, np.complex128)
     spectrum[grid.bins] = subcarriers
     return (np.fft.ifft(spectrum) * grid.scale).astype(np.complex64)
 
 
 def long_symbol(grid: Numerology = OFDM_64_16) -> NDArray[np.complex64]:
-    """The long training symbol `[n_fft]`."""
+    """The long training symbol in time `[n_fft]`, without a prefix."""
     return in_time(long_subcarriers(grid).astype(np.complex64), grid)
 
 

@@ -1,10 +1,10 @@
-"""What the receiver tells."""
+"""The events that a receiver tells, and what it counts."""
 
 from typing import NamedTuple
 
 
 class BurstQuality(NamedTuple):
-    """A burst as received.
+    """A burst's header, and how well it was received.
 
     `start` is the absolute index of the preamble's first sample. SNR is mean burst power over noise
     power in the sample band; EVM is that of the header's points.

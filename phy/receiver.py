@@ -33,10 +33,11 @@ MOST = 0.5
 """False alarms raise the threshold at most up to here: to bursts as strong as all else together."""
 PLAINEST = 0.7
 """A peak that is so strong without the preamble's code is none of it."""
-# By so much each of them does.
+# By so much each false alarm raises the threshold.
 _WARIER = 0.1
 # After a false alarm, the search goes on so many samples later.
 RETRY_AFTER = 16
+# Samples taken at once, so that memory does not grow with how many come in one call.
 PIECE = 1 << 13
 # A PDU fails with less than this share of the burst's power above the noise: the burst is gone.
 _FADED = 0.25
@@ -77,7 +78,7 @@ class Receiver:
         # What acquisition needs: from so many samples before the peak on, so many.
         self._before = before(grid) - 1 - preamble.guard(grid)
         self._span = before(grid) + needed_after(grid)
-        # For acquisition, before the sample at which the search stands.
+        # Samples before that at which the search stands, kept for acquisition.
         self._kept = before(grid) + preamble.SHORT + HISTORY
         self._stream = SampleStream(start, 1 << 16)
         self._state = State.SEARCH
@@ -87,7 +88,7 @@ class Receiver:
             State.ACQUIRE: self._acquire,
             State.PAYLOAD: self._payload,
         }
-        # Of the burst in question, as far as it is known in that state.
+        # The burst in question, as far as it is known in the present state.
         self._burst: IncomingBurst | None = None
         self._crossing, self._peak, self._coarse = start, start, 0.0
         self._excess, self._raised_at, self._began = 0.0, start, start
@@ -103,7 +104,7 @@ class Receiver:
         return self._stream.end
 
     def push(self, samples: NDArray[np.complex64]) -> list[Event]:
-        """Take the next samples `[n]`, complex64; what they complete."""
+        """Take the next samples `[n]`, complex64; the events that they complete."""
         events: list[Event] = []
         for first in range(0, len(samples), PIECE):
             piece = samples[first : first + PIECE]
@@ -115,7 +116,7 @@ class Receiver:
         return events
 
     def gap(self, n: int) -> list[Event]:
-        """`n` samples are missing here: a burst they cut is over, the search begins behind them."""
+        """Note that `n` samples are missing: a burst they cut is over, the search begins anew."""
         if n < 0:
             raise ValueError(f"gap: got {n} samples; allowed: 0 or more")
         self.counters["gaps"] += 1
@@ -130,7 +131,7 @@ class Receiver:
         return events
 
     def flush(self) -> list[Event]:
-        """The stream has ended: what its last samples hold, as if silence followed."""
+        """End the stream: the events that its last samples hold, as if silence followed."""
         n = self._grid.n_symbol + HOP + ALIGN_SPAN + needed_after(self._grid)
         samples, self._began = self.counters["samples"], self._stream.end + n
         events = self.push(np.zeros(n, np.complex64))
@@ -147,10 +148,10 @@ class Receiver:
         self._at = self._began = index
 
     def _go(self, found: Found) -> None:
-        """Go over to the next state."""
+        """Go over to the state that follows what was found."""
         self._state = after(self._state, found)
 
-    # One step for each state. False: samples are missing for it.
+    # One step for each state; False when it needs samples that are not there yet.
 
     def _search(self, _: list[Event]) -> bool:
         """Slide the metric over whole hops of samples, up to the first crossing."""
@@ -185,7 +186,7 @@ class Receiver:
         return True
 
     def _was_nothing(self, peak: int) -> None:
-        """Whoever makes such peaks and sends no preamble must do better to be looked at again."""
+        """Search on after a false alarm, with a raised threshold: who caused it may do so again."""
         self._go(Found.NOTHING)
         self._at = peak + RETRY_AFTER
         # Where noise begins, its first samples resemble anything.

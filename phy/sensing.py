@@ -42,23 +42,23 @@ class EnergyDetector:
 
     @property
     def busy_until(self) -> int:
-        """Absolute index after the last busy window; `start` if there was none."""
+        """Absolute index after the last busy window; `start` if there has been none."""
         return int(self._state[BUSY_UNTIL])
 
     @property
     def noise_dbfs(self) -> float:
-        """The noise floor in dB below full scale; before the first window, the least there is."""
+        """The noise floor in dBFS; LEAST_FLOOR before the first window."""
         return 10 * math.log10(max(float(self._state[FLOOR]), LEAST_FLOOR))
 
     def push(self, samples: NDArray[np.complex64]) -> None:
-        """Take the next samples `[n]`, complex64."""
+        """Take the next samples `[n]`, complex64, and judge the windows that they complete."""
         # Read-only and in one piece, whatever came: else numba compiles anew for every kind.
         x = np.ascontiguousarray(samples, np.complex64).view()
         x.setflags(write=False)
         sense(x, self._threshold, LARGEST_SAMPLE, self._state)
 
     def gap(self, n: int) -> None:
-        """`n` samples are missing here. The floor is kept, a window that they cut is given up.
+        """Note that `n` samples are missing here: the floor is kept, a window that they cut is not.
 
         The next window begins right behind them, not at a multiple of WINDOW: so it always is
         WINDOW samples that were heard, and those behind a gap count at once.

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 
 def lfsr(taps: tuple[int, ...], state: int, n_bits: int) -> NDArray[np.uint8]:
-    """`n_bits` of the feedback register with polynomial 1 + Σ x^tap; `state` ≠ 0 starts it."""
+    """`n_bits` bits of the feedback register with polynomial 1 + Σ x^tap, from `state` ≠ 0 on."""
     degree = max(taps)
     out = np.empty(n_bits, np.uint8)
     for i in range(n_bits):
@@ -23,7 +23,7 @@ POLARITY = np.resize(1 - 2 * lfsr((4, 7), 0b1111111, 127).astype(np.float32), _M
 
 
 def polarity(n_symbols: int, start: int = 0) -> NDArray[np.float32]:
-    """Sign of the pilots from symbol `start`."""
+    """Signs of the pilots of `n_symbols` symbols from symbol `start` on."""
     return POLARITY[start : start + n_symbols]
 
 
@@ -35,5 +35,5 @@ PADDING = np.unpackbits(_WHITE[:256])
 
 
 def whitening(n_bytes: int, start: int = 0) -> NDArray[np.uint8]:
-    """What the bytes of a burst from `start` are XORed with, so that zeros make no peaks."""
+    """The sequence that whitens a burst's bytes from `start` on, by XOR: zeros make no peaks."""
     return _WHITE[start : start + n_bytes]

@@ -77,7 +77,7 @@ class IllegalStepError(Exception):
 
 
 def after(state: State, found: Found) -> State:
-    """The state that follows. Raises IllegalStepError."""
+    """The state that follows `state` on `found`. Raises IllegalStepError where there is none."""
     following = NEXT.get((state, found))
     if following is None:
         raise IllegalStepError(f"{found.name} in {state.name}")

@@ -10,7 +10,7 @@ LARGEST_SAMPLE = 1e6
 
 
 class SampleStream:
-    """Appends at the end, forgets at the beginning; what is kept lies in one piece."""
+    """Samples appended at the end and forgotten at the beginning; those kept lie in one piece."""
 
     def __init__(self, start: int, capacity: int) -> None:
         self._samples = np.zeros(capacity, np.complex64)
@@ -29,7 +29,7 @@ class SampleStream:
         return self._start + self._size
 
     def append(self, samples: NDArray[np.complex64]) -> int:
-        """Take samples; those that are no numbers become 0. Returns how many were."""
+        """Take samples, setting those not finite or too large to 0; returns how many were."""
         n = len(samples)
         if self._begin + self._size + n > len(self._samples):
             self._make_room(n)
@@ -40,12 +40,12 @@ class SampleStream:
         return int(sanitise(room, LARGEST_SAMPLE))
 
     def view(self, first: int, last: int) -> NDArray[np.complex64]:
-        """Samples from `first` up to before `last`, not copied: valid until the next `append`."""
+        """Samples from `first` up to before `last`, as a view valid until the next `append`."""
         begin = self._begin + first - self._start
         return self._samples[begin : begin + last - first]
 
     def forget_before(self, index: int) -> None:
-        """Samples before `index` are not needed any more."""
+        """Forget the samples before `index`."""
         n = min(max(0, index - self._start), self._size)
         self._begin += n
         self._start += n

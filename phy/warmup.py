@@ -31,7 +31,7 @@ _ELSEWHERE = {"demodulator.learn_channel", "ldpc_encoder.encode_blocks", "viterb
 
 
 def warm_up(progress: Progress | None = None) -> None:
-    """Run all that is compiled. Minutes on a fresh machine, a fraction of a second later.
+    """Run every kernel that a link uses. Minutes on a fresh machine, a fraction of a second later.
 
     `progress(done, total)` is told of each kernel when it has been compiled; of none that is loaded
     from the cache. What it raises ends the warm-up, and what is compiled by then stays so.
@@ -43,17 +43,17 @@ def warm_up(progress: Progress | None = None) -> None:
 
 
 class _Compiled(Listener):
-    """Counts kernels that can be run, by whatever means."""
+    """Counts the kernels that are ready to run, whether compiled or loaded."""
 
     def __init__(self, progress: Progress) -> None:
         self._progress = progress
         self._kernels = _kernels()
 
     def on_start(self, event: Event) -> None:
-        """Nothing is told of it."""
+        """Ignore the start of a compilation: only its end is told."""
 
     def on_end(self, event: Event) -> None:
-        """One more, or a step of one."""
+        """Tell how many kernels are ready, now that one or a step of one has been compiled."""
         compiled = event.data["dispatcher"]
         if compiled in self._kernels:
             done = sum(kernel is compiled or bool(kernel.overloads) for kernel in self._kernels)
@@ -61,7 +61,7 @@ class _Compiled(Listener):
 
 
 def _kernels() -> set[Any]:
-    """Those of a link; steps, which are not cached, are compiled with each."""
+    """The kernels that a link runs; steps, which are not cached, are compiled with each of them."""
     modules = [module for name, module in sys.modules.items() if name.startswith("phy.kernels.")]
     found: dict[str, Any] = {
         f"{each.py_func.__module__.removeprefix('phy.kernels.')}.{name}": each
@@ -100,7 +100,7 @@ def _run() -> None:
 def _with_bad_header(
     burst: NDArray[np.complex64], rng: np.random.Generator
 ) -> NDArray[np.complex64]:
-    """One whose header's check fails: other headers that are likely are tried."""
+    """The burst with a header that fails its check, so that other likely headers are tried."""
     n = header.n_symbols(OFDM_64_16) * OFDM_64_16.n_symbol
     bad = burst.copy()
     bad[preamble.length() :][:n] = rng.permutation(burst[preamble.length() :][:n])

@@ -51,7 +51,7 @@ def _read(path: Path) -> Setup:
 
 
 def _checked(setup: Setup) -> list[str]:
-    """What follows from the configuration, and what only the radio can tell. Raises UserError."""
+    """Lines on what follows from the configuration and from the radio. Raises UserError."""
     told = daemon.check(setup)
     verdict = (
         "the file is good; what is not checked shows when the daemon starts"

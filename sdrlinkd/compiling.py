@@ -1,4 +1,4 @@
-"""Compiling the modem, which is done once, and telling how far it is."""
+"""Compiles the modem, which is done once, and tells how far it is."""
 
 import os
 import time

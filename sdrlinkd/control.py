@@ -24,7 +24,7 @@ Arguments = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Verb:
-    """What a request does; `changes` verbs are for root and the service's own user."""
+    """What answers a request; verbs with `changes` are for root and the service's own user."""
 
     answer: Callable[[Arguments], object]
     help: str
@@ -116,7 +116,7 @@ class Control:
 
 
 def error(code: str, reason: str) -> tuple[bytes, object]:
-    """An error answer."""
+    """The answer to a request that cannot be served, with its status."""
     return b"err", {"code": code, "reason": reason}
 
 

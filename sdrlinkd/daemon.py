@@ -93,7 +93,7 @@ async def run(setup: Setup, reload: Reload) -> None:
 
 @contextlib.asynccontextmanager
 async def _only_one_error() -> AsyncIterator[None]:
-    """What a person has to mend is no group of errors. Raises UserError."""
+    """Take the error that a person has to mend out of its group. Raises UserError."""
     try:
         yield
     except BaseExceptionGroup as group:  # Python 3.11.2 groups anew what `except*` raises.
@@ -170,7 +170,7 @@ def _make_pdu_link(
         return DirectLink(config.direct, config.link.pdu_size, rng)
     if config.backend == "gnuradio":
         return make_gnuradio(config)
-    # Else a busy event loop keeps the modem's threads from the interpreter for 5 ms at a time.
+    # By default, a busy event loop keeps the modem's threads from the interpreter for 5 ms.
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     # The modem brings numba, which takes its time to load.
     from sdrlinkd.modem import make_modem
@@ -179,8 +179,8 @@ def _make_pdu_link(
 
 
 def _types_of(setup: Setup) -> tuple[frozenset[int], dict[int, bytes]]:
-    """(topics with a header, stop messages by topic id)."""
-    # They bring the message types.
+    """(ids of topics with a header, stop messages by topic id). Raises ConfigError."""
+    # These bring the message types.
     from sdrlinkd.adapters import header_topics, stop_messages
 
     return header_topics(setup), stop_messages(setup)
@@ -197,7 +197,7 @@ def _chrony(setup: Setup, stack: contextlib.AsyncExitStack) -> "ChronySocket | N
 
 
 def check(setup: Setup) -> list[str]:
-    """What only the message types and the radio's nature can tell. Raises ConfigError."""
+    """Lines on what only message types and the kind of radio tell. Raises ConfigError."""
     _types_of(setup)
     # The modem brings numba, which takes its time to load.
     from sdrlinkd.modem import access_words, check_airtime
@@ -213,7 +213,7 @@ def check(setup: Setup) -> list[str]:
 def _transforms(setup: Setup) -> dict[int, "Transforms"]:
     if not setup.transforms:
         return {}
-    # It brings the message types.
+    # This brings the message types.
     from sdrlinkd.adapters import Transforms
 
     return {topic_id: Transforms(setup.config.tf) for topic_id in setup.transforms}
@@ -240,8 +240,9 @@ def _runtime_directory(config: Config) -> Path:
 
 
 async def _watch(notifier: Notifier, node: Node, control: Control) -> None:
-    """Feed the watchdog from the event loop, keep the status line fresh, and log the story of the
-    drive; for ever.
+    """Feed the watchdog, keep the status line fresh, and log the story of the drive; for ever.
+
+    It runs on the event loop: when that stands still, the watchdog is not fed.
     """
     period_s = WATCH_PERIOD_S
     if notifier.watchdog_s:
@@ -256,7 +257,7 @@ async def _watch(notifier: Notifier, node: Node, control: Control) -> None:
 
 
 def status_line(snapshot: Snapshot) -> str:
-    """One line for systemd and the log."""
+    """The daemon's state in one line, for systemd and the log."""
     tx, rx = snapshot.link.tx, snapshot.link.rx
     verdict = ": ".join([snapshot.verdict.level, *snapshot.verdict.reasons[:1]])
     return (

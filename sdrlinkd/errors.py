@@ -25,7 +25,7 @@ class UserError(SdrlinkError):
 
 
 class ConfigError(UserError):
-    """A configuration key; the message cites key, given and allowed."""
+    """A configuration key that cannot be used; the message cites key, given and allowed."""
 
 
 class RegistryError(UserError):
@@ -45,9 +45,7 @@ class LinkAbsentError(SdrlinkError):
 
 
 class LinkRefusedError(SdrlinkError):
-    """A radio or hub that is there and does not take its settings; the message cites key, given and
-    allowed.
-    """
+    """A radio or hub that refuses its settings; the message cites key, given and allowed."""
 
 
 class CdrError(SdrlinkError):

@@ -28,10 +28,10 @@ class HostClock:
         self._ahead_ns: int | None = None
         self._error_s = 0.0
         self.steps = 0
-        """Times that it was set."""
+        """How often the host's clock was set."""
 
     def look(self, now: float) -> None:
-        """What the host's clock is ahead of the link's, which is at `now`, and how steadily."""
+        """Measure how far the host's clock is ahead of the link's at `now`, and how steadily."""
         wall_ns = time.time_ns() - round(1e9 * now)
         if self._wall_ns is not None:
             moved_s = 1e-9 * abs(wall_ns - self._wall_ns)

@@ -1,4 +1,4 @@
-"""Log lines with the journal's priorities, where it is the journal that reads them."""
+"""Log lines with the journal's priorities, where the journal reads them."""
 
 import logging
 import os
@@ -26,6 +26,6 @@ class JournalFormatter(logging.Formatter):
     """Begins each line with its priority in angle brackets (sd-daemon(3))."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """Every line of a message has its own."""
+        """The record as text, in which every line has the priority."""
         mark = f"<{_PRIORITIES.get(record.levelno, 5)}>"
         return "\n".join(mark + line for line in super().format(record).splitlines())

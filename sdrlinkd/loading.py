@@ -8,11 +8,11 @@ log = logging.getLogger("sdrlinkd")
 
 
 class _GivenUpError(Exception):
-    """Nobody waits for it any more."""
+    """Nobody waits for the modem any more."""
 
 
 class Loading:
-    """Done once, whoever waits for it and gives up; `told` is how far it is, for people."""
+    """Loads the modem once, whoever waits or gives up; `told` is how far it is, for people."""
 
     def __init__(self) -> None:
         self._is_given_up = threading.Event()
@@ -32,7 +32,7 @@ class Loading:
         self._is_given_up.set()
 
     def _load(self) -> None:
-        # It brings numba, which takes its time.
+        # This brings numba, which takes its time.
         from sdrlinkd.compiling import compile_modem
 
         try:

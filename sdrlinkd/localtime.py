@@ -16,11 +16,11 @@ OLDEST_NS = 10 * SECOND_NS
 was set, no message is believed to be older.
 """
 STEP_NS = SECOND_NS
-"""By more than this a clock does not move unless it is set."""
+"""By more than this in ns, a clock does not move unless it is set."""
 
 
 class LocalTimes(NamedTuple):
-    """In ns since 1970, with bounds of their errors in µs; None: not known."""
+    """Times of a message in ns since 1970, bounds of their errors in µs; None: not known."""
 
     published_ns: int | None = None
     published_error_us: int | None = None
@@ -34,7 +34,7 @@ UNKNOWN = LocalTimes()
 def local_times(
     link: Link, message: Delivered, age_s: float, now: float, now_ns: int, stamped: Collection[int]
 ) -> LocalTimes:
-    """Of a message that is `age_s` old at `now`, which is `now_ns` by the host's clock.
+    """The times of a message that is `age_s` old at `now`, `now_ns` by the host's clock.
 
     Topics in `stamped` begin with a std_msgs/Header.
     """
@@ -57,7 +57,7 @@ def local_times(
 
 
 def header_stamp_ns(cdr: bytes) -> int | None:
-    """The time in the std_msgs/Header that a CDR message begins with; None where there is none."""
+    """The time in the std_msgs/Header that a CDR message begins with, in ns; None: no such."""
     if len(cdr) < STAMP_AT + _LITTLE.size:
         return None
     seconds, ns = (_LITTLE if cdr[1] & 1 else _BIG).unpack_from(cdr, STAMP_AT)
@@ -71,21 +71,26 @@ def _us(seconds: float) -> int:
 
 
 def host_clocks() -> tuple[int, int]:
-    """The host's time since 1970, and a clock of it that is never set and runs on while it sleeps;
-    both in ns.
+    """The host's time since 1970, and a clock that is never set, both in ns.
+
+    The latter is the host's, too, and runs on while it sleeps.
     """
     return time.time_ns(), time.clock_gettime_ns(time.CLOCK_BOOTTIME)
 
 
 class PublishClock:
-    """How old messages are by when their producers say they were published; see `host_clocks`."""
+    """Tells how old messages are from when they were published, as their producers say."""
 
     def __init__(self) -> None:
         self._ahead_ns: int | None = None
         self._set_at_ns = -OLDEST_NS
 
     def age_s(self, published_ns: int, now_ns: int, own_ns: int) -> float:
-        """Seconds since then; 0 where that cannot be told: the host's clock was set in between."""
+        """Seconds since a message was published; 0 where its time is in the future, or unsure.
+
+        It is unsure where the host's clock was set in between. `now_ns` and `own_ns` are
+        `host_clocks`.
+        """
         ahead_ns = now_ns - own_ns
         if self._ahead_ns is not None and abs(ahead_ns - self._ahead_ns) > STEP_NS:
             self._set_at_ns = own_ns

@@ -90,7 +90,7 @@ class Node:
         overrides: Overrides = AS_CONFIGURED,
         published_ns: int | None = None,
     ) -> None:
-        """A message from a producer."""
+        """Take a message from a producer."""
         now = self._pdu_link.now()
         if published_ns is not None and not self._is_lockstep:
             # Read next to each other: whatever comes between them is an error of the age.
@@ -115,14 +115,14 @@ class Node:
         receipt: str = "",
         dst: int | None = None,
     ) -> None:
-        """A message that the bus could not take."""
+        """Count a message that the bus could not take."""
         self._link.refuse(reason, topic_id, receipt, dst)
         if receipt:
             self._tell_verdicts()
 
     # The PDU link's listener.
     def attach(self, traits: PduLinkTraits) -> None:
-        """The PDU link is there: fit the link to it. Raises ConfigError."""
+        """Fit the link to the PDU link, which is there now. Raises ConfigError."""
         config = self._opening.config
         fit = self._link.attach(traits, config.access, config.rate)
         log.info("access %s", fit.settled.sentence)
@@ -132,7 +132,7 @@ class Node:
             self._traffic.begin(self._pdu_link.now())
 
     def heard(self, pdus: Sequence[Heard]) -> None:
-        """PDUs from the air."""
+        """Take PDUs from the air, and publish the messages that they complete."""
         now, now_ns = self._pdu_link.now(), time.time_ns()
         link = self._link
         for data, at, snr_db, ended_at in pdus:
@@ -149,7 +149,7 @@ class Node:
             self._pdu_link.wake()
 
     def advance(self, now: float) -> None:
-        """Time has come so far: traffic of our own that is due, and the link's timers."""
+        """Let time come so far: traffic of our own that is due, and the link's timers."""
         for at, message in self._traffic.due(now) if self._traffic else ():
             self._link.submit(message.topic_id, message.payload, at)
             self._pdu_link.wake()
@@ -166,7 +166,7 @@ class Node:
             self._stop_silent(now)
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
-        """The next burst, decided now."""
+        """The next burst, decided now; None where there is none."""
         burst = self._link.next_burst(opportunity)
         if burst is not None and self.bus.is_tapped:
             for data in burst.pdus:
@@ -174,11 +174,11 @@ class Node:
         return burst
 
     def next_wakeup(self, now: float) -> float:
-        """When there may be something to send."""
+        """When there may be something to send, on the link's clock."""
         return self._link.next_wakeup(now)
 
     def settled(self, burst: Burst, outcome: Outcome, at: float) -> None:
-        """A burst has left, or not."""
+        """Take what became of a burst: it has left, or not."""
         self._link.confirm(burst, outcome, at)
         self._tell_verdicts()
         self._queue_moved.set()
@@ -216,7 +216,7 @@ class Node:
                 await self._end_recording()
 
     async def _end_recording(self) -> None:
-        """When all our own traffic is in it; one that is played ends by itself."""
+        """End a recording when all our own traffic is in it; one that is played ends by itself."""
         if self._traffic and self._traffic.is_over and not self._link.has_work:
             self._traffic, config = None, self._setup.config
             if config.backend == "iqfile" and not config.iqfile.receive:
@@ -247,7 +247,7 @@ class Node:
         return self._link.why(topic_id, told, self._pdu_link.now())
 
     def snapshot(self, control_requests: int) -> Snapshot:
-        """Everything there is to know, at this moment."""
+        """The snapshot of this moment, with everything there is to know."""
         now = self._pdu_link.now()
         carrier = self._opening.report(time.monotonic())
         subscribed = {topic_id: name for name, topic_id in self._setup.topics_in.items()}
@@ -273,7 +273,7 @@ class Node:
             self.bus.tell(verdict)
 
     def _stop_silent(self, now: float) -> None:
-        """Whoever obeys a command topic that fell silent is told to stop, once."""
+        """Tell whoever obeys a command topic that fell silent to stop, once."""
         for src, topic_id in self._link.take_silent(now):
             name = self._setup.republished_as(src, topic_id)
             stop = self._stops.get(topic_id)
@@ -284,5 +284,5 @@ class Node:
             self.bus.publish_stop(src, topic_id, stop)
 
     def audit(self) -> list[str]:
-        """Where the ledger does not add up; empty when it does."""
+        """Problems in the ledger, in words; none when it adds up."""
         return self._link.audit()

@@ -1,5 +1,6 @@
-"""Brings up what carries the PDUs, and goes on trying: a radio may come late, or not take what the
-configuration asks of it.
+"""Brings up what carries the PDUs, and goes on trying.
+
+A radio may come late, or not take what the configuration asks of it.
 """
 
 import asyncio
@@ -16,7 +17,7 @@ from sdrlinkd.pdulink import PduLink, PduListener
 from sdrlinkd.reports import PduLinkReport
 
 RETRY_S = 0.25, 2.0
-"""What is not there is tried again after so long; more each time."""
+"""Seconds after which what is not there is tried again: at first, and at most; twice each time."""
 BEING_OPENED = "it is being opened"
 
 Make = Callable[[Setup, Patience, float], PduLink]
@@ -25,8 +26,8 @@ Make = Callable[[Setup, Patience, float], PduLink]
 class Opening:
     """Owns the PDU link, and `state` and `reason` of the time in which it is not up.
 
-    `make` builds one from a configuration, on a clock that began at a given monotonic time; what
-    could not be opened is closed, and another one is made for the next try. A PDU link that
+    `make` builds a PDU link from a configuration, on a clock that began at a given monotonic time;
+    what could not be opened is closed, and another one is made for the next try. A PDU link that
     `notices_replug` is tried again without being told to after its settings were refused.
     `progress` says what takes so long, where something does.
     """
@@ -48,21 +49,21 @@ class Opening:
 
     @property
     def config(self) -> Config:
-        """What it is opened with."""
+        """The configuration that the PDU link is opened with."""
         return self._setup.config
 
     @property
     def is_up(self) -> bool:
-        """Whether it carries PDUs, or did when last heard of."""
+        """Whether the PDU link carries PDUs, or did when last heard of."""
         return self.state == "up"
 
     @property
     def is_working(self) -> bool:
-        """Whether it carries PDUs now."""
+        """Whether the PDU link carries PDUs now."""
         return self.is_up and self.pdu_link.report().state != "down"
 
     async def until_up(self, listener: PduListener) -> None:
-        """Try until it is there. Raises UserError when a person has to mend something first."""
+        """Try until the PDU link is there. Raises UserError when a person has to mend something."""
         wait_s, most_s = RETRY_S
         while not self.is_up:
             is_first = self._patience is Patience.NONE
@@ -81,9 +82,11 @@ class Opening:
             except UserError as error:
                 if is_first:
                     raise
-                # It was good enough to begin with: no reason to end.
+                # The configuration was good enough to begin with: no reason to end the daemon.
                 self._wait("refused", str(error), Patience.THERE, knows_when=False)
             else:
+                # Told to try again in the very moment that it opened: what is open has the old
+                # settings.
                 if not self._told_to.is_set():
                     self.state, self.reason = "up", ""
                 continue
@@ -93,25 +96,25 @@ class Opening:
             wait_s = min(2 * wait_s, most_s)
 
     async def run(self) -> None:
-        """Let it carry PDUs until it will not have us any more, or is to be opened anew."""
+        """Let the PDU link carry PDUs until it refuses, or is to be opened anew."""
         try:
             await self._unless_told(self.pdu_link.run())
         except LinkRefusedError as error:
             self.refused(str(error))
 
     def refused(self, reason: str) -> None:
-        """What is there does not take its settings."""
+        """Wait for another try, as what is there does not take its settings."""
         self._wait("refused", reason, Patience.REPLUGGED, self._notices_replug)
 
     def try_again(self, setup: Setup) -> None:
-        """A person says that it may succeed now, with this configuration."""
+        """Try at once, with this configuration: a person says that it may succeed now."""
         self._setup = setup
         # Whatever it is, it is there now or can be waited for.
         self._wait("opening", BEING_OPENED, Patience.THERE, knows_when=True)
         self._told_to.set()
 
     def report(self, at: float) -> PduLinkReport:
-        """What the PDU link tells, or why there is none; since when, on the clock of `at`."""
+        """The PDU link's report, or why there is none; since when, on the clock of `at`."""
         told = self.pdu_link.report()
         if not self.is_up:
             # An attempt that waits may know more by now.
@@ -123,11 +126,11 @@ class Opening:
         return replace(told, since_s=at - self._told_since)
 
     async def close(self) -> None:
-        """Close what there is."""
+        """Close the PDU link, in whatever state it is."""
         await self.pdu_link.close()
 
     async def _renew(self) -> None:
-        """Another one in place of what there is. Its clock goes on where that one stands."""
+        """Put another PDU link in place of this one. Its clock goes on where this one's stands."""
         began_s = time.monotonic() - self.pdu_link.now()
         await self.pdu_link.close()
         self.pdu_link = self._make(self._setup, self._patience, began_s)
@@ -137,13 +140,14 @@ class Opening:
         self._patience, self._knows_when = patience, knows_when
 
     async def _unless_told(self, work: Coroutine[object, object, None]) -> None:
-        """Do it, but for being told to try again: then it is given up. Raises what it raises."""
+        """Do `work`, which is given up when told to try again. Raises what `work` raises."""
         working = asyncio.ensure_future(work)
         told = asyncio.ensure_future(self._told_to.wait())
         try:
             await asyncio.wait((working, told), return_when=asyncio.FIRST_COMPLETED)
         finally:
             told.cancel()
+            # Waited for, so that nothing of it is left when another attempt begins.
             if not working.done():
                 working.cancel()
                 await asyncio.wait((working,))

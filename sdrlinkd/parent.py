@@ -16,7 +16,7 @@ STOP_S = 20.0
 
 
 def end_with_parent() -> None:
-    """Where the starter asks for it by VARIABLE: stop when standard input, a pipe of its, ends."""
+    """Stop when standard input, a pipe of the starter's, ends: where VARIABLE asks for it."""
     if os.environ.pop(VARIABLE, ""):
         threading.Thread(target=_wait, name="parent", daemon=True).start()
 

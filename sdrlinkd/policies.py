@@ -1,4 +1,4 @@
-"""Policies in force: those of the file, and what was set since."""
+"""The policies in force: those of the file, and what was set since."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -13,7 +13,7 @@ from sdrlinkd.link import Link, TopicPolicy
 log = logging.getLogger("sdrlinkd")
 
 FIXED = ("dictionary", "stamp", "stop")
-"""The other end has to know of the first two, and the third is made at the start."""
+"""Keys that cannot be set: the other end must know of two, and `stop` is made at the start."""
 
 
 class Policies:
@@ -25,17 +25,17 @@ class Policies:
         self.changed: dict[int, set[str]] = {}
         """Keys by topic id that were set since the file was read."""
         self.announce: Callable[[Mapping[int, TopicPolicy]], None] | None = None
-        """Told of the policies in force when they have changed."""
+        """Called with the policies in force when they have changed."""
         link.set_policies(setup.policies)
 
     def reload(self, policies: Mapping[int, TopicPolicy]) -> None:
-        """Those of the file again."""
+        """Put the policies of the file in force again."""
         self.changed.clear()
         self._link.set_policies(policies)
         self._announce()
 
     def topic_id(self, name: str) -> int:
-        """By its bus name or registry name. Raises UserError."""
+        """The id of a topic by its bus name or registry name. Raises UserError."""
         registry, config = self._setup.registry, self._setup.config
         prefix = f"/{config.namespace.strip('/')}/"
         topic = registry.by_name(name.removeprefix(prefix)) or registry.by_name(name)
@@ -44,7 +44,7 @@ class Policies:
         return topic.id
 
     def set(self, name: str, changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Apply `changes`; what was there and what is now. Raises UserError, changing nothing."""
+        """Apply `changes`; what was and what is now. Raises UserError, changing nothing."""
         topic_id = self.topic_id(name)
         known = [key for key in TopicPolicy.__struct_fields__ if key not in FIXED]
         for key in changes:
@@ -76,5 +76,5 @@ class Policies:
 
 
 def _told(value: object) -> object:
-    """As JSON can say it, which knows no infinity."""
+    """A value as JSON can say it, which knows no infinity."""
     return "inf" if value == float("inf") else value

@@ -35,7 +35,7 @@ class SocketReader(Generic[Received]):
         self.recheck()
 
     def recheck(self) -> None:
-        """Look again in the next turn if there is something to read."""
+        """Look again in the next turn of the loop, if there is something to read."""
         if self._again is None and self._readable():
             self._again = self._loop.call_soon(self._drain)
 

@@ -1,4 +1,4 @@
-"""The configuration read again while the daemon runs."""
+"""Reads the configuration again while the daemon runs."""
 
 import logging
 from collections.abc import Callable
@@ -39,7 +39,7 @@ class Reloading:
         self._opening = opening
 
     def reload(self) -> str:
-        """Apply what has changed; which parts were. Raises UserError, changing nothing."""
+        """Apply what has changed; returns which parts were. Raises UserError, changing nothing."""
         changed = self._read()
         if changed.registry.digest() != self._setup.registry.digest():
             raise UserError(
@@ -61,7 +61,7 @@ class Reloading:
         return "topic policies and the radio's settings"
 
     def on_signal(self) -> None:
-        """The same for SIGHUP: the log is told."""
+        """Apply what has changed, on SIGHUP, and tell the log."""
         try:
             told = self.reload()
         except UserError as error:
@@ -70,7 +70,7 @@ class Reloading:
             log.info("re-read: %s; all other keys need a restart", told)
 
     def _fixed(self, config: Config) -> list[str]:
-        """Keys that have changed and may not."""
+        """Keys that have changed and may not without a restart."""
         free = {*_of_the_radio(config), *ANYTIME}
         return [
             key

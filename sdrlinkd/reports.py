@@ -10,7 +10,7 @@ RATE_WINDOW_S = 5.0
 
 
 class TopicReport(msgspec.Struct, frozen=True, kw_only=True):
-    """One topic of the registry on its way out."""
+    """A topic of the registry on its way out."""
 
     topic_id: int
     name: str
@@ -25,14 +25,14 @@ class TopicReport(msgspec.Struct, frozen=True, kw_only=True):
     sent_bytes: int = 0
     queued: int = 0
     reoffered: int = 0
-    """Of those accepted: sent again to robots that came late."""
+    """Messages among those accepted that were sent again to robots that came late."""
     dropped: dict[str, int] = {}
     lifespan_s: float | None = None
-    """After that its messages are not sent any more; null: they have no end."""
+    """Age after which its messages are not sent any more; null: they have no end."""
     lifespan_from: str = ""
-    """Who says so: topic | class; empty: nobody."""
+    """Whose lifespan that is: topic | class; empty: nobody's."""
     queue_ms: float | None = None
-    """Of what they waited, lately: for others before them; for the air; for another chance."""
+    """What messages waited lately: for others before them; for the air; for another chance."""
     access_ms: float | None = None
     again_ms: float | None = None
 
@@ -58,8 +58,10 @@ class LatencyReport(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ClockReport(msgspec.Struct, frozen=True, kw_only=True):
-    """Another robot's clock. `offset_ms`: its link's clock behind ours, ± `bound_us`; `wall_*` the
-    same of the hosts' clocks since 1970. `skew_ppm`: what we gain on it.
+    """Another robot's clock, as far as it is known here.
+
+    `offset_ms`: its link's clock behind ours, ± `bound_us`; `wall_offset_ms` and `wall_bound_us`
+    are that of the hosts' clocks since 1970. `skew_ppm`: what we gain on it.
     """
 
     state: str
@@ -70,20 +72,20 @@ class ClockReport(msgspec.Struct, frozen=True, kw_only=True):
     wall_offset_ms: float | None = None
     wall_bound_us: float | None = None
     period_s: float = 0.0
-    """Between its CLOCK records."""
+    """Time between its CLOCK records."""
     samples: int = 0
     steps: int = 0
-    """Times that it jumped."""
+    """How often the clock jumped."""
     contradicted: int = 0
     """Stamps that did not fit the others."""
     refused: int = 0
     """Records of another boot, or not newer than the last one."""
     resets: int = 0
-    """It started anew, with another clock."""
+    """How often it started anew, with another clock."""
 
 
 class ReceivedTopicReport(msgspec.Struct, frozen=True, kw_only=True):
-    """One topic of one source, as heard here. `pdr` is delivered over begun messages."""
+    """A topic of one source, as heard here. `pdr` is delivered over begun messages."""
 
     src: int
     topic_id: int
@@ -104,7 +106,7 @@ class ReceivedTopicReport(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class NeighborReport(msgspec.Struct, frozen=True, kw_only=True):
-    """One source of PDUs. `per` is PDUs known lost over PDUs sent, from sequence numbers."""
+    """A source of PDUs. `per` is PDUs known lost over PDUs sent, from sequence numbers."""
 
     src: int
     is_self: bool
@@ -113,7 +115,7 @@ class NeighborReport(msgspec.Struct, frozen=True, kw_only=True):
     pdus_lost: int
     per: float
     per_lately: float | None = None
-    """The same over the last `RATE_WINDOW_S`; null: nothing was due from it."""
+    """PDUs known lost over PDUs sent in the last `RATE_WINDOW_S`; null: nothing was due from it."""
     duplicates: int
     usual_gap_s: float = 0.0
     """The longest pause between its PDUs lately."""
@@ -126,7 +128,7 @@ class NeighborReport(msgspec.Struct, frozen=True, kw_only=True):
     """How this neighbor hears us, by its own report; `per_there` likewise."""
     per_there: float | None = None
     mcs: int = 0
-    """What we send to it with."""
+    """The MCS with which we send to it."""
     clock: ClockReport | None = None
 
 
@@ -149,7 +151,7 @@ class TxReport(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RxReport(msgspec.Struct, frozen=True, kw_only=True):
-    """The receive ledgers.
+    """The receive ledgers, of PDUs and of messages.
 
     pdus_heard = pdus_used + every reason of `pdus_dropped`;
     started = delivered + held + every reason of `dropped`.
@@ -168,7 +170,7 @@ class RxReport(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RelayReport(msgspec.Struct, frozen=True, kw_only=True):
-    """PDUs of others; each also counts as a message of the transmit ledger."""
+    """PDUs that are forwarded; each also counts as a message of the transmit ledger."""
 
     accepted: int = 0
     sent: int = 0
@@ -176,28 +178,28 @@ class RelayReport(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
-    """Everything the link knows."""
+    """Everything that the link reports."""
 
     pdu_size: int
     access: str
     access_policy: str = "none"
-    """The one in force; where access.policy is auto, the one that was chosen."""
+    """The access policy in force; where access.policy is auto, the one that was chosen."""
     access_reason: str = ""
-    """Why that one."""
+    """Why the access policy in force was chosen."""
     access_share_pct: float = 100.0
-    """Of the air, what it carries on this radio: bursts of all robots, when all always send."""
+    """Share of the air that the policy in force carries on this radio, when all always send."""
     airtime_s: float
     """Time on the air, all bursts together."""
     air_sent_pct: float = 0.0
     """Share of the air that our bursts took over the last `RATE_WINDOW_S`."""
     air_heard_pct: float = 0.0
-    """The same of the bursts of others, as far as they were heard."""
+    """Share of the air that bursts of others took in that time, as far as they were heard."""
     airtime_by_class_s: dict[str, float] = {}
-    """The same by the class of what was inside, bursts that failed included."""
+    """Time on the air by the class of what was inside, bursts that failed included."""
     control_airtime_s: float = 0.0
-    """Of bursts, PDUs with nothing but records."""
+    """Time on the air of PDUs with nothing but records."""
     control_period_s: float = 0.0
-    """Between PDUs with nothing but CLOCK and RECEIPT records, at the most."""
+    """Longest time between PDUs with nothing but CLOCK and RECEIPT records."""
     bursts_by_mcs: dict[int, int]
     bursts_late: int
     """Bursts that came too late for their slot and were sent again."""
@@ -209,7 +211,7 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     registry_digest: str
     relayed: RelayReport = RelayReport()
     fragments_repaired: int = 0
-    """Computed from parity."""
+    """Fragments computed from parity."""
     receipts_untold: int = 0
     """RECEIPTs to others that found no room."""
     receipts_unasked: int = 0
@@ -230,7 +232,7 @@ class PduLinkReport(msgspec.Struct, frozen=True, kw_only=True):
     not take its settings) | down | ended (a recording is over)"""
     detail: str = ""
     reason: str = ""
-    """Why it is not up, in a sentence."""
+    """Why the link is not up, in a sentence."""
     since_s: float = 0.0
     """How long it has been in this state."""
     level_dbfs: float | None = None
@@ -246,7 +248,7 @@ class PduLinkReport(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BusReport(msgspec.Struct, frozen=True, kw_only=True):
-    """The local bus."""
+    """What the local bus took and handed over."""
 
     runtime_dir: str
     received: int
@@ -265,7 +267,7 @@ class VerdictReport(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Snapshot(msgspec.Struct, frozen=True, kw_only=True):
-    """One moment of one daemon."""
+    """Everything that one daemon reports at one moment."""
 
     version: str
     node: int
@@ -276,7 +278,7 @@ class Snapshot(msgspec.Struct, frozen=True, kw_only=True):
     uptime_s: float
     loop_lag_ms: float
     host_clock_steps: int = 0
-    """Times that this host's clock was set, by more than it strays."""
+    """How often this host's clock was set, by more than it strays."""
     verdict: VerdictReport = VerdictReport()
     carrier: PduLinkReport
     bus: BusReport

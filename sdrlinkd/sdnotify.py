@@ -16,23 +16,23 @@ class Notifier:
         self.watchdog_s = int(interval_us) / 1e6 if interval_us.isdigit() and for_us else None
 
     def ready(self) -> None:
-        """The service is up."""
+        """Tell that the service is up."""
         self._send("READY=1", wait_s=1.0)
 
     def extend(self, seconds: float) -> None:
-        """The state it is in, starting or stopping, may last so much longer."""
+        """Ask for more time: starting, or stopping, may last so many seconds more."""
         self._send(f"EXTEND_TIMEOUT_USEC={seconds * 1e6:.0f}")
 
     def stopping(self) -> None:
-        """The service is on its way down."""
+        """Tell that the service is on its way down."""
         self._send("STOPPING=1")
 
     def alive(self) -> None:
-        """Feed the watchdog."""
+        """Feed the watchdog: the daemon is alive."""
         self._send("WATCHDOG=1")
 
     def status(self, line: str) -> None:
-        """One line for `systemctl status`."""
+        """Tell the line that `systemctl status` shows."""
         self._send(f"STATUS={line}")
 
     def _send(self, state: str, wait_s: float = 0.0) -> None:

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 NOTHING = "–"
-"""Stands where there is no figure."""
+"""What stands where there is no figure."""
 FILE_WIDTH = 100
 """Columns of what is no terminal, such as a file or a pipe; COLUMNS says otherwise."""
 SCREEN = (80, 24)
@@ -22,15 +22,15 @@ GAP = 2
 LEAST_NAME = 12
 
 Bar = Callable[[int], Text]
-"""Draws itself in so many characters."""
+"""A cell that draws itself in so many characters."""
 Cell = str | Text | Bar
 
 
 class Column(NamedTuple):
-    """One column. Of those that do not fit, the one of the highest rank leaves first; 0: none.
+    """A column. Of those that do not fit, the one of the highest rank leaves first; 0: none.
 
-    A figure has its width. Words wrap at `/`, `_` and spaces, down to `least` characters. The
-    cells of a bar column are functions of the width, from `least` to `most` characters.
+    A figure has its width. Words wrap at `/`, `_` and spaces, down to `least` characters. The cells
+    of a bar column are functions of the width, from `least` to `most` characters.
     """
 
     name: str
@@ -73,7 +73,7 @@ class FittedTable:
         self._heads = heads
 
     def add(self, *cells: Cell, style: str = "") -> None:
-        """A row: a cell a column."""
+        """Add a row, with a cell for each column."""
         if len(cells) != len(self.columns):
             raise ValueError(f"{len(cells)} cells for {len(self.columns)} columns")
         self.rows.append((cells, style))
@@ -114,7 +114,7 @@ class FittedTable:
         ]
 
     def fitted(self, width: int, n_rows: int | None = None) -> Table:
-        """The table for a screen of `width`, its first rows only if so wanted."""
+        """The table for a screen of `width`; with `n_rows`, its first rows only."""
         widths = self.widths(width)
         table = Table(
             box=box.SIMPLE_HEAD if self._rule else None,

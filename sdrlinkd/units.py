@@ -29,12 +29,12 @@ _NUMBER = re.compile(
 
 
 def seconds(text: str, key: str) -> float:
-    """`0.1`, `100ms`, `inf`. Raises UserError that cites `key`."""
+    """A time in s from text such as `0.1`, `100ms`, `inf`. Raises UserError that cites `key`."""
     return _read(text, key, _TIMES, "a time such as 0.1, 100ms, 2s or inf")
 
 
 def octets(text: str, key: str) -> int:
-    """`64000`, `64k`, `1MiB`. Raises UserError that cites `key`."""
+    """A size in octets from `64000`, `64k` or `1MiB`. Raises UserError that cites `key`."""
     value = _read(text, key, _SIZES, "a size such as 64000, 64k or 1MiB")
     if not math.isfinite(value):
         raise UserError(f"{key}: got {text}; allowed: a size such as 64000, 64k or 1MiB")
@@ -42,13 +42,16 @@ def octets(text: str, key: str) -> int:
 
 
 def hertz(text: str, key: str) -> float:
-    """`433.92e6`, `433.92 MHz`, `2 Msps`. Raises UserError that cites `key`."""
+    """A frequency or rate in Hz, from `433.92 MHz` or `2 Msps`.
+
+    Raises UserError that cites `key`.
+    """
     allowed = "a frequency or rate such as 433.92e6, 433.92MHz or 2Msps"
     return _finite(text, key, _FREQUENCIES, allowed)
 
 
 def bits_per_second(text: str, key: str) -> float:
-    """`1e5`, `100 kbit/s`. Raises UserError that cites `key`."""
+    """A rate in bit/s from `1e5` or `100 kbit/s`. Raises UserError that cites `key`."""
     return _finite(text, key, _BIT_RATES, "a bit rate such as 1e5 or 100kbit/s")
 
 

@@ -1,4 +1,4 @@
-"""What the control socket answers."""
+"""The verbs that the control socket answers."""
 
 import logging
 from typing import Any
@@ -24,7 +24,7 @@ def make_verbs(
     opening: Opening,
     reloading: Reloading,
 ) -> dict[str, Verb]:
-    """By name (bus document, section 5)."""
+    """The verbs of the control socket by name (bus document, section 5)."""
 
     def hello(_: dict[str, Any]) -> object:
         return {

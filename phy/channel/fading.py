@@ -7,14 +7,15 @@ from numpy.typing import NDArray
 BLOCK = 64
 """Samples through which a channel stands still: at 100 km/h and 1 Msps it turns by 0.1 rad."""
 N_PATHS = 16
+"""Waves that make up each echo."""
 
 
 def jakes(
     n_echoes: int, doppler_hz: float, at: NDArray[np.float64], rng: Generator
 ) -> NDArray[np.complex128]:
-    """Gains `[len(at), n_echoes]` of mean power 1 at the times `at` in s.
+    """Rayleigh gains `[len(at), n_echoes]` of mean power 1 at the times `at` in s.
 
-    Each echo is the sum of waves that come from all around (Jakes 1974).
+    Each echo is the sum of N_PATHS waves that come from all around (Jakes 1974).
     """
     angle = 2 * np.pi * rng.random((n_echoes, N_PATHS))
     phase = 2 * np.pi * rng.random((n_echoes, N_PATHS))
@@ -24,8 +25,8 @@ def jakes(
 
 
 def moving_filter(x: NDArray[np.complex64], taps: NDArray[np.complex64]) -> NDArray[np.complex64]:
-    """`x` through filters `taps` `[blocks, n_taps]`, a next one every BLOCK samples."""
-    # It takes longer to load than all of this package, and most radios do not move.
+    """`x` through FIR filters `taps` `[blocks, n_taps]`, of which each serves for BLOCK samples."""
+    # scipy takes longer to load than all of this package, and most radios do not move.
     from scipy import fft
 
     n_blocks, n_taps = taps.shape

@@ -1,4 +1,4 @@
-"""What a receiver adds to everything that reaches it, sample by sample, for ever."""
+"""What a receiver adds to every sample that reaches it: noise, image, DC and quantisation."""
 
 from dataclasses import dataclass
 
@@ -11,9 +11,11 @@ from phy.kernels.noise import CHUNK, add_noise
 
 @dataclass(frozen=True)
 class FrontEndParams:
-    """Powers in dB below full scale (inf: none); `image_db` below the signal.
+    """The impairments of a receiver.
 
-    `bits`: resolution of the converter, which also clips at full scale; 0: neither.
+    `noise_dbfs` and `dc_dbfs` are powers in dB relative to full scale (−inf: none), `image_db` is
+    how far the image is below the signal (inf: none). `bits` is the resolution of the converter,
+    which also clips at full scale; 0: neither.
     """
 
     noise_dbfs: float = -np.inf
@@ -36,7 +38,7 @@ class FrontEnd:
         self._dc = np.complex64(10 ** (params.dc_dbfs / 20))
 
     def receive(self, x: NDArray[np.complex64]) -> NDArray[np.complex64]:
-        """The digital samples `[n]` of antenna samples `[n]`, which stay as they are.
+        """The digital samples `[n]` of antenna samples `[n]`, which are not changed.
 
         Any chunking of the same stream gives the same samples.
         """

@@ -11,11 +11,12 @@ from phy.channel.profiles import PROFILES
 from phy.channel.resampling import N_TAPS, echo_filters, stretch
 
 SPIN = 128
+"""Samples that are turned by one coarse angle: so few exponentials are computed."""
 
 
 @dataclass(frozen=True)
 class PathParams:
-    """Frequencies in Hz, times in s, `clock_ppm` the sender's crystal against the receiver's.
+    """What lies between a transmitter and a receiver: frequencies in Hz, times in s.
 
     One crystal makes centre frequency and samples: at `centre_hz` it moves both. `image_db` and
     `leak_db` are the transmitter's IQ imbalance and LO leakage below the signal (inf: none).
@@ -50,11 +51,11 @@ class Path:
 
     @property
     def early(self) -> int:
-        """Samples by which a burst may arrive before its own index: the echo filter's skirt."""
+        """Samples by which a burst may arrive before its own index: half of the echo filter."""
         return 0 if PROFILES[self._params.profile] is None else N_TAPS // 2 - 1
 
     def carry(self, burst: NDArray[np.complex64]) -> tuple[int, NDArray[np.complex64]]:
-        """(index relative to the burst's own, samples) of a burst as it arrives, mean gain −loss.
+        """A burst as it arrives: (its first sample's index relative to the burst's own, samples).
 
         Its phase is drawn from the path's chance.
         """
@@ -97,7 +98,7 @@ class Path:
         return np.convolve(x, echo_filters(samples, gains[None, :])[0])
 
     def _phase_noise(self, n: int) -> NDArray[np.complex64]:
-        """A random walk with the spectrum L(f) = step² · rate / (2 π f)²."""
+        """Factors `[n]` of a phase that walks at random: L(f) = step² · rate / (2 π f)²."""
         level = 10 ** (self._params.phase_noise_dbc_hz / 10)
         step = 2 * np.pi * 1e4 * np.sqrt(level / self._params.rate_hz)
         walk = np.cumsum(step * self._rng.standard_normal(n))
@@ -105,7 +106,7 @@ class Path:
 
 
 def _spin(frequency: float, first: complex, n: int) -> NDArray[np.complex64]:
-    """`first` · exp(2πi `frequency` k) for k = 0 … n − 1, as products of two angles."""
+    """`first` · exp(2πi `frequency` k) for k = 0 … n − 1, made of products of two angles."""
     fine = first * np.exp(2j * np.pi * frequency * np.arange(SPIN))
     coarse = np.exp(2j * np.pi * frequency * SPIN * np.arange(-(-n // SPIN)))
     return np.outer(coarse, fine).astype(np.complex64).ravel()[:n]

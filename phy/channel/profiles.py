@@ -22,4 +22,4 @@ PROFILES: dict[str, tuple[tuple[float, float], ...] | None] = {
     "tdl-a": TDL_A,
     "tdl-c": TDL_C,
 }
-"""By name; None: one path that does not fade. The others fade as Rayleigh, anew for each burst."""
+"""Profiles by name; None: one path, no fading. The others are Rayleigh, drawn for each burst."""

@@ -24,7 +24,8 @@ def _filters() -> NDArray[np.float32]:
 def stretch(x: NDArray[np.complex64], delay: float, clock_error: float) -> NDArray[np.complex64]:
     """`x` delayed by `delay` ≥ 0 samples, from a sender whose clock is fast by `clock_error`.
 
-    Sample n of the result is x at (1 + clock_error) n − delay; it is long enough for all of `x`.
+    Sample n of the result is x at (1 + clock_error) n − delay; the result is long enough for all of
+    `x`.
     """
     n = int(np.ceil((len(x) + delay) / (1 + clock_error))) + N_TAPS // 2
     out = np.empty(n, np.complex64)
@@ -36,9 +37,9 @@ def stretch(x: NDArray[np.complex64], delay: float, clock_error: float) -> NDArr
 def echo_filters(
     delays: NDArray[np.float64], gains: NDArray[np.complex128]
 ) -> NDArray[np.complex64]:
-    """FIR filters `[n, n_taps]` of echoes at `delays` samples `[e]` with `gains` `[n, e]`.
+    """FIR filters `[n, n_taps]` of echoes at `delays` in samples `[e]` with `gains` `[n, e]`.
 
-    Their own delay is N_TAPS / 2 − 1.
+    The filters themselves delay by N_TAPS / 2 − 1 samples.
     """
     echoes = np.zeros((len(delays), int(np.ceil(delays.max())) + N_TAPS), np.float32)
     filters = _filters()

@@ -5,8 +5,8 @@ Samples lie in two rows, real and imaginary parts, so that loops are vectorised.
 1. The detector's peak tells the frequency modulo 1/16 cycles a sample.
 2. The long training is correlated for every multiple of 1/16 within reach: the best tells the
    frequency, and the first strong echo the timing.
-3. The phase from each 64 samples of it to the next.
-4. All of the preamble, re-made from a first channel estimate: the most likely frequency.
+3. The phase from each 64 samples of the long training to the next refines the frequency.
+4. All of the preamble, re-made from a first channel estimate, tells the most likely frequency.
 """
 
 import math
@@ -52,20 +52,20 @@ N_LONG = 2
 
 
 class Training(NamedTuple):
-    """What acquisition knows of a preamble and a header on one grid."""
+    """What acquisition knows of the preamble and the header on one grid."""
 
     templates: NDArray[np.complex64]
     """The long symbol, shifted by each multiple of 1/16 that is tried `[2 aliases + 1, n_fft]`."""
     long: NDArray[np.float32]
     """The long training as sent `[2, 2, width]`."""
     waves: NDArray[np.float32]
-    """What a gain of 1 on each tone is in time, `[n_used, 2, 16 + n_fft]`: of a short segment what
-    is clean, then zeros; then the long symbol."""
+    """Each tone of the preamble in time, `[n_used, 2, 16 + n_fft]`: the clean samples of a short
+    segment, then zeros, then the long symbol."""
     cover: Row
     frequencies: NDArray[np.float64]
     """Corrections of the frequency that are tried, in cycles a sample, evenly spaced."""
     turns: NDArray[np.float32]
-    """The preamble's parts turned back by each of them `[n_parts, 2, n_frequencies]`."""
+    """What turns each part of the preamble back by `frequencies` `[n_parts, 2, n_frequencies]`."""
     windows: NDArray[np.int64]
     """First samples of the FFT windows of the long training and the header."""
 
@@ -74,22 +74,22 @@ open_training = opener(Training, "c8[2] f4[3] f4[3] f4[1] f8[1] f4[3] i8[1]")
 
 
 class Room(NamedTuple):
-    """What acquisition needs besides its input, and leaves: one for each thread."""
+    """Working memory and results of acquisition: one for each thread."""
 
     planes: Planes
     """The burst's samples up to the end of its header, turned back."""
     wave: Planes
-    """The preamble as the channel makes it, as of `Training.waves`."""
+    """The preamble as the channel makes it, laid out like a row of `Training.waves`."""
     parts: Planes
-    """How the preamble's parts agree with it."""
+    """Correlation of the preamble's parts with `wave` `[2, n_parts]`."""
     y: NDArray[np.float32]
     """Long training and header `[2 + n_header, 2, width]`."""
     points: NDArray[np.complex64]
-    """Of the header `[n_header, n_data]`."""
+    """The header's equalised points `[n_header, n_data]`."""
     llr: NDArray[np.int16]
-    """Of the header's coded bits, as often as they were repeated `[n_header · n_data]`."""
+    """LLRs of the header's coded bits with their repetitions `[n_header · n_data]`."""
     folded: NDArray[np.int16]
-    """The same, of each bit once `[2 (32 + 6)]`."""
+    """LLRs of the header's coded bits, repetitions added up `[2 (32 + 6)]`."""
     decisions: NDArray[np.uint64]
     octets: NDArray[np.uint8]
     """The likeliest header, with its check `[4]`."""
@@ -127,7 +127,7 @@ def refine(training: Training, h: Planes, room: Room) -> float:
 
 @njit(nogil=True, cache=True)
 def _make_wave(waves: NDArray[np.float32], h: Planes, out: Planes) -> None:
-    """The sum of `waves` `[n_used, 2, n]` times their gains."""
+    """Write the sum of `waves` `[n_used, 2, n]`, each times its gain in `h`, to `out`."""
     n = waves.shape[2]
     for m in range(0, n, N_LANES):
         re: Lanes = splat(0)
@@ -144,7 +144,7 @@ def _make_wave(waves: NDArray[np.float32], h: Planes, out: Planes) -> None:
 
 @njit(nogil=True, cache=True)
 def _agree(room: Room, at: int, wave_at: int, sign: np.float32, part: int) -> None:
-    """Σ z w* over the PART samples from `at` on and those of the wave from `wave_at` on."""
+    """Write Σ z w* over PART samples, from `at` and `wave_at` on, times `sign`, to its place."""
     z, w = room.planes, room.wave
     size, wave_size = z.shape[1], w.shape[1]
     re: Lanes = splat(0)
@@ -183,8 +183,9 @@ def acquire(
 ) -> tuple[int, float]:
     """(first sample of the burst or −1, its frequency) of the burst in `x`; its header to the room.
 
-    The first long symbol is nominally at `nominal`; `coarse` is the frequency modulo 1/16, and
-    `centre_cycles` those of the centre frequency in a sample, if one crystal makes both, or 0.
+    The first long symbol is nominally at `nominal`. `coarse` is the frequency in cycles a sample,
+    modulo 1/16. `centre_cycles` is how many cycles the centre frequency makes in a sample, if one
+    crystal makes both, or 0.
     """
     training, tones, axes = open_training(training_in), open_tones(tones_in), open_axes(axes_in)
     channel, scratch, room = open_channel(channel_in), open_scratch(scratch_in), open_room(room_in)
@@ -223,10 +224,10 @@ def settle(
     scratch_in: PackedArguments,
     room_in: PackedArguments,
 ) -> tuple[float, float, float]:
-    """Learn from a header that was read: what was `sent`, long training and header.
+    """Learn the channel anew from a header that was read; `sent` are long training and header.
 
-    In dB: SNR over the band, mean power of the long training's samples, error of the header's
-    points.
+    Returns, in dB: SNR over the band, mean power of the long training's samples, error of the
+    header's points.
     """
     training, tones, room = open_training(training_in), open_tones(tones_in), open_room(room_in)
     channel, scratch = open_channel(channel_in), open_scratch(scratch_in)
@@ -251,13 +252,13 @@ def settle(
 
 @step
 def _decibel(ratio: float) -> float:
-    """To three places."""
+    """A power ratio in dB, to three places."""
     return math.floor(1e4 * math.log10(max(ratio, 1e-30)) + 0.5) / 1e3
 
 
 @njit(nogil=True, cache=True)
 def fold(llr: NDArray[np.int16], out: NDArray[np.int16]) -> None:
-    """Add up what each bit's repetitions say."""
+    """Add up the LLRs of each bit's repetitions, clipped to ±MAX_LLR."""
     for i in range(out.size):
         total = 0
         for k in range(i, llr.size, out.size):

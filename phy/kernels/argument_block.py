@@ -30,7 +30,7 @@ _FIELDS: dict[type[Any], list[Any]] = {}
 class ArgumentBlock(Generic[_Content]):
     """A named tuple of arrays and numbers; `packed` is what kernels are given.
 
-    TypeError when a field is not as its opener expects it: kernels would not notice.
+    Raises TypeError when a field is not as its opener expects it: kernels would not notice.
     """
 
     def __init__(self, content: _Content) -> None:

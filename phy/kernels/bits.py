@@ -23,7 +23,7 @@ _TURNS = ((4, 0x0F0F0F0F0F0F0F0F), (2, 0x3333333333333333), (1, 0x55555555555555
 
 
 def _signs_generator(_context: Any, array: Any, at: Any) -> Any:
-    """Bit i is 1 where `array[at + i]` is negative, for 32 int16."""
+    """A word whose bit i is 1 where `array[at + i]` is negative, for 32 int16."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         values = builder.load(place(context, builder, signature, args, _VECTOR))
@@ -39,7 +39,7 @@ _signs: Any = intrinsic(_signs_generator)
 
 @njit(nogil=True, cache=True)
 def put(out: Words, at: int, word: np.uint64, n: int) -> None:
-    """Write the `n` bits of `word` from `at` on, where nothing was written."""
+    """Write the lowest `n` bits of `word` from bit `at` on, where there are zeros so far."""
     i, bit = at >> 6, np.uint64(at & 63)
     out[i] |= word << bit
     if bit + np.uint64(n) > _64:
@@ -48,7 +48,7 @@ def put(out: Words, at: int, word: np.uint64, n: int) -> None:
 
 @njit(nogil=True, cache=True)
 def get(words: Words, at: int, n: int) -> np.uint64:
-    """The `n` ≤ 64 bits from `at` on."""
+    """The `n` ≤ 64 bits from bit `at` on, as a word."""
     i, bit = at >> 6, np.uint64(at & 63)
     word: np.uint64 = words[i] >> bit
     if bit + np.uint64(n) > _64:
@@ -59,13 +59,13 @@ def get(words: Words, at: int, n: int) -> np.uint64:
 
 @njit(nogil=True, cache=True)
 def low_ones(n: int) -> np.uint64:
-    """Ones in the `n` ≤ 64 lowest places."""
+    """A word with ones in its `n` ≤ 64 lowest places."""
     return ~np.uint64(0) if n >= 64 else (ONE << np.uint64(n)) - ONE
 
 
 @njit(nogil=True, cache=True)
 def put_signs(values: NDArray[np.int16], first: int, n: int, out: Words, at: int) -> None:
-    """Write from `at` on: 1 where one of `n` values from `first` on is negative."""
+    """Write the signs of `n` values from `first` on as bits from `at` on: 1 where negative."""
     whole = n - n % _LANES
     for i in range(0, whole, _LANES):
         put(out, at + i, np.uint64(_signs(values, first + i)), _LANES)
@@ -75,7 +75,7 @@ def put_signs(values: NDArray[np.int16], first: int, n: int, out: Words, at: int
 
 @step
 def _turned(word: np.uint64) -> np.uint64:
-    """The bits of each byte the other way round."""
+    """The word with the bits of each byte in reverse order."""
     for step_bits, mask in _TURNS:
         kept = np.uint64(mask)
         word = (word >> np.uint64(step_bits)) & kept | (word & kept) << np.uint64(step_bits)
@@ -84,7 +84,7 @@ def _turned(word: np.uint64) -> np.uint64:
 
 @njit(nogil=True, cache=True)
 def to_octets(words: Words, out: NDArray[np.uint8]) -> None:
-    """As bytes, of which the first bit is the highest."""
+    """Write words of bits as bytes, the first bit of each byte the highest."""
     for i in range(words.size):
         word = _turned(words[i])
         for b in range(min(8, out.size - 8 * i)):
@@ -93,7 +93,7 @@ def to_octets(words: Words, out: NDArray[np.uint8]) -> None:
 
 @njit(nogil=True, cache=True)
 def from_octets(octets: NDArray[np.uint8], out: Words) -> None:
-    """The other way, zeros behind."""
+    """Write bytes as words of bits, with zeros after the last byte."""
     for i in range(out.size):
         word = np.uint64(0)
         for b in range(min(8, octets.size - 8 * i)):

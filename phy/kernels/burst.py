@@ -26,13 +26,13 @@ class Tones(NamedTuple):
     bins: NDArray[np.int64]
     subcarriers: NDArray[np.int64]
     numbers: Row
-    """The same as float32 `[width]`."""
+    """`subcarriers` as float32 `[width]`."""
     pilots: Row
-    """Of a symbol with polarity +1 `[n_pilots]`."""
+    """Pilots of a symbol with polarity +1 `[n_pilots]`."""
     polarity: Row
-    """Of each symbol, the header's first being number 0."""
+    """Sign of each symbol's pilots, the header's first symbol being number 0."""
     basis: NDArray[np.float32]
-    """Rows of `phy.kernels.smoothing` `[n, width]`."""
+    """Orthonormal rows of the smoother, `phy.kernels.smoothing` `[n, width]`."""
     ends: NDArray[np.int64]
     neighbours: NDArray[np.int64]
     twiddles: Planes
@@ -43,7 +43,7 @@ open_tones = opener(Tones, "i8 i8 f8 i8 i8[1] i8[1] f4[1] f4[1] f4[1] f4[2] i8[1
 
 
 class Axes(NamedTuple):
-    """Modulation: bits of each axis, half the distance of levels, where each coded bit lies."""
+    """A modulation: bits of each axis, half the distance of levels, where each coded bit lies."""
 
     real_bits: int
     imag_bits: int
@@ -81,12 +81,12 @@ class Channel(NamedTuple):
 
     @property
     def no(self) -> float:
-        """Noise power on a subcarrier."""
+        """Noise power on a subcarrier, on the scale of the gains."""
         return float(self.figures[NO])
 
     @property
     def gain(self) -> float:
-        """Mean |h|²."""
+        """Mean power gain of the subcarriers, |h|²."""
         return float(self.figures[GAIN])
 
 
@@ -99,29 +99,29 @@ correction and what was certain in them, Σ |E s|²; the slope that subcarriers 
 
 
 class Scratch(NamedTuple):
-    """Room to work in: one for each thread."""
+    """Working memory of the receiver's kernels: one for each thread."""
 
     windows: NDArray[np.float32]
     starts: NDArray[np.int64]
     turn: Planes
-    """Of the FFT: eight windows, twice `[4, 8 n_fft]`, where they begin `[8]`, and what turns them
-    back `[2, n_fft]`."""
+    """Room of the FFT: eight windows, twice `[4, 8 n_fft]`, where they begin `[8]`, and what turns
+    them back `[2, n_fft]`."""
     square: Row
-    """Eight by eight."""
+    """Eight by eight values, to be transposed."""
     y: NDArray[np.float32]
     """Tones of eight symbols `[8, 2, width]`."""
     level: Planes
     llr: Row
     planes: NDArray[np.int16]
-    """A symbol's points, and LLRs bit by bit."""
+    """A symbol's points, and its LLRs bit by bit."""
     turned: NDArray[np.complex128]
     pilot_power: NDArray[np.float64]
-    """`[n_pilots]`"""
+    """The pilots as tracking takes them `[n_pilots]`."""
     rest: Planes
     coefficients: NDArray[np.float32]
     energies: NDArray[np.float64]
     weights: NDArray[np.float64]
-    """Of the smoother `[2, width]`, `[2, rows of the basis]`, `[groups + 1]`."""
+    """Room of the smoother `[2, width]`, `[2, rows of the basis]`, `[groups + 1]` twice."""
 
 
 open_scratch = opener(

@@ -29,7 +29,7 @@ def temporary_cache() -> Path | None:
 
 
 class TemporaryCacheLocator(InTreeCacheLocator):
-    """For accounts without a home that run code of somebody else."""
+    """A cache in a temporary folder, for accounts without a home that run code of somebody else."""
 
     def __init__(self, py_func: Any, py_file: Any) -> None:
         super().__init__(py_func, py_file)
@@ -39,15 +39,15 @@ class TemporaryCacheLocator(InTreeCacheLocator):
 
     @classmethod
     def from_function(cls, py_func: Any, py_file: Any) -> Any:
-        """Always one: nothing comes after it."""
+        """A locator for every file that exists: no other locator comes after this one."""
         return cls(py_func, py_file) if Path(py_file).exists() else None
 
 
 @cache
 def _private_folder() -> Path:
-    """The user's own, which later processes find again.
+    """The user's own temporary folder, which later processes find again.
 
-    What is in it is run: one that others have made or may write is not used.
+    What is in it is executed: a folder that others have made or may write to is not used.
     """
     folder = Path(_temporary()) / f"sdrlinkd-{os.geteuid()}"
     with contextlib.suppress(OSError):
@@ -84,7 +84,7 @@ def _stamped(locator: Any, stamp: str) -> Any:
 
 
 def _forgiving(method: Any) -> Any:
-    """A disk that is full, or a folder that has gone, costs time and nothing else."""
+    """`method` without its OSErrors: a full disk or a lost folder costs time and nothing else."""
 
     def call(*arguments: Any) -> Any:
         with contextlib.suppress(OSError):

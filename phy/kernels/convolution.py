@@ -19,7 +19,7 @@ PARITY_B = np.array([_parity(r & G_B) for r in range(2 * N_STATES)], np.uint8)
 
 @njit(nogil=True, cache=True)
 def convolve(bits: NDArray[np.uint8], out: NDArray[np.uint8]) -> None:
-    """Bits `[n, t]` to the mother code's A and B in turn `[n, 2 t]`, each row from state 0."""
+    """Write the mother code's bits A and B in turn `[n, 2 t]` of `bits` `[n, t]`, from state 0."""
     for row in range(bits.shape[0]):
         state = 0
         for t in range(bits.shape[1]):

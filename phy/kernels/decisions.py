@@ -16,7 +16,7 @@ from phy.kernels.lanes import Lanes, least, load, most, splat
 def expected_level(
     llr: NDArray[np.float32], axis_bits: int, at: int, stride: int
 ) -> tuple[Lanes, Lanes]:
-    """(mean, mean square) of eight levels, odd numbers, whose bit b's LLRs are `at + b stride`."""
+    """(mean, mean square) of eight levels, odd numbers, from LLRs of bit b at `at + b stride`."""
     scale = splat(0.5 / LLR_SCALE)
     mean: Lanes = splat(1)
     square: Lanes = splat(1)
@@ -30,7 +30,8 @@ def expected_level(
 
 @step
 def _tanh(x: Lanes) -> Lanes:
-    """To 2 %."""
+    """The hyperbolic tangent, to within 2 %."""
+    # At ±3 the quotient is ±1.
     x = least(most(x, splat(-3)), splat(3))
     square = x * x
     value: Lanes = x * (splat(27) + square) / (splat(27) + splat(9) * square)

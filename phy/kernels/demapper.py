@@ -8,18 +8,19 @@ from phy.kernels.lanes import Lanes, least, magnitude, most, splat, store, with_
 from phy.kernels.viterbi import MAX_LLR
 
 LLR_SCALE = 8.0
-"""Quantised LLRs are 1/8 each."""
+"""Factor from an LLR to its quantised value, in steps of 1/8."""
 
 
 @step
 def axis_llrs(
     level: Lanes, weight: Lanes, axis_bits: int, out: NDArray[np.float32], at: int, stride: int
 ) -> None:
-    """LLRs of `level` in units of half the levels' distance; bit b's go to `out[at + b stride]`.
+    """Write the LLRs of eight levels, those of bit b to `out[at + b stride]` and after.
 
-    An LLR is the difference of squared distances to the nearest levels with the bit 1 and 0, times
-    `weight`. That of the first bit is, of 2 m levels, ±max over k ≤ m of 4 k |u| − 4 k (k − 1);
-    each other bit is the first of the axis folded in the middle.
+    `level` is in units of half the levels' distance. An LLR is the difference of squared distances
+    to the nearest levels with the bit 1 and 0, times `weight`. That of the first bit is, of 2 m
+    levels, ±max over k ≤ m of 4 k |u| − 4 k (k − 1); each other bit is the first of the axis folded
+    in the middle.
     """
     limit = splat(MAX_LLR)
     for bit in range(axis_bits):

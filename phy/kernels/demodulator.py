@@ -31,10 +31,10 @@ def demodulate(
     llr: NDArray[np.int16],
     powers: NDArray[np.float32],
 ) -> None:
-    """The `n` symbols of which the first FFT window begins at `samples[0]`, to LLRs.
+    """Write the LLRs of `n` symbols, the first of whose FFT windows begins at `samples[0]`.
 
-    `powers` `[≥ n]` gets their mean power on a tone. The rest as of `windows_to_tones` and
-    `equalise`.
+    `powers` `[≥ n]` gets each symbol's mean power on a tone. The other arguments are those of
+    `windows_to_tones` and `equalise`.
     """
     tones, axes = open_tones(tones_in), open_axes(axes_in)
     channel, scratch = open_channel(channel_in), open_scratch(scratch_in)
@@ -64,14 +64,14 @@ def to_tones(
     scratch_in: PackedArguments,
     out: NDArray[np.float32],
 ) -> None:
-    """As `windows_to_tones`."""
+    """Run `windows_to_tones` with tables and working memory from argument blocks."""
     tones, scratch = open_tones(tones_in), open_scratch(scratch_in)
     windows_to_tones(samples, starts, frequency, dc, origin, tones, scratch, out)
 
 
 @njit(nogil=True, cache=True)
 def slip(early: int, tones_in: PackedArguments, channel_in: PackedArguments) -> None:
-    """Let windows begin `early` samples earlier: subcarriers lean less by that."""
+    """Let FFT windows begin `early` samples earlier, and lessen the slope over subcarriers by that."""
     tones, channel = open_tones(tones_in), open_channel(channel_in)
     lean = early * 2 * math.pi / tones.n_fft
     channel.tracking[SLOPE, 0] -= lean
@@ -86,7 +86,7 @@ def learn_channel(
     channel_in: PackedArguments,
     scratch_in: PackedArguments,
 ) -> None:
-    """A channel from known symbols, as of `estimate`, ready to be followed."""
+    """Estimate the channel from known symbols, as `estimate` does, and begin to track it."""
     tones, channel = open_tones(tones_in), open_channel(channel_in)
     amplitude = np.ones(sent.shape[0], np.float32)
     estimate(y, amplitude, sent, tones, channel, open_scratch(scratch_in))

@@ -26,7 +26,7 @@ _SHARE = np.float32((SHORT - SEGMENT) / SHORT)
 
 @njit(nogil=True, cache=True)
 def detector_sums(x: NDArray[np.complex64], dc: complex, work: NDArray[np.float32], n: int) -> None:
-    """P (rows 0, 1: real, imaginary) and E (row 2) for the `n` samples after HISTORY of `x`.
+    """P (rows 0, 1: real, imaginary) and E (row 2) of the `n` samples after HISTORY of `x`.
 
     P[n] = Σ_k b_k Σ_m x[n − 16 (10 − k) − m] x*[n − 16 (11 − k) − m], b the Barker code, m = 0…15;
     E[n] = Σ |x|² over the 192 samples that end at n, times 11/12. `work` is `[7, HISTORY + n]`.
@@ -80,7 +80,7 @@ def _double(x: NDArray[np.float32], out: NDArray[np.float32], n: int, step: int)
 
 @step
 def _despread(q: NDArray[np.float32], out: NDArray[np.float32], n: int) -> None:
-    """Σ b_k q[i + 16 k], b = + + + − − − + − − + −."""
+    """Write Σ b_k q[i + 16 k] with the Barker code b = + + + − − − + − − + −."""
     q0, q1, q2, q3 = q, q[16:], q[32:], q[48:]
     q4, q5, q6, q7 = q[64:], q[80:], q[96:], q[112:]
     q8, q9, q10 = q[128:], q[144:], q[160:]
@@ -119,6 +119,7 @@ def search(
         crossings = 0
         for i in range(hop):
             magnitude = p_re[i] * p_re[i] + p_im[i] * p_im[i]
+            # Counted without a branch, so that hops with no crossing, nearly all, are vectorised.
             crossings += magnitude > limit * (energy[i] * energy[i])
         if crossings:
             for i in range(hop):
@@ -133,10 +134,10 @@ def search(
 def strongest(
     x: NDArray[np.complex64], n: int, dc: complex, work: NDArray[np.float32]
 ) -> tuple[int, complex, float]:
-    """The largest |P| / E among the `n` samples after HISTORY of `x`.
+    """(offset, P, |Q| / |P|) where |P| / E is largest of the `n` samples after HISTORY of `x`.
 
-    (its offset, P, |Q| / |P|), where Q is P without the code: small for our preamble, large for
-    whatever repeats itself every 16 samples or turns evenly.
+    Q is P without the code: small for our preamble, large for whatever repeats itself every 16
+    samples or turns evenly.
     """
     detector_sums(x, dc, work, n)
     p_re, p_im, energy = work[0], work[1], work[2]
@@ -148,6 +149,7 @@ def strongest(
             if metric > best_metric:
                 best, best_metric = i, metric
     p = complex(p_re[best], p_im[best])
+    # Silence: as plain as can be, and so no preamble.
     if best_metric <= 0:
         return best, p, 1.0
     plain = 0j
@@ -163,6 +165,7 @@ def _follow_dc(x: NDArray[np.complex64], dc_state: NDArray[np.float64]) -> None:
         re += x[i].real
         im += x[i].imag
     dc_state[2] += 1
+    # The mean of all hops at first, so that it settles at once; of the last 64 or so from then on.
     weight = max(1 / 64, 1 / dc_state[2])
     dc_state[0] += weight * (re / x.size - dc_state[0])
     dc_state[1] += weight * (im / x.size - dc_state[1])
@@ -170,10 +173,11 @@ def _follow_dc(x: NDArray[np.complex64], dc_state: NDArray[np.float64]) -> None:
 
 @njit(nogil=True, cache=True)
 def sanitise(x: NDArray[np.complex64], limit: float) -> int:
-    """Set samples that are not finite or beyond `limit` to 0. How many were."""
+    """Set samples that are not finite or exceed `limit` to 0; returns how many there were."""
     most, n_good = np.float32(limit), 0
     parts = x.view(np.float32)
     for i in range(parts.size):
+        # False of NaN, too. Bad samples are rare: this loop, without a branch, is vectorised.
         n_good += abs(parts[i]) < most
     if n_good == parts.size:
         return 0

@@ -52,7 +52,7 @@ def _noise(channel: Channel) -> float:
 
 @njit(nogil=True, cache=True)
 def start_tracking(tones: Tones, channel: Channel, clock_error: float, is_known: bool) -> None:
-    """Phase and slope as they stand after the preamble.
+    """Set phase and slope, and what is known of them, as they stand after the preamble.
 
     `clock_error` is the share by which the sender's sampling clock is fast, as far as it is known;
     pilots may contradict it.
@@ -73,7 +73,7 @@ def start_tracking(tones: Tones, channel: Channel, clock_error: float, is_known:
 
 @step
 def use_slope(slope: float, tones: Tones, channel: Channel) -> None:
-    """Turn subcarriers back by `slope` from now on."""
+    """Turn subcarriers back by `slope` radians a subcarrier from now on."""
     more = channel.figures[SLOPE_USED] - slope
     channel.figures[SLOPE_USED] = slope
     if abs(more) * tones.n_fft < _SMALL:
@@ -84,7 +84,7 @@ def use_slope(slope: float, tones: Tones, channel: Channel) -> None:
 
 @step
 def renew(channel: Channel) -> None:
-    """What equalising needs, for the gains as they are."""
+    """Compute from the gains what equalising needs: their certainty and their inverse."""
     h, inverse, width = channel.h, channel.inverse, channel.certainty.size
     scale, one = splat(LLR_SCALE / _noise(channel)), splat(1)
     tiny = splat(1e-30)
@@ -101,7 +101,7 @@ def renew(channel: Channel) -> None:
 def _pilots(
     re: Row, im: Row, polarity: float, tones: Tones, channel: Channel, scratch: Scratch
 ) -> float:
-    """Follow phase and slope to this symbol; its noise power on a subcarrier."""
+    """Track phase and slope to this symbol by its pilots; its noise power on a subcarrier."""
     tracking, turned, power = channel.tracking, scratch.turned, scratch.pilot_power
     predict(tracking)
     back = complex(math.cos(tracking[PHASE, 0]), -math.sin(tracking[PHASE, 0])) * polarity
@@ -124,8 +124,9 @@ def _data(
 ) -> float:  # fmt: skip
     """The `n` data subcarriers of a symbol: to levels, and to LLRs plane by plane.
 
-    Turned by c + js and by the slope in use, they and what they probably are go to the channel's
-    sums and masses, times `trust`. What is certain of them is returned.
+    The subcarriers are turned by c + js and by the slope in use. With what they probably are, they
+    are added to the channel's sums and masses, times `trust`. Returns what is certain of them, Σ |E
+    s|² times `trust`.
     """
     width = channel.masses.size
     turns, inverse, sums = channel.turns, channel.inverse, channel.sums
@@ -164,7 +165,7 @@ def _learn_pilots(
     re: Row, im: Row, turned_by: complex, trust: float, polarity: float, tones: Tones,
     channel: Channel,
 ) -> None:  # fmt: skip
-    """What the pilots say of their subcarriers' gains."""
+    """Add what the pilots say of their subcarriers' gains to the channel's sums and masses."""
     for p in range(tones.pilots.size):
         at = tones.n_data + p
         turn = complex(channel.turns[0, at], channel.turns[1, at])
@@ -179,7 +180,8 @@ def _learn_pilots(
 def _correct_channel(tones: Tones, channel: Channel, scratch: Scratch) -> None:
     """Correct the gains by what the last symbols, as decided, say of them.
 
-    A step of expectation and maximisation, made as long as what was uncertain makes it too short.
+    This is a step of expectation and maximisation. What was uncertain makes such a step too short;
+    it is made longer by as much.
     """
     figures, sums, h, width = channel.figures, channel.sums, channel.h, channel.masses.size
     mass = figures[CERTAIN] / tones.bins.size
@@ -210,21 +212,23 @@ def equalise(
     llr: NDArray[np.int16],
     first: int,
 ) -> None:
-    """`n` symbols to LLRs in the code's order, positive for 0, written from symbol `first` on.
+    """Write the LLRs of `n` symbols in the code's order, positive for 0, from symbol `first` on.
 
-    `y` `[≥ n, 2, width]`: real and imaginary parts, in the order of tones; the first is symbol
-    `number`, of which the header's first is 0. `channel` goes on from call to call. `points`
+    `y` `[≥ n, 2, width]` has real and imaginary parts, in the order of tones; its first symbol is
+    number `number`, the header's first being 0. `channel` goes on from call to call. `points`
     `[…, n_data]` gets the equalised points, if it has any rows.
     """
     n_data, n_bits, unit = tones.n_data, axes.gather.size, axes.unit
     gather, planes, figures = axes.gather, scratch.planes, channel.figures
     n_pilots = tones.bins.size - n_data
+    # The slope at which subcarrier n_fft / 2, beyond the outermost, has turned by _LAG.
     most_lag = _LAG / tones.n_fft * 2
     for row in range(n):
         re, im, polarity = y[row, 0], y[row, 1], tones.polarity[number + row]
         no = _pilots(re, im, polarity, tones, channel, scratch)
         if abs(channel.tracking[SLOPE, 0] - figures[SLOPE_USED]) > most_lag:
             use_slope(channel.tracking[SLOPE, 0], tones, channel)
+        # A symbol with more noise than the preamble had, as under interference, counts for less.
         phase, trust = channel.tracking[PHASE, 0], _noise(channel) / no
         c, s = math.cos(phase), -math.sin(phase)
         certain = _data(re, im, c, s, trust, axes, channel, scratch, n_data)

@@ -1,8 +1,8 @@
 """FFTs of eight windows at once, one in each lane.
 
 Stockham's radix 4: every stage reads in order, and writes so that the last one's output is sorted.
-What is read and written are eight windows' samples of the same number; so a stage is the same few
-vector operations again and again, for 64, 128 and 256 samples alike.
+Each value that is read or written is the same sample of all eight windows; so a stage is the same
+few vector operations again and again, for 64, 128 and 256 samples alike.
 """
 
 import math
@@ -19,7 +19,7 @@ from phy.kernels.lanes import N_LANES, first_halves, load, second_halves, splat,
 
 @njit(nogil=True, cache=True)
 def circle(frequency: float, size: float, out: Planes) -> None:
-    """size · exp(j 2π · frequency · m) `[2, n]`."""
+    """Write size · exp(j 2π · frequency · m) for m = 0, 1, … to `out` `[2, n]`."""
     step = complex(math.cos(2 * math.pi * frequency), math.sin(2 * math.pi * frequency))
     value = complex(size)
     for m in range(out.shape[1]):
@@ -39,11 +39,12 @@ def eight_windows(
     scratch: Scratch,
     out: NDArray[np.float32],
 ) -> None:
-    """`windows_to_tones` of the first `n` ≤ 8 windows; `scratch.turn` is that of `frequency`."""
+    """Run `windows_to_tones` on the first `n` ≤ 8 windows, with `scratch.turn` as it is."""
     n_fft, parts, square, turn = tones.n_fft, scratch.windows, scratch.square, scratch.turn
     flat, step = samples.view(np.float32), -2 * math.pi * frequency
     re, im, to_re, to_im = parts[0], parts[1], parts[2], parts[3]
     for lane in range(N_LANES):
+        # Lanes beyond the last window repeat it: nothing is read behind the samples.
         phase = step * (starts[min(lane, n - 1)] + origin)
         square[lane], square[N_LANES + lane] = math.cos(phase), math.sin(phase)
     begin_re, begin_im = load(square, 0), load(square, N_LANES)
@@ -75,7 +76,7 @@ def windows_to_tones(
     scratch: Scratch,
     out: NDArray[np.float32],
 ) -> None:
-    """Tones `[n, 2, width]` of windows that begin at `starts` `[n]`.
+    """Write the tones `[n, 2, width]` of FFT windows that begin at `starts` `[n]`.
 
     Samples are taken less `dc` and turned back by `frequency` cycles a sample; phase 0 is `origin`
     samples before `samples[0]`.
@@ -88,7 +89,7 @@ def windows_to_tones(
 
 @step
 def transpose(square: Row) -> None:
-    """Eight rows of eight: rows become columns, as cards are shuffled three times."""
+    """Transpose eight rows of eight in place, as cards are shuffled three times."""
     a, b, c, d = load(square, 0), load(square, 8), load(square, 16), load(square, 24)
     e, f, g, h = load(square, 32), load(square, 40), load(square, 48), load(square, 56)
     for _ in range(3):
@@ -110,7 +111,7 @@ def transpose(square: Row) -> None:
 def _sort(
     re: Row, im: Row, n: int, bins: NDArray[np.int64], square: Row, out: NDArray[np.float32]
 ) -> None:
-    """Lanes to the first `n` rows of `out` `[…, 2, width]`, bins to the order of `bins`."""
+    """Write the first `n` lanes to rows of `out` `[…, 2, width]`, in the order of `bins`."""
     width = out.shape[2]
     for part in range(2):
         of = im if part else re
@@ -128,7 +129,7 @@ def _sort(
 def transform(
     re: Row, im: Row, to_re: Row, to_im: Row, n: int, twiddles: NDArray[np.float32]
 ) -> bool:
-    """The FFT of lanes `[n · 8]`; True when it is in `to_re`, `to_im`, else in `re`, `im`."""
+    """Compute the FFT of lanes `[n · 8]`; True when it is in `to_re`, `to_im`, not `re`, `im`."""
     left, swapped = n, False
     stride: Any = np.int64(1)
     while left >= 4:
@@ -152,7 +153,7 @@ def transform(
 def _radix_4(
     re: Row, im: Row, to_re: Row, to_im: Row, n: int, stride: int, twiddles: NDArray[np.float32]
 ) -> None:
-    """A stage: `n` groups of `stride` butterflies."""
+    """Run a radix-4 stage: `n` groups of `stride` butterflies."""
     quarter = N_LANES * n * stride
     for j in range(n):
         at = j * stride
@@ -186,7 +187,7 @@ def _radix_4(
 
 @njit(nogil=True, cache=True)
 def _radix_2(re: Row, im: Row, to_re: Row, to_im: Row, stride: int) -> None:
-    """The last stage of sizes that are no power of 4."""
+    """Run the last stage of sizes that are no power of 4."""
     half = N_LANES * stride
     for a in range(0, half, N_LANES):
         b = a + half

@@ -9,7 +9,10 @@ _Step = TypeVar("_Step", bound=Callable[..., Any])
 
 
 def step(function: _Step) -> _Step:
-    """To hand a tuple of arrays on by value costs more than many a step. Only kernels call them."""
+    """Compile a step, which only kernels can call and which is inlined there.
+
+    To hand a tuple of arrays on by value costs more than many a step does.
+    """
     options: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     made: Any = njit(nogil=True, forceinline=True, **options)(function)
     inlined: _Step = made

@@ -20,7 +20,7 @@ N_LANES = 8
 
 
 def whole_lanes(n: int) -> int:
-    """`n`, up to whole values."""
+    """`n`, rounded up to a whole number of vectors of N_LANES."""
     return -(-n // N_LANES) * N_LANES
 
 
@@ -29,7 +29,7 @@ _VECTOR = ir.VectorType(_F32, N_LANES)
 
 
 class Lanes(types.Type):
-    """The type of such a value."""
+    """The type of eight float32 as one value."""
 
     if TYPE_CHECKING:
 
@@ -80,13 +80,13 @@ def _negate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
 
 
 def place(context: Any, builder: Any, signature: Any, args: Any, vector: Any) -> Any:
-    """For intrinsics: where in an array, their first argument, is `vector` from an index on."""
+    """For intrinsics: a pointer to `vector` at an index, argument 1, of an array, argument 0."""
     data = context.make_array(signature.args[0])(context, builder, args[0]).data
     return builder.bitcast(builder.gep(data, [args[1]]), vector.as_pointer())
 
 
 def _load(_typing: Any, array: Any, at: Any) -> Any:
-    """The eight from `at` on, of an array without gaps, counted from its beginning."""
+    """Load eight values of an array without gaps, from index `at` of its flat form on."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         value = builder.load(place(context, builder, signature, args, _VECTOR))
@@ -97,7 +97,7 @@ def _load(_typing: Any, array: Any, at: Any) -> Any:
 
 
 def _store(_typing: Any, array: Any, at: Any, value: Any) -> Any:
-    """Write eight from `at` on."""
+    """Store eight values to an array without gaps, from index `at` of its flat form on."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         where = place(context, builder, signature, args, _VECTOR)
@@ -108,7 +108,7 @@ def _store(_typing: Any, array: Any, at: Any, value: Any) -> Any:
 
 
 def _store_int16(_typing: Any, array: Any, at: Any, value: Any) -> Any:
-    """Write eight as int16, towards zero; they must fit."""
+    """Store eight values as int16, rounded towards zero; they must fit."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         kind = ir.VectorType(_I16, N_LANES)
@@ -121,7 +121,7 @@ def _store_int16(_typing: Any, array: Any, at: Any, value: Any) -> Any:
 
 
 def _splat(_typing: Any, value: Any) -> Any:
-    """The same in all lanes."""
+    """A number, the same in all lanes."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         number = context.cast(builder, args[0], signature.args[0], types.float32)
@@ -133,7 +133,7 @@ def _splat(_typing: Any, value: Any) -> Any:
 
 
 def _total(_typing: Any, value: Any) -> Any:
-    """The sum of the lanes: halves, then quarters, then pairs."""
+    """The sum of the lanes, added up in a fixed order: halves, then quarters, then pairs."""
 
     def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         lanes = [builder.extract_element(args[0], _lane(i)) for i in range(N_LANES)]
@@ -161,7 +161,7 @@ def _pairs(_typing: Any, value: Any) -> Any:
 
 
 def _magnitude(_typing: Any, value: Any) -> Any:
-    """|x| in each lane."""
+    """The magnitude of each lane."""
 
     def generate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
         return _call(builder, "llvm.fabs", [args[0]])

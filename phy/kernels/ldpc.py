@@ -45,10 +45,10 @@ SURE = 4000
 
 
 class Workspace(NamedTuple):
-    """What decoding needs besides its input. One for each thread: the kernels hold no lock."""
+    """Working memory of decoding. One for each thread: the kernels hold no lock."""
 
     llr: NDArray[np.int16]
-    """Of a whole codeword `[24 Z]`."""
+    """LLRs of a whole codeword `[24 Z]`."""
     posteriors: NDArray[np.int16]
     messages: NDArray[np.int16]
     told: NDArray[np.int16]
@@ -60,7 +60,7 @@ open_workspace = opener(Workspace, "i2[1] i2[2] i2[2] i2[2] i2[2]")
 
 
 def new_workspace(max_z: int = 81, max_edges: int = 96) -> ArgumentBlock[Workspace]:
-    """Room for codes up to that size."""
+    """A workspace for codes with up to `max_z` bits a block and up to `max_edges` edges."""
     lanes = -(-max_z // LANES) * LANES
     return ArgumentBlock(
         Workspace(
@@ -77,9 +77,9 @@ def new_workspace(max_z: int = 81, max_edges: int = 96) -> ArgumentBlock[Workspa
 def decode_codeword(
     llr: NDArray[np.int16], form: Form, max_iterations: int, work: Workspace
 ) -> int:
-    """Iterations until all checks held, 0 if they never did; the bits are posteriors' signs.
+    """Decode one codeword; iterations until all checks held, 0 if they never did.
 
-    `llr` `[24 z]`, positive for 0.
+    `llr` `[24 z]` is positive for 0. The decoded bits are the signs of `work.posteriors`.
     """
     z, row_ends, posteriors = form.z, form.row_ends, work.posteriors
     lanes = -(-z // LANES) * LANES
@@ -111,9 +111,10 @@ def decode_blocks(
     white: NDArray[np.uint8],
     out: NDArray[np.uint8],
 ) -> None:
-    """LLRs of blocks, one after another, to their bytes, less `white`: `out` `[blocks, bytes]`.
+    """Decode LLRs of blocks, one after another, to bytes `[blocks, bytes]`, less `white`.
 
-    What was not sent is known to be 0 (information) or not at all.
+    A bit that was not sent is known to be 0 if it is information (shortened), and not known at all
+    if it is parity (punctured).
     """
     form, work = open_form(form_in), open_workspace(work_in)
     z, shares, ends = form.z, form.shares, form.ends
@@ -154,7 +155,7 @@ def decode_blocks(
 
 @njit(nogil=True, cache=True)
 def _begins_with(parity: Words, sent: Words, z: int, n: int) -> bool:
-    """Whether the parity `[rows, 2]`, block after block, begins with the `n` bits sent."""
+    """Whether the parity `[rows, 2]`, one block after another, begins with the `n` bits `sent`."""
     different = np.uint64(0)
     for row in range(parity.shape[0]):
         first = row * z

@@ -1,7 +1,7 @@
 """The encoder of quasi-cyclic LDPC codes; see `phy.kernels.ldpc` for the terms.
 
-A block of Z ≤ 128 bits is two words, bit 0 lowest. A block column's block, shifted by s, are the
-bits from s on of the block repeated: of three words of which two are taken.
+A block of Z ≤ 128 bits is two words, bit 0 lowest. The block shifted by s is the Z bits from bit s
+on of the block written twice in a row.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ _63 = np.uint64(63)
 
 @step
 def _repeat(low: np.uint64, high: np.uint64, z: int, out: Words) -> None:
-    """The `z` bits of `low` and `high`, and after them the same again; `out` `[5]`."""
+    """Write the `z` bits of `low` and `high` twice in a row to `out` `[5]`."""
     word, bit = z >> 6, np.uint64(z & 63)
     rest = _63 - bit
     for i in range(2, 5):
@@ -33,7 +33,7 @@ def _repeat(low: np.uint64, high: np.uint64, z: int, out: Words) -> None:
 
 @step
 def _part(repeated: Words, first: int) -> np.uint64:
-    """The 64 bits from `first` on."""
+    """The 64 bits from bit `first` on of a block written twice."""
     word, bit = first >> 6, np.uint64(first & 63)
     part: np.uint64 = (repeated[word] >> bit) | (repeated[word + 1] << ONE << (_63 - bit))
     return part
@@ -41,7 +41,7 @@ def _part(repeated: Words, first: int) -> np.uint64:
 
 @njit(nogil=True, cache=True)
 def parity_of(bits: Words, form: Form, parity: Words) -> None:
-    """The parity `[rows, 2]` of the information `bits` `[K z / 64 + 1]`, a row for each block.
+    """Write the parity `[rows, 2]`, a row for each block, of information `bits` `[K z / 64 + 1]`.
 
     Parity columns 1, 2, … are a staircase; column 0 has three blocks, in the first and last row
     with shift 1 and in row `middle` with 0. In the sum of all rows only the latter remains.
@@ -84,7 +84,7 @@ def parity_of(bits: Words, form: Form, parity: Words) -> None:
 
 @step
 def unpack(words: Words, n: int, out: NDArray[np.uint8], at: int) -> None:
-    """The first `n` bits of `words`, one in each of `out` from `at` on."""
+    """Write the first `n` bits of `words`, one in each element of `out` from `at` on."""
     for i in range(n):
         out[at + i] = words[i >> 6] >> np.uint64(i & 63) & ONE
 
@@ -93,7 +93,7 @@ def unpack(words: Words, n: int, out: NDArray[np.uint8], at: int) -> None:
 def encode_codeword(
     bits: Words, number: int, form: Form, parity: Words, out: NDArray[np.uint8], at: int
 ) -> None:
-    """Coded bits of the `number`-th codeword of a block from `out[at]` on: `bits`, then parity.
+    """Write the `number`-th codeword of a block, `bits` and then parity, from `out[at]` on.
 
     `bits` are zero beyond its share of the block, `parity` `[rows, 2]` is room.
     """
@@ -110,7 +110,7 @@ def encode_codeword(
 def encode_blocks(
     blocks: NDArray[np.uint8], form_in: PackedArguments, out: NDArray[np.uint8]
 ) -> None:
-    """Coded bits `[blocks, n_coded]` of `blocks` of bits `[blocks, n_bits]`."""
+    """Write the coded bits `[blocks, n_coded]` of blocks of bits `[blocks, n_bits]` to `out`."""
     form = open_form(form_in)
     n_rows = form.row_ends.size - 1
     bits = np.empty((N_COLUMNS - n_rows) * form.z // 64 + 2, np.uint64)
@@ -130,7 +130,7 @@ def encode_blocks(
 def encode_octets(
     octets: NDArray[np.uint8], n_blocks: int, form: Form, out: NDArray[np.uint8]
 ) -> None:
-    """Coded bits of blocks of bytes, one after another."""
+    """Write the coded bits of `n_blocks` blocks of bytes to `out`, one block after another."""
     n_rows, n_octets = form.row_ends.size - 1, octets.size // n_blocks
     whole = np.empty(n_octets // 8 + 2, np.uint64)
     bits = np.empty((N_COLUMNS - n_rows) * form.z // 64 + 2, np.uint64)

@@ -12,7 +12,7 @@ N_COLUMNS = 24
 
 
 class Form(NamedTuple):
-    """The code, and how much of a block is in each codeword; see `phy.kernels.ldpc`."""
+    """A code, and how much of a block is in each codeword; see `phy.kernels.ldpc` for the terms."""
 
     z: int
     middle: int
@@ -25,7 +25,7 @@ class Form(NamedTuple):
     shares: NDArray[np.int32]
     """Bits of the block in each codeword `[codewords]`."""
     ends: NDArray[np.int32]
-    """Where the coded bits of each begin, and after the last `[codewords + 1]`."""
+    """Where the coded bits of each codeword begin, and after the last `[codewords + 1]`."""
 
 
 open_form = opener(Form, "i8 i8 i4[1] i4[1] i4[1] i4[1] i4[1]")

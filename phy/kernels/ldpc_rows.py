@@ -14,10 +14,11 @@ from numba.extending import intrinsic
 
 LANES = 32
 MAX_POSTERIOR = 8000
+"""Posteriors stay within this, so that they fit 16 bits with any message added or taken off."""
 WEIGHT = 14
-"""What messages are taken times, in sixteenths."""
+"""Factor that messages are taken times, in sixteenths."""
 MAX_MAGNITUDE = 2000
-"""Magnitudes beyond count as this; times WEIGHT, it fits 16 bits."""
+"""Magnitudes beyond this count as this; times WEIGHT, it fits 16 bits."""
 _NO_MINIMUM = 32000
 
 _I16, _I32, _I64 = ir.IntType(16), ir.IntType(32), ir.IntType(64)
@@ -28,7 +29,7 @@ def _row_generator(
     _context: Any, posteriors: Any, messages: Any, told: Any, scratch: Any, columns: Any,
     shifts: Any, first: Any, last: Any, z: Any,
 ) -> Any:  # fmt: skip
-    """One block row, whose edges are `first` … `last` − 1; 0 when its checks held before it."""
+    """Visit one block row with edges `first` … `last` − 1; 0 when its checks held before."""
     arrays = (posteriors, messages, told, scratch, columns, shifts)
     signature = types.int64(*arrays, first, last, z)
 
@@ -72,7 +73,7 @@ class _Row:
         return builder.zext(builder.bitcast(signs, _I32), _I64)
 
     def checks(self, at: Any, odd: Any) -> None:
-        """32 checks: new messages and posteriors of all their bits."""
+        """Emit 32 checks: new messages and posteriors of all their bits."""
         builder = self.builder
         least, second = self.variable(_NO_MINIMUM), self.variable(_NO_MINIMUM)
         sign, parity = self.variable(0), self.variable(0)
@@ -104,7 +105,7 @@ class _Row:
             self.store(posterior, self.posteriors, self.place(edge, at))
 
     def unless_turned(self, rest: Any, place: Any) -> Any:
-        """`rest`, or 0 where its sign is another than the check was told last; told now."""
+        """What a check is told, and stored as told: `rest`, or 0 where its sign has turned."""
         builder = self.builder
         before = self.load(self.told, place)
         turned = builder.and_(
@@ -147,7 +148,7 @@ class _Row:
         return self.builder.add(self.builder.mul(edge, self.message_stride), at)
 
     def vectors(self, n: Any) -> Any:
-        """Vectors that hold `n` lanes."""
+        """Number of vectors that hold `n` lanes."""
         return self.builder.sdiv(self.builder.add(n, _long(LANES - 1)), _long(LANES))
 
     def variable(self, value: int) -> Any:
@@ -177,14 +178,14 @@ class _Row:
         return self.builder.select(self.builder.icmp_signed(">", x, y), x, y)
 
     def weighted(self, x: Any) -> Any:
-        """x · WEIGHT / 16, to the nearest."""
+        """A magnitude times WEIGHT / 16, to the nearest."""
         builder = self.builder
         product = builder.mul(self.smaller(x, _splat(MAX_MAGNITUDE)), _splat(WEIGHT))
         return builder.ashr(builder.add(product, _splat(8)), _splat(4))
 
 
 def _edges(builder: Any, first: Any, last: Any) -> Any:
-    """A loop over `first` … `last` − 1: (edge, how many came before it)."""
+    """A loop over edges `first` … `last` − 1: (edge, how many came before it)."""
     return cgutils.for_range_slice(builder, first, last, _long(1), _I64)
 
 

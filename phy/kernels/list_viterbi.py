@@ -15,7 +15,10 @@ _UNREACHED = -(1 << 30)
 
 @njit(nogil=True, cache=True)
 def list_decode(llr: NDArray[np.int16], out: NDArray[np.uint8]) -> None:
-    """Bits `[n_list, t]` of the paths from state 0 to state 0, likeliest first; LLRs `[2 t]`."""
+    """Write the bits `[n_list, t]` of the likeliest paths, best first; LLRs are `[2 t]`.
+
+    Paths begin and end in state 0.
+    """
     n_list, n_steps = out.shape
     metrics = np.full((N_STATES, n_list), _UNREACHED, np.int64)
     grown = np.empty_like(metrics)

@@ -16,14 +16,14 @@ from phy.kernels.ldpc_form import open_form
 
 
 class Map(NamedTuple):
-    """A modulation on a grid."""
+    """A modulation on a grid, as tables from coded bits to points."""
 
     bits: int
     source: NDArray[np.uint32]
     """Which coded bit of a symbol each subcarrier's bits are, highest first `[n_data · bits]`."""
     real: Row
     imag: Row
-    """Of the points, by number."""
+    """Coordinates of the points, by the number that their bits make."""
 
 
 open_map = opener(Map, "i8 u4[1] f4[1] f4[1]")
@@ -38,7 +38,7 @@ def map_symbol(
     by: Map,
     y: NDArray[np.float32],
 ) -> None:
-    """The tones `y` `[2, width]` of the symbol whose coded bits are at `coded[at]` and after."""
+    """Write the tones `y` `[2, width]` of the symbol whose coded bits begin at `coded[at]`."""
     for d in range(tones.n_data):
         number = 0
         for b in range(by.bits):
@@ -60,10 +60,10 @@ def eight_symbols(
     square: Row,
     out: NDArray[np.complex64],
 ) -> None:
-    """Tones `y` `[8, 2, width]` of `n` ≤ 8 symbols to samples `[n · n_symbol]`, mean power 1.
+    """Write `n` ≤ 8 symbols of tones `y` `[8, 2, width]` as samples `[n · n_symbol]`, mean power 1.
 
-    Samples beyond the magnitude `peak` are shortened to it. `windows` `[4, 8 n_fft]` and
-    `square` `[64]` are room.
+    Samples beyond the magnitude `peak` are shortened to it. `windows` `[4, 8 n_fft]` and `square`
+    `[64]` are room.
     """
     n_fft, n_symbol, width = tones.n_fft, tones.n_symbol, y.shape[2]
     n_cp, flat = n_symbol - n_fft, out.view(np.float32)
@@ -111,9 +111,9 @@ def modulate(
     map_in: PackedArguments,
     out: NDArray[np.complex64],
 ) -> None:
-    """Blocks of bytes, whitened, to samples of whole symbols; the first is symbol `number`.
+    """Write whitened blocks of bytes as samples of whole symbols; the first symbol is `number`.
 
-    Symbols are filled up with `padding`.
+    What the blocks leave free of the last symbol is filled with `padding`.
     """
     form, tones = open_form(form_in), open_tones(tones_in)
     n_symbols = out.size // tones.n_symbol
@@ -134,7 +134,7 @@ def modulate_bits(
     map_in: PackedArguments,
     out: NDArray[np.complex64],
 ) -> None:
-    """The same of coded bits, as many as whole symbols hold."""
+    """Write coded bits, as many as whole symbols hold, as samples; the first symbol is `number`."""
     tones, by = open_tones(tones_in), open_map(map_in)
     n_bits, n_symbol = tones.n_data * by.bits, tones.n_symbol
     windows = np.empty((4, N_LANES * tones.n_fft), np.float32)

@@ -39,7 +39,7 @@ def add_noise(
     radii: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
-    """out = x + noise of `scale` per part; both `[2n]`, real and imaginary parts in turn.
+    """Write x + noise of `scale` per part to `out`; both `[2n]`, real and imaginary parts in turn.
 
     `first` is the number of the first sample; `bits` and `radii` `[CHUNK]` are working space.
     """
@@ -58,7 +58,7 @@ def add_noise(
 
 @njit(nogil=True, cache=True)
 def _split(z: np.uint64) -> np.uint64:
-    """A step of splitmix64."""
+    """The hash of splitmix64, from 64 bits to 64."""
     z = (z ^ (z >> _U64(30))) * _U64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> _U64(27))) * _U64(0x94D049BB133111EB)
     return z ^ (z >> _U64(31))
@@ -66,7 +66,7 @@ def _split(z: np.uint64) -> np.uint64:
 
 @njit(nogil=True, cache=True)
 def _hash(key: np.uint32, first: int, out: NDArray[np.uint32]) -> None:
-    """Bits of each counter: Wellons' triple32."""
+    """Write 32 random bits for each counter from `first` on: Wellons' triple32 under a key."""
     for i in range(out.size):
         x = _U32(first + i) ^ key
         x = _U32(x ^ (x >> _U32(17)))
@@ -85,7 +85,10 @@ def _make_radii(
     radii: NDArray[np.float32],
     as_bits: NDArray[np.int32],
 ) -> None:
-    """scale · sqrt(-2 ln u), u = 2^-31 … 1. `as_bits` is a view of `radii`; `bits` are used up."""
+    """Write scale · sqrt(-2 ln u) with u = 2^-31 … 1 to `radii`; `bits` are used up.
+
+    `as_bits` is a view of `radii`.
+    """
     for i in range(bits.size):
         radii[i] = _F32(_I32(bits[i] >> _U32(1))) + _F32(1)
     for i in range(bits.size):
@@ -111,7 +114,7 @@ def _turn(
     x: NDArray[np.float32],
     out: NDArray[np.float32],
 ) -> None:
-    """Adds a point at each radius: 30 bits are an angle up to π/4 either way, two the quadrant."""
+    """Add a point at each radius to `x`: 30 bits are an angle up to ±π/4, two are the quadrant."""
     for i in range(bits.size):
         y = _F32(_I32(bits[i]) >> _I32(2)) * _F32(2.0**-29 * math.pi / 4)
         yy = y * y

@@ -42,7 +42,7 @@ def interpolate(
 
 @njit(nogil=True, cache=True, fastmath={"reassoc", "contract", "nsz"})
 def _dot(weights: NDArray[np.float32], x: NDArray[np.float32]) -> np.float32:
-    """In whatever order is fastest."""
+    """The product of two rows, added up in whatever order is fastest."""
     total = np.float32(0)
     for k in range(weights.size):
         total += weights[k] * x[k]

@@ -27,7 +27,7 @@ def sense(
 ) -> None:
     """Take samples `[n]`: a window is busy when its mean power exceeds `threshold` · floor.
 
-    Samples that are no numbers or larger than `limit` are bad: they count as no power.
+    Samples that are not finite or larger than `limit` are bad: they count as no power.
     """
     powers = state[POWERS:]
     filled = int(state[FILLED])
@@ -54,7 +54,7 @@ def _judge(
     end: float,
     state: NDArray[np.float64],
 ) -> None:
-    """What a full window, over at index `end`, says of the channel and of the floor."""
+    """Judge a full window that is over at index `end`: mark the channel busy, follow the floor."""
     power = _mean(powers)
     # Also true of NaN. A bad sample makes its window's mean so large, or no number.
     spoilt = not power < limit / WINDOW
@@ -90,7 +90,7 @@ def _mean(powers: NDArray[np.float64]) -> float:
 
 @njit(nogil=True, cache=True)
 def _without_bad(powers: NDArray[np.float64], limit: float) -> int:
-    """Set powers that are no numbers or beyond `limit` to 0. How many were."""
+    """Set powers that are not finite or exceed `limit` to 0; returns how many there were."""
     bad = 0
     for i in range(powers.size):
         if not powers[i] <= limit:

@@ -27,7 +27,7 @@ _DRIFT_RISE, _DRIFT_FALL = 0.5, 0.1
 
 @njit(nogil=True, cache=True)
 def mean_delay(h: Planes, neighbours: NDArray[np.int64]) -> float:
-    """Phase from a subcarrier to the next, radians; `neighbours` `[2, n]` are positions in `h`."""
+    """Mean phase, radians, from a subcarrier to the next; `neighbours` `[2, n]` are places in `h`."""
     turn = 0j
     for i in range(neighbours.shape[1]):
         first, second = neighbours[0, i], neighbours[1, i]
@@ -37,7 +37,7 @@ def mean_delay(h: Planes, neighbours: NDArray[np.int64]) -> float:
 
 @step
 def multiply(x: Planes, by: Planes, conjugate: bool, out: Planes) -> None:
-    """x · by or x · by*, over all of a row."""
+    """Write x · by, or x · by* if `conjugate`, to `out`, over whole rows."""
     width, sign = x.shape[1], splat(-1.0 if conjugate else 1.0)
     for k in range(0, width, N_LANES):
         a, b = load(x, k), load(x, width + k)
@@ -48,9 +48,9 @@ def multiply(x: Planes, by: Planes, conjugate: bool, out: Planes) -> None:
 
 @step
 def _split(tones: Tones, wanted: NDArray[np.float64], scratch: Scratch) -> None:
-    """What of `rest` is in the groups that are `wanted`: coefficients and energies.
+    """Split `rest` into the `wanted` groups: coefficients of their rows, energies of all groups.
 
-    What is in none, or in unwanted ones, is the last group.
+    What is in no group, or in one that is not wanted, counts as the last group.
     """
     rest, basis, coefficients = scratch.rest, tones.basis, scratch.coefficients
     energies, width = scratch.energies, scratch.rest.shape[1]
@@ -81,11 +81,12 @@ def _split(tones: Tones, wanted: NDArray[np.float64], scratch: Scratch) -> None:
 
 @step
 def _join(tones: Tones, scratch: Scratch) -> None:
-    """The way back to `rest`, each group times its weight."""
+    """Put `rest` together again, each group times its weight."""
     rest, basis, coefficients = scratch.rest, tones.basis, scratch.coefficients
     weights, width = scratch.weights, scratch.rest.shape[1]
     usual, first = weights[tones.ends.size], 0
     for k in range(0, 2 * width, N_LANES):
+        # The last group has no rows: all of `rest` gets its weight, and the others what they lack.
         store(rest, k, load(rest, k) * splat(usual))
     for group in range(tones.ends.size):
         more = np.float32(weights[group] - usual)
@@ -101,14 +102,14 @@ def _join(tones: Tones, scratch: Scratch) -> None:
 
 @step
 def _size(group: int, tones: Tones) -> int:
-    """Dimensions of a group."""
+    """Number of dimensions of a group."""
     first = tones.ends[group - 1] if group else 0
     return (tones.ends[group] if group < tones.ends.size else tones.bins.size) - first
 
 
 @step
 def _kept(energy: float, size: int, variance: float) -> float:
-    """Share of a group of `size` dimensions that is no noise, erring towards noise."""
+    """Share of a group of `size` dimensions that is kept as no noise, erring towards noise."""
     expected = size * variance
     if size > 1:
         expected += math.sqrt(size) * variance
@@ -117,9 +118,10 @@ def _kept(energy: float, size: int, variance: float) -> float:
 
 @njit(nogil=True, cache=True)
 def smooth(variance: float, tones: Tones, channel: Channel, scratch: Scratch) -> None:
-    """The gains `h`, measured with noise of `variance`, without most of that noise.
+    """Take most of the noise off the gains `h`, which were measured with noise of `variance`.
 
-    `unknown` gets the variance a dimension that is left, `power` what is in it, both of each group.
+    Of each group, `unknown` gets the variance that is left in a dimension, `power` the mean power
+    of one.
     """
     channel.figures[DELAY] = mean_delay(channel.h, tones.neighbours)
     lean(-channel.figures[DELAY], tones.subcarriers, channel.centre)
@@ -140,11 +142,11 @@ def smooth(variance: float, tones: Tones, channel: Channel, scratch: Scratch) ->
 def follow(
     error: Planes, variance: float, tones: Tones, channel: Channel, scratch: Scratch
 ) -> None:
-    """Correct gains that later symbols contradict by `error` `[2, width]`, which is used up.
+    """Correct the gains by `error` `[2, width]`, how later symbols contradict them; it is used up.
 
-    A Kalman filter a group: `unknown` is the variance of what is not known of it. The channel moves
-    by the drift times its `power`; the drift follows how much the errors exceed what noise and
-    ignorance explain.
+    There is a Kalman filter for each group: `unknown` is the variance of what is not known of it.
+    The channel moves by the drift times its `power`; the drift follows how much the errors exceed
+    what noise and ignorance explain.
     """
     power, unknown, energies = channel.power, channel.unknown, scratch.energies
     multiply(error, channel.centre, False, scratch.rest)
@@ -159,6 +161,7 @@ def follow(
         whole += size * power[group]
     drift = channel.figures[DRIFT]
     if whole > 0:
+        # Two standard deviations are left to chance, so that a still channel is taken for still.
         seen = max(0.0, (excess - 2 * math.sqrt(chance)) / whole)
         drift += (_DRIFT_RISE if seen > drift else _DRIFT_FALL) * (seen - drift)
         channel.figures[DRIFT] = drift
@@ -174,6 +177,6 @@ def follow(
 
 @step
 def add(x: Planes, more: Planes) -> None:
-    """x + more, in place."""
+    """Add `more` to `x`, in place."""
     for k in range(0, x.size, N_LANES):
         store(x, k, load(x, k) + load(more, k))

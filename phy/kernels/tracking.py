@@ -18,12 +18,12 @@ PHASE_NOISE = np.array([5e-5, 1e-10])
 SLOPE_NOISE = np.array([1e-10, 1e-15])
 
 SURPRISE = 6.0
-"""Times the preamble's noise at which a symbol's pilots, and with them its data, are doubted."""
+"""Factor of the preamble's noise beyond which a symbol's pilots, and so its data, are doubted."""
 
 
 @step
 def predict(tracking: NDArray[np.float64]) -> None:
-    """One symbol on: values move by their rates."""
+    """Advance both filters by one symbol: values move by their rates."""
     _predict(tracking[PHASE], PHASE_NOISE)
     _predict(tracking[SLOPE], SLOPE_NOISE)
 
@@ -38,11 +38,12 @@ def _predict(state: NDArray[np.float64], noise: NDArray[np.float64]) -> None:
 
 @step
 def _correct(state: NDArray[np.float64], innovation: float, variance: float) -> None:
-    """A measurement that differs from the prediction by `innovation`."""
+    """Take in a measurement of `variance` that differs from the prediction by `innovation`."""
     total = state[2] + variance
     gain, rate_gain = state[2] / total, state[3] / total
     state[0] += gain * innovation
     state[1] += rate_gain * innovation
+    # From the last to the first: each needs those before it as they were.
     state[4] -= rate_gain * state[3]
     state[3] -= gain * state[3]
     state[2] -= gain * state[2]
@@ -58,7 +59,7 @@ def correct(
 ) -> float:
     """Correct phase and slope by pilots; the noise power on a subcarrier, as far as they show it.
 
-    `turned` `[n]`: what came, turned back as predicted, times the conjugate of what should have
+    `turned` `[n]` is what came, turned back as predicted, times the conjugate of what should have
     come, of which `power` is the squared magnitude. Where pilots disagree by more than `no`
     explains, their own noise counts, here and for the data around them: interference that the
     preamble has not seen.
@@ -77,6 +78,7 @@ def correct(
     for p in range(n):
         k, weight = subcarriers[p], power[p]
         aligned = turned[p] * common
+        # The angle times |h|²: it has its weight already.
         theta = aligned.imag
         s0 += weight
         s1 += weight * k
@@ -92,6 +94,7 @@ def correct(
     if not det > 0.0:
         return no
     offset = math.atan2(total.imag, total.real)
+    # Only the half of the noise that is across a pilot turns it.
     _correct(tracking[PHASE], offset + (s2 * t0 - s1 * t1) / det, 0.5 * no * s2 / det)
     _correct(tracking[SLOPE], (s0 * t1 - s1 * t0) / det, 0.5 * no * s0 / det)
     return no

@@ -1,4 +1,4 @@
-"""Known symbols against received ones, tone by tone."""
+"""Estimation of the channel from known symbols, tone by tone."""
 
 import math
 
@@ -19,7 +19,7 @@ _LARGEST_BOOST = 3.0
 
 @njit(nogil=True, cache=True)
 def turn_back(x: NDArray[np.complex64], dc: complex, frequency: float, out: Planes) -> None:
-    """Samples `x` `[n]` less `dc`, turned back by `frequency` cycles a sample; `out` `[2, ≥ n]`."""
+    """Write `x` `[n]` less `dc`, turned back by `frequency` cycles a sample, to `out` `[2, …]`."""
     span, n = 32, x.size
     fine, coarse = np.empty((2, span), np.float32), np.empty((2, -(-n // span)), np.float32)
     circle(-frequency, 1.0, fine)
@@ -39,7 +39,7 @@ def turn_back(x: NDArray[np.complex64], dc: complex, frequency: float, out: Plan
 def least_squares(
     y: NDArray[np.float32], amplitude: Row, sent: NDArray[np.float32], h: Planes
 ) -> tuple[float, float]:
-    """Gain of each tone over `n` ≥ 2 symbols to `h` `[2, width]`; (noise on a tone, Σ |h|²).
+    """Write each tone's gain over `n` ≥ 2 symbols to `h` `[2, width]`; (noise on a tone, Σ |h|²).
 
     `sent` `[n, 2, width]`, 1 / x* of tones x, went out times `amplitude` `[n]`, and came as `y`.
     The noise is summed over tones, too.
@@ -91,7 +91,7 @@ def estimate(
     channel: Channel,
     scratch: Scratch,
 ) -> None:
-    """The channel from known symbols, as of `least_squares`, less what must be noise."""
+    """Estimate the channel from known symbols by `least_squares`, less what must be noise."""
     n_used = tones.bins.size
     noise, power = least_squares(y, amplitude, sent, channel.h)
     no, power = max(noise / n_used, 1e-20), power / n_used
@@ -99,6 +99,7 @@ def estimate(
     for a in amplitude:
         mass += a * a
     channel.figures[NO] = no
+    # Measured gains hold noise, too. Where that is all they hold, the difference may be negative.
     channel.figures[GAIN] = max(power - no / mass, 1e-3 * power, 1e-20)
     smooth(no / mass, tones, channel, scratch)
 
@@ -114,10 +115,10 @@ def learn(
     channel: Channel,
     scratch: Scratch,
 ) -> None:
-    """The channel anew with the header, now known, as further training; `y` is used up.
+    """Estimate the channel anew with the header, now known, as further training; `y` is used up.
 
-    `phase` is the last symbol's, `rate` how it grows a symbol. The preamble may have been sent
-    stronger than the rest: if so is what the header tells.
+    `phase` is the last symbol's, `rate` by how much it grows a symbol. The preamble may have been
+    sent stronger than the rest: the header tells whether, and how much.
     """
     n, width = sent.shape[0], sent.shape[2]
     seen: Lanes = splat(0)

@@ -43,7 +43,7 @@ _SIGN_B = [1 - 2 * int(PARITY_B[2 * j]) for j in range(N_HALF)]
 
 
 class ViterbiWorkspace:
-    """What decoding needs besides its input, for blocks of up to `n_steps` bits and tail.
+    """Working memory of decoding, for blocks of up to `n_steps` bits, tail included.
 
     One for each thread: the kernels hold no lock.
     """
@@ -75,7 +75,7 @@ def _variable(builder: Any, values: list[int]) -> Any:
 
 
 def _forward_generator(_context: Any, llr: Any, decisions: Any) -> Any:
-    """All steps of the trellis: LLRs `[2 t]` to decisions `[t]`, from state 0."""
+    """Run all steps of the trellis from state 0: LLRs `[2 t]` to decisions `[t]`."""
     signature = types.void(llr, decisions)
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -133,7 +133,7 @@ def _emit_steps(builder: Any, llr: Any, decisions: Any, n_steps: Any) -> None:
 def decode_block(
     llr: NDArray[np.int16], decisions: NDArray[np.uint64], out: NDArray[np.uint8]
 ) -> None:
-    """LLRs of the mother code `[2 t]` to the likeliest bytes, the tail left out."""
+    """Decode LLRs of the mother code `[2 t]` to the likeliest bytes, the tail left out."""
     out[:] = 0
     n_bits = 8 * out.size
     _forward(llr, decisions)

@@ -25,7 +25,7 @@ _SERVICE_BYTES = 2
 
 
 class Rate(NamedTuple):
-    """One of the eight; `mbps` at 20 MHz."""
+    """One of the eight rates of 802.11a; `mbps` is its speed in Mbit/s at 20 MHz."""
 
     mbps: int
     modulation: Modulation
@@ -33,16 +33,16 @@ class Rate(NamedTuple):
 
     @property
     def name(self) -> str:
-        """As people say it: `16QAM 1/2`."""
+        """The rate's modulation and code in the usual form, such as `16QAM 1/2`."""
         return f"{self.modulation.label} {self.code.name}"
 
     @property
     def data_bits(self) -> int:
-        """Information bits of a symbol."""
+        """Information bits of one symbol."""
         return int(48 * self.modulation.bits * self.code.rate)
 
     def n_symbols(self, n_bytes: int) -> int:
-        """Symbols that a PSDU of `n_bytes` takes."""
+        """Symbols that a PSDU of `n_bytes` takes, with SERVICE and tail."""
         return -(-(8 * (_SERVICE_BYTES + n_bytes) + N_TAIL) // self.data_bits)
 
 
@@ -56,18 +56,18 @@ RATES = {
     0b0001: Rate(48, Modulation.QAM64, TWO_THIRDS),
     0b0011: Rate(54, Modulation.QAM64, THREE_QUARTERS),
 }
-"""By the four bits of the SIGNAL field, first bit highest (table 17-6)."""
+"""Rates by the four bits of the SIGNAL field, first bit highest (table 17-6)."""
 
 
 class Signal(NamedTuple):
-    """What the SIGNAL field tells: how the rest is sent, and the octets of the PSDU."""
+    """What the SIGNAL field tells: the rate of what follows, and the octets of the PSDU."""
 
     rate: Rate
     n_bytes: int
 
 
 def parse_signal(llr: NDArray[np.int16]) -> Signal | None:
-    """The SIGNAL field of the LLRs of its symbol `[48]`, None when it cannot be one (17.3.4)."""
+    """The SIGNAL field behind its symbol's LLRs `[48]`; None when it cannot be one (17.3.4)."""
     # The decoder ends its trellis behind whole octets; what it is fed behind the tail says 0.
     surely_0 = np.full(2 * (3 * 8 + N_TAIL) - len(llr), MAX_LLR, np.int16)
     fed = np.concatenate((llr, surely_0))[None, :]
@@ -81,7 +81,7 @@ def parse_signal(llr: NDArray[np.int16]) -> Signal | None:
 
 
 def parse_data(llr: NDArray[np.int16], signal: Signal) -> bytes:
-    """The PSDU of the LLRs of the data symbols, descrambled."""
+    """The PSDU behind the LLRs of the data symbols, descrambled."""
     n_bytes = _SERVICE_BYTES + signal.n_bytes
     code = signal.rate.code
     n_coded = code.n_coded(8 * n_bytes)
@@ -92,7 +92,10 @@ def parse_data(llr: NDArray[np.int16], signal: Signal) -> bytes:
 
 
 def _scrambling(first: NDArray[np.uint8], n: int) -> NDArray[np.uint8]:
-    """The sequence x^7 + x^4 + 1 that begins with `first` `[7]`: SERVICE begins with seven 0."""
+    """The scrambling sequence (x^7 + x^4 + 1) that begins with `first` `[7]`, `n` bits of it.
+
+    SERVICE begins with seven zeros: its first seven bits as received are the sequence's own.
+    """
     out = np.empty(max(n, 127), np.uint8)
     out[:7] = first
     for i in range(7, 127):

@@ -25,9 +25,9 @@ class HtSignal(NamedTuple):
 
 
 def parse_ht_signal(points: NDArray[np.complex64]) -> HtSignal | None:
-    """HT-SIG of the equalised points of two symbols `[2, 48]`; None when they are none.
+    """The HT-SIG field in the equalised points of two symbols `[2, 48]`; None when they hold none.
 
-    It is BPSK on the other axis, so nothing else is taken for it; a CRC guards it.
+    HT-SIG is BPSK on the imaginary axis, so nothing else is taken for it; a CRC guards it.
     """
     across = points.imag
     if np.any(np.sum(across**2, axis=1) < np.sum(points.real**2, axis=1)):
@@ -49,7 +49,7 @@ def parse_ht_signal(points: NDArray[np.complex64]) -> HtSignal | None:
 
 
 def _crc(bits: NDArray[np.uint8]) -> int:
-    """x^8 + x^2 + x + 1, from all ones, inverted (19.3.9.4.4)."""
+    """CRC-8 of HT-SIG: x^8 + x^2 + x + 1, from all ones, inverted (19.3.9.4.4)."""
     register = 0xFF
     for bit in bits:
         carry = register >> 7 ^ int(bit)

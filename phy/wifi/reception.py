@@ -23,7 +23,7 @@ from phy.wifi.high_throughput import HT_SIG_SYMBOLS, HtSignal, parse_ht_signal
 
 RATE_HZ = 20e6
 HT_LEGACY_MBPS = 6
-"""What 802.11n frames in mixed format say to receivers of 802.11a."""
+"""Rate in Mbit/s that an 802.11n frame in mixed format claims towards receivers of 802.11a."""
 
 _GRID = OFDM_64_16
 _SEGMENT = preamble.SEGMENT
@@ -32,7 +32,7 @@ _WINDOW = 96
 _ALIKE = 0.6
 """|Σ x[n + 16] x*[n]| / Σ |x|² that a repetition has at least."""
 _AFTER_SHORT = 320
-"""Where the repetition begins, the long training ends within so many samples."""
+"""Samples within which the long training ends, from where the repetition begins."""
 _MATCH = 0.35
 """Share of a window's power that a long symbol has at least."""
 
@@ -44,15 +44,16 @@ class WifiFrame(NamedTuple):
     rate: Rate
     psdu: bytes
     is_right: bool
-    """Whether its FCS is."""
+    """Whether the frame's FCS is right."""
     snr_db: float
     cfo_hz: float
 
 
 class HtFrame(NamedTuple):
-    """An 802.11n frame, of which the HT-SIG field alone is read; `start` is as above.
+    """An 802.11n frame, of which the HT-SIG field alone is read.
 
-    In mixed format it begins as an 802.11a frame of 6 Mbit/s; in greenfield format it does not.
+    `start` is the sample of its first long symbol. In mixed format it begins as an 802.11a frame of
+    6 Mbit/s; in greenfield format it does not.
     """
 
     start: int
@@ -61,7 +62,7 @@ class HtFrame(NamedTuple):
     snr_db: float
     cfo_hz: float
     end: int
-    """Where the preamble says that it is over; in greenfield format the end of HT-SIG."""
+    """Where the preamble says that the frame is over; in greenfield format the end of HT-SIG."""
 
 
 def receive(samples: NDArray[np.complex64]) -> Iterator[WifiFrame | HtFrame]:
@@ -80,7 +81,7 @@ def receive(samples: NDArray[np.complex64]) -> Iterator[WifiFrame | HtFrame]:
 
 
 def _repetitions(x: NDArray[np.complex64]) -> NDArray[np.int64]:
-    """Where something begins to repeat itself every 16 samples, and keeps to it for a while."""
+    """Samples at which something begins to repeat every 16 samples, and keeps to it for a while."""
     wide = x.astype(np.complex128)
     product = wide[_SEGMENT:] * wide[:-_SEGMENT].conj()
     power = np.abs(wide[_SEGMENT:]) ** 2
@@ -94,7 +95,7 @@ def _repetitions(x: NDArray[np.complex64]) -> NDArray[np.int64]:
 
 
 def _end(start: int, n_symbols: int) -> int:
-    """Behind so many symbols, SIGNAL the first; the frame's first long symbol is at `start`."""
+    """Index after `n_symbols` symbols, SIGNAL the first; the first long symbol is at `start`."""
     return start + 2 * _GRID.n_fft + n_symbols * _GRID.n_symbol
 
 
@@ -137,7 +138,7 @@ def _ht_signal(
     frequency: float,
     first_symbol: int,
 ) -> HtSignal | None:
-    """HT-SIG where symbol `first_symbol` behind the training begins; None: there is none."""
+    """The HT-SIG field from symbol `first_symbol` after the training on, or None."""
     points = np.zeros((HT_SIG_SYMBOLS, _GRID.n_data), np.complex64)
     begin = signal_window + first_symbol * _GRID.n_symbol
     # A channel of its own: these points teach nothing.
@@ -152,7 +153,7 @@ def _ht_signal(
 def _long_training(
     samples: NDArray[np.complex64], begin: int, coarse: float
 ) -> tuple[int, float] | None:
-    """(first sample of the first long symbol's first echo, frequency in cycles a sample)."""
+    """(first sample of the long training's first echo, frequency in cycles a sample), or None."""
     n = _GRID.n_fft
     span = samples[begin : begin + _AFTER_SHORT + 2 * n]
     if len(span) < 4 * n:
@@ -165,6 +166,7 @@ def _long_training(
     power = np.sum(np.abs(x[peak : peak + 2 * n]) ** 2)
     if both[peak] < _MATCH * n * power / 2:
         return None
+    # As in `phy.kernels.timing`: the first echo with a tenth of the strongest one's power.
     nearby = both[max(0, peak - 12) : peak + 1]
     start = peak + 1 - len(nearby) + int(np.argmax(nearby >= 0.1 * both[peak]))
     lag = np.vdot(x[peak : peak + n], x[peak + n : peak + 2 * n])
@@ -193,7 +195,7 @@ def _llrs(
     first_symbol: int,
     points: NDArray[np.complex64] | None = None,
 ) -> NDArray[np.int16] | None:
-    """LLRs of `n_symbols` from the FFT window at `window` on; None when samples are missing.
+    """LLRs of `n_symbols` symbols, FFT windows from `window` on; None when samples are missing.
 
     `points` gets the equalised points, if they are wanted.
     """

@@ -11,12 +11,12 @@ from sdrlinkd.adapters.salvage import Piece, looks_cut, salvage
 from sdrlinkd.adapters.typestore import Ros1Converter, ros2_types
 from sdrlinkd.errors import BagError
 
-# Of a reader's reason, as much as a person reads.
+# Characters of a reader's error that are shown: as much as a person reads.
 MAX_REASON = 200
 
 
 class BagTopic(NamedTuple):
-    """One topic of a recording; its name begins with a slash, whatever the recording says."""
+    """A topic of a recording; its name begins with a slash, whatever the recording says."""
 
     name: str
     type: str
@@ -24,7 +24,7 @@ class BagTopic(NamedTuple):
 
 
 class BagMessage(NamedTuple):
-    """One message: CDR bytes as recorded, and when, in ns."""
+    """A message of a recording: CDR bytes as recorded, and the time in ns."""
 
     topic: str
     type: str
@@ -46,7 +46,7 @@ class Bag(Protocol):
         """All messages in the order of time."""
 
     def close(self) -> None:
-        """Release the file."""
+        """Close the file of the recording."""
 
 
 def open_bag(path: Path) -> Bag:
@@ -112,7 +112,7 @@ class _WholeBag:
 
 
 class _DamagedBag:
-    """What salvage finds; held in memory, as order and counts are only known at the end."""
+    """What salvage finds of a bag, held in memory: order and counts are known at the end."""
 
     def __init__(self, path: Path, why: str) -> None:
         self.path = path
@@ -154,10 +154,10 @@ class _DamagedBag:
 
 
 def _absolute(name: str) -> str:
-    """As all the rest of us calls it; ROS 1 records names as a publisher has given them."""
+    """A topic's name with its slash; ROS 1 records names as a publisher has given them."""
     return f"/{name.removeprefix('/')}"
 
 
 def _one_line(error: Exception) -> str:
-    """What an error says; some readers draw pictures over many lines."""
+    """An error's text on one line; some readers draw pictures over many lines."""
     return (" ".join(str(error).split()) or type(error).__name__)[:MAX_REASON]

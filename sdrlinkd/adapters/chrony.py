@@ -1,4 +1,4 @@
-"""Another robot's clock for chronyd: samples for its SOCK reference clock. Sets no clock itself."""
+"""Another robot's clock for chronyd: samples for its SOCK reference clock. No clock is set here."""
 
 import socket
 import struct
@@ -20,7 +20,7 @@ class ChronySocket:
         self.sent = self.lost = 0
 
     def send(self, now_ns: int, offset_s: float) -> None:
-        """The true time is the system's, `now_ns` since 1970, plus `offset_s`."""
+        """Send a sample: the true time is the system's, `now_ns` since 1970, plus `offset_s`."""
         seconds, rest_ns = divmod(now_ns, 1_000_000_000)
         sample = SAMPLE.pack(seconds, rest_ns // 1000, offset_s, 0, LEAP_NORMAL, 0, MAGIC)
         try:
@@ -30,5 +30,5 @@ class ChronySocket:
             self.lost += 1
 
     def close(self) -> None:
-        """No more."""
+        """Close the socket; chronyd keeps its own."""
         self._socket.close()

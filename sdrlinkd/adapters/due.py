@@ -16,16 +16,16 @@ class Due(NamedTuple):
 
 
 class Playable(Protocol):
-    """A bag, or the built-in robot."""
+    """What can be played: a bag, or the built-in robot."""
 
     def messages(self) -> Iterator[BagMessage]:
-        """Its messages in the order of time."""
+        """All messages in the order of time."""
 
 
 def due_messages(
     recording: Playable, duration_s: float, begin_s: float, topic_ids: Mapping[str, int]
 ) -> Iterator[Due]:
-    """The first `duration_s` of `recording`, of the topics that have an id, from `begin_s` on."""
+    """Messages of topics that have an id, in the first `duration_s`, due from `begin_s` on."""
     first_ns: int | None = None
     for message in first_seconds(recording.messages(), duration_s):
         if first_ns is None:

@@ -43,7 +43,7 @@ def _message(kind: str, given: Any, where: str) -> Any:  # noqa: ANN401
 
 
 def _field(kind: Any, given: Any, old: Any, where: str) -> Any:  # noqa: ANN401
-    """`given` as a field of that kind, which is `old` so far."""
+    """`given` as a field of `kind`, whose default is `old`; `where` names it in errors."""
     node, inner = kind
     if node == Nodetype.NAME:
         return _message(inner, given, where)

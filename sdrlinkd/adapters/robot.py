@@ -31,7 +31,7 @@ _TYPES = {
 
 
 class Pose:
-    """Where the robot is at `t`: a figure of eight, and its velocity along it."""
+    """Where the robot is at `t` s on its figure of eight, and how it moves along it."""
 
     def __init__(self, t: float) -> None:
         w = 2 * math.pi / PATH_PERIOD_S
@@ -94,9 +94,9 @@ def _scan(message: Any, pose: Pose, rng: Random) -> None:  # noqa: ANN401
 
 
 class BuiltInRobot:
-    """Odometry at 30 Hz, laser scans and velocity commands at 10 Hz, IMU at 50 Hz.
+    """A robot with odometry at 30 Hz, laser scans and velocity commands at 10 Hz, IMU at 50 Hz.
 
-    The same seed gives the same bytes. Reads like a bag.
+    The same seed gives the same bytes. It reads like a bag.
     """
 
     damage = ""
@@ -110,14 +110,14 @@ class BuiltInRobot:
             to_cdr(empty(kind), kind)
 
     def topics(self) -> list[BagTopic]:
-        """What it publishes."""
+        """The topics that the robot publishes, and how many messages of each."""
         return [
             BagTopic(self._namespace + name, kind, math.ceil(rate * self._duration_s))
             for name, (kind, rate) in _TYPES.items()
         ]
 
     def messages(self) -> Iterator[BagMessage]:
-        """Everything it publishes, in the order of time."""
+        """All messages of the robot in the order of time."""
         builders = {"/cmd_vel": _twist, "/imu": _imu, "/odom": _odometry, "/scan": _scan}
         streams = [
             self._stream(name, kind, rate, builders[name], Random(self._seed + i))
@@ -126,7 +126,7 @@ class BuiltInRobot:
         return merge(*streams, key=lambda message: message.time_ns)
 
     def close(self) -> None:
-        """Nothing to release."""
+        """Release nothing: the robot holds no file."""
 
     def _stream(
         self, name: str, kind: str, rate: int, build: Builder, rng: Random

@@ -11,9 +11,10 @@ HEADER = "std_msgs/msg/Header"
 
 
 def stop_messages(setup: Setup) -> dict[int, bytes]:
-    """CDR by topic id, of topics whose type is known; as their policy's `stop` says, else zero.
+    """The stop messages as CDR by topic id, of all topics whose type is known.
 
-    Raises ConfigError where a policy asks for what cannot be made.
+    Fields are those of the policy's `stop`, the others zero. Raises ConfigError where a policy asks
+    for what cannot be made.
     """
     try:
         return _made(setup)
@@ -42,7 +43,7 @@ def _made(setup: Setup) -> dict[int, bytes]:
 
 
 def header_topics(setup: Setup) -> frozenset[int]:
-    """Topics whose messages begin with a std_msgs/Header."""
+    """Ids of the topics whose messages begin with a std_msgs/Header."""
     known = (topic for topic in setup.registry.topics if knows(topic.type))
     return frozenset(topic.id for topic in known if _begins_with_header(topic.type))
 

@@ -7,7 +7,7 @@ from sdrlinkd.adapters.bags import Bag
 
 
 class TopicSummary(NamedTuple):
-    """One topic; sizes in bytes of CDR. `rate_hz`: None where there are no two moments."""
+    """A topic of a recording, sizes in bytes of CDR; `rate_hz` is None for a single moment."""
 
     name: str
     type: str
@@ -18,7 +18,7 @@ class TopicSummary(NamedTuple):
 
 
 class BagSummary(NamedTuple):
-    """All of it; topics in the order of their names."""
+    """A whole recording, with its topics in the order of their names."""
 
     duration_s: float
     n_messages: int
@@ -27,7 +27,7 @@ class BagSummary(NamedTuple):
 
 
 class _Seen:
-    """The messages of a topic."""
+    """Number, sizes and times of a topic's messages, as far as they are read."""
 
     def __init__(self) -> None:
         self.n = self.n_bytes = self.max_bytes = self.first_ns = self.last_ns = 0
@@ -45,7 +45,7 @@ class _Seen:
 
 
 def summarise(bag: Bag, progress: Callable[[int], None]) -> BagSummary:
-    """Reads all of `bag`; `progress(messages read)` is called on the way."""
+    """The summary of `bag`, all of which is read; `progress(messages read)` on the way."""
     seen = {(topic.name, topic.type): _Seen() for topic in bag.topics()}
     whole = _Seen()
     for message in bag.messages():

@@ -11,7 +11,7 @@ TYPE = "tf2_msgs/msg/TFMessage"
 
 
 class Transforms:
-    """One topic of transforms on its way out."""
+    """Chooses, names and gathers the transforms of one topic on its way out."""
 
     def __init__(self, params: TransformParams) -> None:
         self._params = params
@@ -19,7 +19,7 @@ class Transforms:
         self._due_at = float("-inf")
 
     def take(self, payload: bytes, now: float) -> tuple[bytes | None, str]:
-        """(what is to be sent now, ""), or (None, the ledger's reason)."""
+        """(the message to send now, ""), or (None, the ledger's reason why there is none)."""
         try:
             message = from_cdr(payload, TYPE)
         except CdrError:
@@ -33,7 +33,7 @@ class Transforms:
         return gathered, "" if gathered is not None else "tx_combined"
 
     def flush(self, now: float) -> bytes | None:
-        """What has been gathered, when it is time."""
+        """The transforms gathered so far as one message, when it is time for it; else None."""
         if not self._latest or now < self._due_at:
             return None
         self._due_at = now + self._params.combine_s

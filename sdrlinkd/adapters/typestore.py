@@ -22,12 +22,12 @@ def knows(kind: str) -> bool:
 
 
 def to_cdr(message: object, kind: str) -> bytes:
-    """CDR bytes of a message."""
+    """A message of `kind` as CDR bytes."""
     return bytes(ros2_types().serialize_cdr(message, kind))
 
 
 def from_cdr(data: bytes, kind: str) -> Any:  # noqa: ANN401
-    """The message in CDR bytes. Raises CdrError for what is not valid CDR of that type."""
+    """The message in CDR bytes. Raises CdrError for what is not valid CDR of `kind`."""
     try:
         return ros2_types().deserialize_cdr(data, kind)
     except Exception as error:  # the library's generated code raises whatever it meets
@@ -44,7 +44,7 @@ def empty(kind: str) -> Any:  # noqa: ANN401
 
 
 class Ros1Converter:
-    """ROS 1 messages to ROS 2 CDR, field by field where the definitions differ."""
+    """Converts ROS 1 messages to ROS 2 CDR, field by field where the definitions differ."""
 
     def __init__(self, source: Typestore) -> None:
         self._source = source

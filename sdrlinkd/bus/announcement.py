@@ -12,7 +12,7 @@ from sdrlinkd.wire import MAX_PDU_SIZE, max_message_size
 
 
 def announcement(setup: Setup, policies: Mapping[int, TopicPolicy], boot: str) -> bytes:
-    """The version and the map that subscribers are told; `policies` are those in force."""
+    """The welcome (bus document, 4.1) as version and map; `policies` are those in force."""
     takes = {
         name: _taken(setup, topic_id, policies.get(topic_id, DEFAULT_POLICY))
         for name, topic_id in setup.topics_in.items()

@@ -40,7 +40,7 @@ PDU_TAP = b"\0pdu\0"
 
 
 class Bus:
-    """Sockets `in`, `in-pub` and `out` of one daemon."""
+    """The sockets `in`, `in-pub` and `out` of one daemon."""
 
     def __init__(
         self,
@@ -84,13 +84,13 @@ class Bus:
 
     @property
     def is_tapped(self) -> bool:
-        """Whether someone watches PDUs."""
+        """Whether anybody watches PDUs on the bus."""
         return self._taps > 0
 
     def publish(
         self, message: Delivered, age_s: float | None, received_ns: int, times: LocalTimes = UNKNOWN
     ) -> None:
-        """Hand a message from the air to its consumers."""
+        """Hand a message from the air to its consumers; `age_s` is None where it is not known."""
         topic = self._topic_out(message.src, message.topic_id)
         header = envelope.OutHeader(
             s=message.src,
@@ -115,7 +115,7 @@ class Bus:
         self._out_reader.recheck()
 
     def publish_stop(self, src: int, topic_id: int, payload: bytes) -> None:
-        """In place of a message that did not come."""
+        """Hand a topic's stop message to its consumers, in place of a message that did not come."""
         header = envelope.OutHeader(
             s=src, n=0, tr=time.time_ns(), ty=self._types[topic_id], stop=True
         )
@@ -123,13 +123,13 @@ class Bus:
         self._out_reader.recheck()
 
     def announce(self, policies: Mapping[int, TopicPolicy]) -> None:
-        """These policies are in force now, by topic id: producers learn what that changes."""
+        """Tell producers what the policies now in force, by topic id, change for them."""
         self._welcome = announcement(self._setup, policies, self._boot)
         self._out.setsockopt(zmq.XPUB_WELCOME_MSG, b"\0" + self._welcome)
         self._undropped.send(b"", [b"\0" + self._welcome])
 
     def tell(self, verdict: Verdict) -> None:
-        """What became of a message whose producer wants to know."""
+        """Tell the producer of a message what became of it."""
         name = self._names_in[verdict.topic_id]
         self._tell(envelope.Receipt(verdict.receipt, name, *verdict[2:]))
 
@@ -140,7 +140,7 @@ class Bus:
         self._undropped.send(topic.rpartition(b".")[0], [topic, frame])
 
     def tap(self, direction: str, data: bytes) -> None:
-        """Show a PDU to those who watch."""
+        """Show a PDU to those who watch PDUs."""
         header = msgspec.msgpack.encode({"dir": direction, "t": time.time_ns()})
         self._out.send_multipart([PDU_TAP, envelope.VERSION_BYTE + header, data])
         self._out_reader.recheck()
@@ -157,7 +157,7 @@ class Bus:
         return {key: frame[:-1].decode() for key, frame in self._frames_out.items()}
 
     async def stop_ingress(self) -> None:
-        """Take what has arrived, and then no more: producers see the sockets close."""
+        """Take what has arrived, then close: producers see the sockets go."""
         # Not unbound before: libzmq would close the connections, and what they still hold is lost.
         deadline = time.monotonic() + LAST_MESSAGES_S
         quiet = 0
@@ -182,7 +182,7 @@ class Bus:
             socket.close(linger=LINGER_MS)
 
     def report(self, control_requests: int) -> BusReport:
-        """Counters."""
+        """Counters of the bus, and what it last refused."""
         return BusReport(
             runtime_dir=str(self._directory.path),
             received=self._received,
@@ -206,6 +206,7 @@ class Bus:
     def _take_subscription(self, frames: list[bytes]) -> None:
         subscribed, topic = frames[0][:1] == b"\x01", frames[0][1:]
         if topic == PDU_TAP:
+            # XPUB tells of the first watcher and of the last one that goes, and of none between.
             self._taps = int(subscribed)
         elif subscribed and topic.startswith(ACK_PREFIX):
             # Subscriptions are processed in order: those before this one are active now.

@@ -11,12 +11,12 @@ from sdrlinkd.errors import EnvelopeError
 VERSION_BYTE = b"\x01"
 MAX_HEADER_BYTES = 256
 MOST_LOOKED_AT = 16 * MAX_HEADER_BYTES
-"""Of a header that is too long, to answer who sent it."""
+"""Octets of a longer header that are still looked at, to answer who sent it."""
 MOST_SHOWN = 240
 
 
 class InHeader(msgspec.Struct, frozen=True, gc=False):
-    """What a producer may say of a message; all optional, unknown fields are ignored."""
+    """What a producer may say of a message (bus document, 3.1); unknown fields are ignored."""
 
     q: Literal["urgent", "latency", "default", "bulk"] | None = None
     p: Annotated[int, Meta(ge=0, le=127)] | None = None
@@ -28,7 +28,7 @@ class InHeader(msgspec.Struct, frozen=True, gc=False):
 
 
 class OutHeader(msgspec.Struct, omit_defaults=True, gc=False):
-    """What a consumer learns of a message."""
+    """What a consumer learns of a message (bus document, 3.2)."""
 
     s: int
     n: int
@@ -49,8 +49,9 @@ class OutHeader(msgspec.Struct, omit_defaults=True, gc=False):
 
 
 class Receipt(msgspec.Struct, frozen=True, omit_defaults=True):
-    """What became of a message at robot `d`; `took` is its age there in s, `left` robots have still
-    to answer.
+    """What became of a message at robot `d` (bus document, 4.4).
+
+    `took` is its age there in s; `left` robots have still to answer.
     """
 
     id: str
@@ -63,7 +64,7 @@ class Receipt(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Taken(msgspec.Struct, frozen=True):
-    """A topic that is taken: messages up to `most` B, by the setting `key`; others are `over`."""
+    """A topic that is taken, up to `most` octets by the setting `key`; others end as `over`."""
 
     ty: str
     most: int
@@ -72,7 +73,7 @@ class Taken(msgspec.Struct, frozen=True):
 
 
 class Welcome(msgspec.Struct, frozen=True):
-    """What a new subscriber is told; `boot` is another one after each start."""
+    """What a new subscriber is told (bus document, 4.1); `boot` is new with each start."""
 
     daemon: str
     version: str
@@ -114,8 +115,9 @@ def decode(frames: Sequence[bytes]) -> tuple[bytes, InHeader | None, bytes]:
 
 
 def wanted_of(frames: Sequence[bytes]) -> tuple[str, int | None, dict[str, object]]:
-    """(receipt's id, destination, all fields) of a message that cannot be decoded, as far as they
-    can be read.
+    """(receipt's id, destination, all fields) of a message that `decode` refuses.
+
+    What cannot be read is "", None or empty.
     """
     header = frames[1] if len(frames) > 1 else b""
     if len(header) > MOST_LOOKED_AT:
@@ -137,7 +139,7 @@ def wanted_of(frames: Sequence[bytes]) -> tuple[str, int | None, dict[str, objec
 
 
 def shown(words: str) -> str:
-    """What a program sent, or an error that cites it, as a screen can bear it."""
+    """A program's words, or an error that cites them, made printable and cut for a screen."""
     plain = "".join(each if each.isprintable() else "?" for each in words[: MOST_SHOWN + 1])
     return plain if len(plain) <= MOST_SHOWN else plain[: MOST_SHOWN - 1] + "…"
 

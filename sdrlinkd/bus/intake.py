@@ -20,7 +20,7 @@ from sdrlinkd.wire import BROADCAST
 
 
 class Ingress(Protocol):
-    """Who takes messages from the bus."""
+    """What takes messages from the bus."""
 
     def submit(
         self,
@@ -29,7 +29,7 @@ class Ingress(Protocol):
         overrides: Overrides = AS_CONFIGURED,
         published_ns: int | None = None,
     ) -> None:
-        """A good message; when it was published, in ns since 1970, if its producer says so."""
+        """Take a good message; `published_ns` is in ns since 1970, if its producer tells it."""
 
     def refuse(
         self,
@@ -38,7 +38,7 @@ class Ingress(Protocol):
         receipt: str = "",
         dst: int | None = None,
     ) -> None:
-        """A message that cannot be taken, and the ledger's reason; the rest is as in Overrides."""
+        """Count a message that cannot be taken by the ledger's reason; the rest as in Overrides."""
 
 
 TellRefused = Callable[[envelope.Receipt], None]
@@ -46,7 +46,7 @@ LONGEST_NAME = 256
 
 
 class Intake:
-    """What the bus takes. `tell` answers for messages of no topic, of which the link knows none."""
+    """Checks what producers send. `tell` answers for messages of no topic: the link knows none."""
 
     def __init__(self, setup: Setup, ingress: Ingress, tell: TellRefused) -> None:
         self._topic_ids = {name.encode() + b"\0": id_ for name, id_ in setup.topics_in.items()}
@@ -59,11 +59,11 @@ class Intake:
 
     @property
     def last_bad(self) -> str:
-        """What was wrong with the last message that could not be taken."""
+        """What was wrong with the last message that was not taken."""
         return envelope.shown(self._last_bad())
 
     def take(self, frames: list[bytes]) -> None:
-        """A message as it came."""
+        """Check a message as it came; hand it on, or refuse it."""
         try:
             topic, header, payload = envelope.decode(frames)
         except EnvelopeError as error:

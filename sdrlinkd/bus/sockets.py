@@ -58,7 +58,7 @@ class RuntimeDirectory:
         name: str,
         options: Mapping[int, int | bytes],
     ) -> zmq.Socket[bytes]:
-        """A socket bound to `name` here, for the owner and the group only."""
+        """A socket bound to `name` here, for the owner and the group only. Raises BusError."""
         path = self.path / name
         if _is_live(path):
             raise BusError(
@@ -88,9 +88,11 @@ class RuntimeDirectory:
 
 
 def is_foreign(about: os.stat_result, uid: int) -> bool:
-    """Whether others own a directory, or may write to it, so that it could be prepared to receive
-    the sockets of user `uid`.
+    """Whether others than user `uid` and root own a directory, or may write to it.
+
+    They could have prepared it to receive the sockets of user `uid`.
     """
+    # Where the sticky bit is set, as on /tmp, nobody can replace what is another's.
     is_open = bool(about.st_mode & 0o002) and not about.st_mode & 0o1000
     return about.st_uid not in (0, uid) or is_open
 

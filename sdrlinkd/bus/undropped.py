@@ -10,7 +10,7 @@ import zmq
 
 RETRY_S = 0.001
 STUCK_S = 1.0
-"""Whoever has not read for so long loses what is for it, as with messages."""
+"""Seconds; who has not read for so long loses what is for it, as with messages."""
 
 Frames = Sequence[bytes]
 
@@ -41,17 +41,18 @@ class Undropped:
         self._socket = socket
         self._used = used
         self._lanes: dict[bytes, _Lane] = {}
-        """Those whose subscriber's queue was full."""
+        """Lanes whose subscriber's queue was full, by name."""
         self._retry: asyncio.TimerHandle | None = None
 
     def send(self, name: bytes, frames: Frames) -> None:
-        """In lane `name`: at once, or as soon as there is room."""
+        """Send `frames` in lane `name`: at once, or as soon as there is room."""
         lane = self._lanes.get(name)
         if lane is not None and not lane.is_stuck:
             lane.waiting.append(frames)
         elif self._fits(frames):
             self._lanes.pop(name, None)
         elif lane is not None:
+            # Stuck: sent as messages are, and dropped where there is still no room.
             self._socket.send_multipart(frames, zmq.NOBLOCK)
         else:
             self._lanes[name] = _Lane(deque([frames]), time.monotonic())
@@ -91,7 +92,7 @@ class Undropped:
                 self._socket.send_multipart(waiting.popleft(), zmq.NOBLOCK)
 
     def _fits(self, frames: Frames) -> bool:
-        """Whether all its subscribers had room, and so have it."""
+        """Whether all subscribers of these frames had room; if so, they have them now."""
         # Not for messages: those do not wait for the slowest of their consumers.
         self._socket.setsockopt(zmq.XPUB_NODROP, 1)
         try:

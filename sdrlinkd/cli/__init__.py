@@ -1,4 +1,4 @@
-"""sdrlinkctl."""
+"""The command line of sdrlinkctl."""
 
 from sdrlinkd.cli.app import main, run
 

@@ -1,4 +1,4 @@
-"""`python -m sdrlinkd.cli`."""
+"""Runs sdrlinkctl as `python -m sdrlinkd.cli`."""
 
 from sdrlinkd.cli import main
 

@@ -20,7 +20,7 @@ DEBUG_VARIABLE = "SDRLINKD_DEBUG"
 
 
 class Commands(TyperGroup):
-    """Loads a command when it is called: neither a short one nor completion waits for the modem."""
+    """Loads a command when it is called: short ones and completion do not wait for the modem."""
 
     def __init__(self, **settings: Any) -> None:  # noqa: ANN401 (as the library has it)
         super().__init__(**settings)
@@ -28,7 +28,7 @@ class Commands(TyperGroup):
         self.commands = {**listed, **self.commands}
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 (as above)
-        """The command called, its name, and what is left of the arguments."""
+        """(name, command, rest of the arguments) of what is called, once its modules are loaded."""
         name, listed, rest = super().resolve_command(ctx, args)
         if name is None or listed is None:
             return None, None, rest
@@ -67,7 +67,7 @@ def main() -> None:
 
 
 def run(arguments: list[str]) -> int:
-    """Run one command line; the exit code."""
+    """Run one command line; returns the exit code."""
     try:
         app(arguments, prog_name="sdrlinkctl")
     except SystemExit as done:
@@ -92,7 +92,7 @@ def run(arguments: list[str]) -> int:
 
 
 def connect(runtime_dir: Path | None, timeout_s: float = 5.0) -> ControlClient:
-    """The control socket of the running daemon."""
+    """A client of the running daemon's control socket."""
     return ControlClient(runtime_dir, timeout_s)
 
 

@@ -1,4 +1,4 @@
-"""`bag play`: a recording into a running daemon."""
+"""`bag info` and `bag play`: what is in a recording, and a recording into a running daemon."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -55,7 +55,7 @@ def info(bag: Annotated[Path, typer.Argument(help="rosbag2 folder, .mcap, .db3 o
 
 
 def table_of(found: BagSummary) -> FittedTable:
-    """A row a topic."""
+    """The table of a recording, with a row for each topic."""
     table = FittedTable(
         "",
         (figure("count"), figure("Hz"), figure("mean B", 2), figure("max B", 3), words("topic"),
@@ -135,7 +135,7 @@ def _route(
     only: list[str],
     remap: list[str],
 ) -> tuple[dict[str, str], dict[str, str]]:
-    """(the daemon's topic for each of the bag's, those that have none and why)."""
+    """({topic of the bag: the daemon's}, {topic left out: why}). Raises UserError."""
     mapping = {}
     for rule in remap:
         source, separator, target = rule.partition(":=")

@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 
 class Listed(NamedTuple):
-    """A command that need not be loaded to be shown."""
+    """A command as help shows it, before it is loaded."""
 
     help: str
     modules: tuple[str, ...]
-    """Within this package."""
+    """Modules of this package that define the command."""
 
 
 COMMANDS = {
@@ -72,4 +72,4 @@ COMMANDS = {
         ("bench",),
     ),
 }
-"""In the order of help."""
+"""All commands by name, in the order of help."""

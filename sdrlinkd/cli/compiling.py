@@ -1,4 +1,4 @@
-"""Where a command needs the modem, it is compiled first, and the screen says how far it is."""
+"""Compiles the modem before a command that needs it, and shows how far that is."""
 
 from rich.console import Console
 
@@ -6,8 +6,8 @@ LIVE_S = 0.2
 
 
 def compile_first(console: Console) -> None:
-    """Compile the modem where that has not been done."""
-    # It brings the modem, which takes its time to load.
+    """Compile the modem where that has not been done, and show how far it is."""
+    # This brings the modem, which takes its time to load.
     from sdrlinkd.compiling import EVERY_S, compile_modem
 
     def say(line: str) -> None:

@@ -12,11 +12,11 @@ from sdrlinkd.errors import UserError
 from sdrlinkd.reports import Snapshot
 
 PATIENCE_S = 1.0
-"""Nobody waits longer for TAB."""
+"""Longest wait in s for the daemon: nobody waits longer for TAB."""
 
 
 def one_of(*values: str) -> Callable[[str], list[str]]:
-    """Completes one of these."""
+    """A completion that offers those of `values` that begin with what is typed."""
 
     def complete(incomplete: str) -> list[str]:
         return _begun(values, incomplete)
@@ -25,27 +25,27 @@ def one_of(*values: str) -> Callable[[str], list[str]]:
 
 
 def topic_names(context: typer.Context, incomplete: str) -> list[str]:
-    """Topics that the daemon sends."""
+    """Names of topics that the daemon sends, as far as they begin with `incomplete`."""
     snapshot = _snapshot(context)
     return _begun([each.name for each in snapshot.link.topics] if snapshot else (), incomplete)
 
 
 def heard_names(context: typer.Context, incomplete: str) -> list[str]:
-    """Topics that the daemon hears, as they are on the bus."""
+    """Names on the bus of topics that the daemon hears, as far as they begin with `incomplete`."""
     snapshot = _snapshot(context)
     heard = snapshot.link.received if snapshot else ()
     return _begun([each.republished_as or each.name for each in heard], incomplete)
 
 
 def robot_names(context: typer.Context, incomplete: str) -> list[str]:
-    """Robots that the daemon hears, and everyone."""
+    """Ids of the robots that the daemon hears, and 255 for everyone."""
     snapshot = _snapshot(context)
     heard = snapshot.link.neighbors if snapshot else ()
     return _begun([*(str(each.src) for each in heard if not each.is_self), "255"], incomplete)
 
 
 def field_names(context: typer.Context, incomplete: str) -> list[str]:
-    """Fields of the daemon's snapshot, section by section."""
+    """Names of the snapshot's fields, completed section by section."""
     snapshot = _snapshot(context)
     if snapshot is None:
         return []

@@ -40,7 +40,7 @@ class LinkKind(StrEnum):
 
 
 class ChannelKind(StrEnum):
-    """The simulated air."""
+    """The channel of the simulated air."""
 
     AWGN = "awgn"
     RAYLEIGH = "rayleigh"
@@ -154,7 +154,7 @@ def demo(
 
 
 def _measure(console: Console, source: Source, options: Options) -> float:
-    """The rate that this machine carries, and a line of why."""
+    """The rate in samples a second that this machine carries; a line on the screen says why."""
     with console.status("measuring what this machine carries"):
         found = find_rate(source, options)
     tried = ", ".join(

@@ -101,7 +101,7 @@ def _radio(setup: "Setup | None", device: str) -> list["Finding"]:
     is_on_usb = not driver or (driver in ON_USB and not is_networked(device))
     usb = check_usb(driver, ROOT) if is_on_usb else []
     if any(not each.problem for each in there.devices):
-        # It works; that its ids are not known here, or that it is no USB device, does not matter.
+        # A radio works: that its ids are not known here, or that it is not on USB, is no matter.
         usb = [each for each in usb if each.state is State.GOOD]
     return usb + check_radio(config, there)
 

@@ -19,11 +19,11 @@ USUAL = (
     "link.tx.sent", "link.tx.queued", "link.tx.queued_bytes", "link.rx.pdus_heard",
     "link.rx.started", "link.rx.delivered",
 )  # fmt: skip
-"""Of --csv, where none is named."""
+"""Fields that --csv prints where none is named."""
 
 
 def fields_of(snapshot: Snapshot, names: Sequence[str]) -> list[Any]:
-    """The values of `names`. Raises UserError, which says what there is."""
+    """The values of fields by `names`. Raises UserError, which says what there is."""
     whole = msgspec.to_builtins(snapshot, str_keys=True)
     return [_field(whole, name) for name in names]
 
@@ -54,7 +54,7 @@ class CsvLines:
 
 
 def paths(value: object, at: str = "") -> Iterator[str]:
-    """All names of single values in it, for the shell's completion."""
+    """Names of all single values in `value`, for the shell's completion."""
     if isinstance(value, dict | list):
         if at and isinstance(value, list):
             yield at
@@ -79,7 +79,7 @@ def _field(whole: dict[str, Any], name: str) -> object:
 
 
 def _step(value: object, step: str) -> tuple[object] | None:
-    """The part called `step`, in a tuple, since it may be None itself; None: there is none."""
+    """The part of `value` called `step`, in a tuple, as it may be None itself; else None."""
     parts = _parts(value)
     if step in parts:
         return (parts[step],)
@@ -91,7 +91,7 @@ def _step(value: object, step: str) -> tuple[object] | None:
 
 
 def _parts(value: object) -> dict[str, Any]:
-    """By key; of a list by the topic's name or the robot's number, else by index."""
+    """The parts of a value by key; of a list by topic name or robot number, else by index."""
     if isinstance(value, dict):
         return value
     if not isinstance(value, list):

@@ -14,11 +14,11 @@ from sdrlinkd.reports import Snapshot
 
 WATCH_PERIOD_S = 0.5
 PATIENCE_S = 2.0
-"""For an answer; a daemon that is busier than this is as good as away."""
+"""Longest wait for an answer in s; a daemon that is busier is as good as away."""
 
 
 class Follower:
-    """The snapshots of one daemon; None while it is away. It comes back by itself."""
+    """Asks one daemon again and again, also after it was away."""
 
     def __init__(self, directory: str | os.PathLike[str] | None) -> None:
         self.directory: Path = runtime_dir(directory)
@@ -26,7 +26,7 @@ class Follower:
         self._away_since: float | None = None
 
     def look(self) -> Snapshot | None:
-        """The snapshot of now; None: nobody answers. Raises RefusedError."""
+        """The daemon's snapshot of now; None when nobody answers. Raises RefusedError."""
         try:
             snapshot = msgspec.convert(self.ask("status"), Snapshot)
         except NoDaemonError:
@@ -37,7 +37,7 @@ class Follower:
         return snapshot
 
     def ask(self, verb: str, arguments: dict[str, Any] | None = None) -> Any:  # noqa: ANN401
-        """The daemon's answer. Raises NoDaemonError and RefusedError."""
+        """The daemon's answer to `verb`. Raises NoDaemonError and RefusedError."""
         if self._control is None:
             self._control = connect(self.directory, PATIENCE_S)
         try:
@@ -49,12 +49,12 @@ class Follower:
 
     @property
     def waiting(self) -> str:
-        """What to say while it is away."""
+        """What to show while the daemon is away."""
         for_s = 0.0 if self._away_since is None else time.monotonic() - self._away_since
         return f"waiting for sdrlinkd in {self.directory} ({for_s:.0f} s)"
 
     def close(self) -> None:
-        """Leave."""
+        """Close the connection; the next question opens another one."""
         if self._control is not None:
             self._control.close()
             self._control = None

@@ -112,7 +112,7 @@ def _topics(
 
 
 def _topics_of(bag: Path) -> list[FoundTopic]:
-    # It brings the message types.
+    # This brings the message types.
     from sdrlinkd.adapters import open_bag
 
     opened = open_bag(bag)
@@ -156,7 +156,7 @@ def _socket_folder() -> Path:
 
 
 def _write(files: dict[str, bytes], out: Path, force: bool) -> None:
-    """All of them, or none. Raises UserError."""
+    """Write all the files, or none. Raises UserError."""
     there = [name for name in files if (out / name).exists()]
     if there and not force:
         names = ", ".join(str(out / name) for name in there)
@@ -178,7 +178,7 @@ def _write(files: dict[str, bytes], out: Path, force: bool) -> None:
 
 
 def _try_out(files: dict[str, bytes], out: Path) -> None:
-    """Whether a daemon would take them. Raises UserError."""
+    """Try whether a daemon would take the files. Raises UserError."""
     from sdrlinkd.config import make_setup, parse_config
 
     with tempfile.TemporaryDirectory() as trial:
@@ -190,7 +190,7 @@ def _try_out(files: dict[str, bytes], out: Path) -> None:
 
 
 def _next(files: dict[str, bytes], out: Path, preset: RadioPreset | None) -> list[str]:
-    """What to type then; `preset` is None where nobody says which radio it is."""
+    """Lines on what to type next; `preset` is None where nobody says which radio it is."""
     configs = [out / name for name in files if name.endswith(".toml")]
     is_real = preset is not None and preset.is_real
     is_here = len(configs) > 1 and not is_real

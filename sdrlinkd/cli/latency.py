@@ -47,7 +47,7 @@ def latency(
 
 
 def _watch(follower: Follower, topic: str | None) -> None:
-    """Until Ctrl-C."""
+    """Keep the screen fresh until Ctrl-C."""
     console = screen_console()
     alone = console.is_terminal
     with follower, Live(console=console, screen=alone, auto_refresh=False) as live:

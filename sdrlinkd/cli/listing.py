@@ -26,7 +26,7 @@ LISTENS = 0x10000
 SOCKET_NAMES = (CONTROL_SOCKET, IN_SOCKET, OUT_SOCKET)
 PATIENCE_S = 1.0
 LOCK = "lock"
-"""Holds the daemon's process id, beside its sockets."""
+"""File beside a daemon's sockets that holds its process id."""
 
 
 class Listed(NamedTuple):
@@ -72,7 +72,10 @@ def directories() -> list[Path]:
 
 
 def _listening(lines: Iterable[str]) -> Iterable[Path]:
-    """Num RefCount Protocol Flags Type St Inode Path."""
+    """Paths of the sockets that somebody listens on.
+
+    Each line is: Num RefCount Protocol Flags Type St Inode Path.
+    """
     for line in lines:
         parts = line.split(maxsplit=7)
         # A name that begins with @ is no file.
@@ -86,7 +89,7 @@ def _listening(lines: Iterable[str]) -> Iterable[Path]:
 
 
 def _resolved(path: Path) -> Iterable[Path]:
-    """A socket that a daemon has named from where it was started."""
+    """Whole paths of a socket whose daemon named it relative to where it was started."""
     for link in Path("/proc").glob("[0-9]*/cwd"):
         with contextlib.suppress(OSError):
             whole = link.readlink() / path

@@ -98,7 +98,7 @@ def pub(
 def _show_receipts(
     publisher: Publisher, waiting: dict[str, int], until: float | None = None
 ) -> None:
-    """Those that come while messages, `waiting` by name, are not answered by all."""
+    """Show receipts until all messages `waiting`, by name, are answered, or until that time."""
     while waiting:
         told = publisher.receipt(None if until is None else max(0.0, until - time.monotonic()))
         if told is None:
@@ -174,7 +174,7 @@ def _headline(message: Message) -> str:
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401
-    """A message as dicts, lists and numbers."""
+    """A message as dicts, lists and numbers, long lists cut."""
     if hasattr(value, "__msgtype__"):
         names = [name for name in value.__dataclass_fields__ if not name.startswith("_")]
         return {name: _plain(getattr(value, name)) for name in names}

@@ -6,7 +6,7 @@ from sdrlinkd.reports import Snapshot, TopicReport
 
 
 def topic_sent(given: str, snapshot: Snapshot) -> TopicReport:
-    """The topic of this robot's that `given` means, on the bus or in the registry.
+    """The topic of this robot that `given` means, on the bus or in the registry.
 
     Raises UserError when there is none.
     """
@@ -18,9 +18,9 @@ def topic_sent(given: str, snapshot: Snapshot) -> TopicReport:
 
 
 def refuse_own(given: str, snapshot: Snapshot, rx_format: str) -> None:
-    """Nobody hears what this robot sends: raises UserError that names what is heard instead.
+    """Raise UserError when this robot itself sends `given`, which nobody hears here.
 
-    Other robots' topics appear under `rx_format`.
+    The error names what is heard instead: other robots' topics, which appear under `rx_format`.
     """
     own = {each.name for each in snapshot.link.topics}
     name = given if given in own else _on_bus(given, snapshot)

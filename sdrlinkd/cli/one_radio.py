@@ -18,7 +18,7 @@ MOST_GAIN_DB = 200
 
 
 def _between(option: str, least: int, most: int) -> Callable[[str], float]:
-    """Reads a frequency or rate in that range, in Hz."""
+    """A parser of a frequency or rate in Hz, from `least` to `most`."""
 
     def read(text: str) -> float:
         try:
@@ -35,7 +35,7 @@ def _between(option: str, least: int, most: int) -> Callable[[str], float]:
 
 
 class Factor(StrEnum):
-    """A radio's rate over the modem's."""
+    """The radio's rate divided by the modem's."""
 
     ONE = "1"
     TWO = "2"
@@ -98,14 +98,14 @@ class NamedRadio(NamedTuple):
 
 
 class OneRadio(NamedTuple):
-    """A configuration with a radio, and the robot that has it."""
+    """A configuration with a radio, and the id of the robot that has it."""
 
     config: Config
     node_id: int
 
 
 def receiving(named: NamedRadio) -> OneRadio:
-    """A radio that sends nothing. Raises UserError."""
+    """The radio that the command line names, which will send nothing. Raises UserError."""
     _refuse_none(named)
     if named.config is None:
         soapy = SoapyParams(
@@ -121,7 +121,10 @@ def receiving(named: NamedRadio) -> OneRadio:
 
 
 def sending(named: NamedRadio, transmit: bool) -> OneRadio:
-    """A radio that may send: `transmit` says so, or the configuration. Raises UserError."""
+    """The radio that the command line names, which may send. Raises UserError.
+
+    `transmit` or the configuration has to allow it.
+    """
     _refuse_none(named)
     if named.config is not None:
         found = _of_daemon(named.config, named, tx_enabled=transmit or None)
@@ -159,7 +162,7 @@ def _unasked(allowed: str) -> UserError:
 
 
 def _of_daemon(path: Path, named: NamedRadio, tx_enabled: bool | None) -> OneRadio:
-    """`tx_enabled`: None: as the configuration says."""
+    """The radio of a daemon's configuration; `tx_enabled` None: as the configuration says."""
     for option, key, value in (
         ("--device", "soapy.device", named.device),
         ("--frequency", "modem.frequency_hz", named.frequency_hz),
@@ -191,7 +194,7 @@ def _by_itself(named: NamedRadio, soapy: SoapyParams) -> Config:
 
 
 def _deaf_between_bursts(config: Config) -> Config:
-    """A half-duplex radio need not hear anything while a recording is sent."""
+    """The configuration without listening, which a half-duplex radio need not do in a replay."""
     return replace(config, soapy=replace(config.soapy, longest_tx_s=10.0, listen_s=0.0))
 
 

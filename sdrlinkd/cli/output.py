@@ -13,7 +13,7 @@ REPORT = "report.json"
 
 
 def load_pictures(package: str) -> ModuleType:
-    """`package`.pictures. Matplotlib is an extra, and slow to load: only where it is needed."""
+    """The module `package`.pictures, loaded late: matplotlib is slow to load, and an extra."""
     try:
         return import_module(f"{package}.pictures")
     except ImportError:
@@ -23,7 +23,7 @@ def load_pictures(package: str) -> ModuleType:
 
 
 def make_folder(out: Path, pictures: Sequence[str]) -> None:
-    """A folder in which the report and these pictures can be written."""
+    """Make a folder in which the report and these pictures can be written. Raises UserError."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         for name in (REPORT, *pictures):
@@ -33,7 +33,7 @@ def make_folder(out: Path, pictures: Sequence[str]) -> None:
 
 
 def write_report(path: Path, report: msgspec.Struct) -> None:
-    """As JSON for people and programs."""
+    """Write a report as JSON for people and programs. Raises UserError."""
     text = msgspec.json.format(msgspec.json.encode(report), indent=2)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

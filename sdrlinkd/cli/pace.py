@@ -13,7 +13,7 @@ MAX_SEED = (1 << 31) - 1
 
 
 class Pace(StrEnum):
-    """How time goes on on a simulated air."""
+    """How time passes on a simulated air."""
 
     REALTIME = "realtime"
     LOCKSTEP = "lockstep"
@@ -22,7 +22,7 @@ class Pace(StrEnum):
 def chosen_scenario(
     path: Path, seed: int | None, duration_s: float | None, pace: Pace | None
 ) -> Scenario:
-    """The scenario in `path`, but for what is given. Raises UserError."""
+    """The scenario in `path`, with what is given in place of its own. Raises UserError."""
     if duration_s is not None and not math.isfinite(duration_s):
         raise UserError(f"--duration: got {duration_s}; allowed: a number of seconds")
     changes = {"seed": seed, "duration_s": duration_s, "pace": pace.value if pace else None}
@@ -31,7 +31,7 @@ def chosen_scenario(
 
 
 def scenario_names(incomplete: str) -> list[str]:
-    """For completion: shipped scenarios by name, and files."""
+    """Completions for a scenario: shipped ones by name, and files."""
     files = [
         f"{path}/" if path.is_dir() else str(path)
         for path in sorted(Path().glob(f"{incomplete}*") if not incomplete.startswith("/") else ())

@@ -93,13 +93,13 @@ def watch(
 
 
 def _ask_hello(directory: Path) -> None:
-    """Raises NoDaemonError when the daemon has gone."""
+    """Ask whether the daemon is there. Raises NoDaemonError when it has gone."""
     with ControlClient(directory) as control:
         control.ask("hello")
 
 
 def one_line(data: bytes, registry: Registry | None) -> str:
-    """A PDU in one line."""
+    """A PDU in one line of text."""
     try:
         pdu = parse(data, len(data))
     except PduError as error:
@@ -115,7 +115,7 @@ def one_line(data: bytes, registry: Registry | None) -> str:
 
 
 def explain(data: bytes, registry: Registry | None) -> str:
-    """A PDU field by field; as far as it goes when it is refused."""
+    """A PDU field by field, as far as it can be read."""
     lines = [f"{len(data)} octets"]
     if len(data) >= 5:
         flags, src, dst, seq, hop_count = data[:5]

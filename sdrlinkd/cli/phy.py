@@ -80,7 +80,7 @@ def info(
 
 
 def table_of(told: "ModemInfo") -> FittedTable:
-    """A row an MCS."""
+    """The table of `phy info`, with a row for each MCS."""
     table = FittedTable(
         f"PDUs of {told.pdu_size} B, bursts up to {told.max_burst_s * 1e3:g} ms",
         (
@@ -199,7 +199,7 @@ def grid_named(name: str) -> "phy.Numerology":
 
 
 def open_recording(file: Path, type_name: str, rate: float | None) -> "IqRecording":
-    """A recording, with a word about what is wrong with it."""
+    """Open a recording, with a warning on the screen where it is damaged."""
     from sdrlinkd.iq import IqRecording
 
     recording = IqRecording(file, type_name, rate)
@@ -213,7 +213,7 @@ def open_recording(file: Path, type_name: str, rate: float | None) -> "IqRecordi
 
 @contextmanager
 def show_progress(what: str, recording: "IqRecording") -> Iterator["OnProgress"]:
-    """A bar while it is read."""
+    """Show a bar while a recording is read; yields what takes the samples done."""
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
     hidden = not console.is_terminal
@@ -267,7 +267,7 @@ def _print_counters(console: Console, counters: dict[str, int], recording: "IqRe
 
 
 def _picture_of(file: Path, what: str) -> Path:
-    """In the current folder: that of the recording is the user's data."""
+    """The path of a picture, in the current folder: the recording's folder is the user's."""
     stem = file.name.removesuffix(".sigmf-meta").removesuffix(".sigmf-data")
     return Path(f"{stem}.{what}.png")
 

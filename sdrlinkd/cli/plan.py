@@ -76,7 +76,7 @@ def plan(
 
 
 def lines(made: Plan) -> list[FittedTable | str]:
-    """What a person reads."""
+    """The plan as a person reads it: a table, the verdict, advice and notes."""
     table = FittedTable("plan", COLUMNS)
     for each in made.topics:
         worst = f"{1e3 * each.worst_s:.1f} ms" if each.worst_s < float("inf") else "never ends"

@@ -23,29 +23,29 @@ class Questions:
         self._can_ask = sys.stdin.isatty()
 
     def radio(self, given: str) -> RadioPreset:
-        """Which radio."""
+        """The radio to write for, as given or as answered."""
         if not given and self._can_ask:
             for name, preset in RADIOS.items():
                 typer.echo(f"  {name:<9} {preset.title}")
         return self._answer("--radio", "which radio", "hackrf", given, _radio)
 
     def robots(self, given: int | None) -> int:
-        """How many robots share the air."""
+        """The number of robots that share the air, as given or as answered."""
         text = "" if given is None else str(given)
         return self._answer("--robots", "how many robots share the air", "2", text, _count)
 
     def frequency(self, given: str) -> str:
-        """The middle of the channel, as written."""
+        """The middle of the channel with its unit, as given or as answered."""
         return self._answer("--frequency", _BAND, "433.92 MHz", given, _frequency)
 
     def device(self, given: str, preset: RadioPreset) -> str:
-        """As soapy.device; asked only where the preset does not know it."""
+        """The value of soapy.device; asked only where the preset does not know it."""
         if not given and preset.device:
             return ""
         return self._answer("--device", "which device", "", given, _device)
 
     def own_ids(self, given: str, robots: int) -> list[int]:
-        """The robots to write for; the only one is not asked for."""
+        """Ids of the robots to write for; not asked where there is only one."""
         if not given and robots == 1:
             return [1]
         return self._answer(
@@ -54,7 +54,7 @@ class Questions:
         )  # fmt: skip
 
     def topics(self) -> list[str]:
-        """NAME:TYPE, or a bag, or `graph`."""
+        """The topics as answered: NAME:TYPE each, or one path of a bag, or `graph`."""
         what = "which topics: NAME:TYPE with blanks between, a bag's path, or graph (ROS 2, now)"
         return self._answer("--topic", what, TOPICS, "", str.split)
 

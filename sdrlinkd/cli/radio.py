@@ -52,7 +52,7 @@ def probe(
 
 
 def table_of(device: "DeviceProbe", ahead: "Assessment", rate_hz: float) -> FittedTable:
-    """What it is, what it can do, and what a daemon would do with it."""
+    """The table of a radio: what it is, what it can do, and what a daemon would do with it."""
     table = FittedTable(
         device.label or device.device, (words("", least=20), words("")), heads=False
     )

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 class Written(StrEnum):
-    """Sample types of recordings."""
+    """Sample types that a recording may have."""
 
     CI16 = "ci16_le"
     CF32 = "cf32_le"
@@ -136,7 +136,7 @@ async def _capture(radio: OneRadio, wish: "CaptureWish") -> "CaptureReport":
 
 
 def _refuse_existing(out: Path, force: bool) -> str:
-    """The recording's name without an ending."""
+    """The recording's name without an ending. Raises UserError where it would be replaced."""
     stem = str(out).removesuffix(".sigmf-meta").removesuffix(".sigmf-data")
     for path in (Path(f"{stem}.sigmf-data"), Path(f"{stem}.sigmf-meta")):
         if path.exists() and not force:

@@ -1,4 +1,4 @@
-"""Means and spreads of the last figures, as `ros2 topic` tells them."""
+"""Means and spreads of the latest figures, as `ros2 topic` tells them."""
 
 import math
 from collections import deque
@@ -11,7 +11,7 @@ class Spread:
         self._values: deque[float] = deque(maxlen=window)
 
     def add(self, value: float) -> None:
-        """One more; the oldest goes."""
+        """Take in a value; beyond `window`, the oldest is dropped."""
         self._values.append(value)
 
     def __len__(self) -> int:
@@ -19,32 +19,32 @@ class Spread:
 
     @property
     def total(self) -> float:
-        """Of all in the window."""
+        """The sum of all values in the window."""
         return math.fsum(self._values)
 
     @property
     def first(self) -> float:
-        """The oldest one."""
+        """The oldest value in the window."""
         return self._values[0]
 
     @property
     def mean(self) -> float:
-        """0 where there is nothing."""
+        """The mean of the values; 0 where there are none."""
         return self.total / len(self._values) if self._values else 0.0
 
     @property
     def least(self) -> float:
-        """0 where there is nothing."""
+        """The smallest value; 0 where there is none."""
         return min(self._values, default=0.0)
 
     @property
     def most(self) -> float:
-        """0 where there is nothing."""
+        """The largest value; 0 where there is none."""
         return max(self._values, default=0.0)
 
     @property
     def std_dev(self) -> float:
-        """Of the population, as ROS has it."""
+        """The standard deviation of the population, as ROS computes it."""
         mean = self.mean
         return math.sqrt(math.fsum((each - mean) ** 2 for each in self._values) / max(1, len(self)))
 
@@ -57,13 +57,13 @@ class Rate:
         self._last_s: float | None = None
 
     def add(self, at_s: float, size: int, age_s: float | None) -> None:  # noqa: ARG002
-        """A message came."""
+        """Take in a message that came at `at_s`."""
         if self._last_s is not None:
             self._between.add(at_s - self._last_s)
         self._last_s = at_s
 
     def lines(self) -> list[str]:
-        """Nothing before the second message."""
+        """The lines to print; none before the second message."""
         spread = self._between
         if not len(spread) or not spread.total:
             return []
@@ -78,12 +78,12 @@ class Bandwidth:
         self._times: deque[float] = deque(maxlen=window)
 
     def add(self, at_s: float, size: int, age_s: float | None) -> None:  # noqa: ARG002
-        """A message came."""
+        """Take in a message of `size` bytes that came at `at_s`."""
         self._sizes.add(size)
         self._times.append(at_s)
 
     def lines(self) -> list[str]:
-        """Nothing before the second message."""
+        """The lines to print; none before the second message."""
         sizes = self._sizes
         if len(sizes) < 2 or self._times[-1] <= self._times[0]:
             return []
@@ -103,14 +103,14 @@ class Delay:
         self._unknown = 0
 
     def add(self, at_s: float, size: int, age_s: float | None) -> None:  # noqa: ARG002
-        """A message came."""
+        """Take in a message's age in s; None where it is not known."""
         if age_s is None:
             self._unknown += 1
         else:
             self._ages.add(age_s)
 
     def lines(self) -> list[str]:
-        """Messages of unknown age are counted, and in no figure."""
+        """The lines to print; messages of unknown age are counted, and in no figure."""
         told = [f"{self._unknown} messages of unknown age"] if self._unknown else []
         if not len(self._ages):
             return told
@@ -128,7 +128,7 @@ def _spread(spread: Spread) -> str:
 
 
 def _bytes(count: float) -> str:
-    """As ROS writes them."""
+    """A number of bytes as ROS writes it."""
     for unit, scale in (("MB", 1e6), ("KB", 1e3)):
         if count >= scale:
             return f"{count / scale:.2f} {unit}"

@@ -26,7 +26,7 @@ NO_DAEMON = 4
 
 
 def ask_status(control: ControlClient) -> Snapshot:
-    """The daemon's snapshot."""
+    """The daemon's snapshot, asked over the control socket."""
     return msgspec.convert(control.ask("status"), Snapshot)
 
 
@@ -81,7 +81,7 @@ def status(
 
 
 def _printer(*, as_json: bool, as_csv: bool, names: list[str]) -> Callable[[Snapshot], None] | None:
-    """Prints a snapshot for programs; None: it is for people."""
+    """What prints a snapshot for programs; None when it is for people."""
 
     def as_object(snapshot: Snapshot) -> None:
         typer.echo(msgspec.json.encode(snapshot).decode())
@@ -98,7 +98,7 @@ def _printer(*, as_json: bool, as_csv: bool, names: list[str]) -> Callable[[Snap
 
 
 def _watch(follower: Follower, show: Callable[[Snapshot], None] | None, *, whole: bool) -> None:
-    """Until Ctrl-C."""
+    """Show snapshot after snapshot until Ctrl-C."""
     console = screen_console()
     with follower:
         if show is not None or not console.is_terminal:
@@ -126,7 +126,7 @@ def _watch(follower: Follower, show: Callable[[Snapshot], None] | None, *, whole
 
 
 def _height(console: Console) -> int:
-    """Lines of the terminal; of what is none, those of the smallest one."""
+    """Lines of the terminal; where there is none, those of the smallest one."""
     return console.height if console.is_terminal else SCREEN[1]
 
 
@@ -149,7 +149,7 @@ def check(runtime_dir: RuntimeDir = None, as_json: AsJson = False) -> None:
 
 
 def ledger_lines(link: LinkReport) -> list[str]:
-    """The three identities with their numbers."""
+    """The ledger's three identities with their numbers, a line each."""
     tx, rx = link.tx, link.rx
     return [
         _identity("messages out", tx.accepted, {"sent": tx.sent, "queued": tx.queued,

@@ -1,4 +1,4 @@
-"""Ctrl-C that ends a command well instead of breaking it off."""
+"""Lets Ctrl-C end a command well instead of breaking it off."""
 
 import asyncio
 import contextlib
@@ -10,7 +10,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 @contextlib.contextmanager
 def stopped_by_signals(stop: Callable[[], None]) -> Iterator[None]:
-    """Ctrl-C, a kill and a closed terminal call `stop`, on the event loop of the main thread."""
+    """Let Ctrl-C, a kill and a closed terminal call `stop`, on the main thread's event loop."""
     loop = asyncio.get_running_loop()
     before = {number: signal.getsignal(number) for number in SIGNALS}
     for number in SIGNALS:

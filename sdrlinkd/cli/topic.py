@@ -74,7 +74,7 @@ def _measure(
     duration: float | None,
     runtime_dir: Path | None,
 ) -> None:
-    """Tell every second until Ctrl-C or the end; then of everything. Raises UserError."""
+    """Print `lately` every second until Ctrl-C or the end, then `whole`. Raises UserError."""
     with connect(runtime_dir) as control:
         _refuse_own(name, ask_status(control))
     began_s = tell_s = time.monotonic()

@@ -28,7 +28,7 @@ def topics(context: typer.Context, runtime_dir: RuntimeDir = None, as_json: AsJs
 
 
 def tables(link: LinkReport) -> list[FittedTable]:
-    """What is sent, and what is heard."""
+    """The table of topics sent and, where any is heard, that of topics heard."""
     sent = FittedTable("sent", (figure("id"), words("topic"), words("type", 2), words("", 1)))
     for topic in link.topics:
         left_out = "" if topic.subscribed else "not taken: see the key `topics`"

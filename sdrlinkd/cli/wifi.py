@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 PIECE = 1 << 20
 SHORT_TRAINING = 320
 LONGEST_FRAME = 1 << 17
-"""4095 octets at 6 Mbit/s are 109 920 samples."""
+"""Samples, more than any frame has: 4095 octets at 6 Mbit/s take 109 920."""
 
 _KINDS = {
     0b0000: "association request", 0b0001: "association response", 0b0100: "probe request",
@@ -65,7 +65,7 @@ def decode_wifi(
 def _frames(
     recording: "IqRecording", progress: "OnProgress"
 ) -> Iterator[tuple[int, "WifiFrame | HtFrame"]]:
-    """(sample at which it begins, frame)."""
+    """(sample at which a frame begins, frame) for all frames, read piece by piece."""
     from phy.wifi import receive
 
     total, first = recording.info.n_samples, 0
@@ -133,6 +133,6 @@ def _kind(psdu: bytes) -> str:
 
 
 def _addresses(psdu: bytes) -> str:
-    """Who to whom; acknowledgements tell the receiver alone."""
+    """Sender and receiver as text; acknowledgements tell the receiver alone."""
     to, by = psdu[4:10].hex(":"), psdu[10:16].hex(":")
     return f"{by} → {to}" if len(psdu) >= 20 else f"→ {to}"

@@ -14,7 +14,7 @@ MAX_PRIORITY = 127
 BROADCAST = 255
 CDR_HEADER_SIZE = 4
 MOST_NAMES = 20
-"""Of an error message: whoever has more topics looks them up."""
+"""Names that an error message lists: whoever has more topics looks them up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +32,7 @@ class Topic:
 
 
 class Announced:
-    """A daemon's announcement. `boot` is another one after each of its starts."""
+    """A daemon's announcement; `boot` is another one after each of its starts."""
 
     def __init__(self, fields: Mapping[str, Any]) -> None:
         self.boot: str = fields.get("boot", "")
@@ -45,7 +45,7 @@ class Announced:
         self.frames = {name: name.encode() + b"\0" for name in self.topics}
 
     def check(self, name: str, size: int, type_: str | None) -> None:
-        """Raises MessageRefusedError if a message of `size` octets for topic `name` is refused."""
+        """Raise MessageRefusedError if `size` octets for topic `name` are not taken."""
         topic = self.topics.get(name)
         if topic is None:
             raise MessageRefusedError("tx_unknown_topic", unknown_topic(name, self.topics))
@@ -64,7 +64,7 @@ def check_wishes(
     lifespan_ms: object = None,
     published_ns: object = None,
 ) -> None:
-    """What a producer may ask for one message, whatever the daemon. Raises MessageRefusedError."""
+    """Raise MessageRefusedError for what no daemon takes, whatever its topics are."""
     words = ""
     if qos is not None and qos not in QOS:
         words = f"qos: got {_shown(qos)}; allowed: {', '.join(QOS)}"
@@ -81,8 +81,8 @@ def check_wishes(
 
 
 def unknown_topic(name: str, known: Iterable[str]) -> str:
-    """In words: the daemon does not take it."""
-    # Only for whoever made a mistake.
+    """The error text for a topic that the daemon does not take."""
+    # Loaded only for whoever made a mistake.
     from difflib import get_close_matches
 
     names = list(known)
@@ -98,17 +98,17 @@ def unknown_topic(name: str, known: Iterable[str]) -> str:
 
 
 def too_short(name: str, size: int) -> str:
-    """In words: not even a header."""
+    """The error text for a message with less than a CDR header."""
     return f"{name}: too short: {size} B; CDR begins with a header of {CDR_HEADER_SIZE} B"
 
 
 def too_large(name: str, size: int, most: int, key: str) -> str:
-    """In words: more than `key` allows."""
+    """The error text for a message larger than the setting `key` allows."""
     return f"{name}: too large: {size} B; at most {most} B with {key}"
 
 
 def wrong_type(name: str, given: str, registered: str) -> str:
-    """In words: the registry has another."""
+    """The error text for a type that is not the registry's."""
     return f"type: got {_shown(given)}; allowed: {registered}, which {name} has in the registry"
 
 

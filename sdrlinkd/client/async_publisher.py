@@ -1,4 +1,4 @@
-"""Publish from asyncio programs."""
+"""Publish messages from asyncio programs."""
 
 import asyncio
 import os
@@ -20,7 +20,7 @@ from sdrlinkd.client.publisher import RECONNECT_MS
 
 
 class AsyncPublisher(AsyncSocket):
-    """As `Publisher`, awaiting instead of blocking. For one event loop, and any of its tasks."""
+    """A `Publisher` that awaits instead of blocking. For one event loop, and any of its tasks."""
 
     def __init__(
         self,
@@ -85,7 +85,7 @@ class AsyncPublisher(AsyncSocket):
             except zmq.Again:
                 if not await self._is_writable(deadline):
                     raise no_daemon(self.runtime_dir) from None
-                # It may be another daemon by now.
+                # The one that listens now may be another daemon.
                 await self._ask(deadline, must_answer=receipt)
                 producer.check(topic, cdr, type)
         self._sent = True
@@ -112,7 +112,7 @@ class AsyncPublisher(AsyncSocket):
         return None
 
     async def wait_for_daemon(self, timeout_s: float | None = None) -> None:
-        """Until the daemon answers, for at most `timeout_s`, else the publisher's.
+        """Wait until the daemon answers, for at most `timeout_s`, else the publisher's.
 
         Raises NoDaemonError.
         """
@@ -120,7 +120,10 @@ class AsyncPublisher(AsyncSocket):
         await self._ask(Deadline(wait_s), must_answer=True)
 
     async def flush(self) -> None:
-        """As `Publisher.flush`."""
+        """Wait until the daemon has taken everything sent, as `Publisher.flush`.
+
+        Raises NoDaemonError.
+        """
         deadline, question = Deadline(self._timeout_s), self._question()
         answers = self._producer.answers(question)
         try:
@@ -140,7 +143,7 @@ class AsyncPublisher(AsyncSocket):
             raise restarted(self.runtime_dir)
 
     async def _ask(self, deadline: Deadline, *, must_answer: bool = False) -> None:
-        """Have the daemon's present word. Raises NoDaemonError when there is none in time.
+        """Ask what the daemon takes now. Raises NoDaemonError when no answer comes in time.
 
         Where nothing may be waited for, what is known has to do, unless it `must_answer`.
         """
@@ -157,7 +160,7 @@ class AsyncPublisher(AsyncSocket):
             raise no_daemon(self.runtime_dir)
 
     async def _is_writable(self, deadline: Deadline) -> bool:
-        """Whether the daemon takes messages in time."""
+        """Whether the daemon takes messages before the deadline."""
         poller = zmq.asyncio.Poller()
         poller.register(self._socket, zmq.POLLOUT)
         return bool(await poller.poll(deadline.left_ms))
@@ -172,7 +175,7 @@ class AsyncPublisher(AsyncSocket):
         self._producer.forget(question)
 
     async def _until(self, is_done: Callable[[], bool], deadline: Deadline) -> bool:
-        """Hear the daemon until `is_done`; whether that was in time."""
+        """Hear the daemon until `is_done`; whether that was before the deadline."""
 
         async def listen() -> None:
             while not is_done():

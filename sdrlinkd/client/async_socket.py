@@ -23,7 +23,7 @@ class AsyncSocket:
 
     @property
     def directory(self) -> Path:
-        """The same as `runtime_dir`."""
+        """Another word for `runtime_dir`, as for the constructor."""
         return self.runtime_dir
 
     async def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Subscribe from asyncio programs."""
+"""Subscribe to messages from asyncio programs."""
 
 import asyncio
 import os
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class AsyncSubscriber(AsyncSocket):
-    """As `Subscriber`, an asynchronous iterator; enter it with `async with`."""
+    """A `Subscriber` that is an asynchronous iterator; enter it with `async with`."""
 
     def __init__(
         self,
@@ -59,7 +59,7 @@ class AsyncSubscriber(AsyncSocket):
             self._socket.unsubscribe(token)
 
     async def receive(self) -> Message:
-        """The next message."""
+        """The next message, for which this waits."""
         while True:
             message = decode_in(await self._socket.recv_multipart())
             if message is not None:

@@ -19,7 +19,7 @@ class _Asked:
 
 
 class AwaitedReceipts:
-    """What was sent with a wish for a receipt, and what came of it."""
+    """Messages that were sent with a wish for a receipt, and the receipts that came."""
 
     def __init__(self) -> None:
         self._token = secrets.token_hex(4)
@@ -33,27 +33,27 @@ class AwaitedReceipts:
 
     @property
     def has_come(self) -> bool:
-        """Whether one can be taken that the daemon sent."""
+        """Whether a receipt from the daemon is there to be taken."""
         return bool(self._came)
 
     def new_id(self) -> str:
-        """A name for the next message."""
+        """A new name for the next message that wants a receipt."""
         self._count += 1
         return f"{self._token}.{self._count}"
 
     def expect(self, id_: str, topic: str, dst: int | None, boot: str) -> None:
-        """A message was handed to the daemon of that boot."""
+        """Note that message `id_` was handed to the daemon of that boot."""
         self._open[id_] = _Asked(topic, BROADCAST if dst is None else dst, boot)
 
     def take(self, receipt: Receipt) -> None:
-        """The daemon's word. One that comes after it was given up tells nothing new."""
+        """Take a receipt from the daemon; one for a message that was given up tells nothing new."""
         if receipt.id in self._open:
             self._came.append(receipt)
             if not receipt.left:
                 del self._open[receipt.id]
 
     def next(self, boot: str) -> Receipt | None:
-        """What came first; else a message that another daemon than that of `boot` had."""
+        """The receipt that came first, or one for a message that a daemon of another boot had."""
         if self._came:
             return self._came.popleft()
         for id_, asked in self._open.items():

@@ -28,7 +28,7 @@ class Endpoint:
 
     @property
     def directory(self) -> Path:
-        """The same as `runtime_dir`."""
+        """Another word for `runtime_dir`, as for the constructor."""
         return self.runtime_dir
 
     def _connect(self, name: str, socket: "zmq.Socket[bytes] | None" = None) -> None:

@@ -16,7 +16,7 @@ PROTOCOL = b"sdrl1"
 
 
 class RefusedError(Exception):
-    """The daemon's no; `code` is for programs, the message for people."""
+    """A request that the daemon refuses; `code` is for programs, the message for people."""
 
     def __init__(self, code: str, reason: str) -> None:
         super().__init__(reason)
@@ -42,7 +42,7 @@ class ControlClient(Endpoint):
         self._connect(CONTROL_SOCKET)
 
     def ask(self, verb: str, arguments: dict[str, Value] | None = None) -> Any:  # noqa: ANN401
-        """The daemon's answer to `verb`. Raises RefusedError, or NoDaemonError in time."""
+        """The daemon's answer to `verb`. Raises RefusedError, or NoDaemonError when none comes."""
         request_id = secrets.token_bytes(4)
         deadline = time.monotonic() + self._timeout_s
         self._socket.sndtimeo = int(self._timeout_s * 1000)

@@ -1,4 +1,4 @@
-"""Until when something is waited for."""
+"""Points in time until which something is waited for."""
 
 import math
 import time
@@ -7,30 +7,30 @@ FOREVER = float("inf")
 
 
 class Deadline:
-    """`seconds` from now; None and infinity: never. What is below 0 has passed."""
+    """A point in time `seconds` from now; None and infinity: never. Below 0 it has passed."""
 
     def __init__(self, seconds: float | None) -> None:
         self._at = FOREVER if seconds is None else time.monotonic() + seconds
 
     @property
     def left_s(self) -> float:
-        """0 when it has passed."""
+        """Seconds that are left; 0 when the deadline has passed."""
         return max(0.0, self._at - time.monotonic())
 
     @property
     def left_or_none(self) -> float | None:
-        """For asyncio, where None waits for ever."""
+        """Seconds that are left, for asyncio, where None waits for ever."""
         left_s = self.left_s
         return None if left_s == FOREVER else left_s
 
     @property
     def left_ms(self) -> int | None:
-        """For ZeroMQ, where None waits for ever."""
+        """Milliseconds that are left, for ZeroMQ, where None waits for ever."""
         return milliseconds(self.left_s)
 
 
 def milliseconds(seconds: float | None) -> int | None:
-    """For ZeroMQ: None waits for ever; never less than asked for, and never below 0."""
+    """`seconds` in ms for ZeroMQ, where None waits for ever; never less, and never below 0."""
     if seconds is None or seconds == FOREVER:
         return None
     return max(0, math.ceil(seconds * 1000))

@@ -2,11 +2,11 @@
 
 
 class NoDaemonError(ConnectionError):
-    """No sdrlinkd listens there."""
+    """No sdrlinkd listens in the runtime directory."""
 
 
 class MessageRefusedError(ValueError):
-    """The daemon does not take such a message; the text says what was given and what is allowed.
+    """A message that the daemon does not take; the text says what was given and what is allowed.
 
     `reason` is the ledger's name for it (bus document, section 6.1).
     """

@@ -14,20 +14,21 @@ ACK_PREFIX = b"\0ack\0"
 SYNC_PREFIX = b"\0sync\0"
 RECEIPT_PREFIX = b"\0receipt\0"
 WELCOME_PREFIX = b"\0" + ENVELOPE_VERSION
-"""Of an announcement, which is one frame."""
+"""What an announcement begins with, which is one frame."""
 
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A message another robot sent.
+    """A message that another robot sent.
 
     `number` runs per (source, topic): a step of more than one is what this consumer missed on the
     bus. `lost_pdus` is how many PDUs of the source are known lost on the air so far. `age_us` is
-    how old the message was when it was handed over, None when unknown; of that it waited at its
-    source, its fragments came one after another, and the last one was on the air.
+    how old the message was when it was handed over, None when unknown. Parts of that age are
+    `waited_us` at its source, `reassembly_us` while its fragments came, and `on_air_us` of the last
+    one.
 
     `published_ns` and `sampled_ns` (of messages with a std_msgs/Header) are when it was published
-    and measured, in ns since 1970 by this host's clock, and how wrong that may be; None when
+    and measured, in ns since 1970 by this host's clock, each with the bound of its error; None when
     unknown. `is_stop`: nothing came for too long, and this is the stop message of a command topic.
     """
 
@@ -121,7 +122,7 @@ def topic_filter(topic: str) -> bytes:
 
 
 def new_ack_topic() -> bytes:
-    """A topic for one handshake with the daemon."""
+    """A new topic for one handshake with the daemon."""
     return ACK_PREFIX + secrets.token_hex(8).encode() + b"\0"
 
 

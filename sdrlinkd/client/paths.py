@@ -12,8 +12,11 @@ SYSTEM_DIR = Path("/run/sdrlinkd")
 
 
 def runtime_dir(given: str | os.PathLike[str] | None = None) -> Path:
-    """The runtime directory: as given, else $SDRLINKD_RUNTIME_DIR, else the system service's
-    (/run/sdrlinkd) when it runs, else the user's own."""
+    """The daemon's runtime directory, as given or where it is by default.
+
+    The latter is $SDRLINKD_RUNTIME_DIR, else the system service's (/run/sdrlinkd) when it runs,
+    else the user's own.
+    """
     chosen = given or os.environ.get("SDRLINKD_RUNTIME_DIR")
     if chosen:
         return Path(chosen)
@@ -26,7 +29,7 @@ def runtime_dir(given: str | os.PathLike[str] | None = None) -> Path:
 def chosen_dir(
     runtime_dir_: str | os.PathLike[str] | None, directory: str | os.PathLike[str] | None
 ) -> Path:
-    """The runtime directory, for a caller who may name it by either word."""
+    """The runtime directory, for a caller who may name it by either word; TypeError for both."""
     if runtime_dir_ is not None and directory is not None:
         raise TypeError("runtime_dir and directory are two names of one thing; give runtime_dir")
     return runtime_dir(directory if runtime_dir_ is None else runtime_dir_)
@@ -41,5 +44,5 @@ def is_there(path: Path) -> bool:
 
 
 def endpoint(directory: Path, socket: str) -> str:
-    """The ZeroMQ endpoint of one of the sockets."""
+    """The ZeroMQ endpoint of a socket in the runtime directory."""
     return f"ipc://{directory / socket}"

@@ -22,12 +22,12 @@ from sdrlinkd.client.messages import (
 )
 
 LOOK_S = 0.02
-"""So often, at most, a producer looks whether the daemon has announced something."""
+"""Seconds from one look whether the daemon has announced something to the next, at least."""
 
 STILL_THERE_S = 1.0
-"""After such a silence, a producer that waits for receipts asks whether the daemon is there."""
+"""Seconds of silence after which who waits for receipts asks whether the daemon is there."""
 GONE_S = 5.0
-"""After so long without an answer, it is not."""
+"""Seconds without an answer after which the daemon is taken for gone."""
 
 
 class Producer:
@@ -37,7 +37,7 @@ class Producer:
         self._is_checked = is_checked
         self._look_at = 0.0
         self._questions: dict[bytes, list[str]] = {}
-        """Boots of those who answered, by the topic of the answer."""
+        """Boots of the daemons that answered, by the topic of the answer."""
         self._unprompted: bytes | None = None
         self._unprompted_at = self._heard_at = time.monotonic()
         self._confirmed = ""
@@ -59,7 +59,7 @@ class Producer:
         return True
 
     def take(self, frames: Sequence[bytes]) -> None:
-        """What the daemon sent. Raises EnvelopeMismatchError."""
+        """Take frames that the daemon sent. Raises EnvelopeMismatchError."""
         topic = frames[0]
         self._heard_at = time.monotonic()
         try:
@@ -79,23 +79,24 @@ class Producer:
             self._questions.get(topic, []).append(known.boot)
 
     def ask(self) -> bytes:
-        """The topic of an acknowledgement, to be subscribed to."""
+        """A new topic for an acknowledgement, to be subscribed to."""
         topic = new_ack_topic()
         self._questions[topic] = []
         return topic
 
     def answers(self, topic: bytes) -> list[str]:
-        """Boots of the daemons that have answered so far."""
+        """Boots of the daemons that have answered on `topic` so far."""
         return self._questions[topic]
 
     def forget(self, topic: bytes) -> None:
-        """No answer is awaited any more."""
+        """Await no answer on `topic` any more."""
         self._questions.pop(topic, None)
 
     def unprompted(self) -> tuple[bytes | None, bytes | None]:
-        """Topics to (subscribe to, unsubscribe from): what is asked without waiting for an answer.
+        """Topics to (subscribe to, unsubscribe from), for questions that nobody waits for.
 
-        Whether a new daemon has the subscriptions, and whether that which owes receipts is there.
+        They ask whether a new daemon has the subscriptions, and whether that which owes receipts is
+        there.
         """
         now = time.monotonic()
         if self._unprompted is not None:
@@ -119,7 +120,7 @@ class Producer:
 
     @property
     def boot(self) -> str:
-        """Of the daemon that is known."""
+        """The boot of the daemon that is known; empty where none is."""
         return "" if self.known is None else self.known.boot
 
     def takes(self, topic: str, cdr: bytes, type_: str | None) -> bool:
@@ -135,14 +136,14 @@ class Producer:
         )  # fmt: skip
 
     def check(self, topic: str, cdr: bytes, type_: str | None) -> None:
-        """The same; raises MessageRefusedError."""
+        """Raise MessageRefusedError if such a message is not taken, by what is known."""
         if self._is_checked and self.known is not None:
             self.known.check(topic, len(cdr), type_)
 
     def encode(
         self, topic: str, cdr: bytes, fields: dict[str, Value], published_ns: int | None
     ) -> list[bytes]:
-        """The three frames of a message."""
+        """The three frames of a message, stamped with `published_ns` or now."""
         given = {key: value for key, value in fields.items() if value is not None}
         given["t"] = time.time_ns() if published_ns is None else published_ns
         frame = None if self.known is None else self.known.frames.get(topic)

@@ -37,7 +37,7 @@ class Publisher(Endpoint):
         checked: bool = True,
         directory: str | os.PathLike[str] | None = None,
     ) -> None:
-        """Does not wait for the daemon: see `wait_for_daemon`.
+        """Make a publisher without waiting for the daemon: see `wait_for_daemon`.
 
         `runtime_dir` is where the daemon's sockets are; `directory` is another word for it.
         """
@@ -70,9 +70,9 @@ class Publisher(Endpoint):
     ) -> str | None:
         """Publish `cdr` under `topic`. What is left out comes from the daemon's configuration.
 
-        Its age counts from `published_ns` since 1970, else from now. With `receipt`, each robot
-        that it is for answers what became of it, under the name that is returned; see the method
-        `receipt`.
+        The message's age counts from `published_ns` since 1970, else from now. With `receipt`, each
+        robot that it is for answers what became of it, under the name that is returned; see the
+        method `receipt`.
 
         Blocks for at most `timeout_s`, else the publisher's: 0 never blocks and raises
         NoDaemonError at once where the daemon is not connected (yet) or does not keep up. Raises
@@ -101,7 +101,7 @@ class Publisher(Endpoint):
             except zmq.Again:
                 if not (deadline.left_s and self._socket.poll(deadline.left_ms, zmq.POLLOUT)):
                     raise no_daemon(self.runtime_dir) from None
-                # It may be another daemon by now.
+                # The one that listens now may be another daemon.
                 self._ask(deadline, must_answer=receipt)
                 producer.check(topic, cdr, type)
         self._sent = True
@@ -127,7 +127,7 @@ class Publisher(Endpoint):
         return None
 
     def wait_for_daemon(self, timeout_s: float | None = None) -> None:
-        """Until the daemon answers, for at most `timeout_s`, else the publisher's.
+        """Wait until the daemon answers, for at most `timeout_s`, else the publisher's.
 
         Raises NoDaemonError.
         """
@@ -137,11 +137,11 @@ class Publisher(Endpoint):
     def flush(self, timeout_s: float = 5.0) -> None:
         """Wait until the daemon has taken everything sent. Raises NoDaemonError.
 
-        What a daemon had taken that was killed before this was called is gone with it: where that
+        If a daemon was killed before this was called, what it had taken is gone with it: where that
         matters, ask for receipts.
 
-        ZeroMQ may drop the end of a long burst when the sender goes at once; who leaves the
-        `with` block in peace has flushed.
+        ZeroMQ may drop the end of a long burst when the sender goes at once; who leaves the `with`
+        block without an error has flushed.
         """
         deadline = Deadline(timeout_s)
         question = self._question()
@@ -168,7 +168,7 @@ class Publisher(Endpoint):
         super().close()
 
     def _ask(self, deadline: Deadline, *, must_answer: bool = False) -> None:
-        """Have the daemon's present word. Raises NoDaemonError when there is none in time.
+        """Ask what the daemon takes now. Raises NoDaemonError when no answer comes in time.
 
         Where nothing may be waited for, what is known has to do, unless it `must_answer`.
         """
@@ -194,7 +194,7 @@ class Publisher(Endpoint):
         self._producer.forget(question)
 
     def _until(self, is_done: Callable[[], bool], deadline: Deadline) -> bool:
-        """Hear the daemon until `is_done`; whether that was in time."""
+        """Hear the daemon until `is_done`; whether that was before the deadline."""
         while not is_done():
             if not self._told.poll(deadline.left_ms):
                 return False

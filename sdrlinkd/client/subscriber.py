@@ -30,7 +30,7 @@ class Subscriber(Endpoint):
         depth: int = RECEIVE_HWM,
         directory: str | os.PathLike[str] | None = None,
     ) -> None:
-        """Waits for the daemon, for at most `timeout_s`, then raises NoDaemonError.
+        """Subscribe; wait for the daemon for at most `timeout_s`, then raise NoDaemonError.
 
         `runtime_dir` is where the daemon's sockets are; `directory` is another word for it.
         """
@@ -58,7 +58,7 @@ class Subscriber(Endpoint):
                 yield message
 
     def _wait_until_subscribed(self, timeout_s: float) -> None:
-        """The daemon answers subscriptions in order, so its answer to ours means all are active."""
+        """Wait until all subscriptions are active: they are answered in order, ours last."""
         deadline, again, asked = Deadline(timeout_s), Deadline(0), list[bytes]()
         while deadline.left_s:
             if not again.left_s:

@@ -7,7 +7,7 @@ from msgspec import inspect
 
 
 def allowed(kind: inspect.Type) -> str:
-    """For error messages: `a whole number from 32 to 2047`, `one of direct, loopback`, …"""
+    """What a key of `kind` may hold, for errors: `a whole number from 32 to 2047`, `text`, …"""
     if isinstance(kind, inspect.IntType):
         return "a whole number" + _range(kind.ge, kind.gt, kind.le, kind.lt)
     if isinstance(kind, inspect.FloatType):
@@ -53,7 +53,7 @@ def given(value: object) -> str:
 
 
 def keys_of(kind: inspect.Type) -> list[str] | None:
-    """Names a table may have; None when any will do."""
+    """The keys that a table of `kind` may have; None when any will do."""
     return (
         [field.encode_name for field in kind.fields]
         if isinstance(kind, inspect.StructType)
@@ -67,7 +67,7 @@ def is_table(kind: inspect.Type) -> bool:
 
 
 def child(kind: inspect.Type, key: str) -> inspect.Type | None:
-    """Type of `key` inside a table."""
+    """The type of `key` inside a table of `kind`; None where there is none."""
     if isinstance(kind, inspect.StructType):
         return next((field.type for field in kind.fields if field.encode_name == key), None)
     if isinstance(kind, inspect.DictType):

@@ -12,7 +12,10 @@ from sdrlinkd.wire import Registry
 
 
 def check_relay(config: Config, node_id: int, registry: Registry) -> None:
-    """Raises ConfigError that begins with the key, and says what was given and what is allowed."""
+    """Check what relays and parity need of the rest of the link.
+
+    Raises ConfigError that begins with the key, and says what was given and what is allowed.
+    """
     relay = Relay(config.relay, node_id)
     if config.relay.policy == "routes" and not config.relay.routes:
         raise ConfigError(
@@ -34,7 +37,7 @@ def check_relay(config: Config, node_id: int, registry: Registry) -> None:
 def load_dictionaries(
     policies: Mapping[int, TopicPolicy], registry: Registry, base: Path
 ) -> dict[int, ZstdCompressionDict]:
-    """By topic id. Raises ConfigError."""
+    """The zstd dictionaries that policies name, by topic id. Raises ConfigError."""
     found = {}
     for topic_id, policy in policies.items():
         if not policy.dictionary:

@@ -4,7 +4,7 @@ from sdrlinkd.config.pdu_links import ModemParams
 
 
 def cfo_told(modem: ModemParams) -> str:
-    """How far, and why, in a line."""
+    """How far off bursts are looked for, and why, in a line."""
     searched = f"bursts are looked for up to {modem.searched_cfo_hz / 1e3:.3g} kHz off"
     if modem.max_cfo_hz != "auto":
         return f"{searched} (modem.max_cfo_hz)"
@@ -15,7 +15,7 @@ def cfo_told(modem: ModemParams) -> str:
 
 
 def cfo_warning(modem: ModemParams) -> str:
-    """Where two radios may not hear each other: what to do. Empty where they will."""
+    """What to do where two radios may be too far apart to hear each other; empty elsewhere."""
     if modem.frequency_hz == 0 or modem.searched_cfo_hz >= modem.apart_hz:
         return ""
     apart = "" if modem.max_cfo_hz == "auto" else f", but they can be {modem.apart_hz:g} Hz apart"

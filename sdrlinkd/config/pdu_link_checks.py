@@ -15,7 +15,10 @@ S = TypeVar("S", bound=msgspec.Struct)
 
 
 def check_pdu_link(config: Config) -> None:
-    """Raises ConfigError that begins with the key, and says what was given and what is allowed."""
+    """Check what modem, radios and simulated air must agree on.
+
+    Raises ConfigError that begins with the key, and says what was given and what is allowed.
+    """
     _check_sharing(config)
     if config.backend == "gnuradio":
         _check_flowgraph(config)
@@ -61,7 +64,7 @@ def _check_sharing(config: Config) -> None:
 
 
 def with_paths(config: Config, base: Path) -> Config:
-    """`config` with file names relative to `base` made whole, but for the registry's."""
+    """`config` with file names made whole that are relative to `base`; the registry's stays."""
     base, radio = base.absolute(), backend_of(config)
     named = {name: each.files for name, each in BUILT_IN.items()}
     if radio is not None:

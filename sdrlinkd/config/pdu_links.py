@@ -28,7 +28,7 @@ class DirectParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
 
 class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The OFDM modem, on every radio."""
+    """Parameters of the OFDM modem, on every radio."""
 
     rate_hz: Annotated[float, Meta(ge=1e4, le=2e8)] = 5e6
     """Samples a second, and the width of the channel; the same at all nodes."""
@@ -60,7 +60,7 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Carrier and samples of every radio come from the same crystal: the offset of the one tells
     that of the other."""
     carrier_db: Annotated[float, Meta(ge=3, le=40)] = 6.0
-    """So much energy above the noise is a carrier; for access policies that listen."""
+    """Energy above the noise from which on there is a carrier; for access policies that listen."""
     block_s: Annotated[float, Meta(ge=1e-4, le=0.1)] = 0.001
     """Samples are received in pieces of this length."""
     oversampling: Literal[1, 2, 4] = 1
@@ -68,29 +68,29 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     @property
     def centre_hz(self) -> float:
-        """The middle of the channel, also where none is set."""
+        """The middle of the channel in Hz; SIMULATED_HZ where none is set."""
         return self.frequency_hz or SIMULATED_HZ
 
     @property
     def apart_hz(self) -> float:
-        """How far two radios' carriers may be apart, both crystals off as far as they may be."""
+        """How far apart two radios' carriers may be in Hz, with both crystals at their worst."""
         return 2e-6 * self.crystal_ppm * self.centre_hz
 
     @property
     def most_cfo_hz(self) -> float:
-        """The largest carrier offset that a receiver can search at this rate."""
+        """The largest carrier offset in Hz that a receiver can search at this rate."""
         return self.rate_hz / 4
 
     @property
     def searched_cfo_hz(self) -> float:
-        """The carrier offset up to which bursts are looked for."""
+        """The carrier offset in Hz up to which bursts are looked for."""
         if self.max_cfo_hz == "auto":
             return min(self.apart_hz, self.most_cfo_hz)
         return float(self.max_cfo_hz)
 
 
 class TransformParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """/tf on a slow link."""
+    """What of /tf is sent over a slow link, and how."""
 
     topics: list[str] = []
     """Registry names of type tf2_msgs/TFMessage, such as tf and tf_static."""
@@ -112,9 +112,9 @@ class PlayParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     bag: str = ""
     """Recording to play; empty, with `duration_s`: a built-in robot."""
     duration_s: Annotated[float, Meta(ge=0, le=1e6)] = 0.0
-    """So much of it; 0: nothing."""
+    """How much of the recording is sent; 0: nothing."""
     begin_s: Annotated[float, Meta(ge=0, le=1e6)] = 0.0
-    """When the first message goes."""
+    """When the first message is sent."""
     wait_for_consumer: bool = False
     """The radio's time begins when the first consumer subscribes."""
 

@@ -40,7 +40,7 @@ def located(message: str, source: str) -> str:
 
 
 def _keys_in(message: str) -> Iterator[KeyPath]:
-    """What may be keys, in order; that a word is none shows when the file does not have it."""
+    """Words of a message that may be keys, in order; whether they are, the file shows."""
     for found in _KEY.finditer(message):
         yield [part.strip('"') for part in re.findall(r"\"[^\"]*\"|\w+", found[0])]
 

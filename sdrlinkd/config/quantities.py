@@ -11,7 +11,7 @@ from sdrlinkd.units import bits_per_second, hertz, seconds
 
 
 class _Quantity(NamedTuple):
-    """What a key's ending says of its unit."""
+    """A unit that a key's ending tells, and how text with it is read."""
 
     ending: str
     read: Callable[[str, str], float]
@@ -28,9 +28,10 @@ _QUANTITIES = (
 
 
 def as_numbers(raw: object, kind: inspect.Type | None, key: str = "") -> object:
-    """`raw`, read from TOML, with numbers where a key of that kind has text with a unit.
+    """`raw`, read from TOML, with numbers in place of text with a unit.
 
-    Text that cannot be read stays: the check of types then refuses it.
+    That is done for keys whose kind is a number. Text that cannot be read stays: the check of types
+    then refuses it.
     """
     if isinstance(raw, dict):
         table = next((each for each in _kinds(kind) if each and describe.is_table(each)), None)
@@ -52,7 +53,7 @@ def as_numbers(raw: object, kind: inspect.Type | None, key: str = "") -> object:
 
 
 def example(key: str | int, kind: inspect.Type) -> str:
-    """For error messages: how the value of `key` may be written with its unit."""
+    """How the value of `key` may be written with its unit, for error messages; else empty."""
     quantity = _quantity_of(str(key), kind)
     return f", or with its unit, such as {quantity.example}" if quantity else ""
 
@@ -64,7 +65,7 @@ def _quantity_of(key: str, kind: inspect.Type | None) -> _Quantity | None:
 
 
 def _words(kind: inspect.Type | None) -> set[object]:
-    """Text that means itself."""
+    """Words that a key of `kind` takes as they are."""
     literals = [each for each in _kinds(kind) if isinstance(each, inspect.LiteralType)]
     return {value for each in literals for value in each.values}
 

@@ -18,6 +18,6 @@ class GnuRadioParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     rate_bit_s: Annotated[float, Meta(gt=0, le=1e12)] = 100e3
     """The pace that the flowgraph sustains; what comes faster waits in our queue, not in its."""
     delay_s: Annotated[float, Meta(ge=0, le=10)] = 0.0
-    """How long PDUs take through it; known, it is part of the messages' age."""
+    """How long PDUs take through the flowgraph; this becomes part of the messages' age."""
     hear_self: bool = False
     """Take our own PDUs, where the flowgraph sends them back."""

@@ -7,17 +7,17 @@ from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError
 
 MOST = 254
-"""255 is everyone."""
+"""Largest id of a robot: 255 is everyone."""
 MOST_LISTED = 4
 _DIGITS = re.compile(r"[0-9]+")
 _ALLOWED = f"robot_id from 0 to {MOST}"
 
 
 def robot_id(config: Config, topics: Iterable[str]) -> int:
-    """As configured; with -1 the rightmost run of digits in the namespace.
+    """The id as configured; with −1 the rightmost run of digits in the namespace.
 
-    Without a namespace, that in the names of `topics`, the ones taken from the bus: those that hold
-    digits must agree. Raises ConfigError.
+    Without a namespace, it is the last number in the names of `topics`, the ones taken from the
+    bus: those that hold digits must agree. Raises ConfigError.
     """
     if config.robot_id >= 0:
         return config.robot_id
@@ -54,7 +54,7 @@ def _from_namespace(namespace: str, where: str) -> int:
 
 
 def _last_number(name: str) -> str:
-    """Its rightmost digits, without leading zeros; empty: none."""
+    """The rightmost digits in `name`, without leading zeros; empty where there are none."""
     runs = _DIGITS.findall(name)
     return (runs[-1].lstrip("0") or "0") if runs else ""
 
@@ -64,7 +64,7 @@ def _fits(number: str) -> bool:
 
 
 def _listed(found: dict[str, str]) -> str:
-    """One name for each number."""
+    """The numbers found, each with one name that holds it, for an error message."""
     names = {number: name for name, number in reversed(found.items())}
     told = [f"{_short(number)} in {name}" for number, name in reversed(names.items())]
     more = len(told) - MOST_LISTED

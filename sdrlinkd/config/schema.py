@@ -46,7 +46,7 @@ else:
 
 
 class BusParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The local ZeroMQ bus."""
+    """Where the local ZeroMQ bus is, and what it takes."""
 
     runtime_dir: str = ""
     """Directory of the sockets; empty: systemd's, or the user's own."""
@@ -57,9 +57,9 @@ class ChronyParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """Another robot's clock as a source for this host's chronyd."""
 
     socket: str = ""
-    """As in chrony.conf: `refclock SOCK PATH`; empty: none."""
+    """The socket's path, as in chrony.conf: `refclock SOCK PATH`; empty: none."""
     robot: Annotated[int, Meta(ge=0, le=254)] = 0
-    """Whose clock is the true one."""
+    """The robot whose clock is the true one."""
 
 
 class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -46,26 +46,26 @@ class Setup:
     policies: dict[int, TopicPolicy]
     dictionaries: dict[int, ZstdCompressionDict]
     transforms: list[int]
-    """Topics that [tf] is about."""
+    """Ids of the topics that [tf] is about."""
     warnings: list[str]
     topic_warnings: dict[int, str]
-    """What matters of a topic, once it is used."""
+    """Warnings by topic id that matter once the topic is used."""
     source: str = ""
     """The file that all this is from, if any."""
 
     def republished_as(self, src: int, topic_id: int) -> str:
-        """Bus topic of another robot's message."""
+        """The bus topic under which another robot's message appears."""
         topic = self.registry.by_id(topic_id)
         name = topic.name if topic else str(topic_id)
         return _PLACEHOLDER.sub(str(src), self.config.rx_format).rstrip("/") + "/" + name
 
     @property
     def all_warnings(self) -> list[str]:
-        """Of the whole and of the topics."""
+        """The warnings on the configuration as a whole and on its topics."""
         return [*self.warnings, *self.topic_warnings.values()]
 
     def summary(self) -> list[str]:
-        """What `--check` prints."""
+        """The lines that `--check` prints of the configuration."""
         config = self.config
         size = config.link.pdu_size
         return [

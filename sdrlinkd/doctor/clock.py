@@ -13,7 +13,7 @@ _ERROR = 5
 
 
 class KernelClock(NamedTuple):
-    """What the kernel says of it. Errors in s."""
+    """What the kernel says of this host's clock; `error_s` is the largest error in s."""
 
     is_synchronised: bool
     error_s: float
@@ -34,7 +34,7 @@ class _Timex(ctypes.Structure):
 
 
 def kernel_clock() -> KernelClock | None:
-    """By adjtimex(2), which changes nothing with no modes; None where there is none."""
+    """The kernel's word, by adjtimex(2), which without modes changes nothing; None: no word."""
     timex = _Timex()
     try:
         state = ctypes.CDLL(None, use_errno=True).adjtimex(ctypes.byref(timex))
@@ -47,8 +47,11 @@ def kernel_clock() -> KernelClock | None:
 
 
 def check_clock(kernel: KernelClock | None, step_s: float, chrony: str) -> list[Finding]:
-    """`step_s`: the wall clock against the monotonic one while we looked. `chrony`: the socket in
-    the configuration, "" for none."""
+    """Whether something keeps this host's clock, and whether it stepped while we looked.
+
+    `step_s`: by how much the wall clock ran away from the monotonic one. `chrony`: the socket in
+    the configuration, "" for none.
+    """
     found = [
         _synchronised(kernel),
         good_if(

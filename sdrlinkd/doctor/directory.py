@@ -10,7 +10,7 @@ from sdrlinkd.doctor.finding import Finding, bad, good, good_if
 
 
 def check_directory(path: Path, uid: int) -> list[Finding]:
-    """`uid`: the user who runs the daemon."""
+    """Whether a daemon of user `uid` can have its sockets in `path`."""
     what = "runtime directory"
     length = len(os.fsencode(path))
     if length > MAX_DIRECTORY_BYTES:

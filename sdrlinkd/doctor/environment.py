@@ -1,4 +1,4 @@
-"""Python, the packages, and the compiled modem."""
+"""Whether Python, the packages and the compiled modem are there."""
 
 import os
 import re
@@ -20,9 +20,12 @@ def check_environment(
     phy_home: Path,
     cache: Path,
 ) -> list[Finding]:
-    """`requirements`: as the package's metadata lists them. `version_of` raises
-    PackageNotFoundError. `home`: the folder that sdrlinkd is in; `phy_home`: that of phy.
-    `cache`: where compiled code is kept."""
+    """Whether Python, the packages and the compiled modem are as they must be.
+
+    `requirements`: as the package's metadata lists them. `version_of` raises PackageNotFoundError.
+    `home`: the folder that sdrlinkd is in; `phy_home`: that of phy. `cache`: where compiled code is
+    kept.
+    """
     found = ".".join(map(str, sys.version_info[:3]))
     return [
         good_if(

@@ -1,4 +1,4 @@
-"""What a check says."""
+"""Findings: what a check says of what it looked at."""
 
 from enum import StrEnum
 
@@ -6,7 +6,7 @@ import msgspec
 
 
 class State(StrEnum):
-    """Whether it is as it must be."""
+    """Whether what was looked at is as it must be."""
 
     GOOD = "good"
     BAD = "bad"
@@ -24,20 +24,20 @@ class Finding(msgspec.Struct, frozen=True):
 
 
 def good(what: str, told: str) -> Finding:
-    """As it must be."""
+    """A finding that something is as it must be."""
     return Finding(what, State.GOOD, told)
 
 
 def bad(what: str, told: str, to_do: str) -> Finding:
-    """A person must do something."""
+    """A finding about which a person must do something."""
     return Finding(what, State.BAD, told, to_do)
 
 
 def none(what: str, told: str) -> Finding:
-    """Nothing to be done here."""
+    """A finding about which nothing is to be done."""
     return Finding(what, State.NONE, told)
 
 
 def good_if(is_good: bool, what: str, told: str, to_do: str) -> Finding:
-    """Good, or bad with what to do."""
+    """A good finding, or a bad one that says what to do."""
     return good(what, told) if is_good else bad(what, told, to_do)

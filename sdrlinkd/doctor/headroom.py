@@ -21,24 +21,26 @@ SNR_DB = 15.0
 TOPIC, TYPE = "load", "std_msgs/UInt8MultiArray"
 _MESSAGE = bytes(1000)
 _AHEAD = 200
-"""So many messages wait while the air is full."""
+"""Messages that wait while the air is full."""
 
 
 class Headroom(NamedTuple):
-    """Share of one core that a daemon takes, by the time of the samples: other programs that hold
-    it up do not make it look small."""
+    """Shares of one core that a daemon takes, by the time of the samples.
+
+    Other programs that hold it up do not make them look small.
+    """
 
     rate_hz: float
     silent: float
-    """While nobody sends: the search alone."""
+    """Share while nobody sends: the search alone."""
     full: float
-    """While the air is full: every burst is made, and received."""
+    """Share while the air is full: every burst is made, and received."""
     samples_lost: int
-    """While it was full: the receiver did not keep up."""
+    """Samples lost while the air was full: the receiver did not keep up."""
 
 
 def headroom_found(modem: ModemParams, pdu_size: int, seconds: float) -> Finding:
-    """Measured, or why it cannot be."""
+    """The finding on CPU headroom: measured, or why it cannot be."""
     try:
         return check_headroom(measure_headroom(modem, pdu_size, seconds))
     except UserError as error:
@@ -47,7 +49,7 @@ def headroom_found(modem: ModemParams, pdu_size: int, seconds: float) -> Finding
 
 
 def measure_headroom(modem: ModemParams, pdu_size: int, seconds: float) -> Headroom:
-    """Run a daemon for that long, half of it on a silent air. Raises UserError."""
+    """Run a daemon for `seconds`, half of that on a silent air. Raises UserError."""
     with tempfile.TemporaryDirectory(prefix="sdrlinkd-doctor-") as name:
         folder = Path(name)
         daemon = daemon_process(_config(folder, modem, pdu_size))
@@ -72,7 +74,7 @@ def measure_headroom(modem: ModemParams, pdu_size: int, seconds: float) -> Headr
 
 
 def check_headroom(found: Headroom) -> Finding:
-    """Whether the modem keeps up where the air is full."""
+    """Whether the modem keeps up with the samples where the air is full."""
     lost = f"; {found.samples_lost} samples were lost" if found.samples_lost else ""
     return good_if(
         found.full <= MOST and not found.samples_lost, "CPU headroom",
@@ -102,7 +104,7 @@ def _config(folder: Path, modem: ModemParams, pdu_size: int) -> Path:
 
 
 def _run(seconds: float, out: Publisher | None) -> None:
-    """For so long; with `out`, the queue never runs dry."""
+    """Let `seconds` pass; with `out`, the daemon's queue never runs dry."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         if out is not None:
@@ -120,12 +122,12 @@ class _Spent(NamedTuple):
 
     @classmethod
     def by(cls, pid: int, folder: Path) -> "_Spent":
-        """The daemon of that process, with its sockets in `folder`."""
+        """What the daemon of process `pid` has spent, with its sockets in `folder`."""
         counters = snapshot_of(folder).carrier.counters
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
         cpu_s = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
         return cls(cpu_s, counters.get("samples", 0), counters.get("samples_lost", 0))
 
     def share_since(self, earlier: "_Spent", rate_hz: float) -> float:
-        """Of a core, for what came in time and what came at all."""
+        """CPU time since `earlier`, as a share of the time of the samples that came."""
         return (self.cpu_s - earlier.cpu_s) * rate_hz / max(1, self.samples - earlier.samples)

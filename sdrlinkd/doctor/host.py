@@ -1,4 +1,4 @@
-"""How late this machine is: wakes who sleeps, and hands over from one thread to another.
+"""How late this machine wakes a thread, and hands over from one thread to another.
 
 A real radio's messages are later by this than the air alone makes them.
 """
@@ -17,22 +17,22 @@ PERIOD_S = 0.001
 
 
 class HostTerm(NamedTuple):
-    """In s, at the 99th percentile of `n` trials."""
+    """How late this machine is, in s, at the 99th percentile of `n` trials."""
 
     wakes_s: float
     """From the moment a thread wants to wake to when it does."""
     hands_over_s: float
-    """From there to the event loop."""
+    """From when it wakes to the event loop."""
     n: int
 
     @property
     def host_s(self) -> float:
-        """What a message's latency has of it: the worst case of both."""
+        """What this machine adds to a message's latency in s: the worst case of both."""
         return self.wakes_s + self.hands_over_s
 
 
 async def measure_host(n: int) -> HostTerm:
-    """`n` times a radio's thread wakes and hands a block to the event loop; takes `n` ms."""
+    """How late a radio's thread wakes and hands a block to the event loop; takes `n` ms."""
     loop = asyncio.get_running_loop()
     wakes, arrives = np.zeros(n), np.zeros(n)
     done = asyncio.Event()
@@ -61,7 +61,10 @@ async def measure_host(n: int) -> HostTerm:
 
 
 def check_host(found: HostTerm, lead_s: float | None) -> Finding:
-    """`lead_s`: how long ahead bursts are handed over to the radio; None without a real one."""
+    """Whether this machine is in time for its radio.
+
+    `lead_s`: how long ahead bursts are handed over to the radio; None without a real one.
+    """
     told = (
         f"wakes {1e3 * found.wakes_s:.2f} ms late and hands over in "
         f"{1e3 * found.hands_over_s:.2f} ms (p99 of {found.n}); "

@@ -1,4 +1,4 @@
-"""What the system grants: going before others, memory, buffers of sockets and USB."""
+"""What the system grants: real-time priority, memory, buffers of sockets and USB."""
 
 import os
 import resource
@@ -13,12 +13,12 @@ from sdrlinkd.doctor.usb import is_networked
 NETWORK_BUFFER = 24_912_805
 """Bytes that UHD's manual wants for a receiving socket."""
 USB_BUFFER_MB = 16
-"""Of the kernel, for all transfers under way; 0: without bound."""
+"""MB of the kernel for all transfers under way on USB; 0: without bound."""
 REALTIME = 10
 
 
 class Granted(NamedTuple):
-    """As found on this machine."""
+    """What the system grants, as found on this machine."""
 
     can_hurry: bool
     """Whether a thread could take real-time priority when it was tried."""
@@ -31,7 +31,7 @@ class Granted(NamedTuple):
 
 
 def granted() -> Granted:
-    """What this process and its children may do."""
+    """What this process and its children are granted."""
     best_nice = 20 - resource.getrlimit(resource.RLIMIT_NICE)[0]
     files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     if os.geteuid() == 0:
@@ -40,7 +40,7 @@ def granted() -> Granted:
 
 
 def _can_hurry() -> bool:
-    """Tried in a child, which gives it back by ending."""
+    """Whether real-time priority is granted: tried in a child, which gives it back by ending."""
     code = f"import os; os.sched_setscheduler(0, os.SCHED_RR, os.sched_param({REALTIME}))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)  # noqa: S603
     return done.returncode == 0
@@ -55,7 +55,10 @@ def _can_share() -> bool:
 
 
 def check_limits(granted: Granted, device: str, root: Path) -> list[Finding]:
-    """`device`: as soapy.device, "" without a radio. `root`: / or a copy of its /proc and /sys."""
+    """Whether priority, memory, files and buffers suffice.
+
+    `device`: as soapy.device, "" without a radio. `root`: / or a copy of its /proc and /sys.
+    """
     return [
         _hurry(granted, is_needed=bool(device)),
         good_if(

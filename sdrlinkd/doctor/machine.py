@@ -5,18 +5,21 @@ from pathlib import Path
 from sdrlinkd.doctor.finding import Finding, bad, good, good_if, none
 
 BUSY = 1.0
-"""Programs that want to run, for each core; more of them than that wait for each other."""
+"""Programs that want to run, for each core; where there are more, they wait for each other."""
 STOLEN = 0.05
-"""A virtual machine that loses more of its time to others loses samples."""
+"""Share of its time; a virtual machine that loses more of it to others loses samples."""
 SLOW_GOVERNORS = ("powersave", "conservative")
 
 
 def check_machine(
     cores: int, load: float, stat: tuple[str, str], cpus: Path, *, is_timed: bool
 ) -> list[Finding]:
-    """`load`: programs that wanted to run, a mean of the last minute. `stat`: /proc/stat twice,
-    some time between. `cpus`: /sys/devices/system/cpu. `is_timed`: a radio, real or simulated,
-    wants its samples in time."""
+    """Whether the computer has the cores and the time that a node needs.
+
+    `load`: programs that wanted to run, a mean of the last minute. `stat`: /proc/stat twice, some
+    time between. `cpus`: /sys/devices/system/cpu. `is_timed`: a radio, real or simulated, wants its
+    samples in time.
+    """
     return [
         good_if(
             cores > 1 or not is_timed, "cores", f"{cores}",

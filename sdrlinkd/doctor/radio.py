@@ -13,8 +13,11 @@ LISTENERS = ("csma", "minislot")
 
 
 def check_radio(config: Config | None, found: ProbeReport | None) -> list[Finding]:
-    """`config`: None where only what is here is asked for. `found`: by SoapySDR, of the configured
-    device or all; None where no radio is to be looked at."""
+    """Whether the radio is there, and takes what the configuration asks of it.
+
+    `config`: None where only what is here is asked for. `found`: by SoapySDR, of the configured
+    device or all; None where no radio is to be looked at.
+    """
     if config is not None and config.backend != "soapy":
         return [_without(config)]
     if found is None:

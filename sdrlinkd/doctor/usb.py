@@ -21,7 +21,7 @@ KNOWN = {
 
 ON_USB = tuple(KNOWN)
 NETWORKED = ("addr=", "remote", "hostname=", "uri=ip:")
-"""Of soapy.device, where the radio is behind a network."""
+"""Parts of soapy.device that tell of a radio behind a network."""
 
 
 def is_networked(device: str) -> bool:
@@ -37,7 +37,10 @@ class _Plugged(NamedTuple):
 
 
 def check_usb(driver: str, root: Path) -> list[Finding]:
-    """`driver`: of soapy.device, "" for any. `root`: / or a copy of its /sys and /dev."""
+    """Whether radios that are known here are plugged in, and this user may open them.
+
+    `driver`: of soapy.device, "" for any. `root`: / or a copy of its /sys and /dev.
+    """
     what = "USB device"
     plugged = [each for each in _plugged(root) if driver in ("", each.driver)]
     if driver and driver not in KNOWN:

@@ -1,5 +1,6 @@
-"""How a daemon and its link fare, in plain words: a verdict on a snapshot, and what has changed
-since the one before. Owns the memory that both need; reads snapshots and nothing else.
+"""How a daemon and its link fare, in plain words: a verdict, and what has changed.
+
+The package owns the memory that both need; it reads snapshots and nothing else.
 """
 
 from sdrlinkd.health.health import Health

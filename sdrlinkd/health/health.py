@@ -1,4 +1,4 @@
-"""Looks at a daemon's snapshots, one a second."""
+"""Looks at a daemon's snapshots, about one a second."""
 
 from sdrlinkd.health.lately import Lately
 from sdrlinkd.health.limit import Limiter
@@ -8,7 +8,7 @@ from sdrlinkd.reports import Snapshot, VerdictReport
 
 
 class Health:
-    """Of one daemon. Time is the snapshots' `uptime_s`."""
+    """How one daemon fares. Time is the snapshots' `uptime_s`."""
 
     def __init__(self) -> None:
         self._lately = Lately()
@@ -18,11 +18,11 @@ class Health:
         """Whether other robots may be on the air of what carries the PDUs."""
 
     def judge(self, snapshot: Snapshot) -> VerdictReport:
-        """The verdict on any snapshot; changes nothing."""
+        """The verdict on any snapshot, without remembering it."""
         return judge(snapshot, self._lately, self.shares_air)
 
     def look(self, snapshot: Snapshot) -> list[Line]:
-        """What a log should tell that was not so at the last look; about once a second."""
+        """Lines for the log on what has changed since the last look; about once a second."""
         now = snapshot.uptime_s
         lines = []
         for line in self._story.tell(snapshot, self._lately):

@@ -9,7 +9,7 @@ SHED = ("tx_overflow_old", "tx_overflow_new", "tx_topic_full", "tx_expired", "tx
 
 
 def shed_by_topic(snapshot: Snapshot) -> dict[str, int]:
-    """Messages dropped so far because there was too little air."""
+    """Messages dropped so far because there was too little air, by topic."""
     return {
         topic.name: sum(topic.dropped.get(reason, 0) for reason in SHED)
         for topic in snapshot.link.topics
@@ -23,7 +23,7 @@ class Lately:
         self._seen: deque[tuple[float, dict[str, int], int]] = deque()
 
     def note(self, snapshot: Snapshot) -> None:
-        """Remember one."""
+        """Remember a snapshot, and forget those before the window."""
         now = snapshot.uptime_s
         while self._seen and now - self._seen[0][0] > RATE_WINDOW_S:
             self._seen.popleft()
@@ -31,7 +31,7 @@ class Lately:
         self._seen.append((now, shed_by_topic(snapshot), lost))
 
     def shed(self, snapshot: Snapshot) -> dict[str, int]:
-        """Messages dropped for want of air, by topic, the most first."""
+        """Messages dropped lately for want of air, by topic, the most first."""
         if not self._seen:
             return {}
         _, before, _ = self._seen[0]
@@ -40,7 +40,7 @@ class Lately:
         return dict(sorted(kept.items(), key=lambda each: -each[1]))
 
     def samples_lost(self, snapshot: Snapshot) -> int:
-        """Samples that the receiver did not get."""
+        """Samples that the receiver did not get lately."""
         if not self._seen:
             return 0
         return snapshot.carrier.counters.get("samples_lost", 0) - self._seen[0][2]

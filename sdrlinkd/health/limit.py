@@ -6,9 +6,9 @@ from typing import Generic, TypeVar
 T = TypeVar("T")
 
 MOST = 4
-"""Lines on one subject in a row."""
+"""Lines on one subject that may come in a row."""
 REFILL_S = 15.0
-"""Then one in so long."""
+"""Seconds in which one more line on a subject may come."""
 
 
 @dataclass(slots=True)
@@ -26,7 +26,7 @@ class Limiter(Generic[T]):
         self._subjects: dict[str, _Subject] = {}
 
     def take(self, subject: str, line: T, now: float) -> T | None:
-        """`line`, or None: it is held back."""
+        """`line` if it may be told now; None when it is held back."""
         known = self._refilled(subject, now)
         if known.tokens >= 1 and not known.untold:
             known.tokens -= 1

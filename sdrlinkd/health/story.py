@@ -11,7 +11,7 @@ from sdrlinkd.reports import NeighborReport, Snapshot
 
 
 class Level(Enum):
-    """As journald's priorities."""
+    """How urgent a line is, as journald's priorities."""
 
     INFO = "info"
     WARNING = "warning"
@@ -42,7 +42,7 @@ class Story:
         self._steps = 0
 
     def tell(self, snapshot: Snapshot, lately: Lately) -> Iterator[Line]:
-        """What is new."""
+        """Lines on what is new in a snapshot."""
         yield from self._radio(snapshot)
         for robot in snapshot.link.neighbors:
             if not robot.is_self:

@@ -1,23 +1,23 @@
-"""OK, DEGRADED or DOWN, and why, the worst first."""
+"""The verdict on a daemon: OK, DEGRADED or DOWN, and why, the worst first."""
 
 from sdrlinkd.health.lately import Lately
 from sdrlinkd.health.words import pdu_link_name, percent, span
 from sdrlinkd.reports import RATE_WINDOW_S, NeighborReport, PduLinkReport, Snapshot, VerdictReport
 
 SILENT_S = 5.0
-"""A robot that is not heard for so long, and for much longer than usual, is missed."""
+"""Seconds; a robot not heard for so long, and for much longer than usual, is missed."""
 SILENT_TIMES = 3.0
 GONE_S = 600.0
-"""After so long it is not expected any more."""
+"""Seconds of silence after which a robot is not expected any more."""
 LOSSY = 0.03
-"""More of the PDUs lost than this is worth a word."""
+"""Share of PDUs lost that is worth a word."""
 AWAY_S = 1.0
 CLIPPED_PCT = 0.1
 LATE_LOOP_MS = 250.0
 
 
 def is_away(carrier: PduLinkReport) -> bool:
-    """Whether what carried PDUs does not; a moment's pause is none."""
+    """Whether what carried PDUs is gone; a moment's pause does not count."""
     return carrier.state == "down" and carrier.since_s >= AWAY_S
 
 
@@ -59,7 +59,7 @@ def _down(snapshot: Snapshot) -> str:
 
 
 def _robots(snapshot: Snapshot, shares_air: bool) -> list[str]:
-    """What is wrong with whom we hear, and who hears us."""
+    """Reasons that lie with the robots that we hear, and with how they hear us."""
     robots = [each for each in snapshot.link.neighbors if not each.is_self]
     reasons = []
     if not robots and shares_air:

@@ -11,12 +11,12 @@ _NAMES = {
 
 
 def pdu_link_name(carrier: PduLinkReport) -> str:
-    """Of the thing that may be missing."""
+    """The word for what carries the PDUs, which may be missing."""
     return _NAMES.get(carrier.kind, "radio")
 
 
 def span(seconds: float) -> str:
-    """`12 s`, `3 min 20 s`, `2 h 5 min`."""
+    """A time span as people say it: `12 s`, `3 min 20 s`, `2 h 5 min`."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"
@@ -26,5 +26,5 @@ def span(seconds: float) -> str:
 
 
 def percent(share: float) -> str:
-    """`4 %`; below one, one digit more."""
+    """A share as people say it: `4 %`; below one, with one digit more."""
     return f"{100 * share:.0f} %" if share >= 0.0095 else f"{100 * share:.1f} %"

@@ -12,7 +12,7 @@ _LINE = re.compile(r"(/\S+) \[([^\],]+)\]")
 
 
 def topics_of_graph() -> list[FoundTopic]:
-    """What `ros2 topic list -t` names; topics of several types are not among them.
+    """Topics that `ros2 topic list -t` names, but for those of several types.
 
     Raises UserError where there is no ROS 2 in this shell.
     """

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 
 class RadioPreset(NamedTuple):
-    """How a configuration for it begins."""
+    """How a configuration for one kind of radio begins."""
 
     title: str
     backend: str
@@ -14,16 +14,16 @@ class RadioPreset(NamedTuple):
     soapy: tuple[tuple[str, str], ...] = ()
     """Gains and antennas: lines of TOML with a comment. Sending is always off to begin with."""
     slot: str = ""
-    """Of robots that take turns; empty: made from the radio."""
+    """Slot of robots that take turns; empty: made from the radio."""
 
     @property
     def is_real(self) -> bool:
-        """Whether it sends radio waves."""
+        """Whether the radio sends real waves."""
         return self.backend == "soapy"
 
     @property
     def shares_air(self) -> bool:
-        """Whether several robots hear each other by it."""
+        """Whether several robots hear each other by this radio."""
         return self.backend in ("soapy", "ether")
 
 
@@ -59,4 +59,4 @@ RADIOS = {
                             rate="5 Msps"),
     "direct": RadioPreset("none: one daemon that hears itself, without a modem", "direct"),
 }  # fmt: skip
-"""By the name that a person gives."""
+"""Presets by the name that a person gives."""

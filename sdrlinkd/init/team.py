@@ -12,14 +12,14 @@ REGISTRY = "registry.csv"
 
 
 class Team(NamedTuple):
-    """What a person says of it. Robots are numbered 1 to `robots`."""
+    """What a person says of a team. Its robots are numbered 1 to `robots`."""
 
     radio: RadioPreset
     robots: int
     frequency: str
-    """As written, with its unit; empty where there is no real radio."""
+    """Middle of the channel as written, with its unit; empty where there is no real radio."""
     device: str
-    """As soapy.device; empty: the preset's."""
+    """The value of soapy.device; empty: the preset's."""
     topics: list[FoundTopic]
     air: Path
     """Folder of the hub, for a simulated air."""

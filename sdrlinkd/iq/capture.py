@@ -15,9 +15,9 @@ from sdrlinkd.iq.keeper import Keeper
 
 LOOK_S = 0.1
 SWITCH_INTERVAL_S = 1e-4
-"""Else who looks for bursts keeps the radio's thread from the interpreter for 5 ms at a time."""
+"""Seconds; by default, who looks for bursts keeps the interpreter from the radio for 5 ms."""
 WAITING_S = 1.0
-"""So much may wait for a slow disk."""
+"""Seconds of samples that may wait for a slow disk."""
 
 
 class CaptureWish(NamedTuple):
@@ -31,7 +31,7 @@ class CaptureWish(NamedTuple):
 
 
 class CaptureState(NamedTuple):
-    """How far it is."""
+    """How far a recording has come, for the screen."""
 
     recorded_s: float
     searched_s: float
@@ -39,7 +39,7 @@ class CaptureState(NamedTuple):
     n_bursts: int
     n_gaps: int
     is_recorded: bool
-    """Bursts are still looked for."""
+    """Everything is recorded, and bursts are still looked for."""
     radio: str
 
 
@@ -49,7 +49,7 @@ class CaptureReport(NamedTuple):
     n_samples: int
     seconds: float
     searched_s: float
-    """Bursts were looked for so far."""
+    """Seconds from the start in which bursts were looked for."""
     n_bursts: int
     pdus_good: int
     pdus_bad: int
@@ -59,7 +59,7 @@ class CaptureReport(NamedTuple):
     peak_dbfs: float
     n_full: int
     problem: str
-    """Why it ended early."""
+    """Why the recording ended early."""
 
 
 class Capture:
@@ -75,7 +75,7 @@ class Capture:
         self._problem = ""
 
     async def __aenter__(self) -> Self:
-        # Else the first burst would wait for compiled code.
+        # Without this, the first burst would wait for compiled code.
         await asyncio.to_thread(phy.warm_up)
         try:
             await self._radio.open(self._tuning)
@@ -88,7 +88,7 @@ class Capture:
         await self._radio.close()
 
     def stop(self) -> None:
-        """Receive no more; asked again, look for no more bursts either."""
+        """Receive no more; when asked again, look for no more bursts either."""
         if self._ended.is_set() and self._keeper is not None:
             self._keeper.give_up()
         self._ended.set()

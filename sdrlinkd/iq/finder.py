@@ -13,7 +13,7 @@ LEAST = 1 << 14
 
 
 class BurstFinder:
-    """Reads a recording by `read(first, n)`, behind whoever writes it. For one thread."""
+    """Looks for bursts by `read(first, n)`, behind whoever writes the recording. For one thread."""
 
     def __init__(
         self,
@@ -29,22 +29,22 @@ class BurstFinder:
         self._receiver = phy.Receiver(network, MAX_FREQUENCY, grid)
         self._gaps: deque[tuple[int, int]] = deque()
         self.next_index = 0
-        """What is before it was looked at."""
+        """Everything before this sample was looked at."""
         self.annotations: list[Annotation] = []
         self.n_bursts = 0
 
     @property
     def n_good(self) -> int:
-        """PDUs that were right."""
+        """Number of PDUs whose CRC was right."""
         return self._receiver.counters["pdus_good"]
 
     @property
     def n_bad(self) -> int:
-        """PDUs that were not."""
+        """Number of PDUs whose CRC was wrong."""
         return self._receiver.counters["pdus_bad"]
 
     def miss(self, start: int, n: int, reason: str) -> None:
-        """`n` samples from `start` on are missing."""
+        """Note that `n` samples from `start` on are missing."""
         self._gaps.append((start, n))
         told = f"{reason}: {n} samples, {1e3 * n / self._rate_hz:.3f} ms"
         self.annotations.append(Annotation(start, n, GAP_LABEL, told))
@@ -66,7 +66,7 @@ class BurstFinder:
         return len(samples) > 0
 
     def finish(self, end: int) -> None:
-        """The recording ends there."""
+        """End the search where the recording ends."""
         self._note(self._receiver.flush())
         self.annotations = [
             each._replace(n=min(each.n, end - each.start)) for each in self.annotations

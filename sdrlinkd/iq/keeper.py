@@ -14,11 +14,11 @@ LEAST_WAITING = 16
 
 
 class Keeper:
-    """A thread of its own: what comes is written first; bursts are looked for in what is written.
+    """Writes what comes, on its own thread, and then looks for bursts in what is written.
 
     So a receiver that is too slow loses nothing: it is done later than the recording. `ended` is
     called on that thread when no more blocks are wanted: there are `most` samples, or the disk
-    takes no more. `waiting`: so many blocks may wait for the disk, then the radio does.
+    takes no more. `waiting` blocks may wait for the disk; then the radio does.
     """
 
     def __init__(
@@ -40,7 +40,7 @@ class Keeper:
         self._thread = threading.Thread(target=self._work, name="keeper", daemon=True)
         self.level = LevelMeter(rate_hz)
         self.end = 0
-        """So many samples are kept, gaps included."""
+        """Number of samples kept, gaps included."""
         self.n_gaps = self.n_lost = 0
         self.problem = ""
         """Why the disk takes no more."""
@@ -53,7 +53,7 @@ class Keeper:
         if self._is_full:
             return
         if block.samples is not None:
-            # They may lie in memory that the next block comes to.
+            # Samples may lie in memory that the next block overwrites.
             block = replace(block, samples=block.samples.copy())
         self._blocks.put(block)
 
@@ -62,7 +62,7 @@ class Keeper:
         self._is_given_up = True
 
     def finish(self) -> None:
-        """No block will come: find the bursts that are left, and complete the files."""
+        """Find the bursts that are left and complete the files, as no block will come."""
         self._blocks.put(None)
         self._thread.join()
 
@@ -124,7 +124,7 @@ class Keeper:
         self._finder.miss(first, n, reason)
 
     def _began_ns(self, block: RxBlock) -> int:
-        """When its first sample was there, by this host's clock (UTC)."""
+        """When a block's first sample was there, in ns since 1970 by this host's clock."""
         age_ns = time.monotonic_ns() - block.host_ns + round(1e9 * block.n / self._rate_hz)
         return time.time_ns() - age_ns
 

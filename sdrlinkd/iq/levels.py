@@ -1,4 +1,4 @@
-"""How strong what is received is."""
+"""Levels of received samples: their mean, their peak, and the latest."""
 
 import math
 
@@ -13,7 +13,7 @@ LEAST = 1e-20
 
 
 class LevelMeter:
-    """Powers in dB below a tone of full scale: of all samples, and of the latest."""
+    """Powers relative to a tone of full scale: of all samples, and of the latest."""
 
     def __init__(self, rate_hz: float) -> None:
         self._rate_hz = rate_hz
@@ -23,7 +23,7 @@ class LevelMeter:
         """Values, two a sample, at or beyond full scale."""
 
     def add(self, samples: Samples) -> None:
-        """The next samples."""
+        """Take the next samples into account."""
         n = len(samples)
         if not n:
             return
@@ -44,17 +44,17 @@ class LevelMeter:
 
     @property
     def mean_dbfs(self) -> float:
-        """Of all samples."""
+        """Mean power of all samples in dBFS."""
         return _decibel(self._energy / max(1, self.n_samples))
 
     @property
     def peak_dbfs(self) -> float:
-        """Of the strongest."""
+        """Power of the strongest sample in dBFS."""
         return _decibel(self._peak)
 
     @property
     def recent_dbfs(self) -> float:
-        """Of the last fifth of a second."""
+        """Mean power of the last fifth of a second in dBFS."""
         return _decibel(self._recent)
 
 

@@ -52,8 +52,10 @@ def modem_info(
     frequency_hz: float = SIMULATED_HZ,
     crystal_ppm: float = ModemParams().crystal_ppm,
 ) -> ModemInfo:
-    """Everything that follows from rate, PDU size and longest burst, and from the middle of the
-    channel and the radios' crystals. Raises UserError.
+    """What the modem offers at a rate, with PDUs and bursts of these sizes.
+
+    The carrier offset follows from the middle of the channel and the radios' crystals. Raises
+    UserError.
     """
     params = ModemParams(rate_hz=rate_hz, frequency_hz=frequency_hz, crystal_ppm=crystal_ppm)
     try:

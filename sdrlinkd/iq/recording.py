@@ -42,7 +42,7 @@ class IqRecording:
             raise UserError(f"{self.info.path}: holds no samples")
 
     def read(self, first: int, n: int) -> Samples:
-        """Up to `n` samples from `first` on."""
+        """Up to `n` samples of the recording from `first` on."""
         return self._reader.read(first, n)
 
     def decode(

@@ -25,12 +25,12 @@ from sdrlinkd.iq.replay_plan import ReplayPlan
 from sdrlinkd.iq.stretches import Stretch
 
 AHEAD_S = 0.25
-"""Bursts are handed over so long before the radio must have them; or"""
+"""Seconds by which bursts are handed over before the radio must have them."""
 AHEAD_BLOCKS = 24
-"""so many blocks, of which some wait to be looked at."""
+"""Blocks by which they are at least, where no clock paces blocks: some wait to be looked at."""
 TICK_S = 0.005
 GONE_S = 0.12
-"""So long after its end a burst is in the radio's memory at most."""
+"""Seconds after its end for which a burst is in the radio's memory at most."""
 LOADED = 4
 LOOK_S = 0.1
 MOST_AHEAD = 256
@@ -38,7 +38,7 @@ MOST_AHEAD = 256
 
 
 class ReplayState(NamedTuple):
-    """How far it is."""
+    """How far a replay has come, for the screen."""
 
     seconds: float
     n_sent: int
@@ -54,14 +54,14 @@ class ReplayReport(NamedTuple):
     underflow: int
     lost: int
     slipped: int
-    """Were sent, but not at their time."""
+    """Bursts that were sent, but not at their time."""
     slip_s: float
-    """The largest of these differences."""
+    """The largest difference from a burst's time in s."""
     problem: str
 
 
 class _Out:
-    """Bursts that a radio has, in memory for `room_s` of the longest, twice."""
+    """The bursts that a radio has, in memory for two of `room_s`."""
 
     def __init__(self, room_s: float, rate_hz: float) -> None:
         self._room = round(2 * room_s * rate_hz)
@@ -70,13 +70,13 @@ class _Out:
         self._n = 0
 
     def add(self, burst: TxBurst) -> None:
-        """It has this one, too."""
+        """Note that the radio has this burst, too."""
         n = len(burst.samples)
         self._bursts.append((burst.start + n, n))
         self._n += n
 
     def has_room(self, n: int, now: int) -> bool:
-        """Whether it can take so many samples, wherever its memory wraps around."""
+        """Whether the radio can take `n` samples, wherever its memory wraps around."""
         while self._bursts and self._bursts[0][0] + self._gone_after < now:
             self._n -= self._bursts.popleft()[1]
         if not self._bursts:
@@ -117,7 +117,7 @@ class Replay:
 
     @property
     def seconds(self) -> float:
-        """So long it takes."""
+        """How long the whole replay takes in s."""
         return self._times * self._period / self._tuning.rate_hz
 
     async def __aenter__(self) -> Self:
@@ -137,11 +137,11 @@ class Replay:
         await self._radio.close()
 
     def stop(self) -> None:
-        """Send no more."""
+        """Hand over no more bursts; those on their way are lost."""
         self._stopped.set()
 
     async def run(self, watch: Callable[[ReplayState], None]) -> ReplayReport:
-        """Until all have left, or cannot, or `stop` is called."""
+        """Send until all bursts have left, or cannot, or `stop` is called. Raises UserError."""
         if not self._radio.capabilities.transmits:
             raise UserError(
                 f"this radio does not send ({self._radio.detail}); allowed: one that does"
@@ -164,7 +164,7 @@ class Replay:
                 yield turn * self._period + stretch.start, stretch
 
     async def _load(self) -> None:
-        """Read ahead, off the event loop."""
+        """Read stretches ahead, off the event loop."""
         for start, stretch in self._planned():
             samples = await asyncio.to_thread(self._read, stretch)
             await self._loaded.put(TxBurst(start, samples))
@@ -174,7 +174,7 @@ class Replay:
         return np.nan_to_num(samples)
 
     async def _receive(self, tasks: asyncio.TaskGroup) -> None:
-        """The received stream is the clock; where nobody paces it, it waits until all is sent."""
+        """Take the received stream as the clock; unpaced, it waits until all is sent."""
         try:
             async for block in self._radio.blocks():
                 self._seen = block.index + block.n, block.host_ns
@@ -188,7 +188,7 @@ class Replay:
         self._stopped.set()
 
     async def _keep_time(self, tasks: asyncio.TaskGroup) -> None:
-        """Time goes on between blocks, and while a radio sends and cannot receive."""
+        """Hand over bursts between blocks, and while a radio sends and cannot receive."""
         while not self._is_done:
             if self._seen is not None:
                 await self._hand_over_due(tasks)
@@ -209,7 +209,7 @@ class Replay:
             tasks.create_task(self._settle(burst, self._radio.send(burst)))
 
     async def _first(self) -> TxBurst | None:
-        """Of those still to be handed over, if it is read; unpaced streams wait until it is."""
+        """The next burst to hand over, if it is read; unpaced streams wait until it is."""
         if self._head is None and self._n_taken < self._n:
             if self._paced and self._loaded.empty():
                 return None
@@ -230,7 +230,7 @@ class Replay:
 
     @property
     def _now(self) -> int:
-        """The index that is on its way."""
+        """Index of the sample that is on its way now."""
         if self._seen is None:
             return 0
         end, host_ns = self._seen

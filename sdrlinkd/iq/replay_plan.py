@@ -13,13 +13,13 @@ ROOM_S = 0.5
 
 
 class ReplayPlan(NamedTuple):
-    """What is not silence, and by how much its samples are multiplied."""
+    """What of a recording is not silence, and by how much its samples are multiplied."""
 
     stretches: list[Stretch]
     gain: float
     silence_dbfs: float
     room_s: float
-    """Of bursts of this length a radio must have room for two: for those on their way, and more."""
+    """Length of bursts in s of which a radio must have room for two: on their way, and more."""
 
 
 def plan_replay(
@@ -29,10 +29,10 @@ def plan_replay(
     backoff_db: float | None,
     progress: Progress,
 ) -> ReplayPlan:
-    """For a modem of `rate_hz`. Raises UserError.
+    """The plan for a modem of `rate_hz`. Raises UserError.
 
-    `silence_dbfs`: below is silence (None: a little above the quietest there is). `backoff_db`:
-    mean power of the strongest stretch below full scale (None: as recorded).
+    `silence_dbfs`: what is below is silence (None: a little above the quietest there is).
+    `backoff_db`: mean power of the strongest stretch below full scale (None: as recorded).
     """
     _check_rate(recording, rate_hz)
     silence = silence_of(recording) if silence_dbfs is None else 10 ** (silence_dbfs / 10)

@@ -1,4 +1,4 @@
-"""Where a recording is not silent."""
+"""The stretches of a recording that are not silent."""
 
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ from sdrlinkd.iq.recording import PIECE, IqRecording, Progress
 WINDOW = 32
 """Samples whose mean power is looked at."""
 ABOVE_DB = 7.0
-"""By so much more than the quietest is not silence."""
+"""dB above the quietest from which on there is no silence."""
 PAUSE = 8
 """Windows of silence that end a stretch: fewer may lie within a burst, or between two."""
 N_LOOKS = 256
@@ -27,13 +27,13 @@ class Stretch(NamedTuple):
     start: int
     n: int
     power: float
-    """Its mean; 1 is a tone of full scale."""
+    """Mean power; 1 is a tone of full scale."""
     peak: float
-    """The largest value, real or imaginary."""
+    """The largest magnitude of a value, real or imaginary."""
 
 
 def silence_of(recording: IqRecording) -> float:
-    """The power below which it is silent: a little above the quietest there is.
+    """The power below which a recording is silent: a little above the quietest there is.
 
     What is only now and then more than 0, and then by the least step, is silent, too. Where samples
     are missing, nobody knows.
@@ -92,7 +92,7 @@ def _loud_runs(loud: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _stretch(recording: IqRecording, begin: int, end: int) -> Stretch:
-    """With a window around it: what rises slowly begins before it is loud."""
+    """The stretch of windows `begin` to `end`, and one around it: slow rises begin early."""
     start = max(0, begin - 1) * WINDOW
     samples = recording.read(start, (end + 1) * WINDOW - start)
     parts = np.nan_to_num(samples).view(np.float32)

@@ -1,4 +1,4 @@
-"""How long bursts are, and what fits into one."""
+"""How long bursts are, and how many PDUs fit into one."""
 
 import phy
 from sdrlinkd.config import ModemParams
@@ -8,7 +8,7 @@ ROUNDING = 1e-2
 
 
 class Airtimes:
-    """For PDUs of one size; bursts of several PDUs are at most `max_burst_s` long."""
+    """Lengths of bursts with PDUs of one size; those of several PDUs last `max_burst_s` at most."""
 
     def __init__(self, params: ModemParams, pdu_size: int) -> None:
         self._rate_hz = params.rate_hz
@@ -17,20 +17,20 @@ class Airtimes:
         self._pdu_size = pdu_size
 
     def samples(self, mcs: int, n_pdus: int) -> int:
-        """Length of a burst."""
+        """Length of a burst of `n_pdus` PDUs in samples."""
         return phy.layout(self._grid, mcs, n_pdus, self._pdu_size).n_samples
 
     def airtime_s(self, mcs: int, n_pdus: int) -> float:
-        """Length of a burst in s."""
+        """Length of a burst of `n_pdus` PDUs in s."""
         return self.samples(mcs, n_pdus) / self._rate_hz
 
     def needed_snr_db(self) -> tuple[float, ...]:
-        """What each MCS needs."""
+        """The SNR in dB that each MCS needs for PDUs of this size."""
         return tuple(phy.needed_snr_db(mcs, self._pdu_size) for mcs in range(len(phy.MCS_TABLE)))
 
     @property
     def overhead_s(self) -> float:
-        """Preamble, header, and the last symbol that is not full."""
+        """Time in s for preamble, header, and the last symbol that is not full."""
         one = phy.layout(self._grid, 0, 1, self._pdu_size)
         return (one.n_samples - (one.n_symbols - 1) * one.grid.n_symbol) / self._rate_hz
 
@@ -43,11 +43,11 @@ class Airtimes:
         return phy.most_pdus(self._grid, mcs, self._pdu_size, room)
 
     def shortest_s(self) -> tuple[float, ...]:
-        """A burst of one PDU with each MCS."""
+        """Length in s of a burst of one PDU, by MCS."""
         return tuple(self.airtime_s(mcs, 1) for mcs in range(len(phy.MCS_TABLE)))
 
     def longest_s(self) -> tuple[float, ...]:
-        """The longest burst of each MCS."""
+        """Length in s of the longest burst, by MCS."""
         return tuple(
             self.airtime_s(mcs, self.most_pdus(mcs, float("inf")))
             for mcs in range(len(phy.MCS_TABLE))

@@ -2,10 +2,10 @@
 
 
 class StreamClock:
-    """Seconds since index 0. `host_s` is the monotonic clock at each call.
+    """Seconds since index 0 of a stream; `host_s` is the monotonic clock at each call.
 
-    Until the first block it stands at 0, or, given when it `began_s` by the host's clock, runs with
-    that.
+    Until the first block the clock stands at 0; or, where it `began_s` by the host's clock, it runs
+    with that.
 
     In a paced stream, time goes on between blocks with the monotonic clock, by the block that came
     with the least delay lately; so it does when blocks stop coming, until they return. In lock-step
@@ -13,11 +13,12 @@ class StreamClock:
     """
 
     QUIET_S = 0.1
-    """An unpaced stream without a block for so long has stopped."""
+    """Seconds without a block after which an unpaced stream has stopped."""
     GONE_S = 0.25
-    """A paced one."""
+    """Seconds without a block after which a paced stream has stopped."""
     LATELY_S = 0.25
-    """Twice this; crystals drift apart by some µs in it."""
+    """The least delay is that of the last one to two spans of so many seconds, in which crystals
+    drift apart by some µs."""
 
     def __init__(
         self,
@@ -41,10 +42,11 @@ class StreamClock:
         return 0 if self._seen is None else self._seen[0]
 
     def observe(self, end: int, host_s: float) -> None:
-        """Samples up to before `end` were there at `host_s`; told by one thread after another."""
+        """Note that samples before `end` were there at `host_s`; by one thread after another."""
         late_s = host_s - end / self._rate_hz
         if host_s >= self._until:
             self._before, self._least = self._least, late_s
+            # Nothing came for a whole span: the least delay from before it is too old.
             if host_s >= self._until + self.LATELY_S:
                 self._before = late_s
             self._until = host_s + self.LATELY_S
@@ -53,7 +55,7 @@ class StreamClock:
         self._seen = end, host_s, min(self._before, self._least)
 
     def now(self, host_s: float) -> float:
-        """Seconds on the stream."""
+        """Seconds on the stream's clock."""
         if self._seen is None:
             if self._began_s is not None:
                 self._latest = max(self._latest, host_s - self._began_s)
@@ -69,7 +71,7 @@ class StreamClock:
         return self._latest
 
     def index(self, host_s: float) -> int:
-        """The index that is now on its way."""
+        """Index of the sample that is now on its way."""
         return round(self.now(host_s) * self._rate_hz)
 
     def is_gone(self, host_s: float) -> bool:

@@ -1,4 +1,4 @@
-"""The PHY's compiled code."""
+"""Loading of the PHY's compiled code."""
 
 import asyncio
 
@@ -6,5 +6,5 @@ import phy
 
 
 async def load_phy() -> None:
-    """Compile it, or load what is compiled."""
+    """Compile the PHY, or load what is compiled, off the event loop."""
     await asyncio.to_thread(phy.warm_up)

@@ -1,4 +1,4 @@
-"""The modem: PDUs to bursts at the last moment, samples to PDUs, off the event loop."""
+"""The modem link: PDUs to bursts at the last moment, samples to PDUs, off the event loop."""
 
 import asyncio
 import contextlib
@@ -31,7 +31,7 @@ INFINITE = float("inf")
 class ModemLink:
     """A PDU link over a radio: the PHY off the event loop, everything else on it.
 
-    In lock-step all of it is done within the block that brought it. `listens`: someone wants to
+    In lock-step all of it is done within the block that brought it. `listens`: somebody wants to
     know whether there is a carrier on the air. `lead_grows`: whether, on a radio like that, bursts
     that must leave at a given moment are handed over earlier when the machine proves to be slow.
     `began_s`: the link's clock has run since then (monotonic); None: it begins with the samples.
@@ -75,11 +75,14 @@ class ModemLink:
         self._problem = ""
 
     def now(self) -> float:
-        """Seconds on the received stream."""
+        """Seconds on the received stream's clock."""
         return self._clock.now(time.monotonic())
 
     async def open(self, listener: PduListener) -> None:
-        """Load the compiled code and open the radio."""
+        """Load the compiled code, open the radio and tell the listener what it is.
+
+        Raises LinkAbsentError, LinkRefusedError or UserError.
+        """
         params = self._params
         await self._load()
         tuning = Tuning(params.rate_hz, params.centre_hz)
@@ -135,7 +138,7 @@ class ModemLink:
         raise LinkRefusedError(refusal)
 
     def wake(self) -> None:
-        """There may be something to send."""
+        """Look again for something to send."""
         self._moved.set()
 
     async def idle(self) -> None:
@@ -179,7 +182,7 @@ class ModemLink:
         return bool(self._radio.trouble) or self._clock.is_gone(time.monotonic())
 
     def _first_index(self) -> int:
-        """Of the radio's first sample on the link's clock."""
+        """Index of the radio's first sample on the link's clock."""
         return 0 if self._can.lockstep else self._clock.index(time.monotonic())
 
     async def _receive(self, receiver: Demodulation) -> None:
@@ -187,7 +190,7 @@ class ModemLink:
         paced = self._can.paced
 
         def hear(block: RxBlock) -> None:
-            """On the radio's thread."""
+            """Hear a block, on the radio's thread."""
             self._clock.observe(block.index + block.n, block.host_ns * 1e-9)
             receiver.hear(block)
 
@@ -201,7 +204,7 @@ class ModemLink:
         self._moved.set()
 
     def _deliver(self, events: Sequence[phy.Event], end: int) -> None:
-        """Events that the samples before index `end` completed."""
+        """Pass on events that the samples before index `end` completed."""
         if not self._can.paced:
             # Blocks wait for the receiver, and the clock with them.
             self._clock.observe(end, time.monotonic())
@@ -210,7 +213,7 @@ class ModemLink:
         self._tell(events)
 
     def _step(self, events: Sequence[phy.Event], end: int) -> None:
-        """In lock-step: everything that follows from a block."""
+        """Do everything that follows from a block, in lock-step."""
         self._deliver(events, end)
         if self._listener is not None:
             self._listener.advance(self.now())
@@ -228,7 +231,7 @@ class ModemLink:
             self._listener.heard(heard)
 
     async def _send_when_due(self) -> None:
-        """One burst at a time, each decided at the last moment."""
+        """Send one burst at a time, each decided at the last moment; for ever."""
         paced = self._can.paced
         while True:
             self._moved.clear()
@@ -285,7 +288,7 @@ class ModemLink:
         return 0.0
 
     def _left(self, burst: Burst, report: BurstReport) -> None:
-        """A burst has left, or has not."""
+        """Take what became of a burst: adapt the lead, and tell the listener."""
         if self._lead_grows and report.outcome is Outcome.LATE:
             self._plan.was_late()
         elif self._lead_grows:

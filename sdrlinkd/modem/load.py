@@ -1,4 +1,4 @@
-"""Whether the receiver keeps up."""
+"""Measures whether the receiver keeps up."""
 
 
 class LoadMeter:
@@ -10,11 +10,11 @@ class LoadMeter:
         self._share = 0.0
 
     def add(self, cpu_s: float, stream_s: float) -> None:
-        """A block of `stream_s` took `cpu_s`."""
+        """Take into account that a block of `stream_s` took `cpu_s` of processor time."""
         weight = min(1.0, stream_s / self.SPAN_S)
         self._share += weight * (cpu_s / stream_s - self._share)
 
     @property
     def realtime_ratio(self) -> float:
-        """How many times faster than the samples come; 0 before the first."""
+        """How many times faster than real time samples are processed; 0 before the first block."""
         return 1 / self._share if self._share else 0.0

@@ -3,7 +3,7 @@
 from backends import GAP, TxWindows
 
 EASE = 64
-"""After so many bursts in time, most of what was added to the lead is gone."""
+"""Bursts in time after which most of what was added to the lead is gone."""
 
 
 class AirPlan:
@@ -23,20 +23,20 @@ class AirPlan:
         return max(0, self._free_at - now - self._lead - self._ahead)
 
     def start(self, now: int) -> int:
-        """Where a burst composed now begins."""
+        """Index at which a burst composed now begins."""
         return max(now + self._lead, self._free_at)
 
     def was_late(self) -> None:
-        """A burst came too late: begin earlier from now on, up to so much as `ahead` allows."""
+        """Begin earlier from now on, as a burst was late: up to what `ahead` allows."""
         added = self._lead - self._least
         self._lead += max(0, min(self._lead, self._ahead - added)) // 2
 
     def was_in_time(self) -> None:
-        """It did not; now and then, see whether less will do."""
+        """Begin a little later again, as a burst was in time: less lead may do."""
         self._lead -= (self._lead - self._least + EASE - 1) // EASE
 
     def commit(self, start: int, n_samples: int) -> None:
-        """A burst of `n_samples` will leave at `start`."""
+        """Note that a burst of `n_samples` will leave at `start`."""
         self._free_at = max(self._free_at, start + n_samples + GAP)
 
 
@@ -49,7 +49,7 @@ class TxWindowPlan(AirPlan):
         super().__init__(lead, ahead)
         self._follow, self._pause, self._longest = (round(each * rate_hz) for each in tx_windows)
         self._begun_at = 0
-        # None goes on before the first.
+        # No TX window is open before the first burst.
         self._free_at = -self._pause
 
     def wait(self, now: int) -> int:
@@ -59,13 +59,13 @@ class TxWindowPlan(AirPlan):
         return max(0, self._free_at + self._pause - now - self._lead)
 
     def start(self, now: int) -> int:
-        """Where a burst composed now begins."""
+        """Index at which a burst composed now begins."""
         if self._goes_on(now):
             return self._free_at
         return max(now + self._lead, self._free_at + self._pause)
 
     def commit(self, start: int, n_samples: int) -> None:
-        """A burst of `n_samples` will leave at `start`."""
+        """Note that a burst of `n_samples` will leave at `start`."""
         if start > self._free_at:
             self._begun_at = start
         super().commit(start, n_samples)

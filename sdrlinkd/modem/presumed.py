@@ -11,7 +11,10 @@ from sdrlinkd.modem.traits import pdu_link_traits
 
 
 class PresumedRadio(NamedTuple):
-    """Its traits, and those of what it carries; `presumption` says what only the radio can tell."""
+    """The traits of a radio, and of what it carries, as far as they are known.
+
+    `presumption` says what only the radio can tell.
+    """
 
     traits: PduLinkTraits
     airtimes: Airtimes
@@ -24,7 +27,10 @@ class PresumedRadio(NamedTuple):
 
 
 def presume_radio(config: Config, turnaround_s: float | None = None) -> PresumedRadio:
-    """`turnaround_s`: another than is configured. Raises UserError where there is no radio."""
+    """The radio of `config`. Raises UserError where that has none.
+
+    `turnaround_s` is taken in place of the one that is configured.
+    """
     backend = backend_of(config)
     if backend is None:
         raise UserError(
@@ -45,7 +51,7 @@ def presume_radio(config: Config, turnaround_s: float | None = None) -> Presumed
 
 
 def access_words(config: Config, own_id: int) -> list[str]:
-    """What access comes to, for `--check`. Raises ConfigError where it is sure to be refused."""
+    """What access comes to, in words. Raises ConfigError where it is sure to be refused."""
     if config.backend in WITHOUT_AIR:
         return [f'access none, as no other robot shares the air of the backend "{config.backend}"']
     radio = presume_radio(config)

@@ -59,8 +59,8 @@ def make_radio(
 ) -> Radio:
     """The radio that `config.backend` names, at the modem's rate. Raises UserError.
 
-    `longest_s`: no burst that it is given is longer. `patience`: of one that is not there when it
-    is opened.
+    No burst that it is given is longer than `longest_s`. `patience`: of a radio that is not there
+    when it is opened.
     """
     backend = backend_of(config)
     if backend is None:
@@ -85,7 +85,7 @@ def make_radio(
 
 
 def _has_slots(config: Config, node_id: int, traits: PduLinkTraits) -> bool:
-    """Whether access comes to tdma; what is refused is so where the link is fitted to the radio."""
+    """Whether access comes to tdma; what is refused shows when the link is fitted to the radio."""
     longest_s = traits.longest_in_use_s(
         RateControl(config.rate, traits.needed_snr_db, traits.mcs).usable
     )
@@ -101,7 +101,7 @@ def _longest_burst_s(config: Config) -> float:
 
 
 def check_airtime(config: Config) -> None:
-    """Raises ConfigError where a PDU is so long on the air that fragments would be given up."""
+    """Raise ConfigError where one PDU is on the air for so long that fragments are given up."""
     modem, size = config.modem, config.link.pdu_size
     airtime_s = phy.layout(phy.GRIDS[modem.grid], modem.mcs, 1, size).n_samples / modem.rate_hz
     if airtime_s > config.reassembly.timeout_s / 2:
@@ -116,7 +116,7 @@ def check_airtime(config: Config) -> None:
 def _channel(config: Config, seed: int) -> Channel:
     """The simulated air; its noise is `snr_db` below bursts of the modem's own power.
 
-    In the modem's band: a faster radio hears more of it.
+    That is in the modem's band: a faster radio hears more of it.
     """
     modem, air = config.modem, config.channel
     more_db = 10 * math.log10(modem.oversampling)

@@ -1,4 +1,4 @@
-"""What the modem tells of itself and its radio."""
+"""What the modem reports of itself and its radio."""
 
 from collections.abc import Mapping
 
@@ -18,7 +18,10 @@ def modem_report(
     realtime_ratio: float,
     stream_end: int,
 ) -> PduLinkReport:
-    """`problem`: what ended the stream, if something did; `stream_end`: samples so far."""
+    """The report of a modem and its radio.
+
+    `problem`: what ended the stream, if something did; `stream_end`: samples so far.
+    """
     levels = radio.levels
     reason = problem
     if state == "down" and not problem:

@@ -1,4 +1,4 @@
-"""The receiver on the radio's thread or one of its own; in lock-step, where it stands."""
+"""Where the receiver runs: on the radio's thread, on one of its own, or, in lock-step, at once."""
 
 import asyncio
 import queue
@@ -19,7 +19,7 @@ Deliver = Callable[[Sequence[phy.Event], int], None]
 
 
 class Demodulation(Protocol):
-    """Blocks in; events and the index they stand at out, by `deliver`."""
+    """Takes blocks; hands events, and the index after their block, to `deliver`."""
 
     load: LoadMeter
     wakes: bool
@@ -32,10 +32,10 @@ class Demodulation(Protocol):
         """Hand over a block; may wait while too many are waiting already."""
 
     async def finish(self) -> None:
-        """The stream is over: deliver what its last samples hold."""
+        """End the stream: deliver what its last samples hold."""
 
     def stop(self) -> None:
-        """End, whatever waits."""
+        """End at once, whatever waits."""
 
 
 class ReceiverHere:
@@ -49,30 +49,31 @@ class ReceiverHere:
         self.wakes = True
 
     async def put(self, block: RxBlock) -> None:
-        """Everything that follows from a block."""
+        """Demodulate a block, and do everything that follows from it."""
         self.hear(block)
 
     def hear(self, block: RxBlock) -> None:
-        """The same."""
+        """Demodulate a block, and deliver what it completes."""
         began = time.thread_time()
         events = self._receiving.hear(block)
         self.load.add(time.thread_time() - began, block.n / self._rate_hz)
         self._deliver(events, block.index + block.n)
 
     async def finish(self) -> None:
-        """The last samples."""
+        """Deliver what the last samples hold."""
         end = self._receiving.next_index
         self._deliver(self._receiving.flush(), end)
 
     def stop(self) -> None:
-        """Nothing to end."""
+        """End nothing: there is no thread."""
 
 
 class ReceiverThread:
-    """`deliver` is called on the event loop: when there are events, or while `wakes` is set.
+    """Demodulates on a thread: `deliver` is called on the event loop.
 
-    `hear` demodulates on the radio's thread. What a radio does not bring there is `put`, and
-    demodulated on a thread of our own. A stream is heard, or put, as a whole.
+    It is called when there are events, or while `wakes` is set. `hear` demodulates on the radio's
+    thread. What a radio does not bring there is `put`, and demodulated on a thread of our own. A
+    stream is heard, or put, as a whole.
     """
 
     def __init__(
@@ -105,13 +106,13 @@ class ReceiverThread:
         while self._blocks.qsize() >= MAX_BLOCKS and not self._is_stopped:
             self._has_room.clear()
             self._is_waited_for = True
-            # The thread may have been faster than that.
+            # The thread may have made room before it could see that somebody waits.
             if self._blocks.qsize() > MAX_BLOCKS // 2:
                 await self._has_room.wait()
         self._blocks.put(block)
 
     async def finish(self) -> None:
-        """The stream is over: deliver what its last samples hold, and end the thread."""
+        """End the stream: deliver what its last samples hold, and end the thread."""
         self._begin()
         self._blocks.put(None)
         await self._ended.wait()
@@ -131,6 +132,7 @@ class ReceiverThread:
     def _work(self) -> None:
         while (block := self._blocks.get()) is not None:
             self.hear(block)
+            # Not for every block: who waits is woken once half of the room is free.
             if self._is_waited_for and self._blocks.qsize() <= MAX_BLOCKS // 2:
                 self._is_waited_for = False
                 self._call(self._has_room.set)

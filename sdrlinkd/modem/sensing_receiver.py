@@ -1,4 +1,4 @@
-"""The receiver and what it senses, a block at a time."""
+"""The receiver and the carrier sense, fed block by block."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ TAIL = 2 * phy.SENSE_WINDOW
 
 
 class SensingReceiver:
-    """Samples in; events and the state of the air out. Hears in one thread."""
+    """Takes samples; gives events and the state of the air. Hears in one thread."""
 
     def __init__(
         self, receiver: phy.Receiver, sense: phy.EnergyDetector | None, rate_hz: float
@@ -24,13 +24,13 @@ class SensingReceiver:
         """The state of the air after the last block; may be read from any thread."""
 
     def hear(self, block: RxBlock) -> Sequence[phy.Event]:
-        """What a block completes."""
+        """Take a block; the events that it completes."""
         if block.samples is None:
             events = self._receiver.gap(block.n)
             if self._sense is not None:
                 self._sense.gap(block.n)
                 if block.gap_reason != SENDING:
-                    # Whoever began in it may be on the air still.
+                    # Who began to send in this gap may still be on the air.
                     self._unheard_until = block.index + block.n
         else:
             events = self._receiver.push(block.samples)
@@ -41,7 +41,7 @@ class SensingReceiver:
         return events
 
     def flush(self) -> Sequence[phy.Event]:
-        """What the last samples hold."""
+        """End the stream; the events that its last samples hold."""
         return self._receiver.flush()
 
     @property

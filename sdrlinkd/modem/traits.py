@@ -9,17 +9,20 @@ from sdrlinkd.link import PduLinkTraits
 from sdrlinkd.modem.airtimes import Airtimes
 
 HANDOVER_S = 5e-4
-"""A burst composed for a free air begins so much later: time to modulate it."""
+"""Seconds after which a burst composed for a free air begins: time to modulate it."""
 STAMP_SAMPLES = 1.0
-"""How far a preamble may be from where it is found."""
+"""Samples by which a preamble may be from where it is found."""
 REACTION_S = 0.002
-"""From the last sample of a block to a decision, beyond the block itself."""
+"""Seconds from the last sample of a block to a decision that it leads to."""
 
 
 def pdu_link_traits(
     kind: str, can: Capabilities, params: ModemParams, airtimes: Airtimes
 ) -> PduLinkTraits:
-    """In lock-step composing takes no time, but it happens only when there is a block."""
+    """What the link must know of a radio that `can` do this, with these parameters.
+
+    In lock-step composing takes no time, but it happens only when there is a block.
+    """
     follow_s, pause_s, longest_s = can.tx_windows or TxWindows(0.0, 0.0, math.inf)
     return PduLinkTraits(
         kind=kind,
@@ -32,6 +35,7 @@ def pdu_link_traits(
         stamp_s=STAMP_SAMPLES / params.rate_hz + can.index_error_s,
         lead_s=can.lead_s + can.turnaround_s + (HANDOVER_S if can.paced else 0.0),
         react_s=can.block_s + (REACTION_S if can.paced else 0.0),
+        # A carrier that begins within one window may show in the next one only.
         detect_s=2 * phy.SENSE_WINDOW / params.rate_hz,
         overhead_s=airtimes.overhead_s,
         gap_s=GAP / params.rate_hz,

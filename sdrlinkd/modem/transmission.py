@@ -16,9 +16,7 @@ from sdrlinkd.pdulink import PduListener
 
 INFINITE = float("inf")
 SHORT = 20_000
-"""Samples of a burst that is modulated where it is composed: handing it to a thread and back takes
-longer.
-"""
+"""Samples up to which a burst is modulated on the event loop: a thread and back takes longer."""
 OUTCOMES = {
     TxOutcome.SENT: Outcome.SENT,
     TxOutcome.LATE: Outcome.LATE,
@@ -34,11 +32,11 @@ class BurstReport(NamedTuple):
     end: int
     problem: str = ""
     start: int | None = None
-    """Where it began, if it left."""
+    """Index at which the burst began, if it left."""
 
 
 class Transmission:
-    """The sending half of the modem."""
+    """The sending half of the modem: modulates bursts and hands them to the radio."""
 
     def __init__(self, params: ModemParams, radio: Radio) -> None:
         self._radio = radio
@@ -57,7 +55,7 @@ class Transmission:
         self.counters = {"bursts_slipped": 0, "samples_sent": 0}
 
     def start(self, tasks: asyncio.TaskGroup, left: Callable[[Burst, BurstReport], None]) -> None:
-        """From now on bursts may be sent; `left` is told of each."""
+        """Begin to take bursts; `left` is told what became of each."""
         self._tasks, self._left = tasks, left
         self._at_once = self._radio.capabilities.lockstep
 
@@ -67,6 +65,7 @@ class Transmission:
             raise RuntimeError("send before start")
         self.on_air.append(burst)
         known = (self._late, self._late_by_radio)
+        # While a burst is with the thread, a short one must not overtake it.
         is_short = burst.airtime_s * self._rate_hz <= SHORT and not self._in_thread
         if self._at_once or is_short:
             answer = self._hand_over(burst, start, self._modulate(burst.pdus, burst.mcs), known)
@@ -76,13 +75,13 @@ class Transmission:
             self._tasks.create_task(self._transmit(burst, start, known))
 
     def lose(self, listener: PduListener, now: float) -> None:
-        """The radio is closed: what is on its way is lost."""
+        """Settle all bursts on their way as lost: the radio is closed."""
         for burst in self.on_air:
             listener.settled(burst, Outcome.LOST, now)
         self.on_air.clear()
 
     def close(self) -> None:
-        """End the thread."""
+        """End the thread that modulates, once it is done."""
         self._thread.shutdown(wait=True, cancel_futures=True)
 
     async def _transmit(self, burst: Burst, start: int, known: tuple[int, int]) -> None:
@@ -101,9 +100,10 @@ class Transmission:
     def _hand_over(
         self, burst: Burst, start: int, samples: Samples, known: tuple[int, int]
     ) -> Awaitable[TxReport] | None:
-        """None: one before it, not `known` of when it was composed, was late and has to go again.
+        """Hand a burst to the radio; None where it must not go, as one before it has to go again.
 
-        This one must not overtake it. The radio may have told already what has not been settled.
+        That is so where a burst not yet `known` to be late when this one was composed was late:
+        this one must not overtake it. The radio may have told already what has not been settled.
         """
         latest = None
         if burst.latest != INFINITE:
@@ -137,7 +137,7 @@ class Transmission:
             self._left(burst, told)
 
     def _modulate(self, pdus: Sequence[bytes], mcs: int) -> Samples:
-        """The burst, with room for its peaks."""
+        """The samples of a burst, with room for its peaks."""
         began = time.perf_counter()
         samples: Samples = self._transmitter.modulate(pdus, mcs) * self._amplitude
         self.tempo.note(len(samples), time.perf_counter() - began)

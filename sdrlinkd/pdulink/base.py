@@ -1,4 +1,4 @@
-"""The seam between the link and whatever carries its PDUs."""
+"""The seam between the link and what carries its PDUs."""
 
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
@@ -10,7 +10,7 @@ from sdrlinkd.reports import PduLinkReport
 class Heard(NamedTuple):
     """A PDU from the air: its bytes, when its burst's preamble arrived, and how good it was.
 
-    `ended_at`: when its last sample did; None: that takes no time.
+    `ended_at` is when its last sample arrived; None: that takes no time.
     """
 
     data: bytes
@@ -20,25 +20,25 @@ class Heard(NamedTuple):
 
 
 class PduListener(Protocol):
-    """Whom a PDU link tells and asks. Called on the event loop; must not wait."""
+    """Whom a PDU link tells and asks. It is called on the event loop and must not wait."""
 
     def attach(self, traits: PduLinkTraits) -> None:
-        """The PDU link is there, and what it is. Raises ConfigError when it does not do."""
+        """Fit to the PDU link, which is there now. Raises ConfigError when that does not do."""
 
     def heard(self, pdus: Sequence[Heard]) -> None:
-        """PDUs arrived."""
+        """Take PDUs that have arrived."""
 
     def advance(self, now: float) -> None:
-        """Time has come so far; called where time is that of the samples and nobody's clock."""
+        """Let time come so far; called where time is that of the samples and nobody's clock."""
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
-        """What the carrier shall send now; None: nothing, or not yet."""
+        """The burst that the carrier shall send now; None: nothing, or not yet."""
 
     def next_wakeup(self, now: float) -> float:
-        """When there may next be something to send; not after `now`: already."""
+        """When there may next be something to send; up to `now`: there is already."""
 
     def settled(self, burst: Burst, outcome: Outcome, at: float) -> None:
-        """A burst's last bit left, or did not."""
+        """Take what became of a burst: its last bit left, or did not."""
 
 
 class PduLink(Protocol):
@@ -64,7 +64,7 @@ class PduLink(Protocol):
         """
 
     def wake(self) -> None:
-        """There may be something to send."""
+        """Look again for something to send."""
 
     async def idle(self) -> None:
         """Wait until every burst taken is settled."""
@@ -73,4 +73,4 @@ class PduLink(Protocol):
         """Stop; closing twice is fine. What has not left is settled as lost."""
 
     def report(self) -> PduLinkReport:
-        """State and counters."""
+        """The state of the PDU link, and its counters."""

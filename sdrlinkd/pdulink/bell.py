@@ -1,4 +1,4 @@
-"""What wakes a link that has nothing to send."""
+"""A bell that wakes a link that has nothing to send."""
 
 import asyncio
 import contextlib
@@ -11,15 +11,15 @@ class Bell:
         self._rung = asyncio.Event()
 
     def ring(self) -> None:
-        """Wake who waits, or will."""
+        """Wake who waits, or whoever waits next."""
         self._rung.set()
 
     def hush(self) -> None:
-        """What it was rung for until now is known."""
+        """Forget what it was rung for until now."""
         self._rung.clear()
 
     async def wait(self, most_s: float) -> None:
-        """Until it is rung, but no longer than so many seconds, which may be infinite."""
+        """Wait until it is rung, for at most so many seconds, which may be infinite."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(None if most_s == float("inf") else most_s):
                 await self._rung.wait()

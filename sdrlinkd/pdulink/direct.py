@@ -33,11 +33,11 @@ class DirectLink:
         self._all_settled.set()
 
     def now(self) -> float:
-        """The monotonic clock: there are no samples to count."""
+        """Seconds of the monotonic clock: there are no samples to count."""
         return time.monotonic()
 
     async def open(self, listener: PduListener) -> None:
-        """Begin to listen."""
+        """Attach the listener: there is nothing to open."""
         self._listener = listener
         listener.attach(PduLinkTraits())
 
@@ -57,7 +57,7 @@ class DirectLink:
             await self._bell.wait(max(0.0, listener.next_wakeup(start) - start))
 
     def wake(self) -> None:
-        """There may be something to send."""
+        """Look again for something to send."""
         self._bell.ring()
 
     def _airtime_s(self, _: int, n_pdus: int) -> float:
@@ -70,7 +70,7 @@ class DirectLink:
         return int(min(most, airtime_s / self._airtime_per_pdu_s))
 
     def _send(self, burst: Burst, start: float) -> None:
-        """Its PDUs arrive when the last of them has left."""
+        """Put a burst on its way; its PDUs arrive when the last of them has left."""
         airtime_s = self._airtime_per_pdu_s * len(burst.pdus)
         self._free_at = start + airtime_s
         self._pdus += len(burst.pdus)
@@ -98,7 +98,7 @@ class DirectLink:
         self._all_settled.set()
 
     def report(self) -> PduLinkReport:
-        """State and counters."""
+        """The state of the link, its faults and its counters."""
         rate = f"{self._params.rate_bit_s / 1e6:g} Mbit/s" if self._params.rate_bit_s else "no pace"
         faults = [
             f"{name} {value:g}"

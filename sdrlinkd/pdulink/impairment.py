@@ -1,4 +1,4 @@
-"""What can happen to a PDU between two nodes, as a seeded calculator."""
+"""What happens to a PDU between two nodes, as a seeded calculator."""
 
 from random import Random
 from typing import NamedTuple
@@ -14,7 +14,7 @@ class Arrival(NamedTuple):
 
 
 class Impairment:
-    """Loss, delay, overtaking, duplication and bit errors; counts what it did."""
+    """Loses, delays, reorders, duplicates and corrupts PDUs; counts what it did."""
 
     def __init__(self, params: DirectParams, rng: Random) -> None:
         self._params = params
@@ -25,7 +25,7 @@ class Impairment:
         self.counters = {"lost": 0, "duplicated": 0, "corrupted": 0}
 
     def arrivals(self, data: bytes) -> list[Arrival]:
-        """How often, when and in what shape `data` arrives."""
+        """How often, when and in what shape a PDU arrives."""
         if self._clean:
             return [Arrival(0.0, data)]
         params, chance = self._params, self._rng.random

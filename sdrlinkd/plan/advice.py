@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from sdrlinkd.plan.traffic import Load
 
 LEAST = 0.02
-"""A topic that may send less than this share of what it does is not worth the advice."""
+"""Share of a topic's messages; to send less than this of them is not worth the advice."""
 STEPS = 10
 
 Carries = Callable[[Sequence[Load]], bool]
@@ -14,7 +14,7 @@ Carries = Callable[[Sequence[Load]], bool]
 
 
 def slower(loads: Sequence[Load], asked: Sequence[float], carries: Carries) -> str:
-    """Which topic to send how often.
+    """Advice on which topic to send how often.
 
     `asked`: what each takes, as a share of what the air carries.
     """
@@ -40,7 +40,7 @@ def _periods(loads: Sequence[Load]) -> str:
 
 
 def _most(loads: Sequence[Load], which: set[int], carries: Carries) -> list[Load] | None:
-    """`loads` with `which` as often as the air carries; None: hardly ever."""
+    """`loads`, with `which` as often as the air carries them; None where that is hardly ever."""
     found, low, high = None, LEAST, 1.0
     factor = low
     for _ in range(STEPS):
@@ -59,6 +59,6 @@ def _most(loads: Sequence[Load], which: set[int], carries: Carries) -> list[Load
 
 
 def _up(value: float) -> float:
-    """To three digits, never less."""
+    """`value` in three digits, never less."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 2)
     return float(f"{math.ceil(value / unit - 1e-9) * unit:.6g}")

@@ -7,9 +7,9 @@ from sdrlinkd.modem import Airtimes
 
 
 class Setting(NamedTuple):
-    """What the loads share; times in s.
+    """What all loads of a plan share; times in s.
 
-    `longest_s`: no burst is longer; `host_s`: what the machines at both ends add at most.
+    No burst is longer than `longest_s`; `host_s` is what the machines at both ends add at most.
     """
 
     airtimes: Airtimes
@@ -26,10 +26,10 @@ class Setting(NamedTuple):
 
     @property
     def one_s(self) -> float:
-        """A burst of one PDU."""
+        """Length in s of a burst of one PDU."""
         return self.airtimes.airtime_s(self.mcs, 1)
 
     @property
     def each_s(self) -> float:
-        """A further PDU in a burst."""
+        """Time in s that a further PDU takes in a burst."""
         return self.airtimes.airtime_s(self.mcs, 2) - self.one_s

@@ -19,11 +19,11 @@ from sdrlinkd.plan.traffic import LeftOut, Load, after_policy
 from sdrlinkd.wire import ENTRY_HEADER_SIZE, STAMP_SIZE, equal_payload, fragment_count
 
 FULL = 0.95
-"""More of the air than this cannot be relied on."""
+"""Share of the air; more than this cannot be relied on."""
 
 
 class TopicPlan(NamedTuple):
-    """One topic: share of the air, PDUs a message, latency at worst and what bounds it."""
+    """A topic in the plan: its share of the air, PDUs a message, worst latency and its bound."""
 
     name: str
     qos: str
@@ -42,14 +42,14 @@ class TopicPlan(NamedTuple):
 
 
 class ClassPlan(NamedTuple):
-    """One class, all topics of it."""
+    """A class in the plan: the share of the air of all its topics."""
 
     qos: str
     air: float
 
 
 class Plan(NamedTuple):
-    """What is to be expected; `advice`: what to change where it is not feasible."""
+    """What is to be expected; `advice` says what to change where it is not feasible."""
 
     topics: list[TopicPlan]
     classes: list[ClassPlan]
@@ -71,7 +71,7 @@ def make_plan(
     setting: Setting,
     left_out: Sequence[LeftOut] = (),
 ) -> Plan:
-    """For every robot that sends the same."""
+    """The plan for every robot sending the same `loads` under these policies."""
     given = ((load, policies.get(load.topic_id, DEFAULT_POLICY)) for load in loads)
     known = [(after_policy(load, policy), policy) for load, policy in given]
     topics, asked = _judged(known, setting)
@@ -116,7 +116,7 @@ def _is_carried(topics: Sequence[TopicPlan], asked: Sequence[float]) -> bool:
 
 
 def _backlog_s(known: Sequence[tuple[Load, TopicPolicy]], setting: Setting) -> float:
-    """A burst of one message of each topic."""
+    """Length in s of a burst that has one message of each topic."""
     pdus = sum(_pdus(load.largest, setting.pdu_size, policy.stamp) for load, policy in known)
     return setting.one_s + (pdus - 1) * setting.each_s
 
@@ -144,7 +144,7 @@ def _task(
 
 
 def _pdus(size: float, pdu_size: int, stamp: bool) -> int:
-    """PDUs of a message that has them to itself."""
+    """Number of PDUs of a message that has them to itself."""
     k = equal_payload(pdu_size, 1)
     whole = max(1, math.ceil(size))
     n = fragment_count(whole, k)

@@ -18,17 +18,17 @@ from sdrlinkd.plan.traffic import Load
 FOREVER = float("inf")
 ROUNDS = 5000
 MOST_WAITING = 200
-"""Messages of one topic."""
+"""Messages of one topic that may wait; with more, there is no end."""
 RECORDS_S, RECORDS = 1.0, 0.02
-"""A PDU of a beacon's records in so long, and of the air for CLOCK and RECEIPT of all robots."""
+"""Seconds for one PDU of a beacon's records; share of the air for CLOCKs and RECEIPTs of all."""
 LEVEL = Qos.LATENCY
-"""Up to this class robots go before others' lower ones; among those, nobody orders robots."""
+"""Up to this class, robots go before others' lower ones; within a level, they take turns."""
 
 
 class Task(NamedTuple):
-    """A topic as the analysis sees it: a message takes `cost_s` on the air, every `period_s`.
+    """A topic as the analysis sees it: a message takes `cost_s` of air, every `period_s`.
 
-    The largest takes `most_s`, in so many bursts.
+    The largest message takes `most_s`, in so many `bursts`.
     """
 
     load: Load
@@ -43,7 +43,7 @@ class Task(NamedTuple):
 
 
 def worst_s(task: Task, tasks: Sequence[Task], setting: Setting, supply: Supply) -> float:
-    """The age at which a message of `task` is handed over at the far end, at worst; inf: no end."""
+    """The largest age in s at which a message of `task` is handed over; infinity: no end."""
     lower = [other for other in tasks if other.rank > task.rank]
     before = [other for other in tasks if other.rank <= task.rank and other is not task]
     beside = _beside(task, lower, supply)
@@ -66,7 +66,7 @@ def worst_s(task: Task, tasks: Sequence[Task], setting: Setting, supply: Supply)
 def _blocked_s(
     task: Task, before: Sequence[Task], lower: Sequence[Task], setting: Setting, supply: Supply
 ) -> float:
-    """What has begun is not interrupted: a beacon, or a burst of what is less urgent."""
+    """The longest wait in s for what has begun: a beacon, or a burst of what is less urgent."""
     blocked_s = setting.one_s
     if lower:
         blocked_s = min(setting.longest_s, max(other.most_s for other in lower))
@@ -88,7 +88,7 @@ def _done_s(
     number: int, rest_s: float, task: Task, before: Sequence[Task], beside: Sequence[Task],
     setting: Setting, supply: Supply,
 ) -> float:  # fmt: skip
-    """When that many messages of a topic are through, which come from 0 on, one a period."""
+    """When `number` messages of a topic are through that come from 0 on, one a period, in s."""
     robots = 1 + supply.others
     own_s = number * (task.most_s + task.bursts * supply.passed_s)
     until_s = rest_s + supply.takes(own_s)
@@ -124,13 +124,14 @@ def _done_s(
 
 
 def _level(task: Task) -> bool:
-    """Whether robots that share the air let those of the other level go first."""
+    """Whether a topic is of the lower level, which lets the other level go first on all robots."""
     return task.qos > LEVEL
 
 
 def _beside(task: Task, lower: Sequence[Task], supply: Supply) -> list[Task]:
-    """What is less urgent, and of which others send all the same while this waits: in a level,
-    robots take turns whatever they have.
+    """Tasks less urgent, of which other robots send all the same while this one waits.
+
+    Within a level, robots take turns whatever they have.
     """
     return [other for other in lower if supply.others and _level(other) == _level(task)]
 
@@ -138,7 +139,7 @@ def _beside(task: Task, lower: Sequence[Task], supply: Supply) -> list[Task]:
 def _between_s(
     worst_s: float, turns: int, beside: Sequence[Task], setting: Setting, supply: Supply
 ) -> float:
-    """Bursts of those, in so long: one of each robot before each of our turns, or all there are."""
+    """Time in s of other robots' bursts `beside`: one each before our turns, or all there are."""
     if not beside:
         return 0.0
     longest_s = min(setting.longest_s, max(other.most_s for other in beside))

@@ -1,4 +1,4 @@
-"""What a configuration says of the air."""
+"""What a configuration says of the air, as a plan needs it."""
 
 from random import Random
 
@@ -25,7 +25,7 @@ def setting_of(
     turnaround_s: float | None = None,
     host_s: float = HOST_S,
 ) -> Setting:
-    """For as many robots as access.nodes lists, or `robots`, of which all send the same.
+    """The setting for as many robots as access.nodes lists, or `robots`; all send the same.
 
     `turnaround_s`: of the radio, if not as configured. Raises UserError, ConfigError.
     """

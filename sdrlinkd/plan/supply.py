@@ -9,11 +9,11 @@ INFINITE = float("inf")
 SECTIONS = 2
 """Sections of mini-slots: the higher level, and the lower."""
 RARE = 0.01
-"""csma draws by chance: a wait that only so many exceed stands for the longest."""
+"""Share of waits; csma draws by chance, and a wait that only so many exceed counts as longest."""
 
 
 class Supply(NamedTuple):
-    """Times in s.
+    """When a robot may send, with times in s.
 
     `gap_s`: from a message that has just missed its chance to the first sample that can be its own,
     on an air that is otherwise idle. A turn then lasts `open_s`, and the next begins `closed_s`
@@ -30,11 +30,11 @@ class Supply(NamedTuple):
 
     @property
     def share(self) -> float:
-        """Of the time, what is this robot's own."""
+        """Share of the time that is this robot's own."""
         return 1.0 if self.open_s == INFINITE else self.open_s / (self.open_s + self.closed_s)
 
     def takes(self, demand_s: float) -> float:
-        """From the begin of a turn to the end of so much time on the air."""
+        """Time in s from the begin of a turn to the end of `demand_s` on the air."""
         if self.open_s == INFINITE:
             return demand_s
         turns = max(0, math.ceil(demand_s / self.open_s - 1e-9) - 1)
@@ -44,7 +44,10 @@ class Supply(NamedTuple):
 def supply_of(
     settled: Settled, traits: PduLinkTraits, robots: int, burst_s: float, pdu_s: float
 ) -> Supply:
-    """For one of `robots`; `burst_s`: the longest burst of its own, `pdu_s`: one PDU in it."""
+    """The supply of one of `robots`.
+
+    `burst_s`: the longest burst of its own, `pdu_s`: one PDU in it.
+    """
     access = settled.access
     decided_s = traits.lead_s + traits.ahead_s
     if settled.policy == "tdma":
@@ -74,8 +77,9 @@ def supply_of(
 def _one_window_a_slot(
     traits: PduLinkTraits, round_s: float, open_s: float, burst_s: float
 ) -> Supply:
-    """Where the pause between TX windows is longer than what others have in between, turns are
-    lost.
+    """The supply where a radio sends one TX window in a slot, and none in turns within its pause.
+
+    Where the pause between TX windows is longer than what others have in between, turns are lost.
     """
     frames = max(1, math.ceil((burst_s + traits.rx_window_s) / round_s))
     return Supply(frames * round_s + traits.tx_window_follow_s, open_s, frames * round_s - open_s)

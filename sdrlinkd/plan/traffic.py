@@ -1,4 +1,4 @@
-"""What producers will send: as told, or as a recording shows."""
+"""What producers will send: as a person says, or as a recording shows."""
 
 import math
 import re
@@ -17,7 +17,7 @@ SAMPLES = 50
 
 
 class Load(NamedTuple):
-    """One topic: messages a second, and bytes of a typical and of the largest, as on the air."""
+    """A topic's messages a second, and bytes of a typical and of the largest, as on the air."""
 
     topic_id: int
     name: str
@@ -35,7 +35,7 @@ class LeftOut(NamedTuple):
 
 
 def parse_load(text: str, registry: Registry) -> Load:
-    """`scan:50:1KB`: topic, messages a second, bytes. Raises UserError."""
+    """A load written as `scan:50:1KB`: topic, messages a second, bytes. Raises UserError."""
     found = _LOAD.fullmatch(text.replace(" ", ""))
     topic = registry.by_name(found[1]) if found else None
     if found is None or float(found[2]) <= 0:
@@ -55,7 +55,7 @@ def loads_from_bag(
     policies: Mapping[int, TopicPolicy],
     taken: Collection[str] = (),
 ) -> tuple[list[Load], list[LeftOut]]:
-    """From (topic, time in s, payload) of a recording; compression as the policies say.
+    """Loads from (topic, time in s, payload) of a recording, compressed as policies say.
 
     `taken`: registry names that the daemon takes from the bus; empty: all.
     """
@@ -90,7 +90,7 @@ def loads_from_bag(
 
 
 def after_policy(load: Load, policy: TopicPolicy) -> Load:
-    """What is left of it when throttled and decimated."""
+    """The load that is left when it is throttled and decimated."""
     rate_hz = load.rate_hz / policy.decimate
     if policy.period_s:
         rate_hz = min(rate_hz, 1 / policy.period_s)

@@ -19,15 +19,16 @@ _SOLE = struct.Struct(">9BH")
 
 @lru_cache(maxsize=8)
 def _budgets(pdu_size: int) -> tuple[int, ...]:
-    """`entry_budget` for 0 to 15 entries, and nothing for a sixteenth."""
+    """`entry_budget` for 0 to 15 entries, and 0 for a sixteenth."""
     return (*(entry_budget(pdu_size, n) for n in range(MAX_ENTRIES + 1)), 0)
 
 
 class PduBuilder:
-    """Knows the bytes left; what to put in is the caller's business.
+    """Fills a PDU and knows the bytes left; what to put in is the caller's business.
 
-    `room` is the payload that one more entry could have, `room_beside_stamp` the same if a STAMP
-    were added as well; negative: none fits. Control records join in one entry, the last.
+    `room` is the payload that one more entry could have, `room_beside_stamp` that which it could
+    have if a STAMP were added as well; negative: none fits. Control records join in one entry, the
+    last.
     """
 
     __slots__ = (
@@ -69,7 +70,7 @@ class PduBuilder:
         self._note_room()
 
     def add_record(self, record: bytes) -> bool:
-        """Add a control record if it fits."""
+        """Add a control record; False, and nothing is added, when it does not fit."""
         n = len(self._topic_ids) + 1
         size = self._records_size + len(record)
         if n > MAX_ENTRIES or self._used + ENTRY_HEADER_SIZE + size > self._budgets[n]:
@@ -80,7 +81,7 @@ class PduBuilder:
         return True
 
     def add_stamp(self, topic_id: int, entry_id: int, age_us: int, asks: bool = False) -> bool:
-        """Add a STAMP record if it fits; `asks`: its sender wants a RECEIPT.
+        """Add a STAMP record; False when it does not fit. `asks`: its sender wants a RECEIPT.
 
         Every message has one, so it is built without the detour by `build_records`.
         """

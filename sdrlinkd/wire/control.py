@@ -16,11 +16,11 @@ NO_AGE = 0xFFFF
 RECEIPT_UNIT_US = 100
 RECEIPT_UNIT_S = RECEIPT_UNIT_US / 1e6
 MAX_SINCE = 0xFFFF
-"""Of a RECEIPT's times, in that unit."""
+"""Largest time in a RECEIPT, in its unit of 0.1 ms."""
 
 
 class RecordType(IntEnum):
-    """First octet of a record. Numbers are never reused."""
+    """Type of a record, its first octet. Numbers are never reused."""
 
     STAMP = 1
     BEACON = 2
@@ -43,16 +43,16 @@ class Stamp(NamedTuple):
 
 
 class Beacon(NamedTuple):
-    """I am here: `boot_id` changes with every start, `number` counts up modulo 2^16."""
+    """A sign of life: `boot_id` changes with every start, `number` counts up modulo 2^16."""
 
     boot_id: int
     number: int
 
 
 class LinkReport(NamedTuple):
-    """How well the sender of this record hears `node`.
+    """How well the sender of this record hears `node` (wire document, 6.3).
 
-    SNR in quarter decibels (signed), PER in 1/255, the MCS it would like to hear.
+    SNR is in quarter decibels (signed), PER in 1/255; `mcs` is what the sender would like to hear.
     """
 
     node: int
@@ -62,8 +62,10 @@ class LinkReport(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """The sender's TDMA schedule: whose it is, over how many hops it came, which, and where it
-    stands: µs since the frame began, at this burst's preamble.
+    """The TDMA schedule that the sender keeps (wire document, 6.4).
+
+    It tells whose schedule it is, over how many hops it came, which it is, and where it stands: µs
+    since the frame began, at this burst's preamble.
     """
 
     root: int
@@ -73,8 +75,10 @@ class Frame(NamedTuple):
 
 
 class Receipt(NamedTuple):
-    """What became of a message of `node` here (255: of whoever this PDU is for), its age then
-    (65535: not known, or older), and what has passed since; both in 0.1 ms.
+    """What became of a message of `node` here (wire document, 6.7).
+
+    `node` 255 is whoever this PDU is for. The message's age then (65535: not known, or older) and
+    what has passed since are in 0.1 ms.
     """
 
     topic_id: int
@@ -86,8 +90,9 @@ class Receipt(NamedTuple):
 
 
 class Waits(NamedTuple):
-    """Of what messages of a topic waited at their source, the shares in 1/255: in the queue, for
-    the air, and for another chance after a burst that did not leave.
+    """Shares, in 1/255, of what messages of a topic waited at their source (wire document, 6.8).
+
+    They waited in the queue, for the air, and for another chance after a burst that did not leave.
     """
 
     topic_id: int
@@ -97,8 +102,9 @@ class Waits(NamedTuple):
 
 
 class Parity(NamedTuple):
-    """Octets from `at` on of parity fragment `number` of a message of `total` fragments of `k`
-    octets; the message has `size`.
+    """Octets from `at` on of parity fragment `number` of a message (wire document, 6.5).
+
+    The message has `total` fragments of `k` octets, and `size` octets in all.
     """
 
     topic_id: int
@@ -139,7 +145,7 @@ _KNOWN = {int(number): (kind, _FORMATS[number]) for kind, number in _TYPES.items
 
 _PARITY = struct.Struct(">BBBBBHHI")
 PARITY_OVERHEAD = TLV_HEADER_SIZE + _PARITY.size
-"""Of a record, beside the octets of parity."""
+"""Octets of a PARITY record beside its octets of parity."""
 STAMP_SIZE = TLV_HEADER_SIZE + _FORMATS[RecordType.STAMP].size
 STAMP_RECORD = struct.Struct(">BBBBI")
 ASKING_STAMP_SIZE = STAMP_SIZE + len(ASKS)
@@ -158,8 +164,7 @@ def build_records(records: Iterable[Record]) -> bytes:
 
 
 def record_spans(octets: bytes | bytearray, begin: int, end: int) -> list[tuple[int, int, int]]:
-    """Of all records in a control entry's payload, `octets[begin:end]`: type, where the value
-    begins, and its length.
+    """(type, where the value begins, its length) of records in a payload `octets[begin:end]`.
 
     Raises PduError (rx_control_bad) when a record overruns the payload or is too short for its
     type: then none of them is used.
@@ -239,7 +244,7 @@ def _fixed(record: FixedRecord, number: RecordType) -> bytes:
 
 
 def _with_more(record: FixedRecord, more: bytes) -> FixedRecord:
-    """With the fields behind those that its type always has; what is not known is left out."""
+    """The record with fields behind those that its type always has; unknown ones are left out."""
     if isinstance(record, Stamp):
         return record._replace(asks=bool(more[0] & ASKS[0]))
     if isinstance(record, Receipt) and len(more) >= _WHOSE.size:

@@ -59,8 +59,8 @@ def forwarded(pdu: bytes, by_us: int, has_control: bool) -> bytes:
 def lasting_identity(pdu: bytes) -> tuple[int, int, int]:
     """`identity` of a good PDU with control channel, ages in its STAMPs taken as zero.
 
-    A relay adds to them what it held the PDU for. CRC-16 is linear: the share of four octets is
-    that of the same in a body of zeros.
+    A relay adds to those ages what it held the PDU for. CRC-16 is linear: the share of four octets
+    is that of the same in a body of zeros.
     """
     src, seq, crc = identity(pdu)
     end = len(pdu) - CRC_SIZE
@@ -70,7 +70,7 @@ def lasting_identity(pdu: bytes) -> tuple[int, int, int]:
 
 
 def _times(pdu: bytes | bytearray, kinds: dict[int, int]) -> Iterator[int]:
-    """Where in a good PDU the times stand of records of `kinds`."""
+    """Where in a good PDU the times of records of `kinds` stand."""
     for kind, at, _ in _records(pdu):
         offset = kinds.get(kind)
         if offset is not None:
@@ -78,7 +78,7 @@ def _times(pdu: bytes | bytearray, kinds: dict[int, int]) -> Iterator[int]:
 
 
 def _records(pdu: bytes | bytearray) -> Iterator[tuple[int, int, int]]:
-    """Of all records in a good PDU: type, where the value begins, and its length.
+    """(type, where the value begins, its length) of all records in a good PDU.
 
     Control entries that cannot be read have none.
     """

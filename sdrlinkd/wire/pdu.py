@@ -40,7 +40,7 @@ class Pdu(NamedTuple):
 
 
 def build(pdu: Pdu, pdu_size: int) -> bytes:
-    """Exactly `pdu_size` bytes for `pdu`.
+    """The PDU as exactly `pdu_size` bytes.
 
     Raises ValueError when a field is out of range or the entries do not fit: the sender's bug.
     """

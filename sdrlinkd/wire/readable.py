@@ -1,4 +1,4 @@
-"""What the control entries of a PDU say, those aside that cannot be read (section 6)."""
+"""What the control entries of a PDU say, without those that cannot be read (section 6)."""
 
 from typing import NamedTuple
 
@@ -17,7 +17,10 @@ class ControlEntries(NamedTuple):
 
 
 def read_control_entries(pdu: Pdu) -> ControlEntries:
-    """Of a PDU with control channel. An entry that cannot be read costs itself, and all of it."""
+    """The control entries of a PDU with control channel.
+
+    An entry that cannot be read costs itself, and all of it.
+    """
     records: list[Record] = []
     n_entries = n_bad = 0
     for entry in pdu.entries:

@@ -109,7 +109,7 @@ class Reassembly:
         return None
 
     def hold(self, src: int, parity: Parity, now: float) -> Partial | None:
-        """Keep parity with the message it is of; None where nobody waits for that any more."""
+        """Keep parity with its message; None where that is awaited no more, or does not agree."""
         source, key = self._sources.get(src), (parity.topic_id, parity.entry_id)
         partial = None if source is None else source.partials.get(key)
         if source is None or partial is None or self._is_silent(partial, now):
@@ -129,7 +129,7 @@ class Reassembly:
         return source.partials.get(key)
 
     def expire(self, now: float) -> None:
-        """Give up what has been silent for the timeout."""
+        """Give up messages that have been silent for the timeout."""
         if now < self._next_expiry:
             return
         self._next_expiry = float("inf")
@@ -145,19 +145,19 @@ class Reassembly:
                 del self._sources[src]
 
     def holds(self, src: int, topic_id: int, entry_id: int) -> bool:
-        """Whether fragments of that message are kept."""
+        """Whether fragments of a message are kept."""
         source = self._sources.get(src)
         return source is not None and (topic_id, entry_id) in source.partials
 
     def take_lost(self) -> list[Lost]:
-        """What was given up since the last call."""
+        """The messages that were given up since the last call."""
         lost, self.lost = self.lost, []
         return lost
 
     def _keep(
         self, src: int, source: _Source, key: tuple[int, int], n_bytes: int, now: float
     ) -> None:
-        """Something came for a message that waits."""
+        """Note that something came for a message that waits, and keep within the bounds."""
         partial = source.partials[key]
         partial.touched_at = now
         source.partials.move_to_end(key)

@@ -22,7 +22,7 @@ _HEADERS = (["name", "type"], ["topic", "type"])
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """One line of the registry. `name` has no leading slash; `type` reads `pkg/msg/Name`."""
+    """A line of the registry. `name` has no leading slash; `type` reads `pkg/msg/Name`."""
 
     id: int
     name: str
@@ -31,7 +31,7 @@ class Topic:
 
 @dataclass(frozen=True, slots=True)
 class RegistryDigest:
-    """What two nodes compare: 8 bytes over all, and one byte a topic to name the culprit."""
+    """What two nodes compare: 8 bytes over all, and one byte for each topic to name the culprit."""
 
     overall: bytes
     per_topic: bytes
@@ -44,7 +44,7 @@ class RegistryDigest:
         return cls(value[: cls.OVERALL_SIZE], value[cls.OVERALL_SIZE :])
 
     def shortened(self) -> "RegistryDigest":
-        """Without the octets by topic, for PDUs too small for them."""
+        """The digest without the octets by topic, for PDUs too small for them."""
         return RegistryDigest(self.overall, b"")
 
     def differing_ids(self, other: "RegistryDigest") -> list[int]:
@@ -70,7 +70,7 @@ class Registry:
 
     @property
     def has_control(self) -> bool:
-        """Topic id 0xF is the control channel unless the registry needs all sixteen."""
+        """Whether topic id 0xF is the control channel: unless the registry needs all sixteen."""
         return len(self.topics) < MAX_TOPICS
 
     def by_id(self, topic_id: int) -> Topic | None:
@@ -88,7 +88,7 @@ class Registry:
         return f"the registry has {', '.join(self._by_name) or 'no topics'}{hint}"
 
     def digest(self, dictionaries: Mapping[int, int] | None = None) -> RegistryDigest:
-        """Digest over ids, names and types (wire document, section 7.2).
+        """The digest over ids, names and types (wire document, section 7.2).
 
         `dictionaries`: ids of the zstd dictionaries of topics that have one.
         """
@@ -109,10 +109,10 @@ class Registry:
 
 
 def parse_registry(text: str, source: str = "registry") -> Registry:
-    """Registry from CSV text: one `name,type` a line; empty lines and `#` comments are skipped, and
-    a header `name,type` or `Topic, Type`.
+    """The registry in CSV text: one `name,type` a line (wire document, 7.1).
 
-    Raises RegistryError that cites `source` and the line.
+    Empty lines and `#` comments are skipped, and a header `name,type` or `Topic, Type`. Raises
+    RegistryError that cites `source` and the line.
     """
     pairs: list[tuple[str, str, str]] = []
     for number, raw in enumerate(text.removeprefix("\ufeff").split("\n"), start=1):
@@ -130,7 +130,7 @@ def parse_registry(text: str, source: str = "registry") -> Registry:
 
 
 def make_registry(pairs: Iterable[tuple[str, str]], source: str = "registry") -> Registry:
-    """Registry from (name, type) pairs. Raises RegistryError as `parse_registry` does."""
+    """The registry of (name, type) pairs. Raises RegistryError as `parse_registry` does."""
     return _assemble([(name, kind, source) for name, kind in pairs], source)
 
 

@@ -1,4 +1,4 @@
-"""What salvage yields."""
+"""The messages that salvage finds in a damaged recording."""
 
 from typing import NamedTuple
 

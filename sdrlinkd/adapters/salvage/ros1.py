@@ -59,7 +59,7 @@ def _records(data: bytes) -> Iterator[tuple[Fields, bytes]]:
 
 
 def _sized(data: bytes, at: int) -> tuple[bytes, int]:
-    """A field with its length before it; shorter than told where the file ends."""
+    """(a field that follows its length, index after it); it is cut where the file ends."""
     if at + 4 > len(data):
         return b"", len(data) + 1
     end = at + 4 + struct.unpack_from("<I", data, at)[0]

@@ -1,4 +1,4 @@
-"""The table of `list`."""
+"""The table that `list` shows."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ from sdrlinkd.tables import NOTHING, FittedTable, figure, words
 
 
 def daemons_table(found: Sequence[tuple[str, int | None, Snapshot | str]]) -> FittedTable:
-    """A row a daemon: (runtime directory, process id, what it says or why it does not)."""
+    """A table with a row for each daemon: (runtime directory, process id, snapshot or problem)."""
     table = FittedTable(
         "",
         (

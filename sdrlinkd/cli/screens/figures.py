@@ -1,4 +1,4 @@
-"""How figures are written."""
+"""How figures are written on all screens."""
 
 from sdrlinkd.reports import ClockReport
 from sdrlinkd.tables import NOTHING
@@ -7,14 +7,14 @@ BLOCKS = "▁▂▃▄▅▆▇█"
 
 
 def milliseconds(value: float | None) -> str:
-    """An age in ms."""
+    """An age or a delay in ms, with decimals below 100."""
     if value is None:
         return NOTHING
     return f"{value:.2f}" if value < 100 else f"{value:.0f}"
 
 
 def duration(seconds: float) -> str:
-    """A time span as people say it."""
+    """A time span as people say it, from a number of seconds."""
     if seconds < 60:
         return f"{seconds:.1f} s"
     if seconds < 3600:
@@ -23,7 +23,7 @@ def duration(seconds: float) -> str:
 
 
 def size(n_bytes: float) -> str:
-    """A number of bytes."""
+    """A number of bytes with its unit."""
     for unit, scale in (("MB", 10**6), ("kB", 10**3)):
         if n_bytes >= scale:
             return f"{n_bytes / scale:.1f} {unit}"
@@ -31,12 +31,12 @@ def size(n_bytes: float) -> str:
 
 
 def rate(per_s: float) -> str:
-    """Something a second; nothing where there is none."""
+    """A number of things a second; nothing for 0."""
     return f"{per_s:.1f}" if per_s else NOTHING
 
 
 def bytes_rate(per_s: float) -> str:
-    """Bytes a second; nothing where there are none."""
+    """A number of bytes a second; nothing for 0."""
     return f"{size(per_s)}/s" if per_s else NOTHING
 
 

@@ -91,7 +91,7 @@ def _total_ms(latency: LatencyReport) -> float:
 
 
 def _percentiles(topic: ReceivedTopicReport, latency: LatencyReport) -> Text:
-    """All ages since the start."""
+    """The percentiles of all ages since the start, the period and the stop messages of a topic."""
     told = ", ".join(
         f"{head if head == 'max' else 'p' + head} {milliseconds(value)}"
         for head, value in latency.percentiles_ms.items()

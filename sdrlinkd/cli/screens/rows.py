@@ -21,7 +21,7 @@ LEVEL_STYLES = {"OK": "bold green", "DEGRADED": "bold yellow", "DOWN": "bold red
 
 
 def robots_table(reports: Sequence[NeighborReport], *, rule: bool) -> FittedTable:
-    """Who is heard, and who hears us: the worst first."""
+    """The robots that are heard, and how they hear us: the worst first."""
     table = FittedTable(
         "robots heard" if rule else "",
         (
@@ -50,7 +50,7 @@ def robots_table(reports: Sequence[NeighborReport], *, rule: bool) -> FittedTabl
 
 
 def sent_table(reports: Sequence[TopicReport], *, rule: bool) -> FittedTable:
-    """Topics on their way out: those of which most is lost first."""
+    """The topics on their way out: those that lose most first."""
     table = FittedTable(
         "sent" if rule else "",
         (
@@ -77,7 +77,7 @@ def sent_table(reports: Sequence[TopicReport], *, rule: bool) -> FittedTable:
 
 
 def heard_table(reports: Sequence[ReceivedTopicReport], *, rule: bool) -> FittedTable:
-    """Topics from the air: those of which most is lost first."""
+    """The topics from the air: those that lose most first."""
     table = FittedTable(
         "heard" if rule else "",
         (
@@ -104,7 +104,7 @@ def heard_table(reports: Sequence[ReceivedTopicReport], *, rule: bool) -> Fitted
 
 
 def drops(snapshot: Snapshot) -> list[tuple[str, str, int]]:
-    """(what, reason, count) of every reason that has one, the most frequent first."""
+    """(what, reason, count) for each reason of a drop, the most frequent first."""
     link = snapshot.link
     found = [
         *(("message out", *each) for each in link.tx.dropped.items()),
@@ -115,14 +115,14 @@ def drops(snapshot: Snapshot) -> list[tuple[str, str, int]]:
 
 
 def is_idle(topic: TopicReport | ReceivedTopicReport) -> bool:
-    """Whether nothing comes any more, or never did, and nothing waits."""
+    """Whether no message comes on a topic any more, or ever did, and none waits."""
     if isinstance(topic, TopicReport):
         return not (topic.accepted_per_s or topic.queued)
     return not topic.delivered_per_s
 
 
 def failed(topic: TopicReport) -> int:
-    """Messages dropped that nobody asked to drop."""
+    """Number of messages dropped that nobody asked to drop."""
     return sum(count for reason, count in topic.dropped.items() if reason not in BY_POLICY)
 
 

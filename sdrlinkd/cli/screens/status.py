@@ -23,7 +23,7 @@ REASON_LINES = 2
 
 
 class StatusScreen:
-    """A snapshot in at most `height` lines; None: everything, however long."""
+    """A snapshot in at most `height` lines; None: all of it, however long."""
 
     def __init__(self, snapshot: Snapshot, height: int | None) -> None:
         self._snapshot = snapshot
@@ -38,7 +38,7 @@ class StatusScreen:
 
 @dataclass
 class _Block:
-    """What may be left out from its end: rows of a table, or lines of text."""
+    """A part of the screen that can be cut at its end: rows of a table, or lines of text."""
 
     thing: str
     """What a row is called: topic, robot, …; empty: goes without being named."""
@@ -54,14 +54,14 @@ class _Block:
         return [1 + line.plain.count("\n") for line in self.lines]
 
     def drawn(self, width: int, n: int) -> list[RenderableType]:
-        """The first `n` of them."""
+        """The first `n` rows or texts, ready to be printed."""
         if self.table is not None:
             return [self.table.fitted(width, n)] if n else []
         return [*self.lines[:n]]
 
 
 def verdict(snapshot: Snapshot, width: int, *, whole: bool = False) -> Text:
-    """The level, and why: as many reasons as two lines hold."""
+    """The verdict's level, and as many of its reasons as two lines hold, or all if `whole`."""
     level, reasons = snapshot.verdict.level, snapshot.verdict.reasons
     told, room = level, REASON_LINES * width - len("; + 99 more reasons: --all")
     for at, reason in enumerate(reasons):
@@ -76,7 +76,7 @@ def verdict(snapshot: Snapshot, width: int, *, whole: bool = False) -> Text:
 
 
 def head(snapshot: Snapshot, width: int) -> list[Text]:
-    """Who, on what radio, how full the air is, and the two ledgers."""
+    """The lines below the verdict: robot, radio, air, and the two ledgers."""
     carrier, link = snapshot.carrier, snapshot.link
     named = f" ({snapshot.namespace})" if snapshot.namespace else ""
     lag = f", loop lag {snapshot.loop_lag_ms:.1f} ms"
@@ -153,7 +153,7 @@ def _fitted(snapshot: Snapshot, width: int, height: int) -> list[RenderableType]
 
 
 def _blocks(snapshot: Snapshot, width: int) -> list[_Block]:
-    """In the order of the screen; what is first gets its line first."""
+    """The blocks from the screen's top down; the first one gets its line first."""
     link = snapshot.link
     busy_out = [topic for topic in link.topics if not is_idle(topic)]
     busy_in = [topic for topic in link.received if not is_idle(topic)]
@@ -170,7 +170,7 @@ def _blocks(snapshot: Snapshot, width: int) -> list[_Block]:
 
 
 def _chosen(blocks: Sequence[_Block], width: int, room: int) -> list[int]:
-    """How many rows of each, in turn, until nothing more fits."""
+    """How many rows each block shows: they take turns until nothing more fits."""
     heights = [block.heights(width) for block in blocks]
     shown = [0] * len(blocks)
     grew, turn = True, 0
@@ -192,7 +192,7 @@ def _cost(block: _Block, width: int, n: int) -> int:
 
 
 def _left_out(blocks: Sequence[_Block], shown: Sequence[int], width: int) -> str:
-    """ "6 topics, 2 robots": all that is not on the screen."""
+    """What is not on the screen, such as "6 topics, 2 robots"."""
     missing: dict[str, int] = {}
     for block, n in zip(blocks, shown, strict=True):
         thing = block.thing or "more line"
@@ -207,7 +207,7 @@ def _dropped(snapshot: Snapshot, width: int) -> list[Text]:
 
 
 def _idle(snapshot: Snapshot, width: int) -> list[Text]:
-    """Topics on which nothing moves, in a line."""
+    """A line that names the topics on which nothing moves; none where all move."""
     link = snapshot.link
     out = [each.name.rsplit("/", 1)[-1] for each in link.topics if is_idle(each)]
     into = [each.republished_as or each.name for each in link.received if is_idle(each)]
@@ -219,7 +219,7 @@ def _idle(snapshot: Snapshot, width: int) -> list[Text]:
 
 
 def _one_line(label: str, groups: Sequence[tuple[str, Sequence[str]]], width: int) -> Text:
-    """As many words as a line holds; how many more there are stands at its end."""
+    """A line with as many words as it holds, and how many more there are at its end."""
     words = [
         (f"{'; ' if started else ''}{title}" if not at else ", ") + word
         for started, (title, group) in enumerate(g for g in groups if g[1])
@@ -242,14 +242,14 @@ def _notes(snapshot: Snapshot, width: int) -> list[Text]:
 
 
 def _clocks(snapshot: Snapshot, width: int) -> list[Text]:
-    """How well those of others are known; nothing where nobody tells."""
+    """A line on how well other robots' clocks are known; none where nobody tells."""
     known = [(each.src, each.clock) for each in snapshot.link.neighbors if each.clock]
     told = "; ".join(f"{src} {clock_state(clock)}" for src, clock in known)
     return [_labelled("clocks", f"of robots: {told}", width)] if told else []
 
 
 def _receipts(snapshot: Snapshot, width: int) -> list[Text]:
-    """Those that reached nobody; nothing where there are none."""
+    """A line on receipts that reached nobody; none where there are no such."""
     link = snapshot.link
     parts = (
         (link.receipts_untold, "to others found no room"),
@@ -260,7 +260,7 @@ def _receipts(snapshot: Snapshot, width: int) -> list[Text]:
 
 
 def _labelled(label: str, told: str, width: int) -> Text:
-    """A sentence behind its label, its further lines below it."""
+    """A sentence behind its label, with its further lines indented below it."""
     lines = wrapped(told, width - INDENT).split("\n")
     text = Text(label.ljust(INDENT), style="")
     text.stylize("bold", 0, len(label))

@@ -18,21 +18,21 @@ Ask = Callable[[str, dict[str, Any]], Any]
 
 
 class Explanation(ModalScreen[None]):
-    """Sentences, until any key."""
+    """A box of sentences, which any key closes."""
 
     def __init__(self, title: str, lines: list[str]) -> None:
         super().__init__()
         self._title, self._lines = title, lines
 
     def compose(self) -> ComposeResult:
-        """A box of text."""
+        """The box: title, sentences and a hint."""
         with Vertical(classes="box"):
             yield Label(self._title, classes="title", markup=False)
             yield Static("\n".join(self._lines), markup=False)
             yield Label("any key: back", classes="hint")
 
     def on_key(self) -> None:
-        """Back."""
+        """Close the box on any key."""
         self.dismiss()
 
 
@@ -53,7 +53,7 @@ class PolicyForm(ModalScreen[str]):
         self._topic, self._now, self._ask = topic, now, ask
 
     def compose(self) -> ComposeResult:
-        """A line a field, empty: what is empty stays as it is."""
+        """The form, with an empty line for each field: what stays empty is not changed."""
         with Vertical(classes="box"):
             yield Label(f"policy of {self._topic}", classes="title", markup=False)
             for key, label, help_text in self.FIELDS:
@@ -64,7 +64,7 @@ class PolicyForm(ModalScreen[str]):
             yield Label("Enter: set    Tab: next    Escape: back", classes="hint")
 
     def action_cancel(self) -> None:
-        """Back, changing nothing."""
+        """Close the form and change nothing."""
         self.dismiss("")
 
     async def on_input_submitted(self) -> None:
@@ -84,7 +84,7 @@ class PolicyForm(ModalScreen[str]):
         )
 
     def _changes(self) -> dict[str, Any]:
-        """Raises UserError."""
+        """The fields that were filled in, as the daemon takes them. Raises UserError."""
         given = {key: self.query_one(f"#{key}", Input).value.strip() for key, *_ in self.FIELDS}
         return {key: _value(key, text) for key, text in given.items() if text}
 

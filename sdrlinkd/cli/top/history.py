@@ -13,7 +13,7 @@ SPAN = 240
 
 
 class Series(NamedTuple):
-    """A figure over time, and between which values it is drawn; `high` 0: up to its largest."""
+    """A figure over time, drawn between `low` and `high`; `high` 0: up to its largest."""
 
     name: str
     low: float
@@ -21,7 +21,7 @@ class Series(NamedTuple):
     values: deque[float | None]
 
     def line(self, width: int) -> str:
-        """Name, last value, and the rest as little columns."""
+        """The series in `width` characters: name, last value, and means as little columns."""
         last = self.values[-1] if self.values else None
         told = "–" if last is None else f"{last:.1f}" if abs(last) < 1000 else f"{last:.0f}"
         room = width - 15
@@ -31,7 +31,7 @@ class Series(NamedTuple):
 
 
 class History:
-    """Fed with each snapshot, None while the daemon is away."""
+    """The figures of the last snapshots, as series; None is a moment without the daemon."""
 
     def __init__(self) -> None:
         self._before: tuple[int, int] | None = None
@@ -44,7 +44,7 @@ class History:
         ]  # fmt: skip
 
     def add(self, snapshot: Snapshot | None) -> None:
-        """One more moment."""
+        """Take in the figures of one more moment; None: the daemon is away."""
         values = [None] * len(self.series) if snapshot is None else self._figures(snapshot)
         for series, value in zip(self.series, values, strict=True):
             series.values.append(value)
@@ -69,7 +69,7 @@ class History:
         ]
 
     def _pdr(self, snapshot: Snapshot) -> float | None:
-        """Of the messages begun since the snapshot before, in %."""
+        """Share in % of messages lately ended that were delivered; None where none has ended."""
         rx = snapshot.link.rx
         now = (rx.delivered, sum(rx.dropped.values()))
         before, self._before = self._before, now
@@ -83,7 +83,7 @@ class History:
 
 
 def _means(values: Sequence[float | None], room: int) -> list[float | None]:
-    """So many means of equal spans of time, the last one up to now."""
+    """At most `room` means over equal spans of time, the last one up to now."""
     each = -(-SPAN // max(1, room))
     told: list[float | None] = []
     given = list(values)

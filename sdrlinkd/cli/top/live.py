@@ -33,7 +33,11 @@ HELP = [
 
 
 class TopApp(App[None]):
-    """`look` is called every `period_s`; None while the daemon is away, then `waiting` is shown."""
+    """The live screen of `top`.
+
+    `look` is called every `period_s`; it tells None while the daemon is away, and `waiting` is
+    shown.
+    """
 
     TITLE = "sdrlinkctl top"
     ENABLE_COMMAND_PALETTE = False
@@ -86,14 +90,14 @@ class TopApp(App[None]):
         self._filter = Input(id="filter", placeholder="topic, class or robot 2", compact=True)
 
     def compose(self) -> ComposeResult:
-        """From top to bottom."""
+        """The parts of the screen from top to bottom."""
         yield from (self._verdict, self._robot, self._trend, self._robots)
         yield self._table
         yield self._filter
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        """Begin to look."""
+        """Begin to look at the daemon."""
         self._table.focus()
         if self._period_s:
             self.set_interval(self._period_s, self._follow)
@@ -108,7 +112,7 @@ class TopApp(App[None]):
         self.show(snapshot)
 
     def show(self, snapshot: Snapshot | None) -> None:
-        """One more moment of the link; None: nobody answers."""
+        """Show one more moment of the link; None: nobody answers."""
         # While it quits, there is an answer still to come, and no screen any more.
         if not self.is_running or not self._table.is_attached:
             return
@@ -121,11 +125,11 @@ class TopApp(App[None]):
         self._draw()
 
     def on_resize(self) -> None:
-        """Other columns may fit now."""
+        """Draw anew: other columns may fit now."""
         self._draw()
 
     def _draw(self) -> None:
-        """The last snapshot; while the daemon is away, the verdict is not of now."""
+        """Draw the last snapshot; while the daemon is away, it is dimmed and has no new verdict."""
         at, width = self._snapshot, self.size.width
         if at is None or not width:
             return
@@ -144,7 +148,7 @@ class TopApp(App[None]):
         self._draw_topics(at, width)
 
     def _series(self, width: int) -> Text:
-        """Two series a line."""
+        """The series as text, two on a line."""
         half = (width - 2) // 2
         lines = [*(series.line(half) for series in self._history.series), MINUTES]
         pairs = [lines[at : at + 2] for at in range(0, len(lines), 2)]
@@ -189,37 +193,37 @@ class TopApp(App[None]):
         return self._rows[index] if 0 <= index < len(self._rows) else None
 
     def action_sort(self) -> None:
-        """By the next order."""
+        """Sort the topics by the next order."""
         orders = [*ORDERS]
         self._order = orders[(orders.index(self._order) + 1) % len(orders)]
         self.notify(f"sorted by {self._order}", timeout=2)
         self._draw()
 
     def action_filter(self) -> None:
-        """Ask for a text."""
+        """Ask for a text that topics must hold."""
         self._filter.display = True
         self._filter.focus()
 
     def action_unfilter(self) -> None:
-        """All topics again."""
+        """Show all topics again, without a filter."""
         self._filter.value = ""
         self.on_input_submitted()
 
     def on_input_changed(self) -> None:
-        """While it is typed."""
+        """Draw anew while the filter is typed."""
         self._draw()
 
     def on_input_submitted(self) -> None:
-        """Back to the table; the text stays in force."""
+        """Go back to the table; the filter's text stays in force."""
         self._filter.display = bool(self._filter.value)
         self._table.focus()
 
     def on_data_table_row_selected(self) -> None:
-        """Enter."""
+        """Explain the selected topic when Enter is pressed."""
         self.run_worker(self.action_why())
 
     async def action_why(self) -> None:
-        """What happens to the selected topic."""
+        """Explain what happens to the selected topic."""
         row = self._selected()
         if row is None:
             return
@@ -234,7 +238,7 @@ class TopApp(App[None]):
         self.push_screen(Explanation(row.name, lines))
 
     def action_policy(self) -> None:
-        """A form for the selected topic."""
+        """Open a form for the policy of the selected topic."""
         row = self._selected()
         if row is None or self._snapshot is None:
             return
@@ -246,7 +250,7 @@ class TopApp(App[None]):
         self.push_screen(PolicyForm(row.name, known, self._ask_daemon), self._told)
 
     def action_help(self) -> None:
-        """The keys."""
+        """Show what the keys do."""
         self.push_screen(Explanation("keys", HELP))
 
     def _told(self, text: str | None) -> None:

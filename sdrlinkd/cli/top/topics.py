@@ -29,7 +29,7 @@ class TopicRow(NamedTuple):
 
     @property
     def key(self) -> str:
-        """Its own among all rows."""
+        """The row's key, which no other row has."""
         return f"{self.source} {self.name}"
 
 
@@ -49,7 +49,7 @@ ORDERS: dict[str, Callable[[TopicRow], tuple[object, ...]]] = {
 
 
 def topic_rows(snapshot: Snapshot, order: str, wanted: str) -> list[TopicRow]:
-    """Those whose name, class or robot holds `wanted`."""
+    """The rows of topics whose name, class or robot holds `wanted`, sorted by `order`."""
     rows = [
         *(_out(topic) for topic in snapshot.link.topics),
         *(_in(topic) for topic in snapshot.link.received),
@@ -59,7 +59,7 @@ def topic_rows(snapshot: Snapshot, order: str, wanted: str) -> list[TopicRow]:
 
 
 def topics_table(rows: list[TopicRow]) -> FittedTable:
-    """A row a topic."""
+    """The table of topics, with a line for each row."""
     table = FittedTable(
         "",
         (

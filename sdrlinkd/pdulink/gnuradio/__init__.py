@@ -1,4 +1,4 @@
-"""GNU Radio as the PHY, without GNU Radio on our side."""
+"""GNU Radio as the PHY, without a need for GNU Radio on our side."""
 
 from sdrlinkd.config import Config
 from sdrlinkd.pdulink.gnuradio.link import GnuRadioLink
@@ -7,7 +7,7 @@ from sdrlinkd.pdulink.gnuradio.transport import TcpTransport, Transport, UdpTran
 
 
 def make_gnuradio(config: Config) -> GnuRadioLink:
-    """The link that the configuration describes. Raises UserError."""
+    """The GNU Radio link that the configuration describes. Raises UserError."""
     params, pdu_size = config.gnuradio, config.link.pdu_size
     transport: Transport
     if params.transport == "udp":

@@ -11,13 +11,13 @@ from sdrlinkd.pdulink.gnuradio.transport import Transport
 from sdrlinkd.reports import PduLinkReport
 
 LOOK_S = 0.02
-"""A flowgraph that takes nothing is asked again after so long."""
+"""Seconds after which a flowgraph that takes nothing is asked again."""
 PACE_S = 1e-3
-"""How well a flowgraph's delay is known."""
+"""Seconds by which a flowgraph's delay is not known."""
 
 
 class GnuRadioLink:
-    """A burst is one PDU. What a flowgraph does not take waits in the queue."""
+    """Sends bursts of one PDU to a flowgraph; what that does not take waits in the queue."""
 
     def __init__(self, params: GnuRadioParams, pdu_size: int, transport: Transport) -> None:
         self._params = params
@@ -33,7 +33,7 @@ class GnuRadioLink:
         self._counters = {"pdus_out": 0, "pdus_in": 0}
 
     def now(self) -> float:
-        """The monotonic clock: there are no samples to count."""
+        """Seconds of the monotonic clock: there are no samples to count."""
         return time.monotonic()
 
     async def open(self, listener: PduListener) -> None:
@@ -68,7 +68,7 @@ class GnuRadioLink:
             await self._bell.wait(max(0.0, listener.next_wakeup(start) - start))
 
     def wake(self) -> None:
-        """There may be something to send."""
+        """Look again for something to send."""
         self._bell.ring()
 
     async def idle(self) -> None:
@@ -82,7 +82,7 @@ class GnuRadioLink:
         self._transport.close()
 
     def report(self) -> PduLinkReport:
-        """State and counters."""
+        """The state of the flowgraph, and counters of PDUs."""
         params, is_open = self._params, self._listener is not None
         state = "up" if is_open and self._is_taken else "down"
         reason = f"nobody takes PDUs at {params.send} ({params.transport})"

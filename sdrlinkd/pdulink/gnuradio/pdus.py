@@ -8,7 +8,7 @@ from sdrlinkd.wire import HEADER_SIZE
 
 
 def to_gnu_radio(pdu: bytes) -> bytes:
-    """A PMT message: src_id, dst_id, seq, t_src_wall (s since 1970) beside the octets."""
+    """A PDU as a PMT message: src_id, dst_id, seq, t_src_wall (s since 1970), and its octets."""
     meta = {"src_id": pdu[1], "dst_id": pdu[2], "seq": pdu[3], "t_src_wall": time.time_ns() * 1e-9}
     return pmt.dumps(pmt.Pair(meta, pdu))
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 DEPTH = 32
-"""Nested deeper than this is not meant for us."""
+"""Levels of nesting; a value with more is not meant for us."""
 _TRUE, _FALSE, _SYMBOL, _INT32, _DOUBLE, _COMPLEX, _NIL, _PAIR, _VECTOR, _DICT = range(10)
 _UNIFORM, _UINT64, _TUPLE, _INT64 = 0x0A, 0x0B, 0x0C, 0x0D
 _KINDS = tuple(
@@ -39,7 +39,7 @@ def dumps(value: Any) -> bytes:  # noqa: ANN401
 
 
 def loads(data: bytes) -> Any:  # noqa: ANN401
-    """The value that `data` begins with. Raises ValueError when it is none."""
+    """The value that `data` begins with. Raises ValueError when that is no PMT."""
     try:
         value, _ = _read(data, 0, DEPTH)
     except (struct.error, IndexError, UnicodeDecodeError) as error:
@@ -123,7 +123,7 @@ _WRITERS: tuple[tuple[Any, Callable[[Any, bytearray], None]], ...] = (
 
 
 def _read(data: bytes, at: int, depth: int) -> tuple[Any, int]:
-    """(value, where the next one begins)."""
+    """(value at index `at`, index at which the next one begins). Raises ValueError."""
     if depth < 0:
         raise ValueError("no PMT for us: nested too deep")
     tag, at = data[at], at + 1

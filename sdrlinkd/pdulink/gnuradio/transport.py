@@ -21,26 +21,28 @@ RECEIVE_BYTES = 1 << 16
 
 
 class Transport(Protocol):
-    """Both directions. Calls `take` with every PDU that comes, on the event loop."""
+    """PDUs to a flowgraph and back; `take` gets every one that comes, on the event loop."""
 
     counters: dict[str, int]
 
     async def open(self, take: Take) -> None:
-        """Open sockets. Raises UserError."""
+        """Open the sockets. Raises UserError."""
 
     def is_ready(self) -> bool:
-        """Whether a PDU can be handed over."""
+        """Whether a PDU can be handed over now."""
 
     def send(self, pdu: bytes) -> bool:
-        """Hand one over; False when nobody took it."""
+        """Hand a PDU over; False when nobody took it."""
 
     def close(self) -> None:
-        """Close sockets; closing twice is fine."""
+        """Close the sockets; closing twice is fine."""
 
 
 class ZmqTransport:
-    """gr-zeromq's message blocks: we bind `send` and connect to `receive`, as its own sinks and
-    sources do; @ before an endpoint binds it, > connects.
+    """PDUs by gr-zeromq's message blocks.
+
+    We bind `send` and connect to `receive`, as its own sinks and sources do; @ before an endpoint
+    binds it, > connects.
     """
 
     def __init__(self, send: str, receive: str, publishes: bool) -> None:
@@ -54,7 +56,7 @@ class ZmqTransport:
         self.counters = {"bad_messages": 0}
 
     async def open(self, take: Take) -> None:
-        """Open sockets."""
+        """Open both sockets. Raises UserError."""
         kind_out, kind_in = self._kinds
         try:
             out = open_endpoint(
@@ -81,7 +83,7 @@ class ZmqTransport:
         self._reader = SocketReader(asyncio.get_running_loop(), into, into.recv, taken)
 
     def is_ready(self) -> bool:
-        """When a flowgraph takes it, or has subscribed to it."""
+        """Whether a flowgraph takes a PDU now, or has subscribed."""
         out = self._out
         if out is None:
             return False
@@ -93,7 +95,7 @@ class ZmqTransport:
         return self._subscribed > 0
 
     def send(self, pdu: bytes) -> bool:
-        """Hand one over."""
+        """Hand a PDU over; False when nobody took it."""
         if self._out is None:
             return False
         try:
@@ -103,7 +105,7 @@ class ZmqTransport:
         return True
 
     def close(self) -> None:
-        """Close sockets."""
+        """Close both sockets and their context."""
         if self._reader is not None:
             self._reader.close()
         self._context.destroy(linger=0)
@@ -111,8 +113,9 @@ class ZmqTransport:
 
 
 class UdpTransport(asyncio.DatagramProtocol):
-    """A socket_pdu of UDP: a datagram is a PDU. We send to `send`; answers come back to us, or to
-    `receive` where that is given.
+    """PDUs by a socket_pdu of UDP, one in a datagram.
+
+    We send to `send`; answers come back to us, or to `receive` where that is given.
     """
 
     def __init__(self, send: str, receive: str) -> None:
@@ -123,7 +126,7 @@ class UdpTransport(asyncio.DatagramProtocol):
         self.counters = {"bad_messages": 0, "refused": 0}
 
     async def open(self, take: Take) -> None:
-        """Open the socket."""
+        """Open the UDP socket. Raises UserError."""
         self._take = take
         loop = asyncio.get_running_loop()
         try:
@@ -137,34 +140,35 @@ class UdpTransport(asyncio.DatagramProtocol):
             ) from None
 
     def datagram_received(self, data: bytes, addr: object) -> None:  # noqa: ARG002
-        """A PDU."""
+        """Take a datagram, which is a PDU."""
         self._take(data)
 
     def error_received(self, exc: Exception) -> None:  # noqa: ARG002
-        """Nobody listens there."""
+        """Count that nobody listens where we send."""
         self.counters["refused"] += 1
 
     def is_ready(self) -> bool:
-        """Datagrams do not wait."""
+        """Whether the socket is open: datagrams do not wait."""
         return self._socket is not None
 
     def send(self, pdu: bytes) -> bool:
-        """Hand one over."""
+        """Hand a PDU over; False while there is no socket."""
         if self._socket is None:
             return False
         self._socket.sendto(pdu, self._peer)
         return True
 
     def close(self) -> None:
-        """Close the socket."""
+        """Close the UDP socket, if it is open."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None
 
 
 class TcpTransport(asyncio.Protocol):
-    """A socket_pdu that is a TCP server: octets without frames. PDUs have all the same size, and
-    begin where their CRC says so.
+    """PDUs by a socket_pdu that is a TCP server: octets without frames.
+
+    All PDUs have the same size, and begin where their CRC says so.
     """
 
     def __init__(self, send: str, pdu_size: int) -> None:
@@ -179,7 +183,7 @@ class TcpTransport(asyncio.Protocol):
         self.counters = {"bad_octets": 0, "connections": 0}
 
     async def open(self, take: Take) -> None:
-        """Connect, now or when the flowgraph is there."""
+        """Connect to the flowgraph, now or when it is there."""
         self._take = take
         await self._connect()
 
@@ -201,18 +205,18 @@ class TcpTransport(asyncio.Protocol):
         self._retry = loop.call_later(RETRY_S, again)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """A flowgraph is there."""
+        """Note that a flowgraph is there."""
         self._socket = cast(asyncio.Transport, transport)
         self._have.clear()
         self.counters["connections"] += 1
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
-        """It is gone."""
+        """Connect anew after a while, as the flowgraph is gone."""
         self._socket = None
         self._later()
 
     def data_received(self, data: bytes) -> None:
-        """Some octets."""
+        """Take octets, and the PDUs that they complete."""
         self._have += data
         size = self._pdu_size
         while len(self._have) >= size:
@@ -225,18 +229,18 @@ class TcpTransport(asyncio.Protocol):
             self._take(pdu)
 
     def is_ready(self) -> bool:
-        """While connected, and what was sent has left."""
+        """Whether the flowgraph is connected, and what was sent has left."""
         return self._socket is not None and not self._socket.get_write_buffer_size()
 
     def send(self, pdu: bytes) -> bool:
-        """Hand one over."""
+        """Hand a PDU over; False while not connected."""
         if self._socket is None:
             return False
         self._socket.write(pdu)
         return True
 
     def close(self) -> None:
-        """Disconnect."""
+        """Disconnect, and try no more."""
         self._is_closed = True
         for each in (self._retry, self._trying):
             if each is not None:
