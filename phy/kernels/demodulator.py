@@ -71,7 +71,7 @@ def to_tones(
 
 @njit(nogil=True, cache=True)
 def slip(early: int, tones_in: PackedArguments, channel_in: PackedArguments) -> None:
-    """Let FFT windows begin `early` samples earlier, and lessen the slope over subcarriers by that."""
+    """Let FFT windows begin `early` samples earlier; the slope over subcarriers is less by that."""
     tones, channel = open_tones(tones_in), open_channel(channel_in)
     lean = early * 2 * math.pi / tones.n_fft
     channel.tracking[SLOPE, 0] -= lean

@@ -27,7 +27,7 @@ _DRIFT_RISE, _DRIFT_FALL = 0.5, 0.1
 
 @njit(nogil=True, cache=True)
 def mean_delay(h: Planes, neighbours: NDArray[np.int64]) -> float:
-    """Mean phase, radians, from a subcarrier to the next; `neighbours` `[2, n]` are places in `h`."""
+    """Mean phase in radians from a subcarrier to the next, over the pairs `neighbours` `[2, n]`."""
     turn = 0j
     for i in range(neighbours.shape[1]):
         first, second = neighbours[0, i], neighbours[1, i]
