@@ -249,7 +249,7 @@ class Node:
     def snapshot(self, control_requests: int) -> Snapshot:
         """The snapshot of this moment, with everything there is to know."""
         now = self._pdu_link.now()
-        carrier = self._opening.report(time.monotonic())
+        pdu_link = self._opening.report(time.monotonic())
         subscribed = {topic_id: name for name, topic_id in self._setup.topics_in.items()}
         noted = self._link.notices(now, self._setup.topic_warnings)
         snapshot = Snapshot(
@@ -261,10 +261,10 @@ class Node:
             uptime_s=time.monotonic() - self._started_at,
             loop_lag_ms=self._loop_lag_s * 1e3,
             host_clock_steps=self._host_clock.steps,
-            carrier=carrier,
+            carrier=pdu_link,
             bus=self.bus.report(control_requests),
             link=self._link.report(now, Names(subscribed, self.bus.names_out())),
-            notices=[*self._setup.warnings, *carrier.notices, *noted],
+            notices=[*self._setup.warnings, *pdu_link.notices, *noted],
         )
         return msgspec.structs.replace(snapshot, verdict=self.health.judge(snapshot))
 

@@ -60,7 +60,7 @@ def info(
     ] = 40.0,
     json: AsJson = False,
 ) -> None:
-    """Carriers, rates and airtimes of every MCS."""
+    """Subcarriers, rates and airtimes of every MCS."""
     from sdrlinkd.iq import modem_info
 
     told = modem_info(rate, pdu_size, max_burst, grid_named(grid), frequency, crystal_ppm)
@@ -69,7 +69,8 @@ def info(
         return
     console = screen_console()
     console.print(
-        f"{told.rate_hz / 1e6:g} Msps: {told.n_fft} carriers {told.spacing_hz / 1e3:g} kHz apart, "
+        f"{told.rate_hz / 1e6:g} Msps: {told.n_fft} subcarriers "
+        f"{told.spacing_hz / 1e3:g} kHz apart, "
         f"{told.n_data} for data, {told.n_pilots} pilots, {told.occupied_hz / 1e6:.3g} MHz wide\n"
         f"symbols of {told.symbol_us:g} µs, of these {told.echoes_us:g} µs for echoes; "
         f"preamble and header {told.preamble_us:g} µs a burst\n{told.cfo}",

@@ -52,7 +52,7 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """The preamble is sent so much stronger than the rest: where peaks limit an amplifier, bursts
     are found farther away."""
     max_cfo_hz: Literal["auto"] | Annotated[float, Meta(ge=0, le=1e6)] = "auto"
-    """Largest carrier offset between two radios at which bursts are looked for; "auto": what
+    """Largest frequency offset between two radios at which bursts are looked for; "auto": what
     `crystal_ppm` makes of it, as far as a receiver can search."""
     crystal_ppm: Annotated[float, Meta(ge=0, le=200)] = 40.0
     """How far every radio's crystal may be off."""
@@ -60,7 +60,7 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Carrier and samples of every radio come from the same crystal: the offset of the one tells
     that of the other."""
     carrier_db: Annotated[float, Meta(ge=3, le=40)] = 6.0
-    """Energy above the noise from which on there is a carrier; for access policies that listen."""
+    """Energy above the noise from which on the channel is busy; for access policies that listen."""
     block_s: Annotated[float, Meta(ge=1e-4, le=0.1)] = 0.001
     """Samples are received in pieces of this length."""
     oversampling: Literal[1, 2, 4] = 1
@@ -73,17 +73,19 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     @property
     def apart_hz(self) -> float:
-        """How far apart two radios' carriers may be in Hz, with both crystals at their worst."""
+        """How far apart two radios' centre frequencies may be in Hz, with both crystals at their
+        worst.
+        """
         return 2e-6 * self.crystal_ppm * self.centre_hz
 
     @property
     def most_cfo_hz(self) -> float:
-        """The largest carrier offset in Hz that a receiver can search at this rate."""
+        """The largest frequency offset in Hz that a receiver can search at this rate."""
         return self.rate_hz / 4
 
     @property
     def searched_cfo_hz(self) -> float:
-        """The carrier offset in Hz up to which bursts are looked for."""
+        """The frequency offset in Hz up to which bursts are looked for."""
         if self.max_cfo_hz == "auto":
             return min(self.apart_hz, self.most_cfo_hz)
         return float(self.max_cfo_hz)
@@ -127,7 +129,7 @@ class ChannelParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     snr_db: Decibel = 30.0
     """Burst power over noise power in the sample band; inf: no noise."""
     clock_ppm: Annotated[float, Meta(ge=-200, le=200)] = 0.0
-    """The sender's crystal against the receiver's: carrier and sampling clock."""
+    """The sender's crystal against the receiver's: centre frequency and sampling clock."""
     delay_s: Annotated[float, Meta(ge=0, le=1)] = 0.0
     delay_spread_s: Annotated[float, Meta(ge=0, le=1e-3)] = 1e-7
     """Spread of the echoes (rms)."""

@@ -22,7 +22,7 @@ class LoadOf:
         self._before = self._times()
 
     def read(self) -> Load:
-        """Up to now."""
+        """The load since this was made up to now, by thread."""
         span_s = time.monotonic() - self._began
         loads = []
         for task, (ran_s, waited_s) in self._times().items():

@@ -26,7 +26,7 @@ def daemon_process(config: Path) -> Process:
 
 @contextlib.contextmanager
 def daemon(config: Path) -> Iterator[Process]:
-    """A running daemon."""
+    """A daemon that runs while the context lasts, once its PDU link is up."""
     process = daemon_process(config)
     try:
         process.start()
@@ -50,16 +50,16 @@ def problems_of(directory: Path) -> list[str]:
 
 
 def wait_until_up(process: Process, directory: Path) -> None:
-    """Until it has its carrier. Raises UserError with its log when it does not start."""
+    """Wait until the daemon has its PDU link. Raises UserError with its log when it fails."""
     deadline = time.monotonic() + START_TIMEOUT_S
     while process.is_running and time.monotonic() < deadline:
         # It answers before its modem is ready.
         with contextlib.suppress(NoDaemonError):
-            carrier = snapshot_of(directory).carrier
-            if carrier.state in ("up", "ended"):
+            pdu_link = snapshot_of(directory).carrier
+            if pdu_link.state in ("up", "ended"):
                 return
-            if carrier.state in ("waiting", "refused"):
-                raise UserError(f"the daemon has no link: {carrier.reason}")
+            if pdu_link.state in ("waiting", "refused"):
+                raise UserError(f"the daemon has no link: {pdu_link.reason}")
         time.sleep(0.02)
     raise UserError(f"the daemon did not start:\n{process.log()}")
 

@@ -32,13 +32,13 @@ class Recording(Protocol):
     damage: str
 
     def topics(self) -> list[BagTopic]:
-        """Its topics."""
+        """The topics that the source publishes."""
 
     def messages(self) -> Iterator[BagMessage]:
         """Its messages in the order of time."""
 
     def close(self) -> None:
-        """Release it."""
+        """Release what the source reads from."""
 
 
 @dataclass

@@ -31,7 +31,7 @@ def table_6(runs: list[RunResult]) -> FittedTable:
 
 
 def topic_table(run: RunResult) -> FittedTable:
-    """A row a topic."""
+    """The table of a run, a row for each topic."""
     columns = (words("topic"), words("type", 1), figure("sent"), figure("recv"), figure("PDR"))
     table = FittedTable(f"{run.name}: {run.source} in PDUs of {run.pdu_size} B", columns)
     for topic in run.topics:

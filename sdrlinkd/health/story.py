@@ -54,34 +54,34 @@ class Story:
         self._steps = snapshot.host_clock_steps
 
     def _radio(self, snapshot: Snapshot) -> Iterator[Line]:
-        carrier, now = snapshot.carrier, snapshot.uptime_s
-        name, state = pdu_link_name(carrier), carrier.state
-        if state == self._state or (state == "down" and not is_away(carrier)):
+        pdu_link, now = snapshot.carrier, snapshot.uptime_s
+        name, state = pdu_link_name(pdu_link), pdu_link.state
+        if state == self._state or (state == "down" and not is_away(pdu_link)):
             return
         self._state = state
         if state == "up":
             away = "" if self._away_at is None else f" after {span(now - self._away_at)}"
             word = "back" if self._was_up else "there"
             self._was_up, self._away_at = True, None
-            yield Line("radio", Level.INFO, f"the {name} is {word}{away}: {carrier.detail}")
+            yield Line("radio", Level.INFO, f"the {name} is {word}{away}: {pdu_link.detail}")
             return
         if self._away_at is None:
-            self._away_at = max(0.0, now - carrier.since_s)
+            self._away_at = max(0.0, now - pdu_link.since_s)
         if state == "waiting":
-            yield Line("radio", Level.WARNING, f"no {name}, still trying: {carrier.reason}")
+            yield Line("radio", Level.WARNING, f"no {name}, still trying: {pdu_link.reason}")
         elif state == "refused":
             yield Line(
                 "radio",
                 Level.ERROR,
-                f"the settings do not fit the {name}: {carrier.reason}. It is tried again after a "
+                f"the settings do not fit the {name}: {pdu_link.reason}. It is tried again after a "
                 "reload (SIGHUP)" + (", and when it is plugged in anew" if name == "radio" else ""),
             )
         elif state == "ended":
             yield Line("radio", Level.INFO, f"the {name} is over")
         elif self._was_up:
-            yield Line("radio", Level.WARNING, f"the {name} is away: {carrier.reason}")
+            yield Line("radio", Level.WARNING, f"the {name} is away: {pdu_link.reason}")
         elif state == "down":
-            yield Line("radio", Level.WARNING, f"no {name} yet: {carrier.reason}")
+            yield Line("radio", Level.WARNING, f"no {name} yet: {pdu_link.reason}")
 
     def _robot(self, robot: NeighborReport, snapshot: Snapshot) -> Iterator[Line]:
         src, subject = robot.src, f"robot {robot.src}"

@@ -16,9 +16,9 @@ CLIPPED_PCT = 0.1
 LATE_LOOP_MS = 250.0
 
 
-def is_away(carrier: PduLinkReport) -> bool:
+def is_away(pdu_link: PduLinkReport) -> bool:
     """Whether what carried PDUs is gone; a moment's pause does not count."""
-    return carrier.state == "down" and carrier.since_s >= AWAY_S
+    return pdu_link.state == "down" and pdu_link.since_s >= AWAY_S
 
 
 def is_silent(robot: NeighborReport) -> bool:
@@ -43,17 +43,17 @@ def judge(snapshot: Snapshot, lately: Lately, shares_air: bool) -> VerdictReport
 
 
 def _down(snapshot: Snapshot) -> str:
-    carrier = snapshot.carrier
-    name, since = pdu_link_name(carrier), span(carrier.since_s)
-    if carrier.state == "opening":
-        return f"no {name} yet: {carrier.reason}"
-    if carrier.state == "waiting":
-        return f"no {name} since {since}: {carrier.reason}"
-    if carrier.state == "refused":
-        return f"the settings do not fit the {name}: {carrier.reason}"
-    if is_away(carrier):
-        return f"no {name} since {since}" + (f": {carrier.reason}" if carrier.reason else "")
-    if carrier.state == "ended":
+    pdu_link = snapshot.carrier
+    name, since = pdu_link_name(pdu_link), span(pdu_link.since_s)
+    if pdu_link.state == "opening":
+        return f"no {name} yet: {pdu_link.reason}"
+    if pdu_link.state == "waiting":
+        return f"no {name} since {since}: {pdu_link.reason}"
+    if pdu_link.state == "refused":
+        return f"the settings do not fit the {name}: {pdu_link.reason}"
+    if is_away(pdu_link):
+        return f"no {name} since {since}" + (f": {pdu_link.reason}" if pdu_link.reason else "")
+    if pdu_link.state == "ended":
         return f"the {name} is over"
     return ""
 
@@ -106,13 +106,13 @@ def _queue(snapshot: Snapshot, lately: Lately) -> list[str]:
 
 
 def _machine(snapshot: Snapshot, lately: Lately) -> list[str]:
-    carrier, reasons = snapshot.carrier, []
+    pdu_link, reasons = snapshot.carrier, []
     lost = lately.samples_lost(snapshot)
     if lost > 0:
         reasons.append(f"{lost} samples lost in {RATE_WINDOW_S:g} s: this machine is too slow")
-    if carrier.clipped_pct >= CLIPPED_PCT:
+    if pdu_link.clipped_pct >= CLIPPED_PCT:
         reasons.append(
-            f"the receiver clips {carrier.clipped_pct:.2g} % of the samples: lower its gain"
+            f"the receiver clips {pdu_link.clipped_pct:.2g} % of the samples: lower its gain"
         )
     if snapshot.loop_lag_ms >= LATE_LOOP_MS:
         reasons.append(f"the daemon runs {snapshot.loop_lag_ms:.0f} ms late: this machine is busy")

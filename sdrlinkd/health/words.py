@@ -10,9 +10,9 @@ _NAMES = {
 }
 
 
-def pdu_link_name(carrier: PduLinkReport) -> str:
+def pdu_link_name(pdu_link: PduLinkReport) -> str:
     """The word for what carries the PDUs, which may be missing."""
-    return _NAMES.get(carrier.kind, "radio")
+    return _NAMES.get(pdu_link.kind, "radio")
 
 
 def span(seconds: float) -> str:

@@ -133,8 +133,8 @@ class Capture:
             rate_hz,
             frequency_hz,
             hardware=radio.detail,
-            description=f"Bursts of sdrlinkd's OFDM modem, {wish.grid.n_fft} carriers and a prefix "
-            f"of {wish.grid.n_cp} samples, are annotated",
+            description=f"Bursts of sdrlinkd's OFDM modem, {wish.grid.n_fft} subcarriers and a "
+            f"prefix of {wish.grid.n_cp} samples, are annotated",
             recorder=f"sdrlinkd {__version__}",
         )
         finder = BurstFinder(writer.read, rate_hz, frequency_hz, wish.network, wish.grid)

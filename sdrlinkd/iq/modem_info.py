@@ -54,7 +54,7 @@ def modem_info(
 ) -> ModemInfo:
     """What the modem offers at a rate, with PDUs and bursts of these sizes.
 
-    The carrier offset follows from the middle of the channel and the radios' crystals. Raises
+    The frequency offset follows from the middle of the channel and the radios' crystals. Raises
     UserError.
     """
     params = ModemParams(rate_hz=rate_hz, frequency_hz=frequency_hz, crystal_ppm=crystal_ppm)

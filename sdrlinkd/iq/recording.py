@@ -15,7 +15,7 @@ from sdrlinkd.errors import UserError
 PIECE = 1 << 18
 MAX_POINTS = 20_000
 MAX_FREQUENCY = 0.25
-"""The largest carrier offset looked for, in cycles a sample: as far as a receiver can search, for
+"""The largest frequency offset sought, in cycles a sample: as far as a receiver can search, for
 whatever crystals the radios have."""
 
 Progress = Callable[[int], None]

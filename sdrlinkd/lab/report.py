@@ -28,7 +28,7 @@ class PairResult(Struct, frozen=True, kw_only=True):
 
 
 class RobotResult(Struct, frozen=True, kw_only=True):
-    """One robot's daemon."""
+    """What one robot's daemon did in an experiment."""
 
     id: int
     carrier: str
@@ -76,7 +76,7 @@ class LabReport(Struct, frozen=True, kw_only=True):
 def pair_result(
     sender: int, receiver: int, trace: Trace, began_at: float, duration_s: float
 ) -> PairResult:
-    """Figures of one direction."""
+    """The figures of one direction between two robots."""
     pairs, foreign = trace.matches()
     flat = [pair for found in pairs.values() for pair in found]
     received, sent = len(flat), trace.n_sent

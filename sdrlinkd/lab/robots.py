@@ -23,7 +23,7 @@ TABLES = ("modem", "access", "bus", "ether")
 
 
 def open_sources(scenario: Scenario, bag: Path | None) -> dict[int, Source]:
-    """By robot. Raises UserError."""
+    """The message source of each robot, by its id. Raises UserError."""
     try:
         return _open_sources(scenario, bag)
     except UserError as error:
@@ -48,7 +48,7 @@ def _open_sources(scenario: Scenario, bag: Path | None) -> dict[int, Source]:
 
 
 def seed_of(scenario: Scenario, robot: RobotParams) -> int:
-    """A robot's own chance."""
+    """The seed of one robot's own chance."""
     return scenario.seed * SEED_STEP + robot.id
 
 

@@ -50,7 +50,7 @@ class OutageParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
 
 class Scenario(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A whole experiment."""
+    """A whole experiment: its air, robots, links, and times."""
 
     title: str = ""
     pace: Literal["realtime", "lockstep"] = "realtime"
@@ -71,12 +71,12 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     @property
     def radios(self) -> dict[int, RadioParams]:
-        """Radio of each robot."""
+        """The radio of each robot, by its id."""
         return {robot.id: robot.radio for robot in self.robot}
 
     @property
     def until_s(self) -> float:
-        """When it is over."""
+        """When the experiment is over, in s of its time."""
         return self.duration_s + self.settle_s
 
     def in_reach(self, sender: int, receiver: int) -> bool:
@@ -87,7 +87,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
         return any(hop is not None and hop.snr_db > LEAST_SNR_DB for hop in hops)
 
     def world(self, outages: list[Outage]) -> World:
-        """Where everything is."""
+        """The world that says where everything is."""
         tracks = {
             robot.id: Track([(t, x, y) for t, x, y in robot.path])
             for robot in self.robot

@@ -14,7 +14,7 @@ FOLDERS = (
 
 
 def shipped_scenarios() -> dict[str, Path]:
-    """File by name."""
+    """The files of shipped scenarios, by name."""
     found = next((folder for folder in FOLDERS if folder.is_dir()), None)
     return {} if found is None else {path.stem: path for path in sorted(found.glob("*.toml"))}
 

@@ -21,7 +21,7 @@ LIVE = (
 
 
 def live_table(title: str, state: LabState) -> Group:
-    """A row a robot."""
+    """The table of a running experiment, a row for each robot."""
     table = FittedTable(title, LIVE)
     for snapshot in state.snapshots:
         table.add(*_live_row(snapshot, state.now_s))
@@ -83,7 +83,7 @@ def _receiver_table(report: LabReport) -> FittedTable:
 
 
 def _bars(pair: PairResult) -> str:
-    """Ten little columns."""
+    """A series as ten little columns."""
     shades = "▁▁▂▃▄▅▆▇█"
     return "".join(
         "·" if share is None else " " if not share else shades[min(8, int(share * 8 + 0.5))]

@@ -32,7 +32,7 @@ class ModemLink:
     """A PDU link over a radio: the PHY off the event loop, everything else on it.
 
     In lock-step all of it is done within the block that brought it. `listens`: somebody wants to
-    know whether there is a carrier on the air. `lead_grows`: whether, on a radio like that, bursts
+    know whether the channel is busy. `lead_grows`: whether, on a radio like that, bursts
     that must leave at a given moment are handed over earlier when the machine proves to be slow.
     `began_s`: the link's clock has run since then (monotonic); None: it begins with the samples.
     `load` compiles the PHY, or loads what is compiled.

@@ -1,4 +1,4 @@
-"""The receiver and the carrier sense, fed block by block."""
+"""The receiver and the energy detector, fed block by block."""
 
 from collections.abc import Sequence
 

@@ -35,7 +35,7 @@ def pdu_link_traits(
         stamp_s=STAMP_SAMPLES / params.rate_hz + can.index_error_s,
         lead_s=can.lead_s + can.turnaround_s + (HANDOVER_S if can.paced else 0.0),
         react_s=can.block_s + (REACTION_S if can.paced else 0.0),
-        # A carrier that begins within one window may show in the next one only.
+        # A burst that begins within one window may show in the next one only.
         detect_s=2 * phy.SENSE_WINDOW / params.rate_hz,
         overhead_s=airtimes.overhead_s,
         gap_s=GAP / params.rate_hz,

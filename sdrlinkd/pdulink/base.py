@@ -32,7 +32,7 @@ class PduListener(Protocol):
         """Let time come so far; called where time is that of the samples and nobody's clock."""
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
-        """The burst that the carrier shall send now; None: nothing, or not yet."""
+        """The burst that the PDU link shall send now; None: nothing, or not yet."""
 
     def next_wakeup(self, now: float) -> float:
         """When there may next be something to send; up to `now`: there is already."""

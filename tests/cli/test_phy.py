@@ -29,7 +29,7 @@ def ctl(capsys):
 def test_info_for_people_and_programs(ctl):
     code, out, _ = ctl("info", "--rate", "1e6", "--pdu-size", 220)
     assert code == 0
-    for part in ("1 Msps: 64 carriers 15.625 kHz apart", "16QAM 3/4", "64QAM 3/4", "3.55 ms"):
+    for part in ("1 Msps: 64 subcarriers 15.625 kHz apart", "16QAM 3/4", "64QAM 3/4", "3.55 ms"):
         assert part in out
     assert "bursts are looked for up to 196 kHz off: two crystals of ±40 ppm" in out
     code, out, _ = ctl("info", "--rate", "1e6", "--frequency", "5.9e9")
@@ -225,7 +225,7 @@ def test_recordings_on_any_grid(ctl, tmp_path, grid):
     code, _, _ = ctl("constellation", path, "--grid", grid, "--out", tmp_path / "points.png")
     assert (code, (tmp_path / "points.png").exists()) == (0, True)
     _, out, _ = ctl("info", "--grid", grid)
-    assert f"{grid.split('/')[0]} carriers" in out
+    assert f"{grid.split('/')[0]} subcarriers" in out
     code, _, err = ctl("decode", path, "--grid", "64/4")
     assert code != 0
     for part in ("--grid: got 64/4", "64/16, 64/8, 128/16, 256/32"):

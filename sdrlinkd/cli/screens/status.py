@@ -77,16 +77,18 @@ def verdict(snapshot: Snapshot, width: int, *, whole: bool = False) -> Text:
 
 def head(snapshot: Snapshot, width: int) -> list[Text]:
     """The lines below the verdict: robot, radio, air, and the two ledgers."""
-    carrier, link = snapshot.carrier, snapshot.link
+    pdu_link, link = snapshot.carrier, snapshot.link
     named = f" ({snapshot.namespace})" if snapshot.namespace else ""
     lag = f", loop lag {snapshot.loop_lag_ms:.1f} ms"
     robot = f"{snapshot.node}{named}, {snapshot.state}, up {duration(snapshot.uptime_s)}{lag}"
-    radio = f"{carrier.kind} {carrier.state}"
-    if carrier.state != "up" and carrier.since_s:
-        radio += f" since {duration(carrier.since_s)}"
-    radio += f" ({carrier.detail})" if carrier.detail else ""
-    if carrier.level_dbfs is not None:
-        radio += f"; level {decibels(carrier.level_dbfs)} dBFS, clipped {carrier.clipped_pct:.2f} %"
+    radio = f"{pdu_link.kind} {pdu_link.state}"
+    if pdu_link.state != "up" and pdu_link.since_s:
+        radio += f" since {duration(pdu_link.since_s)}"
+    radio += f" ({pdu_link.detail})" if pdu_link.detail else ""
+    if pdu_link.level_dbfs is not None:
+        radio += (
+            f"; level {decibels(pdu_link.level_dbfs)} dBFS, clipped {pdu_link.clipped_pct:.2f} %"
+        )
     air = f"sent {link.air_sent_pct:.1f} %, heard {link.air_heard_pct:.1f} %"
     air += f"; {link.access}" if link.access != "none" else ""
     air += f"; PDUs of {link.pdu_size} B"
@@ -105,7 +107,7 @@ def head(snapshot: Snapshot, width: int) -> list[Text]:
     )
     lines = (("robot", robot), ("radio", radio), ("air", air), ("out", out), ("in", into))
     texts = [_labelled(label, told, width) for label, told in lines]
-    if carrier.state != "up":
+    if pdu_link.state != "up":
         texts[1].stylize("red")
     return texts
 

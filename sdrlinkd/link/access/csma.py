@@ -16,7 +16,7 @@ from sdrlinkd.link.access.base import NEVER, BusyChannel, Slot, Wish, next_on_gr
 from sdrlinkd.link.access.steps import after
 from sdrlinkd.link.qos import Qos
 
-# Slots that a class lets pass after a carrier, and how much more eager than PERSIST it is.
+# Slots that a class lets pass on an idle channel, and how much more eager than PERSIST it is.
 WINDOWS = {
     Qos.URGENT: (0, 8.0),
     Qos.LATENCY: (1, 4.0),
