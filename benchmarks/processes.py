@@ -90,7 +90,7 @@ class Stolen:
         self._since = _ticks()
 
     def pct(self) -> float:
-        """Of all cores, so far."""
+        """Stolen time so far, in % of all cores."""
         stolen, total = (now - then for now, then in zip(_ticks(), self._since, strict=True))
         return 100 * stolen / max(1, total)
 
@@ -114,5 +114,5 @@ def busy_cores() -> Iterator[None]:
 
 
 def cores() -> list[int]:
-    """Those that we may use."""
+    """The processor cores that this process may use."""
     return sorted(os.sched_getaffinity(0))

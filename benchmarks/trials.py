@@ -66,7 +66,7 @@ def bursts(
 
 @dataclass(frozen=True)
 class ErrorRate:
-    """Of `n` trials, `errors` failed."""
+    """How many of `n` trials failed: `errors`."""
 
     n: int
     errors: int

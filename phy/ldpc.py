@@ -103,7 +103,7 @@ class Segmentation:
 
     @cached_property
     def arguments(self) -> ArgumentBlock[Form]:
-        """The same for the kernels."""
+        """The tables of this segmentation, as kernels take them."""
         code = self.code
         return ArgumentBlock(
             Form(

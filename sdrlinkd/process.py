@@ -86,7 +86,7 @@ class Process:
 
     @property
     def pid(self) -> int:
-        """Its number, once it is started."""
+        """The process number, once the process is started."""
         return self._started.pid
 
     @property

@@ -31,7 +31,7 @@ class HubWatch:
         self._context.destroy(linger=0)
 
     def ask(self) -> protocol.Answer:
-        """Its state. Raises BackendError when it does not answer."""
+        """The hub's state. Raises BackendError when it does not answer."""
         self._socket.send(protocol.encode(protocol.Question()))
         while self._socket.poll(self._timeout_ms):
             answer = protocol.from_hub(self._socket.recv_multipart()[0])

@@ -55,7 +55,7 @@ class _Stamped(Station):
 
 
 def airtime_s() -> float:
-    """Of a burst with one PDU."""
+    """The airtime of a burst with one PDU, in s."""
     modem = ModemParams(rate_hz=AIR.rate_hz, mcs=AIR.mcs, block_s=BLOCK_S)
     return Airtimes(modem, AIR.pdu_size).airtime_s(AIR.mcs, 1)
 

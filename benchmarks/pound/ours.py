@@ -108,7 +108,7 @@ def prepare(
     seed: int,
     policy: Callable[[Flow], TopicPolicy] = by_class,
 ) -> Experiment:
-    """The same, before it begins."""
+    """An experiment with all flows, before its time begins."""
     rng = np.random.default_rng(seed)
     names = [each.flow.name for each in sent]
     registry = make_registry([(name, "std_msgs/msg/UInt8MultiArray") for name in names])

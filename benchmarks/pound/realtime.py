@@ -52,7 +52,7 @@ def rows(seed: int, quick: bool) -> list[Row]:
 
 
 def _median_of(rows: Sequence[Row]) -> Row:
-    """Of the same row in several passes."""
+    """The median of one row over several passes."""
     values = [row.value for row in rows]
     note = "; ".join(filter(None, (row.note for row in rows)))
     if len(rows) > 1:

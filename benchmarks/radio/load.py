@@ -71,7 +71,7 @@ class Span:
         return 100 * (self.last.cpu_s[part] - self.first.cpu_s[part]) / self.seconds
 
     def link(self, way: str, name: str) -> int:
-        """The same of the link's."""
+        """What a counter of its link, such as `tx` `pdus_sent`, has grown by."""
         return int(self.last.status["link"][way][name] - self.first.status["link"][way][name])
 
 
@@ -87,7 +87,7 @@ def rows(seed: int, quick: bool) -> Iterator[Row]:
 
 
 def under_load(rate_hz: float, times: Times, seed: int) -> list[Span]:
-    """Of each robot. Raises PeerError."""
+    """The load of each robot. Raises PeerError."""
     with (
         pair("usrp", ["load"], CONFIG.format(rate=rate_hz), more=DEVICE) as robots,
         _busy(robots.folders, rate_hz, seed),

@@ -159,7 +159,7 @@ class Simulation:
         self._look(station, self._block(until_s))
 
     def _block(self, t: float) -> int:
-        """That at whose end `t` is past."""
+        """The number of the block at whose end `t` is past."""
         return math.ceil(t / self._block_s - ROUNDING)
 
     def _at(self, block: int, order: int, what: Callable[..., None], *arguments: object) -> None:

@@ -116,7 +116,7 @@ async def run(
     until_s: float,
     seed: int,
 ) -> list[Station]:
-    """All of it, up to `until_s`."""
+    """Stations with these arrivals on one air, after they have played up to `until_s`."""
 
     def make(node: int, radio: Radio) -> Station:
         return Station(node, radio, access, modem, pdu_size, arrivals[node], 100 * seed + node)
@@ -133,7 +133,10 @@ async def play(
     look: Callable[[Sequence[AnyStation]], None] = lambda _: None,
     looks_at_s: Iterable[float] = (),
 ) -> list[AnyStation]:
-    """The same with stations of one's own kind; `look` is called at the times `looks_at_s`."""
+    """Stations that `make` makes, after they have played up to `until_s` on one air.
+
+    `look` is called with all of them at the times `looks_at_s`.
+    """
     ether = LocalEther(air, radios, World(air, {}), seed)
     stations = [make(each, ether.radios[each]) for each in radios]
     for station in stations:

@@ -36,13 +36,13 @@ def options() -> argparse.Namespace:
 
 
 def burst_samples(pdu_size: int, samples: int) -> int:
-    """From one PDU to the next."""
+    """Samples from the begin of one PDU to that of the next."""
     around = len(PREAMBLE) + len(ACCESS_CODE) // 8 + LENGTH_BYTES + CRC_BYTES + len(POSTAMBLE)
     return 8 * samples * (around + pdu_size) + TAIL
 
 
 def always(octets: bytes) -> gr.basic_block:
-    """The same bytes for each frame."""
+    """A source that yields `octets` for each frame."""
     length = (0, pmt.intern(daemons.SENT), pmt.from_long(len(octets)), pmt.PMT_F)
     return blocks.vector_source_b(list(octets), True, 1, [gr.tag_utils.python_to_tag(length)])
 

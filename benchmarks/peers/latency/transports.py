@@ -8,7 +8,7 @@ from benchmarks.peers.latency.xrce import Xrce
 
 
 def open_transport(address: Address, side: str, size: int) -> Transport:
-    """`side` is "companion" or "fcu"; topics' payloads have `size` bytes."""
+    """A way for messages from `side`, "companion" or "fcu"; payloads have `size` bytes."""
     if address.transport == "local":
         return Local(int(address.place))
     if address.transport in ("direct", "ether"):
@@ -20,7 +20,7 @@ def open_transport(address: Address, side: str, size: int) -> Transport:
 
 
 def open_serial(address: Address, side: str, size: int) -> SerialPort:
-    """The same, of those that go over a serial line."""
+    """A transport over a serial line; see `open_transport`."""
     if address.transport == "mavlink":
         return SerialPort(address.place, Mavlink(side, size))
     return SerialPort(address.place, Xrce(side))

@@ -15,7 +15,7 @@ class End(NamedTuple):
 
 
 def no_line() -> list[float]:
-    """Of ways without an emulated line."""
+    """An emulated line that is none, for ways that need none."""
     return []
 
 

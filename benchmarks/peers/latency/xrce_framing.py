@@ -43,7 +43,7 @@ def crc16(data: bytes) -> int:
 
 
 def stuff(data: bytes) -> bytes:
-    """The same bytes escaped, so that none is 0x7E."""
+    """`data` escaped, so that no byte is 0x7E."""
     return data.replace(ESCAPE, b"\x7d\x5d").replace(BEGIN, b"\x7d\x5e")
 
 

@@ -18,7 +18,7 @@ class GnuRadio:
     name = "GNU Radio"
 
     def errors(self, bits: int, n_bytes: int, snr_db: float, n: int, seed: int) -> int:
-        """Of `n` frames, how many are not heard."""
+        """How many of `n` frames are not heard."""
         return int(self._run("errors", bits, n_bytes, snr_db, n, seed))
 
     def speed(self, bits: int, n_bytes: int, n: int, seed: int) -> tuple[float, float]:

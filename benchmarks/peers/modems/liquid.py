@@ -21,11 +21,11 @@ class Liquid:
     name = "liquid-dsp"
 
     def errors(self, code: str, bits: int, n_bytes: int, snr_db: float, n: int, seed: int) -> int:
-        """Of `n` frames, how many are not heard."""
+        """How many of `n` frames are not heard."""
         return int(self._run("errors", code, bits, n_bytes, snr_db, n, seed))
 
     def headers(self, snr_db: float, n: int, seed: int) -> int:
-        """Of `n` frames, how many headers are read."""
+        """How many headers of `n` frames are read."""
         return int(self._run("headers", snr_db, n, seed))
 
     def speed(self, code: str, bits: int, n_bytes: int) -> tuple[float, float]:

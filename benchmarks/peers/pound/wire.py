@@ -22,7 +22,7 @@ DATA0, DATAN = 0, 1
 NIMBRO = struct.Struct("<HH")
 """Fragment, message."""
 NIMBRO_FIRST = struct.Struct("<HH64s64s16sHH")
-"""The same, then topic, type, MD5, fragments that follow, flags."""
+"""Fragment, message, topic, type, MD5, fragments that follow, flags."""
 NIMBRO_DATAGRAM = 1500 - 20 - 8
 NIMBRO_TCP = struct.Struct("<HHI16sI")
 """Bytes of topic, of type, of data; MD5, flags."""

@@ -50,7 +50,7 @@ class TopicPolicy(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     queue_bytes: Amount = 0
     """Bytes that may wait; more, and the oldest goes; 0: as many as the queue holds."""
     queue_s: Annotated[float, Meta(ge=0)] = 0.0
-    """The same in seconds on the air; 0: no bound."""
+    """Seconds on the air of what may wait; more, and the oldest goes; 0: no bound."""
 
     @property
     def kept(self) -> int:
