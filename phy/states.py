@@ -73,7 +73,7 @@ NEXT: Mapping[tuple[State, Found], State] = {
 
 
 class IllegalStepError(Exception):
-    """A step that NEXT does not have: a bug of ours."""
+    """A step that NEXT does not have: a bug of ours, which ends the daemon."""
 
 
 def after(state: State, found: Found) -> State:

@@ -128,7 +128,11 @@ class Link:
         return fit
 
     def use(self, fit: Fit) -> None:
-        """Send and hear by a radio as `fit` says, from now on."""
+        """Send and hear by a radio as `fit` says, from now on.
+
+        `attach` makes it of the radio's traits; one with an access policy of one's own may be
+        given, too.
+        """
         if isinstance(self._scheduler, NoRadio):
             self._scheduler = BurstScheduler(
                 fit, self._outbox, self._composer, self._control_records, self._tx_delays,
@@ -147,6 +151,7 @@ class Link:
         burst = self._scheduler.next_burst(opportunity)
         if burst is not None and self._composer.asking:
             self._expect_receipts(burst.start)
+            self._tell_dropped()
         return burst
 
     def next_wakeup(self, now: float) -> float:
@@ -278,8 +283,7 @@ class Link:
         self._control_records.look_round(now, scheduler.record_pdu_s)
         self._tell_dropped()
         self._receipts.expire(now)
-        if self._why.is_due(now):
-            self._why.sample(now, len(self.registry), self._air_use)
+        self._why.sample(now, len(self.registry), scheduler, self._reception.heard_s)
         self._reporter.sample(now, scheduler)
 
     @property
@@ -361,7 +365,9 @@ class Link:
     def _record_heard(self, event: RecordHeard) -> None:
         src, record, at = event
         if isinstance(record, Clock):
-            self._clocks.hear(src, record, at)
+            # Who hears itself knows its own clock.
+            if src != self.own_id:
+                self._clocks.hear(src, record, at)
         elif isinstance(record, Receipt):
             self._receipts.hear(src, record, at)
         elif isinstance(record, Waits):
@@ -374,7 +380,7 @@ class Link:
         pdu, data, at, until, is_ours_too = event
         refused = self._intake.forward(pdu, data, at, until, self._scheduler.bytes_per_s)
         if refused and not is_ours_too:
-            self._reception.not_relayed()
+            self._reception.relay_refused()
         self._scheduler.more_to_send()
 
     def _refused(self, receipt: str, topic_id: int, reason: str, dst: int | None) -> None:

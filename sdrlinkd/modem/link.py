@@ -32,10 +32,9 @@ class ModemLink:
     """A PDU link over a radio: the PHY off the event loop, everything else on it.
 
     In lock-step all of it is done within the block that brought it. `listens`: somebody wants to
-    know whether the channel is busy. `lead_grows`: whether, on a radio like that, bursts
-    that must leave at a given moment are handed over earlier when the machine proves to be slow.
-    `began_s`: the link's clock has run since then (monotonic); None: it begins with the samples.
-    `load` compiles the PHY, or loads what is compiled.
+    know whether the channel is busy. `lead_grows`: whether, on such a radio, bursts of a fixed time
+    are handed over earlier when the machine proves to be slow. `began_s`: the link's clock has run
+    since then (monotonic); None: it begins with the samples. `load` compiles the PHY, or loads it.
     """
 
     def __init__(
@@ -79,10 +78,7 @@ class ModemLink:
         return self._clock.now(time.monotonic())
 
     async def open(self, listener: PduListener) -> None:
-        """Load the compiled code, open the radio and tell the listener what it is.
-
-        Raises LinkAbsentError, LinkRefusedError or UserError.
-        """
+        """Load the PHY, open the radio. Raises LinkAbsentError, LinkRefusedError or UserError."""
         params = self._params
         await self._load()
         tuning = Tuning(params.rate_hz, params.centre_hz)

@@ -165,7 +165,7 @@ def test_robots_that_came_to_different_policies_are_told():
         slots.beacon(2, 2.0)
     assert "robot 2 is heard and keeps no tdma schedule" in notices_of(slots)
     assert notices_of(slots, 70.0) == "", "it left, or was told"
-    slots.take_frame(2, Frame(2, 0, slots._schedule, 0), 1.0)
+    slots.take_frame(2, Frame(2, 0, slots._times_crc, 0), 1.0)
     assert notices_of(slots) == ""
     slots.take_frame(2, Frame(2, 0, 0x1234, 0), 2.0)
     assert "another tdma schedule" in notices_of(slots)

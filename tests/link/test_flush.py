@@ -221,3 +221,15 @@ EXEMPT = "; urgent, latency and messages with a lifespan do not wait"
 )
 def test_what_the_setting_means_in_words(flush_s, told):
     assert flush_told(flush_s) == f"link.flush_s = {told}"
+
+
+def test_what_waits_behind_the_rest_of_an_expired_message_goes_when_that_is_dropped():
+    """The one with a lifespan does not wait, and takes along what does."""
+    link = make_link(pdu_size=256, flush_s=0.0)
+    link.set_policies({0: TopicPolicy(lifespan_s=0.5), 1: TopicPolicy(qos="bulk")})
+    link.submit(0, bytes(600), 0.0)
+    link.confirm(compose(link, 0.1, 2), Outcome.SENT, 0.1)
+    link.submit(1, bytes(28), 0.2)
+    burst = compose(link, 0.6)
+    assert [message.topic_id for (message,) in burst.carried] == [1]
+    assert topic_of(link, 0).dropped == {"tx_expired": 1}

@@ -168,3 +168,12 @@ def test_a_stamp_that_goes_ahead_is_no_record_alone():
     burst = next_burst(link, 0.0)
     assert len(burst.pdus) == 2
     assert (burst.n_records, link.report(0.0).control_airtime_s) == (0, 0.0)
+
+
+def test_a_robot_that_hears_itself_does_not_follow_its_own_clock():
+    link = make_link(1, clock=ClockParams(), hears_self=True)
+    for src in (1, 2):
+        tell(link, src, Clock(7, 1, 1, 1), at=0.5)
+    clocks = {each.src: each.clock for each in link.report(1.0).neighbors}
+    assert clocks[1] is None
+    assert clocks[2] is not None

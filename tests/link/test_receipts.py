@@ -404,3 +404,12 @@ def test_what_parity_repairs_has_its_age():
     (heard,) = got
     assert heard.origin_at == pytest.approx(0.0, abs=1e-5)
     assert receiver.report(0.0).fragments_repaired >= 1
+
+
+def test_a_message_dropped_while_a_burst_is_composed_is_told_of_with_it():
+    link = make_link()
+    link.submit(0, message(1), 0.0, Overrides(receipt="old", dst=2, lifespan_s=0.1))
+    link.submit(0, message(2), 0.0, Overrides(receipt="new", dst=2))
+    assert next_burst(link, 0.2) is not None
+    (verdict,) = link.take_verdicts()
+    assert (verdict.receipt, verdict.fate) == ("old", "expired")

@@ -48,7 +48,7 @@ class Free(BusyChannel):
         return (1 - gaps) * (1 - listens)
 
     def sent(self, end: float, src: int | None) -> None:
-        """Forget it at once: on an air of our own, no burst of ours is in anybody's way."""
+        """Ignore it: nothing here depends on when our bursts end."""
 
     def heard(self, src: int, at: float, is_relayed: bool) -> None:
         """Remember that somebody else is on this air after all."""

@@ -9,7 +9,7 @@ H = TypeVar("H", bound=Enum)
 
 
 class IllegalStepError(Exception):
-    """A step that a policy's table does not have: a bug of ours."""
+    """A step that a policy's table does not have: a bug of ours, which ends the daemon."""
 
 
 def after(table: Mapping[tuple[S, H], S], state: S, happens: H) -> S:

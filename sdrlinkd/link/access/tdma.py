@@ -80,12 +80,12 @@ class Tdma(BusyChannel):
         self.step_s = reuse * minislot_s * len(nodes)
         # Micro-seconds are what travels.
         times = (round(1e6 * slot_s), round(1e6 * guard_s), round(1e6 * minislot_s) * reuse)
-        self._schedule = crc_hqx(pack(">III", *times) + bytes(nodes), 0)
+        self._times_crc = crc_hqx(pack(">III", *times) + bytes(nodes), 0)
         self._origin = 0.0
         self._root, self._level, self._parent = own_id, 0, own_id
         self._lost = (-1, 0, 0.0)
         """(root, level at which we followed it, until when it is not believed)."""
-        self.schedule = State.LISTENING
+        self.role = State.LISTENING
         """Whose schedule is kept."""
         self._told_at = 0.0
         self._begins_at = LISTEN_S + sum(node < own_id for node in nodes)
@@ -103,9 +103,9 @@ class Tdma(BusyChannel):
     def state(self) -> str:
         """Policy, times, and whose schedule is kept, for people."""
         doing = "listening for a schedule"
-        if self.schedule is not State.LISTENING:
+        if self.role is not State.LISTENING:
             doing = f"schedule of robot {self._root}"
-            if self.schedule is State.FOLLOWER:
+            if self.role is State.FOLLOWER:
                 doing += f", {self._level} hops away"
         return (
             f"tdma: {len(self._nodes)} slots of {self._slot_s * 1e3:.3g} ms, guard "
@@ -120,7 +120,7 @@ class Tdma(BusyChannel):
     def slot(self, wish: Wish) -> Slot | None:
         """In our own slot, or in one that nobody uses."""
         earliest, _, need_s, sensed = wish
-        if self.schedule is State.LISTENING:
+        if self.role is State.LISTENING:
             if earliest < self._begins_at and not self._is_first(earliest, sensed):
                 return None
             self._go(Happens.BEGINS)
@@ -162,16 +162,16 @@ class Tdma(BusyChannel):
 
     def frame(self, start: float) -> Frame | None:
         """The schedule as we keep it, for a burst that leaves at `start`; None while listening."""
-        if self.schedule is State.LISTENING:
+        if self.role is State.LISTENING:
             return None
         self._forget(start)
         phase_s = (start - self._origin) % self._frame_s
-        return Frame(self._root, self._level, self._schedule, round(1e6 * phase_s))
+        return Frame(self._root, self._level, self._times_crc, round(1e6 * phase_s))
 
     def take_frame(self, src: int, frame: Frame, at: float) -> None:
         """Follow the lowest root, by the fewest hops."""
         self._unscheduled.clear(src)
-        if frame.schedule != self._schedule:
+        if frame.schedule != self._times_crc:
             self._strangers.add(src, at)
             return
         self._strangers.clear(src)
@@ -182,7 +182,7 @@ class Tdma(BusyChannel):
             self._followed_at = at
         if frame.root >= self._own_id:
             # They will follow us; until then we go on where they are.
-            if self.schedule is State.LISTENING:
+            if self.role is State.LISTENING:
                 self._go(Happens.ADOPTS)
                 self._origin, self._followed_at = origin, at
             elif self._is_alone(at):
@@ -192,9 +192,7 @@ class Tdma(BusyChannel):
             # Somebody who has not forgotten it yet.
             return
         elif frame.level < MAX_LEVEL and (
-            src == self._parent
-            or told < (self._root, self._level)
-            or self.schedule is State.LISTENING
+            src == self._parent or told < (self._root, self._level) or self.role is State.LISTENING
         ):
             self._go(Happens.FOLLOWS)
             self._root, self._level, self._parent = *told, src
@@ -214,7 +212,7 @@ class Tdma(BusyChannel):
         ]
 
     def _go(self, happens: Happens) -> None:
-        self.schedule = after(STEPS, self.schedule, happens)
+        self.role = after(STEPS, self.role, happens)
 
     def _is_first(self, earliest: float, sensed: Sensed) -> bool:
         """Whether we are the lowest, and nobody seems to be there."""
@@ -223,7 +221,7 @@ class Tdma(BusyChannel):
 
     def _forget(self, now: float) -> None:
         """Go on by our own clock where nobody has heard our root for long."""
-        if self.schedule is State.FOLLOWER and now - self._told_at > FORGET_S:
+        if self.role is State.FOLLOWER and now - self._told_at > FORGET_S:
             self._go(Happens.LOSES)
             self._lost = (self._root, self._level, now + 2 * FORGET_S)
             self._root, self._level, self._parent = self._own_id, 0, self._own_id
@@ -231,7 +229,7 @@ class Tdma(BusyChannel):
 
     def _is_alone(self, now: float) -> bool:
         """Whether nobody keeps our schedule, nor we another's; a root is given some time."""
-        is_root = self.schedule is not State.FOLLOWER
+        is_root = self.role is not State.FOLLOWER
         return is_root and now - self._followed_at >= FORGET_S
 
     def _listens_through(self, begin: float, now: float) -> bool:

@@ -223,7 +223,10 @@ class Composer:
             return []
         level = self._outbox.levels[0]
         lane = level.lanes[0]
-        if len(level.lanes) > 1 or self._live(lane, start) is not lane.current:
+        head = lane.current
+        if head is None or len(level.lanes) > 1 or not self._single_entry.fills_some(head):
+            return []
+        if self._live(lane, start) is not head:
             return []
         built = self._single_entry.filled(lane, start, self._seq, most)
         self._seq = (self._seq + len(built)) & 0xFF
@@ -244,7 +247,10 @@ class Composer:
         return self._live(lane, start) if lane.head and lane.head.is_whole else None
 
     def _live(self, lane: Lane, start: float) -> Outgoing | None:
-        """The lane's next message that may still go."""
+        """The lane's next message that may still go.
+
+        That the head is no good is rare, so what follows from it is left to `HeadOfLine`.
+        """
         head = lane.current or (lane.waiting[0] if lane.waiting else None)
         if head is not None and head.in_vain(start, self._patience_s):
             return self._head_of_line.next_live(lane, start)

@@ -27,19 +27,21 @@ class SingleEntry:
         held_us = max(0, round(1e6 * (start - head.arrived_at)))
         return BuiltPdu(forwarded(head.payload, held_us, self._has_control), [head], head.qos)
 
+    def fills_some(self, head: Outgoing) -> bool:
+        """Whether the next fragment of `head` fills a PDU, and is not its last."""
+        # The last one is another matter: its age may be due, and there may be room.
+        return head.k == self._k and (len(head.payload) - 1) // self._k > head.next_index
+
     def filled(self, lane: Lane, start: float, seq: int, most: int) -> list[BuiltPdu]:
         """The next fragments, `most` or fewer, of the message that `lane` is in the middle of.
 
-        The lane has its level to itself. Empty where no fragment fills a PDU.
+        The lane has its level to itself, and the message some fragments that fill a PDU.
         """
         head, k = lane.current, self._k
-        if head is None or head.k != k:
+        if head is None:
             return []
         payload, first = head.payload, head.next_index
-        # The last one is another matter: its age may be due, and there may be room.
         n = min(most, (len(payload) - 1) // k - first)
-        if n < 1:
-            return []
         bits, qos = flags(WIRE_BITS[head.qos], head.is_compressed), head.qos
         built = [
             BuiltPdu(

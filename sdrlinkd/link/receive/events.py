@@ -1,4 +1,4 @@
-"""What receiving comes to, besides whole messages."""
+"""What receiving comes to: whole messages, and what else a PDU means to the link."""
 
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ class PduHeard(NamedTuple):
 
 
 class RecordHeard(NamedTuple):
-    """A control record that is not about messages came from `src` at `at`."""
+    """A control record that receiving itself has no use for came from `src` at `at`."""
 
     src: int
     record: Record
@@ -48,9 +48,9 @@ class Ended(NamedTuple):
 
 
 class PduToRelay(NamedTuple):
-    """A PDU for others is ours to forward; all its messages are worthless after `until`.
+    """A PDU is to be forwarded; all its messages are worthless after `until`.
 
-    `is_ours_too`: it is also for this robot.
+    `is_ours_too`: it is for this robot, as well as for others.
     """
 
     pdu: Pdu

@@ -61,9 +61,9 @@ class Reception:
         """Give up what has waited too long; the messages whose senders want to know of it."""
         return self._inbox.expire(now)
 
-    def not_relayed(self) -> None:
-        """Count the last PDU to be forwarded as one for others: the queue did not take it."""
-        self._ledger.not_relayed()
+    def relay_refused(self) -> None:
+        """Take one PDU back from rx_relayed to rx_not_for_us: the queue refused it."""
+        self._ledger.relay_refused()
 
     def deliver(self, message: Delivered, now: float) -> float | None:
         """Note that `message` is handed over at `now`; its age in s, None when unknown."""

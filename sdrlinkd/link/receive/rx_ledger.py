@@ -42,8 +42,8 @@ class RxLedger:
         """Count a PDU that ended under a reason of RX_PDU_REASONS."""
         self._pdus_dropped[reason] += 1
 
-    def not_relayed(self) -> None:
-        """Count the last PDU to be forwarded as one for others: the queue did not take it."""
+    def relay_refused(self) -> None:
+        """Take one PDU back from rx_relayed to rx_not_for_us: the queue refused it."""
         self._pdus_dropped["rx_relayed"] -= 1
         self._pdus_dropped["rx_not_for_us"] += 1
 

@@ -8,7 +8,7 @@ from sdrlinkd.link.access import idle_words
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue import TX_REASONS, Intake, Outbox, TopicPolicy
 from sdrlinkd.link.status.meters import RateMeter
-from sdrlinkd.link.transmit import TransmitReport
+from sdrlinkd.link.transmit import BurstScheduler, NoRadio, TransmitReport
 from sdrlinkd.wire import BROADCAST
 
 MINUTE_S = 60.0
@@ -42,14 +42,17 @@ class Why:
         self._began_at = float("inf")
         self._meter = RateMeter(MINUTE_S, STEP_S)
 
-    def is_due(self, now: float) -> bool:
-        """Whether the last sample is old enough for another."""
-        return self._meter.is_due(now)
+    def sample(
+        self, now: float, n_topics: int, scheduler: BurstScheduler | NoRadio, heard_s: float
+    ) -> None:
+        """Remember where all counters stand at `now`, if the last time is some seconds ago.
 
-    def sample(self, now: float, n_topics: int, air: AirUse) -> None:
-        """Remember where all counters stand at `now`."""
+        `heard_s` is the airtime of others' bursts so far.
+        """
         self._began_at = min(self._began_at, now)
-        self._meter.sample(self._counters(n_topics, air), now)
+        if self._meter.is_due(now):
+            air = AirUse(scheduler.report(), heard_s)
+            self._meter.sample(self._counters(n_topics, air), now)
 
     def explain(self, topic_id: int, name: str, told: Told, now: float, air: AirUse) -> list[str]:
         """What happens to a topic, in sentences for a person."""

@@ -20,6 +20,7 @@ class PaperClock:
 
     def __init__(self) -> None:
         self._filter = PaperFilter()
+        self._steps = 0
         self._came: tuple[float, float] | None = None
         self._went: tuple[float, float] | None = None
         self._trips_s: deque[float] = deque(maxlen=LATELY)
@@ -31,8 +32,8 @@ class PaperClock:
 
     @property
     def steps(self) -> int:
-        """Times that the filter began anew since its first sample."""
-        return self._filter.resets
+        """Times that the filter began anew by itself, over all boots of the other robot."""
+        return self._steps + self._filter.resets
 
     def heard(self, sent_there: float, came_here: float, airtime_s: float) -> None:
         """Take a burst of the other robot: its own time of sending, ours of hearing."""
@@ -58,6 +59,7 @@ class PaperClock:
 
     def forget(self) -> None:
         """Forget all samples: the other clock is another one now."""
+        self._steps = self.steps
         self._filter = PaperFilter()
         self._came = self._went = self.estimate = None
         self._trips_s.clear()

@@ -1,11 +1,12 @@
 """When control records go: in spare room, or in PDUs that take a bounded share of the air.
 
-Five kinds of them have one pace here: beacons (with digest, link reports and WAITS), the schedule
+Four kinds of them have one pace here: beacons (with digest, link reports and WAITS), the schedule
 of the access policy (FRAME), clocks (CLOCK), and RECEIPTs. Each is made when its time has come,
 rides where a broadcast PDU has room, and knows from when on it deserves a PDU of its own. That
-costs air which messages could have, and a half-duplex radio is deaf meanwhile. So CLOCK and RECEIPT
-together take no more than `clock.share` of it, all robots taken together: with n robots one has
-such a PDU every n · pdu_s / share at most.
+costs air which messages could have, and a half-duplex radio is deaf meanwhile. So PDUs with nothing
+but records take no more than `clock.share` of it, all robots taken together: with n robots, one has
+such a PDU every n · pdu_s / share at most. Beacons are held to that, too, unless rate control or a
+schedule lives on them.
 """
 
 from math import inf
@@ -53,7 +54,7 @@ class ControlRecords:
         if not self.fits:
             clocks.end()
         self.period_s = params.period_s
-        """Between PDUs of our own with nothing but CLOCK and RECEIPT, in s."""
+        """Between PDUs of our own with nothing but records, in s."""
         self.clock_waits = False
         """Whether a CLOCK waits for a burst."""
         self.receipts_untold = 0

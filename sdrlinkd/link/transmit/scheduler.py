@@ -226,17 +226,17 @@ class BurstScheduler:
         return TransmitReport(
             self._fit.settled,
             self.bytes_per_s,
-            self._used_s,
+            dict(self._used_s),
             self.airtime_s,
             self._control_airtime_s,
-            self._bursts_by_mcs,
+            dict(self._bursts_by_mcs),
             self._bursts_sent,
             self._bursts_failed,
             self._retry.count,
             self._pdus_sent,
             self._pdus_failed,
             rate.lowest if rate.adapts else None,
-            rate.changes,
+            tuple(rate.changes),
         )
 
     def _again(self, opportunity: Opportunity) -> Burst | None:
