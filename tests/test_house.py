@@ -107,3 +107,10 @@ def test_rooms_of_the_link_import_down_and_reach_into_nobody():
     assert (len(found.rooms), found.upward) == (14, [])
     chains, lines = deep_chains("sdrlinkd.link")
     assert 1000 * chains / lines < 3
+
+
+def test_tests_of_the_link_enter_by_a_door():
+    """So that the inside of a room can change without them."""
+    inside = re.compile(r"^\s*(?:from|import) sdrlinkd\.link\.\w+\.\w+", re.MULTILINE)
+    past = [path for path in sources("tests", "benchmarks") if inside.search(path.read_text())]
+    assert past == []

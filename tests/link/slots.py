@@ -2,7 +2,7 @@
 
 from random import Random
 
-from sdrlinkd.link.access.choice import CLOCK_ERROR_S
+from sdrlinkd.link.access import CLOCK_ERROR_S
 from tests.link.air import Air
 from tests.link.radios import params
 

@@ -6,11 +6,18 @@ import pytest
 
 from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import AccessParams, PduLinkTraits, Qos, RateParams, Sensed, check_access
-from sdrlinkd.link.access import Free, Wish, make_access
-from sdrlinkd.link.access.choice import CLOCK_ERROR_S, LONGEST_APART_S, LONGEST_ROUND_S, MARGIN_S
-from sdrlinkd.link.access.csma import Csma
-from sdrlinkd.link.access.minislot import MiniSlots
-from sdrlinkd.link.access.tdma import Tdma
+from sdrlinkd.link.access import (
+    CLOCK_ERROR_S,
+    LONGEST_APART_S,
+    LONGEST_ROUND_S,
+    MARGIN_S,
+    Csma,
+    Free,
+    MiniSlots,
+    Tdma,
+    Wish,
+    make_access,
+)
 from tests.link.radios import LOCKSTEP, PACED, params
 from tests.link.world import make_link
 

@@ -7,8 +7,8 @@ from statistics import mean
 import pytest
 
 from sdrlinkd.link import Qos, Sensed
-from sdrlinkd.link.access import Free, Slot, Wish
-from sdrlinkd.link.access.csma import WINDOWS, Csma
+from sdrlinkd.link.access import CSMA_WINDOWS as WINDOWS
+from sdrlinkd.link.access import Csma, Free, Slot, Wish
 from tests.link.air import Air
 from tests.link.radios import DETECT_S, LOCKSTEP, PACED, params
 

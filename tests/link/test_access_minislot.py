@@ -7,8 +7,7 @@ from random import Random
 import pytest
 
 from sdrlinkd.link import Qos, Sensed
-from sdrlinkd.link.access import Wish
-from sdrlinkd.link.access.minislot import LEVELS, MiniSlots
+from sdrlinkd.link.access import LEVELS, MiniSlots, Wish
 from tests.link.air import Air
 from tests.link.radios import DETECT_S, LOCKSTEP, PACED, params
 

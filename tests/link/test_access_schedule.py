@@ -5,8 +5,7 @@ from random import Random
 import pytest
 
 from sdrlinkd.link import Qos, Sensed
-from sdrlinkd.link.access import Wish, make_access
-from sdrlinkd.link.access.tdma import FORGET_S, LISTEN_S
+from sdrlinkd.link.access import FORGET_S, LISTEN_S, Wish, make_access
 from sdrlinkd.wire import Frame
 from tests.link.air import Air
 from tests.link.radios import LOCKSTEP, PACED, TX_WINDOWS, params

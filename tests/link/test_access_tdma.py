@@ -7,9 +7,7 @@ from random import Random
 import pytest
 
 from sdrlinkd.link import Qos, Sensed
-from sdrlinkd.link.access import Wish, make_access
-from sdrlinkd.link.access.choice import CLOCK_ERROR_S
-from sdrlinkd.link.access.tdma import FORGET_S
+from sdrlinkd.link.access import CLOCK_ERROR_S, FORGET_S, Wish, make_access
 from tests.link.radios import LOCKSTEP, PACED, params
 from tests.link.slots import LONGEST_S, SETTLED_S, lengths_s, make_air, places
 

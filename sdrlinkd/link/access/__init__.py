@@ -1,26 +1,50 @@
-"""Medium access: when a node may send on an air that it shares."""
+"""Medium access: when a node may send on an air that it shares.
+
+This room owns the access policies, each a state machine over the link's clock, and the choice of
+one that fits the radio. It never looks into a message, and decides nothing but the time.
+"""
 
 from sdrlinkd.link.access.auto import Settled, may_share, percent, settle
 from sdrlinkd.link.access.base import Access, Slot, Wish
-from sdrlinkd.link.access.choice import check_access, make_access
+from sdrlinkd.link.access.choice import (
+    CLOCK_ERROR_S,
+    LONGEST_APART_S,
+    LONGEST_ROUND_S,
+    MARGIN_S,
+    check_access,
+    make_access,
+)
 from sdrlinkd.link.access.csma import STEPS as CSMA_STEPS
+from sdrlinkd.link.access.csma import WINDOWS as CSMA_WINDOWS
+from sdrlinkd.link.access.csma import Csma
 from sdrlinkd.link.access.free import Free
 from sdrlinkd.link.access.idle import idle_words
-from sdrlinkd.link.access.minislot import MiniSlots
+from sdrlinkd.link.access.minislot import LEVELS, MiniSlots
 from sdrlinkd.link.access.params import AccessParams
 from sdrlinkd.link.access.steps import IllegalStepError, after
+from sdrlinkd.link.access.tdma import FORGET_S, LISTEN_S, Tdma
 from sdrlinkd.link.access.tdma_states import STEPS as TDMA_STEPS
 
 __all__ = [
+    "CLOCK_ERROR_S",
     "CSMA_STEPS",
+    "CSMA_WINDOWS",
+    "FORGET_S",
+    "LEVELS",
+    "LISTEN_S",
+    "LONGEST_APART_S",
+    "LONGEST_ROUND_S",
+    "MARGIN_S",
     "TDMA_STEPS",
     "Access",
     "AccessParams",
+    "Csma",
     "Free",
     "IllegalStepError",
     "MiniSlots",
     "Settled",
     "Slot",
+    "Tdma",
     "Wish",
     "after",
     "check_access",

@@ -1,4 +1,8 @@
-"""How long the next burst may be, and whether it had better wait."""
+"""How long the next burst may be, and whether it had better wait.
+
+This room owns the forecasts of what is due, the classes' caps and shares, and their credit. It
+knows no queue and no radio: what waits and what the air takes are arguments.
+"""
 
 from sdrlinkd.link.schedule.allowance import (
     IDLE_SHARE,

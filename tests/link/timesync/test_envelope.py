@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link import DualEnvelope
-from sdrlinkd.link.timesync.side import Side
+from sdrlinkd.link.timesync import Side
 from tests.laws import law
 
 SEED = 11
