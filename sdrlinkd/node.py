@@ -193,10 +193,10 @@ class Node:
         """Bring the PDU link up and let it run; for ever. Raises UserError."""
         waits = self._setup.config.waits_for_consumer
         while True:
-            await self._opening.until_up(self)
+            carry = await self._opening.until_up(self)
             if waits:
                 await self.bus.has_consumer.wait()
-            await self._opening.run()
+            await self._opening.run(carry)
 
     async def tick(self) -> None:
         """Let the link's time pass, and measure how late the event loop is; for ever."""

@@ -7,19 +7,21 @@ import asyncio
 import contextlib
 import time
 from collections.abc import Callable, Coroutine
+from typing import TypeVar
 
 from msgspec.structs import replace
 
 from backends import Patience
 from sdrlinkd.config import Config, Setup
 from sdrlinkd.errors import LinkAbsentError, LinkRefusedError, UserError
-from sdrlinkd.pdulink import PduLink, PduListener
+from sdrlinkd.pdulink import Carry, PduLink, PduListener
 from sdrlinkd.reports import PduLinkReport
 
 RETRY_S = 0.25, 2.0
 """Seconds after which what is not there is tried again: at first, and at most; twice each time."""
 BEING_OPENED = "it is being opened"
 
+T = TypeVar("T")
 Make = Callable[[Setup, Patience, float], PduLink]
 
 
@@ -62,10 +64,13 @@ class Opening:
         """Whether the PDU link carries PDUs now."""
         return self.is_up and self.pdu_link.report().state != "down"
 
-    async def until_up(self, listener: PduListener) -> None:
-        """Try until the PDU link is there. Raises UserError when a person has to mend something."""
+    async def until_up(self, listener: PduListener) -> Carry:
+        """Try until the PDU link is there; what carries PDUs then.
+
+        Raises UserError when a person has to mend something.
+        """
         wait_s, most_s = RETRY_S
-        while not self.is_up:
+        while True:
             is_first = self._patience is Patience.NONE
             if self._told_to.is_set():
                 # Whatever was found out meanwhile was of the settings before.
@@ -74,7 +79,7 @@ class Opening:
             try:
                 if not is_first:
                     await self._renew()
-                await self._unless_told(self.pdu_link.open(listener))
+                carry = await self._unless_told(self.pdu_link.open(listener))
             except LinkAbsentError as error:
                 self._wait("waiting", str(error), Patience.THERE, knows_when=True)
             except LinkRefusedError as error:
@@ -87,18 +92,19 @@ class Opening:
             else:
                 # Told to try again in the very moment that it opened: what is open has the old
                 # settings.
-                if not self._told_to.is_set():
+                if carry is not None and not self._told_to.is_set():
                     self.state, self.reason = "up", ""
+                    return carry
                 continue
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(wait_s if self._knows_when else None):
                     await self._told_to.wait()
             wait_s = min(2 * wait_s, most_s)
 
-    async def run(self) -> None:
+    async def run(self, carry: Carry) -> None:
         """Let the PDU link carry PDUs until it refuses, or is to be opened anew."""
         try:
-            await self._unless_told(self.pdu_link.run())
+            await self._unless_told(carry())
         except LinkRefusedError as error:
             self.refused(str(error))
 
@@ -139,8 +145,8 @@ class Opening:
         self.state, self.reason = state, reason
         self._patience, self._knows_when = patience, knows_when
 
-    async def _unless_told(self, work: Coroutine[object, object, None]) -> None:
-        """Do `work`, which is given up when told to try again. Raises what `work` raises."""
+    async def _unless_told(self, work: Coroutine[object, object, T]) -> T | None:
+        """Do `work`, which is given up when told to try again: None. Raises what `work` raises."""
         working = asyncio.ensure_future(work)
         told = asyncio.ensure_future(self._told_to.wait())
         try:
@@ -151,5 +157,4 @@ class Opening:
             if not working.done():
                 working.cancel()
                 await asyncio.wait((working,))
-        if not working.cancelled():
-            working.result()
+        return None if working.cancelled() else working.result()

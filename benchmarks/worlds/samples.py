@@ -64,7 +64,7 @@ class Station:
 
     async def open(self) -> None:
         """Open the radio of this robot."""
-        await self.modem.open(self)
+        self.carry = await self.modem.open(self)
 
     def attach(self, traits: PduLinkTraits) -> None:
         """Learn what the radio is, and tell the link."""
@@ -142,7 +142,7 @@ async def play(
     for station in stations:
         await station.open()
     async with asyncio.TaskGroup() as tasks:
-        running = [tasks.create_task(station.modem.run()) for station in stations]
+        running = [tasks.create_task(station.carry()) for station in stations]
         for at_s in looks_at_s:
             await ether.run(at_s)
             look(stations)

@@ -5,6 +5,7 @@ import contextlib
 import math
 import time
 from collections.abc import Awaitable, Callable, Sequence
+from functools import partial
 
 import phy
 from backends import AbsentError, BackendError, LateRadio, Radio, RefusalError, RxBlock, Tuning
@@ -20,7 +21,7 @@ from sdrlinkd.modem.rx_thread import Demodulation, ReceiverHere, ReceiverThread
 from sdrlinkd.modem.sensing_receiver import SensingReceiver
 from sdrlinkd.modem.traits import pdu_link_traits
 from sdrlinkd.modem.transmission import BurstReport, Transmission
-from sdrlinkd.pdulink import Heard, PduListener
+from sdrlinkd.pdulink import Carry, Heard, PduListener
 from sdrlinkd.reports import PduLinkReport
 
 TIMER_S = 0.001
@@ -77,7 +78,7 @@ class ModemLink:
         """Seconds on the received stream's clock."""
         return self._clock.now(time.monotonic())
 
-    async def open(self, listener: PduListener) -> None:
+    async def open(self, listener: PduListener) -> Carry:
         """Load the PHY, open the radio. Raises LinkAbsentError, LinkRefusedError or UserError."""
         params = self._params
         await self._load()
@@ -101,29 +102,28 @@ class ModemLink:
         self._plan = AirPlan(math.ceil(lead), round(ahead))
         if can.tx_windows is not None:
             self._plan = TxWindowPlan(math.ceil(lead), round(ahead), can.tx_windows, params.rate_hz)
+        rx: Demodulation
         if can.lockstep:
-            self._rx = ReceiverHere(self._receiving, params.rate_hz, self._step)
+            rx = ReceiverHere(self._receiving, params.rate_hz, self._step)
         else:
-            self._rx = ReceiverThread(
-                self._receiving, params.rate_hz, self._deliver, wakes=not can.paced
-            )
+            rx = ReceiverThread(self._receiving, params.rate_hz, self._deliver, not can.paced)
+        self._rx = rx
         try:
             listener.attach(traits)
         except ConfigError as error:
             raise LinkRefusedError(str(error)) from None
         self._listener = listener
         self._state = "up"
+        return partial(self._carry, rx)
 
-    async def run(self) -> None:
+    async def _carry(self, rx: Demodulation) -> None:
         """Receive, and send what is to be sent, until cancelled. Raises LinkRefusedError."""
-        if self._rx is None:
-            raise RuntimeError("run before open")
         refusal = ""
         async with asyncio.TaskGroup() as tasks:
             self._tx.start(tasks, self._left)
             sending = None if self._can.lockstep else tasks.create_task(self._send_when_due())
             try:
-                await self._receive(self._rx)
+                await self._receive(rx)
             except BackendError as error:
                 self._state, self._problem = "down", str(error)
                 refusal = str(error) if isinstance(error, RefusalError) else ""

@@ -1,12 +1,13 @@
 """PDU links: what carries PDUs between nodes, behind one seam; and the one without a radio."""
 
-from sdrlinkd.pdulink.base import Heard, PduLink, PduListener
+from sdrlinkd.pdulink.base import Carry, Heard, PduLink, PduListener
 from sdrlinkd.pdulink.direct import DirectLink
 from sdrlinkd.pdulink.gnuradio import GnuRadioLink, from_gnu_radio, make_gnuradio, to_gnu_radio
 from sdrlinkd.pdulink.impairment import Arrival, Impairment
 
 __all__ = [
     "Arrival",
+    "Carry",
     "DirectLink",
     "GnuRadioLink",
     "Heard",

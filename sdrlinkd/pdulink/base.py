@@ -1,6 +1,6 @@
 """The seam between the link and what carries its PDUs."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from typing import NamedTuple, Protocol
 
 from sdrlinkd.link import Burst, Opportunity, Outcome, PduLinkTraits
@@ -41,6 +41,10 @@ class PduListener(Protocol):
         """Take what became of a burst: its last bit left, or did not."""
 
 
+Carry = Callable[[], Coroutine[object, object, None]]
+"""Carries PDUs until cancelled. Raises LinkRefusedError when a radio refuses its settings."""
+
+
 class PduLink(Protocol):
     """Carries PDUs: the direct link, a modem with a radio, a GNU Radio flowgraph.
 
@@ -50,17 +54,11 @@ class PduLink(Protocol):
     def now(self) -> float:
         """Seconds on the link's clock."""
 
-    async def open(self, listener: PduListener) -> None:
-        """Begin to listen, and tell the listener what there is.
+    async def open(self, listener: PduListener) -> Carry:
+        """Begin to listen, and tell the listener what there is; what carries PDUs from now on.
 
         Raises LinkAbsentError or LinkRefusedError where another try may succeed, and UserError
         where a person has to mend something first. Then it can only be closed.
-        """
-
-    async def run(self) -> None:
-        """Carry PDUs until cancelled, in the daemon's task group.
-
-        Raises LinkRefusedError when it will not have us any more.
         """
 
     def wake(self) -> None:

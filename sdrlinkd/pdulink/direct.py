@@ -8,7 +8,7 @@ from random import Random
 
 from sdrlinkd.config import DirectParams
 from sdrlinkd.link import Burst, Opportunity, Outcome, PduLinkTraits
-from sdrlinkd.pdulink.base import Heard, PduListener
+from sdrlinkd.pdulink.base import Carry, Heard, PduListener
 from sdrlinkd.pdulink.bell import Bell
 from sdrlinkd.pdulink.impairment import Impairment
 from sdrlinkd.reports import PduLinkReport
@@ -36,16 +36,14 @@ class DirectLink:
         """Seconds of the monotonic clock: there are no samples to count."""
         return time.monotonic()
 
-    async def open(self, listener: PduListener) -> None:
+    async def open(self, listener: PduListener) -> Carry:
         """Attach the listener: there is nothing to open."""
         self._listener = listener
         listener.attach(PduLinkTraits())
+        return partial(self._carry, listener)
 
-    async def run(self) -> None:
+    async def _carry(self, listener: PduListener) -> None:
         """Ask for a burst when the one before has left, but never without a turn of the loop."""
-        listener = self._listener
-        if listener is None:
-            raise RuntimeError("run before open")
         while True:
             await asyncio.sleep(max(0.0, self._free_at - self.now()))
             self._bell.hush()

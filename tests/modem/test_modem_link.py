@@ -71,8 +71,8 @@ def send(modem, listener, bursts):
 async def running(config):
     modem, listener = make_modem(config, 1, Random(1)), Listener()
     listener.now = modem.now
-    await modem.open(listener)
-    task = asyncio.ensure_future(modem.run())
+    carry = await modem.open(listener)
+    task = asyncio.ensure_future(carry())
     try:
         yield modem, listener
     finally:

@@ -2,10 +2,11 @@
 
 import asyncio
 import time
+from functools import partial
 
 from sdrlinkd.config import GnuRadioParams
 from sdrlinkd.link import Burst, Opportunity, Outcome, PduLinkTraits
-from sdrlinkd.pdulink.base import Heard, PduListener
+from sdrlinkd.pdulink.base import Carry, Heard, PduListener
 from sdrlinkd.pdulink.bell import Bell
 from sdrlinkd.pdulink.gnuradio.transport import Transport
 from sdrlinkd.reports import PduLinkReport
@@ -36,7 +37,7 @@ class GnuRadioLink:
         """Seconds of the monotonic clock: there are no samples to count."""
         return time.monotonic()
 
-    async def open(self, listener: PduListener) -> None:
+    async def open(self, listener: PduListener) -> Carry:
         """Open the sockets. Raises UserError."""
         self._listener = listener
         await self._transport.open(self._heard)
@@ -46,12 +47,10 @@ class GnuRadioLink:
             pdu_burst_s=(airtime_s,), stamp_s=PACE_S + self._params.delay_s,
         )  # fmt: skip
         listener.attach(traits)
+        return partial(self._carry, listener)
 
-    async def run(self) -> None:
+    async def _carry(self, listener: PduListener) -> None:
         """Ask for a PDU when the one before is over and the flowgraph takes another."""
-        listener = self._listener
-        if listener is None:
-            raise RuntimeError("run before open")
         while True:
             await asyncio.sleep(max(0.0, self._free_at - self.now()))
             self._settle()
