@@ -94,6 +94,7 @@ def test_sample_by_sample_yields_the_same(seed, settings):
     assert counters == counted
 
 
+@pytest.mark.slow
 def test_one_cut_anywhere_yields_the_same():
     """Around a burst's start, its header and its end, and the ends of its PDUs."""
     rng = np.random.default_rng(2)

@@ -220,6 +220,7 @@ def test_the_fewest_and_shortest_codewords_are_taken():
     }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.soak
 @pytest.mark.parametrize(
     ("n_bytes", "rate", "ebn0_db"),

@@ -28,6 +28,8 @@ from phy.sequences import polarity
 from tests.phy.channels import assert_same, both_estimates, gains_of, in_tones, trained
 from tests.phy.signals import noise
 
+pytestmark = pytest.mark.slow  # together; each is quick
+
 SEED = 79
 
 every_grid = pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS)

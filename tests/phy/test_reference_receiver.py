@@ -30,6 +30,8 @@ from tests.phy.foreign import FOREIGN
 from tests.phy.signals import endings, heard, noise, noisy, payloads, silence, turned
 from tests.phy.test_chunking import chunk_sizes, make_stream, push_all
 
+pytestmark = pytest.mark.slow  # together; each is quick
+
 SEED = 73
 # What the product's own tests allow a start to be off.
 START = 1.01
