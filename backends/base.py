@@ -60,8 +60,8 @@ class Capabilities:
     before has been done. `block_s`: samples come in pieces of this length. `lead_s`: how long
     before its start a burst must be handed over. `turnaround_s`: for so long before and after a
     burst a half-duplex radio hears nothing. `index_error_s`: how wrong indices may be after a gap,
-    where there are no `timestamps`. `shares_air`: other robots may hear
-    what it sends. `tx_windows`: it sends in those.
+    where there are no `timestamps`. `shares_air`: other robots may hear what it sends.
+    `tx_windows`: it sends in those.
     """
 
     receives: bool

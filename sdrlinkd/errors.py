@@ -12,7 +12,7 @@
     ├── PduError             bytes a peer put on the air; counted by `reason`, never logged as ours
     └── EnvelopeError        a bus message that breaks the envelope; counted, the next one works
 
-Anything else that is raised is a bug of ours.
+Anything else that is raised is a bug of ours. One such bug has a name: IllegalStepError.
 """
 
 
@@ -66,3 +66,7 @@ class PduError(SdrlinkError):
 
 class EnvelopeError(SdrlinkError):
     """A bus message whose frames do not form an envelope (bus document, section 3)."""
+
+
+class IllegalStepError(Exception):
+    """A step that a state machine's table does not have: a bug of ours."""

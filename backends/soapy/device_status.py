@@ -43,6 +43,18 @@ class DeviceStatus:
         """Take what the process has counted; it counts from 0."""
         self._counted, self.notice = Counter(report.counters), report.notice
 
+    def waits(self, reason: str) -> None:
+        """Note what keeps the device from being opened; no reason: what is known already."""
+        self.waits_for = reason or self.waits_for
+
+    def waits_no_more(self) -> None:
+        """Note that opening it for the first time has ended."""
+        self.waits_for = ""
+
+    def came_back(self) -> None:
+        """Note that the device is there again."""
+        self.away = ""
+
     def went(self, reason: str) -> bool:
         """Note that the device is gone; False where that is known already."""
         if self.away:

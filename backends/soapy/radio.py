@@ -200,8 +200,8 @@ class SoapyRadio:
     def _opened(self, child: RadioChild) -> FromProcess | None:
         """How its opening ends; None: it hangs, or we close. What it waits for is our trouble."""
         while isinstance(answer := child.next_answer(OPEN_S, self._closing), Waiting):
-            self._status.waits_for = answer.reason or self._status.waits_for
-        self._status.waits_for = ""
+            self._status.waits(answer.reason)
+        self._status.waits_no_more()
         return answer
 
     def _end(self) -> None:
@@ -247,7 +247,8 @@ class SoapyRadio:
         self._went(child, how)
 
     def _came_back(self, child: RadioChild, found: DeviceInfo) -> None:
-        self._child, self._found, self._status.away = child, found, ""
+        self._child, self._found = child, found
+        self._status.came_back()
         if not self._closing.is_set():
             self._hear_from(child)
 

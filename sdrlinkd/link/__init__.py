@@ -4,7 +4,6 @@ from sdrlinkd.link.access import (
     AccessParams,
     Settled,
     check_access,
-    make_access,
     may_share,
     percent,
     settle,
@@ -14,7 +13,6 @@ from sdrlinkd.link.packing import flush_told
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
 from sdrlinkd.link.qos import (
     AS_CONFIGURED,
-    MAX_PRIORITY,
     QOS_BY_LABEL,
     Overrides,
     Qos,
@@ -25,7 +23,6 @@ from sdrlinkd.link.queue import (
     RX_REASONS,
     TX_REASONS,
     Deflated,
-    Lifespan,
     Lives,
     Outbox,
     Outgoing,
@@ -46,12 +43,10 @@ from sdrlinkd.link.schedule import (
     ClassParams,
     DefaultParams,
     LatencyParams,
-    UrgentParams,
 )
 from sdrlinkd.link.status import Told
 from sdrlinkd.link.timesync import (
     ClockParams,
-    Clocks,
     DualEnvelope,
     Estimate,
     PaperFilter,
@@ -59,14 +54,13 @@ from sdrlinkd.link.timesync import (
     Wall,
 )
 from sdrlinkd.link.traits import Opportunity, PduLinkTraits, Sensed
-from sdrlinkd.link.transmit import Burst, Fit, Outcome, RateChange, RateControl, RateParams
+from sdrlinkd.link.transmit import Burst, Fit, Outcome, RateControl, RateParams
 
 __all__ = [
     "AS_CONFIGURED",
     "CDR_HEADER_SIZE",
     "DEFAULT_POLICY",
     "IDLE_SHARE",
-    "MAX_PRIORITY",
     "OVERRUN",
     "QOS_BY_LABEL",
     "RX_PDU_REASONS",
@@ -80,7 +74,6 @@ __all__ = [
     "ClassParams",
     "ClassesParams",
     "ClockParams",
-    "Clocks",
     "DefaultParams",
     "Deflated",
     "Delivered",
@@ -88,7 +81,6 @@ __all__ = [
     "Estimate",
     "Fit",
     "LatencyParams",
-    "Lifespan",
     "Link",
     "LinkParams",
     "Lives",
@@ -102,7 +94,6 @@ __all__ = [
     "PduLinkTraits",
     "Qos",
     "QueueParams",
-    "RateChange",
     "RateControl",
     "RateParams",
     "ReassemblyParams",
@@ -113,13 +104,11 @@ __all__ = [
     "State",
     "Told",
     "TopicPolicy",
-    "UrgentParams",
     "Verdict",
     "Wall",
     "check_access",
     "flush_told",
     "lifespan_of",
-    "make_access",
     "may_share",
     "percent",
     "settle",

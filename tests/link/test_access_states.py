@@ -5,11 +5,11 @@ from random import Random
 
 import pytest
 
+from sdrlinkd.errors import IllegalStepError
 from sdrlinkd.link import AccessParams, Qos, Sensed
 from sdrlinkd.link.access import (
     CSMA_STEPS,
     TDMA_STEPS,
-    IllegalStepError,
     Wish,
     after,
     make_access,

@@ -5,12 +5,12 @@ from math import inf
 
 import pytest
 
+from sdrlinkd.errors import IllegalStepError
 from sdrlinkd.link import LinkParams, Lives, Outbox, Qos, QueueParams
 from sdrlinkd.link.queue import (
     DEFAULT_POLICY,
     STEPS,
     Fate,
-    IllegalStepError,
     Intake,
     Outgoing,
     Step,

@@ -21,7 +21,7 @@ from sdrlinkd.link.access.free import Free
 from sdrlinkd.link.access.idle import idle_words
 from sdrlinkd.link.access.minislot import LEVELS, MiniSlots
 from sdrlinkd.link.access.params import AccessParams
-from sdrlinkd.link.access.steps import IllegalStepError, after
+from sdrlinkd.link.access.steps import after
 from sdrlinkd.link.access.tdma import FORGET_S, LISTEN_S, Tdma
 from sdrlinkd.link.access.tdma_states import STEPS as TDMA_STEPS
 
@@ -40,7 +40,6 @@ __all__ = [
     "AccessParams",
     "Csma",
     "Free",
-    "IllegalStepError",
     "MiniSlots",
     "Settled",
     "Slot",

@@ -4,12 +4,10 @@ from collections.abc import Mapping
 from enum import Enum
 from typing import TypeVar
 
+from sdrlinkd.errors import IllegalStepError
+
 S = TypeVar("S", bound=Enum)
 H = TypeVar("H", bound=Enum)
-
-
-class IllegalStepError(Exception):
-    """A step that a policy's table does not have: a bug of ours, which ends the daemon."""
 
 
 def after(table: Mapping[tuple[S, H], S], state: S, happens: H) -> S:

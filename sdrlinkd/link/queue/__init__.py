@@ -17,7 +17,7 @@ from sdrlinkd.link.queue.ledger import (
     balance,
 )
 from sdrlinkd.link.queue.lifespan import Lifespan, lifespan_of
-from sdrlinkd.link.queue.lives import IllegalStepError, Lives
+from sdrlinkd.link.queue.lives import Lives
 from sdrlinkd.link.queue.message import (
     STEPS,
     Fate,
@@ -39,7 +39,6 @@ __all__ = [
     "TX_REASONS",
     "Deflated",
     "Fate",
-    "IllegalStepError",
     "Inflated",
     "Intake",
     "Kept",

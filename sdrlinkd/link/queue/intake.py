@@ -77,8 +77,7 @@ class Intake:
         lifespan_s = overrides.lifespan_s or self.lifespan(topic_id, overrides.qos).seconds
         if at + lifespan_s <= now:
             return
-        topic.tally.accepted += 1
-        topic.tally.reoffered += 1
+        topic.tally.accept_again()
         self._enqueue(topic_id, payload, at, now, overrides._replace(dst=dst), bytes_per_s)
 
     def forward(
@@ -89,7 +88,7 @@ class Intake:
         It has the highest priority of the topics inside. None, or why it was refused.
         """
         tally = self._relayed
-        tally.accepted += 1
+        tally.accept()
         known = [each.topic_id for each in pdu.entries if each.topic_id < len(self._topics)]
         priority = max((self._topics[each].priority for each in known), default=0)
         message = Outgoing(
@@ -101,7 +100,7 @@ class Intake:
     def refuse(self, reason: str, topic_id: int | None = None) -> None:
         """Count a message that the bus could not hand over."""
         tally = self._refused if topic_id is None else self._topics[topic_id].tally
-        tally.accepted += 1
+        tally.accept()
         tally.drop(reason)
 
     def begin_anew(self) -> None:

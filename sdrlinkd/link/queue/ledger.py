@@ -75,10 +75,15 @@ class TxTally:
     """Of those accepted: sent again to robots that came late."""
     dropped: Counter[str] = field(default_factory=Counter)
 
-    def accept(self, n_bytes: int) -> None:
-        """Count one message that came."""
+    def accept(self, n_bytes: int = 0) -> None:
+        """Count one message that came; `n_bytes` from a producer."""
         self.accepted += 1
         self.accepted_bytes += n_bytes
+
+    def accept_again(self) -> None:
+        """Count one message that is sent again to robots that came late."""
+        self.accepted += 1
+        self.reoffered += 1
 
     def send(self, n_bytes: int) -> None:
         """Count one message as sent."""
@@ -97,6 +102,15 @@ class RxTally:
     delivered: int = 0
     delivered_bytes: int = 0
     dropped: Counter[str] = field(default_factory=Counter)
+
+    def deliver(self, n_bytes: int) -> None:
+        """Count one message as handed over."""
+        self.delivered += 1
+        self.delivered_bytes += n_bytes
+
+    def drop(self, reason: str) -> None:
+        """Count one message as dropped."""
+        self.dropped[reason] += 1
 
 
 def balance(name: str, entered: int, parts: dict[str, int]) -> list[str]:

@@ -3,11 +3,8 @@
 from collections.abc import Iterable
 from typing import ClassVar
 
+from sdrlinkd.errors import IllegalStepError
 from sdrlinkd.link.queue.message import Fate, Outgoing, Step
-
-
-class IllegalStepError(Exception):
-    """A step that STEPS does not have: a bug of ours."""
 
 
 class Lives:

@@ -47,9 +47,9 @@ class Outgoing:
 
     __slots__ = (
         "arrived_at", "dst", "entry_id", "expires_at", "fate", "is_compressed", "is_expected",
-        "is_held",
-        "is_whole", "k", "lane", "last_at", "next_index", "parity", "payload", "priority", "qos",
-        "receipt", "rests_id", "stamped", "tally", "topic_id", "total", "unconfirmed",
+        "is_held", "is_whole", "k", "lane", "last_at", "next_index", "parity", "payload",
+        "priority", "qos", "receipt", "rests_id", "stamped", "tally", "topic_id", "total",
+        "unconfirmed",
     )  # fmt: skip
 
     def __init__(

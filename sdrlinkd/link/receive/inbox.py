@@ -104,12 +104,11 @@ class Inbox:
         neighbor.heard_at(at)
         _, seq, crc = lasting_identity(data) if stamps else identity(data)
         if not neighbor.track.heard(seq, crc):
-            neighbor.duplicates += 1
+            neighbor.count_duplicate()
             return self._drop("rx_dup", events)
-        neighbor.heard += 1
+        neighbor.count_new(pdu.hop)
         if control.n_bad:
             self._ledger.skip_records(control.n_bad)
-        neighbor.hops_left = pdu.hop
         if not is_relayed:
             neighbor.note_snr(snr_db)
         for stamp in stamps:
@@ -130,7 +129,7 @@ class Inbox:
                     neighbor.track.restart(seq, crc)
                     self._announce(pdu.src, at, events)
             elif isinstance(record, RegistryDigest):
-                neighbor.digest = record
+                neighbor.take_digest(record)
             elif isinstance(record, Receipt):
                 if pdu.dst == self._own_id or record.node == self._own_id:
                     events.append(RecordHeard(pdu.src, record, at))
@@ -229,10 +228,9 @@ class Inbox:
                 ended = reason or DELIVERED
                 events.append(Ended(src, topic_id, entry.entry_id, ended, age_s, now))
             if reason is not None:
-                tally.dropped[reason] += 1
+                tally.drop(reason)
                 continue
-            tally.delivered += 1
-            tally.delivered_bytes += len(payload)
+            tally.deliver(len(payload))
             events.append(
                 Delivered(
                     src, topic_id, payload, tally.delivered, neighbor.track.lost,
@@ -245,6 +243,6 @@ class Inbox:
 
     def _note_lost(self, now: float, events: list[Event]) -> None:
         for src, topic_id, entry_id, reason in self._reassembly.take_lost():
-            self._ledger.tally(src, topic_id).dropped[reason] += 1
+            self._ledger.tally(src, topic_id).drop(reason)
             if self._ages.take(src, topic_id, entry_id).asks:
                 events.append(Ended(src, topic_id, entry_id, reason, None, now))

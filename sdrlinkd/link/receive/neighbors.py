@@ -43,6 +43,15 @@ class Neighbor:
             self.usual_gap_s = max(gap_s, GAP_DECAY * self.usual_gap_s)
         self.last_heard_at = at
 
+    def count_new(self, hops_left: int) -> None:
+        """Count one PDU that was not heard before."""
+        self.heard += 1
+        self.hops_left = hops_left
+
+    def count_duplicate(self) -> None:
+        """Count one PDU that was heard before."""
+        self.duplicates += 1
+
     def note_snr(self, snr_db: float | None) -> None:
         """Note the SNR of one more PDU, in dB."""
         self.snr_db = snr_db
@@ -66,6 +75,10 @@ class Neighbor:
         self.boot_id = beacon.boot_id
         self.reboots += rebooted
         return rebooted
+
+    def take_digest(self, digest: RegistryDigest) -> None:
+        """Note which registry it has."""
+        self.digest = digest
 
     def disagreement(self, registry: Registry, own: RegistryDigest) -> str | None:
         """In words, where this neighbor's registry differs from ours; None when it does not."""

@@ -84,8 +84,8 @@ class Why:
         return lines
 
     def _treatment(self, name: str, policy: TopicPolicy, told: Told, topic_id: int) -> str:
-        state_dst = self._intake.destination(topic_id)
-        to = "everyone" if state_dst == BROADCAST else f"robot {state_dst}"
+        dst = self._intake.destination(topic_id)
+        to = "everyone" if dst == BROADCAST else f"robot {dst}"
         line = f"{name}: class {policy.qos}, priority {policy.priority}, to {to}"
         lifespan = self._intake.lifespan(topic_id)
         if lifespan.source:
