@@ -44,11 +44,12 @@ def free_ports():
     return find
 
 
-def on_samples(robot, ends, pattern="push", form="cf32_le"):
-    """GNU Radio is the air."""
+def on_samples(robot, ends, pattern="push", form="cf32_le", paced=False):
+    """GNU Radio is the air. Unpaced, a flowgraph that stalls is waited for, however long."""
     return (
         f'namespace = "robot_{robot}"\nbackend = "zmq"\n[zmq]\nsend = "{ends[0]}"\n'
         f'receive = "{ends[1]}"\npattern = "{pattern}"\nformat = "{form}"\n'
+        f"paced = {str(paced).lower()}\n"
         f"[modem]\nrate_hz = 1e6\n[link]\npdu_size = {PDU}\nbeacon_s = 0\n[clock]\nperiod_s = 0\n"
     )
 
@@ -122,6 +123,26 @@ def test_gnu_radio_as_the_air(start_daemon, endpoints, pattern, form, sample):
     assert heard == [bodies, bodies]
     for robot in robots:
         assert robot.snapshot().carrier.counters["bad_messages"] == 0
+
+
+def test_what_gnu_radio_loses_in_real_time_has_a_name(start_daemon, endpoints):
+    one, two = endpoints
+    with flowgraph("channel", "--node", *one, "--node", *two, "--rate", 1e6, "--snr-db", 25):
+        robots = [
+            start_daemon(on_samples(1, one, paced=True)),
+            start_daemon(on_samples(2, two, paced=True)),
+        ]
+        bodies, heard = exchange(robots)
+        counters = [robot.snapshot().carrier.counters for robot in robots]
+    for got in heard:
+        assert got == [body for body in bodies if body in set(got)]
+    # A stall of the machine is an outage of the flowgraph's, or samples that came too fast.
+    stalled = any(
+        each[name]
+        for each in counters
+        for name in ("outages", "skips", "late", "samples_lost")
+    )
+    assert stalled or heard == [bodies, bodies], counters
 
 
 @pytest.mark.parametrize("phy", ["ofdm_phy", "gfsk_phy"])
