@@ -26,6 +26,7 @@ from backends.base import (
     TxReport,
     TxWindows,
 )
+from backends.hub_address import HubAddress, hub_at, hub_in
 from backends.late import LateRadio
 from backends.outstanding import GAP
 from backends.params import EtherParams, IqFileParams, LoopbackParams, ZmqParams
@@ -93,6 +94,7 @@ __all__ = [
     "EtherRadio",
     "Hear",
     "Hop",
+    "HubAddress",
     "HubWatch",
     "IqFileParams",
     "IqFileRadio",
@@ -134,6 +136,8 @@ __all__ = [
     "describe",
     "driver_of",
     "find_backend",
+    "hub_at",
+    "hub_in",
     "installed_names",
     "lockstep_capabilities",
     "open_endpoint",

@@ -1,10 +1,14 @@
 """What is known of radios without a device from their settings alone: nothing is opened here."""
 
 from backends.backend import ModemNeeds, Presumption, simulated
+from backends.base import BackendError
+from backends.hub_address import hub_at
 from backends.params import EtherParams, IqFileParams, ZmqParams
 
 ETHER_LEAD_S = 0.002
 """From the event loop to the hub, on a busy machine."""
+ETHER_REMOTE_LEAD_S = 0.02
+"""The same over a network: a round trip on a busy wireless one."""
 ETHER_TURNAROUND_S = 1e-4
 
 
@@ -32,29 +36,38 @@ def iqfile_unchecked(iqfile: IqFileParams) -> list[str]:
 
 def ether_problem(ether: EtherParams, _needs: ModemNeeds) -> str:
     """What is wrong with [ether]: key, given, allowed; empty: nothing."""
-    if ether.dir:
+    if ether.dir and ether.hub:
+        return f'ether.hub: got "{ether.hub}" beside ether.dir; allowed: one of the two'
+    if ether.hub:
+        try:
+            hub_at(ether.hub, "ether.hub")
+        except BackendError as error:
+            return str(error)
+    if ether.dir or ether.hub:
         return ""
     return (
         'ether.dir: got ""; allowed with backend = "ether": the folder of a hub, as in '
-        "sdrlink-ether --dir FOLDER"
+        "sdrlink-ether --dir FOLDER, or ether.hub with HOST:PORT of one on another computer"
     )
 
 
 def ether_unchecked(ether: EtherParams) -> list[str]:
     """What of [ether] nobody can know before the hub is asked."""
-    return [f"whether a hub answers in {ether.dir} (nobody is asked)"]
+    where = f"at {ether.hub}" if ether.hub else f"in {ether.dir}"
+    return [f"whether a hub answers {where} (nobody is asked)"]
 
 
 def ether_presumption(
-    _ether: EtherParams, needs: ModemNeeds, turnaround_s: float | None
+    ether: EtherParams, needs: ModemNeeds, turnaround_s: float | None
 ) -> Presumption:
     """Presume of a radio on the ether: its hub says what it is like, once it is asked."""
+    lead_s = ETHER_REMOTE_LEAD_S if ether.hub else ETHER_LEAD_S
     turn_s = ETHER_TURNAROUND_S if turnaround_s is None else turnaround_s
     told = (
         f"ether: taken for half duplex, turnaround {1e3 * turn_s:g} ms, in blocks of "
         f"{1e3 * needs.block_s:g} ms: the hub tells when the daemon is there"
     )
-    return Presumption(simulated(needs, turn_s, ETHER_LEAD_S), told, is_sure=False)
+    return Presumption(simulated(needs, turn_s, lead_s), told, is_sure=False)
 
 
 def zmq_problem(zmq: ZmqParams, _needs: ModemNeeds) -> str:

@@ -36,7 +36,9 @@ class EtherParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """A radio on the simulated air of an `sdrlink-ether` hub."""
 
     dir: str = ""
-    """Folder of the hub's sockets."""
+    """Folder of the hub's sockets, for a hub on this computer: `sdrlink-ether --dir FOLDER`."""
+    hub: str = ""
+    """HOST:PORT of a hub on another computer, instead of `dir`: `sdrlink-ether --listen`."""
 
 
 class ZmqParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

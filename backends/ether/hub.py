@@ -13,6 +13,7 @@ from backends.ether import protocol
 from backends.ether.medium import Medium, Piece
 from backends.ether.sockets import HubSockets
 from backends.ether.world import AirParams, RadioParams, World
+from backends.hub_address import HubAddress
 
 # A hub that is late makes fewer, longer stretches.
 MAX_LATE_BLOCKS = 8
@@ -36,7 +37,7 @@ class _Member:
 
 
 class EtherHub:
-    """Sockets in `directory`. `radios` are those expected; others get a default one.
+    """Sockets in `directory`, and at `listen`; `radios` are expected, others get a default one.
 
     Paced by the clock; or in lock-step: it begins when all expected are there, each step waits for
     everybody, and it stops at `until_s`.
@@ -52,6 +53,7 @@ class EtherHub:
         paced: bool = True,
         until_s: float = float("inf"),
         seed: int = 0,
+        listen: HubAddress | None = None,
     ) -> None:
         self._air = air
         self._radios = radios
@@ -71,7 +73,7 @@ class EtherHub:
         self._began = 0.0
         self._samples_lost = 0
         self._is_stopped = False
-        self._sockets = HubSockets(directory)
+        self._sockets = HubSockets(directory, listen)
 
     def stop(self) -> None:
         """End `run`; may be called from a signal handler."""

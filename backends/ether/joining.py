@@ -3,13 +3,13 @@
 import contextlib
 import threading
 import time
-from pathlib import Path
 
 import zmq
 
 from backends.base import AbsentError, RefusalError
 from backends.ether import protocol
 from backends.ether.sockets import NOBLOCK
+from backends.hub_address import HubAddress
 
 LOOK_MS = 100
 AGAIN_S = 0.5
@@ -18,7 +18,7 @@ AGAIN_S = 0.5
 def join(
     down: "zmq.Socket[bytes]",
     hello: protocol.Hello,
-    directory: Path,
+    hub: HubAddress,
     within_s: float,
     is_over: threading.Event,
 ) -> protocol.Welcome:
@@ -42,9 +42,7 @@ def join(
         elif time.monotonic() - asked_at >= AGAIN_S:
             asked_at = time.monotonic()
             _say(down, protocol.Question())
-    raise AbsentError(
-        f"{directory}: no hub answers there; start one: sdrlink-ether --dir {directory}"
-    )
+    raise AbsentError(f"{hub.name}: no hub answers there; start one: {hub.start}")
 
 
 def _say(down: "zmq.Socket[bytes]", message: protocol.Hello | protocol.Question) -> None:

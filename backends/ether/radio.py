@@ -3,9 +3,9 @@
 import asyncio
 import contextlib
 import threading
+import time
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable
-from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
@@ -30,9 +30,11 @@ from backends.ether.antenna import Antenna
 from backends.ether.downlink import Downlink
 from backends.ether.joining import join
 from backends.ether.medium import LEAD, Piece
-from backends.ether.sockets import AIR, NOBLOCK, SKY, connect
+from backends.ether.remote_clock import RemoteClock
+from backends.ether.sockets import NOBLOCK, connect
 from backends.feed import BlockFeed, Fed
-from backends.known import ETHER_LEAD_S
+from backends.hub_address import HubAddress
+from backends.known import ETHER_LEAD_S, ETHER_REMOTE_LEAD_S
 from backends.outstanding import answered
 
 ANSWER_MS = 5000
@@ -50,16 +52,17 @@ class _Beside(NamedTuple):
 
 
 class EtherRadio:
-    """Joins the hub whose sockets are in `directory` as robot `node`; `who` names it to people.
+    """Joins the hub at `hub` as robot `node`; `who` names it to people.
 
     When the hub goes away, the stream stands still until it is back; then what it missed is a gap.
     `patience`: of `open`, where there is no hub.
     """
 
     def __init__(
-        self, directory: Path, node: int, who: str, patience: Patience = Patience.NONE
+        self, hub: HubAddress, node: int, who: str, patience: Patience = Patience.NONE
     ) -> None:
-        self._directory = directory
+        self._hub = hub
+        self._clock = RemoteClock() if hub.is_remote else None
         self._waits = patience is not Patience.NONE
         self._node = node
         self._who = who
@@ -85,7 +88,8 @@ class EtherRadio:
     def capabilities(self) -> Capabilities:
         """What this radio can do, as the hub says."""
         paced = self._welcome.paced
-        lead_s = ETHER_LEAD_S if paced else LEAD / self._tuning.rate_hz
+        own_s = ETHER_REMOTE_LEAD_S if self._hub.is_remote else ETHER_LEAD_S
+        lead_s = own_s if paced else LEAD / self._tuning.rate_hz
         return self._joined.capabilities(paced, lead_s, self._welcome.block_s)
 
     @property
@@ -109,9 +113,9 @@ class EtherRadio:
     async def open(self, tuning: Tuning) -> None:
         """Join. Raises BackendError, also when the hub refuses."""
         self._tuning = tuning
-        self._down = connect(self._context, zmq.DEALER, self._directory / AIR)
+        self._down = connect(self._context, zmq.DEALER, self._hub.air)
         self._downlink = Downlink(self._down)
-        self._up = connect(self._context, zmq.PUSH, self._directory / SKY)
+        self._up = connect(self._context, zmq.PUSH, self._hub.sky)
         self._is_idle.clear()
         await asyncio.to_thread(self._ask)
         self._down.setsockopt(zmq.RCVTIMEO, QUIET_MS)
@@ -202,9 +206,7 @@ class EtherRadio:
         """The first time, before there are blocks; in a thread."""
         within_s = INFINITE if self._waits else 1e-3 * ANSWER_MS
         try:
-            self._welcome = join(
-                self._down, self._hello(), self._directory, within_s, self._closing
-            )
+            self._welcome = join(self._down, self._hello(), self._hub, within_s, self._closing)
             self._is_welcome = True
         finally:
             self._is_idle.set()
@@ -263,6 +265,7 @@ class EtherRadio:
     def _receive(self, message: protocol.Stretch, samples: Samples | None) -> RxBlock:
         antenna = self._joined
         self._last_host_ns = message.host_ns
+        at_ns = self._here_ns(message.host_ns)
         self._notice = message.notice or self._notice
         if message.lost:
             self.counters["overflows"] += 1
@@ -270,10 +273,10 @@ class EtherRadio:
             lost = message.lost + message.n
             self.counters["samples_lost"] += lost
             self._beside.append(_Beside(message.placed, message.step))
-            return antenna.miss(lost, "the daemon was too slow", message.host_ns)
+            return antenna.miss(lost, "the daemon was too slow", at_ns)
         piece = Piece(message.n, samples, message.is_deaf)
         self._beside.append(_Beside(message.placed, message.step))
-        return antenna.receive(piece, message.host_ns)
+        return antenna.receive(piece, at_ns)
 
     def _look_for_hub(self) -> None:
         """Nothing came for a while: in lock-step others may be slow, else the hub is gone."""
@@ -292,4 +295,8 @@ class EtherRadio:
         self._beside.append(_Beside([], 0, welcome))
         self._last_host_ns = now_ns
         n = max(1, round(away_s * self._tuning.rate_hz))
-        return self._joined.rejoin(n, "the hub was away", now_ns)
+        return self._joined.rejoin(n, "the hub was away", self._here_ns(now_ns))
+
+    def _here_ns(self, hub_ns: int) -> int:
+        """Our monotonic time of a moment that the hub tells by its own."""
+        return hub_ns if self._clock is None else self._clock.local_ns(hub_ns, time.monotonic_ns())

@@ -11,19 +11,21 @@ import zmq
 
 from backends.base import BackendError, Samples
 from backends.ether import protocol
+from backends.hub_address import HubAddress, hub_in
 
 # As numbers: as enumerations, they cost as much as a short message.
 NOBLOCK, MORE, _EVENTS, _POLLIN = (
     int(zmq.NOBLOCK), int(zmq.SNDMORE), int(zmq.EVENTS), int(zmq.POLLIN),
 )  # fmt: skip
-AIR, SKY = "air.sock", "sky.sock"
 # Stretches that may wait for a radio; half a second of blocks.
 WAITING = 500
 RECONNECT_MS = 500
+LONGEST_MESSAGE = 1 << 26
+"""Bytes of a message that a listening hub takes: eight million samples."""
 
 
 def connect(
-    context: "zmq.Context[zmq.Socket[bytes]]", kind: int, path: Path
+    context: "zmq.Context[zmq.Socket[bytes]]", kind: int, endpoint: str
 ) -> "zmq.Socket[bytes]":
     """A radio's socket to its hub. Raises BackendError."""
     socket = context.socket(kind)
@@ -31,24 +33,29 @@ def connect(
     socket.setsockopt(zmq.RCVHWM, WAITING)
     socket.setsockopt(zmq.RECONNECT_IVL_MAX, RECONNECT_MS)
     try:
-        socket.connect(f"ipc://{path}")
+        socket.connect(endpoint)
     except zmq.ZMQError as error:
-        raise BackendError(f"{path}: cannot be reached ({error.strerror})") from None
+        shown = endpoint.removeprefix("ipc://")
+        raise BackendError(f"{shown}: cannot be reached ({error.strerror})") from None
     return socket
 
 
 class HubSockets:
     """`air` (ROUTER) answers and hands out, `sky` (PULL) takes what radios send.
 
-    Raises BackendError when the folder cannot be had.
+    With `listen` they can also be reached from other computers, by anybody who reaches the port.
+    Raises BackendError when the folder or the port cannot be had.
     """
 
-    def __init__(self, directory: Path) -> None:
-        self._directory = directory
+    def __init__(self, directory: Path, listen: HubAddress | None = None) -> None:
+        self._here = hub_in(directory)
         self._lock = _locked(directory)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._air = self._bind(zmq.ROUTER, AIR)
-        self._sky = self._bind(zmq.PULL, SKY)
+        self._air = self._bind(zmq.ROUTER, self._here.air)
+        self._sky = self._bind(zmq.PULL, self._here.sky)
+        if listen is not None:
+            self._listen(self._air, listen.air)
+            self._listen(self._sky, listen.sky)
         self._poller = zmq.Poller()
         for each in (self._air, self._sky):
             self._poller.register(each, zmq.POLLIN)
@@ -90,23 +97,27 @@ class HubSockets:
     def close(self) -> None:
         """Close the sockets and free the folder."""
         self._context.destroy(linger=100)
-        for name in (AIR, SKY):
-            (self._directory / name).unlink(missing_ok=True)
+        for endpoint in (self._here.air, self._here.sky):
+            Path(endpoint.removeprefix("ipc://")).unlink(missing_ok=True)
         self._lock.close()
 
-    def _bind(self, kind: int, name: str) -> "zmq.Socket[bytes]":
+    def _bind(self, kind: int, endpoint: str) -> "zmq.Socket[bytes]":
         socket = self._context.socket(kind)
         if kind == zmq.ROUTER:
             socket.setsockopt(zmq.ROUTER_MANDATORY, 1)
         socket.setsockopt(zmq.SNDHWM, WAITING)
         socket.setsockopt(zmq.LINGER, 0)
-        path = self._directory / name
+        socket.setsockopt(zmq.MAXMSGSIZE, LONGEST_MESSAGE)
+        self._listen(socket, endpoint)
+        return socket
+
+    def _listen(self, socket: "zmq.Socket[bytes]", endpoint: str) -> None:
         try:
-            socket.bind(f"ipc://{path}")
+            socket.bind(endpoint)
         except zmq.ZMQError as error:
             self.close()
-            raise BackendError(f"{path}: the hub's socket cannot be opened ({error})") from None
-        return socket
+            shown = endpoint.removeprefix("ipc://")
+            raise BackendError(f"{shown}: the hub's socket cannot be opened ({error})") from None
 
 
 def is_readable(socket: "zmq.Socket[bytes]") -> bool:

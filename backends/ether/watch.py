@@ -7,7 +7,7 @@ import zmq
 
 from backends.base import BackendError
 from backends.ether import protocol
-from backends.ether.sockets import AIR
+from backends.hub_address import hub_in
 
 
 class HubWatch:
@@ -19,10 +19,10 @@ class HubWatch:
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
         self._socket = self._context.socket(zmq.DEALER)
         try:
-            self._socket.connect(f"ipc://{directory / AIR}")
+            self._socket.connect(hub_in(directory).air)
         except zmq.ZMQError as error:
             self._context.destroy(linger=0)
-            raise BackendError(f"{directory / AIR}: cannot be reached ({error.strerror})") from None
+            raise BackendError(f"{directory}: cannot be reached ({error.strerror})") from None
 
     def __enter__(self) -> Self:
         return self

@@ -33,6 +33,13 @@ def ether(
     directory: Annotated[
         Path, typer.Option("--dir", help="Folder for the hub's sockets; daemons name it, too.")
     ] = DEFAULT_DIRECTORY,
+    listen: Annotated[
+        str,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="Serve other computers, too: 0.0.0.0:47900. Whoever reaches the port may join.",
+        ),
+    ] = "",
     traces: Annotated[
         Path | None, typer.Option(help="Folder of the logs that a scenario replays.")
     ] = None,
@@ -50,13 +57,16 @@ def ether(
         scenario = find_scenario(scenario)
         chosen = chosen_scenario(scenario, seed, duration, pace)
     compile_first(Console(stderr=True))
-    hub = make_hub(chosen, directory, traces)
+    hub = make_hub(chosen, directory, traces, listen)
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: hub.stop())
+    also = f", and at {listen}" if listen else ""
     title = "all hear all at 20 dB"
     if chosen is not None and scenario is not None:
         title = chosen.title or scenario.stem
-    hub.run(lambda: typer.echo(f"sdrlink-ether {__version__}: {title}; sockets in {directory}"))
+    hub.run(
+        lambda: typer.echo(f"sdrlink-ether {__version__}: {title}; sockets in {directory}{also}")
+    )
 
 
 def main() -> None:

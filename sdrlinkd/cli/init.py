@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from backends import BackendError, hub_at
 from sdrlinkd.cli.app import RuntimeDir, app, connect
 from sdrlinkd.cli.questions import Questions
 from sdrlinkd.errors import UserError
@@ -59,6 +60,13 @@ def init(
     device: Annotated[
         str, typer.Option(metavar="ARGS", help='As soapy.device, such as "driver=hackrf".')
     ] = "",
+    hub: Annotated[
+        str,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="With --radio ether: one computer a robot; this is the hub's address.",
+        ),
+    ] = "",
     out: Annotated[Path, typer.Option(help="Folder to write to.")] = Path(),
     force: Annotated[bool, typer.Option("--force", help="Replace files.")] = False,
     runtime_dir: RuntimeDir = None,
@@ -77,14 +85,25 @@ def init(
         device = questions.device(device, preset) if preset.is_real else ""
         ids = questions.own_ids(own, count)
         found = _topics(questions, topic or [], bag, from_graph=from_graph)
+        if hub:
+            _check_hub(hub, preset)
         air, sockets = (out / "air").absolute(), _socket_folder()
-        team = Team(preset, count, frequency, device, found, air, sockets)
+        team = Team(preset, count, frequency, device, found, air, sockets, hub)
         files = {name: text.encode() for name, text in team_files(team, ids).items()}
     _write(files, out, force)
     console = Console(soft_wrap=True, highlight=False, markup=False)
     console.print(f"wrote {', '.join(str(out / name) for name in files)}")
-    for line in _next(files, out, None if from_daemon else preset):
+    for line in _next(files, out, None if from_daemon else preset, hub):
         console.print(line)
+
+
+def _check_hub(hub: str, preset: RadioPreset) -> None:
+    if preset.backend != "ether":
+        raise UserError(f"--hub: got {hub}; allowed with --radio ether only")
+    try:
+        hub_at(hub, "--hub")
+    except BackendError as error:
+        raise UserError(str(error)) from None
 
 
 def _topics(
@@ -189,11 +208,11 @@ def _try_out(files: dict[str, bytes], out: Path) -> None:
                 make_setup(parse_config(files[name].decode(), str(out / name)), Path(trial))
 
 
-def _next(files: dict[str, bytes], out: Path, preset: RadioPreset | None) -> list[str]:
+def _next(files: dict[str, bytes], out: Path, preset: RadioPreset | None, hub: str) -> list[str]:
     """Lines on what to type next; `preset` is None where nobody says which radio it is."""
     configs = [out / name for name in files if name.endswith(".toml")]
     is_real = preset is not None and preset.is_real
-    is_here = len(configs) > 1 and not is_real
+    is_here = len(configs) > 1 and not is_real and not hub
     lines = ["next:", f"  sdrlinkd --check --config {configs[0]}"]
     if is_real:
         lines += [
@@ -201,7 +220,8 @@ def _next(files: dict[str, bytes], out: Path, preset: RadioPreset | None) -> lis
             "  put 60 dB of attenuation between the radios; then set tx_enabled = true in the file",
         ]
     if preset is not None and preset.backend == "ether":
-        lines.append(f"  sdrlink-ether --dir {out / 'air'} &")
+        where = f"--listen 0.0.0.0:{hub.rpartition(':')[2]}" if hub else f"--dir {out / 'air'}"
+        lines.append(f"  sdrlink-ether {where} &")
     behind = " &" if is_here else ""
     lines += [f"  sdrlinkd --config {each}{behind}" for each in configs[: None if is_here else 1]]
     if len(configs) > 1 and not is_here:

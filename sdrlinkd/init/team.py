@@ -25,6 +25,8 @@ class Team(NamedTuple):
     """Folder of the hub, for a simulated air."""
     sockets: Path
     """Folder of the daemons' sockets, where several run on one computer."""
+    hub: str = ""
+    """HOST:PORT of a hub that robots on other computers reach; empty: all are on this one."""
 
 
 def team_files(team: Team, ids: list[int]) -> dict[str, str]:
@@ -59,12 +61,18 @@ def _config(team: Team, number: int, has_neighbors: bool) -> str:
             + "".join(_line(*each) for each in radio.soapy)
         )
     if radio.backend == "ether":
-        parts.append("[ether]\n" + _text("dir", str(team.air), "sdrlink-ether --dir serves it"))
+        parts.append("[ether]\n" + _hub(team))
     if radio.shares_air and team.robots > 1:
         parts.append(_access(team))
-    if has_neighbors and not radio.is_real:
+    if has_neighbors and not radio.is_real and not team.hub:
         parts.append("[bus]\n" + _text("runtime_dir", str(team.sockets / name)))
     return "\n".join(parts)
+
+
+def _hub(team: Team) -> str:
+    if team.hub:
+        return _text("hub", team.hub, "sdrlink-ether --listen serves it")
+    return _text("dir", str(team.air), "sdrlink-ether --dir serves it")
 
 
 def _head(team: Team, number: int) -> str:

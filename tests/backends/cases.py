@@ -10,7 +10,7 @@ import pytest
 from backends import IqFileRadio, LoopbackRadio, Radio, RadioParams, SoapyRadio, SoapySettings
 from backends.ether.medium import NOISE_DBFS
 from tests.backends.echo import ZmqEcho
-from tests.backends.hubs import SNR_DB, RadioOnHub
+from tests.backends.hubs import SNR_DB, RadioOnHub, free_hub_port
 from tests.backends.radios import AIR, BLOCK_S, PLAYED, N, heard, read, record
 from tests.soapy_loopback import missing
 
@@ -88,12 +88,12 @@ def iqfile(name, receives, transmits, paced=False):
     return Case(name, make, receives, transmits, paced, plays=receives)
 
 
-def ether(name, paced, full_duplex):
+def ether(name, paced, full_duplex, is_remote=False):
     turnaround_s = 0.0 if full_duplex else TURNAROUND_S
     params = RadioParams(full_duplex=full_duplex, turnaround_s=turnaround_s)
     return Case(
         name,
-        lambda folder: RadioOnHub(folder, params, paced),
+        lambda folder: RadioOnHub(folder, params, paced, free_hub_port() if is_remote else None),
         paced=paced,
         lockstep=not paced,
         full_duplex=full_duplex,
@@ -139,6 +139,8 @@ RADIOS = (
     ether("ether-half-duplex", paced=True, full_duplex=False),
     ether("ether-lockstep", paced=False, full_duplex=True),
     ether("ether-lockstep-half-duplex", paced=False, full_duplex=False),
+    ether("ether-remote", paced=True, full_duplex=False, is_remote=True),
+    ether("ether-remote-lockstep", paced=False, full_duplex=True, is_remote=True),
     soapy("soapy", stamps=True),
     zmq("zmq-push", "push"),
     zmq("zmq-req", "req"),

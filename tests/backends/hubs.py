@@ -2,15 +2,26 @@
 
 import asyncio
 import contextlib
+import socket
 import threading
 
 import msgspec
 import numpy as np
 import zmq
 
-from backends import AirParams, EtherHub, EtherRadio, HubWatch, RadioParams, Tuning, World
+from backends import (
+    AirParams,
+    EtherHub,
+    EtherRadio,
+    HubWatch,
+    RadioParams,
+    Tuning,
+    World,
+    hub_at,
+    hub_in,
+)
 from backends.ether import protocol
-from backends.ether.sockets import AIR, SKY
+from backends.hub_address import AIR, SKY
 from tests.backends.radios import BLOCK_S, RATE, TUNING, opened, record
 from tests.waiting import wait_for
 
@@ -26,12 +37,13 @@ def hub_air(**params):
 
 
 @contextlib.contextmanager
-def serving(folder, radios=(), paced=True, seed=0, until_s=np.inf, **air):
+def serving(folder, radios=(), paced=True, seed=0, until_s=np.inf, listen=None, **air):
     """A hub that serves the folder; stopped at the end."""
     shared = hub_air(**air)
     hub = EtherHub(
-        folder, shared, World(shared, {}), dict(radios), paced=paced, seed=seed, until_s=until_s
-    )
+        folder, shared, World(shared, {}), dict(radios), paced=paced, seed=seed, until_s=until_s,
+        listen=listen,
+    )  # fmt: skip
     ready = threading.Event()
     thread = threading.Thread(target=hub.run, args=(ready.set,), name="hub", daemon=True)
     thread.start()
@@ -143,7 +155,7 @@ class Listener:
 
     async def _listen(self):
         async with opened(
-            EtherRadio(self._folder, LISTENER, "the listener"), self._tuning
+            EtherRadio(hub_in(self._folder), LISTENER, "the listener"), self._tuning
         ) as radio:
             self._joined.set()
             async for block in radio.blocks():
@@ -157,11 +169,23 @@ class Listener:
                     return
 
 
+def free_hub_port():
+    """An address on which nobody listens, nor on the port after it."""
+    while True:
+        with socket.socket() as one, socket.socket() as next_one:
+            one.bind(("127.0.0.1", 0))
+            port = one.getsockname()[1]
+            with contextlib.suppress(OSError, OverflowError):
+                next_one.bind(("127.0.0.1", port + 1))
+                return hub_at(f"127.0.0.1:{port}", "test")
+
+
 class RadioOnHub(EtherRadio):
     """Brings a hub of its own when it is opened; what has left is recorded in the file `sent`."""
 
-    def __init__(self, folder, params, paced):
-        super().__init__(folder / "air", NODE, "the radio under test")
+    def __init__(self, folder, params, paced, hub=None):
+        super().__init__(hub or hub_in(folder / "air"), NODE, "the radio under test")
+        self._folder = folder / "air"
         self._sent = folder / "sent"
         self._stack = contextlib.ExitStack()
         self._listener = None
@@ -171,8 +195,10 @@ class RadioOnHub(EtherRadio):
     async def open(self, tuning):
         """The hub, the listener, the radio."""
         radios = {NODE: self._params, LISTENER: RadioParams()}
-        hub = self._stack.enter_context(serving(self._directory, radios, self._paced))
-        self._listener = Listener(self._directory)
+        listen = self._hub if self._hub.is_remote else None
+        served = serving(self._folder, radios, self._paced, listen=listen)
+        hub = self._stack.enter_context(served)
+        self._listener = Listener(self._folder)
         await super().open(tuning)
         began_s, listens_s = (hub._medium.time(node, 0) for node in (NODE, LISTENER))
         self._first = round((began_s - listens_s) * tuning.rate_hz)

@@ -17,9 +17,10 @@ from backends import (
     Tuning,
     TxBurst,
     World,
+    hub_in,
 )
 from backends.ether import protocol
-from backends.ether.sockets import AIR, SKY
+from backends.hub_address import AIR, SKY
 from tests.backends.hubs import RawRadio, ask, hub_air, serving, until
 from tests.backends.radios import (
     RATE,
@@ -40,15 +41,15 @@ TOO_LONG = "x" * 120
 async def refusal(folder, node=1, tuning=TUNING):
     """Why a radio may not join."""
     with pytest.raises(BackendError) as refused:
-        async with opened(EtherRadio(folder, node, "somebody else"), tuning):
+        async with opened(EtherRadio(hub_in(folder), node, "somebody else"), tuning):
             pass
     return str(refused.value)
 
 
 async def test_radios_join_hear_each_other_and_leave(tmp_path):
     with serving(tmp_path) as hub:
-        async with opened(EtherRadio(tmp_path, 7, "the seventh")) as one:
-            async with opened(EtherRadio(tmp_path, 9, "the ninth")) as other:
+        async with opened(EtherRadio(hub_in(tmp_path), 7, "the seventh")) as one:
+            async with opened(EtherRadio(hub_in(tmp_path), 9, "the ninth")) as other:
                 assert ask(tmp_path).nodes == {7: "the seventh", 9: "the ninth"}
                 begins_s = [hub._medium.time(node, 0) for node in (7, 9)]
                 burst = TxBurst(10_000, noise(300))
@@ -71,14 +72,14 @@ async def test_a_radio_is_what_the_hub_says_it_is(tmp_path):
         )
     }
     with serving(tmp_path, radios, block_s=0.004):
-        async with opened(EtherRadio(tmp_path, 1, "")) as one:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as one:
             can = one.capabilities
             assert not can.full_duplex
             assert not can.timestamps
             assert (can.turnaround_s, can.index_error_s) == (0.0005, 0.0002)
             assert (can.paced, can.lockstep, can.block_s) == (True, False, 0.004)
             assert "0.1 Msps" in one.detail
-        async with opened(EtherRadio(tmp_path, 200, "")) as other:
+        async with opened(EtherRadio(hub_in(tmp_path), 200, "")) as other:
             assert other.capabilities.full_duplex, "one that it knows nothing of"
 
 
@@ -111,7 +112,7 @@ async def test_another_rate_or_frequency_is_refused_with_that_of_the_air(tmp_pat
 
 async def test_a_second_robot_of_one_id_is_refused_and_the_first_is_told(tmp_path):
     with serving(tmp_path):
-        async with opened(EtherRadio(tmp_path, 1, "process 17 on earth")) as first:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "process 17 on earth")) as first:
             blocks = first.blocks()
             taken = await take(blocks, N)
             reason = await refusal(tmp_path)
@@ -128,13 +129,13 @@ async def test_a_second_robot_of_one_id_is_refused_and_the_first_is_told(tmp_pat
 async def test_an_id_is_free_when_its_robot_is_gone(tmp_path):
     """With Bye or without."""
     with serving(tmp_path):
-        async with opened(EtherRadio(tmp_path, 1, "the first")):
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "the first")):
             pass
         raw = RawRadio(tmp_path)
         await until(lambda: ask(tmp_path).nodes == {})
         raw.join(1)
         raw.vanish()
-        async with opened(EtherRadio(tmp_path, 1, "the last")) as radio:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "the last")) as radio:
             assert ask(tmp_path).nodes == {1: "the last"}
             assert len(await take(radio.blocks(), 5 * N)) >= 1
 
@@ -143,7 +144,7 @@ async def test_closing_does_not_hold_up_the_event_loop(tmp_path, monkeypatch):
     """However long a radio would wait for its hub."""
     monkeypatch.setattr("backends.ether.radio.QUIET_MS", 3000)
     with serving(tmp_path):
-        async with opened(EtherRadio(tmp_path, 1, "")) as radio:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio:
             await take(radio.blocks(), N)
             began_s = time.monotonic()
             await radio.close()
@@ -161,7 +162,7 @@ async def test_without_a_hub_a_radio_says_how_to_start_one(tmp_path, monkeypatch
 
 async def test_a_radio_that_finds_no_hub_waits_until_there_is_one(tmp_path):
     """Within its patience."""
-    radio = EtherRadio(tmp_path, 1, "the early one")
+    radio = EtherRadio(hub_in(tmp_path), 1, "the early one")
     opening = asyncio.ensure_future(radio.open(TUNING))
     await until(lambda: hasattr(radio, "_down"))
     assert radio.detail == "no hub yet"
@@ -175,7 +176,7 @@ async def test_a_folder_has_one_hub(tmp_path):
     with serving(tmp_path):
         with pytest.raises(BackendError, match="another hub serves this folder; stop it, or name"):
             EtherHub(tmp_path, hub_air(), World(hub_air(), {}), {})
-        async with opened(EtherRadio(tmp_path, 1, "")) as radio:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio:
             assert len(await take(radio.blocks(), 5 * N)) >= 1, "the first goes on"
     assert not (tmp_path / AIR).exists()
     assert not (tmp_path / SKY).exists()
@@ -214,7 +215,7 @@ def test_a_watch_whose_folder_has_too_long_a_name_says_so(tmp_path):
 
 async def test_whoever_watches_is_told_how_it_goes(tmp_path):
     with serving(tmp_path):
-        async with opened(EtherRadio(tmp_path, 3, "robot three")) as radio:
+        async with opened(EtherRadio(hub_in(tmp_path), 3, "robot three")) as radio:
             late = TxBurst(0, noise(10), latest=0)
             await send(radio, radio.blocks(), [TxBurst(0, noise(10))] * 2 + [late])
             with HubWatch(tmp_path) as watch:
@@ -237,7 +238,7 @@ def test_who_watches_where_no_hub_is_is_told_so(tmp_path):
 async def test_a_paced_hub_runs_in_real_time(tmp_path):
     late_s, told_s = [], []
     with serving(tmp_path):
-        async with opened(EtherRadio(tmp_path, 1, "")) as radio:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio:
             began_s = time.monotonic()
             async for block in radio.blocks():
                 stream_s = (block.index + block.n) / RATE

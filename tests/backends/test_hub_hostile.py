@@ -6,7 +6,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from backends import EtherRadio, RadioParams, TxBurst, TxOutcome
+from backends import EtherRadio, RadioParams, TxBurst, TxOutcome, hub_in
 from backends.ether import protocol
 from tests.backends.hubs import RawRadio, ask, serving, until
 from tests.backends.radios import RATE, TUNING, N, noise, opened, send, take
@@ -60,7 +60,7 @@ async def heard_all(folder, raw):
 async def test_any_bytes_on_any_socket_are_survived(tmp_path, paced, seed):
     rng = Random(seed)
     with serving(tmp_path, {1: RadioParams()}, paced), RawRadio(tmp_path) as raw:
-        async with opened(EtherRadio(tmp_path, 1, "the radio")) as radio:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "the radio")) as radio:
             blocks = radio.blocks()
             await take(blocks, N)
             for _ in range(300):
@@ -79,7 +79,7 @@ async def test_any_bytes_on_any_socket_are_survived(tmp_path, paced, seed):
 @paced_or_not
 async def test_messages_of_any_depth_are_survived(tmp_path, paced):
     with serving(tmp_path, {1: RadioParams()}, paced), RawRadio(tmp_path) as raw:
-        async with opened(EtherRadio(tmp_path, 1, "the radio")) as radio:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "the radio")) as radio:
             blocks = radio.blocks()
             await take(blocks, N)
             raw.push(DEEP_BYE)
@@ -91,7 +91,7 @@ async def test_messages_of_any_depth_are_survived(tmp_path, paced):
 
 async def test_without_its_token_nobody_speaks_for_a_radio(tmp_path):
     with serving(tmp_path) as hub, RawRadio(tmp_path) as raw:
-        async with opened(EtherRadio(tmp_path, 1, "the radio")) as radio:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "the radio")) as radio:
             blocks = radio.blocks()
             (token,) = hub._by_token
             mine = raw.join(2)
@@ -117,7 +117,7 @@ async def test_an_id_that_no_robot_can_have_does_not_join(tmp_path, paced, node)
         raw.ask(hello)
         await heard_all(tmp_path, raw)
         assert ask(tmp_path).nodes == {}
-        async with opened(EtherRadio(tmp_path, 1, "the radio")) as radio:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "the radio")) as radio:
             await assert_goes_on(radio, radio.blocks())
 
 
@@ -137,7 +137,7 @@ BURSTS = {
 async def test_whatever_a_robot_sends_the_others_go_on(tmp_path, paced, samples):
     radios = dict.fromkeys((1, 2), RadioParams())
     with serving(tmp_path, radios, paced), RawRadio(tmp_path) as raw:
-        async with opened(EtherRadio(tmp_path, 1, "the radio")) as radio:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "the radio")) as radio:
             token = raw.join(2)
             for number, start in enumerate((-(2**63), 0, 2**31, 2**63 - 1, 2**64 - 1)):
                 sent = protocol.Sent(

@@ -9,7 +9,7 @@ from random import Random
 import numpy as np
 import pytest
 
-from backends import BackendError, EtherRadio, HubWatch, RadioParams, TxBurst, TxOutcome
+from backends import BackendError, EtherRadio, HubWatch, RadioParams, TxBurst, TxOutcome, hub_in
 from backends.ether import protocol
 from tests.backends.hubs import RawRadio, ask, serving, until
 from tests.backends.radios import BLOCK_S, N, noise, opened, send, take, turn
@@ -25,7 +25,7 @@ def lockstep(folder, radios, **more):
 async def drive(folder, node, until, react):
     """A robot in its own thread's loop: all blocks up to that index."""
     taken = []
-    async with opened(EtherRadio(folder, node, f"robot {node}")) as radio:
+    async with opened(EtherRadio(hub_in(folder), node, f"robot {node}")) as radio:
         async for block in radio.blocks():
             taken.append(block)
             await react(radio, block)
@@ -102,13 +102,13 @@ def test_one_seed_is_one_run_however_threads_are_timed(tmp_path):
 
 async def test_an_air_begins_when_all_are_there_and_goes_on_when_all_have_done(tmp_path):
     with lockstep(tmp_path, dict.fromkeys((1, 2), RadioParams())):
-        async with opened(EtherRadio(tmp_path, 1, "")) as one:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as one:
             ahead = one.blocks()
             coming = asyncio.ensure_future(anext(ahead))
             # Nothing tells that a hub does not go on; without a reason it would within this time.
             await asyncio.sleep(0.05)
             assert ask(tmp_path).now_s == 0
-            async with opened(EtherRadio(tmp_path, 2, "")) as other:
+            async with opened(EtherRadio(hub_in(tmp_path), 2, "")) as other:
                 behind = other.blocks()
                 for step in range(4):
                     for block in (await anext(behind), await coming):
@@ -125,7 +125,7 @@ async def test_an_air_begins_when_all_are_there_and_goes_on_when_all_have_done(t
 async def test_an_air_ends_when_it_is_told_to(tmp_path):
     """In the middle of a block, if need be; it still answers."""
     with lockstep(tmp_path, {1: RadioParams()}, until_s=10.5 * BLOCK_S):
-        async with opened(EtherRadio(tmp_path, 1, "")) as radio:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio:
             blocks = radio.blocks()
             taken = await take(blocks, 10.5 * N)
             coming = asyncio.ensure_future(anext(blocks))
@@ -140,10 +140,10 @@ async def test_an_air_ends_when_it_is_told_to(tmp_path):
 
 async def test_who_comes_when_it_has_begun_is_refused(tmp_path):
     with lockstep(tmp_path, {1: RadioParams()}):
-        async with opened(EtherRadio(tmp_path, 1, "")) as radio:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio:
             await take(radio.blocks(), N)
             with pytest.raises(BackendError, match="robot 2 came too late: an air in lock-step"):
-                async with opened(EtherRadio(tmp_path, 2, "")):
+                async with opened(EtherRadio(hub_in(tmp_path), 2, "")):
                     pass
 
 
@@ -162,8 +162,8 @@ async def test_a_radio_that_vanishes_does_not_stop_the_others(tmp_path, monkeypa
         asking = threading.Thread(target=keep_asking, daemon=True)
         async with asyncio.timeout(5):
             async with (
-                opened(EtherRadio(tmp_path, 1, "")) as one,
-                opened(EtherRadio(tmp_path, 2, "")) as two,
+                opened(EtherRadio(hub_in(tmp_path), 1, "")) as one,
+                opened(EtherRadio(hub_in(tmp_path), 2, "")) as two,
             ):
                 both = [asyncio.ensure_future(take(each.blocks(), 50 * N)) for each in (one, two)]
                 raw.push(protocol.Done(token=token, step=0))
@@ -188,10 +188,10 @@ async def test_a_radio_that_leaves_does_not_stop_the_others(tmp_path, monkeypatc
     """Also where it leaves before the air has begun; the hub does not have to look for it."""
     monkeypatch.setattr("backends.ether.hub.LOOK_AFTER_MS", 60_000)
     with lockstep(tmp_path, THREE):
-        async with opened(EtherRadio(tmp_path, 3, "")):
+        async with opened(EtherRadio(hub_in(tmp_path), 3, "")):
             pass
-        async with opened(EtherRadio(tmp_path, 1, "")) as one:
-            async with opened(EtherRadio(tmp_path, 2, "")) as two:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as one:
+            async with opened(EtherRadio(hub_in(tmp_path), 2, "")) as two:
                 coming = asyncio.ensure_future(take(one.blocks(), 30 * N))
                 await take(two.blocks(), 10 * N)
             assert len(await coming) == 30
@@ -210,9 +210,9 @@ async def test_a_robot_that_is_started_again_before_the_air_begins_is_who_it_was
             await until(lambda: ask(tmp_path).nodes == {})
         else:
             raw.vanish()
-        async with opened(EtherRadio(tmp_path, 1, "")) as again:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as again:
             assert not again.capabilities.full_duplex
-            async with opened(EtherRadio(tmp_path, 2, "")) as other:
+            async with opened(EtherRadio(hub_in(tmp_path), 2, "")) as other:
                 coming = asyncio.ensure_future(take(other.blocks(), 3 * N))
                 await take(again.blocks(), 3 * N)
                 await coming
@@ -224,10 +224,10 @@ async def test_what_is_sent_before_the_first_block_leaves_with_it(tmp_path):
     for others_first in (False, True):
         folder = tmp_path / f"{others_first}"
         with lockstep(folder, dict.fromkeys((1, 2), RadioParams())):
-            async with opened(EtherRadio(folder, 1, "")) as one:
+            async with opened(EtherRadio(hub_in(folder), 1, "")) as one:
                 if not others_first:
                     sending = one.send(TxBurst(0, noise(10)))
-                async with opened(EtherRadio(folder, 2, "")) as two:
+                async with opened(EtherRadio(hub_in(folder), 2, "")) as two:
                     hearing = asyncio.ensure_future(take(two.blocks(), 5 * N))
                     if others_first:
                         await asyncio.sleep(0.05)
@@ -255,7 +255,7 @@ async def test_in_whatever_order_bursts_come_in_they_sound_the_same(tmp_path):
                 )
                 raws[node].push(sent, noise(150, node).tobytes())
                 await until(lambda hub=hub, n=i + 1: len(hub._bursts) == n)
-            async with opened(EtherRadio(folder, 4, "")) as radio:
+            async with opened(EtherRadio(hub_in(folder), 4, "")) as radio:
                 coming = asyncio.ensure_future(take(radio.blocks(), 4 * N))
                 for step, node in itertools.product(range(5), raws):
                     raws[node].push(protocol.Done(token=tokens[node], step=step))
@@ -268,7 +268,7 @@ async def test_in_whatever_order_bursts_come_in_they_sound_the_same(tmp_path):
 async def test_nothing_overtakes_a_burst_that_was_late(tmp_path, exact):
     """What was handed over behind it, before its report was there, is late too where exact."""
     with lockstep(tmp_path, {1: RadioParams()}):
-        async with opened(EtherRadio(tmp_path, 1, "")) as radio:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio:
             blocks = radio.blocks()
             await take(blocks, N)
             late = TxBurst(0, noise(10), latest=0)
@@ -289,7 +289,7 @@ async def test_nothing_overtakes_a_burst_that_was_late(tmp_path, exact):
 async def test_who_is_cancelled_just_when_something_comes_stops(tmp_path, turns):
     """Another robot is waited for, so nothing does come."""
     with lockstep(tmp_path, dict.fromkeys((1, 2), RadioParams())):
-        async with opened(EtherRadio(tmp_path, 1, "")) as radio:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio:
             taking = asyncio.ensure_future(take(radio.blocks()))
             await asyncio.sleep(0.02)
             radio._readable.set()

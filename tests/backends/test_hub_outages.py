@@ -8,8 +8,17 @@ import numpy as np
 import pytest
 import zmq
 
-from backends import BackendError, EtherRadio, Patience, RadioParams, Tuning, TxBurst, TxOutcome
-from backends.ether.sockets import AIR
+from backends import (
+    BackendError,
+    EtherRadio,
+    Patience,
+    RadioParams,
+    Tuning,
+    TxBurst,
+    TxOutcome,
+    hub_in,
+)
+from backends.hub_address import AIR
 from tests.backends.hubs import Listener, ask, serving, until
 from tests.backends.radios import BLOCK_S, RATE, TUNING, N, noise, opened, send, take
 
@@ -46,7 +55,7 @@ async def take_gap(blocks):
 
 @pytest.mark.slow
 async def test_when_a_hub_comes_back_its_radios_go_on_behind_one_gap(tmp_path, monkeypatch):
-    radio = EtherRadio(tmp_path, 1, "the radio")
+    radio = EtherRadio(hub_in(tmp_path), 1, "the radio")
     async with asyncio.timeout(20), closing(radio):
         with serving(tmp_path):
             await radio.open(TUNING)
@@ -78,7 +87,7 @@ async def test_when_a_hub_comes_back_its_radios_go_on_behind_one_gap(tmp_path, m
 
 @pytest.mark.parametrize("params", [RadioParams(), RadioParams(full_duplex=False)])
 async def test_bursts_for_a_hub_that_went_away_are_lost_and_those_after_it_leave(tmp_path, params):
-    radio = EtherRadio(tmp_path, 1, "the radio")
+    radio = EtherRadio(hub_in(tmp_path), 1, "the radio")
     async with asyncio.timeout(20), closing(radio):
         with serving(tmp_path, {1: params}):
             await radio.open(TUNING)
@@ -104,7 +113,7 @@ async def test_bursts_for_a_hub_that_went_away_are_lost_and_those_after_it_leave
 
 
 async def test_a_hub_that_comes_back_may_refuse(tmp_path):
-    radio = EtherRadio(tmp_path, 1, "the radio")
+    radio = EtherRadio(hub_in(tmp_path), 1, "the radio")
     async with asyncio.timeout(20), closing(radio):
         with serving(tmp_path):
             await radio.open(TUNING)
@@ -123,7 +132,7 @@ async def test_a_hub_that_is_slow_has_not_been_away(tmp_path, monkeypatch):
     """Radios are still known when they ask."""
     monkeypatch.setattr("backends.ether.hub.MAX_LATE_BLOCKS", 10**6)
     with serving(tmp_path) as hub:
-        async with opened(EtherRadio(tmp_path, 1, "the radio")) as radio:
+        async with opened(EtherRadio(hub_in(tmp_path), 1, "the radio")) as radio:
             blocks = radio.blocks()
             taken = await take(blocks, 10 * N)
             hand_out, go_on = hub._hand_out, asyncio.Event()
@@ -151,7 +160,7 @@ async def test_a_radio_that_does_not_read_loses_samples_and_hinders_nobody(tmp_p
     with serving(tmp_path, rate_hz=10 * RATE):
         listener = Listener(tmp_path, rate_hz=10 * RATE)
         async with opened(
-            EtherRadio(tmp_path, 1, ""), Tuning(10 * RATE, TUNING.frequency_hz)
+            EtherRadio(hub_in(tmp_path), 1, ""), Tuning(10 * RATE, TUNING.frequency_hz)
         ) as radio:
             blocks = radio.blocks()
             taken = await take(blocks, 1)
@@ -186,8 +195,8 @@ async def test_a_radio_a_little_behind_gets_larger_blocks_and_loses_nothing(tmp_
     begins, mark = (6000, 12_000), TxBurst(9000, noise(300))
     with serving(tmp_path, {1: params}) as hub:
         async with (
-            opened(EtherRadio(tmp_path, 2, "")) as other,
-            opened(EtherRadio(tmp_path, 1, "")) as radio,
+            opened(EtherRadio(hub_in(tmp_path), 2, "")) as other,
+            opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio,
         ):
             apart_s = hub._medium.time(1, 0) - hub._medium.time(2, 0)
             at = 9000 + round(apart_s * RATE)
@@ -217,7 +226,7 @@ async def test_a_radio_a_little_behind_gets_larger_blocks_and_loses_nothing(tmp_
 
 async def test_a_radio_that_waits_for_a_hub_greets_the_next_one_too(tmp_path):
     """The first took the greeting along when it died."""
-    radio = EtherRadio(tmp_path, 1, "the radio", Patience.THERE)
+    radio = EtherRadio(hub_in(tmp_path), 1, "the radio", Patience.THERE)
     async with asyncio.timeout(30), closing(radio):
         opening = asyncio.ensure_future(radio.open(TUNING))
         with zmq.Context() as context, context.socket(zmq.ROUTER) as deaf:

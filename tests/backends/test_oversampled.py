@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from backends import GAP, LoopbackRadio, OversampledRadio, RadioParams, Tuning, TxBurst, TxOutcome
+from backends import (
+    GAP,
+    LoopbackRadio,
+    OversampledRadio,
+    RadioParams,
+    Tuning,
+    TxBurst,
+    TxOutcome,
+    hub_in,
+)
 from backends.oversampled import TRIM
 from phy import REACH, Transmitter
 from tests.backends.hubs import NODE, EtherRadio, serving
@@ -65,7 +74,7 @@ async def test_gaps_are_as_long_as_they_were_and_the_time_goes_on(factor, tmp_pa
     """A half-duplex radio hears nothing around its bursts."""
     params = {NODE: RadioParams(full_duplex=False, turnaround_s=0.001)}
     with serving(tmp_path, params, paced=False, rate_hz=factor * RATE):
-        radio = OversampledRadio(EtherRadio(tmp_path, NODE, "under test"), factor)
+        radio = OversampledRadio(EtherRadio(hub_in(tmp_path), NODE, "under test"), factor)
         async with opened(radio, Tuning(RATE, TUNING.frequency_hz)):
             blocks = radio.blocks()
             (report,), taken = await send(radio, blocks, two_bursts(2000)[:1])

@@ -74,6 +74,11 @@ def test_a_hub_tells_where_it_is_and_serves_its_folder_alone(start_hub, refused,
         (("bad.toml",), ["bad.toml:2: robot.id: got 999", "from 0 to 254"]),
         (("outage.toml",), ["outages of a.jsonl", "--traces"]),
         (("outage.toml", "--traces", "."), ["a.jsonl: cannot be read", "--traces"]),
+        (("--listen", "47900"), ['--listen: got "47900"', "HOST:PORT", "192.168.1.5:47900"]),
+        (
+            ("--listen", "nowhere.invalid:47900"),
+            ["nowhere.invalid:47900", "cannot be opened"],
+        ),
         (("--dir", "bad.toml"), ["bad.toml/ether.lock: cannot be opened"]),
         (("--dir", "d" * 120), ["air.sock: the hub's socket cannot be opened"]),
         (("--pace", "fast"), ["--pace", "fast", "realtime", "lockstep"]),
@@ -148,7 +153,7 @@ def test_options_go_before_the_scenario(refused, monkeypatch, tmp_path):
     monkeypatch.setattr("sdrlinkd.cli.ether.make_hub", make)
     refused(scenario, "--dir", "air")
     refused(scenario, "--seed", 7, "--duration", 9, "--pace", "realtime", "--traces", tmp_path)
-    (plain, where, _), (changed, _, traces) = seen
+    (plain, where, *_), (changed, _, traces, _) = seen
     assert (plain.seed, plain.duration_s, plain.pace) == (3, 3.0, "lockstep")
     assert (changed.seed, changed.duration_s, changed.pace) == (7, 9.0, "realtime")
     assert (where, traces) == (Path("air"), tmp_path)

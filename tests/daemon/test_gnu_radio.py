@@ -138,9 +138,7 @@ def test_what_gnu_radio_loses_in_real_time_has_a_name(start_daemon, endpoints):
         assert got == [body for body in bodies if body in set(got)]
     # A stall of the machine is an outage of the flowgraph's, or samples that came too fast.
     stalled = any(
-        each[name]
-        for each in counters
-        for name in ("outages", "skips", "late", "samples_lost")
+        each[name] for each in counters for name in ("outages", "skips", "late", "samples_lost")
     )
     assert stalled or heard == [bodies, bodies], counters
 

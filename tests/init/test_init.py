@@ -104,6 +104,11 @@ def test_nothing_is_replaced_unasked(init, tmp_path):
         (("--radio", "usrp", "--robots", "2", "--frequency", "433"), "with its unit"),
         (("--radio", "usrp", "--robots", "2", "--frequency", "5 GB"), "--frequency: got 5 GB"),
         (("--radio", "ether", "--robots", "2"), "--id: not given"),
+        (("--radio", "direct", "--id", "1", *ODOM, "--hub", "a:1"), "allowed with --radio ether"),
+        (
+            ("--radio", "ether", "--robots", "1", *ODOM, "--hub", "a"),
+            '--hub: got "a"; allowed: HOST:PORT',
+        ),
         (("--radio", "direct", "--id", "2"), '--id: got "2"; allowed: 1 to 1, or all'),
         (("--radio", "direct", "--id", "1"), "--topic: not given"),
         (("--radio", "direct", "--id", "1", "--topic", "odom"), "allowed: NAME:TYPE"),
@@ -256,6 +261,18 @@ def test_what_a_person_gives_is_quoted(init, tmp_path):
     real = ("--radio", "usrp", "--robots", 1, "--frequency", "1 GHz", *ODOM)
     assert init(*real, "--device", device, out="real")[0] == 0
     assert load_config(tmp_path / "real" / "sdrlinkd.toml").soapy.device == device
+
+
+def test_robots_on_computers_of_their_own_share_a_hub(init, tmp_path):
+    hub = "192.168.1.5:47900"
+    given = ("--radio", "ether", "--robots", 2, "--id", "all", *ODOM, "--hub", hub)
+    code, said, err = init(*given)
+    assert code == 0, err
+    for number in (1, 2):
+        written = load_config(tmp_path / "team" / f"robot_{number}.toml")
+        assert (written.ether.hub, written.ether.dir, written.bus.runtime_dir) == (hub, "", "")
+    assert "sdrlink-ether --listen 0.0.0.0:47900 &" in said
+    assert "bring registry.csv and robot_2.toml to the other robots" in said
 
 
 def test_all_files_or_none(init, tmp_path):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import phy
-from backends import EtherRadio, RadioParams, RecordingWriter
+from backends import EtherRadio, RadioParams, RecordingWriter, hub_in
 from sdrlinkd.iq import Capture, CaptureWish, IqRecording, Replay, plan_replay
 from tests.backends.hubs import LISTENER, NODE, serving
 from tests.backends.radios import RATE, TUNING
@@ -46,8 +46,8 @@ async def test_bursts_are_recorded_as_far_apart_as_they_were(tmp_path, recording
     assert len(plan.stretches) == N_BURSTS
     wish = CaptureWish(tmp_path / "again", "ci16_le", None, None, phy.OFDM_64_16)
     folder = tmp_path / "air"
-    capture = Capture(EtherRadio(folder, LISTENER, "who records"), TUNING, wish)
-    replay = Replay(EtherRadio(folder, NODE, "who sends"), TUNING, opened, plan, 1)
+    capture = Capture(EtherRadio(hub_in(folder), LISTENER, "who records"), TUNING, wish)
+    replay = Replay(EtherRadio(hub_in(folder), NODE, "who sends"), TUNING, opened, plan, 1)
     recorded, moved = [0.0], asyncio.Event()
 
     def watch(state):
