@@ -30,7 +30,7 @@ from backends.ether.antenna import Antenna
 from backends.ether.downlink import Downlink
 from backends.ether.joining import join
 from backends.ether.medium import LEAD, Piece
-from backends.ether.remote_clock import RemoteClock
+from backends.ether.remote_clock import HubClock
 from backends.ether.sockets import NOBLOCK, connect
 from backends.feed import BlockFeed, Fed
 from backends.hub_address import HubAddress
@@ -62,7 +62,7 @@ class EtherRadio:
         self, hub: HubAddress, node: int, who: str, patience: Patience = Patience.NONE
     ) -> None:
         self._hub = hub
-        self._clock = RemoteClock() if hub.is_remote else None
+        self._clock = HubClock(hub.is_remote)
         self._waits = patience is not Patience.NONE
         self._node = node
         self._who = who
@@ -265,7 +265,7 @@ class EtherRadio:
     def _receive(self, message: protocol.Stretch, samples: Samples | None) -> RxBlock:
         antenna = self._joined
         self._last_host_ns = message.host_ns
-        at_ns = self._here_ns(message.host_ns)
+        at_ns = self._clock.local_ns(message.host_ns, time.monotonic_ns())
         self._notice = message.notice or self._notice
         if message.lost:
             self.counters["overflows"] += 1
@@ -291,12 +291,9 @@ class EtherRadio:
         """A hub that knows nothing of before: its count begins anew."""
         self._is_away = False
         now_ns = welcome.host_ns
+        at_ns = self._clock.local_ns(now_ns, time.monotonic_ns())
         away_s = (now_ns - self._last_host_ns) * 1e-9 if welcome.paced else 0.0
         self._beside.append(_Beside([], 0, welcome))
         self._last_host_ns = now_ns
         n = max(1, round(away_s * self._tuning.rate_hz))
-        return self._joined.rejoin(n, "the hub was away", self._here_ns(now_ns))
-
-    def _here_ns(self, hub_ns: int) -> int:
-        """Our monotonic time of a moment that the hub tells by its own."""
-        return hub_ns if self._clock is None else self._clock.local_ns(hub_ns, time.monotonic_ns())
+        return self._joined.rejoin(n, "the hub was away", at_ns)

@@ -1,21 +1,24 @@
-"""Times of a hub on another computer."""
+"""Times of a hub, which may be on another computer."""
 
 WINDOW_S = 2.0
 
 
-class RemoteClock:
-    """Turns times of a hub's monotonic clock into times of ours.
+class HubClock:
+    """Turns times of a hub's monotonic clock into times of ours; on one computer, it is the same.
 
     The offset is that of the message that travelled fastest in the last 2 to 4 s, so crystals may
     differ. The shortest travel time stays in it: a millisecond or less on a local network.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, is_remote: bool) -> None:
+        self._is_remote = is_remote
         self._before = self._least = 0
         self._until_ns: int | None = None
 
     def local_ns(self, hub_ns: int, now_ns: int) -> int:
         """Our monotonic time of `hub_ns`, which a message brought at `now_ns`, in order."""
+        if not self._is_remote:
+            return hub_ns
         offset = now_ns - hub_ns
         if self._until_ns is None or now_ns >= self._until_ns:
             self._before = offset if self._until_ns is None else self._least
