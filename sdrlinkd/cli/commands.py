@@ -71,5 +71,8 @@ COMMANDS = {
         "Measure beside peers: `bench pound --quick`; further options are the benchmark's own.",
         ("bench",),
     ),
+    "help": Listed(
+        "Show a how-to page, a configuration key, a ledger name or a command.", ("help",)
+    ),
 }
 """All commands by name, in the order of help."""

@@ -1,6 +1,8 @@
 """Configuration: TOML → types → what the parts are built with."""
 
 from sdrlinkd.config.backends import backend_of, typed_config
+from sdrlinkd.config.describe import allowed as allowed_text
+from sdrlinkd.config.describe import given as given_text
 from sdrlinkd.config.load import explain_policy, load_config, parse_config, parse_toml
 from sdrlinkd.config.not_checked import unchecked
 from sdrlinkd.config.offsets import cfo_told, cfo_warning
@@ -13,6 +15,7 @@ from sdrlinkd.config.pdu_links import (
     TransformParams,
 )
 from sdrlinkd.config.places import located
+from sdrlinkd.config.quantities import example as unit_example
 from sdrlinkd.config.radios import GnuRadioParams
 from sdrlinkd.config.schema import WITHOUT_AIR, BusParams, Config
 from sdrlinkd.config.setup import UNBOUNDED_TYPES, Setup, load_registry, make_setup
@@ -30,10 +33,12 @@ __all__ = [
     "PlayParams",
     "Setup",
     "TransformParams",
+    "allowed_text",
     "backend_of",
     "cfo_told",
     "cfo_warning",
     "explain_policy",
+    "given_text",
     "load_config",
     "load_registry",
     "located",
@@ -42,4 +47,5 @@ __all__ = [
     "parse_toml",
     "typed_config",
     "unchecked",
+    "unit_example",
 ]

@@ -1,0 +1,24 @@
+"""The manual: reference pages made from the code itself, and how-to pages that come with it.
+
+It turns types, commands and files into Markdown. It prints nothing, and asks no daemon.
+"""
+
+from sdrlinkd.manual.commands import commands_page
+from sdrlinkd.manual.configuration import configuration_page
+from sdrlinkd.manual.howto import HowTo, find_how_to, how_tos
+from sdrlinkd.manual.keys import Key, Section, find_key, key_names, sections
+from sdrlinkd.manual.snapshot import snapshot_page
+
+__all__ = [
+    "HowTo",
+    "Key",
+    "Section",
+    "commands_page",
+    "configuration_page",
+    "find_how_to",
+    "find_key",
+    "how_tos",
+    "key_names",
+    "sections",
+    "snapshot_page",
+]

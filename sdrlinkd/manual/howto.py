@@ -1,0 +1,50 @@
+"""How-to pages: found in the source tree, or where a wheel puts them."""
+
+import sysconfig
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+
+from sdrlinkd.errors import UserError
+
+FOLDERS = (
+    Path(__file__).parents[2] / "docs/howto",
+    Path(sysconfig.get_path("data")) / "share/sdrlinkd/howto",
+)
+
+
+@dataclass(frozen=True)
+class HowTo:
+    """A page that answers one question."""
+
+    name: str
+    """As `sdrlinkctl help NAME` takes it: the file's name."""
+    title: str
+    """Its heading, which says what it does for the reader."""
+    text: str
+    """The page in Markdown."""
+
+
+def how_tos() -> list[HowTo]:
+    """All pages, by name."""
+    folder = next((each for each in FOLDERS if each.is_dir()), None)
+    paths = sorted(folder.glob("*.md")) if folder else []
+    return [_read(path) for path in paths if path.stem != "index"]
+
+
+def find_how_to(name: str, others: list[str]) -> HowTo:
+    """The page `name`. Raises UserError, which suggests one of them or of `others`."""
+    pages = {each.name: each for each in how_tos()}
+    if name in pages:
+        return pages[name]
+    close = get_close_matches(name, [*pages, *others], n=1)
+    hint = f"; did you mean {close[0]}?" if close else ""
+    raise UserError(
+        f"help: got {name}, and there is no such page, key or command{hint}; "
+        "`sdrlinkctl help` lists all pages"
+    )
+
+
+def _read(path: Path) -> HowTo:
+    text = path.read_text()
+    return HowTo(path.stem, text.split("\n", 1)[0].removeprefix("# ").strip(), text)
