@@ -1,6 +1,7 @@
 # make demo   set up, then the main job        make check  format, lint, types, import rules
 # make quick  set up, then what every edit wants; make test  all tests; make soak, make fuzz  for hours
 # make bench  measurements beside peers        make fresh  README's commands on a minimal Debian (root)
+# make docs   the site, into build/site        make reference, make figures  pages made from the code, pictures
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -17,7 +18,7 @@ TESTS ?= tests
 WORKERS ?= auto
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 8 --dist loadgroup --no-loadscope-reorder
 
-.PHONY: setup demo quick test soak fuzz fresh check format bench system-packages clean
+.PHONY: setup demo quick test soak fuzz fresh check format bench docs reference figures system-packages clean
 
 setup: $(STAMP)
 
@@ -67,6 +68,19 @@ format: $(DEV_STAMP)
 
 bench: $(DEV_STAMP)
 	$(BIN)/python -m benchmarks
+
+# Strict: a dead link, or an anchor that is not there, ends it.
+docs: $(DEV_STAMP)
+	$(BIN)/python -m docs.site.stage
+	$(BIN)/zensical build --strict -f build/zensical.toml
+
+reference: $(DEV_STAMP)
+	$(BIN)/python -m docs.site.reference
+
+# Drawn of what is kept in docs/measured (`python -m benchmarks.NAME --keep`), and of runs in lock-step.
+figures: $(DEV_STAMP)
+	$(BIN)/python -m benchmarks.page
+	$(BIN)/python -m docs.site.figures
 
 system-packages:
 	@sh etc/install-apt-packages.sh

@@ -7,12 +7,23 @@ import platform
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field
-from typing import Literal
+from datetime import UTC, datetime
+from typing import Any, Literal
 
 from benchmarks.absent import attempt, told
+from benchmarks.kept import keep
+from benchmarks.processes import Stolen
 from sdrlinkd.tables import FittedTable, figure, screen_console, words
 
 SIGNS = {"more": "≥", "less": "≤"}
+
+
+@dataclass
+class Drawing:
+    """What a picture of this benchmark shows: numbers and names only, as JSON can hold them."""
+
+    name: str
+    shows: dict[str, Any]
 
 
 @dataclass
@@ -42,7 +53,7 @@ class Row:
 
 def main(
     benchmark: str,
-    measure: Callable[..., Iterable[Row]],
+    measure: Callable[..., Iterable[Row | Drawing]],
     own: argparse.ArgumentParser | None = None,
 ) -> int:
     """Parse the options all benchmarks share, measure, print; the exit code.
@@ -56,35 +67,53 @@ def main(
     )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--quick", action="store_true", help="fewer trials, the same rows")
+    parser.add_argument(
+        "--keep", action="store_true",
+        help=f"write docs/measured/{benchmark}.json, of which `make figures` makes the page",
+    )  # fmt: skip
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     ours = {key: getattr(options, key) for key in vars(own.parse_args([]))} if own else {}
     rows: list[Row] = []
+    drawings: dict[str, Any] = {}
+    stolen = Stolen()
     try:
         with attempt("the rest") as all_of_it:
-            for row in measure(options.seed, options.quick, **ours):
+            for found in measure(options.seed, options.quick, **ours):
                 # One by one: what is measured is kept, whatever comes next.
-                rows.append(row)  # noqa: PERF402
+                if isinstance(found, Drawing):
+                    drawings[found.name] = found.shows
+                else:
+                    rows.append(found)
     finally:
-        _print(benchmark, rows, options)
+        report = _report(benchmark, rows, options, stolen.pct())
+        if options.json:
+            sys.stdout.write(json.dumps(report, indent=2) + "\n")
+        else:
+            screen_console().print(table_of(benchmark, rows))
+        if options.keep:
+            path = keep(benchmark, {**report, "drawings": drawings})
+            sys.stderr.write(f"kept in {path}\n")
     if all_of_it.failed or not rows:
         return 2
     return 0 if all(row.ok for row in rows) else 1
 
 
-def _print(benchmark: str, rows: list[Row], options: argparse.Namespace) -> None:
+def _report(
+    benchmark: str, rows: list[Row], options: argparse.Namespace, stolen_pct: float
+) -> dict[str, Any]:
     machine = f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
-    if options.json:
-        report = {
-            "benchmark": benchmark,
-            "machine": machine,
-            "seed": options.seed,
-            "rows": [{**asdict(row), "ok": row.ok} for row in rows],
-            "not_measured": told(),
-        }
-        sys.stdout.write(json.dumps(report, indent=2) + "\n")
-    else:
-        screen_console().print(table_of(benchmark, rows))
+    quick = " --quick" if options.quick else ""
+    return {
+        "benchmark": benchmark,
+        "command": f"python -m benchmarks.{benchmark}{quick}",
+        "machine": machine,
+        "stolen_pct": round(stolen_pct, 2),
+        "date": f"{datetime.now(UTC):%Y-%m-%d}",
+        "seed": options.seed,
+        "rows": [{**asdict(row), "ok": row.ok} for row in rows],
+        "not_measured": told(),
+    }
 
 
 def table_of(benchmark: str, rows: list[Row]) -> FittedTable:

@@ -3,8 +3,8 @@
 `python -m benchmarks.latency [--quick] [--json] [--no-peers]`.
 
 What is emulated: the serial line (two pseudo-terminals, paced at 921600 baud), the FCU (a process
-with a clock of its own), the agent and MAVROS (Python, as all of it). A whole run draws
-docs/figures/latency_*.png.
+with a clock of its own), the agent and MAVROS (Python, as all of it).
+`--keep` keeps the rows, and what the figures show, for docs/benchmarks.md.
 """
 
 import argparse
@@ -13,10 +13,10 @@ from collections.abc import Iterator
 
 from benchmarks.absent import attempt
 from benchmarks.latency import pictures, rows
-from benchmarks.report import Row, main
+from benchmarks.report import Drawing, Row, main
 
 
-def measure(seed: int, quick: bool, no_peers: bool = False) -> Iterator[Row]:
+def measure(seed: int, quick: bool, no_peers: bool = False) -> Iterator[Row | Drawing]:
     """The rows of the paper's table, of clocks and of ages."""
     seconds, passes = (3.0, 1) if quick else (15.0, 3)
     beside = () if no_peers else rows.BESIDE
@@ -32,7 +32,7 @@ def measure(seed: int, quick: bool, no_peers: bool = False) -> Iterator[Row]:
     yield from rows.more_topics(seed, 3.0 if quick else 6.0, quick, beside)
     yield rows.correction(seed, 10 if quick else 100)
     if not (quick or no_peers):
-        pictures.draw(found)
+        yield pictures.drawing(found)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """The Pound paper's experiments: `python -m benchmarks.pound [--quick] [--json] [--no-peers]`.
 
-A whole run, peers and all, draws its figures into docs/figures.
+`--keep` keeps the rows, and what the figures show, for docs/benchmarks.md.
 """
 
 import argparse
@@ -11,12 +11,12 @@ import numpy as np
 
 from benchmarks.absent import attempt
 from benchmarks.pound import beside, limits, pictures, realtime, rows, tables
-from benchmarks.report import Row, main
+from benchmarks.report import Drawing, Row, main
 
 PHASES, QUICK_PHASES = 10, 2
 
 
-def measure(seed: int, quick: bool, no_peers: bool = False, figures: bool = False) -> Iterator[Row]:
+def measure(seed: int, quick: bool, no_peers: bool = False) -> Iterator[Row | Drawing]:
     """The rows of all experiments of the paper."""
     peers = [] if no_peers else beside.find(quick)
     n = tables.LASERS // 5 if quick else tables.LASERS
@@ -44,14 +44,11 @@ def measure(seed: int, quick: bool, no_peers: bool = False, figures: bool = Fals
     yield from rows.plan(seed, quick)
     with attempt("daemons in real time"):
         yield from realtime.rows(seed, quick)
-    if figures or not (quick or no_peers):
-        pictures.draw(seed, one_hop, mbps, loops, phases[len(phases) // 2])
+    if not (quick or no_peers):
+        yield pictures.drawing(seed, one_hop, mbps, loops, phases[len(phases) // 2])
 
 
 if __name__ == "__main__":
     own = argparse.ArgumentParser(add_help=False)
     own.add_argument("--no-peers", action="store_true", help="only our own rows")
-    own.add_argument(
-        "--figures", action="store_true", help="draw docs/figures/pound_*.png in any case"
-    )
     sys.exit(main("pound", measure, own))

@@ -1,61 +1,95 @@
 """The figures: what became of the laser beside others, bandwidth, and the control loop."""
 
 from collections.abc import Mapping
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from benchmarks.flows import Figures
+from benchmarks.kept import FIGURES
 from benchmarks.peers.pound.control import local_loop
 from benchmarks.pound import limits, loop, tables
 from benchmarks.pound.beside import LOOP_S
+from benchmarks.report import Drawing
+from sdrlinkd.pictures import COLORS, OURS, legend_beside, looks, make_figure, save
 
-FOLDER = Path(__file__).parents[2] / "docs/figures"
+COMMAND = "python -m benchmarks.pound"
+FLOWS = ("laser", "image")
 
 
-def draw(
+def drawing(
     seed: int,
     one_hop: Mapping[str, Mapping[str, Figures]],
     mbps: Mapping[str, Mapping[int, float]],
     loops: Mapping[str, float],
     phase_s: float,
-) -> None:
-    """Draw this benchmark's figures into docs/figures/pound_*.png."""
-    import matplotlib.pyplot as plt
-
-    FOLDER.mkdir(parents=True, exist_ok=True)
+) -> Drawing:
+    """What the figures show, ours beside the others."""
     ours = tables.by_flow(tables.two_nodes(seed, quick=False).traces)
-    figure, axes = plt.subplots(1, 2, figsize=(11, 4.5))
-    for ax, flow in zip(axes, ("laser", "image"), strict=True):
-        for name, of in {**one_hop, "sdrlinkd": ours}.items():
-            ours_too = name == "sdrlinkd"
-            ax.errorbar(
-                of[flow].d_ms, of[flow].std_jd_ms, xerr=of[flow].std_d_ms, fmt="o",
-                color="k" if ours_too else None, label=name, ms=7 if ours_too else 4, capsize=2,
-            )  # fmt: skip
-        ax.set(xscale="log", yscale="log", xlabel=f"{flow}: delay D, ms (bars: std)",
-               ylabel="std of the time between arrivals, ms")  # fmt: skip
-        ax.grid(which="both", alpha=0.25)
-    axes[1].legend(fontsize=7)
-    figure.savefig(FOLDER / "pound_delays.png", dpi=110, bbox_inches="tight")
-
-    figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4))
-    for name, by_size in mbps.items():
-        left.plot([size / 1024 for size in by_size], list(by_size.values()), "o-", ms=3, label=name)
-    here = [limits.bandwidth(size, 5.0, seed) for size in limits.SIZES]
-    left.plot([size / 1024 for size in limits.SIZES], here, "ko-", label="sdrlinkd")
-    left.set(xscale="log", xlabel="KB a message", ylabel="Mbit/s for the user, of 6", ylim=(0, 6.2))
-    left.legend(fontsize=7)
-    left.grid(alpha=0.25)
     ticks = round(LOOP_S / 0.02)
-    at = 0.02 * np.arange(ticks)
-    right.plot(at, local_loop(ticks), "C1", lw=4, alpha=0.5, label="local")
-    right.plot(at, loop.run_loop(phase_s, seed, ticks), "k", lw=1, label="sdrlinkd")
-    right.set(xlabel="s", ylabel="Vc, V")
-    told = "\n".join(
-        f"{name}: {rms:.1f} mV" for name, rms in sorted(loops.items(), key=lambda e: e[1])
+    return Drawing("beside", {
+        "delays": {
+            name: {flow: of[flow]._asdict() for flow in FLOWS}
+            for name, of in {"sdrlinkd": ours, **one_hop}.items()
+        },
+        "mbps": {
+            "sdrlinkd": {size: limits.bandwidth(size, 5.0, seed) for size in limits.SIZES}, **mbps,
+        },
+        "loops_mv": dict(loops),
+        "loop_v": {
+            "local": local_loop(ticks), "sdrlinkd": loop.run_loop(phase_s, seed, ticks),
+        },
+    })  # fmt: skip
+
+
+def draw(shows: Mapping[str, Any]) -> None:
+    """Draw docs/figures/pound_*.png."""
+    _delays(shows["delays"])
+    _bandwidth_and_loop(shows)
+
+
+def _delays(delays: Mapping[str, Mapping[str, Mapping[str, float]]]) -> None:
+    """A row for each system, a panel for each flow: what is better lies further left."""
+    names = sorted(delays, key=lambda name: delays[name]["laser"]["d_ms"], reverse=True)
+    figure, panels = make_figure(1, 2, (9.0, 0.9 + 0.27 * len(names)), sharey=True)
+    at = np.arange(len(names))
+    for axes, flow in zip(panels[0], FLOWS, strict=True):
+        for y, name in enumerate(names):
+            of, color = delays[name][flow], OURS if name == "sdrlinkd" else COLORS[2]
+            least = of["d_ms"] - min(of["std_d_ms"], 0.8 * of["d_ms"])
+            axes.hlines(y, least, of["d_ms"] + of["std_d_ms"], color=color, linewidth=1.2)
+            axes.plot(of["d_ms"], y, "o", color=color, markersize=5)
+            axes.plot(of["std_jd_ms"], y, "|", color=COLORS[4], markersize=9, markeredgewidth=1.6)
+        axes.set(xscale="log", xlabel=f"{flow}, ms")
+        axes.xaxis.set_major_formatter("{x:g}")
+    panels[0, 0].set_yticks(at, [name.replace("_", " ") for name in names], fontsize=8)
+    for label in panels[0, 0].get_yticklabels():
+        label.set_fontweight("bold" if label.get_text() == "sdrlinkd" else "normal")
+    save(figure, FIGURES / "pound_delays.png",
+         f"{COMMAND}; dots: mean delay; lines: its standard deviation; red ticks: standard "
+         "deviation of the time between arrivals")  # fmt: skip
+
+
+def _bandwidth_and_loop(shows: Mapping[str, Any]) -> None:
+    figure, panels = make_figure(2, 1, (8.0, 7.0))
+    left, right = panels[:, 0]
+    for (name, by_size), look in zip(
+        shows["mbps"].items(), looks(shows["mbps"], "sdrlinkd").values(), strict=True
+    ):
+        left.plot([int(size) / 1024 for size in by_size], list(by_size.values()), color=look.color,
+                  linestyle=look.line, marker=look.marker, markersize=4,
+                  label=name.replace("_", " "))  # fmt: skip
+    left.set(
+        xscale="log", xlabel="KiB a message", ylabel="Mbit/s for the user, of 6", ylim=(0, 6.2)
     )
-    right.text(0.98, 0.04, told, transform=right.transAxes, ha="right", fontsize=7)
-    right.legend(loc="upper right", fontsize=8)
-    figure.savefig(FOLDER / "pound_bandwidth_and_loop.png", dpi=110, bbox_inches="tight")
-    plt.close("all")
+    left.xaxis.set_major_formatter("{x:g}")
+    legend_beside(left)
+    at = 0.02 * np.arange(len(shows["loop_v"]["local"]))
+    right.plot(at, shows["loop_v"]["local"], color=COLORS[1], lw=4, alpha=0.6, label="local")
+    right.plot(at, shows["loop_v"]["sdrlinkd"], color=OURS, lw=1, label="through sdrlinkd")
+    right.set(xlabel="time in s", ylabel="voltage in V")
+    errors = sorted(shows["loops_mv"].items(), key=lambda each: each[1])
+    legend_beside(right, "\n".join(
+        ["off the local run, rms:", *(f"{name.replace('_', ' ')} {mv:.1f} mV" for name, mv in errors)]
+    ))  # fmt: skip
+    save(figure, FIGURES / "pound_bandwidth_and_loop.png", COMMAND)

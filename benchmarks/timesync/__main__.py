@@ -1,18 +1,18 @@
 """Clock filters compared: `python -m benchmarks.timesync [--quick] [--json]`.
 
-A whole run draws docs/figures/timesync_*.png.
+`--keep` keeps the rows, and what the figures show, for docs/benchmarks.md.
 """
 
 import sys
 from collections.abc import Iterator
 
-from benchmarks.report import Row, main
+from benchmarks.report import Drawing, Row, main
 from benchmarks.timesync import pictures, rows
 
 HZ = 5.0
 
 
-def measure(seed: int, quick: bool) -> Iterator[Row]:
+def measure(seed: int, quick: bool) -> Iterator[Row | Drawing]:
     """The rows of all filters and scenarios."""
     runs, stepped = (4, 1) if quick else (40, 8)
     held = rows.Tally()
@@ -25,7 +25,7 @@ def measure(seed: int, quick: bool) -> Iterator[Row]:
     yield rows.sample_clocks(seed, 15.0 if quick else 60.0)
     yield from rows.recorded()
     if not quick:
-        pictures.draw(found, HZ)
+        yield pictures.drawing(found, HZ)
 
 
 if __name__ == "__main__":

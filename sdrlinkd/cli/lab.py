@@ -102,7 +102,7 @@ def lab(
         report = run_lab(options, watch)
     write_report(out / REPORT, report)
     wall_s = time.monotonic() - began
-    pictures.draw(report, out / PICTURE, _caption(report, scenario))
+    pictures.draw(report, chosen, out / PICTURE, _caption(report, scenario))
     console.print(pair_table(report))
     for line in _summary(report, wall_s):
         console.print(line, highlight=False, markup=False, soft_wrap=True)

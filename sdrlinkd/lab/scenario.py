@@ -88,12 +88,16 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     def world(self, outages: list[Outage]) -> World:
         """The world that says where everything is."""
-        tracks = {
+        return World(self.air, self.tracks, self.link, outages)
+
+    @property
+    def tracks(self) -> dict[int, Track]:
+        """Where each robot with a path is at any time, by its id."""
+        return {
             robot.id: Track([(t, x, y) for t, x, y in robot.path])
             for robot in self.robot
             if robot.path
         }
-        return World(self.air, tracks, self.link, outages)
 
 
 def load_scenario(path: Path) -> Scenario:

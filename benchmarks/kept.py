@@ -1,0 +1,40 @@
+"""Results that are kept in docs/measured: docs/benchmarks.md and its pictures are made of them."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+DOCS = Path(__file__).parents[1] / "docs"
+FOLDER = DOCS / "measured"
+FIGURES = DOCS / "figures"
+
+
+def keep(name: str, report: dict[str, Any]) -> Path:
+    """Write the report of benchmark `name`; returns where."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    path = FOLDER / f"{name}.json"
+    path.write_text(json.dumps(_plain(report), indent=1, ensure_ascii=False) + "\n")
+    return path
+
+
+def kept(name: str) -> dict[str, Any] | None:
+    """The report of benchmark `name` as it was kept last; None where it never was."""
+    path = FOLDER / f"{name}.json"
+    if not path.exists():
+        return None
+    report: dict[str, Any] = json.loads(path.read_text())
+    return report
+
+
+def _plain(value: object) -> object:
+    """As JSON can hold it: no NaN, no arrays, and five digits of each figure."""
+    if isinstance(value, dict):
+        return {str(key): _plain(each) for key, each in value.items()}
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, float):
+        return float(f"{value:.5g}") if math.isfinite(value) else None
+    return value

@@ -1,0 +1,194 @@
+"""Writes docs/benchmarks.md, and draws its pictures, of what is kept: `make figures`.
+
+Nothing is measured here. `python -m benchmarks.NAME --keep` measures, and keeps the rows.
+"""
+
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+from benchmarks import phy_curves
+from benchmarks.kept import DOCS, FIGURES, kept
+from benchmarks.latency import pictures as latency_pictures
+from benchmarks.pound import pictures as pound_pictures
+from benchmarks.report import SIGNS
+from benchmarks.timesync import pictures as timesync_pictures
+from sdrlinkd.cli.benchmarks import BENCHMARKS
+
+PAGE = DOCS / "benchmarks.md"
+DRAWN = {
+    ("pound", "beside"): pound_pictures.draw,
+    ("latency", "latency"): latency_pictures.draw,
+    ("timesync", "filters"): timesync_pictures.draw,
+    ("phy_curves", "curves"): phy_curves.draw,
+}
+"""What draws each drawing that is kept, by benchmark and name."""
+
+TEXTS = {
+    "bus": (
+        "CPU time of one message through bus, queue and PDUs, in and out, beside ZeroMQ alone. "
+        "The ratios compare with what cannot be avoided: a CRC, and a join of the fragments."
+    ),
+    "modem_path": (
+        "The first two rows are wall time through one daemon, its modem and a paced loopback. The "
+        "others are CPU time of one core: how many times faster than the samples come."
+    ),
+    "phy_per": (
+        "The modem alone: the SNR at which so many PDUs are lost, with everything that radios do to "
+        "a signal (crystals 80 ppm apart, IQ images, leakage, DC, 8 bits, phase noise). liquid-dsp "
+        "and GNU Radio are tested with a frequency offset only."
+    ),
+    "phy_speed": (
+        "Samples a second that one core's CPU time carries. In brackets the value scaled by how "
+        "fast liquid-dsp runs here, against the machine that the targets were set on; it is not "
+        "what *ok* judges."
+    ),
+    "access": (
+        "Two half-duplex robots, 5 Msps, 16QAM 1/2, messages of 1 KB at random times that would "
+        "fill 40 % of the air each (csma: 15 %), bursts of at most 5 ms, by the time of the "
+        "samples. *Urgent* are short messages ten times a second: from one robot with mini-slots "
+        "(`both_send_them`: from both), from both with tdma."
+    ),
+    "ether": "The simulated air: eight daemons in lock-step, and two in real time.",
+    "radio": (
+        "Two daemons on the test radio, in real time. Like a USRP, both send all the time and hear "
+        "each other; like a HackRF, odometry of 720 B at 10 Hz, one way and both ways. Lost samples "
+        "and underflows have targets up to 5 Msps. The peer is a plain loop in a thread of a busy "
+        "process. The radio process's share of a core contains the test radio's driver, with its "
+        "air and its noise. Where `machine_stolen_pct` is above 20, samples are lost at 2 Msps, too."
+    ),
+    "flowgraphs": "GNU Radio's flowgraphs as the modem, at 1 Msps and 25 dB.",
+    "pound": (
+        "Section VI of the Pound paper: 16QAM 1/2 at 5 Msps, 6 Mbit/s, on the simulated air, by the "
+        "time of the samples. In the same run, what teams use instead, through two network "
+        "namespaces and a token bucket of 6 Mbit/s. The others have a channel of their own in each "
+        "direction, and no radio to turn round. Our image is later than theirs because the laser "
+        "goes first. Over two hops Pound's own scheme, which orders by priority at each hop, is the "
+        "faster one. The rows `..._rt` are whole daemons in real time; they also say how late the "
+        "machine wakes a sleeping program."
+    ),
+    "timesync": (
+        "The same time stamps through clock filters: five exchanges a second, a tenth lost each "
+        "way, queues of up to 20 ms; errors at 60 s, rms of 40 runs. Scenarios: A is idle 40 % of "
+        "the time; B is busy one way; C never idle and lopsided; D never idle; J is D with 1 ms of "
+        "jitter; L is busy and idle by turns."
+    ),
+    "latency": (
+        "The assessment of the Sensors 2023 paper as an emulation: 115 bytes 200 times a second "
+        "each way between two processes with clocks of their own. What is emulated: the serial line "
+        "(two pseudo-terminals, paced at 921600 baud), the flight controller, the agent and MAVROS."
+    ),
+}
+"""What a reader should know before the rows, by benchmark."""
+
+PICTURES = {
+    "phy_per": ["per_curves.png"],
+    "pound": ["pound_delays.png", "pound_bandwidth_and_loop.png"],
+    "timesync": ["timesync_errors.png", "timesync_rms.png"],
+    "latency": ["latency_fwd.png", "latency_bwd.png", "latency_load.png"],
+}
+ALTERNATIVES = {
+    "per_curves.png": "Share of PDUs lost over SNR, for every MCS",
+    "pound_delays.png": "Delay and jitter of laser and image, beside others",
+    "pound_bandwidth_and_loop.png": "Bandwidth by message size, and the control loop",
+    "timesync_errors.png": "Errors of clock filters over time",
+    "timesync_rms.png": "Errors of clock filters at the end",
+    "latency_fwd.png": "Latency, companion computer to flight controller",
+    "latency_bwd.png": "Latency, flight controller to companion computer",
+    "latency_load.png": "Processor and memory of each system",
+}
+
+INTRODUCTION = """\
+# Benchmarks
+
+Every figure on this page is printed by the command above its table, beside peers in the same run. `make bench` runs
+all of them; `--keep` keeps the results, and `make figures` writes this page of them.
+
+- *ok* judges the value as it is printed: **missed** is a miss, and the exit code is then 1. A row without a target is
+  only reported.
+- Rows in lock-step and rows of counted trials are exact: the same seed gives the same figures on any machine. Rows of
+  real time and of speed depend on the machine, and on how much of it a hypervisor gave to others (*stolen*).
+"""
+
+
+def page() -> str:
+    """The page in Markdown, of what is kept."""
+    reports = {name: report for name in BENCHMARKS if (report := kept(name)) and "rows" in report}
+    judged = [row for report in reports.values() for row in report["rows"]
+              if row["target"] is not None]  # fmt: skip
+    met = sum(row["ok"] for row in judged)
+    missed = [
+        f"`{row['name']}` ({name})"
+        for name, report in reports.items()
+        for row in report["rows"]
+        if not row["ok"]
+    ]
+    summary = f"**{met} of {len(judged)} targets are met.**"
+    if missed:
+        summary += f" Missed: {', '.join(missed)}."
+    parts = [INTRODUCTION, summary, ""]
+    for name, report in reports.items():
+        parts += [_section(name, report), ""]
+    return "\n".join(parts).rstrip() + "\n"
+
+
+def draw() -> list[str]:
+    """Draw the pictures of all drawings that are kept; their files' names."""
+    before = {path: path.stat().st_mtime_ns for path in FIGURES.glob("*.png")}
+    for (name, drawing), make in DRAWN.items():
+        report = kept(name) or {}
+        if drawing in report.get("drawings", {}):
+            make(report["drawings"][drawing])
+    now = {path: path.stat().st_mtime_ns for path in FIGURES.glob("*.png")}
+    return sorted(path.name for path, at in now.items() if before.get(path) != at)
+
+
+def _section(name: str, report: Mapping[str, Any]) -> str:
+    where = (
+        f"{report['machine']}; {report['stolen_pct']:g} % stolen; seed {report['seed']}; "
+        f"{report['date']}"
+    )
+    lines = [
+        f"## {name}", "", BENCHMARKS[name].sentence + " " + TEXTS.get(name, ""), "",
+        f"```sh\n{report['command']}\n```", "", f"*{where}*", "",
+        "| row | value | target | ok | peers in the same run | paper | trials |",
+        "|---|---|---|---|---|---|---|",
+        *(_row(row) for row in report["rows"]),
+    ]  # fmt: skip
+    if report["not_measured"]:
+        lines += ["", "Not measured in this run: " + "; ".join(
+            f"{what} ({why})" for what, why in report["not_measured"].items()
+        ) + "."]  # fmt: skip
+    for picture in PICTURES.get(name, ()):
+        lines += ["", f"![{ALTERNATIVES[picture]}](figures/{picture})"]
+    return "\n".join(lines)
+
+
+def _row(row: Mapping[str, Any]) -> str:
+    value = f"{_number(row['value'])} {row['unit']}".strip()
+    if row["like_for_like"] is not None:
+        value += f" ({_number(row['like_for_like'])})"
+    target, ok = "", ""
+    if row["target"] is not None:
+        target = f"{SIGNS[row['better']]} {_number(row['target'])}"
+        ok = "ok" if row["ok"] else "**missed**"
+    peers = ", ".join(f"{name} {_number(each)}" for name, each in row["peers"].items())
+    paper = "" if row["paper"] is None else _number(row["paper"])
+    cells = (f"`{row['name']}`", value, target, ok, peers, paper, f"{row['trials']:,}")
+    return "| " + " | ".join(each.replace("|", "\\|") for each in cells) + " |"
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:,.4g}"
+
+
+def main() -> int:
+    """Write the page, draw the pictures."""
+    drawn = draw()
+    PAGE.write_text(page())
+    sys.stdout.write(f"wrote {PAGE.name}; drew {', '.join(drawn) or 'nothing'}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
