@@ -1,4 +1,4 @@
-"""The hub's sockets in a folder that it has for itself."""
+"""The hub's sockets, in a folder that belongs to the hub alone."""
 
 import fcntl
 from collections.abc import Callable
@@ -12,12 +12,12 @@ import zmq
 from backends.base import BackendError, Samples
 from backends.ether import protocol
 
-# As numbers: as enumerations, they cost as much as a short message.
+# Plain numbers: enumerations would cost as much as a short message.
 NOBLOCK, MORE, _EVENTS, _POLLIN = (
     int(zmq.NOBLOCK), int(zmq.SNDMORE), int(zmq.EVENTS), int(zmq.POLLIN),
 )  # fmt: skip
 AIR, SKY = "air.sock", "sky.sock"
-# Stretches that may wait for a radio; half a second of blocks.
+# Number of stretches that may wait for a radio; half a second of blocks.
 WAITING = 500
 RECONNECT_MS = 500
 
@@ -25,7 +25,7 @@ RECONNECT_MS = 500
 def connect(
     context: "zmq.Context[zmq.Socket[bytes]]", kind: int, path: Path
 ) -> "zmq.Socket[bytes]":
-    """A radio's socket to its hub. Raises BackendError."""
+    """Connect a radio's socket to its hub. Raises BackendError."""
     socket = context.socket(kind)
     socket.setsockopt(zmq.LINGER, 100)
     socket.setsockopt(zmq.RCVHWM, WAITING)
@@ -38,9 +38,9 @@ def connect(
 
 
 class HubSockets:
-    """`air` (ROUTER) answers and hands out, `sky` (PULL) takes what radios send.
+    """The hub's two sockets: `air` (ROUTER) answers and hands out, `sky` (PULL) receives.
 
-    Raises BackendError when the folder cannot be had.
+    Raises BackendError when the folder is not available.
     """
 
     def __init__(self, directory: Path) -> None:
@@ -54,7 +54,7 @@ class HubSockets:
             self._poller.register(each, zmq.POLLIN)
 
     def wait(self, wait_ms: int) -> bool:
-        """Until there is something to take, for at most `wait_ms`; whether there is."""
+        """Wait for messages for at most `wait_ms`; returns whether there is one."""
         return bool(self._poller.poll(wait_ms))
 
     def take(
@@ -62,14 +62,14 @@ class HubSockets:
         from_radio: Callable[[list[bytes]], None],
         request: Callable[[list[bytes]], None],
     ) -> None:
-        """Hand over all messages that are there now."""
+        """Hand over all messages that are waiting now."""
         _drain(self._sky, from_radio)
         _drain(self._air, request)
 
     def reply(self, identity: bytes, message: msgspec.Struct, samples: Samples | None) -> bool:
-        """Send without waiting; False when there is no room for it.
+        """Send without waiting; False when there is no room for the message.
 
-        Raises ConnectionError when nobody of that identity is there.
+        Raises ConnectionError when no peer has that identity.
         """
         data, air = protocol.encode(message), self._air
         try:
@@ -110,7 +110,7 @@ class HubSockets:
 
 
 def is_readable(socket: "zmq.Socket[bytes]") -> bool:
-    """Whether a message is there to be read."""
+    """Whether a message is waiting."""
     return bool(int(socket.getsockopt(_EVENTS)) & _POLLIN)
 
 
@@ -120,12 +120,12 @@ def _drain(socket: "zmq.Socket[bytes]", take: Callable[[list[bytes]], None]) -> 
         try:
             take(frames)
         except (msgspec.DecodeError, ValueError, RecursionError):
-            # Not one of ours; whoever it is gets no answer.
+            # Not a message of this protocol; the sender gets no answer.
             continue
 
 
 def _locked(directory: Path) -> IO[str]:
-    """A second bind would take a living hub's sockets away."""
+    """Lock the folder: a second bind would take a running hub's sockets away."""
     path = directory / "ether.lock"
     try:
         directory.mkdir(parents=True, exist_ok=True)
