@@ -38,8 +38,7 @@ class RxAssembler:
         """Index of the current process's first sample."""
 
     def begin(self, ring: SampleRing, rate_hz: float) -> None:
-        """Continue with a new process that has opened its device; this host's clock sets the gap.
-        """
+        """Continue with a new process that has opened its device; our clock measures the gap."""
         self._rate_hz, self._done = rate_hz, ring.tail
         now_ns = time.monotonic_ns()
         if self._last_ns:
