@@ -30,7 +30,7 @@ _LONG_NEGATIVE = (
 _LONG_POSITIVE = (
     1, -1, -1, 1, 1, -1, 1, -1, 1, -1, -1, -1, -1, -1, 1, 1, -1, -1, 1, -1, 1, -1, 1, 1, 1, 1,
 )  # fmt: skip
-# Where the register of x^9 + x^5 + 1 begins: of all, those with the lowest peaks.
+# Start states of the register of x^9 + x^5 + 1, chosen for the lowest peaks.
 _LONG_SEEDS = {128: 293, 256: 246}
 
 # Signs of (1 + j) on the subcarriers that are multiples of 4, of 64.
