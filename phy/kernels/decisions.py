@@ -17,8 +17,7 @@ from phy.kernels.lanes import Lanes, least, load, most, splat
 def expected_level(
     llr: NDArray[np.float32], axis_bits: int, at: int, stride: int
 ) -> tuple[Lanes, Lanes]:
-    """(mean, mean square) of eight levels (odd numbers); the LLRs of bit b are at `at + b stride`.
-    """
+    """(mean, mean square) of eight levels (odd numbers); LLRs of bit b are at `at + b stride`."""
     scale = splat(0.5 / LLR_SCALE)
     mean: Lanes = splat(1)
     square: Lanes = splat(1)

@@ -19,8 +19,7 @@ _LARGEST_BOOST = 3.0
 
 @njit(nogil=True, cache=True)
 def turn_back(x: NDArray[np.complex64], dc: complex, frequency: float, out: Planes) -> None:
-    """Write `x` `[n]` minus `dc`, rotated back by `frequency` cycles a sample, to `out` `[2, …]`.
-    """
+    """Write `x` `[n]` minus `dc`, rotated by −`frequency` cycles a sample, to `out` `[2, …]`."""
     span, n = 32, x.size
     fine, coarse = np.empty((2, span), np.float32), np.empty((2, -(-n // span)), np.float32)
     circle(-frequency, 1.0, fine)
