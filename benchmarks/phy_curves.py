@@ -1,4 +1,4 @@
-"""Draws error rate over SNR for every MCS, and how little any code of that length could do with.
+"""Draws the error rate over SNR for every MCS, with the bound for any code of that length.
 
 python -m benchmarks.phy_curves    writes docs/figures/per_curves.png
 """

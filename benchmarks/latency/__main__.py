@@ -1,10 +1,10 @@
-"""Latency beside MAVLink and XRCE-DDS.
+"""Latency compared with MAVLink and XRCE-DDS.
 
 `python -m benchmarks.latency [--quick] [--json] [--no-peers]`.
 
-What is emulated: the serial line (two pseudo-terminals, paced at 921600 baud), the FCU (a process
-with a clock of its own), the agent and MAVROS (Python, as all of it). A whole run draws
-docs/figures/latency_*.png.
+Some parts are emulated: the serial line (two pseudo-terminals, paced at 921600 baud), the FCU (a
+process with its own clock), the agent and MAVROS (in Python, like everything here). A full run
+draws docs/figures/latency_*.png.
 """
 
 import argparse
@@ -17,7 +17,7 @@ from benchmarks.report import Row, main
 
 
 def measure(seed: int, quick: bool, no_peers: bool = False) -> Iterator[Row]:
-    """The rows of the paper's table, of clocks and of ages."""
+    """Measure the rows of the paper's table, of clocks and of ages."""
     seconds, passes = (3.0, 1) if quick else (15.0, 3)
     beside = () if no_peers else rows.BESIDE
     found = rows.sessions(seed, seconds, passes, of=rows.OURS if no_peers else rows.TOLD)

@@ -12,7 +12,7 @@ from benchmarks.latency.session import Session
 FOLDER = Path(__file__).parents[2] / "docs" / "figures"
 COMMAND = "python -m benchmarks.latency"
 SHOWN = 400
-"""Messages in a row."""
+"""Number of messages in a row that are shown."""
 LONGEST_MS = 8.0
 
 

@@ -1,4 +1,4 @@
-"""The pictures of how clock filters err."""
+"""The figures of the clock filters' errors."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ COMMAND = "python -m benchmarks.timesync"
 
 
 def draw(found: dict[str, dict[str, list[Course]]], hz: float) -> None:
-    """Errors over time, and at the end, of every filter."""
+    """Draw the errors of every filter over time, and at the end."""
     names = list(found["A"])
     figure, axes = plt.subplots(2, 3, figsize=(11, 6), sharex=True, sharey=True)
     for scenario, axis in zip(TOLD, axes.flat, strict=True):
