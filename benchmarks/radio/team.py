@@ -116,7 +116,7 @@ def _words(robots: Pair, robot: int) -> list[str]:
     with ControlClient(robots.folders[robot]) as control:
         link = control.ask("status")["link"]
         policy, share = link["access_policy"], link["access_share_pct"]
-        told = [f"access {policy}, {link['access_reason']}; the policy can use {share:.0f} % of the air"]
+        told = [f"access {policy}, {link['access_reason']}; capacity {share:.0f} % of the air"]
         for topic in TOPICS:
             told += control.ask("why", {"topic": topic})["why"]
     return told
