@@ -175,8 +175,7 @@ def test_symbols_are_equalised_alike(grid, modulation, noise_share):
 
 @every_grid
 def test_symbols_that_lean_are_equalised_alike(grid):
-    """The kernel lets the slope lag by 0.01 rad at the outermost subcarriers, unlike the reference.
-    """
+    """Unlike the reference, the kernel lets the slope lag by 0.01 rad at the outer subcarriers."""
     ours, other = equalised(grid, Modulation.QAM16, 3 * BLOCK, 0.3 / grid.n_fft, 1e-3)
     assert abs(ours[2].figures[SLOPE_USED]) > 0
     assert np.abs(ours[1] - other[1]).max() < 0.015 * np.abs(other[1]).max()
