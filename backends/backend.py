@@ -49,7 +49,7 @@ class Presumption(NamedTuple):
 
     capabilities: Capabilities
     told: str
-    """What only the radio itself can confirm, in words; empty: nothing."""
+    """What the presumption is based on, in words; empty: nothing to add."""
     is_sure: bool
     """Whether the open radio is certain to match the presumption."""
 
