@@ -1,7 +1,7 @@
 """Radios: IQ samples in and out.
 
-What simulates air brings `phy` and its compiled code; it is loaded when it is first asked for, as
-the radio process, and others that only move samples, never do.
+The simulated air needs `phy` and its compiled code. It is loaded on first use, so the radio process
+and other users that only move samples never load it.
 """
 
 import importlib
@@ -156,7 +156,7 @@ _LATER = {
 
 
 def __getattr__(name: str) -> object:
-    """What is loaded when it is asked for (PEP 562)."""
+    """Import an attribute on first use (PEP 562)."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     where = next((each for each, names in _LATER.items() if name in names), "backends.ether")

@@ -1,4 +1,4 @@
-"""Simulated air between one node's transmitter and a receiver, on one index."""
+"""Simulated air between one node's transmitter and a receiver, on one sample index."""
 
 from dataclasses import dataclass, field
 
@@ -11,27 +11,27 @@ from phy import FrontEnd, FrontEndParams, Path, PathParams
 
 @dataclass(frozen=True)
 class Channel:
-    """Path and front end of a simulated air; `seed` draws its chance."""
+    """Path and front end of a simulated air; `seed` seeds its random numbers."""
 
     path: PathParams
     front_end: FrontEndParams = field(default_factory=FrontEndParams)
     seed: int = 0
 
     def make_path(self) -> Path:
-        """The path. Raises BackendError for a profile that does not exist."""
+        """Make the path. Raises BackendError for an unknown profile."""
         try:
             return Path(self.path, np.random.default_rng([self.seed, 1]))
         except ValueError as error:
             raise BackendError(str(error)) from None
 
     def make_front_end(self) -> FrontEnd:
-        """The front end, with chance of its own."""
+        """Make the front end, with a random number generator of its own."""
         rng = np.random.Generator(np.random.SFC64([self.seed, 2]))
         return FrontEnd(self.front_end, rng)
 
 
 class Timeline:
-    """Bursts laid on an endless line of samples, read once from beginning to end.
+    """Bursts on an endless line of samples, which is read once from beginning to end.
 
     A burst goes through its path when its first sample is read.
     """
@@ -41,11 +41,11 @@ class Timeline:
         self._arriving = Line()
 
     def add(self, start: int, samples: Samples, path: Path) -> None:
-        """Send `samples` at `start` through `path`; what overlaps adds up."""
+        """Send `samples` at `start` through `path`; overlapping bursts add up."""
         self._sent.append((start, samples, path))
 
     def take(self, index: int, n: int) -> Samples | None:
-        """What arrives in `index … index + n`, None for silence; earlier is forgotten."""
+        """Samples that arrive in `index … index + n`, None for silence; discards earlier ones."""
         self._carry(index + n)
         return self._arriving.take(index, n)
 

@@ -1,4 +1,4 @@
-"""What a kind of radio is to those above it: a row of the registry."""
+"""One kind of radio, as the rest of the daemon sees it: a row of the registry."""
 
 import importlib
 from collections.abc import Callable
@@ -14,20 +14,20 @@ if TYPE_CHECKING:
 
 
 class ModemNeeds(NamedTuple):
-    """What the modem asks of any radio."""
+    """What the modem requires of any radio."""
 
     rate_hz: float
-    """Samples a second in the modem, and the width of the channel."""
+    """Sample rate of the modem, which is also the width of the channel."""
     oversampling: int
-    """The radio runs at so many times that rate."""
+    """The radio's sample rate, as a multiple of `rate_hz`."""
     frequency_hz: float
-    """Middle of the channel; 0: not set."""
+    """Centre frequency of the channel; 0: not set."""
     block_s: float
-    """Samples are wanted in pieces of this length."""
+    """Length of the blocks in which the modem wants samples."""
 
     @property
     def radio_rate_hz(self) -> float:
-        """Samples a second at the radio."""
+        """Sample rate of the radio."""
         return self.rate_hz * self.oversampling
 
 
@@ -37,30 +37,30 @@ class RadioRequest(NamedTuple):
     needs: ModemNeeds
     node_id: int
     longest_s: float
-    """No burst that it is given is longer."""
+    """Length of the longest burst that the radio is given."""
     patience: Patience
-    """What it does when it is opened and is not there."""
+    """What the radio does when its device is absent at opening."""
     make_channel: "Callable[[], Channel]"
-    """The simulated air of the configuration, for radios without one of their own."""
+    """Makes the configured simulated air, for radios without an air of their own."""
 
 
 class Presumption(NamedTuple):
-    """What a radio should be able to do, before it is open."""
+    """What a radio should be able to do, presumed before it is open."""
 
     capabilities: Capabilities
     told: str
-    """What of that only the radio can tell, in words; empty: nothing."""
+    """What the presumption is based on, in words; empty: nothing to add."""
     is_sure: bool
-    """Whether the radio, once it is open, will be like that."""
+    """Whether the open radio is certain to match the presumption."""
 
 
 def no_problem(_settings: Any, _needs: ModemNeeds) -> str:  # noqa: ANN401  # any backend's
-    """Find nothing wrong with any settings."""
+    """Report no problem, whatever the settings."""
     return ""
 
 
 def nothing_unchecked(_settings: Any) -> list[str]:  # noqa: ANN401
-    """Leave nothing that only the radio could tell."""
+    """Report nothing that has to wait for the open radio."""
     return []
 
 
@@ -69,9 +69,7 @@ def presume_full_duplex(
     needs: ModemNeeds,
     turnaround_s: float | None,
 ) -> Presumption:
-    """Take a radio of which nothing is known for one that sends while it listens, or, with a
-    `turnaround_s`, that does not.
-    """
+    """Presume that an unknown radio is full duplex, or half-duplex if `turnaround_s` is given."""
     duplex = "sends while it listens" if turnaround_s is None else "cannot hear while it sends"
     told = f"taken for a radio that {duplex} and keeps time: nothing is known of its kind"
     return Presumption(simulated(needs, turnaround_s), told, is_sure=False)
@@ -80,7 +78,7 @@ def presume_full_duplex(
 def simulated(
     needs: ModemNeeds, turnaround_s: float | None, lead_s: float = 0.0, shares_air: bool = True
 ) -> Capabilities:
-    """A radio that does all at once and exactly; with a `turnaround_s`, a half-duplex one."""
+    """Capabilities of a simulated, exact radio; with a `turnaround_s`, a half-duplex one."""
     return Capabilities(
         receives=True,
         transmits=True,
@@ -95,46 +93,46 @@ def simulated(
 
 
 class Backend(NamedTuple):
-    """A kind of radio: its name, its settings, how one is made, and what is known of all of them.
+    """A kind of radio: its name, its settings, how to make one, and its common properties.
 
-    `make` is loaded when the first one is made, so that a row costs nothing. The daemon heeds two
-    keys of any `settings`: with `hear_self` it takes its own PDUs, with `wait_for_consumer` it
-    opens the air when the first consumer subscribes.
+    The module in `make` is imported when the first radio is made, so a row costs nothing. The
+    daemon reads two keys of any `settings`: with `hear_self` it accepts its own PDUs, with
+    `wait_for_consumer` it opens the air when the first consumer subscribes.
     """
 
     name: str
-    """The word for the key `backend`, and of its own section."""
+    """The value of the key `backend`, and the name of the settings' section."""
     settings: type[msgspec.Struct]
-    """Its own section of the configuration; every key has a default."""
+    """The radio's own section of the configuration; every key has a default."""
     make: str
     """`module:callable` that takes (settings, RadioRequest) and returns a Radio.
 
-    It raises BackendError for what it cannot be made from.
+    The callable raises BackendError if the settings cannot be used.
     """
     files: tuple[str, ...] = ()
-    """Keys of its settings that name files, relative to the configuration's."""
+    """Settings that name files; relative paths start at the configuration file."""
     is_timed: bool = True
-    """Its samples come by the clock: a machine that sleeps, or is too slow, loses some."""
+    """Samples arrive in real time: a suspended or slow machine loses some."""
     starts_time: bool = False
-    """Time begins with its first sample, as in a recording."""
+    """Time begins with the first sample, as in a recording."""
     may_be_away: bool = True
-    """It may not be there, and come; its section may change meanwhile."""
+    """The device may be absent and appear later; the radio's section may change meanwhile."""
     heeds_patience: bool = False
-    """It waits where RadioRequest.patience says so, and notices when it was replugged."""
+    """The radio waits as RadioRequest.patience says, and notices when its device was replugged."""
     problem: Callable[[Any, ModemNeeds], str] = no_problem
-    """What is wrong with its settings for that modem: key, given, allowed; empty: nothing."""
+    """What is wrong with the settings for that modem: key, given, allowed; empty: nothing."""
     unchecked: Callable[[Any], list[str]] = nothing_unchecked
-    """What nobody can know of these settings before the radio is open, one thing each."""
+    """What cannot be checked about the settings before the radio is open, one item each."""
     presume: Callable[[Any, ModemNeeds, float | None], Presumption] = presume_full_duplex
-    """What a radio set so should be able to do; with a turnaround in s, another than is set."""
+    """What a radio with these settings should be able to do; a turnaround in s overrides theirs."""
 
     def radio(self, settings: msgspec.Struct, request: RadioRequest) -> Radio:
-        """Make one; it is not open. Raises BackendError."""
+        """Make a radio, not open yet. Raises BackendError."""
         module, _, path = self.make.partition(":")
         try:
             make = reduce(getattr, path.split("."), importlib.import_module(module))
         except Exception as error:
-            # What others wrote may fail in any way.
+            # Third-party code may fail in any way.
             raise BackendError(
                 f'backend: got "{self.name}", whose code cannot be loaded: {self.make} '
                 f"({type(error).__name__}: {error}); allowed: another backend, or a package that "

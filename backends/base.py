@@ -1,4 +1,4 @@
-"""What every radio is to those above it: blocks of samples in, bursts out."""
+"""The interface of every radio: blocks of samples in, bursts out."""
 
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass
@@ -12,38 +12,38 @@ Samples = NDArray[np.complex64]
 
 
 SENDING = "sending"
-"""Why a half-duplex radio's gap is one."""
+"""Gap reason of a half-duplex radio while it sends."""
 
 
 class BackendError(Exception):
-    """A radio or recording that cannot be used; the message says what to do about it."""
+    """A radio or recording cannot be used; the message says what to do about it."""
 
 
 class AbsentError(BackendError):
-    """A radio that is not there now, and may come."""
+    """The radio is absent now, and may appear later."""
 
 
 class RefusalError(BackendError):
-    """A radio that is there and does not take its settings."""
+    """The radio is present but rejects its settings."""
 
 
 class Patience(Enum):
-    """What a radio does when it is opened and is not there."""
+    """What a radio does when its device is absent at opening."""
 
     NONE = "none"
-    """It fails at once, and says why."""
+    """Fail at once, with the reason."""
     THERE = "there"
-    """It waits until it is there."""
+    """Wait until the device is present."""
     REPLUGGED = "replugged"
-    """It waits until it has been away and is back: it refused its settings before."""
+    """Wait until the device has been unplugged and is back: it rejected its settings before."""
 
 
 class TxWindows(NamedTuple):
-    """How a radio sends that must stop receiving for it, in s.
+    """Timing of the TX windows of a radio that must stop receiving to send, in s.
 
-    A burst follows the one before in the same TX window when it is handed over `follow_s` before
-    that one ends, and the window is shorter than `longest_s` then; else it begins `pause_s` after
-    it.
+    A burst joins the TX window of the burst before it under two conditions: it is handed over
+    `follow_s` before that burst ends, and the window is shorter than `longest_s` at that moment.
+    Otherwise it starts `pause_s` after that burst.
     """
 
     follow_s: float
@@ -55,13 +55,13 @@ class TxWindows(NamedTuple):
 class Capabilities:
     """What a radio can do.
 
-    `paced`: blocks come in real time; else as fast as they are taken. `lockstep`: time waits for
-    everybody on the same air, so one block is asked for only when all that follows from the one
-    before has been done. `block_s`: samples come in pieces of this length. `lead_s`: how long
-    before its start a burst must be handed over. `turnaround_s`: for so long before and after a
-    burst a half-duplex radio hears nothing. `index_error_s`: how wrong indices may be after a gap,
-    where there are no `timestamps`. `shares_air`: other robots may hear what it sends.
-    `tx_windows`: it sends in those.
+    `paced`: blocks come in real time, otherwise as fast as they are taken. `lockstep`: time
+    advances only when every node on the same air has finished the current block, so the next block
+    may be requested only when all work on the current one is done. `block_s`: length of a block of
+    samples. `lead_s`: how long before its start a burst must be handed over. `turnaround_s`: time
+    before and after a burst in which a half-duplex radio hears nothing. `index_error_s`: possible
+    error of the indices after a gap, without `timestamps`. `shares_air`: other robots may hear what
+    it sends. `tx_windows`: timing of its TX windows, if it needs them.
     """
 
     receives: bool
@@ -80,7 +80,7 @@ class Capabilities:
 
 @dataclass(frozen=True)
 class Tuning:
-    """What a radio is set to; one rate for both directions, samples at ±1 full scale."""
+    """Rate and frequency of a radio; the rate holds for both directions, and full scale is ±1."""
 
     rate_hz: float
     frequency_hz: float
@@ -88,10 +88,10 @@ class Tuning:
 
 @dataclass(frozen=True, slots=True)
 class RxBlock:
-    """`n` received samples from absolute index `index` on, or, when `samples` is None, a gap.
+    """`n` received samples from absolute index `index` on, or a gap if `samples` is None.
 
-    `host_ns` is the monotonic time at which the last of them was there. `index_uncertainty`: by how
-    many samples the index may be wrong (radios without time stamps, after a gap).
+    `host_ns` is the monotonic time of the last sample. `index_uncertainty` is the possible error of
+    the index in samples (radios without time stamps, after a gap).
     """
 
     index: int
@@ -106,11 +106,12 @@ Hear = Callable[[RxBlock], None]
 
 
 class TxBurst(NamedTuple):
-    """Samples whose first leaves at absolute index `start` of the received stream.
+    """Samples to send, the first one at absolute index `start` of the received stream.
 
-    A burst that comes too late, or overlaps the one before, begins as soon as it can. When that is
-    after `latest` it does not leave at all, nor do others that have a `latest` and were handed over
-    behind it before its report was there: nothing overtakes. None: whenever.
+    A burst that is too late, or overlaps the one before, starts as soon as possible. If that is
+    after `latest`, the burst is not sent. To keep the order, the radio then also drops every later
+    burst that has a `latest` and was handed over before the late one was reported. None: no
+    deadline.
     """
 
     start: int
@@ -128,7 +129,7 @@ class TxOutcome(Enum):
 
 
 class TxReport(NamedTuple):
-    """`start` and `end`: index of the first sample that left, and after the last."""
+    """Outcome of a burst; `start` and `end`: indices of its first sample and after its last."""
 
     outcome: TxOutcome
     start: int
@@ -136,22 +137,22 @@ class TxReport(NamedTuple):
 
 
 class Levels(NamedTuple):
-    """Mean power in dB below full scale, and the share of samples that clip; both lately."""
+    """Recent mean power relative to full scale in dB, and the share of samples that clip."""
 
     power_dbfs: float
     clipped: float
 
 
 class Radio(Protocol):
-    """One radio. Everything but `send` is called from one task."""
+    """Protocol of a radio. Everything but `send` is called from one task."""
 
     @property
     def capabilities(self) -> Capabilities:
-        """What it can do; known once it is open."""
+        """What the radio can do; known once it is open."""
 
     @property
     def counters(self) -> dict[str, int]:
-        """What it counts: overflows, late bursts, …; all growing from 0."""
+        """Counters of the radio: overflows, late bursts, …; they start at 0 and only grow."""
 
     @property
     def detail(self) -> str:
@@ -159,24 +160,24 @@ class Radio(Protocol):
 
     @property
     def trouble(self) -> str:
-        """Why nothing comes from it now, where it knows; empty: nothing is wrong."""
+        """Why the radio delivers nothing now, if it knows; empty: nothing is wrong."""
 
     @property
     def levels(self) -> Levels | None:
-        """How strong what it hears is, before any filter of ours; None: that is not known."""
+        """Level of the received samples before any filter of ours; None: unknown."""
 
     async def open(self, tuning: Tuning) -> None:
-        """Begin to receive at this rate and frequency. Raises BackendError."""
+        """Start to receive at this rate and frequency. Raises BackendError."""
 
     def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
-        """Contiguous blocks from index 0 on; gaps are blocks too. Ends with the recording.
+        """Contiguous blocks from index 0 on, gaps included. Ends with the recording.
 
-        A radio that makes them on a thread of its own may give them to `hear` there, at once; what
-        `hear` has had is not yielded.
+        A radio that makes blocks on a thread of its own may pass them to `hear` there, without
+        delay. A block that `hear` has received is not yielded.
         """
 
     def send(self, burst: TxBurst) -> Awaitable[TxReport]:
-        """Take a burst at once; the report comes when its last sample has left, or it cannot."""
+        """Accept a burst without waiting; the report follows when it has left or cannot leave."""
 
     async def close(self) -> None:
-        """Stop; bursts on their way are lost. Closing twice is fine."""
+        """Stop; pending bursts are lost. Closing twice is fine."""

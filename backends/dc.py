@@ -1,21 +1,21 @@
-"""Takes away what a receiver's own oscillator leaves at 0 Hz."""
+"""Removes the DC offset that a receiver's own oscillator leaves at 0 Hz."""
 
 import numpy as np
 
 from backends.base import Samples
 
 FOLLOWS = 0.02
-"""The part of each block's mean in the estimate."""
+"""Weight of each block's mean in the DC estimate."""
 
 
 class DcBlocker:
-    """Subtracts a slow mean. OFDM has no subcarrier at 0 Hz: nothing that was sent goes with it."""
+    """Subtracts a slow mean. OFDM has no subcarrier at 0 Hz, so no signal is lost."""
 
     def __init__(self) -> None:
         self._mean: np.complex64 | None = None
 
     def push(self, samples: Samples) -> Samples:
-        """The next block, in memory of its own."""
+        """Return the next block without DC, in memory of its own."""
         mean = samples.mean(dtype=np.complex64)
         if self._mean is None:
             self._mean = mean

@@ -1,4 +1,4 @@
-"""Blocks made on a thread of their own, heard there or taken on the event loop."""
+"""Blocks made on a thread of their own, and heard there or taken on the event loop."""
 
 import asyncio
 import threading
@@ -8,23 +8,24 @@ from typing import NamedTuple
 from backends.base import Hear, Levels, RxBlock
 from backends.levels import LevelMeter
 
-# Blocks that may wait for the event loop; past that the thread waits.
+# Number of blocks that may wait for the event loop; beyond that the thread waits.
 MAX_WAITING = 16
 
 
 class Fed(NamedTuple):
-    """A block; whether it was heard where it was made."""
+    """A block, and whether it was already heard on the thread that made it."""
 
     block: RxBlock
     is_heard: bool
 
 
 class BlockFeed:
-    """Calls `next_block` again and again on a thread, until it returns None or `stop` is called.
+    """Calls `next_block` repeatedly on a thread, until it returns None or `stop` is called.
 
-    One wake-up of the event loop a block, and no turn of it while a block is made; none at all for
-    blocks that were heard, unless `is_due` says of the index after one that something else is to be
-    done then. `measures`: how strong what is in the blocks is.
+    The event loop wakes up once per block, and does not run while a block is made. For a block that
+    was heard on the thread it does not wake up at all, unless `is_due` returns true for the index
+    after the block: then the loop has other work to do. `measures`: measure the level of the
+    blocks.
     """
 
     def __init__(
@@ -46,11 +47,11 @@ class BlockFeed:
 
     @property
     def levels(self) -> Levels | None:
-        """How strong the blocks so far were; None before the first look."""
+        """Level of the blocks so far; None before the first measurement."""
         return self._meter.levels if self._meter else None
 
     async def blocks(self, hear: Hear | None) -> AsyncIterator[Fed]:
-        """The blocks in order. What `next_block` or `hear` raise is raised here."""
+        """Yield the blocks in order; exceptions of `next_block` and `hear` are raised here."""
         self._loop, self._hear = asyncio.get_running_loop(), hear
         self._thread.start()
         while (fed := await self._queue.get()) is not None:
@@ -60,7 +61,7 @@ class BlockFeed:
             yield fed
 
     def stop(self) -> None:
-        """End the thread and wait for it; stopping twice is fine."""
+        """Stop the thread and wait for it; stopping twice is fine."""
         self._stopped.set()
         self._room.release()
         if self._thread.is_alive():
@@ -78,7 +79,7 @@ class BlockFeed:
                 self._hand_over(error)
 
     def _make(self) -> bool:
-        """The next block; False: there is none, or nobody who wants it."""
+        """Make the next block; returns False if there is none, or no reader for it."""
         block = self._next_block()
         if self._stopped.is_set():
             return False
@@ -89,7 +90,7 @@ class BlockFeed:
             self._meter.push(block.samples)
         if self._hear is None or not block.n:
             return self._hand_over(Fed(block, is_heard=False))
-        # What is due comes first: who hears of the block may act on it.
+        # Reports go first: whoever hears the block may act on them.
         if self._is_due(block.index + block.n):
             if not self._hand_over(Fed(block, is_heard=True)):
                 return False

@@ -53,7 +53,7 @@ class IqFileRadio:
         self._writer: RecordingWriter | None = None
         self._outstanding = Outstanding()
         self._feed = BlockFeed(self._next_block, "iqfile", self._outstanding.is_due)
-        # The next block's index and the bursts to record belong together.
+        # The next block's index and the bursts to record must change together.
         self._lock = threading.Lock()
         self._next = 0
         self._is_open = False
@@ -62,7 +62,7 @@ class IqFileRadio:
 
     @property
     def capabilities(self) -> Capabilities:
-        """Both directions at once where both files are named; indices exact."""
+        """Both directions at once if both files are named; exact indices."""
         return Capabilities(
             receives=self._receive is not None,
             transmits=self._transmit is not None,
@@ -75,7 +75,7 @@ class IqFileRadio:
 
     @property
     def counters(self) -> dict[str, int]:
-        """Also values that were too large for the recording's sample type."""
+        """Counters of the radio, with the values that clipped in the recording."""
         return {"late": self._late, "clipped": self._writer.clipped if self._writer else 0}
 
     @property
@@ -92,16 +92,16 @@ class IqFileRadio:
 
     @property
     def trouble(self) -> str:
-        """Always empty: a recording is there or is refused when it is opened."""
+        """Always empty: an unusable recording already fails in `open`."""
         return ""
 
     @property
     def levels(self) -> Levels | None:
-        """How strong the blocks so far were; None before the first look."""
+        """Level of the blocks so far; None before the first measurement."""
         return self._feed.levels
 
     async def open(self, tuning: Tuning) -> None:
-        """Open the files. Raises BackendError, also when a recording is of another rate."""
+        """Open the files. Raises BackendError, also when a recording has another sample rate."""
         if self._receive is not None and self._transmit is not None:
             refuse_same(self._receive, self._transmit)
         if self._receive is not None:
@@ -122,12 +122,12 @@ class IqFileRadio:
         self._is_open = True
 
     def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
-        """The recording from its beginning to its end; without one, gaps without end."""
+        """Yield the recording from beginning to end; without one, gaps forever."""
         self._pace.restart()
         return self._outstanding.blocks(self._feed, hear)
 
     def send(self, burst: TxBurst) -> Awaitable[TxReport]:
-        """Record a burst; blocks() raises BackendError when the disk will not take it."""
+        """Record a burst; blocks() raises BackendError when the disk rejects it."""
         if not self._is_open or self._writer is None:
             return answered(TxReport(TxOutcome.LOST, burst.start, burst.start))
         with self._lock:
@@ -139,13 +139,13 @@ class IqFileRadio:
         return self._outstanding.left(start, len(burst.samples))
 
     async def close(self) -> None:
-        """Close the files; a recording lasts until now."""
+        """Close the files; the recording extends up to now."""
         if self._is_open:
             self._is_open = False
             self._pace.end()
             self._feed.stop()
             if self._writer is not None:
-                # On a disk that is full, the recording just ends with its last burst.
+                # On a full disk, the recording simply ends with its last burst.
                 with contextlib.suppress(BackendError):
                     self._writer.extend_to(self._next)
         self._outstanding.lose()
@@ -154,7 +154,7 @@ class IqFileRadio:
                 part.close()
 
     def _next_block(self) -> RxBlock | None:
-        """In the feed's thread: what is received next, and what has left recorded."""
+        """On the feed's thread: make the next block, and record the bursts that have left."""
         first, n = self._next, self._n
         samples: Samples | None = None
         if self._reader is not None:

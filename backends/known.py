@@ -1,4 +1,4 @@
-"""What is known of radios without a device from their settings alone: nothing is opened here."""
+"""What follows from settings alone, for radios without a device; nothing is opened here."""
 
 from backends.backend import ModemNeeds, Presumption, simulated
 from backends.base import BackendError
@@ -13,7 +13,7 @@ ETHER_TURNAROUND_S = 1e-4
 
 
 def alone(_settings: object, needs: ModemNeeds, turnaround_s: float | None) -> Presumption:
-    """Presume of a radio that no other robot hears: it is as it is made."""
+    """Presume a radio that no other robot hears: its properties are certain."""
     return Presumption(simulated(needs, turnaround_s, shares_air=False), "", is_sure=True)
 
 
@@ -28,7 +28,7 @@ def iqfile_problem(iqfile: IqFileParams, _needs: ModemNeeds) -> str:
 
 
 def iqfile_unchecked(iqfile: IqFileParams) -> list[str]:
-    """What of [iqfile] nobody can know before the recording is opened."""
+    """What cannot be checked about [iqfile] before the recording is opened."""
     if not iqfile.receive:
         return []
     return [f"whether {iqfile.receive} can be read (the recording is not opened)"]
@@ -52,7 +52,7 @@ def ether_problem(ether: EtherParams, _needs: ModemNeeds) -> str:
 
 
 def ether_unchecked(ether: EtherParams) -> list[str]:
-    """What of [ether] nobody can know before the hub is asked."""
+    """What cannot be checked about [ether] before the hub answers."""
     where = f"at {ether.hub}" if ether.hub else f"in {ether.dir}"
     return [f"whether a hub answers {where} (nobody is asked)"]
 
@@ -60,7 +60,7 @@ def ether_unchecked(ether: EtherParams) -> list[str]:
 def ether_presumption(
     ether: EtherParams, needs: ModemNeeds, turnaround_s: float | None
 ) -> Presumption:
-    """Presume of a radio on the ether: its hub says what it is like, once it is asked."""
+    """Presume a radio on the ether; its hub decides the properties when the radio joins."""
     lead_s = ETHER_REMOTE_LEAD_S if ether.hub else ETHER_LEAD_S
     turn_s = ETHER_TURNAROUND_S if turnaround_s is None else turnaround_s
     told = (
@@ -82,11 +82,11 @@ def zmq_problem(zmq: ZmqParams, _needs: ModemNeeds) -> str:
 
 
 def zmq_unchecked(_zmq: ZmqParams) -> list[str]:
-    """What of [zmq] nobody can know before the flowgraph is asked."""
+    """What cannot be checked about [zmq] before the flowgraph answers."""
     return ["whether the flowgraph answers, and sends this rate and format (it is not asked)"]
 
 
 def zmq_presumption(zmq: ZmqParams, needs: ModemNeeds, turnaround_s: float | None) -> Presumption:
-    """Presume of a sample stream: it is as it is set."""
+    """Presume a sample stream; its settings decide its properties."""
     lead_s = zmq.lead_s + needs.block_s
     return Presumption(simulated(needs, turnaround_s, lead_s), "", is_sure=True)

@@ -1,4 +1,4 @@
-"""A radio on a clock that began before it."""
+"""A radio that joins a sample clock that is already running."""
 
 import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
@@ -10,9 +10,9 @@ NOT_OPEN = "the radio was not open yet"
 
 
 class LateRadio:
-    """`radio`, whose samples others see from index `first()` on; what lies before is a gap.
+    """`radio`, with its samples moved to index `first()` and later; the time before is a gap.
 
-    `first` is asked when the radio's first block is there, and nothing is sent before.
+    `first` is called when the radio's first block arrives. Nothing is sent before that.
     """
 
     def __init__(self, radio: Radio, first: Callable[[], int]) -> None:
@@ -23,31 +23,31 @@ class LateRadio:
 
     @property
     def capabilities(self) -> Capabilities:
-        """What the radio within can do."""
+        """What the wrapped radio can do."""
         return self._radio.capabilities
 
     @property
     def counters(self) -> dict[str, int]:
-        """What the radio within counts."""
+        """Counters of the wrapped radio."""
         return self._radio.counters
 
     @property
     def detail(self) -> str:
-        """The line that the radio within has for people."""
+        """One line for people from the wrapped radio."""
         return self._radio.detail
 
     @property
     def trouble(self) -> str:
-        """Why nothing comes from the radio within, where it knows."""
+        """Why the wrapped radio delivers nothing, if it knows."""
         return self._radio.trouble
 
     @property
     def levels(self) -> Levels | None:
-        """How strong what the radio within hears is."""
+        """Level of the samples that the wrapped radio receives."""
         return self._radio.levels
 
     async def open(self, tuning: Tuning) -> None:
-        """Open the radio within. Raises BackendError."""
+        """Open the wrapped radio. Raises BackendError."""
         await self._radio.open(tuning)
 
     async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
@@ -63,14 +63,14 @@ class LateRadio:
                 yield each
 
     def send(self, burst: TxBurst) -> Awaitable[TxReport]:
-        """The burst at the radio's own index."""
+        """Send the burst at the wrapped radio's own index."""
         first = self._first
         latest = None if burst.latest is None else burst.latest - first
         answer = self._radio.send(burst._replace(start=burst.start - first, latest=latest))
         return self._report(answer, first)
 
     async def close(self) -> None:
-        """Close the radio within; closing twice is fine."""
+        """Close the wrapped radio; closing twice is fine."""
         await self._radio.close()
 
     def _shifted(self, block: RxBlock) -> Iterator[RxBlock]:

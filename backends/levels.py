@@ -1,19 +1,19 @@
-"""How strong what a radio hears is, and whether it clips."""
+"""Level of the samples that a radio receives, and whether they clip."""
 
 import numpy as np
 
 from backends.base import Levels, Samples
 
 EVERY = 16
-"""One block in so many is looked at: that costs nearly nothing."""
+"""One block in this many is measured; that costs almost nothing."""
 KEEPS = 0.98
-"""Of the means so far, at each look: they are over some hundred blocks."""
+"""Weight of the past in each new mean; a mean covers several hundred blocks."""
 FULL = 0.99
-"""An I or Q beyond this stands at full scale."""
+"""Magnitude from which an I or Q value counts as clipped."""
 
 
 class LevelMeter:
-    """Looks at blocks as they come from the radio; used in one thread, read from any."""
+    """Measures blocks as they come from the radio; written by one thread, readable from any."""
 
     def __init__(self) -> None:
         self._blocks = 0
@@ -21,7 +21,7 @@ class LevelMeter:
         self._weight = 0.0
 
     def push(self, samples: Samples) -> None:
-        """Look at a block, where it is time to."""
+        """Measure this block, if its turn has come."""
         self._blocks += 1
         if self._blocks % EVERY or not len(samples):
             return
@@ -34,7 +34,7 @@ class LevelMeter:
 
     @property
     def levels(self) -> Levels | None:
-        """What the latest look found; None before the first."""
+        """The latest measurement; None before the first."""
         weight, power = self._weight, self._power
         if not weight:
             return None

@@ -1,4 +1,4 @@
-"""Bursts laid on an endless line of samples, read once from beginning to end."""
+"""Bursts on an endless line of samples, which is read once from beginning to end."""
 
 import numpy as np
 
@@ -6,13 +6,13 @@ from backends.base import Samples
 
 
 class Line:
-    """Samples to come, by index; those that overlap add up."""
+    """Samples to come, by index; overlapping ones add up."""
 
     def __init__(self) -> None:
         self._laid: list[tuple[int, Samples]] = []
 
     def __len__(self) -> int:
-        """How many bursts have not been read to their end."""
+        """Number of bursts that have not been read to their end."""
         return len(self._laid)
 
     def lay(self, start: int, samples: Samples) -> None:
@@ -20,7 +20,7 @@ class Line:
         self._laid.append((start, samples))
 
     def take(self, index: int, n: int) -> Samples | None:
-        """What lies in `index … index + n`, None for silence; earlier is forgotten."""
+        """Samples in `index … index + n`, None for silence; discards earlier ones."""
         if not self._laid:
             return None
         out = np.zeros(n, np.complex64)

@@ -1,4 +1,4 @@
-"""A radio whose antenna hears itself, through a simulated channel."""
+"""A radio that receives its own signal, through a simulated channel."""
 
 import threading
 from collections.abc import AsyncIterator, Awaitable
@@ -21,16 +21,16 @@ from backends.feed import BlockFeed
 from backends.outstanding import Outstanding, answered
 from backends.pace import Pace
 
-# A reader further behind than this misses what was on the air; until then nothing is lost.
+# A reader further behind than this misses samples; up to here none are lost.
 MAX_BEHIND_S = 2.0
-# A reader that is late gets fewer, larger blocks.
+# A late reader gets fewer, larger blocks.
 MAX_LATE_BLOCKS = 8
 
 
 class LoopbackRadio:
-    """Sends to itself. `paced` by the clock, or as fast as blocks are taken.
+    """Sends to itself, either `paced` in real time or as fast as blocks are taken.
 
-    Without `hear_self` only the front end's noise is received.
+    Without `hear_self` it receives only the front end's noise.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class LoopbackRadio:
         self._hear_self = hear_self
         self._outstanding = Outstanding()
         self._feed = BlockFeed(self._next_block, "loopback", self._outstanding.is_due)
-        # The next block's index and the bursts sent belong together.
+        # The next block's index and the bursts on the air must change together.
         self._lock = threading.Lock()
         self._next = 0
         self._is_open = False
@@ -53,7 +53,7 @@ class LoopbackRadio:
 
     @property
     def capabilities(self) -> Capabilities:
-        """Both directions at once, indices exact."""
+        """Both directions at once, exact indices."""
         return Capabilities(
             receives=True,
             transmits=True,
@@ -76,18 +76,18 @@ class LoopbackRadio:
 
     @property
     def levels(self) -> Levels | None:
-        """How strong the blocks so far were; None before the first look."""
+        """Level of the blocks so far; None before the first measurement."""
         return self._feed.levels
 
     async def open(self, tuning: Tuning) -> None:
-        """Begin at index 0, at the rate of `tuning`."""
+        """Start at index 0, at the rate of `tuning`."""
         self._n = max(1, round(self._block_s * tuning.rate_hz))
         self._max_behind = round(MAX_BEHIND_S * tuning.rate_hz)
         self._pace = Pace(tuning.rate_hz, self._paced)
         self._is_open = True
 
     def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
-        """What the antenna hears; when the reader is far behind, what it missed is a gap."""
+        """Yield what the antenna receives; a reader that is far behind gets a gap."""
         self._pace.restart()
         return self._outstanding.blocks(self._feed, hear)
 
@@ -105,7 +105,7 @@ class LoopbackRadio:
         return self._outstanding.left(start, len(burst.samples))
 
     async def close(self) -> None:
-        """Stop the feed; bursts on their way are lost."""
+        """Stop the feed; pending bursts are lost."""
         if self._is_open:
             self._is_open = False
             self._pace.end()

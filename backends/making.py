@@ -1,4 +1,4 @@
-"""How each radio of ours is made from its settings; the code of one is loaded with the first."""
+"""Makes each built-in radio from its settings; loads its code with the first of its kind."""
 
 import os
 import socket
@@ -36,7 +36,7 @@ def make_iqfile(iqfile: IqFileParams, request: RadioRequest) -> Radio:
 
 
 def make_ether(ether: EtherParams, request: RadioRequest) -> Radio:
-    """Make a radio on the air of a hub, which gets to know this process by its number."""
+    """Make a radio on a hub's air; the hub learns this process by its number."""
     from backends.ether import EtherRadio
 
     who = f"process {os.getpid()} on {socket.gethostname()}"
@@ -45,7 +45,7 @@ def make_ether(ether: EtherParams, request: RadioRequest) -> Radio:
 
 
 def make_soapy(soapy: SoapyParams, request: RadioRequest) -> Radio:
-    """Make a radio behind SoapySDR, its oscillator beside the channel where that is wanted."""
+    """Make a radio behind SoapySDR, with offset tuning if the settings call for it."""
     from backends.offset import OffsetRadio
 
     needs = request.needs
@@ -58,7 +58,7 @@ def make_soapy(soapy: SoapyParams, request: RadioRequest) -> Radio:
 
 
 def make_zmq(zmq: ZmqParams, request: RadioRequest) -> Radio:
-    """Make a radio that is another program, by samples over ZeroMQ."""
+    """Make a radio that exchanges samples with another program over ZeroMQ."""
     from backends.zmqstream import ZmqRadio
 
     return ZmqRadio(zmq, request.needs.block_s)

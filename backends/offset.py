@@ -1,4 +1,4 @@
-"""A radio whose oscillator is beside the channel: what it leaks is not in the middle of it."""
+"""A radio with offset tuning: its LO leakage falls outside the channel."""
 
 from collections.abc import AsyncIterator, Awaitable
 from dataclasses import replace
@@ -18,11 +18,11 @@ from backends.base import (
 )
 
 UP = np.array([1, 1j, -1, -1j], np.complex64)
-"""A quarter of the rate, where a turn has four samples: the cheapest shift there is."""
+"""A turn of a quarter of the sample rate: four samples long, the cheapest shift there is."""
 
 
 class OffsetRadio:
-    """`radio` tuned a quarter of its rate below the channel; others see the channel at 0 Hz.
+    """`radio` tuned a quarter of its rate below the channel; callers see the channel at 0 Hz.
 
     The channel must be narrower than half the rate.
     """
@@ -34,36 +34,36 @@ class OffsetRadio:
 
     @property
     def capabilities(self) -> Capabilities:
-        """What the radio within can do."""
+        """What the wrapped radio can do."""
         return self._radio.capabilities
 
     @property
     def counters(self) -> dict[str, int]:
-        """What the radio within counts."""
+        """Counters of the wrapped radio."""
         return self._radio.counters
 
     @property
     def detail(self) -> str:
-        """The line that the radio within has for people."""
+        """One line for people from the wrapped radio."""
         return self._radio.detail
 
     @property
     def trouble(self) -> str:
-        """Why nothing comes from the radio within, where it knows."""
+        """Why the wrapped radio delivers nothing, if it knows."""
         return self._radio.trouble
 
     @property
     def levels(self) -> Levels | None:
-        """How strong what the radio within hears is."""
+        """Level of the samples that the wrapped radio receives."""
         return self._radio.levels
 
     async def open(self, tuning: Tuning) -> None:
-        """Open the radio within, its oscillator beside the channel. Raises BackendError."""
+        """Open the wrapped radio with its oscillator below the channel. Raises BackendError."""
         beside_hz = tuning.frequency_hz - tuning.rate_hz / 4
         await self._radio.open(replace(tuning, frequency_hz=beside_hz))
 
     async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
-        """The blocks of the radio within, shifted to the middle of the channel."""
+        """Yield the wrapped radio's blocks, shifted so that the channel is at 0 Hz."""
 
         def hear_shifted(block: RxBlock) -> None:
             if hear is not None:
@@ -73,12 +73,12 @@ class OffsetRadio:
             yield self._shifted(block)
 
     def send(self, burst: TxBurst) -> Awaitable[TxReport]:
-        """A burst in the channel; its phase counts from its own first sample."""
+        """Send a burst in the channel; its shift starts with phase 0 at its first sample."""
         samples = burst.samples * self._up.of(0, len(burst.samples))
         return self._radio.send(burst._replace(samples=samples))
 
     async def close(self) -> None:
-        """Close the radio within; closing twice is fine."""
+        """Close the wrapped radio; closing twice is fine."""
         await self._radio.close()
 
     def _shifted(self, block: RxBlock) -> RxBlock:
@@ -88,13 +88,13 @@ class OffsetRadio:
 
 
 class _Turns:
-    """A turn by index, for any stretch of it."""
+    """A periodic rotation of samples, for any range of indices."""
 
     def __init__(self, turn: Samples) -> None:
         self._turn = self._many = turn
 
     def of(self, index: int, n: int) -> Samples:
-        """For `n` indices from `index` on."""
+        """Factors for `n` samples from `index` on."""
         first = index % len(self._turn)
         if len(self._many) < first + n:
             self._many = np.tile(self._turn, 1 + (first + n) // len(self._turn))

@@ -1,4 +1,4 @@
-"""Bursts handed over whose last sample has not left yet."""
+"""Bursts that were handed over and whose last sample has not left yet."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -12,20 +12,20 @@ GAP = 32
 
 
 def answered(report: TxReport) -> asyncio.Future[TxReport]:
-    """A report that is there already."""
+    """A future that already holds the report."""
     answer: asyncio.Future[TxReport] = asyncio.get_running_loop().create_future()
     answer.set_result(report)
     return answer
 
 
 class Places:
-    """Lays bursts one after another, so that none overlaps."""
+    """Places bursts one after another, so that none overlap."""
 
     def __init__(self) -> None:
         self._free_from = 0
 
     def place(self, burst: TxBurst, earliest: int) -> int | None:
-        """Where a burst begins when `earliest` is the first index possible; None: too late."""
+        """Return the start of a burst, `earliest` or later; None: too late."""
         start = max(burst.start, earliest, self._free_from)
         if burst.latest is not None and start > burst.latest:
             return None
@@ -34,7 +34,7 @@ class Places:
 
 
 class Outstanding(Places):
-    """And answers each when the stream has passed its end."""
+    """Places bursts, and reports each when the stream has passed its end."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -43,7 +43,7 @@ class Outstanding(Places):
         self._first_end = NEVER
 
     def left(self, start: int, n_samples: int) -> asyncio.Future[TxReport]:
-        """The report that comes when the last sample has left, or all is lost."""
+        """Register a burst; its report comes when its last sample has left, or all is lost."""
         report = TxReport(TxOutcome.SENT, start, start + n_samples)
         if self._is_over:
             return answered(report._replace(outcome=TxOutcome.LOST))
@@ -53,7 +53,7 @@ class Outstanding(Places):
         return answer
 
     async def blocks(self, feed: BlockFeed, hear: Hear | None) -> AsyncIterator[RxBlock]:
-        """What the feed makes; bursts that have left by then are answered, and in the end all."""
+        """Yield the feed's blocks; report the bursts that have left, and at the end all as lost."""
         try:
             async for block, is_heard in feed.blocks(hear):
                 self.settle(block.index + block.n)
@@ -63,11 +63,11 @@ class Outstanding(Places):
             self.lose()
 
     def is_due(self, index: int) -> bool:
-        """Whether `settle` would have something to tell; asked from any thread."""
+        """Whether `settle` would report a burst; may be called from any thread."""
         return self._first_end <= index
 
     def settle(self, index: int) -> None:
-        """Every sample before `index` has left."""
+        """Report the bursts that ended before `index`: every sample before it has left."""
         if not self.is_due(index):
             return
         left = [each for each in self._waiting if each[0].end <= index]
@@ -78,7 +78,7 @@ class Outstanding(Places):
                 answer.set_result(report)
 
     def lose(self) -> None:
-        """Nothing more will leave, now or later."""
+        """Report all bursts as lost, now and later ones: nothing more will leave."""
         self._is_over = True
         waiting, self._waiting = self._waiting, []
         for report, answer in waiting:

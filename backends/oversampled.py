@@ -1,4 +1,4 @@
-"""A radio at twice or four times the modem's rate: for those that are not made for slow ones."""
+"""A radio at twice or four times the modem's rate, for devices that cannot run as slowly."""
 
 from collections.abc import AsyncIterator, Awaitable, Iterator
 from dataclasses import replace
@@ -18,11 +18,11 @@ from backends.outstanding import GAP
 from phy import REACH, Downsampler, upsample
 
 TRIM = GAP // 2
-"""Of the filter's rise and fall, where nearly nothing is: bursts GAP apart do not meet."""
+"""Samples cut from the filter's rise and fall, almost 0: bursts GAP apart stay separate."""
 
 
 class OversampledRadio:
-    """`radio` at `factor` times the rate that others see; indices are theirs."""
+    """`radio` at `factor` times the rate that callers see; indices count at the callers' rate."""
 
     def __init__(self, radio: Radio, factor: int) -> None:
         self._radio = radio
@@ -33,39 +33,39 @@ class OversampledRadio:
 
     @property
     def capabilities(self) -> Capabilities:
-        """Bursts are longer by the filter, at both ends."""
+        """What the wrapped radio can do; the filter lengthens bursts, so the lead is longer."""
         found = self._radio.capabilities
         return replace(found, lead_s=found.lead_s + self._reach_s)
 
     @property
     def counters(self) -> dict[str, int]:
-        """The radio's; samples as others count them."""
+        """Counters of the wrapped radio; samples count at the callers' rate."""
         counted = self._radio.counters
         lost = counted.get("samples_lost", 0)
         return {**counted, "samples_lost": lost // self._factor} if lost else counted
 
     @property
     def detail(self) -> str:
-        """The radio's, and how much faster it is."""
+        """One line for people from the wrapped radio, with the oversampling factor."""
         return f"{self._radio.detail}, {self._factor} times oversampled"
 
     @property
     def trouble(self) -> str:
-        """Why nothing comes from the radio within, where it knows."""
+        """Why the wrapped radio delivers nothing, if it knows."""
         return self._radio.trouble
 
     @property
     def levels(self) -> Levels | None:
-        """How strong what the radio within hears is, before our filter."""
+        """Level of the samples that the wrapped radio receives, before our filter."""
         return self._radio.levels
 
     async def open(self, tuning: Tuning) -> None:
-        """Open the radio within at `factor` times the rate. Raises BackendError."""
+        """Open the wrapped radio at `factor` times the rate. Raises BackendError."""
         self._tuning = tuning
         await self._radio.open(replace(tuning, rate_hz=tuning.rate_hz * self._factor))
 
     async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
-        """Blocks REACH samples late; what lies before a gap is told as if silence followed."""
+        """Yield blocks with a delay of REACH samples; a gap ends the filter as silence would."""
 
         def hear_filtered(block: RxBlock) -> None:
             if hear is not None:
@@ -98,13 +98,13 @@ class OversampledRadio:
         yield RxBlock(begin, n, None, block.gap_reason, block.host_ns, self._unsure(block))
 
     def send(self, burst: TxBurst) -> Awaitable[TxReport]:
-        """The burst with the filter's rise before and fall behind it."""
+        """Send the burst, together with the filter's rise before it and fall after it."""
         samples = upsample(burst.samples, self._factor)[TRIM:-TRIM]
         latest = None if burst.latest is None else self._fast(burst.latest)
         return self._report(self._radio.send(TxBurst(self._fast(burst.start), samples, latest)))
 
     def _fast(self, start: int) -> int:
-        """Where the radio begins with a burst."""
+        """Index at the radio's rate at which a burst begins."""
         return (start - REACH) * self._factor + TRIM
 
     async def _report(self, answer: Awaitable[TxReport]) -> TxReport:
@@ -114,7 +114,7 @@ class OversampledRadio:
         return TxReport(report.outcome, start, max(start, end))
 
     async def close(self) -> None:
-        """Close the radio within; closing twice is fine."""
+        """Close the wrapped radio; closing twice is fine."""
         await self._radio.close()
 
     @property

@@ -5,7 +5,7 @@ import time
 
 
 class Pace:
-    """The monotonic clock in samples: blocks come when their last sample would have."""
+    """The monotonic clock in samples: a block is due at the time of its last sample."""
 
     def __init__(self, rate_hz: float, paced: bool) -> None:
         self._rate_hz = rate_hz
@@ -14,17 +14,17 @@ class Pace:
         self._ended = threading.Event()
 
     def restart(self) -> None:
-        """Set index 0 to now."""
+        """Set the time of index 0 to now."""
         self._origin_ns = time.monotonic_ns()
 
     def host_ns(self, index: int) -> int:
-        """Monotonic time at which the sample before `index` was there."""
+        """Monotonic time of the sample before `index`."""
         if not self._paced:
             return time.monotonic_ns()
         return self._origin_ns + round(index / self._rate_hz * 1e9)
 
     def wait_for(self, index: int) -> int:
-        """Block until all samples before `index` are there; how many further ones are already."""
+        """Wait until all samples before `index` are due; returns how many more are due already."""
         if not self._paced:
             return 0
         ahead_s = (self.host_ns(index) - time.monotonic_ns()) * 1e-9
@@ -34,5 +34,5 @@ class Pace:
         return round(-ahead_s * self._rate_hz)
 
     def end(self) -> None:
-        """Wake up whoever waits; nobody waits any more."""
+        """Wake up any thread that waits; from now on none waits."""
         self._ended.set()

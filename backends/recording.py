@@ -1,4 +1,4 @@
-"""Recordings of samples: a data file and what SigMF's metadata says of it (sigmf.org)."""
+"""Reads recordings of samples: a data file, described by SigMF metadata (sigmf.org)."""
 
 import contextlib
 import json
@@ -17,12 +17,12 @@ RAW_TYPES = {
     ".ci16": "ci16_le", ".sc16": "ci16_le", ".i16": "ci16_le",
     ".ci8": "ci8", ".cs8": "ci8", ".sc8": "ci8", ".cu8": "cu8", ".u8": "cu8",
 }  # fmt: skip
-"""Sample type of files without metadata, by their ending."""
+"""Sample type of files without metadata, by file name extension."""
 
 
 @dataclass(frozen=True)
 class RecordingInfo:
-    """What is known of a recording; rate and frequency only where it says so."""
+    """What is known of a recording; rate and frequency are None if it does not state them."""
 
     path: Path
     type: SampleType
@@ -30,13 +30,13 @@ class RecordingInfo:
     rate_hz: float | None
     frequency_hz: float | None
     damage: str
-    """What is wrong with it without keeping it from being read."""
+    """Defects that do not keep it from being read."""
     gaps: tuple[tuple[int, int], ...] = ()
-    """(first, n) of samples that are missing, by its annotations; they are silence."""
+    """(first, n) of missing samples, according to the annotations; they read as silence."""
 
 
 class RecordingReader:
-    """Reads a recording piece by piece; nothing is loaded but the piece."""
+    """Reads a recording piece by piece, and keeps no more than one piece in memory."""
 
     def __init__(self, info: RecordingInfo) -> None:
         self.info = info
@@ -46,19 +46,19 @@ class RecordingReader:
             raise BackendError(f"{info.path}: cannot be read ({error.strerror})") from None
 
     def read(self, first: int, n: int) -> Samples:
-        """Up to `n` samples from `first` on; fewer at the end."""
+        """Up to `n` samples from `first` on; fewer at the end of the recording."""
         size = self.info.type.size
         self._file.seek(first * size)
         data = self._file.read(max(0, min(n, self.info.n_samples - first)) * size)
         return self.info.type.decode(data[: len(data) - len(data) % size])
 
     def close(self) -> None:
-        """Close the file of samples."""
+        """Close the data file."""
         self._file.close()
 
 
 def refuse_same(receive: Path, transmit: Path) -> None:
-    """Raises BackendError when both name one recording: writing would empty it."""
+    """Raise BackendError if both name the same recording: writing would empty it."""
     if sigmf_paths(receive)[1].resolve() == sigmf_paths(transmit)[1].resolve():
         raise BackendError(
             f"{transmit}: is played and cannot be written to; name another recording"
@@ -66,7 +66,7 @@ def refuse_same(receive: Path, transmit: Path) -> None:
 
 
 def sigmf_paths(path: Path) -> tuple[Path, Path]:
-    """(metadata, data) of the recording that `path`, with or without an ending, names."""
+    """(metadata, data) of the recording that `path` names, with or without an extension."""
     name = str(path)
     for suffix in (META_SUFFIX, DATA_SUFFIX):
         name = name.removesuffix(suffix)
@@ -74,10 +74,10 @@ def sigmf_paths(path: Path) -> tuple[Path, Path]:
 
 
 def describe(path: Path, type_name: str = "", rate_hz: float | None = None) -> RecordingInfo:
-    """What there is to know of the recording at `path`. Raises BackendError.
+    """Describe the recording at `path`. Raises BackendError.
 
-    SigMF by either of its files or the name without ending; any other file needs `type_name`, or an
-    ending that tells it.
+    SigMF is found by either of its files or by the name without extension. Any other file needs
+    `type_name`, or an extension that implies it.
     """
     meta_path, data_path = sigmf_paths(path)
     try:
@@ -148,7 +148,7 @@ def _from_sigmf(
 
 
 def _gaps(annotations: object) -> tuple[tuple[int, int], ...]:
-    """Those that are told as we do; what else others annotate is no business of ours."""
+    """The gaps that our own annotations mark; other annotations are ignored."""
     found = []
     for each in annotations if isinstance(annotations, list) else []:
         if isinstance(each, dict) and each.get("core:label") == GAP_LABEL:
@@ -159,7 +159,7 @@ def _gaps(annotations: object) -> tuple[tuple[int, int], ...]:
 
 
 def _number(value: object, where: str, allowed: str = "a number") -> float | None:
-    """A finite number of the metadata; None where there is none."""
+    """A finite number from the metadata; None if it is absent."""
     if value is None:
         return None
     if isinstance(value, int | float) and not isinstance(value, bool):
@@ -171,7 +171,7 @@ def _number(value: object, where: str, allowed: str = "a number") -> float | Non
 
 
 def reason(error: OSError | ValueError) -> str:
-    """Why a file cannot be had, in words."""
+    """Why a file is not available, in words."""
     return error.strerror or str(error) if isinstance(error, OSError) else str(error)
 
 

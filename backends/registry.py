@@ -1,8 +1,8 @@
-"""The radios there are: a table of ours, and what other packages bring.
+"""The kinds of radio: a table of built-in ones, and those that other packages add.
 
 A package adds a radio by an entry point of the group `sdrlinkd.backends`, whose value is
-`module:ENTRY`, a Backend. It is loaded when its name is used, not before: a package that is broken
-harms only those who name its radio. A name of ours is always ours.
+`module:ENTRY`, a Backend. The entry point is loaded when its name is used, not before, so a broken
+package harms only those who name its radio. A built-in name always means the built-in radio.
 """
 
 import sys
@@ -73,16 +73,16 @@ BUILT_IN = {
         ),
     )
 }
-"""The radios of this package by name, in the order in which they are listed."""
+"""The built-in radios by name, in the order in which they are listed."""
 
 
 def installed_names() -> list[str]:
-    """The names of radios that other packages bring; nothing of them is loaded."""
+    """The names of radios that other packages add; none of those packages is loaded."""
     return sorted(set(_entry_points()) - set(BUILT_IN))
 
 
 def find_backend(name: str) -> Backend:
-    """The radio of that name. Raises BackendError: unknown, broken, or brought by two packages."""
+    """Return the radio of that name. Raises BackendError: unknown, broken, or in two packages."""
     if name in BUILT_IN:
         return BUILT_IN[name]
     found = _entry_points().get(name, [])
@@ -104,8 +104,8 @@ def _entry_points() -> dict[str, list["EntryPoint"]]:
 
 @cache
 def _entry_points_on(_path: tuple[str, ...]) -> dict[str, list["EntryPoint"]]:
-    """The entry points of our group by name, where Python looks for packages now."""
-    # It takes longer to load than all that is asked of it, and most configurations ask nothing.
+    """The entry points of our group by name, along Python's current module search path."""
+    # Imported here: loading it takes longer than using it, and most configurations need none.
     from importlib.metadata import entry_points
 
     found: dict[str, list[EntryPoint]] = {}
@@ -118,7 +118,7 @@ def _loaded(point: "EntryPoint") -> Backend:
     try:
         entry = point.load()
     except Exception as error:
-        # What others wrote may fail in any way.
+        # Third-party code may fail in any way.
         raise _broken(point, f"cannot be loaded ({type(error).__name__}: {error})") from error
     if not isinstance(entry, Backend):
         raise _broken(point, f"is of type {type(entry).__name__}, not backends.Backend")

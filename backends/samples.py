@@ -19,11 +19,11 @@ class SampleType:
 
     @property
     def size(self) -> int:
-        """The number of bytes of one complex sample."""
+        """Bytes of one complex sample."""
         return 2 * self.dtype.itemsize
 
     def decode(self, data: bytes | memoryview) -> Samples:
-        """The whole samples that lie in `data`, at ±1 full scale."""
+        """Decode the whole samples in `data`, at ±1 full scale."""
         parts = np.frombuffer(data, self.dtype).astype(np.float32)
         if self.offset:
             parts -= np.float32(self.offset)
@@ -33,7 +33,7 @@ class SampleType:
         return samples
 
     def encode(self, samples: Samples) -> tuple[bytes, int]:
-        """(bytes, how many values were beyond full scale and clipped)."""
+        """Encode samples; returns (bytes, number of values beyond full scale, which clip)."""
         parts: NDArray[np.float32] = np.ascontiguousarray(samples, np.complex64).view(np.float32)
         if self.dtype.kind == "f":
             return parts.astype(self.dtype).tobytes(), 0
@@ -55,7 +55,7 @@ SAMPLE_TYPES = {
         SampleType("cu8", np.dtype("u1"), 128.0, 127.5),
     )
 }
-"""By SigMF name. cu8 is what rtl_sdr writes."""
+"""The sample types by SigMF name; cu8 is what rtl_sdr writes."""
 
 
 def sample_type(name: str, where: str) -> SampleType:

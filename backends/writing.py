@@ -1,4 +1,4 @@
-"""Writes recordings: samples by index, and what SigMF's metadata says of them (sigmf.org)."""
+"""Writes recordings: samples by index, described by SigMF metadata (sigmf.org)."""
 
 import contextlib
 import datetime
@@ -17,7 +17,7 @@ VERSION = "1.2.0"
 
 
 class Annotation(NamedTuple):
-    """What there is to say of `n` samples from `start` on, between two frequencies or in all."""
+    """A note on `n` samples from `start` on, between two frequencies or over the whole band."""
 
     start: int
     n: int
@@ -27,10 +27,10 @@ class Annotation(NamedTuple):
 
 
 class RecordingWriter:
-    """Writes a SigMF recording, sample by absolute index; what is skipped is silence.
+    """Writes a SigMF recording, sample by absolute index; skipped samples are silence.
 
-    On most file systems, silence takes no room on the disk. Of cu8, zeros are not silence: refused.
-    `hardware`, `description` and `recorder` are for people.
+    On most file systems, silence takes no disk space. cu8 is refused, because its zeros are not
+    silence. `hardware`, `description` and `recorder` are for people.
     """
 
     def __init__(
@@ -67,25 +67,25 @@ class RecordingWriter:
             raise _refusal(data_path, error) from None
 
     def begin_capture(self, first: int, at_ns: int) -> None:
-        """What was recorded without a gap begins at index `first`, there at this time (UTC)."""
+        """Start a stretch without gaps at index `first`, recorded at this time (UTC)."""
         self._captures[first] = at_ns
 
     def write(self, first: int, samples: Samples) -> None:
-        """Put samples at index `first`. Raises BackendError when the disk will not take them."""
+        """Write samples at index `first`. Raises BackendError when the disk rejects them."""
         data, clipped = self._type.encode(samples)
         self.clipped += clipped
         rest = memoryview(data)
         try:
             self._file.seek(first * self._type.size)
             while rest:
-                # An unbuffered file may take a part only.
+                # An unbuffered file may accept only a part.
                 rest = rest[self._file.write(rest) or 0 :]
         except OSError as error:
             self._end_with_a_whole_sample()
             raise _refusal(self._file.name, error) from None
 
     def read(self, first: int, n: int) -> Samples:
-        """The samples written so far. Raises BackendError."""
+        """Read samples written so far. Raises BackendError."""
         try:
             self._file.seek(first * self._type.size)
             data = self._file.read(n * self._type.size)
@@ -94,7 +94,7 @@ class RecordingWriter:
         return self._type.decode(data[: len(data) - len(data) % self._type.size])
 
     def extend_to(self, end: int) -> None:
-        """Make the recording `end` samples long, with silence. Raises BackendError."""
+        """Extend the recording with silence to `end` samples. Raises BackendError."""
         if self._file.closed:
             return
         size = end * self._type.size
@@ -105,7 +105,7 @@ class RecordingWriter:
             raise _refusal(self._file.name, error) from None
 
     def describe(self, annotations: Iterable[Annotation] = ()) -> None:
-        """Write the metadata; who reads them finds the old or the new. Raises BackendError."""
+        """Write the metadata at once: a reader finds the old or the new. Raises BackendError."""
         text = json.dumps(self._metadata(annotations), indent=2) + "\n"
         part = self._meta_path.with_suffix(".sigmf-part")
         try:
@@ -153,7 +153,7 @@ class RecordingWriter:
 
 
 def _utc(at_ns: int) -> str:
-    """As SigMF wants it, to the microsecond."""
+    """The time in SigMF's format, with microseconds."""
     at = datetime.datetime.fromtimestamp(at_ns // 10**9, datetime.UTC)
     return f"{at:%Y-%m-%dT%H:%M:%S}.{at_ns % 10**9 // 1000:06d}Z"
 

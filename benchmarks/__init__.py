@@ -1,1 +1,1 @@
-"""Measurements beside peers; each is run as `python -m benchmarks.NAME`."""
+"""Measurements of our link next to its peers; each runs as `python -m benchmarks.NAME`."""

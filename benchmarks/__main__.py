@@ -1,6 +1,7 @@
-"""All benchmarks that have rows, one after the other: `python -m benchmarks [--quick] [--json]`.
+"""Runs all benchmarks with rows in turn: `python -m benchmarks [--quick] [--json]`.
 
-Whatever one of them misses or lacks, the next one runs. Options are given to each.
+A benchmark that misses a target or cannot run does not stop the next one. The options apply to
+each.
 """
 
 import subprocess
@@ -10,7 +11,7 @@ from sdrlinkd.cli.benchmarks import BENCHMARKS
 
 
 def main() -> int:
-    """The exit code: 1 where a target was missed, or something could not be measured."""
+    """Run all benchmarks; returns 1 if a target was missed or something could not be measured."""
     codes = []
     for name, benchmark in BENCHMARKS.items():
         if benchmark.has_rows:

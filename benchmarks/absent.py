@@ -1,6 +1,6 @@
-"""What cannot be measured here: it is told in one line, and the others go on.
+"""Reports in one line what cannot be measured here; the other measurements go on.
 
-Ends of peers import this by other interpreters than ours: it needs the standard library only.
+Peers' ends import this with other interpreters than ours, so it uses the standard library only.
 """
 
 import subprocess
@@ -13,15 +13,15 @@ _told: dict[str, str] = {}
 
 
 class PeerError(Exception):
-    """A peer could not be measured; the message names it and the reason."""
+    """A peer cannot be measured; the message names it and the reason."""
 
 
-# Not installed, ended, silent, or not understood: anything else is a bug of ours.
+# Not installed, ended, silent, or unreadable; any other exception is a bug of ours.
 FAILURES = (PeerError, ProcessError, OSError, subprocess.SubprocessError, ValueError)
 
 
 class attempt:  # noqa: N801  # it reads as a verb
-    """A block whose failure is told as that of `what`; then it goes on behind the block."""
+    """A `with` block that reports a failure as that of `what`, and continues after the block."""
 
     def __init__(self, what: str) -> None:
         self._what = what
@@ -38,7 +38,7 @@ class attempt:  # noqa: N801  # it reads as a verb
 
 
 def tell(what: str, reason: object) -> None:
-    """Say in one line, once, why `what` is not measured."""
+    """Print in one line, once, why `what` is not measured."""
     line = " ".join(str(reason).split()) or type(reason).__name__
     line = line.removeprefix(f"{what}: ")
     if _told.get(what) != line:
@@ -47,5 +47,5 @@ def tell(what: str, reason: object) -> None:
 
 
 def told() -> dict[str, str]:
-    """All that was told so far: what was not measured, and why."""
+    """Everything reported so far: what was not measured, and why."""
     return dict(_told)

@@ -30,20 +30,20 @@ AIRTIME_S = phy.layout(phy.OFDM_64_16, MCS, 1, PDU_SIZE).n_samples / RATE_HZ
 
 
 class Case(NamedTuple):
-    """A policy under a load: `load` is each robot's share of the air, in bursts of one message."""
+    """A policy under a load; `load` is each robot's share of the air, in bursts of one message."""
 
     policy: str
     load: float
     turnaround_s: float = 1e-4
     block_s: float = 1e-4
-    """How soon a robot can react to what it hears."""
+    """Reaction time of a robot to what it hears."""
     stopping: int = 0
-    """So many of the robots send urgent messages, too."""
+    """Number of robots that also send urgent messages."""
     persist: float = 0.02
 
 
 class Result(NamedTuple):
-    """What came of it; delays in ms."""
+    """Outcome of a case; delays in ms."""
 
     sent: int
     received: int
@@ -64,7 +64,8 @@ CASES = {
     "none": Case("none", 0.4),
     "csma": Case("csma", 0.15),
     "minislot": Case("minislot", 0.4, block_s=5e-5),
-    # Two urgent messages at a time wait for each other; with one who sends them, for one burst.
+    # Two simultaneous urgent messages wait for each other; one from a single robot waits for one
+    # burst.
     "minislot_urgent": Case("minislot", 0.4, block_s=5e-5, stopping=1),
     "minislot_urgent_both": Case("minislot", 0.4, block_s=5e-5, stopping=2),
     "tdma": Case("tdma", 0.4),
@@ -74,7 +75,7 @@ CASES = {
 
 
 def measure(seed: int, quick: bool) -> list[Row]:
-    """All rows; `quick` takes a fortieth of the time."""
+    """Measure all rows; `quick` takes a fortieth of the time."""
     duration_s, urgent_s = (0.5, 1.0) if quick else (20.0, 20.0)
     with ProcessPoolExecutor() as pool:
         # Quantiles need more messages than means.
@@ -110,7 +111,7 @@ def measure(seed: int, quick: bool) -> list[Row]:
 
 
 def simulate(case: Case, duration_s: float, seed: int) -> Result:
-    """One policy, in a process of its own."""
+    """Simulate one policy; runs in a process of its own."""
     rng = np.random.default_rng(seed)
     air = AirParams(rate_hz=RATE_HZ, block_s=case.block_s, snr_db=SNR_DB)
     radios = {

@@ -1,4 +1,4 @@
-"""How few errors any code can make: the normal approximation at a finite length.
+"""The least error rate that any code can have: the normal approximation at a finite length.
 
 Polyanskiy, Poor and Verdú, "Channel Coding Rate in the Finite Blocklength Regime", IEEE Trans. Inf.
 Theory 56 (2010), equation 296, with the mutual information and the dispersion of the constellation.
@@ -17,9 +17,7 @@ N_NODES = 24
 
 
 def needed_es_n0_db(mcs: Mcs, n_bits: int, n_subcarriers: float, error_rate: float) -> float:
-    """Es/N0 on a subcarrier at which `n_bits` in `n_subcarriers` uses fail as often as
-    `error_rate`.
-    """
+    """Es/N0 in dB for `n_bits` in `n_subcarriers` uses to fail with probability `error_rate`."""
     distance = norm.isf(error_rate)
 
     def surplus(es_n0_db: float) -> float:
@@ -31,7 +29,7 @@ def needed_es_n0_db(mcs: Mcs, n_bits: int, n_subcarriers: float, error_rate: flo
 
 
 def _moments(mcs: Mcs, es_n0_db: float) -> tuple[float, float]:
-    """Mean and variance of the information density in bits a use, points equally likely."""
+    """Mean and variance of the information density in bits per use, with equally likely points."""
     constellation = points(mcs.modulation).astype(np.complex128)
     nodes, weights = roots_hermite(N_NODES)
     noise = (nodes[:, None] + 1j * nodes[None, :]).reshape(-1)

@@ -1,4 +1,4 @@
-"""The inner path: bus into the queue, queue into PDUs, PDUs into messages, and the whole."""
+"""The path inside the daemon: bus to queue, queue to PDUs, PDUs to messages, and all together."""
 
 import sys
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from benchmarks.report import Row, main
 
 
 def measure(seed: int, quick: bool) -> Iterator[Row]:
-    """All rows; `quick` takes about a tenth of the trials."""
+    """Measure all rows; `quick` takes about a tenth of the trials."""
     yield ingress_row(6_000 if quick else 60_000, 3 if quick else 5)
     yield path_cost_row(seed, 8 if quick else 60)
     yield latency_row(100 if quick else 1500)

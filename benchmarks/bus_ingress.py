@@ -1,4 +1,4 @@
-"""How many messages a CPU second takes from a producer's socket into the queue."""
+"""Number of messages that a CPU second moves from a producer's socket into the queue."""
 
 import asyncio
 import multiprocessing
@@ -25,7 +25,7 @@ Receive = Callable[[Path, int, Callable[[], None]], float]
 
 
 class _Counted:
-    """An ingress that queues for real and knows when all is in."""
+    """An ingress that really queues, and knows when all messages are in."""
 
     def __init__(self, link: Link, expected: int) -> None:
         self._link = link
@@ -49,7 +49,7 @@ class _Counted:
     def refuse(
         self, reason: str, topic_id: int | None = None, receipt: str = "", dst: int | None = None
     ) -> None:
-        """No message of this benchmark may be refused."""
+        """Fail: no message of this benchmark may be refused."""
         raise RuntimeError(f"topic {topic_id}: {reason} {receipt} {dst}")
 
 
@@ -78,14 +78,14 @@ def _run(messages: int, receive: Receive) -> float:
 
 
 def _produce(folder: str, messages: int) -> None:
-    """A bare producer, so that it serves the peers as well, and stays a while."""
+    """A bare producer, which serves the peers as well; it stays for a while."""
     context = zmq.Context()
     with context.socket(zmq.PUSH) as socket:
         socket.connect(f"ipc://{folder}/in.sock")
         frames = [b"/robot_1/odom\0", b"\1\x80", b"\0\1\0\0" + bytes(PAYLOAD_BYTES - 4)]
         for _ in range(messages):
             socket.send_multipart(frames)
-        # libzmq may drop the end of a burst when its sender goes at once.
+        # libzmq may drop the end of a burst when its sender exits at once.
         time.sleep(1.0)
     context.term()
 

@@ -1,4 +1,4 @@
-"""How long a message takes from a producer through one daemon to a consumer."""
+"""Latency of a message from a producer through one daemon to a consumer."""
 
 import tempfile
 import threading
@@ -18,7 +18,7 @@ PERIOD_S = 0.004
 
 
 def latency_row(messages: int) -> Row:
-    """Wall time, as a person would feel it: three processes share this machine's cores."""
+    """Wall time, as a user would notice it: three processes share this machine's cores."""
     ours = _through_daemon(messages)
     floor = _through_forwarder(messages)
     return Row(
@@ -68,7 +68,7 @@ def _through_forwarder(messages: int) -> list[float]:
 
         thread = threading.Thread(target=forward)
         thread.start()
-        # Until the subscription is known, what is published goes nowhere.
+        # Messages published before the subscription is known are dropped.
         push.send_multipart([b"hello"])
         while not sub.poll(10):
             push.send_multipart([b"hello"])

@@ -1,4 +1,4 @@
-"""Daemons of a benchmark, and the hub of their air, as programs of their own."""
+"""Starts the daemons of a benchmark, and the hub of their air, as separate programs."""
 
 import contextlib
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -17,7 +17,7 @@ LOOK_S = 0.2
 QUIET = ("--log-level", "warning")
 TYPE = "std_msgs/UInt8MultiArray"
 TYPES = {"odom": "nav_msgs/Odometry"}
-"""Of topics with messages of their own."""
+"""Message types of topics that have one."""
 DAEMON = """namespace = "robot_{robot}"
 registry = "registry.csv"
 rx_depth = 0
@@ -30,7 +30,7 @@ dir = "{folder}/air"
 
 
 class Running(NamedTuple):
-    """Folders of the daemons' sockets by robot, that of their air, and the processes."""
+    """Folders of the daemons' sockets by robot, the folder of their air, and the processes."""
 
     folders: dict[int, Path]
     air: Path
@@ -38,12 +38,12 @@ class Running(NamedTuple):
 
 
 def hears_one(daemon: ControlClient) -> bool:
-    """Whether it hears another robot."""
+    """Whether the daemon hears another robot."""
     return bool(daemon.ask("peers"))
 
 
 def is_up(daemon: ControlClient) -> bool:
-    """Whether the radio of this daemon works."""
+    """Whether the daemon's radio works."""
     return bool(daemon.ask("status")["carrier"]["state"] == "up")
 
 
@@ -59,10 +59,10 @@ def running(
     own: Mapping[int, str] | None = None,
     ready: Callable[[ControlClient], bool] = hears_one,
 ) -> Iterator[Running]:
-    """Until every daemon is `ready`, and then. Raises PeerError.
+    """Run daemons, from when all of them are `ready`. Raises PeerError.
 
-    `config` are TOML tables for each of them, `own` those of one; `scenario` is for the hub of an
-    ether. With `precede` they go before what else this machine does.
+    `config` is TOML for all of them, `own` for single robots; `scenario` is for the hub of an
+    ether. With `precede` they have priority over other programs on this machine.
     """
     with TemporaryDirectory(prefix="benchmark-") as name, ExitStack() as stack:
         folder = Path(name)
@@ -90,7 +90,7 @@ def running(
 
 @contextmanager
 def daemon_at_work(config: Path) -> Iterator[Path]:
-    """One daemon, once its link is up; `config` has its sockets beside it. Raises PeerError."""
+    """Run one daemon, from when its link is up; sockets are beside `config`. Raises PeerError."""
     with ExitStack() as stack:
         daemon = processes.start_module(
             stack, "daemon", "sdrlinkd", "--config", str(config), *QUIET
@@ -105,7 +105,7 @@ def _wait_for(
     waiting = list(folders.values())
 
     def are_ready() -> bool:
-        # One after the other: none goes back.
+        # Daemons become ready in turn; a ready one stays ready.
         with contextlib.suppress(NoDaemonError, OSError):
             while waiting:
                 with ControlClient(waiting[-1]) as control:
@@ -118,4 +118,4 @@ def _wait_for(
         wait_until(are_ready, START_S, *started, every_s=LOOK_S)
     except ProcessError:
         words = "\n".join(f"{each.name}: {each.log().strip()}" for each in started)
-        raise PeerError(f"the daemons do not get ready; {words}") from None
+        raise PeerError(f"the daemons did not become ready; {words}") from None

@@ -1,7 +1,7 @@
-"""Virtual environments for peers with packages of their own, made when first asked for.
+"""Virtual environments for peers that need packages of their own, created on first use.
 
 They are kept in the user's cache. An rclpy from wheels starts each interpreter of its environment
-twice, with other library paths, so it must not share one with anything of ours.
+twice, with other library paths, so it must not share an environment with our own packages.
 """
 
 import fcntl
@@ -17,7 +17,7 @@ from typing import Protocol
 from benchmarks.absent import PeerError
 
 ROOT = Path(__file__).parents[1]
-"""What has the package `benchmarks`."""
+"""The folder that contains the package `benchmarks`."""
 
 PACKAGES = {
     "zenoh": ["eclipse-zenoh"],
@@ -30,16 +30,16 @@ CHECKS = {
     "mavlink": "import pymavlink.dialects.v20.common",
 }
 WHEELS = (3, 11)
-"""The one Python that the rclpy wheels are built for."""
+"""The only Python version that the rclpy wheels support."""
 INSTALL_S = 600.0
 
 
 class EnvironmentLackingError(PeerError):
-    """An environment cannot be had; the message says why."""
+    """An environment is not available; the message says why."""
 
 
 class NeedsEnvironment(Protocol):
-    """A peer; "" is our own environment."""
+    """A peer with an environment; "" is our own."""
 
     @property
     def environment(self) -> str:
@@ -47,7 +47,7 @@ class NeedsEnvironment(Protocol):
 
 
 def unavailable(peers: Mapping[str, NeedsEnvironment], peer: str) -> str | None:
-    """None where this one can run, else why not; makes the environment that it needs."""
+    """Why a peer cannot run here, or None if it can; creates the environment that it needs."""
     if peer not in peers:
         return f"no peer is called {peer!r}; there are {', '.join(peers)}"
     return _lacking(peers[peer].environment)
@@ -63,7 +63,7 @@ def _lacking(environment: str) -> str | None:
 
 
 def interpreter(environment: str) -> str:
-    """The Python to run endpoints with; "" is ours. Makes what is not there, which takes long."""
+    """The Python interpreter for endpoints; "" is ours. Creates a missing environment (slow)."""
     if not environment:
         return sys.executable
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "sdrlinkd-bench"
@@ -82,8 +82,8 @@ def interpreter(environment: str) -> str:
 
 
 def variables() -> dict[str, str]:
-    """The environment variables of an endpoint: nothing that would change what is measured."""
-    # What an rclpy environment leaves to its children breaks any other.
+    """The environment variables of an endpoint, without any that would affect the measurement."""
+    # Variables that an rclpy environment passes to its children would break others.
     kept = {
         key: value
         for key, value in os.environ.items()

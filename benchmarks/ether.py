@@ -1,4 +1,4 @@
-"""The ether: how fast lock-step is with many daemons, and whether real time holds."""
+"""The ether: speed of lock-step with many daemons, and whether real time holds."""
 
 import sys
 import time
@@ -14,28 +14,28 @@ SCENARIOS = Path(__file__).parents[1] / "etc" / "scenarios"
 
 
 class Speed:
-    """The air's time over the clock's, between the first and the last look."""
+    """Ratio of the air's time to real time, between the first and the last call."""
 
     def __init__(self) -> None:
         self._first: tuple[float, float] | None = None
         self._last = (0.0, 0.0)
 
     def __call__(self, state: LabState) -> None:
-        """Note how far the air is by now."""
+        """Note the current time of the air."""
         if state.now_s < state.until_s and state.now_s > 0:
             self._last = (time.monotonic(), state.now_s)
             self._first = self._first or self._last
 
     @property
     def ratio(self) -> float:
-        """Seconds of the air in one of the clock; 1 is real time."""
+        """Seconds of the air per second of real time; 1 is real time."""
         if self._first is None or self._last == self._first:
             return 0.0
         return (self._last[1] - self._first[1]) / (self._last[0] - self._first[0])
 
 
 def measure(seed: int, quick: bool) -> list[Row]:
-    """Both rows; `quick` runs a twentieth of the time."""
+    """Measure both rows; `quick` runs a twentieth of the time."""
     duration_s = 1.0 if quick else 20.0
     speed = Speed()
     eight = _run("eight-robots", duration_s, seed, speed)

@@ -1,7 +1,7 @@
-"""GNU Radio's flowgraphs of etc/gnuradio as a modem: PDUs delivered, latency, PDUs a second.
+"""GNU Radio's flowgraphs of etc/gnuradio as a modem: PDUs delivered, latency, PDUs per second.
 
 A flowgraph in real time at 1 Msps and 25 dB gets PDUs as a daemon hands them over. Latency is that
-of a lone PDU; the pace is that of many with eight under way.
+of a single PDU; throughput is measured with eight PDUs in flight.
 """
 
 import argparse
@@ -34,14 +34,14 @@ PATIENCE_MS = 3000
 
 
 class Ends(NamedTuple):
-    """The sockets at which a daemon would be."""
+    """The sockets that a daemon would use."""
 
     out: "zmq.Socket[bytes]"
     back: "zmq.Socket[bytes]"
 
 
 class Told(NamedTuple):
-    """What became of the PDUs of one phase."""
+    """Outcome of the PDUs of one phase."""
 
     delivered: int
     latencies_ms: list[float]
@@ -68,7 +68,7 @@ def _running(command: tuple[str, ...], size: int) -> Iterator[Ends]:
 
 
 def _pass(ends: Ends, pdus: list[bytes], under_way: int) -> Told:
-    """Send all, at most so many at once."""
+    """Send all PDUs, with at most `under_way` in flight."""
     left = dict.fromkeys(pdus, 0.0)
     waiting, latencies, begun = list(reversed(pdus)), [], time.perf_counter()
     flying = 0
@@ -90,7 +90,7 @@ def _pass(ends: Ends, pdus: list[bytes], under_way: int) -> Told:
 
 def _rows(name: str, size: int, n: int, rng: Random) -> list[Row]:
     with _running(PHYS[name], size) as ends:
-        # The first one waits until the flowgraph has started for good.
+        # The first PDU waits until the flowgraph has really started.
         _pass(ends, [rng.randbytes(size)], 1)
         lone = _pass(ends, [rng.randbytes(size) for _ in range(n // 4)], 1)
         many = _pass(ends, [rng.randbytes(size) for _ in range(n)], UNDER_WAY)
@@ -105,7 +105,7 @@ def _rows(name: str, size: int, n: int, rng: Random) -> list[Row]:
 
 
 def measure(seed: int, quick: bool) -> Iterator[Row]:
-    """The rows of all modems and sizes."""
+    """Measure the rows of all modems and sizes."""
     rng = Random(seed)
     n = 20 if quick else 400
     for name in PHYS:

@@ -1,4 +1,4 @@
-"""What is sent in an experiment, and what came of it."""
+"""The flows of messages in an experiment, and what became of them."""
 
 from typing import NamedTuple
 
@@ -9,30 +9,30 @@ Times = NDArray[np.float64]
 
 
 class Flow(NamedTuple):
-    """Messages of one topic, in the paper's words: laser, image, u, y.
+    """Messages of one topic, by the paper's names: laser, image, u, y.
 
-    Each leaves `phase_s + i · period_s · (1 + drift)`, and up to ± `jitter_s` beside it.
+    Message i leaves at `phase_s + i · period_s · (1 + drift)`, with up to ± `jitter_s` of jitter.
     """
 
     name: str
     size: int
-    """Bytes of a message."""
+    """Size of a message in bytes."""
     period_s: float
     count: int  # type: ignore[assignment]  # the word for it
     qos: str = "default"
-    """The class, for those that know any: latency goes before bulk."""
+    """The QoS class, for peers with classes: latency precedes bulk."""
     jitter_s: float = 0.0
     drift: float = 0.0
     phase_s: float = 0.0
 
     def times(self, rng: np.random.Generator) -> Times:
-        """When each message leaves its producer, in s from the experiment's beginning."""
+        """Time at which each message leaves its producer, in s from the experiment's start."""
         exact = self.phase_s + np.arange(self.count) * self.period_s * (1 + self.drift)
         return np.maximum(0.0, exact + self.jitter_s * rng.uniform(-1, 1, self.count))
 
 
 class Trace(NamedTuple):
-    """One flow's messages: when each left its producer, and when it came; NaN where it did not."""
+    """Send and arrival time of each message of a flow; NaN if it did not arrive."""
 
     flow: Flow
     sent_at: Times
@@ -42,8 +42,7 @@ class Trace(NamedTuple):
 class Figures(NamedTuple):
     """The columns of the paper's Tables I to IV, in ms, per cent and Mbit/s.
 
-    `jd_ms` is the mean time between two messages that arrive, `d_ms` that from producer to
-    consumer.
+    `jd_ms` is the mean time between two arrivals, `d_ms` the mean delay from producer to consumer.
     """
 
     jd_ms: float
@@ -55,7 +54,7 @@ class Figures(NamedTuple):
 
 
 def figures(trace: Trace) -> Figures:
-    """All columns of one flow; NaN where too few messages came."""
+    """All columns of one flow; NaN if too few messages arrived."""
     heard = ~np.isnan(trace.heard_at)
     arrived = np.sort(trace.heard_at[heard])
     mdr_pct = 100.0 * float(np.mean(heard)) if len(heard) else 0.0
@@ -63,7 +62,7 @@ def figures(trace: Trace) -> Figures:
         nan = float("nan")
         return Figures(nan, nan, nan, nan, mdr_pct, 0.0)
     between, delay = np.diff(arrived), (trace.heard_at - trace.sent_at)[heard]
-    # Over the time in which they were sent: what comes late is no bandwidth lost.
+    # Relative to the sending time: late arrivals do not reduce the bandwidth.
     took_s = max(float(arrived[-1] - trace.sent_at[0]), trace.flow.period_s * trace.flow.count)
     return Figures(
         1e3 * float(np.mean(between)),

@@ -1,4 +1,4 @@
-"""The test radio: its driver, compiled from tests/soapy_loopback, and what it calls a bus."""
+"""The test radio: compiles its driver from tests/soapy_loopback, and names its buses."""
 
 import os
 import subprocess
@@ -15,11 +15,11 @@ SHARED_MEMORY = Path("/dev/shm")
 
 
 class NoDriverError(PeerError):
-    """It cannot be compiled here; the message is the reason."""
+    """The driver cannot be compiled here; the message is the reason."""
 
 
 def use_driver() -> None:
-    """Have our processes find it, and no other driver. Raises NoDriverError."""
+    """Make our processes load this driver and no other. Raises NoDriverError."""
     command = [sys.executable, "-m", "tests.soapy_loopback"]
     built = subprocess.run(command, check=False, cwd=ROOT, capture_output=True, text=True)
     if built.returncode:
@@ -30,7 +30,7 @@ def use_driver() -> None:
 
 @contextmanager
 def a_bus() -> Iterator[str]:
-    """The name of an air that nobody else uses."""
+    """The name of an air that no other process uses."""
     name = f"bench-{uuid.uuid4().hex[:12]}"
     try:
         yield name

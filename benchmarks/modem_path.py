@@ -1,4 +1,4 @@
-"""The modem in a daemon: latency in real time, and how much faster than real time it works."""
+"""The modem in a daemon: its latency in real time, and its speed relative to real time."""
 
 import sys
 import tempfile
@@ -18,13 +18,13 @@ MCS = 1
 PDU_SIZE = 1024
 ODOM = b"\0\1\0\0" + bytes(720)
 PERIOD_S = 1 / 30
-BLOCK = 5000  # samples that the daemon hands over at a time
+BLOCK = 5000  # number of samples that the daemon hands over at once
 SNR_DB = 15.0
 CLOCK_PPM = 10.0
 
 
 def measure(seed: int, quick: bool) -> Iterator[Row]:
-    """All rows; `quick` takes about a tenth of the trials."""
+    """Measure all rows; `quick` takes about a tenth of the trials."""
     phy.warm_up()
     yield from latency_rows(seed, 40 if quick else 600)
     yield rx_row(seed, 15 if quick else 150)
@@ -54,7 +54,7 @@ def latency_rows(seed: int, messages: int) -> list[Row]:
 
 
 def rx_row(seed: int, bursts: int) -> Row:
-    """Samples received a CPU second over those of real time: bursts back to back, 15 dB, 10 ppm."""
+    """Samples received per CPU second, relative to real time: contiguous bursts, 15 dB, 10 ppm."""
     ratios = {
         name: _rx_ratio(seed, bursts, size, n_pdus)
         for name, (size, n_pdus) in {
@@ -68,7 +68,7 @@ def rx_row(seed: int, bursts: int) -> Row:
 
 
 def tx_row(seed: int, bursts: int) -> Row:
-    """Samples made a CPU second over those of real time."""
+    """Samples made per CPU second, relative to real time."""
     ratios = {
         name: _tx_ratio(seed, bursts, size, n_pdus)
         for name, (size, n_pdus) in {
@@ -148,7 +148,7 @@ def _tx_ratio(seed: int, bursts: int, size: int, n_pdus: int) -> float:
 
 
 def _cpu_s(work: Callable[[], object]) -> float:
-    """The median of five runs."""
+    """CPU time of `work`, the median of five runs."""
     spent = []
     for _ in range(5):
         began = time.process_time()

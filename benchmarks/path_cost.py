@@ -1,4 +1,4 @@
-"""Packetize + parse + reassemble, against what no implementation can leave out."""
+"""Cost of packetize + parse + reassemble, relative to the work that no implementation can avoid."""
 
 import binascii
 import statistics
@@ -24,14 +24,15 @@ from sdrlinkd.wire import make_registry
 
 PDU_SIZE = 1024
 IMAGE_BYTES = 65_536
-BURST_S = 0.1  # entry ids of fragmented messages rest before they are used again
+BURST_S = 0.1  # ids of fragmented messages are not reused within this time
 PDU_S = 1e-3
 
 
 def path_cost_row(seed: int, rounds: int) -> Row:
-    """CPU time of the path over that of the CRC at both ends and one join of the same octets.
+    """CPU time of the path relative to the CRC at both ends and one join of the same bytes.
 
-    Worst of three payloads; path and baseline alternate, and the median of the ratios counts.
+    The worst of three payloads counts; path and baseline alternate, and the median of the ratios
+    counts.
     """
     rng = Random(seed)
     payloads = {
@@ -41,7 +42,7 @@ def path_cost_row(seed: int, rounds: int) -> Row:
     }
     ratios = {name: _ratio(messages, seed, rounds) for name, messages in payloads.items()}
     value = max(ratios.values())
-    # Messages that fill a PDU only in part pay per message, not per byte: told beside.
+    # Messages that fill only part of a PDU cost per message, not per byte: reported separately.
     robot = [message.cdr for message in BuiltInRobot("robot_1", 10.0, seed).messages()]
     for size in (724, 1500):
         short = [cdr for cdr in robot if len(cdr) == size]
@@ -54,7 +55,7 @@ def path_cost_row(seed: int, rounds: int) -> Row:
 
 
 def _dense_scan(seed: int) -> bytes:
-    """CDR of a laser scan with 16 000 beams."""
+    """A laser scan with 16 000 beams, as CDR."""
     scan = empty("sensor_msgs/msg/LaserScan")
     scan.header.frame_id = "laser"
     scan.ranges = np.random.default_rng(seed).uniform(0.1, 12, 16_000).astype(np.float32)

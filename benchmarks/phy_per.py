@@ -1,7 +1,8 @@
-"""How little signal the modem needs, beside other modems and beside what any code could do.
+"""The SNR that the modem needs, compared with other modems and with the bound for any code.
 
 SNR is a burst's mean power over the noise power in the sample band. "impaired": see
-`benchmarks.trials`. Rows in dB are where the error rate is surely below what their name says.
+`benchmarks.trials`. Rows in dB give the SNR at which the error rate is surely below the one in
+their name.
 """
 
 import argparse
@@ -23,7 +24,7 @@ from phy import MCS_TABLE, OFDM_64_16, FrontEnd, FrontEndParams, PduHeard, Recei
 from phy.ldpc import decode, encode, new_workspace
 
 PER_SUBCARRIER_DB = 10 * np.log10(OFDM_64_16.n_fft / OFDM_64_16.n_used)
-"""Es/N0 of a subcarrier over the SNR in the sample band."""
+"""Es/N0 of a subcarrier relative to the SNR in the sample band."""
 
 BPSK12, QPSK12, QPSK34, QAM16_12, QAM64_34 = 0, 1, 2, 3, 6
 
@@ -39,14 +40,14 @@ _KNEES = (
 
 
 def measure(seed: int, quick: bool, recordings: Path | None = None) -> Iterator[Row]:
-    """All rows; that of recordings where there are any."""
+    """Measure all rows; the one about recordings only if there are any."""
     n = 500 if quick else 10_000
     peers = _peers_at_64_bytes(seed, 60 if quick else 1000)
     for knee in _KNEES:
         row = _knee(*knee, seed, n)
         row.peers |= peers
         yield row
-        peers = {}  # They are measured at the first knee only.
+        peers = {}  # measured at the first knee only
     yield _tdl_a(seed, n)
     yield _gap_to_bound(seed, n)
     yield _headers(seed, n)
@@ -67,7 +68,7 @@ def _knee(name: str, mcs: int, n_bytes: int, target_db: float, seed: int, n: int
 
 
 def _bound_db(mcs: int, n_bytes: int, rate: float) -> float:
-    """SNR that a PDU needs in the data subcarriers of its burst, whatever the code."""
+    """SNR that a PDU needs in the data subcarriers of its burst, with the best possible code."""
     plan = layout(OFDM_64_16, mcs, 1, n_bytes)
     n_subcarriers = plan.n_symbols * OFDM_64_16.n_data
     es_n0_db = needed_es_n0_db(MCS_TABLE[mcs], 8 * n_bytes, n_subcarriers, rate)
@@ -75,7 +76,7 @@ def _bound_db(mcs: int, n_bytes: int, rate: float) -> float:
 
 
 def _peers_at_64_bytes(seed: int, n: int) -> dict[str, float]:
-    """Where others lose 1 % of 64 B on QPSK; they have a frequency offset and nothing else."""
+    """SNR at which others lose 1 % of 64 B on QPSK, impaired only by a frequency offset."""
     found: dict[str, float] = {}
     liquid, gnuradio = Liquid(), GnuRadio()
     with attempt(liquid.name):
@@ -107,7 +108,7 @@ def _tdl_a(seed: int, n: int) -> Row:
 
 
 def _gap_to_bound(seed: int, n: int) -> Row:
-    """The code alone: bits over a channel that is known exactly."""
+    """The gap of the code alone: bits over a perfectly known channel."""
     plan = layout(OFDM_64_16, QPSK34, 1, 220)
     rng, work = np.random.default_rng(seed), new_workspace()
     n_subcarriers = plan.coded_bits / plan.mcs.modulation.bits
@@ -152,7 +153,7 @@ def _doppler(seed: int, n: int) -> Row:
 
 
 def _false_pdus(seed: int, n_samples: int) -> Row:
-    """Noise alone: what is taken for a burst, or worse, for a PDU."""
+    """Noise alone: how often it is taken for a burst, or worse, for a PDU."""
     block = 1 << 20
     front_end = FrontEnd(FrontEndParams(noise_dbfs=-10.0), np.random.default_rng(seed))
     receiver, silence = Receiver(), np.zeros(block, np.complex64)
@@ -167,7 +168,7 @@ def _false_pdus(seed: int, n_samples: int) -> Row:
 
 
 def false_pdus_in(recordings: Path) -> Row:
-    """In signals of others, at whatever rate they were recorded."""
+    """False PDUs in third-party signals, at whatever rate they were recorded."""
     told, n, names = 0, 0, []
     for path in sorted(recordings.iterdir()):
         if path.suffix not in _TYPES:

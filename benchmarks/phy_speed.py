@@ -1,8 +1,8 @@
-"""What the modem costs: samples a second of one core's time, beside other modems.
+"""The modem's cost: samples per second of one core's time, compared with other modems.
 
-CPU time of this thread, best of some rounds; bursts follow one another after GAP samples of noise,
-at 30 dB, random PDUs. In brackets: scaled by what liquid-dsp does in the same run, against what it
-did on the machine that the targets were set on.
+CPU time of this thread, best of several rounds. Bursts with random PDUs follow one another after
+GAP samples of noise, at 30 dB. In brackets: scaled by the speed of liquid-dsp in the same run,
+relative to its speed on the machine on which the targets were set.
 """
 
 import sys
@@ -22,33 +22,33 @@ GAP = 100
 SNR_DB = 30.0
 BLOCK = 8192
 QPSK12, QAM64_34 = 1, 6
-# Msps of liquid-dsp 1.5.0 without a code where the targets were set: [bits, bytes] to (tx, rx).
+# Msps of liquid-dsp 1.5.0 without a code on the reference machine: [bits, bytes] to (tx, rx).
 _LIQUID_THERE = {(2, 64): (126.0, 23.2), (2, 220): (109.0, 22.4), (6, 220): (87.0, 21.4)}
 _LIQUID_NOISE_THERE = 67.0
 
 
 @dataclass(frozen=True)
 class _Peers:
-    """Msps of other modems, measured once; (tx, rx) by bits a subcarrier and bytes."""
+    """Msps of other modems, measured once; (tx, rx) by bits per subcarrier and bytes."""
 
     liquid: dict[tuple[int, int], tuple[float, float]]
     gnuradio: dict[tuple[int, int], tuple[float, float]]
     noise: dict[str, float]
 
     def beside(self, way: int, bits: int, n_bytes: int) -> dict[str, float]:
-        """What others do; `way` 0 sends, 1 hears."""
+        """Figures of the other modems; `way` 0 sends, 1 receives."""
         found = {"liquid-dsp": self.liquid, "GNU Radio": self.gnuradio}
         key = (bits, n_bytes)
         return {name: speeds[key][way] for name, speeds in found.items() if key in speeds}
 
     def scale(self, way: int, bits: int, n_bytes: int) -> float | None:
-        """How fast liquid-dsp is here, against there."""
+        """Speed of liquid-dsp here relative to the reference machine."""
         here = self.liquid.get((bits, n_bytes))
         return here[way] / _LIQUID_THERE[bits, n_bytes][way] if here else None
 
 
 def measure(seed: int, quick: bool) -> Iterator[Row]:
-    """The rows of receiver, transmitter and latency."""
+    """Measure the rows of receiver, transmitter and latency."""
     rounds = 3 if quick else 20
     peers = _measure_peers(seed)
     yield _search("search_msps_noise", 200.0, _noise(seed), rounds, peers)
@@ -75,7 +75,7 @@ def _measure_peers(seed: int) -> _Peers:
 
 
 def _best_s(work: Callable[[], object], rounds: int) -> float:
-    """CPU time of this thread."""
+    """The least CPU time of this thread over several rounds."""
     best = float("inf")
     for _ in range(rounds):
         begin = time.thread_time()
@@ -95,7 +95,7 @@ def _noise(seed: int) -> list[NDArray[np.complex64]]:
 
 
 def _neighbours(seed: int) -> list[NDArray[np.complex64]]:
-    """Neighbours that send all the time, 20 dB over the noise: 20 and 4 samples a bit."""
+    """Neighbors that send all the time, 20 dB over the noise: 20 and 4 samples per bit."""
     signals = []
     for n_samples in (20, 4):
         rng = np.random.default_rng(seed)
@@ -105,7 +105,7 @@ def _neighbours(seed: int) -> list[NDArray[np.complex64]]:
 
 
 def gfsk(rng: np.random.Generator, n: int, samples_a_bit: int) -> NDArray[np.complex64]:
-    """A neighbour `[n]` as Bluetooth is: shifts by Gaussian pulses, index 0.5; mean power 1."""
+    """A Bluetooth-like signal `[n]`: Gaussian frequency shifts, index 0.5; mean power 1."""
     bits = rng.choice([-1.0, 1.0], -(-n // samples_a_bit) + 1)
     t = np.arange(-2 * samples_a_bit, 2 * samples_a_bit + 1) / samples_a_bit
     pulse = np.exp(-((t / 0.53) ** 2))
@@ -116,7 +116,7 @@ def gfsk(rng: np.random.Generator, n: int, samples_a_bit: int) -> NDArray[np.com
 def _search(
     name: str, target: float, signals: list[NDArray[np.complex64]], rounds: int, peers: _Peers
 ) -> Row:
-    """The slowest of `signals`, in which there is nothing to be found."""
+    """Search speed on the slowest of `signals`, which contain no burst."""
     msps, notes = [], []
     for x in signals:
         receiver = Receiver()
@@ -176,7 +176,7 @@ def _transmit(seed: int, rounds: int, peers: _Peers) -> Row:
 
 
 def _latency(seed: int, n: int, peers: _Peers) -> Row:
-    """From the samples of a whole burst to its PDU's bytes, all in one call; the median."""
+    """Median time from the samples of a whole burst, in one call, to its PDU's bytes."""
     x = _stream(QPSK12, 1, 220, n, seed).reshape(n, -1)
     receiver, took_s = Receiver(), []
     for burst in x:

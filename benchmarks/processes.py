@@ -1,4 +1,4 @@
-"""Processes of a benchmark: given their precedence, and measured from outside."""
+"""Processes of a benchmark: sets their priority, and measures them from outside."""
 
 import contextlib
 import os
@@ -20,7 +20,7 @@ PAGE_MIB = os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
 class Usage(NamedTuple):
-    """What a process has taken so far."""
+    """Resources that a process has used so far."""
 
     cpu_s: float
     rss_mib: float
@@ -29,7 +29,7 @@ class Usage(NamedTuple):
 def start_module(
     stack: ExitStack, name: str, module: str, *arguments: str, environment: str = ""
 ) -> Process:
-    """A module of ours at work in a peer's environment; it is killed with the stack."""
+    """Start one of our modules in a peer's environment; it is killed with the stack."""
     command = [interpreter(environment), "-m", module, *arguments]
     process = Process(command, name=name, environment=variables(), session=False)
     stack.callback(process.kill)
@@ -38,7 +38,7 @@ def start_module(
 
 
 def told_by(name: str, *command: object, within_s: float = MOST_S) -> str:
-    """All that a program prints until it is done. Raises PeerError, ProcessError and OSError."""
+    """All output of a program, until it ends. Raises PeerError, ProcessError and OSError."""
     with Process(command, name=name, folder=ROOT, session=False) as process:
         if process.wait(within_s):
             raise PeerError(f"{name}: {process.last_words()}")
@@ -46,9 +46,10 @@ def told_by(name: str, *command: object, within_s: float = MOST_S) -> str:
 
 
 def precede(process: Process, *, real_time: bool) -> None:
-    """Let it go before what else this machine does, so far as we are allowed to.
+    """Give a process priority over other programs on this machine, if permitted.
 
-    In real time goes what stands for hardware; else what is another process of the companion.
+    Real-time priority is for processes that stand for hardware; the lower one is for other
+    processes of the companion.
     """
     try:
         if real_time:
@@ -61,15 +62,15 @@ def precede(process: Process, *, real_time: bool) -> None:
 
 
 def usage(pid: int) -> Usage:
-    """What a process has taken so far, with all its threads."""
+    """Resources that a process has used so far, with all its threads."""
     fields = _fields(pid)
     resident = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-    # utime and stime are the 14th and 15th field.
+    # utime and stime are fields 14 and 15.
     return Usage((int(fields[11]) + int(fields[12])) / TICKS_HZ, resident * PAGE_MIB)
 
 
 def usage_below(pid: int) -> list[Usage]:
-    """What each process has taken that this one has started and that is there."""
+    """Resources used by each running process that this one has started."""
     found = []
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(FileNotFoundError, ProcessLookupError):
@@ -79,12 +80,12 @@ def usage_below(pid: int) -> list[Usage]:
 
 
 def _fields(pid: int) -> list[str]:
-    """proc(5): the 3rd, its state, is the first here."""
+    """Fields of proc(5), from the third on, which is the state."""
     return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
 
 
 class Stolen:
-    """How much of the machine a hypervisor has given to others since; 0 % where none tells."""
+    """Share of the machine that a hypervisor has given to others; 0 % if unknown."""
 
     def __init__(self) -> None:
         self._since = _ticks()
@@ -96,14 +97,14 @@ class Stolen:
 
 
 def _ticks() -> tuple[int, int]:
-    """(stolen, all), proc_stat(5); guests' ticks, the last two, are in the users' already."""
+    """(stolen, all), proc_stat(5); the last two fields, guests' ticks, are part of user time."""
     ticks = [int(each) for each in Path("/proc/stat").read_text().split("\n", 1)[0].split()[1:9]]
     return ticks[7], sum(ticks)
 
 
 @contextmanager
 def busy_cores() -> Iterator[None]:
-    """A program that never waits, on every core, at the usual priority."""
+    """Run a program that never waits on every core, at the usual priority."""
     with ExitStack() as stack:
         for core in cores():
             process = Process([sys.executable, "-c", "while True: pass"], session=False)

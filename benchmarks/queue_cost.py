@@ -1,4 +1,4 @@
-"""Does a long queue cost more per message than a short one?"""
+"""Compares the cost per message of a long queue with that of a short one."""
 
 import gc
 import statistics
@@ -52,7 +52,7 @@ def make_queue(seed: int) -> Link:
 
 
 def opportunity(now: float, most: int) -> Opportunity:
-    """For a burst of `most` PDUs."""
+    """An opportunity for a burst of `most` PDUs."""
 
     def most_pdus(_: int, airtime_s: float) -> int:
         return int(min(most, max(0.0, (airtime_s - OVERHEAD_S) / PDU_S)))
@@ -65,7 +65,7 @@ def _airtime_s(_: int, n_pdus: int) -> float:
 
 
 def _per_message(depth: int, seed: int) -> float:
-    """CPU time of a message in and a burst of one PDU out, with `depth` waiting."""
+    """CPU time of one message in and a burst of one PDU out, with `depth` messages queued."""
     rng = Random(seed)
     link, payload = make_queue(seed), bytes(700)
     wishes = [Overrides(Qos(topic % 4), priority=8 * topic) for topic in range(TOPICS)]

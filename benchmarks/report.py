@@ -28,24 +28,24 @@ class Drawing:
 
 @dataclass
 class Row:
-    """One measured figure beside its target and its peers."""
+    """One measured figure with its target and its peers."""
 
     name: str
     value: float
     unit: str
     target: float | None
-    """None: it is only told."""
+    """The target; None: the row is only reported."""
     better: Literal["more", "less"]
     trials: int
     peers: dict[str, float] = field(default_factory=dict)
     paper: float | None = None
     note: str = ""
     like_for_like: float | None = None
-    """The value scaled by how a peer runs here, against where the target was set; only told."""
+    """The value scaled by a peer's speed here against the targets' machine; only reported."""
 
     @property
     def ok(self) -> bool:
-        """Whether the value as it was measured here meets its target."""
+        """Whether the value as measured here meets its target."""
         if self.target is None:
             return True
         return self.value >= self.target if self.better == "more" else self.value <= self.target
@@ -56,11 +56,11 @@ def main(
     measure: Callable[..., Iterable[Row | Drawing]],
     own: argparse.ArgumentParser | None = None,
 ) -> int:
-    """Parse the options all benchmarks share, measure, print; the exit code.
+    """Parse the common options of benchmarks, measure, print; returns the exit code.
 
-    0: all targets are met; 1: a row misses its own; 2: it could not go on, or nothing could be
-    measured. What was measured until then is printed all the same. `measure` gets seed and quick,
-    and by name the options of `own`.
+    0: all targets are met; 1: a row misses its target; 2: the benchmark was aborted, or nothing
+    could be measured. Everything measured so far is printed in any case. `measure` gets seed and
+    quick, and by name the options of `own`.
     """
     parser = argparse.ArgumentParser(
         prog=f"python -m benchmarks.{benchmark}", parents=[own] if own else []
@@ -117,7 +117,7 @@ def _report(
 
 
 def table_of(benchmark: str, rows: list[Row]) -> FittedTable:
-    """The rows as a person reads them; a target that is missed says so."""
+    """The rows as a table for people, with missed targets marked."""
     table = FittedTable(
         f"benchmarks.{benchmark}",
         (

@@ -1,4 +1,4 @@
-"""Bursts through a radio's imperfections and noise: how many of them are not heard."""
+"""Sends bursts through a radio's imperfections and noise, and counts the lost ones."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -19,11 +19,11 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Air:
-    """What is between a transmitter and a receiver of bursts of one PDU.
+    """The channel between a transmitter and a receiver of bursts of one PDU.
 
-    Crystals ±40 ppm apart, moving centre frequency and samples; image -36 dB and leak -35 dBc of
-    the transmitter, image -34 dB and DC -25 dBc of the receiver, 8 bits with bursts at -15 dBFS,
-    oscillators of -90 dBc/Hz at 10 kHz.
+    The crystals differ by ±40 ppm, which shifts centre frequency and sample rate. The transmitter
+    has an image of -36 dB and a leak of -35 dBc. The receiver has an image of -34 dB, DC of -25 dBc
+    and 8 bits, with bursts at -15 dBFS. The oscillators have -90 dBc/Hz at 10 kHz.
     """
 
     rate_hz: float = 5e6
@@ -35,10 +35,10 @@ class Air:
 def bursts(
     air: Air, mcs: int, n_bytes: int, snr_db: float, seed: int
 ) -> Iterator[tuple[bytes, NDArray[np.complex64]]]:
-    """PDUs and, each after some noise, their bursts as a receiver samples them, without end.
+    """Endless PDUs with their bursts as a receiver samples them, each after some noise.
 
     SNR is the burst's mean power over that of the noise in the sample band. A fading channel is
-    drawn anew for each, its mean power counts.
+    drawn anew for each burst; its mean power counts.
     """
     rng = np.random.default_rng(seed)
     transmitter = Transmitter()
@@ -73,12 +73,12 @@ class ErrorRate:
 
     @property
     def share(self) -> float:
-        """The rate that was seen."""
+        """The observed error rate."""
         return self.errors / self.n
 
     @property
     def bound(self) -> float:
-        """What it is below of, with 95 % confidence (Clopper and Pearson)."""
+        """Upper bound of the error rate with 95 % confidence (Clopper and Pearson)."""
         if self.errors == self.n:
             return 1.0
         return float(beta.ppf(CONFIDENCE, self.errors + 1, self.n - self.errors))
@@ -87,12 +87,12 @@ class ErrorRate:
 def error_rate(
     air: Air, mcs: int, n_bytes: int, snr_db: float, seed: int, n: int, enough: int
 ) -> ErrorRate:
-    """Trials until `enough` errors, at most `n`."""
+    """Run trials until `enough` errors, at most `n`."""
     receiver = Receiver(max_frequency=PPM * 1e-6 * air.centre_hz / air.rate_hz)
     tried, errors, missing = 0, 0, b""
     for pdu, x in bursts(air, mcs, n_bytes, snr_db, seed):
         heard = {event.data for event in receiver.push(x) if isinstance(event, PduHeard)}
-        # What is not there yet may be told with the first samples of the next.
+        # The end of a burst may only be reported with the first samples of the next.
         errors += missing not in heard | {b""}
         missing = b"" if pdu in heard else pdu
         tried += 1
@@ -111,8 +111,9 @@ def needed_snr_db(
 ) -> tuple[float, int]:
     """(SNR in dB from which on the error rate is `surely` below `error_rate`, trials).
 
-    `rate_at(snr_db, n, enough)` measures. Steps of a quarter dB until the 95 % bounds (else the
-    rates seen) enclose the rate, then a straight line between their logarithms.
+    `rate_at(snr_db, n, enough)` measures. The SNR changes in steps of a quarter dB until the 95 %
+    bounds (else the observed rates) enclose the rate, followed by a straight line between their
+    logarithms.
     """
     if surely and error_rate < 3 / n:
         raise ValueError(f"{n} trials cannot show an error rate of {error_rate}")

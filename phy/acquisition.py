@@ -1,4 +1,4 @@
-"""From a detector's peak to a burst whose header is read and whose channel is known."""
+"""Leads from a detector's peak to a burst with a decoded header and a known channel."""
 
 import math
 from functools import lru_cache
@@ -23,10 +23,10 @@ from phy.numerology import Numerology
 from phy.quality import BurstQuality
 from phy.transmitter import header_samples
 
-# What noise may add to the offset that the peak tells, in cycles a sample.
+# Error that noise may add to the frequency of the detector's peak, in cycles per sample.
 _COARSE_ERROR = 0.008
-# Corrections that the last step tries, in cycles a sample: up to 0.12 of 1/64, the unit of the
-# phase that was measured over 64 samples. A parabola finds what lies between them.
+# Corrections that the last step tries, in cycles per sample: up to 0.12 of 1/64, the unit of the
+# phase measured over 64 samples. A parabola finds the maximum between them.
 _FREQUENCIES = np.linspace(-0.12, 0.12, 25) / 64
 
 
@@ -42,11 +42,11 @@ def needed_after(grid: Numerology) -> int:
 
 
 class Acquired(NamedTuple):
-    """A burst whose header was read and whose channel is known.
+    """A burst with a decoded header and a known channel.
 
     `window` is the absolute index at which the FFT of the first payload symbol begins. `frequency`
-    is the frequency offset in cycles a sample, with phase 0 at index `origin`; `channel` is as seen
-    with that phase. A receiver has one channel: the next burst overwrites it.
+    is the frequency offset in cycles per sample, with phase 0 at index `origin`; `channel` includes
+    that phase reference. A receiver has only one channel: the next burst overwrites it.
     """
 
     header: BurstHeader
@@ -64,7 +64,7 @@ class Missed(NamedTuple):
 
 
 class Acquisition:
-    """Acquires bursts on one grid, with its tables and working memory. For one thread at a time."""
+    """Acquires bursts on one grid, with its own tables and working memory. Not thread-safe."""
 
     def __init__(self, grid: Numerology, max_frequency: float, centre_cycles: float = 0.0) -> None:
         self._grid = grid
@@ -83,8 +83,8 @@ class Acquisition:
     ) -> Acquired | Missed:
         """Read the burst whose first long symbol is nominally at `x[before(grid)]`.
 
-        `base` is the absolute index of `x[0]`; `coarse` is the frequency that the detector's peak
-        tells, in cycles a sample, modulo 1/16.
+        `base` is the absolute index of `x[0]`; `coarse` is the frequency of the detector's peak, in
+        cycles per sample, modulo 1/16.
         """
         grid, room = self._grid, self._room.content
         start, frequency = kernel.acquire(
@@ -109,7 +109,7 @@ class Acquisition:
 
 
 def n_aliases(max_frequency: float) -> int:
-    """Multiples of 1/16 cycle a sample to try on either side, for offsets up to `max_frequency`."""
+    """Multiples of 1/16 cycle per sample to try on each side, for offsets up to `max_frequency`."""
     return max(0, math.ceil((max_frequency + _COARSE_ERROR - AMBIGUITY / 2) / AMBIGUITY))
 
 
@@ -173,13 +173,13 @@ def _new_room(grid: Numerology) -> ArgumentBlock[Room]:
     )
 
 
-# Most headers are like one before, as most bursts are.
+# Cached because most headers equal an earlier one.
 @lru_cache(maxsize=64)
 def _sent(told: BurstHeader, grid: Numerology) -> NDArray[np.float32]:
     """The tones of long training and header as sent `[2 + n_header, 2, width]`.
 
     Each tone x is stored as 1 / x*, so that kernels divide by x when they multiply by the
-    conjugate: the header's peaks are cut off, and so its tones are not exactly ±1.
+    conjugate. Header tones are not exactly ±1, because the header's peaks are clipped.
     """
     long = preamble.long_subcarriers(grid)[grid.tones].astype(np.complex64)
     samples = header_samples(told, grid)

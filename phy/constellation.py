@@ -18,7 +18,7 @@ class Modulation(Enum):
 
     @property
     def bits(self) -> int:
-        """Coded bits on one subcarrier."""
+        """Number of coded bits on one subcarrier."""
         return self.value
 
     @property
@@ -28,20 +28,20 @@ class Modulation(Enum):
 
     @property
     def unit(self) -> float:
-        """Half the distance between neighbouring points, at mean power 1."""
+        """Half the distance between neighboring points, at mean power 1."""
         levels = _levels(self.axis_bits)
         axes = 1 if self is Modulation.BPSK else 2
         return float(1 / np.sqrt(axes * np.mean(levels**2)))
 
     @property
     def axis_bits(self) -> int:
-        """Coded bits on one axis; BPSK has the real axis only."""
+        """Number of coded bits on one axis; BPSK uses the real axis only."""
         return max(1, self.bits // 2)
 
 
 @cache
 def points(modulation: Modulation) -> NDArray[np.complex64]:
-    """Points of mean power 1, by the number that their bits make, first bit highest `[2^bits]`."""
+    """Points of mean power 1 `[2^bits]`, indexed by their bits as a number, first bit highest."""
     levels = _levels(modulation.axis_bits) * modulation.unit
     if modulation is Modulation.BPSK:
         return levels.astype(np.complex64)
@@ -49,7 +49,7 @@ def points(modulation: Modulation) -> NDArray[np.complex64]:
 
 
 def _levels(axis_bits: int) -> NDArray[np.float64]:
-    """Levels of an axis, odd numbers, by the number that their Gray code makes `[2^axis_bits]`."""
+    """Levels of an axis, odd numbers `[2^axis_bits]`, indexed by their Gray code as a number."""
     n = 1 << axis_bits
     rank = np.arange(n)
     levels = np.empty(n)

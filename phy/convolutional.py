@@ -28,18 +28,18 @@ __all__ = [
 
 @dataclass(frozen=True)
 class CodeRate:
-    """A rate of the punctured code: `pattern` is 1 where a bit is sent, outputs A and B in turn."""
+    """A rate of the punctured code; `pattern` has 1 for each bit sent, outputs A and B in turn."""
 
     name: str
     rate: Fraction
     pattern: tuple[int, ...]
 
     def n_coded(self, n_bits: int) -> int:
-        """Coded bits that `n_bits` of information and the tail take."""
+        """Number of coded bits for `n_bits` of information and the tail."""
         return len(self.kept(n_bits))
 
     def kept(self, n_bits: int) -> NDArray[np.int32]:
-        """Which of the mother code's 2 (n_bits + 6) bits are sent, as ascending positions."""
+        """Ascending positions of the sent bits among the mother code's 2 (n_bits + 6) bits."""
         return _kept(self.pattern, n_bits)
 
 
@@ -70,12 +70,12 @@ def decode(
     code: CodeRate,
     workspace: ViterbiWorkspace,
 ) -> NDArray[np.uint8]:
-    """The likeliest bytes `[n, n_bytes]` behind LLRs `[n, n_coded]`, at most ±MAX_LLR, + for 0."""
+    """Decode LLRs `[n, n_coded]`, ±MAX_LLR at most, + for 0, to likeliest bytes `[n, n_bytes]`."""
     return decode_terminated(llr, code.kept(8 * n_bytes), n_bytes, workspace)
 
 
 def decode_list(llr: NDArray[np.int16], n_bytes: int, n_list: int) -> NDArray[np.uint8]:
-    """The `n_list` likeliest blocks `[n_list, n_bytes]`, best first, of one block at rate 1/2."""
+    """Decode one block at rate 1/2 to the `n_list` likeliest, `[n_list, n_bytes]`, best first."""
     bits = np.empty((n_list, 8 * n_bytes + N_TAIL), np.uint8)
     list_decode(llr, bits)
     return np.packbits(bits[:, : 8 * n_bytes], axis=1)

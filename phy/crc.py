@@ -23,12 +23,12 @@ def crc8(data: bytes) -> int:
 
 
 def with_crc32(data: bytes) -> bytes:
-    """`data` followed by its CRC-32 (zlib's), big endian."""
+    """`data` followed by its CRC-32 (as in zlib), big endian."""
     return data + zlib.crc32(data).to_bytes(CRC32_SIZE, "big")
 
 
 def checked(data: bytes) -> bytes | None:
-    """`data` without its CRC-32, the last four octets; None when that is wrong."""
+    """`data` without its CRC-32, the last four octets; None if that is wrong."""
     body = data[:-CRC32_SIZE]
     right = zlib.crc32(body).to_bytes(CRC32_SIZE, "big") == data[-CRC32_SIZE:]
     return body if right else None

@@ -1,4 +1,4 @@
-"""From samples to LLRs, and from LLRs to PDUs."""
+"""Demodulates samples to LLRs, and decodes LLRs to PDUs."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,12 @@ from phy.mapping import axes
 from phy.numerology import Numerology
 from phy.sequences import whitening
 
-# LLRs for which there is room at first: some ten PDUs of usual size.
+# Initial room for LLRs: about ten PDUs of usual size.
 _ROOM = 1 << 14
 
 
 class Demodulator:
-    """Turns samples into LLRs on one grid. For one thread at a time."""
+    """Turns samples into LLRs on one grid. Not thread-safe."""
 
     def __init__(self, grid: Numerology) -> None:
         self._grid = grid
@@ -42,10 +42,10 @@ class Demodulator:
     ) -> None:
         """Write the LLRs of OFDM symbols, in the code's order, to `llr` `[n · n_data · bits]`.
 
-        The first one's FFT window begins with `samples`, which have turned by `frequency` cycles a
-        sample since `origin` samples before. The header's first symbol is number 0. `channel` moves
-        on. `powers` `[≥ n]` gets the mean power on a subcarrier of each symbol, `points` `[n,
-        n_data]` the equalised points, if they are wanted.
+        The first symbol's FFT window begins with `samples`. They have rotated by `frequency` cycles
+        per sample, starting `origin` samples earlier. The header's first symbol is number 0.
+        `channel` is updated. `powers` `[≥ n]` gets each symbol's mean power on a subcarrier;
+        `points` `[n, n_data]`, if given, gets the equalised points.
         """
         grid = self._grid
         n = (len(samples) - grid.n_fft) // grid.n_symbol + 1
@@ -58,7 +58,7 @@ class Demodulator:
 
 
 class PduDecoder:
-    """Collects a burst's LLRs and decodes each PDU when its symbols are in. One for each thread."""
+    """Collects a burst's LLRs and decodes each PDU once its symbols are in. One per thread."""
 
     def __init__(self) -> None:
         self._workspace = new_workspace()
@@ -68,12 +68,12 @@ class PduDecoder:
         self._n_decoded = 0
 
     def start(self, plan: BurstLayout) -> None:
-        """Begin a new burst; LLRs of the last one are dropped."""
+        """Begin a new burst; LLRs of the last one are discarded."""
         self._plan = plan
         self._n_kept = self._n_filled = self._n_decoded = 0
 
     def room(self, n_symbols: int) -> NDArray[np.int16]:
-        """Room for the LLRs of the next `n_symbols` symbols; call `decode` before asking anew."""
+        """Room for the LLRs of the next `n_symbols` symbols; call `decode` between requests."""
         n = self._n_kept + n_symbols * self._plan.symbol_bits
         if n > len(self._llr):
             larger = np.empty(2 * n, np.int16)
@@ -83,7 +83,7 @@ class PduDecoder:
         return self._llr[self._n_kept : n]
 
     def decode(self, n_pdus: int) -> list[bytes | None]:
-        """The next `n_pdus` PDUs, whose symbols are all in; None for each whose CRC-32 is wrong."""
+        """Decode the next `n_pdus` PDUs, whose symbols are complete; None for each wrong CRC-32."""
         plan = self._plan
         found: list[bytes | None] = []
         size, n_bits = plan.block_bytes, n_pdus * plan.coded_bits

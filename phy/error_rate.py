@@ -1,15 +1,15 @@
-"""What SNR each MCS needs in white noise, and the packet error rate that an SNR gives.
+"""The SNR that each MCS needs in white noise, and the packet error rate at a given SNR.
 
-SNR is mean burst power over noise power in the sample band; a burst that is not found loses all
-its PDUs. A PDU is coded at its MCS's rate: where the burst's last symbol has room, there is more
-parity, and a short PDU alone in its burst needs up to 1.5 dB less than told here. Of a PDU in n
+SNR is mean burst power over noise power in the sample band; a burst that is not found loses all its
+PDUs. A PDU is coded at its MCS's rate. If the burst's last symbol has room, the PDU gets more
+parity: a short PDU alone in its burst needs up to 1.5 dB less than given here. For a PDU of n
 codewords with k bits of it each, with x = sqrt(900 / k),
 
     PER = 1 − found · (1 − p)^n        p = Q((snr − half − 0.50 (x − 1)) / (spread x^1.03))
 
-Measured with the modem itself: ±5 kHz of frequency offset at 1 Msps, its clock error with it,
-random phase; every 0.4 dB, 200 to 2000 PDUs each. SNR in dB at PER 50, 10 and 1 %, by bytes of the
-PDU:
+Measured with the modem itself: ±5 kHz of frequency offset at 1 Msps with the matching clock error,
+random phase; every 0.4 dB, 200 to 2000 PDUs each. SNR in dB at PER 50, 10 and 1 %, by PDU size in
+bytes:
 
     MCS        64              220             1024
      0    −2.8 −2.3 −1.9   −2.7 −2.4 −2.0   −2.5 −2.3 −2.0
@@ -23,8 +23,8 @@ PDU:
      8    19.9 20.6 21.3   19.7 20.2 20.7   19.8 20.1 20.4
      9    21.6 22.4 23.1   21.7 22.2 22.8   21.9 22.3 22.7
 
-The law is within 0.3 dB of all of them, and within 0.6 dB at 16 bytes. One point again (MCS, bytes,
-dB, PDUs; found, PER):
+The formula is within 0.3 dB of all of them, and within 0.6 dB at 16 bytes. To measure one point
+again (MCS, bytes, dB, PDUs; prints found, PER):
 
     python -c 'from tests.phy.test_error_rate import measured; print(measured(1, 220, 1.9, 1600))'
 """
@@ -36,7 +36,7 @@ from phy.layout import layout
 from phy.numerology import OFDM_64_16
 
 REFERENCE_BITS = 900
-# By MCS: SNR in dB at which a codeword of so many bits fails half the time; spread in dB.
+# By MCS: SNR in dB at which half of the codewords of REFERENCE_BITS fail; its spread in dB.
 HALF_LOST = (
     (-2.95, 0.29),
     (0.1, 0.32),
@@ -49,9 +49,9 @@ HALF_LOST = (
     (19.5, 0.49),
     (21.45, 0.50),
 )
-# Short codes need more, and tell less sharply: by sqrt(900 / k).
+# Short codes need more SNR and have a flatter slope: by sqrt(900 / k).
 SHORT_NEEDS_DB, SHORT_SPREADS = 0.50, 1.03
-# Preamble and header: SNR in dB at which half are read, and the spread of a normal law.
+# Preamble and header: SNR in dB at which half are read, and the spread of a normal distribution.
 HALF_FOUND = (-4.4, 1.08)
 
 _LOWEST_DB, _HIGHEST_DB = -30.0, 60.0
@@ -63,9 +63,9 @@ def burst_found_rate(snr_db: float) -> float:
 
 
 def pdu_lost_rate(mcs: int, snr_db: float, pdu_bytes: int) -> float:
-    """Probability that a PDU of a burst that is found is not heard, 0 … 1.
+    """Probability that a PDU is lost in a burst that was found, 0 … 1.
 
-    Raises ValueError for an MCS or size that no header can tell.
+    Raises ValueError for an MCS or size that no header can express.
     """
     half_db, spread, n_codewords = _threshold(mcs, pdu_bytes)
     lost = _tail(snr_db, half_db, spread)
@@ -73,9 +73,9 @@ def pdu_lost_rate(mcs: int, snr_db: float, pdu_bytes: int) -> float:
 
 
 def pdu_error_rate(mcs: int, snr_db: float, pdu_bytes: int) -> float:
-    """Probability that a PDU is not heard, 0 … 1, even because its burst is not found.
+    """Probability that a PDU is lost, 0 … 1, including bursts that are not found.
 
-    Raises ValueError for an MCS or size that no header can tell.
+    Raises ValueError for an MCS or size that no header can express.
     """
     lost, missed = pdu_lost_rate(mcs, snr_db, pdu_bytes), _tail(snr_db, *HALF_FOUND)
     return missed + (1 - missed) * lost
@@ -84,7 +84,7 @@ def pdu_error_rate(mcs: int, snr_db: float, pdu_bytes: int) -> float:
 def needed_snr_db(mcs: int, pdu_bytes: int, per: float = 0.01) -> float:
     """SNR in dB at which `pdu_error_rate` is `per`.
 
-    Raises ValueError for an MCS or size that no header can tell, and for a `per` outside 0 … 1.
+    Raises ValueError for an MCS or size that no header can express, and for a `per` outside 0 … 1.
     """
     if not 0 < per < 1:
         raise ValueError(f"packet error rate: got {per}; allowed: more than 0 and less than 1")
@@ -100,7 +100,7 @@ def needed_snr_db(mcs: int, pdu_bytes: int, per: float = 0.01) -> float:
 
 @lru_cache(maxsize=256)
 def _threshold(mcs: int, pdu_bytes: int) -> tuple[float, float, int]:
-    """(SNR in dB at which a codeword fails half the time, its spread, codewords) of a PDU."""
+    """(SNR in dB at which half of the codewords fail, its spread, codewords) of a PDU."""
     form = layout(OFDM_64_16, mcs, 1, pdu_bytes).form
     half_db, spread = HALF_LOST[mcs]
     shortness = math.sqrt(REFERENCE_BITS * form.n_codewords / form.n_bits)
@@ -109,5 +109,5 @@ def _threshold(mcs: int, pdu_bytes: int) -> tuple[float, float, int]:
 
 
 def _tail(snr_db: float, half_db: float, spread: float) -> float:
-    """Tail of the normal law, Q((snr − half) / spread)."""
+    """Tail of the normal distribution, Q((snr − half) / spread)."""
     return 0.5 * math.erfc((snr_db - half_db) / (spread * math.sqrt(2)))

@@ -1,7 +1,7 @@
-"""A burst's channel, and the tables with which it is estimated.
+"""A burst's channel, and the tables used to estimate it.
 
-Window convention: every FFT window begins BACKOFF samples before the first echo, so that echoes a
-little earlier than it stay inside the prefix; the channel estimate holds the resulting slope.
+Window convention: every FFT window begins BACKOFF samples before the first echo, so that slightly
+earlier echoes stay inside the prefix. The channel estimate includes the resulting slope.
 """
 
 from functools import cache
@@ -16,13 +16,13 @@ from phy.kernels.lanes import N_LANES, whole_lanes
 from phy.numerology import Numerology
 from phy.sequences import POLARITY
 
-# Groups of the smoother, by how many samples their echoes are from the mean delay. One more, made
-# in _basis, holds what is farther, up to a prefix.
+# Groups of the smoother, by the distance of their echoes from the mean delay in samples. One more
+# group, made in _basis, holds the echoes farther away, up to a prefix.
 _GROUPS = ((0,), (1,), (2, 3), (4, 5, 6, 7, 8))
 
 
 def new_channel(grid: Numerology) -> ArgumentBlock[Channel]:
-    """Room for a channel of which nothing is known."""
+    """Memory for a channel that is not estimated yet."""
     n_groups, width = len(tones(grid).content.ends) + 1, whole_lanes(grid.n_used)
     h, centre, turns, inverse, sums = np.zeros((5, 2, width), np.float32)
     return ArgumentBlock(
@@ -43,7 +43,7 @@ def new_channel(grid: Numerology) -> ArgumentBlock[Channel]:
 
 
 def new_scratch(grid: Numerology) -> ArgumentBlock[Scratch]:
-    """Working memory of the receiver's kernels on one grid: one for each thread."""
+    """Working memory of the receiver's kernels on one grid; one per thread."""
     table, width = tones(grid).content, whole_lanes(grid.n_used)
     n_bits, n_groups = max(each.bits for each in Modulation), len(table.ends) + 1
     return ArgumentBlock(
@@ -67,7 +67,10 @@ def new_scratch(grid: Numerology) -> ArgumentBlock[Scratch]:
 
 
 def in_planes(y: NDArray[np.complex64]) -> NDArray[np.float32]:
-    """Tones `[n, n_used]` as kernels take them, real and imaginary parts apart `[n, 2, width]`."""
+    """Tones `[n, n_used]` in the kernels' format, with separate real and imaginary parts.
+
+    The result is `[n, 2, width]`.
+    """
     n, n_used = y.shape
     out = np.zeros((n, 2, whole_lanes(n_used)), np.float32)
     out[:, 0, :n_used], out[:, 1, :n_used] = y.real, y.imag
@@ -76,7 +79,7 @@ def in_planes(y: NDArray[np.complex64]) -> NDArray[np.float32]:
 
 @cache
 def tones(grid: Numerology) -> ArgumentBlock[Tones]:
-    """The tables of a grid and its subcarriers, made once."""
+    """The tables of a grid and its subcarriers, computed once."""
     subcarriers = grid.used[grid.tones]
     basis, ends = _basis(subcarriers, grid)
     position = {int(k): i for i, k in enumerate(subcarriers)}
@@ -106,7 +109,7 @@ def tones(grid: Numerology) -> ArgumentBlock[Tones]:
 def _basis(
     subcarriers: NDArray[np.int64], grid: Numerology
 ) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    """The smoother's orthonormal rows `[n, width]` in groups, and where each group ends."""
+    """The smoother's orthonormal rows `[n, width]` in groups, and the end of each group."""
     rows: list[NDArray[np.float64]] = []
     ends = []
     outermost = tuple(range(_GROUPS[-1][-1] + 1, grid.n_cp + 1))
@@ -115,7 +118,7 @@ def _basis(
             angle = 2 * np.pi * delay * subcarriers / grid.n_fft
             rows += [np.cos(angle), np.sin(angle)] if delay else [np.ones(len(subcarriers))]
         ends.append(len(rows))
-    # QR keeps the order: what a group adds is orthogonal to the groups nearer to the mean delay.
+    # QR keeps the order: each group's rows are orthogonal to all groups nearer to the mean delay.
     orthonormal, _ = np.linalg.qr(np.array(rows).T)
     out = np.zeros((len(rows), whole_lanes(grid.n_used)), np.float32)
     out[:, : grid.n_used] = orthonormal.T

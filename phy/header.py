@@ -1,6 +1,6 @@
-"""The burst header: what follows, in 38 bits on BPSK symbols, two of them on 64 subcarriers.
+"""The burst header: 38 bits about the payload on BPSK symbols, two of them on 64 subcarriers.
 
-mcs 4, PDUs 6, PDU length 11, network 3, CRC-8, 6 tail zeros; K=7 rate 1/2; the 76 coded bits are
+mcs 4, PDUs 6, PDU length 11, network 3, CRC-8, 6 tail zeros; K=7 rate 1/2. The 76 coded bits are
 repeated from the first on until the symbols are full.
 """
 
@@ -17,18 +17,18 @@ from phy.numerology import Numerology
 
 N_BITS = 32
 N_CODED = 96
-"""Coded bits that a header takes at least."""
+"""Minimum number of coded bits in a header."""
 MAX_PDUS = 63
 MAX_PDU_BYTES = 2047
 N_NETWORKS = 8
 
 CODE: CodeRate = HALF
 N_CANDIDATES = 8
-"""Code words that are tried when the likeliest fails its check."""
+"""Number of code words to try when the likeliest fails its check."""
 
 
 class BurstHeader(NamedTuple):
-    """MCS index, number of PDUs, bytes of each, and the network they belong to."""
+    """MCS index, number of PDUs, their size in bytes, and their network."""
 
     mcs: int
     n_pdus: int
@@ -37,12 +37,12 @@ class BurstHeader(NamedTuple):
 
 
 def n_symbols(grid: Numerology) -> int:
-    """OFDM symbols that a header takes on `grid`."""
+    """Number of OFDM symbols in a header on `grid`."""
     return -(-N_CODED // grid.n_data)
 
 
 def header_bits(header: BurstHeader, n_coded: int) -> NDArray[np.uint8]:
-    """The coded bits of a header `[n_coded]`, repeated until there are so many."""
+    """The coded bits of a header `[n_coded]`, repeated to fill `n_coded`."""
     mcs, n_pdus, pdu_bytes, network = header
     fields = (mcs << 20 | n_pdus << 14 | pdu_bytes << 3 | network).to_bytes(3, "big")
     data = np.frombuffer(fields + bytes([crc8(fields)]), np.uint8)
@@ -50,7 +50,7 @@ def header_bits(header: BurstHeader, n_coded: int) -> NDArray[np.uint8]:
 
 
 def parse_header(likeliest: NDArray[np.uint8], llr: NDArray[np.int16]) -> BurstHeader | None:
-    """The header in `likeliest` `[4]`, or in other likely words of its LLRs `[76]`, or None."""
+    """The header in `likeliest` `[4]`, or in another likely word of its LLRs `[76]`, or None."""
     header = _checked(likeliest.tobytes())
     if header is not None:
         return header
@@ -61,7 +61,7 @@ def parse_header(likeliest: NDArray[np.uint8], llr: NDArray[np.int16]) -> BurstH
 
 @lru_cache(maxsize=256)
 def _checked(data: bytes) -> BurstHeader | None:
-    """The header in four octets; None when its check fails or it makes no sense."""
+    """The header in four octets; None if its check fails or a field is invalid."""
     if crc8(data[:3]) != data[3]:
         return None
     fields = int.from_bytes(data[:3], "big")

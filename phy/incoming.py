@@ -1,4 +1,4 @@
-"""A burst while it is being received."""
+"""State of a burst while it is being received."""
 
 import math
 
@@ -10,11 +10,11 @@ from phy.layout import BurstLayout
 from phy.numerology import Numerology
 
 SLIP_EVERY = 256
-"""Every so many payload symbols, the FFT windows follow the sender's clock."""
+"""Interval in payload symbols at which the FFT windows are aligned to the sender's clock."""
 
 
 class IncomingBurst:
-    """A burst being received: where its symbols are, and how many PDUs are through."""
+    """A burst being received: the position of its symbols, and how many PDUs are decoded."""
 
     def __init__(self, acquired: Acquired, plan: BurstLayout, grid: Numerology) -> None:
         self.acquired = acquired
@@ -25,7 +25,7 @@ class IncomingBurst:
         self._window = acquired.window
         self._limit = SLIP_EVERY
         self.next_end = 0
-        """Absolute index up to which samples must be there for the burst to go on."""
+        """Absolute index that the stream must reach before the burst can go on."""
         self._look_ahead()
 
     def window(self, symbol: int) -> int:
@@ -33,20 +33,20 @@ class IncomingBurst:
         return self._window + symbol * self._n_symbol
 
     def end_of(self, n: int) -> int:
-        """Absolute index after the FFTs of the first `n` payload symbols."""
+        """Absolute index after the FFT windows of the first `n` payload symbols."""
         return self._window + n * self._n_symbol - self._n_cp
 
     def complete(self, end: int) -> tuple[int, int]:
-        """(symbols to take in all, PDUs that they complete) when the stream reaches index `end`."""
+        """(total symbols to process, PDUs that they complete) when the stream reaches `end`."""
         plan, done = self.plan, self.n_good + self.n_bad
         here = min((end - self.end_of(0)) // self._n_symbol, plan.n_symbols, self._limit)
         n_pdus = min(here * plan.symbol_bits // plan.coded_bits, plan.n_pdus) - done
-        # At the limit all symbols are taken, also those of a PDU that is not complete: the windows
-        # slip there.
+        # At the limit all symbols are processed, even those of an incomplete PDU: the windows slip
+        # there.
         return (here if here == self._limit else plan.symbols_through(done + n_pdus)), n_pdus
 
     def go_on(self) -> None:
-        """Prepare for the next symbols after those so far: slip the windows if it is time."""
+        """Prepare for the next symbols; slip the windows if that is due."""
         if self.n_symbols_in == self._limit:
             self._limit += SLIP_EVERY
             self._slip()
@@ -57,7 +57,7 @@ class IncomingBurst:
         self.next_end = self.end_of(min(through, self._limit))
 
     def _slip(self) -> None:
-        """Move the FFT windows by whole samples, as the slope over subcarriers tells."""
+        """Move the FFT windows by whole samples, according to the slope over the subcarriers."""
         channel, grid = self.acquired.channel, self._grid
         slope = float(channel.content.tracking[SLOPE, 0])
         early = round(slope * grid.n_fft / (2 * math.pi))

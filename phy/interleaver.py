@@ -1,4 +1,4 @@
-"""Spreads neighbouring coded bits over subcarriers and over strong and weak bits of a point.
+"""Spreads neighboring coded bits over subcarriers, and over strong and weak bits of a point.
 
 IEEE 802.11-2020, 17.3.5.7, one OFDM symbol at a time.
 """
@@ -13,7 +13,7 @@ N_COLUMNS = 16
 
 @cache
 def order(n_bits: int, bits_per_subcarrier: int) -> NDArray[np.int32]:
-    """Where each coded bit of a symbol goes: bit k to position `order[k]` `[n_bits]`."""
+    """Interleaved position of each coded bit of a symbol: bit k goes to `order[k]` `[n_bits]`."""
     s = max(bits_per_subcarrier // 2, 1)
     k = np.arange(n_bits)
     i = n_bits // N_COLUMNS * (k % N_COLUMNS) + k // N_COLUMNS

@@ -12,7 +12,7 @@ from phy.numerology import Numerology
 
 @dataclass(frozen=True)
 class BurstLayout:
-    """A burst of `n_pdus` PDUs of `pdu_bytes` each. The PDUs' coded bits follow one another."""
+    """A burst of `n_pdus` PDUs of `pdu_bytes` each, whose coded bits are contiguous."""
 
     grid: Numerology
     mcs: Mcs
@@ -26,24 +26,24 @@ class BurstLayout:
 
     @cached_property
     def form(self) -> Segmentation:
-        """How a PDU is coded: with all the parity that the burst's symbols have room for."""
+        """How a PDU is coded: with as much parity as the burst's symbols have room for."""
         n_bits = 8 * self.block_bytes
         room = self.n_symbols * self.symbol_bits // self.n_pdus
         return segmentation(n_bits, self.mcs.rate, room)
 
     @cached_property
     def coded_bits(self) -> int:
-        """Coded bits of one PDU, all its parity included."""
+        """Coded bits of one PDU, including all parity."""
         return self.form.n_coded
 
     @cached_property
     def least_bits(self) -> int:
-        """Coded bits that a PDU takes at exactly the rate of its MCS."""
+        """Coded bits of one PDU at exactly the rate of its MCS."""
         return least_coded(8 * self.block_bytes, self.mcs.rate)
 
     @cached_property
     def symbol_bits(self) -> int:
-        """Coded bits of an OFDM symbol."""
+        """Coded bits of one OFDM symbol."""
         return self.grid.n_data * self.mcs.modulation.bits
 
     @cached_property
@@ -58,13 +58,13 @@ class BurstLayout:
         return preamble.length(self.grid) + n_symbols * self.grid.n_symbol
 
     def symbols_through(self, n_pdus: int) -> int:
-        """Payload symbols that must be in before the first `n_pdus` PDUs can be decoded."""
+        """Number of payload symbols needed to decode the first `n_pdus` PDUs."""
         return -(-n_pdus * self.coded_bits // self.symbol_bits)
 
 
 @lru_cache(maxsize=256)
 def layout(grid: Numerology, mcs: int, n_pdus: int, pdu_bytes: int) -> BurstLayout:
-    """The layout of a burst. Raises ValueError for what no header can tell."""
+    """Compute the layout of a burst. Raises ValueError for values that no header can express."""
     for name, value, low, high in (
         ("MCS", mcs, 0, len(MCS_TABLE) - 1),
         ("PDUs in a burst", n_pdus, 1, header.MAX_PDUS),
@@ -76,7 +76,7 @@ def layout(grid: Numerology, mcs: int, n_pdus: int, pdu_bytes: int) -> BurstLayo
 
 
 def most_pdus(grid: Numerology, mcs: int, pdu_bytes: int, n_samples: int) -> int:
-    """Number of PDUs that a burst of at most `n_samples` holds; at least 1, at most 63."""
+    """Number of PDUs that fit in a burst of at most `n_samples`; at least 1, at most 63."""
     one = layout(grid, mcs, 1, pdu_bytes)
     fixed = preamble.length(grid) + header.n_symbols(grid) * grid.n_symbol
     symbols = max(0, n_samples - fixed) // grid.n_symbol

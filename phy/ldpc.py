@@ -55,7 +55,7 @@ class QuasiCyclic:
 
     @cached_property
     def row_ends(self) -> NDArray[np.int32]:
-        """Where the edges of each block row begin, and after the last row `[rows + 1]`."""
+        """Start of each block row's edges, and the end of the last row `[rows + 1]`."""
         per_row = np.count_nonzero(self.base >= 0, axis=1)
         return np.concatenate(([0], np.cumsum(per_row))).astype(np.int32)
 
@@ -72,7 +72,7 @@ class QuasiCyclic:
 
     @cached_property
     def middle(self) -> int:
-        """The row in which the first parity column has its block between the outer two."""
+        """The row in which the first parity column has its middle block."""
         return int(np.flatnonzero(self.base[:, N_COLUMNS - len(self.base)] >= 0)[1])
 
 
@@ -80,9 +80,9 @@ class QuasiCyclic:
 class Segmentation:
     """How a block of `n_bits` becomes codewords of `code`.
 
-    Each carries an almost equal share of the block; the rest of its information is 0 and not sent
-    (shortened). Of the parity, as many bits at the end are not sent (punctured) as there is no
-    room for in `n_coded`.
+    Each codeword carries an almost equal share of the block. The rest of its information bits are 0
+    and not sent (shortened). Parity bits at the end that do not fit into `n_coded` are not sent
+    either (punctured).
     """
 
     code: QuasiCyclic
@@ -97,13 +97,13 @@ class Segmentation:
 
     @cached_property
     def ends(self) -> NDArray[np.int32]:
-        """Where the bits of each codeword begin, and after the last `[codewords + 1]`."""
+        """Start of each codeword's bits, and the end of the last `[codewords + 1]`."""
         parity = _shares(self.n_coded - self.n_bits, self.n_codewords)
         return np.concatenate(([0], np.cumsum(self.shares + parity))).astype(np.int32)
 
     @cached_property
     def arguments(self) -> ArgumentBlock[Form]:
-        """The tables of this segmentation, as kernels take them."""
+        """The tables of this segmentation, packed for kernels."""
         code = self.code
         return ArgumentBlock(
             Form(
@@ -119,16 +119,16 @@ class Segmentation:
 
 
 def least_coded(n_bits: int, rate: Fraction) -> int:
-    """Coded bits that a block of `n_bits` takes at exactly `rate`."""
+    """Number of coded bits for a block of `n_bits` at exactly `rate`."""
     return math.ceil(n_bits / rate)
 
 
 @lru_cache(maxsize=256)
 def segmentation(n_bits: int, rate: Fraction, room: int) -> Segmentation:
-    """How to put a block of `n_bits` into at most `room` coded bits.
+    """Fit a block of `n_bits` into at most `room` coded bits.
 
-    It takes the fewest codewords, and of those the shortest. `room` is at least `least_coded`; what
-    the codewords cannot use of it is left.
+    The result has the fewest possible codewords, and of those the shortest. `room` is at least
+    `least_coded`; coded bits that the codewords cannot use remain free.
     """
     n_codewords = -(-n_bits // _code(LIFTINGS[-1], rate).k)
     code = next(each for z in LIFTINGS if n_codewords * (each := _code(z, rate)).k >= n_bits)
@@ -147,7 +147,7 @@ def _shares(n: int, n_codewords: int) -> NDArray[np.int32]:
 
 
 def encode(bits: NDArray[np.uint8], form: Segmentation) -> NDArray[np.uint8]:
-    """Coded bits `[blocks, n_coded]` of blocks of bits `[blocks, n_bits]`."""
+    """Encode blocks of bits `[blocks, n_bits]` to coded bits `[blocks, n_coded]`."""
     out = np.empty((len(bits), form.n_coded), np.uint8)
     encode_blocks(bits, form.arguments.packed, out)
     return out
@@ -160,10 +160,10 @@ def decode(
     max_iterations: int = MAX_ITERATIONS,
     white: NDArray[np.uint8] | None = None,
 ) -> NDArray[np.uint8]:
-    """The likeliest bytes `[blocks, n_bits / 8]` behind LLRs `[blocks · n_coded]`, positive for 0.
+    """Decode LLRs `[blocks · n_coded]`, + for 0, to the likeliest bytes `[blocks, n_bits / 8]`.
 
-    A block whose checks do not hold after `max_iterations` is returned as it stands then. The bytes
-    of all blocks are XORed with `white`.
+    A block whose checks still fail after `max_iterations` is returned as it is. The bytes of all
+    blocks are XORed with `white`.
     """
     out = np.empty((llr.size // form.n_coded, form.n_bits // 8), np.uint8)
     if white is None:

@@ -1,7 +1,7 @@
 """Parity-check matrices of the LDPC codes of IEEE 802.11-2020, Annex F, as cyclic shifts.
 
-A row of text is a row of blocks of Z x Z: a number is the identity shifted right by so many
-columns, a dot a block of zeros. Columns 0 … K-1 are information, the last one for each row parity.
+A row of text is a row of Z x Z blocks: a number is the identity shifted right by that many columns,
+a dot is a zero block. Columns 0 … K-1 are information; the rest, one per row, are parity.
 """
 
 # fmt: off

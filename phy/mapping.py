@@ -1,4 +1,4 @@
-"""From coded bits to samples of OFDM symbols: interleaver, constellation, pilots, inverse FFT."""
+"""Maps coded bits to samples of OFDM symbols: interleaver, constellation, pilots, inverse FFT."""
 
 from functools import cache
 
@@ -39,8 +39,8 @@ class Mapping:
     ) -> NDArray[np.complex64]:
         """Samples `[n · n_symbol]` of coded bits `[n · symbol_bits]`, at mean power 1.
 
-        The first symbol is number `first_symbol`, the header's first being 0. No magnitude exceeds
-        `peak`.
+        The first symbol has number `first_symbol`; the header's first symbol is 0. No magnitude
+        exceeds `peak`.
         """
         grid = self.grid
         out = np.empty(len(coded) // self.symbol_bits * grid.n_symbol, np.complex64)
@@ -56,10 +56,10 @@ class Mapping:
         peak: float,
         out: NDArray[np.complex64],
     ) -> None:
-        """Write `n_blocks` blocks of bytes, coded by `form`, as samples of whole symbols to `out`.
+        """Write `n_blocks` blocks of bytes, coded by `form`, to `out` as samples of whole symbols.
 
-        The first symbol is number `first_symbol`, the header's first being 0. No magnitude exceeds
-        `peak`.
+        The first symbol has number `first_symbol`; the header's first symbol is 0. No magnitude
+        exceeds `peak`.
         """
         kernel.modulate(
             blocks, n_blocks, PADDING, first_symbol, peak,
@@ -69,13 +69,13 @@ class Mapping:
 
 @cache
 def mapping(modulation: Modulation, grid: Numerology) -> Mapping:
-    """The `Mapping` of a modulation on a grid, made once."""
+    """The `Mapping` of a modulation on a grid, created once."""
     return Mapping(modulation, grid)
 
 
 @cache
 def axes(modulation: Modulation, grid: Numerology) -> ArgumentBlock[Axes]:
-    """The way from points back to coded bits, as tables for the equaliser."""
+    """The equaliser's tables for the way from points back to coded bits."""
     order = mapping(modulation, grid).order
     plane, subcarrier = order % modulation.bits, order // modulation.bits
     gather = (plane * grid.n_data + subcarrier).astype(np.uint32)

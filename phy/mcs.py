@@ -23,12 +23,12 @@ class Mcs:
 
     @property
     def peak_db(self) -> float:
-        """Largest peak over the mean power in dB; what is cut off beyond is less than the noise."""
+        """Largest peak over mean power in dB; the clipping error is smaller than the noise."""
         return _PEAKS_DB[self.modulation]
 
     @property
     def peak(self) -> float:
-        """Largest magnitude of a sample, as a factor of the rms amplitude."""
+        """Largest magnitude of a sample, as a factor of the RMS amplitude."""
         return float(10 ** (self.peak_db / 20))
 
     @property
@@ -62,4 +62,4 @@ MCS_TABLE = tuple(
         )
     )
 )
-"""Every MCS that exists, by index."""
+"""Every MCS, by index."""

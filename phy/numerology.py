@@ -1,4 +1,4 @@
-"""Which subcarriers an OFDM symbol has, and what each is for (64: IEEE 802.11-2020, 17.3.5.10)."""
+"""The subcarriers of an OFDM symbol and their purpose (64: IEEE 802.11-2020, 17.3.5.10)."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,7 +11,7 @@ Subcarriers = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Numerology:
-    """An OFDM grid, of which there is one object each.
+    """An OFDM grid; there is only one object of each.
 
     Subcarriers are numbered from −n_fft/2; subcarrier 0, at DC, is unused.
     """
@@ -25,7 +25,7 @@ class Numerology:
 
     @property
     def n_symbol(self) -> int:
-        """Samples of a symbol with its cyclic prefix."""
+        """Samples of a symbol, including its cyclic prefix."""
         return self.n_fft + self.n_cp
 
     @cached_property
@@ -35,7 +35,7 @@ class Numerology:
 
     @property
     def n_used(self) -> int:
-        """Number of subcarriers in use, data and pilots."""
+        """Number of subcarriers in use, data and pilots together."""
         return 2 * self.edge
 
     @cached_property
@@ -60,7 +60,7 @@ class Numerology:
 
     @cached_property
     def tones(self) -> Subcarriers:
-        """Positions in `used` of the data subcarriers, then of the pilots `[n_used]`."""
+        """Positions in `used`, first of the data subcarriers, then of the pilots `[n_used]`."""
         return np.concatenate((self.data_at, self.pilots_at))
 
     @cached_property
@@ -70,7 +70,7 @@ class Numerology:
 
     @cached_property
     def scale(self) -> float:
-        """Factor of the inverse FFT that gives samples of mean power 1."""
+        """Factor of the inverse FFT that yields samples of mean power 1."""
         return float(self.n_fft / np.sqrt(self.n_used))
 
 
@@ -79,13 +79,13 @@ def _map_of_802_11(n_cp: int) -> Numerology:
 
 
 OFDM_64_16 = _map_of_802_11(16)
-"""The default: 48 data subcarriers and 4 pilots, a quarter of the time for echoes."""
+"""The default: 48 data subcarriers and 4 pilots; the cyclic prefix is 1/4 of the FFT length."""
 OFDM_64_8 = _map_of_802_11(8)
-"""For rates of a few Msps, where echoes last less than 8 samples."""
+"""For rates of a few Msps, where echoes are shorter than 8 samples."""
 OFDM_128_16 = Numerology(
     128, 16, 52, (-45, -32, -19, -6, 6, 19, 32, 45), (1, 1, -1, 1, 1, 1, 1, -1)
 )
-"""Echoes as long as on OFDM_64_16 at half the price, for robots that move slowly."""
+"""Echoes as long as on OFDM_64_16 at half the overhead, for robots that move slowly."""
 OFDM_256_32 = Numerology(
     256, 32, 104,
     (-97, -84, -71, -58, -45, -32, -19, -6, 6, 19, 32, 45, 58, 71, 84, 97),
@@ -96,4 +96,4 @@ OFDM_256_32 = Numerology(
 GRIDS = {
     f"{grid.n_fft}/{grid.n_cp}": grid for grid in (OFDM_64_16, OFDM_64_8, OFDM_128_16, OFDM_256_32)
 }
-"""Every grid that exists, by FFT size and samples of prefix."""
+"""Every grid, by FFT size and samples of prefix."""

@@ -1,4 +1,4 @@
-"""From samples to subcarriers: one FFT for each symbol."""
+"""Converts samples to subcarriers, with one FFT per symbol."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,8 @@ def to_tones(
 ) -> NDArray[np.float32]:
     """Tones `[n, 2, width]`, real and imaginary parts, of the FFT windows that begin at `starts`.
 
-    Before, `dc` is taken off and the samples are turned back by `frequency` cycles a sample, with
-    phase 0 `origin` samples before `samples[0]`. A subcarrier sent as 1 arrives as 1 through a
+    First, `dc` is subtracted and the samples are rotated back by `frequency` cycles per sample,
+    with phase 0 `origin` samples before `samples[0]`. A subcarrier sent as 1 arrives as 1 through a
     channel of gain 1.
     """
     out = np.empty((len(starts), 2, whole_lanes(grid.n_used)), np.float32)

@@ -1,7 +1,7 @@
-"""To twice or four times the rate and back, for radios that are faster than the modem.
+"""Resamples to twice or four times the rate and back, for radios that are faster than the modem.
 
-A linear-phase low-pass (Kaiser, 60 dB) that passes the subcarriers in use and takes off their
-images: 802.11's outermost subcarrier is at 0.41 of the modem's rate, its first image at 0.59.
+The filter is a linear-phase low-pass (Kaiser, 60 dB) that passes the subcarriers in use and removes
+their images: 802.11's outermost subcarrier is at 0.41 of the modem's rate, its first image at 0.59.
 """
 
 import numpy as np
@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from phy.kernels.resampler import filter_strided
 
 REACH = 16
-"""Samples of the slow side before and after one that have a part in it."""
-# Of the slow side's rate: half way between outermost subcarrier and first image.
+"""Samples at the low rate on each side of a sample that contribute to it."""
+# Cutoff relative to the low rate: midway between the outermost subcarrier and its first image.
 _CUTOFF = 0.5
 _KAISER_BETA = 5.65
-# Behind samples that are filtered, for the last lanes.
+# Zeros after the samples to be filtered, for the last lanes.
 _REST = np.zeros(4, np.complex64)
 
 
 def low_pass(factor: int) -> NDArray[np.float32]:
-    """The filter's taps on the fast side `[2 factor REACH + 1]`; their sum is 1."""
+    """The filter's taps at the high rate `[2 factor REACH + 1]`; their sum is 1."""
     n = np.arange(-factor * REACH, factor * REACH + 1)
     taps = np.sinc(2 * _CUTOFF * n / factor) * np.kaiser(len(n), _KAISER_BETA)
     unit: NDArray[np.float32] = (taps / taps.sum()).astype(np.float32)
@@ -29,7 +29,8 @@ def low_pass(factor: int) -> NDArray[np.float32]:
 def upsample(burst: NDArray[np.complex64], factor: int) -> NDArray[np.complex64]:
     """A burst `[n]` at `factor` times its rate `[(n + 2 REACH) · factor]`.
 
-    The filter's rise and fall are around it: sample `i` of the burst is at `(i + REACH) · factor`.
+    The result includes the filter's rise and fall: sample `i` of the burst is at `(i + REACH) ·
+    factor`.
     """
     n = len(burst) + 2 * REACH
     padded = np.zeros(len(burst) + 4 * REACH + len(_REST), np.complex64)
@@ -37,14 +38,14 @@ def upsample(burst: NDArray[np.complex64], factor: int) -> NDArray[np.complex64]
     out = np.empty(n * factor, np.complex64)
     taps = low_pass(factor) * np.float32(factor)
     for phase in range(factor):
-        # Of every `factor` samples all but one are zero: so many taps do nothing.
+        # Of every `factor` samples all but one are zero, and so are their products with taps.
         own = _twice(taps[-phase % factor :: factor])
         filter_strided(padded, min(phase, 1), 1, own, out[phase:], factor, n)
     return out
 
 
 class Downsampler:
-    """Brings a stream at `factor` times the modem's rate down to it, however it is chunked."""
+    """Brings a stream from `factor` times the modem's rate down to it, independent of chunking."""
 
     def __init__(self, factor: int) -> None:
         self._factor = factor
@@ -53,15 +54,15 @@ class Downsampler:
         self.restart(0)
 
     def restart(self, index: int) -> None:
-        """Begin anew: the next sample has this index on the fast side, with silence before it."""
+        """Restart: the next sample has this index at the high rate, with silence before it."""
         reach = self._factor * REACH
         self.next_index = -(-index // self._factor)
-        """Index on the slow side of the next sample to come out."""
+        """Index of the next output sample at the low rate."""
         self._end = index
         self._kept = np.zeros(index - self.next_index * self._factor + reach, np.complex64)
 
     def push(self, samples: NDArray[np.complex64]) -> NDArray[np.complex64]:
-        """Take the next samples `[n]`; the slow side's samples that they complete, REACH behind."""
+        """Take samples `[n]`; returns the low-rate samples that they complete, REACH late."""
         factor, reach = self._factor, self._factor * REACH
         x = np.concatenate((self._kept, samples, _REST))
         self._end += len(samples)
@@ -73,12 +74,12 @@ class Downsampler:
         return out
 
     def flush(self) -> NDArray[np.complex64]:
-        """The slow side's last samples, as if silence followed."""
+        """Return the last low-rate samples, as if silence followed."""
         return self.push(np.zeros(self._factor * REACH, np.complex64))
 
 
 def _twice(taps: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Each of `taps` twice, for real and imaginary part, with zeros up to whole lanes."""
+    """Each of `taps` twice, for real and imaginary part, zero-padded to whole lanes."""
     out = np.zeros(-(-2 * len(taps) // 8) * 8, np.float32)
     out[: 2 * len(taps)] = np.repeat(taps, 2)
     return out

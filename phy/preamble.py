@@ -1,8 +1,9 @@
-"""What every burst begins with and every receiver knows: 352 samples on a grid of 64 subcarriers.
+"""The preamble of every burst, known to every receiver: 352 samples on a grid of 64 subcarriers.
 
-Twelve short segments of 16 samples, each the one before times ±1 by the Barker code of length 11
-(the cover): DC, a tone and the plain repetition of 802.11 do not look like it. Then a prefix and
-twice the long training symbol: on 64 subcarriers that of 802.11 (IEEE 802.11-2020, 17.3.3).
+It begins with twelve short segments of 16 samples. Each is the previous one times ±1, according to
+the Barker code of length 11 (the cover), which distinguishes them from DC, a tone and the plain
+repetition of 802.11. A prefix and two long training symbols follow; on 64 subcarriers they are
+those of 802.11 (IEEE 802.11-2020, 17.3.3).
 """
 
 from functools import cache
@@ -29,7 +30,7 @@ _LONG_NEGATIVE = (
 _LONG_POSITIVE = (
     1, -1, -1, 1, 1, -1, 1, -1, 1, -1, -1, -1, -1, -1, 1, 1, -1, -1, 1, -1, 1, -1, 1, 1, 1, 1,
 )  # fmt: skip
-# Where the register of x^9 + x^5 + 1 begins: of all, those with the lowest peaks.
+# Start states of the register of x^9 + x^5 + 1, chosen for the lowest peaks.
 _LONG_SEEDS = {128: 293, 256: 246}
 
 # Signs of (1 + j) on the subcarriers that are multiples of 4, of 64.
@@ -40,17 +41,17 @@ _SHORT_SIGNS = {
 
 
 def guard(grid: Numerology = OFDM_64_16) -> int:
-    """Samples of the prefix before the long training symbols."""
+    """Length in samples of the prefix before the long training symbols."""
     return max(32, 2 * grid.n_cp)
 
 
 def long_start(grid: Numerology = OFDM_64_16) -> int:
-    """Samples before the first long training symbol."""
+    """Number of samples before the first long training symbol."""
     return SHORT + guard(grid)
 
 
 def length(grid: Numerology = OFDM_64_16) -> int:
-    """Samples of the whole preamble."""
+    """Length in samples of the whole preamble."""
     return long_start(grid) + N_LONG * grid.n_fft
 
 

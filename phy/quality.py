@@ -1,10 +1,10 @@
-"""The events that a receiver tells, and what it counts."""
+"""The events that a receiver reports, and the names of its counters."""
 
 from typing import NamedTuple
 
 
 class BurstQuality(NamedTuple):
-    """A burst's header, and how well it was received.
+    """A burst's header, and how well the burst was received.
 
     `start` is the absolute index of the preamble's first sample. SNR is mean burst power over noise
     power in the sample band; EVM is that of the header's points.
@@ -19,11 +19,11 @@ class BurstQuality(NamedTuple):
     rssi_dbfs: float
     evm_db: float
     cfo: float
-    """Frequency offset in cycles a sample."""
+    """Frequency offset in cycles per sample."""
 
 
 class PduHeard(NamedTuple):
-    """The `number`-th PDU of a burst, its CRC-32 right; `at` is the index after its last sample."""
+    """PDU `number` of a burst, with a correct CRC-32; `at` is the index after its last sample."""
 
     data: bytes
     number: int
@@ -34,7 +34,7 @@ class PduHeard(NamedTuple):
 class BurstOver(NamedTuple):
     """The end of a burst whose header was read.
 
-    `ending`: "whole", or why it ended early: "faded" (its power was gone), "cut" (samples are
+    `ending`: "whole", or why it ended early: "faded" (its power vanished), "cut" (samples are
     missing), "foreign" (another network's: not decoded).
     """
 
@@ -59,4 +59,4 @@ COUNTERS = (
     "pdus_good",
     "pdus_bad",
 )
-"""What a receiver counts, all growing from 0."""
+"""Names of a receiver's counters, which start at 0 and only grow."""

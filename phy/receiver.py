@@ -1,7 +1,7 @@
 """The streaming receiver: samples in, PDUs out.
 
-Its states stand in `phy/states.py`. Every step waits until the samples it needs are there, and what
-it makes of a sample does not depend on how many came with it: any chunking yields the same events.
+Its states are in `phy/states.py`. Each step waits for the samples it needs. The result for a sample
+does not depend on how many came with it: any chunking yields the same events.
 """
 
 import cmath
@@ -30,28 +30,28 @@ HOP = 512
 ALIGN_SPAN = preamble.SHORT
 THRESHOLD = 0.25
 MOST = 0.5
-"""False alarms raise the threshold at most up to here: to bursts as strong as all else together."""
+"""Limit for thresholds raised by false alarms: a burst as strong as all else together."""
 PLAINEST = 0.7
-"""A peak that is so strong without the preamble's code is none of it."""
-# By so much each false alarm raises the threshold.
+"""A peak at least this strong without the preamble's code is not a preamble."""
+# Amount by which a false alarm raises the threshold.
 _WARIER = 0.1
-# After a false alarm, the search goes on so many samples later.
+# Number of samples after a false alarm at which the search continues.
 RETRY_AFTER = 16
-# Samples taken at once, so that memory does not grow with how many come in one call.
+# Maximum number of samples processed at once, to limit memory on large calls.
 PIECE = 1 << 13
-# A PDU fails with less than this share of the burst's power above the noise: the burst is gone.
+# When a PDU fails and the power above the noise is below this share of the burst's, the burst has
+# ended.
 _FADED = 0.25
 
 
 class Receiver:
-    """Finds bursts in a stream and decodes them. Not for several threads at once.
+    """Finds bursts in a stream and decodes them. Not thread-safe.
 
-    `max_frequency` is the largest frequency offset expected, in cycles a sample. Bursts of other
-    networks than `network` are told but not decoded; None takes all. `centre_cycles` is how many
-    cycles the centre frequency makes in a sample, for senders whose centre frequency and samples
-    come from one crystal: then the frequency offset tells that of the sampling clock; 0: nothing is
-    known of it. `on_points` gets the equalised points `[n, n_data]` of payload symbols, for
-    pictures.
+    `max_frequency` is the largest frequency offset expected, in cycles per sample. Bursts of other
+    networks than `network` are reported but not decoded; None accepts all. `centre_cycles` is the
+    centre frequency in cycles per sample, if senders derive centre frequency and sample rate from
+    one crystal: then the frequency offset also gives the error of the sampling clock. 0: unknown.
+    `on_points` gets the equalised points `[n, n_data]` of payload symbols, for plots.
     """
 
     def __init__(
@@ -75,10 +75,10 @@ class Receiver:
         self._work = np.zeros((7, HISTORY + HOP), np.float32)
         self._n_header = n_symbols(grid)
         self._dc = np.zeros(3)
-        # What acquisition needs: from so many samples before the peak on, so many.
+        # The samples that acquisition needs: how many before the peak, and how many in total.
         self._before = before(grid) - 1 - preamble.guard(grid)
         self._span = before(grid) + needed_after(grid)
-        # Samples before that at which the search stands, kept for acquisition.
+        # Samples before the search position that acquisition still needs.
         self._kept = before(grid) + preamble.SHORT + HISTORY
         self._stream = SampleStream(start, 1 << 16)
         self._state = State.SEARCH
@@ -88,13 +88,13 @@ class Receiver:
             State.ACQUIRE: self._acquire,
             State.PAYLOAD: self._payload,
         }
-        # The burst in question, as far as it is known in the present state.
+        # What is known in the present state about the current burst.
         self._burst: IncomingBurst | None = None
         self._crossing, self._peak, self._coarse = start, start, 0.0
         self._excess, self._raised_at, self._began = 0.0, start, start
         self._at = start
         self.last_burst = (start, start)
-        """Where the last burst of which the header was read begins, and where it should end."""
+        """Start and expected end of the last burst whose header was read."""
         self.counters: Counter[str] = Counter()
         self._begin(start)
 
@@ -104,7 +104,7 @@ class Receiver:
         return self._stream.end
 
     def push(self, samples: NDArray[np.complex64]) -> list[Event]:
-        """Take the next samples `[n]`, complex64; the events that they complete."""
+        """Take the next samples `[n]`, complex64; returns the events that they complete."""
         events: list[Event] = []
         for first in range(0, len(samples), PIECE):
             piece = samples[first : first + PIECE]
@@ -116,7 +116,7 @@ class Receiver:
         return events
 
     def gap(self, n: int) -> list[Event]:
-        """Note that `n` samples are missing: a burst they cut is over, the search begins anew."""
+        """Note that `n` samples are missing: the current burst ends, the search restarts."""
         if n < 0:
             raise ValueError(f"gap: got {n} samples; allowed: 0 or more")
         self.counters["gaps"] += 1
@@ -131,7 +131,7 @@ class Receiver:
         return events
 
     def flush(self) -> list[Event]:
-        """End the stream: the events that its last samples hold, as if silence followed."""
+        """End the stream; returns the events in its last samples, as if silence followed."""
         n = self._grid.n_symbol + HOP + ALIGN_SPAN + needed_after(self._grid)
         samples, self._began = self.counters["samples"], self._stream.end + n
         events = self.push(np.zeros(n, np.complex64))
@@ -142,16 +142,16 @@ class Receiver:
         return events
 
     def _begin(self, index: int) -> None:
-        """Search from `index`, with silence before it."""
+        """Start the search at `index`, with silence before it."""
         self._stream.restart(index - self._kept)
         self._stream.append(np.zeros(self._kept, np.complex64))
         self._at = self._began = index
 
     def _go(self, found: Found) -> None:
-        """Go over to the state that follows what was found."""
+        """Enter the state that follows what was found."""
         self._state = after(self._state, found)
 
-    # One step for each state; False when it needs samples that are not there yet.
+    # One step for each state; returns False when it needs more samples.
 
     def _search(self, _: list[Event]) -> bool:
         """Slide the metric over whole hops of samples, up to the first crossing."""
@@ -186,17 +186,17 @@ class Receiver:
         return True
 
     def _was_nothing(self, peak: int) -> None:
-        """Search on after a false alarm, with a raised threshold: who caused it may do so again."""
+        """Search on after a false alarm, with a raised threshold: its source may return."""
         self._go(Found.NOTHING)
         self._at = peak + RETRY_AFTER
-        # Where noise begins, its first samples resemble anything.
+        # The first samples of noise after silence resemble anything.
         if peak >= self._began + preamble.SHORT:
             left = self._excess * math.exp((self._raised_at - peak) / FORGETS)
             self._excess = min(left + _WARIER, MOST - THRESHOLD)
             self._raised_at = peak
 
     def _acquire(self, events: list[Event]) -> bool:
-        """Read training and header of the burst whose preamble peaked."""
+        """Read training and header of the burst at the preamble's peak."""
         peak = self._peak
         base = peak - self._before
         if self._stream.end < base + self._span:
@@ -219,7 +219,7 @@ class Receiver:
         self._decoder.start(plan)
         self.last_burst = (found.quality.start, burst.end_of(plan.n_symbols) + BACKOFF)
         if self._network is not None and told.network != self._network:
-            # Searched on, not skipped: a header that lies must not make us deaf.
+            # The search continues in the burst: a false header must not make the receiver deaf.
             self._end(burst, events, "foreign")
             self._go(Found.FOREIGN)
         else:
@@ -229,7 +229,7 @@ class Receiver:
         return True
 
     def _payload(self, events: list[Event]) -> bool:
-        """Decode the symbols that complete PDUs, or those up to where the windows may slip."""
+        """Decode the symbols that complete PDUs, or the symbols up to the next window slip."""
         burst = self._burst
         if burst is None or self._stream.end < burst.next_end:
             return False

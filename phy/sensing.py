@@ -1,4 +1,4 @@
-"""Energy detection: whether anybody is on the air, also those whose bursts cannot be read."""
+"""Energy detection: whether the channel is busy, even with bursts that cannot be read."""
 
 import math
 
@@ -21,11 +21,11 @@ __all__ = ["WINDOW", "EnergyDetector"]
 
 
 class EnergyDetector:
-    """Whether the channel is busy: energy above the noise floor, in windows of WINDOW samples.
+    """Detects energy above the noise floor, in windows of WINDOW samples.
 
-    The floor begins as the first window's power, follows quiet windows (down to less than a half
-    at once, else by 1/64 of the difference), and doubles in 2^17 busy windows, so that a signal
-    that never ends becomes noise. Windows follow one another from `start` on.
+    The floor starts as the first window's power and follows quiet windows (at once to a power below
+    half, otherwise by 1/64 of the difference). It doubles in 2^17 busy windows, so that a permanent
+    signal becomes noise. Windows are contiguous from `start` on.
     """
 
     def __init__(self, threshold_db: float = 6.0, start: int = 0) -> None:
@@ -52,16 +52,17 @@ class EnergyDetector:
 
     def push(self, samples: NDArray[np.complex64]) -> None:
         """Take the next samples `[n]`, complex64, and judge the windows that they complete."""
-        # Read-only and in one piece, whatever came: else numba compiles anew for every kind.
+        # Make every input read-only and contiguous: otherwise numba compiles the kernel for each
+        # kind.
         x = np.ascontiguousarray(samples, np.complex64).view()
         x.setflags(write=False)
         sense(x, self._threshold, LARGEST_SAMPLE, self._state)
 
     def gap(self, n: int) -> None:
-        """Note that `n` samples are missing here: the floor is kept, a window that they cut is not.
+        """Note that `n` samples are missing: the floor is kept, an incomplete window dropped.
 
-        The next window begins right behind them, not at a multiple of WINDOW: so it always is
-        WINDOW samples that were heard, and those behind a gap count at once.
+        The next window begins right after the gap, not at a multiple of WINDOW. So a window always
+        has WINDOW received samples, and the samples after a gap count at once.
         """
         if n < 0:
             raise ValueError(f"gap: got {n} samples; allowed: 0 or more")

@@ -19,7 +19,7 @@ def lfsr(taps: tuple[int, ...], state: int, n_bits: int) -> NDArray[np.uint8]:
 
 _MAX_SYMBOLS = 1 << 17
 POLARITY = np.resize(1 - 2 * lfsr((4, 7), 0b1111111, 127).astype(np.float32), _MAX_SYMBOLS)
-"""Sign of the pilots of each symbol, the header's first being 0 (802.11, 17.3.5.10)."""
+"""Sign of the pilots of each symbol; the header's first symbol is 0 (802.11, 17.3.5.10)."""
 
 
 def polarity(n_symbols: int, start: int = 0) -> NDArray[np.float32]:
@@ -27,7 +27,8 @@ def polarity(n_symbols: int, start: int = 0) -> NDArray[np.float32]:
     return POLARITY[start : start + n_symbols]
 
 
-# x^15 + x^14 + 1 has 32767 bits; 8 and 32767 share no factor, so its bytes repeat as late.
+# x^15 + x^14 + 1 has a period of 32767 bits. 8 does not divide it, so the period in bytes is as
+# long.
 _N_PERIODS = 4
 _WHITE = np.tile(np.packbits(np.tile(lfsr((14, 15), 0x2AAA, 32767), 8)), _N_PERIODS)
 PADDING = np.unpackbits(_WHITE[:256])

@@ -1,14 +1,15 @@
-"""The receiver's states, and what leads from one to the next.
+"""The receiver's states, and the transitions between them.
 
 A burst begins with a preamble that repeats a segment under a code of signs. SEARCH slides the
-normalised autocorrelation of segments over the stream: it costs a few operations a sample, knows
-no frequency offset, and crosses its threshold somewhere within the preamble. ALIGN looks for the
-maximum within a preamble's length of that crossing, because only there all segments take part, and
-tells a tone or another network's signal by a peak that needs no code. ACQUIRE correlates with the
-long training at all offsets that may be, which tells start and frequency, estimates the channel,
-and reads the header: only its check makes a burst of a peak. PAYLOAD demodulates symbol by symbol
-until the last PDU, or until the burst's power is gone. Whatever fails, the search goes on right
-behind the peak, not behind what the header promised: a header that lies must not make us deaf.
+normalised autocorrelation of segments over the stream. It costs a few operations per sample, does
+not depend on the frequency offset, and crosses its threshold somewhere within the preamble. ALIGN
+finds the maximum within a preamble's length of that crossing, because only there all segments
+contribute. It rejects a tone or another network's signal, whose peak does not need the code.
+ACQUIRE correlates with the long training at all possible offsets, which yields start and frequency.
+It estimates the channel and reads the header: only a header with a valid check makes a peak a
+burst. PAYLOAD demodulates symbol by symbol until the last PDU, or until the burst's power has
+vanished. After any failure, the search continues right after the peak, not after the end that the
+header announced: a false header must not make the receiver deaf.
 
 ::
 
@@ -26,36 +27,36 @@ from enum import Enum, auto
 
 
 class State(Enum):
-    """What the receiver waits for."""
+    """The state of the receiver, which is what it waits for."""
 
     SEARCH = auto()
     """The metric crosses its threshold."""
     ALIGN = auto()
-    """The preamble's length behind the crossing is there."""
+    """The preamble's length after the crossing has arrived."""
     ACQUIRE = auto()
-    """Training and header behind the peak are there."""
+    """Training and header after the peak have arrived."""
     PAYLOAD = auto()
-    """The symbols that complete the next PDUs are there."""
+    """The symbols that complete the next PDUs have arrived."""
 
 
 class Found(Enum):
-    """What the receiver makes of the samples that it waited for."""
+    """The receiver's finding in the samples that it waited for."""
 
     CROSSING = auto()
     PEAK = auto()
     NOTHING = auto()
-    """The peak is no preamble's."""
+    """The peak does not belong to a preamble."""
     BAD_HEADER = auto()
-    """There is a preamble, and its header fails its check."""
+    """There is a preamble, but its header fails its check."""
     FOREIGN = auto()
     """The header names another network."""
     HEADER = auto()
     PDUS = auto()
-    """Some of the burst's PDUs are through, and more are to come."""
+    """Some of the burst's PDUs are complete, and more follow."""
     OVER = auto()
     """The burst has ended, whole or faded."""
     CUT = auto()
-    """Samples are missing here, or none follow."""
+    """Samples are missing here, or the stream ends."""
 
 
 NEXT: Mapping[tuple[State, Found], State] = {
@@ -73,11 +74,11 @@ NEXT: Mapping[tuple[State, Found], State] = {
 
 
 class IllegalStepError(Exception):
-    """A step that NEXT does not have: a bug of ours, which ends the daemon."""
+    """A transition that NEXT does not contain: a bug of ours, which ends the daemon."""
 
 
 def after(state: State, found: Found) -> State:
-    """The state that follows `state` on `found`. Raises IllegalStepError where there is none."""
+    """The state that follows `state` on `found`. Raises IllegalStepError if there is none."""
     following = NEXT.get((state, found))
     if following is None:
         raise IllegalStepError(f"{found.name} in {state.name}")

@@ -1,16 +1,16 @@
-"""The last part of an endless stream of samples, by absolute index."""
+"""The most recent part of an endless stream of samples, by absolute index."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from phy.kernels.detector import sanitise
 
-# Larger values are a fault; their squares must stay finite.
+# Larger values are treated as errors; their squares must stay finite.
 LARGEST_SAMPLE = 1e6
 
 
 class SampleStream:
-    """Samples appended at the end and forgotten at the beginning; those kept lie in one piece."""
+    """Samples appended at the end and dropped at the beginning; the kept ones are contiguous."""
 
     def __init__(self, start: int, capacity: int) -> None:
         self._samples = np.zeros(capacity, np.complex64)
@@ -29,7 +29,7 @@ class SampleStream:
         return self._start + self._size
 
     def append(self, samples: NDArray[np.complex64]) -> int:
-        """Take samples, setting those not finite or too large to 0; returns how many were."""
+        """Append samples, with non-finite and too large ones set to 0; returns their number."""
         n = len(samples)
         if self._begin + self._size + n > len(self._samples):
             self._make_room(n)
@@ -45,14 +45,14 @@ class SampleStream:
         return self._samples[begin : begin + last - first]
 
     def forget_before(self, index: int) -> None:
-        """Forget the samples before `index`."""
+        """Drop the samples before `index`."""
         n = min(max(0, index - self._start), self._size)
         self._begin += n
         self._start += n
         self._size -= n
 
     def restart(self, start: int) -> None:
-        """Forget everything; the next sample has index `start`."""
+        """Drop everything; the next sample has index `start`."""
         self._begin, self._size, self._start = 0, 0, start
 
     def _make_room(self, n: int) -> None:

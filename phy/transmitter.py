@@ -1,4 +1,4 @@
-"""From PDUs to the samples of one burst."""
+"""Turns PDUs into the samples of one burst."""
 
 from collections.abc import Sequence
 from functools import cache, lru_cache
@@ -17,16 +17,17 @@ from phy.mcs import HEADER_MCS, MCS_TABLE
 from phy.numerology import OFDM_64_16, Numerology
 from phy.sequences import whitening
 
-# Samples over which a burst begins and ends: at its end, what no FFT window holds.
+# Lengths of a burst's rise and fall in samples; the fall lies after the last FFT window.
 _RISE, _FALL = 8, BACKOFF
 MAX_BOOST_DB = 3.0
 
 
 class Transmitter:
-    """Makes bursts of one network on one grid. It holds tables only: any thread may use it.
+    """Makes bursts of one network on one grid. It only holds tables, so any thread may use it.
 
-    The preamble has lower peaks than the rest; an amplifier that peaks limit can send it stronger,
-    by `preamble_boost_db`, and the burst is found farther away. Receivers measure the boost.
+    The preamble has lower peaks than the rest. An amplifier with limited peak power can send it
+    stronger, by `preamble_boost_db`, which extends the range at which bursts are found. Receivers
+    measure the boost.
     """
 
     def __init__(
@@ -43,10 +44,10 @@ class Transmitter:
         self._boost = 10 ** (preamble_boost_db / 20)
 
     def modulate(self, pdus: Sequence[bytes], mcs: int) -> NDArray[np.complex64]:
-        """The burst of 1 to 63 PDUs of equal size `[n_samples]`, at mean power 1 but for the boost.
+        """The burst of 1 to 63 PDUs of equal size `[n_samples]`, at mean power 1 without the boost.
 
-        No peak exceeds that of the MCS, or the preamble's 3.2 dB and its boost. Raises ValueError
-        for an MCS, number or size that no header can tell.
+        No peak exceeds that of the MCS, or the preamble's 3.2 dB plus its boost. Raises ValueError
+        for an MCS, number or size that no header can express.
         """
         sizes = sorted({len(pdu) for pdu in pdus})
         plan = layout(self._grid, mcs, len(pdus), sizes[-1] if sizes else 0)
@@ -67,7 +68,7 @@ class Transmitter:
 
 @lru_cache(maxsize=64)
 def _opening(told: BurstHeader, grid: Numerology, boost: float) -> NDArray[np.complex64]:
-    """Preamble and header of a burst, kept: most bursts begin like one before."""
+    """Preamble and header of a burst; cached because most bursts begin like an earlier one."""
     start = preamble.preamble(grid) * np.float32(boost)
     start[:_RISE] *= _ramp(_RISE)
     return np.concatenate((start, header_samples(told, grid)))
@@ -75,11 +76,11 @@ def _opening(told: BurstHeader, grid: Numerology, boost: float) -> NDArray[np.co
 
 @cache
 def _ramp(n: int) -> NDArray[np.float32]:
-    """A rise from 0 to 1 without a step `[n]`: the square of a sine."""
+    """A smooth rise from 0 to 1 `[n]`: the square of a sine."""
     return (np.sin(np.pi / 2 * (np.arange(n) + 0.5) / n) ** 2).astype(np.float32)
 
 
 def header_samples(told: BurstHeader, grid: Numerology) -> NDArray[np.complex64]:
-    """The header's samples `[n · n_symbol]` as they leave, with their peaks cut off."""
+    """The header's samples `[n · n_symbol]` as sent, with their peaks clipped."""
     coded = header_bits(told, header.n_symbols(grid) * grid.n_data)
     return mapping(Modulation.BPSK, grid).to_samples(coded, 0, MCS_TABLE[HEADER_MCS].peak)

@@ -23,18 +23,19 @@ from phy.transmitter import Transmitter
 Progress = Callable[[int, int], None]
 
 RATE_HZ, CENTRE_HZ, CLOCK_PPM = 1e6, 1e8, 40.0
-"""As far apart as crystals are; 0.004 cycles a sample, which a receiver expects."""
+"""A realistic clock error: 0.004 cycles per sample, which a receiver expects."""
 LONG = 2000
-"""Octets of a PDU through which two clocks drift apart by a sample."""
-# What only 802.11a and measurements run.
+"""Bytes of a PDU long enough for two clocks to drift apart by a sample."""
+# Kernels that only 802.11a and measurements use.
 _ELSEWHERE = {"demodulator.learn_channel", "ldpc_encoder.encode_blocks", "viterbi._decode"}
 
 
 def warm_up(progress: Progress | None = None) -> None:
-    """Run every kernel that a link uses. Minutes on a fresh machine, a fraction of a second later.
+    """Run every kernel that a link uses; takes minutes on a fresh machine, later under a second.
 
-    `progress(done, total)` is told of each kernel when it has been compiled; of none that is loaded
-    from the cache. What it raises ends the warm-up, and what is compiled by then stays so.
+    `progress(done, total)` is called for each kernel that has been compiled, and not for those
+    loaded from the cache. An exception from it ends the warm-up; kernels compiled so far stay
+    compiled.
     """
     with ExitStack() as stack:
         if progress is not None:
@@ -50,10 +51,10 @@ class _Compiled(Listener):
         self._kernels = _kernels()
 
     def on_start(self, event: Event) -> None:
-        """Ignore the start of a compilation: only its end is told."""
+        """Ignore the start of a compilation: only its end is reported."""
 
     def on_end(self, event: Event) -> None:
-        """Tell how many kernels are ready, now that one or a step of one has been compiled."""
+        """Report how many kernels are ready, when a kernel or a step of one is compiled."""
         compiled = event.data["dispatcher"]
         if compiled in self._kernels:
             done = sum(kernel is compiled or bool(kernel.overloads) for kernel in self._kernels)
@@ -61,7 +62,7 @@ class _Compiled(Listener):
 
 
 def _kernels() -> set[Any]:
-    """The kernels that a link runs; steps, which are not cached, are compiled with each of them."""
+    """The kernels that a link runs; uncached steps are compiled with each of them."""
     modules = [module for name, module in sys.modules.items() if name.startswith("phy.kernels.")]
     found: dict[str, Any] = {
         f"{each.py_func.__module__.removeprefix('phy.kernels.')}.{name}": each
@@ -69,7 +70,7 @@ def _kernels() -> set[Any]:
         for name, each in vars(module).items()
         if isinstance(each, Dispatcher)
     }
-    # What is cached numba does not tell otherwise.
+    # numba reports cached kernels in no other way.
     return {
         each
         for name, each in found.items()
@@ -100,7 +101,7 @@ def _run() -> None:
 def _with_bad_header(
     burst: NDArray[np.complex64], rng: np.random.Generator
 ) -> NDArray[np.complex64]:
-    """The burst with a header that fails its check, so that other likely headers are tried."""
+    """The burst with a header whose check fails, so that the receiver tries other headers."""
     n = header.n_symbols(OFDM_64_16) * OFDM_64_16.n_symbol
     bad = burst.copy()
     bad[preamble.length() :][:n] = rng.permutation(burst[preamble.length() :][:n])

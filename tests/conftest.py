@@ -1,4 +1,4 @@
-"""Fixtures that more than one folder uses: real daemons."""
+"""Fixtures that several folders use: real daemons."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,19 +16,19 @@ from tests.tiers import (
 __all__ = ["pytest_collection_modifyitems", "pytest_configure", "pytest_terminal_summary"]
 
 ETC = Path(__file__).parents[1] / "etc"
-# A daemon would count it, and tell it with its ledger.
+# A daemon would count this and report it with its ledger.
 Lives.is_strict = True
 
 
 @pytest.fixture(autouse=True)
 def _no_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Tables are as wide as where nobody says how wide; whoever runs the tests may say it."""
+    """Use the default width of tables, whatever the environment of the test run says."""
     monkeypatch.delenv("COLUMNS", raising=False)
 
 
 @pytest.fixture
 def write_config() -> Callable[..., Path]:
-    """Writes a configuration whose sockets are in the given folder; further TOML may follow."""
+    """Writes a configuration with its sockets in the given folder and optional further TOML."""
 
     def write(directory: Path, extra_toml: str = "") -> Path:
         top, tables = [], extra_toml
@@ -50,11 +50,11 @@ def write_config() -> Callable[..., Path]:
 def start_daemon(
     tmp_path_factory: pytest.TempPathFactory, write_config: Callable[..., Path]
 ) -> Iterator[Callable[..., Daemon]]:
-    """Starts daemons and stops them in order; each must end well, without a traceback."""
+    """Starts daemons and stops them in order; each must end cleanly, without a traceback."""
     started: list[Daemon] = []
 
     def start(extra_toml: str = "", before: str = "") -> Daemon:
-        """`before`: Python that the daemon runs first."""
+        """Start a daemon; `before` is Python code that it runs first."""
         directory = tmp_path_factory.mktemp("node")
         daemon = Daemon(directory, write_config(directory, extra_toml), directory / "log", before)
         started.append(daemon)

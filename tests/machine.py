@@ -1,4 +1,4 @@
-"""What a machine may lack: why a test is left out there, and how that is told in one line."""
+"""What a machine may lack: why a test is skipped there, reported in one line."""
 
 from collections import Counter
 
@@ -7,12 +7,12 @@ ROOT = "needs root"
 
 
 def lacks(*packages: str) -> str:
-    """Why a test is left out where these Debian packages are not installed."""
+    """Why a test is skipped if these Debian packages are not installed."""
     return PACKAGES + " ".join(packages)
 
 
 def left_out(reasons: list[str]) -> str:
-    """One line on all tests left out for `reasons`; "" without any."""
+    """One line about all tests skipped for `reasons`; "" if there are none."""
     packages = sorted(
         {
             package

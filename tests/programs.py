@@ -1,4 +1,4 @@
-"""Programs of ours as processes of their own, as tests start them."""
+"""Our programs as separate processes, as tests start them."""
 
 import contextlib
 import sys
@@ -16,14 +16,14 @@ MAIN = "import sys; from sdrlinkd.__main__ import main; sys.exit(main(sys.argv[1
 
 
 def sdrlinkctl(*arguments: object, **more: Any) -> Process:
-    """A command that is yet to be started; `more` as for a Process."""
+    """A command that is not started yet; `more` as for a Process."""
     return Process(module("sdrlinkd.cli", *arguments), name=f"sdrlinkctl {arguments[0]}", **more)
 
 
 class Daemon(Process):
-    """A daemon with the configuration `config`, whose sockets are in `directory`.
+    """A daemon with the configuration `config` and its sockets in `directory`.
 
-    `before` is Python that it runs first.
+    `before` is Python code that it runs first.
     """
 
     def __init__(self, directory: Path, config: Path, log: Path, before: str = "") -> None:
@@ -38,12 +38,12 @@ class Daemon(Process):
         return ControlClient(self.directory)
 
     def snapshot(self) -> Snapshot:
-        """Its snapshot."""
+        """The daemon's current snapshot."""
         with self.control() as control:
             return msgspec.convert(control.ask("status"), Snapshot)
 
     def is_up(self) -> bool:
-        """Whether it answers."""
+        """Whether the daemon answers."""
         assert self.is_running, self.log()
         with contextlib.suppress(NoDaemonError), ControlClient(self.directory, 0.2) as control:
             control.ask("hello")
@@ -51,13 +51,13 @@ class Daemon(Process):
         return False
 
     def at_work(self) -> "Daemon":
-        """The same, started, once it answers."""
+        """Start the daemon, and return it once it answers."""
         self.start()
         wait_for(self.is_up)
         return self
 
     def ends_well(self, within_s: float = 10.0) -> None:
-        """Stop it; it must end as expected, without a traceback."""
+        """Stop the daemon; it must end as expected, without a traceback."""
         code = self.stop(within_s=within_s)
         assert "Traceback" not in self.log(), self.log()
         assert code == self.expected_exit, self.log()

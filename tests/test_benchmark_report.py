@@ -1,4 +1,4 @@
-"""What a benchmark prints: misses as misses, and whatever could be measured."""
+"""What a benchmark prints: misses as misses, and everything that could be measured."""
 
 import json
 import os
@@ -51,7 +51,7 @@ def test_a_miss_is_printed_as_a_miss():
 
 
 def run(monkeypatch, capsys, measure):
-    """(exit code, JSON, what was complained of)."""
+    """(exit code, JSON, complaints)."""
     monkeypatch.setattr(sys, "argv", ["x", "--json"])
     code = report.main("x", measure)
     out, err = capsys.readouterr()
@@ -100,7 +100,7 @@ def test_a_bug_of_ours_is_told_as_one_and_loses_no_row(monkeypatch, capsys):
     ("exit 0", "No such file"),
 ])  # fmt: skip
 def test_modems_that_cannot_be_measured_are_left_out(monkeypatch, capsys, tmp_path, program, says):
-    """No compiler, one that fails, one that makes nothing; and a GNU Radio that is no program."""
+    """No compiler, one that fails, one without output; and a GNU Radio that is not a program."""
     if program:
         (tmp_path / "gcc").write_text(f"#!/bin/sh\n{program}\n")
         (tmp_path / "gcc").chmod(0o755)
@@ -146,7 +146,7 @@ def test_a_peer_that_fails_in_its_second_pass_keeps_its_first(monkeypatch, capsy
 def test_a_peer_whose_environment_cannot_be_made_is_left_out(monkeypatch, capsys, tmp_path):
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    # What is known of this machine's own environments stays known to other tests.
+    # Other tests keep what is known of this machine's own environments.
     monkeypatch.setattr(environments, "_lacking", environments._lacking.__wrapped__)
     assert rows.sessions(1, 1.0, 1, of=("mavlink", "mavros")) == {}
     mavlink, mavros = capsys.readouterr().err.splitlines()
@@ -168,7 +168,7 @@ def test_peers_of_pound_go_on_without_one(capsys):
 @pytest.mark.slow
 @pytest.mark.timeout(250)
 def test_a_benchmark_goes_on_where_no_program_is_found():
-    """The whole of it, without a compiler for liquid-dsp."""
+    """The whole benchmark, without a compiler for liquid-dsp."""
     done = subprocess.run(
         [sys.executable, "-m", "benchmarks.phy_speed", "--quick", "--json"],
         cwd=ROOT, env={**os.environ, "PATH": "/nonexistent"}, capture_output=True, text=True,

@@ -1,4 +1,4 @@
-"""The benchmarks run and print their rows; how fast a machine is, is not a test's business."""
+"""The benchmarks run and print their rows; the machine's speed is not tested."""
 
 import json
 import re
@@ -151,16 +151,16 @@ ROWS = {
 }  # fmt: skip
 
 
-# Those of recordings that are not everywhere.
+# Rows of recordings that are not available everywhere.
 OPTIONAL = {"ptp_over_wifi_strays_ms"}
-# Why one cannot run here, if so.
+# Why a benchmark cannot run here, if so.
 LACKING = {"radio": no_test_radio, "flowgraphs": no_gnu_radio}
-# Peers take their time, and a machine of their own to themselves.
+# Peers take long, and need the machine to themselves.
 MORE = {"pound": ("--no-peers",), "latency": ("--no-peers",)}
 
 
 def modules_that_run():
-    """All below `benchmarks` that are called by name, but for the ends of peers."""
+    """All modules below `benchmarks` that are called by name, except the ends of peers."""
     for path in sorted((ROOT / "benchmarks").rglob("*.py")):
         name = path.relative_to(ROOT / "benchmarks").with_suffix("").as_posix().replace("/", ".")
         if name.endswith("__main__"):
@@ -170,7 +170,7 @@ def modules_that_run():
 
 
 def test_every_benchmark_is_in_the_list():
-    """The one that `make bench` and `sdrlinkctl bench` go by; "" runs them all."""
+    """The list that `make bench` and `sdrlinkctl bench` use; "" runs all."""
     assert {*modules_that_run()} - {""} == set(BENCHMARKS)
     assert set(ROWS) == {name for name, each in BENCHMARKS.items() if each.has_rows}
     texts = [path.read_text() for path in (ROOT / "benchmarks").rglob("*.py")]
@@ -195,7 +195,7 @@ def test_a_benchmark_prints_its_rows(name):
     assert set(rows) - OPTIONAL == ROWS[name]
     for row in rows.values():
         assert {"value", "unit", "target", "ok", "peers", "paper", "trials"} <= row.keys()
-        # What is to be small may be nothing at all.
+        # A value that should be small may be zero.
         assert row["value"] > 0 or row["better"] == "less" or row["unit"] == "dB"
     assert done.returncode == (0 if all(row["ok"] for row in rows.values()) else 1)
 
@@ -207,7 +207,7 @@ def test_pdus_in_recordings_of_others_are_counted(tmp_path):
     (tmp_path / "notes.txt").write_text("no samples\n")
     row = false_pdus_in(tmp_path)
     assert (row.value, row.trials, row.note, row.ok) == (0, 200_000, "noise.cf32", True)
-    # The control: one of ours would be told.
+    # The control: one of our own modules would be reported.
     burst = Transmitter().modulate([bytes(64)], 1)
     noise[50_000 : 50_000 + len(burst)] += 0.3 * burst
     noise.astype(np.complex64).tofile(tmp_path / "ours.cf32")

@@ -1,4 +1,4 @@
-"""Rules of this house that no linter knows."""
+"""Rules of this project that no linter checks."""
 
 import re
 import subprocess
@@ -26,7 +26,7 @@ def sources(*folders):
 
 
 def test_phy_and_backends_are_ours():
-    """Both are names of other projects too."""
+    """Other projects have packages of these names, too."""
     home = Path(sdrlinkd.__file__).parents[1]
     assert Path(phy.__file__).parents[1] == home
     assert Path(backends.__file__).parents[1] == home
@@ -110,7 +110,7 @@ def test_rooms_of_the_link_import_down_and_reach_into_nobody():
 
 
 def test_tests_of_the_link_enter_by_a_door():
-    """So that the inside of a room can change without them."""
+    """So the inside of a package can change without them."""
     inside = re.compile(r"^\s*(?:from|import) sdrlinkd\.link\.\w+\.\w+", re.MULTILINE)
     past = [path for path in sources("tests", "benchmarks") if inside.search(path.read_text())]
     assert past == []

@@ -17,7 +17,7 @@ def test_every_line_has_its_priority():
 
 
 def test_only_the_journal_gets_priorities(tmp_path):
-    """$JOURNAL_STREAM is inherited by programs whose stderr leads elsewhere."""
+    """$JOURNAL_STREAM is inherited by programs with another stderr."""
     code = "from sdrlinkd.journal import is_read_by_journal as it; print(it())"
     log = tmp_path / "log"
     with log.open("w") as stream:

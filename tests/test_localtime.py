@@ -23,7 +23,7 @@ def message(payload, src=1):
 
 @pytest.fixture
 def link():
-    """One that hears itself; its clock is that of the host."""
+    """A link that hears itself; its clock is that of the host."""
     link = make_link(own_id=1, hears_self=True)
     link.set_wall(Wall(NOW_NS - 10 * 10**9, ERROR_S))
     return link
@@ -77,7 +77,7 @@ def test_after_the_hosts_clock_was_set_great_ages_are_not_believed(step_s):
     assert clock.age_s(NOW_NS, NOW_NS, 0) == 0.0
     later = NOW_NS + step_s * second
     assert clock.age_s(later - 3600 * second, later + second // 10, second // 10) == 0.0
-    # Small ones are, at once; and all, once messages from before must be through.
+    # Small ages are believed at once, and all ages once earlier messages must be through.
     assert clock.age_s(later, later + second // 5, second // 5) == pytest.approx(0.2)
     at = later + 11 * second
     assert clock.age_s(at - 12 * second, at, 11 * second) == pytest.approx(12.0)

@@ -1,4 +1,4 @@
-"""Programs as processes of their own: what they say is kept, and none is left behind."""
+"""Programs as separate processes: their output is kept, and none is left behind."""
 
 import os
 import signal
@@ -16,7 +16,7 @@ DEAF = "signal.signal(signal.SIGTERM, signal.SIG_IGN)"
 
 
 def program(code, **more):
-    """Python with what these tests use."""
+    """Python code with the imports of these tests, as a program."""
     head = "import os, signal, subprocess, sys, time\n"
     return Process([sys.executable, "-u", "-c", head + textwrap.dedent(code)], **more)
 
@@ -69,7 +69,7 @@ def test_who_ends_without_a_line_is_quoted(code, says):
 
 
 def test_what_is_said_at_last_counts():
-    """Also when the process has ended before anybody looked."""
+    """Even if the process has ended before anyone reads it."""
     with program("print('last')") as process:
         process.wait()
         assert process.line() == "last"
@@ -126,7 +126,7 @@ def test_a_kill_takes_all_that_it_has_started():
 @pytest.mark.slow
 @pytest.mark.parametrize("of", ["sdrlinkd", "sdrlinkd.cli"])
 def test_programs_of_ours_end_with_who_started_them(of, tmp_path, write_config):
-    """Also when that was killed."""
+    """Even if the parent was killed."""
     arguments = ("--config", str(write_config(tmp_path)))
     if of == "sdrlinkd.cli":
         arguments = ("demo", "--link", "direct", "--duration", "60")

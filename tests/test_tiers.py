@@ -1,4 +1,4 @@
-"""The suite itself: it runs where SIGINT is ignored, and tells what it leaves out in one line."""
+"""The suite itself: it runs where SIGINT is ignored, and reports skipped tests in one line."""
 
 import signal
 import subprocess
@@ -18,7 +18,7 @@ def test_interrupts_reach_tests():
 
 @pytest.mark.slow
 def test_interrupts_reach_tests_of_a_caller_who_ignores_them():
-    """As shells start background jobs."""
+    """Shells start background jobs that way."""
     name = f"{__file__}::{test_interrupts_reach_tests.__name__}"
     done = subprocess.run(
         [*IGNORING, *(sys.executable, "-m", "pytest", "-p", "no:cacheprovider"), name],

@@ -1,4 +1,4 @@
-"""Times, sizes, frequencies and rates as people write them."""
+"""Times, sizes, frequencies and rates in user notation."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The tiers of the suite: what runs beside what, and what is told at the end."""
+"""The tiers of the suite: what runs in parallel, and what is reported at the end."""
 
 import signal
 
@@ -10,19 +10,19 @@ from tests.machine import left_out
 
 
 def pytest_configure() -> None:
-    """A shell's background job ignores SIGINT, and so would all that tests start."""
+    """A shell's background job ignores SIGINT, and so would all processes that tests start."""
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-    # Those that do not say how many examples they want.
+    # Tests that do not state how many examples they need.
     settings.register_profile("law", law())
     settings.load_profile("law")
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Those in real time come last, one after the other, when the other workers are done.
+    """Run real-time tests last, one after the other, when the other workers are done.
 
-    A daemon takes a second to start: what starts one is slow, unless it is marked as quick.
+    A daemon takes a second to start: a test that starts one is slow, unless it is marked as quick.
     """
     for item in items:
         starts = "start_daemon" in getattr(item, "fixturenames", ())
@@ -34,7 +34,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """What was left out, and what it needs, in one line."""
+    """Report in one line what was skipped, and what it needs."""
     skipped = terminalreporter.stats.get("skipped", [])
     if line := left_out([report.longrepr[2].removeprefix("Skipped: ") for report in skipped]):
         terminalreporter.write_line(line)

@@ -1,4 +1,4 @@
-"""A simulated air that many nodes share: its world, its medium, a hub process, its radios."""
+"""A simulated air that many nodes share: its world, its medium, its hub process and its radios."""
 
 from backends.ether.antenna import Antenna
 from backends.ether.hub import EtherHub

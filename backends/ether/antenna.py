@@ -1,4 +1,4 @@
-"""One node's radio on a simulated air: what it makes of what arrives, and of its own bursts."""
+"""One node's radio on a simulated air: makes blocks of what arrives, and tracks its bursts."""
 
 import asyncio
 
@@ -14,9 +14,9 @@ NOTHING_DB = 300.0
 
 
 class Antenna:
-    """Front end, sample count and outstanding bursts; all indices told are the radio's own.
+    """Front end, sample count and outstanding bursts of one node; all reported indices are its own.
 
-    Without time stamps, its count is a little off after each gap: all later indices with it.
+    Without time stamps, each gap shifts the radio's count a little, and with it all later indices.
     """
 
     def __init__(self, radio: RadioParams, seed: int, rate_hz: float) -> None:
@@ -40,7 +40,7 @@ class Antenna:
         self._first_end = NEVER
 
     def capabilities(self, paced: bool, lead_s: float, block_s: float) -> Capabilities:
-        """What the radio can do on an air that is paced, or in lock-step."""
+        """What the radio can do on an air that is `paced` or else in lock-step."""
         radio = self._radio
         return Capabilities(
             receives=True,
@@ -56,12 +56,12 @@ class Antenna:
         )
 
     def on_air(self, burst: TxBurst) -> TxBurst:
-        """A burst of ours by the air's count."""
+        """One of this radio's bursts, with indices in the air's sample count."""
         latest = None if burst.latest is None else burst.latest - self._shift
         return TxBurst(burst.start - self._shift, burst.samples, latest)
 
     def receive(self, piece: Piece, host_ns: int) -> RxBlock:
-        """What the radio delivers of the next piece."""
+        """Convert the next piece of the air to the block that the radio delivers."""
         n, first = piece.n, self.next_index
         samples = None
         if piece.is_deaf:
@@ -83,28 +83,28 @@ class Antenna:
         )
 
     def miss(self, n: int, reason: str, host_ns: int) -> RxBlock:
-        """`n` samples that were on the air and did not get here."""
+        """A gap for `n` samples that were on the air but did not reach this radio."""
         first = self.next_index
         self.next_index += n
         uncertainty = self._index_error if self._is_unsure else 0
         return RxBlock(first, n, None, reason, host_ns, uncertainty)
 
     def rejoin(self, n: int, reason: str, host_ns: int) -> RxBlock:
-        """After about `n` samples of nothing, the air's count begins anew at 0."""
+        """A gap of about `n` samples, after which the air's count restarts at 0."""
         block = self.miss(n, reason, host_ns)
         self._shift = self.next_index
         return block
 
     def sent(self, number: int) -> asyncio.Future[TxReport]:
-        """Burst `number` is on its way to the air."""
+        """Register burst `number` as handed to the air; the report follows later."""
         answer: asyncio.Future[TxReport] = asyncio.get_running_loop().create_future()
         self._waiting[number] = (None, answer)
         return answer
 
     def placed(self, number: int, start: int | None, n_samples: int) -> bool:
-        """The air has taken it at `start` by its own count; None: it came too late.
+        """Note where the air placed a burst, in the air's count; `start` None: it came too late.
 
-        Whether that was told now.
+        Returns whether the burst was just reported late.
         """
         _, answer = self._waiting.get(number, (None, None))
         if answer is None:
@@ -121,11 +121,11 @@ class Antenna:
         return False
 
     def is_due(self, index: int) -> bool:
-        """Whether `settle` would have something to tell; asked from any thread."""
+        """Whether `settle` would report a burst; may be called from any thread."""
         return self._first_end <= index
 
     def settle(self, index: int) -> None:
-        """Answer the bursts that ended before `index`: all before it has left."""
+        """Report the bursts that ended before `index`: every sample before it has left."""
         self.end = index
         if not self.is_due(index):
             return
@@ -138,7 +138,7 @@ class Antenna:
         self._first_end = min(ends, default=NEVER)
 
     def lose(self) -> None:
-        """Answer all bursts that wait as lost: none of them will leave."""
+        """Report all pending bursts as lost: none of them will leave."""
         waiting, self._waiting = self._waiting, {}
         for report, answer in waiting.values():
             if not answer.done():

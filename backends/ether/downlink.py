@@ -1,4 +1,4 @@
-"""What the hub sends to a radio, several stretches at a time for who is behind."""
+"""Reads what the hub sends to a radio, and merges stretches when the radio has fallen behind."""
 
 import contextlib
 from collections import deque
@@ -15,29 +15,29 @@ MOST_AT_ONCE = 8
 
 
 class Downlink:
-    """Reads a radio's DEALER; in one thread."""
+    """Reads a radio's DEALER socket; for use in one thread."""
 
     def __init__(self, socket: "zmq.Socket[bytes]") -> None:
         self._socket = socket
         self._waiting: deque[tuple[protocol.FromHub, Samples | None]] = deque()
 
     def read(self, flags: int) -> tuple[protocol.FromHub, Samples | None]:
-        """The next message from the socket, and the samples behind it. Raises zmq.Again."""
+        """Return the next message and its samples from the socket. Raises zmq.Again."""
         frames = self._socket.recv_multipart(flags)
         return protocol.from_hub(frames[0]), protocol.samples_in(frames)
 
     def has_more(self) -> bool:
-        """Whether `read` would have something, without the cost of finding out in vain."""
+        """Whether a message is waiting; cheaper than a `read` that fails."""
         return is_readable(self._socket)
 
     def next(self) -> tuple[protocol.FromHub, Samples | None]:
-        """The next message; waits as long as the socket's time limit says. Raises zmq.Again."""
+        """Return the next message; waits up to the socket's timeout. Raises zmq.Again."""
         return self._waiting.popleft() if self._waiting else self.read(0)
 
     def with_more(
         self, first: protocol.Stretch, samples: Samples | None
     ) -> tuple[protocol.Stretch, Samples | None]:
-        """A stretch together with those that are there behind it: each costs much the same."""
+        """Merge a stretch with those waiting behind it: the cost is per stretch, not per sample."""
         parts = [(first.n, samples)]
         last, placed, notice = first, list(first.placed), first.notice
         with contextlib.suppress(zmq.Again):

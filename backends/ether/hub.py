@@ -1,4 +1,4 @@
-"""The hub: N radios of other processes on one simulated air, paced or in lock-step."""
+"""The hub: radios of other processes on one simulated air, paced or in lock-step."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -15,15 +15,15 @@ from backends.ether.sockets import HubSockets
 from backends.ether.world import AirParams, RadioParams, World
 from backends.hub_address import HubAddress
 
-# A hub that is late makes fewer, longer stretches.
+# A late hub makes fewer, longer stretches.
 MAX_LATE_BLOCKS = 8
-# In lock-step, a radio that says nothing for so long is looked for.
+# In lock-step, the hub checks a radio that is silent for this long.
 LOOK_AFTER_MS = 500
 
 
 @dataclass
 class _Member:
-    """One radio on the air of the hub."""
+    """One radio on the hub's air."""
 
     node: int
     identity: bytes
@@ -37,10 +37,10 @@ class _Member:
 
 
 class EtherHub:
-    """Sockets in `directory`, and at `listen`; `radios` are expected, others get a default one.
+    """A hub: sockets in `directory` and at `listen`. `radios` are expected; others get defaults.
 
-    Paced by the clock; or in lock-step: it begins when all expected are there, each step waits for
-    everybody, and it stops at `until_s`.
+    Paced, it runs in real time. In lock-step it starts when all expected radios have joined, each
+    step waits for every radio, and it stops at `until_s`.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class EtherHub:
         self._members: dict[int, _Member] = {}
         self._by_token: dict[int, _Member] = {}
         self._tokens = Random()
-        # In lock-step, the order in which bursts come in is chance.
+        # In lock-step bursts arrive in random order, so they are collected and sorted.
         self._bursts: list[tuple[int, int, TxBurst, int]] = []
         self._now = 0.0
         self._step = 0
@@ -98,7 +98,7 @@ class EtherHub:
             ahead_s = due - time.monotonic()
             if ahead_s > 0:
                 time.sleep(ahead_s)
-            # What comes in between is in time when it is taken before the block that it is in.
+            # A burst is in time if it is taken before the block that it belongs to.
             self._sockets.take(self._take_from_radio, self._take_request)
             late = time.monotonic() - due
             blocks = 1 + min(int(late / block_s), MAX_LATE_BLOCKS)
@@ -194,7 +194,7 @@ class EtherHub:
         if isinstance(message, protocol.Done):
             member.done = max(member.done, message.step)
         elif isinstance(message, protocol.Bye):
-            # It may be waiting for something to read.
+            # The radio may be waiting for a message.
             self._reply(member.identity, self._answer())
             self._remove(member)
         else:
@@ -212,7 +212,7 @@ class EtherHub:
         member = self._members.get(node)
         if member is not None:
             start = None
-            # Else it would overtake the one that was late and has to go again.
+            # Otherwise this burst would overtake the late one, which has to be sent again.
             if burst.latest is None or late_seen == member.late:
                 start = self._medium.send(node, burst)
             member.late += start is None
@@ -245,7 +245,7 @@ class EtherHub:
     def _reply(
         self, identity: bytes, message: msgspec.Struct, samples: Samples | None = None
     ) -> bool:
-        """Send without waiting; False when there was no room for it."""
+        """Send without waiting; False when there was no room for the message."""
         try:
             return self._sockets.reply(identity, message, samples)
         except ConnectionError:
@@ -255,7 +255,7 @@ class EtherHub:
             return True
 
     def _look_for(self, behind: list[_Member]) -> None:
-        """A daemon that was killed says no Bye, but its connection is gone."""
+        """Detect killed daemons: they send no Bye, but their connection is gone."""
         for member in behind:
             self._is_alive(member)
 
@@ -268,7 +268,7 @@ class EtherHub:
             del self._members[member.node]
             self._medium.leave(member.node)
         self._by_token.pop(member.token, None)
-        # An air in lock-step does not wait for who is gone.
+        # An air in lock-step does not wait for a radio that has left.
         self._expected.discard(member.node)
 
     def _answer(self) -> protocol.Answer:

@@ -1,4 +1,4 @@
-"""Asking to be let onto a hub's air."""
+"""Joins a hub's air."""
 
 import contextlib
 import threading
@@ -22,10 +22,10 @@ def join(
     within_s: float,
     is_over: threading.Event,
 ) -> protocol.Welcome:
-    """The hub's welcome; on a thread.
+    """Join, and return the hub's welcome; runs on a thread.
 
-    A hub that began after we asked, or died before it answered, knows nothing of us: it is asked
-    who is there, and greeted again. Raises AbsentError, RefusalError.
+    A hub that started after our Hello, or died before its answer, does not know us. Therefore we
+    ask which nodes it knows, and send the Hello again. Raises AbsentError, RefusalError.
     """
     _say(down, hello)
     asked_at = time.monotonic()

@@ -20,12 +20,12 @@ from backends.outstanding import answered
 
 
 def lockstep_capabilities(antenna: Antenna, air: AirParams) -> Capabilities:
-    """What a radio with that antenna can do where nobody goes on before all have heard a block."""
+    """Capabilities of a radio with that antenna on an air in lock-step."""
     return antenna.capabilities(paced=False, lead_s=LEAD / air.rate_hz, block_s=air.block_s)
 
 
 class LocalEther:
-    """Radios on one air. Time goes on by a block when all of them have done with the one before."""
+    """Radios on one air; time advances by a block when all radios have finished the current one."""
 
     def __init__(
         self, air: AirParams, radios: Mapping[int, RadioParams], world: World, seed: int
@@ -42,7 +42,7 @@ class LocalEther:
             self.medium.join(node_id, radio, 0.0)
 
     async def run(self, until_s: float) -> None:
-        """Let time pass up to `until_s`."""
+        """Advance time to `until_s`."""
         while self.now < until_s:
             self._steps += 1
             self.now = self._steps * self.air.block_s
@@ -54,7 +54,7 @@ class LocalEther:
                 await radio.queue.join()
 
     def leave(self, node_id: int) -> None:
-        """Nobody waits for a radio that is closed."""
+        """Remove a closed radio, so that no step waits for it."""
         del self.radios[node_id]
         self.medium.leave(node_id)
 
@@ -73,12 +73,12 @@ class LocalRadio:
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this radio can do, as its parameters say."""
+        """What this radio can do, according to its parameters."""
         return lockstep_capabilities(self.antenna, self._ether.air)
 
     @property
     def detail(self) -> str:
-        """The kind of air in one line for people."""
+        """The kind of air, in one line for people."""
         return "simulated air in this process"
 
     @property
@@ -88,11 +88,11 @@ class LocalRadio:
 
     @property
     def levels(self) -> None:
-        """Always None: nobody asks for levels of this radio."""
+        """Always None: this radio measures no levels."""
         return None
 
     async def open(self, tuning: Tuning) -> None:
-        """Begin. Raises BackendError when it is set to another air."""
+        """Start the radio. Raises BackendError if its rate is not that of the air."""
         if tuning.rate_hz != self._ether.air.rate_hz:
             raise BackendError(
                 f"rate_hz: got {tuning.rate_hz:g}; allowed: {self._ether.air.rate_hz:g}"
@@ -103,13 +103,13 @@ class LocalRadio:
         self,
         hear: Hear | None = None,  # noqa: ARG002  # there is no thread
     ) -> AsyncIterator[RxBlock]:
-        """What is received, a step at a time."""
+        """Yield what is received, one step at a time."""
         while (block := await self.queue.get()) is not None:
             self.antenna.settle(block.index + block.n)
             try:
                 yield block
             finally:
-                # Who asks for the next has done with this one.
+                # A reader that requests the next block has finished this one.
                 self.queue.task_done()
         self.queue.task_done()
 

@@ -1,4 +1,4 @@
-"""The air itself: what each node's antenna gets of what the others send. Only computes."""
+"""The air itself: computes what each node's antenna receives from the others."""
 
 import math
 from dataclasses import dataclass, field
@@ -13,17 +13,17 @@ from backends.outstanding import GAP
 from phy import Path, PathParams
 
 NOISE_DBFS = -80.0
-"""Every receiver's noise. A burst arrives so far above it as its SNR says."""
+"""Noise of every receiver. A burst's SNR is its power above this."""
 MARGIN = 16
-"""Bursts arrive so many samples early at most: skirts of filters, rounding between clocks."""
+"""Samples by which a burst may arrive early at most: filter skirts, rounding between clocks."""
 
 
 LEAD = MARGIN + 1
-"""A burst that is to leave on time is handed over so many samples before it."""
+"""Number of samples before its start at which a burst must be handed over."""
 
 
 class Piece(NamedTuple):
-    """The next `n` samples of a node: None for silence; `is_deaf`: it does not hear them."""
+    """The next `n` samples of a node: None for silence; `is_deaf`: the node does not hear them."""
 
     n: int
     samples: Samples | None
@@ -34,7 +34,7 @@ class Piece(NamedTuple):
 class _Node:
     radio: RadioParams
     rate_hz: float
-    """The node's sample rate by its own crystal."""
+    """The node's sample rate, as its own crystal makes it."""
     joined_at: float
     timeline: Timeline = field(default_factory=Timeline)
     next_index: int = 0
@@ -49,9 +49,10 @@ class _Node:
 
 
 class Medium:
-    """N nodes on one air, each with a sample count of its own that begins when it joins.
+    """Nodes on one air, each with a sample count of its own that begins when it joins.
 
-    What arrives at the same time adds up. Chance (fading, phases) is drawn per pair from `seed`.
+    Bursts that arrive at the same time add up. Random effects (fading, phases) are drawn for each
+    pair of nodes from `seed`.
     """
 
     def __init__(self, air: AirParams, world: World, seed: int) -> None:
@@ -64,24 +65,24 @@ class Medium:
         self.bursts_late = 0
 
     def join(self, node_id: int, radio: RadioParams, now: float) -> None:
-        """A node whose index 0 is at `now`."""
+        """Add a node whose index 0 is at the time `now`."""
         rate_hz = self._air.rate_hz * (1 + 1e-6 * radio.clock_ppm)
         self._nodes[node_id] = _Node(radio, rate_hz, now)
 
     def leave(self, node_id: int) -> None:
-        """It is gone; what it has sent still arrives."""
+        """Remove a node; what it has sent still arrives."""
         self._nodes.pop(node_id, None)
 
     def time(self, node_id: int, index: int) -> float:
-        """The time in s at which a node's sample is."""
+        """The time in s of a node's sample."""
         return self._nodes[node_id].time(index)
 
     def next_index(self, node_id: int) -> int:
-        """The node's samples before this have been taken."""
+        """Index of the node's first sample that has not been taken."""
         return self._nodes[node_id].next_index
 
     def send(self, node_id: int, burst: TxBurst) -> int | None:
-        """Put a burst on the air; where it begins, by the sender's count. None: too late."""
+        """Put a burst on the air; returns its start in the sender's count, None if too late."""
         node = self._nodes[node_id]
         turnaround = 0
         if not node.radio.full_duplex:
@@ -103,7 +104,7 @@ class Medium:
         return start
 
     def take(self, node_id: int, until: float) -> list[Piece]:
-        """What the node's antenna gets from where it stands up to the time `until`, in pieces."""
+        """Take what the node's antenna receives up to the time `until`, in pieces."""
         node = self._nodes[node_id]
         end = node.index(until)
         pieces: list[Piece] = []
@@ -123,7 +124,7 @@ class Medium:
         if hop is None:
             return
         arrives = (at + hop.delay_s - to.joined_at) * to.rate_hz
-        # Two clocks in the same sample are in step, however their quotient is rounded.
+        # Two clocks within one sample are in step, even if the quotient is rounded.
         whole, part = math.floor(arrives), arrives - math.floor(arrives)
         if abs(arrives - round(arrives)) < 1e-3:
             whole, part = round(arrives), 0.0
@@ -145,7 +146,7 @@ class Medium:
 
 
 def _next_stretch(deaf: list[tuple[int, int]], first: int, end: int) -> tuple[bool, int]:
-    """(whether the node is deaf at `first`, up to where that stays so; at most `end`)."""
+    """(whether the node is deaf at `first`, index at which that changes; at most `end`)."""
     now = [upto for begin, upto in deaf if begin <= first < upto]
     if now:
         return True, min(max(now), end)

@@ -1,9 +1,9 @@
-"""What hub and radios of an ether say to each other, over ZeroMQ.
+"""Messages between the hub of an ether and its radios, over ZeroMQ.
 
-A radio's DEALER talks to the hub's ROUTER `air`: it says Hello and gets Welcome or Refused, then
-Stretch after Stretch, samples (complex64) in a second frame where there are any. On a socket of its
-own it PUSHes to the hub's PULL `sky`: Sent with the samples, Done after each Stretch that asks for
-it (lock-step), Bye. All but samples is msgpack.
+A radio's DEALER talks to the hub's ROUTER `air`. It sends Hello, receives Welcome or Refused, and
+then one Stretch after another, with samples (complex64) in a second frame if there are any. On a
+second socket it PUSHes to the hub's PULL `sky`: Sent with the samples, Done after each Stretch that
+requests it (lock-step), and Bye. Everything but samples is msgpack.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ VERSION = 1
 
 
 class Hello(msgspec.Struct, tag=True, frozen=True, kw_only=True):
-    """A radio wants to join. `who` names its daemon to people."""
+    """A radio's request to join; `who` names its daemon to people."""
 
     version: int
     node: Annotated[int, Meta(ge=0, le=254)]
@@ -30,26 +30,26 @@ class Hello(msgspec.Struct, tag=True, frozen=True, kw_only=True):
 
 
 class Welcome(msgspec.Struct, tag=True, frozen=True, kw_only=True):
-    """It may: its radio, its chance, and how time goes on here."""
+    """The radio may join: its parameters, its seed, and the pace of this air."""
 
     token: int
     radio: RadioParams
     seed: int
     block_s: float
     host_ns: int
-    """The time of its index 0 by the monotonic clock."""
+    """Monotonic time of the radio's index 0."""
     paced: bool
     air: str
 
 
 class Refused(msgspec.Struct, tag=True, frozen=True, kw_only=True):
-    """It may not; the reason says what to do."""
+    """The radio may not join; the reason says what to do."""
 
     reason: str
 
 
 class Placed(msgspec.Struct, array_like=True, frozen=True):
-    """Burst `number` begins at `start`; None: it came too late."""
+    """Burst `number` starts at `start`; None: it came too late."""
 
     number: int
     start: int | None
@@ -57,31 +57,31 @@ class Placed(msgspec.Struct, array_like=True, frozen=True):
 
 
 class Stretch(msgspec.Struct, tag=True, frozen=True, kw_only=True):
-    """The next `n` samples. `step`: answer with Done(step), and nothing happens until then."""
+    """The next `n` samples. With a `step`, the air waits until the radio answers Done(step)."""
 
     n: int
     is_deaf: bool
     host_ns: int
     step: int = 0
     lost: int = 0
-    """Samples before these that the hub could not deliver."""
+    """Number of samples before these that the hub could not deliver."""
     placed: list[Placed] = []
     notice: str = ""
 
 
 class Sent(msgspec.Struct, tag=True, frozen=True, kw_only=True):
-    """A burst, from `start` on, or up to `latest`, by the air's count of this node."""
+    """A burst to send at `start`, at the latest at `latest`, in the air's count of this node."""
 
     token: int
     number: int
     start: int
     latest: int | None
     late_seen: int
-    """How many of its bursts the radio knows to have been late."""
+    """Number of the radio's bursts that it knows were late."""
 
 
 class Done(msgspec.Struct, tag=True, frozen=True, kw_only=True):
-    """All that follows from a step has been done."""
+    """All work that follows from a step is done."""
 
     token: int
     step: int
@@ -94,11 +94,11 @@ class Bye(msgspec.Struct, tag=True, frozen=True, kw_only=True):
 
 
 class Question(msgspec.Struct, tag=True, frozen=True, kw_only=True):
-    """How goes it? Asked by whoever watches; answered with Answer."""
+    """A request for the hub's state; answered with Answer."""
 
 
 class Answer(msgspec.Struct, tag=True, frozen=True, kw_only=True):
-    """The state of the hub, for whoever asks."""
+    """The state of the hub, for anyone who requests it."""
 
     now_s: float
     nodes: dict[int, str]
@@ -119,25 +119,25 @@ _from_radio: msgspec.msgpack.Decoder[FromRadio] = msgspec.msgpack.Decoder(FromRa
 
 
 def encode(message: msgspec.Struct) -> bytes:
-    """The bytes of one message."""
+    """Encode one message."""
     return _encoder.encode(message)
 
 
 def to_hub(data: bytes) -> ToHub:
-    """What a radio or a watcher says. Raises msgspec.DecodeError."""
+    """Decode a message from a radio or a watcher. Raises msgspec.DecodeError."""
     return _to_hub.decode(data)
 
 
 def from_hub(data: bytes) -> FromHub:
-    """What the hub says. Raises msgspec.DecodeError."""
+    """Decode a message from the hub. Raises msgspec.DecodeError."""
     return _from_hub.decode(data)
 
 
 def from_radio(data: bytes) -> FromRadio:
-    """What a radio sends. Raises msgspec.DecodeError."""
+    """Decode a message from a radio. Raises msgspec.DecodeError."""
     return _from_radio.decode(data)
 
 
 def samples_in(frames: Sequence[bytes]) -> Samples | None:
-    """The samples behind a message; None when there are none."""
+    """The samples that follow a message; None if there are none."""
     return np.frombuffer(bytearray(frames[1]), np.complex64) if len(frames) > 1 else None

@@ -38,13 +38,13 @@ from backends.known import ETHER_LEAD_S, ETHER_REMOTE_LEAD_S
 from backends.outstanding import answered
 
 ANSWER_MS = 5000
-# A paced hub that says nothing for so long is gone; it is asked again that often.
+# A paced hub that is silent for this long is gone; it is then queried at this interval.
 QUIET_MS = 500
 INFINITE = float("inf")
 
 
 class _Beside(NamedTuple):
-    """What came with a block: read on the event loop, when the block is."""
+    """What came together with a block; the event loop reads it together with that block."""
 
     placed: list[protocol.Placed]
     step: int
@@ -54,8 +54,8 @@ class _Beside(NamedTuple):
 class EtherRadio:
     """Joins the hub at `hub` as robot `node`; `who` names it to people.
 
-    When the hub goes away, the stream stands still until it is back; then what it missed is a gap.
-    `patience`: of `open`, where there is no hub.
+    When the hub is gone, the stream pauses until the hub returns; the missed samples become a gap.
+    `patience` says what `open` does without a hub.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class EtherRadio:
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this radio can do, as the hub says."""
+        """What this radio can do, according to the hub."""
         paced = self._welcome.paced
         own_s = ETHER_REMOTE_LEAD_S if self._hub.is_remote else ETHER_LEAD_S
         lead_s = own_s if paced else LEAD / self._tuning.rate_hz
@@ -94,7 +94,7 @@ class EtherRadio:
 
     @property
     def detail(self) -> str:
-        """The hub's air, and whether the hub is there, in one line for people."""
+        """The hub's air, and whether the hub is present, in one line for people."""
         if self._antenna is None:
             return "no hub yet"
         parts = [self._welcome.air, "the hub is away" if self._is_away else "", self._notice]
@@ -107,11 +107,11 @@ class EtherRadio:
 
     @property
     def levels(self) -> Levels | None:
-        """How strong the blocks so far were; None before the first look."""
+        """Level of the blocks so far; None before the first measurement."""
         return self._feed.levels
 
     async def open(self, tuning: Tuning) -> None:
-        """Join. Raises BackendError, also when the hub refuses."""
+        """Join the air. Raises BackendError, also when the hub refuses."""
         self._tuning = tuning
         self._down = connect(self._context, zmq.DEALER, self._hub.air)
         self._downlink = Downlink(self._down)
@@ -122,9 +122,9 @@ class EtherRadio:
         self._antenna = Antenna(self._welcome.radio, self._welcome.seed, tuning.rate_hz)
 
     async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
-        """What the hub hands out. Raises BackendError when it will not have us any more."""
+        """Yield what the hub hands out. Raises BackendError when the hub refuses a return."""
         antenna = self._joined
-        # In lock-step everybody waits anyway, and a thread would only cost.
+        # In lock-step every node waits anyway, so a thread would only add cost.
         blocks = self._feed.blocks(hear) if self._welcome.paced else self._blocks_here()
         if not self._welcome.paced:
             self._say(protocol.Done(token=self._welcome.token, step=0))
@@ -132,7 +132,7 @@ class EtherRadio:
             async for block, is_heard in blocks:
                 beside = self._beside.popleft()
                 if beside.welcome is not None:
-                    # From here on, bursts are for the new hub.
+                    # From here on, bursts belong to the new hub.
                     antenna.lose()
                     self._welcome, self._late_seen = beside.welcome, 0
                 for placed in beside.placed:
@@ -149,7 +149,7 @@ class EtherRadio:
             antenna.lose()
 
     def send(self, burst: TxBurst) -> Awaitable[TxReport]:
-        """Hand a burst to the hub; while there is none, it is lost when the hub is back."""
+        """Hand a burst to the hub; without a hub, it is reported lost when the hub returns."""
         if self._antenna is None or self._is_over or self._closing.is_set():
             return answered(TxReport(TxOutcome.LOST, burst.start, burst.start))
         self._number += 1
@@ -171,7 +171,7 @@ class EtherRadio:
         if self._closing.is_set():
             return
         self._closing.set()
-        # A socket is not closed under who polls it.
+        # A socket must not be closed while another thread polls it.
         await asyncio.to_thread(self._is_idle.wait)
         if self._is_welcome:
             self._say(protocol.Bye(token=self._welcome.token))
@@ -189,7 +189,7 @@ class EtherRadio:
         return self._antenna
 
     def _say(self, message: msgspec.Struct, *more: memoryview) -> None:
-        """To the hub; without one, into the void."""
+        """Send a message to the hub; without a hub, it is dropped."""
         with contextlib.suppress(zmq.Again):
             self._up.send_multipart([protocol.encode(message), *more], NOBLOCK)
 
@@ -203,7 +203,7 @@ class EtherRadio:
         )
 
     def _ask(self) -> None:
-        """The first time, before there are blocks; in a thread."""
+        """Join for the first time, before there are blocks; runs in a thread."""
         within_s = INFINITE if self._waits else 1e-3 * ANSWER_MS
         try:
             self._welcome = join(self._down, self._hello(), self._hub, within_s, self._closing)
@@ -233,7 +233,7 @@ class EtherRadio:
         return None
 
     def _is_due(self, end: int) -> bool:
-        """In the feed's thread: whether something came with a block, or a burst has left."""
+        """On the feed's thread: whether a message came with a block, or a burst has left."""
         beside = self._beside[-1]
         if beside.placed or beside.step or beside.welcome or self._joined.is_due(end):
             return True
@@ -249,7 +249,7 @@ class EtherRadio:
         try:
             while not self._closing.is_set():
                 readable.clear()
-                # The socket tells only once that it has become readable; so look first.
+                # The descriptor only signals new messages, so check for waiting ones first.
                 if not self._downlink.has_more():
                     await readable.wait()
                     continue
@@ -269,7 +269,7 @@ class EtherRadio:
         self._notice = message.notice or self._notice
         if message.lost:
             self.counters["overflows"] += 1
-            # The samples at hand go with those before them.
+            # These samples are lost too, together with those before them.
             lost = message.lost + message.n
             self.counters["samples_lost"] += lost
             self._beside.append(_Beside(message.placed, message.step))
@@ -279,7 +279,7 @@ class EtherRadio:
         return antenna.receive(piece, at_ns)
 
     def _look_for_hub(self) -> None:
-        """Nothing came for a while: in lock-step others may be slow, else the hub is gone."""
+        """Query a silent hub: in lock-step other nodes may be slow, otherwise the hub is gone."""
         if self._welcome.paced and not self._is_away:
             self._is_away = True
             self.counters["hub_outages"] += 1
@@ -288,7 +288,7 @@ class EtherRadio:
             self._down.send(protocol.encode(protocol.Question()), NOBLOCK)
 
     def _rejoin(self, welcome: protocol.Welcome) -> RxBlock:
-        """A hub that knows nothing of before: its count begins anew."""
+        """Join a hub that has no record of this radio: its sample count restarts."""
         self._is_away = False
         now_ns = welcome.host_ns
         at_ns = self._clock.local_ns(now_ns, time.monotonic_ns())

@@ -1,4 +1,4 @@
-"""The hub's sockets in a folder that it has for itself."""
+"""The hub's sockets, in a folder that belongs to the hub alone."""
 
 import fcntl
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from backends.base import BackendError, Samples
 from backends.ether import protocol
 from backends.hub_address import HubAddress, hub_in
 
-# As numbers: as enumerations, they cost as much as a short message.
+# Plain numbers: enumerations would cost as much as a short message.
 NOBLOCK, MORE, _EVENTS, _POLLIN = (
     int(zmq.NOBLOCK), int(zmq.SNDMORE), int(zmq.EVENTS), int(zmq.POLLIN),
 )  # fmt: skip
@@ -27,7 +27,7 @@ LONGEST_MESSAGE = 1 << 26
 def connect(
     context: "zmq.Context[zmq.Socket[bytes]]", kind: int, endpoint: str
 ) -> "zmq.Socket[bytes]":
-    """A radio's socket to its hub. Raises BackendError."""
+    """Connect a radio's socket to its hub. Raises BackendError."""
     socket = context.socket(kind)
     socket.setsockopt(zmq.LINGER, 100)
     socket.setsockopt(zmq.RCVHWM, WAITING)
@@ -41,10 +41,10 @@ def connect(
 
 
 class HubSockets:
-    """`air` (ROUTER) answers and hands out, `sky` (PULL) takes what radios send.
+    """The hub's two sockets: `air` (ROUTER) answers and hands out, `sky` (PULL) receives.
 
-    With `listen` they can also be reached from other computers, by anybody who reaches the port.
-    Raises BackendError when the folder or the port cannot be had.
+    With `listen` other computers can reach them too: everybody who reaches the port.
+    Raises BackendError when the folder or the port is not available.
     """
 
     def __init__(self, directory: Path, listen: HubAddress | None = None) -> None:
@@ -61,7 +61,7 @@ class HubSockets:
             self._poller.register(each, zmq.POLLIN)
 
     def wait(self, wait_ms: int) -> bool:
-        """Until there is something to take, for at most `wait_ms`; whether there is."""
+        """Wait for messages for at most `wait_ms`; returns whether there is one."""
         return bool(self._poller.poll(wait_ms))
 
     def take(
@@ -69,14 +69,14 @@ class HubSockets:
         from_radio: Callable[[list[bytes]], None],
         request: Callable[[list[bytes]], None],
     ) -> None:
-        """Hand over all messages that are there now."""
+        """Hand over all messages that are waiting now."""
         _drain(self._sky, from_radio)
         _drain(self._air, request)
 
     def reply(self, identity: bytes, message: msgspec.Struct, samples: Samples | None) -> bool:
-        """Send without waiting; False when there is no room for it.
+        """Send without waiting; False when there is no room for the message.
 
-        Raises ConnectionError when nobody of that identity is there.
+        Raises ConnectionError when no peer has that identity.
         """
         data, air = protocol.encode(message), self._air
         try:
@@ -121,7 +121,7 @@ class HubSockets:
 
 
 def is_readable(socket: "zmq.Socket[bytes]") -> bool:
-    """Whether a message is there to be read."""
+    """Whether a message is waiting."""
     return bool(int(socket.getsockopt(_EVENTS)) & _POLLIN)
 
 
@@ -131,12 +131,12 @@ def _drain(socket: "zmq.Socket[bytes]", take: Callable[[list[bytes]], None]) -> 
         try:
             take(frames)
         except (msgspec.DecodeError, ValueError, RecursionError):
-            # Not one of ours; whoever it is gets no answer.
+            # Not a message of this protocol; the sender gets no answer.
             continue
 
 
 def _locked(directory: Path) -> IO[str]:
-    """A second bind would take a living hub's sockets away."""
+    """Lock the folder: a second bind would take a running hub's sockets away."""
     path = directory / "ether.lock"
     try:
         directory.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Asking a hub how it goes."""
+"""Queries the state of a hub."""
 
 from pathlib import Path
 from typing import Self
@@ -11,7 +11,7 @@ from backends.hub_address import hub_in
 
 
 class HubWatch:
-    """Asks the hub whose sockets are in `directory`."""
+    """Queries the hub whose sockets are in `directory`."""
 
     def __init__(self, directory: Path, timeout_s: float = 5.0) -> None:
         self._directory = directory

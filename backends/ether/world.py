@@ -15,20 +15,20 @@ Decibel = Annotated[float, Meta(ge=-300, le=300)]
 
 
 class AirParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The air that all share. SNR is mean burst power over the receiver's noise in the band."""
+    """The shared air. SNR is mean burst power over the receiver's noise in the band."""
 
     rate_hz: Annotated[float, Meta(ge=1e4, le=2e8)] = 5e6
     frequency_hz: Annotated[float, Meta(ge=0, le=1e11)] = 2.45e9
     profile: Literal["awgn", "rayleigh", "tdl-a", "tdl-c"] = "awgn"
-    """One path, or echoes that fade anew for each burst."""
+    """A single path, or echoes that fade anew for each burst."""
     delay_spread_s: Annotated[float, Meta(ge=0, le=1e-3)] = 1e-7
     snr_db: Decibel = 20.0
-    """Between nodes without positions, where no link says otherwise."""
+    """SNR between nodes without positions, unless a link overrides it."""
     snr_db_at_1m: Decibel = 60.0
-    """SNR at 1 m, between nodes that have positions."""
+    """SNR at a distance of 1 m, between nodes that have positions."""
     path_loss_exponent: Annotated[float, Meta(ge=0, le=8)] = 2.0
     block_s: Annotated[float, Meta(ge=1e-5, le=0.1)] = 0.001
-    """Samples are handed out in pieces of this length."""
+    """Length of the pieces in which samples are handed out."""
 
 
 class RadioParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -36,30 +36,30 @@ class RadioParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     full_duplex: bool = True
     turnaround_s: Annotated[float, Meta(ge=0, le=1)] = 0.0
-    """Deaf so long before and after each burst; of half-duplex radios."""
+    """Time before and after each burst in which a half-duplex radio hears nothing."""
     timestamps: bool = True
     index_error_s: Annotated[float, Meta(ge=0, le=0.1)] = 0.0
-    """Without time stamps: how wrong the sample count may be after each burst."""
+    """Without time stamps: possible error of the sample count after each burst."""
     clock_ppm: Annotated[float, Meta(ge=-200, le=200)] = 0.0
-    """Error of its crystal: centre frequency and sampling clock."""
+    """Frequency error of its crystal, which drives centre frequency and sampling clock."""
     image_db: Decibel = 300.0
     dc_dbfs: Annotated[float, Meta(ge=-300, le=0)] = -300.0
     adc_bits: Annotated[int, Meta(ge=0, le=24)] = 0
 
 
 class LinkOverride(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How one node hears another, whatever their places; both ways unless `one_way`."""
+    """How one node hears another, regardless of positions; both ways unless `one_way`."""
 
     sender: Annotated[int, Meta(ge=0, le=254)]
     receiver: Annotated[int, Meta(ge=0, le=254)]
     snr_db: Decibel | None = None
-    """Absent: from the places. -300: nothing at all."""
+    """SNR of the link; absent: computed from the positions. -300: nothing arrives."""
     delay_s: Annotated[float, Meta(ge=0, le=1)] = 0.0
     one_way: bool = False
 
 
 class Outage(NamedTuple):
-    """Nothing gets through from `begin_s` to `end_s`."""
+    """A period, `begin_s` to `end_s`, in which nothing arrives."""
 
     begin_s: float
     end_s: float
@@ -74,7 +74,7 @@ class Hop(NamedTuple):
 
 
 class Track:
-    """Where a node is: straight lines between waypoints (t in s, x and y in m), then it stays."""
+    """A node's path: straight lines between waypoints (t in s, x and y in m); stays at the last."""
 
     def __init__(self, waypoints: Sequence[tuple[float, float, float]]) -> None:
         self._times = [t for t, _, _ in waypoints]
@@ -114,7 +114,7 @@ class World:
                 self._links.setdefault((link.receiver, link.sender), link)
 
     def hop(self, sender: int, receiver: int, t: float) -> Hop | None:
-        """At `t`; None when nothing gets through."""
+        """The hop from sender to receiver at time `t`; None when nothing arrives."""
         if self.is_out(t):
             return None
         link = self._links.get((sender, receiver))
@@ -137,7 +137,7 @@ class World:
         return i < len(self._outages) and self._outages[i].begin_s <= t
 
     def _distance(self, sender: int, receiver: int, t: float) -> tuple[float, float]:
-        """(distance in m, how fast it grows in m/s); 0 where places are not known."""
+        """(distance in m, its rate of growth in m/s); 0 if the positions are unknown."""
         one, other = self._tracks.get(sender), self._tracks.get(receiver)
         if one is None or other is None:
             return 0.0, 0.0
@@ -147,7 +147,7 @@ class World:
 
 
 def _merged(outages: Sequence[Outage]) -> list[Outage]:
-    """In order, none within or over another."""
+    """The outages in order, merged where they overlap."""
     apart: list[Outage] = []
     for outage in sorted(outages):
         if apart and outage.begin_s <= apart[-1].end_s:

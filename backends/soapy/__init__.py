@@ -1,7 +1,7 @@
 """Real radios, through SoapySDR (https://github.com/pothosware/SoapySDR).
 
-The daemon's side stands in this folder: SoapyRadio and what it keeps of its radio process. It never
-loads SoapySDR or a driver itself: `radio_process` and `probe` do, in processes of their own.
+This folder itself holds the daemon's side: SoapyRadio and what it knows of its radio process. The
+daemon never loads SoapySDR or a driver: `radio_process` and `probe` do, in processes of their own.
 """
 
 from backends.soapy.binding import driver_of

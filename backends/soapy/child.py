@@ -1,4 +1,4 @@
-"""The radio process as the daemon sees it: started, spoken to, and ended whatever it does."""
+"""The radio process as the daemon sees it: starts it, talks to it, and ends it in any case."""
 
 import os
 import select
@@ -26,13 +26,13 @@ from backends.soapy.protocol import (
 from backends.soapy.settings import SoapySettings
 
 END_S = 2.0
-"""A process that has not ended so long after it was told to is killed."""
+"""A process that has not ended this long after it was told to is killed."""
 LOOK_S = 0.1
 SOCKET_BYTES = 1 << 20
 
 
 class RadioChild:
-    """A radio process, as patient with its device as told."""
+    """A radio process; `patience` says how it waits for its device."""
 
     def __init__(
         self, settings: SoapySettings, rx_samples: int, tx_samples: int, patience: Patience
@@ -40,7 +40,7 @@ class RadioChild:
         kind = socket.SOCK_SEQPACKET
         self._control, control = socket.socketpair(socket.AF_UNIX, kind)
         self.control_fd = self._control.fileno()
-        """A descriptor that is readable when there is an answer."""
+        """A descriptor that is readable when the process has answered."""
         self._rx_socket, rx_socket = socket.socketpair(socket.AF_UNIX, kind)
         for end in (self._control, control, rx_socket):
             end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SOCKET_BYTES)
@@ -69,9 +69,9 @@ class RadioChild:
         self._hangs = False
 
     def next_answer(self, within_s: float, is_over: threading.Event) -> FromProcess | None:
-        """Wait for what the process says next; None: nothing in time, or before `is_over`.
+        """Wait for the process's next message; None: nothing in time, or `is_over` is set.
 
-        Of a process that has ended, the answer is Failed and says how.
+        If the process has ended, the answer is Failed with the reason.
         """
         poll = select.poll()
         poll.register(self._control, select.POLLIN)
@@ -86,7 +86,7 @@ class RadioChild:
         return None
 
     def answer(self) -> FromProcess | None:
-        """What it has said; None: nothing yet. Raises EOFError when it will say no more."""
+        """The process's next message; None: none yet. Raises EOFError when no more can come."""
         try:
             data = self._control.recv(protocol.MOST_BYTES)
         except BlockingIOError:
@@ -98,11 +98,11 @@ class RadioChild:
         return protocol.from_process(data)
 
     def begin(self) -> None:
-        """Have the process receive from now on."""
+        """Tell the process to start receiving."""
         self._say(Begin())
 
     def next_chunk(self, timeout_s: float) -> RxChunk | None:
-        """The next chunk received, if one comes in time. Raises EOFError when none will."""
+        """The next chunk received, if one comes in time. Raises EOFError when no more can come."""
         if not self._poll.poll(1e3 * timeout_s):
             return None
         try:
@@ -114,7 +114,7 @@ class RadioChild:
         return protocol.unpack_rx_chunk(data)
 
     def send_burst(self, number: int, start: int, samples: Samples, latest: int | None) -> bool:
-        """Have samples sent as burst `number`; False when the process cannot take them."""
+        """Send samples as burst `number`; False when the process cannot accept them."""
         n = len(samples)
         at = self.tx.whole(self._tx_at, n)
         if n > self.tx.capacity or at + n - self.tx.tail > self.tx.capacity:
@@ -126,12 +126,12 @@ class RadioChild:
         return True
 
     def give_up(self) -> None:
-        """Kill a process that hangs."""
+        """Kill a hanging process."""
         self._hangs = True
         self._process.kill()
 
     def wait(self) -> None:
-        """Wait until it has ended, for at most END_S; then kill it."""
+        """Wait up to END_S for the process to end; then kill it."""
         try:
             self._process.wait(END_S)
         except subprocess.TimeoutExpired:
@@ -139,7 +139,7 @@ class RadioChild:
             self._process.wait()
 
     def end(self) -> None:
-        """End the process and free what it shared; ending twice is fine."""
+        """End the process and free its shared memory; ending twice is fine."""
         self._control.close()
         self.wait()
         self._rx_socket.close()
@@ -154,7 +154,7 @@ class RadioChild:
         return True
 
     def how_it_ended(self) -> str:
-        """How the process ended, in words; waits until it has."""
+        """How the process ended, in words; waits for its end."""
         self.wait()
         code = self._process.returncode
         if self._hangs:

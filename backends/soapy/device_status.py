@@ -1,4 +1,4 @@
-"""Whether the device is there, and what its radio processes have counted so far."""
+"""Whether the device is present, and what its radio processes have counted so far."""
 
 from collections import Counter
 
@@ -6,15 +6,15 @@ from backends.soapy.protocol import CountersReport
 
 
 class DeviceStatus:
-    """The state of one device over all radio processes that had it. Only read by other threads."""
+    """State of one device across its radio processes. Other threads only read it."""
 
     def __init__(self) -> None:
         self.away = ""
-        """Why the device is away; empty while it is there."""
+        """Why the device is away; empty while it is present."""
         self.notice = ""
-        """What the radio process found odd about it."""
+        """An oddity of the device that the radio process reported."""
         self.waits_for = ""
-        """What keeps it from being opened for the first time."""
+        """Why the device could not be opened for the first time yet."""
         self._before: Counter[str] = Counter()
         self._counted: Counter[str] = Counter(overflows=0, samples_lost=0)
         self.outages = 0
@@ -22,41 +22,41 @@ class DeviceStatus:
 
     @property
     def counters(self) -> dict[str, int]:
-        """The counts of all radio processes so far."""
+        """Sum of the counts of all radio processes so far."""
         total = Counter(self._before)
         total.update(self._counted)
         return dict(total)
 
     @property
     def trouble(self) -> str:
-        """Why nothing comes from it, while it is away or not there yet; else empty."""
+        """Why the device delivers nothing while it is away or not present yet; else empty."""
         if self.away:
             return f"{self.away}; it is looked for until it is back"
         return self.waits_for
 
     @property
     def told(self) -> str:
-        """The news about it, in words for people; empty where there are none."""
+        """News about the device, in words for people; empty if there are none."""
         return f"away ({self.away}), looked for until it is back" if self.away else self.notice
 
     def counted(self, report: CountersReport) -> None:
-        """Take what the process has counted; it counts from 0."""
+        """Store what the running process has counted; each process counts from 0."""
         self._counted, self.notice = Counter(report.counters), report.notice
 
     def waits(self, reason: str) -> None:
-        """Note what keeps the device from being opened; no reason: what is known already."""
+        """Note why the device cannot be opened yet; an empty reason keeps the previous one."""
         self.waits_for = reason or self.waits_for
 
     def waits_no_more(self) -> None:
-        """Note that opening it for the first time has ended."""
+        """Note that the first opening has ended."""
         self.waits_for = ""
 
     def came_back(self) -> None:
-        """Note that the device is there again."""
+        """Note that the device is present again."""
         self.away = ""
 
     def went(self, reason: str) -> bool:
-        """Note that the device is gone; False where that is known already."""
+        """Note that the device is gone; False if that is already known."""
         if self.away:
             return False
         self.away = reason

@@ -1,18 +1,18 @@
-"""What drivers print: kept from the daemon's screen, and the last of it told where it matters."""
+"""Output of drivers: kept off the daemon's screen; its end is reported when a driver fails."""
 
 import os
 import threading
 from collections import deque
 
 DEBUG = "SDRLINKD_DEBUG"
-"""With this in the environment all of it is shown."""
+"""Environment variable that shows all output of drivers."""
 KEPT = 20
 _PIECE = 4096
 _JOIN_S = 0.5
 
 
 class DriverLog:
-    """A pipe for a process's output, read by a thread of its own until the process has ended."""
+    """A pipe for a process's output, read by its own thread until the process has ended."""
 
     def __init__(self) -> None:
         self._lines: deque[str] = deque(maxlen=KEPT)
@@ -22,16 +22,16 @@ class DriverLog:
 
     @property
     def fd(self) -> int | None:
-        """The descriptor that the process is to write to; None: where we do."""
+        """The descriptor for the process to write to; None: the same as ours."""
         return None if self._shown else self._write_fd
 
     def begin(self) -> None:
-        """Read from now on: the process has its end of the pipe."""
+        """Start to read; the process now has its end of the pipe."""
         os.close(self._write_fd)
         self._thread.start()
 
     def last_line(self) -> str:
-        """The last line that was printed, or empty; the process has ended."""
+        """The last line that the ended process printed, or empty."""
         self._thread.join(_JOIN_S)
         return next((line for line in reversed(self._lines) if line), "")
 
@@ -40,7 +40,7 @@ class DriverLog:
         while piece := os.read(self._read_fd, _PIECE):
             *lines, rest = (rest + piece.decode(errors="replace")).split("\n")
             self._lines.extend(line.strip() for line in lines)
-            # Some drivers print a letter now and then, and never a line's end.
+            # Some drivers print single letters and never a newline.
             rest = rest[-_PIECE:]
         self._lines.append(rest.strip())
         os.close(self._read_fd)

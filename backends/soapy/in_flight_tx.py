@@ -1,4 +1,4 @@
-"""Bursts handed to a radio process, until it has answered and their end was heard, too."""
+"""Bursts handed to a radio process, until it has answered and the stream has passed their end."""
 
 import asyncio
 
@@ -8,7 +8,7 @@ from backends.soapy.protocol import TxDone
 
 
 class InFlightTx:
-    """The bursts on their way, by number. Used on the event loop, but for `is_due`."""
+    """The pending bursts by number. Only `is_due` may be called outside the event loop."""
 
     def __init__(self) -> None:
         self._waiting: dict[int, tuple[TxReport, asyncio.Future[TxReport]]] = {}
@@ -18,18 +18,18 @@ class InFlightTx:
         self.counters = {"late": 0, "underflows": 0}
 
     def next_number(self) -> int:
-        """The number of the next burst; each is given once."""
+        """Return the number of the next burst; no number is used twice."""
         self._number += 1
         return self._number
 
     def wait(self, number: int, start: int, n: int) -> asyncio.Future[TxReport]:
-        """The report to come of burst `number`, whose `n` samples begin at index `start`."""
+        """Register burst `number`, `n` samples at index `start`; returns its future report."""
         answer: asyncio.Future[TxReport] = asyncio.get_running_loop().create_future()
         self._waiting[number] = TxReport(TxOutcome.LOST, start, start + n), answer
         return answer
 
     def completed(self, told: TxDone, base: int) -> None:
-        """Take the process's answer, by indices that begin at `base`."""
+        """Process the answer to a burst; its indices count from `base`."""
         report = TxReport(TxOutcome(told.outcome), told.start + base, told.end + base)
         self.counters["late"] += report.outcome is TxOutcome.LATE
         self.counters["underflows"] += report.outcome is TxOutcome.UNDERFLOW
@@ -43,11 +43,11 @@ class InFlightTx:
             _answer(waiting[1], report)
 
     def is_due(self, index: int) -> bool:
-        """Whether `settle` would have something to tell; asked from any thread."""
+        """Whether `settle` would report a burst; may be called from any thread."""
         return self._first_end <= index
 
     def settle(self, index: int) -> None:
-        """Answer all bursts that ended before `index`: every sample before it was heard."""
+        """Report the bursts that ended before `index`: the stream has passed them."""
         if not self.is_due(index):
             return
         over = [each for each in self._sent if each[0].end <= index]
@@ -57,9 +57,7 @@ class InFlightTx:
             _answer(answer, report)
 
     def lose(self) -> None:
-        """Answer all bursts, for nothing more will be told: what was sent was, the rest will not
-        be.
-        """
+        """Report all bursts, as no more answers will come: those sent as sent, others as lost."""
         unsure, self._waiting = self._waiting, {}
         for report, answer in [*self._sent, *unsure.values()]:
             _answer(answer, report)

@@ -1,4 +1,4 @@
-"""A call from a thread to the event loop, which the thread waits for."""
+"""A call from a thread to the event loop; the thread waits for its end."""
 
 import asyncio
 import threading
@@ -10,7 +10,7 @@ LOOK_S = 0.1
 def on_loop(
     loop: asyncio.AbstractEventLoop | None, is_over: threading.Event, action: Callable[[], None]
 ) -> None:
-    """Have the event loop do `action`, and wait until it has, or `is_over`."""
+    """Run `action` on the event loop, and wait until it is done, or `is_over` is set."""
     done = threading.Event()
 
     def act() -> None:

@@ -1,4 +1,4 @@
-"""A radio behind SoapySDR, in a process of its own."""
+"""A radio behind SoapySDR, which runs in a process of its own."""
 
 import asyncio
 import threading
@@ -40,9 +40,9 @@ from backends.soapy.rx_assembler import RxAssembler
 from backends.soapy.settings import DeviceInfo, SoapySettings
 
 OPEN_S = 60.0
-"""Some devices load their firmware first."""
+"""Generous, because some devices load their firmware first."""
 HUNG_S = 3.0
-"""A device that says nothing for so long, beyond what it may send without listening, hangs."""
+"""A device that is silent for this long, plus its longest TX window, hangs."""
 LOOK_S = 0.1
 RETRY_S = 0.25, 2.0
 
@@ -50,8 +50,8 @@ RETRY_S = 0.25, 2.0
 class SoapyRadio:
     """The device that `settings` names; `longest_s` is the longest burst it is given.
 
-    A device that goes away is looked for until it is back; what it missed is a gap. `patience`: of
-    `open`, where it is not there.
+    After an unplug or driver crash it retries until the device returns; the missed samples become a
+    gap. `patience` says what `open` does without a device.
     """
 
     def __init__(
@@ -79,19 +79,19 @@ class SoapyRadio:
 
     @property
     def capabilities(self) -> Capabilities:
-        """What the open device can do, set as it is. Raises RuntimeError before it is open."""
+        """What the open device can do with its settings. Raises RuntimeError before it is open."""
         return self._settings.capabilities(self._known)
 
     @property
     def counters(self) -> dict[str, int]:
-        """The counts of all radio processes so far, and of bursts that were late or torn."""
+        """Counts of all radio processes so far, and of late and underflowed bursts."""
         return {
             **self._status.counters, **self._in_flight_tx.counters, "outages": self._status.outages,
         }  # fmt: skip
 
     @property
     def detail(self) -> str:
-        """The device in one line for people: what it is, and whether it is away."""
+        """The device in one line for people: its identity, and whether it is away."""
         found = self._found
         if found is None:
             return f"{self._settings.device}, not open"
@@ -105,16 +105,16 @@ class SoapyRadio:
 
     @property
     def trouble(self) -> str:
-        """Why nothing comes from the device, while it is away or not there yet."""
+        """Why the device delivers nothing while it is away or not present yet; else empty."""
         return self._status.trouble
 
     @property
     def levels(self) -> Levels | None:
-        """How strong the samples are as the device delivers them; None before the first look."""
+        """Level of the samples as the device delivers them; None before the first measurement."""
         return self._assembler.meter.levels
 
     async def open(self, tuning: Tuning) -> None:
-        """Start the process and open the device. Raises BackendError."""
+        """Start the radio process and open the device. Raises BackendError."""
         self._loop = asyncio.get_running_loop()
         self._rate_hz = tuning.rate_hz
         self._settings = msgspec.structs.replace(
@@ -138,7 +138,7 @@ class SoapyRadio:
         )
 
     async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
-        """What the antenna hears. Raises BackendError when the device will not have us any more."""
+        """Yield what the antenna receives. Raises BackendError when a return is refused."""
         self._assembler.is_heard_at_once = hear is not None
         if self._child is not None:
             self._assembler.begin(self._child.rx, self._rate_hz)
@@ -154,7 +154,7 @@ class SoapyRadio:
             self._in_flight_tx.lose()
 
     def send(self, burst: TxBurst) -> Awaitable[TxReport]:
-        """Hand a burst to the radio process; while the device is away it is lost."""
+        """Hand a burst to the radio process; while the device is away, it is lost."""
         child, assembler = self._child, self._assembler
         lost = TxReport(TxOutcome.LOST, burst.start, burst.start)
         is_open = self._found is not None and not self._status.away and not self._is_over
@@ -172,7 +172,7 @@ class SoapyRadio:
         return self._in_flight_tx.wait(number, start, len(samples))
 
     async def close(self) -> None:
-        """End the radio process and give the device back; closing twice is fine."""
+        """End the radio process and release the device; closing twice is fine."""
         if not self._closing.is_set():
             self._closing.set()
             if self._child is not None:
@@ -188,7 +188,7 @@ class SoapyRadio:
 
     @property
     def _least_lead(self) -> int:
-        """So many samples after the last one heard, nothing can leave any more."""
+        """Lead in samples over the last one heard; a burst that starts earlier cannot be sent."""
         if not self._known.timestamped_tx:
             return 0
         return round(0.5 * self._settings.lead_s * self._rate_hz)
@@ -198,7 +198,7 @@ class SoapyRadio:
         return RadioChild(self._settings, rx, tx, patience)
 
     def _opened(self, child: RadioChild) -> FromProcess | None:
-        """How its opening ends; None: it hangs, or we close. What it waits for is our trouble."""
+        """Wait for the outcome of opening; None: the process hangs, or the radio closes."""
         while isinstance(answer := child.next_answer(OPEN_S, self._closing), Waiting):
             self._status.waits(answer.reason)
         self._status.waits_no_more()
@@ -212,12 +212,12 @@ class SoapyRadio:
     # On the event loop.
 
     def _listen(self, child: RadioChild) -> None:
-        """Take all that the process has said so far."""
+        """Handle all messages that the process has sent so far."""
         try:
             while (answer := child.answer()) is not None:
                 self._told(child, answer)
         except EOFError:
-            # The feed's thread notices, too, and waits until it is known how it ended.
+            # The feed's thread also notices, and waits to learn how the process ended.
             self._unlisten(child)
 
     def _told(self, child: RadioChild, answer: FromProcess) -> None:
@@ -236,13 +236,13 @@ class SoapyRadio:
             self._listened = None
 
     def _went(self, child: RadioChild, reason: str) -> None:
-        """Give up what was on its way to a device that is gone."""
+        """Report the pending bursts as lost when the device is gone."""
         self._unlisten(child)
         if self._status.went(reason):
             self._in_flight_tx.lose()
 
     def _lost(self, child: RadioChild, how: str) -> None:
-        """It has ended: what it had still to say, and if that does not tell, how."""
+        """Handle the last messages of an ended process; `how` is the reason if they give none."""
         self._listen(child)
         self._went(child, how)
 
@@ -274,7 +274,7 @@ class SoapyRadio:
         return None
 
     def _reopen(self, lost: RadioChild) -> RadioChild | None:
-        """Until the device is back; None: we close before. Raises RefusalError, BackendError."""
+        """Retry until the device is back; None: closing. Raises RefusalError, BackendError."""
         how = lost.how_it_ended()
         on_loop(self._loop, self._closing, partial(self._lost, lost, how))
         lost.end()

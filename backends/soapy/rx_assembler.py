@@ -1,4 +1,4 @@
-"""What a radio process heard, as blocks on one index that outlives it."""
+"""Assembles what radio processes receive into blocks on one index that outlives each process."""
 
 import time
 from collections import deque
@@ -19,9 +19,9 @@ SLOW = "the daemon was too slow"
 
 
 class RxAssembler:
-    """Joins chunks of all radio processes. Used on the feed's thread, but for what is only read.
+    """Joins the chunks of all radio processes. Other threads than the feed's only read it.
 
-    Where blocks are heard at once, their samples lie in shared memory until the next is asked for.
+    If blocks are heard on the thread, their samples stay in shared memory until the next request.
     """
 
     def __init__(self, removes_dc: bool) -> None:
@@ -33,12 +33,12 @@ class RxAssembler:
         self._ahead: deque[RxBlock] = deque()
         self.is_heard_at_once = False
         self.next_index = 0
-        """The index behind the last sample heard."""
+        """Index after the last sample heard."""
         self.base = 0
-        """The index of the process's first sample."""
+        """Index of the current process's first sample."""
 
     def begin(self, ring: SampleRing, rate_hz: float) -> None:
-        """Go on with a process that has opened the device; what was missed is known by time."""
+        """Continue with a new process that has opened its device; our clock measures the gap."""
         self._rate_hz, self._done = rate_hz, ring.tail
         now_ns = time.monotonic_ns()
         if self._last_ns:
@@ -47,11 +47,11 @@ class RxAssembler:
 
     @property
     def quiet_s(self) -> float:
-        """How long nothing came, in s."""
+        """Time in s since the last chunk."""
         return 1e-9 * (time.monotonic_ns() - self._last_ns)
 
     def next(self, child: RadioChild, within_s: float) -> RxBlock | None:
-        """The next block, if one comes in time. Raises EOFError when none will."""
+        """The next block, if one comes in time. Raises EOFError when no more can come."""
         if self._ahead:
             return self._ahead.popleft()
         child.rx.tail = self._done
@@ -63,12 +63,12 @@ class RxAssembler:
         self.next_index, self._last_ns = index + chunk.n, time.monotonic_ns()
         if index <= begin:
             return block
-        # The process had no room for what lies between.
+        # The process had no room for the samples in between.
         self._ahead.append(block)
         return RxBlock(begin, index - begin, None, SLOW, chunk.host_ns)
 
     def gap(self, reason: str, found: DeviceInfo) -> RxBlock:
-        """The gap up to where the process that is there now begins."""
+        """The gap up to the first sample of the current process."""
         begin, self.next_index = self.next_index, self.base
         unsure = round(found.receives_in_s * self._rate_hz)
         return RxBlock(begin, self.base - begin, None, reason, self._last_ns, unsure)

@@ -1,4 +1,4 @@
-"""ZeroMQ sockets at endpoints that people write."""
+"""ZeroMQ sockets at endpoints that users configure."""
 
 import zmq
 
@@ -10,7 +10,7 @@ Socket = zmq.Socket[bytes]
 def open_endpoint(
     context: zmq.Context[Socket], kind: int, endpoint: str, key: str, binds: bool, ahead: int
 ) -> Socket:
-    """A socket; as czmq has it, @ before an endpoint binds, > connects; without, `binds`.
+    """Open a socket; a leading @ binds, > connects (as in czmq), otherwise `binds` decides.
 
     At most `ahead` messages wait in it. Raises BackendError that cites `key`.
     """

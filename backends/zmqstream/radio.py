@@ -28,17 +28,17 @@ from backends.zmqstream.sockets import Pattern, Sink, Source, open_sink, open_so
 
 LOOK_MS = 20
 QUIET_S = 0.25
-"""A paced peer from which nothing comes for so long is not there."""
+"""A paced peer that sends nothing for this long counts as absent."""
 WILD = 1e3
-"""No radio's samples are so large; those of another type, taken for floats, are."""
+"""Samples beyond this are taken as a wrong item type: no radio's samples are so large."""
 NOT_THERE = "nothing comes from the peer"
 
 
 class ZmqRadio:
-    """Sends at `send` and receives at `receive`, which GNU Radio's sinks and sources name alike.
+    """Sends at `send` and receives at `receive`; GNU Radio's sinks and sources use the same names.
 
-    For every sample received one is sent, `lead_s` ahead: nothing piles up, whoever sets the pace.
-    While a `paced` peer is away, both go on by the clock.
+    For every sample received one is sent, `lead_s` ahead, so nothing piles up, whoever sets the
+    pace. While a `paced` peer is absent, both directions run in real time.
     """
 
     def __init__(self, params: ZmqParams, block_s: float) -> None:
@@ -55,7 +55,7 @@ class ZmqRadio:
         self._outstanding = Outstanding()
         self._feed = BlockFeed(self._next_block, "zmq", self._outstanding.is_due)
         self._closing = threading.Event()
-        # The next sample to be sent and the bursts laid down belong together.
+        # The next sample to send and the bursts on the line must change together.
         self._lock = threading.Lock()
         self._received = self._sent = 0
         self._pieces: list[Samples] = []
@@ -72,7 +72,7 @@ class ZmqRadio:
 
     @property
     def capabilities(self) -> Capabilities:
-        """Indices count samples: where a peer loses some, nobody can know."""
+        """What this radio can do. Indices count samples: a loss in the peer goes unnoticed."""
         return Capabilities(
             receives=True,
             transmits=True,
@@ -93,12 +93,12 @@ class ZmqRadio:
 
     @property
     def trouble(self) -> str:
-        """While the peer sends nothing, or nothing that can be read."""
+        """Why nothing comes: the peer sends nothing, or nothing readable; else empty."""
         return self._notice if self._is_bad or self._notice == NOT_THERE else ""
 
     @property
     def levels(self) -> Levels | None:
-        """How strong the blocks so far were; None before the first look."""
+        """Level of the blocks so far; None before the first measurement."""
         return self._feed.levels
 
     async def open(self, tuning: Tuning) -> None:
@@ -116,12 +116,12 @@ class ZmqRadio:
         self._is_open = True
 
     def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
-        """The samples that the peer sends, as blocks."""
+        """Yield the samples that the peer sends."""
         self._last_ns = time.monotonic_ns()
         return self._outstanding.blocks(self._feed, hear)
 
     def send(self, burst: TxBurst) -> Awaitable[TxReport]:
-        """Lay a burst on the line of samples to be sent."""
+        """Put a burst on the line of samples to send."""
         if not self._is_open:
             return answered(TxReport(TxOutcome.LOST, burst.start, burst.start))
         with self._lock:
@@ -141,7 +141,7 @@ class ZmqRadio:
         self._context.destroy(linger=0)
         self._outstanding.lose()
 
-    # In the feed's thread.
+    # On the feed's thread.
 
     def _next_block(self) -> RxBlock | None:
         source, sink = self._source, self._sink
@@ -152,7 +152,7 @@ class ZmqRadio:
             if self._have >= self._n:
                 return self._block(self._have - self._have % self._n)
             if self._gap:
-                # What came before it is told first.
+                # The samples before the gap come first.
                 return self._block(self._have) if self._have else self._missing()
             data = source.next()
             if data is not None:
@@ -162,7 +162,7 @@ class ZmqRadio:
         return None
 
     def _take(self, data: bytes) -> None:
-        """Samples of a message; what cannot be any is a gap of the same length."""
+        """Take the samples of a message; an unreadable message becomes a gap of the same length."""
         self._last_ns = time.monotonic_ns()
         if len(data) % self._type.size:
             self._refuse(
@@ -173,7 +173,7 @@ class ZmqRadio:
             return
         samples = self._type.decode(data)
         parts = samples.view(np.float32)
-        # Not smaller: that holds for NaN, too.
+        # Written with `not` to catch NaN, too.
         if len(parts) and not max(parts.max(), -parts.min()) < WILD:
             self._refuse(
                 len(samples),
@@ -193,7 +193,7 @@ class ZmqRadio:
         self._gap += max(1, n)
 
     def _block(self, n: int) -> RxBlock:
-        """Of all that is there, as one: who is late gets fewer, larger ones."""
+        """Make one block of the first `n` waiting samples: a late reader gets larger blocks."""
         whole = np.concatenate(self._pieces)
         self._pieces, self._have = [whole[n:]] if self._have > n else [], self._have - n
         return self._heard(RxBlock(self._received, n, whole[:n], "", self._last_ns))
@@ -210,7 +210,7 @@ class ZmqRadio:
         return block
 
     def _wait(self) -> None:
-        """Without a peer that sets the pace, the clock does."""
+        """Let the clock set the pace while the peer does not."""
         silent_ns = time.monotonic_ns() - self._last_ns
         if not self._paced or silent_ns < QUIET_S * 1e9:
             return
@@ -220,14 +220,14 @@ class ZmqRadio:
         self._gap += round(1e-9 * silent_ns * self._rate_hz)
 
     def _emit(self, sink: Sink) -> None:
-        """As much as was received, and the lead."""
+        """Send as many samples as were received, plus the lead."""
         while True:
             if self._unsent and not sink.send(self._unsent):
                 return
             self._unsent = b""
             ahead = self._received + self._lead - self._sent
             if ahead > 2 * self._lead:
-                # Nobody took it: what was to be sent at that time is not any more.
+                # Nobody took these samples: their time has passed, so they are dropped.
                 self.counters["skips"] += 1
                 self._next_samples(ahead - self._lead)
                 continue

@@ -1,4 +1,4 @@
-"""Samples in and out by the three patterns of gr-zeromq; bytes only."""
+"""Samples in and out by the three socket patterns of gr-zeromq; handles bytes only."""
 
 import struct
 from typing import Literal, Protocol
@@ -11,32 +11,32 @@ Pattern = Literal["push", "pub", "req"]
 NOBLOCK = int(zmq.NOBLOCK)
 _COUNT = struct.Struct("<I")
 WAITING = 16
-"""Requests that may wait for a peer."""
+"""Number of requests that may wait for a peer."""
 
 
 class Source(Protocol):
-    """The socket that samples come from."""
+    """The socket that samples are read from."""
 
     socket: Socket
 
     def next(self) -> bytes | None:
-        """The next message, if one is there."""
+        """Return the next message, or None if none is waiting."""
 
 
 class Sink(Protocol):
-    """The socket that samples go to."""
+    """The socket that samples are written to."""
 
     socket: Socket
 
     def wanted(self, have: int) -> int:
-        """How many of `have` samples the peer takes in one message now."""
+        """How many of `have` samples the peer accepts in one message now."""
 
     def send(self, data: bytes) -> bool:
-        """Hand over a message; False when there is no room for it after all."""
+        """Send a message; False when there is no room for it after all."""
 
 
 def open_source(context: zmq.Context[Socket], pattern: Pattern, endpoint: str) -> Source:
-    """A PULL, SUB or REQ socket. Raises BackendError."""
+    """Open a PULL, SUB or REQ socket. Raises BackendError."""
     kind = {"push": zmq.PULL, "pub": zmq.SUB, "req": zmq.REQ}[pattern]
     socket = open_endpoint(context, kind, endpoint, "zmq.receive", binds=False, ahead=WAITING)
     if pattern == "pub":
@@ -45,14 +45,14 @@ def open_source(context: zmq.Context[Socket], pattern: Pattern, endpoint: str) -
 
 
 def open_sink(context: zmq.Context[Socket], pattern: Pattern, endpoint: str, ahead: int) -> Sink:
-    """A PUSH, PUB or REP socket; at most `ahead` messages wait in it. Raises BackendError."""
+    """Open a PUSH, PUB or REP socket; at most `ahead` messages wait in it. Raises BackendError."""
     kind = {"push": zmq.PUSH, "pub": zmq.PUB, "req": zmq.REP}[pattern]
     socket = open_endpoint(context, kind, endpoint, "zmq.send", binds=True, ahead=ahead)
     return _Answering(socket) if pattern == "req" else _Telling(socket)
 
 
 class _Listening:
-    """PULL or SUB. Of several parts, samples are the last; before them is gr-zeromq's key."""
+    """A PULL or SUB socket; samples are the last part of a message, behind gr-zeromq's key."""
 
     def __init__(self, socket: Socket) -> None:
         self.socket = socket
@@ -65,7 +65,7 @@ class _Listening:
 
 
 class _Asking(_Listening):
-    """REQ: GNU Radio's rep_sink wants the number of items, srsRAN takes whatever is asked."""
+    """A REQ socket: GNU Radio's rep_sink expects the number of items, srsRAN takes any request."""
 
     MOST = 4096
 
@@ -89,7 +89,7 @@ class _Asking(_Listening):
 
 
 class _Telling:
-    """A sink that sends without being asked, by PUSH or PUB."""
+    """A sink that sends without a request, by PUSH or PUB."""
 
     def __init__(self, socket: Socket) -> None:
         self.socket = socket
@@ -106,7 +106,7 @@ class _Telling:
 
 
 class _Answering:
-    """REP. Four bytes ask for so many items (GNU Radio), one byte for some (srsRAN)."""
+    """A REP socket: four bytes request a number of items (GNU Radio), one byte any (srsRAN)."""
 
     def __init__(self, socket: Socket) -> None:
         self.socket = socket

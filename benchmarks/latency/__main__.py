@@ -1,4 +1,4 @@
-"""Latency beside MAVLink and XRCE-DDS.
+"""Latency compared with MAVLink and XRCE-DDS.
 
 `python -m benchmarks.latency [--quick] [--json] [--no-peers]`.
 
@@ -17,7 +17,7 @@ from benchmarks.report import Drawing, Row, main
 
 
 def measure(seed: int, quick: bool, no_peers: bool = False) -> Iterator[Row | Drawing]:
-    """The rows of the paper's table, of clocks and of ages."""
+    """Measure the rows of the paper's table, of clocks and of ages."""
     seconds, passes = (3.0, 1) if quick else (15.0, 3)
     beside = () if no_peers else rows.BESIDE
     found = rows.sessions(seed, seconds, passes, of=rows.OURS if no_peers else rows.TOLD)

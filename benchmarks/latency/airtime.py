@@ -1,4 +1,4 @@
-"""How much of the air CLOCKs and RECEIPTs take, with five robots."""
+"""Share of the air that CLOCKs and RECEIPTs take, with five robots."""
 
 from collections.abc import Iterable, Iterator
 from random import Random
@@ -27,14 +27,14 @@ PDU_SIZE = 1024
 REGISTRY = make_registry([("odom", "nav_msgs/Odometry"), ("cmd", "geometry_msgs/Twist")])
 ODOM, CMD = range(2)
 SETTLING_S = 10.0
-"""Until everybody knows how many they are."""
+"""Time until every robot knows the number of robots."""
 CMD_HZ = 2.0
-"""With a receipt from everybody."""
+"""Rate of commands, each with a receipt from every robot."""
 ODOM_SIZE, CMD_SIZE = 700, 52
 
 
 class Case(NamedTuple):
-    """A channel; `odom_hz`: what each robot sends besides."""
+    """A channel; `odom_hz`: rate of each robot's other messages."""
 
     rate_hz: float
     mcs: int
@@ -42,7 +42,7 @@ class Case(NamedTuple):
 
 
 class Share(NamedTuple):
-    """In percent of the time, and seconds between a robot's CLOCKs in PDUs with nothing else."""
+    """Airtime shares in percent; `period_s`: between CLOCKs in PDUs of their own, on average."""
 
     control_pct: float
     all_pct: float
@@ -55,7 +55,7 @@ SLOW = Case(1e6, 1, 0.5)
 
 
 def measure(case: Case, seed: int, seconds: float) -> Share:
-    """By mini-slots, half duplex, as daemons are configured."""
+    """Measure with mini-slots, half duplex, as daemons are configured."""
     air = AirParams(rate_hz=case.rate_hz, snr_db=25.0, block_s=0.001)
     modem = ModemParams(rate_hz=case.rate_hz, mcs=case.mcs, block_s=air.block_s)
     robots = range(1, ROBOTS + 1)
@@ -96,7 +96,7 @@ def measure(case: Case, seed: int, seconds: float) -> Share:
 
 
 def _sent_s(links: Iterable[Link], now: float) -> tuple[float, float]:
-    """Airtime up to `now`, in s: (PDUs with nothing but records, all bursts)."""
+    """Airtime up to `now`, in s: (PDUs with records only, all bursts)."""
     reports = [link.report(now) for link in links]
     return sum(each.control_airtime_s for each in reports), sum(each.airtime_s for each in reports)
 

@@ -1,7 +1,7 @@
-"""Two daemons by the clock: what they say of each other's host, and of messages' ages.
+"""Two daemons in real time: their estimates of each other's host clock, and of messages' ages.
 
-Their radios' sample counts begin at different times and run at different rates; the hosts' clocks
-are one and the same, so whatever offset they tell is their error.
+Their radios' sample counts start at different times and run at different rates. Both use the same
+host clock, so any offset that they estimate is an error.
 """
 
 import struct
@@ -15,7 +15,7 @@ from sdrlinkd.client import ControlClient, Publisher, Subscriber
 
 AIR = Air(rate_hz=1e6, mcs=1, pdu_size=512, share=0.5)
 LOAD = 0.3
-"""Of the air, both robots together."""
+"""Share of the air that both robots use together."""
 SETTLING_S = 5.0
 EACH_S = 0.1
 CDR = b"\0\1\0\0"
@@ -28,11 +28,11 @@ class Found(NamedTuple):
     offsets_s: np.ndarray
     ages_s: np.ndarray
     within: float
-    """The share of offsets within their bounds."""
+    """Share of offsets within their bounds."""
 
 
 def measure(hz: float, seconds: float, airtime_s: float) -> Found:
-    """CLOCKs at `hz`; `airtime_s`: of a burst with one message."""
+    """Measure with CLOCKs at `hz`; `airtime_s` is that of a burst with one message."""
     offsets, ages, good = [], [], 0
     period_s = 2 * airtime_s / LOAD
     with running(AIR._replace(clock_s=1 / hz), [1, 2], ["load"]) as daemons:

@@ -1,7 +1,8 @@
-"""The Pound paper's control loop with and without knowing how late things are (its future work).
+"""The Pound paper's control loop with and without correction for latency (its future work).
 
-The circuit of its section VI-G; what the controller hears is as old as a link makes it. Corrected,
-it computes from the age where the plant is by now, and will be when its answer gets there.
+The circuit is that of section VI-G; the controller's input is as old as a link makes it. With
+correction, the age tells the controller the plant's present state, and its state when the answer
+arrives.
 """
 
 import numpy as np
@@ -13,7 +14,7 @@ LEAST_S = 0.002
 
 
 def draw_s(rng: np.random.Generator, mean_s: float, n: int) -> NDArray[np.float64]:
-    """One-way latencies: at least 2 ms, the rest exponential."""
+    """Draw one-way latencies: at least 2 ms, the rest exponential."""
     return LEAST_S + rng.exponential(max(mean_s - LEAST_S, 0.0), n)
 
 
@@ -28,7 +29,7 @@ def run_loop(delays_s: NDArray[np.float64], ticks: int, *, corrected: bool) -> N
         now = k * PERIOD_S
         arrived = [each for each in answers if each[0] <= now]
         if arrived:
-            # The newest is what counts, in whatever order they came.
+            # Only the newest counts, whatever the order of arrival.
             held = max(arrived, key=lambda each: each[1])[2]
             answers = [each for each in answers if each[0] > now]
         vc[k] = x[0]
@@ -36,7 +37,7 @@ def run_loop(delays_s: NDArray[np.float64], ticks: int, *, corrected: bool) -> N
         there_s, back_s = delays_s[k]
         y = x.copy()
         if corrected:
-            # So many periods later the answer is in force.
+            # Number of periods until the answer takes effect.
             ahead = int(np.ceil((there_s + back_s) / PERIOD_S)) - 1
             for i in range(ahead):
                 y = a @ y + b * sent[max(0, k - i)]
@@ -46,7 +47,7 @@ def run_loop(delays_s: NDArray[np.float64], ticks: int, *, corrected: bool) -> N
 
 
 def rms_mv(seed: int, mean_s: float, seconds: float, runs: int, *, corrected: bool) -> float:
-    """Root mean square of the difference to the local run, in mV, over all runs."""
+    """RMS difference to the local run, in mV, over all runs."""
     ticks = round(seconds / PERIOD_S)
     rng = np.random.default_rng(seed)
     local, squares = local_loop(ticks), []

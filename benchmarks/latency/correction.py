@@ -1,4 +1,4 @@
-"""From stamps to latencies: as the paper corrects them, and as they are (Equations 10 and 11)."""
+"""From stamps to latencies: as the paper corrects them, and the true ones (Equations 10 and 11)."""
 
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ Seconds = NDArray[np.float64]
 
 
 class Stamps(NamedTuple):
-    """What the receiver of one direction has written down."""
+    """What the receiver of one direction has recorded."""
 
     heard: NDArray[np.float64]
     """`[n, 4]`: topic, number, created (s, the sender's clock), arrived (s, the receiver's)."""
@@ -25,28 +25,28 @@ class Offsets(NamedTuple):
     """A filter's estimates of local minus remote time, in s."""
 
     at: Seconds
-    """When each began to hold, by the local clock."""
+    """Times from which each estimate holds, by the local clock."""
     offset_s: Seconds
-    """NaN until converged."""
+    """The estimates; NaN until converged."""
 
 
 class Direction(NamedTuple):
-    """One way's messages, without those of the warm-up."""
+    """One direction's messages, without those of the warm-up."""
 
     corrected_s: Seconds
-    """Of those heard: difference of stamps minus the estimated offset; NaN until it converged."""
+    """Latencies by stamps minus the estimated offset; NaN until it converged."""
     true_s: Seconds
-    """Of the same, by the machine's clock."""
+    """True latencies of the same messages, by the machine's clock."""
     n_sent: int
     n_heard: int
     filter_error_s: Seconds
     """Estimated minus true offset at each exchange after the warm-up."""
     stamps: Stamps
-    """All there are, for other filters."""
+    """All stamps, for other filters."""
 
 
 def estimate(exchanges: NDArray[np.float64]) -> Offsets:
-    """By the paper's filter. A reply's two remote stamps are one: the moment between them."""
+    """Estimate offsets with the paper's filter, given the middle of a reply's remote stamps."""
     paper = PaperFilter()
     offsets = np.full(len(exchanges), np.nan)
     for i, (t1, t2, t3, t4) in enumerate(exchanges):
@@ -57,7 +57,7 @@ def estimate(exchanges: NDArray[np.float64]) -> Offsets:
 
 
 def direction(sender: Job, receiver: Job, stamps: Stamps) -> Direction:
-    """What the receiver could compute, and what is true."""
+    """What the receiver could compute, and the truth."""
     counted = stamps.heard[stamps.heard[:, 1] >= sender.n_warmup]
     created, arrived = counted[:, 2], counted[:, 3]
     offsets = estimate(stamps.exchanges)
@@ -78,7 +78,7 @@ def direction(sender: Job, receiver: Job, stamps: Stamps) -> Direction:
 
 
 def _true(shown: Seconds, clock: Clock) -> Seconds:
-    """The machine's time when this clock shows that, in s."""
+    """The machine's time in s at which `clock` shows `shown`."""
     return (shown - clock.offset_s) / clock.rate
 
 

@@ -1,4 +1,4 @@
-"""115 bytes 200 times a second each way by the air's own time: links and modems in one process."""
+"""115 bytes 200 times per second each way, in the air's time: links and modems in one process."""
 
 import asyncio
 import struct
@@ -29,11 +29,11 @@ class LockStep(NamedTuple):
     latencies_s: np.ndarray
     age_errors_s: np.ndarray
     airtime_s: float
-    """Of a burst with one PDU."""
+    """Airtime of a burst with one PDU."""
 
 
 class _Stamped(Station):
-    """Remembers how late messages came by the air's time, and by their age."""
+    """A station that records the latency of messages in the air's time, and by their age."""
 
     def __init__(self, *arguments: object, pace: float, **more: object) -> None:
         super().__init__(*arguments, **more)  # type: ignore[arg-type]
@@ -42,7 +42,7 @@ class _Stamped(Station):
         self.errors_s: list[float] = []
 
     def heard(self, pdus: Sequence[Heard]) -> None:
-        """Take PDUs from the air, and note how late their messages are."""
+        """Take PDUs from the air, and record the latency of their messages."""
         now = self.modem.now()
         for data, at, snr_db, ended_at in pdus:
             for message in self.link.hear(data, at, snr_db, now, ended_at):
@@ -61,7 +61,7 @@ def airtime_s() -> float:
 
 
 def measure(seed: int, seconds: float, size: int = 115, rate_hz: float = 200.0) -> LockStep:
-    """Between two full-duplex radios at 5 Msps."""
+    """Measure between two full-duplex radios at 5 Msps."""
     modem = ModemParams(rate_hz=AIR.rate_hz, mcs=AIR.mcs, block_s=BLOCK_S)
     stations = asyncio.run(_run(seed, seconds, size, rate_hz, modem))
     return LockStep(
@@ -81,7 +81,7 @@ async def _run(
     def make(node: int, radio: object) -> _Stamped:
         phase_s, pace = rng.uniform(0, 1 / rate_hz), 1 + 1e-6 * PPM[node]
         times = phase_s + np.arange(round(seconds * rate_hz)) / rate_hz
-        # The link counts by its own crystal.
+        # The link counts time by its own crystal.
         arrivals = [
             Arrival(float(at * pace), DATA, CDR + _AT.pack(at) + rng.bytes(size - 12))
             for at in times

@@ -1,4 +1,4 @@
-"""Rows: the paper's Table 3 as an emulation, and what clocks and ages are good for."""
+"""Rows: the paper's Table 3 as an emulation, and the quality of clocks and ages."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
@@ -18,7 +18,7 @@ from sdrlinkd.modem import Airtimes
 OURS = ("direct", "ether")
 TOLD = ("mavlink", "mavros", "xrce", *OURS)
 BESIDE = ("mavlink", "xrce")
-"""Those that are measured under stress and with more topics, too."""
+"""Peers that are also measured under stress and with more topics."""
 PAPER_MS = {
     ("xrce", "fwd"): (1.329, 0.162),
     ("xrce", "bwd"): (1.752, 0.315),
@@ -28,7 +28,7 @@ PAPER_MS = {
 """Table 3: mean and standard deviation; its MAVLink is the one with MAVROS."""
 TARGET_MS = {"direct": (1.33, 0.16)}
 ANY_MS = 1e3
-"""Peers, and what only beyond the airtime has a target."""
+"""Limit for rows without a real target: peers, and totals of which only a part has one."""
 SHARE_PCT = 2.0
 
 
@@ -41,7 +41,7 @@ def sessions(
     n_topics: int = 1,
     of: Iterable[str] = TOLD,
 ) -> dict[str, list[Session]]:
-    """Every peer's passes, as many as it could do."""
+    """All passes of each peer that can run."""
     found = defaultdict[str, list[Session]](list)
     for name in of:
         with attempt(name):
@@ -53,12 +53,12 @@ def sessions(
 
 
 def ways(session: Session) -> dict[str, Direction]:
-    """Companion to FCU, and back."""
+    """The two directions: companion to FCU, and back."""
     return {"fwd": session.forward, "bwd": session.backward}
 
 
 def table(found: dict[str, list[Session]]) -> Iterator[Row]:
-    """Mean and standard deviation each way, medians of the passes."""
+    """Mean and standard deviation each way, as medians of the passes."""
     for name, passes in found.items():
         for way in ("fwd", "bwd"):
             each = [ways(session)[way] for session in passes]
@@ -80,7 +80,7 @@ def table(found: dict[str, list[Session]]) -> Iterator[Row]:
 
 
 def load(found: dict[str, list[Session]]) -> Iterator[Row]:
-    """Processor and memory, of everything between the two programs and of those."""
+    """CPU time and memory of everything between the two programs, and of the programs."""
     for what, unit in (("cpu_share", "cores"), ("rss_mib", "MiB")):
         totals = {
             name: median(sum(getattr(each, what).values()) for each in passes)
@@ -93,7 +93,7 @@ def load(found: dict[str, list[Session]]) -> Iterator[Row]:
 
 
 def beyond_air(found: dict[str, list[Session]]) -> Iterator[Row]:
-    """What the ether's messages take besides the air; by the machine's clock."""
+    """Latency of messages over the ether in excess of the airtime, in real time."""
     if "ether" not in found:
         return
     air_ms = 1e3 * lockstep.airtime_s()
@@ -107,7 +107,7 @@ def beyond_air(found: dict[str, list[Session]]) -> Iterator[Row]:
 
 
 def by_the_air(seed: int, seconds: float) -> Iterator[Row]:
-    """In lock-step: nothing but what the protocol does."""
+    """Latency in lock-step: only what the protocol adds."""
     found = lockstep.measure(seed, seconds)
     late_ms, n = 1e3 * found.latencies_s, len(found.latencies_s)
     yield Row("ether_115B_200hz_lockstep_std_ms", float(late_ms.std()), "ms", 0.08, "less",
@@ -116,7 +116,7 @@ def by_the_air(seed: int, seconds: float) -> Iterator[Row]:
 
 
 def by_the_clock(seconds: float) -> Iterator[Row]:
-    """Two daemons: what they know of each other."""
+    """Two daemons in real time: the quality of their estimates of each other."""
     air = clocks.AIR
     modem = ModemParams(rate_hz=air.rate_hz, mcs=air.mcs, block_s=air.block_s)
     airtime_s = Airtimes(modem, air.pdu_size).airtime_s(air.mcs, 1)
@@ -148,7 +148,7 @@ def shares(seed: int, seconds: float) -> Iterator[Row]:
 def more_topics(
     seed: int, seconds: float, quick: bool, beside: Sequence[str] = BESIDE
 ) -> Iterator[Row]:
-    """The paper's future work: how it goes with more topics, 200 Hz each."""
+    """The paper's future work: latency with more topics, 200 Hz each."""
     peers: dict[str, float] = {}
     for n_topics in (2,) if quick else (2, 4, 7):
         for name, each in sessions(
@@ -167,7 +167,7 @@ def more_topics(
 def under_stress(
     seed: int, seconds: float, passes: int, beside: Sequence[str] = BESIDE
 ) -> Iterator[Row]:
-    """A busy program on every core."""
+    """Latency with a busy program on every core."""
     found = sessions(seed, seconds, passes, stress=True, of=(*beside, "direct"))
     means = {
         name: median(_ms(each.forward.true_s, np.mean) for each in of) for name, of in found.items()
@@ -182,7 +182,7 @@ def under_stress(
 
 
 def correction(seed: int, runs: int) -> Row:
-    """A control loop that knows how old its measurements are, beside one that does not."""
+    """A control loop that knows the age of its measurements, compared with one that does not."""
     mean_s, seconds = 0.03, 3.0
     rms = {
         corrected: control.rms_mv(seed, mean_s, seconds, runs, corrected=corrected)
@@ -194,7 +194,7 @@ def correction(seed: int, runs: int) -> Row:
 
 
 def _corrected(one: Direction) -> np.ndarray:
-    """Where the paper's filter never converged, true latencies stand for corrected ones."""
+    """Corrected latencies; true ones if the paper's filter never converged."""
     return one.corrected_s if np.isfinite(one.corrected_s).any() else one.true_s
 
 

@@ -1,4 +1,4 @@
-"""One assessment: VIO odometry to the FCU and IMU back, at the same time, between two clocks."""
+"""One session: VIO odometry to the FCU and IMU back, at the same time, between two clocks."""
 
 import json
 import time
@@ -17,27 +17,27 @@ from benchmarks.processes import busy_cores, precede, start_module, usage
 from sdrlinkd.process import Process
 
 START_S = 0.3
-"""From both ends being ready to the start."""
+"""Time from when both ends are ready to the start."""
 WARMUP_S = 6.5
-"""At 100 requests a second: more than the 500 samples that the paper's filter wants."""
+"""At 100 requests per second: more than the 500 samples that the paper's filter needs."""
 CLOCKS = {"companion": Clock(0.0, 0.0), "fcu": Clock(3.7, 20.0)}
 
 
 class Session(NamedTuple):
-    """What came of one assessment."""
+    """The outcome of one session."""
 
     forward: Direction
     """Companion computer to FCU."""
     backward: Direction
     """FCU to companion computer."""
     cpu_share: dict[str, float]
-    """Of one core, by process, after the warm-up."""
+    """Load by process after the warm-up, as a share of one core."""
     rss_mib: dict[str, float]
-    """By process, at the end."""
+    """Memory by process, at the end."""
     filter_error_s: Seconds
-    """Of both ends, one after the other."""
+    """Errors of both ends' filters, concatenated."""
     line_late_s: Seconds
-    """How much after its time the emulated line let each piece go; empty where there is none."""
+    """Delay of each piece on the emulated line beyond its due time; empty without a line."""
 
 
 def run(
@@ -51,7 +51,7 @@ def run(
     seed: int = 1,
     warmup_s: float = WARMUP_S,
 ) -> Session:
-    """Measure a peer, for so long after the warm-up. Raises PeerError and ProcessError."""
+    """Measure a peer for `seconds` after the warm-up. Raises PeerError and ProcessError."""
     if (reason := unavailable(transport_name)) is not None:
         raise PeerError(f"{transport_name}: {reason}")
     if not 1 <= n_topics <= MOST_TOPICS or size <= STAMP.size:

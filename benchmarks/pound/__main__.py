@@ -17,7 +17,7 @@ PHASES, QUICK_PHASES = 10, 2
 
 
 def measure(seed: int, quick: bool, no_peers: bool = False) -> Iterator[Row | Drawing]:
-    """The rows of all experiments of the paper."""
+    """Measure the rows of all experiments of the paper."""
     peers = [] if no_peers else beside.find(quick)
     n = tables.LASERS // 5 if quick else tables.LASERS
     flows = [
@@ -26,7 +26,7 @@ def measure(seed: int, quick: bool, no_peers: bool = False) -> Iterator[Row | Dr
         for hops in (1, 2)
     ]  # fmt: skip
     rng = np.random.default_rng(seed)
-    # Not at the beat of the loop: there, who comes first is a matter of luck.
+    # Not in phase with the loop, where the order of arrival would be a matter of luck.
     phases = list(rng.uniform(0.002, 0.018, QUICK_PHASES if quick else PHASES))
     phases = [phase + 0.02 * i for i, phase in enumerate(phases)]
     sizes = (limits.SIZES[-1],) if quick else limits.SIZES

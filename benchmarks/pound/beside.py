@@ -18,14 +18,14 @@ from benchmarks.pound.tables import by_flow
 
 QUICK = ("tcp_nodelay", "udp", "pound_like")
 FIFO = ("tcp_nagle", "tcp_nodelay", "udp", "udp_nod", "nimbro_udp", "nimbro_udp_tcp")
-"""Those without priorities."""
+"""Peers without priorities."""
 LOOP_S = 3.0
 
 T = TypeVar("T")
 
 
 def find(quick: bool) -> list[str]:
-    """Those that can run here, by name; why not the others is told."""
+    """Names of the peers that can run here; reports why the others cannot."""
     if reason := available():
         tell("the peers", reason)
         return []
@@ -41,7 +41,7 @@ def find(quick: bool) -> list[str]:
 def tables(
     peers: Sequence[str], flows: Sequence[Flow], relay: bool, seed: int
 ) -> dict[str, dict[str, Figures]]:
-    """By peer and flow: Tables I to IV."""
+    """Tables I to IV, by peer and flow."""
 
     def one(name: str) -> dict[str, Figures]:
         with network(shared=relay, relay=relay) as on:
@@ -53,12 +53,12 @@ def tables(
 def bandwidths(
     peers: Sequence[str], sizes: Sequence[int], seconds: float
 ) -> dict[str, dict[int, float]]:
-    """By peer and size, in Mbit/s: Fig. 19."""
+    """Fig. 19: Mbit/s by peer and size."""
 
     def one(name: str) -> dict[int, float]:
         found = {}
         for size in sizes:
-            # What is still on its way in one is no part of another.
+            # One network each, so that messages still in flight do not affect the next run.
             with attempt(f"{name}, bandwidth at {size} B"), network() as on:
                 found[size] = saturate(name, size, seconds, on)
         return found
@@ -67,7 +67,7 @@ def bandwidths(
 
 
 def recoveries(peers: Sequence[str]) -> dict[str, float]:
-    """By peer, in s, the later of two flows: Table V."""
+    """Table V: recovery time in s by peer, the later of two flows."""
 
     def one(name: str) -> float:
         with network() as on:
@@ -77,7 +77,7 @@ def recoveries(peers: Sequence[str]) -> dict[str, float]:
 
 
 def loops(peers: Sequence[str], phases: Sequence[float]) -> dict[str, float]:
-    """By peer, the mean RMS difference to the local run in mV: Fig. 21."""
+    """Fig. 21: mean RMS difference to the local run in mV, by peer."""
     local = local_loop(round(LOOP_S / 0.02))
 
     def one(name: str) -> float:

@@ -1,4 +1,4 @@
-"""What deciding costs: queue, classes, shares, forecasts."""
+"""The cost of scheduling decisions: queue, classes, shares, forecasts."""
 
 import binascii
 import gc
@@ -15,7 +15,7 @@ MOST = 14
 
 
 def rows(seed: int, rounds: int) -> list[Row]:
-    """Both rows of what deciding costs."""
+    """Both rows about the cost of scheduling decisions."""
     over = [_over_crc_and_join(seed + i) for i in range(rounds)]
     return [
         queue_cost_row("scheduler_cost_ratio_10_to_10000_queued", seed, rounds),
@@ -27,12 +27,12 @@ def rows(seed: int, rounds: int) -> list[Row]:
 
 
 def _over_crc_and_join(seed: int) -> float:
-    """Images in bulk, and a laser that has to be foreseen."""
+    """Cost with bulk images, and a laser whose messages have to be forecast."""
     link, rng = make_queue(seed), Random(seed)
     images = [rng.randbytes(MESSAGE) for _ in range(4)]
     laser = bytes(990)
     pdus: list[bytes] = []
-    # A topic shuffles its entry ids once.
+    # A topic shuffles its entry ids once, so that is done beforehand.
     for topic in (0, 1):
         link.submit(topic, laser, -1.0)
         first = link.next_burst(opportunity(-1.0, MOST))

@@ -1,4 +1,4 @@
-"""What `sdrlinkctl plan` says, against what happens."""
+"""Compares the forecast of `sdrlinkctl plan` with the measured outcome."""
 
 from random import Random
 
@@ -12,12 +12,12 @@ from sdrlinkd.modem import Airtimes
 from sdrlinkd.plan import Load, Plan, Setting, make_plan
 
 LEARNING = 10
-"""Messages of a topic until its beat is known."""
+"""Number of messages of a topic until its period is known."""
 CDR_OVERHEAD = 8
 
 
 def plan_of(run: Run, air: Air) -> Plan:
-    """For the flows of an experiment on an air of our own."""
+    """The plan for the flows of an experiment on an air of their own."""
     modem = ModemParams(rate_hz=RATE_HZ, mcs=MCS, max_burst_s=MAX_BURST_S)
     flows = [trace.flow for trace in run.traces]
     loads = [
@@ -39,7 +39,7 @@ def plan_of(run: Run, air: Air) -> Plan:
 
 
 def errors_pct(run: Run, air: Air) -> dict[str, float]:
-    """Of each predicted share of the air, and each worst latency."""
+    """Error of each predicted share of the air, and of each worst latency."""
     plan, simulation = plan_of(run, air), run.simulation
     used_s = simulation.stations[1].link.report(simulation.now).airtime_by_class_s
     found = {}

@@ -1,4 +1,4 @@
-"""Fig. 19 (bandwidth), Table V (recovery), and what an urgent message has to wait for."""
+"""Fig. 19 (bandwidth), Table V (recovery), and the waiting time of an urgent message."""
 
 from typing import NamedTuple
 
@@ -20,18 +20,18 @@ _KINDS = {"laser": (1024, 0.02, "latency"), "image": (65536, 0.15, "bulk")}
 
 
 def bandwidth(size: int, seconds: float, seed: int) -> float:
-    """Mbit/s of messages of `size` that come while more is offered than fits."""
+    """Mbit/s of messages of `size` that arrive while more is offered than fits."""
     period_s = 8e-6 * size / OFFERED_MBPS
     flow = Flow("bulk", size, period_s, int(seconds / period_s), "bulk")
     (trace,) = run([Sent(flow, 1, 2)], Air(), seed).traces
     heard = np.sort(trace.heard_at[~np.isnan(trace.heard_at)])
-    # From the first to the last, while the queue is never empty.
+    # From the first to the last message, while the queue is never empty.
     busy = heard[heard <= seconds]
     return 8e-6 * size * (len(busy) - 1) / float(busy[-1] - busy[0])
 
 
 class Recovery(NamedTuple):
-    """Seconds from the end of the outage until messages are fresh again, in each trial."""
+    """Time in s from the end of the outage until messages are fresh again, in each trial."""
 
     lasers_s: list[float]
     images_s: list[float]
@@ -40,7 +40,8 @@ class Recovery(NamedTuple):
 def recovery(seed: int, quick: bool) -> Recovery:
     """Two lasers (Table V), and laser and camera; the sender's radio is gone for 5 s.
 
-    Latest wins. Until the first message younger than 10 ms (image: 120 ms) after which all are.
+    Newer messages replace older ones. The time is that of the first message younger than 10 ms
+    (image: 120 ms) after which all are.
     """
     rng = np.random.default_rng(seed)
     found = Recovery([], [])

@@ -1,7 +1,7 @@
-"""Fig. 20 and 21: a control loop through our link, while 64 KB go the same way now and then.
+"""Fig. 20 and 21: a control loop over our link, with 64 KB in the same direction now and then.
 
-Plant at robot 1, controller at robot 2, both directions on one half-duplex channel. The circuit,
-the controller and the local run are those that the peers are measured with.
+The plant is at robot 1, the controller at robot 2, both directions on one half-duplex channel. The
+circuit, the controller and the local run are those of the peers' measurements.
 """
 
 import struct
@@ -44,7 +44,7 @@ TWO = Air(policy="minislot", turnaround_s=1e-4, max_burst_s=0.01, block_s=BLOCK_
 
 
 def rms_vs_local_mv(phase_s: float, seed: int, seconds: float, with_classes: bool = True) -> float:
-    """Root mean square of the difference to the local run, in mV."""
+    """RMS difference to the local run, in mV."""
     ticks = round(seconds / PERIOD_S)
     error = run_loop(phase_s, seed, ticks, with_classes) - local_loop(ticks)
     return float(1e3 * np.sqrt(np.mean(error**2)))
@@ -53,7 +53,7 @@ def rms_vs_local_mv(phase_s: float, seed: int, seconds: float, with_classes: boo
 def run_loop(
     phase_s: float, seed: int, ticks: int, with_classes: bool = True
 ) -> NDArray[np.float64]:
-    """Vc(k) in V `[ticks]`; without classes everything is one FIFO."""
+    """Vc(k) in V `[ticks]`; without classes all messages share one FIFO."""
     a, b = plant()
     x, vc = np.zeros(2), np.zeros(ticks)
     heard_u = held_u = 0.0

@@ -42,7 +42,7 @@ Listen = Callable[[int, Delivered, float], None]
 
 
 class Sent(NamedTuple):
-    """A flow, and the robots that send and receive it."""
+    """A flow with the robots that send and receive it."""
 
     flow: Flow
     src: int
@@ -50,7 +50,7 @@ class Sent(NamedTuple):
 
 
 class Air(NamedTuple):
-    """Who is there, and how the air is shared."""
+    """The robots, and how they share the air."""
 
     nodes: int = 2
     policy: str = "none"
@@ -61,28 +61,28 @@ class Air(NamedTuple):
     block_s: float = BLOCK_S
     pdu_size: int = PDU_SIZE
     routes: Mapping[int, Sequence[str]] = {}
-    """What each relay forwards."""
+    """The topics that each relay forwards."""
 
 
 class Run(NamedTuple):
-    """What came of all flows."""
+    """The outcome of all flows."""
 
     traces: list[Trace]
     simulation: Simulation
 
 
 class Experiment(NamedTuple):
-    """Robots and their traffic, about to begin."""
+    """Robots and their traffic, before the start."""
 
     sent: Sequence[Sent]
     times: list[Times]
     heard: list[Times]
     simulation: Simulation
     own_s: float
-    """Length of a burst of one PDU."""
+    """Airtime of a burst of one PDU."""
 
     def finish(self, until_s: float | None = None) -> list[Trace]:
-        """Let it pass, until everything has had time to come."""
+        """Run until everything has had time to arrive."""
         last = max((float(each[-1]) for each in self.times if len(each)), default=0.0)
         self.simulation.run(last + SETTLE_S if until_s is None else until_s)
         return [
@@ -92,12 +92,12 @@ class Experiment(NamedTuple):
 
 
 def by_class(flow: Flow) -> TopicPolicy:
-    """A policy of the flow's class, by which every message counts."""
+    """A policy for the flow's class that keeps every message."""
     return TopicPolicy(qos=flow.qos)  # type: ignore[arg-type]
 
 
 def run(sent: Sequence[Sent], air: Air, seed: int) -> Run:
-    """All flows, from producer to consumer."""
+    """Run all flows, from producer to consumer."""
     experiment = prepare(sent, air, seed)
     return Run(experiment.finish(), experiment.simulation)
 
@@ -108,7 +108,7 @@ def prepare(
     seed: int,
     policy: Callable[[Flow], TopicPolicy] = by_class,
 ) -> Experiment:
-    """An experiment with all flows, before its time begins."""
+    """Set up an experiment with all flows."""
     rng = np.random.default_rng(seed)
     names = [each.flow.name for each in sent]
     registry = make_registry([(name, "std_msgs/msg/UInt8MultiArray") for name in names])
@@ -132,7 +132,7 @@ def prepare(
 
 
 def modem_on(air: Air) -> ModemParams:
-    """The modem that every robot has."""
+    """The modem settings of every robot."""
     return ModemParams(rate_hz=RATE_HZ, mcs=MCS, max_burst_s=air.max_burst_s, block_s=air.block_s)
 
 
@@ -145,7 +145,7 @@ def simulate(
     seed: int,
     policies: Mapping[int, TopicPolicy] = NO_POLICIES,
 ) -> Simulation:
-    """Robots with links of their own; `clocks_ppm` says which."""
+    """Robots with links of their own; `clocks_ppm` lists them."""
     params = AirParams(rate_hz=RATE_HZ, block_s=air.block_s, snr_db=SNR_DB)
     radio = RadioParams(full_duplex=air.policy == "none", turnaround_s=air.turnaround_s)
     links = {}
@@ -184,7 +184,7 @@ def _arrivals(
     sent: Sequence[Sent],
     times: Sequence[Times],
 ) -> Iterator[Arrival]:
-    """Messages of one robot, in order of time; each begins with its number."""
+    """Messages of one robot in order of time; each starts with its number."""
     mine = [
         (float(at), topic_id, number)
         for topic_id, each in enumerate(sent)
@@ -192,7 +192,7 @@ def _arrivals(
         for number, at in enumerate(times[topic_id])
     ]
     for at, topic_id, number in sorted(mine):
-        # As CDR: encapsulation and the sequence's length before the bytes.
+        # CDR puts the encapsulation and the sequence's length before the bytes.
         payload = CDR + number.to_bytes(4, "little") + bytes(sent[topic_id].flow.size)
         yield Arrival(at, topic_id, payload)
 

@@ -1,4 +1,4 @@
-"""The figures: what became of the laser beside others, bandwidth, and the control loop."""
+"""The figures: the laser's outcome compared with others, bandwidth, and the control loop."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,4 +1,4 @@
-"""Our daemons, and what they are told."""
+"""Our daemons, and their configuration."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -9,7 +9,7 @@ from benchmarks import daemons
 from benchmarks.pound.ours import MCS, PDU_SIZE, RATE_HZ, SNR_DB
 
 BLOCK_S = {"loopback": 2.5e-4, "ether": 5e-4}
-"""Three programs on two cores have no time for more of them."""
+"""Block lengths; three programs on two cores have no time for shorter blocks."""
 MAX_BURST_S = 0.02
 BULK_BURST_S = 0.003
 LEAD_S = 0.001
@@ -51,7 +51,7 @@ TOPICS = ("laser", "image", "stop")
 
 
 class Ends(NamedTuple):
-    """Folders of the daemons that send and hear, and of their air."""
+    """Folders of the sending and the receiving daemon, and of their air."""
 
     sends: Path
     hears: Path
@@ -62,7 +62,7 @@ class Ends(NamedTuple):
 def running(
     backend: str, nodes: Sequence[int], outages: Sequence[tuple[float, float]] = ()
 ) -> Iterator[Ends]:
-    """Daemons that hear each other, or themselves; `outages` (begin, end) are in s of the air.
+    """Run daemons that hear each other, or themselves; `outages` (begin, end) are in s of the air.
 
     Raises PeerError.
     """

@@ -1,7 +1,7 @@
-"""The laser and the camera by the clock, on whatever this machine is.
+"""The laser and the camera in real time, on this machine.
 
-One daemon whose radio hears itself; beside it two daemons and the hub of their air, which is three
-programs on the same cores.
+Measures one daemon whose radio hears itself, and two daemons with the hub of their air, which are
+three programs on the same cores.
 """
 
 import statistics
@@ -24,13 +24,13 @@ from sdrlinkd.modem import Airtimes
 PASSES = 3
 DRAIN_S = 2.0
 BETWEEN_S = 9.5
-"""From the begin of an outage to that of the next."""
+"""Time from the start of one outage to the start of the next."""
 BEFORE_S = 1.5
 SLEEPS = 500
 
 
 def rows(seed: int, quick: bool) -> list[Row]:
-    """Those that have a target in real time: the median of several passes."""
+    """The rows with a target in real time: medians of several passes."""
     n_passes = 1 if quick else PASSES
     outages = [(i * BETWEEN_S, i * BETWEEN_S + OUTAGE_S) for i in range(1, 30)]
     with running("ether", (1, 2), outages) as ends:
@@ -62,20 +62,20 @@ def _median_of(rows: Sequence[Row]) -> Row:
 
 
 def _lateness() -> str:
-    """How late this machine wakes who sleeps."""
+    """How late this machine wakes a sleeping thread."""
     late_ms = []
     for _ in range(SLEEPS):
         began = time.monotonic()
         time.sleep(1e-3)
         late_ms.append(1e3 * (time.monotonic() - began) - 1)
     median, p99 = np.quantile(late_ms, [0.5, 0.99])
-    return f"a sleeper here wakes {median:.2f} ms late, p99 {p99:.1f} ms"
+    return f"sleeps on this machine end {median:.2f} ms late, p99 {p99:.1f} ms"
 
 
 def _recovery(
     ends: Ends, seed: int, outages: Sequence[tuple[float, float]], trials: int
 ) -> list[Row]:
-    """Table V on two daemons: the air is gone for 5 s, and nobody is told."""
+    """Table V with two daemons: the air vanishes for 5 s without notice."""
     rng = np.random.default_rng(seed)
     lasers, images = [], []
     for _ in range(trials):
@@ -92,7 +92,7 @@ def _recovery(
         traces, began = _play(ends, flows, seed)
         lasers.append(_fresh_after(traces[0], origin + end - began, FRESH_S))
         images.append(_fresh_after(traces[1], origin + end - began, FRESH_IMAGE_S))
-    note = "two daemons and a hub, whose air is gone"
+    note = "two daemons and a hub, with an outage of the air"
     return [
         Row("recovery_after_5s_outage_s_rt", max(lasers), "s", 0.2, "less", trials, note=note),
         Row("recovery_after_5s_outage_image_s_rt", float(np.mean(images)), "s", 0.5, "less",
@@ -101,7 +101,7 @@ def _recovery(
 
 
 def _fresh_after(trace: Trace, end: float, limit_s: float) -> float:
-    """From `end` until the first message that is younger than that."""
+    """Time from `end` to the first message younger than `limit_s`."""
     ages = trace.heard_at - trace.sent_at
     fresh = trace.heard_at[(trace.heard_at > end) & (ages <= limit_s)]
     return float(fresh.min() - end) if len(fresh) else float("inf")
@@ -158,7 +158,7 @@ def _median(trace: Trace) -> float:
 
 
 def _play(ends: Ends, flows: list[Flow], seed: int) -> tuple[list[Trace], float]:
-    """Publish at robot 1 by an exact clock, listen at robot 2; and when that began."""
+    """Publish at robot 1 on an exact schedule, listen at robot 2; also returns the start time."""
     rng = np.random.default_rng(seed)
     times = [flow.times(rng) for flow in flows]
     heard: dict[str, Times] = {flow.name: np.full(flow.count, np.nan) for flow in flows}

@@ -1,4 +1,4 @@
-"""Every row, with what the paper measured and what was measured beside."""
+"""All rows, with the paper's figures and those of the peers in the same run."""
 
 import math
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from benchmarks.pound.ours import Air
 from benchmarks.report import Row
 
 SIZE_64KB = 65_536
-# Tables I to IV: Pound's own rows.
+# Pound's own rows in Tables I to IV.
 POUND = {
     "laser_2n": Figures(20.0, 2.0, 4.1, 4.0, 99.8, 0.400),
     "image_2n": Figures(150.2, 2.9, 112.0, 1.9, 99.9, 3.417),
@@ -27,7 +27,7 @@ Beside = Mapping[str, Mapping[str, Figures]]
 
 
 def two_nodes(seed: int, quick: bool, peers: Beside) -> list[Row]:
-    """Tables I and II; the jittered and drifting lasers are told in notes."""
+    """Tables I and II; the notes have the lasers with jitter and drift."""
     run = tables.two_nodes(seed, quick)
     ours = tables.by_flow(run.traces)
     others = []
@@ -52,7 +52,7 @@ def two_nodes(seed: int, quick: bool, peers: Beside) -> list[Row]:
 
 
 def three_nodes(seed: int, quick: bool, peers: Beside) -> list[Row]:
-    """Tables III and IV, and section VI-H in the notes."""
+    """Tables III and IV, with section VI-H in the notes."""
     run = tables.three_nodes(seed, quick)
     laser, image = tables.by_flow(run.traces).values()
     more = {
@@ -78,7 +78,7 @@ def three_nodes(seed: int, quick: bool, peers: Beside) -> list[Row]:
 
 
 def bandwidth(seed: int, quick: bool, peers: Mapping[str, Mapping[int, float]]) -> list[Row]:
-    """Fig. 19 at its largest messages; the others in the note."""
+    """Fig. 19 at its largest messages; the other sizes are in the note."""
     seconds = 1.0 if quick else 10.0
     largest = {name: of[SIZE_64KB] for name, of in peers.items() if SIZE_64KB in of}
     found = {size: limits.bandwidth(size, seconds, seed) for size in limits.SIZES}
@@ -118,7 +118,7 @@ def control_loop(seed: int, phases: list[float], peers: Mapping[str, float]) -> 
 
 
 def urgent(seed: int, quick: bool) -> list[Row]:
-    """While 10 MB of bulk wait."""
+    """Latency of urgent messages while 10 MB of bulk wait."""
     ages, own_ms, burst_ms = limits.urgent_waits_ms(seed, quick)
     return [
         Row("urgent_p99_ms", float(np.quantile(ages, 0.99)), "ms", burst_ms + own_ms + SLACK_MS,
@@ -128,14 +128,14 @@ def urgent(seed: int, quick: bool) -> list[Row]:
 
 
 def costs(seed: int, quick: bool) -> list[Row]:
-    """The rows of what deciding costs."""
+    """The rows about the cost of scheduling decisions."""
     return cost.rows(seed, 5 if quick else 25)
 
 
 def plan(seed: int, quick: bool) -> list[Row]:
-    """Predicted against measured, the largest error.
+    """The largest error of predicted against measured figures.
 
-    The laser drifts past the camera: where its phase is a lucky one, the worst case never comes.
+    The laser drifts past the camera: at a lucky fixed phase the worst case would never occur.
     """
     run = tables.two_nodes(seed, quick, tables.DRIFTING)
     errors = errors_pct(run, Air())
@@ -145,7 +145,7 @@ def plan(seed: int, quick: bool) -> list[Row]:
 
 
 def _rest(of: Figures) -> str:
-    """What the tables have besides."""
+    """The other columns of the tables."""
     return f"Jd {of.jd_ms:.2f} ms, std {of.std_jd_ms:.2f}, {of.mbps:.3f} Mbit/s"
 
 

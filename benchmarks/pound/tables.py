@@ -16,7 +16,7 @@ KB = 1024
 IMAGE = 65536
 BLOCK_3N_S = 5e-5
 FAR_DB = 4.0
-"""Over two hops at once, the signal is felt and not read."""
+"""SNR over two hops at once: the signal is sensed but not decoded."""
 
 
 class Case(NamedTuple):
@@ -33,7 +33,7 @@ CASES = (Case("jitter_0.5ms", 5e-4), Case("jitter_2ms", 2e-3), DRIFTING)
 
 
 def flows(n_hops: int, case: Case, seed: int, quick: bool) -> tuple[Flow, Flow]:
-    """(laser, image); they begin whenever they begin."""
+    """(laser, image), with random phases."""
     rng = np.random.default_rng(seed)
     n = LASERS // 12 if quick else LASERS
     image_s = IMAGE_S if n_hops == 1 else IMAGE_3N_S
@@ -53,7 +53,7 @@ def two_nodes(seed: int, quick: bool, case: Case = EXACT) -> Run:
 
 
 def chain(n_nodes: int) -> Air:
-    """Nodes in a row that hear their neighbours; the others they only notice."""
+    """Nodes in a row that hear their neighbors; they only sense the others."""
     ids = range(1, n_nodes + 1)
     far = [
         LinkOverride(sender=a, receiver=b, snr_db=FAR_DB, one_way=False)
@@ -86,7 +86,7 @@ def four_nodes(seed: int, quick: bool) -> Run:
 
 
 def opposing(seed: int, quick: bool) -> Run:
-    """VI-H: the same traffic both ways at once, on one channel."""
+    """VI-H: the same traffic both ways at the same time, on one channel."""
     laser, image = flows(1, EXACT, seed, quick)
     slow = image._replace(period_s=0.4, count=max(3, image.count * 3 // 8))
     back = (

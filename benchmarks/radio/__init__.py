@@ -1,1 +1,1 @@
-"""Daemons on radios by SoapySDR, in real time, on the test radio of tests/soapy_loopback."""
+"""Daemons on radios through SoapySDR, in real time, on the test radio of tests/soapy_loopback."""

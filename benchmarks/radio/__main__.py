@@ -1,8 +1,8 @@
-"""Radios by SoapySDR in real time: `python -m benchmarks.radio [--quick] [--json]`.
+"""Radios through SoapySDR in real time: `python -m benchmarks.radio [--quick] [--json]`.
 
-The radio is the driver of tests/soapy_loopback, whose antenna is shared memory. It has the ways of
-a USRP or a HackRF, but neither USB nor firmware, and its driver computes in the radio process what
-a device would do by itself. 2 where it cannot be compiled.
+The radio is the driver of tests/soapy_loopback, whose antenna is shared memory. It behaves like a
+USRP or a HackRF, but has neither USB nor firmware, and its driver computes in the radio process
+what a device would do by itself. Exits with 2 if the driver cannot be compiled.
 """
 
 import sys
@@ -15,7 +15,7 @@ from benchmarks.report import Row, main
 
 
 def measure(seed: int, quick: bool) -> Iterator[Row]:
-    """The rows of load and odometry. Raises NoDriverError."""
+    """Measure the rows of load and odometry. Raises NoDriverError."""
     use_driver()
     with attempt("radios like a USRP"):
         yield from load.rows(seed, quick)

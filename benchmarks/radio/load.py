@@ -1,4 +1,4 @@
-"""A radio like a USRP under full load: both robots send all the time, each hears the other."""
+"""A radio like a USRP under full load: both robots send all the time, and each hears the other."""
 
 import math
 import threading
@@ -19,16 +19,16 @@ from sdrlinkd.client import ControlClient, Publisher, Subscriber
 
 RATES_MSPS = (1, 2, 5, 10)
 SURE_MSPS = 5
-"""Beyond that, no machine is promised to keep up."""
+"""The highest rate that any machine is expected to sustain."""
 REFILL_S = 0.25
 AHEAD_S = 1.0
-"""Of the air's time, at least, waits while the transmitter is kept busy."""
+"""Least airtime of queued messages, which keeps the transmitter busy."""
 BITS_PER_SAMPLE = 0.65
-"""QPSK 1/2, and more than it."""
+"""More than the rate of QPSK 1/2."""
 SIZE = 8192
 CDR = b"\0\1\0\0" + bytes(8) + SIZE.to_bytes(4, "little")
 DEVICE = f",rxbuf={256 * 2040}"
-"""What `num_recv_frames = 256` of etc/radios/usrp.toml makes of a USRP by USB."""
+"""The effect of `num_recv_frames = 256` of etc/radios/usrp.toml on a USRP with USB."""
 CONFIG = """[modem]
 rate_hz = {rate}
 frequency_hz = 915e6
@@ -38,7 +38,7 @@ qos = "bulk"
 
 
 class Times(NamedTuple):
-    """How long is spent at each rate."""
+    """Duration of the measurement at each rate."""
 
     warm_up_s: float
     measured_s: float
@@ -50,28 +50,28 @@ WHOLE, QUICK = Times(2.0, 20.0, 5.0), Times(1.0, 4.0, 0.5)
 
 @dataclass(frozen=True)
 class Span:
-    """One robot between two looks."""
+    """One robot between two readings."""
 
     first: Look
     last: Look
     stolen_pct: float
-    """Of the machine's time."""
+    """Share of the machine's time that others used."""
 
     @property
     def seconds(self) -> float:
-        """How long the span is."""
+        """Length of the span in s."""
         return self.last.at - self.first.at
 
     def count(self, name: str) -> int:
-        """What a counter of its PDU link has grown by."""
+        """Growth of a counter of its PDU link."""
         return self.last.counter(name) - self.first.counter(name)
 
     def cpu_pct(self, part: str) -> float:
-        """Processor time of `daemon` or `radio_process`, of one core."""
+        """CPU time of `daemon` or `radio_process`, in % of one core."""
         return 100 * (self.last.cpu_s[part] - self.first.cpu_s[part]) / self.seconds
 
     def link(self, way: str, name: str) -> int:
-        """What a counter of its link, such as `tx` `pdus_sent`, has grown by."""
+        """Growth of a counter of its link, such as `tx` `pdus_sent`."""
         return int(self.last.status["link"][way][name] - self.first.status["link"][way][name])
 
 
@@ -87,7 +87,7 @@ def rows(seed: int, quick: bool) -> Iterator[Row]:
 
 
 def under_load(rate_hz: float, times: Times, seed: int) -> list[Span]:
-    """The load of each robot. Raises PeerError."""
+    """Measure the load of each robot. Raises PeerError."""
     with (
         pair("usrp", ["load"], CONFIG.format(rate=rate_hz), more=DEVICE) as robots,
         _busy(robots.folders, rate_hz, seed),
@@ -130,15 +130,15 @@ def _rows_of(
 
 NOTES = {
     "daemon": "of one core, user and system, robot 1's daemon; trials: seconds",
-    "radio_process": "of one core, user and system, robot 1's radio process and in it the test "
-    "radio's driver, which computes what converters and the air do elsewhere; gnu_radio: source "
-    "and sink alone, no bursts, with the same driver; trials: seconds",
+    "radio_process": "of one core, user and system, robot 1's radio process with the test radio's "
+    "driver, which simulates converters and air; gnu_radio: source and sink alone, no bursts, with "
+    "the same driver; trials: seconds",
 }
 
 
 @contextmanager
 def _busy(folders: dict[int, Path], rate_hz: float, seed: int) -> Iterator[None]:
-    """Every robot always has something to send, and a consumer for what it hears."""
+    """Give every robot constant traffic, and a consumer for what it hears."""
     stop = threading.Event()
     threads = []
     for robot, folder in folders.items():

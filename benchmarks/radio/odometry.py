@@ -20,14 +20,14 @@ TRANSFER, IN_FLIGHT = 131_072, 4
 TURNAROUND_S = 0.02
 PERIOD_S = 0.1
 MESSAGES, QUICK_MESSAGES = 300, 60
-"""Of each robot; in the quick version, of all."""
+"""Messages of each robot; in the quick version, of both together."""
 WARM_UP = 20
-"""Messages before those that are measured: 2 s."""
+"""Messages before the measured ones: 2 s."""
 DRAIN_S, LOOK_S = 2.0, 0.05
 STAMP = slice(4, 12)
-"""Of the header, in CDR."""
+"""Position of the header's stamp in CDR."""
 ODOM_HZ = 30
-"""Of the robot whose messages these are."""
+"""Rate of the recorded robot's odometry."""
 MODEM = f"""[modem]
 rate_hz = {RATE_HZ}
 frequency_hz = 915e6
@@ -46,23 +46,23 @@ SENDERS = {"oneway": ROBOTS[:1], "twoway": ROBOTS}
 
 @dataclass
 class Flow:
-    """From one robot to the other: when each message was sent and heard, in ns, by its stamp."""
+    """Messages from one robot to the other: send and receive times in ns, by stamp."""
 
     sent: dict[bytes, int] = field(default_factory=dict)
     heard: dict[bytes, int] = field(default_factory=dict)
 
     def latencies_ms(self) -> list[float]:
-        """The latencies of the messages that came."""
+        """The latencies of the messages that arrived."""
         return [1e-6 * (self.heard[each] - at) for each, at in self.sent.items()
                 if each in self.heard]  # fmt: skip
 
     @property
     def is_complete(self) -> bool:
-        """Whether all messages have come."""
+        """Whether all messages have arrived."""
         return self.sent.keys() <= self.heard.keys()
 
     def listen(self, ear: Subscriber, until: float) -> None:
-        """Note what comes until that time."""
+        """Record arrivals until that time."""
         while (left_s := until - time.monotonic()) > 0:
             message = ear.receive(left_s)
             if message is not None:
@@ -70,7 +70,7 @@ class Flow:
 
 
 def rows(seed: int, quick: bool) -> Iterator[Row]:
-    """p50, p99 and the share that came, with one robot that sends and with two."""
+    """p50, p99 and the share that arrived, with one robot that sends and with two."""
     messages = {robot: _odometry(robot, seed) for robot in ROBOTS}
     for way, senders in SENDERS.items():
         count = QUICK_MESSAGES // len(senders) if quick else MESSAGES
@@ -95,7 +95,7 @@ def _rows_of(way: str, flows: list[Flow], counted: dict[str, float]) -> Iterator
     late_ms = np.array([each for flow in flows for each in flow.latencies_ms()])
     sent = sum(len(flow.sent) for flow in flows)
     least_ms = 1e3 * (TURNAROUND_S + (IN_FLIGHT + 1) * TRANSFER / RATE_HZ / OVERSAMPLING)
-    note = "least: turnaround, the transfers that the driver takes ahead, and the message's own"
+    note = "least: turnaround, the driver's transfers in flight, and the message's own transfer"
     for label, share in (("p50", 0.5), ("p99", 0.99)):
         value = float(np.quantile(late_ms, share)) if len(late_ms) else float("inf")
         yield Row(f"{name}_{label}_ms", value, "ms", None, "less", len(late_ms),
@@ -105,7 +105,7 @@ def _rows_of(way: str, flows: list[Flow], counted: dict[str, float]) -> Iterator
 
 
 def _play(robots: Pair, seed: int, robot: int, messages: list[bytes]) -> Flow:
-    """Send them, the first ones as a warm-up, and listen at the other robot."""
+    """Send messages, the first ones as a warm-up, and listen at the other robot."""
     flow = Flow()
     other = next(each for each in ROBOTS if each != robot)
     begin = time.monotonic() + np.random.default_rng(seed + robot).uniform(0, PERIOD_S)
@@ -127,6 +127,6 @@ def _play(robots: Pair, seed: int, robot: int, messages: list[bytes]) -> Flow:
 
 
 def _odometry(robot: int, seed: int) -> list[bytes]:
-    """Of a robot that drives around, as many as there may be."""
+    """Odometry of a robot that drives around, as many messages as are needed at most."""
     driven = BuiltInRobot(f"robot_{robot}", (WARM_UP + MESSAGES) / ODOM_HZ, seed)
     return [each.cdr for each in driven.messages() if each.topic.endswith("/odom")]

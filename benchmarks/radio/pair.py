@@ -27,26 +27,26 @@ DEVICE = 'device = "driver=loopback,bus={bus},unit={unit},model={model},noise_db
 
 @dataclass(frozen=True)
 class Look:
-    """A moment of a daemon: its status; processor time so far, its radio process's beside it."""
+    """A daemon at one moment: its status, and CPU time so far of it and its radio process."""
 
     at: float
     status: dict[str, Any]
     cpu_s: dict[str, float]
 
     def counter(self, name: str) -> int:
-        """The count of one of its PDU link's counters."""
+        """Value of one of its PDU link's counters."""
         return int(self.status["carrier"]["counters"][name])
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Their sockets' folders and the daemons, by robot."""
+    """Socket folders and daemons, by robot."""
 
     folders: dict[int, Path]
     daemons: dict[int, Process]
 
     def look(self, robot: int) -> Look:
-        """As it is now. Raises PeerError when its radio process is not there."""
+        """The daemon's current state. Raises PeerError if its radio process is gone."""
         daemon = self.daemons[robot]
         with ControlClient(self.folders[robot]) as control:
             status = control.ask("status")
@@ -61,9 +61,9 @@ class Pair:
 def pair(
     model: str, topics: Collection[str], tables: str, soapy: str = "", more: str = ""
 ) -> Iterator[Pair]:
-    """Until both radios work, and then. Raises PeerError.
+    """Run two daemons, from when both radios work. Raises PeerError.
 
-    TOML: `tables`, with that of the modem, and more lines of `soapy`; `more` of the device's
+    In TOML: `tables`, with that of the modem, and extra lines of `soapy`; `more` is for the device
     arguments.
     """
     config = CONFIG.format(tables=tables, soapy=soapy)

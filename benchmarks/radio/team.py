@@ -33,16 +33,16 @@ qos = "latency"
 qos = "bulk"
 """
 TOPICS = {"odom": (30, 720), "image": (1, 65_536)}
-"""Messages a second, and bytes."""
+"""Messages per second, and their size in bytes."""
 CDR = b"\0\1\0\0"
 NUMBER = slice(4, 12)
 SETTLE_S, DRAIN_S, LOOK_S = 5.0, 5.0, 0.2
 Heard = dict[str, dict[int, float]]
-"""When each message came, in s, by topic and number."""
+"""Arrival time of each message in s, by topic and number."""
 
 
 def main() -> int:
-    """0: all came; 1: not all; 2: no test radio here."""
+    """Run; returns 0 if everything arrived, 1 if not, 2 without a test radio."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", maxsplit=1)[0])
     parser.add_argument("--rate", type=float, default=5.0, help="Msps")
     parser.add_argument("--mcs", type=int, default=1)
@@ -74,7 +74,7 @@ def main() -> int:
             is_whole &= len(ages_ms) == len(times)
             quantiles = np.quantile(ages_ms, (0.5, 0.99)) if ages_ms else (np.nan, np.nan)
             print(
-                f"robot {robot} {topic:5}: {len(ages_ms)} of {len(times)} came, PDR "
+                f"robot {robot} {topic:5}: {len(ages_ms)} of {len(times)} arrived, PDR "
                 f"{len(ages_ms) / len(times):.3f}, p50 {quantiles[0]:.0f} ms, p99 "
                 f"{quantiles[1]:.0f} ms"
             )
@@ -83,7 +83,7 @@ def main() -> int:
 
 
 def _send(robots: Pair, seconds: float, robot: int) -> Heard:
-    """Each at its rate; when they were sent."""
+    """Send each topic at its rate; returns the send times."""
     begin, sent = time.monotonic(), defaultdict[str, dict[int, float]](dict)
     due = sorted(
         (i / per_s, topic, i) for topic, (per_s, _) in TOPICS.items()
@@ -100,7 +100,7 @@ def _send(robots: Pair, seconds: float, robot: int) -> Heard:
 
 
 def _listen(robots: Pair, robot: int, until: float) -> Heard:
-    """What comes from the other one."""
+    """Record what arrives from the other robot."""
     heard = defaultdict[str, dict[int, float]](dict)
     with Subscriber("*", directory=robots.folders[robot]) as ear:
         while time.monotonic() < until:
@@ -112,11 +112,11 @@ def _listen(robots: Pair, robot: int, until: float) -> Heard:
 
 
 def _words(robots: Pair, robot: int) -> list[str]:
-    """Access in force, and `why` of each topic."""
+    """Access policy in force, and `why` of each topic."""
     with ControlClient(robots.folders[robot]) as control:
         link = control.ask("status")["link"]
         policy, share = link["access_policy"], link["access_share_pct"]
-        told = [f"access {policy}, {link['access_reason']}; it carries {share:.0f} % of the air"]
+        told = [f"access {policy}, {link['access_reason']}; capacity {share:.0f} % of the air"]
         for topic in TOPICS:
             told += control.ask("why", {"topic": topic})["why"]
     return told

@@ -1,6 +1,6 @@
-"""How the code is built: calls of one message, imports between rooms, writes to a message's fields.
+"""Code structure: calls per message, imports between packages, writes to a message's fields.
 
-`python -m benchmarks.structure` prints all of it; none of it depends on the machine.
+`python -m benchmarks.structure` prints everything; none of it depends on the machine.
 """
 
 from benchmarks.structure.sources import deep_chains, graph, writes

@@ -1,4 +1,4 @@
-"""Prints how the code is built."""
+"""Prints figures on the structure of the code."""
 
 from rich.console import Console
 
@@ -12,10 +12,10 @@ ROOMS = ("sdrlinkd", "sdrlinkd.link", "sdrlinkd.bus", "backends", "backends.soap
 def main() -> None:
     """Print the figures as tables for people."""
     console = screen_console()
-    for with_beacon, beside in ((False, "between two beacons"), (True, "a beacon rides with it")):
+    for with_beacon, beside in ((False, "between two beacons"), (True, "with a beacon in its PDU")):
         _print_trace(console, trace(with_beacon), f"one message of 724 B, {beside}")
     table = FittedTable(
-        "imports between the rooms right inside a room",
+        "imports between the packages directly inside a package",
         (words("room", least=16), figure("rooms"), figure("arrows"), figure("floors"),
          figure("upward")),
     )  # fmt: skip
@@ -28,7 +28,7 @@ def main() -> None:
     console.print(table)
     written = writes("sdrlinkd.link", "Outgoing")
     console.print(
-        f"fields called as a queued message's are set by others in {len(written)} files: "
+        f"fields named like a queued message's are set elsewhere in {len(written)} files: "
         f"{dict(written)}"
     )
     chains, lines = deep_chains("sdrlinkd.link")

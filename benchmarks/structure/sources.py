@@ -1,4 +1,4 @@
-"""What the sources of a room say of each other: imports, deep chains, writes to foreign fields."""
+"""Figures from a package's sources: imports, deep attribute chains, writes to foreign fields."""
 
 import ast
 from collections import Counter
@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).parents[2]
 DEEP = 3
-"""Hops on one object from which on a line knows too much of others' insides."""
+"""Number of attributes in a chain from which a line depends on other objects' internals."""
 
 
 def _files(room: str) -> Iterator[tuple[tuple[str, ...], ast.Module, int]]:
-    """(parts of its name below the room, syntax tree, lines) of each file of a dotted room."""
+    """(name parts below the package, syntax tree, lines) of each file of a dotted package."""
     folder = ROOT.joinpath(*room.split("."))
     for path in sorted(folder.rglob("*.py")):
         text = path.read_text()
@@ -21,14 +21,14 @@ def _files(room: str) -> Iterator[tuple[tuple[str, ...], ast.Module, int]]:
 
 
 class Graph(NamedTuple):
-    """Rooms right inside a room, and who imports whom."""
+    """The packages directly inside a package, and who imports whom."""
 
     rooms: list[str]
     arrows: list[tuple[str, str]]
 
     @property
     def floors(self) -> int:
-        """The longest way down, in rooms; 0 where there is a cycle."""
+        """Length of the longest import chain, in packages; 0 if there is a cycle."""
         below: dict[str, set[str]] = {room: set() for room in self.rooms}
         for from_, to in self.arrows:
             below[from_].add(to)
@@ -44,7 +44,7 @@ class Graph(NamedTuple):
 
     @property
     def upward(self) -> list[tuple[str, str]]:
-        """Arrows from which a way leads back: with one of them, there is no up and down."""
+        """Imports that are part of a cycle: with one of them, there is no order of layers."""
         return [(a, b) for a, b in self.arrows if self._leads(b, a)]
 
     def _leads(self, begin: str, end: str) -> bool:
@@ -60,7 +60,7 @@ class Graph(NamedTuple):
 
 
 def graph(room: str) -> Graph:
-    """Of the rooms right inside a dotted room; its own door is none."""
+    """The imports between the packages directly inside a package, without its own __init__."""
     rooms, arrows = set[str](), set[tuple[str, str]]()
     for parts, tree, _ in _files(room):
         if parts == ("__init__",):
@@ -86,7 +86,7 @@ def deep_chains(room: str) -> tuple[int, int]:
 
 
 def _hops(node: ast.Attribute) -> int:
-    """Attributes one behind the other on a name; 0 where there is a call between."""
+    """Number of consecutive attributes on a name; 0 if there is a call in between."""
     hops, inside = 1, node.value
     while isinstance(inside, ast.Attribute):
         hops, inside = hops + 1, inside.value

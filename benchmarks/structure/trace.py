@@ -31,19 +31,19 @@ PDU_S = 1.4e-3
 OVERHEAD_S = 1e-4
 MOST_PDUS = 64
 MESSAGES = 40
-"""Of these, the first ones warm everything up: beats are learned, caches filled."""
+"""Number of messages; the first ones warm up forecasts and caches."""
 
 
 class Step(NamedTuple):
-    """One call from outside, and what it calls in `link` and `wire`."""
+    """One call from outside, and its calls in `link` and `wire`."""
 
     name: str
     files: tuple[str, ...]
-    """Of each call, in order."""
+    """The file of each call, in order."""
 
     @property
     def changes(self) -> int:
-        """Calls that go on in another file than the call before."""
+        """Number of calls into another file than the call before."""
         return sum(a != b for a, b in zip(self.files, self.files[1:], strict=False))
 
 
@@ -52,7 +52,7 @@ class _Recorder:
         self.steps: list[Step] = []
 
     def __call__(self, name: str, function: Callable[P, T], *given: P.args, **more: P.kwargs) -> T:
-        """What `function` returns; its Python calls are noted."""
+        """Result of `function`; its Python calls are recorded."""
         files: list[str] = []
 
         def note(frame: FrameType, event: str, _: object) -> None:
@@ -95,7 +95,7 @@ def _most_pdus(_: int, airtime_s: float) -> int:
 
 
 def trace(with_beacon: bool) -> list[Step]:
-    """The steps of one message after others like it; a beacon rides with it, or none does."""
+    """The steps of one message after others like it, with or without a beacon in the same PDU."""
     sender, receiver = _link(1), _link(2)
     record, found = _Recorder(), list[Step]()
     for number in range(MESSAGES):
@@ -116,7 +116,7 @@ def trace(with_beacon: bool) -> list[Step]:
         for message in heard:
             record("delivered", receiver.delivered, message, now + 2 * PDU_S)
         if [message.payload for message in heard] != [MESSAGE]:
-            raise RuntimeError("the message did not come whole")
+            raise RuntimeError("the message did not arrive intact")
         entries = [entry for pdu in burst.pdus for entry in parse(pdu, PDU_SIZE).entries]
         records = [
             each

@@ -1,1 +1,1 @@
-"""Clock filters on the same streams of stamps."""
+"""Compares clock filters on the same streams of stamps."""

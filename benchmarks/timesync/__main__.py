@@ -1,4 +1,4 @@
-"""Clock filters compared: `python -m benchmarks.timesync [--quick] [--json]`.
+"""Compares clock filters: `python -m benchmarks.timesync [--quick] [--json]`.
 
 `--keep` keeps the rows, and what the figures show, for docs/benchmarks.md.
 """
@@ -13,7 +13,7 @@ HZ = 5.0
 
 
 def measure(seed: int, quick: bool) -> Iterator[Row | Drawing]:
-    """The rows of all filters and scenarios."""
+    """Measure the rows of all filters and scenarios."""
     runs, stepped = (4, 1) if quick else (40, 8)
     held = rows.Tally()
     found = rows.precision(seed, runs, HZ, held)
@@ -21,7 +21,7 @@ def measure(seed: int, quick: bool) -> Iterator[Row | Drawing]:
     yield rows.steps(seed, stepped, HZ, held)
     yield from rows.hostile(seed, runs, HZ, held)
     yield Row("bound_holds_pct", held.percent, "%", 99.9, "more", held.all,
-              note="all scenarios, 5 s after steps left out")  # fmt: skip
+              note="all scenarios, without the 5 s after each step")  # fmt: skip
     yield rows.sample_clocks(seed, 15.0 if quick else 60.0)
     yield from rows.recorded()
     if not quick:

@@ -1,4 +1,4 @@
-"""Filters behind one face: exchanges in, local minus remote time out."""
+"""Filters with a common interface: exchanges in, local minus remote time out."""
 
 from collections import deque
 from collections.abc import Callable
@@ -9,24 +9,24 @@ from sdrlinkd.link import DualEnvelope, PaperFilter
 
 
 class Filter(Protocol):
-    """`offset` at a local time in s; None while it has no estimate."""
+    """A clock filter; `offset` at a local time in s is None while it has no estimate."""
 
     def take(self, exchange: Exchange) -> None:
-        """One more exchange, or what arrived of it."""
+        """Take one more exchange, or the part of it that arrived."""
 
     def offset(self, now: float) -> float | None:
         """Local minus remote time, in s."""
 
 
 class Ours:
-    """The dual envelope; knows what the air takes, and needs no pairs."""
+    """The dual envelope; knows the airtime, and needs no pairs of stamps."""
 
     def __init__(self, resolution_s: float = 2e-5, airtime_s: float = AIR_S) -> None:
         self.envelope = DualEnvelope(resolution_s)
         self._airtime_s = airtime_s
 
     def take(self, exchange: Exchange) -> None:
-        """Either direction on its own."""
+        """Take either direction on its own."""
         t1, t2, t3, t4 = exchange
         if t2 is not None:
             self.envelope.was_heard(t1, t2, self._airtime_s)
@@ -35,41 +35,41 @@ class Ours:
         self.envelope.solve(max(t1, t4 or t1))
 
     def offset(self, now: float) -> float | None:
-        """The last estimate, extrapolated to now."""
+        """The last estimate, extrapolated to `now`."""
         found = self.envelope.estimate
         return None if found is None else found.offset(now)
 
     def bound(self, now: float) -> float:
-        """A bound that no error exceeds."""
+        """A bound on the error at `now`."""
         found = self.envelope.estimate
         return float("inf") if found is None else found.bound(now)
 
 
 class Paper:
-    """Algorithm 3 with four stamps, a favour: the other robot's turnaround is left out."""
+    """Algorithm 3 with four stamps, in its favour: the other robot's turnaround is excluded."""
 
     def __init__(self) -> None:
         self.filter = PaperFilter()
 
     def take(self, exchange: Exchange) -> None:
-        """Take an exchange, if it is whole."""
+        """Take an exchange if it is complete."""
         t1, t2, t3, t4 = exchange
         if t2 is not None and t3 is not None and t4 is not None:
             self.filter.update_four(1e6 * t1, 1e6 * t2, 1e6 * t3, 1e6 * t4)
 
     def offset(self, now: float) -> float | None:  # noqa: ARG002
-        """As it was at the last exchange; also before it has converged."""
+        """The estimate of the last exchange, even before convergence."""
         return 1e-6 * self.filter.offset_estimated if self.filter.n else None
 
 
 class Px4(Paper):
-    """Algorithm 3 with three stamps, as printed and as PX4 has it."""
+    """Algorithm 3 with three stamps, as printed and as in PX4."""
 
     def take(self, exchange: Exchange) -> None:
-        """Take an exchange, if it is whole."""
+        """Take an exchange if it is complete."""
         t1, t2, _, t4 = exchange
         if t2 is not None and t4 is not None:
-            # Remote stamps count from a start long ago, so that none is negative.
+            # Remote stamps start from a time long ago, so that none is negative.
             t1, t2, t4 = (1e6 * (each + 1000) for each in (t1, t2, t4))
             self.filter.update(t1, t2, t4)
 
@@ -88,7 +88,7 @@ class NtpLike:
         self._skew = 0.0
 
     def take(self, exchange: Exchange) -> None:
-        """Take an exchange, if it is whole."""
+        """Take an exchange if it is complete."""
         t1, t2, t3, t4 = exchange
         if t2 is None or t3 is None or t4 is None:
             return
@@ -105,7 +105,7 @@ class NtpLike:
         self._at = at
 
     def offset(self, now: float) -> float | None:
-        """The last estimate, extrapolated to now."""
+        """The last estimate, extrapolated to `now`."""
         return None if self._offset is None else self._offset + self._skew * (now - self._at)
 
 

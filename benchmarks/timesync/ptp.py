@@ -1,5 +1,7 @@
-"""PTP over robots' Wi-Fi, as recorded: an offset and a path delay a second, and a clock that the
-recorded servo slewed by up to 500 ppm. What it did is taken out, so that a line is left.
+"""Recorded PTP over robots' Wi-Fi: one offset and one path delay per second.
+
+The recorded servo slewed its clock by up to 500 ppm. Its corrections are removed, so that a
+straight line remains.
 """
 
 import csv
@@ -14,11 +16,11 @@ from benchmarks.timesync.streams import Exchange
 
 FOLDER = Path(__file__).parents[3] / "shared" / "data" / "traces"
 SETTLING = 30
-"""Samples."""
+"""Number of samples before a filter counts."""
 
 
 class Trace(NamedTuple):
-    """By the slave's time in s."""
+    """A recording, by the slave's time in s."""
 
     name: str
     at: np.ndarray
@@ -27,7 +29,7 @@ class Trace(NamedTuple):
 
 
 def traces() -> Iterator[Trace]:
-    """The recordings that are on this machine."""
+    """The recordings on this machine."""
     for path in sorted(FOLDER.glob("ptp_log_*.csv")):
         rows, last = [], None
         with path.open() as file:
@@ -46,10 +48,10 @@ def traces() -> Iterator[Trace]:
 
 
 def spread_ms(make: Callable[[], Filter], trace: Trace) -> float:
-    """How far what a filter says strays from a line, rms in ms; clocks that nobody sets do not."""
+    """RMS deviation of a filter's output from a line, in ms; free-running clocks follow a line."""
     filter_, said = make(), []
     for at, offset_s, path_s in zip(*trace[1:], strict=True):
-        # PTP: offset = way there - path delay; both ways make the path delay.
+        # PTP: offset = delay of one way - path delay; both ways give the path delay.
         there_s, back_s = offset_s + path_s, path_s - offset_s
         t1, t4 = float(at), float(at + 1e-3)
         filter_.take(Exchange(t1, t1 + float(back_s), t4 - float(there_s), t4))
@@ -58,7 +60,7 @@ def spread_ms(make: Callable[[], Filter], trace: Trace) -> float:
     x, y = trace.at[SETTLING:], np.array(said)[SETTLING:]
     known = np.isfinite(y)
     if not known.any():
-        # No round trip was short enough for it.
+        # No round trip was short enough for the filter.
         return float("inf")
     line = np.polyfit(x[known], y[known], 1)
     return float(1e3 * np.sqrt(np.mean(np.square(y[known] - np.polyval(line, x[known])))))

@@ -1,4 +1,4 @@
-"""Rows: what filters reach on the same streams."""
+"""Rows: the accuracy of filters on the same streams."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
@@ -17,12 +17,12 @@ MOST_US = {"A": 50.0, "B": 50.0, "L": 50.0}
 PAPER = "paper_four_stamps"
 STEPS_S = (0.003, -0.003, 0.01, -0.05, 0.05, 0.2, -0.2)
 STEPPED = "ABL"
-"""In D, where no direction ever is idle, a step of 3 ms is within what messages wait anyway."""
+"""Scenarios with a step; in D no direction is ever idle, so a step of 3 ms is within its waits."""
 STEP_AT_S, STEPPED_S = 40.0, 70.0
 
 
 class Tally:
-    """How often errors were within their bounds."""
+    """How many errors were within their bounds."""
 
     def __init__(self) -> None:
         self.good = self.all = 0
@@ -34,12 +34,12 @@ class Tally:
 
     @property
     def percent(self) -> float:
-        """The share of all that held, in percent."""
+        """Percentage of bounds that held."""
         return 100 * self.good / max(1, self.all)
 
 
 def precision(seed: int, runs: int, hz: float, held: Tally) -> dict[str, dict[str, list[Course]]]:
-    """All filters, by scenario and name; `held` is told of our bounds."""
+    """Run all filters; courses by scenario and name. `held` counts our bounds."""
     found: dict[str, dict[str, list[Course]]] = {}
     for scenario in SCENARIOS:
         courses: dict[str, list[Course]] = defaultdict(list)
@@ -55,14 +55,14 @@ def precision(seed: int, runs: int, hz: float, held: Tally) -> dict[str, dict[st
 
 
 def rms_us(courses: Iterable[Course]) -> float:
-    """Of the errors at the end, where there is an estimate by then."""
+    """RMS of the errors at the end of the runs that have an estimate by then."""
     errors = np.array([each.last_error_s for each in courses])
     known = errors[np.isfinite(errors)]
     return float(1e6 * np.sqrt(np.mean(np.square(known)))) if len(known) else float("inf")
 
 
 def precision_rows(found: dict[str, dict[str, list[Course]]], hz: float) -> Iterator[Row]:
-    """Errors at 60 s, and how much less they are than the paper's."""
+    """Errors at 60 s, and their ratio to the paper's."""
     rms = {of: {name: rms_us(each) for name, each in found[of].items()} for of in TOLD}
     for scenario in TOLD:
         peers = dict(rms[scenario])
@@ -87,7 +87,7 @@ def precision_rows(found: dict[str, dict[str, list[Course]]], hz: float) -> Iter
 
 
 def steps(seed: int, runs: int, hz: float, held: Tally) -> Row:
-    """How long after the other clock jumps until the error stays below 2 ms; at worst."""
+    """Time after a jump of the other clock until the error stays below 2 ms; the worst case."""
     took: dict[str, list[float]] = defaultdict(list)
     makes: dict[str, type[Filter]] = {PAPER: PEERS[PAPER], "ours": Ours}  # type: ignore[dict-item]
     for scenario in (*STEPPED, "D"):
@@ -114,7 +114,7 @@ def steps(seed: int, runs: int, hz: float, held: Tally) -> Row:
 
 
 def _told(seconds: float) -> float:
-    """Never, within what was looked at, is a number, too."""
+    """A time as a number; "never" becomes the length of the run."""
     return seconds if np.isfinite(seconds) else STEPPED_S - STEP_AT_S
 
 
@@ -136,7 +136,7 @@ def hostile(seed: int, runs: int, hz: float, held: Tally) -> Iterator[Row]:
 
 
 def sample_clocks(seed: int, seconds: float) -> Row:
-    """Stamps by the sample, through the modem and the air."""
+    """Stamps taken by sample count, through the modem and the air."""
     found = samples.measure(seed, seconds)
     bound_us = 1e6 * max(found.bounds_s)
     worst_us = 1e6 * max(map(abs, found.errors_s))
@@ -145,7 +145,7 @@ def sample_clocks(seed: int, seconds: float) -> Row:
 
 
 def recorded() -> Iterator[Row]:
-    """PTP over Wi-Fi, where the recordings are at hand."""
+    """PTP over Wi-Fi, if the recordings are available."""
     spreads: dict[str, list[float]] = defaultdict(list)
     n = 0
     for trace in ptp.traces():
@@ -158,6 +158,6 @@ def recorded() -> Iterator[Row]:
     means = {name: float(np.mean(each)) for name, each in spreads.items()}
     ours = means.pop("ours")
     peers = {name: each for name, each in means.items() if np.isfinite(each)}
-    note = "from a line; the paper's filter takes no sample: round trips exceed 10 ms"
+    note = "rms deviation from a line; the paper's filter rejects all: round trips exceed 10 ms"
     target = min(peers.values())
     yield Row("ptp_over_wifi_strays_ms", ours, "ms", target, "less", n, peers, note=note)

@@ -1,4 +1,4 @@
-"""A filter over a stream: its error all along."""
+"""Runs a filter over a stream, and keeps its error over time."""
 
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ SETTLING_S = 5.0
 
 
 class Course(NamedTuple):
-    """At the times `at`, each just before the next exchange; nan: no estimate, no bound."""
+    """Errors and bounds at the times `at`, each just before the next exchange; NaN: none."""
 
     at: np.ndarray
     error_s: np.ndarray
@@ -25,7 +25,7 @@ class Course(NamedTuple):
         return float(self.error_s[-1])
 
     def settled_s(self, near_s: float = NEAR_S, since: float = 0.0) -> float:
-        """How long after `since` errors stay below `near_s`; inf: they do not."""
+        """Time after `since` from which errors stay below `near_s`; inf: never."""
         after = self.at >= since
         wrong = np.flatnonzero(~(np.abs(self.error_s[after]) < near_s))
         if not len(wrong):
@@ -35,7 +35,7 @@ class Course(NamedTuple):
         return float(self.at[after][wrong[-1] + 1] - since)
 
     def held(self, step_at: float = np.inf) -> tuple[int, int]:
-        """(errors within their bound, all that had one), but for 5 s after a step."""
+        """(errors within their bound, errors with a bound), without the 5 s after a step."""
         counts = np.isfinite(self.bound_s)
         counts &= (self.at < step_at) | (self.at > step_at + SETTLING_S)
         good = np.abs(self.error_s[counts]) <= self.bound_s[counts]
@@ -43,7 +43,7 @@ class Course(NamedTuple):
 
 
 def follow(filter_: Filter, stream: Stream) -> Course:
-    """The course of all that `filter_` said."""
+    """The course of a filter's output over a stream."""
     n = len(stream.exchanges) - 1
     error_s, bound_s = np.full(n, np.nan), np.full(n, np.nan)
     for i, exchange in enumerate(stream.exchanges[:-1]):
@@ -51,7 +51,7 @@ def follow(filter_: Filter, stream: Stream) -> Course:
         at = float(stream.at[i + 1])
         offset_s = filter_.offset(at)
         truth_s = float(stream.offset_s[i])
-        # Of the step that comes with the next exchange nobody can know yet.
+        # A step that comes with the next exchange cannot be known yet.
         error_s[i] = np.nan if offset_s is None else offset_s - truth_s - _drift(stream, i)
         if isinstance(filter_, Ours):
             bound_s[i] = filter_.bound(at)
@@ -59,6 +59,6 @@ def follow(filter_: Filter, stream: Stream) -> Course:
 
 
 def _drift(stream: Stream, i: int) -> float:
-    """What the clocks drift apart until the next exchange, steps left out."""
+    """Drift of the clocks until the next exchange, without steps."""
     moved = float(stream.offset_s[i + 1] - stream.offset_s[i])
     return moved if abs(moved) < RECOVERED_S else 0.0

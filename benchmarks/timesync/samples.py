@@ -1,4 +1,4 @@
-"""Sample clocks of two robots on the simulated air: what the link says of them, and the truth."""
+"""Sample clocks of two robots on the simulated air: the links' estimates, and the truth."""
 
 import asyncio
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ SETTLING_S = 5.0
 
 
 class SampleClocks:
-    """What was found: errors in s, and bounds."""
+    """Measured errors in s, and bounds."""
 
     def __init__(self) -> None:
         self.errors_s: list[float] = []
@@ -28,12 +28,12 @@ class SampleClocks:
 
     @property
     def rms_us(self) -> float:
-        """Root of the mean square."""
+        """RMS of the errors in µs."""
         return float(1e6 * np.sqrt(np.mean(np.square(self.errors_s))))
 
 
 def measure(seed: int, seconds: float) -> SampleClocks:
-    """From 5 s on, twice a second, both robots' opinion of each other."""
+    """Compare both robots' estimates of each other, from 5 s on, twice per second."""
     air = AirParams(rate_hz=RATE_HZ, snr_db=SNR_DB, block_s=0.002)
     radios = {node: RadioParams(full_duplex=True, clock_ppm=ppm) for node, ppm in PPM.items()}
     modem = ModemParams(rate_hz=RATE_HZ, mcs=1, block_s=air.block_s)
@@ -57,8 +57,8 @@ def _look(station: Station, other: int, found: SampleClocks) -> None:
     now = station.modem.now()
     estimate = station.link.clock_estimate(other, now)
     if estimate is None:
-        raise RuntimeError(f"robot {own} knows nothing of robot {other}'s clock")
-    # Both began to count at the air's 0.
+        raise RuntimeError(f"robot {own} has no estimate of robot {other}'s clock")
+    # Both sample counts began at the air's time 0.
     paces = [1 + 1e-6 * PPM[node] for node in (own, other)]
     truth_s = now * (1 - paces[1] / paces[0])
     found.errors_s.append(estimate.offset(now) - truth_s)

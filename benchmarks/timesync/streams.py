@@ -7,11 +7,11 @@ import numpy as np
 from numpy.random import Generator
 
 AIR_S = 0.002
-"""Each way; known to both."""
+"""Airtime each way, known to both."""
 TURNAROUND_S = 0.001
 JITTER_S = 5e-5
 LOSS = 0.1
-"""Each way."""
+"""Loss rate each way."""
 SKEW_PPM = 20.0
 WANDER = 2e-8
 """Random walk of the frequency, per √s."""
@@ -23,9 +23,9 @@ Waits = Callable[[Generator, int, float], tuple[np.ndarray, np.ndarray]]
 
 
 class Exchange(NamedTuple):
-    """A message and its answer: sent and heard there, sent there and heard here, each by its clock.
+    """A message and its answer: sent, heard there, answered there, heard; each by its own clock.
 
-    None: it was lost.
+    None: lost.
     """
 
     t1: float
@@ -35,7 +35,7 @@ class Exchange(NamedTuple):
 
 
 class Stream(NamedTuple):
-    """Exchanges, and the truth: local minus remote time at the local times `at`."""
+    """Exchanges with the truth: local minus remote time at the local times `at`."""
 
     exchanges: list[Exchange]
     at: np.ndarray
@@ -43,7 +43,7 @@ class Stream(NamedTuple):
 
 
 def _busy(rng: Generator, n: int, share: float, least_s: float = 0.0) -> np.ndarray:
-    """A queue that is empty at other times."""
+    """Waiting times in a queue that is busy for a `share` of the time."""
     return (rng.random(n) < share) * rng.uniform(least_s, LONGEST_WAIT_S, n)
 
 
@@ -61,8 +61,11 @@ SCENARIOS: dict[str, Waits] = {
     "J": lambda rng, n, _: (_busy(rng, n, 1.0), _busy(rng, n, 1.0)),
     "L": _in_spans,
 }
-"""What messages wait each way: A 40 % idle; B busy and quiet; C never idle, lopsided; D never idle;
-J with 1 ms of jitter, too; L busy and idle by turns."""
+"""Waiting times each way, by scenario.
+
+A: 40 % idle; B: busy and quiet; C: never idle, asymmetric; D: never idle; J: with 1 ms of jitter,
+too; L: alternately busy and idle.
+"""
 
 
 def stream(
@@ -75,8 +78,10 @@ def stream(
     bad_share: float = 0.0,
     skew_ppm: float | None = None,
 ) -> Stream:
-    """`step`: at which time the remote clock jumps by how much, in s. `bad_share` of the stamps are
-    wrong by up to 50 ms.
+    """Make a stream of exchanges.
+
+    `step`: (time, amount) in s by which the remote clock jumps. `bad_share` of the stamps are wrong
+    by up to 50 ms.
     """
     rng = np.random.default_rng([seed, ord(scenario), round(hz)])
     n = round(seconds * hz) + 1

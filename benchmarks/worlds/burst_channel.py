@@ -1,4 +1,4 @@
-"""The medium once more, in bursts instead of samples: who hears what, by the tables of errors."""
+"""The medium in bursts, not samples: decides who receives what, from tables of error rates."""
 
 import math
 from collections.abc import Sequence
@@ -30,17 +30,16 @@ from benchmarks.worlds.flight import (
 
 NEVER = -1.0
 TAIL = 2 * phy.SENSE_WINDOW
-"""Energy may seem to end so many samples later than a header tells."""
+"""Samples by which energy may seem to last longer than the header says."""
 KEEP_S = 1.0
-"""A burst is forgotten so long after it is over at the latest."""
+"""Maximum time for which a burst is kept after its end."""
 
 
 class AirSense(NamedTuple):
-    """A receiver has listened up to `until`; as far as it knows, the channel is idle since
-    `idle_since`.
+    """State of a receiver at the time `until`; the channel has been idle since `idle_since`.
 
-    While it is busy, that is later than `until`. `burst_at`: when the last burst's first sample
-    arrived; None when its header was not read, negative before the first.
+    While the channel is busy, `idle_since` is later than `until`. `burst_at`: arrival of the last
+    burst's first sample; None if its header was not read, negative before the first burst.
     """
 
     until: float
@@ -55,15 +54,15 @@ class _Node:
     free_from: float = NEVER
     energy_end: float = 0.0
     burst: tuple[float, float] = (NEVER, 0.0)
-    """Begin and end of the last one whose header was read."""
+    """Start and end of the last burst whose header was read."""
 
 
 class BurstChannel:
-    """N nodes on one air, all by the same clock in s. `carrier_db`: so much above noise is noticed.
+    """Nodes on one air, all on the same clock in s; power of `carrier_db` over noise is detected.
 
-    A pair's SNR and delay are kept for `keep_s`, inf: for ever; outages hold at once. Raises
-    ValueError for an air that fades: there are no tables. Those of errors are of the usual grid,
-    which others come close to.
+    A pair's SNR and delay are kept for `keep_s`, inf: forever; outages take effect at once. Raises
+    ValueError for a fading air, for which there are no tables. The error tables are for the usual
+    grid, and other grids are close to it.
     """
 
     def __init__(
@@ -88,7 +87,7 @@ class BurstChannel:
         self._live: list[Flight] = []
 
     def join(self, node: int, radio: RadioParams) -> Capabilities:
-        """A node is there from now on; what its radio can do."""
+        """Add a node; returns the capabilities of its radio."""
         self._nodes[node] = _Node(radio)
         self._hops.clear()
         return lockstep_capabilities(Antenna(radio, 0, self._air.rate_hz), self._air)
@@ -96,7 +95,7 @@ class BurstChannel:
     def send(self, node: int, start_s: float, mcs: int, n_pdus: int, pdu_bytes: int) -> Flight:
         """Put a burst on the air, ahead of `start_s` by the turnaround or more.
 
-        Raises ValueError when the node's last one is not over by then.
+        Raises ValueError if the node's last burst has not ended by then.
         """
         sender = self._nodes[node]
         if start_s < sender.free_from - 1e-9:
@@ -122,9 +121,9 @@ class BurstChannel:
         return flight
 
     def readers(self, flight: Flight, number: int, nodes: Sequence[int]) -> list[tuple[int, float]]:
-        """Which of `nodes` read a PDU, and the SNR in dB that their receivers tell.
+        """Those of `nodes` that decode a PDU, with the SNR in dB that their receivers report.
 
-        To be asked when all of it has arrived at these, and before the flight is settled.
+        Call this when the whole PDU has arrived at them, and before the flight is settled.
         """
         shape, (begin_s, end_s), read = flight.shape, flight.shape.pdus[number], []
         for node in nodes:
@@ -141,7 +140,7 @@ class BurstChannel:
         return read
 
     def settle(self, flight: Flight) -> None:
-        """It has passed all: what remains of it is what each node knows."""
+        """Finish a burst that has passed all nodes: keep only what each node knows of it."""
         for node, at in flight.arrives.items():
             one = self._nodes[node]
             if self._finds(flight, node, at) and at > one.burst[0]:
@@ -150,11 +149,11 @@ class BurstChannel:
                 one.energy_end = max(one.energy_end, self._energy_end(flight, node, at, math.inf))
         if flight in self._live:
             self._live.remove(flight)
-        # Those that it met may still ask for it, but not on and on for those it met in turn.
+        # Bursts that met it still refer to it; without its own list that chain does not grow.
         flight.near = []
 
     def sensed(self, node: int, t: float) -> AirSense:
-        """What the node's receiver knows of the air at `t`, which is not later than now."""
+        """What the node's receiver knows of the air at `t`, which must not be later than now."""
         energy_end, (begin, end) = self._nodes[node].energy_end, self._nodes[node].burst
         for flight in self._live:
             at = flight.arrives.get(node, t)
@@ -178,7 +177,7 @@ class BurstChannel:
         return hops
 
     def _finds(self, flight: Flight, node: int, at: float) -> bool:
-        """Whether the header is read; not to be asked before it is over."""
+        """Whether the node reads the header; call this only after the header's end."""
         found = flight.found.get(node)
         if found is None:
             found = flight.found[node] = (
@@ -189,7 +188,7 @@ class BurstChannel:
         return found
 
     def _is_taken(self, flight: Flight, node: int, at: float) -> bool:
-        """Whether the receiver is in another burst that it has found, and not been deaf since."""
+        """Whether the receiver is busy with another burst, and has not been deaf since."""
         return any(
             ((begin := other.arrives.get(node, math.inf)), other.sender) < (at, flight.sender)
             and at < begin + other.shape.airtime_s
@@ -204,7 +203,7 @@ class BurstChannel:
         return is_late and any(first < end and begin < last for first, last in deaf)
 
     def _energy_end(self, flight: Flight, node: int, at: float, t: float) -> float:
-        """Up to when its power was noticed, by `t`."""
+        """Time until which the burst's power was detected, as of `t`."""
         if flight.hops[node].snr_db <= self._loud_db:
             return NEVER
         begin, end = at, min(t, at + flight.shape.airtime_s)

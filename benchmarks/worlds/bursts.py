@@ -1,4 +1,4 @@
-"""Hours of many robots in seconds: real links on an air of bursts, in virtual time."""
+"""Simulates hours of many robots in seconds: real links on an air of bursts, in virtual time."""
 
 import math
 from collections import Counter, defaultdict, deque
@@ -31,59 +31,59 @@ from sdrlinkd.modem import Airtimes, pdu_link_traits
 
 INFINITE = float("inf")
 TICK_S = 0.05
-"""Timers of a link in which something waits run so often."""
+"""Interval of a link's timers while something waits."""
 IDLE_TICK_S = 1.0
-"""And those of others."""
+"""Interval of the timers of idle links."""
 KEPT_AGES = 1000
 ROUNDING = 1e-3
-"""So much of a block is nothing: clocks are not quite the same."""
+"""Share of a block that counts as rounding: clocks are not exactly equal."""
 
 
 @dataclass(slots=True)
 class Pair:
-    """What one robot got of another's topic, with ages in s."""
+    """Messages that one robot received of another's topic, with ages in s."""
 
     received: int = 0
     age_sum_s: float = 0.0
-    """Over all of them."""
+    """Sum over all messages."""
     ages_s: deque[float] = field(default_factory=lambda: deque(maxlen=KEPT_AGES))
-    """The last ones."""
+    """The most recent ages."""
 
 
 @dataclass(slots=True, eq=False)
 class Station:
-    """A robot: its link, and the little that a modem adds to it."""
+    """A robot: its link, and the few parts of a modem that it needs."""
 
     link: Link
     traits: PduLinkTraits
     settled: Settled
     pace: float
-    """Of its own crystal, by which its link's times are."""
+    """Rate of its own crystal, by which its link counts time."""
     arrivals: Iterator[Arrival]
     least_s: float
-    """No burst with what follows it takes less."""
+    """Least duration of a burst with what follows it."""
     look_at: float = INFINITE
-    """In blocks."""
+    """The next block at which to query the link."""
     free_at: float = 0.0
     ticked_at: float = 0.0
     sent: Counter[int] = field(default_factory=Counter)
-    """Messages handed over, by topic id."""
+    """Number of messages handed over, by topic id."""
     bursts: int = 0
 
 
 _Event = tuple[int, int, int, Callable[..., None], tuple[object, ...]]
-# What is done in this order after a block.
+# Actions after a block, in this order.
 _HEAR, _SETTLE, _ARRIVE, _LOOK = range(4)
 
 
 class Simulation:
-    """One BurstChannel and a real link for each of `radios`; `arrivals` come in order of time.
+    """One BurstChannel and a real link for each of `radios`; `arrivals` are in order of time.
 
-    Decisions fall at the ends of blocks of `air.block_s`, as in a simulation of samples in
-    lock-step. `watch` is told of every burst, `listen` of what
-    a node gets, and when. `keep_s`: see BurstChannel. Raises ConfigError where
-    the radios cannot carry the access policy. `fit` makes another radio's traits of the air's own,
-    such as one that wants its bursts earlier.
+    Decisions are made at the ends of blocks of `air.block_s`, as in a simulation of samples in
+    lock-step. `watch` is called for every burst, `listen` for what a node receives, with its time.
+    `keep_s`: see BurstChannel. Raises ConfigError if the radios cannot support the access policy.
+    `fit` turns the air's traits into those of another radio, such as one that needs its bursts
+    earlier.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class Simulation:
     ) -> None:
         self.now = 0.0
         self.pairs: defaultdict[tuple[int, int, int], Pair] = defaultdict(Pair)
-        """By sender, receiver and topic id."""
+        """Received messages by sender, receiver and topic id."""
         self._block_s = air.block_s
         self._airtimes = airtimes
         self._access = access
@@ -131,7 +131,7 @@ class Simulation:
         self._at(self._block(TICK_S), _ARRIVE, self._tick)
 
     def run(self, until_s: float) -> None:
-        """Let time pass up to `until_s`."""
+        """Advance time to `until_s`."""
         events, last = self._events, math.floor(until_s / self._block_s + ROUNDING)
         while events and events[0][0] <= last:
             block, _, _, what, arguments = heappop(events)
@@ -140,26 +140,26 @@ class Simulation:
         self.now = until_s
 
     def call(self, at_s: float, what: Callable[[], None]) -> None:
-        """Have `what` done at `at_s`, before that block's decisions."""
+        """Call `what` at `at_s`, before that block's decisions."""
         self._at(self._block(at_s), _ARRIVE, what)
 
     def submit(
         self, node: int, topic_id: int, payload: bytes, overrides: Overrides = AS_CONFIGURED
     ) -> None:
-        """A message that has just been made."""
+        """Submit a message that was just made."""
         station = self.stations[node]
         station.link.submit(topic_id, payload, self.now * station.pace, overrides)
         station.sent[topic_id] += 1
         self._look(station, self._block(self.now))
 
     def silence(self, node: int, until_s: float) -> None:
-        """A radio that sends nothing until then."""
+        """Let a radio send nothing until that time."""
         station = self.stations[node]
         station.free_at = max(station.free_at, until_s * station.pace)
         self._look(station, self._block(until_s))
 
     def _block(self, t: float) -> int:
-        """The number of the block at whose end `t` is past."""
+        """Number of the block whose end is the first after `t`."""
         return math.ceil(t / self._block_s - ROUNDING)
 
     def _at(self, block: int, order: int, what: Callable[..., None], *arguments: object) -> None:
@@ -178,13 +178,13 @@ class Simulation:
         self._await_arrival(station)
 
     def _look(self, station: Station, block: int) -> None:
-        """Ask the link for a burst after this block, or before."""
+        """Query the link for a burst after this block, or earlier."""
         if block < station.look_at:
             station.look_at = block
             self._at(block, _LOOK, self._turn, station, block)
 
     def _turn(self, station: Station, block: int) -> None:
-        """As the modem does after a block."""
+        """Do what the modem does after a block."""
         if station.look_at != block:
             return
         station.look_at = INFINITE
@@ -258,10 +258,10 @@ class Simulation:
 def _next_chance(
     station: Station, name: str, access: AccessParams, sensed: Sensed, t: float
 ) -> float:
-    """Before this, and `t`, the link will not say anything else, if nothing new comes.
+    """Earliest time after `t` at which the link can decide differently, if nothing new arrives.
 
-    All by the station's clock. In tdma: its own slot; with reuse, also those before that, so many
-    mini-slots after their begin, or the end of a burst in them, as they are before.
+    All times are by the station's clock. In tdma that is its own slot. With reuse it is also the
+    slots before that, at its mini-slots after their start or after the end of a burst in them.
     """
     policy, traits = station.settled.access, station.traits
     frame = policy.frame(t + traits.lead_s)

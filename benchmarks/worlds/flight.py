@@ -1,8 +1,8 @@
-"""A burst on its way, and how likely its parts are lost where it arrives.
+"""A burst on its way, and the loss probability of its parts at each receiver.
 
-White noise only. What others send meanwhile is noise too: their powers add up. A codeword has of
-each of its parts the information that a subcarrier gives at that part's SINR, and fails as often as
-at the one SNR that gives as much on average; a PDU fails with any of its codewords.
+White noise only. Concurrent transmissions also count as noise: their powers add up. Each part of a
+codeword carries the information that a subcarrier gives at that part's SINR. The codeword fails as
+often as at the constant SNR with the same mean information; a PDU fails with any of its codewords.
 """
 
 import math
@@ -18,8 +18,8 @@ from backends import Hop
 class BurstShape(NamedTuple):
     """Times in s from a burst's first sample.
 
-    At `head_s` preamble and header are over; `pdus`: where each PDU's symbols begin and end, in
-    which `n_codewords` follow one another.
+    `head_s`: end of preamble and header. `pdus`: start and end of each PDU's symbols, which contain
+    `n_codewords` in sequence.
     """
 
     mcs: int
@@ -32,23 +32,23 @@ class BurstShape(NamedTuple):
 
 @dataclass(slots=True, eq=False)
 class Flight:
-    """A burst on the air; by node that it reaches: when, how, and what chance has for it."""
+    """A burst on the air; for each node that it reaches: arrival, strength and random numbers."""
 
     sender: int
     start_s: float
     over_s: float
-    """The time in s at which it has passed all nodes."""
+    """Time in s at which it has passed all nodes."""
     shape: BurstShape
     hops: dict[int, Hop]
     arrives: dict[int, float]
     draws: dict[int, list[float]]
     near: list["Flight"] = field(default_factory=list)
-    """Others that are on the air somewhere at the same time."""
+    """Other bursts that are on the air somewhere at the same time."""
     found: dict[int, bool] = field(default_factory=dict)
 
     @property
     def end_s(self) -> float:
-        """When its last sample has left."""
+        """Time at which its last sample leaves."""
         return self.start_s + self.shape.airtime_s
 
 
@@ -60,7 +60,7 @@ def burst_shape(
     pdu_bytes: int,
     grid: phy.Numerology = phy.OFDM_64_16,
 ) -> BurstShape:
-    """Times of a burst as the modem sends it. Raises ValueError for what no header can tell."""
+    """Times of a burst as the modem sends it. Raises ValueError for what no header can express."""
     plan = phy.layout(grid, mcs, n_pdus, pdu_bytes)
     symbol, head = plan.grid.n_symbol, plan.n_samples - plan.n_symbols * plan.grid.n_symbol
     firsts = [i * plan.coded_bits // plan.symbol_bits for i in range(n_pdus)]
@@ -81,7 +81,7 @@ found_rate = lru_cache(maxsize=4096)(phy.burst_found_rate)
 
 
 def _parts(flight: Flight, node: int, begin: float, end: float) -> list[tuple[float, float]]:
-    """(share, power of all noise over the receiver's own) of the parts between two times."""
+    """(share, power of all noise relative to the receiver's own) of the parts between two times."""
     others = []
     for each in flight.near:
         at = each.arrives.get(node, math.inf)
@@ -99,7 +99,7 @@ def _parts(flight: Flight, node: int, begin: float, end: float) -> list[tuple[fl
 
 
 def head_snr_db(flight: Flight, node: int, at: float) -> float:
-    """By the mean noise until the header is over."""
+    """SNR by the mean noise until the end of the header."""
     snr_db = flight.hops[node].snr_db
     if not flight.near:
         return snr_db
@@ -108,7 +108,7 @@ def head_snr_db(flight: Flight, node: int, at: float) -> float:
 
 
 def lost_rate_in(flight: Flight, node: int, begin: float, end: float) -> float:
-    """Of a PDU between two times, whose codewords others may meet one by one."""
+    """Loss probability of a PDU between two times; interference may hit single codewords."""
     shape, kept = flight.shape, 1.0
     n = shape.n_codewords
     for number in range(n):
@@ -120,10 +120,10 @@ def lost_rate_in(flight: Flight, node: int, begin: float, end: float) -> float:
 
 
 def _mean_snr_db(flight: Flight, node: int, parts: list[tuple[float, float]]) -> float:
-    """The one SNR at which a subcarrier gives as much information as in all parts, by their shares.
+    """The constant SNR with the same mean information per subcarrier as the given parts.
 
-    Others' power counts as more than the same of white noise: a receiver has four pilots in a
-    symbol to tell it by.
+    Interference counts more than the same power of white noise: a receiver has only four pilots in
+    a symbol to detect it.
     """
     snr_db = flight.hops[node].snr_db
     if parts == [(1.0, 1.0)]:
@@ -137,5 +137,5 @@ def _mean_snr_db(flight: Flight, node: int, parts: list[tuple[float, float]]) ->
 
 
 def decibel(ratio: float) -> float:
-    """Rounded: a table of errors need not be long."""
+    """A ratio in dB, rounded to keep the table of errors short."""
     return round(10 * math.log10(ratio), 2)

@@ -1,5 +1,6 @@
-"""Robots in one process on a simulated air in lock-step: link, modem and radio of a daemon, without
-its bus.
+"""Robots in one process on a simulated air in lock-step, with a daemon's link, modem and radio.
+
+They have no bus.
 """
 
 import asyncio
@@ -35,7 +36,7 @@ NO_CLOCK = ClockParams(period_s=0.0)
 
 
 class Got(NamedTuple):
-    """A message that arrived, and how old it was then."""
+    """A message that arrived, and its age at arrival."""
 
     src: int
     topic_id: int
@@ -43,7 +44,7 @@ class Got(NamedTuple):
 
 
 class Station:
-    """One robot: asks its link what to do, as a daemon does."""
+    """One robot, which drives its link like a daemon."""
 
     def __init__(
         self, own_id: int, radio: Radio, access: AccessParams, modem: ModemParams, pdu_size: int,
@@ -67,11 +68,11 @@ class Station:
         self.carry = await self.modem.open(self)
 
     def attach(self, traits: PduLinkTraits) -> None:
-        """Learn what the radio is, and tell the link."""
+        """Note the radio's traits, and pass them to the link."""
         self.access = self.link.attach(traits, self._access, RateParams()).settled.access
 
     def advance(self, now: float) -> None:
-        """Messages that have come up to now."""
+        """Submit the messages that have arrived up to `now`."""
         while self._next is not None and self._next.at <= now:
             at, topic_id, payload, overrides = self._next
             self.link.submit(topic_id, payload, at, overrides)
@@ -82,7 +83,7 @@ class Station:
             self.link.handle_timers(now)
 
     def heard(self, pdus: Sequence[Heard]) -> None:
-        """Take PDUs from the air, and note what they carried."""
+        """Take PDUs from the air, and record what they contained."""
         for data, at, snr_db, _ in pdus:
             for message in self.link.hear(data, at, snr_db):
                 age_s = self.link.delivered(message, self.modem.now())
@@ -90,15 +91,15 @@ class Station:
                     self.got.append(Got(message.src, message.topic_id, age_s))
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
-        """The burst that goes next, if any."""
+        """The next burst to send, if any."""
         return self.link.next_burst(opportunity)
 
     def next_wakeup(self, now: float) -> float:
-        """When there may be something."""
+        """Time at which there may be something to send."""
         return self.link.next_wakeup(now)
 
     def settled(self, burst: Burst, outcome: Outcome, at: float) -> None:
-        """What became of a burst."""
+        """Report the outcome of a burst to the link."""
         self.bursts += 1
         self.link.confirm(burst, outcome, at)
 
@@ -116,7 +117,7 @@ async def run(
     until_s: float,
     seed: int,
 ) -> list[Station]:
-    """Stations with these arrivals on one air, after they have played up to `until_s`."""
+    """Run stations with these arrivals on one air up to `until_s`, and return them."""
 
     def make(node: int, radio: Radio) -> Station:
         return Station(node, radio, access, modem, pdu_size, arrivals[node], 100 * seed + node)
@@ -133,7 +134,7 @@ async def play(
     look: Callable[[Sequence[AnyStation]], None] = lambda _: None,
     looks_at_s: Iterable[float] = (),
 ) -> list[AnyStation]:
-    """Stations that `make` makes, after they have played up to `until_s` on one air.
+    """Run stations that `make` makes on one air up to `until_s`, and return them.
 
     `look` is called with all of them at the times `looks_at_s`.
     """

@@ -21,7 +21,7 @@ TIMEOUT_MS = 100
 
 
 def options() -> argparse.Namespace:
-    """The command line."""
+    """Parse the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.ArgumentDefaultsHelpFormatter
     )
@@ -54,7 +54,7 @@ def options() -> argparse.Namespace:
 
 
 class Channel(gr.top_block):
-    """Sources of all nodes, and for each the sum of the others."""
+    """The flowgraph: the sources of all nodes, and for each node the sum of the others."""
 
     def __init__(self, asked: argparse.Namespace) -> None:
         gr.top_block.__init__(self, "channel")
@@ -66,7 +66,7 @@ class Channel(gr.top_block):
         sent = [self._heard_of(send, w) for (send, _), w in zip(asked.node, carriers, strict=True)]
         for node, (_, receive) in enumerate(asked.node):
             total = blocks.add_cc()
-            # The seed of a noise source counts from 1: 0 is the clock.
+            # Noise source seeds start at 1: 0 means the clock.
             source = analog.fastnoise_source_c(analog.GR_GAUSSIAN, noise, node + 1, 1 << 18)
             heard = [silence, source, *sent[:node], *sent[node + 1 :]]
             for port, part in enumerate(heard):
@@ -74,7 +74,7 @@ class Channel(gr.top_block):
             self._tell(total, receive, carriers[node])
 
     def _heard_of(self, endpoint: str, carrier: float) -> gr.basic_block:
-        """What a node sends, on its carrier."""
+        """The signal that a node sends, on its carrier."""
         source, _ = ENDS[self._asked.pattern]
         if self._asked.format == "cf32":
             chain = [source(gr.sizeof_gr_complex, 1, endpoint, TIMEOUT_MS)]
@@ -91,7 +91,7 @@ class Channel(gr.top_block):
         return chain[-1]
 
     def _tell(self, heard: gr.basic_block, endpoint: str, carrier: float) -> None:
-        """What a node hears, as its own carrier turns it."""
+        """Send a node what it hears, rotated by its own carrier."""
         _, sink = ENDS[self._asked.pattern]
         chain = [heard]
         if carrier:
@@ -111,7 +111,7 @@ class Channel(gr.top_block):
 
 
 def main() -> None:
-    """Run until told to end."""
+    """Run until SIGTERM or SIGINT."""
     flowgraph.run(Channel(options()))
 
 

@@ -1,4 +1,4 @@
-"""Where a daemon's PDUs enter and leave a flowgraph."""
+"""The points where a daemon's PDUs enter and leave a flowgraph."""
 
 import argparse
 
@@ -11,13 +11,13 @@ ENDS = {
     "pub": (zeromq.sub_msg_source, zeromq.pub_msg_sink),
 }
 SERVERS = {"udp": "UDP_SERVER", "tcp": "TCP_SERVER"}
-# A sender's tags must not be taken for a receiver's: their keys differ.
+# The keys differ, so that a sender's tags are not taken for a receiver's.
 SENT, HEARD = "sent_len", "heard_len"
 ARRIVED = "arrived_len"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Those of every PHY."""
+    """Add the options that every PHY has."""
     air = parser.add_mutually_exclusive_group(required=True)
     air.add_argument(
         "--link",
@@ -41,12 +41,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 class Daemon:
-    """A daemon's end of a flowgraph."""
+    """A daemon's connection to a flowgraph."""
 
     def __init__(self, graph: gr.top_block, asked: argparse.Namespace, *endpoints: str) -> None:
         self._graph = graph
-        # A throttle counts from its start: silence would be time to catch up with. This tag of the
-        # burst that comes of a PDU starts it anew.
+        # A throttle counts from its start, so it would catch up after silence. This tag on a PDU's
+        # burst restarts it.
         self._paced = pdu.pdu_set(pmt.intern("rx_rate"), pmt.from_double(asked.rate))
         self._cut = asked.pdu_size if asked.transport == "tcp" else 0
         if asked.transport == "zeromq":
@@ -61,26 +61,26 @@ class Daemon:
             self._out = self._in = "pdus"
 
     def sent(self) -> gr.basic_block:
-        """Bytes of its PDUs, each tagged with its length."""
+        """The bytes of the daemon's PDUs, each PDU tagged with its length."""
         stream = pdu.pdu_to_tagged_stream(gr.types.byte_t, ARRIVED if self._cut else SENT)
         self._graph.msg_connect(self._source, self._out, self._paced, "pdus")
         self._graph.msg_connect(self._paced, "pdus", stream, "pdus")
         if not self._cut:
             return stream
-        # TCP has no ends of PDUs: what came is a stream, and is cut.
+        # TCP does not keep PDU boundaries: the received stream is cut into PDUs.
         cut = blocks.stream_to_tagged_stream(gr.sizeof_char, 1, self._cut, SENT)
         self._graph.connect(stream, cut)
         return cut
 
     def hear(self, stream: gr.basic_block) -> None:
-        """Give it the PDUs of a stream of bytes."""
+        """Give the daemon the PDUs in a stream of bytes."""
         pdus = pdu.tagged_stream_to_pdu(gr.types.byte_t, HEARD)
         self._graph.connect(stream, pdus)
         self._graph.msg_connect(pdus, "pdus", self._sink, self._in)
 
 
 def pairs(graph: gr.top_block, asked: argparse.Namespace) -> list[tuple[Daemon, Daemon]]:
-    """Who speaks to whom."""
+    """The pairs of sender and receiver."""
     each = 2 if asked.transport == "zeromq" else 1
     named = asked.link or asked.loop
     if len(named) != (2 * each if asked.link else each):

@@ -1,4 +1,4 @@
-"""What the flowgraphs of this folder share: pace, start and end."""
+"""Common parts of the flowgraphs in this folder: pace, start and end."""
 
 import os
 import signal
@@ -11,7 +11,7 @@ gr.logging().set_default_level(gr.log_levels.warn)
 
 
 class Silence(gr.hier_block2):
-    """Zeros in real time: what is added to them comes in real time, too."""
+    """Zeros in real time; a stream that is added to them also runs in real time."""
 
     PERIOD_S, LONGEST = 0.5, 1 << 19
     AHEAD = 4096
@@ -20,8 +20,8 @@ class Silence(gr.hier_block2):
         gr.hier_block2.__init__(
             self, "silence", gr.io_signature(0, 0, 0), gr.io_signature(1, 1, gr.sizeof_gr_complex)
         )
-        # A throttle counts from its start: an hour of waiting would be an hour to catch up with.
-        # This tag starts it anew.
+        # A throttle counts from its start, so it would catch up after an hour of waiting. This tag
+        # restarts it.
         again = (0, pmt.intern("rx_rate"), pmt.from_double(rate_hz), pmt.PMT_F)
         n = min(int(rate_hz * self.PERIOD_S), self.LONGEST)
         zeros = blocks.vector_source_c([0] * n, True, 1, [gr.tag_utils.python_to_tag(again)])
@@ -32,7 +32,7 @@ class Silence(gr.hier_block2):
 
 
 class Air(gr.hier_block2):
-    """Real time, noise, and no way through for a sender's tags."""
+    """Real time and noise; a sender's tags do not pass."""
 
     AT_ONCE = 4096
 
@@ -50,7 +50,7 @@ class Air(gr.hier_block2):
 
 
 def run(graph: gr.top_block, note: str = "") -> None:
-    """Until SIGTERM or SIGINT."""
+    """Run the flowgraph until SIGTERM or SIGINT."""
     ends = {signal.SIGTERM, signal.SIGINT}
     signal.pthread_sigmask(signal.SIG_BLOCK, ends)
     with os.fdopen(os.dup(1), "w") as out:
@@ -62,5 +62,5 @@ def run(graph: gr.top_block, note: str = "") -> None:
         out.flush()
         signal.sigwait(ends)
     graph.stop()
-    # Without wait(): a sink that nobody hears never ends.
+    # Without wait(), because a sink that nobody reads never ends.
     os._exit(0)

@@ -15,7 +15,7 @@ from gnuradio import blocks, digital, gr
 from gnuradio.digital import packet_utils
 
 PREAMBLE = b"\xaa" * 16
-# The filters hold back the last bits.
+# The filters delay the last bits; without these they would stay inside.
 POSTAMBLE = b"\xaa" * 4
 ACCESS_CODE = packet_utils.default_access_code
 WRONG_BITS = 4
@@ -26,7 +26,7 @@ BANDWIDTH_TIME = 0.5
 
 
 def options() -> argparse.Namespace:
-    """The command line."""
+    """Parse the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.ArgumentDefaultsHelpFormatter
     )
@@ -36,7 +36,7 @@ def options() -> argparse.Namespace:
 
 
 def burst_samples(pdu_size: int, samples: int) -> int:
-    """Samples from the begin of one PDU to that of the next."""
+    """Number of samples from the start of one PDU to the start of the next."""
     around = len(PREAMBLE) + len(ACCESS_CODE) // 8 + LENGTH_BYTES + CRC_BYTES + len(POSTAMBLE)
     return 8 * samples * (around + pdu_size) + TAIL
 
@@ -48,12 +48,12 @@ def always(octets: bytes) -> gr.basic_block:
 
 
 def whitener(tag: str) -> gr.basic_block:
-    """Turns what is whitened into what is not, and back; begins anew at each tag."""
+    """A block that whitens and dewhitens; it restarts at each tag."""
     return digital.additive_scrambler_bb(0x8A, 0x7F, 7, 0, 8, tag)
 
 
 class Sender(gr.hier_block2):
-    """Bytes of PDUs into samples."""
+    """Converts bytes of PDUs to samples."""
 
     def __init__(self, samples: int, sensitivity: float) -> None:
         gr.hier_block2.__init__(
@@ -81,7 +81,7 @@ class Sender(gr.hier_block2):
 
 
 class Hearer(gr.hier_block2):
-    """Samples into bytes of PDUs."""
+    """Converts samples to bytes of PDUs."""
 
     def __init__(self, samples: int, sensitivity: float) -> None:
         gr.hier_block2.__init__(
@@ -103,7 +103,7 @@ class Hearer(gr.hier_block2):
 
 
 class Phy(gr.top_block):
-    """A modem, an air and a modem for each direction."""
+    """The flowgraph: a modem, an air and a modem for each direction."""
 
     def __init__(self, asked: argparse.Namespace) -> None:
         gr.top_block.__init__(self, "gfsk_phy")
@@ -117,7 +117,7 @@ class Phy(gr.top_block):
 
 
 def main() -> None:
-    """Run until told to end."""
+    """Run until SIGTERM or SIGINT."""
     asked = options()
     a_second = asked.rate / burst_samples(asked.pdu_size, asked.samples)
     flowgraph.run(Phy(asked), f"{a_second:.0f} PDUs of {asked.pdu_size} bytes a second at most")

@@ -18,7 +18,7 @@ TAIL = 400
 
 
 def options() -> argparse.Namespace:
-    """The command line."""
+    """Parse the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.ArgumentDefaultsHelpFormatter
     )
@@ -30,13 +30,13 @@ def options() -> argparse.Namespace:
 
 
 def burst_samples(pdu_size: int, bits: int) -> int:
-    """From one PDU to the next."""
+    """Number of samples from the start of one PDU to the start of the next."""
     symbols = math.ceil(8 * (pdu_size + CRC_BYTES) / (bits * DATA_CARRIERS))
     return (PREAMBLE_AND_HEADER + symbols) * (FFT + PREFIX) + TAIL
 
 
 class Phy(gr.top_block):
-    """A modem, an air and a modem for each direction."""
+    """The flowgraph: a modem, an air and a modem for each direction."""
 
     def __init__(self, asked: argparse.Namespace) -> None:
         gr.top_block.__init__(self, "ofdm_phy")
@@ -58,7 +58,7 @@ class Phy(gr.top_block):
 
 
 def main() -> None:
-    """Run until told to end."""
+    """Run until SIGTERM or SIGINT."""
     asked = options()
     a_second = asked.rate / burst_samples(asked.pdu_size, asked.bits)
     flowgraph.run(Phy(asked), f"{a_second:.0f} PDUs of {asked.pdu_size} bytes a second at most")

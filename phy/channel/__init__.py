@@ -1,4 +1,4 @@
-"""What happens to samples between a transmitter and a receiver, as a seeded calculator."""
+"""Simulates, from a seed, what happens to samples between a transmitter and a receiver."""
 
 from phy.channel.front_end import FrontEnd, FrontEndParams
 from phy.channel.path import Path, PathParams

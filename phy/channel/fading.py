@@ -5,9 +5,9 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 BLOCK = 64
-"""Samples through which a channel stands still: at 100 km/h and 1 Msps it turns by 0.1 rad."""
+"""Samples for which the channel is constant: at 100 km/h and 1 Msps it turns by 0.1 rad."""
 N_PATHS = 16
-"""Waves that make up each echo."""
+"""Number of waves that make up each echo."""
 
 
 def jakes(
@@ -15,7 +15,7 @@ def jakes(
 ) -> NDArray[np.complex128]:
     """Rayleigh gains `[len(at), n_echoes]` of mean power 1 at the times `at` in s.
 
-    Each echo is the sum of N_PATHS waves that come from all around (Jakes 1974).
+    Each echo is the sum of N_PATHS waves from all directions (Jakes 1974).
     """
     angle = 2 * np.pi * rng.random((n_echoes, N_PATHS))
     phase = 2 * np.pi * rng.random((n_echoes, N_PATHS))
@@ -25,8 +25,8 @@ def jakes(
 
 
 def moving_filter(x: NDArray[np.complex64], taps: NDArray[np.complex64]) -> NDArray[np.complex64]:
-    """`x` through FIR filters `taps` `[blocks, n_taps]`, of which each serves for BLOCK samples."""
-    # scipy takes longer to load than all of this package, and most radios do not move.
+    """`x` through FIR filters `taps` `[blocks, n_taps]`, each used for BLOCK samples."""
+    # Imported here: scipy loads more slowly than this whole package, and most radios do not move.
     from scipy import fft
 
     n_blocks, n_taps = taps.shape

@@ -1,4 +1,4 @@
-"""What a receiver adds to every sample that reaches it: noise, image, DC and quantisation."""
+"""What a receiver's front end adds to every sample: noise, image, DC and quantisation."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ class FrontEndParams:
 
     `noise_dbfs` and `dc_dbfs` are powers in dB relative to full scale (−inf: none), `image_db` is
     how far the image is below the signal (inf: none). `bits` is the resolution of the converter,
-    which also clips at full scale; 0: neither.
+    which also clips at full scale; 0: no quantisation and no clipping.
     """
 
     noise_dbfs: float = -np.inf
@@ -38,7 +38,7 @@ class FrontEnd:
         self._dc = np.complex64(10 ** (params.dc_dbfs / 20))
 
     def receive(self, x: NDArray[np.complex64]) -> NDArray[np.complex64]:
-        """The digital samples `[n]` of antenna samples `[n]`, which are not changed.
+        """The digital samples `[n]` of antenna samples `[n]`, which are not modified.
 
         Any chunking of the same stream gives the same samples.
         """
@@ -55,7 +55,7 @@ class FrontEnd:
     def _noisy(self, x: NDArray[np.complex64]) -> NDArray[np.complex64]:
         noisy = np.empty_like(x)
         first, self._next_index = self._next_index, self._next_index + len(x)
-        # Read-only, whatever came: else numba compiles anew for the other kind.
+        # Make every input read-only: otherwise numba compiles the kernel again for writable ones.
         parts = x.view(np.float32)
         parts.setflags(write=False)
         add_noise(

@@ -1,4 +1,4 @@
-"""One burst from antenna to antenna: what the transmitter, the echoes and the clocks do to it."""
+"""One burst from antenna to antenna: effects of the transmitter, the echoes and the clocks."""
 
 from dataclasses import dataclass
 
@@ -11,18 +11,18 @@ from phy.channel.profiles import PROFILES
 from phy.channel.resampling import N_TAPS, echo_filters, stretch
 
 SPIN = 128
-"""Samples that are turned by one coarse angle: so few exponentials are computed."""
+"""Samples that share one coarse angle, which saves exponentials."""
 
 
 @dataclass(frozen=True)
 class PathParams:
     """What lies between a transmitter and a receiver: frequencies in Hz, times in s.
 
-    One crystal makes centre frequency and samples: at `centre_hz` it moves both. `image_db` and
-    `leak_db` are the transmitter's IQ imbalance and LO leakage below the signal (inf: none).
-    `doppler_hz` is the largest shift of an echo, v / c times the centre frequency, on channels that
-    fade. `phase_noise_dbc_hz` is that of both oscillators 10 kHz from the centre, falling as 1 / f²
-    (-inf: none).
+    One crystal drives centre frequency and sample rate: at `centre_hz` it shifts both. `image_db`
+    and `leak_db` are the transmitter's IQ imbalance and LO leakage below the signal (inf: none).
+    `doppler_hz` is the largest shift of an echo, v / c times the centre frequency, on fading
+    channels. `phase_noise_dbc_hz` is the phase noise of both oscillators 10 kHz from the centre,
+    falling as 1 / f² (-inf: none).
     """
 
     rate_hz: float
@@ -51,13 +51,13 @@ class Path:
 
     @property
     def early(self) -> int:
-        """Samples by which a burst may arrive before its own index: half of the echo filter."""
+        """Samples by which a burst may arrive before its index: half the echo filter's length."""
         return 0 if PROFILES[self._params.profile] is None else N_TAPS // 2 - 1
 
     def carry(self, burst: NDArray[np.complex64]) -> tuple[int, NDArray[np.complex64]]:
         """A burst as it arrives: (its first sample's index relative to the burst's own, samples).
 
-        Its phase is drawn from the path's chance.
+        The burst's phase is random.
         """
         params = self._params
         offset = 0
@@ -98,7 +98,7 @@ class Path:
         return np.convolve(x, echo_filters(samples, gains[None, :])[0])
 
     def _phase_noise(self, n: int) -> NDArray[np.complex64]:
-        """Factors `[n]` of a phase that walks at random: L(f) = step² · rate / (2 π f)²."""
+        """Factors `[n]` of a random-walk phase: L(f) = step² · rate / (2 π f)²."""
         level = 10 ** (self._params.phase_noise_dbc_hz / 10)
         step = 2 * np.pi * 1e4 * np.sqrt(level / self._params.rate_hz)
         walk = np.cumsum(step * self._rng.standard_normal(n))
@@ -106,7 +106,7 @@ class Path:
 
 
 def _spin(frequency: float, first: complex, n: int) -> NDArray[np.complex64]:
-    """`first` · exp(2πi `frequency` k) for k = 0 … n − 1, made of products of two angles."""
+    """`first` · exp(2πi `frequency` k) for k = 0 … n − 1, computed as products of two angles."""
     fine = first * np.exp(2j * np.pi * frequency * np.arange(SPIN))
     coarse = np.exp(2j * np.pi * frequency * SPIN * np.arange(-(-n // SPIN)))
     return np.outer(coarse, fine).astype(np.complex64).ravel()[:n]

@@ -1,6 +1,6 @@
 """Power delay profiles: (delay, power in dB) of each echo."""
 
-# Delays in units of the rms delay spread (3GPP TR 38.901, tables 7.7.2-1 and 7.7.2-3).
+# Delays in units of the RMS delay spread (3GPP TR 38.901, tables 7.7.2-1 and 7.7.2-3).
 TDL_A = (
     (0.0000, -13.4), (0.3819, 0.0), (0.4025, -2.2), (0.5868, -4.0), (0.4610, -6.0),
     (0.5375, -8.2), (0.6708, -9.9), (0.5750, -10.5), (0.7618, -7.5), (1.5375, -15.9),

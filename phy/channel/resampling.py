@@ -1,4 +1,4 @@
-"""Samples between samples: windowed-sinc interpolation for delays and clock differences."""
+"""Windowed-sinc interpolation between samples, for delays and clock differences."""
 
 from functools import cache
 
@@ -46,7 +46,8 @@ def echo_filters(
     for echo, delay in zip(echoes, delays, strict=True):
         whole = int(delay)
         phase = round((1 - (delay - whole)) * N_PHASES)
-        # A filter looks ahead by its phase from one sample back; reversed, it is a response.
+        # A filter looks ahead by its phase from one sample back; reversed, it is an impulse
+        # response.
         echo[whole : whole + N_TAPS] = filters[phase][::-1]
     taps: NDArray[np.complex64] = (gains @ echoes).astype(np.complex64)
     return taps

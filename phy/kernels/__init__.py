@@ -1,3 +1,3 @@
-"""Compiled loops. Everything outside reads like the equations; what must be fast is here."""
+"""Compiled loops: the code that must be fast. The rest of the modem reads like the equations."""
 
 from phy.kernels import cache as cache

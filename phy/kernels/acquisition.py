@@ -2,11 +2,11 @@
 
 Samples lie in two rows, real and imaginary parts, so that loops are vectorised.
 
-1. The detector's peak tells the frequency modulo 1/16 cycles a sample.
-2. The long training is correlated for every multiple of 1/16 within reach: the best tells the
+1. The detector's peak gives the frequency modulo 1/16 cycles per sample.
+2. The long training is correlated for every multiple of 1/16 within reach: the best match gives the
    frequency, and the first strong echo the timing.
 3. The phase from each 64 samples of the long training to the next refines the frequency.
-4. All of the preamble, re-made from a first channel estimate, tells the most likely frequency.
+4. The whole preamble, rebuilt from a first channel estimate, gives the most likely frequency.
 """
 
 import math
@@ -36,36 +36,41 @@ from phy.kernels.tracking import PHASE
 from phy.kernels.training import estimate, learn, turn_back
 from phy.kernels.viterbi import MAX_LLR, decode_block
 
-# A literal would have its callee compiled for it alone.
+# A literal would make numba compile the callee once more, for this value.
 _0: Any = np.int64(0)
 
 BACKOFF = 3
-"""FFT windows begin so many samples before the first echo."""
+"""Number of samples before the first echo at which FFT windows begin."""
 _SEGMENT = 16
-# Samples of a short segment that echoes of the one before hardly reach.
+# First samples of a short segment that echoes of the previous segment hardly reach.
 FIRST_CLEAN = BACKOFF + 4
 N_CLEAN = _SEGMENT - 4
 PART = 16
-"""Samples of the long training whose phase is looked at as one."""
+"""Number of samples of the long training whose phase is evaluated together."""
 N_LONG = 2
-"""Symbols of the long training."""
+"""Number of symbols in the long training."""
 
 
 class Training(NamedTuple):
-    """What acquisition knows of the preamble and the header on one grid."""
+    """Tables about the preamble and the header on one grid, for acquisition."""
 
     templates: NDArray[np.complex64]
-    """The long symbol, shifted by each multiple of 1/16 that is tried `[2 aliases + 1, n_fft]`."""
+    """The long symbol, shifted by each multiple of 1/16 to try `[2 aliases + 1, n_fft]`."""
     long: NDArray[np.float32]
     """The long training as sent `[2, 2, width]`."""
     waves: NDArray[np.float32]
-    """Each tone of the preamble in time, `[n_used, 2, 16 + n_fft]`: the clean samples of a short
-    segment, then zeros, then the long symbol."""
+    """Each tone of the preamble in time, `[n_used, 2, 16 + n_fft]`.
+
+    A row holds the clean samples of a short segment, then zeros, then the long symbol.
+    """
     cover: Row
     frequencies: NDArray[np.float64]
-    """Corrections of the frequency that are tried, in cycles a sample, evenly spaced."""
+    """Frequency corrections to try, in cycles per sample, evenly spaced."""
     turns: NDArray[np.float32]
-    """What turns each part of the preamble back by `frequencies` `[n_parts, 2, n_frequencies]`."""
+    """Factors that rotate each preamble part back by `frequencies`.
+
+    The shape is `[n_parts, 2, n_frequencies]`.
+    """
     windows: NDArray[np.int64]
     """First samples of the FFT windows of the long training and the header."""
 
@@ -74,12 +79,12 @@ open_training = opener(Training, "c8[2] f4[3] f4[3] f4[1] f8[1] f4[3] i8[1]")
 
 
 class Room(NamedTuple):
-    """Working memory and results of acquisition: one for each thread."""
+    """Working memory and results of acquisition; one per thread."""
 
     planes: Planes
-    """The burst's samples up to the end of its header, turned back."""
+    """The burst's samples up to the end of its header, rotated back."""
     wave: Planes
-    """The preamble as the channel makes it, laid out like a row of `Training.waves`."""
+    """The preamble after the channel, laid out like a row of `Training.waves`."""
     parts: Planes
     """Correlation of the preamble's parts with `wave` `[2, n_parts]`."""
     y: NDArray[np.float32]
@@ -87,12 +92,12 @@ class Room(NamedTuple):
     points: NDArray[np.complex64]
     """The header's equalised points `[n_header, n_data]`."""
     llr: NDArray[np.int16]
-    """LLRs of the header's coded bits with their repetitions `[n_header · n_data]`."""
+    """LLRs of the header's coded bits, including repetitions `[n_header · n_data]`."""
     folded: NDArray[np.int16]
-    """LLRs of the header's coded bits, repetitions added up `[2 (32 + 6)]`."""
+    """LLRs of the header's coded bits, with repetitions added up `[2 (32 + 6)]`."""
     decisions: NDArray[np.uint64]
     octets: NDArray[np.uint8]
-    """The likeliest header, with its check `[4]`."""
+    """The likeliest header, with its check sum `[4]`."""
 
 
 open_room = opener(Room, "f4[2] f4[2] f4[2] f4[3] c8[2] i2[1] i2[1] u8[1] u1[1]")
@@ -100,7 +105,7 @@ open_room = opener(Room, "f4[2] f4[2] f4[2] f4[3] c8[2] i2[1] i2[1] u8[1] u1[1]"
 
 @njit(nogil=True, cache=True)
 def refine(training: Training, h: Planes, room: Room) -> float:
-    """The most likely correction of the frequency, over all of the preamble, cycles a sample.
+    """The most likely frequency correction from the whole preamble, in cycles per sample.
 
     `room.planes` begin BACKOFF samples before the preamble.
     """
@@ -144,7 +149,7 @@ def _make_wave(waves: NDArray[np.float32], h: Planes, out: Planes) -> None:
 
 @njit(nogil=True, cache=True)
 def _agree(room: Room, at: int, wave_at: int, sign: np.float32, part: int) -> None:
-    """Write Σ z w* over PART samples, from `at` and `wave_at` on, times `sign`, to its place."""
+    """Write Σ z w* over PART samples, from `at` and `wave_at` on, times `sign`, to part `part`."""
     z, w = room.planes, room.wave
     size, wave_size = z.shape[1], w.shape[1]
     re: Lanes = splat(0)
@@ -159,7 +164,7 @@ def _agree(room: Room, at: int, wave_at: int, sign: np.float32, part: int) -> No
 
 @njit(nogil=True, cache=True)
 def _peak_of_parabola(places: NDArray[np.float64], values: NDArray[np.float64]) -> float:
-    """Where the parabola through the largest value and its neighbours has its peak."""
+    """Position of the peak of the parabola through the largest value and its neighbors."""
     i = int(min(max(int(values.argmax()), 1), values.size - 2))
     left, middle, right = values[i - 1], values[i], values[i + 1]
     bend = left - 2 * middle + right
@@ -181,11 +186,11 @@ def acquire(
     scratch_in: PackedArguments,
     room_in: PackedArguments,
 ) -> tuple[int, float]:
-    """(first sample of the burst or −1, its frequency) of the burst in `x`; its header to the room.
+    """Acquire the burst in `x`; returns (its first sample or −1, its frequency).
 
-    The first long symbol is nominally at `nominal`. `coarse` is the frequency in cycles a sample,
-    modulo 1/16. `centre_cycles` is how many cycles the centre frequency makes in a sample, if one
-    crystal makes both, or 0.
+    The header is written to the room. The first long symbol is nominally at `nominal`. `coarse` is
+    the frequency in cycles per sample, modulo 1/16. `centre_cycles` is the centre frequency in
+    cycles per sample if one crystal makes both, or 0.
     """
     training, tones, axes = open_training(training_in), open_tones(tones_in), open_axes(axes_in)
     channel, scratch, room = open_channel(channel_in), open_scratch(scratch_in), open_room(room_in)
@@ -224,7 +229,7 @@ def settle(
     scratch_in: PackedArguments,
     room_in: PackedArguments,
 ) -> tuple[float, float, float]:
-    """Learn the channel anew from a header that was read; `sent` are long training and header.
+    """Refine the channel with a decoded header; `sent` are long training and header.
 
     Returns, in dB: SNR over the band, mean power of the long training's samples, error of the
     header's points.

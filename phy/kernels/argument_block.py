@@ -1,8 +1,9 @@
-"""Many arrays as one argument of a kernel.
+"""Passes many arrays as one argument of a kernel.
 
-numba looks at every array that crosses from the interpreter, and at every field of a tuple; a short
-burst takes hardly longer than that. What stays the same from call to call is packed once instead: a
-`ArgumentBlock` holds the addresses, and the kernel opens it into the tuple that it was.
+numba inspects every array that crosses from the interpreter, and every field of a tuple; decoding a
+short burst takes hardly longer than that. So arguments that stay the same from call to call are
+packed once: an `ArgumentBlock` holds their addresses, and the kernel opens it into the original
+tuple.
 """
 
 import ctypes
@@ -21,16 +22,17 @@ from numpy.typing import NDArray
 _I64 = ir.IntType(64)
 
 PackedArguments = NDArray[np.int64]
-"""an argument block as kernels are given it."""
+"""An argument block in the packed form that kernels take."""
 
 _Content = TypeVar("_Content", bound=tuple[Any, ...])
 _FIELDS: dict[type[Any], list[Any]] = {}
 
 
 class ArgumentBlock(Generic[_Content]):
-    """A named tuple of arrays and numbers; `packed` is what kernels are given.
+    """A named tuple of arrays and numbers; `packed` is its form for kernels.
 
-    Raises TypeError when a field is not as its opener expects it: kernels would not notice.
+    Raises TypeError when a field is not of the type that its opener expects: kernels would not
+    notice.
     """
 
     def __init__(self, content: _Content) -> None:
@@ -45,17 +47,17 @@ class ArgumentBlock(Generic[_Content]):
                 words.append(int(np.array(value).view(np.int64)))
             if found != kind:
                 raise TypeError(f"{type(content).__name__}: got {found}; allowed: {kind}")
-        # Who has the packed form keeps alive what it points to.
+        # The packed form keeps the arrays alive that it points to.
         buffer: Any = (ctypes.c_int64 * len(words))(*words)
         buffer.content = content
         self.packed: PackedArguments = np.frombuffer(buffer, np.int64)
 
 
 def opener(kind: type[Any], fields: str) -> Any:
-    """For kernels: the packed form of an argument block to the tuple `kind` again.
+    """Make a kernel function that turns the packed form of an argument block into the tuple `kind`.
 
-    `fields` tells in order what each is: a scalar's dtype, and for an array its dimensions in
-    brackets, as in "i8 f4[2] c8[1]".
+    `fields` gives the type of each field in order: a scalar's dtype, and for an array also its
+    number of dimensions in brackets, as in "i8 f4[2] c8[1]".
     """
     found = [_numba_type(field) for field in fields.split()]
     result = types.NamedTuple(found, kind)

@@ -1,4 +1,4 @@
-"""Bits in words of 64, the first one lowest."""
+"""Bits in words of 64, the first bit lowest."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ _64 = np.uint64(64)
 _LANES = 32
 _I16, _I32 = ir.IntType(16), ir.IntType(32)
 _VECTOR = ir.VectorType(_I16, _LANES)
-# Halves, quarters and eighths of a byte that change places when it is turned round.
+# Masks of halves, quarters and eighths of a byte that swap places when its bits are reversed.
 _TURNS = ((4, 0x0F0F0F0F0F0F0F0F), (2, 0x3333333333333333), (1, 0x5555555555555555))
 
 
@@ -39,7 +39,7 @@ _signs: Any = intrinsic(_signs_generator)
 
 @njit(nogil=True, cache=True)
 def put(out: Words, at: int, word: np.uint64, n: int) -> None:
-    """Write the lowest `n` bits of `word` from bit `at` on, where there are zeros so far."""
+    """Write the lowest `n` bits of `word` from bit `at` on; that place must hold zeros."""
     i, bit = at >> 6, np.uint64(at & 63)
     out[i] |= word << bit
     if bit + np.uint64(n) > _64:
@@ -59,7 +59,7 @@ def get(words: Words, at: int, n: int) -> np.uint64:
 
 @njit(nogil=True, cache=True)
 def low_ones(n: int) -> np.uint64:
-    """A word with ones in its `n` ≤ 64 lowest places."""
+    """A word with ones in its `n` ≤ 64 lowest bits."""
     return ~np.uint64(0) if n >= 64 else (ONE << np.uint64(n)) - ONE
 
 

@@ -1,6 +1,6 @@
-"""What kernels of the receiver are told, and what they keep between calls.
+"""Tables and working memory of the receiver's kernels.
 
-Rows over tones are as long as `width`: the tones in use, up to whole lanes, zeros behind.
+Rows over tones have the length `width`: the tones in use, padded with zeros to whole lanes.
 """
 
 from typing import NamedTuple
@@ -12,16 +12,16 @@ from phy.kernels.argument_block import opener
 
 Row = NDArray[np.float32]
 Planes = NDArray[np.float32]
-"""Real parts in one row, imaginary ones in the next, so that loops are vectorised."""
+"""Real parts in one row, imaginary parts in the next, so that loops are vectorised."""
 
 
 class Tones(NamedTuple):
-    """A grid, and its subcarriers in use, data first, then pilots `[n_used]`."""
+    """A grid and its subcarriers in use, data first, then pilots `[n_used]`."""
 
     n_fft: int
     n_symbol: int
     gain: float
-    """What subcarriers of samples of mean power 1 are taken times."""
+    """Factor for subcarriers of samples of mean power 1."""
     n_data: int
     bins: NDArray[np.int64]
     subcarriers: NDArray[np.int64]
@@ -30,9 +30,9 @@ class Tones(NamedTuple):
     pilots: Row
     """Pilots of a symbol with polarity +1 `[n_pilots]`."""
     polarity: Row
-    """Sign of each symbol's pilots, the header's first symbol being number 0."""
+    """Sign of each symbol's pilots; the header's first symbol is number 0."""
     basis: NDArray[np.float32]
-    """Orthonormal rows of the smoother, `phy.kernels.smoothing` `[n, width]`."""
+    """Orthonormal rows of the smoother `[n, width]`; see `phy.kernels.smoothing`."""
     ends: NDArray[np.int64]
     neighbours: NDArray[np.int64]
     twiddles: Planes
@@ -43,29 +43,29 @@ open_tones = opener(Tones, "i8 i8 f8 i8 i8[1] i8[1] f4[1] f4[1] f4[1] f4[2] i8[1
 
 
 class Axes(NamedTuple):
-    """A modulation: bits of each axis, half the distance of levels, where each coded bit lies."""
+    """A modulation: bits of each axis, half the level distance, position of each coded bit."""
 
     real_bits: int
     imag_bits: int
     unit: float
     gather: NDArray[np.uint32]
-    """Place of each bit of the code's order, when a symbol's bits lie plane by plane."""
+    """Position of each bit of the code's order in a symbol whose bits lie plane by plane."""
 
 
 open_axes = opener(Axes, "i8 i8 f8 u4[1]")
 
 
 class Channel(NamedTuple):
-    """What is known of a burst's channel; it changes while the burst is heard."""
+    """What is known of a burst's channel; it is updated during the burst."""
 
     h: Planes
     """Gains `[2, width]`, in the order of `Tones`."""
     centre: Planes
-    """What turns gains back by their mean delay `[2, width]`."""
+    """Factors that rotate gains back by their mean delay `[2, width]`."""
     turns: Planes
-    """What turns a symbol's subcarriers back by the slope that is used `[2, width]`."""
+    """Factors that rotate a symbol's subcarriers back by the slope in use `[2, width]`."""
     inverse: Planes
-    """1 / h `[2, width]`; 0 where nothing arrives."""
+    """1 / h `[2, width]`; 0 for gains of 0."""
     certainty: Row
     """|h|² over the noise, in units of LLRs `[width]`."""
     sums: Planes
@@ -73,11 +73,11 @@ class Channel(NamedTuple):
     """Over the symbols since the last correction, Σ y (E s)* `[2, width]`, Σ E |s|² `[width]`."""
     unknown: NDArray[np.float64]
     power: NDArray[np.float64]
-    """`[groups + 1]`: see `phy.kernels.smoothing`."""
+    """Mean power of each group of the smoother `[groups + 1]`; see `phy.kernels.smoothing`."""
     figures: NDArray[np.float64]
-    """See the indices below."""
+    """Scalar values; their indices are defined below."""
     tracking: NDArray[np.float64]
-    """See `phy.kernels.tracking` `[2, 5]`."""
+    """State of both tracking filters `[2, 5]`; see `phy.kernels.tracking`."""
 
     @property
     def no(self) -> float:
@@ -99,15 +99,18 @@ correction and what was certain in them, Σ |E s|²; the slope that subcarriers 
 
 
 class Scratch(NamedTuple):
-    """Working memory of the receiver's kernels: one for each thread."""
+    """Working memory of the receiver's kernels; one per thread."""
 
     windows: NDArray[np.float32]
     starts: NDArray[np.int64]
     turn: Planes
-    """Room of the FFT: eight windows, twice `[4, 8 n_fft]`, where they begin `[8]`, and what turns
-    them back `[2, n_fft]`."""
+    """Room of the FFT.
+
+    It has eight windows, twice `[4, 8 n_fft]`, their start indices `[8]`, and the factors that
+    rotate them back `[2, n_fft]`.
+    """
     square: Row
-    """Eight by eight values, to be transposed."""
+    """Eight by eight values to transpose."""
     y: NDArray[np.float32]
     """Tones of eight symbols `[8, 2, width]`."""
     level: Planes
@@ -116,7 +119,7 @@ class Scratch(NamedTuple):
     """A symbol's points, and its LLRs bit by bit."""
     turned: NDArray[np.complex128]
     pilot_power: NDArray[np.float64]
-    """The pilots as tracking takes them `[n_pilots]`."""
+    """The pilots in the form that tracking takes `[n_pilots]`."""
     rest: Planes
     coefficients: NDArray[np.float32]
     energies: NDArray[np.float64]

@@ -1,11 +1,12 @@
-"""Where compiled kernels are kept, and until when.
+"""Where compiled kernels are cached, and for how long.
 
-A compiled kernel holds the code of those that it calls, and constants of other files. numba keeps
-it until the function's own file changes; here the stamp on it is that of all the files beside it.
+A compiled kernel contains the code of the functions that it calls, and constants of other files.
+numba considers it valid until the function's own file changes; here it is valid until any file in
+the folder changes.
 
-numba keeps it in $NUMBA_CACHE_DIR, beside the source or in the user's cache, and fails where none
-of them can be written. Here a private temporary folder comes last; what cannot be kept at all is
-compiled anew by the next process.
+numba caches kernels in $NUMBA_CACHE_DIR, beside the source or in the user's cache, and fails if it
+can write to none of them. Here a private temporary folder is the last choice, and if that fails too
+each process compiles its kernels anew.
 """
 
 import contextlib
@@ -24,12 +25,12 @@ _in_use: set[Path] = set()
 
 
 def temporary_cache() -> Path | None:
-    """The temporary folder that kernels are kept in; None where a lasting one can be written."""
+    """The temporary folder with the cached kernels; None if a permanent folder is writable."""
     return next(iter(_in_use), None)
 
 
 class TemporaryCacheLocator(InTreeCacheLocator):
-    """A cache in a temporary folder, for accounts without a home that run code of somebody else."""
+    """A cache in a temporary folder, for accounts without a home that run another user's code."""
 
     def __init__(self, py_func: Any, py_file: Any) -> None:
         super().__init__(py_func, py_file)
@@ -39,7 +40,7 @@ class TemporaryCacheLocator(InTreeCacheLocator):
 
     @classmethod
     def from_function(cls, py_func: Any, py_file: Any) -> Any:
-        """A locator for every file that exists: no other locator comes after this one."""
+        """A locator for every existing file: no other locator comes after this one."""
         return cls(py_func, py_file) if Path(py_file).exists() else None
 
 
@@ -47,7 +48,7 @@ class TemporaryCacheLocator(InTreeCacheLocator):
 def _private_folder() -> Path:
     """The user's own temporary folder, which later processes find again.
 
-    What is in it is executed: a folder that others have made or may write to is not used.
+    Its content is executed, so a folder that other users own or may write to is rejected.
     """
     folder = Path(_temporary()) / f"sdrlinkd-{os.geteuid()}"
     with contextlib.suppress(OSError):
@@ -65,7 +66,7 @@ def _temporary() -> str:
     try:
         return tempfile.gettempdir()
     except FileNotFoundError:
-        # Not one can be written.
+        # None of them is writable.
         return "/tmp"  # noqa: S108 (nothing is written to it)
 
 
@@ -84,7 +85,7 @@ def _stamped(locator: Any, stamp: str) -> Any:
 
 
 def _forgiving(method: Any) -> Any:
-    """`method` without its OSErrors: a full disk or a lost folder costs time and nothing else."""
+    """`method` with its OSErrors suppressed: a full disk or a lost folder only costs time."""
 
     def call(*arguments: Any) -> Any:
         with contextlib.suppress(OSError):

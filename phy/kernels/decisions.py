@@ -1,7 +1,8 @@
-"""What was sent, as far as the LLRs of its bits tell: mean and mean square of every point.
+"""Mean and mean square of each sent point, estimated from the LLRs of its bits.
 
 An axis with Gray-coded bits 0, 1, …, m − 1 has the level ±R_1, where R_b = 2^(m − b) ± R_(b + 1)
-and R_m = 1. So means follow from the inside out, a bit at a time, with tanh(LLR / 2) for its sign.
+and R_m = 1. So the means follow from the inside out, one bit at a time, with tanh(LLR / 2) as the
+sign of a bit.
 """
 
 import numpy as np
@@ -16,7 +17,7 @@ from phy.kernels.lanes import Lanes, least, load, most, splat
 def expected_level(
     llr: NDArray[np.float32], axis_bits: int, at: int, stride: int
 ) -> tuple[Lanes, Lanes]:
-    """(mean, mean square) of eight levels, odd numbers, from LLRs of bit b at `at + b stride`."""
+    """(mean, mean square) of eight levels (odd numbers); LLRs of bit b are at `at + b stride`."""
     scale = splat(0.5 / LLR_SCALE)
     mean: Lanes = splat(1)
     square: Lanes = splat(1)
@@ -31,7 +32,7 @@ def expected_level(
 @step
 def _tanh(x: Lanes) -> Lanes:
     """The hyperbolic tangent, to within 2 %."""
-    # At ±3 the quotient is ±1.
+    # At ±3 the quotient reaches ±1.
     x = least(most(x, splat(-3)), splat(3))
     square = x * x
     value: Lanes = x * (splat(27) + square) / (splat(27) + splat(9) * square)

@@ -1,4 +1,4 @@
-"""Points to LLRs: exact max-log for Gray-coded axes of any size, eight subcarriers at a time."""
+"""Converts points to LLRs: exact max-log for Gray-coded axes, eight subcarriers at once."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +15,12 @@ LLR_SCALE = 8.0
 def axis_llrs(
     level: Lanes, weight: Lanes, axis_bits: int, out: NDArray[np.float32], at: int, stride: int
 ) -> None:
-    """Write the LLRs of eight levels, those of bit b to `out[at + b stride]` and after.
+    """Write the LLRs of eight levels, those of bit b from `out[at + b stride]` on.
 
-    `level` is in units of half the levels' distance. An LLR is the difference of squared distances
-    to the nearest levels with the bit 1 and 0, times `weight`. That of the first bit is, of 2 m
-    levels, ±max over k ≤ m of 4 k |u| − 4 k (k − 1); each other bit is the first of the axis folded
-    in the middle.
+    `level` is in units of half the level distance. An LLR is the difference of the squared
+    distances to the nearest levels with the bit 1 and 0, times `weight`. For the first bit of 2 m
+    levels it is ±max over k ≤ m of 4 k |u| − 4 k (k − 1). Each further bit is the first bit of the
+    axis folded in the middle.
     """
     limit = splat(MAX_LLR)
     for bit in range(axis_bits):

@@ -1,4 +1,4 @@
-"""From samples to LLRs, as the interpreter calls it: argument blocks in, arrays filled."""
+"""The demodulator's kernels as the interpreter calls them: with argument blocks."""
 
 import math
 
@@ -33,7 +33,7 @@ def demodulate(
 ) -> None:
     """Write the LLRs of `n` symbols, the first of whose FFT windows begins at `samples[0]`.
 
-    `powers` `[≥ n]` gets each symbol's mean power on a tone. The other arguments are those of
+    `powers` `[≥ n]` gets each symbol's mean power on a tone. For the other arguments see
     `windows_to_tones` and `equalise`.
     """
     tones, axes = open_tones(tones_in), open_axes(axes_in)
@@ -71,7 +71,7 @@ def to_tones(
 
 @njit(nogil=True, cache=True)
 def slip(early: int, tones_in: PackedArguments, channel_in: PackedArguments) -> None:
-    """Let FFT windows begin `early` samples earlier; the slope over subcarriers is less by that."""
+    """Move FFT windows `early` samples earlier, and adapt the slope over subcarriers."""
     tones, channel = open_tones(tones_in), open_channel(channel_in)
     lean = early * 2 * math.pi / tones.n_fft
     channel.tracking[SLOPE, 0] -= lean
@@ -86,7 +86,7 @@ def learn_channel(
     channel_in: PackedArguments,
     scratch_in: PackedArguments,
 ) -> None:
-    """Estimate the channel from known symbols, as `estimate` does, and begin to track it."""
+    """Estimate the channel from known symbols, as `estimate` does, and start to track it."""
     tones, channel = open_tones(tones_in), open_channel(channel_in)
     amplitude = np.ones(sent.shape[0], np.float32)
     estimate(y, amplitude, sent, tones, channel, open_scratch(scratch_in))

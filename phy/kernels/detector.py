@@ -1,7 +1,7 @@
 """The preamble detector: the metric of a sample is a fixed tree of sums over 192 samples.
 
-No running sum is carried from sample to sample, so there is nothing to drift, every loop is
-vectorised, and the result does not depend on how the stream was cut into chunks.
+There is no running sum from sample to sample, so nothing drifts, every loop is vectorised, and the
+result does not depend on how the stream was cut into chunks.
 """
 
 import math
@@ -15,12 +15,12 @@ from phy.kernels.inline import step
 SEGMENT = 16
 SHORT = 192
 HISTORY = SHORT - 1
-"""Samples before a sample that its metric needs."""
+"""Number of samples before a sample that its metric needs."""
 
 FORGETS = 4096.0
-"""Samples in which a raised threshold sinks by a factor e."""
+"""Number of samples in which a raised threshold decays by a factor of e."""
 
-# E is over 192 samples, P over the 176 products of neighbours 16 apart.
+# E is over 192 samples, P over the 176 products of samples 16 apart.
 _SHARE = np.float32((SHORT - SEGMENT) / SHORT)
 
 
@@ -37,7 +37,7 @@ def detector_sums(x: NDArray[np.complex64], dc: complex, work: NDArray[np.float3
     for i in range(size):
         re[i] = x[i].real - dc_re
         im[i] = x[i].imag - dc_im
-    # Products of samples 16 apart, and powers.
+    # Products of samples 16 apart, and powers of samples.
     p_re, p_im, power = work[0], work[1], work[2]
     late_re, late_im = re[SEGMENT:], im[SEGMENT:]
     for i in range(size - SEGMENT):
@@ -45,7 +45,7 @@ def detector_sums(x: NDArray[np.complex64], dc: complex, work: NDArray[np.float3
         p_im[i] = late_im[i] * re[i] - late_re[i] * im[i]
     for i in range(size):
         power[i] = re[i] * re[i] + im[i] * im[i]
-    # Sums of 16 by doubling; entry i is the sum that begins at i.
+    # Sums of 16 by repeated doubling; entry i is the sum that begins at i.
     a, b, c = work[3], work[4], work[5]
     _double(p_re, a, size - SEGMENT, 1)
     _double(a, p_re, size - SEGMENT - 1, 2)
@@ -106,8 +106,8 @@ def search(
     """Index in `x` of the first sample with |P| > threshold · E, or -1 after `n_hops` hops.
 
     `x` begins HISTORY samples before the first hop. The threshold was raised by `excess`, `age`
-    samples before the first hop, and sinks back hop by hop. DC (`dc_state`: real, imaginary, hops
-    seen) follows the mean slowly; a hop with a crossing leaves it as it is.
+    samples before the first hop, and decays hop by hop. The DC estimate (`dc_state`: real,
+    imaginary, hops seen) follows the mean slowly; a hop with a crossing does not change it.
     """
     for h in range(n_hops):
         level = threshold + excess * math.exp(-(age + h * hop) / FORGETS)
@@ -119,7 +119,8 @@ def search(
         crossings = 0
         for i in range(hop):
             magnitude = p_re[i] * p_re[i] + p_im[i] * p_im[i]
-            # Counted without a branch, so that hops with no crossing, nearly all, are vectorised.
+            # Counted without a branch, so that hops without a crossing, which are almost all, are
+            # vectorised.
             crossings += magnitude > limit * (energy[i] * energy[i])
         if crossings:
             for i in range(hop):
@@ -134,10 +135,10 @@ def search(
 def strongest(
     x: NDArray[np.complex64], n: int, dc: complex, work: NDArray[np.float32]
 ) -> tuple[int, complex, float]:
-    """(offset, P, |Q| / |P|) where |P| / E is largest of the `n` samples after HISTORY of `x`.
+    """(offset, P, |Q| / |P|) at the largest P / E of the `n` samples after HISTORY of `x`.
 
-    Q is P without the code: small for our preamble, large for whatever repeats itself every 16
-    samples or turns evenly.
+    Q is P without the code: small for our preamble, large for any signal that repeats every 16
+    samples or rotates evenly.
     """
     detector_sums(x, dc, work, n)
     p_re, p_im, energy = work[0], work[1], work[2]
@@ -149,7 +150,7 @@ def strongest(
             if metric > best_metric:
                 best, best_metric = i, metric
     p = complex(p_re[best], p_im[best])
-    # Silence: as plain as can be, and so no preamble.
+    # Silence: return the ratio that rules out a preamble.
     if best_metric <= 0:
         return best, p, 1.0
     plain = 0j
@@ -165,7 +166,7 @@ def _follow_dc(x: NDArray[np.complex64], dc_state: NDArray[np.float64]) -> None:
         re += x[i].real
         im += x[i].imag
     dc_state[2] += 1
-    # The mean of all hops at first, so that it settles at once; of the last 64 or so from then on.
+    # At first the mean of all hops, for quick settling; later of about the last 64.
     weight = max(1 / 64, 1 / dc_state[2])
     dc_state[0] += weight * (re / x.size - dc_state[0])
     dc_state[1] += weight * (im / x.size - dc_state[1])
@@ -173,11 +174,12 @@ def _follow_dc(x: NDArray[np.complex64], dc_state: NDArray[np.float64]) -> None:
 
 @njit(nogil=True, cache=True)
 def sanitise(x: NDArray[np.complex64], limit: float) -> int:
-    """Set samples that are not finite or exceed `limit` to 0; returns how many there were."""
+    """Set samples that are not finite or exceed `limit` to 0; returns their number."""
     most, n_good = np.float32(limit), 0
     parts = x.view(np.float32)
     for i in range(parts.size):
-        # False of NaN, too. Bad samples are rare: this loop, without a branch, is vectorised.
+        # The comparison is also false for NaN. Bad samples are rare, so this branch-free loop is
+        # vectorised.
         n_good += abs(parts[i]) < most
     if n_good == parts.size:
         return 0

@@ -1,4 +1,4 @@
-"""Subcarriers to LLRs: follow phase, timing and channel, equalise, demap, de-interleave."""
+"""Subcarriers to LLRs: tracks phase, timing and channel, equalises, demaps, de-interleaves."""
 
 import math
 
@@ -28,20 +28,19 @@ from phy.kernels.smoothing import follow
 from phy.kernels.tracking import PHASE, SLOPE, correct, predict
 
 BLOCK = 8
-"""Symbols from one correction of the channel to the next."""
+"""Number of symbols from one correction of the channel to the next."""
 _LEAST_MASS = BLOCK / 4
-"""Of what must have been certain in a block, or it teaches nothing: others were on the air."""
-# However strong a signal, echoes and converters leave so much on a subcarrier.
+"""Least certainty in a block; with less, others were on the air and the block is not used."""
+# Noise floor relative to the signal: echoes and converters always leave this share.
 _LEAST_NOISE = 1e-4
 # Frequency error of the preamble's estimate, in subcarrier spacings: at 0 dB, and at best.
 _FREQUENCY_ERROR_0_DB = 0.006
 _FREQUENCY_ERROR_MIN = 0.0005
-# Sampling clocks differ by so much, and by so much if the centre frequency tells it (standard
-# deviations).
+# Standard deviations of the sampling clock's error: unknown, and derived from the centre frequency.
 _CLOCK_ERROR, _CLOCK_DOUBT = 40e-6, 5e-6
-# Radians by which the outermost subcarriers may lag the slope before their turn is made anew.
+# Lag in radians of the outermost subcarriers behind the slope at which their turn is recomputed.
 _LAG = 0.01
-# Twice the turn of the outermost subcarriers below which a series will do.
+# Twice the turn of the outermost subcarriers up to which a series is accurate enough.
 _SMALL = 0.2
 
 
@@ -52,10 +51,10 @@ def _noise(channel: Channel) -> float:
 
 @njit(nogil=True, cache=True)
 def start_tracking(tones: Tones, channel: Channel, clock_error: float, is_known: bool) -> None:
-    """Set phase and slope, and what is known of them, as they stand after the preamble.
+    """Initialise phase, slope and their uncertainty as they are after the preamble.
 
-    `clock_error` is the share by which the sender's sampling clock is fast, as far as it is known;
-    pilots may contradict it.
+    `clock_error` is the relative excess of the sender's sampling clock, as far as it is known;
+    pilots may correct it.
     """
     figures, tracking = channel.figures, channel.tracking
     error = _FREQUENCY_ERROR_0_DB * math.sqrt(figures[NO] / figures[GAIN])
@@ -73,7 +72,7 @@ def start_tracking(tones: Tones, channel: Channel, clock_error: float, is_known:
 
 @step
 def use_slope(slope: float, tones: Tones, channel: Channel) -> None:
-    """Turn subcarriers back by `slope` radians a subcarrier from now on."""
+    """From now on, rotate subcarriers back by `slope` radians per subcarrier."""
     more = channel.figures[SLOPE_USED] - slope
     channel.figures[SLOPE_USED] = slope
     if abs(more) * tones.n_fft < _SMALL:
@@ -101,7 +100,7 @@ def renew(channel: Channel) -> None:
 def _pilots(
     re: Row, im: Row, polarity: float, tones: Tones, channel: Channel, scratch: Scratch
 ) -> float:
-    """Track phase and slope to this symbol by its pilots; its noise power on a subcarrier."""
+    """Track phase and slope to this symbol by its pilots; returns its noise per subcarrier."""
     tracking, turned, power = channel.tracking, scratch.turned, scratch.pilot_power
     predict(tracking)
     back = complex(math.cos(tracking[PHASE, 0]), -math.sin(tracking[PHASE, 0])) * polarity
@@ -122,11 +121,11 @@ def _data(
     re: Row, im: Row, c: float, s: float, trust: float, axes: Axes, channel: Channel,
     scratch: Scratch, n: int,
 ) -> float:  # fmt: skip
-    """The `n` data subcarriers of a symbol: to levels, and to LLRs plane by plane.
+    """Convert a symbol's `n` data subcarriers to levels, and to LLRs plane by plane.
 
-    The subcarriers are turned by c + js and by the slope in use. With what they probably are, they
-    are added to the channel's sums and masses, times `trust`. Returns what is certain of them, Σ |E
-    s|² times `trust`.
+    The subcarriers are rotated by c + js and by the slope in use. With their likely values, they
+    are added to the channel's sums and masses, times `trust`. Returns the certain part of them, Σ
+    |E s|² times `trust`.
     """
     width = channel.masses.size
     turns, inverse, sums = channel.turns, channel.inverse, channel.sums
@@ -165,7 +164,7 @@ def _learn_pilots(
     re: Row, im: Row, turned_by: complex, trust: float, polarity: float, tones: Tones,
     channel: Channel,
 ) -> None:  # fmt: skip
-    """Add what the pilots say of their subcarriers' gains to the channel's sums and masses."""
+    """Add the pilots' evidence about their subcarriers' gains to the channel's sums and masses."""
     for p in range(tones.pilots.size):
         at = tones.n_data + p
         turn = complex(channel.turns[0, at], channel.turns[1, at])
@@ -178,10 +177,10 @@ def _learn_pilots(
 
 @step
 def _correct_channel(tones: Tones, channel: Channel, scratch: Scratch) -> None:
-    """Correct the gains by what the last symbols, as decided, say of them.
+    """Correct the gains with the last symbols, as decided.
 
-    This is a step of expectation and maximisation. What was uncertain makes such a step too short;
-    it is made longer by as much.
+    This is a step of expectation maximisation. Uncertainty makes such a step too short; it is
+    lengthened to compensate.
     """
     figures, sums, h, width = channel.figures, channel.sums, channel.h, channel.masses.size
     mass = figures[CERTAIN] / tones.bins.size
@@ -214,21 +213,21 @@ def equalise(
 ) -> None:
     """Write the LLRs of `n` symbols in the code's order, positive for 0, from symbol `first` on.
 
-    `y` `[≥ n, 2, width]` has real and imaginary parts, in the order of tones; its first symbol is
-    number `number`, the header's first being 0. `channel` goes on from call to call. `points`
-    `[…, n_data]` gets the equalised points, if it has any rows.
+    `y` `[≥ n, 2, width]` has real and imaginary parts, in the order of tones. Its first symbol is
+    number `number`; the header's first symbol is 0. `channel` carries over from call to call.
+    `points` `[…, n_data]` gets the equalised points if it has any rows.
     """
     n_data, n_bits, unit = tones.n_data, axes.gather.size, axes.unit
     gather, planes, figures = axes.gather, scratch.planes, channel.figures
     n_pilots = tones.bins.size - n_data
-    # The slope at which subcarrier n_fft / 2, beyond the outermost, has turned by _LAG.
+    # The slope at which subcarrier n_fft / 2, beyond the outermost one, turns by _LAG.
     most_lag = _LAG / tones.n_fft * 2
     for row in range(n):
         re, im, polarity = y[row, 0], y[row, 1], tones.polarity[number + row]
         no = _pilots(re, im, polarity, tones, channel, scratch)
         if abs(channel.tracking[SLOPE, 0] - figures[SLOPE_USED]) > most_lag:
             use_slope(channel.tracking[SLOPE, 0], tones, channel)
-        # A symbol with more noise than the preamble had, as under interference, counts for less.
+        # A symbol with more noise than the preamble, as under interference, counts less.
         phase, trust = channel.tracking[PHASE, 0], _noise(channel) / no
         c, s = math.cos(phase), -math.sin(phase)
         certain = _data(re, im, c, s, trust, axes, channel, scratch, n_data)

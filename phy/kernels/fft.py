@@ -1,8 +1,8 @@
-"""FFTs of eight windows at once, one in each lane.
+"""FFTs of eight windows at once, one per lane.
 
-Stockham's radix 4: every stage reads in order, and writes so that the last one's output is sorted.
-Each value that is read or written is the same sample of all eight windows; so a stage is the same
-few vector operations again and again, for 64, 128 and 256 samples alike.
+The algorithm is Stockham's radix 4: every stage reads in order, and writes so that the last one's
+output is sorted. Each value read or written is the same sample of all eight windows. So a stage
+repeats the same few vector operations, for 64, 128 and 256 samples alike.
 """
 
 import math
@@ -44,7 +44,7 @@ def eight_windows(
     flat, step = samples.view(np.float32), -2 * math.pi * frequency
     re, im, to_re, to_im = parts[0], parts[1], parts[2], parts[3]
     for lane in range(N_LANES):
-        # Lanes beyond the last window repeat it: nothing is read behind the samples.
+        # Unused lanes repeat the last window, so nothing beyond the samples is read.
         phase = step * (starts[min(lane, n - 1)] + origin)
         square[lane], square[N_LANES + lane] = math.cos(phase), math.sin(phase)
     begin_re, begin_im = load(square, 0), load(square, N_LANES)
@@ -78,8 +78,8 @@ def windows_to_tones(
 ) -> None:
     """Write the tones `[n, 2, width]` of FFT windows that begin at `starts` `[n]`.
 
-    Samples are taken less `dc` and turned back by `frequency` cycles a sample; phase 0 is `origin`
-    samples before `samples[0]`.
+    Before the FFT, `dc` is subtracted from the samples and they are rotated back by `frequency`
+    cycles per sample; phase 0 is `origin` samples before `samples[0]`.
     """
     circle(-frequency, tones.gain, scratch.turn)
     for row in range(0, starts.size, N_LANES):
@@ -89,7 +89,7 @@ def windows_to_tones(
 
 @step
 def transpose(square: Row) -> None:
-    """Transpose eight rows of eight in place, as cards are shuffled three times."""
+    """Transpose eight rows of eight in place by three perfect shuffles."""
     a, b, c, d = load(square, 0), load(square, 8), load(square, 16), load(square, 24)
     e, f, g, h = load(square, 32), load(square, 40), load(square, 48), load(square, 56)
     for _ in range(3):
@@ -129,7 +129,7 @@ def _sort(
 def transform(
     re: Row, im: Row, to_re: Row, to_im: Row, n: int, twiddles: NDArray[np.float32]
 ) -> bool:
-    """Compute the FFT of lanes `[n · 8]`; True when it is in `to_re`, `to_im`, not `re`, `im`."""
+    """Compute the FFT of lanes `[n · 8]`; True if the result is in `to_re`, `to_im`."""
     left, swapped = n, False
     stride: Any = np.int64(1)
     while left >= 4:
@@ -187,7 +187,7 @@ def _radix_4(
 
 @njit(nogil=True, cache=True)
 def _radix_2(re: Row, im: Row, to_re: Row, to_im: Row, stride: int) -> None:
-    """Run the last stage of sizes that are no power of 4."""
+    """Run the last stage for sizes that are not a power of 4."""
     half = N_LANES * stride
     for a in range(0, half, N_LANES):
         b = a + half

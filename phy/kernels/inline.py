@@ -1,4 +1,4 @@
-"""Steps of a kernel: code of their own to read, inlined where they are used."""
+"""Steps: parts of a kernel, written as functions and inlined where they are called."""
 
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -11,7 +11,7 @@ _Step = TypeVar("_Step", bound=Callable[..., Any])
 def step(function: _Step) -> _Step:
     """Compile a step, which only kernels can call and which is inlined there.
 
-    To hand a tuple of arrays on by value costs more than many a step does.
+    Passing a tuple of arrays by value would cost more than many steps do.
     """
     options: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     made: Any = njit(nogil=True, forceinline=True, **options)(function)

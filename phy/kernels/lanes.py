@@ -1,10 +1,10 @@
-"""Eight float32 as one value, for loops that must be vectors.
+"""Eight float32 as one value, for loops that must be vectorised.
 
-numba leaves it to LLVM to find vectors in loops over arrays. It finds none where too many arrays
-may overlap, and none across a loop inside. Code in `Lanes` says what it means: `load` eight
+numba leaves the vectorisation of loops over arrays to LLVM. LLVM gives up if too many arrays may
+overlap, or if the loop contains another loop. Code in `Lanes` is explicit: `load` eight
 subcarriers, calculate with + - * /, `store` eight results. LLVM lowers each operation to what the
-machine has (one instruction of AVX, two of NEON); nothing is contracted or put in another order, so
-that numpy's float32 gives the same bits.
+machine has (one instruction of AVX, two of NEON). Nothing is contracted or reordered, so numpy's
+float32 gives the same bits.
 """
 
 import operator
@@ -20,7 +20,7 @@ N_LANES = 8
 
 
 def whole_lanes(n: int) -> int:
-    """`n`, rounded up to a whole number of vectors of N_LANES."""
+    """Round `n` up to a whole number of vectors of N_LANES."""
     return -(-n // N_LANES) * N_LANES
 
 
@@ -80,13 +80,13 @@ def _negate(_context: Any, builder: Any, _signature: Any, args: Any) -> Any:
 
 
 def place(context: Any, builder: Any, signature: Any, args: Any, vector: Any) -> Any:
-    """For intrinsics: a pointer to `vector` at an index, argument 1, of an array, argument 0."""
+    """For intrinsics: a vector pointer to an element; the arguments are an array and an index."""
     data = context.make_array(signature.args[0])(context, builder, args[0]).data
     return builder.bitcast(builder.gep(data, [args[1]]), vector.as_pointer())
 
 
 def _load(_typing: Any, array: Any, at: Any) -> Any:
-    """Load eight values of an array without gaps, from index `at` of its flat form on."""
+    """Load eight values of a contiguous array, from index `at` of its flat form on."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         value = builder.load(place(context, builder, signature, args, _VECTOR))
@@ -97,7 +97,7 @@ def _load(_typing: Any, array: Any, at: Any) -> Any:
 
 
 def _store(_typing: Any, array: Any, at: Any, value: Any) -> Any:
-    """Store eight values to an array without gaps, from index `at` of its flat form on."""
+    """Store eight values to a contiguous array, from index `at` of its flat form on."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         where = place(context, builder, signature, args, _VECTOR)
@@ -108,7 +108,7 @@ def _store(_typing: Any, array: Any, at: Any, value: Any) -> Any:
 
 
 def _store_int16(_typing: Any, array: Any, at: Any, value: Any) -> Any:
-    """Store eight values as int16, rounded towards zero; they must fit."""
+    """Store eight values as int16, rounded towards zero; they must be in range."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         kind = ir.VectorType(_I16, N_LANES)
@@ -121,7 +121,7 @@ def _store_int16(_typing: Any, array: Any, at: Any, value: Any) -> Any:
 
 
 def _splat(_typing: Any, value: Any) -> Any:
-    """A number, the same in all lanes."""
+    """A number, repeated in all lanes."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         number = context.cast(builder, args[0], signature.args[0], types.float32)
@@ -146,7 +146,7 @@ def _total(_typing: Any, value: Any) -> Any:
 
 
 def _pairs(_typing: Any, value: Any) -> Any:
-    """The sums of even and of odd lanes, as real and imaginary part."""
+    """The sum of the even lanes and that of the odd lanes, as real and imaginary part."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         lanes = [builder.extract_element(args[0], _lane(i)) for i in range(N_LANES)]

@@ -1,31 +1,31 @@
 """Layered min-sum decoder of quasi-cyclic LDPC codes.
 
-The parity-check matrix is made of Z x Z blocks, each zero or a shifted identity. So the Z checks of
-a block row are independent, and each takes one bit of every block column it touches: from block
+The parity-check matrix consists of Z x Z blocks, each zero or a shifted identity. So the Z checks
+of a block row are independent, and each takes one bit of every block column it touches: from block
 column c with shift s, check z takes bit (z + s) mod Z. Z checks at a time are Z lanes of a vector.
 
-*Layers.* The decoder keeps a posterior LLR of each bit, and of each edge (check, bit) the message
-the check last sent. It visits one block row after another; a row takes its old messages off the
-posteriors, forms new ones from what is left, and adds them at once, so that the next row already
-knows (Hocevar 2004).
+*Layers.* The decoder keeps a posterior LLR for each bit, and for each edge (check, bit) the check's
+last message. It visits one block row after another. A row subtracts its old messages from the
+posteriors, forms new ones from the rest, and adds them at once, so that the next row already uses
+them (Hocevar 2004).
 
 *Min-sum.* A check sends to each of its bits the product of the signs and the least magnitude of all
-its other bits. That is the least magnitude of all, and for the bit that has it the second least:
-two minima and one product of signs serve all edges. The minimum is an overestimate, so messages
-are taken times 14/16 (Chen and Fossorier 2002), to the nearest.
+its other bits. That is the least magnitude of all, or the second least for the bit that has the
+least: two minima and one product of signs serve all edges. The minimum is an overestimate, so
+messages are multiplied by 14/16 (Chen and Fossorier 2002) and rounded.
 
-*Doubts.* A bit that tells a check the contrary of what it told it last is not believed this time:
-it counts as 0 (Savin 2008). Fewer blocks go astray, and those that do come back sooner.
+*Doubts.* If a bit's message to a check has changed its sign since the last one, it counts as 0 this
+time (Savin 2008). Fewer blocks diverge, and those that do recover sooner.
 
-*Rotation.* Each block column of posteriors is stored as a periodic sequence that goes on for a
-vector or more beyond Z. Then Z lanes from any shift on are contiguous in memory; lanes past Z hold
-exact copies of the first, and compute the same. After a row, what it has written is copied to the
-places Z before and behind.
+*Rotation.* Each block column of posteriors is stored as a periodic sequence that continues for a
+vector or more beyond Z. Then Z lanes from any shift on are contiguous in memory; lanes beyond Z
+hold exact copies of the first lanes and compute the same. After a row, its results are copied to
+the positions Z before and after.
 
-*Nothing to do.* On a good link the signs of a codeword's LLRs are a codeword already, the likeliest
-there is. So its information is encoded first, which is cheap, and the parity compared.
+*Shortcut.* On a good link the signs of a codeword's LLRs are already a codeword, the likeliest
+there is. So the information bits are encoded first, which is cheap, and the parity is compared.
 
-*Vectors.* A row is written as LLVM vector instructions (`ldpc_rows.py`, which says why).
+*Vectors.* A row is written as LLVM vector instructions; `ldpc_rows.py` explains why.
 """
 
 from typing import NamedTuple
@@ -45,14 +45,17 @@ SURE = 4000
 
 
 class Workspace(NamedTuple):
-    """Working memory of decoding. One for each thread: the kernels hold no lock."""
+    """Working memory of decoding; one per thread, because the kernels hold no lock."""
 
     llr: NDArray[np.int16]
     """LLRs of a whole codeword `[24 Z]`."""
     posteriors: NDArray[np.int16]
     messages: NDArray[np.int16]
     told: NDArray[np.int16]
-    """What checks sent and were told last `[edges, Z up to whole vectors]`."""
+    """What checks last received; `messages` is what they last sent.
+
+    Both are `[edges, Z up to whole vectors]`.
+    """
     scratch: NDArray[np.int16]
 
 
@@ -60,7 +63,7 @@ open_workspace = opener(Workspace, "i2[1] i2[2] i2[2] i2[2] i2[2]")
 
 
 def new_workspace(max_z: int = 81, max_edges: int = 96) -> ArgumentBlock[Workspace]:
-    """A workspace for codes with up to `max_z` bits a block and up to `max_edges` edges."""
+    """A workspace for codes with up to `max_z` bits per block and up to `max_edges` edges."""
     lanes = -(-max_z // LANES) * LANES
     return ArgumentBlock(
         Workspace(
@@ -77,7 +80,7 @@ def new_workspace(max_z: int = 81, max_edges: int = 96) -> ArgumentBlock[Workspa
 def decode_codeword(
     llr: NDArray[np.int16], form: Form, max_iterations: int, work: Workspace
 ) -> int:
-    """Decode one codeword; iterations until all checks held, 0 if they never did.
+    """Decode one codeword; returns the iterations until all checks held, 0 if they never did.
 
     `llr` `[24 z]` is positive for 0. The decoded bits are the signs of `work.posteriors`.
     """
@@ -111,10 +114,10 @@ def decode_blocks(
     white: NDArray[np.uint8],
     out: NDArray[np.uint8],
 ) -> None:
-    """Decode LLRs of blocks, one after another, to bytes `[blocks, bytes]`, less `white`.
+    """Decode LLRs of consecutive blocks to bytes `[blocks, bytes]`, XORed with `white`.
 
-    A bit that was not sent is known to be 0 if it is information (shortened), and not known at all
-    if it is parity (punctured).
+    An information bit that was not sent is known to be 0 (shortened); a parity bit that was not
+    sent is unknown (punctured).
     """
     form, work = open_form(form_in), open_workspace(work_in)
     z, shares, ends = form.z, form.shares, form.ends
@@ -155,7 +158,7 @@ def decode_blocks(
 
 @njit(nogil=True, cache=True)
 def _begins_with(parity: Words, sent: Words, z: int, n: int) -> bool:
-    """Whether the parity `[rows, 2]`, one block after another, begins with the `n` bits `sent`."""
+    """Whether the parity `[rows, 2]`, block after block, begins with the `n` bits `sent`."""
     different = np.uint64(0)
     for row in range(parity.shape[0]):
         first = row * z

@@ -1,7 +1,7 @@
 """The encoder of quasi-cyclic LDPC codes; see `phy.kernels.ldpc` for the terms.
 
-A block of Z ≤ 128 bits is two words, bit 0 lowest. The block shifted by s is the Z bits from bit s
-on of the block written twice in a row.
+A block of Z ≤ 128 bits is two words, bit 0 lowest. The block shifted by s consists of the Z bits
+from bit s on of the block written twice in sequence.
 """
 
 import numpy as np
@@ -18,14 +18,14 @@ _63 = np.uint64(63)
 
 @step
 def _repeat(low: np.uint64, high: np.uint64, z: int, out: Words) -> None:
-    """Write the `z` bits of `low` and `high` twice in a row to `out` `[5]`."""
+    """Write the `z` bits of `low` and `high` twice in sequence to `out` `[5]`."""
     word, bit = z >> 6, np.uint64(z & 63)
     rest = _63 - bit
     for i in range(2, 5):
         out[i] = 0
     out[0], out[1] = low, high
     out[word] |= low << bit
-    # Shifted in two steps, as by 64 it would be undefined.
+    # Two shifts, because a single shift by 64 is undefined.
     out[word + 1] |= low >> ONE >> rest
     out[word + 1] |= high << bit
     out[word + 2] |= high >> ONE >> rest
@@ -33,7 +33,7 @@ def _repeat(low: np.uint64, high: np.uint64, z: int, out: Words) -> None:
 
 @step
 def _part(repeated: Words, first: int) -> np.uint64:
-    """The 64 bits from bit `first` on of a block written twice."""
+    """The 64 bits from bit `first` on of a repeated block."""
     word, bit = first >> 6, np.uint64(first & 63)
     part: np.uint64 = (repeated[word] >> bit) | (repeated[word + 1] << ONE << (_63 - bit))
     return part
@@ -41,10 +41,10 @@ def _part(repeated: Words, first: int) -> np.uint64:
 
 @njit(nogil=True, cache=True)
 def parity_of(bits: Words, form: Form, parity: Words) -> None:
-    """Write the parity `[rows, 2]`, a row for each block, of information `bits` `[K z / 64 + 1]`.
+    """Write the parity `[rows, 2]`, one row per block, of information `bits` `[K z / 64 + 1]`.
 
-    Parity columns 1, 2, … are a staircase; column 0 has three blocks, in the first and last row
-    with shift 1 and in row `middle` with 0. In the sum of all rows only the latter remains.
+    Parity columns 1, 2, … form a staircase. Column 0 has three blocks: shift 1 in the first and
+    last row, and shift 0 in row `middle`. Only the latter remains in the sum of all rows.
     """
     z, row_ends, columns, shifts = form.z, form.row_ends, form.columns, form.shifts
     n_rows = parity.shape[0]
@@ -60,7 +60,7 @@ def parity_of(bits: Words, form: Form, parity: Words) -> None:
         low = high = np.uint64(0)
         for edge in range(row_ends[row], row_ends[row + 1]):
             column = columns[edge]
-            # Parity columns come last in a row.
+            # Parity columns are last in a row.
             if column >= n_info:
                 break
             low ^= _part(repeated[column], shifts[edge])
@@ -70,7 +70,7 @@ def parity_of(bits: Words, form: Form, parity: Words) -> None:
         first_high ^= sums[row, 1]
     parity[0, 0], parity[0, 1] = first_low, first_high
     _repeat(first_low, first_high, z, repeated[n_info])
-    # From row 0 down: bit column r + 1 is what row r lacks.
+    # From row 0 down: parity column r + 1 completes row r.
     low = sums[0, 0] ^ (_part(repeated[n_info], 1) & low_mask)
     high = sums[0, 1] ^ (_part(repeated[n_info], 65) & high_mask)
     for row in range(1, n_rows):
@@ -84,7 +84,7 @@ def parity_of(bits: Words, form: Form, parity: Words) -> None:
 
 @step
 def unpack(words: Words, n: int, out: NDArray[np.uint8], at: int) -> None:
-    """Write the first `n` bits of `words`, one in each element of `out` from `at` on."""
+    """Write the first `n` bits of `words` to `out` from `at` on, one bit per element."""
     for i in range(n):
         out[at + i] = words[i >> 6] >> np.uint64(i & 63) & ONE
 
@@ -93,9 +93,10 @@ def unpack(words: Words, n: int, out: NDArray[np.uint8], at: int) -> None:
 def encode_codeword(
     bits: Words, number: int, form: Form, parity: Words, out: NDArray[np.uint8], at: int
 ) -> None:
-    """Write the `number`-th codeword of a block, `bits` and then parity, from `out[at]` on.
+    """Write codeword `number` of a block, first `bits` and then parity, from `out[at]` on.
 
-    `bits` are zero beyond its share of the block, `parity` `[rows, 2]` is room.
+    `bits` are zero beyond the codeword's share of the block; `parity` `[rows, 2]` is working
+    memory.
     """
     z, share = form.z, form.shares[number]
     n_parity = form.ends[number + 1] - form.ends[number] - share

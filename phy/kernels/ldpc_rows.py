@@ -1,7 +1,7 @@
-"""A block row of LDPC checks as LLVM vector instructions; `phy.kernels.ldpc` says what it computes.
+"""A block row of LDPC checks as LLVM vector instructions; for the method see `phy.kernels.ldpc`.
 
 numba widens int16 arithmetic to int64 and must assume that arrays overlap, which defeats
-vectorising; so a row is written as instructions on 32 int16. LLVM lowers them to whatever the
+vectorisation. So a row is written as instructions on 32 int16, which LLVM lowers to what the
 machine has (AVX2, AVX-512, NEON).
 """
 
@@ -14,11 +14,11 @@ from numba.extending import intrinsic
 
 LANES = 32
 MAX_POSTERIOR = 8000
-"""Posteriors stay within this, so that they fit 16 bits with any message added or taken off."""
+"""Limit of posteriors, so that they fit 16 bits with any message added or subtracted."""
 WEIGHT = 14
-"""Factor that messages are taken times, in sixteenths."""
+"""Factor of messages, in sixteenths."""
 MAX_MAGNITUDE = 2000
-"""Magnitudes beyond this count as this; times WEIGHT, it fits 16 bits."""
+"""Limit of magnitudes; times WEIGHT, it fits 16 bits."""
 _NO_MINIMUM = 32000
 
 _I16, _I32, _I64 = ir.IntType(16), ir.IntType(32), ir.IntType(64)
@@ -29,7 +29,7 @@ def _row_generator(
     _context: Any, posteriors: Any, messages: Any, told: Any, scratch: Any, columns: Any,
     shifts: Any, first: Any, last: Any, z: Any,
 ) -> Any:  # fmt: skip
-    """Visit one block row with edges `first` … `last` − 1; 0 when its checks held before."""
+    """Visit one block row with edges `first` … `last` − 1; returns 0 if its checks already held."""
     arrays = (posteriors, messages, told, scratch, columns, shifts)
     signature = types.int64(*arrays, first, last, z)
 
@@ -68,7 +68,7 @@ class _Row:
             self.checks(at, odd)
         with self.edges() as (edge, _):
             self.mend(edge)
-        # A sign in any lane: some check did not hold.
+        # A sign in any lane means that a check did not hold.
         signs = builder.icmp_signed("<", builder.load(odd), _splat(0))
         return builder.zext(builder.bitcast(signs, _I32), _I64)
 
@@ -105,7 +105,7 @@ class _Row:
             self.store(posterior, self.posteriors, self.place(edge, at))
 
     def unless_turned(self, rest: Any, place: Any) -> Any:
-        """What a check is told, and stored as told: `rest`, or 0 where its sign has turned."""
+        """The message of a bit to a check, also stored: `rest`, or 0 if its sign has changed."""
         builder = self.builder
         before = self.load(self.told, place)
         turned = builder.and_(
@@ -117,7 +117,7 @@ class _Row:
         return now
 
     def mend(self, edge: Any) -> None:
-        """Make a block column periodic again: what is at `shift` … belongs Z before and behind."""
+        """Make a block column periodic: copy the values at `shift` … to Z before and after."""
         builder = self.builder
         column, shift = self.column_and_shift(edge)
         base = builder.mul(column, self.stride)
@@ -130,7 +130,7 @@ class _Row:
             self.store(self.load(self.posteriors, builder.add(to, self.z)), self.posteriors, to)
 
     def edges(self) -> Any:
-        """A loop over the row's edges: (edge, its number in the row)."""
+        """A loop over the row's edges: (edge, its index in the row)."""
         return _edges(self.builder, self.first, self.last)
 
     def column_and_shift(self, edge: Any) -> tuple[Any, Any]:
@@ -178,14 +178,14 @@ class _Row:
         return self.builder.select(self.builder.icmp_signed(">", x, y), x, y)
 
     def weighted(self, x: Any) -> Any:
-        """A magnitude times WEIGHT / 16, to the nearest."""
+        """A magnitude times WEIGHT / 16, rounded."""
         builder = self.builder
         product = builder.mul(self.smaller(x, _splat(MAX_MAGNITUDE)), _splat(WEIGHT))
         return builder.ashr(builder.add(product, _splat(8)), _splat(4))
 
 
 def _edges(builder: Any, first: Any, last: Any) -> Any:
-    """A loop over edges `first` … `last` − 1: (edge, how many came before it)."""
+    """A loop over edges `first` … `last` − 1: (edge, number of edges before it)."""
     return cgutils.for_range_slice(builder, first, last, _long(1), _I64)
 
 

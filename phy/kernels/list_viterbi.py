@@ -1,7 +1,8 @@
-"""The `n_list` likeliest code words of the K=7 code, not the likeliest alone.
+"""Finds the `n_list` likeliest code words of the K=7 code, not only the likeliest.
 
-The Viterbi algorithm with a list in every state (Seshadri and Sundberg 1994). A check sum then
-finds the right one among them. Slow beside `phy.kernels.viterbi`: for when that has failed.
+This is the Viterbi algorithm with a list in every state (Seshadri and Sundberg 1994). A check sum
+then finds the right word among them. It is slow compared with `phy.kernels.viterbi`, and used only
+when that has failed.
 """
 
 import numpy as np
@@ -23,7 +24,7 @@ def list_decode(llr: NDArray[np.int16], out: NDArray[np.uint8]) -> None:
     metrics = np.full((N_STATES, n_list), _UNREACHED, np.int64)
     grown = np.empty_like(metrics)
     metrics[0, 0] = 0
-    # Which of its two predecessors, and which of that one's paths: 2 · rank + predecessor.
+    # Choice of predecessor and of its path: 2 · rank + predecessor.
     came_from = np.empty((n_steps, N_STATES, n_list), np.int16)
     for t in range(n_steps):
         a, b = int(llr[2 * t]), int(llr[2 * t + 1])
@@ -54,5 +55,5 @@ def list_decode(llr: NDArray[np.int16], out: NDArray[np.uint8]) -> None:
 
 @njit(nogil=True, cache=True)
 def _agreement(a: int, b: int, register: int) -> int:
-    """How well LLRs agree with what the encoder sends from `register`."""
+    """How well LLRs agree with the encoder's output from `register`."""
     return (-a if PARITY_A[register] else a) + (-b if PARITY_B[register] else b)

@@ -1,4 +1,4 @@
-"""From PDUs to samples, eight OFDM symbols at a time."""
+"""Converts PDUs to samples, eight OFDM symbols at a time."""
 
 from typing import NamedTuple
 
@@ -20,10 +20,10 @@ class Map(NamedTuple):
 
     bits: int
     source: NDArray[np.uint32]
-    """Which coded bit of a symbol each subcarrier's bits are, highest first `[n_data · bits]`."""
+    """Index of the coded bit for each subcarrier bit, highest first `[n_data · bits]`."""
     real: Row
     imag: Row
-    """Coordinates of the points, by the number that their bits make."""
+    """Coordinates of the points, indexed by their bits as a number."""
 
 
 open_map = opener(Map, "i8 u4[1] f4[1] f4[1]")
@@ -62,8 +62,8 @@ def eight_symbols(
 ) -> None:
     """Write `n` ≤ 8 symbols of tones `y` `[8, 2, width]` as samples `[n · n_symbol]`, mean power 1.
 
-    Samples beyond the magnitude `peak` are shortened to it. `windows` `[4, 8 n_fft]` and `square`
-    `[64]` are room.
+    Samples beyond the magnitude `peak` are clipped to it. `windows` `[4, 8 n_fft]` and `square`
+    `[64]` are working memory.
     """
     n_fft, n_symbol, width = tones.n_fft, tones.n_symbol, y.shape[2]
     n_cp, flat = n_symbol - n_fft, out.view(np.float32)
@@ -79,7 +79,7 @@ def eight_symbols(
             transpose(square)
             for i in range(min(N_LANES, tones.bins.size - first)):
                 store(to, N_LANES * tones.bins[first + i], load(square, N_LANES * i))
-    # The inverse: real and imaginary parts change places, before and after.
+    # Inverse FFT by the forward one: swap real and imaginary parts before and after.
     if transform(im, re, to_im, to_re, n_fft, tones.twiddles):
         re, im = to_re, to_im
     scale, most, one = splat(1 / (tones.gain * n_fft)), splat(peak), splat(1)
@@ -113,7 +113,7 @@ def modulate(
 ) -> None:
     """Write whitened blocks of bytes as samples of whole symbols; the first symbol is `number`.
 
-    What the blocks leave free of the last symbol is filled with `padding`.
+    `padding` fills the rest of the last symbol.
     """
     form, tones = open_form(form_in), open_tones(tones_in)
     n_symbols = out.size // tones.n_symbol
@@ -134,7 +134,7 @@ def modulate_bits(
     map_in: PackedArguments,
     out: NDArray[np.complex64],
 ) -> None:
-    """Write coded bits, as many as whole symbols hold, as samples; the first symbol is `number`."""
+    """Write coded bits that fill whole symbols as samples; the first symbol is `number`."""
     tones, by = open_tones(tones_in), open_map(map_in)
     n_bits, n_symbol = tones.n_data * by.bits, tones.n_symbol
     windows = np.empty((4, N_LANES * tones.n_fft), np.float32)

@@ -1,7 +1,8 @@
 """White Gaussian noise: sample n is a function of a key and of n, so any chunk can be made alone.
 
-Box and Muller: radius sqrt(-2 ln u) and a uniform angle. Counters are hashed instead of a state
-being passed on, and both functions are polynomials, so every loop runs on vectors.
+The method is Box and Muller's: radius sqrt(-2 ln u) and a uniform angle. The random numbers are
+hashed counters instead of a running state, and both functions are polynomials, so every loop is
+vectorised.
 """
 
 import math
@@ -11,7 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 CHUNK = 1024
-"""Samples under one pair of keys; also what the working space holds."""
+"""Number of samples with one pair of keys; also the size of the working memory."""
 _U32, _U64, _F32, _I32 = np.uint32, np.uint64, np.float32, np.int32
 _LN_2 = math.log(2)
 _TINY = _F32(2.0**-24)  # what u near 1 is rounded by: no sample is 0
@@ -41,7 +42,7 @@ def add_noise(
 ) -> None:
     """Write x + noise of `scale` per part to `out`; both `[2n]`, real and imaginary parts in turn.
 
-    `first` is the number of the first sample; `bits` and `radii` `[CHUNK]` are working space.
+    `first` is the index of the first sample; `bits` and `radii` `[CHUNK]` are working memory.
     """
     n, done = x.size // 2, 0
     while done < n:
@@ -66,7 +67,7 @@ def _split(z: np.uint64) -> np.uint64:
 
 @njit(nogil=True, cache=True)
 def _hash(key: np.uint32, first: int, out: NDArray[np.uint32]) -> None:
-    """Write 32 random bits for each counter from `first` on: Wellons' triple32 under a key."""
+    """Write 32 random bits for each counter from `first` on: Wellons' triple32 with a key."""
     for i in range(out.size):
         x = _U32(first + i) ^ key
         x = _U32(x ^ (x >> _U32(17)))
@@ -85,7 +86,7 @@ def _make_radii(
     radii: NDArray[np.float32],
     as_bits: NDArray[np.int32],
 ) -> None:
-    """Write scale · sqrt(-2 ln u) with u = 2^-31 … 1 to `radii`; `bits` are used up.
+    """Write scale · sqrt(-2 ln u) with u = 2^-31 … 1 to `radii`; overwrites `bits`.
 
     `as_bits` is a view of `radii`.
     """

@@ -1,4 +1,4 @@
-"""Interpolation of a signal at evenly spaced times between its samples."""
+"""Interpolates a signal at evenly spaced times between its samples."""
 
 import math
 
@@ -42,7 +42,7 @@ def interpolate(
 
 @njit(nogil=True, cache=True, fastmath={"reassoc", "contract", "nsz"})
 def _dot(weights: NDArray[np.float32], x: NDArray[np.float32]) -> np.float32:
-    """The product of two rows, added up in whatever order is fastest."""
+    """The dot product of two rows, summed in whatever order is fastest."""
     total = np.float32(0)
     for k in range(weights.size):
         total += weights[k] * x[k]
@@ -61,7 +61,7 @@ def filter_strided(
 ) -> None:
     """out[i · out_stride] = Σ_k taps[2 k] x[first + i · stride + k] for `n` outputs.
 
-    `taps` are each there twice, then zeros up to whole lanes: `x` must be as long.
+    `taps` contain each tap twice, then zeros up to whole lanes: `x` must be as long.
     """
     flat = x.view(np.float32)
     for i in range(n):

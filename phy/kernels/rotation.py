@@ -1,4 +1,4 @@
-"""Phases that grow evenly over subcarriers."""
+"""Phases that are linear over subcarriers."""
 
 import math
 
@@ -30,7 +30,7 @@ def lean(slope: float, subcarriers: NDArray[np.int64], out: NDArray[np.float32])
 
 @step
 def lean_more(slope: float, numbers: NDArray[np.float32], turns: NDArray[np.float32]) -> None:
-    """Turn `turns` `[2, width]` by slope · `numbers`, by a series that errs by 1e-7 at 0.1 rad."""
+    """Rotate `turns` `[2, width]` by slope · `numbers`; its series errs by 1e-7 at 0.1 rad."""
     by, one, width = splat(slope), splat(1), numbers.size
     half, sixth, rest = splat(-1 / 2), splat(-1 / 6), splat(1 / 24)
     for k in range(0, width, N_LANES):

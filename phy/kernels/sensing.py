@@ -1,6 +1,6 @@
-"""Power in windows of 64 samples against a noise floor that follows the quiet ones.
+"""Compares power in windows of 64 samples with a noise floor that follows the quiet windows.
 
-A window's powers are kept and summed when it is full, always in the same order, so that its power
+A window's powers are stored and summed when it is full, always in the same order, so that its power
 does not depend on how the stream was cut into chunks.
 """
 
@@ -9,13 +9,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 WINDOW = 64
-# What the state holds: the floor (0: none yet), the index after the last busy window, the index of
-# the next sample, how many samples the window has so far, and their powers.
+# Content of the state: the floor (0: none yet), the index after the last busy window, the index of
+# the next sample, the number of samples in the current window, and their powers.
 FLOOR, BUSY_UNTIL, NEXT, FILLED, POWERS = 0, 1, 2, 3, 4
 N_STATE = POWERS + WINDOW
 
 LEAST_FLOOR = 1e-12
-# A signal that never ends is noise after a while: the floor doubles in so many busy windows.
+# A permanent signal becomes noise: the floor doubles in this many busy windows.
 DOUBLING = 1 << 17
 _CREEP = 2 ** (1 / DOUBLING)
 _WEIGHT = 1 / 64
@@ -25,9 +25,9 @@ _WEIGHT = 1 / 64
 def sense(
     x: NDArray[np.complex64], threshold: float, limit: float, state: NDArray[np.float64]
 ) -> None:
-    """Take samples `[n]`: a window is busy when its mean power exceeds `threshold` · floor.
+    """Process samples `[n]`: a window is busy when its mean power exceeds `threshold` · floor.
 
-    Samples that are not finite or larger than `limit` are bad: they count as no power.
+    Bad samples, which are not finite or exceed `limit`, count as no power.
     """
     powers = state[POWERS:]
     filled = int(state[FILLED])
@@ -54,9 +54,9 @@ def _judge(
     end: float,
     state: NDArray[np.float64],
 ) -> None:
-    """Judge a full window that is over at index `end`: mark the channel busy, follow the floor."""
+    """Judge a full window that ends at index `end`: mark the channel busy, follow the floor."""
     power = _mean(powers)
-    # Also true of NaN. A bad sample makes its window's mean so large, or no number.
+    # Also true for NaN. A bad sample makes its window's mean very large or NaN.
     spoilt = not power < limit / WINDOW
     if spoilt:
         spoilt = _without_bad(powers, limit) > 0
@@ -68,7 +68,8 @@ def _judge(
     if busy:
         floor *= _CREEP
     elif spoilt:
-        # Its power is too low by who knows what; a floor too low would call all noise busy.
+        # The window's power is too low by an unknown amount; too low a floor would make all noise
+        # busy.
         return
     elif floor == 0 or power < floor / 2:
         floor = power
@@ -90,7 +91,7 @@ def _mean(powers: NDArray[np.float64]) -> float:
 
 @njit(nogil=True, cache=True)
 def _without_bad(powers: NDArray[np.float64], limit: float) -> int:
-    """Set powers that are not finite or exceed `limit` to 0; returns how many there were."""
+    """Set powers that are not finite or exceed `limit` to 0; returns their number."""
     bad = 0
     for i in range(powers.size):
         if not powers[i] <= limit:

@@ -1,13 +1,13 @@
-"""What training tells of the channel, less what must be noise.
+"""Removes from a channel estimate the part that must be noise.
 
-A channel is a few echoes, its gains over the subcarriers are smooth: centred on their mean delay,
+A channel has few echoes, so its gains are smooth over the subcarriers. Centred on their mean delay,
 most of their power is in few of the functions 1, cos k, sin k, cos 2k, … (k: subcarriers over
-n_fft), made orthonormal. They come in groups, from the mean delay outwards; what is in none is the
-last group.
+n_fft), made orthonormal. The functions form groups, from the mean delay outwards; everything
+outside them is the last group.
 
-Of each group as much is kept as its energy exceeds what noise alone would have (James and Stein
-1961): on a link in sight that is one dimension of 52, among many echoes almost all, and nobody
-must know before which it will be.
+Each group is kept in proportion to its energy in excess of pure noise (James and Stein 1961). On a
+line-of-sight link that is one dimension of 52, among many echoes almost all; no prior knowledge of
+the channel is needed.
 """
 
 import math
@@ -21,13 +21,13 @@ from phy.kernels.inline import step
 from phy.kernels.lanes import N_LANES, Lanes, load, splat, store, total
 from phy.kernels.rotation import lean
 
-# How fast the guess of a channel's drift follows what is seen of it.
+# Rates at which the drift estimate of a channel follows the observations.
 _DRIFT_RISE, _DRIFT_FALL = 0.5, 0.1
 
 
 @njit(nogil=True, cache=True)
 def mean_delay(h: Planes, neighbours: NDArray[np.int64]) -> float:
-    """Mean phase in radians from a subcarrier to the next, over the pairs `neighbours` `[2, n]`."""
+    """Mean phase in radians between adjacent subcarriers, over the pairs `neighbours` `[2, n]`."""
     turn = 0j
     for i in range(neighbours.shape[1]):
         first, second = neighbours[0, i], neighbours[1, i]
@@ -50,7 +50,7 @@ def multiply(x: Planes, by: Planes, conjugate: bool, out: Planes) -> None:
 def _split(tones: Tones, wanted: NDArray[np.float64], scratch: Scratch) -> None:
     """Split `rest` into the `wanted` groups: coefficients of their rows, energies of all groups.
 
-    What is in no group, or in one that is not wanted, counts as the last group.
+    Everything outside these groups counts as the last group.
     """
     rest, basis, coefficients = scratch.rest, tones.basis, scratch.coefficients
     energies, width = scratch.energies, scratch.rest.shape[1]
@@ -81,12 +81,13 @@ def _split(tones: Tones, wanted: NDArray[np.float64], scratch: Scratch) -> None:
 
 @step
 def _join(tones: Tones, scratch: Scratch) -> None:
-    """Put `rest` together again, each group times its weight."""
+    """Reassemble `rest`, each group times its weight."""
     rest, basis, coefficients = scratch.rest, tones.basis, scratch.coefficients
     weights, width = scratch.weights, scratch.rest.shape[1]
     usual, first = weights[tones.ends.size], 0
     for k in range(0, 2 * width, N_LANES):
-        # The last group has no rows: all of `rest` gets its weight, and the others what they lack.
+        # The last group has no rows: apply its weight to all of `rest`, then correct the other
+        # groups.
         store(rest, k, load(rest, k) * splat(usual))
     for group in range(tones.ends.size):
         more = np.float32(weights[group] - usual)
@@ -109,7 +110,7 @@ def _size(group: int, tones: Tones) -> int:
 
 @step
 def _kept(energy: float, size: int, variance: float) -> float:
-    """Share of a group of `size` dimensions that is kept as no noise, erring towards noise."""
+    """Share of a group of `size` dimensions that is not noise; a cautious estimate."""
     expected = size * variance
     if size > 1:
         expected += math.sqrt(size) * variance
@@ -118,10 +119,10 @@ def _kept(energy: float, size: int, variance: float) -> float:
 
 @njit(nogil=True, cache=True)
 def smooth(variance: float, tones: Tones, channel: Channel, scratch: Scratch) -> None:
-    """Take most of the noise off the gains `h`, which were measured with noise of `variance`.
+    """Remove most of the noise from the gains `h`, which were measured with noise of `variance`.
 
-    Of each group, `unknown` gets the variance that is left in a dimension, `power` the mean power
-    of one.
+    For each group, `unknown` gets the remaining variance per dimension, `power` the mean power per
+    dimension.
     """
     channel.figures[DELAY] = mean_delay(channel.h, tones.neighbours)
     lean(-channel.figures[DELAY], tones.subcarriers, channel.centre)
@@ -142,11 +143,11 @@ def smooth(variance: float, tones: Tones, channel: Channel, scratch: Scratch) ->
 def follow(
     error: Planes, variance: float, tones: Tones, channel: Channel, scratch: Scratch
 ) -> None:
-    """Correct the gains by `error` `[2, width]`, how later symbols contradict them; it is used up.
+    """Correct the gains by `error` `[2, width]`, the deviation of later symbols.
 
-    There is a Kalman filter for each group: `unknown` is the variance of what is not known of it.
-    The channel moves by the drift times its `power`; the drift follows how much the errors exceed
-    what noise and ignorance explain.
+    `error` is overwritten. Each group has a Kalman filter; `unknown` is the variance of its
+    estimate. The channel moves by the drift times its `power`; the drift follows the excess of the
+    errors over noise and uncertainty.
     """
     power, unknown, energies = channel.power, channel.unknown, scratch.energies
     multiply(error, channel.centre, False, scratch.rest)
@@ -161,7 +162,7 @@ def follow(
         whole += size * power[group]
     drift = channel.figures[DRIFT]
     if whole > 0:
-        # Two standard deviations are left to chance, so that a still channel is taken for still.
+        # Two standard deviations count as chance, so that a still channel is recognised as still.
         seen = max(0.0, (excess - 2 * math.sqrt(chance)) / whole)
         drift += (_DRIFT_RISE if seen > drift else _DRIFT_FALL) * (seen - drift)
         channel.figures[DRIFT] = drift

@@ -1,4 +1,4 @@
-"""Where the long training is, and at what frequency: correlation with what was sent."""
+"""Finds the position and frequency of the long training by correlation with the sent signal."""
 
 import math
 
@@ -11,28 +11,29 @@ from phy.kernels.inline import step
 from phy.kernels.lanes import N_LANES, Lanes, load, splat, store, total
 
 SEARCH = 24
-"""The first long symbol is looked for this many samples around where the peak puts it."""
-# Share of the samples' power that a match has at least: less is chance, or no preamble.
+"""The search for the first long symbol covers this many samples around its nominal place."""
+# Least share of the samples' power in a match: less is chance, or no preamble.
 MIN_MATCH = 0.12
-# The first echo counts, not the strongest: windows must begin before it. It has this share of the
-# strongest one's power, and comes at most MAX_SPREAD samples earlier.
+# The first echo counts, not the strongest: windows must begin before it. It has at least this share
+# of the strongest one's power, and comes at most MAX_SPREAD samples earlier.
 FIRST_ECHO = 0.1
 MAX_SPREAD = 12
-# Cycles a sample: the detector's peak, over segments of 16 samples, tells the frequency modulo it.
+# In cycles per sample: the detector's peak, over segments of 16 samples, gives the frequency modulo
+# this.
 AMBIGUITY = 1 / 16
-# Samples of the longest template of which two in a row are added up with their phases.
+# Longest template in samples for which two in sequence are added with their phases.
 _COHERENT = 64
-# Samples from one phase measured to the next, on every grid.
+# Samples from one phase measurement to the next, on every grid.
 _LAG = 64
 
 
 @njit(nogil=True, cache=True)
 def correlate(planes: Planes, templates: NDArray[np.complex64], out: NDArray[np.float32]) -> None:
-    """Write how strongly two templates in a row are at each offset of `planes` `[2, …]`.
+    """Write how strongly two consecutive templates match at each offset of `planes` `[2, …]`.
 
-    With c[o] = Σ_m z[o + m] t*[a, m], out[a, o] = |c[o] + c[o + n]|²; for templates so long that
-    the frequency is not known well enough to add them up, 2 |c[o]|² + 2 |c[o + n]|². `templates`
-    are `[aliases, n]`; `out` is `[aliases, offsets]`, whole lanes of them.
+    With c[o] = Σ_m z[o + m] t*[a, m], out[a, o] = |c[o] + c[o + n]|². For long templates the
+    frequency is not known well enough to add amplitudes: out[a, o] = 2 |c[o]|² + 2 |c[o + n]|².
+    `templates` are `[aliases, n]`; `out` is `[aliases, offsets]` with whole lanes of offsets.
     """
     n, n_out = templates.shape[1], out.shape[1]
     for a in range(templates.shape[0]):
@@ -63,10 +64,10 @@ def _match(planes: Planes, at: int, template: NDArray[np.complex64]) -> tuple[La
 
 @njit(nogil=True, cache=True)
 def locate(planes: Planes, templates: NDArray[np.complex64]) -> tuple[int, float]:
-    """(first sample of the long training's first echo or −1, frequency in cycles a sample).
+    """(first sample of the long training's first echo or −1, frequency in cycles per sample).
 
-    The first echo is looked for at the first 2 SEARCH samples of `planes`
-    `[2, ≥ 2 SEARCH + 2 n_fft]`.
+    The search for the first echo covers the first 2 SEARCH samples of `planes` `[2, ≥ 2 SEARCH + 2
+    n_fft]`.
     """
     n_aliases, n = templates.shape
     strength = np.empty((n_aliases, 2 * SEARCH), np.float32)

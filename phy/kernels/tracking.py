@@ -1,7 +1,7 @@
 """Two Kalman filters on the pilots: the phase common to all subcarriers, and its slope over them.
 
-The phase turns with what is left of the frequency offset and with the oscillators' noise; the slope
-grows as the sender's sampling clock runs away from ours.
+The phase changes with the residual frequency offset and the oscillators' noise; the slope grows as
+the sender's sampling clock drifts away from ours.
 """
 
 import math
@@ -11,19 +11,19 @@ from numpy.typing import NDArray
 
 from phy.kernels.inline import step
 
-# Rows of the state: [value, rate, var(value), cov, var(rate)], rates a symbol.
+# Rows of the state: [value, rate, var(value), cov, var(rate)], rates per symbol.
 PHASE, SLOPE = 0, 1
-# Process noise a symbol: phase noise of the oscillators, and what the models leave out.
+# Process noise per symbol: phase noise of the oscillators, and modelling errors.
 PHASE_NOISE = np.array([5e-5, 1e-10])
 SLOPE_NOISE = np.array([1e-10, 1e-15])
 
 SURPRISE = 6.0
-"""Factor of the preamble's noise beyond which a symbol's pilots, and so its data, are doubted."""
+"""Excess over the preamble's noise, as a factor, at which a symbol's pilots and data lose trust."""
 
 
 @step
 def predict(tracking: NDArray[np.float64]) -> None:
-    """Advance both filters by one symbol: values move by their rates."""
+    """Advance both filters by one symbol: values change by their rates."""
     _predict(tracking[PHASE], PHASE_NOISE)
     _predict(tracking[SLOPE], SLOPE_NOISE)
 
@@ -38,12 +38,12 @@ def _predict(state: NDArray[np.float64], noise: NDArray[np.float64]) -> None:
 
 @step
 def _correct(state: NDArray[np.float64], innovation: float, variance: float) -> None:
-    """Take in a measurement of `variance` that differs from the prediction by `innovation`."""
+    """Update with a measurement of `variance` that differs from the prediction by `innovation`."""
     total = state[2] + variance
     gain, rate_gain = state[2] / total, state[3] / total
     state[0] += gain * innovation
     state[1] += rate_gain * innovation
-    # From the last to the first: each needs those before it as they were.
+    # From last to first: each needs the old values of those before it.
     state[4] -= rate_gain * state[3]
     state[3] -= gain * state[3]
     state[2] -= gain * state[2]
@@ -57,12 +57,12 @@ def correct(
     no: float,
     tracking: NDArray[np.float64],
 ) -> float:
-    """Correct phase and slope by pilots; the noise power on a subcarrier, as far as they show it.
+    """Correct phase and slope by pilots; returns the noise power on a subcarrier that they show.
 
-    `turned` `[n]` is what came, turned back as predicted, times the conjugate of what should have
-    come, of which `power` is the squared magnitude. Where pilots disagree by more than `no`
-    explains, their own noise counts, here and for the data around them: interference that the
-    preamble has not seen.
+    `turned` `[n]` is the received pilots, rotated back as predicted, times the conjugate of the
+    expected ones; `power` is the expected ones' squared magnitude. If pilots disagree by more than
+    `no` explains, their own noise counts instead, here and for the data around them: interference
+    that the preamble did not see.
     """
     n = turned.size
     total = 0j
@@ -78,7 +78,7 @@ def correct(
     for p in range(n):
         k, weight = subcarriers[p], power[p]
         aligned = turned[p] * common
-        # The angle times |h|²: it has its weight already.
+        # The imaginary part is the angle times |h|², so it is already weighted.
         theta = aligned.imag
         s0 += weight
         s1 += weight * k
@@ -94,7 +94,7 @@ def correct(
     if not det > 0.0:
         return no
     offset = math.atan2(total.imag, total.real)
-    # Only the half of the noise that is across a pilot turns it.
+    # Only half of the noise, the part across a pilot, changes its angle.
     _correct(tracking[PHASE], offset + (s2 * t0 - s1 * t1) / det, 0.5 * no * s2 / det)
     _correct(tracking[SLOPE], (s0 * t1 - s1 * t0) / det, 0.5 * no * s0 / det)
     return no

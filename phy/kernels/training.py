@@ -1,4 +1,4 @@
-"""Estimation of the channel from known symbols, tone by tone."""
+"""Estimates the channel from known symbols, tone by tone."""
 
 import math
 
@@ -12,14 +12,14 @@ from phy.kernels.inline import step
 from phy.kernels.lanes import N_LANES, Lanes, load, splat, store, total
 from phy.kernels.smoothing import smooth
 
-# Standard deviations at which a difference in strength is no chance.
+# Number of standard deviations from which a difference in strength is not chance.
 _SURELY = 4.0
 _LARGEST_BOOST = 3.0
 
 
 @njit(nogil=True, cache=True)
 def turn_back(x: NDArray[np.complex64], dc: complex, frequency: float, out: Planes) -> None:
-    """Write `x` `[n]` less `dc`, turned back by `frequency` cycles a sample, to `out` `[2, …]`."""
+    """Write `x` `[n]` minus `dc`, rotated by −`frequency` cycles a sample, to `out` `[2, …]`."""
     span, n = 32, x.size
     fine, coarse = np.empty((2, span), np.float32), np.empty((2, -(-n // span)), np.float32)
     circle(-frequency, 1.0, fine)
@@ -39,10 +39,10 @@ def turn_back(x: NDArray[np.complex64], dc: complex, frequency: float, out: Plan
 def least_squares(
     y: NDArray[np.float32], amplitude: Row, sent: NDArray[np.float32], h: Planes
 ) -> tuple[float, float]:
-    """Write each tone's gain over `n` ≥ 2 symbols to `h` `[2, width]`; (noise on a tone, Σ |h|²).
+    """Write each tone's gain over `n` ≥ 2 symbols to `h` `[2, width]`; returns (Σ noise, Σ |h|²).
 
-    `sent` `[n, 2, width]`, 1 / x* of tones x, went out times `amplitude` `[n]`, and came as `y`.
-    The noise is summed over tones, too.
+    `sent` `[n, 2, width]` holds 1 / x* of tones x, which were sent times `amplitude` `[n]` and
+    received as `y`. Both sums are over the tones.
     """
     n, width = sent.shape[0], sent.shape[2]
     mass = np.float32(0)
@@ -76,7 +76,7 @@ def least_squares(
 def _pair(
     y: NDArray[np.float32], sent: NDArray[np.float32], s: int, k: int
 ) -> tuple[Lanes, Lanes, Lanes, Lanes]:
-    """Eight tones from `k` on of symbol `s`: as they came, and as they were sent."""
+    """Eight tones from `k` on of symbol `s`, as received and as sent."""
     width = sent.shape[2]
     at = 2 * width * s + k
     return load(y, at), load(y, at + width), load(sent, at), load(sent, at + width)
@@ -91,7 +91,7 @@ def estimate(
     channel: Channel,
     scratch: Scratch,
 ) -> None:
-    """Estimate the channel from known symbols by `least_squares`, less what must be noise."""
+    """Estimate the channel from known symbols by `least_squares`, without the probable noise."""
     n_used = tones.bins.size
     noise, power = least_squares(y, amplitude, sent, channel.h)
     no, power = max(noise / n_used, 1e-20), power / n_used
@@ -99,7 +99,7 @@ def estimate(
     for a in amplitude:
         mass += a * a
     channel.figures[NO] = no
-    # Measured gains hold noise, too. Where that is all they hold, the difference may be negative.
+    # Measured gains include noise. If they contain nothing else, the difference may be negative.
     channel.figures[GAIN] = max(power - no / mass, 1e-3 * power, 1e-20)
     smooth(no / mass, tones, channel, scratch)
 
@@ -115,10 +115,10 @@ def learn(
     channel: Channel,
     scratch: Scratch,
 ) -> None:
-    """Estimate the channel anew with the header, now known, as further training; `y` is used up.
+    """Estimate the channel again, with the decoded header as further training; overwrites `y`.
 
-    `phase` is the last symbol's, `rate` by how much it grows a symbol. The preamble may have been
-    sent stronger than the rest: the header tells whether, and how much.
+    `phase` is the last symbol's, `rate` its growth per symbol. The preamble may have been sent
+    stronger than the rest: the header shows whether, and by how much.
     """
     n, width = sent.shape[0], sent.shape[2]
     seen: Lanes = splat(0)

@@ -2,20 +2,20 @@
 
 A state is the last six bits, newest highest. State j < 32 (newest bit 0) and state j + 32 (newest
 bit 1) both come from states 2j and 2j + 1. All generators have their first and last tap set, so of
-these four transitions, the two outer ones agree with the branch metric m_j and the two others with
-its opposite:
+these four transitions, the two outer ones agree with the branch metric m_j and the two inner ones
+with its opposite:
 
     from 2j:  to j  +m_j,  to j+32  −m_j        from 2j+1:  to j  −m_j,  to j+32  +m_j
 
 With E[j] = metric(2j) and O[j] = metric(2j+1), a step of all 64 states is four vector additions and
-two maxima. The new metrics come out in the order 0…31 and 32…63; taking every other one of both
-makes the next E and O. Which of the two won is one bit a state: 64 bits a step.
+two maxima. The new metrics come out in the order 0…31 and 32…63; the even and odd elements of both
+are the next E and O. The decision is one bit per state: 64 bits per step.
 
 Metrics are compared by the sign of their wrapped difference, so they may overflow and never need
 normalising: the spread of 64 states is at most 6 steps of 4 · MAX_LLR each, below 2^15.
 
-numba widens int16 arithmetic to int64, which defeats vectorising; so the step is written as LLVM
-vector instructions. LLVM lowers them to whatever the machine has (AVX2, AVX-512, NEON).
+numba widens int16 arithmetic to int64, which defeats vectorisation. So the step is written as LLVM
+vector instructions, which LLVM lowers to what the machine has (AVX2, AVX-512, NEON).
 """
 
 from typing import Any
@@ -43,9 +43,9 @@ _SIGN_B = [1 - 2 * int(PARITY_B[2 * j]) for j in range(N_HALF)]
 
 
 class ViterbiWorkspace:
-    """Working memory of decoding, for blocks of up to `n_steps` bits, tail included.
+    """Working memory of decoding, for blocks of up to `n_steps` bits, including the tail.
 
-    One for each thread: the kernels hold no lock.
+    One per thread, because the kernels hold no lock.
     """
 
     def __init__(self, n_steps: int) -> None:
@@ -57,7 +57,7 @@ class ViterbiWorkspace:
 def decode_terminated(
     llr: NDArray[np.int16], kept: NDArray[np.int32], n_bytes: int, work: ViterbiWorkspace
 ) -> NDArray[np.uint8]:
-    """The likeliest bytes `[n, n_bytes]`; `llr[:, i]` is of bit `kept[i]` of the mother code."""
+    """The likeliest bytes `[n, n_bytes]`; `llr[:, i]` is of the mother code's bit `kept[i]`."""
     out = np.empty((len(llr), n_bytes), np.uint8)
     n_steps = 8 * n_bytes + 6
     _decode(llr, kept, work.mother[: 2 * n_steps], work.decisions[:n_steps], out)
@@ -133,7 +133,7 @@ def _emit_steps(builder: Any, llr: Any, decisions: Any, n_steps: Any) -> None:
 def decode_block(
     llr: NDArray[np.int16], decisions: NDArray[np.uint64], out: NDArray[np.uint8]
 ) -> None:
-    """Decode LLRs of the mother code `[2 t]` to the likeliest bytes, the tail left out."""
+    """Decode LLRs of the mother code `[2 t]` to the likeliest bytes, without the tail."""
     out[:] = 0
     n_bits = 8 * out.size
     _forward(llr, decisions)

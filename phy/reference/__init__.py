@@ -1,14 +1,14 @@
-"""The reference owns this modem once more, in plain NumPy: the transmitter and the receiver.
+"""The modem once more in plain NumPy, both transmitter and receiver, as a reference.
 
-It is written to be read beside the equations of `phy/README.md`, and the kernels of both are tested
-against it. It never runs in a daemon, it never uses a kernel, and its speed does not matter.
-What is arithmetic alone (grid, layout, MCS, constellation, CRC, sequences, code tables) it takes
-from `phy`; what is made of samples it computes itself: in double precision, but for the demapper.
+It is meant to be read beside the equations of `phy/README.md`, and the kernels are tested against
+it. It never runs in a daemon, never uses a kernel, and need not be fast. It shares with `phy` only
+tables and arithmetic (grid, layout, MCS, constellation, CRC, sequences, code tables). It computes
+everything with samples itself, in double precision except in the demapper.
 
-The modules stand in the order of the signal. What is sent: `header`, `viterbi` (its code), `ldpc`,
-`mapping`, `ofdm`, `transmitter`. What is received: `detection`, `timing`, `offset`, `channel`,
-`smoothing`, `training`, `tracking`, `demapper`, `equaliser`, and again `viterbi` and `ldpc`;
-`acquisition`, `payload` and `receiver` put them together.
+The modules in the order of the signal, sending: `header`, `viterbi` (its code), `ldpc`, `mapping`,
+`ofdm`, `transmitter`. Receiving: `detection`, `timing`, `offset`, `channel`, `smoothing`,
+`training`, `tracking`, `demapper`, `equaliser`, and again `viterbi` and `ldpc`; `acquisition`,
+`payload` and `receiver` combine them.
 """
 
 from phy.reference.receiver import Receiver

@@ -1,4 +1,4 @@
-"""Acquisition leads from the detector's peak to a header that is read and a known channel."""
+"""Acquisition: from the detector's peak to a decoded header and a known channel."""
 
 import math
 from typing import NamedTuple
@@ -23,10 +23,10 @@ from phy.reference.transmitter import header_samples
 
 
 class Acquired(NamedTuple):
-    """A burst was acquired: its header is read, and its payload can be equalised.
+    """An acquired burst: its header is decoded, and its payload can be equalised.
 
-    `origin` is the absolute index at which samples turned back by `frequency` have phase 0, and
-    `window` that at which the first payload symbol's FFT begins.
+    `origin` is the absolute index at which samples rotated back by `frequency` have phase 0, and
+    `window` the index at which the first payload symbol's FFT begins.
     """
 
     header: BurstHeader
@@ -38,26 +38,26 @@ class Acquired(NamedTuple):
 
 
 class Missed(NamedTuple):
-    """Nothing was acquired: there was no "preamble", or its "header" could not be read."""
+    """A failed acquisition: no "preamble" was found, or its "header" could not be decoded."""
 
     stage: str
 
 
 def before(grid: Numerology) -> int:
-    """Acquisition needs this many samples before the nominal start of the first long symbol."""
+    """Number of samples that acquisition needs before the nominal first long symbol."""
     return preamble.long_start(grid) + SEARCH + BACKOFF
 
 
 def needed_after(grid: Numerology) -> int:
-    """Acquisition needs this many samples from the nominal start of the first long symbol on."""
+    """Number of samples that acquisition needs from the nominal first long symbol on."""
     return SEARCH + preamble.N_LONG * grid.n_fft + n_symbols(grid) * grid.n_symbol
 
 
 class Acquisition:
-    """Acquisition works on one grid, for offsets up to `max_frequency` cycles a sample.
+    """Acquires bursts on one grid, for offsets up to `max_frequency` cycles per sample.
 
-    `centre_cycles` is how many cycles a centre frequency that is made by the same crystal makes in
-    a sample; 0 says that nothing is known of it.
+    `centre_cycles` is the centre frequency in cycles per sample if it comes from the same crystal;
+    0: unknown.
     """
 
     def __init__(self, grid: Numerology, max_frequency: float, centre_cycles: float = 0.0) -> None:
@@ -72,10 +72,10 @@ class Acquisition:
     def acquire(
         self, x: NDArray[np.complex64], base: int, coarse: float, dc: complex
     ) -> Acquired | Missed:
-        """The method reads the burst whose first long symbol is nominally at `x[before(grid)]`.
+        """Decode the header of the burst whose first long symbol is nominally at `x[before(grid)]`.
 
-        `base` is the absolute index of `x[0]`, `coarse` the frequency that the peak tells, modulo
-        1/16 cycles a sample.
+        `base` is the absolute index of `x[0]`, `coarse` the frequency of the peak, modulo 1/16
+        cycles per sample.
         """
         grid = self._grid
         # 2. Timing and offset.
@@ -116,21 +116,21 @@ class Acquisition:
         return Acquired(header, quality, origin, window, frequency, equaliser)
 
     def _of_training(self, y: Subcarriers) -> Channel:
-        """Both long symbols tell the channel."""
+        """Estimate the channel from both long symbols."""
         n = preamble.N_LONG
         return estimate(y[:n], self._long, np.ones(n), self._grid)
 
     def _read(
         self, y: Subcarriers, equaliser: Equaliser
     ) -> tuple[NDArray[np.int16], NDArray[np.complex128]]:
-        """The header's symbols `[n, n_used]` become (LLRs `[n · n_data]`, points `[n, n_data]`)."""
+        """Convert header symbols `[n, n_used]` to (LLRs `[n · n_data]`, points `[n, n_data]`)."""
         read = [equaliser.equalise(each, i, Modulation.BPSK) for i, each in enumerate(y)]
         return np.concatenate([llr for llr, _ in read]), np.array([points for _, points in read])
 
     def _learn(self, y: Subcarriers, sent: Subcarriers, equaliser: Equaliser) -> None:
-        """The header, known now, tells the channel once more, with four symbols instead of two.
+        """Refine the channel with the decoded header: four symbols instead of two.
 
-        Its symbols have turned by the phase that is tracked, less the rate for each that followed.
+        The header's symbols have turned by the tracked phase, minus the rate for each later symbol.
         """
         phase, rate = equaliser.tracking.phase.state
         rotation = phase - rate * np.arange(len(sent))[::-1]
@@ -141,17 +141,17 @@ class Acquisition:
 
 
 def header_subcarriers(header: BurstHeader, grid: Numerology) -> Subcarriers:
-    """A header is sent on these subcarriers `[n, n_used]`; its cut peaks have moved them."""
+    """The subcarriers of a header as sent `[n, n_used]`, with the effect of clipped peaks."""
     samples: Samples = header_samples(header, grid)
     starts = grid.n_cp + grid.n_symbol * np.arange(n_symbols(grid))
     return to_subcarriers(samples, starts, 0.0, 0j, grid)
 
 
 def _snr_db(channel: Channel, grid: Numerology) -> float:
-    """The SNR counts noise in all 64 subcarriers and the signal in 52, in dB."""
+    """The SNR in dB; noise counts in all 64 subcarriers, the signal in 52."""
     return decibel(channel.gain / channel.no * grid.n_used / grid.n_fft)
 
 
 def decibel(ratio: float) -> float:
-    """The function returns a ratio of powers in dB, rounded to three places."""
+    """Convert a power ratio to dB, rounded to three places."""
     return math.floor(1e4 * math.log10(max(ratio, 1e-30)) + 0.5) / 1e3

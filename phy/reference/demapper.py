@@ -1,8 +1,8 @@
-"""The demapper makes LLRs of equalised points, and of LLRs what was probably sent.
+"""Demapper: turns equalised points into LLRs, and LLRs into the likely sent points.
 
-It computes in single precision, in the order of the kernels `demapper` and `decisions`: the bits
-are theirs. Both axes of a point are alike, and an axis is told by levels: odd numbers, in units of
-half the distance of neighbouring points.
+It computes in single precision, in the order of the kernels `demapper` and `decisions`, so the bits
+are equal. Both axes of a point are handled alike. Levels of an axis are odd numbers, in units of
+half the distance of neighboring points.
 """
 
 import numpy as np
@@ -13,18 +13,18 @@ from phy.reference.viterbi import MAX_LLR
 Levels = NDArray[np.float32]
 
 LLR_SCALE = 8.0
-"""Quantised LLRs are 1/8 each."""
+"""Factor of quantised LLRs, in steps of 1/8."""
 _F32 = np.float32
 
 
 def axis_llrs(level: Levels, weight: Levels, axis_bits: int) -> Levels:
-    """Levels `[n]` become LLRs of each bit of the axis `[axis_bits, n]`, at most ±MAX_LLR.
+    """Convert levels `[n]` to LLRs of each bit of the axis `[axis_bits, n]`, at most ±MAX_LLR.
 
         L = w (min_{x: bit 1} |u − x|² − min_{x: bit 0} |u − x|²)
 
     For the first bit of 2m levels that is ±max over k ≤ m of 4k|u| − 4k(k − 1): a few straight
-    lines, no search. Each next bit is the first one of the axis folded in the middle, because the
-    bits are Gray-coded.
+    lines, no search. Each further bit is the first bit of the axis folded in the middle, because
+    the bits are Gray-coded.
     """
     llr = np.empty((axis_bits, len(level)), np.float32)
     for bit in range(axis_bits):
@@ -38,11 +38,11 @@ def axis_llrs(level: Levels, weight: Levels, axis_bits: int) -> Levels:
 
 
 def expected_levels(llr: Levels) -> tuple[Levels, Levels]:
-    """LLRs `[axis_bits, n]` tell mean E s and mean square E s² of the levels sent `[n]`.
+    """Estimate mean E s and mean square E s² of the sent levels `[n]` from LLRs `[axis_bits, n]`.
 
         E(1 − 2 bit) = tanh(L/2);  level ±R_1, R_b = 2^(m − b) ± R_(b + 1), R_m = 1
 
-    Bits count from 0, so that R_1 follows from the inside out, a bit at a time.
+    Bits count from 0, so that R_1 follows from the inside out, one bit at a time.
     """
     mean = square = np.ones(llr.shape[1], np.float32)
     for bit in range(len(llr) - 1, 0, -1):
@@ -54,7 +54,7 @@ def expected_levels(llr: Levels) -> tuple[Levels, Levels]:
 
 
 def _tanh(x: Levels) -> Levels:
-    """tanh x is x (27 + x²) / (27 + 9x²) to 2 %, and ±1 beyond ±3."""
+    """Approximate tanh x by x (27 + x²) / (27 + 9x²), to 2 %, and by ±1 beyond ±3."""
     x = np.clip(x, _F32(-3), _F32(3))
     square = x * x
     value: Levels = x * (_F32(27) + square) / (_F32(27) + _F32(9) * square)

@@ -1,8 +1,8 @@
-"""Detection finds the short training: a window of 192 samples that is our code, at any strength.
+"""Detection: finds the short training, 192 samples that follow our code, at any signal level.
 
 Segment i of the short training is segment i − 1 times b_i. So the product of each sample with the
 one 16 before it, times b_i, has the same phase throughout, whatever the channel: that of 16 samples
-of frequency offset. What repeats itself without the code adds up to little.
+of frequency offset. A signal that repeats without the code adds up to little.
 """
 
 import cmath
@@ -16,24 +16,24 @@ from phy.preamble import BARKER, SEGMENT, SHORT
 from phy.reference.ofdm import Samples
 
 HISTORY = SHORT - 1
-"""The metric of a sample needs so many samples before it."""
+"""Number of samples before a sample that its metric needs."""
 HOP = 512
-"""The threshold and the DC are the same for so many samples."""
+"""Number of samples with the same threshold and DC."""
 THRESHOLD = 0.25
 MOST = 0.5
-"""False alarms raise the threshold at most up to here."""
+"""Limit up to which false alarms raise the threshold."""
 WARIER = 0.1
-"""Each of them raises it by so much."""
+"""Amount by which each false alarm raises the threshold."""
 FORGETS = 4096
-"""A raised threshold sinks by a factor e in so many samples."""
+"""Number of samples in which a raised threshold decays by a factor of e."""
 PLAINEST = 0.7
-"""A peak whose sum without the code is more than this share of it is none."""
+"""A peak whose sum without the code exceeds this share of it is not a preamble."""
 SLOWEST = 1 / 64
-"""The DC follows the mean of each hop by at least this share."""
+"""Least weight of each hop's mean in the DC."""
 
 
 def sums(x: NDArray[np.complexfloating], dc: complex) -> tuple[Samples, NDArray[np.float64]]:
-    """The function returns P and E `[n]` of the last n of the samples `[191 + n]`.
+    """Compute P and E `[n]` of the last n of the samples `[191 + n]`.
 
     P[n] = Σ_{k=0}^{10} b_k Σ_{m=0}^{15} y[n−16(10−k)−m] y*[n−16(11−k)−m]
     E[n] = 11/12 Σ_{m=0}^{191} |y[n−m]|²
@@ -49,7 +49,7 @@ def sums(x: NDArray[np.complexfloating], dc: complex) -> tuple[Samples, NDArray[
 
 
 def _neighbours(x: NDArray[np.complexfloating], dc: complex) -> Samples:
-    """Entry i compares a segment with the one before it: Σ_{m=0}^{15} y[i+16+m] y*[i+m]."""
+    """Compare each segment with the one before it: entry i is Σ_{m=0}^{15} y[i+16+m] y*[i+m]."""
     y = x.astype(np.complex128) - dc
     products = y[SEGMENT:] * y[:-SEGMENT].conj()
     total: Samples = sliding_window_view(products, SEGMENT).sum(axis=-1)
@@ -57,7 +57,7 @@ def _neighbours(x: NDArray[np.complexfloating], dc: complex) -> Samples:
 
 
 class Detector:
-    """The detector remembers the DC of a stream, and how wary false alarms have made it."""
+    """Detects preambles; keeps the DC of a stream and the threshold raised by false alarms."""
 
     def __init__(self, start: int) -> None:
         self.dc = 0j
@@ -65,10 +65,10 @@ class Detector:
         self._excess, self._raised_at = 0.0, start
 
     def crossing(self, x: NDArray[np.complexfloating], at: int) -> int | None:
-        """The method returns the first of 512 samples with |P| > threshold · E, or None.
+        """Find the first of 512 samples with |P| > threshold · E, or None.
 
-        `x` `[191 + 512]` ends with those samples, of which the first has the absolute index `at`.
-        The result is an absolute index. A hop without a crossing tells the DC.
+        `x` `[191 + 512]` ends with those samples; the first of them has the absolute index `at`.
+        The result is an absolute index. A hop without a crossing updates the DC.
         """
         level = THRESHOLD + self._excess_at(at)
         p, e = sums(x, self.dc)
@@ -81,12 +81,12 @@ class Detector:
         return None
 
     def strongest(self, x: NDArray[np.complexfloating]) -> tuple[int, float | None]:
-        """The method finds the largest |P| / E after 191 samples of `x`: (its offset, frequency).
+        """Find the largest |P| / E after 191 samples of `x`; returns (its offset, frequency).
 
             f = arg P / (2π16), modulo 1/16 cycles a sample
 
-        The frequency is None where |Σ_k Σ_m …|, P without the code, is more than 0.7 |P|: such are
-        Wi-Fi, levels and slow neighbours.
+        The frequency is None if |Σ_k Σ_m …|, P without the code, exceeds 0.7 |P|, as for Wi-Fi,
+        constant levels and slow neighbors.
         """
         p, e = sums(x, self.dc)
         metric = np.divide(np.abs(p) ** 2, e**2, out=np.full(len(p), -1.0), where=e > 0)
@@ -100,10 +100,10 @@ class Detector:
         return best, cmath.phase(p[best]) / (2 * math.pi * SEGMENT)
 
     def was_nothing(self, peak: int) -> None:
-        """A false alarm at `peak` raises the threshold: who made it must do better next time."""
+        """Raise the threshold after a false alarm at `peak`: its source may return."""
         self._excess = min(self._excess_at(peak) + WARIER, MOST - THRESHOLD)
         self._raised_at = peak
 
     def _excess_at(self, index: int) -> float:
-        """The threshold is raised by this much at an absolute index."""
+        """Excess of the raised threshold at an absolute index."""
         return self._excess * math.exp((self._raised_at - index) / FORGETS)

@@ -1,4 +1,4 @@
-"""The equaliser makes LLRs of a symbol's subcarriers, and learns the channel from its decisions."""
+"""Equaliser: turns a symbol's subcarriers into LLRs, and learns the channel from its decisions."""
 
 from typing import NamedTuple
 
@@ -16,13 +16,13 @@ from phy.reference.tracking import Tracking
 from phy.sequences import polarity
 
 BLOCK = 8
-"""The channel is corrected after so many symbols."""
+"""Number of symbols after which the channel is corrected."""
 LEAST_MASS = BLOCK / 4
-"""Less certainty than this in a block teaches nothing: others were on the air."""
+"""Least certainty in a block; with less, others were on the air and the block is not used."""
 
 
 class Decided(NamedTuple):
-    """The LLRs decide what was probably sent on the data subcarriers of a symbol."""
+    """The likely sent points on the data subcarriers of a symbol, decided from the LLRs."""
 
     mean: Subcarriers
     """E s `[n_data]`."""
@@ -31,7 +31,7 @@ class Decided(NamedTuple):
 
 
 class Equaliser:
-    """The equaliser follows one burst symbol by symbol, and `channel` with it."""
+    """Equalises one burst symbol by symbol, and updates `channel`."""
 
     def __init__(self, grid: Numerology, channel: Channel, tracking: Tracking) -> None:
         self._grid = grid
@@ -42,12 +42,12 @@ class Equaliser:
     def equalise(
         self, y: Subcarriers, number: int, modulation: Modulation
     ) -> tuple[NDArray[np.int16], Subcarriers]:
-        """The method makes LLRs in the order of the code, and points, of a symbol `[n_used]`.
+        """Convert a symbol `[n_used]` to LLRs in the order of the code, and points.
 
             u = Y exp(−j(φ + sk)) / Ĥ;  L = |Ĥ|²/N (min_{x: bit 1} |u − x|² − min_{x: bit 0} …)
 
         LLRs `[n_data · bits]` are in eighths, positive for 0; the equalised points are `[n_data]`.
-        The header's first symbol has `number` 0, and symbols follow one another.
+        The header's first symbol has `number` 0, and symbols are consecutive.
         """
         sign = float(polarity(1, number)[0])
         self.tracking.predict()
@@ -61,10 +61,9 @@ class Equaliser:
         return deinterleaved(llr, modulation, self._grid), u
 
     def _learn(self, turned: Subcarriers, decided: Decided, sign: float, trust: float) -> None:
-        """A symbol adds to the block's sums: Σ Y (E s)*, Σ E|s|², Σ|E s|².
+        """Add a symbol to the block's sums: Σ Y (E s)*, Σ E|s|², Σ|E s|².
 
-        Pilots are certain. A symbol that interference has hit counts less, by `trust` = N over its
-        own noise.
+        Pilots are certain. A symbol with interference counts less: `trust` is N over its own noise.
         """
         grid = self._grid
         mean, square = np.empty(grid.n_used, np.complex128), np.empty(grid.n_used)
@@ -78,12 +77,12 @@ class Equaliser:
             self._correct_channel()
 
     def _correct_channel(self) -> None:
-        """A block of symbols corrects the gains: a step of expectation and maximisation.
+        """Correct the gains after a block of symbols: a step of expectation maximisation.
 
             ΔĤ = (Σ Y (E s)* − Ĥ Σ E|s|²) / Σ|E s|²
 
-        The last sum is the mean over the subcarriers. It is less than Σ E|s|², so that the step is
-        as long as what was uncertain would make it too short. The error has the noise N / Σ|E s|².
+        The last sum is averaged over the subcarriers. It is less than Σ E|s|², which lengthens the
+        step and compensates the shortening by uncertainty. The error has the noise N / Σ|E s|².
         """
         mass = self._certain / self._grid.n_used
         if mass > LEAST_MASS:
@@ -92,7 +91,7 @@ class Equaliser:
         self._forget_block()
 
     def _forget_block(self) -> None:
-        """A new block begins with empty sums."""
+        """Reset the sums for a new block."""
         self._sums = np.zeros(self._grid.n_used, np.complex128)
         self._masses = np.zeros(self._grid.n_used)
         self._certain, self._n_heard = 0.0, 0
@@ -101,10 +100,10 @@ class Equaliser:
 def demap(
     u: Subcarriers, certainty: NDArray[np.float64], modulation: Modulation
 ) -> tuple[NDArray[np.int16], Decided]:
-    """The function makes LLRs `[n · bits]` of points `[n]`, and decides what was sent.
+    """Convert points `[n]` to LLRs `[n · bits]`, and decide what was sent.
 
-    `certainty` `[n]` is |Ĥ|²/N. Quantised LLRs are eighths, cut towards 0. BPSK has no imaginary
-    axis.
+    `certainty` `[n]` is |Ĥ|²/N. Quantised LLRs are eighths, truncated towards 0. BPSK has no
+    imaginary axis.
     """
     unit = modulation.unit
     weight = (LLR_SCALE * certainty * unit**2).astype(np.float32)

@@ -1,8 +1,8 @@
-"""The header tells a burst's MCS, PDUs and network; it is coded and read again here.
+"""Header: encodes and decodes a burst's MCS, PDUs and network.
 
     mcs 4 · PDUs 6 · PDU length 11 · network 3 · CRC-8, then 6 zeros, rate 1/2: 76 bits
 
-The first coded bits are sent once more until the header's BPSK symbols are full.
+The coded bits are repeated from the first on until the header's BPSK symbols are full.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ N_CODED = 2 * (N_BITS + N_TAIL)
 
 
 def header_bits(header: BurstHeader, n_coded: int) -> NDArray[np.uint8]:
-    """A header becomes its coded bits, repeated from the first on up to `n_coded`."""
+    """Encode a header; the coded bits repeat from the first on up to `n_coded`."""
     text = "".join(f"{value:0{width}b}" for value, width in zip(header, WIDTHS, strict=True))
     fields = int(text, 2).to_bytes(3, "big")
     octets = np.frombuffer(fields + bytes([crc8(fields)]), np.uint8)
@@ -26,7 +26,7 @@ def header_bits(header: BurstHeader, n_coded: int) -> NDArray[np.uint8]:
 
 
 def folded(llr: NDArray[np.int16]) -> NDArray[np.int16]:
-    """The LLRs of a bit and of its repetitions add up: `[n]` become `[76]`, at most ±MAX_LLR."""
+    """Add up the LLRs of each bit and its repetitions: `[n]` become `[76]`, at most ±MAX_LLR."""
     padded = np.zeros(-(-len(llr) // N_CODED) * N_CODED, np.int64)
     padded[: len(llr)] = llr
     total = padded.reshape(-1, N_CODED).sum(axis=0)
@@ -34,9 +34,9 @@ def folded(llr: NDArray[np.int16]) -> NDArray[np.int16]:
 
 
 def parse_header(llr: NDArray[np.int16]) -> BurstHeader | None:
-    """The header behind LLRs `[76]` is the first of the eight likeliest words that is one.
+    """Decode a header from LLRs `[76]`: the first of the eight likeliest words that is valid.
 
-    None says that the CRC-8 of each is wrong, or that what they tell makes no sense.
+    None: each word has a wrong CRC-8 or an invalid field.
     """
     for bits in decode(llr, N_CANDIDATES):
         header = checked(np.packbits(bits[:N_BITS]).tobytes())
@@ -46,7 +46,7 @@ def parse_header(llr: NDArray[np.int16]) -> BurstHeader | None:
 
 
 def checked(octets: bytes) -> BurstHeader | None:
-    """Four octets are a header when their CRC-8 is right and each field can be; else None."""
+    """Decode four octets as a header; None if the CRC-8 is wrong or a field is invalid."""
     if crc8(octets[:3]) != octets[3]:
         return None
     rest, values = int.from_bytes(octets[:3], "big"), []

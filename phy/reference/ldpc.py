@@ -1,7 +1,7 @@
-"""The LDPC code protects the blocks of PDUs; this module codes and decodes them.
+"""LDPC code: encodes and decodes the blocks of PDUs.
 
-A parity-check matrix is made of Z × Z blocks, each zero or the identity shifted right by s: check z
-of a block row takes bit (z + s) mod Z of the block column (IEEE 802.11-2020, Annex F; `phy.ldpc`
+A parity-check matrix consists of Z × Z blocks, each zero or the identity shifted right by s: check
+z of a block row takes bit (z + s) mod Z of the block column (IEEE 802.11-2020, Annex F; `phy.ldpc`
 has the tables). So a codeword is an array `[24, Z]`, and the Z checks of a block row are one vector
 operation for each of its blocks.
 """
@@ -16,27 +16,28 @@ from phy.ldpc import MAX_ITERATIONS, QuasiCyclic, Segmentation
 Bits = NDArray[np.uint8]
 
 SURE = 4000
-"""A bit that was not sent because it is 0 has this LLR."""
+"""LLR of a bit that was not sent because it is 0."""
 MAX_POSTERIOR = 8000
 MAX_MAGNITUDE = 2000
-"""Magnitudes beyond count as this."""
+"""Limit of magnitudes."""
 WEIGHT = 14
-"""Messages are taken times so many sixteenths (Chen and Fossorier 2002)."""
+"""Factor of messages, in sixteenths (Chen and Fossorier 2002)."""
 
 
 def taken(code: QuasiCyclic) -> NDArray[np.int64]:
-    """Row e tells which bit of its block column each check takes on edge e `[edges, Z]`."""
+    """The bit of its block column that each check takes on edge e, in row e `[edges, Z]`."""
     return (np.arange(code.z) + code.shifts[:, None]) % code.z
 
 
 def parity(information: Bits, code: QuasiCyclic) -> Bits:
-    """Information `[k]` has this parity `[n − k]`.
+    """Compute the parity `[n − k]` of information `[k]`.
 
         λ_r = Σ_c P^s u_c;  p_0 = Σ_r λ_r;  p_1 = λ_0 + P¹ p_0;  p_{r+1} = p_r + λ_r (+ p_0)
 
-    λ_r is what the information adds to the checks of block row r. Parity column 0 has blocks with
-    shift 1 in the first and the last row and with 0 in row `middle`, so that in the sum of all rows
-    only p_0 remains; the other columns are a staircase. The + p_0 is that of row `middle`.
+    λ_r is the contribution of the information to the checks of block row r. Parity column 0 has
+    blocks with shift 1 in the first and the last row and with 0 in row `middle`, so that only p_0
+    remains in the sum of all rows; the other columns form a staircase. The + p_0 belongs to row
+    `middle`.
     """
     n_rows = len(code.base)
     u = information.reshape(-1, code.z)
@@ -57,10 +58,10 @@ def parity(information: Bits, code: QuasiCyclic) -> Bits:
 
 
 def encode_blocks(blocks: Bits, form: Segmentation) -> Bits:
-    """Blocks of bits `[blocks, n_bits]` become coded bits `[blocks, n_coded]`.
+    """Encode blocks of bits `[blocks, n_bits]` to coded bits `[blocks, n_coded]`.
 
-    Each codeword takes its share of the block as information, zeros behind it that are not sent,
-    and sends as much of its parity from the front as the burst has room for.
+    Each codeword carries its share of the block as information, followed by zeros that are not
+    sent, and then as much of its parity, from the front, as the burst has room for.
     """
     code = form.code
     out = np.empty((len(blocks), form.n_coded), np.uint8)
@@ -78,9 +79,9 @@ def encode_blocks(blocks: Bits, form: Segmentation) -> Bits:
 def decode_blocks(
     llr: NDArray[np.int16], form: Segmentation, max_iterations: int = MAX_ITERATIONS
 ) -> Bits:
-    """LLRs `[blocks · n_coded]`, positive for 0, become bits `[blocks, n_bits]`.
+    """Decode LLRs `[blocks · n_coded]`, positive for 0, to bits `[blocks, n_bits]`.
 
-    A codeword whose LLRs' signs are one already is taken as it stands: there is none likelier.
+    If the signs of the LLRs already form a codeword, it is the likeliest and is taken as it is.
     """
     code = form.code
     blocks = []
@@ -104,13 +105,13 @@ def decode_blocks(
 def decode_codeword(
     llr: NDArray[np.int16], code: QuasiCyclic, max_iterations: int
 ) -> tuple[int, NDArray[np.int32]]:
-    """Layered min-sum returns (iterations until all checks held or 0, posteriors `[24, Z]`).
+    """Layered min-sum decoding; (iterations until all checks held or 0, posteriors `[24, Z]`).
 
         rest = posterior − message;  message' = f(rest of the others);  posterior' = rest + message'
 
-    It goes from block row to block row, and each knows what the one before has found (Hocevar
-    2004). A bit that tells a check the contrary of what it told it last counts as 0 for once
-    (Savin 2008).
+    It visits the block rows in turn, and each row uses the results of the one before (Hocevar
+    2004). If a bit's message to a check has changed its sign since the last one, it counts as 0
+    this time (Savin 2008).
     """
     posteriors = llr.reshape(-1, code.z).astype(np.int32)
     messages, told = np.zeros((2, len(code.columns), code.z), np.int32)
@@ -131,12 +132,14 @@ def decode_codeword(
 
 
 def check_messages(told: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Each check answers each of its bits from what its other bits told it `[bits, checks]`.
+    """Messages of each check to each of its bits, from what its other bits told it.
+
+    Both are `[bits, checks]`.
 
         message_i = 14/16 · min_{j ≠ i} |told_j| · Π_{j ≠ i} sign told_j
 
-    Two minima serve all bits: the least of all, and the second least for the bit that has it. A bit
-    that tells 0 counts as a positive one.
+    Two minima serve all bits: the least of all, and the second least for the bit that has the
+    least. A bit that tells 0 counts as positive.
     """
     size = np.abs(told)
     least, second = np.sort(size, axis=0)[:2]

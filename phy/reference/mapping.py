@@ -1,4 +1,4 @@
-"""The mapping owns the way from coded bits to subcarriers: interleaver, constellation, pilots.
+"""Mapping from coded bits to subcarriers: interleaver, constellation, pilots.
 
 The way back is in `equaliser` and `demapper`; only `deinterleaved` is here, beside its inverse.
 """
@@ -15,10 +15,10 @@ Bits = NDArray[np.uint8]
 
 
 def to_points(coded: Bits, modulation: Modulation, grid: Numerology) -> NDArray[np.complex128]:
-    """Coded bits `[n · n_data · bits]` become the points of the data subcarriers `[n, n_data]`.
+    """Map coded bits `[n · n_data · bits]` to the points of the data subcarriers `[n, n_data]`.
 
-    Bit k of a symbol goes to place `order[k]`; every `bits` places are the number of a point, first
-    bit highest (IEEE 802.11-2020, 17.3.5.7 and 17.3.5.8).
+    Bit k of a symbol moves to position `order[k]`; each group of `bits` positions is the number of
+    a point, first bit highest (IEEE 802.11-2020, 17.3.5.7 and 17.3.5.8).
     """
     n_bits = grid.n_data * modulation.bits
     placed = np.empty((len(coded) // n_bits, n_bits), np.int64)
@@ -31,7 +31,7 @@ def to_points(coded: Bits, modulation: Modulation, grid: Numerology) -> NDArray[
 def to_subcarriers(
     coded: Bits, modulation: Modulation, grid: Numerology, first_symbol: int
 ) -> NDArray[np.complex128]:
-    """Coded bits become whole symbols `[n, n_used]`: points, and pilots with their polarity.
+    """Map coded bits to whole symbols `[n, n_used]`: points, and pilots with their polarity.
 
         X_k = a point on a data subcarrier, p_i P_k on a pilot
 
@@ -48,5 +48,5 @@ def to_subcarriers(
 def deinterleaved(
     placed: NDArray[np.int16], modulation: Modulation, grid: Numerology
 ) -> NDArray[np.int16]:
-    """Values of a symbol's places `[n_data · bits]` come back in the order of the code."""
+    """Put the values of a symbol's positions `[n_data · bits]` back into the order of the code."""
     return placed[order(grid.n_data * modulation.bits, modulation.bits)]

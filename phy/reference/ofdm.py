@@ -1,4 +1,4 @@
-"""OFDM makes samples of subcarriers with an inverse FFT, and subcarriers of samples with an FFT.
+"""OFDM: converts subcarriers to samples with an inverse FFT, and back with an FFT.
 
 The cyclic prefix makes the echoes' convolution circular. So a window that begins inside the prefix
 sees every subcarrier times one complex gain, and echoes never mix subcarriers.
@@ -14,11 +14,11 @@ Subcarriers = NDArray[np.complex128]
 
 
 def to_samples(subcarriers: Subcarriers, grid: Numerology, peak: float = np.inf) -> Samples:
-    """Symbols `[n, n_used]` become samples `[n · n_symbol]` of mean power 1, none beyond `peak`.
+    """Convert symbols `[n, n_used]` to samples `[n · n_symbol]`, mean power 1, none beyond `peak`.
 
         x[n] = (1/√52) Σ_k X_k exp(j2πkn/64), its last 16 samples before it
 
-    Subcarriers are in the order of `grid.used`. A sample beyond `peak` is shortened to that
+    Subcarriers are in the order of `grid.used`. A sample beyond `peak` is clipped to that
     magnitude: the error of −34 dB and less is below the noise at which the MCS works (`phy.mcs`).
     """
     spectrum = np.zeros((len(subcarriers), grid.n_fft), np.complex128)
@@ -33,11 +33,11 @@ def to_samples(subcarriers: Subcarriers, grid: Numerology, peak: float = np.inf)
 def turned_back(
     samples: NDArray[np.complexfloating], dc: complex, frequency: float, origin: int = 0
 ) -> Samples:
-    """Samples `[n]` lose their DC and their frequency offset of `frequency` cycles a sample.
+    """Remove the DC and a frequency offset of `frequency` cycles per sample from samples `[n]`.
 
         z[n] = (y[n] − d) exp(−j2πfn)
 
-    The phase is 0 at `origin` samples before the first one.
+    The phase is 0 `origin` samples before the first one.
     """
     n = np.arange(origin, origin + len(samples))
     z: Samples = (samples.astype(np.complex128) - dc) * np.exp(-2j * np.pi * frequency * n)
@@ -52,11 +52,11 @@ def to_subcarriers(
     grid: Numerology,
     origin: int = 0,
 ) -> Subcarriers:
-    """FFT windows that begin at `starts` `[n]` become subcarriers `[n, n_used]`.
+    """Convert FFT windows that begin at `starts` `[n]` to subcarriers `[n, n_used]`.
 
         Y_k = (√52/64) Σ_n z[n] exp(−j2πkn/64)
 
-    The samples are turned back first, with phase 0 at `origin` samples before `samples[0]`. A
+    The samples are rotated back first, with phase 0 `origin` samples before `samples[0]`. A
     subcarrier sent as 1 arrives as 1 through a channel of gain 1.
     """
     z = turned_back(samples, dc, frequency, origin)

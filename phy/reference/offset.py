@@ -1,4 +1,4 @@
-"""The whole preamble, re-made with the channel, tells the likeliest frequency offset."""
+"""Frequency offset: the most likely one, from the whole preamble rebuilt with the channel."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,25 +8,25 @@ from phy.numerology import Numerology
 from phy.reference.ofdm import Samples, Subcarriers
 
 BACKOFF = 3
-"""FFT windows begin so many samples before the first echo: earlier ones still do no harm."""
+"""Samples before the first echo at which FFT windows begin: slightly earlier echoes do no harm."""
 FIRST_CLEAN = BACKOFF + 4
-"""Before this sample of a short segment, echoes of the segment before it reach into it."""
+"""First sample of a short segment that echoes of the previous segment do not reach."""
 N_CLEAN = preamble.SEGMENT - 4
 PART = 16
-"""The phase of so many samples of the long training is looked at as one."""
+"""Number of samples of the long training whose phase is evaluated together."""
 FREQUENCIES = np.linspace(-0.12, 0.12, 25) / 64
-"""These corrections are tried, in cycles a sample."""
+"""Frequency corrections to try, in cycles per sample."""
 
 
 def refine(z: Samples, h: Subcarriers, grid: Numerology) -> float:
-    """The function returns the likeliest correction of the frequency, in cycles a sample.
+    """Find the most likely correction of the frequency, in cycles per sample.
 
         z_i = Σ_m z[t+m] w*[t+m];  f maximises |Σ_i z_i exp(−j2πft_i)|
 
-    `z` begins BACKOFF samples before the preamble and is turned back by the frequency so far; `h`
-    `[n_used]` are the gains, from which w, the preamble as it should arrive, is made. Times t_i are
-    the middles of the parts. A grid of frequencies is tried; a parabola through the best and its
-    neighbours tells what is between them.
+    `z` begins BACKOFF samples before the preamble and is rotated back by the frequency so far; `h`
+    `[n_used]` are the gains, from which w, the expected preamble, is made. Times t_i are the
+    middles of the parts. A grid of frequencies is tried; a parabola through the best one and its
+    neighbors finds the maximum in between.
     """
     short = _in_time(h * preamble.short_subcarriers(grid), grid)[: preamble.SEGMENT]
     long = _in_time(h * preamble.long_subcarriers(grid), grid)
@@ -44,14 +44,14 @@ def refine(z: Samples, h: Subcarriers, grid: Numerology) -> float:
 
 
 def _in_time(subcarriers: Subcarriers, grid: Numerology) -> Samples:
-    """One period of a symbol `[n_fft]` has these subcarriers `[n_used]`."""
+    """One period of a symbol `[n_fft]` with these subcarriers `[n_used]`."""
     spectrum = np.zeros(grid.n_fft, np.complex128)
     spectrum[grid.bins] = subcarriers
     return np.fft.ifft(spectrum) * grid.scale
 
 
 def peak_of_parabola(places: NDArray[np.float64], values: NDArray[np.float64]) -> float:
-    """The parabola through the largest value and its neighbours has its peak at this place.
+    """Position of the peak of the parabola through the largest value and its neighbors.
 
     place + (left − right) / 2(left − 2 middle + right) steps, at most one step
     """

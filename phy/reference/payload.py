@@ -1,4 +1,4 @@
-"""The payload of a burst keeps count of its symbols and of the PDUs in them."""
+"""Payload: tracks the symbols of a burst and the PDUs in them."""
 
 import math
 
@@ -14,13 +14,13 @@ from phy.reference.ofdm import to_subcarriers
 from phy.sequences import whitening
 
 SLIP_EVERY = 256
-"""After so many symbols, the FFT windows follow the sender's clock by whole samples."""
+"""Interval in symbols at which the FFT windows are aligned to the sender's clock."""
 FADED = 0.25
-"""A burst is gone when a PDU fails with less than this share of its power above the noise."""
+"""A burst is gone if a PDU fails with less than this share of the burst's power above noise."""
 
 
 class Payload:
-    """A payload is taken in symbol by symbol, and each PDU decoded when its last symbol is in."""
+    """Takes a burst's payload symbol by symbol, and decodes each PDU after its last symbol."""
 
     def __init__(
         self, acquired: Acquired, plan: BurstLayout, grid: Numerology, n_header: int
@@ -36,19 +36,19 @@ class Payload:
 
     @property
     def n_done(self) -> int:
-        """This many PDUs were decoded, well or badly."""
+        """Number of PDUs decoded so far, successfully or not."""
         return self.n_good + self.n_bad
 
     def window(self, symbol: int) -> int:
-        """The FFT of a payload symbol begins at this absolute index."""
+        """Absolute index at which the FFT of a payload symbol begins."""
         return self._window + symbol * self._grid.n_symbol
 
     def end_of(self, n: int) -> int:
-        """The FFTs of the first `n` symbols end before this absolute index."""
+        """Absolute index after the FFTs of the first `n` symbols."""
         return self.window(n) - self._grid.n_cp
 
     def take(self, samples: NDArray[np.complex64], dc: complex) -> NDArray[np.complex128]:
-        """The method takes in the next symbol's FFT window `[n_fft]`, and returns its points."""
+        """Process the next symbol's FFT window `[n_fft]`; returns its points."""
         found, grid, number = self.acquired, self._grid, self.n_symbols_in
         origin = self.window(number) - found.origin
         y = to_subcarriers(samples, np.array([0]), found.frequency, dc, grid, origin)[0]
@@ -59,12 +59,12 @@ class Payload:
         return points
 
     def is_next_in(self) -> bool:
-        """The answer is True when the symbols of the next PDU are all in."""
+        """Whether all symbols of the next PDU have arrived."""
         plan = self.plan
         return self.n_done < plan.n_pdus and len(self._llr) >= plan.coded_bits
 
     def decode(self) -> bytes | None:
-        """The method returns the next PDU, or None when its CRC-32 is wrong."""
+        """Decode the next PDU; None if its CRC-32 is wrong."""
         plan, size = self.plan, self.plan.block_bytes
         bits = decode_blocks(self._llr[: plan.coded_bits], plan.form)
         block = np.packbits(bits) ^ whitening(size, self.n_done * size)
@@ -75,18 +75,17 @@ class Payload:
         return data
 
     def is_gone(self) -> bool:
-        """The answer is True when the symbols since the last PDU had no power of a burst."""
+        """Whether the symbols since the last PDU lacked the power of a burst."""
         channel = self.acquired.equaliser.channel
         powers = self._powers
         return bool(powers) and float(np.mean(powers)) < channel.no + FADED * channel.gain
 
     def count_powers_anew(self) -> None:
-        """The powers of symbols count from here on for the next PDU."""
+        """Start to measure the power of symbols for the next PDU."""
         self._powers = []
 
     def slip(self) -> None:
-        """Every 256 symbols, windows follow the sender's clock, as the slope over subcarriers
-        tells.
+        """Align the windows to the sender's clock every 256 symbols, by the slope over subcarriers.
 
         early = s · 64 / 2π samples, to the nearest
         """

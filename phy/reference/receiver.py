@@ -1,7 +1,7 @@
-"""The receiver takes a stream of samples and tells PDUs, in the order of "What is received".
+"""Receiver: takes a stream of samples and reports PDUs, in the order of "What is received".
 
-SEARCH → ALIGN → ACQUIRE → PAYLOAD. Each state waits until the samples it needs are there. What it
-makes of a sample never depends on how many came with it: any chunking yields the same events.
+SEARCH → ALIGN → ACQUIRE → PAYLOAD. Each state waits for the samples it needs. The result for a
+sample never depends on how many came with it: any chunking yields the same events.
 """
 
 from collections import Counter
@@ -22,26 +22,26 @@ from phy.reference.offset import BACKOFF
 from phy.reference.payload import Payload
 
 ALIGN_SPAN = preamble.SHORT
-"""The peak is looked for so many samples from the first crossing on."""
+"""Number of samples from the first crossing on in which the peak must lie."""
 RETRY_AFTER = 16
-"""After a false alarm, the search goes on so many samples later."""
+"""Number of samples after a false alarm at which the search continues."""
 LARGEST_SAMPLE = 1e6
-"""Larger values are a fault and count as 0, as do those that are no numbers."""
+"""Larger values are errors and count as 0, as do values that are not finite."""
 
 
 class Receiver:
-    """A receiver finds bursts in a stream and decodes them; `phy.Receiver` has the same face.
+    """Finds bursts in a stream and decodes them; has the same interface as `phy.Receiver`.
 
-    `max_frequency` is the largest frequency offset expected, in cycles a sample. Bursts of other
-    networks than `network` are told but not decoded; None takes all. `centre_cycles` is how many
-    cycles the centre frequency makes in a sample, for senders with one crystal; 0 says nothing.
-    `on_points` gets the equalised points `[n, n_data]`. ValueError tells a network that cannot be.
+    `max_frequency` is the largest frequency offset expected, in cycles per sample. Bursts of other
+    networks than `network` are reported but not decoded; None accepts all. `centre_cycles` is the
+    centre frequency in cycles per sample, for senders with one crystal; 0: unknown. `on_points`
+    gets the equalised points `[n, n_data]`. Raises ValueError for an impossible network.
     """
 
-    # The samples kept, and the absolute index of the first of them.
+    # The samples kept, and the absolute index of the first one.
     _samples: NDArray[np.complex64]
     _first: int
-    # Absolute indices at which the search stands, and at which it began.
+    # Absolute indices of the search position, and of the start of the search.
     _at: int
     _began: int
 
@@ -61,26 +61,26 @@ class Receiver:
         self._on_points = on_points
         self._acquisition = Acquisition(grid, max_frequency, centre_cycles)
         self._detector = Detector(start)
-        # From the peak back to where acquisition wants its samples to begin.
+        # Distance from the first sample for acquisition to the peak.
         self._before = before(grid) - 1 - preamble.guard(grid)
         self._span = before(grid) + needed_after(grid)
-        # For acquisition and detection, before the sample at which the search stands.
+        # Number of samples before the search position that acquisition and detection need.
         self._kept = before(grid) + preamble.SHORT + HISTORY
         self._burst: Payload | None = None
         self._crossing: int | None = None
         self._peak: tuple[int, float] | None = None
         self.last_burst = (start, start)
-        """The last burst whose header was read begins and should end at these indices."""
+        """Start and expected end of the last burst whose header was read."""
         self.counters: Counter[str] = Counter()
         self._begin(start)
 
     @property
     def next_index(self) -> int:
-        """The next sample to push has this absolute index."""
+        """Absolute index of the next sample to push."""
         return self._first + len(self._samples)
 
     def push(self, samples: NDArray[np.complex64]) -> list[Event]:
-        """The receiver takes the next samples `[n]`, and returns the events that they complete."""
+        """Take the next samples `[n]`; returns the events that they complete."""
         x = np.array(samples, np.complex64)
         with np.errstate(invalid="ignore"):
             good = (np.abs(x.real) < LARGEST_SAMPLE) & (np.abs(x.imag) < LARGEST_SAMPLE)
@@ -91,13 +91,13 @@ class Receiver:
         events: list[Event] = []
         while self._step(events):
             pass
-        # What lies long before the search is not needed any more.
+        # Samples long before the search position are no longer needed.
         n_old = max(0, self._at - self._kept - self._first)
         self._samples, self._first = self._samples[n_old:], self._first + n_old
         return events
 
     def gap(self, n: int) -> list[Event]:
-        """`n` samples are missing: a burst that they cut is over, the search begins behind them."""
+        """Note that `n` samples are missing: the current burst ends, the search restarts."""
         if n < 0:
             raise ValueError(f"gap: got {n} samples; allowed: 0 or more")
         self.counters["gaps"] += 1
@@ -111,7 +111,7 @@ class Receiver:
         return events
 
     def flush(self) -> list[Event]:
-        """The stream has ended: what its last samples hold is told, as if silence followed."""
+        """End the stream; returns the events in its last samples, as if silence followed."""
         n = self._grid.n_symbol + HOP + ALIGN_SPAN + needed_after(self._grid)
         counted, self._began = self.counters["samples"], self.next_index + n
         events = self.push(np.zeros(n, np.complex64))
@@ -121,20 +121,20 @@ class Receiver:
         return events
 
     def _begin(self, index: int) -> None:
-        """The search begins at `index`, with silence before it."""
+        """Start the search at `index`, with silence before it."""
         self._crossing = self._peak = None
         self._samples = np.zeros(self._kept, np.complex64)
         self._first = index - self._kept
         self._at = self._began = index
 
     def _view(self, first: int, last: int) -> NDArray[np.complex64] | None:
-        """The samples from `first` to before `last` are returned, or None if some are missing."""
+        """The samples from `first` to before `last`, or None if some are missing."""
         if last > self.next_index:
             return None
         return self._samples[first - self._first : last - self._first]
 
     def _step(self, events: list[Event]) -> bool:
-        """The receiver goes one step on; False says that samples are missing for it."""
+        """Advance by one step; returns False if samples for it are missing."""
         if self._burst is not None:
             return self._payload(self._burst, events)
         if self._peak is not None:
@@ -144,7 +144,7 @@ class Receiver:
         return self._search()
 
     def _search(self) -> bool:
-        """A hop is searched for the first sample over the threshold."""
+        """Search a hop for the first sample above the threshold."""
         x = self._view(self._at - HISTORY, self._at + HOP)
         if x is None:
             return False
@@ -157,7 +157,7 @@ class Receiver:
         return True
 
     def _align(self, crossing: int) -> bool:
-        """The peak is the metric's maximum within a short training's length of the crossing."""
+        """Find the metric's maximum within a short training's length of the crossing."""
         x = self._view(crossing - HISTORY, crossing + ALIGN_SPAN)
         if x is None:
             return False
@@ -171,14 +171,14 @@ class Receiver:
         return True
 
     def _was_nothing(self, peak: int) -> None:
-        """The search goes on behind a false alarm, and is warier."""
+        """Continue the search after a false alarm, with a raised threshold."""
         self._at = peak + RETRY_AFTER
-        # Where noise begins, its first samples resemble anything.
+        # The first samples of noise after silence resemble anything.
         if peak >= self._began + preamble.SHORT:
             self._detector.was_nothing(peak)
 
     def _acquire(self, peak: int, coarse: float, events: list[Event]) -> bool:
-        """A burst's header is read, if there is one."""
+        """Read a burst's header, if there is one."""
         base = peak - self._before
         x = self._view(base, base + self._span)
         if x is None:
@@ -199,7 +199,7 @@ class Receiver:
         self._burst = burst = Payload(found, plan, self._grid, n_symbols(self._grid))
         self.last_burst = (found.quality.start, burst.end_of(plan.n_symbols) + BACKOFF)
         if self._network is not None and told.network != self._network:
-            # Searched on, not skipped: a header that lies must not make us deaf.
+            # The search continues in the burst: a false header must not make the receiver deaf.
             self._end(burst, events, "foreign")
         else:
             self.counters["bursts"] += 1
@@ -207,7 +207,7 @@ class Receiver:
         return True
 
     def _payload(self, burst: Payload, events: list[Event]) -> bool:
-        """The next symbol is taken in, and the PDUs that it completes are told."""
+        """Process the next symbol, and report the PDUs that it completes."""
         number = burst.n_symbols_in
         x = self._view(burst.window(number), burst.end_of(number + 1))
         if x is None:
@@ -235,7 +235,7 @@ class Receiver:
         return True
 
     def _end(self, burst: Payload, events: list[Event], ending: str) -> None:
-        """The burst is over, and the search goes on behind what was taken in of it."""
+        """End the burst, and continue the search after the part that was processed."""
         self._burst = None
         if ending != "whole":
             self.counters[f"bursts_{ending}"] += 1

@@ -1,8 +1,8 @@
-"""Smoothing takes off the channel's estimate what must be noise, and follows the channel later.
+"""Smoothing: removes probable noise from the channel estimate, and later follows the channel.
 
-A channel is a few echoes. Turned back by its mean delay, its gains are smooth over the subcarriers,
-so that most of their power is in few of the functions 1, cos k, sin k, cos 2k, … Noise is in all of
-them alike.
+A channel has few echoes. Rotated back by its mean delay, its gains are smooth over the subcarriers,
+so that most of their power is in few of the functions 1, cos k, sin k, cos 2k, … Noise is equally
+in all of them.
 """
 
 from functools import cache
@@ -15,14 +15,14 @@ from phy.reference.channel import Channel
 from phy.reference.ofdm import Subcarriers
 
 GROUPS = ((0,), (1,), (2, 3), (4, 5, 6, 7, 8))
-"""Delays of a group's echoes, from the mean delay; all else up to a prefix is one group more."""
+"""Delays of each group's echoes from the mean delay; one more group has all up to a prefix."""
 DRIFT_RISE, DRIFT_FALL = 0.5, 0.1
-"""The guess of a channel's drift follows what is seen of it by these shares."""
+"""Rates at which the drift estimate rises and falls with the observations."""
 
 
 @cache
 def basis(grid: Numerology) -> tuple[NDArray[np.float64], ...]:
-    """The basis is 1, cos k, sin k, cos 2k, … (2πk/64), orthonormal, in groups `[m, n_used]`."""
+    """The functions 1, cos k, sin k, cos 2k, … (2πk/64), orthonormal, in groups `[m, n_used]`."""
     angle = 2 * np.pi * grid.used / grid.n_fft
     outermost = tuple(range(GROUPS[-1][-1] + 1, grid.n_cp + 1))
     rows: list[NDArray[np.float64]] = []
@@ -38,26 +38,26 @@ def basis(grid: Numerology) -> tuple[NDArray[np.float64], ...]:
 
 
 def sizes(grid: Numerology) -> NDArray[np.int64]:
-    """Each group, and at last what is in none, has this many dimensions `[groups + 1]`."""
+    """Number of dimensions of each group, and last of the rest `[groups + 1]`."""
     own = [len(rows) for rows in basis(grid)]
     return np.array([*own, grid.n_used - sum(own)])
 
 
 def mean_delay(h: Subcarriers, grid: Numerology) -> float:
-    """Gains turn by this from a subcarrier to the next, in radians: arg Σ_k Ĥ_{k+1} Ĥ*_k."""
+    """Mean phase in radians from one subcarrier to the next: arg Σ_k Ĥ_{k+1} Ĥ*_k."""
     next_to = np.flatnonzero(np.diff(grid.used) == 1)
     return float(np.angle(np.sum(h[next_to + 1] * h[next_to].conj())))
 
 
 def centred(h: Subcarriers, delay: float, grid: Numerology) -> Subcarriers:
-    """Gains `[n_used]` are turned back by `delay` radians a subcarrier."""
+    """Rotate gains `[n_used]` back by `delay` radians per subcarrier."""
     return np.asarray(h * np.exp(-1j * delay * grid.used))
 
 
 def split(x: Subcarriers, wanted: NDArray[np.bool_], grid: Numerology) -> Subcarriers:
-    """The function splits `x` `[n_used]` into parts of each group `[groups + 1, n_used]`.
+    """Split `x` `[n_used]` into the parts of each group `[groups + 1, n_used]`.
 
-    What is in none of the groups `wanted` `[groups + 1]` is the last part.
+    The last part is everything outside the groups `wanted` `[groups + 1]`.
     """
     parts = np.zeros((len(wanted), grid.n_used), np.complex128)
     for group, rows in enumerate(basis(grid)):
@@ -68,17 +68,17 @@ def split(x: Subcarriers, wanted: NDArray[np.bool_], grid: Numerology) -> Subcar
 
 
 def energies(parts: Subcarriers) -> NDArray[np.float64]:
-    """Each part `[groups + 1, n_used]` has this energy `[groups + 1]`."""
+    """Energy of each part: `[groups + 1, n_used]` becomes `[groups + 1]`."""
     return np.asarray(np.sum(np.abs(parts) ** 2, axis=1))
 
 
 def smooth(h: Subcarriers, variance: float, channel: Channel, grid: Numerology) -> None:
-    """The channel's gains become `h`, measured with noise of `variance`, less most of that noise.
+    """Set the channel's gains to `h`, measured with noise of `variance`, less most of the noise.
 
         kept of a group = max(0, 1 − v (m + √m) / E)   (James and Stein 1961; 1 − v/E where m = 1)
 
-    m is the group's size and E its energy. What is left unknown of a group is kept · v a dimension,
-    and what was found in it kept · E/m.
+    m is the group's size and E its energy. The remaining variance of a group is kept · v per
+    dimension, its power kept · E/m.
     """
     channel.delay = mean_delay(h, grid)
     m = sizes(grid)
@@ -92,14 +92,13 @@ def smooth(h: Subcarriers, variance: float, channel: Channel, grid: Numerology) 
 
 
 def follow(error: Subcarriers, variance: float, channel: Channel, grid: Numerology) -> None:
-    """The channel moves towards later symbols, which contradict it by `error` `[n_used]`.
+    """Move the channel towards later symbols, which deviate from it by `error` `[n_used]`.
 
         p' = p + drift · power;  weight = p' / (p' + v);  p = p' (1 − weight)
 
-    That is a Kalman filter for each group, p being what is unknown of a dimension and v the
-    `variance` of the error. The drift follows how much the errors exceed, by two standard
-    deviations, what noise and ignorance explain. Groups in which nothing was found count as noise,
-    all together.
+    This is a Kalman filter for each group, where p is the variance per dimension and v the
+    `variance` of the error. The drift follows the excess of the errors over noise and uncertainty,
+    beyond two standard deviations. Groups in which nothing was found count as noise, all together.
     """
     m, power = sizes(grid), channel.power
     parts = split(centred(error, channel.delay, grid), power > 0, grid)

@@ -1,4 +1,4 @@
-"""Timing correlates the long training with what was sent, at each frequency in reach."""
+"""Timing: correlates the long training with the sent signal, at each frequency within reach."""
 
 import math
 from functools import cache
@@ -12,25 +12,25 @@ from phy.numerology import Numerology
 from phy.reference.ofdm import Samples
 
 SEARCH = 24
-"""The first long symbol is looked for so many samples around where the peak puts it."""
+"""The search for the first long symbol covers this many samples around its nominal place."""
 MIN_MATCH = 0.12
 FIRST_ECHO = 0.1
-"""The first echo is the first one with this share of the strongest's power,"""
+"""Least power of the first echo, as a share of the strongest echo's power."""
 MAX_SPREAD = 12
-"""at most so many samples before it."""
+"""Largest distance in samples from the first echo to the strongest one."""
 AMBIGUITY = 1 / 16
-"""The peak tells the frequency modulo this, in cycles a sample."""
+"""The peak gives the frequency modulo this, in cycles per sample."""
 COHERENT = 64
-"""Over more samples than this, the frequency is not known well enough to add amplitudes."""
+"""Longest template in samples whose amplitudes may be added; beyond, the frequency is unsure."""
 COARSE_ERROR = 0.008
-"""Noise may add so much to the frequency that the peak tells, in cycles a sample."""
+"""Error that noise may add to the frequency of the peak, in cycles per sample."""
 
 
 @cache
 def templates(grid: Numerology, max_frequency: float) -> Samples:
-    """The long symbol l is shifted by each multiple a/16 that offsets up to `max_frequency` need.
+    """The long symbol l, shifted by each multiple a/16 that offsets up to `max_frequency` need.
 
-    The shape is `[2A + 1, n_fft]`, from −A/16 to A/16 cycles a sample.
+    The shape is `[2A + 1, n_fft]`, from −A/16 to A/16 cycles per sample.
     """
     reach = (max_frequency + COARSE_ERROR - AMBIGUITY / 2) / AMBIGUITY
     n_aliases = max(0, math.ceil(reach))
@@ -40,7 +40,7 @@ def templates(grid: Numerology, max_frequency: float) -> Samples:
 
 
 def strengths(z: Samples, shifted: Samples, n_offsets: int) -> NDArray[np.float64]:
-    """S `[aliases, n_offsets]` tells how well samples match two long symbols from each offset on.
+    """S `[aliases, n_offsets]`: how well samples match two long symbols from each offset on.
 
         c[a, o] = Σ_m z[o+m] l*[a, m];  S[a, o] = |c[a, o] + c[a, o+64]|²
 
@@ -56,13 +56,13 @@ def strengths(z: Samples, shifted: Samples, n_offsets: int) -> NDArray[np.float6
 
 
 def locate(z: Samples, shifted: Samples) -> tuple[int, float] | None:
-    """The function finds (first sample of the long training, frequency in cycles a sample).
+    """Find (first sample of the long training, frequency in cycles per sample).
 
         S > 0.12 · 128 · Σ|y|² over the 128 samples;  f = a/16 + arg Σ_i r_i r*_{i−1} / (2π64)
 
-    r_i is how well the i-th 64 samples match. The first sample is that of the first echo. `z` is
-    turned back by what the peak tells, and begins SEARCH samples before the nominal place. None
-    says that no long training is there.
+    r_i is the correlation of the i-th 64 samples. The first sample is that of the first echo. `z`
+    is rotated back by the peak's frequency, and begins SEARCH samples before the nominal place.
+    None: there is no long training.
     """
     n = shifted.shape[1]
     s = strengths(z, shifted, 2 * SEARCH)

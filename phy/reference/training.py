@@ -1,4 +1,4 @@
-"""Training is what the receiver knows was sent; it tells the gain of every subcarrier."""
+"""Training: symbols known to the receiver, which give the gain of every subcarrier."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,14 +9,14 @@ from phy.reference.ofdm import Subcarriers
 from phy.reference.smoothing import smooth
 
 SURELY = 4.0
-"""A difference in strength of so many standard deviations is no chance."""
+"""Number of standard deviations from which a difference in strength is not chance."""
 LARGEST_BOOST = 3.0
 
 
 def least_squares(
     y: Subcarriers, sent: Subcarriers, amplitude: NDArray[np.float64]
 ) -> tuple[Subcarriers, float]:
-    """Received symbols `[n, n_used]`, n ≥ 2, tell (gains `[n_used]`, noise power on a subcarrier).
+    """Estimate (gains `[n_used]`, noise power on a subcarrier) from symbols `[n, n_used]`, n ≥ 2.
 
         Ĥ_k = Σ_s a_s Y_sk/X_sk / Σ_s a_s²;  N = mean_k Σ_s |Y_sk/X_sk − a_s Ĥ_k|² / (n − 1)
 
@@ -31,7 +31,7 @@ def least_squares(
 def estimate(
     y: Subcarriers, sent: Subcarriers, amplitude: NDArray[np.float64], grid: Numerology
 ) -> Channel:
-    """Known symbols tell the channel by least squares, less what must be noise of it.
+    """Estimate the channel from known symbols by least squares, without the probable noise.
 
     The noise of a gain is v = N / Σ_s a_s².
     """
@@ -47,13 +47,13 @@ def learn(
     y: Subcarriers, sent: Subcarriers, n_training: int, rotation: NDArray[np.float64],
     before: Channel, grid: Numerology,
 ) -> Channel:  # fmt: skip
-    """A header that was read tells the channel once more, as further training.
+    """Estimate the channel again, with the decoded header as further training.
 
         strength = Σ|Ĥ|² / Re Σ (Y/X) Ĥ*, over the header
 
-    The first `n_training` symbols of `y` and `sent` `[n, n_used]` are the preamble's, the others
+    The first `n_training` symbols of `y` and `sent` `[n, n_used]` are the preamble's; the others
     have turned by `rotation` radians `[n − n_training]`. The preamble may have been sent stronger
-    than the rest by `strength`: it counts as 1 where it differs from 1 by chance.
+    than the rest by `strength`, which counts as 1 if it differs from 1 only by chance.
     """
     y = y.copy()
     y[n_training:] *= np.exp(-1j * rotation)[:, None]

@@ -1,4 +1,4 @@
-"""The transmitter makes a burst's samples of PDUs, in the order of "What is sent"."""
+"""Transmitter: turns PDUs into a burst's samples, in the order of "What is sent"."""
 
 from collections.abc import Sequence
 
@@ -19,15 +19,15 @@ from phy.reference.ofdm import Samples, to_samples
 from phy.sequences import PADDING, whitening
 
 RISE, FALL = 8, 3
-"""A burst rises and falls over so many samples: at its end, what no FFT window holds."""
+"""Number of samples of a burst's rise and fall; no FFT window covers the fall."""
 MAX_BOOST_DB = 3.0
 
 
 class Transmitter:
-    """A transmitter makes bursts of one network on one grid; `phy.Transmitter` has the same face.
+    """Makes bursts of one network on one grid; has the same interface as `phy.Transmitter`.
 
-    The preamble is sent stronger than the rest by `preamble_boost_db`. ValueError tells a network
-    or a boost that cannot be.
+    The preamble is stronger than the rest by `preamble_boost_db`. Raises ValueError for an
+    impossible network or boost.
     """
 
     def __init__(
@@ -44,9 +44,9 @@ class Transmitter:
         self._boost = 10 ** (preamble_boost_db / 20)
 
     def modulate(self, pdus: Sequence[bytes], mcs: int) -> NDArray[np.complex64]:
-        """The method returns the burst of 1 to 63 PDUs of one size `[n_samples]`, at mean power 1.
+        """Make the burst of 1 to 63 PDUs of one size `[n_samples]`, at mean power 1.
 
-        ValueError tells an MCS, a number or a size of PDUs that no header can tell.
+        Raises ValueError for an MCS, a number or a size of PDUs that no header can express.
         """
         grid = self._grid
         sizes = sorted({len(pdu) for pdu in pdus})
@@ -71,13 +71,13 @@ class Transmitter:
 
 
 def header_samples(told: BurstHeader, grid: Numerology) -> Samples:
-    """The header becomes BPSK symbols, its peaks cut off as its MCS says `[n · n_symbol]`."""
+    """The header as BPSK symbols, its peaks clipped as its MCS says `[n · n_symbol]`."""
     coded = header_bits(told, n_symbols(grid) * grid.n_data)
     subcarriers = to_subcarriers(coded, Modulation.BPSK, grid, 0)
     return to_samples(subcarriers, grid, MCS_TABLE[HEADER_MCS].peak)
 
 
 def ramp(n: int) -> NDArray[np.float64]:
-    """A ramp of `n` samples goes from 0 to 1 without a step: sin² of 0 to π/2."""
+    """A smooth ramp of `n` samples from 0 to 1: sin² of 0 to π/2."""
     rise: NDArray[np.float64] = np.sin(np.pi / 2 * (np.arange(n) + 0.5) / n) ** 2
     return rise

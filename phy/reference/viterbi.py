@@ -1,12 +1,12 @@
-"""The K = 7 code has the generators 133 and 171 (octal); Viterbi's algorithm decodes it (1967).
+"""The K = 7 code with the generators 133 and 171 (octal), decoded by Viterbi's algorithm (1967).
 
 A state is the last six bits, the newest highest. Each step of the trellis takes a new bit u: state
-s goes to (u·64 + s) >> 1 and sends two bits, parities of the seven-bit register u·64 + s under the
-generators. The likeliest path into a state goes through the likeliest path into one of its two
-predecessors; so 64 paths are enough.
+s changes to (u·64 + s) >> 1 and sends two bits, parities of the seven-bit register u·64 + s under
+the generators. The likeliest path into a state leads through the likeliest path into one of its two
+predecessors, so 64 paths are enough.
 
-Here each state keeps a list of its likeliest paths, not one (Seshadri and Sundberg 1994). A check
-sum outside then finds the right one among those that end in state 0.
+Here each state keeps a list of its likeliest paths, not one (Seshadri and Sundberg 1994). The
+caller's check sum then finds the right one among those that end in state 0.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ GENERATORS = (0o133, 0o171)
 N_STATES = 64
 N_TAIL = 6
 MAX_LLR = 511
-"""LLRs are clipped to this: a single subcarrier must not outvote all others."""
+"""Limit of LLRs: a single subcarrier must not outvote all others."""
 UNREACHED = -(1 << 30)
 
 _STATE = np.arange(N_STATES)
@@ -26,7 +26,7 @@ _REGISTER = (_STATE >> 5)[:, None] << 6 | _CAME_FROM
 
 
 def _sent(generator: int) -> NDArray[np.int64]:
-    """A transition `[64, 2]` has +1 where it sends 0, and −1 where it sends 1."""
+    """Signs of the transitions `[64, 2]`: +1 where they send 0, −1 where they send 1."""
     tapped = _REGISTER & generator
     parity = sum(tapped >> i & 1 for i in range(7)) % 2
     return np.asarray(1 - 2 * parity, np.int64)
@@ -36,7 +36,7 @@ _SENT_A, _SENT_B = map(_sent, GENERATORS)
 
 
 def encode(bits: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Bits `[n]` and a tail of six zeros become A and B in turn `[2 (n + 6)]`.
+    """Encode bits `[n]` and a tail of six zeros to A and B in turn `[2 (n + 6)]`.
 
         A[t] = Σ_i a_i u[t − i],  B[t] = Σ_i b_i u[t − i]  (mod 2)
 
@@ -51,12 +51,12 @@ def encode(bits: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def decode(llr: NDArray[np.integer], n_list: int = 1) -> NDArray[np.uint8]:
-    """LLRs `[2 t]`, positive for 0, become the `n_list` likeliest paths from state 0 to state 0.
+    """Decode LLRs `[2 t]`, positive for 0, to the `n_list` likeliest paths from state 0 to state 0.
 
         metric of a path = Σ_t ±L_A[t] ± L_B[t], + where it sends 0
 
-    Bits `[n_list, t]` are returned, the likeliest first, with their tails. Of two paths that are as
-    likely, the one from the even state wins.
+    Returns bits `[n_list, t]`, the likeliest first, with their tails. Of two equally likely paths,
+    the one from the even state wins.
     """
     steps = llr.astype(np.int64).reshape(-1, 2)
     metrics = np.full((N_STATES, n_list), UNREACHED)

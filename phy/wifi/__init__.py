@@ -1,6 +1,6 @@
-"""802.11a reception with the modem's own parts, as a proof on signals that nobody here made.
+"""802.11a reception with the modem's own parts, as a proof on third-party signals.
 
-Nothing of the daemon uses it.
+The daemon does not use it.
 """
 
 from phy.wifi.bits import RATES, Rate

@@ -1,4 +1,4 @@
-"""From LLRs to the octets of an 802.11a frame (IEEE 802.11-2020, 17.3.4 and 17.3.5)."""
+"""Decodes LLRs to the octets of an 802.11a frame (IEEE 802.11-2020, 17.3.4 and 17.3.5)."""
 
 import zlib
 from typing import NamedTuple
@@ -42,7 +42,7 @@ class Rate(NamedTuple):
         return int(48 * self.modulation.bits * self.code.rate)
 
     def n_symbols(self, n_bytes: int) -> int:
-        """Symbols that a PSDU of `n_bytes` takes, with SERVICE and tail."""
+        """Number of symbols for a PSDU of `n_bytes`, with SERVICE and tail."""
         return -(-(8 * (_SERVICE_BYTES + n_bytes) + N_TAIL) // self.data_bits)
 
 
@@ -60,15 +60,15 @@ RATES = {
 
 
 class Signal(NamedTuple):
-    """What the SIGNAL field tells: the rate of what follows, and the octets of the PSDU."""
+    """Content of the SIGNAL field: the rate of what follows, and the octets of the PSDU."""
 
     rate: Rate
     n_bytes: int
 
 
 def parse_signal(llr: NDArray[np.int16]) -> Signal | None:
-    """The SIGNAL field behind its symbol's LLRs `[48]`; None when it cannot be one (17.3.4)."""
-    # The decoder ends its trellis behind whole octets; what it is fed behind the tail says 0.
+    """Decode the SIGNAL field from its symbol's LLRs `[48]`; None if it is invalid (17.3.4)."""
+    # The decoder's trellis ends after whole octets, so certain zeros are appended to the tail.
     surely_0 = np.full(2 * (3 * 8 + N_TAIL) - len(llr), MAX_LLR, np.int16)
     fed = np.concatenate((llr, surely_0))[None, :]
     bits = np.unpackbits(decode(fed, 3, HALF, ViterbiWorkspace(3 * 8 + N_TAIL))[0])
@@ -81,7 +81,7 @@ def parse_signal(llr: NDArray[np.int16]) -> Signal | None:
 
 
 def parse_data(llr: NDArray[np.int16], signal: Signal) -> bytes:
-    """The PSDU behind the LLRs of the data symbols, descrambled."""
+    """The descrambled PSDU from the LLRs of the data symbols."""
     n_bytes = _SERVICE_BYTES + signal.n_bytes
     code = signal.rate.code
     n_coded = code.n_coded(8 * n_bytes)
@@ -92,9 +92,9 @@ def parse_data(llr: NDArray[np.int16], signal: Signal) -> bytes:
 
 
 def _scrambling(first: NDArray[np.uint8], n: int) -> NDArray[np.uint8]:
-    """The scrambling sequence (x^7 + x^4 + 1) that begins with `first` `[7]`, `n` bits of it.
+    """`n` bits of the scrambling sequence (x^7 + x^4 + 1) that begins with `first` `[7]`.
 
-    SERVICE begins with seven zeros: its first seven bits as received are the sequence's own.
+    SERVICE begins with seven zeros, so its first seven received bits are those of the sequence.
     """
     out = np.empty(max(n, 127), np.uint8)
     out[:7] = first

@@ -1,4 +1,4 @@
-"""The HT-SIG field, by which 802.11n frames are known (IEEE 802.11-2020, 19.3.9.4.3)."""
+"""The HT-SIG field, which identifies 802.11n frames (IEEE 802.11-2020, 19.3.9.4.3)."""
 
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ _CRC_POLYNOMIAL = 0x07
 
 
 class HtSignal(NamedTuple):
-    """What HT-SIG tells: modulation and coding scheme, octets of the PSDU, and the width."""
+    """Content of HT-SIG: modulation and coding scheme, octets of the PSDU, and the width."""
 
     mcs: int
     n_bytes: int
@@ -25,16 +25,16 @@ class HtSignal(NamedTuple):
 
 
 def parse_ht_signal(points: NDArray[np.complex64]) -> HtSignal | None:
-    """The HT-SIG field in the equalised points of two symbols `[2, 48]`; None when they hold none.
+    """Decode HT-SIG from the equalised points of two symbols `[2, 48]`; None if it is not there.
 
-    HT-SIG is BPSK on the imaginary axis, so nothing else is taken for it; a CRC guards it.
+    HT-SIG is BPSK on the imaginary axis, so nothing else is mistaken for it; a CRC protects it.
     """
     across = points.imag
     if np.any(np.sum(across**2, axis=1) < np.sum(points.real**2, axis=1)):
         return None
     levels = np.clip(np.rint(-_SCALE * across), -MAX_LLR, MAX_LLR).astype(np.int16)
     coded = levels[:, order(_N_DATA, 1)].reshape(-1)
-    # The decoder ends its trellis behind whole octets; what it is fed behind the tail says 0.
+    # The decoder's trellis ends after whole octets, so certain zeros are appended to the tail.
     surely_0 = np.full(2 * N_TAIL, MAX_LLR, np.int16)
     fed = np.concatenate((coded, surely_0))[None, :]
     octets = decode(fed, _N_BYTES, HALF, ViterbiWorkspace(8 * _N_BYTES + N_TAIL))[0]

@@ -1,4 +1,4 @@
-"""Finds 802.11a frames in samples at 20 Msps and reads them."""
+"""Finds and reads 802.11a frames in samples at 20 Msps."""
 
 import cmath
 import math
@@ -23,37 +23,37 @@ from phy.wifi.high_throughput import HT_SIG_SYMBOLS, HtSignal, parse_ht_signal
 
 RATE_HZ = 20e6
 HT_LEGACY_MBPS = 6
-"""Rate in Mbit/s that an 802.11n frame in mixed format claims towards receivers of 802.11a."""
+"""Rate in Mbit/s that an 802.11n frame in mixed format announces to 802.11a receivers."""
 
 _GRID = OFDM_64_16
 _SEGMENT = preamble.SEGMENT
 _WINDOW = 96
-"""Samples over which the short training's repetition is looked for."""
+"""Samples over which the repetition of the short training is measured."""
 _ALIKE = 0.6
-"""|Σ x[n + 16] x*[n]| / Σ |x|² that a repetition has at least."""
+"""Least |Σ x[n + 16] x*[n]| / Σ |x|² of a repetition."""
 _AFTER_SHORT = 320
-"""Samples within which the long training ends, from where the repetition begins."""
+"""Number of samples from the start of the repetition in which the long training ends."""
 _MATCH = 0.35
-"""Share of a window's power that a long symbol has at least."""
+"""Least share of a window's power in a long symbol."""
 
 
 class WifiFrame(NamedTuple):
-    """A frame whose SIGNAL field made sense. `start` is the sample of its first long symbol."""
+    """A frame with a valid SIGNAL field; `start` is the first sample of its first long symbol."""
 
     start: int
     rate: Rate
     psdu: bytes
     is_right: bool
-    """Whether the frame's FCS is right."""
+    """Whether the frame's FCS is correct."""
     snr_db: float
     cfo_hz: float
 
 
 class HtFrame(NamedTuple):
-    """An 802.11n frame, of which the HT-SIG field alone is read.
+    """An 802.11n frame, of which only the HT-SIG field is read.
 
-    `start` is the sample of its first long symbol. In mixed format it begins as an 802.11a frame of
-    6 Mbit/s; in greenfield format it does not.
+    `start` is the first sample of its first long symbol. In mixed format it begins as an 802.11a
+    frame of 6 Mbit/s; in greenfield format it does not.
     """
 
     start: int
@@ -62,7 +62,7 @@ class HtFrame(NamedTuple):
     snr_db: float
     cfo_hz: float
     end: int
-    """Where the preamble says that the frame is over; in greenfield format the end of HT-SIG."""
+    """End of the frame according to the preamble; in greenfield format the end of HT-SIG."""
 
 
 def receive(samples: NDArray[np.complex64]) -> Iterator[WifiFrame | HtFrame]:
@@ -81,7 +81,7 @@ def receive(samples: NDArray[np.complex64]) -> Iterator[WifiFrame | HtFrame]:
 
 
 def _repetitions(x: NDArray[np.complex64]) -> NDArray[np.int64]:
-    """Samples at which something begins to repeat every 16 samples, and keeps to it for a while."""
+    """Samples at which a sustained repetition every 16 samples begins."""
     wide = x.astype(np.complex128)
     product = wide[_SEGMENT:] * wide[:-_SEGMENT].conj()
     power = np.abs(wide[_SEGMENT:]) ** 2
@@ -95,7 +95,7 @@ def _repetitions(x: NDArray[np.complex64]) -> NDArray[np.int64]:
 
 
 def _end(start: int, n_symbols: int) -> int:
-    """Index after `n_symbols` symbols, SIGNAL the first; the first long symbol is at `start`."""
+    """Index after `n_symbols` symbols, the first of which is SIGNAL; `start`: first long symbol."""
     return start + 2 * _GRID.n_fft + n_symbols * _GRID.n_symbol
 
 
@@ -112,7 +112,7 @@ def _read(samples: NDArray[np.complex64], begin: int) -> WifiFrame | HtFrame | N
     signal_window = window + 2 * _GRID.n_fft + _GRID.n_cp
     llr = _llrs(samples, window, signal_window, 1, frequency, channel, Modulation.BPSK, 0)
     signal = parse_signal(llr) if llr is not None else None
-    # As measured on the training: what follows teaches the channel, not the noise.
+    # Keep the noise measured on the training: the following symbols only refine the channel.
     ratio = channel.content.gain / channel.content.no
     snr_db = 10 * math.log10(ratio * _GRID.n_used / _GRID.n_fft)
     cfo_hz = frequency * RATE_HZ
@@ -141,7 +141,7 @@ def _ht_signal(
     """The HT-SIG field from symbol `first_symbol` after the training on, or None."""
     points = np.zeros((HT_SIG_SYMBOLS, _GRID.n_data), np.complex64)
     begin = signal_window + first_symbol * _GRID.n_symbol
-    # A channel of its own: these points teach nothing.
+    # A separate channel, so that these points do not affect the estimate.
     channel = _channel(samples, window, frequency)
     llr = _llrs(
         samples, window, begin, HT_SIG_SYMBOLS, frequency, channel, Modulation.BPSK, first_symbol,
@@ -166,7 +166,7 @@ def _long_training(
     power = np.sum(np.abs(x[peak : peak + 2 * n]) ** 2)
     if both[peak] < _MATCH * n * power / 2:
         return None
-    # As in `phy.kernels.timing`: the first echo with a tenth of the strongest one's power.
+    # As in `phy.kernels.timing`: the first echo with a tenth of the strongest echo's power.
     nearby = both[max(0, peak - 12) : peak + 1]
     start = peak + 1 - len(nearby) + int(np.argmax(nearby >= 0.1 * both[peak]))
     lag = np.vdot(x[peak : peak + n], x[peak + n : peak + 2 * n])
@@ -195,9 +195,9 @@ def _llrs(
     first_symbol: int,
     points: NDArray[np.complex64] | None = None,
 ) -> NDArray[np.int16] | None:
-    """LLRs of `n_symbols` symbols, FFT windows from `window` on; None when samples are missing.
+    """LLRs of `n_symbols` symbols with FFT windows from `window` on; None if samples are missing.
 
-    `points` gets the equalised points, if they are wanted.
+    `points`, if given, gets the equalised points.
     """
     last = window + (n_symbols - 1) * _GRID.n_symbol + _GRID.n_fft
     if last > len(samples):

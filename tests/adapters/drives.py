@@ -21,7 +21,7 @@ TOPICS = {
 
 
 def drive(duration_s):
-    """(topic, type, ns) in order of time."""
+    """Message times of a drive in order: (topic, type, ns)."""
     streams = [
         [(int((i + 0.1) * 1e9 / rate_hz), topic, kind) for i in range(int(duration_s * rate_hz))]
         for topic, (kind, rate_hz) in TOPICS.items()
@@ -30,7 +30,7 @@ def drive(duration_s):
 
 
 def filled(types, kind, rng):
-    """A message of that type whose fields all hold something."""
+    """A message of that type with content in every field."""
     return types.types[kind](
         **{name: _value(types, node, rng) for name, node in types.get_msgdef(kind).fields}
     )
@@ -44,7 +44,7 @@ def _value(types, node, rng):
         case "NAME", [name]:
             return filled(types, name, rng)
         case _, [(inner, n)]:
-            # Bounds of sequences are 0 where there is none.
+            # The bound of an unbounded sequence is 0.
             n = n if form.name == "ARRAY" else int(rng.integers(1, 40))
             if inner[0].name == "BASE" and inner[1][0] not in ("string", "octet"):
                 dtype = "bool" if inner[1][0] == "bool" else inner[1][0]
@@ -62,7 +62,7 @@ def _base(base, rng):
 
 
 def ros2_drive(path, storage, duration_s):
-    """A rosbag2 of a drive; the messages written."""
+    """Write a rosbag2 of a drive; returns the messages written."""
     types, rng = get_typestore(Stores.ROS2_HUMBLE), np.random.default_rng(1)
     written = []
     with Writer2(path, version=9, storage_plugin=storage) as writer:
@@ -78,7 +78,7 @@ def ros2_drive(path, storage, duration_s):
 
 
 def ros1_drive(path, compression, duration_s):
-    """A ROS 1 bag of a drive; topics, types and times written."""
+    """Write a ROS 1 bag of a drive; returns topics, types and times."""
     types, rng = get_typestore(Stores.ROS1_NOETIC), np.random.default_rng(1)
     frames = "geometry_msgs/TransformStamped[] transforms\n"
     types.register(get_types_from_msg(frames, TOPICS["/tf"][0]))

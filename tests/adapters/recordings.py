@@ -1,4 +1,4 @@
-"""Small bags in every format, and what is in them."""
+"""Small bags in every format, with their known content."""
 
 from random import Random
 
@@ -12,7 +12,7 @@ CUSTOM_DEFINITION = "std_msgs/Header header\nfloat32 value\nstring unit\n"
 
 
 def ros2_bag(path, storage, messages):
-    """A rosbag2 folder with (topic, type, ns, cdr)."""
+    """A rosbag2 folder with messages (topic, type, ns, cdr)."""
     types = get_typestore(Stores.ROS2_HUMBLE)
     with Writer2(path, version=9, storage_plugin=storage) as writer:
         connections = {}
@@ -24,7 +24,7 @@ def ros2_bag(path, storage, messages):
 
 
 def noisy_messages(seed, count):
-    """Odometry and strings whose bytes no serializer would make: padding holds garbage."""
+    """Odometry and strings with bytes that no serializer would make: garbage in the padding."""
     rng = Random(seed)
     return [
         (
@@ -37,7 +37,7 @@ def noisy_messages(seed, count):
 
 
 def ros1_bag(path, compression, count):
-    """A ROS 1 bag with poses and a type of nobody else's."""
+    """A ROS 1 bag with poses and a type that no other package has."""
     types = get_typestore(Stores.ROS1_NOETIC)
     types.register(get_types_from_msg(CUSTOM_DEFINITION, CUSTOM))
     header_type = types.types["std_msgs/msg/Header"]

@@ -69,7 +69,7 @@ def data_file(path):
 
 
 def chunks_of(mcap):
-    """How many chunk records follow the magic, up to the end of the data section."""
+    """Number of chunk records after the magic, up to the end of the data section."""
     data, at, count = mcap.read_bytes(), 8, 0
     while data[at] != 0x0F:
         count += data[at] == 6
@@ -122,7 +122,7 @@ def read_or_refusal(path):
 
 
 def damaged_copies(data, seed):
-    """Cut at many places, and with flipped octets."""
+    """Copies of `data` cut at many places, and copies with flipped octets."""
     rng = Random(seed)
     for _ in range(25):
         yield "cut", data[: rng.randrange(len(data))]
@@ -234,7 +234,7 @@ def test_a_cut_compressed_file_is_refused_in_words(tmp_path, storage):
 
 
 def flip_until(path, file, seed, change):
-    """Damage `file` in 400 seeded ways; what BagError does not cover is the test's failure."""
+    """Damage `file` in 400 seeded ways; any exception but BagError fails the test."""
     data, rng = file.read_bytes(), Random(seed)
     for _ in range(400):
         damaged = bytearray(data)
@@ -285,7 +285,7 @@ def test_what_is_no_bag_is_refused_in_words(tmp_path, name):
 
 @pytest.mark.parametrize("storage", STORAGES)
 def test_names_are_absolute_whatever_the_recording_says(tmp_path, storage):
-    """ROS 1 records what a publisher has typed, and its bags are converted as they are."""
+    """ROS 1 records names as the publisher wrote them, and its bags are converted unchanged."""
     messages = [(t.removeprefix("/"), *rest) for t, *rest in noisy_messages(3, 30)]
     bag = open_bag(ros2_bag(tmp_path / "bag", STORAGES[storage], messages))
     assert [topic.name for topic in bag.topics()] == ["/chat", "/odom"]

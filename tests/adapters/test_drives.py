@@ -1,4 +1,4 @@
-"""A robot's whole recording: every topic, every message, in order, of the type that it says."""
+"""A robot's whole recording: every topic, every message, in order, with the stated type."""
 
 from contextlib import closing
 from itertools import pairwise
@@ -15,7 +15,7 @@ COUNTS = {topic: int(DURATION_S * rate_hz) for topic, (_, rate_hz) in TOPICS.ite
 
 
 def read(path):
-    """(messages, topics) of an undamaged bag whose messages are in order of time."""
+    """(messages, topics) of an undamaged bag with messages in order of time."""
     with closing(open_bag(path)) as bag:
         messages = [tuple(each) for each in bag.messages()]
         assert bag.damage == ""

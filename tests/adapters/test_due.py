@@ -1,4 +1,4 @@
-"""A recording as a plan: times from its first message on, of the topics that count."""
+"""A recording as a plan: times relative to its first message, of the selected topics."""
 
 from itertools import pairwise
 
@@ -11,7 +11,7 @@ IDS = {"/a": 4, "/b": 0}
 
 
 class Recording:
-    """Messages (topic, time in s, payload), with a note of how many were taken."""
+    """Messages (topic, time in s, payload); counts how many were taken."""
 
     def __init__(self, *messages):
         self._messages = messages
@@ -60,7 +60,7 @@ def test_only_the_first_seconds_are_due():
     assert [due.payload for due in plan(FIVE, duration_s=0.25)] == [b"one"]
     assert [due.payload for due in plan(FIVE, duration_s=0.26)] == [b"one", b"two", b"three"]
     assert plan(FIVE, duration_s=0.0) == []
-    # Of the recording, not of the time at which it is played.
+    # Relative to the recording's start, not to the time of replay.
     assert len(plan(FIVE, duration_s=0.26, begin_s=100.0)) == 3
 
 

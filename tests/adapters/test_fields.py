@@ -1,4 +1,4 @@
-"""Fields as people write them, into messages and back."""
+"""Converts fields in user notation into messages and back."""
 
 import math
 

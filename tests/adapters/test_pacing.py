@@ -1,4 +1,4 @@
-"""Play at the recorded pace or another."""
+"""Replay at the recorded pace or another."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from sdrlinkd.adapters.bags import BagMessage
 
 
 class FakeTime:
-    """A clock that sleeping moves."""
+    """A clock that advances by sleeping."""
 
     def __init__(self):
         self.now = 100.0

@@ -1,4 +1,4 @@
-"""The built-in robot: repeatable, and physically one thing."""
+"""The built-in robot: repeatable, and physically consistent."""
 
 import math
 from collections import Counter

@@ -1,4 +1,4 @@
-"""/tf on a slow link: which frames, under which names, how often."""
+"""/tf on a slow link: which frames are sent, with which names, and how often."""
 
 import numpy as np
 import pytest

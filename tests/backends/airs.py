@@ -1,4 +1,4 @@
-"""Simulated airs that nodes share, and short ways to look at what arrives there."""
+"""Simulated airs that nodes share, and helpers to examine what arrives there."""
 
 import numpy as np
 
@@ -17,12 +17,12 @@ def half_duplex(turnaround_s=0.0, **more):
 
 
 def air(**params):
-    """An air of this rate and carrier."""
+    """An air with this sample rate and carrier."""
     return AirParams(**{"rate_hz": RATE, "frequency_hz": CENTRE_HZ, **params})
 
 
 def medium(radios, seed=SEED, tracks=(), links=(), outages=(), **params):
-    """Nodes on an air, all there from time 0 on; `radios`: how many, or each one's own."""
+    """Nodes on an air, all present from time 0 on; `radios`: their number, or the radio of each."""
     if isinstance(radios, int):
         radios = dict.fromkeys(range(radios), PLAIN)
     shared = air(**params)
@@ -33,7 +33,7 @@ def medium(radios, seed=SEED, tracks=(), links=(), outages=(), **params):
 
 
 def line(pieces):
-    """All that arrives, `[n]`; zeros where there is silence, and where the node is deaf."""
+    """Everything that arrives, `[n]`; zeros for silence and where the node is deaf."""
     parts = [
         np.zeros(piece.n, np.complex64) if piece.samples is None else piece.samples
         for piece in pieces
@@ -42,17 +42,17 @@ def line(pieces):
 
 
 def deafness(pieces):
-    """For each sample, whether the node is deaf there `[n]`."""
+    """Whether the node is deaf at each sample `[n]`."""
     return np.repeat([piece.is_deaf for piece in pieces], [piece.n for piece in pieces])
 
 
 def heard(made, node, until_s):
-    """All that arrives at a node up to then."""
+    """Everything that arrives at a node up to `until_s`."""
     return line(made.take(node, until_s))
 
 
 def loud(x):
-    """Where there is anything at all."""
+    """Positions of all samples that are not zero."""
     return np.flatnonzero(np.abs(x) > 1e-9).tolist()
 
 
@@ -66,7 +66,7 @@ def power_db(x):
 
 
 def smooth(n, seed=SEED):
-    """Noise without its upper half of frequencies `[n]`, which interpolates well."""
+    """Noise without the upper half of its frequencies `[n]`, which interpolates well."""
     spectrum = np.fft.fft(noise(n, seed))
     spectrum[n // 4 : -n // 4] = 0
     x = np.fft.ifft(spectrum) * np.hanning(n)
@@ -74,7 +74,7 @@ def smooth(n, seed=SEED):
 
 
 def delay_of(x, reference, finer=64):
-    """Where in `x` `reference` begins, in samples: the peak of the correlation, interpolated."""
+    """Start of `reference` in `x` in samples: the interpolated peak of the correlation."""
     n = len(x) + len(reference)
     spectrum = np.fft.fft(x, n) * np.conj(np.fft.fft(reference, n))
     fine = np.zeros(n * finer, complex)
@@ -84,6 +84,6 @@ def delay_of(x, reference, finer=64):
 
 
 def frequency_of(x):
-    """Of a tone, in cycles a sample: the slope of its phase."""
+    """Frequency of a tone in cycles per sample: the slope of its phase."""
     phase = np.unwrap(np.angle(x.astype(complex)))
     return np.polyfit(np.arange(len(x)), phase, 1)[0] / (2 * np.pi)

@@ -1,4 +1,4 @@
-"""Every radio there is, made for a folder."""
+"""Every kind of radio, set up in a folder."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -32,29 +32,29 @@ class Case:
     full_duplex: bool = True
     turnaround_s: float = 0.0
     begin: int = 0
-    """Bursts handed over when the radio has been opened are in time from here on."""
+    """First index at which bursts handed over right after opening are in time."""
     gap_noise: float = 0.0
-    """What is heard where nothing was sent, at most."""
+    """Maximum noise that is received when nothing was sent."""
     settles_with_blocks: bool = True
-    """Reports come just with the block that a burst ends in; else when the device tells."""
+    """Whether reports come with the block in which a burst ends, not from the device."""
     snr_db: float | None = None
-    """At which bursts arrive, whatever their own power; None: as they are, without noise."""
+    """SNR of arriving bursts, whatever their power; None: they arrive unchanged, without noise."""
 
     def __str__(self):
         return self.name
 
     @property
     def backend(self):
-        """Its name in the table of radios."""
+        """The radio's name in the table of backends."""
         return self.name.split("-")[0]
 
     @property
     def noise(self):
-        """What no sample of noise alone exceeds."""
+        """A limit that no sample of noise alone exceeds."""
         return self.gap_noise if self.snr_db is None else 7 * 10 ** (NOISE_DBFS / 20)
 
     def gain(self, burst):
-        """How much larger a burst arrives."""
+        """Gain of an arriving burst."""
         if self.snr_db is None:
             return 1.0
         return 10 ** ((NOISE_DBFS + self.snr_db) / 20) / np.sqrt(
@@ -62,7 +62,7 @@ class Case:
         )
 
     def recorded(self, folder, blocks):
-        """What became of the bursts sent: the closed radio's recording, or what it heard."""
+        """The bursts that were sent: the closed radio's recording, or what it heard."""
         if self.hears_self:
             return heard(blocks)
         return read(folder / "sent")
@@ -104,7 +104,7 @@ def ether(name, paced, full_duplex, is_remote=False):
 
 
 def soapy(name, stamps):
-    """A device that hears itself: with stamps, bursts leave at times that it keeps."""
+    """A device that hears itself; with stamps, it sends bursts at given times."""
     can = "time=yes,ack=yes" if stamps else "time=no,ack=no"
     settings = SoapySettings(
         device=f"driver=loopback,model=plain,self=yes,noise_db=-200,mtu={N},{can}",
@@ -122,7 +122,7 @@ def soapy(name, stamps):
 
 
 def zmq(name, pattern):
-    """A peer that sends back what it gets."""
+    """A ZeroMQ radio with a peer that echoes the samples."""
     return Case(
         name, lambda folder: ZmqEcho(folder, pattern), paced=True, hears_self=True, begin=10_000
     )
@@ -166,7 +166,7 @@ not_in_lockstep = _those(lambda case: not case.lockstep)
 
 
 def assert_only(case, recorded, sent):
-    """`recorded` holds each (burst, report) once, turned and scaled at most, and nothing else."""
+    """Assert that `recorded` contains each (burst, report) once, apart from phase and scale."""
     rest = recorded.copy()
     for burst, report in sent:
         got = recorded[report.start : report.end]

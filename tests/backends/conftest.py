@@ -1,4 +1,4 @@
-"""What an ordinary user may do, and how patient radios are here."""
+"""Permissions of an ordinary user, and radios that tolerate slow machines."""
 
 import os
 
@@ -12,13 +12,13 @@ NOBODY = 65534
 
 @pytest.fixture(scope="session", autouse=True)
 def _warm():
-    """Compiling takes longer on a fresh machine than a hub may be late."""
+    """Compile first: on a fresh machine that takes longer than a hub may be late."""
     warm_up()
 
 
 @pytest.fixture(scope="session", autouse=True)
 def _test_radio():
-    """SoapySDR finds the test radio, and no other driver: some take seconds to load."""
+    """Make SoapySDR find the test radio only: some other drivers take seconds to load."""
     with pytest.MonkeyPatch.context() as patch:
         if not missing():
             patch.setenv("SOAPY_SDR_PLUGIN_PATH", str(module_folder()))
@@ -28,9 +28,9 @@ def _test_radio():
 
 @pytest.fixture
 def own_rights(tmp_path, monkeypatch):
-    """The rights of an ordinary user, also where root runs the tests, in a folder of their own."""
+    """The permissions of an ordinary user, even if root runs the tests, in a folder of its own."""
     tmp_path.chmod(0o777)
-    # By its whole name, the folder is behind others that are root's alone.
+    # By its full path, the folder would lie inside others that only root may read.
     monkeypatch.chdir(tmp_path)
     was = os.geteuid()
     if was == 0:
@@ -43,9 +43,9 @@ def own_rights(tmp_path, monkeypatch):
 
 @pytest.fixture
 def at_ease(monkeypatch):
-    """Radios that a slow machine does not make gaps in; radios and hubs that end soon."""
-    # Gaps have tests of their own.
+    """Radios that make no gaps on a slow machine; radios and hubs that end quickly."""
+    # Gaps have separate tests.
     monkeypatch.setattr("backends.loopback.MAX_BEHIND_S", 1e6)
-    # Who waits in vain looks up so often.
+    # Interval at which a waiting thread checks whether it should stop.
     monkeypatch.setattr("backends.ether.hub.LOOK_AFTER_MS", 20)
     monkeypatch.setattr("backends.ether.radio.QUIET_MS", 50)

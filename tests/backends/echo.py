@@ -1,4 +1,4 @@
-"""A program that sends back the samples it gets, as GNU Radio or srsRAN would."""
+"""A program that echoes samples, like GNU Radio or srsRAN."""
 
 import contextlib
 import struct
@@ -15,7 +15,7 @@ ASKS_700 = struct.pack("<I", 700)
 
 
 class Echo:
-    """In a thread of its own, by the patterns of gr-zeromq; `word` is what it asks with."""
+    """Echoes samples on a thread, with the patterns of gr-zeromq; `word` is its request."""
 
     def __init__(self, folder, pattern, word=ASKS_700):
         self._context = zmq.Context()
@@ -38,7 +38,7 @@ class Echo:
         self._thread.start()
 
     def end(self):
-        """Ending twice is fine."""
+        """End the echo; ending twice is fine."""
         self._ended.set()
         self._thread.join()
         self._context.term()
@@ -71,7 +71,7 @@ class Echo:
 
 
 class ZmqEcho(ZmqRadio):
-    """A radio whose peer is its echo."""
+    """A radio with an echo as its peer."""
 
     def __init__(self, folder, pattern):
         self._echo = Echo(folder, pattern)
@@ -80,6 +80,6 @@ class ZmqEcho(ZmqRadio):
         super().__init__(params, BLOCK_S)
 
     async def close(self):
-        """The echo ends, too."""
+        """Close the radio and end the echo."""
         await super().close()
         self._echo.end()

@@ -1,4 +1,4 @@
-"""Hubs in threads of this process, and robots that listen there."""
+"""Hubs in threads of this process, and robots that listen on their air."""
 
 import asyncio
 import contextlib
@@ -38,7 +38,7 @@ def hub_air(**params):
 
 @contextlib.contextmanager
 def serving(folder, radios=(), paced=True, seed=0, until_s=np.inf, listen=None, **air):
-    """A hub that serves the folder; stopped at the end."""
+    """Run a hub on the folder, and stop it at the end."""
     shared = hub_air(**air)
     hub = EtherHub(
         folder, shared, World(shared, {}), dict(radios), paced=paced, seed=seed, until_s=until_s,
@@ -53,7 +53,7 @@ def serving(folder, radios=(), paced=True, seed=0, until_s=np.inf, listen=None, 
     finally:
         hub.stop()
         with RawRadio(folder) as raw:
-            # In lock-step it may be waiting for somebody to say something.
+            # In lock-step the hub may be waiting for a message.
             raw.ask(protocol.Question())
             thread.join(TIMEOUT_S)
         assert not thread.is_alive()
@@ -66,12 +66,12 @@ def ask(folder):
 
 
 async def until(condition):
-    """Waits for what another thread does."""
+    """Wait for something that another thread does."""
     await asyncio.to_thread(wait_for, condition)
 
 
 class RawRadio:
-    """Speaks the protocol by hand: whatever a radio could say, and what none should."""
+    """Speaks the protocol by hand: everything that a radio could send, and more."""
 
     def __init__(self, folder):
         self._context = zmq.Context()
@@ -85,15 +85,15 @@ class RawRadio:
         self.vanish()
 
     def ask(self, *frames):
-        """To the hub's `air`; messages are encoded."""
+        """Send to the hub's `air`; messages are encoded."""
         self._down.send_multipart(_encoded(frames))
 
     def push(self, *frames):
-        """To the hub's `sky`."""
+        """Send to the hub's `sky`."""
         self._up.send_multipart(_encoded(frames))
 
     def hear(self, kind=msgspec.Struct):
-        """The next message of that kind."""
+        """Receive the next message of that kind."""
         while self._down.poll(1000 * TIMEOUT_S):
             message = protocol.from_hub(self._down.recv_multipart()[0])
             if isinstance(message, kind):
@@ -101,7 +101,7 @@ class RawRadio:
         raise AssertionError("the hub says nothing")
 
     def join(self, node, who="made by hand"):
-        """Joins as a radio would; its token."""
+        """Join as a radio would; returns the token."""
         hello = protocol.Hello(
             version=protocol.VERSION,
             node=node,
@@ -113,7 +113,7 @@ class RawRadio:
         return self.hear(protocol.Welcome).token
 
     def vanish(self):
-        """As when its process is killed: no Bye."""
+        """Disappear without Bye, like a killed process."""
         self._context.destroy(linger=0)
 
     def _connected(self, kind, path):
@@ -127,7 +127,7 @@ def _encoded(frames):
 
 
 class Listener:
-    """Another robot on the same air: hears all from its index 0 on, in a thread of its own."""
+    """Another robot on the same air, which records everything from its index 0 on, on a thread."""
 
     def __init__(self, folder, rate_hz=RATE):
         self._folder = folder
@@ -142,12 +142,12 @@ class Listener:
         assert self._joined.wait(TIMEOUT_S)
 
     def wait_until(self, end):
-        """Until it has heard all samples before `end`."""
+        """Wait until all samples before `end` have been heard."""
         with self._moved:
             assert self._moved.wait_for(lambda: self._end >= end, TIMEOUT_S)
 
     def stop(self):
-        """All it has heard; ends with the next block."""
+        """Stop with the next block; returns everything heard."""
         self._is_over = True
         self._thread.join(TIMEOUT_S)
         assert not self._thread.is_alive()
@@ -181,7 +181,7 @@ def free_hub_port():
 
 
 class RadioOnHub(EtherRadio):
-    """Brings a hub of its own when it is opened; what has left is recorded in the file `sent`."""
+    """A radio that starts its own hub when opened; what it sends is recorded in the file `sent`."""
 
     def __init__(self, folder, params, paced, hub=None):
         super().__init__(hub or hub_in(folder / "air"), NODE, "the radio under test")
@@ -193,7 +193,7 @@ class RadioOnHub(EtherRadio):
         self._params, self._paced = params, paced
 
     async def open(self, tuning):
-        """The hub, the listener, the radio."""
+        """Start the hub and the listener, and open the radio."""
         radios = {NODE: self._params, LISTENER: RadioParams()}
         listen = self._hub if self._hub.is_remote else None
         served = serving(self._folder, radios, self._paced, listen=listen)
@@ -204,7 +204,7 @@ class RadioOnHub(EtherRadio):
         self._first = round((began_s - listens_s) * tuning.rate_hz)
 
     async def close(self):
-        """The recording lasts as long as what the radio has heard."""
+        """Close everything; the recording is as long as what the radio has heard."""
         listener, self._listener = self._listener, None
         end = self._first + (0 if self._antenna is None else self._antenna.end)
         if listener is not None:

@@ -1,4 +1,4 @@
-"""Nodes on an air inside this process: what they do after each block, and what they heard."""
+"""Nodes on an air inside this process: what they do after each block, and what they hear."""
 
 import asyncio
 import itertools
@@ -22,7 +22,7 @@ def ether_of(radios, seed=SEED, links=(), **params):
 
 
 async def drive(radio, taken, react):
-    """A node: it takes blocks, and does something after each."""
+    """Run a node: take blocks, and call `react` after each."""
     async for block in radio.blocks():
         taken.append(block)
         if react is not None:
@@ -30,7 +30,7 @@ async def drive(radio, taken, react):
 
 
 async def run(ether, until_s, reacts=None):
-    """Blocks of each radio, by node; `reacts`: what nodes do after each block."""
+    """Blocks of each radio, by node; `reacts`: functions to call after each block."""
     taken = {node: [] for node in ether.radios}
     radios = list(ether.radios.values())
     async with asyncio.timeout(TIMEOUT_S), asyncio.TaskGroup() as tasks:
@@ -44,7 +44,7 @@ async def run(ether, until_s, reacts=None):
 
 
 def sending(radio, wanted, reports):
-    """Hands over bursts, each (when, burst), after the first block that ends at `when` or later."""
+    """Hand over bursts, each (when, burst), after the first block that ends at `when` or later."""
     waiting = list(wanted)
 
     async def react(block):
@@ -55,7 +55,7 @@ def sending(radio, wanted, reports):
 
 
 def line_of(blocks):
-    """All samples; zeros in gaps."""
+    """All samples, with zeros for gaps."""
     parts = [
         np.zeros(block.n, np.complex64) if block.samples is None else block.samples
         for block in blocks
@@ -64,7 +64,7 @@ def line_of(blocks):
 
 
 def above_noise(x):
-    """Where there is more than noise ever is."""
+    """Positions of all samples above the noise."""
     return np.flatnonzero(np.abs(x) > 6 * 10 ** (NOISE_DBFS / 20)).tolist()
 
 

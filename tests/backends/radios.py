@@ -1,4 +1,4 @@
-"""Short ways to run a radio, and to read and write recordings."""
+"""Helpers to run a radio, and to read and write recordings."""
 
 import asyncio
 from contextlib import asynccontextmanager
@@ -21,7 +21,7 @@ N = 200
 """Samples of an ordinary block."""
 TUNING = Tuning(RATE, 868e6)
 AIR = Channel(PathParams(rate_hz=RATE), seed=5)
-"""Nothing but the carrier's phase."""
+"""An air that changes only the carrier's phase."""
 SEED = 20
 
 
@@ -32,11 +32,11 @@ def noise(n, seed=SEED, scale=0.2):
 
 
 PLAYED = noise(40_017)
-"""What a radio that receives from a recording plays; no whole number of blocks."""
+"""What a radio plays from a recording; not a whole number of blocks."""
 
 
 def record(path, samples, type_name="cf32_le", rate_hz=RATE):
-    """Write a recording that begins with `samples`; how many values were clipped."""
+    """Write a recording that begins with `samples`; returns how many values were clipped."""
     writer = RecordingWriter(path, type_name, rate_hz, TUNING.frequency_hz)
     writer.write(0, samples)
     writer.close()
@@ -53,7 +53,7 @@ def read(path, type_name=""):
 
 
 def heard(blocks):
-    """The samples of blocks that hold no gap."""
+    """The samples of all blocks that are not gaps."""
     return np.concatenate([np.zeros(0, np.complex64), *(block.samples for block in blocks)])
 
 
@@ -68,7 +68,7 @@ def bursts(seed, n=8):
 
 @asynccontextmanager
 async def opened(radio, tuning=TUNING):
-    """The radio, open; closed at the end."""
+    """Open the radio, and close it at the end."""
     try:
         await radio.open(tuning)
         yield radio
@@ -77,20 +77,20 @@ async def opened(radio, tuning=TUNING):
 
 
 async def turn():
-    """Let the event loop run what is due."""
+    """Let the event loop run everything that is due."""
     for _ in range(3):
         await asyncio.sleep(0)
 
 
 async def hand_over(radio, wanted):
-    """Tasks that send `wanted`, in order, each begun."""
+    """Start a task for each burst to send, in order."""
     sends = [asyncio.ensure_future(radio.send(burst)) for burst in wanted]
     await turn()
     return sends
 
 
 async def take(blocks, until=np.inf):
-    """Blocks up to the one that holds the sample before `until`."""
+    """Take blocks up to the one that contains the sample before `until`."""
     taken = []
     async for block in blocks:
         taken.append(block)
@@ -101,7 +101,7 @@ async def take(blocks, until=np.inf):
 
 
 async def send(radio, blocks, wanted):
-    """(reports, blocks taken until the last of them)."""
+    """Send bursts; returns (reports, blocks taken until the last of them)."""
     sends = await hand_over(radio, wanted)
     taken = []
     while not all(each.done() for each in sends):
@@ -113,6 +113,6 @@ async def send(radio, blocks, wanted):
 
 
 async def stream(radio, until=None):
-    """What a radio hears up to `until`, or its end."""
+    """Everything a radio hears up to `until`, or to its end."""
     async with opened(radio):
         return heard(await take(radio.blocks(), until or np.inf))[:until]

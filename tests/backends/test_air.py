@@ -1,4 +1,4 @@
-"""Simulated air: bursts on one line, its chance, and the time at which it is heard."""
+"""Simulated air: bursts on one line, random numbers, and the time of arrival."""
 
 import threading
 import time
@@ -26,13 +26,13 @@ def air(seed=1, noise_dbfs=-np.inf, **path):
 
 
 def taken(timeline, index, n):
-    """A piece of the line; silence in zeros."""
+    """A piece of the line; zeros for silence."""
     samples = timeline.take(index, n)
     return np.zeros(n, np.complex64) if samples is None else samples
 
 
 def line(channel, bursts, sizes):
-    """What arrives of bursts, (start, length) each, read in pieces of these sizes."""
+    """What arrives of bursts, each (start, length), read in pieces of these sizes."""
     timeline, path = Timeline(), channel.make_path()
     for start, n in bursts:
         timeline.add(start, noise(n, seed=start), path)
@@ -45,7 +45,7 @@ def line(channel, bursts, sizes):
 
 
 def carried(channel, bursts):
-    """The same, each burst carried by itself and added up."""
+    """What arrives of bursts if each is carried by itself and added up."""
     path, wanted = channel.make_path(), np.zeros(2 * END, np.complex64)
     for start, n in bursts:
         offset, samples = path.carry(noise(n, seed=start))
@@ -91,7 +91,7 @@ def test_bursts_may_be_added_in_any_order():
 
 
 def test_each_burst_goes_through_its_own_path():
-    """Also where one path has echoes, which arrive before their burst, and the other has none."""
+    """One path has echoes, which arrive before their burst, and the other has none."""
     one, other = air(loss_db=6), air(seed=2, profile="tdl-a", delay_s=5e-6)
     first, second = [(100, 300)], [(250, 300)]
     both, paths = Timeline(), (one.make_path(), other.make_path())
@@ -141,7 +141,7 @@ def test_the_same_seed_is_the_same_noise():
 
 
 def test_noise_and_path_have_chance_of_their_own():
-    """More noise drawn does not change the fading."""
+    """Drawing more noise does not change the fading."""
     channel = air(noise_dbfs=-20, profile="rayleigh")
     front_end, path, same = channel.make_front_end(), channel.make_path(), channel.make_path()
     front_end.receive(np.zeros(777, np.complex64))
@@ -155,7 +155,7 @@ def test_an_unknown_profile_is_named_with_those_that_exist():
 
 @pytest.fixture
 def clock(monkeypatch):
-    """Pace's clock, standing still until it is set."""
+    """Pace's clock, which stands still until it is set."""
     clock = SimpleNamespace(ns=10**12)
     clock.monotonic_ns = lambda: clock.ns
     monkeypatch.setattr("backends.pace.time", clock)

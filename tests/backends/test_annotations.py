@@ -1,4 +1,4 @@
-"""What is said of a recording, and when a reader finds it."""
+"""Annotations of a recording, and when a reader sees them."""
 
 import json
 
@@ -19,7 +19,7 @@ def metadata(path):
 
 @pytest.fixture
 def annotated(tmp_path):
-    """A recording of which everything is said that can be."""
+    """A recording with every possible annotation."""
     writer = RecordingWriter(
         tmp_path / "rec", "ci16_le", RATE, TUNING.frequency_hz,
         hardware="a radio", description="a test", recorder="tests 1",

@@ -1,4 +1,4 @@
-"""Recordings that cannot be used, or not wholly: what is said of them."""
+"""Recordings that cannot be used, or only in part, and the messages about them."""
 
 import json
 import os
@@ -24,7 +24,7 @@ ALLOWED = ", ".join(SAMPLE_TYPES)
 
 @pytest.fixture
 def write(tmp_path):
-    """Writes a recording of 20 samples with the metadata given; where it is."""
+    """Write a recording of 20 samples with the given metadata; returns its path."""
 
     def write(metadata=GOOD, data=bytes(40)):
         text = metadata if isinstance(metadata, str) else json.dumps(metadata)
@@ -45,7 +45,7 @@ def with_capture(**fields):
 
 
 def refusal(path, *arguments):
-    """Why `path` cannot be described."""
+    """The reason why `path` cannot be described."""
     with pytest.raises(BackendError) as error:
         describe(path, *arguments)
     return str(error.value)
@@ -155,7 +155,7 @@ def hostile(tmp_path_factory):
 
 
 def described(path, *arguments):
-    """What is known of a recording, or why nothing is."""
+    """The description of a recording, or the reason why there is none."""
     try:
         return describe(path, *arguments)
     except BackendError as error:

@@ -1,4 +1,4 @@
-"""What every radio keeps to: its stream, and how bursts leave."""
+"""The contract of every radio: its stream, and how it sends bursts."""
 
 import asyncio
 import itertools
@@ -110,7 +110,7 @@ async def test_a_burst_too_late_leaves_as_soon_as_it_can(case, tmp_path):
         (report,), more = await send(radio, blocks, [late])
         assert_sent(late, report)
         assert report.start >= now
-        # Blocks that wait were made before it came; paced, late blocks may be larger.
+        # Waiting blocks were made before the burst; paced, late blocks may be larger.
         if not radio.capabilities.paced:
             assert report.start <= now + (MAX_WAITING + 1) * N
     assert_only(case, case.recorded(tmp_path, taken + more), [(late, report)])
@@ -121,7 +121,7 @@ async def test_a_burst_leaves_in_its_time_or_not_at_all(case, tmp_path):
     begin, n = 30_000, 400
     end = begin + n
     free_at = begin + 3 * (n + GAP)
-    # Behind a late one, the next are handed over when its report is there.
+    # After a late burst, the next ones are handed over when its report has come.
     asked = [
         [(TxBurst(0, noise(n), latest=0), None)],
         [(TxBurst(begin, noise(n), latest=begin), begin)],
@@ -178,7 +178,7 @@ async def test_a_radio_says_what_it_can_do(case, tmp_path):
 
 @transceivers
 async def test_a_radio_misses_what_its_own_bursts_cover_only_when_half_duplex(case, tmp_path):
-    """From turnaround before to turnaround after each; what is missing is told with a reason."""
+    """From the turnaround before to the turnaround after each burst; each gap has a reason."""
     wanted = [TxBurst(case.begin + start, noise(n)) for start, n in ((1000, 500), (2000, 1))]
     async with opened(case.make(tmp_path)) as radio:
         _, taken = await send(radio, radio.blocks(), wanted)
@@ -192,7 +192,7 @@ async def test_a_radio_misses_what_its_own_bursts_cover_only_when_half_duplex(ca
 
 @every_radio
 async def test_what_is_heard_where_it_is_made_is_not_yielded(case, tmp_path):
-    """And reports come all the same. A radio without a thread yields everything."""
+    """Reports still come. A radio without a thread yields everything."""
     there, wanted = [], []
     if case.transmits:
         wanted = [TxBurst(case.begin + start, noise(500)) for start in (1000, 2500, 9000)]

@@ -1,4 +1,4 @@
-"""What every radio keeps to when it is closed, and with a consumer that stops."""
+"""The contract of every radio when it is closed, and with a consumer that stops."""
 
 import asyncio
 import threading
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.usefixtures("at_ease")
 
 
 def threads():
-    """All but those of the loop's own pool, which stay."""
+    """All threads except those of the loop's own pool, which remain."""
     return {each for each in threading.enumerate() if not each.name.startswith("asyncio_")}
 
 
@@ -57,7 +57,7 @@ async def test_closing_ends_blocks_and_the_thread(case, tmp_path):
 
 @every_radio
 async def test_a_closed_radio_leaves_nothing_on_the_event_loop(case, tmp_path):
-    """Also while its consumer is still busy with a block: what it watched may be another's soon."""
+    """Its consumer may still be busy; a watched descriptor may soon be reused."""
     watched = asyncio.get_running_loop()._selector.get_map()
     async with opened(case.make(tmp_path)) as radio:
         before = set(watched)
@@ -139,10 +139,10 @@ async def test_few_blocks_wait_for_a_consumer_that_stopped(case, tmp_path):
         blocks = radio.blocks()
         await take(blocks, 1)
         assert await asyncio.to_thread(full.wait, 20)
-        # Nothing tells that a thread does not go on; without a bound it would within this time.
+        # Nothing shows that a thread is blocked; without a bound it would go on within this time.
         await asyncio.sleep(0.05)
         assert len(made) == 1 + MAX_WAITING
-        # All that waited is still there, and the stream goes on behind it.
+        # All waiting blocks are still there, and the stream continues after them.
         taken = await take(blocks, made[-1].index + made[-1].n + 2 * N)
         waited = made[1 : 1 + MAX_WAITING]
         assert [block.index for block in taken[:MAX_WAITING]] == [block.index for block in waited]

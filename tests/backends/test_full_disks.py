@@ -1,4 +1,4 @@
-"""Where recordings cannot be written."""
+"""Recordings that cannot be written."""
 
 import asyncio
 import gc
@@ -28,7 +28,7 @@ from tests.backends.radios import (
 
 @contextmanager
 def room_for(size):
-    """No file can grow beyond `size` bytes."""
+    """Limit the size of every file to `size` bytes."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:
@@ -46,7 +46,7 @@ def transmitter(path):
 
 
 def refusal(path):
-    """Why nothing can be recorded in `path`."""
+    """The reason why nothing can be recorded in `path`."""
     with pytest.raises(BackendError) as error:
         writer(path)
     return str(error.value)
@@ -54,7 +54,7 @@ def refusal(path):
 
 @pytest.fixture
 def full(tmp_path):
-    """A recording whose data goes to a disk that is full."""
+    """A recording on a full disk."""
     (tmp_path / "full.sigmf-data").symlink_to("/dev/full")
     return tmp_path / "full"
 

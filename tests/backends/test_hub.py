@@ -1,4 +1,4 @@
-"""A hub and its radios: who may join, what they are told, and how it ends."""
+"""A hub and its radios: who may join, the messages they get, and how the hub ends."""
 
 import asyncio
 import gc
@@ -35,11 +35,11 @@ from tests.backends.radios import (
 
 pytestmark = pytest.mark.usefixtures("at_ease")
 TOO_LONG = "x" * 120
-"""A socket's path holds some 100 characters."""
+"""A socket's path can only have about 100 characters."""
 
 
 async def refusal(folder, node=1, tuning=TUNING):
-    """Why a radio may not join."""
+    """The reason why a radio may not join."""
     with pytest.raises(BackendError) as refused:
         async with opened(EtherRadio(hub_in(folder), node, "somebody else"), tuning):
             pass
@@ -127,7 +127,7 @@ async def test_a_second_robot_of_one_id_is_refused_and_the_first_is_told(tmp_pat
 
 
 async def test_an_id_is_free_when_its_robot_is_gone(tmp_path):
-    """With Bye or without."""
+    """The robot may leave with Bye or without."""
     with serving(tmp_path):
         async with opened(EtherRadio(hub_in(tmp_path), 1, "the first")):
             pass
@@ -141,7 +141,7 @@ async def test_an_id_is_free_when_its_robot_is_gone(tmp_path):
 
 
 async def test_closing_does_not_hold_up_the_event_loop(tmp_path, monkeypatch):
-    """However long a radio would wait for its hub."""
+    """The radio may still be waiting for its hub."""
     monkeypatch.setattr("backends.ether.radio.QUIET_MS", 3000)
     with serving(tmp_path):
         async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio:

@@ -28,7 +28,7 @@ paced_or_not = pytest.mark.parametrize("paced", [True, False], ids=["paced", "lo
 
 
 def garbage(rng):
-    """Frames of any bytes, or of messages that somebody has tampered with."""
+    """Random frames, or messages that were tampered with."""
     kind = rng.randrange(4)
     if kind == 0:
         return [rng.randbytes(rng.randrange(200)) for _ in range(rng.randrange(1, 4))]
@@ -42,7 +42,7 @@ def garbage(rng):
 
 
 async def assert_goes_on(radio, blocks):
-    """It hears, and what it sends leaves."""
+    """Assert that the radio still hears, and that its bursts still leave."""
     async with asyncio.timeout(10):
         (report,), taken = await send(radio, blocks, [TxBurst(0, noise(100))])
         assert report.outcome is TxOutcome.SENT
@@ -50,7 +50,7 @@ async def assert_goes_on(radio, blocks):
 
 
 async def heard_all(folder, raw):
-    """Both of the hub's sockets have been read, up to here."""
+    """Wait until both of the hub's sockets have been read up to here."""
     raw.ask(protocol.Question())
     await asyncio.to_thread(raw.hear, protocol.Answer)
 
@@ -66,7 +66,7 @@ async def test_any_bytes_on_any_socket_are_survived(tmp_path, paced, seed):
             for _ in range(300):
                 raw.ask(*garbage(rng))
                 raw.push(*garbage(rng))
-            # Whole messages, on the socket that they are not for.
+            # Whole messages on the wrong socket.
             for message in GOOD:
                 raw.push(message)
             for message in GOOD[2:]:
@@ -109,7 +109,7 @@ async def test_without_its_token_nobody_speaks_for_a_radio(tmp_path):
 @paced_or_not
 @pytest.mark.parametrize("node", [-1, 255, 2**60])
 async def test_an_id_that_no_robot_can_have_does_not_join(tmp_path, paced, node):
-    """With it, nobody's bursts would get anywhere."""
+    """Bursts of such an id would reach nobody."""
     hello = protocol.Hello(
         version=protocol.VERSION, node=node, who="", rate_hz=RATE, frequency_hz=868e6
     )

@@ -1,4 +1,4 @@
-"""A hub in lock-step: time waits for everybody, and one seed gives one result."""
+"""A hub in lock-step: no node advances until every node has finished, and results repeat."""
 
 import asyncio
 import contextlib
@@ -23,7 +23,7 @@ def lockstep(folder, radios, **more):
 
 
 async def drive(folder, node, until, react):
-    """A robot in its own thread's loop: all blocks up to that index."""
+    """Run a robot on its own thread's loop: all blocks up to the index `until`."""
     taken = []
     async with opened(EtherRadio(hub_in(folder), node, f"robot {node}")) as radio:
         async for block in radio.blocks():
@@ -35,7 +35,7 @@ async def drive(folder, node, until, react):
 
 
 def in_threads(folder, nodes, until, react):
-    """What each of the nodes heard, each in a thread of its own; `react`: what it does then."""
+    """What each node hears, each on its own thread; `react`: what it does after each block."""
     heard = {}
 
     def work(node):
@@ -51,7 +51,7 @@ def in_threads(folder, nodes, until, react):
 
 
 def hear_a_run(folder, seed, dawdling):
-    """What three nodes hear that send at random; by another chance, they take their time."""
+    """What three nodes hear when they send at random; `dawdling` seeds random delays."""
     radios = {
         1: RadioParams(),
         2: RadioParams(full_duplex=False, turnaround_s=0.0005, clock_ppm=15),
@@ -105,7 +105,7 @@ async def test_an_air_begins_when_all_are_there_and_goes_on_when_all_have_done(t
         async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as one:
             ahead = one.blocks()
             coming = asyncio.ensure_future(anext(ahead))
-            # Nothing tells that a hub does not go on; without a reason it would within this time.
+            # Nothing shows that a hub is blocked; without a reason it would go on within this time.
             await asyncio.sleep(0.05)
             assert ask(tmp_path).now_s == 0
             async with opened(EtherRadio(hub_in(tmp_path), 2, "")) as other:
@@ -123,7 +123,7 @@ async def test_an_air_begins_when_all_are_there_and_goes_on_when_all_have_done(t
 
 
 async def test_an_air_ends_when_it_is_told_to(tmp_path):
-    """In the middle of a block, if need be; it still answers."""
+    """The end may be in the middle of a block; the hub still answers."""
     with lockstep(tmp_path, {1: RadioParams()}, until_s=10.5 * BLOCK_S):
         async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio:
             blocks = radio.blocks()
@@ -149,7 +149,7 @@ async def test_who_comes_when_it_has_begun_is_refused(tmp_path):
 
 @pytest.mark.parametrize("watched", [False, True])
 async def test_a_radio_that_vanishes_does_not_stop_the_others(tmp_path, monkeypatch, watched):
-    """Without Bye, before it has done with a step; also when there is something else to answer."""
+    """It sends no Bye and leaves its step unfinished, possibly while other messages wait."""
     monkeypatch.setattr("backends.ether.hub.LOOK_AFTER_MS", 200)
     with lockstep(tmp_path, THREE), HubWatch(tmp_path) as watch, RawRadio(tmp_path) as raw:
         token = raw.join(3)
@@ -185,7 +185,7 @@ async def test_a_radio_that_vanishes_does_not_stop_the_others(tmp_path, monkeypa
 
 
 async def test_a_radio_that_leaves_does_not_stop_the_others(tmp_path, monkeypatch):
-    """Also where it leaves before the air has begun; the hub does not have to look for it."""
+    """It may also leave before the air has begun; the hub does not have to wait for a timeout."""
     monkeypatch.setattr("backends.ether.hub.LOOK_AFTER_MS", 60_000)
     with lockstep(tmp_path, THREE):
         async with opened(EtherRadio(hub_in(tmp_path), 3, "")):
@@ -201,7 +201,7 @@ async def test_a_radio_that_leaves_does_not_stop_the_others(tmp_path, monkeypatc
 async def test_a_robot_that_is_started_again_before_the_air_begins_is_who_it_was(
     tmp_path, says_bye
 ):
-    """With its own radio."""
+    """It gets its own radio back."""
     radios = {1: RadioParams(full_duplex=False), 2: RadioParams()}
     with lockstep(tmp_path, radios), RawRadio(tmp_path) as raw:
         token = raw.join(1)
@@ -219,7 +219,7 @@ async def test_a_robot_that_is_started_again_before_the_air_begins_is_who_it_was
 
 
 async def test_what_is_sent_before_the_first_block_leaves_with_it(tmp_path):
-    """Whether the other robots are there already or not."""
+    """The other robots may be present already or not."""
     starts = []
     for others_first in (False, True):
         folder = tmp_path / f"{others_first}"
@@ -239,7 +239,7 @@ async def test_what_is_sent_before_the_first_block_leaves_with_it(tmp_path):
 
 
 async def test_in_whatever_order_bursts_come_in_they_sound_the_same(tmp_path):
-    """The sum of three depends on their order, in its last bit."""
+    """The sum of three depends on their order in its last bit."""
     heard = []
     for order in ([1, 2, 3], [3, 1, 2], [2, 3, 1]):
         folder = tmp_path / "".join(map(str, order))
@@ -266,7 +266,7 @@ async def test_in_whatever_order_bursts_come_in_they_sound_the_same(tmp_path):
 
 @pytest.mark.parametrize("exact", [True, False])
 async def test_nothing_overtakes_a_burst_that_was_late(tmp_path, exact):
-    """What was handed over behind it, before its report was there, is late too where exact."""
+    """A burst handed over after a late one, before its report, is late too if it has a `latest`."""
     with lockstep(tmp_path, {1: RadioParams()}):
         async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio:
             blocks = radio.blocks()
@@ -287,7 +287,7 @@ async def test_nothing_overtakes_a_burst_that_was_late(tmp_path, exact):
 
 @pytest.mark.parametrize("turns", range(5))
 async def test_who_is_cancelled_just_when_something_comes_stops(tmp_path, turns):
-    """Another robot is waited for, so nothing does come."""
+    """No block comes, because another robot is missing."""
     with lockstep(tmp_path, dict.fromkeys((1, 2), RadioParams())):
         async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio:
             taking = asyncio.ensure_future(take(radio.blocks()))

@@ -1,4 +1,4 @@
-"""Hubs that stop and come back, and radios that do not keep up."""
+"""Hubs that stop and come back, and radios that cannot keep up."""
 
 import asyncio
 import contextlib
@@ -38,7 +38,7 @@ def gaps_in(blocks):
 
 @contextlib.asynccontextmanager
 async def closing(radio):
-    """The radio is closed at the end."""
+    """Close the radio at the end."""
     try:
         yield
     finally:
@@ -46,7 +46,7 @@ async def closing(radio):
 
 
 async def take_gap(blocks):
-    """Blocks up to the next gap, with it."""
+    """Take blocks up to and including the next gap."""
     taken = await take(blocks, 1)
     while taken[-1].samples is not None:
         taken += await take(blocks, 1)
@@ -77,7 +77,7 @@ async def test_when_a_hub_comes_back_its_radios_go_on_behind_one_gap(tmp_path, m
     assert_contiguous(taken)
     (gap,) = gaps_in(taken)
     assert gap.gap_reason == "the hub was away"
-    # It is as long as the hub was away, so that time went on.
+    # The gap is as long as the hub was away, so time is continuous.
     before = taken[taken.index(gap) - 1]
     apart_s = (taken[-1].host_ns - before.host_ns) * 1e-9
     n = taken[-1].index + taken[-1].n - before.index - before.n
@@ -92,7 +92,7 @@ async def test_bursts_for_a_hub_that_went_away_are_lost_and_those_after_it_leave
         with serving(tmp_path, {1: params}):
             await radio.open(TUNING)
             blocks = radio.blocks()
-            # One is too late, so that hub and radio have something to count.
+            # One burst is too late, so that hub and radio have something to count.
             late = TxBurst(0, noise(10), latest=0)
             reports, _ = await send(radio, blocks, [late, TxBurst(N, noise(20))])
             assert [each.outcome for each in reports] == [TxOutcome.LATE, TxOutcome.SENT]
@@ -129,7 +129,7 @@ async def test_a_hub_that_comes_back_may_refuse(tmp_path):
 
 
 async def test_a_hub_that_is_slow_has_not_been_away(tmp_path, monkeypatch):
-    """Radios are still known when they ask."""
+    """The hub still knows the radios when they ask."""
     monkeypatch.setattr("backends.ether.hub.MAX_LATE_BLOCKS", 10**6)
     with serving(tmp_path) as hub:
         async with opened(EtherRadio(hub_in(tmp_path), 1, "the radio")) as radio:
@@ -165,7 +165,7 @@ async def test_a_radio_that_does_not_read_loses_samples_and_hinders_nobody(tmp_p
             blocks = radio.blocks()
             taken = await take(blocks, 1)
             began_s = ask(tmp_path).now_s
-            # It does not ask for more, until the hub has no room.
+            # The radio reads no more, until the hub has no room.
             await until(lambda: ask(tmp_path).samples_lost > 30 * N)
             taken += await take_gap(blocks)
             lost = ask(tmp_path).samples_lost
@@ -183,13 +183,13 @@ async def test_a_radio_that_does_not_read_loses_samples_and_hinders_nobody(tmp_p
     assert {block.gap_reason for block in gaps} == {"the daemon was too slow"}
     assert counters["overflows"] == len(gaps)
     assert counters["samples_lost"] == sum(block.n for block in gaps)
-    # All the while, the other one has heard everything.
+    # Meanwhile the other radio has heard everything.
     assert len(others) >= gone_s * 10 * RATE
     assert np.abs(others).all()
 
 
 async def test_a_radio_a_little_behind_gets_larger_blocks_and_loses_nothing(tmp_path):
-    """Its gaps and what others send stay where they are."""
+    """Gaps and bursts keep their positions."""
     turnaround = 100
     params = RadioParams(full_duplex=False, turnaround_s=turnaround / RATE)
     begins, mark = (6000, 12_000), TxBurst(9000, noise(300))
@@ -204,7 +204,7 @@ async def test_a_radio_a_little_behind_gets_larger_blocks_and_loses_nothing(tmp_
             blocks = radio.blocks()
             sends = [radio.send(TxBurst(begin, noise(700), latest=begin)) for begin in begins]
             taken = await take(blocks, 1)
-            # It does not ask for more, until all of it is long over.
+            # The radio reads no more until all of it is long over.
             await until(lambda: ask(tmp_path).now_s - hub._medium.time(1, 0) > 16_000 / RATE)
             taken += await take(blocks, 16_000)
             reports = [await each for each in sends]
@@ -225,7 +225,7 @@ async def test_a_radio_a_little_behind_gets_larger_blocks_and_loses_nothing(tmp_
 
 
 async def test_a_radio_that_waits_for_a_hub_greets_the_next_one_too(tmp_path):
-    """The first took the greeting along when it died."""
+    """The first hub died together with the radio's Hello."""
     radio = EtherRadio(hub_in(tmp_path), 1, "the radio", Patience.THERE)
     async with asyncio.timeout(30), closing(radio):
         opening = asyncio.ensure_future(radio.open(TUNING))

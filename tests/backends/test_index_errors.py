@@ -1,4 +1,4 @@
-"""Radios without time stamps: their count of samples is a little off after each gap."""
+"""Radios without time stamps: each gap shifts their count of samples a little."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from tests.backends.nodes import N, assert_contiguous, ether_of, line_of, run, s
 from tests.backends.radios import noise
 
 ERROR = 40
-"""Samples by which the count may be wrong after a gap."""
+"""Possible error of the count after a gap, in samples."""
 N_GAPS = 8
 EVERY = 20_000
 BEGIN = 5000
@@ -23,19 +23,19 @@ def unsure(**more):
 
 
 def found(line, near):
-    """Where the mark begins, around `near`."""
+    """Start of the mark near the index `near`."""
     first = near - 1000
     part = line[first : near + 1000 + len(MARK)]
     return first + int(np.argmax(np.abs(np.correlate(part, MARK, "valid"))))
 
 
 async def gaps_and_marks(burst_n, seed, **radio):
-    """(blocks of node 0, where it has marks by its own count less where they are by the air's).
+    """(blocks of node 0, positions of its marks in its own count minus those in the air's count).
 
     Node 0 sends bursts of that length, node 1 a mark before each and after the last.
     """
     ether = ether_of({0: unsure(**radio), 1: PLAIN}, seed=seed, snr_db=30.0)
-    # By the air's count; node 0 hands its own over at whatever it takes for now.
+    # In the air's count; node 0 hands over its own burst at its estimate of the present.
     marks = [BEGIN + i * EVERY for i in range(N_GAPS + 1)]
     reports = []
     wanted = [(at - 2 * N, TxBurst(at, MARK, latest=at)) for at in marks]
@@ -50,7 +50,7 @@ async def gaps_and_marks(burst_n, seed, **radio):
     return taken[0], np.array([found(line, at) - at for at in marks])
 
 
-# Within a block, and over several.
+# Within one block, and over several.
 @pytest.mark.parametrize("burst_n", [300, 5500])
 @pytest.mark.parametrize("seed", [1, 2, 3])
 async def test_after_each_gap_the_index_is_off_by_no_more_than_told(burst_n, seed):
@@ -66,7 +66,7 @@ async def test_after_each_gap_the_index_is_off_by_no_more_than_told(burst_n, see
 
 
 async def test_a_burst_leaves_where_the_radio_takes_its_index_to_be():
-    """Off as all it hears is."""
+    """The burst is off by as much as everything that the radio hears."""
     ether = ether_of({0: unsure(), 1: PLAIN}, snr_db=30.0)
     mark_at, begin = 15_000, 20_000
     mine, others = [], []
@@ -87,7 +87,7 @@ async def test_a_burst_leaves_where_the_radio_takes_its_index_to_be():
 
 
 async def test_a_gap_that_is_cut_short_still_has_samples():
-    """However much the index slips, no block is empty or runs backwards."""
+    """However far the index slips, no block is empty or runs backwards."""
     ether = ether_of({0: unsure(turnaround_s=0.0), 1: PLAIN})
     wanted = [(i * N, TxBurst(i * N + 1500, noise(1 + i % 3))) for i in range(1, 40)]
     taken = await run(ether, 0.045, {0: sending(ether.radios[0], wanted, [])})

@@ -1,4 +1,4 @@
-"""A radio that is a recording: what it plays, what it records, and files it does not take."""
+"""A radio that is a recording: what it plays and records, and files that it rejects."""
 
 import asyncio
 import time
@@ -68,7 +68,7 @@ async def test_what_one_records_another_receives(tmp_path, type_name, step):
 
 
 async def sent_into_one_block(radio, wanted):
-    """(reports, the block that holds all)."""
+    """(reports, the block that contains all bursts)."""
     async with opened(radio):
         reports, (block,) = await send(radio, radio.blocks(), wanted)
     return reports, block
@@ -142,7 +142,7 @@ async def test_a_recording_of_another_rate_is_not_played(tmp_path):
             pass
     wanted = "x.sigmf-data: is sampled at 100000 Hz; the modem is set to 200000 Hz"
     assert str(error.value).endswith(wanted)
-    # An oscillator's error is not another rate.
+    # An oscillator's error does not count as another rate.
     async with opened(player(tmp_path / "x"), Tuning(RATE * (1 + 5e-7), 0)):
         pass
 
@@ -169,7 +169,7 @@ async def test_a_recording_lasts_until_the_radio_is_closed(tmp_path):
     async with opened(radio):
         await take(radio.blocks(), 10 * N)
     info = describe(tmp_path / "x")
-    # Blocks that wait count; one is made, and one more while the radio is closed.
+    # Waiting blocks count; one is being made, and one more while the radio is closed.
     assert 10 * N <= info.n_samples <= (10 + MAX_WAITING + 2) * N
     assert (info.rate_hz, info.frequency_hz) == (TUNING.rate_hz, TUNING.frequency_hz)
     assert not read(tmp_path / "x").any()

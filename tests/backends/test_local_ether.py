@@ -1,4 +1,4 @@
-"""Radios on one air inside this process: in step, whatever each does between its blocks."""
+"""Radios on one air inside this process stay in step, whatever each does between its blocks."""
 
 import asyncio
 from random import Random
@@ -111,7 +111,7 @@ async def test_no_radio_gets_ahead_of_one_that_dawdles():
 
 
 async def hear_a_run(seed, dawdling):
-    """All blocks of a run in which three nodes send at random; they dawdle by another chance."""
+    """All blocks of a run in which three nodes send at random; `dawdling` seeds random delays."""
     radios = {0: PLAIN, 1: half_duplex(0.0002, clock_ppm=12), 2: half_duplex()}
     ether = ether_of(radios, seed=seed, profile="tdl-a")
     idle = Random(dawdling)
@@ -143,7 +143,7 @@ async def test_one_seed_is_one_run_however_nodes_dawdle():
 
 
 async def test_exact_bursts_in_slots_of_their_own_never_meet():
-    """As with TDMA: three half-duplex radios, four frames."""
+    """Slots as with TDMA: three half-duplex radios, four frames."""
     slot, n, turnaround = 1500, 1200, 120
     nodes = (0, 1, 2)
     ether = ether_of(dict.fromkeys(nodes, half_duplex(turnaround / RATE)), snr_db=40.0)
@@ -152,7 +152,7 @@ async def test_exact_bursts_in_slots_of_their_own_never_meet():
     reacts = {
         node: sending(
             ether.radios[node],
-            # Decided late: with the last block that ends early enough.
+            # Decided as late as possible: with the last block that ends early enough.
             [((at - turnaround - LEAD) // N * N, tone(at, n, exact=True)) for at in begins[node]],
             reports[node],
         )

@@ -34,12 +34,12 @@ def noisy(seed=1, noise_dbfs=-20.0, **path):
 
 @pytest.fixture
 def few_waiting(monkeypatch):
-    """Two blocks may wait for the reader, so that it is soon behind."""
+    """Let only two blocks wait for the reader, so that it soon falls behind."""
     monkeypatch.setattr("backends.feed.MAX_WAITING", 2)
 
 
 async def gap_in(blocks, taken):
-    """The next gap; blocks before it are added to `taken`."""
+    """The next gap; earlier blocks are appended to `taken`."""
     while (block := (await take(blocks, 1))[0]).samples is not None:
         taken.append(block)
     return block
@@ -133,7 +133,7 @@ async def test_a_reader_far_behind_finds_a_gap(monkeypatch, few_waiting):
         taken = await take(blocks, N)
         await asyncio.sleep(0.35)
         taken.append(await gap_in(blocks, taken))
-        # From here on there are no more, so that the count is of those that are taken.
+        # From here on there are no more blocks, so the count is of those that were taken.
         radio._max_behind = FOREVER_S * RATE
         again = TxBurst(taken[-1].index + taken[-1].n + 10_000, noise(200))
         (report,), more = await send(radio, blocks, [again])
@@ -148,7 +148,7 @@ async def test_a_reader_far_behind_finds_a_gap(monkeypatch, few_waiting):
     assert max(block.n for block in gaps) > 0.1 * RATE
     assert counters["overflows"] == len(gaps)
     assert counters["samples_lost"] == sum(block.n for block in gaps)
-    # A burst leaves whether or not it is heard; behind the gap, all is heard again.
+    # A burst leaves whether or not it is heard; after the gap everything is heard again.
     assert (missed.outcome, missed.start) == (TxOutcome.SENT, 25_000)
     line = np.concatenate(
         [np.zeros(block.n) if block.samples is None else block.samples for block in taken]

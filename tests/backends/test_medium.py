@@ -1,4 +1,4 @@
-"""How bursts get from node to node: strength, delay, carrier, clocks, and together."""
+"""How bursts get from node to node: power, delay, carrier, clocks, and superposition."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_a_burst_arrives_as_it_was_sent_turned_and_weakened_and_nothing_else_doe
 @pytest.mark.parametrize("snr_db", [-10.0, 0.0, 33.3])
 @pytest.mark.parametrize("scale", [0.001, 0.7])
 def test_a_burst_arrives_with_the_snr_of_its_way_whatever_its_own_power(snr_db, scale):
-    """Above the noise that every receiver has."""
+    """The SNR is relative to the noise of every receiver."""
     links = [LinkOverride(sender=0, receiver=2, snr_db=7.0)]
     made = medium(3, snr_db=snr_db, links=links)
     made.send(0, TxBurst(100, noise(3000, scale=scale)))
@@ -63,11 +63,11 @@ def test_bursts_that_fade_have_the_snr_of_their_way_on_average(profile):
 
 @pytest.mark.parametrize(("spread_s", "lasts"), [(0.0, 0), (1e-5, 97)])
 def test_echoes_last_as_long_as_they_are_spread(spread_s, lasts):
-    """The last one of this profile comes 9.66 spreads behind the first."""
+    """The last echo of this profile comes 9.66 delay spreads after the first."""
     made = medium(2, profile="tdl-a", delay_spread_s=spread_s, snr_db=100.0)
     made.send(0, burst(1000, 300))
     where = loud(heard(made, 1, 0.002))
-    # And the skirts of filters.
+    # Plus the skirts of filters.
     assert where[0] >= 1000 - 16
     assert 1300 + lasts - 16 <= where[-1] <= 1300 + lasts + 32
 
@@ -85,7 +85,7 @@ def test_nothing_gets_through_where_there_is_no_way():
     ("start", "is_heard"), [(9_999, True), (10_000, False), (19_999, False), (20_000, True)]
 )
 def test_in_an_outage_bursts_that_begin_do_not_get_through(start, is_heard):
-    """A burst gets through as a whole or not: what counts is where it begins."""
+    """A burst gets through as a whole or not at all: its start decides."""
     made = medium(2, outages=[Outage(0.010, 0.020)])
     made.send(0, burst(start, 50))
     assert np.count_nonzero(heard(made, 1, 0.03)) == (50 if is_heard else 0)
@@ -102,7 +102,7 @@ def test_nobody_hears_itself():
 
 @pytest.mark.parametrize("delay", [0, 1, 129])
 def test_a_delay_of_whole_samples_moves_the_burst_and_leaves_it_as_it_is(delay):
-    """Also where light's way makes a sample of it."""
+    """The delay may also come from the propagation time."""
     tracks = {0: Track([(0.0, 0.0, 0.0)]), 1: Track([(0.0, 0.0, SPEED_OF_LIGHT / RATE)])}
     links = [LinkOverride(sender=0, receiver=1, snr_db=20.0, delay_s=delay / RATE)]
     sent = burst(500, 400)
@@ -118,7 +118,7 @@ def test_a_delay_of_whole_samples_moves_the_burst_and_leaves_it_as_it_is(delay):
 
 
 def test_counts_that_began_whole_samples_apart_are_in_step():
-    """However the quotients are rounded: a burst arrives in its samples and in no others."""
+    """However the quotients are rounded, a burst arrives in exactly its samples."""
     made = medium(1)
     for i in range(1, 30):
         now = i * 0.0007
@@ -168,9 +168,9 @@ def test_movement_moves_the_carrier(towards):
 
 @pytest.mark.parametrize(("sends_ppm", "hears_ppm"), [(100, 0), (0, 100), (-100, 50), (80, 80)])
 def test_crystals_move_the_samples_as_they_move_the_carrier(sends_ppm, hears_ppm):
-    """What is n samples apart there is n (1 − difference) apart here."""
+    """What is n samples apart at the sender is n (1 − difference) apart here."""
     radios = {0: RadioParams(clock_ppm=sends_ppm), 1: RadioParams(clock_ppm=hears_ppm)}
-    # Without a carrier, nothing turns.
+    # Without a carrier, the phase does not change.
     made = medium(radios, frequency_hz=0.0)
     sent = np.zeros(61_000, np.complex64)
     sent[:1000], sent[-1000:] = smooth(1000), smooth(1000)

@@ -1,4 +1,4 @@
-"""Each node's count of samples: when it is deaf, what comes too late, who is there."""
+"""Each node's count of samples: when it is deaf, what is too late, who is present."""
 
 import math
 
@@ -46,7 +46,7 @@ def indices(begin, end):
 def test_a_half_duplex_node_is_deaf_from_turnaround_before_to_turnaround_after(
     turnaround_s, clock_ppm
 ):
-    """By its own count; no sample more, none less."""
+    """In the node's own count; no sample more or less."""
     made = medium({0: half_duplex(turnaround_s, clock_ppm=clock_ppm), 1: PLAIN})
     turnaround = math.ceil(turnaround_s * RATE * (1 + 1e-6 * clock_ppm))
     spans = [(1000, 1500), (3000, 3001), (4000, 4900)]
@@ -86,7 +86,7 @@ def test_who_is_deaf_misses_what_arrives_meanwhile_and_nothing_else(bursts, time
 @law(80)
 @given(some_bursts, some_bursts, some_times, some_times, st.sampled_from(list(PROFILES)))
 def test_whenever_samples_are_taken_they_are_the_same(early, late, times, others, profile):
-    """Each once and in order, for each of three nodes with clocks and radios of their own."""
+    """Each sample once and in order, for three nodes with their own clocks and radios."""
     radios = {
         0: RadioParams(clock_ppm=150),
         1: half_duplex(0.0001, clock_ppm=-60),
@@ -137,7 +137,7 @@ def test_an_exact_burst_that_is_late_does_not_leave_at_all(radio, profile):
     assert (made.bursts, made.bursts_late) == (0, 1)
     assert not deafness(made.take(0, 0.0013)).any()
     assert not heard(made, 1, END_S).any()
-    # Nor does it keep the next one from leaving.
+    # A late burst does not block the next one.
     assert made.send(0, burst(1300 + earliest - 1000, 9, exact=True)) == 300 + earliest
     assert (made.bursts, made.bursts_late) == (1, 1)
 
@@ -201,7 +201,7 @@ def test_who_joins_late_begins_at_0_and_hears_what_is_sent_from_then_on():
     made.send(0, burst(3000, 100))
     assert loud(heard(made, 2, 0.004)) == indices(1000, 1100)
     assert loud(heard(made, 1, 0.004)) == indices(1000, 1100)
-    # Its own bursts are by its own count.
+    # Its own bursts are in its own count.
     assert made.send(2, burst(2500, 50)) == 2500
     assert loud(heard(made, 1, 0.006)) == indices(500, 550)
 
@@ -216,7 +216,7 @@ def test_what_was_sent_arrives_also_when_its_sender_has_left():
         made.next_index(0)
     assert np.count_nonzero(heard(made, 1, 0.002)) == 50
     assert np.count_nonzero(heard(made, 2, 0.002)) == 100
-    # Nothing is sent to who is gone, and who comes back begins anew.
+    # A node that has left gets nothing, and one that returns starts over.
     made.send(1, burst(3000, 100))
     made.join(0, PLAIN, 0.002)
     assert not heard(made, 0, 0.01).any()

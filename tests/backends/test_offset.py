@@ -1,4 +1,4 @@
-"""A radio tuned beside the channel, and what its oscillator leaves."""
+"""A radio with offset tuning, and the leakage of its oscillator."""
 
 import asyncio
 
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.usefixtures("at_ease")
 
 
 class Tuned(LoopbackRadio):
-    """Remembers where to."""
+    """A radio that remembers its frequency."""
 
     async def open(self, tuning):
         self.tuning = tuning
@@ -34,7 +34,7 @@ class Tuned(LoopbackRadio):
 
 
 async def test_the_channel_is_where_it_was():
-    """Sent up, heard down: nothing is left of the shift but a turn."""
+    """Sending shifts up and receiving shifts down: only a phase remains."""
     inner = Tuned(AIR, BLOCK_S, paced=False)
     async with opened(OversampledRadio(OffsetRadio(inner), 4)) as radio:
         assert inner.tuning.frequency_hz == TUNING.frequency_hz - TUNING.rate_hz

@@ -1,4 +1,4 @@
-"""Bursts that have been handed over and have not left."""
+"""Bursts that were handed over and have not left yet."""
 
 import numpy as np
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""A radio at twice or four times the rate: others see theirs, bursts and gaps where they were."""
+"""A radio at twice or four times the rate: callers see their own rate, bursts and gaps in place."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ factors = pytest.mark.parametrize("factor", [2, 4])
 
 
 def two_bursts(first):
-    """What a modem sends, the second with a last moment that it will keep."""
+    """Bursts of a modem; the second one has a `latest` that it will meet."""
     rng = np.random.default_rng(6)
     samples = [0.2 * Transmitter().modulate([rng.bytes(60)], 1) for _ in range(2)]
     second = first + len(samples[0]) + 500
@@ -31,7 +31,7 @@ def two_bursts(first):
 
 
 def assert_heard(stream, sent, reports, gain_db=0.0):
-    """Each where its report says, with nothing but the filter's error."""
+    """Assert that each burst is where its report says, with only the filter's error."""
     for burst, report in zip(sent, reports, strict=True):
         assert report.outcome is TxOutcome.SENT
         assert (report.start, report.end) == (burst.start, burst.start + len(burst.samples))

@@ -1,4 +1,4 @@
-"""Recordings of samples: written, read, and understood by SigMF's own package."""
+"""Recordings of samples: written, read, and accepted by SigMF's own package."""
 
 import itertools
 import json
@@ -25,7 +25,7 @@ some_parts = arrays(
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
-    """(samples, where they are recorded)."""
+    """(samples, path of their recording)."""
     path = tmp_path_factory.mktemp("recorded") / "some"
     samples = noise(1000)
     record(path, samples)
@@ -87,7 +87,7 @@ def test_the_octets_of_rtl_sdr_are_read(tmp_path):
 
 
 def test_octets_without_a_sign_are_not_written(tmp_path):
-    """What is skipped would be zeros, which are not its silence."""
+    """Skipped samples would be zero octets, which are not silence in unsigned types."""
     with pytest.raises(BackendError, match="sent: cu8 is only read; write ci8 instead"):
         RecordingWriter(tmp_path / "sent", "cu8", RATE, 0)
 
@@ -202,7 +202,7 @@ def test_what_we_write_is_valid_sigmf(tmp_path, type_name):
     record(tmp_path / "ours", noise(300), type_name)
     theirs = sigmf.sigmffile.fromfile(tmp_path / "ours.sigmf-meta")
     theirs.validate()
-    # Of what is read, their package adds what is missing.
+    # Their package adds the missing parts of what it reads.
     sigmf.validate.validate(json.loads((tmp_path / "ours.sigmf-meta").read_text()))
     assert theirs.get_global_field("core:sample_rate") == RATE
     assert theirs.get_capture_info(0)["core:frequency"] == TUNING.frequency_hz
@@ -227,7 +227,7 @@ def test_what_their_package_writes_is_read(tmp_path, type_name, dtype):
     info = describe(tmp_path / "theirs")
     assert (info.n_samples, info.rate_hz, info.frequency_hz) == (200, 2.4e6, 433.92e6)
     assert not info.damage
-    # Our octets are centred on 127.5, as the converter's are; theirs on 128.
+    # Our octets are centred on 127.5, like the converter's; theirs on 128.
     centre = (0.5 + 0.5j) / 128 if type_name == "cu8" else 0
     assert np.array_equal(read(tmp_path / "theirs"), theirs.read_samples() + np.complex64(centre))
 

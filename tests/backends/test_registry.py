@@ -1,4 +1,4 @@
-"""The table of radios: every row is whole, and costs nothing before it is used."""
+"""The table of radios: every row is complete, and costs nothing before it is used."""
 
 import subprocess
 import sys
@@ -50,7 +50,7 @@ def test_every_row_answers_what_is_asked_without_a_radio(name):
 
 @every_row
 def test_what_is_presumed_of_the_shared_air_is_so(name):
-    """Whether others hear it is a matter of the kind of radio, not of its settings."""
+    """Whether others hear a radio depends on its kind, not on its settings."""
     row = find(name)
     presumed = row.presume(row.settings(), NEEDS, None).capabilities
     assert presumed.shares_air == (name not in ("loopback", "iqfile"))

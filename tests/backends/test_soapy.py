@@ -1,4 +1,4 @@
-"""Parts of the radio behind SoapySDR: times, plans, bindings; faults that need a device's hand."""
+"""Parts of the radio behind SoapySDR: times, plans, bindings, and injected device faults."""
 
 import asyncio
 import os
@@ -102,7 +102,7 @@ def test_a_device_is_named_as_soapysdrs_tools_do():
 
 
 def timing(has_time, full_duplex, transfer_s, in_flight=0):
-    """How bursts leave such a device, at settings that are all the same here."""
+    """Timing of bursts on such a device, with the same settings everywhere here."""
     hardware = SimpleNamespace(
         has_time=has_time, full_duplex=full_duplex, tx_transfer_s=transfer_s, in_flight=in_flight
     )
@@ -136,7 +136,7 @@ def radio(more="", model="plain", **settings):
 
 @needs_radio
 async def test_without_stamps_and_acknowledgements_bursts_are_counted_in():
-    """Where they leave is only as sure as the host's clock; that they do, and once, is sure."""
+    """Their position is only as accurate as the host's clock, but each is sent exactly once."""
     async with opened(radio(",time=no,ack=no")) as each:
         can = each.capabilities
         assert (can.timestamps, can.full_duplex, can.tx_windows) == (False, True, None)

@@ -1,4 +1,4 @@
-"""Bursts that a device refuses as late: given up once, and the next ones leave."""
+"""Bursts that a device rejects as late: each is given up once, and the next ones leave."""
 
 import asyncio
 import os
@@ -20,20 +20,20 @@ from tests.soapy_loopback import Bus, missing
 
 needs_radio = pytest.mark.skipif(bool(missing()), reason=missing())
 NEEDED_S = 0.06
-"""So long before its time the device wants a burst."""
+"""Lead that the device requires."""
 SOON_S, IN_TIME_S = NEEDED_S / 2, 0.2
-"""Too late for the device, not for us; and in time on any machine that is not overrun."""
+"""A lead too short for the device but not for us, and one long enough on any normal machine."""
 
 
 @pytest.fixture
 def bus(request):
-    """An air of the test's own."""
+    """An air for this test alone."""
     with Bus(f"{os.getpid()}-{abs(hash(request.node.name)) % 10**6}") as found:
         yield found
 
 
 def radio(bus, tells, more=""):
-    """A device that tells of late bursts by `tells`."""
+    """A device that reports late bursts in the way `tells`."""
     name = bus._path.name.removeprefix("soapy-loopback-")
     return SoapyRadio(
         SoapySettings(
@@ -47,7 +47,7 @@ def radio(bus, tells, more=""):
 
 
 async def answers(blocks, sends):
-    """What the radio reports of them."""
+    """The radio's reports of these bursts."""
     while not all(each.done() for each in sends):
         await take(blocks, 1)
         await turn()
@@ -55,7 +55,7 @@ async def answers(blocks, sends):
 
 
 async def sent_at_last(each, blocks):
-    """Bursts one after another until one leaves; the outcomes."""
+    """Send bursts one after another until one leaves; returns the outcomes."""
     outcomes = []
     while TxOutcome.SENT not in outcomes:
         now = (await take(blocks, 1))[-1].index
@@ -68,7 +68,7 @@ async def sent_at_last(each, blocks):
 @needs_radio
 @pytest.mark.parametrize("tells", ["status", "return"])
 async def test_a_late_burst_is_given_up_and_holds_up_none_behind_it(bus, tells):
-    """As often as bursts were late, the device says so: it is not asked again and again."""
+    """The device reports each late burst once: it is not retried."""
     async with opened(radio(bus, tells)) as each:
         blocks = each.blocks()
         now = (await take(blocks, 20 * N))[-1].index
@@ -80,13 +80,13 @@ async def test_a_late_burst_is_given_up_and_holds_up_none_behind_it(bus, tells):
         more = await sent_at_last(each, blocks)
         n_late = 3 + more.count(TxOutcome.LATE)
         assert each.counters["late"] == n_late
-        # Those that were late for ourselves never reached the device.
+        # Bursts that were late for ourselves never reached the device.
         assert 1 <= bus.stats(0).late <= n_late
 
 
 @needs_radio
 async def test_what_has_begun_to_leave_is_closed_and_does_not_go_again(bus):
-    """The queue of the device is shorter than the burst."""
+    """The device's queue is shorter than the burst."""
     async with opened(radio(bus, "return", f",txbuf={2 * N}")) as each:
         blocks = each.blocks()
         now = (await take(blocks, 20 * N))[-1].index
@@ -98,13 +98,13 @@ async def test_what_has_begun_to_leave_is_closed_and_does_not_go_again(bus):
         bus.inject(0, "time_error")
         assert await answers(blocks, sends) == [TxOutcome.UNDERFLOW]
         assert bus.stats(0).sent < 20 * N
-        # END_BURST came even so.
+        # END_BURST was sent all the same.
         assert bus.stats(0).bursts == 1
         await sent_at_last(each, blocks)
 
 
 def test_the_last_sample_of_a_burst_is_zero():
-    """Some devices keep it on the air until the next one."""
+    """Some devices hold the last sample on the air until the next burst."""
     written = []
     stream = SimpleNamespace(
         mtu=100,

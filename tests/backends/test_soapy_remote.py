@@ -1,4 +1,4 @@
-"""A device at the other end of SoapyRemote: the same radio, through a network."""
+"""A device at the other end of SoapyRemote: the same radio, over a network."""
 
 import asyncio
 import json
@@ -32,7 +32,7 @@ RATE = 1e6
 
 
 def lacking():
-    """Why there can be no server here; "" when there can."""
+    """Why no server can run here; "" if one can."""
     if why := missing():
         return why
     if absent := [package for name, package in NEEDS.items() if not shutil.which(name)]:
@@ -47,7 +47,7 @@ def lacking():
 @pytest.mark.slow
 @pytest.mark.skipif(bool(lacking()), reason=lacking())
 def test_a_device_behind_soapyremote_keeps_time_as_if_it_were_here():
-    # The module for it is among the system's.
+    # The driver module is among the system's modules.
     environment = {**os.environ, "SOAPY_SDR_PLUGIN_PATH": str(module_folder())}
     environment.pop("SOAPY_SDR_ROOT", None)
     done = subprocess.run(
@@ -70,7 +70,7 @@ def test_a_device_behind_soapyremote_keeps_time_as_if_it_were_here():
 
 
 async def hear_a_burst():
-    """A burst sent and heard by the device behind the server."""
+    """Send and hear a burst through the device behind the server."""
     device = "driver=remote,remote=127.0.0.1:55132,remote:driver=loopback,remote:model=plain"
     radio = SoapyRadio(
         SoapySettings(

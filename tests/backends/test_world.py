@@ -14,13 +14,13 @@ metres = st.floats(-1e5, 1e5)
 
 
 def placed(*places, air=AIR, **more):
-    """A world whose nodes 0, 1, … stand still at these places."""
+    """A world whose nodes 0, 1, … stay at these places."""
     tracks = {i: Track([(0.0, x, y)]) for i, (x, y) in enumerate(places)}
     return World(air, tracks, **more)
 
 
 def between(outages):
-    """Whether two nodes hear each other, at any time, with these outages."""
+    """Returns a function: whether two nodes hear each other at a time, with these outages."""
     world = World(AIR, {}, outages=[Outage(*each) for each in outages])
     return lambda t: world.hop(1, 2, t) is not None
 
@@ -139,7 +139,7 @@ def test_at_300_db_below_noise_there_is_nothing(snr_db, is_heard):
 
 
 def test_what_comes_nearer_is_heard_higher_and_what_goes_away_lower():
-    """v / c: by this much both carrier and symbols are faster."""
+    """Carrier and symbols are both faster by v / c."""
     tracks = {
         0: Track([(0.0, 0.0, 0.0)]),
         1: Track([(0.0, 3000.0, 0.0), (10.0, 0.0, 0.0), (20.0, 0.0, -3000.0), (30.0, 0.0, -3e3)]),
@@ -175,7 +175,7 @@ def test_an_outage_begins_with_its_first_moment_and_ends_before_its_last():
 )
 @example([(0, 10), (1, 2)], 0.0)
 def test_any_outages_are_out_when_one_of_them_is(outages, between_s):
-    """In any order, one within another, one after another."""
+    """Outages in any order, nested or consecutive."""
     is_heard = between(outages)
     for t in range(-1, 42):
         at = t + between_s

@@ -15,12 +15,12 @@ QUIET = 0.25
 
 
 def zmq_radio(send, receive, **more):
-    """At these endpoints."""
+    """A radio at these endpoints."""
     return ZmqRadio(ZmqParams(send=send, receive=receive, **more), BLOCK_S)
 
 
 class Peer:
-    """A program that pushes what it is told to, and listens to nothing."""
+    """A program that pushes given data, and reads nothing."""
 
     def __init__(self, folder):
         self._context = zmq.Context()
@@ -30,15 +30,15 @@ class Peer:
         self._out.bind(self.receive)
 
     def push(self, *parts):
-        """A message."""
+        """Push a message."""
         self._out.send_multipart(parts)
 
     def radio(self, form="cf32_le", paced=False):
-        """Connected to it."""
+        """A radio connected to this peer."""
         return zmq_radio(self.send, self.receive, format=form, paced=paced)
 
     def close(self):
-        """Gone."""
+        """Close the peer."""
         self._context.destroy(linger=0)
 
 
@@ -54,7 +54,7 @@ async def test_messages_of_any_size_are_one_stream(peer):
     async with opened(peer.radio()) as radio:
         cuts = [0, 1, 5, 700, 701, 1500, 10 * N]
         for begin, end in itertools.pairwise(cuts):
-            # gr-zeromq's key comes before the samples, if there is one.
+            # gr-zeromq's key, if there is one, precedes the samples.
             peer.push(*([b"key"] * (begin % 2)), played[begin:end].tobytes())
         taken = await take(radio.blocks(), 10 * N)
     assert np.array_equal(heard(taken), played)
@@ -105,7 +105,7 @@ async def test_without_a_peer_time_goes_on_and_bursts_do_not_leave_twice(peer, t
 
 
 async def test_srsrans_requests_are_answered_too(tmp_path):
-    """One byte instead of a count."""
+    """A request is one byte instead of a count."""
     echo = Echo(tmp_path, "req", word=b"\xff")
     radio = zmq_radio(echo.send, echo.receive, pattern="req", paced=False)
     try:

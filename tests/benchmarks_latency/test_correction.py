@@ -22,7 +22,7 @@ def shown(true, clock):
 
 
 def stamps(sender, receiver, start, delay_back_s=DELAY_S):
-    """Everything takes as long; the answer may take longer to come back."""
+    """Stamps with equal delays everywhere; only the answer may take longer."""
     sends = [(start + at, kind, number) for at, kind, number in schedule(sender)]
     heard = [
         (kind, number, shown(at, sender.clock), shown(at + DELAY_S, receiver.clock))
@@ -43,7 +43,7 @@ def test_the_correction_finds_the_latency_between_two_clocks(here, there):
     assert found.n_sent == found.n_heard == 400
     assert found.true_s == pytest.approx(DELAY_S, abs=1e-9)
     assert found.corrected_s == pytest.approx(DELAY_S, abs=1e-4)
-    # What it corrected: both offset and drift since the machine was started.
+    # The correction: both offset and drift since the machine was started.
     counted = found.stamps.heard[-400:]
     assert np.abs(counted[:, 3] - counted[:, 2]).min() > 3
 

@@ -1,4 +1,4 @@
-"""The serial line: by the calculator, and through the pseudo-terminals."""
+"""The serial line: by calculation, and through the pseudo-terminals."""
 
 import contextlib
 import json
@@ -18,7 +18,7 @@ chunks = st.lists(st.tuples(st.floats(0, 0.01), st.binary(min_size=1, max_size=4
 
 
 def drained(pacer):
-    """(when, bytes) of all that it holds."""
+    """(when, bytes) of everything it holds."""
     out = []
     while pacer.due < float("inf"):
         out.append((pacer.due, pacer.give(pacer.due)))

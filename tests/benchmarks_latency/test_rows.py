@@ -1,4 +1,4 @@
-"""Rows whose figures do not depend on how fast the machine is, and the shape of the others."""
+"""Rows with figures that do not depend on the machine's speed, and the shape of the others."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A short assessment through real processes. How fast a machine is, is not a test's business."""
+"""A short session through real processes; the machine's speed is not tested."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from benchmarks.latency.session import run
 from benchmarks.peers.latency.table import BAUD, PEERS, unavailable
 
 FRAME = 134
-"""Bytes at least."""
+"""Minimum size of a frame in bytes."""
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""XRCE-DDS on a serial line: frames of any bytes, in any chunks, and what they carry."""
+"""XRCE-DDS on a serial line: frames of any bytes, in any chunks, and their content."""
 
 import itertools
 
@@ -20,7 +20,7 @@ from benchmarks.peers.latency.xrce_framing import (
 )
 
 CLIENT, AGENT = 1, 0
-# Half of them bytes that need stuffing, or look as if they did.
+# Half of the bytes need stuffing, or look as if they were stuffed.
 octets = st.lists(
     st.one_of(st.integers(0, 255), st.sampled_from([0x7E, 0x7D, 0x5E, 0x5D])), max_size=200
 ).map(bytes)

@@ -41,7 +41,7 @@ from tests.machine import lacks
 
 
 def no_network():
-    """Why there can be no namespaces here; "" when there can."""
+    """Why no namespaces are available here; "" if they are."""
     if not shutil.which("tc"):
         return lacks("iproute2")
     if os.geteuid():
@@ -112,7 +112,7 @@ def test_a_job_comes_back_from_its_line():
 
 
 def test_an_endpoint_needs_the_standard_library_only():
-    """It is run by interpreters that have nothing of ours."""
+    """Endpoints run with interpreters that have none of our packages."""
     code = "import benchmarks.peers.pound.endpoint"
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     subprocess.run([sys.executable, "-S", "-c", code], check=True, env=environment)
@@ -191,7 +191,7 @@ def test_a_second_of_laser_and_image(peer):
         rooms = [network.a.namespace, network.b.namespace]
     assert figures(laser).mdr_pct == 100
     assert np.all(laser.heard_at > laser.sent_at)
-    # The channel's own time for 64 KB; no machine is fast enough to do it in less.
+    # The channel's own time for 64 KB; no machine can be faster.
     assert np.nanmin(image.heard_at - image.sent_at) > 0.08
     listed = subprocess.run(["ip", "netns", "list"], capture_output=True, text=True).stdout
     assert not [room for room in rooms if room in listed]

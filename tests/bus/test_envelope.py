@@ -1,4 +1,4 @@
-"""Bus frames: what is accepted, and that nothing else crashes."""
+"""Bus frames: what is accepted; nothing else crashes."""
 
 import json
 

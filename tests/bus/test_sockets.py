@@ -1,4 +1,4 @@
-"""The runtime directory: one daemon in it, nobody else's sockets touched."""
+"""The runtime directory: it has one daemon, and other sockets stay untouched."""
 
 import os
 import socket

@@ -1,4 +1,4 @@
-"""Answers wait for a subscriber whose queue is full, and for nobody else's."""
+"""Answers wait for a subscriber with a full queue, and for no other subscriber."""
 
 import asyncio
 
@@ -8,7 +8,7 @@ import zmq
 from sdrlinkd.bus import undropped
 
 ROOM = 4
-"""Messages that a subscriber of these tests has room for, both ends of the pipe together."""
+"""Number of messages that fit for a subscriber here, in both ends of the pipe together."""
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Screens as text, held against the stored ones in docs/screens."""
+"""Screens as text, compared with the stored ones in docs/screens."""
 
 import os
 from io import StringIO
@@ -8,11 +8,11 @@ from rich.console import Console
 
 SCREENS = Path(__file__).parents[2] / "docs" / "screens"
 REWRITE = "REWRITE_SCREENS"
-"""A variable of the environment: the tests then write what they would compare with."""
+"""Environment variable with which the tests write the stored screens instead of comparing."""
 
 
 def drawn(*renderables: object, width: int = 80, height: int | None = None) -> str:
-    """What a terminal of that size shows, without colours; blanks at the ends of lines are cut."""
+    """What a terminal of that size shows, without colours and trailing blanks."""
     console = Console(file=StringIO(), width=width, legacy_windows=False, color_system=None)
     for each in renderables:
         console.print(each, highlight=False)
@@ -21,7 +21,7 @@ def drawn(*renderables: object, width: int = 80, height: int | None = None) -> s
 
 
 def assert_stored(name: str, text: str) -> None:
-    """`text` is that of docs/screens/NAME.txt."""
+    """Assert that `text` equals docs/screens/NAME.txt."""
     path = SCREENS / f"{name}.txt"
     if os.environ.get(REWRITE):
         path.parent.mkdir(exist_ok=True)

@@ -1,4 +1,4 @@
-"""Snapshots of daemons that never were: a quiet one, and one with more than a screen holds."""
+"""Invented snapshots of daemons: a quiet one, and one with more than a screen can show."""
 
 import msgspec
 

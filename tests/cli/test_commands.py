@@ -1,4 +1,4 @@
-"""sdrlinkctl against real daemons, and what bad input gets."""
+"""sdrlinkctl with real daemons, and its response to bad input."""
 
 import contextlib
 import json
@@ -23,7 +23,7 @@ ODOM = "/robot_1/odom"
 
 @pytest.fixture
 def ctl(capsys):
-    """Runs a command line; (exit code, stdout, stderr). No traceback, ever."""
+    """Runs a command line; (exit code, stdout, stderr). No traceback is allowed."""
 
     def call(*arguments):
         code = run([str(argument) for argument in arguments])
@@ -96,7 +96,7 @@ def test_pub_says_what_became_of_each_message(start_daemon, ctl):
     code, out, _ = ctl("pub", "/robot_1/odom", "{}", "--dst", "1", "-t", "3", "-r", "20", *dir_)
     assert code == 0
     assert re.findall(r"message (\d), robot 1: delivered, \d+\.\d\d ms old", out) == list("123")
-    # A robot that is alone knows of nobody who could answer.
+    # A lone robot knows of nobody who could answer.
     _, out, _ = ctl("pub", "/robot_1/odom", "{}", *dir_)
     assert "message 1, everyone: unknown\n" in out
     _, out, _ = ctl("pub", "cmd_vel", "{}", "--dst", "7", "-t", "2", "-r", "1000", *dir_)
@@ -200,7 +200,7 @@ def test_echo_says_when_nothing_comes(start_daemon, ctl):
 def test_without_a_daemon(ctl, tmp_path, arguments, recorded):
     arguments = [recorded if a == "BAG" else a for a in arguments]
     code, _, err = ctl(*arguments, "--runtime-dir", tmp_path)
-    # The exit code of status is its verdict; 2 is for what was called wrongly.
+    # The exit code of status is its verdict; 2 means wrong usage.
     assert code == (4 if arguments[0] == "status" else 2)
     assert f"no sdrlinkd answers in {tmp_path}" in err
 
@@ -339,7 +339,7 @@ def test_a_bug_of_ours_is_one_line_too(ctl, monkeypatch):
 
 
 def test_completion_and_help(ctl, monkeypatch):
-    # Whatever shell the tests are run from, if any.
+    # Independent of the shell that runs the tests, if any.
     monkeypatch.setattr("shellingham.detect_shell", lambda *_: ("bash", "/bin/bash"))
     code, out, _ = ctl("--help")
     assert code == 0
@@ -395,7 +395,7 @@ def test_a_policy_that_is_not_allowed_is_refused_and_changes_nothing(
     start_daemon, ctl, arguments, parts
 ):
     daemon = start_daemon()
-    # What is right beside it is not taken, either.
+    # Not even what is right next to it is accepted.
     more = ["--depth", "3"] if len(arguments) > 1 else []
     code, _, err = ctl("set", *arguments, *more, "--runtime-dir", daemon.directory)
     assert code == 2

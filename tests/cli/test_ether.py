@@ -1,4 +1,4 @@
-"""`sdrlink-ether`: the hub as a program of its own, and daemons that outlive it."""
+"""`sdrlink-ether`: the hub as a separate program, and daemons that outlive it."""
 
 import gc
 import signal
@@ -37,7 +37,7 @@ def start_hub(tmp_path):
 
 @pytest.fixture
 def refused(monkeypatch, capsys):
-    """What a hub says that must not start."""
+    """The message of a hub that must not start."""
 
     def call(*arguments):
         monkeypatch.setattr(sys, "argv", ["sdrlink-ether", *(str(each) for each in arguments)])
@@ -97,12 +97,12 @@ def test_what_a_hub_cannot_serve_it_says(refused, tmp_path, monkeypatch, argumen
     err = refused(*arguments, *where)
     for part in parts:
         assert part in err
-    # What it has opened is closed: else Python complains now.
+    # Everything it opened must be closed: otherwise Python complains now.
     gc.collect()
 
 
 def no_hub(make):
-    """`make`, but what it would serve it must not: nobody would stop it."""
+    """`make`, except that the hub must not run: nobody would stop it."""
 
     def made(*arguments):
         make(*arguments)._sockets.close()
@@ -113,7 +113,7 @@ def no_hub(make):
 
 @pytest.fixture
 def stopped(monkeypatch, capsys):
-    """What a hub says that is stopped before it begins."""
+    """The message of a hub that is stopped before it begins."""
 
     def call(*arguments):
         monkeypatch.setattr(sys, "argv", ["sdrlink-ether", *(str(each) for each in arguments)])
@@ -165,7 +165,7 @@ def test_without_a_scenario_all_hear_all(stopped, tmp_path):
 
 @pytest.mark.parametrize("duration_s", ["0.01", "0.1", "1e5"])
 def test_any_duration_of_a_scenario_can_be_told_to_a_hub(stopped, tmp_path, duration_s):
-    """As a lab does."""
+    """A lab passes a scenario's duration this way."""
     path = tmp_path / "s.toml"
     path.write_text(f"duration_s = {duration_s}\n[[robot]]\nid = 1\n")
     try:
@@ -203,7 +203,7 @@ def test_daemons_outlive_their_hub(start_hub, start_daemon, tmp_path_factory):
         }
 
         def talk(word):
-            """From each to the other."""
+            """Send a message from each robot to the other."""
             for robot, other in ((1, 2), (2, 1)):
                 say[robot].send(f"/robot_{robot}/cmd_vel", CDR + word)
                 message = heard[other].receive(60)
@@ -216,10 +216,11 @@ def test_daemons_outlive_their_hub(start_hub, start_daemon, tmp_path_factory):
         for node in nodes.values():
             assert carrier(node).state == "down"
             assert any("the radio delivers nothing" in text for text in carrier(node).notices)
-        # What is said while there is no air waits for it.
+        # Messages sent without an air wait for it.
         say[1].send("/robot_1/cmd_vel", CDR + b"meanwhile")
         wait_for(lambda: nodes[1].snapshot().link.tx.queued == 1)
-        # Whoever is back first sends at once: robot 2 is, or it would not hear what waited.
+        # The first one back sends at once: that is robot 2, because otherwise it would not hear
+        # what waited.
         nodes[1].send_signal(signal.SIGSTOP)
         start_hub(folder)
         wait_for(lambda: carrier(nodes[2]).state == "up", 60)

@@ -1,4 +1,4 @@
-"""`sdrlinkctl lab`: one command runs a scenario; report and picture lie in a folder."""
+"""`sdrlinkctl lab`: one command runs a scenario; report and figures are in a folder."""
 
 import time
 from pathlib import Path
@@ -25,18 +25,18 @@ id = 2
 topics = ["cmd_vel"]
 sends = false
 """
-# Whole tenths, with a while before each border for what is on its way.
+# Whole tenths, with a pause before each border for messages in flight.
 OUTAGE = "[outages]\ntimes = [[0.76, 1.16]]\n"
 
 
 class LateListener(run_module.Listener):
-    """Of robot 2, the lab listens late: the air has to wait for it."""
+    """The lab starts late to listen to robot 2: the air has to wait for it."""
 
     def __init__(self, directory, by_age):
         if directory.name == "robot_2":
             give_up_at = time.monotonic() + 1.0
             with HubWatch(directory.parent / "hub") as watch:
-                # In vain, when the air waits.
+                # Without effect if the air waits.
                 while watch.ask().now_s < 0.5 and time.monotonic() < give_up_at:
                     pass
         super().__init__(directory, by_age)
@@ -44,7 +44,7 @@ class LateListener(run_module.Listener):
 
 @pytest.fixture
 def lab(capsys, tmp_path):
-    """Runs `sdrlinkctl lab`; (exit code, stdout, stderr). No traceback, ever."""
+    """Runs `sdrlinkctl lab`; (exit code, stdout, stderr). No traceback is allowed."""
 
     def call(*arguments):
         code = run(["lab", *(str(each) for each in arguments), "--out", str(tmp_path / "out")])
@@ -57,7 +57,7 @@ def lab(capsys, tmp_path):
 
 @pytest.fixture
 def come_to(monkeypatch):
-    """Runs that do not take place come to the report given; what they were asked for."""
+    """Replace runs by a given report; returns the arguments of the calls."""
     seen = []
 
     def come_to(made):
@@ -66,7 +66,7 @@ def come_to(monkeypatch):
             return made
 
         monkeypatch.setattr("sdrlinkd.cli.lab.run_lab", pretend)
-        # Takes a second, and has tests of its own.
+        # Takes a second, and has separate tests.
         monkeypatch.setattr("sdrlinkd.lab.pictures.draw", lambda *_: None)
         return seen
 
@@ -75,7 +75,7 @@ def come_to(monkeypatch):
 
 @pytest.fixture
 def asked(come_to):
-    """What a run was asked for; none takes place."""
+    """The arguments of a run, which does not take place."""
     return come_to(report())
 
 
@@ -90,7 +90,7 @@ def test_a_run_is_told_drawn_and_written(lab, tmp_path, monkeypatch):
     picture = (tmp_path / "out/lab.png").read_bytes()
     assert picture.startswith(b"\x89PNG")
     assert len(picture) > 5000
-    # Robot 2 only listens, and hears all but what is sent in the outage.
+    # Robot 2 only listens, and hears everything but what is sent in the outage.
     (pair,) = made.pairs
     assert (pair.sender, pair.receiver, pair.sent) == (1, 2, 20)
     assert pair.pdr_tenths == [1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0]
@@ -98,7 +98,7 @@ def test_a_run_is_told_drawn_and_written(lab, tmp_path, monkeypatch):
     sender, listener = made.robots
     assert sender.ledger_adds_up
     assert listener.ledger_adds_up
-    # It tells only that it is there.
+    # It only announces itself.
     assert 0 < listener.bursts_sent < 6 < sender.bursts_sent
     assert "Two small robots: who got what of whom" in out
     assert "PDR 0.8000 in all, 0.8000 at worst; in lock-step" in out
@@ -198,7 +198,7 @@ def test_a_shipped_scenario_is_called_by_its_name(lab, asked, tmp_path, monkeypa
     assert code == 0
     assert asked[0].path == ETC / "scenarios/two-robots.toml"
     assert "starting the hub and 2 robots" in out
-    # One's own goes before it.
+    # The user's own setting has priority.
     own = write_scenario(tmp_path).rename(tmp_path / name)
     lab(name)
     assert asked[1].path.absolute() == own

@@ -1,4 +1,4 @@
-"""`sdrlinkctl phy`: tables, pictures and PDUs of recordings, and what bad input gets."""
+"""`sdrlinkctl phy`: tables, figures and PDUs of recordings, and its response to bad input."""
 
 import json
 import re
@@ -15,7 +15,7 @@ from tests.phy.wifi_frames import frame, ht_frame, with_fcs
 
 @pytest.fixture
 def ctl(capsys):
-    """Runs a command line; (exit code, stdout, stderr). No traceback, ever."""
+    """Runs a command line; (exit code, stdout, stderr). No traceback is allowed."""
 
     def call(*arguments):
         code = run(["phy", *(str(argument) for argument in arguments)])
@@ -70,7 +70,7 @@ def test_noise_has_no_bursts(ctl, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize("picture", ["spectrum", "constellation"])
 def test_pictures_are_drawn(ctl, tmp_path, monkeypatch, picture):
-    """In the folder where one is, not among the recordings."""
+    """Figures are written to the working folder, not next to the recordings."""
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
     write_bursts(tmp_path / "rec")
@@ -138,7 +138,7 @@ def test_bad_input_is_refused_in_one_line(ctl, tmp_path):
 
 @pytest.fixture
 def wifi_file(tmp_path):
-    """A recording of three 802.11a frames, the second with a wrong octet; what was sent."""
+    """A recording of three 802.11a frames, the second with a wrong octet; and the frames."""
     rng = np.random.default_rng(3)
     beacon = with_fcs(bytes([0x80, 0, 0, 0]) + bytes(6 * [255]) + bytes(range(12)) + rng.bytes(40))
     broken = bytearray(with_fcs(rng.bytes(60)))
@@ -171,7 +171,7 @@ def test_wifi_frames_for_people_and_programs(ctl, wifi_file):
 
 
 def test_frames_of_802_11n_are_told_as_such(ctl, tmp_path):
-    """In mixed format they begin as one of 6 Mbit/s that would be wrong."""
+    """In mixed format they begin like a wrong frame of 6 Mbit/s."""
     parts = [silence(400), ht_frame(3, 138), silence(400), ht_frame(7, 900, True, True)]
     path = tmp_path / "air.cf32"
     rng = np.random.default_rng(3)

@@ -1,4 +1,4 @@
-"""`sdrlinkctl radio probe`: what is here, and what a daemon would do with it."""
+"""`sdrlinkctl radio probe`: the attached radios, and how a daemon would drive them."""
 
 import json
 from pathlib import Path
@@ -15,7 +15,7 @@ needs_radio = pytest.mark.skipif(bool(missing()), reason=missing())
 
 @pytest.fixture(autouse=True)
 def _drivers(monkeypatch):
-    """No others than the test radio's; a wide terminal."""
+    """Only the test radio's driver; a wide terminal."""
     if not missing():
         monkeypatch.setenv("SOAPY_SDR_PLUGIN_PATH", str(module_folder()))
     monkeypatch.setenv("SOAPY_SDR_ROOT", "/nonexistent")
@@ -74,7 +74,7 @@ def test_what_is_not_there_is_told_apart(capsys, args, part):
 def test_shipped_radio_configurations_want_only_a_frequency(name):
     path = ETC / "radios" / f"{name}.toml"
     text = path.read_text().replace("frequency_hz = 0.0 ", "frequency_hz = 433.92e6 ")
-    # In its place, and copied beside a registry, as a page may say.
+    # In its place, and copied next to a registry, as a page suggests.
     assert (ETC / "radios" / "registry.csv").read_text() == (ETC / "registry.csv").read_text()
     assert make_setup(parse_config(text, str(path)), ETC)
     setup = make_setup(parse_config(text, str(path)), path.parent)

@@ -1,4 +1,4 @@
-"""`sdrlinkctl record`: from radios of a configuration, and what bad input gets."""
+"""`sdrlinkctl record`: records radios of a configuration, and its response to bad input."""
 
 import re
 import signal
@@ -18,7 +18,7 @@ DEVICE = ("--device", "driver=none", "--frequency", "433e6", "--rate", "2e6")
 
 @pytest.fixture
 def ctl(capsys):
-    """Runs a command line; (exit code, stdout, stderr). No traceback, ever."""
+    """Runs a command line; (exit code, stdout, stderr). No traceback is allowed."""
 
     def call(*arguments):
         code = run([str(argument) for argument in arguments])
@@ -31,7 +31,7 @@ def ctl(capsys):
 
 @pytest.fixture
 def config(tmp_path):
-    """Writes a configuration with this backend; further TOML may follow."""
+    """Writes a configuration with this backend and optional further TOML."""
 
     def write(backend, more=""):
         path = tmp_path / "robot.toml"

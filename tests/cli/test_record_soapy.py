@@ -22,22 +22,22 @@ RATE_HZ, FREQUENCY_HZ = 1e6, 2.4e9
 TUNING = Tuning(RATE_HZ, FREQUENCY_HZ)
 PATIENCE_S = 60
 ATTEMPTS = 3
-"""A busy machine may lose samples, or be late."""
+"""A busy machine may lose samples, or be late, so tests are repeated up to this number."""
 
 pytestmark = pytest.mark.realtime
 
 
 @pytest.fixture
 def device(monkeypatch):
-    """Arguments of the devices of an air of their own, by unit."""
+    """Device arguments for an air of this test alone, by unit."""
     if why := missing():
         pytest.skip(why)
     monkeypatch.setenv("SOAPY_SDR_PLUGIN_PATH", str(module_folder()))
-    # Without a root SoapySDR loads no other driver: this is faster, and quiet.
+    # With an empty root SoapySDR loads no other driver: this is faster, and quiet.
     monkeypatch.setenv("SOAPY_SDR_ROOT", "/nonexistent")
     name = f"record-{uuid.uuid4().hex[:12]}"
     with Bus(name):
-        # A busy machine may be late by a second.
+        # Tolerates a second of delay on a busy machine.
         yield (
             lambda unit: (
                 f"driver=loopback,model=usrp,bus={name},unit={unit},noise_db=-50,rxbuf=1000000"
@@ -46,14 +46,14 @@ def device(monkeypatch):
 
 
 def radio(device, unit, **changes):
-    """Sends and hears at the level of who sent."""
+    """A radio that receives at the level of the sender."""
     gains = {"rx_gain_db": 20, "tx_gain_db": 40, "tx_enabled": True} | changes
     settings = SoapySettings(device=device(unit), rate_hz=0, frequency_hz=0, **gains)
     return SoapyRadio(settings, longest_s=0.25)
 
 
 class Recording:
-    """A recording that is being made: entered when the radio is heard."""
+    """A recording in progress; entered when the radio is heard."""
 
     def __init__(self, device, unit, path):
         wish = CaptureWish(path, "ci16_le", None, None, phy.OFDM_64_16)
@@ -68,7 +68,7 @@ class Recording:
         return self
 
     async def __aexit__(self, *_):
-        # What was on the air is recorded when as much more as may be on its way is there.
+        # A signal is recorded once as much more is recorded as may be in flight.
         await self._heard(self._recorded_s + 0.3)
         self._capture.stop()
         self.report = await self._task
@@ -90,7 +90,7 @@ class Recording:
 
 @contextlib.asynccontextmanager
 async def on_the_air(sender):
-    """Opened, its stream taken; a function for the index it stands at."""
+    """Open the radio and take its stream; yields a function for its current index."""
     at = asyncio.get_running_loop().create_future()
 
     async def take():
@@ -115,7 +115,7 @@ def decoded(path):
 
 
 def annotated(path):
-    """(start, length) of each burst, by their package, which finds the file valid."""
+    """(start, length) of each burst, read by SigMF's package, which must find the file valid."""
     theirs = sigmf.fromfile(f"{path}.sigmf-meta")
     theirs.validate()
     return np.array(
@@ -128,7 +128,7 @@ def annotated(path):
 
 
 def begins_at(path, near, burst):
-    """Where a burst of these samples begins, by correlation."""
+    """Start of a burst with these samples, found by correlation."""
     with IqRecording(path) as recording:
         x = recording.read(near - 200, len(burst) + 400)
     return near - 200 + int(np.abs(np.correlate(x, burst, "valid")).argmax())
@@ -199,7 +199,7 @@ def test_the_commands_do_the_same(device, tmp_path, capsys):
         assert capsys.readouterr().out.startswith(
             "sent 3 of 3 stretches; between them is silence, below -"
         )
-        # What was sent is in it when it is as much longer as may be on its way.
+        # The recording contains what was sent once it is longer by what may be in flight.
         size = data.stat().st_size
         enough = size + 4 * round(0.3 * 2e6)
         wait_until(lambda: data.stat().st_size > enough, PATIENCE_S, record)

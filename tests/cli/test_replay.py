@@ -1,4 +1,4 @@
-"""`sdrlinkctl replay`: recordings onto radios of a configuration, and what bad input gets."""
+"""`sdrlinkctl replay`: sends recordings on configured radios, and its response to bad input."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ DEVICE = ("--device", "driver=none", "--frequency", "433e6", "--transmit")
 
 @pytest.fixture
 def ctl(capsys):
-    """Runs a command line; (exit code, stdout, stderr). No traceback, ever."""
+    """Runs a command line; (exit code, stdout, stderr). No traceback is allowed."""
 
     def call(*arguments):
         code = run([str(argument) for argument in arguments])
@@ -28,7 +28,7 @@ def ctl(capsys):
 
 @pytest.fixture
 def config(tmp_path):
-    """Writes a configuration; a radio that writes the recording `sent`, or what is given."""
+    """Writes a configuration; by default with a radio that writes the recording `sent`."""
 
     def write(text='backend = "iqfile"\n[iqfile]\ntransmit = "sent"\npaced = false\n', rate_hz=2e6):
         path = tmp_path / "robot.toml"
@@ -62,7 +62,7 @@ def test_raw_samples_are_sent_too(ctl, config, tmp_path):
 
 
 def test_what_is_not_sent_is_told_by_the_exit_code(ctl, config, tmp_path):
-    """The stream ends before it could be: its recording is too short."""
+    """The stream ends first, because its recording is too short."""
     write_bursts(tmp_path / "rec")
     record(tmp_path / "short", np.zeros(240_000, np.complex64), rate_hz=RATE_HZ)
     radio = 'backend = "iqfile"\n[iqfile]\nreceive = "short"\ntransmit = "sent"\npaced = false\n'

@@ -1,4 +1,4 @@
-"""The status screen: what is on it, that it fits, and that it says what it leaves out."""
+"""The status screen: its content, that it fits, and that it says what it leaves out."""
 
 import re
 
@@ -55,7 +55,7 @@ def test_what_is_left_out_is_counted():
 def test_the_worst_come_first():
     lines = screen(busy(), 140, 60).splitlines()
     robots = [line.split()[0] for line in lines if re.match(r"\d +\d", line)]
-    # Another registry first, then by what is lost.
+    # Robots with another registry come first, then the order is by loss.
     assert robots == ["5", "9", "8", "7", "6", "4", "3", "2"]
     sent = [line.split()[0] for line in lines if line.startswith("/robot_1")]
     assert sent[:2] == ["/robot_1/topic_9", "/robot_1/topic_7"]

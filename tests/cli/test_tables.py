@@ -36,7 +36,7 @@ SUMMARY = BagSummary(
 
 
 def run(kind: str, topic: str) -> RunResult:
-    """A run of the demonstration that never was."""
+    """An invented run of the demonstration."""
     heard = TopicResult(
         name=topic, type=ODOMETRY, sent=3982, received=3341, pdr=0.839,
         goodput_bytes_per_s=21763.4, latency_ms=LATENCY, path_error_m=0.0012,
@@ -50,7 +50,7 @@ def run(kind: str, topic: str) -> RunResult:
 
 
 def planned(topic: str) -> Plan:
-    """A plan that never was."""
+    """An invented plan."""
     topics_of = [
         TopicPlan(topic, "latency", 123.4, 65536.0, 6500, 0.613, 12.3456, 1.0, 34.94),
         TopicPlan("odom", "default", 30.0, 724.0, 1, 0.045, 0.0069, 2.0, 0.174),
@@ -63,7 +63,7 @@ def planned(topic: str) -> Plan:
 
 
 def probed(device: str) -> tuple[DeviceProbe, Assessment]:
-    """A radio that never was."""
+    """An invented radio."""
     way = msgspec.convert(
         {
             "rates_hz": [(1e6 * i, 1e6 * i + 5e5) for i in range(1, 9)],
@@ -80,7 +80,7 @@ def probed(device: str) -> tuple[DeviceProbe, Assessment]:
 
 
 def bench_rows() -> list[Row]:
-    """Rows of a benchmark that never was."""
+    """Invented rows of a benchmark."""
     peers = {"blocking_receive_only": 256_300.0, "zmq_asyncio_receive_only": 74_710.0}
     return [Row("path_cost_over_crc_and_join_1024B", 2.677, "ratio", 4.0, "less", 180, peers)]
 
@@ -127,7 +127,7 @@ def test_no_figure_is_cut_and_nothing_is_wider_than_the_screen(command, width):
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("command", everything(80))
 def test_every_figure_stays_whole_on_its_line(command, width):
-    """A table that wrapped a figure would leave an empty cell where the row begins."""
+    """A table that wraps a figure would leave an empty cell at the start of the row."""
     for table in everything(width)[command]:
         if not isinstance(table, FittedTable):
             continue

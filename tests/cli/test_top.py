@@ -1,4 +1,4 @@
-"""The live screen: its picture at two sizes, its keys, and a daemon that goes and comes back."""
+"""The live screen: its appearance at two sizes, its keys, and a daemon that goes and returns."""
 
 from io import StringIO
 
@@ -15,7 +15,7 @@ from tests.cli.snapshots import SNAPSHOT, busy
 
 
 class Asked:
-    """A daemon's control socket that answers what it is told to."""
+    """A fake control socket with preset answers."""
 
     def __init__(self):
         self.requests = []
@@ -31,7 +31,7 @@ class Asked:
 
 
 def make_app(asked=None):
-    """One that is shown moments by hand."""
+    """An app whose snapshots are set by hand."""
     return TopApp(lambda: None, asked or Asked(), lambda: "waiting for sdrlinkd in /run", 0.0)
 
 
@@ -139,7 +139,7 @@ async def test_why_is_told_of_the_selected_topic():
         assert "class latency, priority 90" in text_of(app)
         await pilot.press("x")
         assert not isinstance(app.screen, Explanation)
-        # What another robot sends is explained there.
+        # Messages from another robot are explained there.
         await pilot.press("s", "down", "down", "down", "w")
         await pilot.pause()
         assert "robot 2 sends it" in text_of(app)

@@ -54,7 +54,7 @@ def test_delay_leaves_out_what_it_does_not_know():
 
 
 def measuring(daemon, *arguments):
-    """`topic …` while messages come, until it ends; what it printed."""
+    """Output of `topic …`, run while messages come until it ends."""
     message = to_cdr(empty(KIND), KIND)
     with (
         sdrlinkctl("topic", *arguments, "--runtime-dir", daemon.directory) as topic,
@@ -80,7 +80,7 @@ def test_a_topic_heard_is_measured(start_daemon, what, pattern):
 def test_ctrl_c_ends_with_a_summary(start_daemon):
     daemon = start_daemon()
     with sdrlinkctl("topic", "hz", HEARD, "--runtime-dir", daemon.directory) as topic:
-        # It says so when a second has passed without any.
+        # It reports a second without any message.
         assert topic.line() == "no new messages"
         assert topic.stop(signal.SIGINT) == 130
     assert f"{HEARD}: 0 messages in" in topic.out()

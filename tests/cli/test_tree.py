@@ -1,4 +1,4 @@
-"""The command tree: what is listed is what there is, and only what is called is loaded."""
+"""The command tree: it lists exactly what exists, and only the called command is loaded."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""What scripts get of `status`: the exit code, bare fields, CSV; and of a restart, nothing."""
+"""What scripts get from `status`: the exit code, bare fields, CSV; and nothing of a restart."""
 
 import contextlib
 import os
@@ -110,7 +110,7 @@ def test_a_follower_waits_for_a_daemon_that_is_restarted(start_daemon):
 
 
 class Terminal:
-    """A command in a terminal of 80 x 24; what it has written."""
+    """A command in a terminal of 80 x 24, with everything it has written."""
 
     def __init__(self, *arguments):
         ours, theirs = pty.openpty()
@@ -126,20 +126,20 @@ class Terminal:
         self._reader.start()
 
     def _read(self):
-        # The other end closed is an error of input here.
+        # A closed other end is an input error here.
         with contextlib.suppress(OSError):
             while data := os.read(self._fd, 65536):
                 self.text += data.decode(errors="replace")
 
     def shows(self, text):
-        """Whether it stood on the screen at any time, colours and jumps left out."""
+        """Whether the text was on the screen at any time, apart from colours and cursor moves."""
         return text in re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", self.text)
 
     def press(self, keys):
         os.write(self._fd, keys.encode())
 
     def end(self):
-        """Its exit code."""
+        """The exit code of the command."""
         code = self.process.wait(30)
         self._reader.join(10)
         os.close(self._fd)

@@ -1,4 +1,4 @@
-"""A program that has the client and pyzmq alone, for any Python: `alone.py RUNTIME_DIR`."""
+"""A program that has only the client and pyzmq, for any Python: `alone.py RUNTIME_DIR`."""
 # ruff: noqa: T201
 
 import asyncio

@@ -1,4 +1,4 @@
-"""Daemons that end and come back while a program goes on."""
+"""Daemons that end and come back while a program continues."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from tests.waiting import wait_for
 
 @pytest.fixture
 def spawn_again():
-    """Starts one more daemon in the folder of one that has ended; does not wait for it."""
+    """Start a new daemon in the folder of an ended one; does not wait for it."""
     started = []
 
     def spawn(daemon):
@@ -24,7 +24,7 @@ def spawn_again():
 
 @pytest.fixture
 def stop():
-    """Ends a daemon in peace."""
+    """Stop a daemon cleanly."""
 
     def end(daemon):
         assert daemon.stop() == 0
@@ -34,7 +34,7 @@ def stop():
 
 @pytest.fixture
 def restart(stop, spawn_again):
-    """Ends a daemon and waits until another one answers in its folder."""
+    """Stop a daemon, and wait until another one answers in its folder."""
 
     def again(daemon):
         stop(daemon)

@@ -18,7 +18,7 @@ FILES = (ROOT / "sdrlinkd/__init__.py", ROOT / "sdrlinkd/client")
 
 
 def call(*arguments, **options):
-    """A command's output; fails with what it said."""
+    """Output of a command; a failure includes it."""
     done = subprocess.run(
         [str(each) for each in arguments], capture_output=True, text=True, check=False, **options
     )
@@ -27,9 +27,9 @@ def call(*arguments, **options):
 
 
 def python_3_10():
-    """A real one, or None where the machine has none."""
+    """A real Python 3.10, or None if the machine has none."""
     found = [Path(name)] if (name := which("python3.10")) else []
-    # A shim of pyenv's may stand for one that is not chosen.
+    # A shim of pyenv may stand for a version that is not selected.
     for candidate in (*found, *sorted(Path.home().glob(".pyenv/versions/3.10.*/bin/python"))):
         tried = subprocess.run(
             [candidate, "-c", "import sys; sys.exit(sys.version_info[:2] != (3, 10))"],
@@ -54,7 +54,7 @@ def wheel(tmp_path_factory):
 
 
 def run_alone(python, daemon):
-    """The program beside this test, and nothing of this source tree."""
+    """Run the program next to this test, without anything of this source tree."""
     out = call(python, "-I", PROGRAM, daemon)
     nobody = f"no sdrlinkd answers in {daemon}/nobody"
     assert out.count(nobody) == 3
@@ -96,7 +96,7 @@ def test_the_wheel_is_the_client_alone(wheel, start_daemon, tmp_path):
     ]  # fmt: skip
     own = tomllib.loads((ROOT / "etc/client/pyproject.toml").read_text())["project"]
     assert own["dependencies"] == ["pyzmq>=22.3"]
-    # What `pip install` would do, without asking an index.
+    # Like `pip install`, but without an index.
     call(sys.executable, "-m", "venv", "--without-pip", tmp_path / "bare")
     site = next((tmp_path / "bare/lib").glob("python3.*/site-packages"))
     with zipfile.ZipFile(wheel) as archive:

@@ -80,7 +80,7 @@ def test_a_prefix_takes_all_and_a_name_only_itself(start_daemon):
 
 
 def test_everything_is_every_topic_and_nothing_else():
-    """A daemon that waits for its first consumer takes notice of filters of topics only."""
+    """A daemon that waits for its first consumer only notices filters of topics."""
     assert topic_filter("*") == topic_filter("/*") == b"/"
 
 

@@ -1,4 +1,4 @@
-"""Every message that asks for a receipt is answered, whatever becomes of it and of its daemon."""
+"""Every message that requests a receipt is answered, whatever becomes of it and of its daemon."""
 
 import asyncio
 import json
@@ -76,13 +76,13 @@ def module_daemon(tmp_path_factory):
 
 @pytest.fixture
 def policed(module_daemon):
-    """Sends frames as they are; the receipt that comes."""
+    """Sends raw frames; returns the receipt."""
     context = zmq.Context()
     with context.socket(zmq.SUB) as sub, context.socket(zmq.PUSH) as push:
         sub.connect(f"ipc://{module_daemon.directory}/out.sock")
         push.connect(f"ipc://{module_daemon.directory}/in.sock")
         sub.subscribe(b"\0receipt\0")
-        # A new topic each time: of several subscribers, only the first is answered.
+        # A new topic each time, because only the first of several subscribers is answered.
         here = new_ack_topic()
         sub.subscribe(here)
         assert sub.poll(20_000), "the daemon does not answer"
@@ -115,7 +115,7 @@ def test_a_client_that_does_not_check_is_answered(start_daemon):
 
 @pytest.mark.parametrize("rx_depth", [1, 256])
 def test_many_answers_at_once_all_come(start_daemon, rx_depth):
-    """A robot that is alone gives up on all of them in one tick of its timers."""
+    """A lone robot gives up on all of them in one tick of its timers."""
     daemon = start_daemon(
         f"rx_depth = {rx_depth}\n[link]\nreceipt_s = 0.3\n[direct]\nhear_self = false\n"
     )
@@ -141,7 +141,7 @@ def test_a_producer_that_does_not_read_holds_up_nobody_else(start_daemon):
         frozen.connect(f"ipc://{daemon.directory}/out.sock")
         assert frozen.poll(20_000)
         push.connect(f"ipc://{daemon.directory}/in.sock")
-        # More than what the operating system keeps for a socket, too.
+        # More than the operating system buffers for a socket, too.
         header = ENVELOPE_VERSION + pack_map({"id": "frozen." + "x" * 200, "d": 7})
         for _ in range(6000):
             push.send_multipart([b"/robot_1/nothing\0", header, CDR])
@@ -160,7 +160,7 @@ def test_a_daemon_that_is_restarted_owes_nothing(start_daemon, spawn_again):
         daemon.expected_exit = -9
         wait_for(spawn_again(daemon).is_up)
         later = out.send("/robot_1/scan", CDR, dst=3, lifespan_ms=1e-3, receipt=True)
-        # What the new daemon says may come between.
+        # Messages of the new daemon may come in between.
         told = [out.receipt(30) for _ in (*names, later)]
         assert sorted((each.id, each.dst, each.fate, each.reason) for each in told) == [
             *((name, 2, "unknown", DAEMON_GONE) for name in names),
@@ -170,7 +170,7 @@ def test_a_daemon_that_is_restarted_owes_nothing(start_daemon, spawn_again):
 
 @pytest.fixture
 def impatient(monkeypatch):
-    """A producer that believes sooner that a daemon is gone."""
+    """A producer that assumes sooner that a daemon is gone."""
     monkeypatch.setattr(producer, "STILL_THERE_S", 0.1)
     monkeypatch.setattr(producer, "GONE_S", 0.5)
 
@@ -181,7 +181,7 @@ def test_a_daemon_that_never_comes_back_owes_nothing(start_daemon, impatient):
     name = out.send(ODOM, CDR, dst=2, receipt=True)
     daemon.kill()
     daemon.expected_exit = -9
-    # Also for who never waits for long.
+    # Applies also to a caller that never waits for long.
     deadline = time.monotonic() + 60
     while (told := out.receipt(0.05)) is None:
         assert time.monotonic() < deadline
@@ -203,13 +203,13 @@ async def test_a_daemon_that_is_gone_owes_nothing_in_asyncio(start_daemon, impat
 
 
 async def test_tasks_share_a_publisher(start_daemon):
-    """One waits for receipts, others send, ask and flush: nobody takes another's answer."""
+    """One waits for receipts, others send, query and flush: no task takes another's answer."""
     daemon = start_daemon()
     async with AsyncPublisher(daemon.directory) as out:
         names, told = [], []
 
         async def hear():
-            # While nothing is owed, `receipt` returns at once, and lets others go on.
+            # Without receipts pending, `receipt` returns at once, and lets other tasks run.
             while len(told) < 200:
                 if (each := await out.receipt(0.02)) is not None:
                     told.append(each.id)

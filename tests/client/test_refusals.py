@@ -1,4 +1,4 @@
-"""What the daemon would refuse, the client refuses: at once, by the daemon's present word."""
+"""The client refuses what the daemon would refuse: at once, by the daemon's current rules."""
 
 import asyncio
 
@@ -60,7 +60,7 @@ MESSAGES = [
 
 
 def push(directory, *messages):
-    """Frames as they are, from any program."""
+    """Send raw frames, as any program could."""
     context = zmq.Context()
     with context.socket(zmq.PUSH) as socket:
         socket.connect(f"ipc://{directory}/in.sock")
@@ -82,7 +82,7 @@ def test_send_refuses_in_the_daemons_words(start_daemon):
             assert (str(refused.value), refused.value.reason) == (says, reason)
         out.send(ODOM, CDR + bytes(257_801))
     assert daemon.snapshot().link.tx.accepted == 1
-    # The same mistakes of a program in another language.
+    # The same mistakes made by a program in another language.
     keys = {"qos": "q", "priority": "p", "dst": "d", "lifespan_ms": "ls", "published_ns": "t"}
     for wishes, says in WISHES:
         if isinstance(wishes.get("published_ns"), int):
@@ -139,7 +139,7 @@ def test_a_limit_that_changes_while_running_is_known_at_once(start_daemon):
     with Publisher(daemon.directory) as out, daemon.control() as control:
         out.send(ODOM, CDR + bytes(100))
         control.ask("set", {"topic": "odom", "max_bytes": 50})
-        # Whoever has not looked yet leaves it to the daemon.
+        # A client that has not queried yet leaves the refusal to the daemon.
         out.flush()
         with pytest.raises(MessageRefusedError, match=r"at most 50 B with topic.odom.max_bytes"):
             out.send(ODOM, CDR + bytes(100))
@@ -156,7 +156,7 @@ def registry_of(folder, *names):
 
 @pytest.fixture(params=["looks", "only asks"])
 def looking(request, monkeypatch):
-    """A producer that has not looked yet, after a restart, asks before it refuses."""
+    """A producer that queries the daemon again after a restart, before it refuses."""
     if request.param == "only asks":
         monkeypatch.setattr(producer, "LOOK_S", 1e9)
 
@@ -200,7 +200,7 @@ def test_a_message_that_waited_for_a_daemon_is_checked_by_that_one(
         out.send("/robot_1/one", CDR)
         registry_of(tmp_path, "two")
         stop(daemon)
-        # Now no daemon is there; the next one comes while `send` waits for it.
+        # Now no daemon is running; the next one starts while `send` waits for it.
         again = spawn_again(daemon)
         with pytest.raises(MessageRefusedError, match=r"allowed: /robot_1/two$"):
             out.send("/robot_1/one", CDR)

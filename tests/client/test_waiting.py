@@ -1,4 +1,4 @@
-"""How long a program waits, and what it is told when its daemon is another by then."""
+"""How long a program waits, and what it learns when its daemon has been replaced meanwhile."""
 
 import asyncio
 import threading
@@ -34,12 +34,12 @@ def test_a_deadline_passes_once():
 
 
 def test_send_waits_no_longer_than_it_is_told(tmp_path):
-    """However many things there are to wait for."""
+    """The limit holds for all waits together."""
     context = zmq.Context()
     with context.socket(zmq.XPUB) as out_socket, context.socket(zmq.PULL) as in_socket:
         out_socket.bind(f"ipc://{tmp_path}/out.sock")
         in_socket.bind(f"ipc://{tmp_path}/in.sock")
-        # Somebody listens and never answers.
+        # A listener that never answers.
         with Publisher(tmp_path, timeout_s=0.5) as out:
             began = time.monotonic()
             with pytest.raises(NoDaemonError):
@@ -49,7 +49,7 @@ def test_send_waits_no_longer_than_it_is_told(tmp_path):
 
 
 async def test_who_has_the_answer_goes_on_whoever_listens(start_daemon):
-    """Several tasks wait for receipts that never come, one for what does."""
+    """Several tasks wait for receipts that never come, one for an answer that does."""
     daemon = start_daemon('backend = "ether"\n[ether]\ndir = "nobody"\n')
     async with AsyncPublisher(daemon.directory) as out:
         await out.send("/robot_1/odom", CDR, receipt=True)
@@ -65,7 +65,7 @@ async def test_who_has_the_answer_goes_on_whoever_listens(start_daemon):
 
 @pytest.fixture
 def full_stream(tmp_path):
-    """A daemon whose first answer is lost among messages; the topics that it was asked about."""
+    """A daemon whose first answer is lost among messages; yields the topics it was queried for."""
     asked, is_over = [], threading.Event()
 
     def serve(out):

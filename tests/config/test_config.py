@@ -1,4 +1,4 @@
-"""The configuration: the shipped file is the defaults; every error cites key, given, allowed."""
+"""The configuration: the shipped file has the defaults; errors cite key, given, allowed."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Mistakes that people make in a configuration: each gets one line that says where and what."""
+"""Common mistakes in a configuration: each yields one line that says where and what."""
 
 import re
 from pathlib import Path
@@ -13,7 +13,7 @@ LOOPBACK = 'backend = "loopback"\n'
 SOAPY = 'backend = "soapy"\n[soapy]\ndevice = "driver=uhd"\n'
 ON_AIR = "[modem]\nfrequency_hz = 4e8\n"
 
-# What stands in the file, the line that is cited (0: none), and what is said of it.
+# Content of the file, the cited line (0: none), and the message.
 MISTAKES = [
     ('namespce = "robot_1"', 1, ["namespce: unknown key; did you mean namespace?"]),
     ('[topic.scan]\nqos = "realtime"', 2, ['topic.scan.qos: got "realtime"', 'one of "bulk"']),
@@ -93,7 +93,7 @@ MISTAKES = [
 
 @pytest.fixture
 def check(tmp_path, capsys):
-    """`sdrlinkd --check` of a text: exit code, what it says, and its error."""
+    """`sdrlinkd --check` of a text: exit code, output, and errors."""
 
     def of(text):
         path = tmp_path / "m.toml"

@@ -1,4 +1,4 @@
-"""How far off in frequency bursts are looked for follows the radios' crystals."""
+"""The range of frequency offsets in the burst search follows the radios' crystals."""
 
 import pytest
 

@@ -8,7 +8,7 @@ from sdrlinkd.errors import ConfigError
 
 @pytest.fixture
 def setup(tmp_path):
-    """A setup from names of topics, and keys of the configuration."""
+    """A setup from topic names and keys of the configuration."""
 
     def make(names=("odom", "scan"), **keys):
         csv = "Topic, Type\n" + "".join(f"{name}, nav_msgs/Odometry\n" for name in names)

@@ -1,6 +1,6 @@
-"""Daemons of every kind of link, one after the other in this process: what they compile.
+"""Runs daemons with every kind of link in turn in this process, to see what they compile.
 
-Prints each kernel that was given a new signature after the warm-up; run by a test.
+Prints each kernel that was compiled for a new signature after the warm-up; a test runs it.
 """
 
 import contextlib
@@ -28,7 +28,7 @@ ECHOES = "[channel]\nsnr_db = 30.0\nclock_ppm = 10.0\ndelay_s = 1.3e-6\nrx_image
 
 
 def signatures() -> set[tuple[str, str]]:
-    """(kernel, what it is compiled for) of all."""
+    """All kernels with their signatures: (kernel, what it is compiled for)."""
     return {
         (f"{name}.{key}", str(signature))
         for name, module in list(sys.modules.items())
@@ -40,7 +40,7 @@ def signatures() -> set[tuple[str, str]]:
 
 
 def run(name: str, toml: str, hears: int = N, hearer: Path | None = None) -> None:
-    """A daemon that sends `N` messages, until `hears` were heard by it or by that in `hearer`."""
+    """Run a daemon that sends `N` messages, until it (or `hearer`) has received `hears` of them."""
     folder = FOLDER / name
     folder.mkdir(exist_ok=True)
     config = folder / "sdrlinkd.toml"
@@ -75,7 +75,7 @@ def run(name: str, toml: str, hears: int = N, hearer: Path | None = None) -> Non
 
 @contextlib.contextmanager
 def client(folder: Path, hearer: Path) -> Iterator[tuple[Subscriber, Publisher]]:
-    """When both daemons are there."""
+    """Clients of both daemons, once both are running."""
     deadline = time.monotonic() + 60
     while True:
         try:
@@ -89,7 +89,7 @@ def client(folder: Path, hearer: Path) -> Iterator[tuple[Subscriber, Publisher]]
 
 
 def on_ether(robot: int) -> str:
-    """One of two who share the air."""
+    """Configuration of one of two robots that share the air."""
     return (
         f'namespace = "robot_{robot}"\nbackend = "ether"\n[ether]\ndir = "{FOLDER}/hub"\n'
         '[access]\npolicy = "csma"\nforce = true\n' + MODEM

@@ -6,12 +6,12 @@ from tests.soapy_loopback import Bus
 
 
 def device(bus, unit, model="usrp", more=""):
-    """What soapy.device is then."""
+    """The value of soapy.device for this unit."""
     return f"driver=loopback,bus={bus},unit={unit},model={model},noise_db=-50{more}"
 
 
 def on_soapy(robot, bus, model="usrp", modem="rate_hz = 1e6\n", soapy="", top="", more=""):
-    """The configuration of a robot with a radio of its own."""
+    """The configuration of a robot with its own radio."""
     return (
         f'namespace = "robot_{robot}"\nbackend = "soapy"\n{top}'
         f'[soapy]\ndevice = "{device(bus, robot, model, more)}"\ntx_enabled = true\n'
@@ -22,6 +22,6 @@ def on_soapy(robot, bus, model="usrp", modem="rate_hz = 1e6\n", soapy="", top=""
 
 @contextmanager
 def air(name):
-    """The bus of test radios, to ask and to inject faults."""
+    """The bus of test radios, for queries and injected faults."""
     with Bus(name) as bus:
         yield bus

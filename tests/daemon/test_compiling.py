@@ -1,4 +1,4 @@
-"""Daemons and compiled code: nothing is compiled while a link runs, and a cold start tells."""
+"""Daemons and compiled code: nothing is compiled while a link runs, and a cold start says so."""
 
 import signal
 import subprocess
@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.mark.slow
 def test_no_kind_of_link_compiles_anything(tmp_path):
-    """In one process and with signatures, not files: so it costs seconds, whatever is cached."""
+    """In one process and by signatures, not files, so it takes seconds whatever is cached."""
     done = subprocess.run(
         [sys.executable, "-m", "tests.daemon.link_kinds", str(tmp_path)],
         cwd=ROOT, capture_output=True, text=True, check=False,
@@ -30,7 +30,7 @@ def test_no_kind_of_link_compiles_anything(tmp_path):
 def test_a_daemon_with_a_cold_cache_takes_messages_says_so_and_can_be_stopped(
     start_daemon, tmp_path, monkeypatch
 ):
-    """Its radio is opened behind that."""
+    """Its radio is opened after the compilation."""
     (tmp_path / "cold").mkdir()
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cold"))
     daemon = start_daemon(
@@ -44,7 +44,7 @@ def test_a_daemon_with_a_cold_cache_takes_messages_says_so_and_can_be_stopped(
     assert snapshot.verdict.level == "DOWN"
     assert snapshot.link.tx.queued == 1
     assert not list(tmp_path.glob("radio*"))
-    # A reload begins the opening anew, but not the compiling; and nobody has to wait for it.
+    # A reload restarts the opening, but not the compilation, and nobody has to wait for it.
     daemon.send_signal(signal.SIGHUP)
     wait_for(lambda: "re-read: " in daemon.log())
     assert daemon.is_up()
@@ -55,7 +55,7 @@ def test_a_daemon_with_a_cold_cache_takes_messages_says_so_and_can_be_stopped(
 
 @pytest.fixture
 def told(monkeypatch):
-    """What is said of a warm-up that compiles kernels at these times, in a cache that is there."""
+    """What is logged about a warm-up that compiles kernels at these times, with a cache present."""
 
     def call(times, folder=None, **options):
         clock = iter([0.0, *times, times[-1] if times else 0.0])
@@ -102,7 +102,7 @@ def test_where_it_is_kept_is_told_in_a_line(told, tmp_path):
 
 def test_it_can_be_given_up(told):
     class GivenUpError(Exception):
-        """Who waits for it has gone."""
+        """The caller that waited for the warm-up has gone."""
 
     def stop(done, total):
         if done == 2:

@@ -1,4 +1,4 @@
-"""Real daemons on a simulated air: whom its hub takes, and what they play by its time."""
+"""Real daemons on a simulated air: which ones the hub accepts, and replay in the air's time."""
 
 import time
 
@@ -28,7 +28,7 @@ def on_ether(hub, robot=1, more=""):
 
 
 def verdict(daemon):
-    """Its level, and the first reason for it."""
+    """The daemon's health level, and the first reason for it."""
     told = daemon.snapshot().verdict
     return told.level, (told.reasons or [""])[0]
 
@@ -36,7 +36,7 @@ def verdict(daemon):
 def test_without_a_hub_a_daemon_stays_and_joins_when_there_is_one(
     start_daemon, tmp_path, tmp_path_factory
 ):
-    """What came in the meantime is sent then, as old as it is; what is too old is dropped."""
+    """Messages from the meantime are sent then, with their true age; those too old are dropped."""
     hub = tmp_path / "hub"
     daemon = start_daemon(on_ether(hub), HASTY)
     wait_for(lambda: daemon.snapshot().carrier.state == "waiting")
@@ -53,7 +53,7 @@ def test_without_a_hub_a_daemon_stays_and_joins_when_there_is_one(
         with Subscriber("/rx_robot_1/odom", directory=other.directory) as heard:
             for each in (daemon, other):
                 wait_for(lambda each=each: each.snapshot().carrier.state == "up", 60)
-            # Its first PDU may have been too early for the other one.
+            # Its first PDU may have been too early for the other robot.
             wait_for(lambda: daemon.snapshot().link.tx.sent == 1)
             with Publisher(daemon.directory) as out:
                 out.send("/robot_1/odom", b"\0\1\0\0more")
@@ -81,12 +81,12 @@ def test_a_second_robot_of_one_id_is_refused_and_the_first_is_told(start_daemon,
         assert first.snapshot().carrier.state == "up"
         assert list(ask(hub).nodes) == [1]
         assert first.stop(within_s=20) == 0
-        # The air is free for the other.
+        # The air is free for the other robot.
         wait_for(lambda: second.snapshot().carrier.state == "up", 20)
 
 
 class Conductor(RawRadio):
-    """A third robot, without which time does not go on; notes when the air is in use."""
+    """A third robot, without which time does not advance; it records when the air is in use."""
 
     def __init__(self, folder):
         super().__init__(folder)
@@ -98,10 +98,10 @@ class Conductor(RawRadio):
         )  # fmt: skip
         self._token = self.hear(protocol.Welcome).token
         self.busy = []
-        """Steps at which somebody began to send."""
+        """Steps at which a robot began to send."""
 
     def play(self, until_s, pause):
-        """Let time go on; `pause` is called whenever somebody has begun to send."""
+        """Let time advance; calls `pause` whenever a robot has begun to send."""
         step, was_busy = 0, False
         self.push(protocol.Done(token=self._token, step=0))
         while step * BLOCK_S < until_s:
@@ -128,9 +128,9 @@ def test_what_is_planned_leaves_at_its_time_by_the_airs_clock(start_daemon, tmp_
         receiver = start_daemon(on_ether(hub, 2))
         wait_for(lambda: set(ask(hub).nodes) == {1, 2, 3}, 60)
         with Subscriber("/rx_robot_1/*", directory=receiver.directory) as heard:
-            # Whoever plays waits for its first consumer, and the air for whoever plays.
+            # Replay waits for its first consumer, and the air waits for the replaying daemon.
             with Subscriber(directory=sender.directory):
-                # An air that stands still for longer than a burst takes makes nobody older.
+                # A pause of the air, longer than a burst, must not age messages.
                 conductor.play(0.9, lambda: time.sleep(0.05))
                 got = [heard.receive(20) for _ in plan]
             tx = sender.snapshot().link.tx
@@ -143,7 +143,7 @@ def test_what_is_planned_leaves_at_its_time_by_the_airs_clock(start_daemon, tmp_
     for due, at in zip(plan, began, strict=True):
         assert 0 < at - due.at < 0.005
     ages_ms = [message.age_us * 1e-3 for message in got]
-    # A burst takes 12 ms; what happens is noticed with the block that it is in.
+    # A burst takes 12 ms; events are noticed at the end of their block.
     assert all(10 < age_ms < 20 for age_ms in ages_ms), ages_ms
     assert max(ages_ms) - min(ages_ms) <= 1.01, ages_ms
 

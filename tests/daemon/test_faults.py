@@ -1,4 +1,4 @@
-"""Real daemons and what goes wrong around them: the ledger holds, others lose nothing."""
+"""Real daemons with faults around them: the ledger adds up, others lose nothing."""
 
 import os
 import signal
@@ -21,7 +21,7 @@ CDR = b"\0\1\0\0"
 
 
 def spawn(code, directory):
-    """A Python program that finds the daemon in `directory`; prints a line when it is ready."""
+    """Run a Python program for the daemon in `directory`; it prints a line when it is ready."""
     environment = {**os.environ, "SDRLINKD_RUNTIME_DIR": str(directory)}
     return Process([sys.executable, "-c", textwrap.dedent(code)], environment=environment)
 
@@ -188,7 +188,7 @@ def test_what_has_arrived_before_sigterm_is_in_the_ledger(start_daemon):
         daemon.send_signal(signal.SIGSTOP)
         for _ in range(299):
             push.send_multipart([b"/robot_1/odom\0", b"{}", CDR + bytes(100)])
-        # The pipe is written by ZeroMQ's own thread; what it holds when the daemon wakes counts.
+        # ZeroMQ's own thread writes the pipe; its content when the daemon wakes counts.
         time.sleep(0.3)
         daemon.send_signal(signal.SIGTERM)
         daemon.send_signal(signal.SIGCONT)

@@ -23,7 +23,7 @@ RATES = {"ofdm_phy": 3e5, "gfsk_phy": 1e5}
 
 @pytest.fixture
 def endpoints(tmp_path_factory):
-    """(send, receive) of two robots, as each of them names them."""
+    """(send, receive) of two robots, from the view of each."""
     folder = tmp_path_factory.mktemp("air")
     return [
         (f"ipc://{folder}/{robot}-out", f"ipc://{folder}/{robot}-in") for robot in ("one", "two")
@@ -32,7 +32,7 @@ def endpoints(tmp_path_factory):
 
 @pytest.fixture
 def free_ports():
-    """So many TCP and UDP ports that nobody uses."""
+    """Some TCP and UDP ports that nobody uses."""
 
     def find(n):
         with contextlib.ExitStack() as stack:
@@ -45,7 +45,7 @@ def free_ports():
 
 
 def on_samples(robot, ends, pattern="push", form="cf32_le", paced=False):
-    """GNU Radio is the air. Unpaced, a flowgraph that stalls is waited for, however long."""
+    """Configuration with GNU Radio as the air; unpaced, a daemon waits for a stalled flowgraph."""
     return (
         f'namespace = "robot_{robot}"\nbackend = "zmq"\n[zmq]\nsend = "{ends[0]}"\n'
         f'receive = "{ends[1]}"\npattern = "{pattern}"\nformat = "{form}"\n'
@@ -55,7 +55,7 @@ def on_samples(robot, ends, pattern="push", form="cf32_le", paced=False):
 
 
 def on_pdus(robot, send, receive="", transport="zmq-push", rate=3e5, size=PDU):
-    """GNU Radio is the modem."""
+    """Configuration with GNU Radio as the modem."""
     return (
         f'namespace = "robot_{robot}"\nbackend = "gnuradio"\n[gnuradio]\nsend = "{send}"\n'
         f'receive = "{receive}"\ntransport = "{transport}"\nrate_bit_s = {rate}\n'
@@ -64,13 +64,13 @@ def on_pdus(robot, send, receive="", transport="zmq-push", rate=3e5, size=PDU):
 
 
 def is_ready(robot):
-    """PDUs are taken, samples flow."""
+    """Whether PDUs are accepted and samples flow."""
     carrier = robot.snapshot().carrier
     return carrier.state == "up" and carrier.counters.get("samples", SAMPLES) >= SAMPLES
 
 
 def greet(robot):
-    """One PDU from it."""
+    """Send one PDU from the robot."""
     name = robot.snapshot().namespace
     with Publisher(robot.directory) as publisher:
         publisher.send(f"/{name}/imu", bytes(20))
@@ -79,7 +79,7 @@ def greet(robot):
 
 
 def exchange(robots, n=N):
-    """Messages from each robot to the other: who heard which."""
+    """Send messages from each robot to the other; returns who heard which."""
     bodies = [struct.pack("<IQ", 0x100, i) + bytes(80) for i in range(n)]
     with (
         Subscriber("/rx_robot_2/odom", directory=robots[0].directory, depth=0) as first,
@@ -169,7 +169,7 @@ def test_gnu_radio_as_the_modem_by_socket_pdu(start_daemon, free_ports, transpor
             start_daemon(on_pdus(2, two, "", transport)),
         ]
         if transport == "udp":
-            # Its answers go to whom it has heard.
+            # Its answers are sent to the peer that it has heard.
             for robot in robots:
                 greet(robot)
         bodies, heard = exchange(robots)

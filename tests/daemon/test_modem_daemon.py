@@ -30,7 +30,7 @@ def payloads(n):
 
 
 def sent_and_heard(node, n):
-    """`n` messages through the daemon's own air, unchanged and in order."""
+    """Send `n` messages through the daemon's own air, and get them unchanged and in order."""
     with (
         Subscriber("/rx_robot_1/odom", directory=node.directory) as heard,
         Publisher(node.directory) as out,
@@ -69,7 +69,7 @@ def test_messages_go_over_the_air_on_any_grid_with_a_stronger_preamble(start_dae
 
 @pytest.mark.parametrize("factor", [2, 4])
 def test_a_radio_may_be_faster_than_the_modem(start_daemon, factor):
-    """The noise in the modem's band is as at its own rate."""
+    """The noise in the modem's band equals that at the modem's own rate."""
     keys = f"rate_hz = 5e5\noversampling = {factor}"
     node = start_daemon(LOOPBACK.replace("rate_hz = 2e6", keys))
     for message in sent_and_heard(node, 10):
@@ -88,7 +88,7 @@ def test_stopping_sends_what_is_queued_first(start_daemon):
 
 
 def test_a_receiver_too_slow_for_its_rate_says_so_and_stays_small(start_daemon):
-    # Four times oversampled, a fast machine is too slow as well.
+    # With 4-fold oversampling, even a fast machine is too slow.
     keys = "rate_hz = 5e7\noversampling = 4\nmax_cfo_hz = 1e5\n"
     node = start_daemon(f'backend = "loopback"\n[modem]\n{keys}')
     wait_for(lambda: node.snapshot().carrier.counters["overflows"] > 1, timeout_s=60)
@@ -159,7 +159,7 @@ def test_a_recording_of_another_rate_is_refused_in_one_line(write_config, tmp_pa
 
 @pytest.mark.parametrize("paced", [False, True])
 def test_a_recording_ends_with_what_the_daemon_plays_into_it(start_daemon, tmp_path, paced):
-    """Unpaced, it would fill the disk in no time."""
+    """Unpaced, it would quickly fill the disk."""
     node = start_daemon(
         f'namespace = "robot_1"\nbackend = "iqfile"\n[play]\nduration_s = 0.5\n[modem]\n'
         f'rate_hz = 2e6\n[iqfile]\ntransmit = "{tmp_path}/rec"\npaced = {str(paced).lower()}\n'
@@ -171,7 +171,7 @@ def test_a_recording_ends_with_what_the_daemon_plays_into_it(start_daemon, tmp_p
     with node.control() as control:
         assert control.ask("check")["problems"] == []
     assert (tmp_path / "rec.sigmf-data").stat().st_size == size
-    # And what is in it can be heard.
+    # Its content can be decoded again.
     other = start_daemon(
         f'namespace = "robot_2"\nbackend = "iqfile"\n[modem]\nrate_hz = 2e6\n'
         f'[iqfile]\nreceive = "{tmp_path}/rec"\npaced = false\nwait_for_consumer = true\n'

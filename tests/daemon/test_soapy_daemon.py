@@ -1,4 +1,4 @@
-"""Daemons on SoapySDR radios, real drivers in real time: what one sends, the other republishes."""
+"""Daemons on SoapySDR radios, real drivers in real time: each republishes what the other sends."""
 
 import os
 import signal
@@ -29,27 +29,27 @@ BINDING = DEBIAN / f"_SoapySDR{sysconfig.get_config_var('EXT_SUFFIX')}"
 
 @pytest.fixture(autouse=True)
 def _drivers(monkeypatch):
-    """No others than the test radio's."""
+    """Only the test radio's driver."""
     monkeypatch.setenv("SOAPY_SDR_PLUGIN_PATH", str(module_folder()))
     monkeypatch.setenv("SOAPY_SDR_ROOT", "/nonexistent")
 
 
 @pytest.fixture
 def bus(request):
-    """An air of the test's own."""
+    """An air for this test alone."""
     name = f"{os.getpid()}-{abs(hash(request.node.name)) % 10**6}"
     with air(name) as found:
         yield name, found
 
 
 def up(robots):
-    """All radios stream."""
+    """Wait until all radios stream."""
     for robot in robots:
         wait_for(lambda robot=robot: robot.snapshot().carrier.counters.get("samples", 0) > 0, 60)
 
 
 def body(number):
-    """An odometry message's worth of bytes, told from others by its number."""
+    """Bytes of an odometry message, identified by its number."""
     return struct.pack("<IQ", 0x100, number) + bytes(120)
 
 
@@ -80,7 +80,7 @@ def test_what_one_sends_the_other_republishes_both_ways(start_daemon, bus):
 
 @pytest.mark.parametrize("fault", ["unplug", "crash"])
 def test_traffic_flows_again_when_a_device_is_back(start_daemon, bus, fault):
-    """Within 2 s; no message comes twice, and the ledger holds."""
+    """Within 2 s; no message arrives twice, and the ledger adds up."""
     name, air_ = bus
     robots = [start_daemon(on_soapy(robot, name)) for robot in (1, 2)]
     up(robots)
@@ -117,7 +117,7 @@ def test_traffic_flows_again_when_a_device_is_back(start_daemon, bus, fault):
 
 
 BACK_S = 2.0
-"""After its device is back, a daemon sends and hears again so soon."""
+"""Time after its device is back in which a daemon must send and receive again."""
 
 
 def test_a_driver_that_hangs_is_given_up(start_daemon, bus):
@@ -173,7 +173,7 @@ def test_a_half_duplex_radio_sends_in_tx_windows(start_daemon, bus):
         for number in range(10):
             sender.send("/robot_1/odom", body(number))
         assert [listener.receive(20).payload for _ in range(10)] == list(map(body, range(10)))
-    # The radio process counts when it listens again.
+    # The radio process reports its counts when it listens again.
     wait_for(lambda: robots[0].snapshot().carrier.counters["tx_spells"])
     wait_for(lambda: not air_.stats(1).is_transmitting)
     tx_windows = [robot.snapshot().carrier.counters["tx_spells"] for robot in robots]
@@ -217,7 +217,7 @@ def test_the_official_binding_serves_as_well(start_daemon, bus, tmp_path, monkey
 
 
 def test_a_driver_that_is_not_installed_is_for_a_person_to_mend(write_config, tmp_path, bus):
-    """Nothing that is plugged in would help."""
+    """Plugging in a device would not help."""
     config = on_soapy(1, bus[0]).replace("driver=loopback", "driver=hackrff")
     done = subprocess.run(
         [sys.executable, "-m", "sdrlinkd", "--config", str(write_config(tmp_path, config))],
@@ -282,7 +282,7 @@ def test_what_a_device_does_not_take_is_a_state_and_no_end(start_daemon, bus, ch
 
 
 def test_a_radio_that_comes_late_is_waited_for(start_daemon, bus):
-    """What was queued meanwhile is sent, as old as it is; what grew too old is not."""
+    """Messages queued meanwhile are sent with their true age; those too old are dropped."""
     name, air_ = bus
     air_.inject(1, "unplug")
     robots = [start_daemon(on_soapy(robot, name)) for robot in (1, 2)]
@@ -310,7 +310,7 @@ def test_a_radio_that_comes_late_is_waited_for(start_daemon, bus):
 
 
 LINK_S = 5.0
-"""After its device is there, a daemon sends and hears so soon."""
+"""Time after its device appears in which a daemon must send and receive."""
 
 
 def test_a_reload_that_makes_it_worse_ends_nothing(start_daemon, bus):
@@ -333,7 +333,7 @@ def test_a_reload_that_makes_it_worse_ends_nothing(start_daemon, bus):
     robot.send_signal(signal.SIGHUP)
     air_.inject(1, "replug")
     wait_for(lambda: robot.snapshot().carrier.state == "up", 20)
-    # While it is away after it was up, its settings may change, too.
+    # While the device is away after it was up, its settings may change, too.
     air_.inject(1, "unplug")
     wait_for(lambda: robot.snapshot().carrier.state == "down", 20)
     robot.config.write_text(good.replace("tx_gain_db = 40.0", "tx_gain_db = 30.0"))
@@ -361,7 +361,7 @@ def test_settings_that_were_refused_are_tried_again(start_daemon, bus, mended_by
     opened = air_.stats(1).opened
 
     def replugged():
-        """Away for longer than between two looks at it; when that is done, nobody outside knows."""
+        """Absent for longer than the check interval; nothing shows outside that it was noticed."""
         air_.inject(1, "unplug")
         time.sleep(2 * AWAY_S)
         air_.inject(1, "replug")
@@ -373,7 +373,7 @@ def test_settings_that_were_refused_are_tried_again(start_daemon, bus, mended_by
 
 
 def test_who_obeys_is_stopped_while_the_radio_is_refused(start_daemon, bus):
-    """No command can come, and that is when a stop is needed most."""
+    """No command can arrive then, and that is when a stop is needed most."""
     name, air_ = bus
     robots = [
         start_daemon(
@@ -405,6 +405,6 @@ def test_who_obeys_is_stopped_while_the_radio_is_refused(start_daemon, bus):
 
 
 def assert_whole(robot):
-    """The ledger adds up."""
+    """Assert that the ledger adds up."""
     with robot.control() as control:
         assert control.ask("check")["problems"] == []

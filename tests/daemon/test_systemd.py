@@ -1,4 +1,4 @@
-"""The service units, and what the daemon tells the service manager."""
+"""The service units, and the daemon's notifications to the service manager."""
 
 import os
 import re
@@ -19,7 +19,7 @@ from tests.machine import lacks
 
 ROOT = Path(__file__).parents[2]
 UNITS = [ROOT / "systemd" / name for name in ("sdrlinkd.service", "sdrlinkd@.service")]
-# What may differ between one node and several.
+# What may differ between the units for one node and for several.
 OF_THE_NODE = {"ExecStart", "RuntimeDirectory", "StateDirectory"}
 WATCHDOG_S = 0.3
 PATIENCE_S = 30.0
@@ -85,7 +85,7 @@ def test_bad_configuration_is_not_restarted(unit: Path, tmp_path: Path):
 
 
 def runnable_copy(unit: Path, directory: Path) -> Path:
-    """A copy whose ExecStart exists on this host; verify insists on that."""
+    """A copy with an ExecStart that exists on this host, as verify requires it."""
     text, replaced = re.subn(r"(?m)^ExecStart=\S+", f"ExecStart={sys.executable}", unit.read_text())
     assert replaced == 1
     copy = directory / unit.name
@@ -102,7 +102,7 @@ def exposure(unit: Path) -> tuple[int, str]:
 
 
 def systemd_analyze(*arguments: str) -> tuple[int, str]:
-    """Exit status and all output."""
+    """Exit status and all output of systemd-analyze."""
     run = subprocess.run(
         ["systemd-analyze", "--no-pager", *arguments],
         stdout=subprocess.PIPE,
@@ -114,7 +114,7 @@ def systemd_analyze(*arguments: str) -> tuple[int, str]:
 
 
 def service_lines(unit: Path) -> list[str]:
-    """Lines of [Service] that must not depend on the node."""
+    """The lines of [Service] that must not depend on the node."""
     section = unit.read_text().split("[Service]\n")[1].split("\n[")[0]
     lines = [line for line in section.splitlines() if line and not line.startswith("#")]
     return [line for line in lines if line.split("=")[0] not in OF_THE_NODE]
@@ -124,7 +124,7 @@ def service_lines(unit: Path) -> list[str]:
 
 
 class Manager:
-    """Plays the service manager: starts the daemon and hears what it says."""
+    """Plays the service manager: starts the daemon and receives its notifications."""
 
     def __init__(self, sock: socket.socket, directory: Path):
         self.runtime_dir = directory / "run"
@@ -149,7 +149,7 @@ class Manager:
         return Process(command, environment=environment, folder=ROOT, umask=0o007)
 
     def wait_for(self, start: str) -> str:
-        """The next state that begins so."""
+        """Wait for the next state that starts with `start`."""
         until = time.monotonic() + PATIENCE_S
         while True:
             self._socket.settimeout(max(until - time.monotonic(), 0.001))
@@ -161,7 +161,7 @@ class Manager:
 @pytest.fixture(params=["path", "abstract"])
 def manager(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Manager]:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:
-        # At the empty address the kernel chooses an abstract one.
+        # For an empty address the kernel chooses an abstract one.
         sock.bind(str(tmp_path / "notify") if request.param == "path" else "")
         yield Manager(sock, tmp_path)
 

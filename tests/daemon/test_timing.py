@@ -64,7 +64,7 @@ def pair(start_daemon, tmp_path_factory):
 
 
 def odometry(stamp_ns):
-    """With that stamp in its header."""
+    """An odometry message with that stamp in its header."""
     message = empty(ODOMETRY)
     message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, 10**9)
     return to_cdr(message, ODOMETRY)
@@ -87,7 +87,8 @@ def test_two_daemons_know_how_late_everything_is(pair, capsys, monkeypatch):
             assert (receipt.id, receipt.topic, receipt.dst) == (name, "/robot_1/odom", 2)
             assert receipt.fate == "delivered"
             assert receipt.took_s == pytest.approx(1e-6 * message.age_us, abs=2e-4)
-            # Wide: machines are not real-time ones. How exact it is, benchmarks tell.
+            # Wide limits, because machines are not real-time systems. Benchmarks measure the
+            # accuracy.
             assert 1e3 * message.age_us <= arrived_ns - sent_ns + 20_000_000
             assert abs(message.published_ns - sent_ns) < 50_000_000
             assert message.sampled_ns == pytest.approx(sent_ns - 7_000_000, abs=5_000_000)
@@ -115,7 +116,7 @@ def test_two_daemons_know_how_late_everything_is(pair, capsys, monkeypatch):
     latency = topic.latency
     assert latency.air_ms == pytest.approx(7.4, abs=0.5)
     assert sum(latency.percentiles_ms.values()) > 0
-    # Room for names beside the figures of a slow machine.
+    # Names still have room next to the figures of a slow machine.
     monkeypatch.setenv("COLUMNS", "140")
     assert run(["latency", "--runtime-dir", str(two.directory)]) == 0
     screen = capsys.readouterr().out

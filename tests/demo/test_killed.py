@@ -1,4 +1,4 @@
-"""A demonstration or a lab that is killed leaves no process, and the next run takes its folder."""
+"""A killed demonstration or lab leaves no process, and the next run can reuse its folder."""
 
 import signal
 import sys
@@ -14,8 +14,8 @@ from tests.waiting import wait_for
 
 @pytest.fixture
 def killed(tmp_path, tmp_path_factory, monkeypatch):
-    """Runs a command until `is_up(folder of its run)`, then kills it; that folder."""
-    # A short name: there are sockets in it.
+    """Run a command until `is_up(folder of its run)`, then kill it; returns that folder."""
+    # A short name, because the folder contains sockets.
     temporary = tmp_path_factory.mktemp("k")
     monkeypatch.setenv("TMPDIR", str(temporary))
 
@@ -51,7 +51,7 @@ def test_no_process_is_left_and_the_next_run_removes_the_folder(
         assert not left.exists()
         assert list(temporary.glob("sdrlink-*")) == [folder]
         with run_folder() as other:
-            # One that is in use is not removed.
+            # A folder in use is not removed.
             assert folder.exists()
             assert other != folder
     assert list(temporary.glob("sdrlink-*")) == []
@@ -69,7 +69,7 @@ def test_what_is_not_of_a_run_is_left_alone(tmp_path, monkeypatch):
 
 
 def test_a_daemon_that_does_not_stop_is_killed_in_the_end(tmp_path):
-    """Who starts it is gone: nobody else would."""
+    """Its parent is gone, so nothing else would stop it."""
     code = (
         "import signal, sdrlinkd.parent as parent; parent.STOP_S = 0.1;"
         "signal.signal(signal.SIGTERM, signal.SIG_IGN); parent.end_with_parent();"

@@ -1,4 +1,4 @@
-"""What the daemons of a demonstration are told."""
+"""The configuration of a demonstration's daemons."""
 
 import tomllib
 
@@ -8,7 +8,7 @@ from sdrlinkd.demo.links import Options, write_config
 from sdrlinkd.demo.source import open_source
 
 RESTS = 1.25
-"""So many reassembly timeouts an entry id rests."""
+"""Time for which an entry id is not reused, in reassembly timeouts."""
 
 
 @pytest.mark.parametrize("speed", [0.1, 1.0, 7.0, 50.0])

@@ -1,4 +1,4 @@
-"""The demonstration takes the rate that this machine carries, and says what it found."""
+"""The demonstration selects the rate that this machine can sustain, and reports it."""
 
 import signal
 import sys
@@ -22,7 +22,7 @@ OPTIONS = Options(link="direct")
         ([0.66], 0.2, 5e6, 1),
         ([0.70, 0.50], 0.2, 2e6, 2),
         ([0.90, 0.80, 0.66], 0.1, 1e6, 3),
-        # A third is free nowhere: then where most is.
+        # No rate leaves a third free: then the one with the most free time is chosen.
         ([0.95, 0.90, 0.85, 0.86], 0.05, 1e6, 4),
         # At 1 Msps the air would be full.
         ([0.90, 0.80], 0.2, 2e6, 2),
@@ -64,5 +64,5 @@ def test_of_a_process_the_busiest_thread_counts():
         wait_for(lambda: loads[0].read().busy > 0.9)
         assert loads[1].read().busy < 0.1
         assert 0 <= loads[0].read().waited < 1
-        # What is stopped does not hear that it shall end.
+        # A stopped process cannot receive a request to end.
         still.kill()

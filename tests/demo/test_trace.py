@@ -1,4 +1,4 @@
-"""The paper's figures of merit, by hand."""
+"""The paper's figures of merit, calculated by hand."""
 
 import numpy as np
 import pytest
@@ -119,7 +119,7 @@ def test_path_error_by_hand():
     assert path_error_m(line, line + np.array((0, 0.3))) == pytest.approx(0.3)
     assert path_error_m(line, line[::7]) == pytest.approx(0, abs=1e-9)
     assert path_error_m(line[[0, -1]], line) == pytest.approx(0, abs=1e-9)
-    # A path that ends half way: the mean distance of points at equal shares of the length.
+    # A path that ends half way: the mean distance of points at equal fractions of the length.
     assert path_error_m(line, line * [0.5, 1]) == pytest.approx(2.5, rel=1e-3)
     assert path_error_m(line, line[:1]) is None
     assert path_error_m(line, np.zeros((5, 2))) is None
@@ -129,7 +129,8 @@ def test_path_error_by_hand():
 def test_path_error_of_a_corner():
     corner = np.array([(0.0, 0.0), (4.0, 0.0), (4.0, 4.0)])
     assert path_error_m(corner, corner + (3, 4)) == pytest.approx(5)  # noqa: RUF005
-    # At share t < 1/2 the corner is at (8t, 0) and its diagonal at (4t, 4t): 4√2·t apart, mean √2.
+    # At fraction t < 1/2 the corner is at (8t, 0) and its diagonal at (4t, 4t): 4√2·t apart, mean
+    # √2.
     assert path_error_m(corner, corner[[0, 2]]) == pytest.approx(np.sqrt(2), rel=2e-3)
 
 

@@ -1,4 +1,4 @@
-"""What is told of a run that did not bring everything, and whether that is a fault."""
+"""The verdict on a run that did not deliver everything, and whether that is a fault."""
 
 import pytest
 from msgspec.structs import replace
@@ -73,5 +73,5 @@ def test_changed_bytes_and_a_ledger_that_is_off_are_faults_on_any_air():
     assert not is_good(replace(noisy, ledger_adds_up=False))
     assert "not what was sent" in verdict(replace(GOOD, bytes_identical=False))
     assert "does not add up" in verdict(replace(GOOD, ledger_adds_up=False))
-    # Of which nothing came, nothing was changed.
+    # Where nothing arrived, nothing was changed.
     assert is_good(replace(noisy, received=0, bytes_identical=False))

@@ -1,1 +1,1 @@
-"""The documents do what they print."""
+"""The documents are true: their commands work, and their screens are real."""

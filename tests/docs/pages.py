@@ -1,16 +1,16 @@
-"""What a page tells its reader to type, and what it shows then."""
+"""The commands that a page tells its reader to type, and the screens that it shows."""
 
 import re
 from dataclasses import dataclass
 
 _BLOCK = re.compile(r"^```console ?(.*?)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-# What a shown line has that a screen must have, too: numbers, paths and lines of tables differ.
+# The parts of a shown line that a screen must contain, too: numbers, paths and table lines differ.
 _WORD = re.compile(r"(?<![\w./])[A-Za-z_][A-Za-z_]+(?![\w./])")
 
 
 @dataclass(frozen=True)
 class Command:
-    """A line behind `$`, who types it, and the lines shown below it."""
+    """A line after `$`, who types it, and the lines shown below it."""
 
     who: str
     line: str
@@ -18,7 +18,7 @@ class Command:
 
     @property
     def runs_on(self) -> bool:
-        """Whether the reader goes on typing while it runs."""
+        """Whether the reader continues to type while it runs."""
         return self.line.endswith("&")
 
 
@@ -33,7 +33,7 @@ def commands_of(text):
 
 
 def missing_words(shown, screen):
-    """Words of the lines shown that the screen does not have, by line."""
+    """Words of the shown lines that are not on the screen, by line."""
     there = set(_WORD.findall(screen))
     return {
         line: lost

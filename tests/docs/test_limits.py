@@ -1,4 +1,4 @@
-"""What docs/limits.md says is what the code does."""
+"""The figures in docs/limits.md are those of the code."""
 
 import re
 from pathlib import Path

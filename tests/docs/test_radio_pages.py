@@ -1,4 +1,4 @@
-"""The pages of radios from their first to their last command, on test radios that are like them."""
+"""The pages about radios, from first to last command, on test radios that imitate them."""
 
 import contextlib
 import os
@@ -18,11 +18,11 @@ from tests.soapy_loopback import Bus, missing, module_folder
 ROOT = Path(__file__).parents[2]
 PAGES = ROOT / "docs" / "radios"
 NOT_HERE = ("sudo ", "make setup", "export PATH", "hackrf_info")
-"""Needs root, or a HackRF of metal; or it has been done."""
+"""Needs root, or a real HackRF; or it has been done."""
 MAY_SAY_NO = ("sdrlinkctl doctor", "sdrlinkctl status", "sdrlinkctl plan")
-"""Their exit code is about this machine and its air."""
+"""Commands with an exit code that depends on this machine and its air."""
 ASKED_AGAIN = ("sdrlinkctl status",)
-"""Whoever sees too little looks again: robots get to know each other."""
+"""Commands to repeat until they show enough: robots need time to discover each other."""
 PATIENCE_S = 240
 
 pytestmark = [
@@ -50,7 +50,7 @@ class Laptop:
         folder.mkdir()
 
     def type(self, command):
-        """What is on the screen then; a command behind `&` is left running."""
+        """Type a command; returns the screen. A command with `&` continues to run."""
         line = command.line.replace(self._driver, self.device)
         if command.runs_on:
             return self._leave_running(line.removesuffix("&"), command.shown)
@@ -76,7 +76,7 @@ class Laptop:
         return process.log()
 
     def close(self):
-        """Ends what was left running, the last first: in good order, and without a traceback."""
+        """End what still runs, the last one first: cleanly, and without a traceback."""
         for process in reversed(self._behind):
             process.stop(within_s=30)
             assert "Traceback" not in process.log(), process.log()
@@ -95,7 +95,7 @@ def laptops(folder, driver, model):
 
 
 def walk(page, typists, default=""):
-    """Types every command of a page, as `default` where it does not say who; how many it were."""
+    """Type every command of a page, as `default` if it names no typist; returns their number."""
     run = 0
     for command in commands_of((PAGES / page).read_text()):
         named = command.who or default

@@ -1,4 +1,4 @@
-"""README's commands: each that runs in seconds works as printed, in the order of the page."""
+"""README's commands: each one that runs in seconds works as printed, in the order of the page."""
 
 import contextlib
 import os
@@ -25,9 +25,9 @@ NOT_HERE = {
     r".*sdrlinkctl latency --runtime-dir .*…": "names the sockets of a running lab",
     r".*python -m benchmarks\.": "takes minutes; tests run benchmarks with --quick",
 }
-# Whose exit code is about this machine.
+# Commands with an exit code that depends on this machine.
 MAY_SAY_NO = re.compile(r"sdrlinkctl (radio probe|status)")
-# Of a daemon that is started for them.
+# Commands that need a daemon, which is started for them.
 OF_A_DAEMON = re.compile(r"sdrlinkctl (set|why|status)")
 ON_THE_TEST_RADIO = re.compile(
     r"SOAPY_SDR_PLUGIN_PATH|test-radio|soapy_loopback|driver=loopback|grep "
@@ -35,20 +35,20 @@ ON_THE_TEST_RADIO = re.compile(
 
 
 def commands(page):
-    """What stands behind `$` in its blocks."""
+    """The lines after `$` in the page's blocks."""
     blocks = re.findall(r"^```\w*\n(.*?)^```$", (ROOT / page).read_text(), re.MULTILINE | re.DOTALL)
     return [line.removeprefix("$ ") for block in blocks for line in block.splitlines()
             if line.startswith("$ ")]  # fmt: skip
 
 
 def here():
-    """Those of README that run in seconds."""
+    """The commands of README that run in seconds."""
     return [each for each in commands("README.md") if not any(re.match(k, each) for k in NOT_HERE)]
 
 
 @pytest.fixture
 def reader(tmp_path):
-    """A checkout, as far as the commands need one, and a shell in it: exit code and screen."""
+    """A checkout with what the commands need, and a shell in it: exit code and screen."""
     (tmp_path / "etc").symlink_to(ROOT / "etc")
     environment = os.environ | {
         "SDRLINKD_RUNTIME_DIR": str(tmp_path / "run"),
@@ -92,7 +92,7 @@ def is_up(directory):
 
 
 def run_all(reader, lines):
-    """Each works, and none ends in a traceback."""
+    """Run the lines; each must work, without a traceback."""
     for line in lines:
         code, screen = reader(line)
         assert code == 0 or MAY_SAY_NO.search(line), f"{line}\n{screen}"

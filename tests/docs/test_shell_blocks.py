@@ -1,4 +1,4 @@
-"""What pages tell their reader to type is a shell's language, and names files that are there."""
+"""What pages tell their reader to type is valid shell, and names files that exist."""
 
 import re
 import subprocess
@@ -12,7 +12,7 @@ PAGES = ["systemd/README.md", "docs/radios/hackrf.md", "docs/radios/usrp.md"]
 
 
 def commands(page):
-    """Its blocks, without screens."""
+    """The page's shell blocks, without screens."""
     for block in BLOCK.findall((ROOT / page).read_text()):
         lines = block.splitlines()
         typed = [line[2:] for line in lines if line.startswith("$ ")]
@@ -36,7 +36,7 @@ def test_what_the_systemd_page_installs_is_in_the_source():
     assert {"etc/sdrlinkd.toml", "etc/registry.csv", "systemd/*.service"} <= named
     for each in named:
         assert list(ROOT.glob(each)), each
-    # What is put into PATH is there to be put.
+    # Folders put into PATH exist there.
     scripts = (ROOT / "pyproject.toml").read_text()
     for program in re.findall(r"/opt/sdrlinkd/bin/([\w-]+)", text):
         assert program == "pip" or f"\n{program} = " in scripts, program

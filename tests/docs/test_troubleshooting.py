@@ -1,4 +1,4 @@
-"""What docs/troubleshooting.md quotes is what the code says."""
+"""Each quotation in docs/troubleshooting.md is in the code."""
 
 import ast
 import re
@@ -15,7 +15,7 @@ QUOTED = re.findall(r"^\| `([^`]+)` \|", PAGE, re.MULTILINE)
 
 
 def text_of(node):
-    """A string of the code, with a gap for each value in it; else nothing."""
+    """A string of the code, with a gap for each value in it; otherwise nothing."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         return node.value
     if isinstance(node, ast.JoinedStr):
@@ -28,7 +28,7 @@ def text_of(node):
 
 @pytest.fixture(scope="module")
 def sentences():
-    """All that the daemon and its command line may say."""
+    """All sentences that the daemon and its command line can print."""
     return {
         text_of(node)
         for path in (ROOT / "sdrlinkd").rglob("*.py")

@@ -1,1 +1,1 @@
-"""Whether this machine can carry a node."""
+"""Checks whether this machine can run a node."""

@@ -1,4 +1,4 @@
-"""Each check by itself, on machines that are made up."""
+"""Each check by itself, on invented machines."""
 
 import os
 import sys
@@ -35,7 +35,7 @@ ALL = Granted(can_hurry=True, nice=-20, shared_memory=True, files=1024)
 
 
 def by_name(findings):
-    """What was found by what was looked at; a bad one says what to do."""
+    """Findings by what was examined; a bad one must say what to do."""
     assert all(each.to_do for each in findings if each.state is BAD)
     return {each.what: each for each in findings}
 
@@ -143,7 +143,7 @@ def test_the_clock(tmp_path):
     assert states(check_clock(kept, 0.0, str(tmp_path / "sock")))["chrony.socket"] is GOOD
     missing = by_name(check_clock(kept, 0.0, str(tmp_path / "none")))["chrony.socket"]
     assert "refclock SOCK" in missing.to_do
-    # This machine's own tells something, or nothing; never an error.
+    # This machine's own value may be present or absent, but never an error.
     assert kernel_clock() is None or kernel_clock().error_s >= 0
 
 

@@ -1,4 +1,4 @@
-"""`sdrlinkctl doctor` as a person runs it."""
+"""`sdrlinkctl doctor` as a user runs it."""
 
 import json
 
@@ -21,7 +21,7 @@ needs_radio = pytest.mark.skipif(bool(missing()), reason=missing())
 
 @pytest.fixture(autouse=True)
 def _quick(monkeypatch):
-    """A machine with room; measuring has a test of its own."""
+    """A machine with spare capacity; the measurement has a separate test."""
     quick = doctor.check_headroom(Headroom(2e6, 0.1, 0.3, 0))
     monkeypatch.setattr(doctor, "headroom_found", lambda *_: quick)
     monkeypatch.setattr("os.getloadavg", lambda: (0.0, 0.0, 0.0))
@@ -30,7 +30,7 @@ def _quick(monkeypatch):
 
 @pytest.fixture
 def examine(write_config, tmp_path, capsys):
-    """With a configuration: (exit code, its findings by what was looked at)."""
+    """With a configuration: (exit code, findings by what was examined)."""
 
     def of(text):
         path = write_config(tmp_path, text)

@@ -1,4 +1,4 @@
-"""Snapshots of a daemon, made by hand: all is well but for what is given."""
+"""Hand-made snapshots of a daemon: everything is well except what is given."""
 
 from msgspec.structs import replace
 
@@ -15,7 +15,7 @@ from sdrlinkd.reports import (
 
 
 def robot(src=2, **more):
-    """A neighbor that was heard just now."""
+    """A neighbor that was just heard."""
     return NeighborReport(
         **{
             "src": src, "is_self": False, "last_heard_s_ago": 0.1, "pdus_heard": 100,
@@ -26,7 +26,7 @@ def robot(src=2, **more):
 
 
 def topic(name="/robot_1/scan", **more):
-    """A topic on its way out."""
+    """A topic that is being sent."""
     return TopicReport(
         **{
             "topic_id": 0, "name": name, "type": "", "subscribed": True, "qos": "default",

@@ -1,4 +1,4 @@
-"""The log of a drive: each thing once, in order, and never a flood."""
+"""The log of a drive: each event once, in order, and never a flood."""
 
 import itertools
 
@@ -8,7 +8,7 @@ from tests.health.snapshots import robot, snapshot, topic
 
 
 def story(*snapshots):
-    """What is logged, as (level, text)."""
+    """The log entries, as (level, text)."""
     health = Health()
     return [(line.level.value, line.text) for each in snapshots for line in health.look(each)]
 
@@ -21,7 +21,7 @@ def test_a_radio_that_comes_late_goes_and_comes_back():
         snapshot(2.0, absent, []),
         snapshot(12.0, absent, []),
         snapshot(13.0, robots=[]),
-        # A moment's pause is nothing.
+        # A short pause is not an event.
         snapshot(14.0, {**away, "since_s": 0.3}, []),
         snapshot(15.0, robots=[]),
         snapshot(20.0, away, []),
@@ -76,7 +76,7 @@ def test_the_slowest_mcs_and_the_way_up_again():
         ("warning", "the MCS to robot 2 is down to 0, the lowest: it hears us at 2 dB"),
         ("info", "the MCS to robot 2 is up again: 2"),
     ]
-    # A fixed one is no news.
+    # A fixed one is not news.
     fixed = [snapshot(second, robots=[robot(mcs=0, snr_there_db=2.0)]) for second in (1.0, 2.0)]
     assert len(story(*fixed)) == 2
 
@@ -115,7 +115,7 @@ def test_clocks_that_jump():
 
 
 def test_what_goes_on_and_off_all_day_does_not_fill_the_log():
-    """And the last word on it is the truth."""
+    """The log ends with the true state."""
     health, lines = Health(), []
     away = {"state": "down", "reason": "gone", "since_s": 1.5}
     for second, is_away in zip(range(600), itertools.cycle((False, True)), strict=False):

@@ -1,4 +1,4 @@
-"""A verdict says the worst first, and why."""
+"""A verdict states the worst first, with its reason."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from tests.health.snapshots import robot, snapshot, topic
 
 
 def verdict(*seen, shares_air=True):
-    """On the last of these snapshots."""
+    """The verdict on the last of these snapshots."""
     health = Health()
     health.shares_air = shares_air
     for each in seen:
@@ -68,13 +68,13 @@ def test_a_moment_without_samples_is_no_outage():
         ([robot(per_lately=0.1, snr_db=5.0)], ["we hear robot 2 at 5 dB, 10 % lost"]),
         ([robot(registry="differs")], ["robot 2 has another topic registry"]),
         ([robot(last_heard_s_ago=6.0), robot(3)], ["robot 2 not heard for 6 s"]),
-        # It usually pauses for so long: half duplex.
+        # Its usual pause is as long: half duplex.
         ([robot(last_heard_s_ago=30.0, usual_gap_s=15.0)], []),
         ([robot(last_heard_s_ago=50.0, usual_gap_s=15.0)], ["robot 2 not heard for 50 s"]),
-        # It has left.
+        # The robot has left.
         ([robot(last_heard_s_ago=700.0), robot(3)], []),
         ([robot(last_heard_s_ago=7200.0)], ["no robot heard for 2 h 0 min"]),
-        # What it said of us before it fell silent is not news.
+        # What it reported about us before it fell silent is outdated.
         ([robot(last_heard_s_ago=9.0, per_there=0.5)], ["robot 2 not heard for 9 s"]),
     ],
 )

@@ -1,1 +1,1 @@
-"""Configurations to begin with."""
+"""Configurations to start with."""

@@ -1,4 +1,4 @@
-"""`sdrlinkctl init`: what it writes is good, and nothing is written that is not wanted."""
+"""`sdrlinkctl init`: its output is valid, and nothing unwanted is written."""
 
 import contextlib
 import os
@@ -23,7 +23,7 @@ ODOM = ("--topic", "odom:nav_msgs/msg/Odometry")
 
 @pytest.fixture
 def init(tmp_path, capsys):
-    """Runs it with `tmp_path`/team as the folder: (exit code, what it says, its errors)."""
+    """Runs it with `tmp_path`/team as the folder: (exit code, output, errors)."""
 
     def call(*arguments, out="team"):
         code = run(["init", *map(str, arguments), "--out", str(tmp_path / out)])
@@ -35,7 +35,7 @@ def init(tmp_path, capsys):
 
 
 def checked(path, capsys):
-    """`sdrlinkd --check`."""
+    """Run `sdrlinkd --check`."""
     code = main(["--check", "--config", str(path)])
     out, err = capsys.readouterr()
     assert (code, err) == (0, ""), err
@@ -283,7 +283,7 @@ def test_all_files_or_none(init, tmp_path):
 
 
 def test_what_is_missing_is_asked_with_a_default(tmp_path, capsys):
-    """On a terminal: a wrong answer is asked again, an empty one is the default."""
+    """On a terminal: a wrong answer is asked again, an empty one means the default."""
     ours, theirs = pty.openpty()
     process = subprocess.Popen(
         [sys.executable, "-m", "sdrlinkd.cli", "init", "--out", str(tmp_path / "team")],
@@ -306,7 +306,7 @@ def test_what_is_missing_is_asked_with_a_default(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_a_team_on_the_ether_talks_at_once(init, tmp_path, monkeypatch):
-    """As the ether's page says: a hub, and the daemons with what was written."""
+    """As on the ether's page: a hub, and the daemons with what was written."""
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     monkeypatch.chdir(tmp_path)
     assert init("--radio", "ether", "--robots", 2, "--id", "all", *ODOM)[0] == 0

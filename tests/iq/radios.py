@@ -1,4 +1,4 @@
-"""A radio that delivers given blocks, and keeps what it is given to send."""
+"""A radio that delivers given blocks, and stores what it is given to send."""
 
 import asyncio
 import time
@@ -20,12 +20,12 @@ def pieces(samples, size, first=0):
 
 
 def gap(index, n, reason="the radio lost samples"):
-    """A block of which nothing was heard."""
+    """A block in which nothing was heard."""
     return RxBlock(index, n, None, reason, time.monotonic_ns())
 
 
 def air(starts, n, network=0, pdu=b"\x5a" * 64, mcs=1):
-    """(samples, length of a burst): bursts of one PDU, -12 dBFS, where they are told to begin."""
+    """(samples, length of a burst): bursts of one PDU at -12 dBFS that begin at `starts`."""
     rng = np.random.default_rng(7)
     burst = phy.Transmitter(network).modulate([pdu], mcs) * np.float32(0.25)
     samples = (rng.standard_normal(2 * n, np.float32) * np.float32(0.002)).view(np.complex64)
@@ -35,7 +35,7 @@ def air(starts, n, network=0, pdu=b"\x5a" * 64, mcs=1):
 
 
 class BlockRadio:
-    """`blocks` one after the other, all in one piece of memory; then silence, or `fails`."""
+    """Delivers `blocks` in order, in one piece of memory; then silence, or it fails."""
 
     def __init__(self, blocks, fails=None, ends=True, **can):
         self._blocks = blocks

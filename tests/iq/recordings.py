@@ -1,4 +1,4 @@
-"""Recordings with bursts in them."""
+"""Recordings that contain bursts."""
 
 import numpy as np
 
@@ -18,7 +18,7 @@ def pdu(seq, size=64):
 
 
 def write_bursts(path, mcs_list=(1, 3, 6), sample_type="ci16_le", snr_db=25.0, n_pdus=2):
-    """One burst for each MCS, 20 000 samples apart, in noise; the PDUs sent."""
+    """Write one burst for each MCS, 20 000 samples apart, in noise; returns the PDUs."""
     rng = np.random.default_rng(4)
     writer = RecordingWriter(path, sample_type, RATE_HZ, 2.45e9)
     front_end = phy.FrontEnd(phy.FrontEndParams(noise_dbfs=-12 - snr_db), rng)

@@ -1,4 +1,4 @@
-"""From radios into recordings, with annotations of what was heard."""
+"""From radios into recordings, with annotations of what was received."""
 
 import json
 import re
@@ -31,7 +31,7 @@ async def captured(radio, wanted, watch=lambda _: None):
 
 
 def metadata(path):
-    """As their package has it, once it has found it valid."""
+    """Metadata as read by SigMF's package, which must find it valid."""
     theirs = sigmf.fromfile(f"{path}.sigmf-meta")
     theirs.validate()
     meta = json.loads(path.with_suffix(".sigmf-meta").read_text())

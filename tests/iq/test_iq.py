@@ -1,4 +1,4 @@
-"""What is found in a recording."""
+"""What the analysis finds in a recording."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from tests.iq.recordings import RATE_HZ, write_bursts
 
 
 def silent(_):
-    """No progress."""
+    """Report no progress."""
 
 
 @pytest.mark.parametrize("sample_type", ["cf32_le", "ci16_le", "ci8"])

@@ -58,7 +58,8 @@ async def test_bursts_are_recorded_as_far_apart_as_they_were(tmp_path, recording
         async with asyncio.timeout(60), capture, replay:
             recording_it = asyncio.ensure_future(capture.run(watch))
             report = await replay.run(lambda _: None)
-            # In lock-step, who records has heard all that has left; and hears nothing more alone.
+            # In lock-step, the recorder has heard everything that has left, and hears nothing more
+            # alone.
             until_s = recorded[-1] + 0.2
             while paced and recorded[-1] < until_s:
                 moved.clear()

@@ -1,4 +1,4 @@
-"""Recordings sent again."""
+"""Recordings that are sent again."""
 
 import asyncio
 import time
@@ -29,7 +29,7 @@ async def replayed(path, radio, times=1, watch=lambda _, __: None, **wished):
 
 
 def found(path):
-    """(start of its burst, PDU) of each PDU in a recording."""
+    """(start of its burst, PDU) for each PDU in a recording."""
     with IqRecording(path) as recording:
         events = [event for event, _ in recording.decode(None, lambda _: None)]
     return [(event.burst.start, event.data) for event in events if isinstance(event, phy.PduHeard)]
@@ -49,7 +49,7 @@ async def test_every_burst_is_sent_at_its_time(tmp_path, times):
     assert [pdu for _, pdu in again] == times * sent
     offsets = [b - a for (a, _), (b, _) in zip(times * before, again, strict=True)]
     turns = np.reshape(offsets, (times, -1))
-    # The receiver tells where a burst begins to a sample.
+    # The receiver reports the start of a burst to the sample.
     assert np.ptp(turns, axis=1).max() <= 1
     assert np.abs(np.diff(turns[:, 0]) - 80_032).max(initial=0) <= 1
 
@@ -67,7 +67,7 @@ async def test_as_recorded_or_with_the_power_wished(tmp_path):
 
 
 def clock(n, size=2000):
-    """A stream of so many blocks of 1 ms."""
+    """A stream of `n` blocks of 1 ms."""
     return [RxBlock(k * size, size, None, "nothing", 0) for k in range(n)]
 
 
@@ -91,7 +91,7 @@ async def test_bursts_are_handed_over_some_time_before_theirs(tmp_path):
     assert [b.start - first["start"] for b in radio.sent] == pytest.approx(
         [start - 2000 for start in starts], abs=32
     )
-    # At least what the radio needs, and never much more.
+    # At least the lead that the radio needs, and never much more.
     assert min(ahead) >= 0.03 * RATE_HZ
     assert max(ahead) <= (0.03 + AHEAD_S) * RATE_HZ
 

@@ -1,4 +1,4 @@
-"""What of a recording is not silence."""
+"""The parts of a recording that are not silence."""
 
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ def test_bursts_in_noise_are_found_whole(tmp_path, monkeypatch, type_name, piece
     assert len(found) == len(starts)
     for start, each in zip(starts, found, strict=True):
         assert max(0, start - MARGIN) <= each.start <= start
-        # The last few samples fall to nothing.
+        # The last few samples fade to zero.
         assert start + length - 4 <= each.start + each.n <= start + length + MARGIN
         assert 10 * np.log10(each.power) == pytest.approx(-12, abs=0.5)
 

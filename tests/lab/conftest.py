@@ -1,4 +1,4 @@
-"""Scenarios from text, and the configurations that a lab makes of them."""
+"""Scenarios from text, and the configurations that a lab derives from them."""
 
 import pytest
 
@@ -19,7 +19,7 @@ def load(tmp_path):
 
 @pytest.fixture
 def write_configs(tmp_path):
-    """Writes the configurations of all daemons of a scenario; their paths."""
+    """Write the configurations of all daemons of a scenario; returns their paths."""
 
     def call(scenario, bag=None, name="s.toml"):
         sources = open_sources(scenario, bag)

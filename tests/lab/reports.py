@@ -1,10 +1,10 @@
-"""Reports of runs that never were."""
+"""Reports of invented runs."""
 
 from sdrlinkd.lab import LabReport, PairResult, RobotResult
 
 
 def robot(robot_id: int, **given: object) -> RobotResult:
-    """A robot to which nothing happened."""
+    """A robot without events."""
     figures = {
         "carrier": "QPSK 3/4", "access": "tdma: 2 slots", "airtime_share": 0.1,
         "bursts_by_mcs": {2: 30}, "mcs_changes": [], "snr_db": {}, "bursts_sent": 30,
@@ -16,7 +16,7 @@ def robot(robot_id: int, **given: object) -> RobotResult:
 
 
 def pair(sender: int, receiver: int, **given: object) -> PairResult:
-    """A direction in which all arrived."""
+    """A direction in which everything arrived."""
     figures = {
         "sent": 30, "received": 30, "pdr": 1.0, "pdr_tenths": [1.0] * 10,
         "latency_ms": {"p50": 20.0, "p90": 25.0, "p99": 30.0, "max": 31.0},
@@ -26,7 +26,7 @@ def pair(sender: int, receiver: int, **given: object) -> PairResult:
 
 
 def lost(sender: int, receiver: int) -> PairResult:
-    """A direction in which nothing arrived, of what was sent in the second half."""
+    """A direction in which nothing of the second half arrived."""
     tenths = [None] * 5 + [0.0] * 5
     return pair(
         sender, receiver, received=0, pdr=0.0, pdr_tenths=tenths, latency_ms={},
@@ -35,7 +35,7 @@ def lost(sender: int, receiver: int) -> PairResult:
 
 
 def report(**given: object) -> LabReport:
-    """Two robots, and all arrived."""
+    """A report of two robots, between which everything arrived."""
     figures = {
         "scenario": "small", "title": "Two small robots", "pace": "lockstep", "seed": 1,
         "duration_s": 3.0, "source": "built-in robot", "pdr": 1.0, "worst_pdr": 1.0,

@@ -24,7 +24,7 @@ TOPICS = (("data", "std_msgs/msg/ByteMultiArray"),)
 
 
 def usrp(traits):
-    """As modem.traits makes them of a device with a lead of 20 ms and blocks of 1 ms."""
+    """The traits of a device with a lead of 20 ms and blocks of 1 ms, as in modem.traits."""
     return traits._replace(
         is_lockstep=False, lead_s=0.0205 + traits.turnaround_s, react_s=0.003, ahead_s=0.005
     )
@@ -32,13 +32,13 @@ def usrp(traits):
 
 def saturated(access, n, qos=Qos.DEFAULT, *, rate_hz=5e6, block_s=1e-3, seconds=5.0, seed=1,
               turnaround_s=1e-4, fit=lambda traits: traits, size=8000):  # fmt: skip
-    """The simulation, and the share of the air that bursts took once all took turns."""
+    """The simulation, and the share of the air used by bursts once all robots take turns."""
     air = AirParams(rate_hz=rate_hz, block_s=block_s, snr_db=25.0)
     modem = ModemParams(rate_hz=rate_hz)
     airtimes = Airtimes(modem, PDU_SIZE)
     ids, rng = range(1, n + 1), Random(seed)
     until_s = SETTLE_S + seconds
-    # More than one robot alone could send.
+    # More than a single robot could send.
     period_s = airtimes.airtime_s(modem.mcs, 1) * size / PDU_SIZE
 
     def arrivals(node):

@@ -18,7 +18,7 @@ topics = ["cmd_vel"]
 def scenario_text(
     top: str = "", robots: str = ROBOTS, extra: str = "", pace: str = "lockstep"
 ) -> str:
-    """Two robots at 1 Msps who take turns; `top`, `robots` and `extra` are more TOML."""
+    """Two robots at 1 Msps that take turns; `top`, `robots` and `extra` are more TOML."""
     return f"""title = "Two small robots"
 pace = "{pace}"
 duration_s = 3.0
@@ -38,14 +38,14 @@ policy = "tdma"
 
 
 def write_scenario(folder: Path, **parts: str) -> Path:
-    """As a file."""
+    """Write the scenario to a file."""
     path = folder / "small.toml"
     path.write_text(scenario_text(**parts))
     return path
 
 
 def processes_of(folder: Path) -> list[str]:
-    """Command lines of the processes that name something in `folder`."""
+    """Command lines of the processes that mention `folder`."""
     found = []
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         try:

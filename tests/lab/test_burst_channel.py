@@ -1,4 +1,4 @@
-"""The medium in bursts: who hears what, and what a receiver knows of the air."""
+"""The medium in bursts: who receives what, and what a receiver knows of the air."""
 
 import gc
 import math
@@ -19,7 +19,7 @@ A_SAMPLE = 1e-6
 
 
 def medium(radios, links=(), outages=(), seed=1, snr_db=25.0, **more):
-    """Nodes on one air; `radios`: how many, or each one's own; `links`: (from, to, SNR in dB)."""
+    """Nodes on one air; `radios`: number, or each one's own; `links`: (from, to, SNR in dB)."""
     if isinstance(radios, int):
         radios = dict.fromkeys(range(radios), PLAIN)
     shared = air(snr_db=snr_db)
@@ -63,7 +63,7 @@ def test_the_times_of_a_burst_are_those_of_the_modem():
 
 @pytest.mark.parametrize(("off_s", "hears"), [(-A_SAMPLE, False), (A_SAMPLE, True)])
 def test_who_sends_is_deaf_and_a_turnaround_before_and_after(off_s, hears):
-    """To the sample: a burst that is over before that, or begins after."""
+    """To the sample, for bursts that end before that or begin after it."""
     turn_s, begin_s = 5e-4, 0.05
     length_s = send(medium(1), 0, 0.0).shape.airtime_s
     for start_s in (begin_s - turn_s - length_s - off_s, begin_s + length_s + turn_s + off_s):
@@ -90,8 +90,9 @@ def test_our_own_burst_cuts_what_comes_and_keeps_what_came():
     [(25, 25, []), (30, 10, [0]), (10, 30, []), (-9, 25, [1])],
 )
 def test_two_at_the_same_time(first_db, second_db, reads):
-    """Equal ones spoil each other, a weak one disturbs little; a receiver is taken by the first
-    that it finds, however strong the next.
+    """Equal bursts destroy each other, a weak one does little harm.
+
+    A receiver keeps to the first burst that it finds, however strong the next one is.
     """
     made = medium(3, [(0, 2, first_db), (1, 2, second_db)])
     flights = [send(made, 0, 0.0), send(made, 1, 0.001)]
@@ -121,7 +122,7 @@ def test_only_the_pdus_that_are_hit_are_lost():
 
 
 def shares_lost(mcs, size, share, n):
-    """Of `n` PDUs whose last `share` another burst of equal power meets: in samples, in bursts."""
+    """Shares lost if the last `share` of a PDU meets an equal burst: in samples, in bursts."""
     rng = np.random.default_rng(5)
     transmitter, receiver = phy.Transmitter(), phy.Receiver()
     front_end = phy.FrontEnd(phy.FrontEndParams(noise_dbfs=-25), rng)
@@ -149,7 +150,7 @@ def shares_lost(mcs, size, share, n):
     [(1, 220, 0.15, 0.55), (3, 1024, 0.025, 0.09), (2, 220, 0.08, 0.3), (6, 1024, 0.025, 0.12)],
 )
 def test_what_another_burst_meets_is_lost_as_in_the_modem(mcs, size, bears, fails):
-    """A code bears a share of drowned symbols; of short codewords in a row, less of the whole."""
+    """A code tolerates a share of drowned symbols; consecutive short codewords tolerate less."""
     assert max(shares_lost(mcs, size, bears, 30)) < 0.2
     assert min(shares_lost(mcs, size, fails, 30)) > 0.8
 
@@ -173,7 +174,7 @@ def test_what_is_near_comes_first_and_stands_with_its_own_delay():
     flight = send(made, 0, 1.0)
     assert flight.arrives == {1: 1.25, 2: 1.0}
     assert flight.over_s == 1.25 + flight.shape.airtime_s
-    # What it meets at one of them it does not meet at the other.
+    # The same burst does not interfere at every receiver.
     other = send(made, 2, 1.25)
     assert got(made, flight, 1) == []
     assert got(made, other, 0) == [0]
@@ -204,7 +205,7 @@ def test_a_read_header_tells_when_the_air_is_free():
 
 
 def test_a_burst_that_cannot_be_read_is_still_a_carrier():
-    """Its receiver was taken by another that began before: energy is all there is to go by."""
+    """Its receiver was busy with an earlier burst: only energy is left to detect it."""
     made = medium(3)
     first = send(made, 0, 1.0)
     second = send(made, 1, first.end_s - 0.001, n_pdus=2)
@@ -220,7 +221,7 @@ def test_a_burst_that_cannot_be_read_is_still_a_carrier():
 
 @pytest.mark.parametrize(("snr_db", "is_noticed"), [(4.5, False), (5.0, True)])
 def test_a_carrier_is_noticed_from_carrier_db_on(snr_db, is_noticed):
-    """6 dB more than noise alone is 4.74 dB of SNR. Both are too weak to find it half-deaf."""
+    """6 dB more than noise alone is 4.74 dB of SNR. Both are too weak to be found half-deaf."""
     made = medium({0: PLAIN, 1: half_duplex()}, [(0, 1, snr_db)])
     own = send(made, 1, 1.0 - send(medium(1), 0, 0.0).shape.airtime_s / 2)
     flight = send(made, 0, 1.0)
@@ -240,7 +241,7 @@ def test_who_is_deaf_notices_nothing():
 
 
 def test_the_last_carrier_is_never_forgotten():
-    """Also by those to whom the bursts that others sent since were nothing."""
+    """Even nodes that the bursts sent since did not concern remember it."""
     made = medium(4, [(2, 1, -300.0)])
     flight = send(made, 0, 0.0)
     for number in range(1, 50):
@@ -265,7 +266,7 @@ def test_an_air_that_fades_is_refused():
 
 
 def crowded(seed, n=300):
-    """Bursts at random times at a threshold: what everybody reads, and what all sense."""
+    """Bursts at random times near the threshold: what every node reads, and what all sense."""
     rng = Random(seed)
     made = medium(6, snr_db=9.0, seed=seed)
     free, live, told = [0.0] * 6, [], []
@@ -291,7 +292,7 @@ def test_the_same_seed_gives_the_same_and_another_does_not():
 
 
 def test_what_is_sensed_follows_what_was_before():
-    """Time does not go back, and a carrier that is over stays over: whatever collides."""
+    """Time does not run backwards, and a carrier that has ended stays ended, whatever collides."""
     for seed in range(5):
         before = None
         for senses in crowded(seed):

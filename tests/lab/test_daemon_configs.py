@@ -1,4 +1,4 @@
-"""What daemons are told: shipped scenarios are good, and [daemon] has its limits."""
+"""The configuration of daemons: shipped scenarios are valid, and [daemon] has its limits."""
 
 import pytest
 
@@ -20,7 +20,7 @@ THREE_ROBOTS = [
     for robot in (1, 2, 3)
 ]
 MESSAGES = {"mrclam-three": THREE_ROBOTS}
-"""In bags like those that scenarios say they are to be run with."""
+"""Messages in bags like those for which the scenarios are made."""
 
 ONE = "[[robot]]\nid = 1\n"
 TWO = "[[robot]]\nid = 2\n"

@@ -1,4 +1,4 @@
-"""Runs with real daemons: in lock-step, repeated to the byte; whatever happens, nothing is left."""
+"""Runs with real daemons: in lock-step they repeat to the byte, and nothing is left behind."""
 
 import os
 import signal
@@ -23,7 +23,7 @@ MESSAGES = 30
 
 @pytest.fixture(scope="module")
 def temporary(tmp_path_factory):
-    """The folder for temporary files, ours alone."""
+    """The folder for temporary files, for this test alone."""
     folder = tmp_path_factory.mktemp("lab")
     was, tempfile.tempdir = tempfile.tempdir, str(folder)
     yield folder
@@ -32,7 +32,7 @@ def temporary(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def run_small(temporary):
-    """Runs a small scenario; its report and all that was shown."""
+    """Runs a small scenario; returns its report and everything shown."""
 
     def run(name="run", **parts):
         folder = temporary / name
@@ -46,7 +46,7 @@ def run_small(temporary):
 
 @pytest.fixture
 def nothing_left(temporary):
-    """Checks that it is so, in the end."""
+    """Checks at the end that nothing is left behind."""
     yield
     assert list(temporary.glob("sdrlink-*")) == []
     assert processes_of(temporary) == []
@@ -54,7 +54,7 @@ def nothing_left(temporary):
 
 @pytest.fixture(scope="module")
 def runs(run_small):
-    """Three at once, so that each has the machine to itself at other moments."""
+    """Three simultaneous runs, so that the scheduling differs between them."""
     seeds = {"first": 1, "again": 1, "other": 2}
     with ThreadPoolExecutor(len(seeds)) as pool:
         found = {
@@ -135,7 +135,7 @@ def test_a_scenario_that_cannot_be_run_tells_why(run_small, nothing_left, parts,
 @pytest.mark.slow
 @pytest.mark.parametrize("nth", [1, 3], ids=["the hub", "the second daemon"])
 def test_an_interrupt_while_a_process_starts_leaves_none(run_small, nothing_left, monkeypatch, nth):
-    """In the moment in which it runs and nobody has noted it yet."""
+    """The interrupt comes when the process runs but is not registered yet."""
     started = []
 
     def start(*arguments, **options):

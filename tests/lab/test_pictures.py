@@ -1,4 +1,4 @@
-"""A run as a picture and as tables, whatever came of it."""
+"""A run as a figure and as tables, whatever its outcome."""
 
 import pytest
 from rich.console import Console
@@ -7,7 +7,7 @@ from sdrlinkd.lab import LabState, live_table, pair_table, pictures
 from tests.lab.reports import lost, pair, report, robot
 
 STRANGE = "50 $_$ of [/b] robots [bold"
-"""Signs that Matplotlib and Rich take for their own."""
+"""Characters that Matplotlib and Rich would interpret."""
 
 
 @pytest.mark.slow
@@ -30,7 +30,7 @@ def test_a_title_is_shown_as_it_is(tmp_path):
 
 
 def check(made, path, caption):
-    """It can be drawn and shown."""
+    """Assert that it can be drawn and shown."""
     pictures.draw(made, path, caption)
     picture = path.read_bytes()
     assert picture.startswith(b"\x89PNG")

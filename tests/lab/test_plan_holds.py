@@ -1,5 +1,6 @@
-"""What is planned against what happens, in virtual time: nothing comes later than it says, and what
-fills the air comes not much sooner.
+"""Compares the plan with the outcome, in virtual time.
+
+Nothing arrives later than planned, and traffic that fills the air arrives not much sooner.
 """
 
 from random import Random
@@ -27,7 +28,7 @@ from tests.lab.saturated import PDU_SIZE, usrp
 
 pytestmark = pytest.mark.slow
 SETTLE_S = 4.0
-"""Until all know a schedule, and each other's beats."""
+"""Time until all robots know the schedule, and each other's periods."""
 RADIOS = {
     "soon": {"block_s": 1e-4},
     "blocks": {},
@@ -44,7 +45,7 @@ LOADS = {
 
 def set_up(policy, robots, n_topics=1, qos=(), arrivals=None, listen=lambda *_: None, seed=1, *,
            rate_hz=5e6, block_s=1e-3, turnaround_s=1e-4, fit=lambda traits: traits):  # fmt: skip
-    """Simulation and setting of `robots` that send; with one, another one listens."""
+    """Simulation and setting of `robots` that send; a single sender gets a listener."""
     rng, nodes = Random(seed), range(1, max(2, robots) + 1)
     modem, air = (
         ModemParams(rate_hz=rate_hz),
@@ -77,24 +78,24 @@ def set_up(policy, robots, n_topics=1, qos=(), arrivals=None, listen=lambda *_: 
 
 
 def policies_of(qos):
-    """By topic id; nothing expires."""
+    """Policies by topic id; nothing expires."""
     return {i: TopicPolicy(qos=each, lifespan_s=float("inf")) for i, each in enumerate(qos)}
 
 
 def plan_of(setting, loads):
-    """For (class, rate in Hz, bytes) of each topic."""
+    """The plan for topics of (class, rate in Hz, bytes)."""
     asked = [Load(i, f"t{i}", rate, size, size) for i, (_, rate, size) in enumerate(loads)]
     return make_plan(asked, policies_of([qos for qos, _, _ in loads]), setting)
 
 
 def trial(policy, robots, loads, seed, seconds=10.0, **radio):
-    """The plan, and the ages in s of what came of each topic."""
+    """The plan, and the ages in s of the messages that arrived, by topic."""
     until_s, ages = SETTLE_S + seconds, [[] for _ in loads]
 
     def arrivals(node):
         chance, found = np.random.default_rng([seed, node]), []
         for topic_id, (_, per_s, size) in enumerate(loads):
-            # Phases wander past each other.
+            # The phases drift relative to each other.
             period_s = (1 + 1e-3 * chance.uniform(-1, 1)) / per_s
             times = np.arange(chance.uniform(0, period_s), until_s, period_s)
             found += [Arrival(float(at), topic_id, bytes(size)) for at in times]
@@ -136,11 +137,11 @@ def test_nothing_comes_later_than_the_plan_says(policy, robots, radio):
 
 @pytest.mark.parametrize(
     ("policy", "robots", "radio"),
-    # Where one is silent, the others have its air.
+    # If one robot is silent, the others get its airtime.
     [each for each in CASES if each[0] == "none" or each[1] > 1],
 )
 def test_what_fills_the_air_comes_not_much_sooner_than_the_plan_says(policy, robots, radio):
-    """Large messages, as many as are feasible by a little."""
+    """Large messages, with a load just below the limit."""
 
     def loads(per_s):
         return [("latency", 5, 500), ("bulk", per_s, 20_000)]

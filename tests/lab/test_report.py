@@ -1,4 +1,4 @@
-"""The figures of a lab run, by hand."""
+"""The figures of a lab run, calculated by hand."""
 
 import warnings
 
@@ -30,7 +30,7 @@ def trace_of(sent, received, name="cmd_vel"):
 
 
 def numbered(times):
-    """A message of its own at each time."""
+    """A distinct message at each time."""
     return [(at, str(i).encode()) for i, at in enumerate(times)]
 
 
@@ -87,7 +87,7 @@ def test_tenths_are_counted_from_the_beginning_and_hold_what_is_beside_them():
 
 @pytest.mark.parametrize(("duration_s", "rate_hz"), [(3.0, 10), (6.0, 10), (7.0, 30), (2.0, 50)])
 def test_what_is_sent_on_the_border_belongs_to_the_tenth_it_begins(duration_s, rate_hz):
-    """Times are whole nanoseconds, as a plan has them."""
+    """Times are whole nanoseconds, as in a plan."""
     count = round(duration_s * rate_hz)
     each = count // 10
     sent = numbered([round(i * 1e9 / rate_hz) * 1e-9 for i in range(count)])

@@ -1,4 +1,4 @@
-"""What a policy is said to carry against what it carries, in virtual time; and what `why` says."""
+"""The capacity that a policy claims against what it carries, in virtual time; and `why`'s text."""
 
 import pytest
 
@@ -15,7 +15,7 @@ RADIOS = {
     "turns_slowly": {"turnaround_s": 0.01},
 }
 CLOSE = {"minislot": 0.05, "tdma": 0.08, "csma": 0.5}
-"""Two thirds of a slot do not end with a PDU; and chance has its own way."""
+"""Tolerances: two thirds of a slot do not end with a PDU, and csma is random."""
 
 
 @pytest.mark.parametrize("policy", CLOSE)

@@ -1,4 +1,4 @@
-"""The simulation in bursts against that of samples, and what it alone can do: many, for long."""
+"""The simulation in bursts compared with that in samples, and long runs with many robots."""
 
 import asyncio
 from collections import Counter
@@ -25,7 +25,7 @@ INFINITE = float("inf")
 
 
 def radios(n, seed):
-    """Half-duplex ones, whose crystals are off."""
+    """Half-duplex radios with crystal errors."""
     rng = Random(seed)
     return {
         node: RadioParams(
@@ -45,7 +45,7 @@ def simulation(
     policy, arrivals, *, air, pdu_size, seed, links=(), mcs=MCS, beacons_s=None, keep_s=INFINITE,
     **more,
 ):  # fmt: skip
-    """Robots 1 to n, as benchmarks.worlds.samples makes them; `beacons_s` by robot, else 1."""
+    """Robots 1 to n, as benchmarks.worlds.samples makes them; `beacons_s` by robot, default 1."""
     ids = list(arrivals)
     modem = ModemParams(rate_hz=air.rate_hz, mcs=mcs)
     made = {
@@ -65,14 +65,14 @@ def simulation(
 
 
 def got(sim):
-    """(sender, receiver): messages received, mean age in s."""
+    """By (sender, receiver): messages received, mean age in s."""
     return {
         key[:2]: (pair.received, pair.age_sum_s / pair.received) for key, pair in sim.pairs.items()
     }
 
 
 def delivered(sim):
-    """Of all messages, the share that all others got."""
+    """The share of all messages that all others received."""
     sent = sum(sum(each.sent.values()) for each in sim.stations.values())
     return sum(n for n, _ in got(sim).values()) / sent / (len(sim.stations) - 1)
 
@@ -82,7 +82,7 @@ def audit(sim):
 
 
 def hears_only_neighbors(n):
-    """A chain."""
+    """Links of a chain, in which each robot only hears its neighbors."""
     pairs = [(a, b) for a in range(1, n + 1) for b in range(a + 2, n + 1)]
     return [LinkOverride(sender=a, receiver=b, snr_db=-300) for a, b in pairs]
 
@@ -116,7 +116,7 @@ def two_at_40_percent(policy, n_nodes=2, seconds=1.0, seed=3):
 
 @pytest.mark.slow
 def test_without_access_it_loses_what_samples_lose():
-    """Two that talk at once are deaf, and collide at a third."""
+    """Two simultaneous senders are deaf, and collide at a third robot."""
     by_samples, by_bursts, sent = two_at_40_percent("none", n_nodes=3)
     assert by_samples.keys() == by_bursts.keys() == {(1, 2), (2, 1), (1, 3), (2, 3)}
     for pair, (n, age_s) in by_samples.items():
@@ -135,7 +135,7 @@ def test_with_access_it_delivers_as_samples_do(policy):
 
 
 class Overlaps:
-    """Watches bursts; who begins before all others are over."""
+    """Watches bursts, and counts those that begin before all others are over."""
 
     def __init__(self):
         self.flights = []
@@ -154,8 +154,9 @@ def small_messages(n, per_s, until_s, seed):
 
 @pytest.mark.slow
 def test_24_robots_with_tdma_for_ten_minutes():
-    """The first tells the schedule; that the others hardly tell of themselves saves half the time
-    that this takes.
+    """The first robot announces the schedule.
+
+    The others hardly announce themselves, which saves half of the run time.
     """
     n, seconds, seed = 24, 600.0, 7
     overlaps = Overlaps()
@@ -192,7 +193,7 @@ def test_12_robots_with_minislots_for_two_minutes():
 
 @pytest.mark.parametrize(("policy", "least", "most"), [("minislot", 0.3, 0.9), ("tdma", 1, 1)])
 def test_those_who_do_not_hear_each_other_need_a_schedule(policy, least, most):
-    """Of a chain of three, the outer two collide in the middle, unless they have one."""
+    """In a chain of three, the outer two collide in the middle without a schedule."""
     seed, seconds = 9, 15.0
     arrivals = {
         1: poisson(1, 25.0, 200, seconds, seed),
@@ -224,7 +225,7 @@ def test_a_chain_keeps_one_schedule():
 @pytest.mark.slow
 @pytest.mark.parametrize("policy", ["none", "csma", "minislot", "tdma"])
 def test_looking_only_when_it_may_matter_loses_nothing(policy, monkeypatch):
-    """Against a look after every block, as a modem does it."""
+    """Compared with a query after every block, as in a modem."""
     ends = []
     for how in ("now and then", "every block"):
         if how == "every block":

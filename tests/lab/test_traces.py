@@ -1,4 +1,4 @@
-"""Outages out of logs: where messages are missing, whatever the log looks like."""
+"""Outages from logs: where messages are missing, whatever the log looks like."""
 
 import json
 from itertools import pairwise
@@ -19,7 +19,7 @@ PERIOD_S = 0.5
 
 @pytest.fixture
 def outages(tmp_path):
-    """Outages of a log of these lines; a number is one with that sequence number."""
+    """Outages of a log with these lines; a number is a line with that sequence number."""
 
     def call(lines, from_s=0.0, period_s=PERIOD_S):
         path = tmp_path / "log.jsonl"
@@ -159,7 +159,7 @@ def test_without_a_trace_no_folder_is_asked_for(tmp_path):
 
 
 def log_of(path, states):
-    """Writes a log of one message a period, lost where `states` is True; when it was."""
+    """Write a log of one message per period, lost where `states` is True; returns its times."""
     lines = [_line(number + 1000) for number, is_lost in enumerate(states) if not is_lost]
     path.write_bytes(b"".join(line + b"\n" for line in lines))
     edges = [i for i in range(1, len(states)) if states[i] != states[i - 1]]
@@ -167,7 +167,7 @@ def log_of(path, states):
 
 
 def shipyard(seed, n):
-    """What a robot between ships loses: a third, some singly, some for many seconds."""
+    """Losses of a robot between ships: a third, some single, some for many seconds."""
     rng = Random(seed)
     states = [False]
     while len(states) < n:
@@ -185,7 +185,7 @@ def test_outages_of_a_long_log_are_the_runs_of_what_is_lost(tmp_path, seed):
     assert lost_s == PERIOD_S * sum(states)
     assert 0.15 < lost_s / (PERIOD_S * len(states)) < 0.6
     assert max(end - begin for begin, end in expected) >= 10
-    # The shipped scenario's part of it.
+    # The part of it in the shipped scenario.
     scenario = load_scenario(SHIPPED / "shipyard-outage.toml")
     world = scenario.world(outages_of(scenario, tmp_path))
     periods = range(round(scenario.duration_s / PERIOD_S))

@@ -1,5 +1,7 @@
-"""Two robots with radios like a USRP: odometry and images both ways, more than turns by listening
-can carry. In virtual time; by the clock it is `python -m benchmarks.radio.team`.
+"""Two robots with radios like a USRP: odometry and images both ways.
+
+That is more than turns by listening can carry. It runs in virtual time; for real time see `python
+-m benchmarks.radio.team`.
 """
 
 from random import Random
@@ -34,7 +36,7 @@ FILE = Told("robot.toml", ())
 
 
 def team(policy, rate_hz, mcs, seed=1):
-    """The simulation after 20 s of 30 Hz odometry of 724 B and one image of 64 KB a second."""
+    """The simulation after 20 s of 30 Hz odometry of 724 B and one image of 64 KB per second."""
     modem = ModemParams(rate_hz=rate_hz, mcs=mcs)
     air = AirParams(rate_hz=rate_hz, snr_db=25.0)
     links = {
@@ -81,7 +83,7 @@ def test_minislots_do_not_and_why_says_so():
     pair = sim.pairs[1, 2, ODOM]
     assert pair.received < 0.7 * 30 * SECONDS
     assert sim.pairs[1, 2, IMAGE].received == 0
-    # What comes is no older than its class allows, but for its way.
+    # Arriving messages are no older than their class allows, plus the time on the air.
     assert max(pair.ages_s) < 2.1
     told = sim.stations[1].link.why(ODOM, FILE, sim.now)
     assert told[0].endswith("worthless after 2 s as its class says (robot.toml)")

@@ -1,4 +1,4 @@
-"""An air of bursts instead of samples: nodes with access policies, looking every so often."""
+"""An air of bursts instead of samples: nodes with access policies, which decide periodically."""
 
 from bisect import bisect_left, insort
 from heapq import heappop, heappush
@@ -13,18 +13,18 @@ from tests.link.radios import AHEAD_S, DETECT_S, LOOK_S
 
 INFINITE = float("inf")
 HEADER_S = 0.0003
-"""Of a burst so much is needed to read its header."""
+"""Time from the start of a burst until its header is read."""
 LEAST_S = 0.0005
 """The shortest burst."""
 BEACON_S = 1.0
 _LOOKED_AT = 12
-"""So many bursts back the channel may be busy, whatever overlaps."""
+"""Number of most recent bursts to examine when the channel may be busy, whatever overlaps."""
 _begin = attrgetter("begin")
 _end = attrgetter("end")
 
 
 class Message(NamedTuple):
-    """What waits; it goes in one burst."""
+    """A waiting message, which is sent in one burst."""
 
     qos: Qos
     at: float
@@ -32,7 +32,7 @@ class Message(NamedTuple):
 
 
 class Burst(NamedTuple):
-    """On the air; times are true, `until` is what the sender had listened to when it decided."""
+    """A burst; times are true, `until` is the end of what the sender had heard when it decided."""
 
     begin: float
     end: float
@@ -45,7 +45,7 @@ class Burst(NamedTuple):
 
 
 class Node:
-    """One robot. Its clock begins when it joins, and goes `ppm` too fast."""
+    """One robot. Its clock starts when it joins, and is `ppm` too fast."""
 
     def __init__(self, node_id, access, joined_at, ppm):
         self.id = node_id
@@ -70,10 +70,10 @@ class Node:
 
 
 class Air:
-    """Nodes `ids`, each with an access policy of its own, and bursts of at most `longest_s`.
+    """Nodes `ids`, each with its own access policy, and bursts of at most `longest_s`.
 
-    `hears`: pairs (to, from), None: all; `ppm` and `joins` by node; `beacons`: each tells its frame
-    once a second; `miss`: chance that a node cannot read a burst that it hears.
+    `hears`: pairs (to, from), None: all; `ppm` and `joins` by node; `beacons`: each announces its
+    frame once per second; `miss`: probability that a node cannot read a burst that it hears.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class Air:
             self.join(node_id, (joins or {}).get(node_id, 0.0), (ppm or {}).get(node_id, 0.0))
 
     def join(self, node_id, at=0.0, ppm=0.0):
-        """A robot is switched on."""
+        """Switch a robot on."""
         access = make_access(self.params, node_id, self.traits, self.longest_s, Random(node_id))
         node = self.nodes[node_id] = Node(node_id, access, at, ppm)
         node.phase = at + (0.0 if self.traits.is_lockstep else self.rng.uniform(0, LOOK_S))
@@ -104,16 +104,16 @@ class Air:
         return node
 
     def leave(self, node_id):
-        """A robot is switched off."""
+        """Switch a robot off."""
         self.nodes.pop(node_id).is_on = False
 
     def offer(self, node_id, at, qos=Qos.DEFAULT, length_s=None):
-        """A message that begins to wait at `at`."""
+        """Add a message that waits from `at` on."""
         message = Message(qos, at, self.longest_s if length_s is None else length_s)
         self._schedule(at, self._arrive, self.nodes[node_id], message)
 
     def offer_randomly(self, until_s, per_s, classes=tuple(Qos), fixed=False, begin_s=0.0):
-        """Poisson arrivals at each node, `per_s` of each class."""
+        """Add Poisson arrivals at each node, `per_s` of each class."""
         for node_id in self.nodes:
             for qos in classes:
                 at = begin_s
@@ -122,13 +122,13 @@ class Air:
                     self.offer(node_id, at, qos, self.longest_s if fixed else length_s)
 
     def saturate(self, n, at=0.0, qos=Qos.DEFAULT):
-        """`n` messages wait at each node from `at` on."""
+        """Add `n` messages that wait at each node from `at` on."""
         for node_id in self.nodes:
             for _ in range(n):
                 self.offer(node_id, at, qos)
 
     def run(self, until_s):
-        """Let time pass; the bursts so far, by their beginning."""
+        """Advance time; returns the bursts so far, by start time."""
         while self._events and self._events[0][0] <= until_s:
             t, _, what, arguments = heappop(self._events)
             what(t, *arguments)
@@ -138,7 +138,7 @@ class Air:
         return to != src and (self._hears is None or (to, src) in self._hears)
 
     def clashes(self, apart_s=0.0):
-        """Pairs of bursts less than `apart_s` apart that somebody hears both of, or should."""
+        """Pairs of bursts less than `apart_s` apart that one node hears both, or should."""
         found = []
         longest_s = max((each.end - each.begin for each in self.bursts), default=0.0)
         for i, one in enumerate(self.bursts):
@@ -150,7 +150,7 @@ class Air:
         return found
 
     def assert_nobody_clashes(self, since=0.0):
-        """Nor does anybody begin while others, who just sent, are still deaf."""
+        """Assert no clashes, and that no burst starts while earlier senders are still deaf."""
         clashes = self.clashes(self.traits.turnaround_s)
         assert not [each for each in clashes if each[0].begin > since], f"seed {self.seed}"
 
@@ -167,7 +167,7 @@ class Air:
         heappush(self._events, (at, self._count, what, arguments))
 
     def _look_next(self, node, at):
-        """At the end of a block; a node with nothing to send looks when it tells its frame."""
+        """Decide next at the end of a block; an idle node decides to announce its frame."""
         if not node.waiting:
             if not self._beacons:
                 return
@@ -196,7 +196,7 @@ class Air:
             self._decide(t, node)
 
     def _decide(self, t, node):
-        """As the modem asks: whenever something waits, for a time that is not far ahead."""
+        """Decide as the modem does: whenever something waits, for a time in the near future."""
         lead_s = self.traits.lead_s
         while True:
             soonest = node.clock(t) + lead_s
@@ -241,7 +241,7 @@ class Air:
         )
 
     def _reads(self, node, burst, end):
-        """Whether what `burst` is up to `end` was alone on the air, and can be read."""
+        """Whether `burst` up to `end` was alone on the air at the node, and can be read."""
         if (
             node.id in burst.missed_by
             or burst.begin < node.joined_at
@@ -255,7 +255,7 @@ class Air:
         )
 
     def sensed(self, node):
-        """What its receiver knows of the air."""
+        """What the node's receiver knows of the air."""
         until, turnaround_s = node.until, self.traits.turnaround_s
         begin = end = energy_end = awake_since = node.joined_at
         for first, last in node.own[-4:]:
@@ -265,7 +265,7 @@ class Air:
         for i in range(bisect_left(self.bursts, until, key=_begin) - 1, -1, -1):
             burst = self.bursts[i]
             if burst.begin + self.longest_s < max(end, energy_end):
-                # Neither this one nor any before it was the last.
+                # Neither this burst nor an earlier one was the last.
                 break
             if not self.hears(node.id, burst.src):
                 continue
@@ -282,7 +282,7 @@ class Air:
         return Sensed(at(until), at(end), at(begin))
 
     def _tell(self, node):
-        """Of all that has been heard whole by now."""
+        """Report all bursts that have been heard completely by now."""
         while node.heard and node.heard[0].end <= node.until:
             burst = node.heard.pop(0)
             if self._reads(node, burst, burst.end):

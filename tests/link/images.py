@@ -1,11 +1,11 @@
-"""Links whose bulk has parity, and images sent over them."""
+"""Links with parity for bulk messages, and images sent over them."""
 
 from sdrlinkd.link import ClassesParams, ClassParams, Outcome, Overrides, Qos
 from tests.link.world import compose, make_link, rx
 
 
 def protected(share, own_id=1, **more):
-    """A link whose bulk has that share of parity."""
+    """A link with that share of parity for bulk."""
     classes = ClassesParams(bulk=ClassParams(parity=share))
     return make_link(own_id, classes=classes, seed=own_id, **more)
 
@@ -21,7 +21,7 @@ def pdus_of(link, payload, now=0.0, topic=0):
 
 
 def images_over(lost, share):
-    """How many of 60 images arrive where PDU i is lost if `lost[i]` is; memory stays bounded."""
+    """Number of 60 images that arrive if PDU i is lost where `lost[i]`; memory stays bounded."""
     sender, receiver = protected(share, pdu_size=1024), protected(0.0, 2, pdu_size=1024)
     at = got = 0
     for i in range(60):

@@ -4,10 +4,10 @@ from sdrlinkd.link import AccessParams, PduLinkTraits
 
 RATE = 5e6
 LOOK_S = 0.001
-"""A block."""
+"""Length of a block."""
 DETECT_S = 128 / RATE
 AHEAD_S = 0.005
-"""A node's next burst is asked for so long before its last one is over."""
+"""How long before the end of its last burst a node requests the next one."""
 
 _SHARED = PduLinkTraits(
     kind="ether",
@@ -24,7 +24,7 @@ PACED = _SHARED._replace(lead_s=50e-6 + 0.003, react_s=LOOK_S + 0.002, ahead_s=A
 TX_WINDOWS = _SHARED._replace(
     kind="soapy", turnaround_s=0.08, index_error_s=0.001, lead_s=0.15, react_s=0.02
 )
-"""It takes long to turn round."""
+"""Traits of a radio with a slow T/R switch."""
 
 
 def params(policy, nodes, **more):

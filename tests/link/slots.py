@@ -1,4 +1,4 @@
-"""Airs with `tdma`, for tests."""
+"""Airs with `tdma`."""
 
 from random import Random
 
@@ -8,11 +8,11 @@ from tests.link.radios import params
 
 LONGEST_S = 0.004
 SETTLED_S = 4.5
-"""By then all have heard of the schedule."""
+"""Time by which all robots know the schedule."""
 
 
 def make_air(n, traits, seed, reuse=False, ppm=20.0, **more):
-    """Robots 1 to n, switched on within a second, whose crystals are off by ±`ppm` at most."""
+    """Robots 1 to n, switched on within a second, with crystals off by ±`ppm` at most."""
     rng = Random(seed)
     ids = list(range(1, n + 1))
     rng.shuffle(ids)
@@ -25,7 +25,7 @@ def make_air(n, traits, seed, reuse=False, ppm=20.0, **more):
 
 
 def lengths_s(air):
-    """(slot, guard)"""
+    """(slot, guard) in s."""
     access = next(iter(air.nodes.values())).access
     return access._slot_s, access._guard_s
 

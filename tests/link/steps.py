@@ -1,39 +1,39 @@
-"""Links that hear each other in steps of time, with no air between."""
+"""Links that hear each other in time steps, without an air in between."""
 
 from sdrlinkd.link import Outcome
 
 
 class Steps:
-    """Links by robot. In every step each does what is due and sends; then all hear what has come.
+    """Links by robot. In each step all do what is due and send, then all hear the arrivals.
 
-    `next_burst(link, now)` is asked up to `most_bursts` times a step. A world of its own overrides
-    `arrivals`, which says what comes of a burst.
+    `next_burst(link, now)` is called up to `most_bursts` times per step. Subclasses override
+    `arrivals`, which says what arrives of a burst.
     """
 
     def __init__(self, links, step_s, next_burst, most_bursts=1000):
         self.links = links
         self.now = 0.0
         self.bursts = []
-        """(when it was asked for, sender, burst) of all."""
+        """All bursts as (time of the request, sender, burst)."""
         self._step_s = step_s
         self._next_burst = next_burst
         self._most_bursts = most_bursts
         self._under_way = []
 
     def arrivals(self, to, src, burst):
-        """(s after the burst's start, SNR, PDU) of what this robot gets of it."""
+        """What this robot receives of a burst: (s after the burst's start, SNR, PDU)."""
         raise NotImplementedError
 
     def confirmed_s(self):
-        """How long after its start a burst is told as sent."""
+        """How long after its start a burst is reported as sent."""
         return 0.0
 
     def order(self, due):
-        """What has come in a step, in the order in which it is heard."""
+        """The arrivals of a step, in the order in which they are heard."""
         return due
 
     def take(self, robot, message):
-        """A message for a robot's programs."""
+        """Deliver a message to a robot's programs."""
 
     def run(self, until, each_step=lambda steps: None):
         while self.now < until:

@@ -1,4 +1,4 @@
-"""Which policy auto comes to, what each carries, and which are refused."""
+"""The policy that auto selects, the capacity of each policy, and which ones are refused."""
 
 from random import Random
 
@@ -174,7 +174,7 @@ def test_robots_that_came_to_different_policies_are_told():
 
 
 def test_beacons_reach_the_policy():
-    """Of a robot that has no schedule; those that come by a relay tell nothing."""
+    """Those of a robot that has no schedule; relayed ones say nothing."""
     teller, hearer = make_link(2, beacon_s=1.0), make_link(1)
     access = hearer.attach(USRP, auto([1, 2]), RateParams()).settled.access
     for number in range(3):

@@ -1,4 +1,4 @@
-"""Which policy a radio can carry, with which times, and what is said when it cannot."""
+"""The policies that a radio supports, with their times, and the message if it does not."""
 
 from random import Random
 
@@ -162,7 +162,7 @@ def test_without_turns_a_radio_that_turns_round_slowly_is_told_of(turnaround_s, 
 
 
 def test_a_slot_that_is_over_before_it_is_known_to_be_unused_is_not_reused():
-    """Then its owner may begin late in it: nobody counts on hearing it by then."""
+    """Its owner may then begin late in it, so nobody relies on hearing the owner by then."""
     never = make(params("tdma", [1, 2], minislot_s=0.1, slot_s=0.02))
     assert not never._reuse
     slots = [never.slot(Wish(1e-3 * i, Qos.BULK, 0.001, Sensed())) for i in range(600)]
@@ -175,7 +175,7 @@ def test_a_slot_that_is_over_before_it_is_known_to_be_unused_is_not_reused():
 
 
 def test_minislots_too_short_to_hear_each_other_are_not_reused_in_tdma():
-    """They are refused nowhere: without reuse nobody needs them."""
+    """They are never refused: without reuse they are not needed."""
     tight = make(params("tdma", [1, 2], minislot_s=1e-4))
     wide = make(params("tdma", [1, 2], minislot_s=0.01, slot_s=0.02))
     assert (tight._reuse, wide._reuse) == (False, True)
@@ -185,11 +185,11 @@ def test_minislots_too_short_to_hear_each_other_are_not_reused_in_tdma():
 @pytest.mark.parametrize("policy", ["minislot", "csma", "tdma"])
 @pytest.mark.parametrize("traits", [LOCKSTEP, PACED], ids=["lockstep", "paced"])
 def test_who_began_a_slot_earlier_a_kilometre_away_is_heard_in_time(policy, traits):
-    """A burst is decided when one that began a slot before has been on the air long enough here."""
+    """A burst is decided when one begun a slot earlier has been on the air long enough here."""
     wanted = params(policy, [2, 1], persist=1.0, slot_s=0.2)
     access = make(wanted, traits=traits)
     if policy == "tdma":
-        # The slot of 2, who is silent.
+        # The slot of robot 2, which is silent.
         access._origin, access._is_running = 10.0, True
     else:
         access.heard(2, 9.9, False)

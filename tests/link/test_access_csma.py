@@ -1,4 +1,4 @@
-"""`csma`: it waits for an idle air, gives way to the more urgent, and collides seldom; `none`."""
+"""`csma`: it waits for an idle air, yields to urgent messages, and collides rarely; `none`."""
 
 from itertools import pairwise
 from random import Random
@@ -23,7 +23,7 @@ def make(seed=1, persist=0.2):
 
 
 def first_start(access, idle_since, qos=Qos.DEFAULT, earliest=0.0):
-    """Where it begins when the air stays idle from `idle_since` on."""
+    """Its start time if the air stays idle from `idle_since` on."""
     until = idle_since
     while until < idle_since + 10:
         wish = Wish(max(earliest, until + SLOT / 4), qos, 0.001, Sensed(until, idle_since))
@@ -39,7 +39,7 @@ def first_start(access, idle_since, qos=Qos.DEFAULT, earliest=0.0):
 @radios
 @pytest.mark.parametrize("n", [2, 4])
 def test_nobody_begins_on_a_busy_channel_that_could_be_sensed(traits, n):
-    """What began less than it takes to hear of it before the decision is chance."""
+    """A burst that began too shortly before the decision cannot be detected: chance."""
     late = 0
     for seed in range(2):
         air = Air(range(n), params("csma", []), traits, seed, LONGEST_S)
@@ -57,7 +57,7 @@ def test_nobody_begins_on_a_busy_channel_that_could_be_sensed(traits, n):
 @radios
 @pytest.mark.parametrize("n", [2, 4])
 def test_it_collides_less_than_without_access_though_sometimes(traits, n):
-    """The control for every law of no collisions: this air does have them."""
+    """The control for every law without collisions: this air does have them."""
     clashes = {"none": 0, "csma": 0}
     for policy in clashes:
         for seed in range(2):
@@ -72,7 +72,7 @@ def test_the_more_urgent_wait_less_on_average():
     waited_s = {qos: [] for qos in Qos}
     for seed in range(3):
         air = Air(range(4), params("csma", [], persist=0.05), LOCKSTEP, seed)
-        # Each robot has one class, so that no queue but only the air decides.
+        # Each robot has one class, so that only the air decides, not a queue.
         for node_id, qos in enumerate(Qos):
             at = 0.0
             while (at := at + air.rng.expovariate(20)) < 3:
@@ -101,7 +101,7 @@ def test_with_a_chance_of_one_it_takes_the_first_slot(qos):
 
 @pytest.mark.parametrize(("qos", "persist"), [(Qos.DEFAULT, 0.2), (Qos.LATENCY, 0.05)])
 def test_each_slot_has_the_same_chance(qos, persist):
-    """Slots passed are geometric: mean (1 - p) / p."""
+    """The number of skipped slots is geometric: mean (1 - p) / p."""
     waits, eagerness = WINDOWS[qos]
     chance = eagerness * persist
     access = make(7, persist)
@@ -127,7 +127,7 @@ def test_it_waits_until_the_channel_is_idle():
 
 
 def test_a_slot_is_kept_to_while_nothing_changes():
-    """Drawn anew at each look, the chance of all slots would be another."""
+    """A new draw at each query would change the probabilities of all slots."""
     for seed in range(20):
         access = make(seed, persist=0.1)
         slot, until = None, 5.0

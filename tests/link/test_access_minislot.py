@@ -1,4 +1,4 @@
-"""`minislot`: nodes that hear each other never collide, and the more urgent go first."""
+"""`minislot`: nodes that hear each other never collide, and urgent messages go first."""
 
 from collections import Counter
 from itertools import pairwise
@@ -29,7 +29,7 @@ def make(node_id, nodes=NODES):
 
 
 def first_start(access, idle_since, burst_at, qos=Qos.DEFAULT):
-    """Where a node begins that wants to send from `idle_since` on, while nobody else does."""
+    """The start of a node that wants to send from `idle_since` on, while no other node does."""
     until = idle_since
     while until < idle_since + 1:
         wish = Wish(until + MS / 4, qos, 0.001, Sensed(until, idle_since, burst_at))
@@ -53,7 +53,7 @@ def test_bursts_never_overlap_whoever_sends_whatever(traits, n):
 
 
 def test_the_same_traffic_without_access_overlaps():
-    """The control: else the law above would say nothing."""
+    """The control: otherwise the law above would prove nothing."""
     for n in (2, 5):
         air = Air(range(n), params("none", range(n)), LOCKSTEP, 1)
         air.offer_randomly(1.0, per_s=10)
@@ -86,7 +86,7 @@ def test_after_long_silence_all_may_begin_at_once(traits):
 
 
 def test_clocks_may_drift_apart_while_nobody_sends():
-    """Beacons come once a second; in that time two clocks of ±20 ppm part by 40 µs."""
+    """Beacons come once per second; meanwhile two clocks of ±20 ppm drift apart by 40 µs."""
     for seed in range(12):
         rng = Random(seed)
         air = make_air(3, LOCKSTEP, seed)
@@ -110,14 +110,14 @@ def test_a_burst_that_some_could_not_read_leads_to_no_collision(traits):
 
 @radios
 def test_urgent_goes_before_default_of_any_other_at_a_carriers_end(traits):
-    """Of those that waited when a burst ended, the next is of the higher level."""
+    """Among the messages that waited when a burst ended, the next has the higher level."""
     seen = 0
     for seed in range(3):
         air = make_air(3, traits, seed)
         air.offer_randomly(1.5, per_s=12, classes=(Qos.URGENT, Qos.DEFAULT))
         bursts = air.run(3.0)
         for i, (before, chosen) in enumerate(pairwise(bursts), start=1):
-            # Whoever had just sent is deaf for a moment, and so knows the air as late as others.
+            # A node that has just sent is deaf for a moment, so it knows the air as late as others.
             waited = [each for each in bursts[i:] if each.arrived_at < before.end]
             if any(each.qos is Qos.URGENT for each in waited):
                 assert chosen.qos is Qos.URGENT, f"seed {seed}: {before} {chosen}"
@@ -168,7 +168,7 @@ def test_each_node_has_a_place_of_its_own_and_the_last_sender_the_last(last, qos
 
 @pytest.mark.parametrize("qos", list(Qos))
 def test_who_could_not_read_the_last_burst_stays_out_of_the_round(qos):
-    """Others know who sent it; their places are not those that this node would reckon."""
+    """Others know who sent it; their mini-slots differ from those that this node would compute."""
     access = make(2)
     access.heard(7, 3.0, False)
     round_s = LEVELS * len(NODES) * MS

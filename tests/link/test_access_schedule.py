@@ -1,4 +1,4 @@
-"""`tdma`: whose schedule is kept, when robots come and go, and whose is not."""
+"""`tdma`: which schedule is kept, and which is not, when robots come and go."""
 
 from random import Random
 
@@ -20,20 +20,20 @@ def make(own_id, **given):
 
 
 def begun(access, at):
-    """It keeps a schedule by `at`."""
+    """The policy, which keeps a schedule by `at`."""
     access.slot(Wish(at, Qos.URGENT, 0.0005, Sensed(at)))
     return access
 
 
 def kept(air, at):
-    """(root, level) of each robot's schedule at the true time `at`, up to which the air ran."""
+    """(root, level) of each robot's schedule at the true time `at`, the end of the run."""
     frames = {i: node.access.frame(node.clock(at)) for i, node in air.nodes.items()}
     return {i: frame[:2] for i, frame in frames.items()}
 
 
 @radios
 def test_a_chain_keeps_one_schedule(traits):
-    """3 hears only 2, and takes the schedule of 1 from it."""
+    """Robot 3 hears only robot 2, and gets the schedule of robot 1 from it."""
     hears = {(1, 2), (2, 1), (2, 3), (3, 2)}
     for seed in range(2):
         air = make_air(3, traits, seed, hears=hears)
@@ -94,7 +94,7 @@ def test_a_lower_root_that_appears_is_followed_by_all(traits):
 def test_who_come_back_into_reach_find_each_other_whatever_they_send(
     traits, slot_s, longest_s, within_s, n
 ):
-    """All have too much to send, and slots at the same time wherever chance has put them."""
+    """All are overloaded, and their slots coincide wherever chance has put them."""
     for seed in range(3):
         ids, back_at = list(range(1, n + 1)), 5.0
         late = Random(seed).uniform(0, 2 * max(slot_s, 0.005))
@@ -138,7 +138,7 @@ def test_a_root_that_nobody_follows_leaves_some_of_its_slots_to_others():
 
 @radios
 def test_a_root_that_starts_again_disturbs_nobody(traits):
-    """Its schedule is kept by the others still."""
+    """The others still keep its schedule."""
     for seed in range(7):
         air = make_air(3, traits, seed)
         air.run(SETTLED_S)
@@ -151,7 +151,7 @@ def test_a_root_that_starts_again_disturbs_nobody(traits):
 
 @pytest.mark.parametrize(("own_id", "lower"), [(4, 0), (6, 1), (9, 2)])
 def test_who_hears_no_schedule_begins_one_the_lowest_first(own_id, lower):
-    """The lowest need not wait; the others do so one after another."""
+    """The lowest need not wait; the others start one after another."""
     access = make(own_id, nodes=(4, 9, 6))
     begins_at = LISTEN_S + lower
     if lower:
@@ -220,7 +220,7 @@ def test_the_fewest_hops_are_followed_and_the_parent_at_once():
 
 
 def test_who_follows_another_goes_where_that_one_is_and_nowhere_else():
-    """A robot that has just come has a schedule of its own, for a while."""
+    """A newly started robot has its own schedule for a while."""
     access = begun(make(2), 9.0)
     schedule = access.frame(9.0).schedule
     for step in range(20):

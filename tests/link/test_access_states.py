@@ -1,4 +1,4 @@
-"""Access policies as tables: every step is allowed or refused, and robots take each allowed one."""
+"""Access policies as tables: each transition is allowed or refused, and allowed ones occur."""
 
 import itertools
 from random import Random
@@ -21,7 +21,7 @@ TABLES = {"csma": CSMA_STEPS, "tdma": TDMA_STEPS}
 
 
 def steps_of(table):
-    """Every pair of a state and of what may happen."""
+    """Every pair of a state and an event."""
     states, happenings = ({key[i] for key in table} for i in (0, 1))
     states |= set(table.values())
     return [*itertools.product(*(sorted(each, key=str) for each in (states, happenings)))]
@@ -42,7 +42,7 @@ def test_every_step_is_allowed_or_refused(policy, state, happens):
 
 @pytest.fixture
 def taken(monkeypatch):
-    """The steps that policies take."""
+    """The transitions that policies take."""
     found = {policy: set() for policy in TABLES}
     for policy in TABLES:
 
@@ -68,7 +68,7 @@ def test_robots_take_every_step_of_csma(taken):
 
 
 def test_robots_take_every_step_of_tdma(taken):
-    """Alone, beside a later robot, below an earlier one, and after that has fallen silent."""
+    """Alone, with a later robot, below an earlier one, and after that one has fallen silent."""
 
     def robot():
         return make_access(params("tdma", [1, 2, 3]), 2, LOCKSTEP, 0.01, Random(1))
@@ -107,7 +107,7 @@ MINISLOT_S = 0.004
     [("own", 5), ("forwarded 3", 5), ("read 1", 3), ("relayed 1", 4), ("unread", 7), ("read 9", 7)],
 )
 def test_what_kept_the_channel_busy_tells_a_robots_mini_slot(ended, place):
-    """Of robot 2 of three, for a message of class default: FIRST and the theory above it."""
+    """For robot 2 of three with a message of class default: FIRST and the theory above it."""
     kind, _, src = ended.partition(" ")
     access = make_access(
         params("minislot", [1, 2, 3], minislot_s=MINISLOT_S), 2, LOCKSTEP, 0.01, Random(1)

@@ -1,4 +1,4 @@
-"""`tdma`: bursts stay in slots, nobody clashes, and urgent messages keep time."""
+"""`tdma`: bursts stay in slots, none clash, and urgent messages are in time."""
 
 from collections import Counter
 from math import floor
@@ -20,8 +20,9 @@ def make(own_id, traits=LOCKSTEP, longest_s=LONGEST_S, nodes=(1, 2, 3)):
 
 
 def assert_in_slots(air):
-    """Begins in a slot and is over before its guard, but for the error of clocks; how often in
-    another's.
+    """Assert that each burst is within a slot and its guard, except for clock errors.
+
+    Returns how many were in another robot's slot.
     """
     slot_s, guard_s = lengths_s(air)
     foreign = 0
@@ -36,7 +37,7 @@ def assert_in_slots(air):
 @radios
 @sizes
 def test_bursts_stay_in_slots_of_their_own(traits, n):
-    """Also while clocks part, from the first burst on."""
+    """From the first burst on, and while the clocks drift apart."""
     for seed in range(2):
         air = make_air(n, traits, seed)
         air.offer_randomly(SETTLED_S + 1.2, per_s=8, begin_s=SETTLED_S)
@@ -59,13 +60,13 @@ def test_slots_of_the_silent_are_used_by_others_and_nobody_clashes(traits, n, is
         air.run(SETTLED_S + 1.5)
         air.assert_nobody_clashes()
         foreign += assert_in_slots(air)
-    # A slot here is shorter than the mini-slots of a radio that takes its time.
+    # Here a slot is shorter than the mini-slots of a slow radio.
     assert foreign > 20 or not traits.is_lockstep
 
 
 @sizes
 def test_reuse_makes_the_air_of_one_robot_nearly_whole(n):
-    """The control: it is worth something."""
+    """The control: reuse is useful."""
     sent = {}
     for reuse in (False, True):
         air = make_air(n, LOCKSTEP, 1, reuse=reuse)
@@ -90,7 +91,7 @@ def test_all_get_the_same_when_all_have_too_much(traits, n):
 @radios
 @pytest.mark.parametrize("reuse", [False, True])
 def test_an_urgent_message_waits_a_frame_at_most(traits, reuse):
-    """However much else waits, at whichever robot; and here no slot is ever empty."""
+    """However much else waits at any robot; no slot is ever empty here."""
     for seed in range(2):
         air = make_air(4, traits, seed, reuse=reuse, ppm=0.0)
         air.saturate(80, SETTLED_S)
@@ -124,7 +125,7 @@ def test_what_is_given_is_kept_to():
 
 
 def assert_alike(one, other, begin):
-    """Both say the same at any moment from `begin` on."""
+    """Assert that both decide the same at any time from `begin` on."""
     granted = 0
     for step in range(300):
         until = begin + step * 1e-4
@@ -136,7 +137,7 @@ def assert_alike(one, other, begin):
 
 
 def two_of_robot_2():
-    """(the same twice, where its slot begins)"""
+    """(the same policy twice, start of its slot)"""
     pair = make(2), make(2)
     slot_s = pair[0]._slot_s
     begin = 10.0 + 3 * slot_s
@@ -155,7 +156,7 @@ def test_a_burst_that_did_not_leave_was_never_there():
 
 
 def test_a_burst_that_did_not_leave_takes_nothing_from_the_one_behind_it():
-    """Two may be on their way to the radio when it says that the first came too late."""
+    """Two may be on their way to the radio when it reports that the first was late."""
     one, twin, begin = two_of_robot_2()
     one.sent(begin + 0.001, None)
     for each in (one, twin):
@@ -165,7 +166,7 @@ def test_a_burst_that_did_not_leave_takes_nothing_from_the_one_behind_it():
 
 
 def begun(access, since, for_s=0.2):
-    """Whose slots a robot begins in that looks every 50 µs, while nobody is heard."""
+    """Owners of the slots in which a robot begins that decides every 50 µs and hears nobody."""
     looks = (since + 5e-5 * i for i in range(int(for_s / 5e-5)))
     slots = (access.slot(Wish(at, Qos.BULK, 0.001, Sensed(at))) for at in looks)
     numbers = ((slot.start - access._origin) / access._slot_s for slot in slots if slot)
@@ -173,7 +174,7 @@ def begun(access, since, for_s=0.2):
 
 
 def test_who_knows_of_a_robot_it_does_not_hear_uses_its_own_slots_only():
-    """That one may be sending, and the robot between them would hear neither."""
+    """That robot may be sending, and the robot between them would hear neither."""
     access = make(3, LOCKSTEP, 0.004, nodes=(1, 2, 3))
     begun(access, 10.0)
     assert begun(access, 11.0) == {1, 2, 3}
@@ -183,7 +184,7 @@ def test_who_knows_of_a_robot_it_does_not_hear_uses_its_own_slots_only():
     access.told_of(1, 12.0)
     access.told_of(3, 12.0)
     assert begun(access, 12.1) == {1, 2, 3}
-    # Now we do not any more.
+    # Now we no longer do.
     access.told_of(1, 15.0)
     access.heard(2, 15.0, False)
     assert begun(access, 15.1) == {3}

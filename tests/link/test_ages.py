@@ -1,4 +1,4 @@
-"""Age travels, not time."""
+"""Messages carry their age, not a time."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from tests.link.world import compose, make_link, send_all
 
 
 def carry(sender, receiver, sent_at, heard_at, **kwargs):
-    """PDUs composed at `sent_at` of the sender's clock arrive at `heard_at` of the receiver's."""
+    """PDUs composed at the sender's time `sent_at` arrive at the receiver's time `heard_at`."""
     return [m for pdu in send_all(sender, sent_at, **kwargs) for m in receiver.hear(pdu, heard_at)]
 
 

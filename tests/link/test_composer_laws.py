@@ -1,4 +1,4 @@
-"""Whatever may be packed: no burst is longer, none mixes sources, and the queue stays in order."""
+"""For any packing: no burst is too long, none mixes sources, and the queue stays in order."""
 
 from math import inf
 from random import Random
@@ -27,7 +27,7 @@ CLASSES = ClassesParams(bulk=ClassParams(parity=0.3, share=0.1))
 
 
 def walk(outbox):
-    """(messages waiting, messages being fragmented) by looking at every lane."""
+    """(messages waiting, messages being fragmented), counted over every lane."""
     waiting, current = [], []
     for level in outbox.levels:
         assert level.lanes, "an empty level stays behind"

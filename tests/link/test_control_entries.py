@@ -1,4 +1,4 @@
-"""Control entries of others that cannot be read: they cost themselves, and nothing beside them."""
+"""Unreadable control entries of other robots only affect themselves."""
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -22,7 +22,7 @@ from tests.link.world import make_link, neighbors, rx
 SIZE = 220
 MESSAGE = b"\0\1\0\0data"
 SPOILT = build_records([Beacon(7, 1), Stamp(0, 9, 5_000_000)]) + b"\4\4\6"
-"""Records that can be read, and one that is cut."""
+"""Readable records, followed by one that is cut."""
 
 
 def control(payload, total=1):
@@ -45,7 +45,7 @@ def readable(entry):
     return entry.total == 1
 
 
-# Any octets, and octets that begin like records do.
+# Random octets, and octets that begin like records.
 payloads = st.binary(max_size=60) | st.builds(
     lambda kind, length, rest: bytes((kind, length)) + rest,
     st.integers(0, 12),
@@ -82,7 +82,7 @@ def test_a_good_control_entry_beside_a_bad_one_is_used():
 def test_of_a_bad_entry_no_record_is_used():
     link = make_link(2, pdu_size=SIZE)
     (got,) = link.hear(pdu([data(), control(SPOILT)]), 1.0)
-    # Neither its STAMP nor its BEACON.
+    # Neither its STAMP nor its BEACON takes effect.
     assert got.origin_at is None
     link.hear(pdu([control(build_records([Beacon(8, 1)]))], seq=1), 1.1)
     assert neighbors(link)[1].reboots == 0

@@ -1,4 +1,4 @@
-"""How long a PDU that is not full waits for more, and what never does."""
+"""How long a partly filled PDU waits for more messages, and what never waits."""
 
 from random import Random
 
@@ -30,7 +30,7 @@ from tests.link.world import (
 
 INFINITE = float("inf")
 NEVER = 0.0
-"""By time, as in the paper."""
+"""By time only, as in the paper."""
 LATE = 1e6
 
 
@@ -75,7 +75,7 @@ class TestWithoutEnd:
 
     def test_it_goes_when_it_is_full(self, flush_s):
         link = waiting(flush_s)
-        # 4 × 50 B and the headers of 3 of them are more than 207 B.
+        # 4 × 50 B and the headers of 3 of them exceed 207 B.
         for i in range(4):
             link.submit(i % 2, bytes(50), 0.1 * i)
             burst = compose(link, 0.1 * i)
@@ -97,7 +97,7 @@ class TestWithoutEnd:
         link.submit(1, bytes(50), 0.0)
         link.submit(0, bytes(50), 0.0, Overrides(qos=qos))
         assert link.next_wakeup(0.0) <= 0.0
-        # What may wait fills what is left.
+        # Messages that may wait fill the rest.
         assert len(layouts(compose(link, 0.0).pdus, 220)[0]) == 2
 
     @pytest.mark.parametrize("wish", ["policy", "message"])
@@ -149,7 +149,7 @@ class TestWithoutEnd:
         assert not link.has_work
 
     def test_beacons_clocks_and_receipts_do_not_wait(self, flush_s):
-        """Beside a message that waits for ever."""
+        """They go even if a message in the queue waits forever."""
         clock = ClockParams(period_s=0.2, share=0.5)
         link = waiting(flush_s, beacon_s=1.0, clock=clock)
         far = make_link(2, pdu_size=220, beacon_s=1.0, clock=clock)
@@ -177,7 +177,7 @@ class TestWithoutEnd:
 @settings(derandomize=True, deadline=None, max_examples=40)
 @given(st.integers(0, 2**32), st.sampled_from([NEVER, 0.05]))
 def test_whatever_waits_goes_with_the_rest_or_at_the_end(seed, flush_s):
-    """Nothing is stuck: what is in the queue leaves at the latest when the node stops."""
+    """Nothing is stuck: a queued message leaves at the latest when the node stops."""
     rng = Random(seed)
     link = make_link(pdu_size=220, flush_s=flush_s, seed=seed)
     now = 0.0
@@ -192,7 +192,7 @@ def test_whatever_waits_goes_with_the_rest_or_at_the_end(seed, flush_s):
         wakes_at = link.next_wakeup(now)
         ledger = tx(link)
         if link.has_work:
-            # Asleep for ever means: nothing is begun, and nothing of it would fill a PDU.
+            # Sleeping forever means: no message is begun, and none would fill a PDU.
             pending = ledger.queued_bytes + (ledger.queued - 1) * ENTRY_HEADER_SIZE
             assert wakes_at < INFINITE or (
                 flush_s == NEVER and not ledger.in_flight and pending < equal_payload(220, 1)
@@ -224,7 +224,7 @@ def test_what_the_setting_means_in_words(flush_s, told):
 
 
 def test_what_waits_behind_the_rest_of_an_expired_message_goes_when_that_is_dropped():
-    """The one with a lifespan does not wait, and takes along what does."""
+    """The one with a lifespan does not wait, and takes the waiting ones along."""
     link = make_link(pdu_size=256, flush_s=0.0)
     link.set_policies({0: TopicPolicy(lifespan_s=0.5), 1: TopicPolicy(qos="bulk")})
     link.submit(0, bytes(600), 0.0)

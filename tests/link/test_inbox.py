@@ -1,4 +1,4 @@
-"""What a node takes from the air, and what it refuses by name."""
+"""What a node accepts from the air, and what it refuses by name."""
 
 from random import Random
 

@@ -1,4 +1,4 @@
-"""transient_local: who comes late gets the last message, for little air."""
+"""transient_local: a late joiner gets the last message, for little airtime."""
 
 import pytest
 
@@ -10,7 +10,7 @@ MAP = b"\0\1\0\0map"
 
 
 def exchange(links, now):
-    """Everybody sends and hears; what each got by (to, from, payload)."""
+    """All robots send and hear; what each received by (to, from, payload)."""
     got = []
     for link in links:
         while burst := compose(link, now, 8):

@@ -1,4 +1,4 @@
-"""Where a message's age comes from, and what control records cost."""
+"""The source of a message's age, and the cost of control records."""
 
 from itertools import pairwise
 from random import Random
@@ -77,7 +77,7 @@ def test_why_a_message_waited_is_told_in_a_beacon():
     link = make_link(beacon_s=0.5)
     link.attach(PduLinkTraits(lead_s=0.002), AccessParams(), RateParams())
     link.submit(0, bytes(20), 0.0)
-    # The radio could take it at 10 ms, and its burst left 30 ms later than it was meant to.
+    # The radio could accept it at 10 ms, and its burst left 30 ms later than planned.
     burst = next_burst(link, 0.012)
     link.confirm(burst._replace(start=0.042), Outcome.SENT, 0.05)
     waits = topic_of(link, 0)
@@ -90,7 +90,7 @@ def test_why_a_message_waited_is_told_in_a_beacon():
 
 def test_what_a_source_tells_of_its_waits_splits_the_wait_of_its_messages():
     sender, receiver = make_link(1), make_link(2)
-    # Numbers of topics that nobody has are of no use, and do no harm.
+    # Unknown topic numbers are useless, but harmless.
     tell(receiver, 1, *(Waits(topic_id, 1, 2, 3) for topic_id in range(16)), at=0.0)
     tell(receiver, 1, Waits(0, 60, 20, 20), at=0.0)
     sender.submit(0, bytes(20), 0.0)
@@ -102,7 +102,7 @@ def test_what_a_source_tells_of_its_waits_splits_the_wait_of_its_messages():
 
 
 def clocks_of(link, until, step_s=0.01, submit_s=None):
-    """(time, whether it went alone) of every CLOCK that left, robot 9 being there, too."""
+    """(time, whether it was alone) of each CLOCK sent, with robot 9 present."""
     found, now, next_at = [], 0.0, 0.0
     while now < until:
         now += step_s
@@ -131,7 +131,7 @@ def test_clocks_ride_at_their_period_and_go_alone_within_their_share():
     beside = make_link(clock=ClockParams(period_s=0.2, share=0.004))
     beside.attach(PduLinkTraits(pdu_burst_s=(PDU_S,)), AccessParams(), RateParams())
     found = clocks_of(beside, 20.0, submit_s=0.05)
-    # They ride from three quarters of their period on.
+    # They may piggyback from three quarters of their period on.
     assert 85 < len(found) <= 20 / 0.15 + 1
     assert not any(is_alone for _, is_alone in found[1:])
 

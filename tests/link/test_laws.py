@@ -1,4 +1,4 @@
-"""Laws that hold for any traffic: the ledger adds up, order holds, nothing is made up."""
+"""Laws for any traffic: the ledger adds up, order is kept, no message is invented."""
 
 from collections import Counter
 from random import Random
@@ -107,7 +107,7 @@ def test_the_ledger_holds_at_every_step_of_any_run(seed):
 @law(30)
 @given(st.integers(0, 2**32))
 def test_whatever_the_air_does_nothing_is_made_up(seed):
-    """Loss, duplication, bit errors and overtaking: each message arrives whole, once, or not."""
+    """Loss, duplication, bit errors, reordering: a message arrives whole, once, or not at all."""
     rng = Random(seed)
     air = Impairment(
         DirectParams(loss=0.1, duplicate=0.1, corrupt=0.05, jitter_s=0.03, delay_s=0.001), rng

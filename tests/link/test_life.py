@@ -1,4 +1,4 @@
-"""A message's life: which steps there are, and who may take them."""
+"""A message's life: which transitions exist, and who may cause them."""
 
 import itertools
 from math import inf

@@ -1,4 +1,4 @@
-"""How long messages are worth sending: by themselves, by their topic, by their class."""
+"""How long messages are worth sending: by their own lifespan, their topic's, their class's."""
 
 import pytest
 
@@ -20,7 +20,7 @@ FILE = Told("robot.toml", ())
 
 
 def outlives(link, after_s, **wishes):
-    """Whether a message of topic 0 is still sent so long after it was submitted."""
+    """Whether a message of topic 0 is still sent `after_s` after it was submitted."""
     link.submit(0, bytes(40), 0.0, Overrides(**wishes))
     link.handle_timers(after_s)
     sent = bool(send_all(link, after_s))
@@ -66,7 +66,7 @@ def test_the_class_says_nothing_of_what_is_kept_for_those_who_come_late():
     for now in (60.0, 61.0, 62.0, 63.0):
         link.handle_timers(now)
     assert len(send_all(link, 63.0)) == 1
-    # Its topic does.
+    # Its topic has one.
     link.set_policy(0, TopicPolicy(qos="latency", durability="transient_local", lifespan_s=5.0))
     tell(link, 3, at=70.0)
     for now in (70.0, 71.0, 72.0, 73.0):
@@ -90,7 +90,7 @@ def test_nothing_changes_for_a_topic_that_nobody_configured():
 
 
 def test_a_receiver_leaves_the_classes_lifespan_to_the_sender():
-    """The producer may have asked for more, and nobody here knows."""
+    """The producer may have requested more, which the receiver cannot know."""
     sender, receiver = make_link(1), make_link(2)
     for link in (sender, receiver):
         link.set_policies({0: TopicPolicy(qos="latency")})
@@ -152,7 +152,7 @@ def test_why_and_the_report_tell_which():
 
 
 def test_an_overloaded_air_hands_over_nothing_old_of_class_latency():
-    """Twice as many messages come as the air carries."""
+    """Twice as many messages are submitted as the air can carry."""
     sender, receiver = make_link(1, pdu_size=64), make_link(2, pdu_size=64)
     for link in (sender, receiver):
         link.set_policies({0: TopicPolicy(qos="latency")})

@@ -1,4 +1,4 @@
-"""How long a robot is silent now and then, and what is an outage."""
+"""How long a robot's usual pauses are, and what is an outage."""
 
 from sdrlinkd.link.receive import LONGEST_GAP_S, Neighbor
 
@@ -17,7 +17,7 @@ def test_the_usual_pause_is_the_longest_of_the_latest():
 
 
 def test_an_outage_is_no_usual_pause():
-    """Else the next one would be missed for longer than anybody waits."""
+    """Otherwise the next outage would be noticed far too late."""
     neighbor = Neighbor(2)
     heard(neighbor, [float(second) for second in range(1, 60)])
     assert heard(neighbor, [400.0]) == LONGEST_GAP_S

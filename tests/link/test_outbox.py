@@ -1,4 +1,4 @@
-"""What waits, who is shed, and that nobody starves among equals."""
+"""What waits, what is shed, and that no equal starves."""
 
 import pytest
 
@@ -73,7 +73,7 @@ def test_expired_messages_are_not_sent():
 
 @pytest.mark.parametrize("age_s", [1.0, 12.0, 3600.0])
 def test_a_message_that_is_too_old_when_it_comes_expires_at_once(age_s):
-    """However old it is, and it does not take the place of a fresh one."""
+    """However old it is, it does not displace a fresh one."""
     link = make_link(pdu_size=64)
     link.set_policies({0: TopicPolicy(depth=1, lifespan_s=0.3)})
     assert link.submit(0, bytes(8), 0.0) is None
@@ -86,7 +86,7 @@ def test_a_message_that_is_too_old_when_it_comes_expires_at_once(age_s):
 
 @pytest.mark.parametrize(("age_s", "told_us"), [(9.0, 9_000_000), (12.0, 0), (3600.0, 0)])
 def test_without_a_lifespan_great_ages_count_from_now(age_s, told_us):
-    """A recording that is played, or another clock."""
+    """A replayed recording, or another clock."""
     link = make_link(pdu_size=64)
     link.submit(0, bytes(8), 0.0, Overrides(age_s=age_s))
     (pdu,) = send_all(link)

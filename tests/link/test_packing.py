@@ -1,4 +1,4 @@
-"""The paper's packing policy (section 5.2), and what we add to it."""
+"""The paper's packing policy (section 5.2), and our additions."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Messages whose lost PDUs are computed from the others."""
+"""Messages whose lost PDUs are reconstructed from the others."""
 
 from random import Random
 
@@ -74,7 +74,7 @@ def test_what_is_sent_is_only_sent_when_its_parity_is():
 
 
 def test_records_that_contradict_their_message_or_themselves_do_no_harm():
-    """Beside them, every third message loses two fragments and has parity that is good."""
+    """At the same time, every third message loses two fragments and has valid parity."""
     rng = Random(4)
     sender = protected(0.3, pdu_size=220, beacon_s=0.0)
     receiver = protected(0.0, 2, pdu_size=220)
@@ -101,7 +101,7 @@ def test_records_that_contradict_their_message_or_themselves_do_no_harm():
 
 
 def test_parity_of_a_message_that_is_complete_is_no_part_of_the_next():
-    """Entry ids come back, and images are often of one size."""
+    """Entry ids are reused, and images often have the same size."""
     rng = Random(5)
     sender, receiver = protected(0.2, pdu_size=220), protected(0.0, 2, pdu_size=220)
     for i in range(600):
@@ -126,7 +126,7 @@ def test_memory_is_bounded_whatever_comes():
 
 
 def fading(seed, n):
-    """Whether each of `n` PDUs is lost: 7 %, where a strength that changes slowly is weakest."""
+    """Whether each of `n` PDUs is lost: 7 %, at the minima of a slowly varying level."""
     rng = np.random.default_rng(seed)
     strength = lfilter([1.0], [1.0, -0.6], rng.standard_normal(n))
     return strength < np.quantile(strength, 0.07)

@@ -1,4 +1,4 @@
-"""What a topic's policy lets in, keeps, shrinks and hands over."""
+"""What a topic's policy accepts, keeps, shrinks and hands over."""
 
 from itertools import pairwise
 from random import Random
@@ -39,7 +39,7 @@ def reasons(link):
 
 
 def test_a_throttled_topic_goes_at_its_period_on_average():
-    """The producer's period, 20 ms, is no part of the policy's."""
+    """The producer's period of 20 ms does not divide the policy's."""
     link = link_with(TopicPolicy(period_s=0.05))
     taken = [i for i in range(500) if link.submit(0, TEXT, i * 0.02) is None]
     assert len(taken) == pytest.approx(10 / 0.05, abs=2)
@@ -218,7 +218,7 @@ def test_what_has_expired_is_never_handed_over(seed):
 
 
 def test_a_message_begun_and_not_gone_on_with_is_given_up():
-    """Receivers wait for half a second; the rest would be sent in vain."""
+    """Receivers wait half a second; the rest would be sent in vain."""
     link = make_link(pdu_size=64)
     link.submit(0, bytes(400), 0.0)
     burst = compose(link, 0.0, 2)

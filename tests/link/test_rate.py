@@ -1,4 +1,4 @@
-"""Which MCS a burst gets: from what neighbors say, neither too fast nor back and forth."""
+"""The MCS of a burst follows neighbors' reports, neither too fast nor oscillating."""
 
 from random import Random
 
@@ -30,7 +30,7 @@ def make(fixed=1, **params):
 
 
 def tell(rate, src, snr_db, at=0.0, per=0.0, is_heard=True):
-    """`src` says how well it hears us."""
+    """`src` reports how well it hears us."""
     if is_heard:
         rate.heard(src, at)
     rate.take(src, LinkReport(ME, round(4 * snr_db), round(255 * per), 0), at)
@@ -48,7 +48,7 @@ def test_an_mcs_is_taken_with_its_margin_and_the_hysteresis_in_hand(mcs, qos, ma
     for snr_db, best in ((enough - 0.25, mcs - 1), (enough, mcs)):
         rate = make(hysteresis_db=HYSTERESIS)
         tell(rate, 2, snr_db)
-        # From below, and not over the next one, which needs 2 dB more at the least.
+        # From below, and not past the next one, which needs at least 2 dB more.
         assert choice(rate, qos=qos) == best
 
 
@@ -74,7 +74,7 @@ def test_snr_that_jitters_within_the_hysteresis_changes_nothing(seed, snr_db):
         tell(rate, 2, each, at=second)
         chosen.append(choice(rate, at=second))
     steps = sum(a != b for a, b in zip([0, *chosen], chosen, strict=False))
-    # Once up; and down, when the first was one of the best.
+    # Up once; and down, if the first one was among the best.
     assert steps <= 2, f"seed {seed}"
 
 

@@ -36,7 +36,7 @@ def next_burst(link, now):
 
 
 class World(Steps):
-    """Links that hear each other as `snr_db(to, src, now)` says: a burst below its need is lost."""
+    """Links that hear each other by `snr_db(to, src, now)`; weaker bursts are lost."""
 
     def __init__(self, ids, snr_db, most_bursts=10, **rate):
         self.snr_db = snr_db
@@ -51,7 +51,7 @@ class World(Steps):
             yield from ((0.0, snr_db, pdu) for pdu in burst.pdus)
 
     def mcs(self, src, since, until=INFINITE):
-        """The MCS of its bursts of messages in that time."""
+        """The MCS values of `src`'s bursts with messages in that time."""
         return [
             burst.mcs
             for at, sender, burst in self.bursts
@@ -67,7 +67,7 @@ def chatter(to=BROADCAST, src=1, size=100):
 
 
 def there(world, node, src):
-    """(SNR in dB, PER) at which `src` says it hears `node`."""
+    """(SNR in dB, PER) with which `src` reports to hear `node`."""
     report = neighbors(world.links[node])[src]
     return report.snr_there_db, report.per_there
 
@@ -112,7 +112,7 @@ def test_the_mcs_follows_a_falling_and_a_rising_snr(to):
 
 
 def test_losses_that_snr_does_not_tell_make_it_cautious():
-    """Fading, interference: the mean SNR is fine, PDUs are lost nevertheless."""
+    """Fading, interference: the mean SNR is fine, but PDUs are lost."""
     rng = Random(5)
 
     def snr_db(_to, src, _now):
@@ -147,7 +147,7 @@ def test_a_third_that_is_far_slows_broadcasts_only():
 
 @pytest.mark.parametrize("size", [100, 2000], ids=["some", "more than the air carries"])
 def test_beacons_are_for_all_also_beside_messages_for_one(size):
-    """Unicast at full speed must not make us mute to those further away."""
+    """Unicast at full rate must not hide us from robots farther away."""
 
     def snr_db(to, src, _now):
         return 6.0 if 3 in (to, src) else 25.0

@@ -34,7 +34,7 @@ N = 60
 
 
 class Air(Steps):
-    """Robots that all hear each other, by chance; PDUs may be lost, doubled and overtaken."""
+    """Robots that hear each other at random; PDUs may be lost, duplicated and reordered."""
 
     def __init__(self, seed, robots, loss=0.0, doubled=0.0, late=0.0, **params):
         self.rng = Random(seed)
@@ -48,7 +48,7 @@ class Air(Steps):
         }  # fmt: skip
         super().__init__(links, STEP_S, next_burst)
         self.delivered = Counter()
-        """(robot, payload): times it was handed over."""
+        """Number of times that (robot, payload) was handed over."""
         self.expired = []
         self.verdicts = []
 
@@ -181,7 +181,7 @@ def test_of_all_robots_asked_the_last_one_is_told_of_as_such():
 
 
 def test_a_receipt_is_for_the_message_that_had_the_entry_id_then():
-    """Entry ids come again after 256 messages."""
+    """Entry ids are reused after 256 messages."""
     air = Air(5, (1, 2), pdu_size=128)
     air.run(1.5)
     for number in range(600):
@@ -205,7 +205,7 @@ def test_receipts_that_reach_nobody_are_reported():
 
 
 def test_a_receipt_that_waited_is_for_the_message_of_then():
-    """It says since when; the entry id is another message's by now."""
+    """It states its time; the entry id belongs to another message by now."""
     receipts = Receipts(1, RECEIPT_S)
     for name, at in (("then", 10.0), ("now", 10.5)):
         asks = Outgoing(
@@ -226,7 +226,7 @@ def test_a_receipt_that_waited_is_for_the_message_of_then():
 
 
 def test_a_receipt_of_the_short_form_is_for_whom_the_pdu_is():
-    """RECEIPT without node and age, as it was first written down."""
+    """A RECEIPT without node and age, as originally specified."""
     link = make_link()
     link.submit(0, message(1), 0.0, Overrides(receipt="one", dst=2))
     burst = next_burst(link, 0.0)
@@ -371,7 +371,7 @@ def test_an_early_stamp_is_kept_while_its_message_is_still_arriving():
     pdus = []
     for i in range(40):
         if i == 2:
-            # Its rest leaves room for the other's age, too.
+            # The rest of the message leaves room for the other's age, too.
             sender.submit(1, message(2, 4), 0.0)
         burst = compose(sender, 0.05 * i, 1)
         pdus += [(0.05 * i, pdu) for pdu in (burst.pdus if burst else ())]

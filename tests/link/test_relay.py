@@ -1,4 +1,4 @@
-"""PDUs for others: on by route or flood, once, never back, with their ages."""
+"""PDUs for others: forwarded by route or flood, once, never back, with their ages."""
 
 from random import Random
 
@@ -49,7 +49,7 @@ def test_a_message_crosses_a_chain_and_its_age_adds_up():
 
 
 def test_what_a_relay_sends_on_is_known_to_who_heard_it_before():
-    """STAMPs grow on the way; duplicates are known by what does not change."""
+    """STAMPs grow on the way; duplicates are recognised by the constant parts."""
     one, two, three = node(1), node(2, "any>all"), node(3)
     one.submit(0, b"\0\1\0\0message", 0.0)
     (pdu,) = pass_on(one, 0.0)
@@ -144,7 +144,7 @@ def test_a_relay_does_not_keep_what_is_old():
 @law(30)
 @given(st.integers(0, 2**32))
 def test_in_any_mesh_messages_arrive_once_and_the_ledgers_add_up(seed):
-    """Flooding over random links that lose a tenth; everybody sends to everybody."""
+    """Flooding over random links that lose a tenth; every robot sends to every other."""
     rng = Random(seed)
     nodes = {i: node(i, policy="flood") for i in range(1, 6)}
     links = {(a, b) for a in nodes for b in nodes if a != b and rng.random() < 0.5}

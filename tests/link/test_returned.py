@@ -1,4 +1,4 @@
-"""Bursts that came too late go again: in their order, older, and never lost in silence."""
+"""Late bursts are sent again: in order, with higher ages, and never lost silently."""
 
 import pytest
 
@@ -24,7 +24,7 @@ def records(pdu):
 
 
 def without_ages(pdu):
-    """All of a PDU but the ages in its STAMPs."""
+    """A PDU without the ages in its STAMPs."""
     parsed = parse(pdu, SIZE)
     messages = [e for e in parsed.entries if e.topic_id != 15]
     kept = [r._replace(age_us=0) if isinstance(r, Stamp) else r for r in records(pdu)]
@@ -36,7 +36,7 @@ def stamps(burst):
 
 
 class Doorkeeper:
-    """An access policy that says what it is told to say, and keeps what it is told."""
+    """An access policy with preset answers, which records its calls."""
 
     def __init__(self, *slots):
         self.slots, self.told = list(slots), []
@@ -107,7 +107,7 @@ def test_a_tdma_phase_moves_too():
     assert phase_us(again) - phase_us(first) == pytest.approx(
         1e6 * (again.start - first.start), abs=1
     )
-    # It may be more than a frame; who hears it reckons from its start.
+    # It may exceed a frame; listeners count from its start.
     kept_us, frame_us = access.frame(again.start).phase_us, 1e6 * access.round_s
     off_us = (phase_us(again) - kept_us) % frame_us
     assert min(off_us, frame_us - off_us) < 2
@@ -128,7 +128,7 @@ def test_several_go_again_in_their_order_and_before_anything_new():
 
     first = next_burst(link, 0.1)
     assert number(first) == number(bursts[0])
-    # Late once more, while the others wait: still the first.
+    # Late once more while the others wait: it remains the first.
     link.confirm(first, Outcome.LATE, 0.11)
     order = [number(next_burst(link, 0.2 + 0.01 * i)) for i in range(4)]
     assert order[:3] == [number(bursts[i]) for i in (0, 2, 3)]
@@ -186,7 +186,7 @@ def test_the_rest_of_a_message_that_is_given_up_is_not_sent():
 
 @pytest.mark.parametrize("outcome", [Outcome.LOST, Outcome.UNDERFLOW])
 def test_only_what_did_not_leave_at_all_goes_again(outcome):
-    """Of a burst that broke off, others may have heard a part: its PDUs would be duplicates."""
+    """Others may have heard a part of an interrupted burst: its PDUs would be duplicates."""
     link = make_link(pdu_size=SIZE)
     link.submit(0, bytes(30), 0.0)
     link.confirm(next_burst(link, 0.0), outcome, 0.1)
@@ -211,7 +211,7 @@ def test_shut_down_leaves_nothing_to_send():
 
 
 def test_air_that_was_not_used_is_not_counted():
-    """What is told to people: time on the air and bursts by MCS are of those that left."""
+    """Reported airtime and bursts by MCS only count bursts that left."""
     link = make_link(pdu_size=SIZE)
     link.attach(PduLinkTraits(), AccessParams(), RateParams())
     link.submit(0, bytes(30), 0.0)

@@ -1,4 +1,4 @@
-"""Laws that hold however many bursts come too late."""
+"""Laws that hold however many bursts are late."""
 
 from random import Random
 

@@ -1,4 +1,4 @@
-"""Bursts that end before what is due, shares that nobody loses."""
+"""Bursts end before forecast messages are due, and no class loses its share."""
 
 from random import Random
 
@@ -97,7 +97,7 @@ def test_when_no_pdu_fits_before_what_is_due_the_air_is_kept_free():
 
 
 def test_the_air_is_kept_free_for_a_tenth_of_the_time_at_most():
-    """Fifteen topics, so that something is always due."""
+    """With fifteen topics, so that something is always due."""
     forecasts = Forecasts()
     for i in range(15):
         for n in range(20):
@@ -127,7 +127,7 @@ def test_what_nobody_can_foresee_shortens_bursts_and_what_is_alone_has_long_ones
 @law(40)
 @given(st.integers(0, 2**32))
 def test_no_class_with_a_share_starves(seed):
-    """Each gets its share of the air while it waits, whatever the others want."""
+    """Each waiting class gets its share of the air, whatever the others want."""
     rng = Random(seed)
     classes = ClassesParams(
         latency=ClassParams(share=rng.choice((0.0, 0.1, 0.3))),
@@ -192,7 +192,7 @@ def test_an_urgent_message_never_waits_for_more_than_one_burst():
 
 
 class Later(Free):
-    """Half a second after it is asked for."""
+    """Allows a burst half a second after the request."""
 
     def slot(self, wish):
         return Slot(wish.earliest + 0.5)

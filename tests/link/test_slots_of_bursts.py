@@ -1,4 +1,4 @@
-"""What a slot allows, the burst in it keeps to: its last moment, and who may ride along."""
+"""A burst respects its slot: its last moment, and what may be added to it."""
 
 import pytest
 
@@ -20,7 +20,7 @@ def test_a_burst_may_begin_late_as_long_as_it_is_over_in_time():
     first = next_burst(link, 0.5)
     assert (len(first.pdus), first.latest) == (2, pytest.approx(0.598))
     link.confirm(first, Outcome.LATE, 0.6)
-    # Where it cannot be over in time if it is late, its moment is the only one.
+    # A burst that would not end in time if late may only start at its exact time.
     again = next_burst(link, 0.7)
     assert (again.number, again.latest) == (first.number, 0.7)
     link.confirm(again, Outcome.SENT, 0.7)
@@ -28,9 +28,9 @@ def test_a_burst_may_begin_late_as_long_as_it_is_over_in_time():
 
 
 def test_a_burst_that_tells_the_schedule_leaves_at_its_moment():
-    """Else who hears it would set its clock wrong."""
+    """Otherwise listeners would set their clocks wrong."""
     link = make_link(pdu_size=SIZE, beacon_s=0.5)
-    # Nobody could reuse so short a slot, so its owner may begin late.
+    # So short a slot cannot be reused, so its owner may start late.
     tdma = params("tdma", [1], slot_s=0.02, minislot_s=0.02)
     link.attach(LOCKSTEP._replace(longest_burst_s=(0.01,)), tdma, RateParams())
     told = []

@@ -1,4 +1,4 @@
-"""`why`, word by word."""
+"""The text of `why`, word by word."""
 
 from sdrlinkd.link import Outcome, Overrides, Qos, QueueParams, Told, TopicPolicy
 from tests.link.world import make_link, next_burst
@@ -7,7 +7,7 @@ FILE = Told("etc/sdrlinkd.toml", ())
 
 
 def pass_time(link, n, rate_hz, begin=0.0):
-    """Submit `n` messages and send what may go; when it is over."""
+    """Submit `n` messages and send what may leave; returns the end time."""
     for i in range(n):
         now = begin + i / rate_hz
         link.submit(0, bytes(40), now)

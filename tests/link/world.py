@@ -1,4 +1,4 @@
-"""Links for tests: small to make, with their times written down."""
+"""Links for tests: easy to make, with explicit times."""
 
 from collections import Counter
 from itertools import count
@@ -58,7 +58,7 @@ def make_link(
     clock=None,
     **params,
 ):
-    """A link on an air of its own; `params` are LinkParams. No beacons unless asked for."""
+    """A link on its own air; `params` are LinkParams. No beacons unless requested."""
     link = Link(
         LinkParams(beacon_s=beacon_s, **params),
         queue or QueueParams(),
@@ -77,12 +77,12 @@ def make_link(
 
 
 def compose(link, now, max_pdus=MAX_PDUS):
-    """The burst that leaves at `now` over an air that takes no time; None: nothing goes."""
+    """The burst that leaves at `now` over an air with zero airtime; None if none leaves."""
     return link.next_burst(Opportunity(now, lambda _mcs, _n: 0.0, lambda _mcs, _s: max_pdus))
 
 
 def compose_at(link, bytes_per_s):
-    """Have the link send something of topic 2 on an air that carries so much."""
+    """Make the link send something of topic 2 on an air of that capacity."""
     link.submit(2, b"", 0.0)
     each_s = equal_payload(link.params.pdu_size, 1) / bytes_per_s
     burst = link.next_burst(Opportunity(0.0, lambda _, n: n * each_s, lambda *_: 8))
@@ -95,7 +95,7 @@ def tx(link):
 
 
 def rx(link):
-    """The RX half of the ledger; of what never came, 0."""
+    """The RX half of the ledger; 0 for anything that never came."""
     report = link.report(0.0).rx
     return msgspec.structs.replace(
         report, dropped=Counter(report.dropped), pdus_dropped=Counter(report.pdus_dropped)
@@ -103,13 +103,13 @@ def rx(link):
 
 
 def topic_of(link, topic_id):
-    """A topic on its way out; of what never came, 0."""
+    """The report on a topic to send; 0 for anything that never came."""
     report = link.report(0.0).topics[topic_id]
     return msgspec.structs.replace(report, dropped=Counter(report.dropped))
 
 
 def received(link):
-    """What came, by (source, topic id)."""
+    """Reports on received topics, by (source, topic id)."""
     return {
         (each.src, each.topic_id): msgspec.structs.replace(each, dropped=Counter(each.dropped))
         for each in link.report(0.0).received
@@ -117,17 +117,17 @@ def received(link):
 
 
 def neighbors(link):
-    """Who is heard, by robot."""
+    """The neighbors, by robot."""
     return {each.src: each for each in link.report(0.0).neighbors}
 
 
 def classes_queued(link):
-    """Messages that wait, by class."""
+    """Waiting messages, by class."""
     return {QOS_BY_LABEL[label]: n for label, n in tx(link).queued_by_class.items()}
 
 
 def send_all(link, now=0.0, max_pdus=63):
-    """Compose and confirm until nothing is left that may go at `now`; the PDUs."""
+    """Compose and confirm until no message may leave at `now`; returns the PDUs."""
     pdus = []
     while burst := compose(link, now, max_pdus):
         pdus += burst.pdus
@@ -148,22 +148,22 @@ def layouts(pdus, pdu_size):
 
 
 def airtime_s(_mcs, n_pdus):
-    """As of an air without preambles."""
+    """Airtime on an air without preambles."""
     return PDU_S * n_pdus
 
 
 def most_pdus(_mcs, longest_s):
-    """At most 8."""
+    """Always 8 PDUs at most."""
     return int(min(8, longest_s / PDU_S + 1e-6))
 
 
 def next_burst(link, now):
-    """What the link sends when it is asked at `now`."""
+    """What the link sends when queried at `now`."""
     return link.next_burst(Opportunity(now, airtime_s, most_pdus))
 
 
 def tell(link, src, *records, at):
-    """Have `link` hear a PDU of robot `src` with nothing but `records`; of BEACON by default."""
+    """Make `link` hear a PDU of robot `src` with only `records`; a BEACON by default."""
     builder = PduBuilder(link.params.pdu_size)
     for record in records or (Beacon(src, 0),):
         assert builder.add_record(build_records([record]))
@@ -173,7 +173,7 @@ def tell(link, src, *records, at):
 
 
 def use(link, access, **traits):
-    """Have `link` ask `access` when it may send."""
+    """Make `link` use `access` to decide when to send."""
     fit = link.attach(PduLinkTraits(**traits), AccessParams(), RateParams())
     link.use(fit._replace(settled=fit.settled._replace(access=access)))
 

@@ -1,4 +1,4 @@
-"""How long bursts are, and what fits."""
+"""The length of bursts, and what fits into them."""
 
 import pytest
 from hypothesis import given

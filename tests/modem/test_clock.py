@@ -83,11 +83,11 @@ def test_it_never_goes_back(kind, steps):
 
 BLOCK_S = 1e-3
 BEGAN_S = 100.0
-"""By the host's clock, when the stream began."""
+"""Host time at which the stream began."""
 
 
 class Paced:
-    """A paced stream of blocks; each comes when its last sample was taken, and a delay later."""
+    """A paced stream of blocks; each arrives a delay after its last sample."""
 
     def __init__(self):
         self.clock = StreamClock(1e6, paced=True)
@@ -95,7 +95,7 @@ class Paced:
         self.host_s = 0.0
 
     def block(self, delay_s, lost=0):
-        """The next one comes, `lost` blocks having been lost before it; the clock's time then."""
+        """Deliver the next block after `lost` lost ones; returns the clock's time then."""
         self.end += round(BLOCK_S * 1e6)
         self.host_s = max(self.host_s, BEGAN_S + self.end / 1e6 + lost * BLOCK_S + delay_s)
         self.clock.observe(self.end, self.host_s)

@@ -1,4 +1,4 @@
-"""What stands in `[soapy]` is what the device is set to, key by key."""
+"""Each key of `[soapy]` reaches the device."""
 
 from random import Random
 
@@ -33,7 +33,7 @@ def test_what_is_configured_reaches_the_device(key):
         modem=ModemParams(frequency_hz=868e6),
     )
     radio = make_radio(config, 1, Random(0), 0.1)
-    # With its oscillator beside the channel, it stands in another one.
+    # With offset tuning, the oscillator is at another frequency.
     device = getattr(radio, "_radio", radio)
     told = msgspec.structs.asdict(device._settings)
     assert told == {

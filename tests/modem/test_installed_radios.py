@@ -1,4 +1,4 @@
-"""Radios that other packages bring: found by entry points, set, made, and told when broken."""
+"""Radios of other packages: found by entry points, configured, made, and reported when broken."""
 
 import importlib
 import re
@@ -32,7 +32,7 @@ gain = 0.25
 
 @pytest.fixture
 def install(tmp_path, monkeypatch):
-    """Installs packages, as pip would, where this process looks for them; returns that folder."""
+    """Installs packages, like pip, where this process finds them; returns that folder."""
     site = tmp_path / "site"
     site.mkdir()
     monkeypatch.syspath_prepend(site)
@@ -57,12 +57,12 @@ def install(tmp_path, monkeypatch):
 
 @pytest.fixture
 def acme(install):
-    """The package of the page on adding a radio."""
+    """The package from the page on adding a radio."""
     return install("acme-sdr", {"acme": "acme_radio:ENTRY"}, acme_radio=EXAMPLE)
 
 
 def refused(text):
-    """What a configuration is refused for."""
+    """The reason why a configuration is refused."""
     with pytest.raises(ConfigError) as caught:
         parse_config(text, "f.toml")
     return str(caught.value)
@@ -170,7 +170,7 @@ def test_a_package_that_is_broken_is_named(install, name):
     assert told.startswith(f'f.toml:2: backend: got "{name}", which package broken-sdr 1.0 brings')
     assert f"but its entry {value} {why}" in told
     assert told.endswith("; allowed: another backend, or a package that is whole")
-    # Nobody else is harmed.
+    # Other radios are not affected.
     assert parse_config('backend = "loopback"').backend == "loopback"
 
 

@@ -22,7 +22,7 @@ SIZE = 64
 
 
 class Listener:
-    """Hands out bursts in their order, and keeps what it is asked and told."""
+    """Hands out bursts in order, and records its calls."""
 
     def __init__(self):
         self.queue, self.asked, self.taken = deque(), [], []
@@ -117,7 +117,7 @@ async def test_every_pdu_comes_back_and_every_burst_is_settled(paced):
             assert 0 <= heard.at <= modem.now()
         starts = [burst.start for burst in listener.taken for _ in burst.pdus]
         for heard, start in zip(listener.pdus, starts, strict=True):
-            # Later where the radio could not any sooner, earlier never.
+            # Later if the radio could not start sooner, but never earlier.
             assert heard.at > start - 5e-6
         report = modem.report()
         assert (report.state, report.kind, report.notices) == ("up", "loopback", [])
@@ -140,7 +140,7 @@ async def test_each_burst_leaves_with_its_own_mcs():
 
 @pytest.mark.parametrize(("rate_hz", "ppm"), [(5e6, 80), (5e6, -80), (1e6, 40), (1e6, -40)])
 async def test_by_default_radios_hear_each_other_however_far_their_crystals_are_off(rate_hz, ppm):
-    """At 5.9 GHz, where 40 ppm are 236 kHz; nothing is set but the frequency."""
+    """At 5.9 GHz, where 40 ppm are 236 kHz; only the frequency is set."""
     sent = list(bursts(7, 4))
     air = Config(
         backend="loopback",

@@ -1,4 +1,4 @@
-"""When bursts may leave: never more committed than the lead and one burst."""
+"""When bursts may leave: never more is committed than the lead and one burst."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -60,10 +60,10 @@ def test_a_burst_joins_the_window_that_is_open_or_waits_for_the_next():
     assert plan.start(now=0) == 100
     plan.commit(100, 50)
     free = 150 + GAP
-    # In time for the same TX window: right behind.
+    # In time for the same TX window: right after the burst before.
     assert plan.wait(now=60) == 12
     assert plan.start(now=free - 30) == free
-    # Too late for it: a pause, in which it listens.
+    # Too late for it: a pause, in which the radio listens.
     assert plan.start(now=free - 29) == free + 200
     assert plan.wait(now=free - 29) == 200 + 29 - 100
 

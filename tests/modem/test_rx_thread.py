@@ -1,4 +1,4 @@
-"""The receiver on its thread, and where it stands."""
+"""The receiver on its thread, and its position in the stream."""
 
 import asyncio
 
@@ -32,7 +32,7 @@ def make_air(seed, n):
 
 
 class Told:
-    """Keeps what it is told."""
+    """Records everything it is told."""
 
     def __init__(self):
         self.heard, self.ends = [], []

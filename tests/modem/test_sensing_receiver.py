@@ -13,9 +13,9 @@ from sdrlinkd.modem.sensing_receiver import TAIL, SensingReceiver
 RATE = 1e6
 WINDOW = phy.SENSE_WINDOW
 QUIET = 20 * WINDOW
-# The header is read so many samples after the burst's first: preamble, header, and a search hop.
+# Samples from a burst's start until its header is read: preamble, header, and a search hop.
 HEADER_WITHIN = 2000
-# Energy is told in whole windows.
+# Energy is reported in whole windows.
 COARSE = WINDOW + 1
 
 
@@ -35,7 +35,7 @@ def no_burst(seed, n):
 
 
 def on_air(*parts, seed=1, snr_db=20):
-    """Parts one after another over noise; a number is so much silence."""
+    """Parts in sequence, with noise; a number is a silence of that many samples."""
     parts = [np.zeros(each, np.complex64) if isinstance(each, int) else each for each in parts]
     x = np.concatenate(parts)
     return (x + 10 ** (-snr_db / 20) * no_burst(seed + 1000, len(x))).astype(np.complex64)
@@ -46,7 +46,7 @@ def gap(index, n, reason):
 
 
 def listen(receiving, samples, size, index=0):
-    """[(index after a block, what is sensed then, PDUs it brought)]"""
+    """[(index after a block, channel state then, PDUs that it brought)]"""
     story = []
     for first in range(0, len(samples), size):
         piece = samples[first : first + size]
@@ -69,7 +69,7 @@ def test_it_has_listened_up_to_the_last_sample():
 
 
 def test_before_the_first_block_it_has_not_listened_at_all():
-    """Else a burst could be decided for an air that nobody has heard."""
+    """Otherwise a burst could be decided for an air that nobody has heard."""
     assert make_receiving().sensed.until == 0
 
 
@@ -105,7 +105,7 @@ def test_the_header_tells_the_end_ahead(seed):
 
 @pytest.mark.parametrize("size", [50, 1000, 4096])
 def test_the_preamble_time_is_the_same_number_that_its_pdus_bear(size):
-    """Access policies ask whether the last carrier was that of the last PDU."""
+    """Access policies compare whether the last carrier was that of the last PDU."""
     x = on_air(QUIET + 13, a_burst(1), 3 * WINDOW, a_burst(2), QUIET)
     n_pdus = n_same = 0
     for _, sensed, pdus in listen(make_receiving(), x, size):
@@ -212,7 +212,7 @@ def test_while_we_send_we_hear_nothing_and_that_is_no_carrier():
 
 
 def test_what_was_lost_is_not_taken_for_silence():
-    """It has not listened there: others may have begun, and may be on the air still."""
+    """The receiver did not hear that time: others may have started, and may still be on the air."""
     receiving = make_receiving()
     listen(receiving, on_air(QUIET), 100)
     receiving.hear(gap(QUIET, 5000, "the reader was too slow"))

@@ -1,4 +1,4 @@
-"""How long bursts may be on machines that are slow, or busy."""
+"""The maximum length of bursts on slow or busy machines."""
 
 from random import Random
 

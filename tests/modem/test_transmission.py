@@ -1,4 +1,4 @@
-"""Bursts on their way to a radio: none overtakes one that was late."""
+"""Bursts on their way to a radio: none overtakes a late one."""
 
 import asyncio
 
@@ -12,7 +12,7 @@ from sdrlinkd.modem.transmission import Transmission
 
 
 class Radio:
-    """Takes bursts and says nothing until told to."""
+    """A radio that accepts bursts and reports nothing until told to."""
 
     def __init__(self, lockstep):
         self.capabilities = Capabilities(True, True, True, True, not lockstep, lockstep=lockstep)
@@ -42,7 +42,7 @@ def made(number, latest=1.0, airtime_s=0.0):
 @pytest.mark.parametrize("lockstep", [False, True], ids=["in-a-thread", "here"])
 @pytest.mark.parametrize("composed", ["before", "between"])
 async def test_what_was_composed_before_a_late_one_was_known_goes_back_too(lockstep, composed):
-    """The radio has told, but nobody has been woken by that yet."""
+    """The radio has reported, but no task has been woken up yet."""
     radio, left, settled = Radio(lockstep), [], asyncio.Event()
 
     def note(burst, report):
@@ -88,7 +88,7 @@ async def test_what_may_leave_whenever_it_can_does_not_wait_for_a_late_one():
 
 
 async def test_a_short_burst_does_not_overtake_a_long_one():
-    """Short ones are modulated where they are composed, long ones in a thread."""
+    """Short bursts are modulated where they are composed, long ones in a thread."""
     radio = Radio(lockstep=False)
     async with asyncio.TaskGroup() as tasks, asyncio.timeout(60):
         transmission = Transmission(ModemParams(rate_hz=1e6), radio)

@@ -14,7 +14,7 @@ FLOWGRAPHS = Path(__file__).parents[2] / "etc" / "gnuradio"
 
 @functools.cache
 def no_gnu_radio():
-    """Why flowgraphs cannot run here; "" when they can."""
+    """Why flowgraphs cannot run here; "" if they can."""
     try:
         done = subprocess.run(
             [PYTHON, "-c", "import gnuradio.zeromq, gnuradio.digital"],
@@ -28,7 +28,7 @@ def no_gnu_radio():
 
 @contextlib.contextmanager
 def flowgraph(name, *arguments):
-    """etc/gnuradio/NAME.py at work."""
+    """Run etc/gnuradio/NAME.py."""
     with Process([PYTHON, FLOWGRAPHS / f"{name}.py", *arguments], name=name) as process:
         line = process.line()
         assert line == "ready", f"{name} says {line!r}"

@@ -1,4 +1,4 @@
-"""PDUs to and from flowgraphs: what peers may send, and endpoints that cannot be had."""
+"""PDUs to and from flowgraphs: what peers may send, and endpoints that are not available."""
 
 import asyncio
 import binascii
@@ -18,7 +18,7 @@ SIZE = 64
 
 
 def whole(number):
-    """A PDU, as far as its CRC goes."""
+    """A PDU with a valid CRC."""
     body = struct.pack(">I", number) + bytes(SIZE - 6)
     return body + binascii.crc_hqx(body, 0).to_bytes(2, "big")
 
@@ -81,7 +81,7 @@ async def test_nothing_is_published_before_anybody_has_subscribed(tmp_path):
 
 
 async def until(condition):
-    """ZeroMQ tells of peers only to who asks."""
+    """Poll until the condition holds: ZeroMQ reports peers only on request."""
     async with asyncio.timeout(20):
         while not condition():  # noqa: ASYNC110
             await asyncio.sleep(0.005)
@@ -89,7 +89,7 @@ async def until(condition):
 
 @pytest.mark.parametrize("cut", [1, 7, 63, 64, 65, 1000])
 async def test_a_stream_of_octets_is_cut_where_pdus_are_whole(cut):
-    """From any beginning, in any pieces."""
+    """From any start, in any pieces."""
     got = asyncio.Queue()
     sent = [whole(number) for number in range(5)]
     stream = sent[0][9:] + b"".join(sent[1:])

@@ -29,7 +29,7 @@ GOLDEN = [
     ({}, "06"),
     ({"a": 1, "b": 2}, "0907020001620300000002090702000161030000000106"),
 ]
-"""By GNU Radio's pmt.serialize_str."""
+"""Golden vectors from GNU Radio's pmt.serialize_str."""
 
 
 @pytest.mark.parametrize(("value", "data"), GOLDEN, ids=str)

@@ -1,4 +1,4 @@
-"""Channels as kernels and as the reference hold them, for tests that compare the two."""
+"""Channels in the form of the kernels and of the reference, to compare the two."""
 
 import numpy as np
 import pytest
@@ -18,19 +18,19 @@ def gains_of(channel, grid):
 
 
 def in_tones(y, grid):
-    """Symbols `[n, n_used]` as kernels take them."""
+    """Symbols `[n, n_used]` in the kernels' form."""
     return in_planes(y[:, grid.tones].astype(np.complex64))
 
 
 def echoed(draws, grid, n_echoes=3):
-    """Gains of a channel with some echoes, of mean power 1 or so."""
+    """Gains of a channel with several echoes, of mean power about 1."""
     delays = draws.uniform(0, grid.n_cp / 2, n_echoes)
     gains = noise(draws, n_echoes, 1 / n_echoes)
     return np.exp(-2j * np.pi * grid.used[:, None] * delays / grid.n_fft) @ gains
 
 
 def assert_same(channel, other, grid, error=2e-4):
-    """A kernel's channel and the reference's are the same."""
+    """Assert that a kernel's channel equals the reference's."""
     power = other.gain + other.no
     assert gains_of(channel, grid) == pytest.approx(other.h, abs=error * np.sqrt(power))
     assert channel.figures[NO] == pytest.approx(other.no, rel=2e-3)
@@ -41,7 +41,7 @@ def assert_same(channel, other, grid, error=2e-4):
 
 
 def trained(draws, grid, no, n=2, amplitude=None):
-    """(symbols received, sent, gains) of `n` symbols of ±1."""
+    """(received symbols, sent symbols, gains) of `n` symbols of ±1."""
     sent = draws.choice([-1.0, 1.0], (n, grid.n_used)).astype(np.complex64)
     h = echoed(draws, grid)
     y = (np.ones(n) if amplitude is None else amplitude)[:, None] * h * sent
@@ -49,7 +49,7 @@ def trained(draws, grid, no, n=2, amplitude=None):
 
 
 def both_estimates(grid, y, sent):
-    """(the kernel's channel, its argument block, the reference's) from known symbols."""
+    """Estimates from known symbols: (the kernel's channel, its argument block, the reference's)."""
     block, scratch = new_channel(grid), new_scratch(grid)
     table, n = tones(grid).content, len(sent)
     known = in_tones(sent, grid), np.ones(n, np.float32)

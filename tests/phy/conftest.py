@@ -7,5 +7,5 @@ from phy import warm_up
 
 @pytest.fixture(scope="session", autouse=True)
 def _warm():
-    """Compiling takes longer on a fresh machine than a single test may."""
+    """Compile first: on a fresh machine that takes longer than a single test may."""
     warm_up()

@@ -1,4 +1,4 @@
-"""What others send: pulses of aeroplanes, codes of satellites below the noise, Wi-Fi."""
+"""Third-party signals: pulses of aeroplanes, codes of satellites below the noise, Wi-Fi."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ def echoed(rng, x):
 
 
 def aeroplanes(rng):
-    """Mode S at 2 Msps: pulses of 0.5 µs, their places telling 112 bits, of many strengths."""
+    """Mode S at 2 Msps: pulses of 0.5 µs whose positions encode 112 bits, with many levels."""
     head = np.zeros(16)
     head[[0, 2, 7, 9]] = 1
     parts = []
@@ -31,7 +31,7 @@ def aeroplanes(rng):
 
 
 def satellites(rng):
-    """Eight spreading codes of 1023 chips, 4 samples a chip, each 20 dB below the noise."""
+    """Eight spreading codes of 1023 chips, 4 samples per chip, each 20 dB below the noise."""
     x = noise(rng, 40_000)
     for _ in range(8):
         chips = np.repeat(rng.choice([-1.0, 1.0], 1023), 4)
@@ -40,7 +40,7 @@ def satellites(rng):
 
 
 def wifi(rng, make, snr_db):
-    """Twelve frames through a room, between pauses; an access point's clock is not ours."""
+    """Twelve frames through a room, with pauses; the access point has another clock."""
     parts = [silence(400)]
     for _ in range(12):
         psdu = with_fcs(rng.bytes(int(rng.integers(20, 400))))

@@ -1,4 +1,4 @@
-"""A receiver that must hear nothing."""
+"""A receiver that must not receive anything."""
 
 from time import process_time
 
@@ -7,7 +7,7 @@ from tests.phy.signals import heard
 
 
 def quiet(samples, network, max_frequency=0.1):
-    """Counters of a receiver that must not hear a PDU in `samples`, nor work long to see it."""
+    """Assert that a receiver hears no PDU in `samples` and works little; returns its counters."""
     receiver = Receiver(network, max_frequency)
     begin = process_time()
     assert heard(receiver.push(samples) + receiver.flush()) == []

@@ -1,4 +1,4 @@
-"""Signals for the modem's tests, and a short way to hear them."""
+"""Signals for the modem's tests, and helpers to receive them."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from phy import BurstOver, PduHeard, Receiver
 
 
 def silence(n):
-    """`n` samples of nothing."""
+    """`n` samples of silence."""
     return np.zeros(n, np.complex64)
 
 
@@ -22,7 +22,7 @@ def noisy(rng, x, snr_db):
 
 
 def turned(x, frequency, phase=0.0):
-    """`x` with a frequency offset in cycles a sample."""
+    """`x` with a frequency offset in cycles per sample."""
     turn = np.exp(2j * np.pi * (frequency * np.arange(len(x)) + phase))
     return (x * turn).astype(np.complex64)
 
@@ -33,14 +33,14 @@ def payloads(rng, n, size):
 
 
 def hear(samples, **settings):
-    """(events, counters) of a fresh receiver that gets all of `samples`."""
+    """(events, counters) of a new receiver for all of `samples`."""
     receiver = Receiver(**settings)
     events = receiver.push(samples) + receiver.flush()
     return events, receiver.counters
 
 
 def heard(events):
-    """What the PDUs among `events` hold."""
+    """The content of the PDUs among `events`."""
     return [event.data for event in events if isinstance(event, PduHeard)]
 
 

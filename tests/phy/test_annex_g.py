@@ -1,4 +1,4 @@
-"""Against the example of IEEE 802.11a-1999, Annex G: numbers that nobody here made."""
+"""Compares with the example of IEEE 802.11a-1999, Annex G."""
 
 import numpy as np
 import pytest
@@ -10,9 +10,9 @@ from phy.mapping import mapping
 from phy.ofdm import to_tones
 from phy.preamble import BARKER, SEGMENT, SHORT, length, long_symbol, preamble, short_subcarriers
 
-# The standard's samples carry the inverse FFT's 1/64; ours have mean power 1.
+# The standard's samples include the inverse FFT's 1/64; ours have mean power 1.
 OURS = OFDM_64_16.scale
-# It prints three decimals.
+# The standard prints three decimals.
 ROUNDING = 0.00071 * OURS
 
 SIGNAL = "b13000"  # table G.7, the six tail bits included
@@ -85,7 +85,7 @@ def test_the_signal_field_is_mapped_with_its_pilots():
 
 
 def mirrored(half):
-    """A period `[64]` of which one half `[33]` is known, all subcarriers being real."""
+    """A period `[64]` from one half `[33]`, as all subcarriers are real."""
     half = np.array(half)
     return OURS * np.concatenate((half, half[31:0:-1].conj()))
 

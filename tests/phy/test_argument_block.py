@@ -1,4 +1,4 @@
-"""Arrays in an argument block reach the kernel unchanged; a changed kernel is compiled anew."""
+"""Arrays in an argument block reach the kernel unchanged; a changed kernel is recompiled."""
 
 import gc
 import re
@@ -69,7 +69,7 @@ def test_what_a_kernel_does_not_expect_is_refused(field, value, told):
 
 @pytest.mark.slow
 def test_a_change_in_one_kernel_has_all_compiled_anew(tmp_path):
-    """Whoever calls it has it within, as numba cannot know."""
+    """Its callers contain it, which numba cannot know."""
     copy = tmp_path / "phy"
     shutil.copytree(Path(phy.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
     program = (

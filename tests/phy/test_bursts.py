@@ -1,4 +1,4 @@
-"""Streams of several bursts, and bursts that do not end as they began."""
+"""Streams of several bursts, and bursts that are cut or disturbed."""
 
 import numpy as np
 import pytest
@@ -105,7 +105,7 @@ def test_a_gap_inside_a_preamble_or_a_header_loses_that_burst_only():
         receiver = Receiver()
         events = receiver.push(stream(LEAD, burst[:cut]))
         assert events == []
-        # From half a header on, it may be known that a burst was there.
+        # From half a header on, the receiver may know of the burst.
         assert [each.n_good for each in receiver.gap(10)] in ([], [0])
         assert heard(receiver.push(stream(100, burst_2)) + receiver.flush()) == pdus
 
@@ -127,7 +127,7 @@ def test_a_burst_that_stops_has_faded_and_the_next_is_found(mcs):
     first, burst = a_burst(rng, mcs, n_pdus=40)
     end = 352 + 80 * (2 + layout(OFDM_64_16, mcs, 40, 100).symbols_through(3)) + 30
     second, burst_2 = a_burst(rng, mcs)
-    # What is found wanting is the PDU after the last good one, and at worst one more.
+    # The PDU after the last good one fails, and at worst one more.
     pause = 2 * layout(OFDM_64_16, mcs, 1, 100).n_samples
     events, counters = hear(stream(LEAD, burst[:end], pause, burst_2))
     assert heard(events) == first[:3] + second
@@ -137,7 +137,7 @@ def test_a_burst_that_stops_has_faded_and_the_next_is_found(mcs):
 
 
 def test_a_pdu_with_wrong_bits_fails_alone():
-    """Half of its symbols are another burst's; all that frames them is as it should be."""
+    """Half of its symbols are from another burst; its framing is intact."""
     rng = np.random.default_rng(SEED)
     pdus, burst = a_burst(rng, n_pdus=6)
     _, other = a_burst(rng, n_pdus=6)
@@ -200,7 +200,8 @@ def test_of_two_bursts_at_once_the_louder_is_heard_when_it_comes_first_or_soon(d
     if loud == 0 or distance < 350:
         assert heard(events) == both[loud][0] + later
     else:
-        # The receiver follows the one that it has found, and may read what is hit the least.
+        # The receiver follows the burst that it has found, and may read the one that is hit the
+        # least.
         assert heard(events) == both[0][0][:1] + later
 
 

@@ -1,4 +1,4 @@
-"""The channel does what it is asked to, measured."""
+"""The channel has the requested properties, as measured."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def error_db(x, wanted):
 
 
 def band_limited(t, band=26.5 / 64):
-    """A signal of 40 tones within ±`band` cycles a sample, at any times."""
+    """A signal of 40 tones within ±`band` cycles per sample, at arbitrary times."""
     draws = rng()
     frequency = draws.uniform(-band, band, 40)
     gain = draws.standard_normal(40) + 1j * draws.standard_normal(40)
@@ -195,7 +195,7 @@ def test_fading_has_mean_gain_1_and_is_rayleigh(profile):
     path = Path(params, rng())
     x = np.zeros(40, np.complex64)
     x[0] = 1
-    # At DC, the gain is the sum of all echoes: complex and normal, its power exponential.
+    # At DC, the gain is the sum of all echoes: complex normal, with exponential power.
     gain = np.array([np.abs(path.carry(x)[1].sum()) ** 2 for _ in range(2500)]) * 10**0.3
     assert gain.mean() == pytest.approx(1, abs=0.06)
     for least in (0.1, 0.5, 2):
@@ -204,7 +204,7 @@ def test_fading_has_mean_gain_1_and_is_rayleigh(profile):
 
 @pytest.mark.parametrize(("name", "n", "last"), [("tdl-a", 23, 9.6586), ("tdl-c", 24, 8.6523)])
 def test_profiles_are_normalised(name, n, last):
-    """TR 38.901, 7.7.3: the rms delay spread is 1."""
+    """TR 38.901, 7.7.3: the RMS delay spread is 1."""
     delay, power = np.array(PROFILES[name]).T
     share = 10 ** (power / 10) / np.sum(10 ** (power / 10))
     assert (len(delay), delay.max()) == (n, last)
@@ -228,14 +228,14 @@ def test_echoes_have_the_delays_and_powers_of_the_profile(profile):
     listed = np.array(PROFILES[profile])
     share = 10 ** (listed[:, 1] / 10) / np.sum(10 ** (listed[:, 1] / 10))
     assert mean == pytest.approx(20 * np.sum(listed[:, 0] * share), rel=0.08)
-    # What came until then, for some delays: the profile's powers added up.
+    # The power that has arrived by several delays: the cumulated profile.
     for until in (0.8, 2, 5):
         came = power[delay <= 20 * until + 2].sum()
         assert came == pytest.approx(share[listed[:, 0] <= until].sum(), abs=0.05)
 
 
 def test_moving_echoes_change_as_jakes_said():
-    """Mean gain 1, and from t to t + τ the correlation J0(2π f τ)."""
+    """Mean gain 1, and the correlation from t to t + τ is J0(2π f τ)."""
     doppler_hz, tau_s = 40.0, np.array([0.0, 0.002, 0.006, 0.0096])
     gains = np.stack([jakes(50, doppler_hz, tau_s, np.random.default_rng(i)) for i in range(60)])
     got = np.mean(gains * gains[:, :1].conj(), axis=(0, 2))
@@ -267,6 +267,6 @@ def test_phase_noise_has_its_spectrum():
         _, y = Path(params, np.random.default_rng(seed)).carry(np.ones(n, np.complex64))
         phase = np.unwrap(np.angle(y))
         spectra.append(np.abs(np.fft.fft(np.diff(phase))[1:]) ** 2 / n)
-    # Steps of a random walk are white: S(f) (2π f)² / rate.
+    # The steps of a random walk are white: S(f) (2π f)² / rate.
     step = np.mean(spectra) * 1e6 / (2 * np.pi * 1e4) ** 2
     assert 10 * np.log10(step) == pytest.approx(-80, abs=0.3)

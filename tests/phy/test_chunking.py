@@ -1,4 +1,4 @@
-"""The receiver's law: how a stream is cut into chunks changes nothing."""
+"""The receiver's law: chunking of the stream makes no difference."""
 
 from itertools import cycle
 
@@ -13,10 +13,10 @@ from tests.phy.signals import endings, heard, noise, payloads, silence, turned
 
 
 def make_stream(seed):
-    """(samples, a place for a gap, its length, PDUs of the bursts that are not spoilt).
+    """(samples, position of a gap, its length, PDUs of the undamaged bursts).
 
-    Own and foreign bursts of any MCS with their own frequency offsets and strengths, close together
-    or not, false starts, samples that are no numbers, DC, noise.
+    The stream has own and foreign bursts of any MCS with their own frequency offsets and levels,
+    close together or not, false starts, non-finite samples, DC and noise.
     """
     rng = np.random.default_rng(seed)
     parts, sent = [silence(int(rng.integers(0, 1500)))], []
@@ -44,7 +44,7 @@ def make_stream(seed):
 
 
 def push_all(receiver, x, sizes):
-    """Events of `x` in chunks of `sizes`, over and over."""
+    """Events of `x` in chunks of `sizes`, repeated."""
     events, at, size = [], 0, cycle(sizes)
     while at < len(x):
         n = next(size)
@@ -54,7 +54,7 @@ def push_all(receiver, x, sizes):
 
 
 def receive(x, gap_at, gap, sizes, **settings):
-    """(events, counters) of `x` in chunks; `gap` samples are missing at `gap_at`, if any."""
+    """(events, counters) of `x` in chunks; if given, `gap` samples are missing at `gap_at`."""
     receiver = Receiver(**settings)
     events = push_all(receiver, x[:gap_at], sizes)
     if gap_at is not None:
@@ -96,7 +96,7 @@ def test_sample_by_sample_yields_the_same(seed, settings):
 
 @pytest.mark.slow
 def test_one_cut_anywhere_yields_the_same():
-    """Around a burst's start, its header and its end, and the ends of its PDUs."""
+    """Cuts around a burst's start, its header and its end, and the ends of its PDUs."""
     rng = np.random.default_rng(2)
     pdus = payloads(rng, 3, 30)
     burst = Transmitter().modulate(pdus, 3)
@@ -112,7 +112,7 @@ def test_one_cut_anywhere_yields_the_same():
 
 @pytest.mark.parametrize("size", [301, 100_000])
 def test_a_stream_far_longer_than_what_is_kept(size):
-    """What is kept moves to the buffer's beginning again and again, also in a burst's middle."""
+    """The kept samples move to the buffer's start repeatedly, even in the middle of a burst."""
     rng = np.random.default_rng(3)
     pdus = payloads(rng, 2, 20)
     period = np.concatenate((Transmitter().modulate(pdus, 3), silence(int(rng.integers(150, 250)))))
@@ -126,7 +126,7 @@ def test_a_stream_far_longer_than_what_is_kept(size):
 
 
 def test_the_streams_hold_what_they_are_meant_to():
-    """The positive control: without gaps, every whole burst of ours is heard, in order."""
+    """The positive control: without gaps, every whole burst of ours is received, in order."""
     all_endings, n_sent, n_heard, n_odd = set(), 0, 0, 0
     for seed in range(60):
         x, gap_at, gap, sent = make_stream(seed)

@@ -1,4 +1,4 @@
-"""The convolutional code: against the reference, its distances, and the union bound."""
+"""The convolutional code: compared with the reference, its distances, and the union bound."""
 
 from math import erfc, sqrt
 
@@ -31,7 +31,7 @@ def random_blocks(rng, n, n_bytes):
 
 
 def surely(coded, strength=100):
-    """LLRs that say these bits."""
+    """LLRs that clearly represent these bits."""
     return (strength * (1 - 2 * coded.astype(np.int16))).astype(np.int16)
 
 
@@ -40,7 +40,7 @@ def decode_one(llr, n_bytes, code):
 
 
 def plain_viterbi(llr, n_bytes, pattern):
-    """The reference's decoder; bits that were not sent tell nothing."""
+    """The reference's decoder; punctured bits carry no information."""
     n_steps = 8 * n_bytes + 6
     sent = np.flatnonzero(np.resize(pattern, 2 * n_steps))
     mother = np.zeros(2 * n_steps, np.int64)
@@ -95,7 +95,7 @@ def test_as_many_errors_as_the_distance_allows_are_corrected_anywhere(code, n_er
     data = random_blocks(rng, 300, 20)
     for block, coded in zip(data, encode(data, code), strict=True):
         first = rng.integers(0, len(coded) - 12)
-        # Close together is worst.
+        # Errors close together are the worst.
         wrong = first + rng.permutation(12)[:n_errors]
         coded[wrong] ^= 1
         assert np.array_equal(decode_one(surely(coded), 20, code), block)
@@ -162,7 +162,7 @@ def test_blocks_together_are_decoded_as_each_alone(code):
 
 
 def block_error_rate(es_no_db, n, n_bytes):
-    """Of blocks in QPSK with the noise power known, LLRs quantised as the demapper does."""
+    """Block error rate in QPSK with known noise power and LLRs quantised like the demapper's."""
     rng = np.random.default_rng(SEED)
     no = 2 / 10 ** (es_no_db / 10)  # for ±1 on either axis
     data = random_blocks(rng, n, n_bytes)
@@ -173,7 +173,7 @@ def block_error_rate(es_no_db, n, n_bytes):
 
 
 def union_bound(es_no_db, n_bits):
-    """Blocks in error at most, by the code's known spectrum of distances."""
+    """Upper bound of the block error rate, from the code's known distance spectrum."""
     paths = {10: 11, 12: 38, 14: 193, 16: 1331, 18: 7275, 20: 40406, 22: 234969}
     snr = 10 ** (es_no_db / 10)
     return n_bits * sum(n * 0.5 * erfc(sqrt(d * snr / 2)) for d, n in paths.items())
@@ -184,6 +184,6 @@ def test_one_block_of_64_bytes_in_a_hundred_is_lost_at_3_45_db():
 
 
 def test_block_errors_keep_the_union_bound():
-    """Less than the bound, and not much: quantisation costs a few hundredths of a dB."""
+    """Below the bound, but not by much: quantisation costs a few hundredths of a dB."""
     rate, bound = block_error_rate(3.45, 4000, 64), union_bound(3.45, 8 * 64)
     assert 0.5 * bound < rate < 1.3 * bound

@@ -1,4 +1,4 @@
-"""Equaliser and demapper against max-log LLRs computed from the constellation itself."""
+"""Compares equaliser and demapper with max-log LLRs computed from the constellation itself."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ every_modulation = pytest.mark.parametrize("modulation", Modulation)
 
 
 def channel_of(h, no):
-    """A channel known exactly: gains of the subcarriers in use, noise power."""
+    """A perfectly known channel: gains of the subcarriers in use, noise power."""
     block = new_channel(GRID)
     channel = block.content
     channel.h[:, : GRID.n_used] = h[GRID.tones].real, h[GRID.tones].imag
@@ -49,7 +49,7 @@ def flat():
 
 
 def selective(rng):
-    """Subcarriers between a fade of 30 dB and a gain of 6."""
+    """Gains of subcarriers between a fade of 30 dB and a gain of 6 dB."""
     gain = 10 ** (rng.uniform(-30, 6, GRID.n_used) / 20)
     return gain * np.exp(2j * np.pi * rng.random(GRID.n_used))
 
@@ -77,7 +77,7 @@ def bins_of(coded, modulation, first_symbol):
 
 
 def exact_llrs(data, h, no, modulation):
-    """Max-log by trying every point, then back into the code's order `[n · 48 · bits]`."""
+    """Max-log by trying every point, converted to the code's order `[n · 48 · bits]`."""
     bits = modulation.bits
     expected = h[GRID.data_at][:, None] * points(modulation)
     distance = np.abs(data[..., None] - expected) ** 2
@@ -98,7 +98,7 @@ def test_llrs_are_max_log_within_their_quantisation(modulation, no, kind):
     h = flat() if kind == "flat" else selective(rng)
     at = rng.integers(0, 2**modulation.bits, (N_SYMBOLS, 48))
     noise = rng.standard_normal((N_SYMBOLS, 48, 2)) @ [1, 1j] * 0.4
-    # As complex64, for near the steps of the quantiser single precision decides.
+    # As complex64, because near the quantiser's steps single precision matters.
     data = (h[GRID.data_at] * (points(modulation)[at] + noise)).astype(np.complex64)
     channel = channel_of(h, no)
     llr, _ = demap(modulation, with_pilots(data, h), channel)
@@ -117,7 +117,7 @@ def test_clean_symbols_give_back_their_bits(modulation):
     bins[:, GRID.bins] *= h
     channel = channel_of(h, 1e-4)
     llr, equalised = demap(modulation, bins, channel, 5)
-    # On a subcarrier that hardly arrives, the finest points tell nothing.
+    # On a subcarrier in a deep fade, the finest points carry no information.
     assert np.count_nonzero(llr) > 0.95 * len(llr)
     assert np.array_equal(llr[llr != 0] < 0, coded[llr != 0])
     nearest = np.abs(equalised[..., None] - points(modulation)).min(-1)
@@ -138,8 +138,9 @@ def test_symbols_one_by_one_are_the_same_as_together(modulation):
 
 
 def turned_symbols(n, phase, slope):
-    """QPSK points sent, and bins whose subcarriers turn by phase + slope · subcarrier, radians
-    `[n]`.
+    """QPSK points, and bins with a rotation of phase + slope · subcarrier.
+
+    `phase` and `slope` are in radians `[n]`.
     """
     rng = np.random.default_rng(SEED)
     sent = points(Modulation.QPSK)[rng.integers(0, 4, (n, 48))]
@@ -150,7 +151,7 @@ def turned_symbols(n, phase, slope):
 
 
 def error_after_tracking(n, phase, slope):
-    """Errors of the equalised points by symbol, rms `[n]`."""
+    """RMS errors of the equalised points by symbol `[n]`."""
     channel = channel_of(np.ones(GRID.n_used), 0.01)
     sent, bins = turned_symbols(n, phase, slope)
     _, equalised = demap(Modulation.QPSK, bins, channel)
@@ -197,9 +198,9 @@ def faded_symbols(modulation, h, no, rng):
 @pytest.mark.slow
 @every_modulation
 def test_a_channel_that_fades_is_followed(modulation):
-    """Echoes turn against each other: the band moves through its fades, as at 40 Hz and 5 Msps.
+    """Echoes rotate against each other: the band moves through its fades, as at 40 Hz and 5 Msps.
 
-    The densest points bear a quarter of that: they lose track in the deepest fades.
+    The densest points tolerate a quarter of that: they lose track in the deepest fades.
     """
     rng = np.random.default_rng(SEED)
     n, no = 6000 if modulation is Modulation.QAM256 else 1500, 1e-4
@@ -208,14 +209,14 @@ def test_a_channel_that_fades_is_followed(modulation):
     coded, bins = faded_symbols(modulation, h, no, rng)
     llr, _ = demap(modulation, bins, channel_of(h[0], no))
     assert np.mean((llr < 0) != coded) < 0.01
-    # The control: by the first symbols' channel alone, as if it stood still.
+    # The control: with the first symbols' channel only, as if it were constant.
     stale = [demap(modulation, bins[i : i + 1], channel_of(h[0], no), 2 + i)[0] for i in range(n)]
     wrong = np.mean((np.concatenate(stale) < 0) != coded)
     assert wrong > 0.05 or modulation is Modulation.BPSK
 
 
 def error_of(channel, h):
-    """Mean square, whatever phase and slope: those the pilots follow."""
+    """Mean square error, apart from phase and slope, which the pilots track."""
     subcarriers = GRID.used[GRID.tones]
     h_hat = (channel.content.h[0] + 1j * channel.content.h[1])[: GRID.n_used]
     leaning = h_hat * np.exp(1j * np.linspace(-0.05, 0.05, 101)[:, None] * subcarriers)
@@ -228,7 +229,7 @@ def error_of(channel, h):
     ("modulation", "no"), [(Modulation.BPSK, 1.2), (Modulation.QPSK, 0.6), (Modulation.QAM16, 0.17)]
 )
 def test_a_channel_that_stands_still_becomes_known_better(modulation, no):
-    """Where the code of rate 1/2 just holds, and every tenth bit and more is decided wrongly."""
+    """Where the code of rate 1/2 just works, and at least every tenth bit is decided wrongly."""
     rng = np.random.default_rng(SEED)
     h = flat() / abs(flat()[0])
     _, bins = faded_symbols(modulation, np.repeat(h[None, :], 200, axis=0), no, rng)

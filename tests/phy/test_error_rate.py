@@ -1,4 +1,4 @@
-"""The law of packet errors against the modem itself."""
+"""Compares the formula for packet errors with the modem itself."""
 
 from itertools import pairwise
 
@@ -31,13 +31,13 @@ low_middle_high = pytest.mark.parametrize("mcs", [0, 3, 6, 9])
 
 
 def n_together(mcs, pdu_bytes):
-    """PDUs in a burst that leave its last symbol little room for more parity than the rate's."""
+    """Number of PDUs in a burst that leave its last symbol little room for extra parity."""
     plans = (layout(OFDM_64_16, mcs, n, pdu_bytes) for n in range(1, 64))
     return next(plan.n_pdus for plan in plans if plan.coded_bits <= 1.01 * plan.least_bits)
 
 
 def measured(mcs, pdu_bytes, snr_db, n_pdus, seed=SEED):
-    """(share of bursts found, packet error rate) of `n_pdus` or more in white noise."""
+    """(share of bursts found, packet error rate) of at least `n_pdus` in white noise."""
     rng = np.random.default_rng(seed)
     transmitter, receiver = Transmitter(), Receiver()
     front_end = FrontEnd(FrontEndParams(noise_dbfs=-snr_db), rng)
@@ -56,7 +56,7 @@ def measured(mcs, pdu_bytes, snr_db, n_pdus, seed=SEED):
 
 
 def told(event, mcs, n_pdus, pdu_bytes):
-    """Whether it tells of a burst whose header was read as it was sent."""
+    """Whether the event is a burst with the header that was sent."""
     return isinstance(event, BurstOver) and event.burst[1:5] == (mcs, n_pdus, pdu_bytes, 0)
 
 
@@ -67,14 +67,14 @@ def test_a_little_more_than_the_needed_snr_is_enough(mcs):
 
 @low_middle_high
 def test_less_than_the_needed_snr_is_not(mcs):
-    """1.2 dB less is about where half are lost."""
+    """With 1.2 dB less, about half are lost."""
     assert measured(mcs, 220, needed_snr_db(mcs, 220) - 1.2, N)[1] > 0.2
 
 
 @pytest.mark.parametrize("pdu_bytes", [64, 1024])
 @low_middle_high
 def test_half_are_lost_where_the_law_says_so(mcs, pdu_bytes):
-    """Other sizes than the reference; 0.2 is five sigma, or 0.3 dB."""
+    """For other sizes than the reference; 0.2 is five sigma, or 0.3 dB."""
     snr_db = needed_snr_db(mcs, pdu_bytes, per=0.5)
     assert measured(mcs, pdu_bytes, snr_db, N)[1] == pytest.approx(0.5, abs=0.2)
 
@@ -103,7 +103,7 @@ def test_the_needed_snr_gives_that_rate(mcs, per):
 def test_more_bits_need_more_and_so_do_short_codes_and_many():
     needed = [[needed_snr_db(mcs, size) for size in (16, 64, 220, 1024, 2047)] for mcs in range(10)]
     assert (np.diff(needed, axis=0) > 1).all()
-    # One codeword that is short needs more than one that is not; many need no less than few.
+    # A single short codeword needs more SNR than a long one; many need no less than few.
     assert (np.diff(needed, axis=1)[:, 0] < 0).all()
     assert (np.diff(needed, axis=1)[:, 3] > -0.02).all()
 

@@ -1,4 +1,4 @@
-"""Every grid carries bursts; their tables fit together."""
+"""Every grid can carry bursts, and its tables are consistent."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def test_bursts_of_every_mcs_are_heard(grid, mcs):
 
 @every_grid
 def test_bursts_through_echoes_as_long_as_the_prefix_allows(grid):
-    """The last comes within the prefix less what windows begin early by, and timing may err."""
+    """The last echo comes within the prefix, less the windows' backoff and timing errors."""
     rng = np.random.default_rng(SEED)
     pdus = payloads(rng, 4, 100)
     burst = Transmitter(grid=grid).modulate(pdus, 1)
@@ -68,6 +68,6 @@ def test_training_is_of_magnitude_1_and_low_peaks(grid):
     long = preamble.long_symbol(grid)
     assert np.mean(np.abs(long) ** 2) == pytest.approx(1, rel=1e-5)
     assert np.abs(long).max() ** 2 < 10**0.55
-    # The search knows one short training for all grids.
+    # The search uses the same short training for all grids.
     short = preamble.preamble()[: preamble.SHORT]
     assert preamble.preamble(grid)[: preamble.SHORT] == pytest.approx(short, abs=1e-6)

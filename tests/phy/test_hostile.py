@@ -1,4 +1,4 @@
-"""Samples that no sender made: nothing is heard in them, and what follows is."""
+"""Arbitrary samples: nothing is heard in them, and bursts after them are."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ BAD = (np.nan, np.inf, -np.inf, 1e30, 3e38, 1e7)
 
 
 def nasty():
-    """Streams of `N` samples by name, and how many of them are no numbers."""
+    """Streams of `N` samples by name, with the number of non-finite ones."""
     rng = np.random.default_rng(SEED)
     gauss = noise(rng, N)
     signs = np.sign(gauss.real) + 1j * np.sign(gauss.imag)
@@ -49,7 +49,7 @@ def test_nothing_is_heard_and_the_next_burst_is(name, max_frequency):
     receiver = Receiver(max_frequency=max_frequency)
     with np.errstate(over="raise", divide="raise", invalid="raise"):
         assert receiver.push(samples.astype(np.complex64)) == []
-        # Its idea of DC must fade before a burst a thousand times weaker is heard.
+        # Its DC estimate must decay before a burst a thousand times weaker is heard.
         receiver.push(noise(rng, 200_000, 1e-3))
         events = receiver.push(noisy(rng, Transmitter().modulate(pdus, 1), 30)) + receiver.flush()
     assert heard(events) == pdus
@@ -59,7 +59,7 @@ def test_nothing_is_heard_and_the_next_burst_is(name, max_frequency):
 
 @pytest.mark.parametrize("bad", BAD)
 def test_a_few_samples_that_are_no_numbers_cost_their_own_symbol_at_most(bad):
-    """They count as 0, so that a strong code does without them."""
+    """They count as 0, so that a strong code tolerates them."""
     rng = np.random.default_rng(SEED)
     pdus = payloads(rng, 3, 100)
     burst = Transmitter().modulate(pdus, 1)
@@ -90,7 +90,7 @@ def test_a_clipped_burst_is_heard():
 @law(60)
 @given(st.data())
 def test_anything_may_come_between_bursts(data):
-    """Pieces of bursts, noise, levels and no numbers: no crash, and no PDU that nobody sent."""
+    """Pieces of bursts, noise, levels, non-finite values: no crash, and no PDU that nobody sent."""
     rng = np.random.default_rng(data.draw(st.integers(0, 2**32)))
     sent, receiver = set(), Receiver(network=None, max_frequency=0.1)
     events = []

@@ -1,4 +1,4 @@
-"""Neighbours that send all the time, and clocks that the centre frequency tells, or does not."""
+"""Neighbors that send all the time, and clocks that do or do not follow the centre frequency."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_when_the_neighbour_is_gone_weak_bursts_are_found_as_before():
         receiver = Receiver()
         if is_jammed:
             receiver.push(10 * gfsk(rng, 100_000, 4) + noise(rng, 100_000))
-            # Five times what the threshold takes to sink by e.
+            # Five times the period in which the threshold decays by a factor of e.
             receiver.push(noise(rng, 5 * 4096))
         before = receiver.counters["preambles"]
         for _ in range(n):
@@ -51,9 +51,9 @@ def test_when_the_neighbour_is_gone_weak_bursts_are_found_as_before():
 
 
 def n_lost_of_20(ppm, one_crystal, snr_db):
-    """Long bursts whose subcarrier, and with one crystal also whose samples, are off by `ppm`.
+    """Number of 20 long bursts that are lost with a frequency error of `ppm`.
 
-    The receiver takes it for granted that one crystal makes both.
+    With one crystal the sample rate has the same error. The receiver always assumes one crystal.
     """
     rng, centre_hz, rate_hz = np.random.default_rng(SEED), 2.4e9, 5e6
     params = PathParams(rate_hz, centre_hz if one_crystal else 0.0, clock_ppm=ppm * one_crystal)

@@ -1,4 +1,4 @@
-"""Kernels against the reference, or where it has none of theirs against their formulas."""
+"""Compares kernels with the reference, or with their formulas where it has no counterpart."""
 
 import numpy as np
 import pytest
@@ -71,7 +71,7 @@ def test_search_finds_the_first_sample_over_the_threshold(lead):
 
 
 def test_a_raised_threshold_sinks_again():
-    """A peak of about 0.6 each 2048 samples: the first that the threshold has sunk below."""
+    """A peak of about 0.6 every 2048 samples: the first one above the decayed threshold counts."""
     x = 0.75 * noise(rng(), HISTORY + 10 * 2048)
     for begin in range(300, len(x) - 352, 2048):
         x[begin : begin + 352] += preamble()
@@ -102,7 +102,7 @@ def test_numbers_too_large_or_none_become_0_and_are_counted():
 @pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS)
 @pytest.mark.parametrize("n", [1, 7, 8, 19])
 def test_coded_bits_become_the_references_symbols(grid, modulation, n):
-    """Interleaved, mapped, with pilots, prefix and cut peaks."""
+    """Interleaved, mapped, with pilots, prefix and clipped peaks."""
     by = mapping(modulation, grid)
     coded = rng().integers(0, 2, n * by.symbol_bits, np.uint8)
     subcarriers = to_subcarriers(coded, modulation, grid, 7)

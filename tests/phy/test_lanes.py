@@ -1,4 +1,4 @@
-"""Eight at a time: every operation by numpy, FFTs and the demapper by the reference."""
+"""Eight lanes: compares every operation with numpy, FFTs and the demapper with the reference."""
 
 import numpy as np
 import pytest
@@ -122,7 +122,7 @@ def test_the_demapper_does_what_the_reference_says_bit_for_bit(axis_bits):
 
 @pytest.mark.parametrize("modulation", Modulation)
 def test_decisions_are_means_over_the_points(modulation):
-    """With each point as likely as its bits say."""
+    """Each point has the probability that its bits give."""
     axis_bits = modulation.axis_bits
     n = 1 << axis_bits
     llr = rng().integers(-60, 61, (axis_bits, 48)).astype(np.float32)

@@ -1,4 +1,4 @@
-"""How long bursts are, against counting by hand and against the transmitter."""
+"""The length of bursts, compared with manual counts and with the transmitter."""
 
 from fractions import Fraction
 from math import ceil
@@ -56,7 +56,7 @@ def test_symbols_through_against_laying_out_every_pdu(grid, mcs, n_pdus, size):
     plan = layout(grid, mcs, n_pdus, size)
     entry = MCS_TABLE[mcs]
     sent = plan.coded_bits
-    # At least the code's rate; more parity only where it costs no symbol.
+    # At least the code's rate; extra parity only if it needs no additional symbol.
     assert sent >= 8 * (size + 4) / entry.rate
     least = ceil(n_pdus * ceil(8 * (size + 4) / entry.rate) / (48 * entry.modulation.bits))
     assert plan.n_symbols == least
@@ -132,7 +132,7 @@ def test_pdus_of_unequal_size_and_unknown_networks_are_refused():
 
 
 def test_a_burst_is_the_same_every_time():
-    """Tables are shared and cached; no burst may change them."""
+    """Tables are shared and cached; no burst may modify them."""
     transmitter, pdus = Transmitter(3), [b"one", b"two"]
     first = transmitter.modulate(pdus, 4)
     first *= 0

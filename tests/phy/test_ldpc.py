@@ -1,4 +1,4 @@
-"""LDPC codes: the standard's codewords, blocks of any size, and how much noise they bear."""
+"""LDPC codes: the standard's codewords, blocks of any size, and the noise that they tolerate."""
 
 import hashlib
 import zlib
@@ -29,7 +29,7 @@ RATES = [Fraction(1, 2), Fraction(2, 3), Fraction(3, 4), Fraction(5, 6)]
 CODES = [QuasiCyclic(z, rate) for z in LIFTINGS for rate in RATES]
 SEED = 5
 
-# CRC-32 of codewords found by Gaussian elimination over GF(2), their information SHA-256 of 0, 1, …
+# CRC-32 of codewords found by Gaussian elimination over GF(2) for information SHA-256 of 0, 1, …
 CODEWORDS = {
     (27, "1/2"): 0x05CFA884,
     (27, "2/3"): 0xA3320602,
@@ -49,7 +49,7 @@ codes = pytest.mark.parametrize("code", CODES, ids=lambda code: f"{code.n}-{code
 
 
 def parity_check(code):
-    """The whole matrix `[n - k, n]`, block by block."""
+    """The complete matrix `[n - k, n]`, block by block."""
     matrix = np.zeros((code.n - code.k, code.n), np.int64)
     lanes = np.arange(code.z)
     for row, column in zip(*np.nonzero(code.base >= 0), strict=True):
@@ -68,7 +68,7 @@ def random_bits(rng, *shape):
 
 
 def whole(code):
-    """Blocks that are codewords."""
+    """Blocks that are whole codewords."""
     return Segmentation(code, code.k, 1, code.n)
 
 
@@ -99,7 +99,7 @@ def solved(matrix, right):
 
 @codes
 def test_parity_is_what_solving_the_checks_gives(code):
-    """H · c = 0 has one solution for each data, whatever the shape of H."""
+    """H · c = 0 has one solution for each information word, whatever the shape of H."""
     matrix, rng = parity_check(code), np.random.default_rng(SEED)
     for _ in range(3):
         data = random_bits(rng, code.k)
@@ -123,14 +123,14 @@ def test_every_check_holds_for_every_codeword(code):
     matrix = parity_check(code)
     words = np.array([encoded(code, random_bits(rng, code.k)) for _ in range(20)])
     assert not np.any(words @ matrix.T % 2)
-    # Each bit is in at least one check, and each check in as many as its row has edges.
+    # Each bit is in at least one check, and each check has as many bits as its row has edges.
     assert np.all(matrix.sum(axis=0) >= 1)
     assert np.array_equal(matrix.sum(axis=1), np.repeat(np.diff(code.row_ends), code.z))
 
 
 @codes
 def test_the_vectors_do_what_the_reference_says_bit_for_bit(code):
-    """In noise from little to hopeless, and with values at the edges of the range."""
+    """With noise from little to hopeless, and with values at the limits of the range."""
     rng = np.random.default_rng(SEED)
     work, form = new_workspace().content, whole(code).arguments.content
     outcomes = set()
@@ -159,7 +159,7 @@ def test_blocks_of_any_size_come_back(n_bytes, rate, more, seed):
     bits = random_bits(rng, n_blocks, form.n_bits)
     coded = encode(bits, form)
     assert coded.shape == (n_blocks, form.n_coded)
-    # The code's own rate is the lowest there is.
+    # The code's own rate is the lowest.
     parity = np.diff(form.ends) - form.shares
     assert form.n_coded == room or np.all(parity == form.code.n - form.code.k)
     assert form.n_coded >= least
@@ -178,7 +178,7 @@ def test_blocks_of_any_size_come_back(n_bytes, rate, more, seed):
     st.integers(0, 2**32 - 1),
 )
 def test_blocks_are_coded_and_decoded_as_the_reference_does(n_bytes, rate, more, ebn0_db, seed):
-    """Those too whose signs are a codeword, which are not decoded at all."""
+    """Includes blocks whose signs are already a codeword, which are not decoded."""
     rng = np.random.default_rng(seed)
     form = segmentation(8 * n_bytes, rate, round(least_coded(8 * n_bytes, rate) * (1 + more)))
     bits, most = random_bits(rng, 1, form.n_bits), 12
@@ -234,7 +234,7 @@ def test_the_fewest_and_shortest_codewords_are_taken():
     ],
 )
 def test_it_bears_noise_near_its_threshold(n_bytes, rate, ebn0_db):
-    """At most 1 % of blocks lost; two decibels less and nearly all are."""
+    """At most 1 % of blocks are lost; with two decibels less, almost all."""
     form = segmentation(8 * (n_bytes + 4), rate, least_coded(8 * (n_bytes + 4), rate))
     rng = np.random.default_rng(SEED)
     work = new_workspace()

@@ -1,4 +1,4 @@
-"""Gaussian noise made by counters: against its definition in double precision, and chance."""
+"""Gaussian noise from counters: its definition in double precision, and its statistics."""
 
 import math
 
@@ -44,7 +44,7 @@ def by_definition(index):
 def test_it_is_what_its_definition_says():
     got = made(3 * CHUNK)
     wanted = np.array([by_definition(i) for i in range(3 * CHUNK)])
-    # ln u is the difference of two numbers near 31 ln 2, each good to 24 bits.
+    # ln u is the difference of two numbers near 31 ln 2, each accurate to 24 bits.
     error_of_ln = 31 * math.log(2) * 2**-23
     allowed = np.minimum(np.sqrt(2 * error_of_ln), error_of_ln / np.abs(wanted)) + 1e-6
     assert np.all(np.abs(got - wanted) < allowed)

@@ -1,4 +1,4 @@
-"""To a faster radio's rate and back: nothing that a burst needs is lost, no image is left."""
+"""To a faster radio's rate and back: nothing that a burst needs is lost, and no image remains."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ factors = pytest.mark.parametrize("factor", [1, 2, 4])
 
 
 def plain_upsample(x, factor):
-    """Zeros between samples, then the filter, by numpy."""
+    """Zeros between samples, then the filter, in numpy."""
     stuffed = np.zeros((len(x) + 2 * REACH) * factor, np.complex128)
     stuffed[REACH * factor : (REACH + len(x)) * factor : factor] = x
     taps = factor * low_pass(factor).astype(float)
@@ -58,7 +58,7 @@ def test_any_chunking_gives_the_same_bit_for_bit(factor, start, sizes, seed):
         assert pieces.next_index == before + len(found[-1])
         at += n
     assert np.concatenate((*found, pieces.flush())).tobytes() == expected.tobytes()
-    # Each sample that falls on the slow side's grid is told.
+    # Each sample on the low rate's grid is reported.
     assert len(expected) == -(-(start + at) // factor) - -(-start // factor)
 
 

@@ -1,4 +1,4 @@
-"""Packet error rates in white noise, and how often nothing is taken for something.
+"""Packet error rates in white noise, and the rate of false detections.
 
 SNR is the burst's mean power over the noise power of a complex sample.
 """
@@ -16,7 +16,7 @@ SEED = 41
 
 
 def n_lost(n, mcs, size, snr_db, max_frequency=0.02, **settings):
-    """Of `n` bursts of one PDU, each with a subcarrier of its own, how many are not heard."""
+    """Number of `n` bursts of one PDU that are lost, each with its own frequency offset."""
     rng = np.random.default_rng(SEED)
     transmitter, receiver = Transmitter(), Receiver(max_frequency=max_frequency, **settings)
     sent, events = [], []
@@ -56,7 +56,7 @@ def test_qpsk_half_of_220_bytes_at_6_db_loses_one_in_a_hundred_at_most():
     ],
 )
 def test_of_300_bursts_near_the_knee_few_are_lost(mcs, size, snr_db, most):
-    """At the lower SNR of each, a percent or two are lost, and 1 dB less would be over `most`."""
+    """At each lower SNR one or two percent are lost; with 1 dB less it would exceed `most`."""
     assert n_lost(often(300), mcs, size, snr_db) <= often(most)
 
 
@@ -75,7 +75,7 @@ def test_a_wide_search_for_the_carrier_costs_little():
 
 @pytest.mark.soak
 def test_preambles_are_found_below_the_noise():
-    """Headers at -2 dB: what all else stands on must be the last to fail."""
+    """Headers at -2 dB: everything depends on them, so they must fail last."""
     rng = np.random.default_rng(SEED)
     receiver, n_found = Receiver(), 0
     for _ in range(often(200)):
@@ -108,7 +108,7 @@ def test_nothing_is_heard_in_silence(network):
 @networks
 @pytest.mark.parametrize("name", FOREIGN)
 def test_nothing_of_ours_is_heard_in_what_others_send(name, network):
-    """Wi-Fi's long training is ours too, but its short training lacks our code."""
+    """Wi-Fi has the same long training, but its short training lacks our code."""
     counters = quiet(FOREIGN[name](np.random.default_rng(SEED)), network)
     assert counters["triggers"] > 0 or not name.startswith("wifi")
     assert counters["preambles"] == counters["headers_bad"] == 0

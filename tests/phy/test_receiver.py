@@ -1,4 +1,4 @@
-"""Bursts through all that a path and a front end do to them, and what is told about them."""
+"""Bursts through all effects of a path and a front end, and the reports about them."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def framed(burst, lead=LEAD):
 
 
 def carried(burst, seed=SEED, front_end=None, **path):
-    """A framed burst as a receiver gets it."""
+    """A framed burst as it reaches a receiver."""
     rng = np.random.default_rng(seed)
     offset, samples = Path(PathParams(**path), rng).carry(burst)
     x = framed(samples, LEAD + offset)
@@ -61,7 +61,7 @@ def test_pdus_come_back(mcs, n_pdus, size, seed):
 def test_corners_come_back(mcs, n_pdus, size, grid):
     rng = np.random.default_rng(SEED)
     pdus = payloads(rng, n_pdus, size)
-    # The shortest code words of all are the weakest.
+    # The shortest codewords are the weakest.
     samples = noisy(rng, framed(Transmitter(grid=grid).modulate(pdus, mcs)), 34)
     assert heard(hear(samples, grid=grid)[0]) == pdus
 
@@ -87,7 +87,7 @@ def test_crystals_20_ppm_off_on_both_sides_at_2_4_ghz(mcs, ppm, rate_hz, setting
 @pytest.mark.parametrize("ppm", [-40, 40])
 @pytest.mark.parametrize(("mcs", "n_pdus", "size"), [(0, 12, 220), (3, 40, 220), (6, 12, 2047)])
 def test_clocks_apart_by_40_ppm_in_long_bursts(mcs, n_pdus, size, ppm):
-    """Over 70 000 samples, they part by 3."""
+    """Over 70 000 samples, the clocks drift apart by 3 samples."""
     pdus = payloads(np.random.default_rng(SEED), n_pdus, size)
     burst = Transmitter().modulate(pdus, mcs)
     assert 55_000 < len(burst) < 75_000
@@ -107,7 +107,7 @@ def test_any_delay_is_found(delay):
 
 @pytest.mark.parametrize(("profile", "rate_hz"), [("tdl-a", 1e6), ("tdl-a", 10e6), ("tdl-c", 5e6)])
 def test_echoes_at_25_db(profile, rate_hz):
-    """With the grid's prefix longer than the echoes; some bursts fade as a whole."""
+    """The grid's prefix is longer than the echoes; some bursts fade as a whole."""
     transmitter, rng = Transmitter(), np.random.default_rng(SEED)
     n_heard = 0
     for seed in range(100):
@@ -136,7 +136,7 @@ def test_echoes_at_25_db(profile, rate_hz):
     ids=["dc", "image", "8 bits", "all"],
 )
 def test_a_front_end_that_is_not_perfect(mcs, front_end):
-    """A burst at -15 dBFS after some time of noise, at 4 ppm."""
+    """A burst at -15 dBFS after a period of noise, at 4 ppm."""
     pdus = payloads(np.random.default_rng(SEED), 4, 220)
     rng = np.random.default_rng(SEED)
     params = PathParams(rate_hz=1e6, centre_hz=2.4e9, clock_ppm=4, loss_db=15)
@@ -185,7 +185,7 @@ def test_estimates_are_close(snr_db, gain_db):
 
 @every_mcs
 def test_each_pdu_is_delivered_when_its_last_symbol_is_in(mcs):
-    """Not at the burst's end."""
+    """Not only at the burst's end."""
     rng = np.random.default_rng(SEED)
     pdus = payloads(rng, 9, 100)
     samples = noisy(rng, framed(Transmitter().modulate(pdus, mcs)), 30)
@@ -215,7 +215,7 @@ def test_pdus_that_share_a_symbol_come_together_when_it_is_in():
         events += receiver.push(samples[pushed:end])
         assert heard(events) == pdus[: sum(symbol <= symbols for symbol in last_symbol)]
         pushed = end
-    # Nothing is missing when nothing follows.
+    # Nothing is missing if nothing follows.
     assert receiver.gap(1) == []
     assert [event.at for event in events[:-1]] == [LEAD + 512 + 80 * n for n in last_symbol]
 

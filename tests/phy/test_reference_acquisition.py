@@ -1,4 +1,4 @@
-"""Kernels that find a burst and read its header, against the reference."""
+"""Compares the kernels that find a burst and read its header with the reference."""
 
 import numpy as np
 import pytest
@@ -115,7 +115,7 @@ def test_the_likeliest_offset_is_the_same(grid):
 @every_grid
 @pytest.mark.parametrize("centre_cycles", [0.0, 500.0])
 def test_a_burst_is_acquired_alike(grid, centre_cycles):
-    """Start, offset, header, what is told of it, and the channel that its payload begins with."""
+    """Start, offset, header, quality, and the channel at the start of the payload."""
     ours = acquisition.Acquisition(grid, 0.1, centre_cycles)
     other = plain_acquisition.Acquisition(grid, 0.1, centre_cycles)
     n_read = n_missed = 0
@@ -145,7 +145,7 @@ def test_a_burst_is_acquired_alike(grid, centre_cycles):
 
 
 def test_headers_repetitions_are_folded_and_read_alike():
-    """From clean to hopeless; many are read with the list's help only."""
+    """From clean to hopeless; many can only be read with the list."""
     n_listed = n_read = 0
     for seed in range(120):
         draws = rng(seed)

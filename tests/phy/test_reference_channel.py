@@ -1,7 +1,7 @@
-"""Kernels that learn and follow a burst's channel, against the reference.
+"""Compares the kernels that learn and follow a burst's channel with the reference.
 
-What single precision rounds, and what a kernel leaves out on purpose, is all that may part them.
-Others are compared in `test_reference_acquisition`, and where their own tests are: detector and
+They may differ only by single-precision rounding and by deliberate simplifications of a kernel.
+Other kernels are compared in `test_reference_acquisition`, and in their own tests: detector and
 modulator in `test_kernels`, FFT and demapper in `test_lanes`, LDPC in `test_ldpc`, training in
 `test_training`, the K=7 code in `test_coding`.
 """
@@ -91,7 +91,7 @@ def _correct(turned_by, power, subcarriers, no, tracking):
 
 
 def state_of(kalman):
-    """Value, rate, their variances and covariance, as the kernel has them."""
+    """Value, rate, their variances and covariance, in the kernel's order."""
     (value, cov), (_, rate) = kalman.covariance
     return [*kalman.state, value, cov, rate]
 
@@ -99,11 +99,11 @@ def state_of(kalman):
 @every_grid
 @pytest.mark.parametrize("clock_error", [None, 1.7e-5])
 def test_pilots_are_tracked_alike(grid, clock_error):
-    """Through a turn, a lean, a symbol that others hit, one without power, pilots all of noise."""
+    """With a rotation, a slope, a disturbed symbol, one without power, and pilots of pure noise."""
     draws = rng()
     block, channel = both_estimates(grid, *trained(draws, grid, 0.02)[:2])
     told = clock_error is not None
-    # The kernel's own channel, so that nothing else parts them.
+    # The kernel's own channel, so that nothing else differs.
     channel.no, channel.gain = block.content.no, block.content.gain
     equaliser_kernel.start_tracking(tones(grid).content, block.content, clock_error or 0.0, told)
     ours, other = block.content.tracking, Tracking(grid, channel, clock_error)
@@ -130,12 +130,12 @@ def test_pilots_are_tracked_alike(grid, clock_error):
 def equalised(grid, modulation, n, lean, no):
     """(the kernel's LLRs, points, channel; the reference's LLRs, points, equaliser).
 
-    `n` symbols that turn, and that lean more and more, the last by `lean` radians a subcarrier.
+    The `n` symbols rotate, with a growing slope, which reaches `lean` radians per subcarrier.
     """
     draws, n_bits = rng(modulation.bits), grid.n_data * modulation.bits
     block, channel = both_estimates(grid, *trained(draws, grid, no)[:2])
     coded = draws.integers(0, 2, n * n_bits, np.uint8)
-    # The same to the last bit: subcarriers in a fade would tell the difference.
+    # Equal to the last bit: subcarriers in a fade would show a difference.
     channel.h, channel.no, channel.gain = (
         gains_of(block.content, grid),
         *block.content.figures[:2],
@@ -161,10 +161,10 @@ def equalised(grid, modulation, n, lean, no):
 @every_grid
 @pytest.mark.parametrize("noise_share", [0.3, 0.03, 1e-3])
 def test_symbols_are_equalised_alike(grid, modulation, noise_share):
-    """A block of them, and the channel after it as both have learned it."""
+    """A block of symbols, and the channel that both have learned from it."""
     no = noise_share / modulation.bits**2
     ours, other = equalised(grid, modulation, BLOCK, 0.0, no)
-    # Near a step of the quantiser, single precision decides.
+    # Near a step of the quantiser, single precision matters.
     difference = np.abs(ours[0].astype(int) - other[0])
     assert difference.max() <= 1
     assert np.mean(difference > 0) < 0.01
@@ -175,7 +175,7 @@ def test_symbols_are_equalised_alike(grid, modulation, noise_share):
 
 @every_grid
 def test_symbols_that_lean_are_equalised_alike(grid):
-    """The kernel lets the slope lag by 0.01 rad at the outermost subcarriers, the reference not."""
+    """Unlike the reference, the kernel lets the slope lag by 0.01 rad at the outer subcarriers."""
     ours, other = equalised(grid, Modulation.QAM16, 3 * BLOCK, 0.3 / grid.n_fft, 1e-3)
     assert abs(ours[2].figures[SLOPE_USED]) > 0
     assert np.abs(ours[1] - other[1]).max() < 0.015 * np.abs(other[1]).max()
@@ -185,7 +185,7 @@ def test_symbols_that_lean_are_equalised_alike(grid):
 
 @every_grid
 def test_a_carrier_sent_as_1_comes_back_as_1(grid):
-    """The control of the reference itself: its FFT undoes its inverse FFT, with signs of pilots."""
+    """The control of the reference: its FFT inverts its inverse FFT, with the pilots' signs."""
     coded = rng().integers(0, 2, 5 * grid.n_data * 4, np.uint8)
     sent = mapping.to_subcarriers(coded, Modulation.QAM16, grid, 9)
     samples = ofdm.to_samples(sent, grid)
@@ -194,7 +194,7 @@ def test_a_carrier_sent_as_1_comes_back_as_1(grid):
     assert ofdm.to_subcarriers(samples, starts, 0.0, 0j, grid) == pytest.approx(sent, abs=1e-12)
     pilots = sent[:, grid.pilots_at] * grid.pilot_values
     assert np.array_equal(pilots.real, np.repeat(polarity(5, 9)[:, None], pilots.shape[1], 1))
-    # A window that begins within the prefix sees each subcarrier turned, and nothing else.
+    # A window that begins within the prefix sees each subcarrier rotated, and nothing else.
     early = ofdm.to_subcarriers(samples, starts - 3, 0.0, 0j, grid)
     lean = np.exp(-2j * np.pi * 3 * grid.used / OFDM_64_16.n_fft * 64 / grid.n_fft)
     assert early == pytest.approx(sent * lean, abs=1e-12)

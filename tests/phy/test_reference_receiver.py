@@ -1,4 +1,4 @@
-"""The reference receiver hears what the modem's hears, through noise, offsets, echoes and gaps."""
+"""The reference receiver hears what the modem's hears, with noise, offsets, echoes and gaps."""
 
 import inspect
 
@@ -33,7 +33,7 @@ from tests.phy.test_chunking import chunk_sizes, make_stream, push_all
 pytestmark = pytest.mark.slow  # together; each is quick
 
 SEED = 73
-# What the product's own tests allow a start to be off.
+# The error of a start that the modem's own tests allow.
 START = 1.01
 
 every_mcs = pytest.mark.parametrize("mcs", range(len(MCS_TABLE)))
@@ -44,7 +44,7 @@ transmitters = pytest.mark.parametrize(
 
 
 def listen(kind, x, **settings):
-    """(events, counters) of a fresh receiver that gets all of `x`."""
+    """(events, counters) of a new receiver for all of `x`."""
     receiver = kind(**settings)
     return receiver.push(x) + receiver.flush(), receiver.counters
 
@@ -55,7 +55,7 @@ def overs(events):
 
 
 def agree(x, **settings):
-    """What both receivers hear in `x` is the same and as good; the reference's events."""
+    """Assert that both receivers agree on `x`; returns the reference's events."""
     ours, counted = listen(Receiver, x, **settings)
     other, counters = listen(reference.Receiver, x, **settings)
     assert [told(event) for event in other] == [told(event) for event in ours]
@@ -72,7 +72,7 @@ def agree(x, **settings):
 
 
 def told(event):
-    """What of an event must be the same."""
+    """The parts of an event that must be equal."""
     if isinstance(event, PduHeard):
         return event.data, event.number, event.at
     return event.n_good, event.ending
@@ -81,7 +81,7 @@ def told(event):
 @every_mcs
 @transmitters
 def test_bursts_somewhat_above_threshold_are_heard_by_both(mcs, transmitter):
-    """Five bursts, each with its own offset, 2 dB above where one in a hundred is lost."""
+    """Five bursts, each with its own offset, 2 dB above the SNR at which 1 % is lost."""
     rng = np.random.default_rng(SEED + mcs)
     snr_db = needed_snr_db(mcs, 60) + 2
     parts, sent, starts, offsets, at = [], [], [], [], 0
@@ -138,7 +138,7 @@ def test_echoes_change_nothing_between_them(grid, profile, rate_hz, doppler_hz):
 @pytest.mark.parametrize("ppm", [-40, 40])
 @pytest.mark.parametrize("centre_cycles", [0.0, 100.0])
 def test_windows_slip_along_with_the_senders_clock(ppm, centre_cycles):
-    """Over 74 000 samples, the clocks part by 3."""
+    """Over 74 000 samples, the clocks drift apart by 3 samples."""
     rng = np.random.default_rng(SEED)
     pdus = payloads(rng, 4, 2047)
     burst = Transmitter().modulate(pdus, 1)
@@ -171,7 +171,7 @@ def test_wide_searches_find_the_same(max_frequency):
 
 @pytest.mark.slow
 def test_streams_with_every_kind_of_burst_are_told_alike():
-    """Own and foreign bursts, false starts, bursts cut short, spoilt samples, DC."""
+    """Own and foreign bursts, false starts, truncated bursts, damaged samples, DC."""
     all_endings, n_odd = set(), 0
     for seed in range(25):
         x, *_ = make_stream(seed)
@@ -189,7 +189,7 @@ def test_what_others_send_alarms_both_alike(name):
 
 
 def received(x, gap_at, gap, sizes, **settings):
-    """(events, counters) of the reference that gets `x` in chunks, with a gap if any."""
+    """(events, counters) of the reference for `x` in chunks, with a gap if given."""
     receiver = reference.Receiver(**settings)
     events = push_all(receiver, x[:gap_at], sizes)
     if gap_at is not None:
@@ -264,7 +264,7 @@ def test_a_pushed_array_is_left_alone():
 
 
 def losses(mcs, snr_db, n):
-    """Of `n` bursts of 100 bytes, how many (the modem, the reference) do not hear."""
+    """Losses of (the modem, the reference) among `n` bursts of 100 bytes."""
     rng = np.random.default_rng(SEED)
     receivers = Receiver(), reference.Receiver()
     events = [], []
@@ -284,7 +284,7 @@ def losses(mcs, snr_db, n):
 @pytest.mark.slow
 @pytest.mark.parametrize(("mcs", "less_db"), [(0, 0.1), (4, 0.5), (9, 0.9)])
 def test_near_threshold_as_many_are_lost(mcs, less_db):
-    """Where about half are lost; noise is the same for both, so that few bursts part them."""
+    """About half are lost; the noise is the same for both, so that few bursts differ."""
     n = often(40)
     ours, other = losses(mcs, needed_snr_db(mcs, 100, per=0.5) - less_db, n)
     assert 0.15 * n < ours < 0.85 * n

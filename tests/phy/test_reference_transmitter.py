@@ -15,7 +15,7 @@ from tests.laws import law
 from tests.phy.signals import payloads
 
 SEED = 71
-# Of the samples' rms, which is 1. Single precision rounds by some 6e-8 a step.
+# Relative to the samples' RMS, which is 1. Single precision rounds by about 6e-8 per step.
 ROUNDING = 3e-6
 
 every_mcs = pytest.mark.parametrize("mcs", range(len(MCS_TABLE)))
@@ -23,7 +23,7 @@ every_grid = pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS)
 
 
 def error(pdus, mcs, **settings):
-    """The largest difference of a sample between the two transmitters' bursts."""
+    """The largest difference between the samples of the two transmitters' bursts."""
     ours = Transmitter(**settings).modulate(pdus, mcs)
     other = reference.Transmitter(**settings).modulate(pdus, mcs)
     assert (other.dtype, other.shape) == (ours.dtype, ours.shape)
@@ -52,7 +52,7 @@ def test_networks_and_stronger_preambles_are_the_same(network, boost_db):
 
 
 def test_the_yardstick_tells_one_bit():
-    """The control: a burst of which one bit of one PDU is another."""
+    """The control: a burst with one changed bit in one PDU."""
     ours = Transmitter().modulate([b"to and fro"], 9)
     other = reference.Transmitter().modulate([b"to and frn"], 9)
     assert np.abs(ours - other).max() > 0.1
@@ -94,7 +94,7 @@ def test_headers_are_coded_and_told_as_the_modem_does(mcs, n_pdus, pdu_bytes, ne
 
 
 def header_octets(coded):
-    """Four octets from their coded bits: A and B are what each bit adds to those before it."""
+    """Four octets from their coded bits: A and B are each bit's contribution."""
     bits = np.zeros(32, np.uint8)
     for t in range(32):
         bits[t] = encode(bits)[2 * t] ^ coded[2 * t]

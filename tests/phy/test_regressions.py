@@ -1,4 +1,4 @@
-"""What was once broken."""
+"""Bugs that were fixed."""
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def test_points_are_the_same_to_the_last_bit_for_any_chunking():
 
 
 def test_a_faster_crystal_raises_the_carrier_and_shortens_the_burst():
-    """The sender's clock against the receiver's: both from one crystal."""
+    """The sender's clock against the receiver's; one crystal drives carrier and samples."""
     n = 100_000
     burst = turned(np.ones(n), 0.01)
     params = PathParams(rate_hz=1e6, centre_hz=0.0, clock_ppm=100)

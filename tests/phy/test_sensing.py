@@ -1,4 +1,4 @@
-"""Subcarrier sense: bursts are sensed from end to end, noise is not, and the floor recovers."""
+"""Carrier sensing: bursts are sensed from end to end, noise is not, and the floor recovers."""
 
 from itertools import pairwise
 
@@ -42,7 +42,7 @@ def busy_windows(sense, samples):
 
 
 def plainly(samples, threshold_db=6.0):
-    """(ends of busy windows, floor) by the law, term by term; no sample is bad."""
+    """(ends of busy windows, floor) by the formula, term by term; no sample is bad."""
     floor, ends = None, []
     windows = len(samples) // WINDOW
     powers = np.abs(samples[: windows * WINDOW].astype(np.complex128)) ** 2
@@ -92,7 +92,7 @@ def test_noise_is_not_busy(seed, power):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_a_burst_at_10_db_is_sensed_from_end_to_end(seed):
-    """To one window, and without a break; the floor stays."""
+    """To one window, and without interruption; the floor is constant."""
     draws = rng(seed)
     begin = 20_000 + int(draws.integers(0, WINDOW))
     burst = a_burst(draws, mcs=seed % 7)
@@ -107,14 +107,14 @@ def test_a_burst_at_10_db_is_sensed_from_end_to_end(seed):
 
 
 def test_the_yardstick_tells_strong_from_weak():
-    """The control: 10 dB below the noise, a burst is nothing."""
+    """The control: 10 dB below the noise, a burst is not sensed."""
     draws = rng()
     x = noisy(draws, np.concatenate((silence(20_000), a_burst(draws))), -10)
     assert busy_windows(EnergyDetector(), x) == []
 
 
 def test_a_start_within_a_burst_is_over_when_the_burst_is():
-    """The burst is taken for the floor; the first windows behind it put that right."""
+    """The burst is taken for the floor; the first windows after it correct that."""
     draws = rng()
     first, second = a_burst(draws), a_burst(draws)
     x = np.concatenate((first[1000:], silence(2000), second, silence(2000)))
@@ -125,10 +125,10 @@ def test_a_start_within_a_burst_is_over_when_the_burst_is():
 
 
 def test_a_carrier_that_never_ends_becomes_noise():
-    """Not before 2^16 windows; when it is gone, the floor is back at once.
+    """Not before 2^16 windows; when it ends, the floor is back at once.
 
-    A doubling is enough for 10 dB: then the first windows fall below the threshold, and those
-    take the floor along.
+    One doubling is enough for 10 dB: then the first windows fall below the threshold, and pull the
+    floor along.
     """
     draws = rng()
     sense = sensed(noise(draws, 6400))
@@ -179,7 +179,7 @@ def test_a_stream_that_begins_with_bad_samples_has_no_floor_yet():
 
 
 def test_after_zeros_any_signal_is_busy_until_the_floor_has_crept_up():
-    """The least floor is -120 dBFS; 10 dB above it are 2^17 windows and more."""
+    """The least floor is -120 dBFS; to a level 10 dB above it takes at least 2^17 windows."""
     draws = rng()
     sense = sensed(silence(6400))
     sense.push(noise(draws, 64_000, 1e-11))
@@ -200,7 +200,7 @@ def test_windows_begin_behind_a_gap_and_the_floor_is_kept():
     draws = rng()
     sense = sensed(noise(draws, 6400 + 63), start=1000)
     floor = sense.noise_dbfs
-    # One more sample would have made a busy window of what was before the gap.
+    # With one more sample, the samples before the gap would have made a busy window.
     sense.gap(937)
     assert (sense.next_index, sense.noise_dbfs) == (8400, floor)
     sense.push(10 * noise(draws, 63))
@@ -220,7 +220,7 @@ def test_what_makes_no_sense_is_refused():
 
 
 def make_stream(seed):
-    """(samples, places of gaps): bursts, noise, zeros, bad samples."""
+    """(samples, positions of gaps): bursts, noise, zeros, bad samples."""
     draws = rng(seed)
     parts = [noise(draws, int(draws.integers(0, 500)))]
     for _ in range(int(draws.integers(1, 6))):
@@ -233,7 +233,7 @@ def make_stream(seed):
 
 
 def told(x, cuts, gaps):
-    """All that is told of `x` cut at `cuts`, with 100 samples missing at each of `gaps`."""
+    """All results for `x` cut at `cuts`, with 100 samples missing at each of `gaps`."""
     sense = EnergyDetector()
     for first, last in pairwise([0, *cuts, len(x)]):
         if first in gaps:
@@ -245,7 +245,7 @@ def told(x, cuts, gaps):
 @law(150)
 @given(st.integers(0, 2**32), st.lists(st.floats(0, 1), max_size=40), st.booleans())
 def test_any_chunking_tells_the_same(seed, cuts, with_gaps):
-    """Empty chunks among them: a cut may come twice, though a gap only once."""
+    """Some chunks are empty: a cut may be repeated, but a gap may not."""
     x, gaps = make_stream(seed)
     gaps = sorted(set(gaps)) if with_gaps else []
     at = [int(cut * len(x)) for cut in cuts]

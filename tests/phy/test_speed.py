@@ -1,7 +1,7 @@
-"""What the modem costs, as a multiple of numpy's own work in the same process.
+"""The modem's cost, as a multiple of numpy's own work in the same process.
 
-The yardstick is an FFT of as many samples, 64 at a time, and a product of as many: what any OFDM
-receiver in numpy does at least. Bounds are twice what was measured, for machines differ.
+The reference is an FFT of as many samples, 64 at a time, and a product of as many: the least that
+any OFDM receiver in numpy does. Limits are twice the measured values, because machines differ.
 """
 
 from time import thread_time
@@ -17,7 +17,7 @@ ROUNDS = 7
 
 
 def best_s(work):
-    """CPU time of this thread."""
+    """The least CPU time of this thread."""
     work()
     took = []
     for _ in range(ROUNDS):
@@ -28,7 +28,7 @@ def best_s(work):
 
 
 def yardstick_s(n):
-    """For `n` samples."""
+    """CPU time of the reference work for `n` samples."""
     x = noise(np.random.default_rng(SEED), 1 << 13).reshape(-1, 64)
     return best_s(lambda: [np.fft.fft(x) * x for _ in range(16)]) * n / (16 * x.size)
 

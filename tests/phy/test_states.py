@@ -1,4 +1,4 @@
-"""The receiver's states: every step is allowed or refused, and signals take every allowed one."""
+"""The receiver's states: every transition is allowed or refused, and each allowed one occurs."""
 
 import itertools
 
@@ -31,7 +31,7 @@ def test_every_state_can_be_reached_and_left():
 
 
 def test_signals_take_every_allowed_step(monkeypatch):
-    """Bursts, foreign ones, tones, headers that fail, fades, and gaps at any moment."""
+    """Bursts, foreign ones, tones, invalid headers, fades, and gaps at any time."""
     taken = set()
 
     def spy(state, found):
@@ -50,6 +50,6 @@ def test_signals_take_every_allowed_step(monkeypatch):
             if rng.random() < 0.2:
                 receiver.gap(int(rng.integers(0, 300)))
         receiver.flush()
-    # A gap takes in what can be told of the samples before it, so only a burst is left to be cut.
+    # A gap first processes the samples before it, so only a burst can be cut.
     rare = {(State.ALIGN, Found.CUT), (State.ACQUIRE, Found.CUT)}
     assert set(NEXT) - rare <= taken <= set(NEXT)

@@ -1,4 +1,4 @@
-"""Tables: what the standard prints, and what must hold for any of them."""
+"""Tables: what the standard prints, and what must hold for each of them."""
 
 import zlib
 
@@ -57,7 +57,7 @@ def test_the_interleaver_is_a_permutation(modulation):
 
 @pytest.mark.parametrize("modulation", Modulation)
 def test_the_standards_deinterleaver_undoes_the_interleaver(modulation):
-    """Equations 17-22 and 17-23, which are not the inverse of ours by construction."""
+    """Equations 17-22 and 17-23, which are not derived from our interleaver."""
     n, s = 48 * modulation.bits, max(modulation.bits // 2, 1)
     j = order(n, modulation.bits).astype(int)
     i = s * (j // s) + (j + 16 * j // n) % s
@@ -70,7 +70,7 @@ def test_neighbouring_coded_bits_are_three_carriers_apart_at_least(modulation):
     assert np.abs(np.diff(subcarrier)).min() >= 3
 
 
-# IEEE 802.11-2020, tables 17-12 to 17-15: levels of an axis by the bits as they are sent.
+# IEEE 802.11-2020, tables 17-12 to 17-15: levels of an axis by the bits in sending order.
 AXIS = {
     "0": -1, "1": 1,
     "00": -3, "01": -1, "11": 1, "10": 3,
@@ -150,7 +150,7 @@ def llr_of(coded):
 
 
 def read(llr):
-    """The header that LLRs of its symbols tell."""
+    """The header decoded from LLRs of its symbols."""
     folded, octets = np.empty(76, np.int16), np.empty(4, np.uint8)
     fold(llr, folded)
     decode_block(folded, np.empty(N_BITS + 6, np.uint64), octets)
@@ -176,7 +176,7 @@ def test_either_copy_of_a_headers_first_bits_will_do(lost):
 
 
 def test_a_header_is_the_first_likely_word_whose_check_holds():
-    """Where noise makes another the likeliest, in most cases the right one is next."""
+    """If noise makes another word the likeliest, the right one is usually next."""
     header, n_read, n_likeliest = BurstHeader(5, 33, 1234, 6), 0, 0
     draws = np.random.default_rng(7)
     for _ in range(400):

@@ -1,4 +1,4 @@
-"""What training tells: correlation, gains, what is noise of them, and what was decided."""
+"""Results of training: correlation, gains, their noise, and the decisions."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def planes_of(x):
 
 @pytest.mark.parametrize("n", [16, 64, 128])
 def test_correlation_with_two_templates_in_a_row(n):
-    """Those longer than 64 samples add up as powers."""
+    """Templates longer than 64 samples add up as powers."""
     z, templates = noise(rng(), 2 * n + 8), noise(rng(), 3 * n).reshape(3, n)
     out = np.empty((3, 8), np.float32)
     correlate(planes_of(z), templates, out)
@@ -50,7 +50,7 @@ def test_samples_are_turned_back(frequency):
 
 
 def test_least_squares_tells_gains_and_noise():
-    """Of symbols of which some went out stronger."""
+    """Some of the symbols were sent stronger."""
     draws = rng()
     sent = draws.choice([-1, 1, 1j], (4000, 4)).astype(np.complex64)
     amplitude = np.resize([1, 1.4], 4000).astype(np.float32)
@@ -69,7 +69,7 @@ def test_least_squares_tells_gains_and_noise():
 @pytest.mark.slow
 @pytest.mark.parametrize("boost", [0.7, 1.0, 1.41])
 def test_a_header_tells_how_much_stronger_the_preamble_was(boost):
-    """The channel is that of the header, with all four symbols' help."""
+    """The channel is that of the header, estimated from all four symbols."""
     draws, grid = rng(), OFDM_64_16
     table, scratch = tones(grid).content, new_scratch(grid).content
     h = np.exp(-2j * np.pi * 3 * table.subcarriers / 64) * (1 + 0.3j)
@@ -85,7 +85,7 @@ def test_a_header_tells_how_much_stronger_the_preamble_was(boost):
 
 
 def smoothed(h, no, grid=OFDM_64_16):
-    """(estimate, variance left) of gains in the order of tones, measured with noise `no`."""
+    """(estimate, remaining variance) of gains in the order of tones, measured with noise `no`."""
     rough = h + noise(np.random.default_rng(SEED), len(h), no)
     channel = new_channel(grid).content
     channel.h[:] = in_planes(rough[None])[0]
@@ -109,7 +109,7 @@ def test_of_one_path_hardly_any_noise_is_left(grid, delay):
 
 
 def test_of_many_echoes_no_more_is_lost_than_smoothing_is_worth():
-    """However the gains vary, even as no channel's do, it never does harm."""
+    """However the gains vary, even unlike any channel, smoothing never does harm."""
     draws, subcarriers = rng(), tones(OFDM_64_16).content.subcarriers
     for echoes in (2, 8, 16, 60):
         taps = noise(draws, echoes)
@@ -127,7 +127,7 @@ def test_a_basis_is_orthonormal():
 
 
 def test_the_likeliest_code_words_come_first():
-    """Against every message of a short code."""
+    """Compared with every message of a short code."""
     n_bits, n_list = 8, 6
     messages = np.unpackbits(np.arange(256, dtype=np.uint8)[:, None], axis=1)
     padded = np.zeros((256, n_bits + 6), np.uint8)

@@ -1,4 +1,4 @@
-"""What leaves the transmitter: peaks, edges, spectrum, and a preamble that may be stronger."""
+"""The transmitter's output: peaks, edges, spectrum, and a preamble that may be stronger."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ SEED = 67
 
 every_mcs = pytest.mark.parametrize("mcs", MCS_TABLE, ids=lambda mcs: mcs.name)
 
-# IEEE 802.11-2020, 17.3.9.3: offset over the channel's width, dB below the top.
+# IEEE 802.11-2020, 17.3.9.3: offset relative to the channel's width, dB below the top.
 MASK = ((0.45, 0.0), (0.55, -20.0), (1.0, -28.0), (1.5, -40.0))
 
 
@@ -26,7 +26,7 @@ def test_no_sample_is_beyond_the_peak_and_the_mean_is_1(mcs, grid):
     burst = a_burst(mcs.index, grid=grid)
     most = max(mcs.peak_db, MCS_TABLE[0].peak_db)
     assert np.abs(burst).max() <= 10 ** (most / 20) * (1 + 1e-5)
-    # Peaks are cut off, which takes a few hundredths of a dB.
+    # Peaks are clipped, which costs a few hundredths of a dB.
     assert np.mean(np.abs(burst[preamble.length(grid) :]) ** 2) == pytest.approx(1, abs=0.02)
 
 
@@ -38,7 +38,7 @@ def test_bursts_begin_and_end_without_a_step():
 
 @every_mcs
 def test_the_spectrum_fits_the_mask_at_four_times_the_rate(mcs):
-    """Of 802.11a, scaled to the rate; between its corners the line is straight."""
+    """The mask of 802.11a, scaled to the rate; it is linear between its corners."""
     x = resample_poly(a_burst(mcs.index), 4, 1, window=("kaiser", 8.0))
     size = 512
     blocks = x[: len(x) // size * size].reshape(-1, size) * np.hanning(size)
@@ -72,7 +72,7 @@ def test_a_stronger_preamble_changes_nothing_else(mcs, boost_db):
     events = receiver.push(noisy(rng, np.concatenate((silence(500), burst)), 32))
     events += receiver.flush()
     assert heard(events) == pdus
-    # What counts for the choice of an MCS is the payload's.
+    # The payload's level decides the choice of an MCS.
     assert events[0].burst.snr_db == pytest.approx(32, abs=2)
 
 

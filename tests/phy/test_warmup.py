@@ -1,4 +1,4 @@
-"""The warm-up compiles whatever a link runs, and where compiled code is kept."""
+"""The warm-up compiles everything that a link runs; where compiled code is stored."""
 
 import os
 import shutil
@@ -23,9 +23,9 @@ for name, module in sorted(sys.modules.items()):
             if isinstance(known[key], Dispatcher):
                 print(key, len(known[key].signatures))
 """
-# Kernels that bursts are measured with, and no link has.
+# Kernels that measure bursts, which no link uses.
 MEASURED = {"encode_blocks"}
-# One small kernel, and where numba has put it.
+# One small kernel, and the place where numba stored it.
 SMALL = """
 import numpy as np, phy
 from phy.kernels.rotation import lean
@@ -35,7 +35,7 @@ print(lean._cache.cache_path, sum(lean.stats.cache_hits.values()), phy.temporary
 
 
 def test_every_kernel_that_the_modem_calls_is_warm():
-    """Also those of rare moments: a second look at a header, windows that slip in a long burst."""
+    """Includes kernels of rare cases: a second look at a header, slipping windows."""
     done = subprocess.run(
         [sys.executable, "-c", CALLED], capture_output=True, text=True, check=True
     )
@@ -46,9 +46,9 @@ def test_every_kernel_that_the_modem_calls_is_warm():
 
 @pytest.fixture
 def small(tmp_path):
-    """Runs a kernel of code that is somebody else's; (folder of its cache, hits, what is told)."""
+    """Runs a kernel of another user's code; (folder of its cache, hits, log)."""
     shutil.copytree(ROOT / "phy", tmp_path / "phy", ignore=shutil.ignore_patterns("__pycache__"))
-    # As good as a folder that may not be written, and it holds for root, too.
+    # Equivalent to a folder without write permission, but also works for root.
     (tmp_path / "phy/kernels/__pycache__").write_text("")
     (tmp_path / "nowhere").write_text("")
     environment = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
@@ -80,7 +80,7 @@ def test_who_can_write_nowhere_else_keeps_it_in_a_folder_of_his_own(small, tmp_p
 
 @pytest.mark.slow
 def test_what_others_may_write_is_not_run(small, tmp_path):
-    """Compiled code is code: whoever writes the folder would run his own."""
+    """Compiled code is executed: a writer of the folder could run code of his own."""
     temporary = tmp_path / "tmp"
     (temporary / f"sdrlinkd-{os.geteuid()}").mkdir(parents=True)
     (temporary / f"sdrlinkd-{os.geteuid()}").chmod(0o777)

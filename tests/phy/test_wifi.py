@@ -1,4 +1,4 @@
-"""802.11a frames: of a transmitter written from the standard, and the standard's own message."""
+"""802.11a frames: from a transmitter written after the standard, and the standard's own message."""
 
 import numpy as np
 import pytest
@@ -77,7 +77,7 @@ def test_frames_of_802_11n_are_told_as_such(greenfield, mcs, n_bytes, wide):
     for each in got:
         assert each.cfo_hz == pytest.approx(-0.003 * 20e6, abs=1000)
         assert each.snr_db == pytest.approx(15, abs=1.5)
-    # What is said of one does not spill over to the next.
+    # Information about one frame does not leak into the next.
     assert last.psdu == psdu
 
 
@@ -109,7 +109,7 @@ def test_the_standards_own_message_is_read_with_its_fcs():
 
 @pytest.mark.parametrize("mbps", [6, 24])
 def test_frames_as_a_radio_records_them_have_the_right_fcs(mbps):
-    """Octets of 16-bit samples, weak, off the middle, with the radio's own offset."""
+    """As 16-bit samples, weak, off-centre, with the radio's own offset."""
     rng = np.random.default_rng(SEED)
     sent = [with_fcs(rng.bytes(134)) for _ in range(8)]
     parts = [silence(300)]

@@ -1,4 +1,4 @@
-"""An 802.11a transmitter written from the standard's text, of nothing that the modem uses."""
+"""An 802.11a transmitter written after the standard's text, independent of the modem."""
 
 import zlib
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def signs(subcarriers, text):
-    """±1 by subcarrier, 0 left out."""
+    """±1 by subcarrier, without 0."""
     values = [1 if sign == "+" else -1 for sign in text]
     return dict(zip([k for k in subcarriers if k], values, strict=True))
 
@@ -16,7 +16,7 @@ SHORT_SIGNS = "+-+--+--++++"
 LONG_SIGNS = "++--++-+-++++++--++-+-++++" + "+--++-+-+-----++--+-+-++++"
 SHORT = signs(range(-24, 25, 4), SHORT_SIGNS)
 LONG = signs(range(-26, 27), LONG_SIGNS)
-# SIGNAL's bits, bits a subcarrier, puncturing of A and B (table 17-6).
+# SIGNAL's bits, bits per subcarrier, puncturing of A and B (table 17-6).
 RATES = {
     6: (0b1101, 1, "11"), 9: (0b1111, 1, "111001"), 12: (0b0101, 2, "11"),
     18: (0b0111, 2, "111001"), 24: (0b1001, 4, "11"), 36: (0b1011, 4, "111001"),
@@ -27,7 +27,7 @@ DATA = [k for k in range(-26, 27) if k and k not in PILOTS]
 
 
 def register(state, n):
-    """x^7 + x^4 + 1 from the seven bits of `state`, the last of them newest."""
+    """Output of x^7 + x^4 + 1 from the seven bits of `state`, the newest last."""
     out = []
     for _ in range(n):
         bit = state[-7] ^ state[-4]
@@ -37,7 +37,7 @@ def register(state, n):
 
 
 def coded(bits, pattern):
-    """K=7, 133 and 171, punctured."""
+    """The K=7 code (133, 171), punctured."""
     out, past = [], [0] * 6
     for bit in bits:
         window = [bit, *past]
@@ -48,7 +48,7 @@ def coded(bits, pattern):
 
 
 def interleaved(bits, per_carrier):
-    """Two permutations of a symbol's bits (17.3.5.7)."""
+    """The two permutations of a symbol's bits (17.3.5.7)."""
     n, s = len(bits), max(per_carrier // 2, 1)
     out = [0] * n
     for k, bit in enumerate(bits):
@@ -58,7 +58,7 @@ def interleaved(bits, per_carrier):
 
 
 def point(bits):
-    """Gray-coded levels on both axes (17.3.5.8)."""
+    """A point with Gray-coded levels on both axes (17.3.5.8)."""
     levels = {1: [-1, 1], 2: [-3, -1, 3, 1], 3: [-7, -5, -1, -3, 7, 5, 1, 3]}
     if len(bits) == 1:
         return 2 * bits[0] - 1
@@ -69,7 +69,7 @@ def point(bits):
 
 
 def in_time(subcarriers):
-    """64 samples, of the standard's scale."""
+    """64 samples in the standard's scale."""
     bins = np.zeros(64, complex)
     for k, value in subcarriers.items():
         bins[k] = value
@@ -77,7 +77,7 @@ def in_time(subcarriers):
 
 
 def symbol(bits, per_carrier, number, turn=1):
-    """One OFDM symbol with its prefix; SIGNAL is number 0. Data are turned by `turn`."""
+    """One OFDM symbol with its prefix; SIGNAL is number 0. Data are rotated by `turn`."""
     spread = interleaved(bits, per_carrier)
     groups = [spread[i : i + per_carrier] for i in range(0, len(spread), per_carrier)]
     subcarriers = {k: turn * point(group) for k, group in zip(DATA, groups, strict=True)}
@@ -87,7 +87,7 @@ def symbol(bits, per_carrier, number, turn=1):
 
 
 def prefixed(subcarriers):
-    """A symbol of these subcarriers behind its prefix."""
+    """A symbol of these subcarriers with its prefix."""
     body = in_time(subcarriers)
     return np.concatenate((body[-16:], body))
 
@@ -111,7 +111,7 @@ def signal(code, n_bytes):
 
 
 def ht_bits(mcs, n_bytes, wide):
-    """HT-SIG's 48 bits with its CRC, a long division (19.3.9.4.4)."""
+    """HT-SIG's 48 bits with its CRC, computed by long division (19.3.9.4.4)."""
     bits = [mcs >> i & 1 for i in range(7)] + [int(wide)] + [n_bytes >> i & 1 for i in range(16)]
     bits += [1, 1, 1, 0, 0, 0, 0, 0, 0, 0]
     rest = [bit ^ (i < 8) for i, bit in enumerate(bits + [0] * 8)]
@@ -123,11 +123,11 @@ def ht_bits(mcs, n_bytes, wide):
 
 
 def ht_frame(mcs, n_bytes, wide=False, greenfield=False, n_symbols=7):
-    """An 802.11n frame whose data, and the training for it, are any symbols."""
+    """An 802.11n frame with arbitrary symbols as data and training."""
     ht = coded(ht_bits(mcs, n_bytes, wide), "11")
     parts, first = training(), 0
     if not greenfield:
-        # At 6 Mbit/s as long as what follows.
+        # A length at 6 Mbit/s that covers what follows.
         parts.append(signal(RATES[6][0], 3 * (2 + n_symbols) - 3))
         first = 1
     parts += [symbol(ht[48 * i : 48 * i + 48], 1, first + i, turn=1j) for i in range(2)]

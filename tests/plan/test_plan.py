@@ -1,4 +1,4 @@
-"""What is planned, in numbers and in words."""
+"""The plan, in numbers and in words."""
 
 import re
 from pathlib import Path
@@ -78,7 +78,7 @@ def test_too_much_is_not_feasible_and_says_what_to_change():
 
 @pytest.mark.parametrize("seed", range(trials(12)))
 def test_who_follows_the_advice_has_enough(seed):
-    """Whatever the policy, the robots and which topic takes the most."""
+    """For any policy, any robots and any largest topic."""
     rng = Random(seed)
     policy = rng.choice(["none", "tdma", "minislot", "csma"])
     how = {"policy": policy, "robots": 1 if policy == "none" else rng.randint(2, 4)}

@@ -1,4 +1,4 @@
-"""What a plan takes from the configuration, and what it presumes of the radio."""
+"""What a plan takes from the configuration, and what it presumes about the radio."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ TWO_WAY = '[access]\npolicy = "tdma"\nnodes = [1, 2]\nslot_s = 0.3\nreuse = fals
 
 
 def preset(name, access=""):
-    """Of etc/radios, as `sdrlinkd` reads it."""
+    """A configuration of etc/radios, as `sdrlinkd` reads it."""
     return parse_config((ETC / "radios" / f"{name}.toml").read_text() + access)
 
 
@@ -29,7 +29,7 @@ def odom(config, **how):
 
 @pytest.mark.parametrize(("way", "access"), [("oneway", ""), ("twoway", TWO_WAY)])
 def test_a_hackrf_is_as_late_as_it_was_measured(way, access):
-    """The measurement took 20 ms for a change of direction."""
+    """The measurement allowed 20 ms for a change of direction."""
     plan = odom(preset("hackrf", access), turnaround_s=0.02)
     p50_ms, p99_ms = MEASURED_MS[way]
     assert p99_ms <= 1e3 * plan.topics[0].worst_s < 2 * p50_ms
@@ -115,7 +115,7 @@ def test_without_an_air_the_key_and_an_example_are_named(capsys):
 
 
 def checked(tmp_path, capsys, text):
-    """Exit code and words of `sdrlinkd --check`."""
+    """Exit code and output of `sdrlinkd --check`."""
     (tmp_path / "registry.csv").write_text("odom,nav_msgs/Odometry\n")
     text = text.replace("../registry.csv", "registry.csv")
     text = text.replace("frequency_hz = 0.0", "frequency_hz = 433.5e6")

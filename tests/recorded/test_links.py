@@ -1,4 +1,4 @@
-"""What real links lost: logs of messages at a shipyard, signal strengths of an 802.11 grid."""
+"""Losses of real links: logs of messages at a shipyard, signal strengths of an 802.11 grid."""
 
 import json
 from itertools import pairwise
@@ -17,7 +17,7 @@ PERIOD_S = 0.5
 
 
 def span_s(path):
-    """From the first message of the log to the end of the last."""
+    """Time from the first message of the log to the end of the last."""
     numbers = [json.loads(line)["payload"]["seqnum"] for line in path.read_text().splitlines()]
     return (max(numbers) - min(numbers) + 1) * PERIOD_S
 
@@ -43,7 +43,7 @@ def test_a_log_without_losses_has_no_outages(data):
 
 
 def test_over_recorded_links_memory_is_bounded_and_parity_helps(data):
-    """PDUs are lost where a real link's signal was weak."""
+    """PDUs are lost when a real link's signal was weak."""
     rssi = np.load(data / "traces/orbit_links_rssi.npz")["rssi"].astype(float).reshape(-1)[:6000]
     lost = rssi < np.nanquantile(rssi, 0.07)
     got = {share: images_over(lost, share) for share in (0.0, 0.2)}

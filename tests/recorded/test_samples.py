@@ -1,4 +1,4 @@
-"""Samples that others recorded, and codewords that others made."""
+"""Third-party samples and codewords."""
 
 import json
 from fractions import Fraction
@@ -41,7 +41,7 @@ def test_nothing_of_ours_is_heard_in_recordings_of_others(data, name, wifi, netw
 
 @pytest.mark.parametrize(("name", "mbps"), [("6mbps", 6), ("24mbps", 24)])
 def test_frames_from_an_access_point_have_the_right_fcs(data, name, mbps):
-    """Made by hardware that knows nothing of us, recorded by others over a cable."""
+    """Sent by independent hardware, and recorded by third parties over a cable."""
     frames = list(receive(samples(data / f"iq/wifi_11a_{name}_conducted_20M.i16")))
     assert all(each.is_right and each.rate.mbps == mbps for each in frames)
     data_frames = [each.psdu for each in frames if len(each.psdu) == 138]
@@ -57,7 +57,7 @@ def test_frames_of_another_receiver_are_read(data):
 
 
 def test_frames_of_802_11n_on_the_air_are_told_and_those_beside_them_read(data):
-    """MCS 3 is 26 Mbit/s; the block acknowledgements between them are 802.11a."""
+    """MCS 3 is 26 Mbit/s; the block acknowledgements in between are 802.11a."""
     frames = list(receive(samples(data / "iq/wifi_11n_26mbps_radiated_20M.i16")))
     ht = [each for each in frames if isinstance(each, HtFrame)]
     assert sum(each.signal == HtSignal(3, 138, False) for each in ht) == 5

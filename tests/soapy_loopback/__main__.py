@@ -1,6 +1,6 @@
-"""`python -m tests.soapy_loopback [OUT]`: the driver's module, for SOAPY_SDR_PLUGIN_PATH.
+"""`python -m tests.soapy_loopback [OUT]`: builds the driver's module, for SOAPY_SDR_PLUGIN_PATH.
 
-Without OUT, in a folder of its own, compiled once per state of the source.
+Without OUT, it is in a folder of its own, and compiled once per version of the source.
 """
 
 import sys

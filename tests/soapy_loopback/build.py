@@ -1,4 +1,4 @@
-"""Compiles the driver, once per state of its source."""
+"""Compiles the driver, once per version of its source."""
 
 import functools
 import hashlib
@@ -14,7 +14,7 @@ from tests.machine import lacks
 
 HERE = Path(__file__).parent
 COMPILE = ["g++", "-std=c++17", "-O2", "-Wall", "-Wextra", "-fPIC"]
-# Loops over samples only: elsewhere NaN and infinity mean something.
+# Only for loops over samples: elsewhere NaN and infinity are significant.
 FAST = ["-O3", "-march=native", "-ffast-math"]
 
 
@@ -24,7 +24,7 @@ class BuildError(Exception):
 
 @functools.cache
 def missing() -> str:
-    """What keeps the driver from being compiled here, as tests.machine has it; "" if nothing."""
+    """Why the driver cannot be compiled here, in the form of tests.machine; "" if it can."""
     if shutil.which("g++") is None:
         return lacks("g++", "libsoapysdr-dev")
     header = "#include <SoapySDR/Device.hpp>"
@@ -39,7 +39,7 @@ def missing() -> str:
 
 
 def module_folder() -> Path:
-    """Where the module of this state of the source is, compiled if it is not there yet."""
+    """Folder of the module for this version of the source; compiles it if necessary."""
     digest = hashlib.sha256(platform.node().encode())
     for source in sorted([*HERE.glob("*.cpp"), *HERE.glob("*.h"), HERE / "build.py"]):
         digest.update(source.read_bytes())
@@ -48,7 +48,7 @@ def module_folder() -> Path:
 
 
 def build(folder: Path) -> Path:
-    """Puts the module into `folder`, unless it is there. Raises BuildError."""
+    """Put the module into `folder`, unless it is there. Raises BuildError."""
     module = folder / "libloopbackSupport.so"
     if module.exists():
         return folder
@@ -57,7 +57,7 @@ def build(folder: Path) -> Path:
         objects = list(pool.map(lambda source: _compile(source, Path(work)), HERE.glob("*.cpp")))
         linked = Path(work) / module.name
         _run(["g++", "-shared", *map(str, objects), "-lSoapySDR", "-o", str(linked)])
-        # Another session may be building the same: whoever is last wins, with the same result.
+        # Another session may build the same: the last one wins, with the same result.
         part = folder / f".{os.getpid()}"
         part.write_bytes(linked.read_bytes())
         part.replace(module)

@@ -1,4 +1,4 @@
-"""A bus from outside: faults in, counters out, in the process of a test."""
+"""Access to a bus from a test's process: faults in, counters out."""
 
 import fcntl
 import mmap
@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-# layout.h: the order of Control's words, and where they are.
+# From layout.h: the order of Control's words, and their position.
 FIELDS = (
     *("unplugged", "unplugs", "stall", "lose", "underflow", "time_error", "crash", "hang"),
     *("owner", "plugged", "mode", "on_from_ns", "on_until_ns"),
@@ -27,7 +27,7 @@ FLOCK = "hhqqi4x"
 
 @dataclass(frozen=True)
 class Stats:
-    """What a unit has done since its bus began, in samples or counts."""
+    """Totals of a unit since its bus began, in samples or counts."""
 
     sent: int
     bursts: int
@@ -42,7 +42,7 @@ class Stats:
 
 
 class Bus:
-    """The shared memory of the bus `name`, made if nobody has; removed when a `with` ends."""
+    """The shared memory of the bus `name`, created if absent, and removed when a `with` ends."""
 
     def __init__(self, name: str) -> None:
         self._path = Path(f"/dev/shm/soapy-loopback-{name}")
@@ -54,7 +54,7 @@ class Bus:
         self._words = memoryview(self._map).cast("q")
 
     def inject(self, unit: int, fault: str) -> None:
-        """A fault as README.md names it: "unplug", "overflow=5000", …"""
+        """Inject a fault as README.md names it: "unplug", "overflow=5000", …"""
         name, _, number = fault.partition("=")
         count = int(number or 1)
         if name == "unplug":
@@ -70,7 +70,7 @@ class Bus:
             raise ValueError(name)
 
     def stats(self, unit: int) -> Stats:
-        """Counters of this moment."""
+        """Current counters of a unit."""
         word = {name: self._get(unit, name) for name in FIELDS}
         now_ns = time.monotonic_ns()
         on = word["mode"] == MODE_TX or word["on_from_ns"] <= now_ns < word["on_until_ns"]
@@ -83,7 +83,7 @@ class Bus:
         )
 
     def close(self) -> None:
-        """Removes the bus; devices that are open keep what they have."""
+        """Remove the bus; open devices keep their memory."""
         self._words.release()
         self._map.close()
         self._file.close()

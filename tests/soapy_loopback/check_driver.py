@@ -81,7 +81,7 @@ def check_carrier_offset():
 
 
 def check_sampling_clock():
-    # At 100 ppm who counts slower hears the same tones at a higher frequency, and a shorter burst.
+    # With 100 ppm, a slower receiver hears the same tones higher, and a shorter burst.
     with Bus(bus := new_bus()), Radio(bus, 0, ppm=100) as one, Radio(bus, 1) as other:
         one.device.writeSetting("cfo", str(-100e-6 * 2.4e9))
         rng = np.random.default_rng(1)
@@ -231,7 +231,7 @@ def check_rate_that_is_not_as_told():
         args = {"rate_error": 0.01, "lie": lie, "rxbuf": 2_000_000}
         with Bus(bus := new_bus()), Radio(bus, 0, **args) as one:
             assert one.rate == told
-            # A busy machine is late now and then, not three times.
+            # A busy machine is late now and then, but not three times.
             rates = [_measured_rate(one) for _ in range(3)]
             assert any(abs(rate / 2.02e6 - 1) < 0.003 for rate in rates), rates
 
@@ -242,7 +242,7 @@ def _measured_rate(radio):
 
 
 def _newest(radio):
-    """The host's time, and the index of the sample taken then."""
+    """Host time, and the index of the sample taken then."""
     index = None
     while True:
         ret, stamp, _ = radio.read(2040, 0)

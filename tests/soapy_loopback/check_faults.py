@@ -1,4 +1,4 @@
-"""Faults and the company of other processes, checked by check_driver.py."""
+"""Faults, and other processes on the same bus; check_driver.py runs these checks."""
 
 import subprocess
 import sys
@@ -18,7 +18,7 @@ from tests.soapy_loopback.bus import Bus
 from tests.soapy_loopback.rig import Radio, burst, evm_db, new_bus, refused
 
 LEAD_NS = 10_000_000
-# A radio of another process: reads for ever, or sends one burst at the time it says.
+# A radio in another process: reads forever, or sends one burst at its given time.
 READER = """
 from tests.soapy_loopback.rig import *
 with Radio({bus!r}, 1) as radio:
@@ -97,7 +97,7 @@ def check_faults_of_streams():
 
 
 def check_late_by_return():
-    """As SoapyBladeRF: refused, and nothing of it is taken."""
+    """Like SoapyBladeRF: rejected, with no part of it accepted."""
     with Bus(bus := new_bus()) as seen, Radio(bus, 0, late="return") as one:
         sent = burst(10_000)
         for n in (1, 2):

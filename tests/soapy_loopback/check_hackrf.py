@@ -1,4 +1,4 @@
-"""The radio that is like a HackRF, checked by check_driver.py."""
+"""Checks of the HackRF-like radio; check_driver.py runs them."""
 
 import time
 
@@ -49,7 +49,7 @@ def check_hackrf_switches_by_itself():
         assert one.read(BLOCK)[0] == BLOCK
         took = time.monotonic() - began
         assert not seen.stats(0).is_transmitting
-        # Two turns of 20 ms, a block sent, a block received.
+        # Two turnarounds of 20 ms, a block sent, a block received.
         assert 0.16 < took < 1, took
         assert one.status()[0] == SOAPY_SDR_NOT_SUPPORTED
         assert seen.stats(0).sent == BLOCK

@@ -1,4 +1,4 @@
-"""Radios for the checks, through the official binding: runs where `import SoapySDR` does."""
+"""Radios for the checks, through the official binding: needs `import SoapySDR`."""
 
 import time
 import uuid
@@ -16,12 +16,12 @@ from SoapySDR import (
 )
 
 FREQUENCY = 2.4e9
-# Full scale of each format, and its numpy type.
+# Full scale and numpy type of each format.
 FORMATS = {"CF32": (1.0, np.complex64), "CS16": (32768, np.int16), "CS8": (128, np.int8)}
 
 
 def new_bus():
-    """The name of a bus nobody has used."""
+    """An unused bus name."""
     return f"check-{uuid.uuid4().hex[:12]}"
 
 
@@ -32,7 +32,7 @@ def burst(n, seed=1, rms=0.25):
 
 
 class Radio:
-    """A device with both streams, at unity gain to others; RX is active."""
+    """A device with both streams, at unity gain to other units; RX is active."""
 
     def __init__(self, bus, unit, rate=2e6, model="usrp", form=SOAPY_SDR_CF32, **args):
         args = {"bus": bus, "unit": unit, "model": model} | args
@@ -56,7 +56,7 @@ class Radio:
         return SoapySDR.timeNsToTicks(time_ns, self.rate)
 
     def write(self, samples, time_ns=None, ends=True, timeout_us=200_000):
-        """One call of writeStream; how many it took, or the error."""
+        """One call of writeStream; returns the number of samples accepted, or the error."""
         flags = ends * SOAPY_SDR_END_BURST
         if time_ns is not None:
             flags |= SOAPY_SDR_HAS_TIME
@@ -70,7 +70,7 @@ class Radio:
         ).ret
 
     def read(self, n, timeout_us=500_000):
-        """One call of readStream: what it returned, its time, and the samples."""
+        """One call of readStream; returns its result, its time, and the samples."""
         width = n if self.dtype is np.complex64 else 2 * n
         raw = np.zeros(width, self.dtype)
         answer = self.device.readStream(self.rx, [raw], n, 0, timeout_us)
@@ -80,7 +80,7 @@ class Radio:
         return answer.ret, answer.timeNs, got
 
     def read_from(self, time_ns, n):
-        """The samples [time, time + n), by their time stamps."""
+        """The samples [time, time + n), located by time stamps."""
         first, blocks = self.index(time_ns), []
         while True:
             ret, stamp, samples = self.read(4080)
@@ -96,12 +96,12 @@ class Radio:
         return np.concatenate([samples for _, samples in blocks])[first - blocks[0][0] :][:n]
 
     def status(self, timeout_us=200_000):
-        """What readStreamStatus says: its code, flags and time."""
+        """The result of readStreamStatus: code, flags and time."""
         answer = self.device.readStreamStatus(self.tx, timeout_us)
         return answer.ret, answer.flags, answer.timeNs
 
     def hear_for(self, seconds):
-        """All samples of the next so many seconds, whatever the time stamps."""
+        """All samples of the next `seconds`, whatever the time stamps."""
         blocks, until = [], time.monotonic() + seconds
         while time.monotonic() < until:
             ret, _, samples = self.read(self.mtu, 100_000)
@@ -112,7 +112,7 @@ class Radio:
     def close(self):
         self.device.closeStream(self.rx)
         self.device.closeStream(self.tx)
-        # The binding unmakes a device when it is collected.
+        # The binding releases a device when it is garbage-collected.
         self.device = None
 
     def __enter__(self):
@@ -123,7 +123,7 @@ class Radio:
 
 
 def refused(act, *args):
-    """What an act raises, as text."""
+    """The exception of a call, as text."""
     try:
         act(*args)
     except Exception as error:
@@ -132,7 +132,7 @@ def refused(act, *args):
 
 
 def find_burst(heard, sent):
-    """Where in `heard` what was sent begins, and how strongly they correlate (0 to 1)."""
+    """Position of `sent` in `heard`, and their correlation (0 to 1)."""
     head = sent[:4096]
     size = 1 << int(np.ceil(np.log2(len(heard) + len(head))))
     spectrum = np.fft.fft(heard, size) * np.conj(np.fft.fft(head, size))
@@ -143,7 +143,7 @@ def find_burst(heard, sent):
 
 
 def evm_db(heard, sent):
-    """Error against what was sent, at the best complex gain."""
+    """Error relative to what was sent, at the best complex gain."""
     gain = np.vdot(sent, heard) / np.vdot(sent, sent)
     error = np.mean(np.abs(heard - gain * sent) ** 2) / np.mean(np.abs(gain * sent) ** 2)
     return 10 * np.log10(error)

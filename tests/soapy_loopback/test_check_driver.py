@@ -1,4 +1,4 @@
-"""The test radio does what its README says, asked through the official binding."""
+"""The test radio does what its README says, as seen through the official binding."""
 
 import os
 import subprocess
@@ -21,7 +21,7 @@ def test_driver_passes_its_checks():
     probe = subprocess.run(["env", PYTHON, "-c", "import SoapySDR, numpy"], capture_output=True)
     if probe.returncode:
         pytest.skip(lacks("python3-soapysdr", "python3-numpy"))
-    # Without a root SoapySDR loads no other driver: this is faster, and quiet.
+    # With an empty root SoapySDR loads no other driver: this is faster, and quiet.
     where = {"SOAPY_SDR_PLUGIN_PATH": str(module_folder()), "SOAPY_SDR_ROOT": "/nonexistent"}
     done = subprocess.run(
         [PYTHON, "-m", "tests.soapy_loopback.check_driver"],

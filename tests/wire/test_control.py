@@ -30,9 +30,9 @@ from tests.wire.vectors import RECORDS
 SEED = 6
 CASES = 20_000
 
-# Octets that the fields of each type need (clause 6).
+# Number of octets that the fields of each type need (clause 6).
 NEED = {1: 6, 2: 4, 3: 8, 4: 4, 5: 3, 6: 13, 7: 8, 8: 24, 9: 4}
-# What stands behind the fields of these belongs to the record.
+# Types whose records may be longer than their fields.
 OPEN = (RegistryDigest, Parity, Clock, Stamp, Receipt)
 
 octet = st.integers(0, 255)
@@ -131,7 +131,7 @@ def test_octets_behind_the_fields_of_stamp_receipt_and_clock():
     ("kind", "size"), [(kind, size) for kind, need in NEED.items() for size in range(need)]
 )
 def test_short_known_record(kind, size):
-    # There would be room for the missing octets in the payload.
+    # The payload would have room for the missing octets.
     refused(bytes([kind, size]) + bytes(size) + bytes([200, 10]) + bytes(10))
 
 

@@ -1,4 +1,4 @@
-"""The golden vectors, both ways."""
+"""The golden vectors, encoded and decoded."""
 
 import binascii
 

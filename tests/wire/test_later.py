@@ -1,4 +1,4 @@
-"""A PDU that leaves later: its ages and phases move, all else stays."""
+"""A PDU that leaves later: its ages and phases change, everything else stays."""
 
 import pytest
 from hypothesis import given
@@ -100,7 +100,7 @@ def test_two_delays_are_one(case, first_us, second_us):
 @law(40)
 @given(sized_pdus(), steps_us)
 def test_messages_are_never_touched_whatever_they_look_like(case, by_us):
-    """Payloads here are any octets; those under topic id 0xF would be records."""
+    """Payloads are random octets here; under topic id 0xF they would be records."""
     pdu, pdu_size = case
     kept = [entry._replace(topic_id=entry.topic_id % CONTROL_TOPIC_ID) for entry in pdu.entries]
     octets = build(pdu._replace(entries=kept), pdu_size)
@@ -133,7 +133,7 @@ def test_every_control_entry_moves_and_unknown_records_are_stepped_over():
     payload = (
         bytes([200, 3, 1, 6, 9])
         + build_records([Stamp(1, 2, 100)])
-        # A longer STAMP, as later versions may send: 2 octets more.
+        # A longer STAMP, with 2 more octets, as later versions may send.
         + bytes([1, 8, 3, 4, 0, 0, 0, 50, 7, 7])
     )
     entries = [
@@ -151,7 +151,7 @@ def test_every_control_entry_moves_and_unknown_records_are_stepped_over():
 
 
 def test_the_yardstick_sees_a_wrong_crc():
-    """The control: a PDU whose CRC was not made anew is refused."""
+    """The control: a PDU without an updated CRC is refused."""
     pdu = bytearray(postponed(BY_NAME["message_stamp_and_frame"].octets, 5))
     assert reseal(bytes(pdu)) == bytes(pdu)
     pdu[-1] ^= 1

@@ -1,4 +1,4 @@
-"""PDUs: what is built parses, what parses is canonical, anything else is refused by name."""
+"""PDUs: what is built can be parsed, what is parsed is canonical, the rest is refused by name."""
 
 import binascii
 from collections import Counter
@@ -103,7 +103,7 @@ def test_any_bytes_parse_or_are_refused_by_name():
             assert build(pdu, pdu_size) == octets, where
         assert verdict in {"parsed", *REASONS}, where
         verdicts[verdict] += 1
-    # Were the generator to yield only rubbish, the loop above would prove little.
+    # If the generator yielded only garbage, the loop above would prove little.
     assert verdicts["parsed"] > CASES // 5, verdicts
     assert all(verdicts[reason] > CASES // 500 for reason in REASONS), verdicts
 
@@ -203,14 +203,14 @@ def flip(octets, bit):
 
 
 def any_octets(rng):
-    """Octets and a pdu_size: rubbish, valid, or valid and then damaged."""
+    """Octets and a pdu_size: garbage, valid, or valid and then damaged."""
     kind = rng.randrange(10)
     if kind == 0:
         return rng.randbytes(rng.randrange(70)), 32
     if kind == 1:
         return sealed(rng.randbytes(30)), 32
     if kind == 2:
-        # Small numbers are what totals, lengths and PAD are made of.
+        # Totals, lengths and PAD consist of small numbers.
         header = bytes([rng.choice([0, 4, 8, 12]), 1, 255, 0, 0x10 | rng.randrange(4)])
         return sealed(header + bytes(rng.choices((0, 0, 0, 1, 2), k=25))), 32
     octets, pdu_size = random_pdu(rng)
@@ -254,7 +254,7 @@ def random_pdu(rng):
 
 
 def sealed(body):
-    """As vectors.with_crc, at the speed of 10^5 cases."""
+    """Like vectors.with_crc, but fast enough for 10^5 cases."""
     return body + binascii.crc_hqx(body, 0).to_bytes(2, "big")
 
 

@@ -1,4 +1,4 @@
-"""Reassembly: all that came whole, nothing else, in bounded memory, and every loss by name."""
+"""Reassembly: all complete messages and nothing else, in bounded memory, losses by name."""
 
 import tracemalloc
 from collections import Counter
@@ -37,9 +37,9 @@ def fragments(topic_id, entry_id, parts):
 
 @st.composite
 def arrivals(draw):
-    """Messages of several sources, and their fragments shuffled, some of them twice or more.
+    """Messages of several sources, with their fragments shuffled and some duplicated.
 
-    A copy comes before the message is whole; later it would be a fragment of a new one.
+    A copy comes before the message is complete; later it would be a fragment of a new one.
     """
     keys = st.tuples(octet, st.integers(0, 15), octet)
     parts = st.lists(st.binary(max_size=6), min_size=1, max_size=6)
@@ -87,7 +87,7 @@ def test_any_order_with_copies_yields_exactly_the_messages(case):
 
 
 class Model:
-    """Clause 5.3 in its plainest form, without bounds on memory."""
+    """Clause 5.3 in its plainest form, without memory limits."""
 
     def __init__(self, timeout):
         self.timeout = timeout
@@ -254,14 +254,14 @@ def test_a_whole_message_under_the_same_id():
 
 
 def cost_of(payload_size):
-    """What one held fragment of a message costs."""
+    """Memory cost of one held fragment of a message."""
     reassembly = make()
     reassembly.add(0, Entry(0, 0, 0, 2, bytes(payload_size)), 0.0)
     return reassembly.held_bytes
 
 
 def test_the_message_silent_for_longest_is_evicted():
-    # Room for three messages and one fragment more, not for four messages.
+    # Room for three messages and one more fragment, but not for four messages.
     reassembly = make(source_bytes=4 * cost_of(100) - 1)
     for topic_id in (1, 2, 3):
         reassembly.add(5, Entry(topic_id, 0, 0, 9, bytes(100)), topic_id / 10)

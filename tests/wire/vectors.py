@@ -25,7 +25,7 @@ CONTROL = 0xF
 
 
 def crc16_xmodem(octets: bytes) -> int:
-    """CRC-16/XMODEM, a bit at a time (clause 5.2)."""
+    """CRC-16/XMODEM, bit by bit (clause 5.2)."""
     register = 0x0000
     for octet in octets:
         register ^= octet << 8
@@ -38,13 +38,13 @@ def crc16_xmodem(octets: bytes) -> int:
 
 
 def with_crc(body: bytes) -> bytes:
-    """The octets of a PDU, given all but its CRC."""
+    """The octets of a PDU, from all but its CRC."""
     crc = crc16_xmodem(body)
     return body + bytes([crc >> 8, crc & 0xFF])
 
 
 def reseal(pdu: bytes) -> bytes:
-    """The same PDU with a CRC that is right."""
+    """The same PDU with a correct CRC."""
     return with_crc(pdu[:-2])
 
 
@@ -88,7 +88,7 @@ class DigestVector(NamedTuple):
 
 
 class RefusalVector(NamedTuple):
-    """Octets that clause 5.1 refuses. Only the named check finds fault with them."""
+    """Octets that clause 5.1 refuses. Only the named check rejects them."""
 
     name: str
     reason: str
@@ -382,7 +382,7 @@ _report = PduVector(
     ])),
 )  # fmt: skip
 
-# What a PDU says of time: STAMP and FRAME.
+# What a PDU says about time: STAMP and FRAME.
 _timed = PduVector(
     "message_stamp_and_frame",
     48, DEFAULT, 1, EVERYONE, 2, 1,
@@ -421,7 +421,7 @@ _timed_later = _timed._replace(
     ])),
 )  # fmt: skip
 
-# A control entry that cannot be read (clause 6), the message beside it, and one that can.
+# An unreadable control entry (clause 6), the message beside it, and a readable one.
 _spoilt = PduVector(
     "message_and_spoilt_control",
     48, DEFAULT, 1, EVERYONE, 3, 1,

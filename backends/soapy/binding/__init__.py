@@ -1,8 +1,8 @@
-"""SoapySDR itself: which library there is, the calls we need of it, and devices by their names.
+"""SoapySDR itself: which library is installed, the calls that we need, and devices by name.
 
-This room owns both bindings, the official one and the C library's, behind one set of protocols, and
-says what is wrong where a device cannot be had. It never decides what a device is set to, holds no
-thread, and knows nothing of daemons, bursts or sample indices.
+This package owns both bindings, the official one and the C library's, behind one set of protocols,
+and explains why a device is not available. It never decides a device's settings, holds no thread,
+and knows nothing of daemons, bursts or sample indices.
 """
 
 from backends.soapy.binding.api import (

@@ -1,4 +1,4 @@
-"""What we need of SoapySDR, whichever way it is called; both bindings offer just this."""
+"""The calls that we need of SoapySDR; both bindings offer exactly these."""
 
 from typing import Any, NamedTuple, Protocol
 
@@ -13,16 +13,16 @@ ERRORS = {
     OVERFLOW: "overflow", NOT_SUPPORTED: "not supported", TIME_ERROR: "time error",
     UNDERFLOW: "underflow",
 }  # fmt: skip
-"""What stream calls return instead of a count."""
+"""Names of the error codes that stream calls return instead of a count."""
 SAMPLE_BYTES = {"CF32": 8, "CS16": 4, "CS8": 2}
-"""Bytes of a sample in each format that we speak, the cheapest for us first."""
+"""Bytes of a sample in each supported format, the one that is cheapest for us first."""
 
 Values = NDArray[Any]
 Kwargs = dict[str, str]
 
 
 class DriverError(Exception):
-    """What a driver, or SoapySDR itself, says went wrong."""
+    """An error that a driver or SoapySDR reports."""
 
 
 class HostError(DriverError):
@@ -37,7 +37,7 @@ class Range(NamedTuple):
 
 
 class StreamResult(NamedTuple):
-    """Outcome of a stream call: `n` samples, or below 0 a key of ERRORS."""
+    """Outcome of a stream call: `n` samples, or a key of ERRORS if negative."""
 
     n: int
     flags: int
@@ -49,59 +49,59 @@ class Stream(Protocol):
 
     @property
     def mtu(self) -> int:
-        """The number of samples that the driver moves at once."""
+        """Number of samples that the driver moves at once."""
 
     def activate(self) -> int:
-        """Have samples flow; 0 or a key of ERRORS."""
+        """Start the flow of samples; returns 0 or a key of ERRORS."""
 
     def deactivate(self) -> int:
-        """Stop the flow of samples; 0 or a key of ERRORS."""
+        """Stop the flow of samples; returns 0 or a key of ERRORS."""
 
     def read(self, into: Values, timeout_us: int) -> StreamResult:
-        """Fill `into` with samples, or a part of it."""
+        """Read samples into all or part of `into`."""
 
     def write(self, samples: Values, flags: int, time_ns: int, timeout_us: int) -> StreamResult:
-        """Hand over `samples` to be sent, or the first of them."""
+        """Write all of `samples`, or the first of them."""
 
     def status(self, timeout_us: int) -> StreamResult:
-        """Ask what became of samples handed over; `n` is 0 or an error."""
+        """Query what became of samples written earlier; `n` is 0 or an error."""
 
     def close(self) -> None:
-        """Give the stream back; closing twice is fine."""
+        """Release the stream; closing twice is fine."""
 
 
 class Handle(Protocol):
-    """An open device, by names of SoapySDR's own calls."""
+    """An open device, called by the names of SoapySDR's own calls."""
 
     def call(self, name: str, *arguments: object) -> Any:  # noqa: ANN401  # a text, number, list …
         """Call `SoapySDR::Device::name` with these arguments. Raises DriverError."""
 
     def open_stream(self, direction: int, channel: int, form: str, args: Kwargs) -> Stream:
-        """Open a stream of samples of type `form`, which is not active yet. Raises DriverError."""
+        """Open an inactive stream with samples of type `form`. Raises DriverError."""
 
     def close(self) -> None:
-        """Give the device back, streams first; closing twice is fine."""
+        """Release the device, streams first; closing twice is fine."""
 
 
 class Library(Protocol):
-    """The SoapySDR library, by either binding."""
+    """The SoapySDR library, through either binding."""
 
     @property
     def detail(self) -> str:
-        """Which binding it is, and which version, in words for people."""
+        """Which binding and version this is, in words for people."""
 
     def modules(self) -> list[str]:
-        """The files of the drivers that were loaded."""
+        """Paths of the driver modules that were loaded."""
 
     def enumerate(self, args: str) -> list[Kwargs]:
-        """The device arguments of each device that is there. Raises DriverError."""
+        """Device arguments of each attached device that matches. Raises DriverError."""
 
     def make(self, args: str) -> Handle:
         """Open the device that `args` name. Raises DriverError."""
 
 
 def check_buffer(values: Values, size: int, writeable: bool) -> None:
-    """SoapySDR takes addresses on trust. Raises ValueError for what it must not be given."""
+    """Raise ValueError for an unsuitable buffer: SoapySDR does not check addresses."""
     if values.ndim != 1 or not values.flags.c_contiguous:
         raise ValueError(f"a stream's buffer must be one row without steps, got {values.shape}")
     if values.itemsize != size:
@@ -111,7 +111,7 @@ def check_buffer(values: Values, size: int, writeable: bool) -> None:
 
 
 def check_result(result: StreamResult, asked: int) -> StreamResult:
-    """A driver that claims more than it was asked for has written elsewhere. Raises DriverError."""
+    """Raise DriverError if a driver claims too many samples: it has written past the buffer."""
     if result.n > asked:
         raise DriverError(f"the driver claims {result.n} samples of {asked}")
     return result

@@ -1,4 +1,4 @@
-"""What is wrong where a device cannot be had, in sentences that say what to do."""
+"""Explains why a device is not available, in sentences that say what to do."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ def is_driver_missing(library: Library, args: str, error: DriverError) -> bool:
 
 
 def no_radio(args: str) -> str:
-    """Why what `args` names is no radio; empty where it may be one."""
+    """Why `args` cannot name a radio; empty if they may."""
     if driver_of(args) != "null":
         return ""
     return (
@@ -25,7 +25,7 @@ def no_radio(args: str) -> str:
 
 
 def why_not(library: Library, args: str, error: DriverError) -> str:
-    """Why no device could be opened by `args`, and what to do."""
+    """Why no device could be opened with `args`, and what to do."""
     driver = driver_of(args)
     text = str(error)
     if is_driver_missing(library, args, error):
@@ -48,7 +48,7 @@ def why_not(library: Library, args: str, error: DriverError) -> str:
 
 
 def not_installed(error: DriverError) -> str:
-    """Why there is no SoapySDR, and what to do."""
+    """Why SoapySDR is not available, and what to do."""
     return (
         f"SoapySDR is not installed ({error}); on Debian: apt-get install libsoapysdr0.8 "
         "soapysdr-tools and the radio's soapysdr-module-…"

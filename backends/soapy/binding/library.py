@@ -1,4 +1,4 @@
-"""Which SoapySDR this machine has, and which of its driver modules are loaded."""
+"""Which SoapySDR is installed on this machine, and which of its driver modules are loaded."""
 
 from pathlib import Path
 
@@ -8,11 +8,11 @@ MODULES = {
     "airspy": "airspy", "bladerf": "bladeRF", "hackrf": "HackRF", "lime": "LMS7",
     "plutosdr": "PlutoSDR", "remote": "remote", "rtlsdr": "rtlsdr", "uhd": "uhd",
 }  # fmt: skip
-"""What the file of a driver's module has in its name; in lower case, so has Debian's package."""
+"""Part of the file name of each driver's module; lowercase, it is part of Debian's package name."""
 
 
 def load_library() -> Library:
-    """The official binding where it can be loaded, else the C library. Raises DriverError."""
+    """Load the official binding if possible, else the C library. Raises DriverError."""
     try:
         from backends.soapy.binding.official import OfficialLibrary
     except ImportError:
@@ -21,14 +21,14 @@ def load_library() -> Library:
 
 
 def load_native_library() -> Library:
-    """The C library, also where the official binding is there. Raises DriverError."""
+    """Load the C library, even if the official binding is available. Raises DriverError."""
     from backends.soapy.binding.native import NativeLibrary
 
     return NativeLibrary()
 
 
 def has_module(library: Library, driver: str) -> bool | None:
-    """Whether the driver's module is loaded; None: of this one nobody knows its file's name."""
+    """Whether the driver's module is loaded; None: the name of its file is unknown."""
     wanted = MODULES.get(driver, driver).lower()
     if any(wanted in Path(each).name.lower() for each in library.modules()):
         return True

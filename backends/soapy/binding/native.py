@@ -1,4 +1,4 @@
-"""SoapySDR by its C library, for interpreters that Debian's binding is not made for."""
+"""SoapySDR through its C library, for interpreters that Debian's binding does not support."""
 
 import ctypes.util
 from collections.abc import Callable
@@ -46,7 +46,7 @@ class _Range(Structure):
 _Strings, _Ranges = POINTER(c_void_p), POINTER(_Range)
 _DIRECTION, _N, _TEXT = (c_int, c_size_t), POINTER(c_size_t), c_char_p
 _CALLS: dict[str, tuple[Any, tuple[Any, ...]]] = {
-    # In C a list comes with its length at the end.
+    # In C a list comes with a pointer to its length as the last argument.
     "getDriverKey": (c_void_p, ()),
     "getHardwareKey": (c_void_p, ()),
     "getNumChannels": (c_size_t, (c_int,)),
@@ -79,7 +79,7 @@ _CALLS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "getHardwareTime": (c_longlong, (_TEXT,)),
     "writeSetting": (None, (_TEXT, _TEXT)),
 }
-"""Result and arguments behind the device; None: an int that is 0 when all went well."""
+"""Result and argument types, without the device; None: an int that is 0 on success."""
 
 
 class NativeLibrary:
@@ -98,12 +98,12 @@ class NativeLibrary:
         return f"SoapySDR {self._c.SoapySDR_getLibVersion().decode()} by its C library"
 
     def modules(self) -> list[str]:
-        """The files of the drivers that were loaded."""
+        """Paths of the driver modules that were loaded."""
         self._c.SoapySDR_loadModules()
         return _texts(self._c, self._c.SoapySDR_listModules)
 
     def enumerate(self, args: str) -> list[Kwargs]:
-        """The device arguments of each device that is there."""
+        """Device arguments of each attached device that matches."""
         n = c_size_t()
         found = self._c.SoapySDRDevice_enumerateStrArgs(args.encode(), byref(n))
         devices = [
@@ -148,7 +148,7 @@ class NativeHandle:
         return Range(found.low, found.high) if result is _Range else found
 
     def open_stream(self, direction: int, channel: int, form: str, args: Kwargs) -> "NativeStream":
-        """Open a stream, which is not active yet. Raises DriverError."""
+        """Open an inactive stream. Raises DriverError."""
         keys = (c_char_p * len(args))(*(key.encode() for key in args))
         values = (c_char_p * len(args))(*(value.encode() for value in args.values()))
         pointer = self._c.SoapySDRDevice_setupStream(
@@ -160,7 +160,7 @@ class NativeHandle:
         return NativeStream(self._c, self._open, c_void_p(pointer), SAMPLE_BYTES[form])
 
     def close(self) -> None:
-        """Give the device back; closing twice is fine."""
+        """Release the device; closing twice is fine."""
         device, self._device = self._device, None
         if device is not None:
             self._c.SoapySDRDevice_unmake(device)
@@ -183,7 +183,7 @@ class NativeHandle:
 
 
 class NativeStream:
-    """A stream of one direction. What its calls take is made once: they come very often."""
+    """A stream of one direction; prepares its call arguments once, because calls are frequent."""
 
     def __init__(self, c: CDLL, device: c_void_p, stream: c_void_p, size: int) -> None:
         self._c = c
@@ -195,17 +195,17 @@ class NativeStream:
         self.mtu = int(c.SoapySDRDevice_getStreamMTU(*self._at))
 
     def activate(self) -> int:
-        """Have samples flow; 0 or a key of ERRORS."""
+        """Start the flow of samples; returns 0 or a key of ERRORS."""
         return int(
             self._c.SoapySDRDevice_activateStream(*self._at, c_int(0), c_longlong(0), c_size_t(0))
         )
 
     def deactivate(self) -> int:
-        """Stop the flow of samples; 0 or a key of ERRORS."""
+        """Stop the flow of samples; returns 0 or a key of ERRORS."""
         return int(self._c.SoapySDRDevice_deactivateStream(*self._at, c_int(0), c_longlong(0)))
 
     def read(self, into: Values, timeout_us: int) -> StreamResult:
-        """Fill `into` with samples, or a part of it."""
+        """Read samples into all or part of `into`."""
         check_buffer(into, self._size, writeable=True)
         self._buffers[0] = into.ctypes.data
         self._flags.value = 0
@@ -216,7 +216,7 @@ class NativeStream:
         return check_result(StreamResult(n, self._flags.value, self._time_ns.value), len(into))
 
     def write(self, samples: Values, flags: int, time_ns: int, timeout_us: int) -> StreamResult:
-        """Hand over `samples` to be sent, or the first of them."""
+        """Write all of `samples`, or the first of them."""
         check_buffer(samples, self._size, writeable=False)
         self._buffers[0] = samples.ctypes.data
         self._flags.value = flags
@@ -227,7 +227,7 @@ class NativeStream:
         return check_result(StreamResult(n, self._flags.value, time_ns), len(samples))
 
     def status(self, timeout_us: int) -> StreamResult:
-        """Ask what became of samples handed over."""
+        """Query what became of samples written earlier."""
         self._flags.value = 0
         n = self._c.SoapySDRDevice_readStreamStatus(
             *self._at, byref(self._mask), byref(self._flags), byref(self._time_ns),
@@ -236,7 +236,7 @@ class NativeStream:
         return StreamResult(n, self._flags.value, self._time_ns.value)
 
     def close(self) -> None:
-        """Give the stream back; closing twice is fine."""
+        """Release the stream; closing twice is fine."""
         if self._is_open:
             self._is_open = False
             self._c.SoapySDRDevice_closeStream(*self._at)
@@ -268,7 +268,7 @@ def _decoded(text: bytes | None) -> str:
 
 
 def _text_of(c: CDLL, pointer: int | None) -> str:
-    """A C string that is ours to free."""
+    """Copy a C string that we own, and free it."""
     text = _decoded(string_at(pointer)) if pointer else ""
     c.SoapySDR_free(c_void_p(pointer))
     return text

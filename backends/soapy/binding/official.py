@@ -1,4 +1,4 @@
-"""SoapySDR by its own Python binding (Debian's python3-soapysdr)."""
+"""SoapySDR through its official Python binding (Debian's python3-soapysdr)."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -18,7 +18,7 @@ from backends.soapy.binding.api import (
 
 
 class OfficialLibrary:
-    """The library, as the module SoapySDR calls it."""
+    """The library, as the module SoapySDR exposes it."""
 
     @property
     def detail(self) -> str:
@@ -26,12 +26,12 @@ class OfficialLibrary:
         return f"SoapySDR {SoapySDR.getLibVersion()} by its Python binding"
 
     def modules(self) -> list[str]:
-        """The files of the drivers that were loaded."""
+        """Paths of the driver modules that were loaded."""
         SoapySDR.loadModules()
         return list(SoapySDR.listModules())
 
     def enumerate(self, args: str) -> list[Kwargs]:
-        """The device arguments of each device that is there. Raises DriverError."""
+        """Device arguments of each attached device that matches. Raises DriverError."""
         return [dict(_called(dict, each)) for each in _called(SoapySDR.Device.enumerate, args)]
 
     def make(self, args: str) -> "OfficialHandle":
@@ -57,14 +57,14 @@ class OfficialHandle:
     def open_stream(
         self, direction: int, channel: int, form: str, args: Kwargs
     ) -> "OfficialStream":
-        """Open a stream, which is not active yet. Raises DriverError."""
+        """Open an inactive stream. Raises DriverError."""
         stream = _called(self._open.setupStream, direction, form, [channel], args)
         if stream is None:
             raise DriverError("the driver gives no stream")
         return OfficialStream(self._open, stream, SAMPLE_BYTES[form])
 
     def close(self) -> None:
-        """Give the device back; closing twice is fine."""
+        """Release the device; closing twice is fine."""
         device, self._device = self._device, None
         if device is not None:
             device.close()
@@ -86,21 +86,21 @@ class OfficialStream:
         self.mtu = int(_called(device.getStreamMTU, stream))
 
     def activate(self) -> int:
-        """Have samples flow; 0 or a key of ERRORS."""
+        """Start the flow of samples; returns 0 or a key of ERRORS."""
         return int(_called(self._device.activateStream, self._stream))
 
     def deactivate(self) -> int:
-        """Stop the flow of samples; 0 or a key of ERRORS."""
+        """Stop the flow of samples; returns 0 or a key of ERRORS."""
         return int(_called(self._device.deactivateStream, self._stream))
 
     def read(self, into: Values, timeout_us: int) -> StreamResult:
-        """Fill `into` with samples, or a part of it."""
+        """Read samples into all or part of `into`."""
         check_buffer(into, self._size, writeable=True)
         got = _called(self._device.readStream, self._stream, [into], len(into), 0, timeout_us)
         return check_result(StreamResult(got.ret, got.flags, got.timeNs), len(into))
 
     def write(self, samples: Values, flags: int, time_ns: int, timeout_us: int) -> StreamResult:
-        """Hand over `samples` to be sent, or the first of them."""
+        """Write all of `samples`, or the first of them."""
         check_buffer(samples, self._size, writeable=False)
         took = _called(
             self._device.writeStream, self._stream, [samples], len(samples), flags, time_ns,
@@ -109,19 +109,19 @@ class OfficialStream:
         return check_result(StreamResult(took.ret, took.flags, time_ns), len(samples))
 
     def status(self, timeout_us: int) -> StreamResult:
-        """Ask what became of samples handed over."""
+        """Query what became of samples written earlier."""
         told = _called(self._device.readStreamStatus, self._stream, timeout_us)
         return StreamResult(told.ret, told.flags, told.timeNs)
 
     def close(self) -> None:
-        """Give the stream back; closing twice is fine."""
+        """Release the stream; closing twice is fine."""
         if self._is_open:
             self._is_open = False
             self._device.closeStream(self._stream)
 
 
 def _called(call: Any, *arguments: object) -> Any:  # noqa: ANN401
-    """What `call` gives; what it throws is the driver's."""
+    """Result of `call`; its exceptions become DriverErrors."""
     try:
         return call(*arguments)
     except (RuntimeError, ValueError, IndexError, OSError) as error:

@@ -1,8 +1,8 @@
-"""What is attached to this machine, and how a daemon would drive it.
+"""The devices attached to this machine, and how a daemon would drive each.
 
-This room owns the look at devices, in a process of its own because drivers may crash, and the
-judgement of what it finds. It never sets a device, sends or receives a sample, or runs beside a
-radio process on the same device.
+This package owns the inspection of devices, in a process of its own because drivers may crash, and
+the assessment of what it finds. It never sets a device, never sends or receives a sample, and never
+runs beside a radio process on the same device.
 """
 
 from backends.soapy.probe.assessment import Assessment, assess_device

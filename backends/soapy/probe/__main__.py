@@ -1,6 +1,6 @@
-"""The process that looks: `python -m backends.soapy.probe ARGS` prints a report as JSON.
+"""The probing process: `python -m backends.soapy.probe ARGS` prints a report as JSON.
 
-A line of its own comes before it, for drivers print what they like.
+A newline precedes the report, because drivers print whatever they like.
 """
 
 import sys

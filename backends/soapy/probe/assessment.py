@@ -1,4 +1,4 @@
-"""What a daemon would make of a device, from what the device says of itself."""
+"""How a daemon would drive a device, derived from the device's own data."""
 
 from typing import NamedTuple
 
@@ -7,12 +7,12 @@ from backends.soapy.probe.report import DeviceProbe
 from backends.soapy.settings import SoapySettings, in_flight, profile_of
 
 FACTORS = (1, 2, 4)
-"""The values that modem.oversampling may have."""
+"""The allowed values of modem.oversampling."""
 LONG_PIECE_S = 0.02
 
 
 class _ProbedTx(NamedTuple):
-    """What matters of a probed device for how bursts leave it; see TxHardware."""
+    """The properties of a probed device that decide how it sends bursts; see TxHardware."""
 
     has_time: bool
     full_duplex: bool
@@ -21,9 +21,9 @@ class _ProbedTx(NamedTuple):
 
 
 class Assessment(NamedTuple):
-    """How a daemon would drive a device, with a modem of `rate_hz`; times in s.
+    """How a daemon would drive a device with a modem of `rate_hz`; times in s.
 
-    `piece_s`: samples come in pieces of this length. `latency_s`: a burst's way beside its airtime.
+    `piece_s` is the length of the pieces in which samples come.
     """
 
     how: str
@@ -36,7 +36,7 @@ class Assessment(NamedTuple):
 
     @property
     def latency_s(self) -> float:
-        """From the decision to send to the far end's receiver, beside the airtime."""
+        """Delay from the decision to send to the far end's receiver, without the airtime."""
         return self.lead_s + self.turnaround_s + self.piece_s
 
 
@@ -50,7 +50,7 @@ def assess_device(device: DeviceProbe, rate_hz: float) -> Assessment:
         for factor in FACTORS
         if all(_offers(direction.rates_hz, factor * rate_hz, least) for direction in directions)
     ]
-    # Without stamps there is no calibrated front end either: leave the oscillator aside.
+    # A device without time stamps has no calibrated front end either, so use offset tuning.
     wished = [factor for factor in fitting if factor > 1 or device.has_time] or fitting
     factor = wished[0] if wished else 1
     radio_hz = factor * rate_hz

@@ -1,4 +1,4 @@
-"""What SoapySDR finds on this machine, device by device. Runs in a process of its own."""
+"""What SoapySDR finds on this machine, device by device. Runs in its own process."""
 
 from backends.soapy.binding import (
     RX,
@@ -17,7 +17,7 @@ from backends.soapy.probe.report import DeviceProbe, DirectionProbe, ProbeReport
 
 
 def enumerate_devices(args: str) -> ProbeReport:
-    """Open each device that `args` name, ask what it offers, and close it; "" names all."""
+    """Open each device that matches `args`, query its properties, and close it; "" matches all."""
     try:
         library = load_library()
     except DriverError as error:

@@ -1,4 +1,4 @@
-"""Probing devices in a process of its own: a driver that crashes takes only that with it."""
+"""Probes devices in a process of its own: a crashing driver ends only that process."""
 
 import subprocess
 import sys
@@ -9,11 +9,11 @@ from backends.base import BackendError
 from backends.soapy.probe.report import ProbeReport
 
 PATIENCE_S = 90.0
-"""Some devices load their firmware first."""
+"""Generous, because some devices load their firmware first."""
 
 
 def probe_devices(args: str = "") -> ProbeReport:
-    """Look at the devices that `args` names; "": all. Raises BackendError."""
+    """Probe the devices that match `args`; "" matches all. Raises BackendError."""
     try:
         done = subprocess.run(
             [sys.executable, "-m", "backends.soapy.probe", args],
@@ -31,5 +31,5 @@ def probe_devices(args: str = "") -> ProbeReport:
         raise BackendError(
             f"a driver crashed ({how}); name one device, such as driver=hackrf, to find which"
         )
-    # Drivers print what they like before that.
+    # Drivers may print anything before the report.
     return msgspec.json.decode(done.stdout.splitlines()[-1], type=ProbeReport)

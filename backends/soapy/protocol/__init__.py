@@ -1,7 +1,8 @@
-"""What daemon and radio process tell each other: messages, and samples in shared memory.
+"""What the daemon and its radio process exchange: messages, and samples in shared memory.
 
-This room owns the form of both: control messages, chunks of received samples, and the ring that the
-samples lie in. It opens no socket and decides nothing: who sends what, and when, is each side's.
+This package owns the format of both: control messages, chunks of received samples, and the ring
+that holds the samples. It opens no socket and decides nothing: who sends what, and when, is up to
+each side.
 """
 
 from backends.soapy.protocol.control import (

@@ -11,13 +11,13 @@ MOST_BYTES = 1 << 16
 
 
 class Open(msgspec.Struct, frozen=True, tag="open"):
-    """The first message to the process: which device, set how."""
+    """The first message to the process: the device and its settings."""
 
     settings: SoapySettings
     rx_samples: int
-    """Samples that the shared memory for receiving holds."""
+    """Capacity of the shared memory for receiving, in samples."""
     tx_samples: int
-    """Samples that the shared memory for sending holds."""
+    """Capacity of the shared memory for sending, in samples."""
     patience: Patience = Patience.NONE
 
 
@@ -26,7 +26,7 @@ class Begin(msgspec.Struct, frozen=True, tag="begin"):
 
 
 class TxCommand(msgspec.Struct, frozen=True, tag="tx"):
-    """Send `n` samples that lie at `at`, from index `start` on, or at the latest from `latest`."""
+    """Send the `n` samples at position `at` at index `start`, at the latest at `latest`."""
 
     number: int
     start: int
@@ -36,7 +36,7 @@ class TxCommand(msgspec.Struct, frozen=True, tag="tx"):
 
 
 class Opened(msgspec.Struct, frozen=True, tag="opened"):
-    """The device is open and takes its settings."""
+    """The device is open and accepts its settings."""
 
     found: DeviceInfo
 
@@ -45,9 +45,9 @@ class Blame(Enum):
     """Why a device does not stream."""
 
     ABSENT = "absent"
-    """It is not there, in use, or went away."""
+    """The device is not present, is in use, or has gone."""
     SETTINGS = "settings"
-    """It is there and does not take its settings."""
+    """The device is present but rejects its settings."""
     HOST = "host"
     """SoapySDR or the device's driver is not installed."""
 
@@ -56,27 +56,27 @@ _ERRORS = {Blame.ABSENT: AbsentError, Blame.SETTINGS: RefusalError, Blame.HOST: 
 
 
 class Waiting(msgspec.Struct, frozen=True, tag="waiting"):
-    """It looks for its device, which is not there; `reason` where that is another than before.
+    """The process waits for an absent device; `reason` is set when it differs from the last one.
 
-    Said again and again: a process that does not hangs.
+    The process repeats this message; if it stops, it hangs.
     """
 
     reason: str = ""
 
 
 class Failed(msgspec.Struct, frozen=True, tag="failed"):
-    """It does not stream, or not any more; the process ends."""
+    """The device does not stream, or no longer does; the process ends."""
 
     reason: str
     blame: Blame = Blame.ABSENT
 
     def error(self) -> BackendError:
-        """The error to raise to whoever wanted the device open."""
+        """The error to raise in the code that wanted the device open."""
         return _ERRORS[self.blame](self.reason)
 
 
 class TxDone(msgspec.Struct, frozen=True, tag="tx_done"):
-    """What became of a TxCommand: `outcome` by name of TxOutcome."""
+    """What became of a TxCommand; `outcome` is the name of a TxOutcome."""
 
     number: int
     outcome: str
@@ -99,12 +99,12 @@ _from_process = msgspec.msgpack.Decoder(FromProcess)
 
 
 def to_process(data: bytes) -> Begin | TxCommand:
-    """Decode what the daemon says once the device is open."""
+    """Decode a message from the daemon, once the device is open."""
     told: Begin | TxCommand = _to_process.decode(data)
     return told
 
 
 def from_process(data: bytes) -> FromProcess:
-    """Decode what the radio process says."""
+    """Decode a message from the radio process."""
     told: FromProcess = _from_process.decode(data)
     return told

@@ -1,4 +1,4 @@
-"""Samples in memory that daemon and radio process share."""
+"""Samples in memory that the daemon and its radio process share."""
 
 import contextlib
 import mmap
@@ -15,18 +15,19 @@ LEAST_RING = 1 << 19
 
 
 def ring_sizes(rate_hz: float, longest_s: float, lead_s: float) -> tuple[int, int]:
-    """Samples of a receive and of a transmit ring, for bursts of at most `longest_s`."""
+    """Capacities of the receive and the transmit ring, for bursts of at most `longest_s`."""
     rx = max(LEAST_RING, round(RX_RING_S * rate_hz))
-    # In any case the burst that leaves and the next one.
+    # Always room for the burst on the air and the next one.
     tx = max(LEAST_RING, round((2 * longest_s + TX_RING_S + lead_s) * rate_hz))
     return rx, tx
 
 
 class SampleRing:
-    """`capacity` samples, written by one process in order and read by another.
+    """A ring of `capacity` samples, written in order by one process and read by another.
 
-    The reader says in `tail` how many it is done with since the beginning; what was written is told
-    by messages, whose way through the kernel also orders the memory.
+    The reader sets `tail` to the number of samples that it has finished since the beginning. The
+    writer announces samples by messages; their passage through the kernel also orders the memory
+    accesses.
     """
 
     def __init__(self, fd: int, capacity: int) -> None:
@@ -37,7 +38,7 @@ class SampleRing:
 
     @property
     def tail(self) -> int:
-        """The number of samples that the reader is done with since the beginning."""
+        """Number of samples that the reader has finished since the beginning."""
         return int(self._tail[0])
 
     @tail.setter
@@ -45,25 +46,25 @@ class SampleRing:
         self._tail[0] = n
 
     def close(self) -> None:
-        """Give the memory back, as soon as nobody looks at samples in it; closing twice is fine."""
+        """Free the memory as soon as no view of its samples is left; closing twice is fine."""
         self._tail = np.zeros(1, np.int64)
         self._samples = np.zeros(0, np.complex64)
         with contextlib.suppress(BufferError):
             self._map.close()
 
     def view(self, first: int, n: int) -> Samples:
-        """Up to `n` samples from the `first` ever on; fewer at the ring's end."""
+        """Up to `n` samples from position `first` (never wraps) on; fewer at the ring's end."""
         at = first % self.capacity
         return self._samples[at : at + n]
 
     def whole(self, first: int, n: int) -> int:
-        """The first place at or behind `first` where `n` samples lie in one piece."""
+        """The first position from `first` on at which `n` samples are contiguous."""
         at = first % self.capacity
         return first if at + n <= self.capacity else first + self.capacity - at
 
 
 def make_shared(capacity: int, name: str) -> int:
-    """A file descriptor of memory for so many samples; gone with the last process that has it."""
+    """Descriptor of memory for `capacity` samples; freed with the last process that holds it."""
     fd = os.memfd_create(f"sdrlinkd-{name}")
     os.ftruncate(fd, _PAGE + 8 * capacity)
     return fd

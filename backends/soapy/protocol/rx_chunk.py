@@ -1,4 +1,4 @@
-"""Chunks of what was received: where in the shared memory they lie, or why there are none."""
+"""Chunks of received samples: their place in the shared memory, or why there are none."""
 
 import struct
 from enum import IntEnum
@@ -9,17 +9,17 @@ class GapReason(IntEnum):
     """Why a chunk has no samples."""
 
     NONE = 0
-    """The chunk has samples: it is no gap."""
+    """The chunk has samples; it is not a gap."""
     OVERFLOW = 1
     SENDING = 2
     RESTART = 3
 
 
 class RxChunk(NamedTuple):
-    """`n` samples from index `first` on, at `at` of the shared memory; or why there are none.
+    """`n` samples from index `first` on, at position `at` in the shared memory; or a gap.
 
-    `host_ns`: when the last of them was there, by this host's monotonic clock. `uncertainty`: by
-    how many samples the index may be wrong. `gap_reason`: a GapReason.
+    `host_ns`: time of the last sample by this host's monotonic clock. `uncertainty`: possible error
+    of the index in samples. `gap_reason`: a GapReason.
     """
 
     first: int
@@ -35,10 +35,10 @@ RX_CHUNK_BYTES = _RX_CHUNK.size
 
 
 def pack_rx_chunk(chunk: RxChunk) -> bytes:
-    """A chunk as one message of the receive socket, RX_CHUNK_BYTES long."""
+    """Encode a chunk as one message of the receive socket, RX_CHUNK_BYTES long."""
     return _RX_CHUNK.pack(*chunk)
 
 
 def unpack_rx_chunk(data: bytes) -> RxChunk:
-    """The chunk of a message that `pack_rx_chunk` made. Raises struct.error for any other."""
+    """Decode a message that `pack_rx_chunk` made. Raises struct.error for any other."""
     return RxChunk(*_RX_CHUNK.unpack(data))

@@ -1,6 +1,6 @@
-"""`python -m backends.soapy.radio_process CONTROL RX RX_MEMORY TX_MEMORY`, as SoapyRadio runs it.
+"""Entry of `python -m backends.soapy.radio_process CONTROL RX RX_MEMORY TX_MEMORY`.
 
-The four arguments are numbers of inherited descriptors.
+SoapyRadio runs it. The four arguments are numbers of inherited descriptors.
 """
 
 import os
@@ -10,6 +10,6 @@ from backends.soapy.radio_process import main
 
 if __name__ == "__main__":
     main()
-    # Drivers may keep threads that never end.
+    # Drivers may leave threads that never end.
     sys.stdout.flush()
     os._exit(0)

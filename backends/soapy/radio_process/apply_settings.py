@@ -1,4 +1,4 @@
-"""Sets a device and reads back what it made of it."""
+"""Applies settings to a device and reads back what it made of them."""
 
 import contextlib
 from collections.abc import Iterator, Sequence
@@ -7,12 +7,12 @@ from backends.soapy.binding import DIRECTIONS, RX, SAMPLE_BYTES, TX, Device, Dri
 from backends.soapy.settings import SettingError, SoapySettings, profile_of
 
 RATE_TOLERANCE = 1e-3
-"""OFDM bears far less between two robots, but both would be off alike."""
+"""Relative. OFDM tolerates far less between two robots, but both would be equally wrong."""
 FREQUENCY_TOLERANCE_HZ = 1e3
 
 
 def apply_settings(device: Device, settings: SoapySettings) -> dict[int, dict[str, float]]:
-    """Set everything but the streams; returns the gains in force by direction.
+    """Apply all settings but the streams'; returns the gains in force by direction.
 
     Raises SettingError, DriverError.
     """
@@ -27,7 +27,7 @@ def apply_settings(device: Device, settings: SoapySettings) -> dict[int, dict[st
         _set_channel(device, settings, direction)
         _set_antenna(device, settings, direction)
         _set_rate(device, settings, direction)
-    # Frequencies when all rates are set: some drivers move the oscillator with the rate.
+    # Frequencies after all rates: in some drivers a new rate moves the oscillator.
     for direction in directions:
         _set_frequency(device, settings, direction)
         if settings.bandwidth_hz:
@@ -40,7 +40,7 @@ def apply_settings(device: Device, settings: SoapySettings) -> dict[int, dict[st
 
 
 def choose_format(device: Device, settings: SoapySettings, direction: int) -> str:
-    """The sample format, of those the device offers, that costs least here. Raises SettingError."""
+    """The cheapest sample format for us that the device offers. Raises SettingError."""
     offered = device.formats(direction, settings.channel)
     for form in SAMPLE_BYTES:
         if form in offered:
@@ -108,9 +108,9 @@ def _set_frequency(device: Device, settings: SoapySettings, direction: int) -> N
 
 @contextlib.contextmanager
 def blaming(what: str) -> Iterator[None]:
-    """Turn what the driver refuses into a SettingError that says `what`.
+    """Turn a driver's refusal into a SettingError that begins with `what`.
 
-    Where only the driver knows what is allowed, it says so itself.
+    If only the driver knows what is allowed, its own message says so.
     """
     try:
         yield
@@ -119,9 +119,9 @@ def blaming(what: str) -> Iterator[None]:
 
 
 def _set_gains(device: Device, settings: SoapySettings, direction: int) -> dict[str, float]:
-    """Set the gains of a direction; returns those in force in dB by element.
+    """Set the gains of a direction; returns those in force, in dB by element.
 
-    The element "" is all together, where only that was asked for.
+    The element "" is the overall gain; it is present only if the settings include it.
     """
     name, channel = DIRECTIONS[direction], settings.channel
     total = settings.rx_gain_db if direction == RX else settings.tx_gain_db

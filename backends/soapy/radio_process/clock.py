@@ -1,13 +1,13 @@
-"""From a device's time to sample indices and back, in whole numbers: floats lose nanoseconds."""
+"""Converts a device's time to sample indices and back, in integers: floats lose nanoseconds."""
 
 from fractions import Fraction
 
 DRIFT_PPM = 100
-"""More than two crystals drift apart."""
+"""Upper limit of the drift between two crystals."""
 
 
 class SampleClock:
-    """The time of each sample. Index 0 is the first sample received; `begin` tells its time."""
+    """The time of each sample. Index 0 is the first sample received; `begin` sets its time."""
 
     def __init__(self, rate_hz: float, is_stamped: bool) -> None:
         self._is_stamped = is_stamped
@@ -18,7 +18,7 @@ class SampleClock:
 
     @property
     def has_begun(self) -> bool:
-        """Whether there was a first sample, and its time is known if the device stamps them."""
+        """Whether the first sample has arrived, and with it its time stamp if there are any."""
         return self.knows_time or (not self._is_stamped and self._seen_ns > 0)
 
     @property
@@ -27,35 +27,35 @@ class SampleClock:
         return self._zero_ns is not None
 
     def begin(self, time_ns: int, index: int = 0) -> None:
-        """Note that sample `index` was there at `time_ns` by the device's clock."""
+        """Note that sample `index` arrived at `time_ns` by the device's clock."""
         self._zero_ns = time_ns - self.ns(index)
 
     def index_at(self, time_ns: int) -> int:
-        """The index of the sample nearest to a time of the device."""
+        """Index of the sample nearest to a device time."""
         return self.samples(time_ns - (self._zero_ns or 0))
 
     def time_ns(self, index: int) -> int:
-        """The device's time at which this sample is there."""
+        """Device time of a sample."""
         return (self._zero_ns or 0) + self.ns(index)
 
     def samples(self, ns: int) -> int:
-        """The number of samples in a time, rounded."""
+        """Number of samples in a time span, rounded."""
         return (2 * ns * self._up + self._down) // (2 * self._down)
 
     def ns(self, samples: int) -> int:
-        """The time in ns that so many samples take, rounded."""
+        """Time in ns that `samples` take, rounded."""
         return (2 * samples * self._down + self._up) // (2 * self._up)
 
     def saw(self, end: int, host_ns: int) -> None:
-        """Note that all samples before `end` were there at `host_ns` by this host's clock."""
+        """Note that all samples before `end` had arrived at `host_ns` by this host's clock."""
         late_ns = host_ns - self.ns(end)
         allowed = late_ns
         if self._seen_ns:
-            # Who brings samples is late now and then, never early; and crystals drift.
+            # Deliveries are sometimes late, never early; and crystals drift.
             allowed = self._late_ns + (host_ns - self._seen_ns) * DRIFT_PPM // 10**6
         self._late_ns = min(late_ns, allowed)
         self._seen_ns = host_ns
 
     def now(self, host_ns: int) -> int:
-        """The index on its way now, by the host's clock and the samples that came in time."""
+        """Index of the sample on its way now, estimated from the most punctual deliveries."""
         return self.samples(host_ns - self._late_ns) if self._seen_ns else 0

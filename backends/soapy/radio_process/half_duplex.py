@@ -1,4 +1,4 @@
-"""A device that cannot receive while it sends; one thread does both."""
+"""Drives a device that cannot receive while it sends; one thread does both."""
 
 import time
 
@@ -7,11 +7,11 @@ from backends.soapy.radio_process.sample_counted_tx import SampleCountedTransmit
 from backends.soapy.radio_process.tx_commands import TxCommands
 
 READ_US = 5_000
-"""Commands wait for at most so long."""
+"""Maximum time that commands wait for a read."""
 
 
 class HalfDuplex:
-    """Receives, and between that sends in TX windows. The driver must never see two threads."""
+    """Receives, and sends in TX windows in between. Only one thread may call the driver."""
 
     def __init__(
         self,
@@ -27,7 +27,7 @@ class HalfDuplex:
         self._listens_until_ns = 0
 
     def step(self) -> None:
-        """Receive a piece; send when it is time."""
+        """Receive a piece, then send if a burst is due."""
         self._rx_stream.step(READ_US)
         self._commands.wait(0)
         if self._transmitter.is_due() and time.monotonic_ns() >= self._listens_until_ns:

@@ -1,4 +1,4 @@
-"""The radio process from start to end: signals, priority, and what it says when it fails."""
+"""The radio process from start to end: signals, priority, and its report when it fails."""
 
 import contextlib
 import os
@@ -14,14 +14,14 @@ from backends.soapy.radio_process.tx_commands import TxCommands
 from backends.soapy.settings import SettingError
 
 REALTIME, NICE = 10, -10
-"""Priorities, where they may be had: samples do not wait."""
+"""Real-time priority or else niceness, if permitted: samples do not wait."""
 SWITCH_INTERVAL_S = 5e-4
-"""Two threads that mostly wait in the driver should not wait for each other."""
+"""Short, because two threads that mostly wait in the driver should not wait for each other."""
 
 
 def main() -> None:
     """Run with CONTROL, RX, RX_MEMORY, TX_MEMORY as arguments: numbers of descriptors."""
-    # Whoever stops the daemon, by Ctrl-C or systemd, lets it send what is queued and then end us.
+    # When Ctrl-C or systemd stops the daemon, it still sends what is queued before it ends us.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
@@ -42,7 +42,7 @@ def main() -> None:
 
 
 def _raise_priority() -> None:
-    """Run before others, as far as this process may."""
+    """Raise the priority of this process as far as permitted."""
     may, _ = resource.getrlimit(resource.RLIMIT_RTPRIO)
     with contextlib.suppress(PermissionError):
         if may >= REALTIME:

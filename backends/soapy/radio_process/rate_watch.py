@@ -1,14 +1,14 @@
-"""Whether samples come as fast as the device says, by this host's clock."""
+"""Checks by this host's clock whether samples come at the rate that the device reports."""
 
 from backends.soapy.radio_process.clock import SampleClock
 
 SPAN_NS = 5 * 10**9
 TOLERANCE = 0.005
-"""No crystal is so far off."""
+"""Relative; no crystal is off by as much."""
 
 
 class RateWatch:
-    """Compares the rate of each span with the device's word; samples come in pieces of `piece`."""
+    """Compares the rate of each time span with the device's rate; samples come in `piece`s."""
 
     def __init__(self, clock: SampleClock, rate_hz: float, piece: int) -> None:
         self._clock = clock
@@ -19,7 +19,7 @@ class RateWatch:
         self.notice = ""
 
     def saw(self, end: int, host_ns: int) -> None:
-        """Note that all samples before `end` were there, or missing, at `host_ns`."""
+        """Note that all samples before `end` had arrived, or were missing, at `host_ns`."""
         if self._begun is None:
             self._begun = end, host_ns
             return

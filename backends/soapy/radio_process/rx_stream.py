@@ -1,4 +1,4 @@
-"""Samples from the device into shared memory, and an index for each."""
+"""Receives samples from the device into shared memory, and gives each an index."""
 
 import socket
 import time
@@ -23,9 +23,9 @@ from backends.soapy.radio_process.clock import SampleClock
 from backends.soapy.radio_process.rate_watch import RateWatch
 
 STALLED_S = 1.0
-"""An active stream without a sample for so long is started anew, and after that given up."""
+"""An active stream without samples for this long is restarted, and the next time given up."""
 TOLERANCE = 2
-"""Samples by which a device's stamps may be rounded."""
+"""Allowed rounding error of a device's time stamps, in samples."""
 MOST_US = 100_000
 
 
@@ -60,22 +60,22 @@ class RxStream:
         self.counters = {"overflows": 0, "samples_lost": 0, "stalls": 0, "clock_jumps": 0}
 
     def start(self) -> None:
-        """Have the device receive. Raises DriverError."""
+        """Make the device receive. Raises DriverError."""
         _check(self._stream.activate())
         self._heard_ns = time.monotonic_ns()
 
     def pause(self) -> None:
-        """Receive no more for a while, for devices that send instead."""
+        """Stop receiving, for devices that cannot send at the same time."""
         self._tell(time.monotonic_ns())
         _check(self._stream.deactivate())
 
     def resume(self, reason: GapReason = GapReason.SENDING) -> None:
-        """Receive again; what was missed is a gap, by the next stamp or this host's clock."""
+        """Receive again; the gap is measured by the next time stamp or this host's clock."""
         self.start()
         self._missed = reason
 
     def step(self, timeout_us: int = MOST_US) -> None:
-        """One call of the driver, and what follows. Raises DriverError when it is of no use."""
+        """Call the driver once and process the result. Raises DriverError if the stream failed."""
         room = self._room()
         result = self._reader.read(self._stream, room, timeout_us)
         host_ns = time.monotonic_ns()
@@ -86,13 +86,13 @@ class RxStream:
         elif result.n == OVERFLOW and not self._has_time:
             self._drain()
         elif result.n in (OVERFLOW, TIME_ERROR, CORRUPTION):
-            # The next stamp tells how many samples are missing.
+            # The next time stamp shows how many samples are missing.
             self.counters["overflows"] += 1
         else:
             _check(result.n)
 
     def _room(self) -> Samples | None:
-        """Where the next samples go; None: the daemon has not made room."""
+        """Memory for the next samples; None: the daemon has not made room."""
         if self._at == self._until:
             begin = self._ring.whole(self._at, self._piece)
             if begin + self._piece - self._ring.tail > self._ring.capacity:
@@ -106,7 +106,7 @@ class RxStream:
         if result.flags & HAS_TIME and self._has_time:
             self._place(result.time_ns, host_ns)
         elif self._missed is not None:
-            # These samples have just come: what is missing lies before them.
+            # These samples have just arrived, so the missing ones lie before them.
             n = max(0, self.clock.now(host_ns) - self._next - result.n)
             if self._missed is GapReason.OVERFLOW:
                 self._lost(n)
@@ -123,13 +123,13 @@ class RxStream:
             self._tell(host_ns)
 
     def _place(self, time_ns: int, host_ns: int) -> None:
-        """Compare the index of the next sample with where the ones before it ended."""
+        """Compare the next sample's index by its time stamp with the expected index."""
         if not self.clock.knows_time:
             self.clock.begin(time_ns, self._next)
             return
         ahead = self.clock.index_at(time_ns) - self._next
         if ahead < -TOLERANCE:
-            # The device's clock was set; ours never goes back.
+            # The device's clock was set back; our indices never go back.
             self.counters["clock_jumps"] += 1
             self._tell(host_ns)
             self._gap(max(0, self.clock.now(host_ns) - self._next), GapReason.RESTART, host_ns)
@@ -140,7 +140,7 @@ class RxStream:
             self._gap(ahead, GapReason.OVERFLOW, host_ns)
 
     def _drain(self) -> None:
-        """Throw away what waits: without stamps nobody knows where in it samples are missing."""
+        """Discard waiting samples: without time stamps, the place of the loss is unknown."""
         self._tell(time.monotonic_ns())
         while self._reader.read(self._stream, None, 0).n > 0:
             continue
@@ -158,7 +158,7 @@ class RxStream:
         self._was_restarted = True
 
     def _tell(self, host_ns: int) -> None:
-        """Hand over what there is of a piece, and begin the next."""
+        """Hand over the current piece, even if it is not full, and begin the next."""
         n = self._at - self._begun
         if not n:
             return
@@ -174,7 +174,7 @@ class RxStream:
         self.clock.saw(self._next, host_ns)
 
     def _say(self, chunk: RxChunk) -> None:
-        """Tell the daemon of a chunk; what it was not told it sees from the next index."""
+        """Send a chunk to the daemon; if that fails, the next chunk's index reveals the loss."""
         try:
             self._rx_socket.send(pack_rx_chunk(chunk))
         except BlockingIOError:
@@ -186,7 +186,7 @@ class RxStream:
 
 
 class _SampleReader:
-    """Reads samples of any format that we speak as complex64."""
+    """Reads samples of any supported format as complex64."""
 
     def __init__(self, form: str, most: int) -> None:
         self._scratch: Samples = np.zeros(most, np.complex64)
@@ -195,7 +195,7 @@ class _SampleReader:
         self._raw: Values | None = None if kind is None else np.zeros((most, 2), kind)
 
     def read(self, stream: Stream, into: Samples | None, timeout_us: int) -> StreamResult:
-        """Fill `into` with samples, or, None, nothing that anybody sees."""
+        """Read samples into `into`, or discard them if it is None."""
         target = self._scratch if into is None else into
         if self._raw is None:
             return stream.read(target, timeout_us)

@@ -1,4 +1,4 @@
-"""Bursts on devices that keep no time, placed by counting samples."""
+"""Sends bursts on devices without time stamps, at positions found by counting samples."""
 
 import time
 from collections import deque
@@ -15,23 +15,23 @@ from backends.soapy.settings import HANDOVER_S, TRAILING
 
 WRITE_US = 100_000
 BUSY_S, QUIET_S = 0.002, 0.1
-"""How long commands are waited for while one is not due yet, and while none is there."""
+"""How long to wait for commands while some are pending, and while none are."""
 
 
 @dataclass
 class _BurstOut:
-    """A burst handed to the device whose first sample leaves at `start`."""
+    """A burst handed to the device; its first sample leaves at `start`."""
 
     command: TxCommand
     start: int
 
 
 class SampleCountedTransmitter:
-    """Sends in TX windows: zeros, bursts where they belong, zeros up to whole transfers, off again.
+    """Sends in TX windows: leading zeros, bursts at their positions, zeros up to whole transfers.
 
     Such devices send only whole transfers, whatever END_BURST says, and cut off what has not left
-    when they are told to stop. Indices are as good as the moment at which the first sample leaves
-    is known.
+    when they are told to stop. Indices are only as accurate as the time at which the first sample
+    leaves is known.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class SampleCountedTransmitter:
         self._zeros = np.zeros(self._transfer, np.complex64)
         self._in_flight = in_flight * self._transfer
         self._handover = self._in_flight + self._transfer + clock.samples(round(1e9 * HANDOVER_S))
-        # From the decision to send to the first sample of a burst.
+        # Lead from the decision to send to the first sample of a burst.
         self._ahead = (
             clock.samples(round(1e9 * turnaround_s))
             + (1 + leading) * self._transfer
@@ -65,7 +65,7 @@ class SampleCountedTransmitter:
         self.counters = {"tx_spells": 0}
 
     def step(self) -> None:
-        """Wait for commands a little; if there are any, send for a TX window."""
+        """Wait briefly for commands; if one is due, send for a TX window."""
         self._commands.wait(BUSY_S if self._commands.waiting else QUIET_S)
         if self.is_due():
             self.send_window()
@@ -74,32 +74,32 @@ class SampleCountedTransmitter:
         """Do nothing: between TX windows the transmitter is off."""
 
     def is_due(self) -> bool:
-        """Whether the first command has to go on its way now."""
+        """Whether the TX window of the first command has to start now."""
         waiting = self._commands.waiting
         if not waiting or not self._clock.has_begun:
             return False
         return waiting[0].start <= self._clock.now(time.monotonic_ns()) + self._ahead
 
     def send_window(self) -> None:
-        """Send all that is due, and what comes meanwhile; the transmitter is off afterwards."""
+        """Send all due bursts and those that arrive meanwhile; then switch the transmitter off."""
         self.counters["tx_spells"] += 1
         self._tx_stream.activate()
-        # Zeros are in flight before what is written first.
+        # The driver's queue fills with zeros before our first sample.
         self._origin = self._clock.now(time.monotonic_ns()) + self._in_flight
         self._written = 0
         try:
             self._fill(self._leading * self._transfer)
             while self._next_command():
                 self._send(self._commands.waiting.popleft())
-            # Whole transfers, and more: a device takes the first one up to a transfer later than
-            # we think, and the last one may be cut off.
+            # Whole transfers and more: a device may take the first one up to a transfer later than
+            # estimated, and may cut off the last one.
             self._fill(-self._written % self._transfer + TRAILING * self._transfer)
             self._drain()
         finally:
             self._stream.deactivate()
 
     def _next_command(self) -> bool:
-        """Whether another burst goes in this TX window; waits as long as there is time to."""
+        """Whether another burst joins this TX window; waits for one as long as time allows."""
         while not self._commands.is_over and self._written < self._longest:
             if self._commands.waiting:
                 return self._commands.waiting[0].start <= self._end + self._ahead
@@ -112,7 +112,7 @@ class SampleCountedTransmitter:
 
     @property
     def _end(self) -> int:
-        """The index at which what is written next will leave."""
+        """Index at which the next sample written will leave."""
         return self._origin + self._written
 
     def _send(self, command: TxCommand) -> None:
@@ -132,7 +132,7 @@ class SampleCountedTransmitter:
             n -= len(some)
 
     def _write(self, samples: Values) -> None:
-        """Hand samples to the device. Raises DriverError when it takes none for a long time."""
+        """Write samples to the device. Raises DriverError when it accepts none for a long time."""
         since_ns = time.monotonic_ns()
         while len(samples):
             self._catch_up()
@@ -147,7 +147,7 @@ class SampleCountedTransmitter:
                 raise DriverError("it takes no samples for 1 s")
 
     def _drain(self) -> None:
-        """Wait until all but the last zeros have left; there is nothing that would tell."""
+        """Wait until all but the last zeros have left; the device does not report it."""
         while not self._commands.is_over:
             left = self._end - self._clock.now(time.monotonic_ns())
             if left <= 0:
@@ -163,10 +163,9 @@ class SampleCountedTransmitter:
             self._commands.done(out.command, "sent", out.start)
 
     def _catch_up(self) -> None:
-        """A device that was given too little has sent something of its own in the meantime.
+        """Correct the count after an underrun, in which the device has sent something else.
 
-        Drivers tell of underflows, too, but of those before the first transfer and after the last
-        as well.
+        Drivers report underflows, too, but also those before the first transfer and after the last.
         """
         now = self._clock.now(time.monotonic_ns())
         if self._written < self._transfer:
@@ -178,7 +177,7 @@ class SampleCountedTransmitter:
             self._origin += -(-late // self._transfer) * self._transfer
 
     def _underflow(self) -> None:
-        """Answer what was torn apart on its way as such; what was over by then was not torn."""
+        """Report the bursts that the underrun interrupted; those that had ended were sent whole."""
         self._settle()
         now = self._clock.now(time.monotonic_ns())
         while self._out and self._out[0].start <= now:

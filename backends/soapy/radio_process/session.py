@@ -1,4 +1,4 @@
-"""One device, from open to the end."""
+"""The life of one device, from open to close."""
 
 import contextlib
 import socket
@@ -31,14 +31,14 @@ from backends.soapy.radio_process.tx_stream import TxStream
 from backends.soapy.settings import DeviceInfo, in_flight
 
 RETRY_S = 0.25, 0.5
-"""A device that went away is looked for again after so long; more each time."""
+"""First and longest pause between attempts to open an absent device; each pause is longer."""
 LOOK_S = 0.1
 AWAY_S = 1.0
-"""A device that refused its settings is looked at so often."""
+"""Interval at which a device that rejected its settings is checked for its removal."""
 
 
 class Session:
-    """Opens the device of a `request`, streams, and gives it all back."""
+    """Opens the device of a `request`, streams, and releases everything."""
 
     def __init__(
         self, request: Open, commands: TxCommands, rx_socket: socket.socket, ring: SampleRing
@@ -65,7 +65,7 @@ class Session:
             self._stream(library, device, stack)
 
     def _made(self, library: Library) -> Device | None:
-        """The open device; None: the daemon is gone. Raises DriverError."""
+        """Open the device; None: the daemon is gone. Raises DriverError."""
         wait_s, most_s = RETRY_S
         args = self._settings.device
         if refused := no_radio(args):
@@ -81,7 +81,7 @@ class Session:
                     raise HostError(why_not(library, args, error)) from None
                 if self._patience is Patience.NONE:
                     raise DriverError(why_not(library, args, error)) from None
-                # To ask all drivers for what there is takes its time.
+                # Only for a new error: `why_not` queries all drivers, which takes time.
                 is_new, told = str(error) != told, str(error)
                 self._commands.say(Waiting(why_not(library, args, error) if is_new else ""))
             self._commands.wait(wait_s)
@@ -89,7 +89,7 @@ class Session:
         return None
 
     def _wait_until_away(self, library: Library) -> None:
-        """Nobody can tell a device that was replugged from one that was not, but by its absence."""
+        """Wait until the device is absent: only its absence proves that it was replugged."""
         while not self._commands.is_over and library.enumerate(self._settings.device):
             self._commands.say(Waiting())
             self._commands.wait(AWAY_S)
@@ -154,7 +154,7 @@ class Session:
 
 
 def _end(opened: Stream) -> None:
-    # Of a device that was unplugged, nothing can be ended.
+    # An unplugged device can no longer end a stream.
     with contextlib.suppress(DriverError):
         opened.deactivate()
     with contextlib.suppress(DriverError):

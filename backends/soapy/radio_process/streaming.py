@@ -1,4 +1,4 @@
-"""Which thread does what, until the daemon is gone."""
+"""Assigns the work to threads, until the daemon is gone."""
 
 import threading
 import time
@@ -16,14 +16,14 @@ Transmitter = TimestampedTransmitter | SampleCountedTransmitter
 
 
 class _CounterReports:
-    """What receiving and sending have counted, told when it has changed."""
+    """Counters of receiving and sending, reported when they have changed."""
 
     def __init__(self, rx_stream: RxStream, transmitter: Transmitter | None) -> None:
         self._rx_stream, self._transmitter = rx_stream, transmitter
         self._told: CountersReport | None = None
 
     def tell(self, commands: TxCommands) -> None:
-        """Report the counters where they have changed since the last report."""
+        """Report the counters if they have changed since the last report."""
         sent = (
             self._transmitter.counters
             if isinstance(self._transmitter, SampleCountedTransmitter)
@@ -67,7 +67,7 @@ def _at_once(
     commands: TxCommands,
     reports: _CounterReports,
 ) -> None:
-    """Receive on a thread of its own, and send on this one."""
+    """Receive on another thread, and send on this one."""
     failures: list[Exception] = []
     stopped = threading.Event()
 

@@ -1,4 +1,4 @@
-"""Bursts at times that the device itself keeps."""
+"""Sends bursts at times that the device itself keeps."""
 
 import time
 from dataclasses import dataclass
@@ -24,40 +24,40 @@ from backends.soapy.radio_process.tx_stream import TxStream
 
 WRITE_US = 50_000
 AHEAD_S = 0.25
-"""A device gets bursts at most so long before their time."""
+"""How long before its time the device gets a burst at most."""
 GRACE_S = 0.1
-"""So long after its end a burst's acknowledgement may come."""
+"""How long after a burst's end its acknowledgement may come."""
 SLACK = 16
-"""Samples by which a burst may be acknowledged too early; the next one ends later than that."""
+"""Samples by which an acknowledgement may be early; the next burst ends later than that."""
 TAIL = 8
-"""Zeros behind a burst; the next one begins later than that."""
+"""Number of zeros after a burst; the next one begins later than that."""
 IDLE_S = 0.5
-"""After so long without a burst the transmitter goes off."""
+"""Time without a burst after which the transmitter is switched off."""
 BUSY_S, QUIET_S = 0.002, 0.1
-"""How long commands are waited for while bursts are out, and while none is."""
+"""How long to wait for commands while bursts are pending, and while none are."""
 
 _NOTHING = np.zeros(0, np.complex64)
 
 
 @dataclass
 class _BurstOut:
-    """A burst handed to the device, or on its way there."""
+    """A burst that the device has, or is being given."""
 
     command: TxCommand
     is_failed: bool = False
     is_begun: bool = False
-    """The device has a part of it."""
+    """Whether the device has a part of the burst."""
     is_whole: bool = False
-    """The device has all of it."""
+    """Whether the device has all of the burst."""
 
     @property
     def end(self) -> int:
-        """The index behind its last sample."""
+        """Index after its last sample."""
         return self.command.start + self.command.n
 
 
 class TimestampedTransmitter:
-    """Hands bursts over with their time and END_BURST, and reads what became of them."""
+    """Hands bursts to the device with their time and END_BURST, and reads their status."""
 
     def __init__(self, commands: TxCommands, tx_stream: TxStream, clock: SampleClock) -> None:
         self._commands = commands
@@ -71,7 +71,7 @@ class TimestampedTransmitter:
         self._used_ns = 0
 
     def step(self) -> None:
-        """Wait for commands a little, carry them out, look what became of others."""
+        """Wait briefly for commands, send the due ones, and read the status of earlier ones."""
         self._commands.wait(BUSY_S if self._out or self._commands.waiting else QUIET_S)
         while self._is_due():
             self._send(self._commands.waiting.popleft())
@@ -80,9 +80,9 @@ class TimestampedTransmitter:
             self._rest()
 
     def _is_due(self) -> bool:
-        """Whether the first command goes to the device now: what is far off fills its queue."""
+        """Whether the first command goes to the device now: early bursts would fill its queue."""
         waiting = self._commands.waiting
-        # Before the first sample, an index means nothing to the device.
+        # Before the first sample, an index has no device time.
         if not waiting or not self._clock.has_begun:
             return False
         ahead = self._clock.samples(round(1e9 * AHEAD_S))
@@ -102,7 +102,7 @@ class TimestampedTransmitter:
         self._out.append(out)
         samples = self._tx_stream.converted(self._with_tail(self._commands.samples(command)))
         time_ns = self._clock.time_ns(command.start)
-        # END_BURST only with what a device takes at once: of a part it would be the end.
+        # END_BURST goes with the last write only: on an earlier one it would end the burst there.
         most = max(1, self._stream.mtu)
         last = (len(samples) - 1) // most * most
         flags = HAS_TIME
@@ -115,15 +115,15 @@ class TimestampedTransmitter:
 
     @staticmethod
     def _with_tail(samples: Samples) -> Samples:
-        """With zeros behind them: some devices keep the last sample on the air."""
+        """The samples with zeros appended: some devices hold the last sample on the air."""
         return np.concatenate((samples, np.zeros(TAIL, np.complex64)))
 
     def _write(self, out: _BurstOut, samples: Values, flags: int, time_ns: int) -> bool:
-        """Whether the device took all of it.
+        """Write samples; returns whether the device accepted all of them.
 
-        A device that tells of late bursts by status takes them, and drops them. One that refuses
-        them here would refuse them for ever: the burst is given up at once, and the daemon plans
-        another before those behind it are late, too.
+        Some devices accept late bursts, drop them and report them by status. A device that refuses
+        them here would refuse them forever. Such a burst is given up at once, so that the daemon
+        can reschedule it before the bursts behind it are late, too.
         """
         until = out.end + self._clock.samples(round(1e9 * GRACE_S))
         while len(samples) and not self._commands.is_over:
@@ -137,7 +137,7 @@ class TimestampedTransmitter:
             elif result.n == UNDERFLOW:
                 self._fail(out, "underflow")
             elif result.n == TIME_ERROR:
-                # What has begun to leave must not go again.
+                # A burst that has begun to leave must not be sent again.
                 self._fail(out, "underflow" if out.is_begun else "late")
                 if out.is_begun:
                     self._end_burst()
@@ -151,16 +151,16 @@ class TimestampedTransmitter:
         return not len(samples)
 
     def _end_burst(self) -> None:
-        """The device must not wait for the rest of a burst that was given up.
+        """End a burst that was given up, so that the device does not wait for the rest of it.
 
-        To some, going off says so; to others, only END_BURST.
+        Some devices need a deactivated stream for that, others END_BURST.
         """
         self._stream.write(self._tx_stream.converted(_NOTHING), END_BURST, 0, WRITE_US)
         self._stream.deactivate()
         self._is_active = False
 
     def _look(self) -> None:
-        """Take all that the device has to tell of bursts handed to it."""
+        """Read all status reports of the device."""
         while self._tells:
             told = self._stream.status(0)
             if told.n == NOT_SUPPORTED:
@@ -176,7 +176,7 @@ class TimestampedTransmitter:
         self._give_up()
 
     def _acknowledged(self, time_ns: int | None) -> None:
-        """The oldest burst has ended, or, by its time, a later one and all before it."""
+        """Settle the oldest burst; a time stamp may settle later ones and all before them."""
         self._acknowledges = True
         if time_ns is not None:
             end = self._clock.index_at(time_ns) + SLACK
@@ -186,7 +186,7 @@ class TimestampedTransmitter:
             self._settle("sent")
 
     def _give_up(self) -> None:
-        """Settle bursts whose acknowledgement should be there; where there are none, those over."""
+        """Settle bursts with an overdue acknowledgement; without any, those that are over."""
         now = self._clock.now(time.monotonic_ns())
         grace_s = 0.0 if self._acknowledges is None and not self._tells else GRACE_S
         grace = self._clock.samples(round(1e9 * grace_s))
@@ -209,7 +209,7 @@ class TimestampedTransmitter:
             return
         out.is_failed = True
         if outcome == "late" and out in self._out:
-            # A burst that does not begin has no end to be acknowledged.
+            # A burst that does not begin has no end to acknowledge.
             self._out.remove(out)
         self._commands.done(out.command, outcome, out.command.start)
 

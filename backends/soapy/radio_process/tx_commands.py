@@ -1,4 +1,4 @@
-"""Bursts that the daemon wants sent, and the answers."""
+"""The daemon's commands to send bursts, and the answers to them."""
 
 import select
 import socket
@@ -12,7 +12,7 @@ from backends.soapy.protocol import SampleRing, TxCommand, TxDone
 
 
 class TxCommands:
-    """The control socket; `is_over` when the daemon has closed its end. Owned by one thread."""
+    """The control socket of one thread; `is_over` is set when the daemon has closed its end."""
 
     def __init__(self, control: socket.socket, ring: SampleRing) -> None:
         self._control = control
@@ -24,22 +24,22 @@ class TxCommands:
         self.is_over = False
 
     def wait(self, seconds: float) -> None:
-        """Wait until there is a command that was not there, or for so long."""
+        """Wait up to `seconds` for a new command."""
         while not self.is_over and self._poll.poll(max(0, round(1e3 * seconds))):
             self._receive()
             seconds = 0.0
 
     def samples(self, command: TxCommand) -> Samples:
-        """The samples of a command; they stay in place until `done`."""
+        """The samples of a command; they stay valid until `done`."""
         return self._ring.view(command.at, command.n)
 
     def done(self, command: TxCommand, outcome: str, start: int) -> None:
-        """Answer a command; its memory is free, and that of all before it."""
+        """Answer a command, and free its memory and that of all before it."""
         self._ring.tail = max(self._ring.tail, command.at + command.n)
         self.say(TxDone(command.number, outcome, start, start + command.n))
 
     def say(self, message: msgspec.Struct) -> None:
-        """Send a message to the daemon, which reads it soon or is gone."""
+        """Send a message to the daemon."""
         try:
             self._control.send(protocol.encode(message))
         except (BrokenPipeError, ConnectionResetError):

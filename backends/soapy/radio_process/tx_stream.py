@@ -1,4 +1,4 @@
-"""The transmit stream of a device, whatever sample format it takes."""
+"""The transmit stream of a device, for any sample format."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ _FULL_SCALE = {"CS16": (np.int16, 32767), "CS8": (np.int8, 127)}
 
 
 class TxStream:
-    """A transmit stream that takes samples of type `form`."""
+    """A transmit stream that accepts samples of type `form`."""
 
     def __init__(self, stream: Stream, form: str) -> None:
         self.stream = stream
@@ -22,7 +22,7 @@ class TxStream:
             raise DriverError(f"the transmitter cannot be switched on ({ERRORS.get(n, n)})")
 
     def converted(self, samples: Samples) -> Values:
-        """The samples as the stream takes them; beyond full scale they are clipped."""
+        """Convert samples to the stream's format; values beyond full scale are clipped."""
         if self._form == "CF32":
             return samples
         kind, full = _FULL_SCALE[self._form]

@@ -1,8 +1,8 @@
-"""What a device is to be set to, what is known of its driver, and what follows for sending.
+"""A device's settings, what is known of its driver, and the timing of bursts.
 
-This room owns the section `[soapy]` of a configuration, the table of drivers, and the arithmetic
-from a device's nature to its lead, turnaround and TX windows. It only computes: it never opens a
-device, loads no library and starts nothing.
+This package owns the section `[soapy]` of a configuration, the table of drivers, and the
+computation of lead, turnaround and TX windows from a device's properties. It only computes: it
+never opens a device, loads no library and starts nothing.
 """
 
 from backends.soapy.settings.checks import soapy_presumption, soapy_problem, soapy_unchecked

@@ -48,7 +48,7 @@ def soapy_problem(soapy: SoapyParams, needs: ModemNeeds) -> str:
 
 
 def soapy_unchecked(soapy: SoapyParams) -> list[str]:
-    """What of [soapy] nobody can know before the device is opened."""
+    """What cannot be checked about [soapy] before the device is opened."""
     keys = ["frequency", "rate", "antennas" if soapy.rx_antenna or soapy.tx_antenna else ""]
     if soapy.tx_gains or soapy.rx_gains or (soapy.tx_gain_db, soapy.rx_gain_db) != (None, None):
         keys.append("gains")
@@ -62,7 +62,7 @@ def soapy_unchecked(soapy: SoapyParams) -> list[str]:
 def soapy_presumption(
     soapy: SoapyParams, needs: ModemNeeds, turnaround_s: float | None
 ) -> Presumption:
-    """Presume of the device by its driver, as if it sent, where that is switched off as yet."""
+    """Presume the device's properties from its driver, as if tx_enabled were set."""
     settings = SoapySettings.of(soapy, needs.radio_rate_hz, needs.frequency_hz, needs.block_s)
     settings = msgspec.structs.replace(settings, tx_enabled=True)
     if turnaround_s is not None:

@@ -1,4 +1,4 @@
-"""What an open device is; the radio process tells the daemon."""
+"""The properties of an open device, as the radio process reports them to the daemon."""
 
 import msgspec
 
@@ -15,9 +15,9 @@ class DeviceInfo(msgspec.Struct, frozen=True, kw_only=True):
     frequency_hz: float
     full_duplex: bool
     has_time: bool
-    """Its samples are stamped by its own clock."""
+    """Whether its samples are stamped by its own clock."""
     receives_in_s: float
-    """Samples come in pieces of this length."""
+    """Length in s of the pieces in which samples come."""
     tx_transfer_s: float = 0.0
     in_flight: int = 0
     gains: str = ""
@@ -30,5 +30,5 @@ class DeviceInfo(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def timestamped_tx(self) -> bool:
-        """Whether bursts leave at times that the device itself keeps."""
+        """Whether the device itself sends bursts at given times."""
         return timestamped_tx(self.has_time, self.full_duplex)

@@ -1,19 +1,19 @@
-"""What is known of drivers without a device at hand: one table, a row a driver."""
+"""What is known of drivers without their devices: one table, a row per driver."""
 
 from typing import NamedTuple
 
 
 class DriverProfile(NamedTuple):
-    """What a driver does that it does not tell, or not before its device is open."""
+    """Properties of a driver that it does not report, or only once its device is open."""
 
     least_rate_hz: float = 0.0
-    """The slowest rate that works; some drivers claim to go slower, and do not."""
+    """The lowest rate that works; some drivers wrongly claim lower ones."""
     transfer: int = 0
-    """Samples that it moves at once; 0: few."""
+    """Number of samples that the driver moves at once; 0: few."""
     in_flight: int = 0
-    """Transfers that it takes ahead of the antenna."""
+    """Number of transfers that the driver accepts ahead of the antenna."""
     full_duplex: bool = True
-    """It receives while it sends, and stamps its samples."""
+    """Whether the device receives while it sends, and stamps its samples."""
 
 
 PROFILES = {
@@ -23,12 +23,12 @@ PROFILES = {
     "uhd": DriverProfile(),
     "usrp": DriverProfile(),
 }
-"""The profile of each driver known here, by its name in lower case."""
+"""The profile of each known driver, by its name in lower case."""
 
 UNKNOWN = DriverProfile()
-"""The profile of any other driver: a radio that sends while it listens, and keeps time."""
+"""The profile of any other driver: full duplex, with time stamps."""
 
 
 def profile_of(driver: str) -> DriverProfile:
-    """The profile of a driver by its name in any case; UNKNOWN where there is none."""
+    """The profile of a driver by its name in any case; UNKNOWN if there is none."""
     return PROFILES.get(driver.lower(), UNKNOWN)

@@ -1,4 +1,4 @@
-"""What a device should be able to do, before it is opened."""
+"""Presumes what a device can do before it is opened."""
 
 from typing import NamedTuple
 
@@ -10,16 +10,16 @@ from backends.soapy.settings.soapy_settings import SoapySettings, in_flight
 
 
 class Presumed(NamedTuple):
-    """What a radio should be able to do; `driver` is empty where nothing is known of its driver."""
+    """What a radio should be able to do; `driver` is empty if its driver is unknown."""
 
     capabilities: Capabilities
     driver: str
 
 
 def presume(settings: SoapySettings) -> Presumed:
-    """Presume of the device that `settings` name, by its driver or the model a test radio plays.
+    """Presume a device's properties from its driver, or from the model that a test radio imitates.
 
-    One that is not known is taken for a radio that sends while it listens, and keeps time.
+    An unknown device is presumed to be full duplex, with time stamps.
     """
     named = parse_device_args(settings.device.lower())
     driver = next((named[key] for key in ("driver", "model") if named.get(key) in PROFILES), "")

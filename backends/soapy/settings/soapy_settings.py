@@ -1,4 +1,4 @@
-"""What a device is to be set to: a person's wishes, and the modem's rate and frequency."""
+"""A device's complete settings: the user's, and the modem's rate and frequency."""
 
 from backends.base import Capabilities
 from backends.soapy.settings.device_info import DeviceInfo
@@ -8,11 +8,11 @@ from backends.soapy.settings.tx_timing import TxHardware, TxTiming, timing_of
 
 
 class SettingError(Exception):
-    """Settings that the device does not take; the message cites key, given and allowed."""
+    """The device rejects its settings; the message cites key, given and allowed."""
 
 
 class SoapySettings(SoapyParams, frozen=True, kw_only=True):
-    """What a person sets of a device, and at what rate and frequency (Hz) it runs."""
+    """The user's settings of a device, and its rate and frequency (Hz)."""
 
     rate_hz: float
     frequency_hz: float
@@ -22,19 +22,19 @@ class SoapySettings(SoapyParams, frozen=True, kw_only=True):
     def of(
         cls, params: SoapyParams, rate_hz: float, frequency_hz: float, block_s: float
     ) -> "SoapySettings":
-        """All that is in `params`, for a device at that rate and frequency, in such pieces."""
+        """Combine `params` with a rate, a frequency, and the length of a block."""
         given = {name: getattr(params, name) for name in SoapyParams.__struct_fields__}
         return cls(**given, rate_hz=rate_hz, frequency_hz=frequency_hz, block_s=block_s)
 
     def tx_timing(self, hardware: TxHardware) -> TxTiming:
-        """How bursts leave a device that is like `hardware` and set like this."""
+        """Timing of bursts on a device with the properties of `hardware` and these settings."""
         return timing_of(
             hardware, self.leading_transfers, self.lead_s, self.turnaround_s, self.listen_s,
             self.longest_tx_s,
         )  # fmt: skip
 
     def capabilities(self, found: DeviceInfo) -> Capabilities:
-        """What a radio can do that is that device, set so."""
+        """What a radio on the device `found` can do with these settings."""
         tx = self.tx_timing(found)
         return Capabilities(
             receives=True,
@@ -51,6 +51,6 @@ class SoapySettings(SoapyParams, frozen=True, kw_only=True):
 
 
 def in_flight(settings: SoapyParams, driver: str) -> int:
-    """Transfers that this driver takes ahead of the antenna, as set or as is known of it."""
+    """Transfers that the driver accepts ahead of the antenna, from the settings or its profile."""
     given = settings.transfers_in_flight
     return profile_of(driver).in_flight if given is None else given

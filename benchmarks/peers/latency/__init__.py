@@ -1,8 +1,8 @@
-"""What joins a companion computer to a flight controller (FCU): serial lines, agents, daemons.
+"""Links from a companion computer to a flight controller (FCU): serial lines, agents, daemons.
 
     from benchmarks.peers.latency.table import PEERS, unavailable
 
-A way is all that there is between the two ends. Each end is a process of its own (`endpoint`), some
-by another interpreter than ours: therefore this file, and what `endpoint` imports, needs nothing
-but the standard library. `ours` has our own daemons as one way among the others.
+A way is everything between the two ends. Each end is a process of its own (`endpoint`), some with
+another interpreter than ours, so this file and everything that `endpoint` imports use the standard
+library only. `ours` has our own daemons as one way among the others.
 """

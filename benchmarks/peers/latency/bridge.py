@@ -1,7 +1,7 @@
 """The hop on the companion computer: between the serial line and the nodes' own middleware.
 
-`python -m benchmarks.peers.latency.bridge TRANSPORT DEVICE SIZE`, as the XRCE agent and MAVROS are
-processes of their own. Tells the port where it is to be found, and ends when its input does.
+`python -m benchmarks.peers.latency.bridge TRANSPORT DEVICE SIZE`; like the XRCE agent and MAVROS it
+is a process of its own. It prints the port at which it listens, and ends when its input does.
 """
 
 import select
@@ -13,7 +13,7 @@ from benchmarks.peers.latency.transports import open_serial
 
 
 def main() -> None:
-    """Carry messages for the command line, until its input ends."""
+    """Carry messages as the command line says, until the input ends."""
     transport, device, size = sys.argv[1:]
     line = open_serial(Address(transport, device), "companion", int(size))
     nodes = Local()

@@ -1,4 +1,4 @@
-"""A clock of its own for each end, made of the one that all processes of this machine share."""
+"""A separate clock for each end, derived from the one that all processes of this machine share."""
 
 import time
 from typing import NamedTuple
@@ -12,13 +12,13 @@ class Clock(NamedTuple):
 
     @property
     def rate(self) -> float:
-        """Its seconds in one of the machine's."""
+        """Seconds of this clock per second of the machine."""
         return 1 + self.ppm * 1e-6
 
     def now(self) -> float:
-        """What this clock shows now, in s."""
+        """The clock's current time in s."""
         return time.monotonic() * self.rate + self.offset_s
 
     def now_ns(self) -> int:
-        """In whole ns, as time synchronisation's messages have it."""
+        """The clock's current time in ns, as messages for time synchronisation need it."""
         return round(self.now() * 1e9)

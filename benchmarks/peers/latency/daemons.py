@@ -1,4 +1,4 @@
-"""The daemons of this assessment, and what they are told."""
+"""The daemons of this benchmark, and their configuration."""
 
 from collections.abc import Collection
 from contextlib import AbstractContextManager
@@ -31,7 +31,7 @@ PPM = {1: 18.0, 2: -16.0}
 
 
 class Air(NamedTuple):
-    """What all daemons of a run have in common."""
+    """Common settings of all daemons of a run."""
 
     backend: str = "ether"
     rate_hz: float = 5e6
@@ -45,7 +45,7 @@ class Air(NamedTuple):
 def running(
     air: Air, robots: Collection[int], topics: Collection[str]
 ) -> AbstractContextManager[daemons.Running]:
-    """Until every daemon hears one, and then. Raises PeerError."""
+    """Run daemons, from when each hears another. Raises PeerError."""
     parts = [ROBOT.format(robot=robot, ppm=PPM[robot]) for robot in robots]
     scenario = SCENARIO.format(**air._asdict()) + "".join(parts)
     config = CONFIG.format(**air._asdict())

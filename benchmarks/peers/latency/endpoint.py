@@ -1,7 +1,7 @@
 """One end, as a process of its own: `python -m benchmarks.peers.latency.endpoint`.
 
-It reads a Job (one line of JSON), says "ready", reads when to start (monotonic s), and tells in the
-end the stamps of all that it heard, as JSON. What the stamps mean is for others to compute.
+It reads a Job (one line of JSON), prints "ready", reads the start time (monotonic s), and at the
+end prints the stamps of everything it heard, as JSON. It does not interpret the stamps.
 """
 
 import gc
@@ -25,13 +25,13 @@ from benchmarks.peers.latency.schedule import schedule
 from benchmarks.peers.latency.transports import open_transport
 
 DRAIN_S = 0.3
-"""After the last message, for what is still under way."""
+"""Time after the last message, for messages still in flight."""
 SPARE_S = 60.0
-"""Whatever hangs, the process ends so long after its time."""
+"""Time after its end at which even a hanging process exits."""
 
 
 class Endpoint:
-    """Sends by the schedule, answers requests for the time, and stamps what comes."""
+    """Sends by the schedule, answers time requests, and stamps what arrives."""
 
     def __init__(self, job: Job, transport: Transport) -> None:
         self._job, self._transport, self._clock = job, transport, job.clock
@@ -44,7 +44,7 @@ class Endpoint:
         """t1 to t4 in ns: sent by us, heard there, sent there, heard by us."""
 
     def play(self, start: float) -> None:
-        """The whole schedule; `start` in monotonic s."""
+        """Play the whole schedule; `start` in monotonic s."""
         for after, kind, number in schedule(self._job):
             self._listen(start + after)
             if kind == REQUEST:
@@ -55,7 +55,7 @@ class Endpoint:
         self._listen(start + self._job.warmup_s + self._job.seconds + DRAIN_S)
 
     def _listen(self, until: float) -> None:
-        """Until then, or, where that is past, to what is here."""
+        """Listen until that time; if it has passed, only to what is waiting."""
         left = until - time.monotonic()
         while True:
             for kind, payload in self._transport.receive(max(0.0, left)):
@@ -78,7 +78,7 @@ class Endpoint:
 
 
 def main() -> dict[str, object]:
-    """What is to be told."""
+    """Run the endpoint; returns its report."""
     job = Job.from_json(sys.stdin.readline())
     signal.alarm(int(job.warmup_s + job.seconds + SPARE_S))
     endpoint = Endpoint(job, open_transport(job.address, job.side, job.size))

@@ -1,4 +1,4 @@
-"""What an endpoint is told, what its messages look like, and what a transport does for it."""
+"""The job of an endpoint, the format of its messages, and the interface of a transport."""
 
 import json
 import struct
@@ -9,9 +9,9 @@ from typing import NamedTuple, Protocol
 from benchmarks.peers.latency.clock import Clock
 
 REQUEST, REPLY = 0, 1
-"""The kinds of time synchronisation."""
+"""The kinds of time synchronisation messages."""
 FIRST_TOPIC = 2
-"""Kinds from here on are topics."""
+"""Kinds from this on are topics."""
 MOST_TOPICS = 15
 
 ASKED = struct.Struct("<q")
@@ -23,51 +23,51 @@ STAMP = struct.Struct("<dI")
 
 
 class Transport(Protocol):
-    """One end of a peer. Payloads of the kinds below `FIRST_TOPIC` are as above."""
+    """One end of a peer. The payloads of kinds below `FIRST_TOPIC` are defined above."""
 
     def send(self, kind: int, payload: bytes) -> None:
-        """Take a message; what cannot be taken is dropped."""
+        """Send a message; it is dropped if it cannot be accepted."""
 
     def receive(self, timeout_s: float) -> Iterable[tuple[int, bytes]]:
-        """Wait so long for messages, and tell them one by one, each as soon as it is parsed."""
+        """Wait up to `timeout_s` for messages; yields each as soon as it is parsed."""
 
 
 class Address(NamedTuple):
-    """A transport's end: by which name it is opened, and where."""
+    """A transport's end: the name to open it by, and its place."""
 
     transport: str
-    """A name that `transports.open_transport` knows."""
+    """A name that `transports.open_transport` accepts."""
     place: str
-    """A device, a port, a folder: the transport's own."""
+    """A device, a port or a folder, depending on the transport."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What one end has to do."""
+    """The task of one end."""
 
     side: str
     """ "companion" or "fcu"."""
     address: Address
     clock: Clock
     rate_hz: float
-    """Of each topic."""
+    """Rate of each topic."""
     size: int
     """Bytes of each message's payload."""
     n_topics: int
     warmup_s: float
-    """Everything is sent, but nothing counts; time synchronisation goes faster."""
+    """Duration in which messages are sent but not counted; time requests are more frequent."""
     seconds: float
-    """What counts, after the warm-up."""
+    """Duration that counts, after the warm-up."""
     seed: int
 
     @property
     def n_warmup(self) -> int:
-        """Messages of each topic that do not count: the first ones."""
+        """Number of messages of each topic that do not count: the first ones."""
         return round(self.warmup_s * self.rate_hz)
 
     @property
     def n_counted(self) -> int:
-        """Messages of each topic that count."""
+        """Number of messages of each topic that count."""
         return round(self.seconds * self.rate_hz)
 
     def to_json(self) -> str:
@@ -76,7 +76,7 @@ class Job:
 
     @classmethod
     def from_json(cls, text: str) -> "Job":
-        """The job that `to_json` put on a line."""
+        """Parse a job from `to_json`."""
         told = json.loads(text)
         told["address"] = Address(*told["address"])
         told["clock"] = Clock(*told["clock"])

@@ -9,9 +9,10 @@ HELLO = b""
 
 
 class Local:
-    """A message is a datagram: its kind in one byte, then its payload.
+    """Sends each message as a datagram: its kind in one byte, then its payload.
 
-    The side that has no port to go to waits to be greeted, and drops what it should send before.
+    The side without a peer's port waits for a first message, and drops what it should send before
+    that.
     """
 
     def __init__(self, port: int | None = None) -> None:
@@ -24,16 +25,16 @@ class Local:
             self._socket.sendto(HELLO, self._peer)
 
     def fileno(self) -> int:
-        """The file that shows when there is something to receive."""
+        """Descriptor that is readable when there is something to receive."""
         return self._socket.fileno()
 
     def send(self, kind: int, payload: bytes) -> None:
-        """Send a message at once, if the peer is known."""
+        """Send a message at once if the peer is known."""
         if self._peer:
             self._socket.sendto(bytes([kind]) + payload, self._peer)
 
     def receive(self, timeout_s: float) -> Iterator[tuple[int, bytes]]:
-        """Wait for one message, and tell it."""
+        """Wait for one message and yield it."""
         if select.select([self._socket], [], [], timeout_s)[0]:
             datagram, self._peer = self._socket.recvfrom(DATAGRAM)
             if datagram:

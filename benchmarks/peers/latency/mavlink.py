@@ -1,11 +1,12 @@
 """MAVLink 2 by pymavlink. Runs in its own environment.
 
-The paper changed messages so that each had 115 bytes. So here: each topic is a message of its own,
-of just as many bytes as its payload, by a class like those that MAVLink's generator makes. With 12
-bytes of MAVLink around it. (TUNNEL, of the common dialect, would add 5, and ends at 128.)
+The paper changed messages so that each had 115 bytes. Here, likewise, each topic is a message of
+its own with exactly the size of its payload, by a class like those that MAVLink's generator makes,
+plus 12 bytes of MAVLink framing. (TUNNEL, of the common dialect, would add 5 bytes, and ends at
+128.)
 
-What comes is parsed by pymavlink, checked, and unpacked field by field into an object, as MAVROS
-and PX4 do; the object's field then becomes the payload again.
+Incoming messages are parsed by pymavlink, checked, and unpacked field by field into an object, as
+MAVROS and PX4 do; the object's field then becomes the payload again.
 """
 
 import importlib
@@ -19,16 +20,16 @@ COMPONENTS = {"fcu": 1, "companion": 191}
 """MAV_COMP_ID_AUTOPILOT1, MAV_COMP_ID_ONBOARD_COMPUTER."""
 SYSTEM = 1
 FIRST_ID = 52000
-"""No message of the common dialect has such a number."""
+"""First message id of ours; the common dialect has none this high."""
 CRC_EXTRA = 115
-"""Stands for a checksum over the message's definition."""
+"""Stands for a checksum of the message's definition."""
 
 
 class Mavlink:
     """One end's encoder and parser."""
 
     def __init__(self, side: str, size: int) -> None:
-        # Not in the environment that types are checked in.
+        # Imported here: it is not installed in the type checker's environment.
         self._common: Any = importlib.import_module("pymavlink.dialects.v20.common")
         self._mavlink = self._common.MAVLink(None, SYSTEM, COMPONENTS[side])
         self._mavlink.robust_parsing = True
@@ -39,7 +40,7 @@ class Mavlink:
         self._common.mavlink_map.update({made.id: made for made in self._topics.values()})
 
     def encode(self, kind: int, payload: bytes) -> bytes:
-        """A reply has room for one of the answerer's stamps: when it was sent."""
+        """Encode a message. A reply holds only one of the responder's stamps: when it was sent."""
         if kind == REQUEST:
             message = self._common.MAVLink_timesync_message(0, *ASKED.unpack(payload))
         elif kind == REPLY:
@@ -52,7 +53,7 @@ class Mavlink:
         return frame
 
     def decode(self, chunk: bytes) -> Iterator[tuple[int, bytes]]:
-        """Messages of neither kind, and bytes of none, are left out."""
+        """Decode messages of both kinds; others, and bytes outside messages, are skipped."""
         message = self._mavlink.parse_char(chunk)
         while message is not None:
             if message.get_type() == "TIMESYNC":
@@ -69,7 +70,7 @@ def _timesync(message: Any) -> tuple[int, bytes]:  # noqa: ANN401
 
 
 def message_class(common: Any, kind: int, size: int) -> Any:  # noqa: ANN401
-    """A topic's message, as the generator would make it: `uint8_t[size] data`."""
+    """A topic's message class, as the generator would make it: `uint8_t[size] data`."""
 
     def init(self: Any, data: bytes) -> None:  # noqa: ANN401
         common.MAVLink_message.__init__(self, self.id, self.msgname)

@@ -1,4 +1,4 @@
-"""Our own daemons as a peer: programs on the bus, and between them PDUs straight back or an air."""
+"""Our own daemons as a peer: programs on the bus, with looped-back PDUs or an air between."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,13 +11,13 @@ from sdrlinkd.client import Publisher, Subscriber
 AIR = Air()
 ROBOT = {"companion": 1, "fcu": 2}
 SHARED = "direct"
-"""Here both ends are programs of one robot."""
+"""With this link both ends are programs of one robot."""
 TOPICS = {SHARED: 7, "ether": 15}
-"""So many each way: of one registry both ways, or of one each."""
+"""Number of topics each way: of one registry for both ways, or of one each."""
 
 
 class BusEnd:
-    """One end's program. Messages for time synchronisation are told from others by their length."""
+    """One end's program. Messages for time synchronisation are recognised by their length."""
 
     def __init__(self, address: Address, side: str) -> None:
         robot = ROBOT[side]
@@ -38,7 +38,7 @@ class BusEnd:
         self._out.send(f"{self._prefix}{number}", payload)
 
     def receive(self, timeout_s: float) -> Iterator[tuple[int, bytes]]:
-        """Wait for one message from the daemon, and tell it."""
+        """Wait for one message from the daemon and yield it."""
         message = self._heard.receive(timeout_s)
         if message is None:
             return
@@ -53,7 +53,7 @@ class BusEnd:
 
 @contextmanager
 def direct(_: int) -> Iterator[Way]:
-    """Both ends at one daemon, whose PDUs come straight back."""
+    """Both ends on one daemon, whose PDUs are looped back."""
     names = [f"{side}{i}" for side in "cf" for i in range(TOPICS[SHARED])]
     with running(AIR._replace(backend=SHARED), [1], names) as daemons:
         address = Address(SHARED, str(daemons.folders[1]))

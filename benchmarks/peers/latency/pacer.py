@@ -1,18 +1,18 @@
-"""One direction of a serial line, as a calculator: when which bytes have left it."""
+"""One direction of a serial line: computes when which bytes have left it."""
 
 import math
 from collections import deque
 
 BITS_PER_BYTE = 10
-"""8N1: with a start bit and a stop bit."""
+"""8N1: eight bits with a start bit and a stop bit."""
 PIECE = 144
-"""Bytes handed over at a time: what a long chunk begins with does not wait for all the rest."""
+"""Bytes handed over at once: the start of a long chunk does not wait for its end."""
 BUFFER = 4096
-"""Bytes that a driver keeps for a line that is busy."""
+"""Bytes that a driver buffers for a busy line."""
 
 
 class Pacer:
-    """Bytes enter at any time, and leave at baud / 10 a second; times in s."""
+    """Delays bytes: they enter at any time, and leave at baud / 10 per second; times in s."""
 
     def __init__(self, baud: int) -> None:
         self._byte_s = BITS_PER_BYTE / baud
@@ -20,15 +20,15 @@ class Pacer:
         self._pieces: deque[tuple[float, bytes]] = deque()
         self._queued = 0
         self.dropped = 0
-        """Bytes of chunks that the buffer had no room for."""
+        """Bytes of chunks that did not fit in the buffer."""
 
     @property
     def due(self) -> float:
-        """When the next piece is out; infinity where there is none."""
+        """Time at which the next piece is out; infinity if there is none."""
         return self._pieces[0][0] if self._pieces else math.inf
 
     def take(self, chunk: bytes, now: float) -> None:
-        """A chunk that was written now; its last byte is out at max(now, free) + n * 10 / baud."""
+        """Take a chunk written now; its last byte is out at max(now, free) + n * 10 / baud."""
         if self._queued + len(chunk) > BUFFER:
             self.dropped += len(chunk)
             return
@@ -41,7 +41,7 @@ class Pacer:
         self._free = out
 
     def give(self, now: float) -> bytes:
-        """What is out by now."""
+        """Return the bytes that are out by now."""
         out = []
         while self.due <= now:
             piece = self._pieces.popleft()[1]

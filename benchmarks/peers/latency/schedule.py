@@ -1,20 +1,21 @@
-"""When an end sends what: topics at a fixed rate, requests for the time at chance moments."""
+"""When an end sends what: topics at a fixed rate, time requests at random moments."""
 
 import random
 
 from benchmarks.peers.latency.job import FIRST_TOPIC, REQUEST, Job
 
 WARMUP_REQUESTS_HZ = 100.0
-"""So that the paper's filter has its 500 samples soon."""
+"""High enough for the paper's filter to get its 500 samples soon."""
 REQUESTS_HZ = 10.0
-"""As MAVROS asks."""
+"""The rate of MAVROS."""
 
 
 def schedule(job: Job) -> list[tuple[float, int, int]]:
-    """(s after the start, kind, number), in order of time.
+    """The schedule in order of time: (s after the start, kind, number).
 
-    Each topic has a phase of its own, by the seed. Requests go at a moment by chance within their
-    period: in runs as short as these, timers do not drift through each other as they do in flight.
+    Each topic has its own phase, drawn from the seed. Requests have a random time within their
+    period, because in runs as short as these, timers do not drift through each other as they do in
+    flight.
     """
     rng = random.Random(f"{job.seed} {job.side}")
     period = 1 / job.rate_hz

@@ -1,4 +1,4 @@
-"""The peers by name, how their ends are joined up, and which of them can run here."""
+"""The peers by name, how their ends are connected, and which of them can run here."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -13,24 +13,24 @@ from benchmarks.processes import precede, start_module
 from sdrlinkd.process import Process
 
 BAUD = 921_600
-"""What PX4's TELEM2 is set to for a companion computer."""
+"""The rate of PX4's TELEM2 for a companion computer."""
 
 
 class Peer(NamedTuple):
-    """What a team would use."""
+    """A system that a team would use."""
 
     of: str
-    """The software whose manner this is."""
+    """The software that this peer imitates."""
     open: Callable[[int], AbstractContextManager[Way]]
-    """Makes a way for messages of so many bytes."""
+    """Opens a way for messages of the given size in bytes."""
     environment: str = ""
-    """The virtual environment that some part of it needs."""
+    """The virtual environment that it needs."""
 
 
 def serial(
     transport: str, environment: str = "", hop: str = ""
 ) -> Callable[[int], AbstractContextManager[Way]]:
-    """Over a line of 921600 baud; `hop` is what a bridge on the companion is called."""
+    """A way over a line of 921600 baud; `hop` is the transport of a bridge on the companion."""
 
     @contextmanager
     def open_way(size: int) -> Iterator[Way]:
@@ -53,7 +53,7 @@ def serial(
 
 
 def _late_s(line: Process) -> list[float]:
-    """What the line tells when it is done."""
+    """The delays that the line reports at its end."""
     line.close_input()
     late_s: list[float] = json.loads(line.line())
     return late_s
@@ -71,5 +71,5 @@ PEERS: dict[str, Peer] = {
 
 
 def unavailable(peer: str) -> str | None:
-    """None where this peer can run, else why not; makes the environment that it needs."""
+    """Why a peer cannot run here, or None if it can; creates the environment that it needs."""
     return environments.unavailable(PEERS, peer)

@@ -12,7 +12,7 @@ def open_transport(address: Address, side: str, size: int) -> Transport:
     if address.transport == "local":
         return Local(int(address.place))
     if address.transport in ("direct", "ether"):
-        # What it needs is not in other environments.
+        # Imported here: its dependencies are missing in other environments.
         from benchmarks.peers.latency.ours import BusEnd
 
         return BusEnd(address, side)

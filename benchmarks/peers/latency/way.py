@@ -1,4 +1,4 @@
-"""What there is between two ends."""
+"""Everything between two ends."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -8,23 +8,23 @@ from sdrlinkd.process import Process
 
 
 class End(NamedTuple):
-    """Where one endpoint is joined up, and by which interpreter it runs; see `environments`."""
+    """How one endpoint is connected, and its interpreter; see `environments`."""
 
     address: Address
     environment: str = ""
 
 
 def no_line() -> list[float]:
-    """An emulated line that is none, for ways that need none."""
+    """No delays: for ways without an emulated line."""
     return []
 
 
 class Way(NamedTuple):
-    """What there is from end to end, up and running."""
+    """A running connection from end to end."""
 
     ends: dict[str, End]
-    """Of "companion" and "fcu"."""
+    """The ends of "companion" and "fcu"."""
     between: list[Process]
-    """Processes whose load counts too."""
+    """Processes whose load counts as well."""
     line_late_s: Callable[[], list[float]] = no_line
-    """Called once, in the end."""
+    """Delays of the emulated line; called once, at the end."""

@@ -1,7 +1,7 @@
 """A serial line: two pairs of pseudo-terminals and a pacer each way, in a process of its own.
 
-`python -m benchmarks.peers.latency.wire BAUD` tells the two devices as JSON, carries bytes until
-its input ends, and then tells how late it was with each piece, in s.
+`python -m benchmarks.peers.latency.wire BAUD` prints the two devices as JSON, carries bytes until
+its input ends, and then prints the delay of each piece in s.
 """
 
 import json
@@ -15,7 +15,7 @@ from benchmarks.peers.latency.pacer import Pacer
 
 CHUNK = 1024
 SPIN_S = 250e-6
-"""Sleeps end late by about so much; the rest of a wait is spent looking."""
+"""Sleeps end late by about this much, so the rest of a wait is polled."""
 
 
 class Wire:
@@ -23,18 +23,18 @@ class Wire:
 
     def __init__(self, baud: int) -> None:
         pairs = [os.openpty() for _ in range(2)]
-        # Ours stay open: without any, reading would fail until an end has opened its device.
+        # We keep ours open: otherwise reads would fail until an end has opened its device.
         for ends in pairs:
             for end in ends:
                 tty.setraw(end)
         self.devices = [os.ttyname(device) for _, device in pairs]
         (a, _), (b, _) = pairs
         self._ways = {a: (b, Pacer(baud)), b: (a, Pacer(baud))}
-        """By what is read from: what is written to, and when."""
+        """By the descriptor read from: the descriptor written to, and its pacer."""
         self.late_s: list[float] = []
 
     def run(self, stop: int) -> None:
-        """Until that file is at its end."""
+        """Carry bytes until the file `stop` ends."""
         while True:
             due = min(pacer.due for _, pacer in self._ways.values())
             wait = due - time.monotonic() - SPIN_S
@@ -52,7 +52,7 @@ class Wire:
 
 
 def main() -> None:
-    """Be a line for the command line, until its input ends."""
+    """Run the line as the command line says, until the input ends."""
     wire = Wire(int(sys.argv[1]))
     print(json.dumps(wire.devices), flush=True)
     wire.run(sys.stdin.fileno())

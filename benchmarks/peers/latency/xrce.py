@@ -1,8 +1,8 @@
 """An XRCE-DDS session on a serial line, best effort (DDS-XRCE 1.0, chapter 8).
 
-The FCU is the client: it writes with WRITE_DATA, and is given DATA by the agent. The creation of
-client, participant, topics, readers and writers is taken as done. Time synchronisation goes by
-TIMESTAMP and TIMESTAMP_REPLY, and unlike eProsima's agent, either side asks.
+The FCU is the client: it writes with WRITE_DATA, and receives DATA from the agent. The creation of
+client, participant, topics, readers and writers is assumed to be done. Time synchronisation uses
+TIMESTAMP and TIMESTAMP_REPLY; unlike with eProsima's agent, either side may ask.
 """
 
 import struct
@@ -12,13 +12,13 @@ from benchmarks.peers.latency.job import ANSWERED, ASKED, REPLY, REQUEST
 from benchmarks.peers.latency.xrce_framing import Deframer, frame
 
 ADDRESSES = {"companion": 0, "fcu": 1}
-"""The agent's and the client's, as eProsima's have them."""
+"""The agent's and the client's addresses, as in eProsima's software."""
 HEADER = struct.Struct("<BBH")
-"""Session, stream, sequence number; a session from 0x80 on goes without the client's key."""
+"""Session, stream, sequence number; sessions from 0x80 on omit the client's key."""
 SUBHEADER = struct.Struct("<BBH")
 """Submessage, flags, length."""
 OBJECT = struct.Struct(">HH")
-"""Of a writer's or reader's request: its number, the object (12 bits of number, 4 of kind)."""
+"""A writer's or reader's request: its number, the object (12 bits of number, 4 of kind)."""
 TIME = struct.Struct("<iI")
 """Seconds, nanoseconds."""
 SESSION = 0x81
@@ -41,7 +41,7 @@ class Xrce:
         self._sequence = 0
 
     def encode(self, kind: int, payload: bytes) -> bytes:
-        """One frame with one submessage."""
+        """Encode a message as one frame with one submessage."""
         if kind == REQUEST:
             return self._frame(NO_STREAM, 0, TIMESTAMP, _time(*ASKED.unpack(payload)))
         if kind == REPLY:
@@ -57,7 +57,7 @@ class Xrce:
         return frame(self._address, 1 - self._address, header + subheader + payload)
 
     def decode(self, chunk: bytes) -> Iterator[tuple[int, bytes]]:
-        """Anything but what the other side's `encode` makes is left out."""
+        """Decode what the other side's `encode` made; anything else is skipped."""
         for message in self._deframer.feed(chunk):
             if len(message) < HEADER.size + SUBHEADER.size:
                 continue

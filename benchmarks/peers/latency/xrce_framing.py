@@ -1,8 +1,8 @@
-"""Frames on a serial line, as DDS-XRCE 1.0 (11.3) and eProsima's client and agent have them.
+"""Frames on a serial line, as in DDS-XRCE 1.0 (11.3) and eProsima's client and agent.
 
     0x7E, source, destination, length (2), payload, CRC-16 of the payload (2); little-endian
 
-After the first byte, 0x7E and 0x7D go as 0x7D and the byte XOR 0x20. Nothing marks the end.
+After the first byte, 0x7E and 0x7D are sent as 0x7D and the byte XOR 0x20. There is no end marker.
 """
 
 import re
@@ -48,18 +48,18 @@ def stuff(data: bytes) -> bytes:
 
 
 def unstuff(data: bytes) -> bytes:
-    """What `stuff` was given. An escape at the end, with nothing after it, is left out."""
+    """Undo `stuff`. An incomplete escape at the end is dropped."""
     return ESCAPED.sub(lambda found: bytes([found[1][0] ^ FLIP]), data.removesuffix(ESCAPE))
 
 
 def frame(source: int, destination: int, payload: bytes) -> bytes:
-    """As it goes over the line."""
+    """Make a frame for the line."""
     head = HEAD.pack(source, destination, len(payload))
     return BEGIN + stuff(head + payload + CRC.pack(crc16(payload)))
 
 
 class Deframer:
-    """Takes the stream in any chunks; what is damaged or for others is left out."""
+    """Finds frames in a stream of any chunks; damaged ones and those for others are skipped."""
 
     def __init__(self, address: int) -> None:
         self._address = address
@@ -94,7 +94,7 @@ class Deframer:
 
 
 def _complete(body: bytes) -> bool:
-    """Whether it is all there, or never will be a frame."""
+    """Whether the frame is complete, or can never become a valid one."""
     if len(body) < HEAD.size:
         return False
     length: int = HEAD.unpack_from(body)[2]

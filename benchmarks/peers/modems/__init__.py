@@ -1,6 +1,6 @@
-"""Other OFDM modems, built or found when first asked for: GNU Radio's and liquid-dsp's.
+"""Other OFDM modems, built or located on first use: GNU Radio's and liquid-dsp's.
 
-Where one cannot be measured, whoever asks for a figure gets a PeerError that says why.
+If one cannot be measured, any request for a figure raises PeerError with the reason.
 """
 
 from benchmarks.peers.modems.gnu_radio import GnuRadio

@@ -1,4 +1,4 @@
-"""GNU Radio: `gnu_radio_ofdm.py` beside this file, run by the system's interpreter."""
+"""GNU Radio: runs `gnu_radio_ofdm.py` in this folder with the system's interpreter."""
 
 from pathlib import Path
 
@@ -10,24 +10,24 @@ SCRIPT = Path(__file__).with_name("gnu_radio_ofdm.py")
 
 
 class GnuRadio:
-    """Its OFDM modem has no error correction; `bits` a subcarrier, 1 or 2.
+    """GNU Radio's OFDM modem, which has no error correction; `bits` per subcarrier, 1 or 2.
 
-    Every measurement raises PeerError and ProcessError where it is not there (Debian: gnuradio).
+    Every measurement raises PeerError and ProcessError if GNU Radio is absent (Debian: gnuradio).
     """
 
     name = "GNU Radio"
 
     def errors(self, bits: int, n_bytes: int, snr_db: float, n: int, seed: int) -> int:
-        """How many of `n` frames are not heard."""
+        """Number of `n` frames that are lost."""
         return int(self._run("errors", bits, n_bytes, snr_db, n, seed))
 
     def speed(self, bits: int, n_bytes: int, n: int, seed: int) -> tuple[float, float]:
-        """Msps of CPU time, (transmitter, receiver at 30 dB with gaps of 400 samples)."""
+        """Msps of CPU time: (transmitter, receiver at 30 dB with gaps of 400 samples)."""
         sends, hears = self._run("speed", bits, n_bytes, n, seed).split()
         return float(sends), float(hears)
 
     def noise_msps(self, n_samples: int, seed: int) -> float:
-        """Msps of CPU time of a receiver that hears nothing."""
+        """Msps of CPU time of a receiver on noise alone."""
         return float(self._run("noise", n_samples, seed))
 
     def _run(self, *arguments: object) -> str:

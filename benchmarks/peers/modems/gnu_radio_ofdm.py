@@ -1,12 +1,12 @@
-"""GNU Radio's own OFDM modem, run by the interpreter that GNU Radio belongs to.
+"""GNU Radio's own OFDM modem, run by GNU Radio's interpreter.
 
     python3 gnu_radio_ofdm.py errors BITS BYTES SNR_DB FRAMES SEED   frames lost
     python3 gnu_radio_ofdm.py speed BITS BYTES FRAMES SEED           Msps of CPU time: tx, rx
     python3 gnu_radio_ofdm.py noise SAMPLES SEED                     Msps of CPU time on noise
 
 `digital.ofdm_tx` and `ofdm_rx` with 64 subcarriers, prefix 16, no code. SNR is a frame's mean power
-over that of the noise in the sample band; before each are 200 to 599 samples of noise, its
-frequency is off by up to 0.02 radians a sample. CPU time is that of all threads of the flow graph.
+over that of the noise in the sample band. 200 to 599 samples of noise precede each frame, and its
+frequency offset is up to 0.02 radians per sample. CPU time is that of all threads of the flowgraph.
 """
 
 import sys
@@ -22,14 +22,14 @@ GAP = 400
 
 
 def payloads(rng, n_frames, n_bytes):
-    """Random, each with its number in front."""
+    """Random payloads, each starting with its number."""
     frames = rng.integers(0, 256, (n_frames, n_bytes), np.uint8)
     frames[:, :4] = np.arange(n_frames, dtype=">u4").view(np.uint8).reshape(-1, 4)
     return frames
 
 
 def run(*chain):
-    """CPU time of a flow graph of these blocks."""
+    """CPU time of a flowgraph of these blocks."""
     graph = gr.top_block()
     graph.connect(*chain)
     begin = time.process_time()
@@ -38,7 +38,7 @@ def run(*chain):
 
 
 def send(frames, bits):
-    """(samples `[n_frames, n]`, CPU time)."""
+    """Modulate frames; (samples `[n_frames, n]`, CPU time)."""
     source = blocks.vector_source_b(frames.reshape(-1).tolist(), False)
     tagged = blocks.stream_to_tagged_stream(gr.sizeof_char, 1, frames.shape[1], TAG)
     modem = digital.ofdm_tx(packet_length_tag_key=TAG, bps_header=1, bps_payload=bits)
@@ -48,8 +48,8 @@ def send(frames, bits):
 
 
 def hear(samples, bits):
-    """(bytes of all frames told, CPU time)."""
-    # From a file: no tags of the sender reach the receiver, which would take them for its own.
+    """Demodulate samples; (bytes of all received frames, CPU time)."""
+    # Via a file: the receiver would take the sender's tags for its own.
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "samples.cf32"
         samples.tofile(path)
@@ -73,7 +73,7 @@ def through(rng, bursts, snr_db, gaps):
 
 
 def count(told, frames):
-    """Frames that are among the bytes told."""
+    """Number of frames that are among the received bytes."""
     n = frames.shape[1]
     got = {told[at : at + n] for at in range(0, len(told) - n + 1, n)}
     return sum(frame.tobytes() in got for frame in frames)

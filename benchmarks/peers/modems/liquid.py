@@ -1,4 +1,4 @@
-"""liquid-dsp: `liquid.c` beside this file, built when the library and a compiler are there."""
+"""liquid-dsp: builds `liquid.c` in this folder if the library and a compiler are installed."""
 
 import functools
 import shutil
@@ -12,29 +12,28 @@ SOURCE = Path(__file__).with_name("liquid.c")
 
 
 class Liquid:
-    """Codes are named as liquid-dsp does: "none", "h128", "g2412".
+    """liquid-dsp's modem; codes have liquid-dsp's names: "none", "h128", "g2412".
 
-    Every measurement raises PeerError and ProcessError where it is not there (Debian:
-    libliquid-dev).
+    Every measurement raises PeerError and ProcessError if it is absent (Debian: libliquid-dev).
     """
 
     name = "liquid-dsp"
 
     def errors(self, code: str, bits: int, n_bytes: int, snr_db: float, n: int, seed: int) -> int:
-        """How many of `n` frames are not heard."""
+        """Number of `n` frames that are lost."""
         return int(self._run("errors", code, bits, n_bytes, snr_db, n, seed))
 
     def headers(self, snr_db: float, n: int, seed: int) -> int:
-        """How many headers of `n` frames are read."""
+        """Number of headers of `n` frames that are read."""
         return int(self._run("headers", snr_db, n, seed))
 
     def speed(self, code: str, bits: int, n_bytes: int) -> tuple[float, float]:
-        """Msps of CPU time, (transmitter, receiver at 30 dB with gaps of 400 samples)."""
+        """Msps of CPU time: (transmitter, receiver at 30 dB with gaps of 400 samples)."""
         sends, hears = self._run("speed", code, bits, n_bytes).split()
         return float(sends), float(hears)
 
     def noise_msps(self, n_samples: int, seed: int) -> float:
-        """Msps of CPU time of a receiver that hears nothing."""
+        """Msps of CPU time of a receiver on noise alone."""
         return float(self._run("noise", n_samples, seed).split()[0])
 
     def _run(self, *arguments: object) -> str:

@@ -17,14 +17,14 @@ from benchmarks.peers.pound.runs import run_peer
 from benchmarks.peers.pound.table import PEERS
 
 IMAGE_PERIOD_S = {False: 0.15, True: 0.3}
-"""By whether there is a relay: the channel then carries half as much."""
+"""Image period without and with a relay, which halves the channel's capacity."""
 
 Result = dict[str, Figures] | str
 """The figures by flow, or why there are none."""
 
 
 def flows(lasers: int, relay: bool) -> list[Flow]:
-    """The paper's two, over the same time."""
+    """The paper's two flows, over the same time."""
     period_s = IMAGE_PERIOD_S[relay]
     return [
         Flow("laser", 1024, 0.02, lasers, "latency"),
@@ -33,7 +33,7 @@ def flows(lasers: int, relay: bool) -> list[Flow]:
 
 
 def measure(names: list[str], options: argparse.Namespace) -> Iterator[tuple[str, Result]]:
-    """Peer by peer, each on a network of its own."""
+    """Measure each peer in turn, each on a network of its own."""
     for name in names:
         try:
             with network(shared=options.shared, relay=options.relay) as on:
@@ -46,7 +46,7 @@ def measure(names: list[str], options: argparse.Namespace) -> Iterator[tuple[str
 def table(results: dict[str, dict[str, Figures]]) -> Table:
     """All figures as a table for people."""
     made = Table(title="laser and image through each peer", title_justify="left")
-    for column in ("peer", "in the manner of", "flow"):
+    for column in ("peer", "imitates", "flow"):
         made.add_column(column)
     for column in ("Jd ms", "std(Jd)", "D ms", "std(D)", "MDR %", "Mbit/s"):
         made.add_column(column, justify="right")
@@ -61,7 +61,7 @@ def table(results: dict[str, dict[str, Figures]]) -> Table:
 
 
 def main() -> int:
-    """Parse, measure, print; 1 where no peer could be measured."""
+    """Parse, measure, print; returns 1 if no peer could be measured."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.peers.pound", description=__doc__)
     parser.add_argument("--peer", action="append", choices=[*PEERS], help="only this one; repeat")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
@@ -70,7 +70,7 @@ def main() -> int:
     parser.add_argument("--relay", action="store_true", help="three nodes in a chain")
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
-    # As an interrupt does: through all that gives back what was opened.
+    # Like an interrupt: runs all cleanup handlers.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     names = options.peer or [*PEERS]
     results: dict[str, Result] = {}

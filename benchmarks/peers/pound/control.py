@@ -2,8 +2,8 @@
 
     G(s) = 1 / (L C s² + R C s + 1),  L = C = 0.1, R = 1,  u = K (Vi - y),  K = 1, Vi = 1 V, 20 ms
 
-Every 20 ms A samples and sends y, and holds for that period the last u that it heard by then, at
-best what B made of the y before; B answers each y at once. Beside u, B sends 64 KB every 200 ms.
+Every 20 ms A samples and sends y. For that period it holds the last u received by then, at best the
+answer to the previous y; B answers each y at once. In addition to u, B sends 64 KB every 200 ms.
 Both directions share the channel.
 """
 
@@ -24,7 +24,7 @@ RESISTANCE = 1.0
 GAIN = SETPOINT = 1.0
 PERIOD_S = 0.02
 SMALL = 60
-"""Bytes of a y or a u."""
+"""Size of a y or a u in bytes."""
 LARGE = 65536
 LARGE_PERIOD_S = 0.2
 
@@ -32,7 +32,7 @@ LARGE_PERIOD_S = 0.2
 def plant() -> tuple[Voltages, Voltages]:
     """A `[2, 2]` and b `[2]` of x(k+1) = A x(k) + b u(k), u held for a period; x = (Vc, Vc')."""
     lc = INDUCTANCE * CAPACITANCE
-    # exp of [[F, g], [0, 0]] T holds exp(F T) and the integral of exp(F t) g beside it.
+    # exp of [[F, g], [0, 0]] T contains exp(F T) and the integral of exp(F t) g.
     whole = np.zeros((3, 3))
     whole[0, 1] = 1.0
     whole[1] = [-1 / lc, -RESISTANCE * CAPACITANCE / lc, 1 / lc]
@@ -41,7 +41,7 @@ def plant() -> tuple[Voltages, Voltages]:
 
 
 def local_loop(ticks: int) -> Voltages:
-    """Vc(k) in V, `[ticks]`, where u(k) is made from y(k-1): what no network can better."""
+    """Vc(k) in V, `[ticks]`, with u(k) computed from y(k-1): the optimum over any network."""
     a, b = plant()
     x, u, vc = np.zeros(2), 0.0, np.zeros(ticks)
     for k in range(ticks):

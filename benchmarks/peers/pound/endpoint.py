@@ -1,7 +1,7 @@
 """One end of an experiment, as a process of its own: `python -m benchmarks.peers.pound.endpoint`.
 
-It reads a Job (one line of JSON), joins up with the other end, says "ready", reads when to start
-(monotonic s; both ends share the machine's clock), and tells in the end what it heard, as JSON.
+It reads a Job (one line of JSON), connects with the other end, prints "ready", reads the start time
+(monotonic s; both ends share the machine's clock), and at the end prints what it heard, as JSON.
 """
 
 import gc
@@ -21,11 +21,11 @@ from benchmarks.peers.pound.wire import HEAD
 VALUE = struct.Struct("<d")
 Y, U = 0, 1
 NICE = -10
-"""So that what else this machine does is not measured as jitter."""
+"""High priority, so that other programs on this machine cause no jitter."""
 
 
 class Player:
-    """Sends by a schedule, and notes when messages come."""
+    """Sends by a schedule, and records when messages arrive."""
 
     def __init__(self, job: Job) -> None:
         self._job = job
@@ -35,12 +35,12 @@ class Player:
         self.start = math.inf
 
     def hear(self, message: bytes, at: float) -> None:
-        """Note a message; when it came is told in s after the start."""
+        """Record a message with its arrival time in s after the start."""
         topic, number = HEAD.unpack_from(message)
         self.heard[topic].setdefault(number, at - self.start)
 
     def play(self, transport: Transport) -> None:
-        """The schedule, then until the end."""
+        """Play the schedule, then wait until the end."""
         end = self.start + self._job.seconds
         for after, topic, number in self._job.sends:
             transport.run(min(self.start + after, end))
@@ -50,20 +50,20 @@ class Player:
         transport.run(end)
 
     def send(self, transport: Transport, topic: int, number: int, value: float = 0.0) -> None:
-        """One message with these numbers; random bytes fill it up."""
+        """Send one message with these numbers, padded with random bytes."""
         head = HEAD.pack(topic, number) + VALUE.pack(value)
         transport.send(topic, head + self._filler[topic][len(head) :])
 
 
 class Plant(Player):
-    """Sends its output once a period, and steps with the input it had heard by then."""
+    """Sends its output once per period, and steps with the input received by then."""
 
     def __init__(self, job: Job, loop: Loop) -> None:
         super().__init__(job)
         self._loop, self._u = loop, 0.0
 
     def hear(self, message: bytes, at: float) -> None:
-        """Hold an input; anything else only shares the channel."""
+        """Store an input; other messages only load the channel."""
         super().hear(message, at)
         if HEAD.unpack_from(message)[0] == U:
             (self._u,) = VALUE.unpack_from(message, HEAD.size)
@@ -82,7 +82,7 @@ class Plant(Player):
 
 
 class Controller(Player):
-    """Answers each output with an input, and plays its schedule beside that."""
+    """Answers each output with an input, and plays its schedule at the same time."""
 
     def __init__(self, job: Job, loop: Loop) -> None:
         super().__init__(job)
@@ -90,7 +90,7 @@ class Controller(Player):
         self.transport: Transport | None = None
 
     def hear(self, message: bytes, at: float) -> None:
-        """u = gain (setpoint - y)."""
+        """Answer an output y with u = gain (setpoint - y)."""
         super().hear(message, at)
         topic, number = HEAD.unpack_from(message)
         if topic == Y and self.transport:
@@ -99,7 +99,7 @@ class Controller(Player):
 
 
 def part(job: Job) -> Player:
-    """The player of what this end does."""
+    """The player for this end's task."""
     if job.loop is None:
         return Player(job)
     return Plant(job, job.loop) if job.side == "a" else Controller(job, job.loop)
@@ -120,10 +120,10 @@ def open_transport(job: Job, player: Player) -> Transport:
 
 
 def main() -> dict[str, object]:
-    """What is to be told."""
+    """Run the endpoint; returns its report."""
     job = Job.from_json(sys.stdin.readline())
     os.nice(NICE)
-    # Whatever hangs, the process ends.
+    # Even a hanging process ends in time.
     signal.alarm(int(2 * CONTACT_S + job.seconds + 20))
     player = part(job)
     try:
@@ -146,5 +146,5 @@ def main() -> dict[str, object]:
 
 if __name__ == "__main__":
     print(json.dumps(main()), flush=True)
-    # Not through the interpreter's own end: threads of middleware would hold it up.
+    # Skip the interpreter's shutdown, which middleware threads would delay.
     os._exit(0)

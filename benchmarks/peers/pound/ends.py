@@ -14,22 +14,22 @@ from benchmarks.peers.pound.table import PEERS, unavailable
 from sdrlinkd.process import Process
 
 START_S = 0.3
-"""From both ends being ready to the beginning of the experiment."""
+"""Time from when both ends are ready to the start of the experiment."""
 LATE_S = 30.0
-"""An end that has told nothing so long after its time hangs."""
+"""An end that has not reported this long after its time hangs."""
 
 
 class Told(NamedTuple):
-    """What one end tells when it is done."""
+    """The report of one end."""
 
     heard: dict[int, dict[int, float]]
-    """Of each topic's messages that came, by number: s after the start."""
+    """Arrival time of each topic's messages by number: s after the start."""
     values: list[float]
     """The plant's output at each tick."""
 
 
 class Plan(NamedTuple):
-    """What a pair of ends is to do; see `Job`."""
+    """The task of a pair of ends; see `Job`."""
 
     topics: list[Topic]
     sends: dict[str, list[tuple[float, int, int]]]
@@ -41,9 +41,9 @@ class Plan(NamedTuple):
 def run_ends(
     peer: str, plan: Plan, network: Network, during: Callable[[float], None] | None = None
 ) -> dict[str, Told]:
-    """What sides "a" and "b" tell. `during` is called with the start, in monotonic s.
+    """Run sides "a" and "b", and return their reports.
 
-    Raises PeerError and ProcessError.
+    `during` is called with the start, in monotonic s. Raises PeerError and ProcessError.
     """
     if (reason := unavailable(peer)) is not None:
         raise PeerError(f"{peer}: {reason}")
@@ -70,13 +70,13 @@ def run_ends(
             end.tell(repr(start))
         if during:
             during(start)
-        # Whoever looks for lines meanwhile takes processor time from those that are measured.
+        # Reading lines meanwhile would take CPU time from the measured programs.
         time.sleep(max(0.0, start + plan.seconds - time.monotonic()))
         return {side: _told(end.line(LATE_S)) for side, end in ends.items()}
 
 
 def _start(stack: ExitStack, job: Job, node: Node) -> Process:
-    """One end, which knows its job. It ends by itself in bounded time, or with the stack."""
+    """Start one end with its job. It ends by itself in bounded time, or with the stack."""
     program = [interpreter(PEERS[job.peer].environment), "-m", "benchmarks.peers.pound.endpoint"]
     name = f"{job.peer}, end {job.side}"
     command = node.command(*program)

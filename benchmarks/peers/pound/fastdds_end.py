@@ -1,7 +1,7 @@
 """One end of ROS 2 with Fast DDS: rclpy from wheels. Runs in its own environment.
 
-Messages are std_msgs/UInt8MultiArray, serialised here, so that rclpy's slow way from a list of
-numbers to bytes is no part of what is measured.
+Messages are std_msgs/UInt8MultiArray, serialised here, so that rclpy's slow conversion from a list
+of numbers to bytes is not measured.
 """
 
 import importlib
@@ -14,7 +14,7 @@ from typing import Any
 from benchmarks.peers.pound.job import CONTACT_S, Hear, Job, NoContactError
 
 CDR = struct.Struct("<4sIII")
-"""Encapsulation; an empty layout: dimensions, data_offset; then how many bytes follow."""
+"""Encapsulation; an empty layout: dimensions, data_offset; then the number of bytes that follow."""
 LITTLE_ENDIAN = b"\0\1\0\0"
 DEPTH = 10
 DOMAIN = "77"
@@ -26,14 +26,14 @@ class FastDds:
     def __init__(self, job: Job, reliability: str, hear: Hear) -> None:
         os.environ |= {
             "ROS_DOMAIN_ID": DOMAIN,
-            # Not by multicast, which a relay would not pass on.
+            # No multicast, which a relay would not forward.
             "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
             "ROS_STATIC_PEERS": job.there,
             # Both ends share this machine's memory, which two robots would not.
             "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
             "ROS_LOG_DIR": tempfile.gettempdir(),
         }
-        # Not in the environment that types are checked in.
+        # Imported here: it is not installed in the type checker's environment.
         self._rclpy: Any = importlib.import_module("rclpy")
         qos: Any = importlib.import_module("rclpy.qos")
         kind: Any = importlib.import_module("std_msgs.msg").UInt8MultiArray
@@ -60,7 +60,7 @@ class FastDds:
         self._executor.add_node(self._node)
 
     def meet(self) -> None:
-        """Until all publishers and subscriptions are matched."""
+        """Wait until all publishers and subscriptions are matched."""
         deadline = time.monotonic() + CONTACT_S
         while not (
             all(one.get_subscription_count() for one in self._publishers.values())
@@ -69,7 +69,7 @@ class FastDds:
             if time.monotonic() > deadline:
                 raise NoContactError(f"DDS discovery was not done within {CONTACT_S:.0f} s")
             self._executor.spin_once(0.02)
-        # Both ends' readers and writers hear of each other, one after the other.
+        # The readers and writers of both ends discover each other one after the other.
         self.run(time.monotonic() + 0.5)
 
     def send(self, topic: int, message: bytes) -> None:
@@ -77,12 +77,12 @@ class FastDds:
         self._publishers[topic].publish(CDR.pack(LITTLE_ENDIAN, 0, 0, len(message)) + message)
 
     def run(self, until: float) -> None:
-        """Spin until then, and hand over what has come."""
+        """Spin until that time, and hand over what has arrived."""
         while (left := until - time.monotonic()) > 0:
             self._executor.spin_once(left)
 
     def close(self) -> None:
-        """Leave it to the end of the process: destroying entities takes longer than they lived."""
+        """Do nothing: the process ends soon, and destroying entities takes very long."""
 
     def _come_in(self, data: bytes) -> None:
         now = time.monotonic()

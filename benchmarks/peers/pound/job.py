@@ -1,7 +1,7 @@
-"""What an endpoint is told, and what a transport has to do for it.
+"""The job of an endpoint, and the interface of a transport.
 
-Everything an endpoint imports is of the standard library: some peers bring an interpreter of their
-own, which has nothing of ours.
+Everything that an endpoint imports is in the standard library: some peers need an interpreter of
+their own, without our packages.
 """
 
 import json
@@ -10,14 +10,14 @@ from dataclasses import asdict, dataclass
 from typing import NamedTuple, Protocol
 
 Hear = Callable[[bytes, float], None]
-"""Takes a whole message, and when it was whole (monotonic s)."""
+"""Takes a complete message, and the time at which it was complete (monotonic s)."""
 
 CONTACT_S = 20.0
-"""How long both ends may take to find each other."""
+"""Time in which both ends must find each other."""
 
 
 class NoContactError(Exception):
-    """The ends did not find each other; the message says which part did not."""
+    """The ends did not find each other; the message says which part failed."""
 
 
 class Topic(NamedTuple):
@@ -28,7 +28,7 @@ class Topic(NamedTuple):
     size: int
     qos: str
     sender: str
-    """Whose it is: "a" or "b"."""
+    """The side that sends it: "a" or "b"."""
 
 
 class Loop(NamedTuple):
@@ -51,12 +51,12 @@ class Job:
     here: str
     there: str
     rate_bps: float
-    """What the channel carries of one node's, for peers that pace."""
+    """Channel capacity of one node, for peers that pace."""
     topics: list[Topic]
     sends: list[tuple[float, int, int]]
     """This end's schedule: s after the start, topic's number, message's number."""
     seconds: float
-    """How long after the start this end stops, whatever happens."""
+    """Time after the start at which this end stops, whatever happens."""
     loop: Loop | None = None
     """In the control loop "a" is the plant, "b" the controller; topics 0 and 1 are y and u."""
 
@@ -85,16 +85,16 @@ class Job:
 
 
 class Transport(Protocol):
-    """One end of a peer. Messages that come go to the `Hear` it was opened with."""
+    """One end of a peer. Received messages are passed to the `Hear` it was opened with."""
 
     def meet(self) -> None:
-        """Wait until all topics are joined up; raises NoContactError."""
+        """Wait until all topics are connected; raises NoContactError."""
 
     def send(self, topic: int, message: bytes) -> None:
-        """Take a message, as a publisher does."""
+        """Send a message, as a publisher does."""
 
     def run(self, until: float) -> None:
-        """Move bytes until then (monotonic s)."""
+        """Move bytes until that time (monotonic s)."""
 
     def close(self) -> None:
-        """Give back what was opened."""
+        """Release everything that was opened."""

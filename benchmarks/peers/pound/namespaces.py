@@ -2,12 +2,12 @@
 
     A ─veth─ B                 shared=False: each direction has a token bucket of its own
     A ─┐   ┌─ B
-       ├─air                   shared=True: one bucket for all that is sent
-    A ─┴─ R ─┴─ B              relay=True: R forwards, and both hops go through that bucket
+       ├─air                   shared=True: one bucket for all traffic
+    A ─┴─ R ─┴─ B              relay=True: R forwards, and both hops use that bucket
 
-On the shared channel each node has its own queue, and the queues take turns packet by packet, as
-stations on Wi-Fi do: A, R and B are macvlans in "vepa" mode on one veth, whose other end reflects.
-What waits there still counts against the sender's socket buffer, as in a driver's queue.
+On the shared channel each node has its own queue, and the queues take turns packet by packet, like
+stations on Wi-Fi: A, R and B are macvlans in "vepa" mode on one veth, whose other end reflects.
+Queued packets still count against the sender's socket buffer, as in a driver's queue.
 """
 
 import contextlib
@@ -28,9 +28,9 @@ from benchmarks.absent import PeerError
 DEVICE = "air"
 NET = "10.77.0"
 BURST = 4600
-"""Bytes: three frames, so that a late timer costs no throughput."""
+"""Bytes of three frames, so that a late timer costs no throughput."""
 TCP = ("congctl", "cubic")
-"""Linux's own default, whatever this machine's is."""
+"""Linux's default congestion control, whatever this machine's setting is."""
 
 _COUNT = itertools.count()
 
@@ -52,7 +52,7 @@ class Node(NamedTuple):
 
 @dataclass(frozen=True)
 class Network:
-    """Open between `with` and its end; see `network`."""
+    """An open network; see `network`."""
 
     a: Node
     b: Node
@@ -62,15 +62,15 @@ class Network:
 
     @property
     def hops(self) -> int:
-        """How often each packet is on the channel."""
+        """Number of times that each packet is on the channel."""
         return 2 if self.relay else 1
 
     def outage(self, seconds: float) -> tuple[float, float]:
-        """The sender's link, or the relay's, goes down and up again; (down, up) as monotonic s."""
+        """Take the sender's or the relay's link down and up again; (down, up) as monotonic s."""
         namespace = (self.relay or self.a).namespace
         _run("ip", "-n", namespace, "link", "set", DEVICE, "down")
         down = time.monotonic()
-        # Absolute, so that the commands' own time is no part of it.
+        # Absolute times, so that the commands' own duration does not count.
         time.sleep(max(0.0, down + seconds - time.monotonic()))
         _run("ip", "-n", namespace, "link", "set", DEVICE, "up")
         return down, time.monotonic()
@@ -78,7 +78,7 @@ class Network:
 
 @functools.cache
 def available() -> str | None:
-    """None where the networks can be had, else the reason why not."""
+    """Why the networks are not available, or None if they are."""
     if os.geteuid() != 0:
         return "network namespaces need root"
     for tool in ("ip", "tc"):
@@ -98,7 +98,7 @@ def available() -> str | None:
 def network(
     rate_bps: float = 6e6, *, shared: bool = False, relay: bool = False, queue_s: float = 0.5
 ) -> Iterator[Network]:
-    """A network for as long as the `with` lasts; `relay` implies `shared`.
+    """A network for the duration of the `with`; `relay` implies `shared`.
 
     A node's queue holds what the channel carries in `queue_s`.
     """
@@ -139,14 +139,14 @@ def _network(rate_bps: float, shared: bool, relay: bool, queue_s: float) -> Iter
 
 
 def _sweep() -> None:
-    """Remove what processes left that were killed."""
+    """Remove what killed processes left behind."""
     for name in re.findall(r"^(pound\d+n\w+)", _run("ip", "netns", "list"), re.MULTILINE):
         if not Path("/proc", name.removeprefix("pound").split("n")[0]).exists():
             _run("ip", "netns", "del", name)
 
 
 def _settle(room: str, forward: bool) -> None:
-    """The rules of a namespace: IPv4 only, and no short cuts past R."""
+    """Set the rules of a namespace: IPv4 only, and no short cuts past R."""
     rules = {
         "ipv6/conf/all/disable_ipv6": 1,
         "ipv4/ip_forward": int(forward),
@@ -156,7 +156,7 @@ def _settle(room: str, forward: bool) -> None:
         "ipv4/conf/default/accept_redirects": 0,
     }
     script = "; ".join(f"echo {value} > /proc/sys/net/{key}" for key, value in rules.items())
-    # What a kernel does not have cannot be in the way.
+    # Settings that a kernel lacks cannot interfere.
     command = ["ip", "netns", "exec", room, "sh", "-c", f"exec 2>/dev/null; {script}; true"]
     subprocess.run(command, check=False, capture_output=True)
     _run("ip", "-n", room, "link", "set", "lo", "up")
@@ -182,7 +182,7 @@ def _share(air: str, nodes: list[Node], rate_bps: float, queue_s: float) -> None
     for device in ("sky", "mirror", "bridge"):
         _run(*ip, "link", "set", device, "up")
     whole = [f"{rate_bps:.0f}bit", "burst", str(BURST), "cburst", str(BURST)]
-    # Next to nothing of their own: all of it is borrowed from the one bucket, in turns.
+    # Almost no guaranteed rate: all of it is borrowed from the one bucket, in turns.
     turn = ["htb", "rate", "8kbit", "ceil", *whole, "quantum", "1514"]
     _run(*tc, "qdisc", "add", "dev", "sky", "root", "handle", "1:", "htb", "default", "99")
     under = [*tc, "class", "add", "dev", "sky", "parent"]
@@ -196,7 +196,7 @@ def _share(air: str, nodes: list[Node], rate_bps: float, queue_s: float) -> None
         _run(*ip, "link", "add", f"m{i}", "link", "sky", "type", "macvlan", "mode", "vepa")
         _run(*ip, "link", "set", f"m{i}", "gso_max_segs", "1")
         _run(*ip, "link", "set", f"m{i}", "netns", node.namespace, "name", DEVICE)
-        # By the station that sends, not by the address in the packet: R sends what A made.
+        # By the sending station, not by the address in the packet: R sends packets that A made.
         mac = _run("ip", "-n", node.namespace, "-br", "link", "show", DEVICE).split()[2]
         digits = mac.replace(":", "")
         match = f"match u32 0x{digits[:8]} 0xffffffff at -8 match u16 0x{digits[8:]} 0xffff at -4"

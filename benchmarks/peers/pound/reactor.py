@@ -1,4 +1,4 @@
-"""Waits for sockets and for one alarm, in one thread: no lock or switch of threads adds jitter."""
+"""Waits for sockets and for one alarm in one thread: no locks or thread switches add jitter."""
 
 import math
 import select
@@ -7,13 +7,13 @@ import time
 from collections.abc import Callable
 
 SPIN_S = 0.0002
-"""Before a deadline, polling instead of sleeping: timers are late by up to that much."""
+"""Time before a deadline in which to poll instead of sleep: timers are late by up to this much."""
 
 Do = Callable[[], None]
 
 
 class Reactor:
-    """What is registered here is called from `run`."""
+    """Calls the registered handlers from `run`."""
 
     def __init__(self) -> None:
         self._readers: dict[socket.socket, Do] = {}
@@ -26,24 +26,24 @@ class Reactor:
         self._readers[sock] = do
 
     def when_writable(self, sock: socket.socket, do: Do | None) -> None:
-        """Call `do` whenever there is room to write; None ends it."""
+        """Call `do` whenever there is room to write; None stops it."""
         if do is None:
             self._writers.pop(sock, None)
         else:
             self._writers[sock] = do
 
     def forget(self, sock: socket.socket) -> None:
-        """Close a socket and call for it no more."""
+        """Close a socket and remove its handlers."""
         self._readers.pop(sock, None)
         self._writers.pop(sock, None)
         sock.close()
 
     def alarm(self, at: float, ring: Do) -> None:
-        """Call `ring` once, not before `at` and as late as a sleep is; there is one alarm."""
+        """Call `ring` once, not before `at`, with the delay of a sleep; there is only one alarm."""
         self._alarm_at, self._ring = at, ring
 
     def run(self, until: float) -> None:
-        """Serve until then (monotonic s), and at least once."""
+        """Handle events until that time (monotonic s), at least once."""
         while True:
             left = min(until - SPIN_S, self._alarm_at) - time.monotonic()
             ready = select.select([*self._readers], [*self._writers], [], max(0.0, left))
@@ -61,6 +61,6 @@ class Reactor:
                 return
 
     def close(self) -> None:
-        """Close all sockets that are registered."""
+        """Close all registered sockets."""
         for sock in {*self._readers, *self._writers}:
             self.forget(sock)

@@ -1,4 +1,4 @@
-"""The experiments of section VI that one or more flows make up: Tables I to V, Fig. 19."""
+"""The experiments of section VI with one or more flows: Tables I to V, Fig. 19."""
 
 import time
 from collections.abc import Callable
@@ -15,25 +15,25 @@ DRAIN_S = 5.0
 OFFERED_BPS = 6.5e6
 FRESH_S = 0.01
 STAYS, HICCUPS = 50, 2
-"""Of so many messages in a row, so many may be late: a machine pauses now and then."""
+"""Number of messages in a row, of which HICCUPS may be late: a machine pauses now and then."""
 
 
 class Recovery(NamedTuple):
-    """What a flow does after the link is up again; s, NaN where it never came."""
+    """How a flow recovers after the link is up again; in s, NaN if it does not."""
 
     first_s: float
-    """Until its first message, however old."""
+    """Time until its first message, however old."""
     fresh_s: float
-    """Until the first that is less than 10 ms old, with which they begin to stay so."""
+    """Time until the first message younger than 10 ms from which on they stay as young."""
 
 
 def run_peer(
     peer: str, flows: list[Flow], network: Network, seed: int, *, drain_s: float = DRAIN_S
 ) -> list[Trace]:
-    """All flows from A to B, of messages of 16 bytes and more; times in s from the beginning.
+    """Run all flows from A to B, of messages of 16 bytes and more; times in s from the start.
 
-    A message is sent when its producer has it, whether or not the peer could take it at once: what
-    a sender is held up by is delay. Stops `drain_s` after the last message, whatever happens.
+    A message counts as sent when its producer has it, even if the peer cannot accept it yet:
+    waiting in the sender is delay. Stops `drain_s` after the last message, whatever happens.
     """
     return _run(peer, flows, network, seed, drain_s)
 
@@ -65,7 +65,7 @@ def _run(
 def saturate(peer: str, size: int, seconds: float, network: Network) -> float:
     """Mbit/s of messages of `size` bytes that arrive while 6.5 Mbit/s of them are offered.
 
-    The first half second is not counted: queues fill.
+    The first half second is not counted, because the queues fill.
     """
     period_s = 8 * size / OFFERED_BPS
     flow = Flow("load", size, period_s, int(seconds / period_s))
@@ -84,7 +84,7 @@ def outage(
     down_s: float = 5.0,
     after_s: float = 10.0,
 ) -> list[Recovery]:
-    """Two flows of 1 KB every 20 ms; the sender's link, or the relay's, goes down for `down_s`."""
+    """Two flows of 1 KB every 20 ms; the sender's or the relay's link goes down for `down_s`."""
     count = round((before_s + down_s + after_s) / 0.02)
     flows = [
         Flow("first", 1024, 0.02, count, "latency"),
@@ -101,16 +101,16 @@ class _Outage:
     def __init__(self, network: Network, before_s: float, down_s: float) -> None:
         self._network, self._before_s, self._down_s = network, before_s, down_s
         self.up_s = float("nan")
-        """When it was up again, in s from the beginning."""
+        """Time at which the link was up again, in s from the start."""
 
     def begin(self, start: float) -> None:
-        """Cut it, and come back when it is whole again."""
+        """Cut the link, and return when it is up again."""
         time.sleep(max(0.0, start + self._before_s - time.monotonic()))
         self.up_s = self._network.outage(self._down_s)[1] - start
 
 
 def recovery(trace: Trace, up_s: float) -> Recovery:
-    """What a trace shows of a link that was up again at `up_s`, in s from the beginning."""
+    """Recovery of a flow after its link was up again at `up_s`, in s from the start."""
     order = np.argsort(trace.heard_at)
     order = order[trace.heard_at[order] > up_s]
     if not len(order):

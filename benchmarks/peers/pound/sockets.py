@@ -1,4 +1,4 @@
-"""The peers that are plain sockets: a transport for each topic, by its class."""
+"""The peers that are plain sockets, with one transport per topic, chosen by its class."""
 
 import time
 from collections.abc import Callable
@@ -11,13 +11,13 @@ from benchmarks.peers.pound.udp import NimbroTopic, PoundNode, PoundTopic, UdpRo
 
 
 class Transport(Protocol):
-    """What takes one topic's messages across."""
+    """Carries one topic's messages."""
 
     def meet(self, deadline: float) -> None:
         """Wait for the other end."""
 
     def send(self, message: bytes) -> None:
-        """Take a message for its topic's transport."""
+        """Send a message of this topic."""
 
 
 Open = Callable[[Reactor, Topic, Job, Hear], Transport]
@@ -33,7 +33,7 @@ TRANSPORTS: dict[str, Open] = {
 
 
 class Sockets:
-    """One end of such a peer."""
+    """One end of a peer with plain sockets."""
 
     def __init__(self, job: Job, transports: dict[str, str], hear: Hear) -> None:
         self._reactor = Reactor()
@@ -48,13 +48,13 @@ class Sockets:
                 self._transports[topic.number] = TRANSPORTS[name](self._reactor, topic, job, hear)
 
     def meet(self) -> None:
-        """Topic by topic, in the same order at both ends."""
+        """Connect topic by topic, in the same order at both ends."""
         deadline = time.monotonic() + CONTACT_S
         for transport in self._transports.values():
             transport.meet(deadline)
 
     def send(self, topic: int, message: bytes) -> None:
-        """Take a message for its topic's transport."""
+        """Send a message over its topic's transport."""
         self._transports[topic].send(message)
 
     def run(self, until: float) -> None:

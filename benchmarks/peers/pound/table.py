@@ -6,12 +6,12 @@ from benchmarks import environments
 
 
 class Peer(NamedTuple):
-    """What a team would use."""
+    """A system that a team would use."""
 
     of: str
-    """The software whose manner this is."""
+    """The software that this peer imitates."""
     transports: dict[str, str]
-    """The transport of each class of topics; "default" is that of those not named."""
+    """The transport of each class of topics; "default" is for all classes not listed."""
     environment: str = ""
     """The virtual environment it needs; see `environments`."""
 
@@ -35,5 +35,5 @@ PEERS: dict[str, Peer] = {
 
 
 def unavailable(peer: str) -> str | None:
-    """None where this peer can run, else why not; makes the environment that it needs."""
+    """Why a peer cannot run here, or None if it can; creates the environment that it needs."""
     return environments.unavailable(PEERS, peer)

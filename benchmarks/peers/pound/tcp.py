@@ -1,4 +1,4 @@
-"""Topics over TCP: as TCPROS, with Nagle's algorithm or without, and nimbro_network do."""
+"""Topics over TCP: like TCPROS, with Nagle's algorithm or without, and like nimbro_network."""
 
 import socket
 import time
@@ -13,16 +13,16 @@ PORT = 45000
 PIECE = 1 << 16
 ACK = b"\x06"
 QUEUE = 20
-"""Messages: what nimbro_network's TCP sender keeps of a topic, the newest."""
+"""Number of messages that nimbro_network's TCP sender keeps per topic, the newest ones."""
 
 
 class TcpTopic:
-    """One connection; the subscriber makes it. What does not fit into the socket waits here.
+    """One connection, made by the subscriber. Data that does not fit in the socket waits here.
 
-    That queue is unbounded, as with ROS 1's queue_size 0, and holds up no other topic.
+    That queue is unbounded, like ROS 1's queue_size 0, and does not block other topics.
 
-    Nagle's algorithm costs time only where acknowledgements are delayed. Since the end of 2023
-    Linux acknowledges a message as soon as it is read; `delayed_ack` asks for what it did before.
+    Nagle's algorithm costs time only if acknowledgements are delayed. Since the end of 2023 Linux
+    acknowledges a message as soon as it is read; `delayed_ack` requests the previous behaviour.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class TcpTopic:
             self._listener = socket.create_server((job.here, self._port))
 
     def meet(self, deadline: float) -> None:
-        """Connect, or be connected to."""
+        """Connect, or wait for a connection."""
         if self._listener:
             self._listener.settimeout(max(0.01, deadline - time.monotonic()))
             try:
@@ -60,7 +60,7 @@ class TcpTopic:
         self._reactor.when_readable(self._socket, self._read)
 
     def send(self, message: bytes) -> None:
-        """Queue it behind what is not yet in the socket."""
+        """Queue a message behind the data that is not yet in the socket."""
         self._unsent.append(memoryview(cut_tcpros(message)))
         self._write()
 
@@ -91,7 +91,7 @@ class TcpTopic:
 
     def _read(self) -> None:
         try:
-            # Before each read: the kernel takes it as advice, and goes back to its own ways.
+            # Before each read, because the kernel treats it as a hint and reverts it.
             if self._delayed_ack:
                 self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 0)
             while piece := self._socket.recv(PIECE):
@@ -107,13 +107,13 @@ class TcpTopic:
             self._hear(message, time.monotonic())
 
     def _lose(self) -> None:
-        """The other end is gone, or the kernel gave up: nothing comes and goes any more."""
+        """Note that the connection is gone: nothing is sent or received any more."""
         self._reactor.forget(self._socket)
         self._unsent.clear()
 
 
 class NimbroTcpTopic(TcpTopic):
-    """Stop and wait: the next message goes when the receiver has acknowledged the one before."""
+    """Stop and wait: the next message is sent when the receiver has acknowledged the one before."""
 
     def __init__(self, reactor: Reactor, topic: Topic, job: Job, hear: Hear) -> None:
         super().__init__(reactor, topic, job, hear, nodelay=False)
@@ -123,7 +123,7 @@ class NimbroTcpTopic(TcpTopic):
         self._busy = False
 
     def send(self, message: bytes) -> None:
-        """Queue it; the oldest of twenty goes."""
+        """Queue a message; of more than twenty, the oldest is dropped."""
         self._waiting.append(message)
         self._next()
 
@@ -147,7 +147,7 @@ class NimbroTcpTopic(TcpTopic):
 def tcp_topic(
     *, nodelay: bool, delayed_ack: bool = False
 ) -> Callable[[Reactor, Topic, Job, Hear], TcpTopic]:
-    """Opens TCPROS topics with Nagle's algorithm or without."""
+    """Make a function that opens TCPROS topics, with Nagle's algorithm or without."""
 
     def opened(reactor: Reactor, topic: Topic, job: Job, hear: Hear) -> TcpTopic:
         return TcpTopic(reactor, topic, job, hear, nodelay=nodelay, delayed_ack=delayed_ack)

@@ -1,4 +1,4 @@
-"""Topics over UDP: as UDPROS, nimbro_network and Pound do."""
+"""Topics over UDP: like UDPROS, nimbro_network and Pound."""
 
 import errno
 import heapq
@@ -24,10 +24,10 @@ from benchmarks.peers.pound.wire import (
 PORT = 46000
 POUND_PORT = 32000
 POUND_QUEUE = 50
-"""Fragments: while more wait, Pound takes no message larger than the next figure."""
+"""Number of waiting fragments above which Pound rejects messages larger than the next figure."""
 POUND_LARGE = 10_000
 CATCH_UP = 3
-"""Fragments."""
+"""Number of fragments whose delay the sender may make up for."""
 OVERHEAD = 14 + 20 + 8
 """Bytes of Ethernet, IP and UDP around each datagram."""
 RANKS = {"latency": 0, "default": 1, "bulk": 2}
@@ -41,10 +41,10 @@ class Join(Protocol):
 
 
 class UdpTopic:
-    """A socket of its own for one topic. There is nothing to meet: UDP knows no connection."""
+    """A separate socket for one topic. It has no handshake: UDP is connectionless."""
 
     _join: Callable[[], Join]
-    """Makes messages of datagrams."""
+    """Makes an object that joins datagrams to messages."""
 
     def __init__(self, reactor: Reactor, topic: Topic, job: Job, hear: Hear) -> None:
         self._reactor, self._topic = reactor, topic
@@ -60,20 +60,20 @@ class UdpTopic:
             reactor.when_readable(self._socket, lambda: drain(self._socket, join, hear))
 
     def meet(self, deadline: float) -> None:
-        """Do nothing: there is nobody to wait for."""
+        """Do nothing: there is no connection to wait for."""
 
 
 class UdpRosTopic(UdpTopic):
-    """roscpp's sender: all blocks at once, and a full socket holds up the node.
+    """roscpp's sender: all blocks at once, and a full socket blocks the node.
 
-    The block for which there is no room loses its number, and with it the receiver the message;
-    its data goes out under the next number all the same, and so does all that follows.
+    A block that does not fit loses its number, so the receiver loses the message. Its data is sent
+    under the next number all the same, and so is all later data.
     """
 
     _join = UdpRosJoin
 
     def send(self, message: bytes) -> None:
-        """Into the socket, however long that takes."""
+        """Write a message to the socket, however long that takes."""
         broken = False
         blocks = cut_udpros(message, self._topic.number, next(self._numbers) & 0xFF)
         for block in blocks:
@@ -83,7 +83,7 @@ class UdpRosTopic(UdpTopic):
 
 
 class NimbroTopic(UdpTopic):
-    """nimbro_network's: all fragments at once; only the newest message waits behind them."""
+    """nimbro_network's sender: all fragments at once; only the newest message waits behind them."""
 
     _join = NimbroJoin
 
@@ -93,7 +93,7 @@ class NimbroTopic(UdpTopic):
         self._newest: bytes | None = None
 
     def send(self, message: bytes) -> None:
-        """Into the socket, or into the one place before it."""
+        """Write a message to the socket, or put it into the one waiting place."""
         self._newest = message
         self._write()
 
@@ -111,11 +111,11 @@ class NimbroTopic(UdpTopic):
 
 
 class PoundNode:
-    """Pound: one socket for all topics, behind one queue by priority, then by arrival.
+    """Pound's sender: one socket for all topics, with one queue by priority, then by arrival.
 
-    After each fragment it sleeps for as long as the channel needs for that. What it oversleeps it
-    makes up for, within what the channel's token bucket has saved meanwhile. A large message that
-    finds the queue long is discarded.
+    After each fragment it sleeps for as long as the channel needs for it. It makes up for
+    oversleeping, within what the channel's token bucket has saved meanwhile. A large message that
+    finds a long queue is discarded.
     """
 
     def __init__(self, reactor: Reactor, job: Job, hear: Hear) -> None:
@@ -153,13 +153,13 @@ class PoundNode:
 
 
 class PoundTopic:
-    """One topic of the node."""
+    """One topic of a PoundNode."""
 
     def __init__(self, node: PoundNode, topic: Topic) -> None:
         self._node, self._number = node, topic.number
 
     def meet(self, deadline: float) -> None:
-        """Do nothing: there is nobody to wait for."""
+        """Do nothing: there is no connection to wait for."""
 
     def send(self, message: bytes) -> None:
         """Put the message's fragments into the node's queue."""
@@ -167,7 +167,7 @@ class PoundTopic:
 
 
 def put(sock: socket.socket, datagram: bytes, to: tuple[str, int] | None = None) -> bool:
-    """Whether the socket had room; what the network refuses is lost without a word."""
+    """Send a datagram; False if the socket was full. What the network rejects is lost silently."""
     try:
         if to is None:
             sock.send(datagram)
@@ -182,14 +182,14 @@ def put(sock: socket.socket, datagram: bytes, to: tuple[str, int] | None = None)
 
 
 def drain(sock: socket.socket, join: Join, hear: Hear) -> None:
-    """Hand over all messages that have come."""
+    """Hand over all messages that have arrived."""
     while True:
         try:
             datagram = sock.recv(1 << 16)
         except BlockingIOError:
             return
         except OSError:
-            # An ICMP answer to something sent earlier: it is told once.
+            # An ICMP answer to an earlier datagram, which is reported once.
             continue
         for message in join.feed(datagram):
             hear(message, time.monotonic())

@@ -1,22 +1,24 @@
-"""Messages cut into what each protocol sends, and joined again. No sockets here.
+"""Cuts messages into each protocol's datagrams, and joins them again. No sockets here.
 
-A `cut_*` function makes the datagrams of one message; a `*Join` takes whatever comes, one datagram
-(or, for TCP, one piece of the stream) at a time, and tells the messages that it completes.
+A `cut_*` function makes the datagrams of one message. A `*Join` takes one datagram (or, for TCP,
+one piece of the stream) at a time, and yields the messages that it completes.
 """
 
 import struct
 from collections.abc import Iterator
 
 HEAD = struct.Struct("<II")
-"""What each message of an experiment begins with: its flow's number, its own number."""
+"""The start of each message of an experiment: its flow's number, its own number."""
 
 LENGTH = struct.Struct("<I")
 
 UDPROS = struct.Struct("<IBBH")
-"""Connection, operation, message, block: how many there are in the first, else which one."""
+"""Connection, operation, message, block: first the number of blocks, then the block's own."""
 UDPROS_DATAGRAM = 1500
-"""Bytes of UDP payload: roscpp's own limit, which leaves no room for the IP and UDP headers, so
-that each full datagram becomes two IP packets."""
+"""Bytes of UDP payload: roscpp's own limit.
+
+It leaves no room for the IP and UDP headers, so each full datagram becomes two IP packets.
+"""
 DATA0, DATAN = 0, 1
 
 NIMBRO = struct.Struct("<HH")
@@ -34,11 +36,11 @@ destination, number of parts."""
 POUND_PART = 1400
 
 UNDER_WAY = 32
-"""Incomplete messages that a join keeps: the oldest goes first."""
+"""Number of incomplete messages that a join keeps; the oldest is dropped first."""
 
 
 class TcpRosJoin:
-    """TCPROS: 4 bytes of length before each message."""
+    """Joins TCPROS messages: 4 bytes of length before each."""
 
     def __init__(self) -> None:
         self._bytes = bytearray()
@@ -56,7 +58,7 @@ class TcpRosJoin:
 
 
 def cut_tcpros(message: bytes) -> bytes:
-    """As it goes into the stream."""
+    """A message as it is written to the stream."""
     return LENGTH.pack(len(message)) + message
 
 
@@ -96,7 +98,7 @@ def cut_udpros(message: bytes, connection: int, number: int) -> list[bytes]:
 
 
 class UdpRosJoin:
-    """As roscpp does: blocks in their order, and one that is missing costs the message."""
+    """Joins blocks as roscpp does: in order only; a missing one costs the message."""
 
     def __init__(self) -> None:
         self._number = -1
@@ -104,7 +106,7 @@ class UdpRosJoin:
         self._blocks: list[bytes] = []
 
     def feed(self, datagram: bytes) -> Iterator[bytes]:
-        """The message that this datagram completes, if it does."""
+        """The message that this datagram completes, if any."""
         _, operation, number, block = UDPROS.unpack_from(datagram)
         if operation == DATA0:
             self._number, self._total, self._blocks = number, block, []
@@ -135,7 +137,7 @@ class NimbroJoin:
         self._totals: dict[int, int] = {}
 
     def feed(self, datagram: bytes) -> Iterator[bytes]:
-        """The message that this datagram completes, if it does."""
+        """The message that this datagram completes, if any."""
         part, number = NIMBRO.unpack_from(datagram)
         parts = _under_way(self.under_way, number)
         if part == 0:
@@ -163,7 +165,7 @@ class PoundJoin:
         self.under_way: dict[int, dict[int, bytes]] = {}
 
     def feed(self, datagram: bytes) -> Iterator[bytes]:
-        """The message that this datagram completes, if it does."""
+        """The message that this datagram completes, if any."""
         part, _, _, number, *_, total = POUND.unpack_from(datagram)
         parts = _under_way(self.under_way, number)
         parts[part] = datagram[POUND.size :]

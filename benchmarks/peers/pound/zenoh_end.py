@@ -12,10 +12,10 @@ PRIORITIES = {"latency": "REAL_TIME", "default": "DATA", "bulk": "BACKGROUND"}
 
 
 class Zenoh:
-    """Side "a" listens, "b" connects. Messages are stamped where Zenoh calls, heard in `run`."""
+    """A Zenoh peer: side "a" listens, "b" connects. Stamps are taken in Zenoh's callback."""
 
     def __init__(self, job: Job, congestion: str, hear: Hear) -> None:
-        # Not in the environment that types are checked in.
+        # Imported here: it is not installed in the type checker's environment.
         zenoh: Any = importlib.import_module("zenoh")
         self._job, self._hear = job, hear
         self._come: queue.SimpleQueue[tuple[bytes, float]] = queue.SimpleQueue()
@@ -45,7 +45,7 @@ class Zenoh:
         ]
 
     def meet(self) -> None:
-        """Until each publisher knows of a subscriber, and the link is up."""
+        """Wait until each publisher knows a subscriber, and the link is up."""
         deadline = time.monotonic() + CONTACT_S
         while not (
             all(publisher.matching_status.matching for publisher in self._publishers.values())
@@ -56,11 +56,11 @@ class Zenoh:
             time.sleep(0.02)
 
     def send(self, topic: int, message: bytes) -> None:
-        """Publish; where congestion blocks, so does this."""
+        """Publish a message; blocks under congestion if Zenoh does."""
         self._publishers[topic].put(message)
 
     def run(self, until: float) -> None:
-        """Hand over what has come."""
+        """Hand over what has arrived."""
         while (left := until - time.monotonic()) > 0:
             try:
                 message, at = self._come.get(timeout=left)

@@ -1,4 +1,4 @@
-"""How others read a radio: by SoapySDR in a thread of their own process, and in a GNU Radio graph.
+"""How others read a radio: with SoapySDR in a thread of their own process, and with GNU Radio.
 
-`bare` measures both on the test radio; `flowgraph` runs by the interpreter of GNU Radio.
+`bare` measures both on the test radio; `flowgraph` runs with GNU Radio's interpreter.
 """

@@ -1,4 +1,4 @@
-"""Peers: who receives in a thread of a busy process, by SoapySDR's C library; and GNU Radio.
+"""Peers: a receiving thread in a busy process, with SoapySDR's C library; and GNU Radio.
 
 `python -m benchmarks.peers.radio.bare DEVICE SECONDS CHUNK SWITCH_S RATE_HZ…` prints the samples
 lost at each rate.
@@ -18,10 +18,10 @@ from benchmarks.loopback_radio import a_bus
 from benchmarks.processes import told_by
 
 WAYS = {"thread": (4096, 5e-3), "tuned_thread": (65536, 5e-4)}
-"""Samples of a read, and how long Python lets a thread run."""
+"""Samples per read, and the time slice that Python gives a thread."""
 THREADS = (
-    "thread: one robot's receiver and nothing else, 4096 samples a read, beside a main thread of "
-    "pure Python; tuned_thread: 65536, and threads take turns every 0.5 ms; both scaled to our time"
+    "thread: one robot's receiver alone, 4096 samples per read, with a busy main thread in pure "
+    "Python; tuned_thread: 65536 and a thread switch every 0.5 ms; both scaled to our time"
 )
 DEVICE = "driver=loopback,bus={bus},model=usrp"
 TIMEOUT_US = 100_000
@@ -30,7 +30,7 @@ FLOWGRAPH = Path(__file__).with_name("flowgraph.py")
 
 
 def lost_in_threads(rates_msps: Sequence[int], seconds: float) -> dict[str, dict[int, float]]:
-    """Samples a second that each loses, by rate."""
+    """Samples per second that each peer loses, by rate."""
     module = [sys.executable, "-m", "benchmarks.peers.radio.bare"]
     lost = {}
     for name, numbers in WAYS.items():
@@ -41,7 +41,7 @@ def lost_in_threads(rates_msps: Sequence[int], seconds: float) -> dict[str, dict
 
 
 def flowgraph_cpu_pct(rates_msps: Sequence[int], seconds: float) -> dict[int, float]:
-    """Of one core for each radio, by rate; empty without GNU Radio."""
+    """CPU load of each radio in % of one core, by rate; empty without GNU Radio."""
     with attempt("GNU Radio"):
         return _told([SYSTEM_PYTHON, str(FLOWGRAPH)], rates_msps, seconds)
     return {}
@@ -50,7 +50,7 @@ def flowgraph_cpu_pct(rates_msps: Sequence[int], seconds: float) -> dict[int, fl
 def _told(
     program: list[str], rates_msps: Sequence[int], seconds: float, *numbers: float
 ) -> dict[int, float]:
-    """A figure for each rate, in the last line that the program prints."""
+    """One figure per rate, from the last line that the program prints."""
     given = map(str, (seconds, *numbers, *(1e6 * each for each in rates_msps)))
     with a_bus() as bus:
         command = [*program, DEVICE.format(bus=bus), *given]
@@ -60,7 +60,7 @@ def _told(
 
 
 class _Counting:
-    """Receives; what is missing between the first and the last stamp was lost."""
+    """Receives, and counts the samples missing between the first and the last stamp."""
 
     def __init__(self, device: str, rate_hz: float, chunk: int) -> None:
         self._rate_hz = rate_hz
@@ -70,7 +70,7 @@ class _Counting:
         self.lost = 0
 
     def run(self, seconds: float) -> None:
-        """Receive for so many seconds, and count what is missing."""
+        """Receive for that time, and count what is missing."""
         stream = self._handle.open_stream(RX, 0, "CF32", {})
         into = np.zeros(self._chunk, np.complex64)
         stream.activate()
@@ -90,7 +90,7 @@ class _Counting:
 
 
 def main() -> None:
-    """Receive beside a main thread that never waits."""
+    """Receive while the main thread never waits."""
     device = sys.argv[1]
     seconds, chunk, switch_s, *rates_hz = (float(each) for each in sys.argv[2:])
     sys.setswitchinterval(switch_s)

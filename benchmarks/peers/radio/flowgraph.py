@@ -1,9 +1,9 @@
-"""GNU Radio's own SoapySDR blocks, run by the interpreter that GNU Radio belongs to.
+"""GNU Radio's own SoapySDR blocks, run by GNU Radio's interpreter.
 
-    python3 flowgraph.py DEVICE SECONDS RATE_HZ…   CPU time of a radio in % of the clock's, by rate
+    python3 flowgraph.py DEVICE SECONDS RATE_HZ…   CPU time of a radio in % of real time, by rate
 
-Two radios that hear each other receive into nothing and send zeros, without a pause; CPU time is
-that of all threads, halved.
+Two radios that hear each other discard what they receive and send zeros without a pause; CPU time
+is that of all threads, halved.
 """
 
 import sys
@@ -16,7 +16,7 @@ NO_ARGS = ("", [""], [""])
 
 
 def cpu_pct(device, rate_hz, seconds):
-    """User and system time for each radio over the time that passed."""
+    """User and system time of each radio relative to the elapsed time."""
     graph = gr.top_block()
     for unit in (1, 2):
         source = soapy.source(f"{device},unit={unit}", "fc32", 1, "", *NO_ARGS)
@@ -37,7 +37,7 @@ def cpu_pct(device, rate_hz, seconds):
 
 
 def main():
-    """Print the figure of each rate, one after the other."""
+    """Print the figure of each rate in turn."""
     device, seconds = sys.argv[1], float(sys.argv[2])
     print(*(cpu_pct(device, float(each), seconds) for each in sys.argv[3:]))
 

@@ -14,7 +14,7 @@ DELAY_S = 2e-6
 
 
 class Pair:
-    """Two robots whose clocks differ; both CLOCKs of a period go each way."""
+    """Two robots with different clocks; both CLOCKs of a period are exchanged."""
 
     def __init__(self, offset_s=7.0, skew=2e-5, delay_s=DELAY_S, seed=SEED, **params):
         self.offset_s, self.skew, self.delay_s = offset_s, skew, delay_s
@@ -24,12 +24,12 @@ class Pair:
         for clocks in (self.one, self.two):
             clocks.set_resolution(1e-6)
         self.at = 10.0
-        """By the clock of robot 1."""
+        """Current time by the clock of robot 1."""
         self.sent = []
-        """What robot 2 has sent, and when it came to robot 1."""
+        """What robot 2 has sent, and its arrival times at robot 1."""
 
     def there(self, at):
-        """By the clock of robot 2: one − two = offset + skew * t."""
+        """Time by the clock of robot 2: one − two = offset + skew * t."""
         return at - self.offset_s - self.skew * at
 
     def period(self, lost=0.0):

@@ -1,4 +1,4 @@
-"""The dual envelope: its bound holds whatever the delays, and clocks that jump are followed."""
+"""The dual envelope: its bound holds for any delays, and it follows clocks that jump."""
 
 import math
 from random import Random
@@ -42,7 +42,7 @@ def test_the_error_is_within_the_bound_whatever_the_delays(offset_s, skew, steps
         if estimate is None:
             continue
         truth_s = offset_s + skew * came
-        # The other side's clock was read a delay before ours.
+        # The other side's clock was read one delay before ours.
         slack_s = 1e-3 * 0.06
         assert abs(estimate.offset(came) - truth_s) <= estimate.bound(came) + slack_s
         later = came + 10.0

@@ -6,7 +6,7 @@ from sdrlinkd.link import State
 from tests.link.timesync.test_clocks import Pair
 
 CONVERGES = 500
-"""Round trips of which the paper's filter makes up its mind (Equation 6)."""
+"""Round trips that the paper's filter needs to converge (Equation 6)."""
 
 
 @pytest.mark.parametrize("lost", [0.0, 0.2])
@@ -19,7 +19,7 @@ def test_it_knows_nothing_for_500_round_trips_and_then_the_clock_within_its_boun
     report = pair.one.report(2, pair.at)
     assert report.state == "synced"
     assert report.samples >= CONVERGES
-    # As printed, it lags a drifting clock; half of the longest round trip bounds what delays do.
+    # As printed, it lags a drifting clock; half of the longest round trip bounds the delay effects.
     assert abs(pair.error_s()) < 1e-3
 
 
