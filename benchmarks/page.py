@@ -30,53 +30,55 @@ TEXTS = {
         "The ratios compare with what cannot be avoided: a CRC, and a join of the fragments."
     ),
     "modem_path": (
-        "The first two rows are wall time through one daemon, its modem and a paced loopback. The "
-        "others are CPU time of one core: how many times faster than the samples come."
+        "The first two rows are wall time through one daemon, its modem and a paced loopback. "
+        "The others are CPU time of one core: how many times faster than the samples come."
     ),
     "phy_per": (
-        "The modem alone: the SNR at which so many PDUs are lost, with everything that radios do to "
-        "a signal (crystals 80 ppm apart, IQ images, leakage, DC, 8 bits, phase noise). liquid-dsp "
-        "and GNU Radio are tested with a frequency offset only."
+        "The modem alone: the SNR at which so many PDUs are lost, with everything that radios "
+        "do to a signal (crystals 80 ppm apart, IQ images, leakage, DC, 8 bits, phase noise). "
+        "liquid-dsp and GNU Radio are tested with a frequency offset only."
     ),
     "phy_speed": (
-        "Samples a second that one core's CPU time carries. In brackets the value scaled by how "
-        "fast liquid-dsp runs here, against the machine that the targets were set on; it is not "
-        "what *ok* judges."
+        "Samples a second that one core's CPU time carries. In brackets the value scaled by how"
+        " fast liquid-dsp runs here, against the machine that the targets were set on; it is "
+        "not what *ok* judges."
     ),
     "access": (
-        "Two half-duplex robots, 5 Msps, 16QAM 1/2, messages of 1 KB at random times that would "
-        "fill 40 % of the air each (csma: 15 %), bursts of at most 5 ms, by the time of the "
-        "samples. *Urgent* are short messages ten times a second: from one robot with mini-slots "
-        "(`both_send_them`: from both), from both with tdma."
+        "Two half-duplex robots, 5 Msps, 16QAM 1/2, messages of 1 KB at random times that would"
+        " fill 40 % of the air each (csma: 15 %), bursts of at most 5 ms, by the time of the "
+        "samples. *Urgent* are short messages ten times a second: from one robot with mini-"
+        "slots (`both_send_them`: from both), from both with tdma."
     ),
     "ether": "The simulated air: eight daemons in lock-step, and two in real time.",
     "radio": (
-        "Two daemons on the test radio, in real time. Like a USRP, both send all the time and hear "
-        "each other; like a HackRF, odometry of 720 B at 10 Hz, one way and both ways. Lost samples "
-        "and underflows have targets up to 5 Msps. The peer is a plain loop in a thread of a busy "
-        "process. The radio process's share of a core contains the test radio's driver, with its "
-        "air and its noise. Where `machine_stolen_pct` is above 20, samples are lost at 2 Msps, too."
+        "Two daemons on the test radio, in real time. Like a USRP, both send all the time and "
+        "hear each other; like a HackRF, odometry of 720 B at 10 Hz, one way and both ways. "
+        "Lost samples and underflows have targets up to 5 Msps. The peer is a plain loop in a "
+        "thread of a busy process. The radio process's share of a core contains the test "
+        "radio's driver, with its air and its noise. Where `machine_stolen_pct` is above 20, "
+        "samples are lost at 2 Msps, too."
     ),
     "flowgraphs": "GNU Radio's flowgraphs as the modem, at 1 Msps and 25 dB.",
     "pound": (
-        "Section VI of the Pound paper: 16QAM 1/2 at 5 Msps, 6 Mbit/s, on the simulated air, by the "
-        "time of the samples. In the same run, what teams use instead, through two network "
-        "namespaces and a token bucket of 6 Mbit/s. The others have a channel of their own in each "
-        "direction, and no radio to turn round. Our image is later than theirs because the laser "
-        "goes first. Over two hops Pound's own scheme, which orders by priority at each hop, is the "
-        "faster one. The rows `..._rt` are whole daemons in real time; they also say how late the "
-        "machine wakes a sleeping program."
+        "Section VI of the Pound paper: 16QAM 1/2 at 5 Msps, 6 Mbit/s, on the simulated air, by"
+        " the time of the samples. In the same run, what teams use instead, through two network"
+        " namespaces and a token bucket of 6 Mbit/s. The others have a channel of their own in "
+        "each direction, and no radio to turn round. Our image is later than theirs because the"
+        " laser goes first. Over two hops Pound's own scheme, which orders by priority at each "
+        "hop, is the faster one. The rows `..._rt` are whole daemons in real time; they also "
+        "say how late the machine wakes a sleeping program."
     ),
     "timesync": (
-        "The same time stamps through clock filters: five exchanges a second, a tenth lost each "
-        "way, queues of up to 20 ms; errors at 60 s, rms of 40 runs. Scenarios: A is idle 40 % of "
-        "the time; B is busy one way; C never idle and lopsided; D never idle; J is D with 1 ms of "
-        "jitter; L is busy and idle by turns."
+        "The same time stamps through clock filters: five exchanges a second, a tenth lost each"
+        " way, queues of up to 20 ms; errors at 60 s, rms of 40 runs. Scenarios: A is idle 40 %"
+        " of the time; B is busy one way; C never idle and lopsided; D never idle; J is D with "
+        "1 ms of jitter; L is busy and idle by turns."
     ),
     "latency": (
-        "The assessment of the Sensors 2023 paper as an emulation: 115 bytes 200 times a second "
-        "each way between two processes with clocks of their own. What is emulated: the serial line "
-        "(two pseudo-terminals, paced at 921600 baud), the flight controller, the agent and MAVROS."
+        "The assessment of the Sensors 2023 paper as an emulation: 115 bytes 200 times a second"
+        " each way between two processes with clocks of their own. What is emulated: the serial"
+        " line (two pseudo-terminals, paced at 921600 baud), the flight controller, the agent "
+        "and MAVROS."
     ),
 }
 """What a reader should know before the rows, by benchmark."""
@@ -101,13 +103,14 @@ ALTERNATIVES = {
 INTRODUCTION = """\
 # Benchmarks
 
-Every figure on this page is printed by the command above its table, beside peers in the same run. `make bench` runs
-all of them; `--keep` keeps the results, and `make figures` writes this page of them.
+The command above each table prints its figures, beside peers in the same run. `make bench` runs
+all of them; `--keep` keeps the results, and `make figures` writes this page.
 
-- *ok* judges the value as it is printed: **missed** is a miss, and the exit code is then 1. A row without a target is
-  only reported.
-- Rows in lock-step and rows of counted trials are exact: the same seed gives the same figures on any machine. Rows of
-  real time and of speed depend on the machine, and on how much of it a hypervisor gave to others (*stolen*).
+- *ok* judges the value as it is printed: **missed** is a miss, and the exit code is then 1. A row
+  without a target is only reported.
+- Rows in lock-step and rows of counted trials are exact: the same seed gives the same figures on
+  any machine. Rows of real time and of speed depend on the machine, and on how much of it a
+  hypervisor gave to others (*stolen*).
 """
 
 

@@ -89,7 +89,6 @@ def _bandwidth_and_loop(shows: Mapping[str, Any]) -> None:
     right.plot(at, shows["loop_v"]["sdrlinkd"], color=OURS, lw=1, label="through sdrlinkd")
     right.set(xlabel="time in s", ylabel="voltage in V")
     errors = sorted(shows["loops_mv"].items(), key=lambda each: each[1])
-    legend_beside(right, "\n".join(
-        ["off the local run, rms:", *(f"{name.replace('_', ' ')} {mv:.1f} mV" for name, mv in errors)]
-    ))  # fmt: skip
+    told = [f"{name.replace('_', ' ')} {mv:.1f} mV" for name, mv in errors]
+    legend_beside(right, "\n".join(["off the local run, rms:", *told]))
     save(figure, FIGURES / "pound_bandwidth_and_loop.png", COMMAND)
