@@ -1,16 +1,19 @@
-"""The commands that a page tells its reader to type, and the screens that it shows."""
+"""What a page has its reader type and write, and what the screen shows then."""
 
 import re
 from dataclasses import dataclass
+from pathlib import Path
 
-_BLOCK = re.compile(r"^```console ?(.*?)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-# The parts of a shown line that a screen must contain, too: numbers, paths and table lines differ.
+ROOT = Path(__file__).parents[2]
+
+_BLOCK = re.compile(r"^```(\w+) ?(.*?)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+# What a shown line has that a screen must have, too: numbers, paths and lines of tables differ.
 _WORD = re.compile(r"(?<![\w./])[A-Za-z_][A-Za-z_]+(?![\w./])")
 
 
 @dataclass(frozen=True)
 class Command:
-    """A line after `$`, who types it, and the lines shown below it."""
+    """A line behind `$`, who types it, and the lines shown below it."""
 
     who: str
     line: str
@@ -18,22 +21,57 @@ class Command:
 
     @property
     def runs_on(self) -> bool:
-        """Whether the reader continues to type while it runs."""
+        """Whether the reader goes on typing while it runs."""
         return self.line.endswith("&")
+
+
+@dataclass(frozen=True)
+class File:
+    """A block with a title: the reader saves it under that name."""
+
+    name: str
+    text: str
+
+
+def pages():
+    """All documents that people read, by their path in the tree."""
+    found = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
+    found += [ROOT / each for each in (
+        "backends/README.md", "backends/ether/README.md", "etc/client/README.md",
+        "etc/gnuradio/README.md", "phy/README.md", "sdrlinkd/bus/README.md",
+        "sdrlinkd/link/README.md", "sdrlinkd/wire/README.md", "systemd/README.md",
+        "tests/soapy_loopback/README.md",
+    )]  # fmt: skip
+    return sorted(path.relative_to(ROOT).as_posix() for path in found)
+
+
+def blocks(page, *languages):
+    """(rest of the first line, text) of a page's blocks in any of these languages."""
+    text = (ROOT / page).read_text()
+    return [(rest, body) for language, rest, body in _BLOCK.findall(text) if language in languages]
+
+
+def steps_of(text):
+    """The commands and files of a page, in order."""
+    found = []
+    for language, rest, body in _BLOCK.findall(text):
+        title = re.fullmatch(r'title="(.+)"', rest)
+        if title:
+            found.append(File(title[1], body))
+        elif language == "console":
+            for each in re.split(r"^\$ ", body, flags=re.MULTILINE)[1:]:
+                line, *shown = each.rstrip("\n").split("\n")
+                found.append(Command(rest, line, tuple(shown)))
+    return found
 
 
 def commands_of(text):
     """All commands of a page, in order."""
-    found = []
-    for block in _BLOCK.finditer(text):
-        for each in re.split(r"^\$ ", block[2], flags=re.MULTILINE)[1:]:
-            line, *shown = each.rstrip("\n").split("\n")
-            found.append(Command(block[1], line, tuple(shown)))
-    return found
+    return [each for each in steps_of(text) if isinstance(each, Command)]
 
 
 def missing_words(shown, screen):
-    """Words of the shown lines that are not on the screen, by line."""
+    """Words of the lines shown that the screen does not have, by line."""
     there = set(_WORD.findall(screen))
     return {
         line: lost

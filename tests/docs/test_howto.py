@@ -1,0 +1,66 @@
+"""How-to pages: each command works as printed, each file is one that the daemon reads."""
+
+import contextlib
+import re
+
+import pytest
+
+from sdrlinkd.client import ControlClient, NoDaemonError
+from sdrlinkd.manual import find_how_to, how_tos
+from sdrlinkd.process import wait_until
+from tests.docs.pages import ROOT, commands_of
+from tests.docs.reader import PATIENCE_S, Reader
+
+FOLDER = ROOT / "docs/howto"
+NAMES = sorted(path.stem for path in FOLDER.glob("*.md") if path.stem != "index")
+TYPED = [name for name in NAMES if commands_of((FOLDER / f"{name}.md").read_text())]
+STARTS_ITS_OWN = re.compile(r"^\$ (sdrlinkd --config|sdrlink-ether)", re.MULTILINE)
+ONE_SCREEN = 62
+"""Lines of the longest page."""
+
+
+def is_up(directory):
+    """Whether the daemon there is up."""
+    with contextlib.suppress(NoDaemonError), ControlClient(directory, 0.5) as control:
+        return control.ask("status")["carrier"]["state"] == "up"
+    return False
+
+
+@pytest.fixture
+def reader(tmp_path):
+    """In a checkout, as far as commands need one."""
+    (tmp_path / "etc").symlink_to(ROOT / "etc")
+    typist = Reader(tmp_path, may_say_no=("sdrlinkctl doctor", "sdrlinkctl status"))
+    yield typist
+    typist.close()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("name", TYPED)
+def test_commands_work_and_show_what_is_printed(reader, name):
+    text = (FOLDER / f"{name}.md").read_text()
+    if not STARTS_ITS_OWN.search(text):
+        reader.leave_running("sdrlinkd --config etc/robot.toml")
+        wait_until(lambda: is_up(reader.folder / "run"), PATIENCE_S, reader.behind("sdrlinkd"))
+    for command in commands_of(text):
+        reader.see(command)
+
+
+def test_most_pages_show_commands_that_run():
+    assert len(TYPED) >= 10
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_page_is_one_screen_and_listed(name):
+    text = (FOLDER / f"{name}.md").read_text()
+    lines = text.splitlines()
+    assert lines[0].startswith("# ")
+    assert len(lines) <= ONE_SCREEN
+    assert max(map(len, lines)) <= 120
+    assert f"[{name}]({name}.md)" in (FOLDER / "index.md").read_text()
+
+
+def test_all_pages_are_those_that_help_shows():
+    assert [page.name for page in how_tos()] == NAMES
+    assert find_how_to("late-joiners", []).title == "Let robots that come late get the map"
