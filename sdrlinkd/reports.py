@@ -61,7 +61,7 @@ class LatencyReport(msgspec.Struct, frozen=True, kw_only=True):
     """
 
     wait_ms: float
-    """Wait at the source and at relays before the last fragment was sent, in ms."""
+    """From submission to the preamble of the burst with the first fragment, in ms."""
     queue_ms: float | None = None
     """Part of the wait behind other messages, in ms; null: the source has not reported it."""
     access_ms: float | None = None
@@ -69,11 +69,11 @@ class LatencyReport(msgspec.Struct, frozen=True, kw_only=True):
     again_ms: float | None = None
     """Part of the wait in the retry queue, in ms; null: the source has not reported it."""
     reassembly_ms: float
-    """From the first fragment to the last one, in ms."""
+    """From the preamble of the burst with the first fragment to that with the last, in ms."""
     air_ms: float
-    """Time of the last fragment on the air, in ms."""
+    """From that preamble to the end of the last fragment, in ms."""
     handover_ms: float
-    """From the end of the last fragment to the handover to consumers, in ms."""
+    """From the end of the last fragment to the handover to the bus, in ms."""
     period_ms: float | None = None
     """Time between two messages, in ms; null: fewer than two have arrived."""
     jitter_ms: float | None = None
