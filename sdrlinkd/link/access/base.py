@@ -60,7 +60,9 @@ class Access(Protocol):
 
     @property
     def share(self) -> float:
-        """Share of airtime that one robot gets when all want to send, before burst overhead."""
+        """Share of airtime in which one robot may start bursts, not counting others' bursts: its
+        slots in tdma, else 1.
+        """
 
     @property
     def step_s(self) -> float:
