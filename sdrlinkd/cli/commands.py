@@ -1,10 +1,10 @@
-"""The commands of sdrlinkctl: the line of help of each, and where it is."""
+"""The commands of sdrlinkctl, with their help lines and modules."""
 
 from typing import NamedTuple
 
 
 class Listed(NamedTuple):
-    """A command as help shows it, before it is loaded."""
+    """A command as the help shows it, before its modules are loaded."""
 
     help: str
     modules: tuple[str, ...]
@@ -72,4 +72,4 @@ COMMANDS = {
         ("bench",),
     ),
 }
-"""All commands by name, in the order of help."""
+"""All commands by name, in the order of the help."""

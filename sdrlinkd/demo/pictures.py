@@ -1,4 +1,4 @@
-"""The paper's Figures 6 and 7 for our runs."""
+"""Draws the paper's Figures 6 and 7 for our runs."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ SENT_MARK_EVERY = 50
 
 
 def latency_cdf(runs: dict[str, Trace], path: Path, caption: str) -> None:
-    """Figure 6: distribution of the end-to-end latency, one line a run."""
+    """Draw Figure 6: the distribution of the end-to-end latency, with one line per run."""
     figure, axes = plt.subplots(figsize=(6.4, 4.0), layout="constrained")
     for name, trace in runs.items():
         ordered = latencies_s(trace.all_pairs()) * 1e3
@@ -34,7 +34,7 @@ def latency_cdf(runs: dict[str, Trace], path: Path, caption: str) -> None:
 
 
 def paths(runs: dict[str, Trace], path: Path, caption: str) -> None:
-    """Figure 7: the path sent and the path received; a column a run, a row an odometry topic."""
+    """Draw Figure 7: paths sent and received, a column per run and a row per odometry topic."""
     topics = next(iter(runs.values())).odometry_topics()
     n_rows = max(1, len(topics))
     figure, panels = plt.subplots(

@@ -1,4 +1,4 @@
-"""Pictures of a recording: its spectrum, and its equalised points."""
+"""Pictures of a recording: its spectrum and its constellation."""
 
 from pathlib import Path
 
@@ -13,12 +13,12 @@ import phy
 from sdrlinkd.iq.recording import Points
 from sdrlinkd.iq.spectrum import Spectrum
 
-# dB below the loudest at which nothing more is told apart.
+# Dynamic range of the color scale, in dB below the strongest value.
 RANGE_DB = 70
 
 
 def draw_spectrum(spectrum: Spectrum, rate_hz: float | None, title: str, path: Path) -> None:
-    """Draw power over frequency, and below it over time as well."""
+    """Draw power over frequency, and below it a waterfall of power over frequency and time."""
     unit, scale = ("MHz", rate_hz / 1e6) if rate_hz else ("cycles a sample", 1.0)
     time_unit, time_scale = ("s", 1 / rate_hz) if rate_hz else ("samples", 1.0)
     figure, (power, waterfall) = plt.subplots(
@@ -51,7 +51,7 @@ def draw_spectrum(spectrum: Spectrum, rate_hz: float | None, title: str, path: P
 
 
 def draw_constellation(points: Points, title: str, path: Path) -> None:
-    """Draw the equalised points beside those that were meant, one panel for each modulation."""
+    """Draw the equalised points and the ideal ones, one panel per modulation."""
     found = sorted(points.by_modulation, key=lambda each: each.bits)
     figure, panels = plt.subplots(
         1, len(found), figsize=(5 * len(found), 5.4), layout="constrained", squeeze=False

@@ -1,4 +1,4 @@
-"""The hub of a scenario."""
+"""Makes the hub of a scenario, which simulates its air."""
 
 from pathlib import Path
 
@@ -8,10 +8,10 @@ from sdrlinkd.lab.scenario import Scenario, outages_of
 
 
 def make_hub(scenario: Scenario | None, directory: Path, traces: Path | None) -> EtherHub:
-    """For `scenario`, or an air of which nothing is known but that all hear each other.
+    """The hub of `scenario`; None: of an air on which all robots hear each other.
 
-    The modem should have been compiled: else the first burst that is delayed would have the air
-    wait for it. Raises UserError when the folder cannot be had.
+    The modem should be compiled before; otherwise the air would wait for that at the first delayed
+    burst. Raises UserError if the folder cannot be used.
     """
     try:
         if scenario is None:

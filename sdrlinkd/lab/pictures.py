@@ -1,4 +1,4 @@
-"""A run as pictures: who got what of whom over time, and with which MCS."""
+"""Pictures of a run: what each robot received from each other over time, and the MCS used."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from sdrlinkd.lab.report import LabReport
 
 
 def draw(report: LabReport, path: Path, caption: str) -> None:
-    """PDR in each tenth, latency, and the MCS that each robot chose for each other."""
+    """Draw the PDR in each tenth of the run, latencies, and the MCS between each two robots."""
     adaptive = any(robot.mcs_changes for robot in report.robots)
     figure, panels = plt.subplots(
         2 + adaptive, 1, figsize=(7.2, 6.4 + 2.2 * adaptive), layout="constrained"
