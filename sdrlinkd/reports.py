@@ -282,7 +282,7 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     bursts_by_mcs: dict[int, int]
     """Bursts that left, by MCS."""
     bursts_late: int
-    """Times that a burst missed its slot; it then goes to the retry queue."""
+    """How often a burst missed its slot and was put into the retry queue."""
     mcs_lowest: int | None = None
     """Slowest MCS that rate control may choose; null: the MCS is fixed."""
     mcs_changes: list[tuple[float, int, int]]

@@ -21,7 +21,7 @@ SNR_DB = 15.0
 TOPIC, TYPE = "load", "std_msgs/UInt8MultiArray"
 _MESSAGE = bytes(1000)
 _AHEAD = 200
-"""Number of messages kept in the queue while the channel is to be full."""
+"""Number of messages kept in the queue to fill the channel."""
 
 
 class Headroom(NamedTuple):

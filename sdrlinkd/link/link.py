@@ -316,7 +316,7 @@ class Link:
         self._tell_dropped()
         self._receipts.expire(inf)
 
-    # What people ask.
+    # Status and explanations.
 
     def why(self, topic_id: int, told: Told, now: float) -> list[str]:
         """What happens to a topic's messages and why, in plain sentences."""
@@ -338,7 +338,7 @@ class Link:
         """Discrepancies in the ledger, as sentences; empty when it adds up."""
         return self._intake.audit() + self._reception.audit()
 
-    # Inside.
+    # Internal.
 
     @property
     def _air_use(self) -> AirUse:
@@ -368,7 +368,7 @@ class Link:
     def _record_heard(self, event: RecordHeard) -> None:
         src, record, at = event
         if isinstance(record, Clock):
-            # Our own CLOCK, when we hear ourselves, tells nothing.
+            # If we hear ourselves, our own CLOCK is no news.
             if src != self.own_id:
                 self._clocks.hear(src, record, at)
         elif isinstance(record, Receipt):
