@@ -1,4 +1,4 @@
-"""One node at work: the link between its bus and its PDU link."""
+"""One running node: connects the link to the bus and to the PDU link."""
 
 import asyncio
 import logging
@@ -167,7 +167,7 @@ class Node:
             self._stop_silent(now)
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
-        """The next burst, decided now; None where there is none."""
+        """The next burst, decided now; None if there is none."""
         burst = self._link.next_burst(opportunity)
         if burst is not None and self.bus.is_tapped:
             for data in burst.pdus:
@@ -175,7 +175,7 @@ class Node:
         return burst
 
     def next_wakeup(self, now: float) -> float:
-        """When there may be something to send, on the link's clock."""
+        """Earliest time on the link's clock at which there may be something to send."""
         return self._link.next_wakeup(now)
 
     def settled(self, burst: Burst, outcome: Outcome, at: float) -> None:

@@ -131,7 +131,7 @@ class Opening:
         return replace(told, since_s=at - self._told_since)
 
     async def close(self) -> None:
-        """Close the PDU link, in whatever state it is."""
+        """Close the PDU link, whatever its state."""
         await self.pdu_link.close()
 
     async def _renew(self) -> None:

@@ -86,7 +86,7 @@ class ClockReport(msgspec.Struct, frozen=True, kw_only=True):
     """What this robot knows about another robot's clock."""
 
     state: str
-    """unsynced | coarse | synced | holdover"""
+    """How well the clock is known: unsynced | coarse | synced | holdover (no recent CLOCK)"""
     offset_ms: float | None = None
     """Our link's clock minus the other robot's, in ms; null: unknown."""
     bound_us: float | None = None
@@ -255,7 +255,7 @@ class RelayReport(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
-    """Everything that the link reports."""
+    """The link: ledgers, topics, neighbors, access, and use of the channel."""
 
     pdu_size: int
     """Size of every PDU, in octets."""
@@ -317,8 +317,8 @@ class PduLinkReport(msgspec.Struct, frozen=True, kw_only=True):
     kind: str
     """The configured backend."""
     state: str
-    """opening | up | waiting (for a radio that is absent) | refused (the radio does not accept its
-    settings) | down | ended (a recording is over)"""
+    """State of the PDU link: opening | up | waiting (for a radio that is absent) | refused (the
+    radio does not accept its settings) | down | ended (a recording is over)"""
     detail: str = ""
     """The PDU link and its main settings, as text for people."""
     reason: str = ""
@@ -358,7 +358,7 @@ class VerdictReport(msgspec.Struct, frozen=True, kw_only=True):
     """The state of the daemon and its link, in one word and in plain sentences."""
 
     level: str = "OK"
-    """OK | DEGRADED | DOWN"""
+    """The verdict: OK | DEGRADED | DOWN"""
     reasons: list[str] = []
     """Why the level is not OK, the worst reason first."""
 
@@ -373,7 +373,7 @@ class Snapshot(msgspec.Struct, frozen=True, kw_only=True):
     namespace: str
     """ROS namespace of this robot's topics."""
     state: str
-    """running | draining"""
+    """State of the daemon: running | draining (it sends the queue and then stops)"""
     taken_at_unix_ns: int
     """Time of the snapshot by the host's clock, in ns since 1970."""
     uptime_s: float

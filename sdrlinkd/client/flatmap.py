@@ -25,7 +25,7 @@ def pack_map(values: Mapping[str, Value]) -> bytes:
 
 
 def unpack(data: bytes) -> Any:  # noqa: ANN401
-    """The value that `data` holds. Raises ValueError when it is not one MessagePack value."""
+    """The value in `data`. Raises ValueError if `data` is not exactly one MessagePack value."""
     try:
         value, at = _unpack(memoryview(data), 0)
     except (struct.error, IndexError, RecursionError, TypeError) as error:

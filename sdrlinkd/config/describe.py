@@ -67,7 +67,7 @@ def is_table(kind: inspect.Type) -> bool:
 
 
 def child(kind: inspect.Type, key: str) -> inspect.Type | None:
-    """The type of `key` inside a table of `kind`; None where there is none."""
+    """The type of `key` in a table of `kind`; None if there is no such key."""
     if isinstance(kind, inspect.StructType):
         return next((field.type for field in kind.fields if field.encode_name == key), None)
     if isinstance(kind, inspect.DictType):

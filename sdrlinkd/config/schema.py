@@ -57,7 +57,7 @@ class ChronyParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """Another robot's clock as a reference clock for this host's chronyd."""
 
     socket: str = ""
-    """The socket's path, as in chrony.conf: `refclock SOCK PATH`; empty: none."""
+    """Path of chronyd's socket, as in chrony.conf: `refclock SOCK PATH`; empty: none."""
     robot: Annotated[int, Meta(ge=0, le=254)] = 0
     """Id of the robot whose clock is the reference."""
 
@@ -71,7 +71,7 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     """This robot's id on the air; -1: the last number in the namespace or, without a namespace, in
     the names of the topics taken from the bus."""
     registry: str = "registry.csv"
-    """Topic registry, relative to the configuration file; the same file at all nodes."""
+    """File with the topic registry, relative to the configuration file; the same at all nodes."""
     topics: list[str] = []
     """Registry names to take from the bus; empty: all."""
     rx_format: str = "/rx_robot_{src_id}"

@@ -1,4 +1,4 @@
-"""Loading of the PHY's compiled code."""
+"""Loads the PHY's compiled code."""
 
 import asyncio
 

@@ -78,7 +78,7 @@ def _blocked_s(
             blocked_s += 0.0 if setting.traits.is_lockstep else setting.traits.react_s
             often = setting.one_s * sum(1 / each.period_s for each in (task, *before)) > IDLE_SHARE
             if often or supply.closed_s:
-                # The channel is not kept free for messages this frequent, nor in other robots' turns.
+                # The channel is not kept free for so frequent messages, nor in others' turns.
                 blocked_s = setting.one_s
     if supply.others:
         # Another robot may have begun a burst, too.

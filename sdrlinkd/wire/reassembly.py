@@ -111,7 +111,7 @@ class Reassembly:
     def hold(self, src: int, parity: Parity, now: float) -> Partial | None:
         """Keep parity with its incomplete message and return that message.
 
-        None if no such message is held, or if the parity does not match it.
+        None if no such message is held, or if the parity is not new or does not match it.
         """
         source, key = self._sources.get(src), (parity.topic_id, parity.entry_id)
         partial = None if source is None else source.partials.get(key)

@@ -169,7 +169,7 @@ class EntryWriter:
         return True
 
     def stamp(self, draft: Draft, message: Outgoing, start: float) -> None:
-        """Add the message's age to `draft` where it fits."""
+        """Add the message's age to `draft` if it fits."""
         age_us = min(max(round((start - message.arrived_at) * 1e6), 0), MAX_AGE_US)
         asks = bool(message.receipt)
         if not draft.add_stamp(message.topic_id, message.entry_id, age_us, asks):

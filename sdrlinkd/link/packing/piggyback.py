@@ -36,11 +36,11 @@ class PiggybackRecords:
         """Earliest time at which a record gets its own PDU; infinity: no record waits."""
 
     def holds(self, kind: RecordType) -> bool:
-        """Whether a record of that type waits."""
+        """Whether a record of type `kind` waits."""
         return any(key[0] == kind for key in self.waiting)
 
     def count(self, kind: RecordType) -> int:
-        """How many records of that type wait."""
+        """How many records of type `kind` wait."""
         return sum(key[0] == kind for key in self.waiting)
 
     def offer(self, records: Iterable[Record], due_at: float = -inf) -> None:

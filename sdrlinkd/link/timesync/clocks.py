@@ -66,7 +66,7 @@ class Clocks:
         self._wall = wall
 
     def end(self) -> None:
-        """Make no more CLOCK records."""
+        """Send no more CLOCK records."""
         self.due_at = float("inf")
 
     def record(self, start: float, room: int) -> Clock:

@@ -32,7 +32,7 @@ class Pair(NamedTuple):
 
 
 def dumps(value: Any) -> bytes:  # noqa: ANN401
-    """Bytes of a value. Raises ValueError when there is no PMT for it."""
+    """A value as PMT bytes. Raises ValueError if it has no PMT."""
     out = bytearray()
     _write(value, out)
     return bytes(out)
