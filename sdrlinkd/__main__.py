@@ -18,7 +18,7 @@ DEFAULT_CONFIG = Path("/etc/sdrlinkd/sdrlinkd.toml")
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the daemon; 0 after an orderly stop, 2 for what a person can mend."""
+    """Run the daemon; returns 0 after a clean stop, 2 for errors that a person can fix."""
     end_with_parent()
     options = _parser().parse_args(arguments)
     _log_to_stderr(options.log_level)
@@ -33,7 +33,7 @@ def main(arguments: list[str] | None = None) -> int:
         sys.stderr.write(f"sdrlinkd: {error}\n")
         return 2
     except KeyboardInterrupt:
-        # Before the daemon's own handler stood.
+        # Ctrl-C before the daemon has installed its own handler.
         return 130
     return 0
 
@@ -51,7 +51,7 @@ def _read(path: Path) -> Setup:
 
 
 def _checked(setup: Setup) -> list[str]:
-    """Lines on what follows from the configuration and from the radio. Raises UserError."""
+    """The lines that `--check` prints about the configuration and the radio. Raises UserError."""
     told = daemon.check(setup)
     verdict = (
         "the file is good; what is not checked shows when the daemon starts"

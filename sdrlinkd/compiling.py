@@ -1,4 +1,4 @@
-"""Compiles the modem, which is done once, and tells how far it is."""
+"""Compiles the modem, which is necessary only once, and reports the progress."""
 
 import os
 import time
@@ -19,9 +19,9 @@ def compile_modem(
 ) -> None:
     """Compile the modem, or load it: minutes the first time, less than a second later.
 
-    `say` is told how long it took and what else should be known, and nothing when all was there;
-    `passing`, by default also `say`, how far it is, at most once in `every_s`. `watch(done, total)`
-    is told of every kernel that was compiled; what it raises ends the work.
+    `say` gets a line on how long that took, and on problems with the cache. `passing`, by default
+    `say`, gets the progress, at most once per `every_s`. `watch(done, total)` is called for every
+    compiled kernel; an exception from it ends the work.
     """
     told = passing or say
     began = time.monotonic()

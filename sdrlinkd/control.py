@@ -24,7 +24,7 @@ Arguments = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Verb:
-    """What answers a request; verbs with `changes` are for root and the service's own user."""
+    """The handler of a request; verbs with `changes` are for root and the service's own user."""
 
     answer: Callable[[Arguments], object]
     help: str
@@ -61,7 +61,7 @@ class Control:
         self._verbs = verbs
 
     def close(self) -> None:
-        """Stop serving; answers on their way have 200 ms."""
+        """Stop serving; pending answers have 200 ms to leave."""
         self._reader.close()
         self._socket.close(linger=200)
 
@@ -109,18 +109,18 @@ class Control:
                 zmq.NOBLOCK,
             )
         except zmq.ZMQError:
-            # The asker has gone or does not read; a ROUTER that waited would stall all others.
+            # The client has gone or does not read; waiting for it would stall all others.
             return
         finally:
             self._reader.recheck()
 
 
 def error(code: str, reason: str) -> tuple[bytes, object]:
-    """The answer to a request that cannot be served, with its status."""
+    """The (status, body) of the answer to a request that cannot be served."""
     return b"err", {"code": code, "reason": reason}
 
 
 def _uid(frame: zmq.Frame) -> int:
-    """User id of the asker from ZeroMQ's Peer-Address, `host:uid:gid:pid`; -1 when not told."""
+    """The client's user id from ZeroMQ's Peer-Address, `host:uid:gid:pid`; -1 if not given."""
     parts = str(frame.get("Peer-Address")).split(":")
     return int(parts[1]) if len(parts) == 4 and parts[1].isdigit() else -1

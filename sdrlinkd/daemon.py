@@ -1,4 +1,4 @@
-"""Opens, runs and stops one node. Knows all parts and holds no algorithm."""
+"""Opens, runs and stops one node: it connects all parts and contains no algorithm."""
 
 import asyncio
 import contextlib
@@ -35,7 +35,7 @@ from sdrlinkd.sdnotify import Notifier
 from sdrlinkd.verbs import make_verbs
 
 if TYPE_CHECKING:
-    # Loading it brings recordings, of which a daemon of a real robot has none.
+    # Its package imports the bag readers, which the daemon on a robot does not need.
     from sdrlinkd.adapters import ChronySocket, Due, Transforms
 
 log = logging.getLogger("sdrlinkd")
@@ -48,9 +48,9 @@ LEVELS = {
 }
 SWITCH_INTERVAL_S = 1e-4
 START_S = 120.0
-"""Loading what the daemon is made of may take so long on a small computer."""
+"""Longest time in s that startup may take, for small computers."""
 STOP_S = 30.0
-"""A radio takes so long to be let go at the most, and so does a kernel that is being compiled."""
+"""Longest time in s to release a radio or to finish compiling a kernel."""
 
 Reload = Callable[[], Setup]
 
@@ -58,7 +58,7 @@ Reload = Callable[[], Setup]
 async def run(setup: Setup, reload: Reload) -> None:
     """Run the node of `setup` until SIGTERM or SIGINT.
 
-    `reload` reads the configuration anew, for SIGHUP. Raises UserError when the node cannot be
+    On SIGHUP, `reload` reads the configuration again. Raises UserError when the node cannot be
     opened.
     """
     stop = asyncio.Event()
@@ -77,7 +77,7 @@ async def run(setup: Setup, reload: Reload) -> None:
                 tasks.create_task(node.tick(), name="tick"),
                 tasks.create_task(_watch(notifier, node, control), name="watch"),
             ]
-            # The bus takes messages; the radio may come later.
+            # The bus accepts messages from here on; the radio may appear later.
             notifier.ready()
             await stop.wait()
             log.info("stopping: %d messages queued", node.snapshot(0).link.tx.queued)
@@ -93,10 +93,10 @@ async def run(setup: Setup, reload: Reload) -> None:
 
 @contextlib.asynccontextmanager
 async def _only_one_error() -> AsyncIterator[None]:
-    """Take the error that a person has to mend out of its group. Raises UserError."""
+    """Unwrap a UserError from its exception group. Raises UserError."""
     try:
         yield
-    except BaseExceptionGroup as group:  # Python 3.11.2 groups anew what `except*` raises.
+    except BaseExceptionGroup as group:  # Python 3.11.2 regroups what `except*` raises.
         mendable, rest = group.split(UserError)
         if mendable is None or rest is not None:
             raise
@@ -134,7 +134,7 @@ async def _open(
     notices_replug = radio is not None and radio.heeds_patience
     opening = Opening(setup, make, notices_replug, lambda: loading.told)
     context = zmq.Context()
-    # Closes what a part that failed half-way left open; term() would wait for it for ever.
+    # Closes sockets that a failed part left open; term() would wait for them forever.
     stack.callback(context.destroy)
     headers, stops = _types_of(setup)
     open_bus = partial(Bus, context, directory, setup)
@@ -148,7 +148,7 @@ async def _open(
     control.serve(make_verbs(setup, node, control, policies, opening, reloading))
     stack.push_async_callback(opening.close)
     stack.callback(loading.give_up)
-    # What is loaded stays; to look through all of it would hold up everything for 50 ms.
+    # All that is loaded so far stays: a collection would scan it and stall the daemon for 50 ms.
     gc.collect()
     gc.freeze()
     if config.play.duration_s:
@@ -170,9 +170,9 @@ def _make_pdu_link(
         return DirectLink(config.direct, config.link.pdu_size, rng)
     if config.backend == "gnuradio":
         return make_gnuradio(config)
-    # By default, a busy event loop keeps the modem's threads from the interpreter for 5 ms.
+    # With the default, a busy event loop keeps the modem's threads waiting for 5 ms.
     sys.setswitchinterval(SWITCH_INTERVAL_S)
-    # The modem brings numba, which takes its time to load.
+    # The modem imports numba, which is slow to load.
     from sdrlinkd.modem import make_modem
 
     return make_modem(config, setup.node_id, rng, patience, began_s, loading)
@@ -180,7 +180,7 @@ def _make_pdu_link(
 
 def _types_of(setup: Setup) -> tuple[frozenset[int], dict[int, bytes]]:
     """(ids of topics with a header, stop messages by topic id). Raises ConfigError."""
-    # These bring the message types.
+    # These import the message types, which are slow to load.
     from sdrlinkd.adapters import header_topics, stop_messages
 
     return header_topics(setup), stop_messages(setup)
@@ -197,9 +197,9 @@ def _chrony(setup: Setup, stack: contextlib.AsyncExitStack) -> "ChronySocket | N
 
 
 def check(setup: Setup) -> list[str]:
-    """Lines on what only message types and the kind of radio tell. Raises ConfigError."""
+    """Lines for the user from checks of message types and radio. Raises ConfigError."""
     _types_of(setup)
-    # The modem brings numba, which takes its time to load.
+    # The modem imports numba, which is slow to load.
     from sdrlinkd.modem import access_words, check_airtime
 
     try:
@@ -213,14 +213,14 @@ def check(setup: Setup) -> list[str]:
 def _transforms(setup: Setup) -> dict[int, "Transforms"]:
     if not setup.transforms:
         return {}
-    # This brings the message types.
+    # This imports the message types, which are slow to load.
     from sdrlinkd.adapters import Transforms
 
     return {topic_id: Transforms(setup.config.tf) for topic_id in setup.transforms}
 
 
 def _own_traffic(setup: Setup, stack: contextlib.AsyncExitStack) -> Iterator["Due"]:
-    # Recordings bring much that a daemon of a real robot never needs.
+    # The bag readers import much that the daemon on a robot never needs.
     from sdrlinkd.adapters import BuiltInRobot, due_messages, open_bag
 
     config, play = setup.config, setup.config.play
@@ -234,15 +234,15 @@ def _own_traffic(setup: Setup, stack: contextlib.AsyncExitStack) -> Iterator["Du
 
 
 def _runtime_directory(config: Config) -> Path:
-    # systemd's RuntimeDirectory= may name several, the first is ours.
+    # systemd's RuntimeDirectory= may name several; the first one is ours.
     given = config.bus.runtime_dir or os.environ.get("RUNTIME_DIRECTORY", "").split(":")[0]
     return runtime_dir(given or None)
 
 
 async def _watch(notifier: Notifier, node: Node, control: Control) -> None:
-    """Feed the watchdog, keep the status line fresh, and log the story of the drive; for ever.
+    """Feed the watchdog, update the status line and log changes of health, forever.
 
-    It runs on the event loop: when that stands still, the watchdog is not fed.
+    It runs on the event loop, so a blocked loop does not feed the watchdog.
     """
     period_s = WATCH_PERIOD_S
     if notifier.watchdog_s:

@@ -1,4 +1,4 @@
-"""Every error of sdrlinkd, by who is to blame.
+"""Every error of sdrlinkd, by its cause.
 
     SdrlinkError
     ├── UserError            what a person or a file gave us; exit code 2, never a traceback
@@ -6,18 +6,18 @@
     │   ├── RegistryError    a line of the topic registry
     │   ├── BusError         sockets, runtime directory, a second instance, no daemon
     │   └── BagError         a recording that cannot be read
-    ├── LinkAbsentError      what carries the PDUs is not there now; it is tried again
-    ├── LinkRefusedError     it is there and does not take its settings
-    ├── CdrError             bytes that are no message of their type, as any program may send
-    ├── PduError             bytes a peer put on the air; counted by `reason`, never logged as ours
-    └── EnvelopeError        a bus message that breaks the envelope; counted, the next one works
+    ├── LinkAbsentError      the PDU link is absent now; the daemon retries
+    ├── LinkRefusedError     the PDU link is present and refuses its settings
+    ├── CdrError             bytes that are not a message of their type; any program may send them
+    ├── PduError             bad bytes from a peer; counted by `reason`, not logged as our error
+    └── EnvelopeError        a bus message that breaks the envelope; counted and skipped
 
-Anything else that is raised is a bug of ours. One such bug has a name: IllegalStepError.
+Any other exception is a bug of ours. One such bug has a class of its own: IllegalStepError.
 """
 
 
 class SdrlinkError(Exception):
-    """Root of all errors that are not bugs."""
+    """Base class of all errors that are not bugs."""
 
 
 class UserError(SdrlinkError):
@@ -37,11 +37,11 @@ class BusError(UserError):
 
 
 class BagError(UserError):
-    """A recording that cannot be read, or only in part."""
+    """A recording that cannot be read, or only partly."""
 
 
 class LinkAbsentError(SdrlinkError):
-    """A radio, hub or flowgraph that is not there now, and may come."""
+    """A radio, hub or flowgraph that is absent now and may appear later."""
 
 
 class LinkRefusedError(SdrlinkError):
@@ -49,13 +49,13 @@ class LinkRefusedError(SdrlinkError):
 
 
 class CdrError(SdrlinkError):
-    """A payload that is no message of its type; the message says why not."""
+    """A payload that is not a message of its type; the error text says why."""
 
 
 class PduError(SdrlinkError):
     """A received PDU that must not be used.
 
-    `reason` is the ledger's name for it (`rx_crc`, `rx_entry`, …); the message says more.
+    `reason` is the ledger's reason (`rx_crc`, `rx_entry`, …); the error text has the details.
     """
 
     def __init__(self, reason: str, detail: str) -> None:
@@ -69,4 +69,4 @@ class EnvelopeError(SdrlinkError):
 
 
 class IllegalStepError(Exception):
-    """A step that a state machine's table does not have: a bug of ours."""
+    """A state machine was asked for a step that its table does not have, which is a bug of ours."""

@@ -1,4 +1,4 @@
-"""This host's clock beside the link's: how steadily it runs; and what chronyd is told of others."""
+"""Compares the host's clock with the link's clock, and feeds chronyd with another robot's clock."""
 
 import time
 from typing import TYPE_CHECKING
@@ -7,17 +7,17 @@ from sdrlinkd.link import Link, State, Wall
 from sdrlinkd.localtime import host_clocks
 
 if TYPE_CHECKING:
-    # Loading it brings recordings, of which a daemon of a real robot has none.
+    # Its package imports the bag readers, which the daemon on a robot does not need.
     from sdrlinkd.adapters import ChronySocket
 
 CHRONY_S = 1.0
 SET_S = 0.1
-"""By more than this a host's clock does not move unless it is set."""
+"""A jump of the host's clock by this much, in s, means that somebody set it."""
 LEAST_ERROR_S = 5e-5
 
 
 class HostClock:
-    """Tells `link` of this host's clock, and `chrony` of the clock of `robot`."""
+    """Reports this host's clock to `link`, and the clock of `robot` to `chrony`."""
 
     def __init__(self, link: Link, chrony: "ChronySocket | None", robot: int) -> None:
         self._link = link
@@ -28,18 +28,18 @@ class HostClock:
         self._ahead_ns: int | None = None
         self._error_s = 0.0
         self.steps = 0
-        """How often the host's clock was set."""
+        """How often the host's clock was set since the start."""
 
     def look(self, now: float) -> None:
-        """Measure how far the host's clock is ahead of the link's at `now`, and how steadily."""
+        """Measure how far the host's clock is ahead of the link's at `now`, and how that varies."""
         wall_ns = time.time_ns() - round(1e9 * now)
         if self._wall_ns is not None:
             moved_s = 1e-9 * abs(wall_ns - self._wall_ns)
-            # A clock that was set is no less exact for it.
+            # Setting the clock does not make it less exact.
             if moved_s < SET_S:
                 self._error_s = max(moved_s, 0.95 * self._error_s)
         self._wall_ns = wall_ns
-        # The link's time may jump, too: what was set is told by a clock that never is.
+        # The link's time may jump, too, so detect steps by a clock that is never set.
         host_ns, own_ns = host_clocks()
         ahead_ns = host_ns - own_ns
         if self._ahead_ns is not None and 1e-9 * abs(ahead_ns - self._ahead_ns) >= SET_S:

@@ -1,4 +1,4 @@
-"""Log lines with the journal's priorities, where the journal reads them."""
+"""Log lines with the journal's priorities, if the journal reads them."""
 
 import logging
 import os
@@ -14,7 +14,7 @@ _PRIORITIES = {
 
 
 def is_read_by_journal() -> bool:
-    """Whether stderr leads to the journal (systemd.exec(5), $JOURNAL_STREAM)."""
+    """Whether stderr is connected to the journal (systemd.exec(5), $JOURNAL_STREAM)."""
     try:
         found = os.fstat(sys.stderr.fileno())
     except (OSError, ValueError):
@@ -26,6 +26,6 @@ class JournalFormatter(logging.Formatter):
     """Begins each line with its priority in angle brackets (sd-daemon(3))."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """The record as text, in which every line has the priority."""
+        """The record as text, with the priority on every line."""
         mark = f"<{_PRIORITIES.get(record.levelno, 5)}>"
         return "\n".join(mark + line for line in super().format(record).splitlines())

@@ -1,4 +1,4 @@
-"""The modem, compiled or loaded on a thread while the bus takes messages already."""
+"""Compiles or loads the modem on a thread, while the bus already accepts messages."""
 
 import asyncio
 import logging
@@ -8,11 +8,11 @@ log = logging.getLogger("sdrlinkd")
 
 
 class _GivenUpError(Exception):
-    """Nobody waits for the modem any more."""
+    """Raised on the loading thread when the modem is no longer needed."""
 
 
 class Loading:
-    """Loads the modem once, whoever waits or gives up; `told` is how far it is, for people."""
+    """Loads the modem once, however many tasks wait for it; `told` is the progress as text."""
 
     def __init__(self) -> None:
         self._is_given_up = threading.Event()
@@ -23,16 +23,16 @@ class Loading:
         """Wait until the modem is compiled, or loaded."""
         if self._done is None:
             self._done = asyncio.ensure_future(asyncio.to_thread(self._load))
-            # Where nobody waits any more, nobody needs to know.
+            # Retrieve the exception, so that asyncio does not log it if nobody waits any more.
             self._done.add_done_callback(lambda done: done.cancelled() or done.exception())
         await asyncio.shield(self._done)
 
     def give_up(self) -> None:
-        """Stop behind the kernel that is being compiled: what is done stays so."""
+        """Stop after the kernel being compiled; compiled kernels are kept."""
         self._is_given_up.set()
 
     def _load(self) -> None:
-        # This brings numba, which takes its time.
+        # This imports numba, which is slow to load.
         from sdrlinkd.compiling import compile_modem
 
         try:

@@ -1,4 +1,4 @@
-"""When messages were published and their data measured, by this host's clock."""
+"""Converts the times of messages, of publication and measurement, to this host's clock."""
 
 import struct
 import time
@@ -8,19 +8,19 @@ from typing import NamedTuple
 from sdrlinkd.link import Delivered, Link
 
 STAMP_AT = 4
-"""A std_msgs/Header begins with a time: seconds and nanoseconds, behind the CDR encapsulation."""
+"""Offset of the time stamp of a std_msgs/Header, after the CDR encapsulation, in octets."""
 _LITTLE, _BIG = struct.Struct("<iI"), struct.Struct(">iI")
 SECOND_NS = 1_000_000_000
 OLDEST_NS = 10 * SECOND_NS
-"""Data that were so old when they were published are replayed. For so long after the host's clock
-was set, no message is believed to be older.
+"""Age in ns above which data count as replayed. For this long after the host's clock was set, older
+messages are not believed.
 """
 STEP_NS = SECOND_NS
-"""By more than this in ns, a clock does not move unless it is set."""
+"""A jump of the clock by more than this, in ns, means that somebody set it."""
 
 
 class LocalTimes(NamedTuple):
-    """Times of a message in ns since 1970, bounds of their errors in µs; None: not known."""
+    """Times of a message in ns since 1970, and bounds of their errors in µs; None if unknown."""
 
     published_ns: int | None = None
     published_error_us: int | None = None
@@ -34,9 +34,9 @@ UNKNOWN = LocalTimes()
 def local_times(
     link: Link, message: Delivered, age_s: float, now: float, now_ns: int, stamped: Collection[int]
 ) -> LocalTimes:
-    """The times of a message that is `age_s` old at `now`, `now_ns` by the host's clock.
+    """The times of a message that is `age_s` old at `now`, which is `now_ns` by the host's clock.
 
-    Topics in `stamped` begin with a std_msgs/Header.
+    `stamped`: ids of topics whose messages begin with a std_msgs/Header.
     """
     known = link.wall_offset(message.src, now)
     if known is None:
@@ -57,7 +57,7 @@ def local_times(
 
 
 def header_stamp_ns(cdr: bytes) -> int | None:
-    """The time in the std_msgs/Header that a CDR message begins with, in ns; None: no such."""
+    """The stamp of the std_msgs/Header at the start of a CDR message, in ns; None if invalid."""
     if len(cdr) < STAMP_AT + _LITTLE.size:
         return None
     seconds, ns = (_LITTLE if cdr[1] & 1 else _BIG).unpack_from(cdr, STAMP_AT)
@@ -71,25 +71,25 @@ def _us(seconds: float) -> int:
 
 
 def host_clocks() -> tuple[int, int]:
-    """The host's time since 1970, and a clock that is never set, both in ns.
+    """(the host's time since 1970, a clock of the host that is never set), both in ns.
 
-    The latter is the host's, too, and runs on while it sleeps.
+    The latter also runs while the host sleeps.
     """
     return time.time_ns(), time.clock_gettime_ns(time.CLOCK_BOOTTIME)
 
 
 class PublishClock:
-    """Tells how old messages are from when they were published, as their producers say."""
+    """Computes the ages of messages from the publication times that producers report."""
 
     def __init__(self) -> None:
         self._ahead_ns: int | None = None
         self._set_at_ns = -OLDEST_NS
 
     def age_s(self, published_ns: int, now_ns: int, own_ns: int) -> float:
-        """Seconds since a message was published; 0 where its time is in the future, or unsure.
+        """Age in s of a message; 0 if its time is in the future or unreliable.
 
-        It is unsure where the host's clock was set in between. `now_ns` and `own_ns` are
-        `host_clocks`.
+        An old time is unreliable if the host's clock was set recently. `now_ns` and `own_ns` are
+        the values of `host_clocks`.
         """
         ahead_ns = now_ns - own_ns
         if self._ahead_ns is not None and abs(ahead_ns - self._ahead_ns) > STEP_NS:

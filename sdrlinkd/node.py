@@ -1,4 +1,4 @@
-"""One node at work: the link between its bus and its PDU link."""
+"""One running node: connects the link to the bus and to the PDU link."""
 
 import asyncio
 import logging
@@ -31,7 +31,7 @@ from sdrlinkd.reports import Snapshot
 from sdrlinkd.traffic import OwnTraffic
 
 if TYPE_CHECKING:
-    # Loading it brings recordings, of which a daemon of a real robot has none.
+    # Its package imports the bag readers, which the daemon on a robot does not need.
     from sdrlinkd.adapters import ChronySocket, Due, Transforms
 
 TICK_S = 0.05
@@ -42,10 +42,11 @@ log = logging.getLogger("sdrlinkd")
 
 
 class Node:
-    """Asks the link what to do and does it. Holds no queue and no decision of its own.
+    """Connects the link, the bus and the PDU link; it has no queue and takes no decision itself.
 
-    Messages of the topics in `headers` begin with a std_msgs/Header; `stops`, by topic id, are to
-    be handed over when a command topic falls silent. `chrony` is told of another robot's clock.
+    `headers` are the ids of topics whose messages begin with a std_msgs/Header. `stops` holds the
+    stop message of each command topic by topic id, for when the topic falls silent. `chrony`
+    receives samples of another robot's clock.
     """
 
     def __init__(
@@ -93,7 +94,7 @@ class Node:
         """Take a message from a producer."""
         now = self._pdu_link.now()
         if published_ns is not None and not self._is_lockstep:
-            # Read next to each other: whatever comes between them is an error of the age.
+            # Read the two clocks back to back: a delay between them is an error of the age.
             age_s = self._publish_clock.age_s(published_ns, *host_clocks())
             overrides = overrides._replace(age_s=age_s)
         transforms = self._transforms.get(topic_id)
@@ -115,14 +116,14 @@ class Node:
         receipt: str = "",
         dst: int | None = None,
     ) -> None:
-        """Count a message that the bus could not take."""
+        """Count a message that the bus refused."""
         self._link.refuse(reason, topic_id, receipt, dst)
         if receipt:
             self._tell_verdicts()
 
     # The PDU link's listener.
     def attach(self, traits: PduLinkTraits) -> None:
-        """Fit the link to the PDU link, which is there now. Raises ConfigError."""
+        """Fit the link to the PDU link, which has just opened. Raises ConfigError."""
         config = self._opening.config
         fit = self._link.attach(traits, config.access, config.rate)
         log.info("access %s", fit.settled.sentence)
@@ -149,7 +150,7 @@ class Node:
             self._pdu_link.wake()
 
     def advance(self, now: float) -> None:
-        """Let time come so far: traffic of our own that is due, and the link's timers."""
+        """Advance to `now`: submit generated traffic that is due and run the link's timers."""
         for at, message in self._traffic.due(now) if self._traffic else ():
             self._link.submit(message.topic_id, message.payload, at)
             self._pdu_link.wake()
@@ -166,7 +167,7 @@ class Node:
             self._stop_silent(now)
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
-        """The next burst, decided now; None where there is none."""
+        """The next burst, decided now; None if there is none."""
         burst = self._link.next_burst(opportunity)
         if burst is not None and self.bus.is_tapped:
             for data in burst.pdus:
@@ -174,11 +175,11 @@ class Node:
         return burst
 
     def next_wakeup(self, now: float) -> float:
-        """When there may be something to send, on the link's clock."""
+        """Earliest time on the link's clock at which there may be something to send."""
         return self._link.next_wakeup(now)
 
     def settled(self, burst: Burst, outcome: Outcome, at: float) -> None:
-        """Take what became of a burst: it has left, or not."""
+        """Report the outcome of a burst to the link."""
         self._link.confirm(burst, outcome, at)
         self._tell_verdicts()
         self._queue_moved.set()
@@ -186,11 +187,11 @@ class Node:
     # The daemon's tasks.
 
     def play(self, traffic: Iterator["Due"]) -> None:
-        """Send messages of our own, from when the PDU link is there, at their time."""
+        """Send generated `traffic` at its times, counted from when the PDU link is up."""
         self._traffic = OwnTraffic(traffic)
 
     async def carry(self) -> None:
-        """Bring the PDU link up and let it run; for ever. Raises UserError."""
+        """Bring the PDU link up and run it, forever. Raises UserError."""
         waits = self._setup.config.waits_for_consumer
         while True:
             carry = await self._opening.until_up(self)
@@ -199,7 +200,7 @@ class Node:
             await self._opening.run(carry)
 
     async def tick(self) -> None:
-        """Let the link's time pass, and measure how late the event loop is; for ever."""
+        """Run the link's timers and measure the event loop's lag, forever."""
         while True:
             silent_s = self._link.silence_at - self._pdu_link.now()
             tick_s = TICK_S if self._is_lockstep else min(TICK_S, max(silent_s, SHORTEST_TICK_S))
@@ -207,7 +208,7 @@ class Node:
             await asyncio.sleep(tick_s)
             self._loop_lag_s = max(time.monotonic() - due, 0.9 * self._loop_lag_s)
             if not self._is_attached:
-                # There has been no air yet, and whether its time is ours is not known.
+                # No PDU link has opened yet, so it is unknown whether it runs in real time.
                 self._link.expire_queue(self._pdu_link.now())
                 self._tell_verdicts()
             elif not self._is_lockstep:
@@ -216,7 +217,7 @@ class Node:
                 await self._end_recording()
 
     async def _end_recording(self) -> None:
-        """End a recording when all our own traffic is in it; one that is played ends by itself."""
+        """Close a recording once it holds all generated traffic; a played one ends by itself."""
         if self._traffic and self._traffic.is_over and not self._link.has_work:
             self._traffic, config = None, self._setup.config
             if config.backend == "iqfile" and not config.iqfile.receive:
@@ -224,7 +225,7 @@ class Node:
                 await self._pdu_link.close()
 
     async def drain(self, at_most_s: float) -> None:
-        """Take nothing more, send what is queued for at most `at_most_s`, drop the rest by name."""
+        """Stop taking messages, send the queue for at most `at_most_s`, and drop the rest."""
         self._draining = True
         await self.bus.stop_ingress()
         self._link.drain()
@@ -243,11 +244,11 @@ class Node:
         self._tell_verdicts()
 
     def why(self, topic_id: int, told: Told) -> list[str]:
-        """What happens to a topic, in plain words."""
+        """What happens to a topic's messages and why, in plain sentences."""
         return self._link.why(topic_id, told, self._pdu_link.now())
 
     def snapshot(self, control_requests: int) -> Snapshot:
-        """The snapshot of this moment, with everything there is to know."""
+        """A snapshot of everything that the daemon reports now."""
         now = self._pdu_link.now()
         pdu_link = self._opening.report(time.monotonic())
         subscribed = {topic_id: name for name, topic_id in self._setup.topics_in.items()}
@@ -273,7 +274,7 @@ class Node:
             self.bus.tell(verdict)
 
     def _stop_silent(self, now: float) -> None:
-        """Tell whoever obeys a command topic that fell silent to stop, once."""
+        """Publish the stop message of each command topic that fell silent, once."""
         for src, topic_id in self._link.take_silent(now):
             name = self._setup.republished_as(src, topic_id)
             stop = self._stops.get(topic_id)
@@ -284,5 +285,5 @@ class Node:
             self.bus.publish_stop(src, topic_id, stop)
 
     def audit(self) -> list[str]:
-        """Problems in the ledger, in words; none when it adds up."""
+        """Discrepancies in the ledger, as sentences; empty when it adds up."""
         return self._link.audit()

@@ -1,6 +1,6 @@
-"""Brings up what carries the PDUs, and goes on trying.
+"""Brings up the PDU link, and retries.
 
-A radio may come late, or not take what the configuration asks of it.
+A radio may appear late, or may not support the configured settings.
 """
 
 import asyncio
@@ -18,7 +18,7 @@ from sdrlinkd.pdulink import Carry, PduLink, PduListener
 from sdrlinkd.reports import PduLinkReport
 
 RETRY_S = 0.25, 2.0
-"""Seconds after which what is not there is tried again: at first, and at most; twice each time."""
+"""First and longest wait in s before a retry; the wait doubles each time."""
 BEING_OPENED = "it is being opened"
 
 T = TypeVar("T")
@@ -26,12 +26,12 @@ Make = Callable[[Setup, Patience, float], PduLink]
 
 
 class Opening:
-    """Owns the PDU link, and `state` and `reason` of the time in which it is not up.
+    """Owns the PDU link, and the `state` and `reason` while it is not up.
 
-    `make` builds a PDU link from a configuration, on a clock that began at a given monotonic time;
-    what could not be opened is closed, and another one is made for the next try. A PDU link that
-    `notices_replug` is tried again without being told to after its settings were refused.
-    `progress` says what takes so long, where something does.
+    `make` builds a PDU link from a configuration, with a clock that started at a given monotonic
+    time. A PDU link that could not be opened is closed, and a new one is made for the next try. If
+    `notices_replug`, a PDU link that refused its settings is retried without a request. `progress`
+    returns a text while something takes long, else an empty one.
     """
 
     def __init__(
@@ -51,12 +51,12 @@ class Opening:
 
     @property
     def config(self) -> Config:
-        """The configuration that the PDU link is opened with."""
+        """The configuration with which the PDU link is opened."""
         return self._setup.config
 
     @property
     def is_up(self) -> bool:
-        """Whether the PDU link carries PDUs, or did when last heard of."""
+        """Whether the PDU link was opened and has not refused since."""
         return self.state == "up"
 
     @property
@@ -65,15 +65,15 @@ class Opening:
         return self.is_up and self.pdu_link.report().state != "down"
 
     async def until_up(self, listener: PduListener) -> Carry:
-        """Try until the PDU link is there; what carries PDUs then.
+        """Try until the PDU link is open, and return its function that carries PDUs.
 
-        Raises UserError when a person has to mend something.
+        Raises UserError if the first try fails in a way that only a person can fix.
         """
         wait_s, most_s = RETRY_S
         while True:
             is_first = self._patience is Patience.NONE
             if self._told_to.is_set():
-                # Whatever was found out meanwhile was of the settings before.
+                # What was found out meanwhile concerns the old settings.
                 self._patience = Patience.THERE
                 self._told_to.clear()
             try:
@@ -87,11 +87,10 @@ class Opening:
             except UserError as error:
                 if is_first:
                     raise
-                # The configuration was good enough to begin with: no reason to end the daemon.
+                # The daemon already runs with this configuration, so do not end it.
                 self._wait("refused", str(error), Patience.THERE, knows_when=False)
             else:
-                # Told to try again in the very moment that it opened: what is open has the old
-                # settings.
+                # If a retry was requested in the same moment, the open link has the old settings.
                 if carry is not None and not self._told_to.is_set():
                     self.state, self.reason = "up", ""
                     return carry
@@ -102,28 +101,28 @@ class Opening:
             wait_s = min(2 * wait_s, most_s)
 
     async def run(self, carry: Carry) -> None:
-        """Let the PDU link carry PDUs until it refuses, or is to be opened anew."""
+        """Run the PDU link until it refuses its settings or a retry is requested."""
         try:
             await self._unless_told(carry())
         except LinkRefusedError as error:
             self.refused(str(error))
 
     def refused(self, reason: str) -> None:
-        """Wait for another try, as what is there does not take its settings."""
+        """Wait for another try, as the PDU link refuses its settings."""
         self._wait("refused", reason, Patience.REPLUGGED, self._notices_replug)
 
     def try_again(self, setup: Setup) -> None:
-        """Try at once, with this configuration: a person says that it may succeed now."""
+        """Try at once with the configuration of `setup`, as a person requested it."""
         self._setup = setup
-        # Whatever it is, it is there now or can be waited for.
+        # A person expects the device to be present or to appear.
         self._wait("opening", BEING_OPENED, Patience.THERE, knows_when=True)
         self._told_to.set()
 
     def report(self, at: float) -> PduLinkReport:
-        """The PDU link's report, or why there is none; since when, on the clock of `at`."""
+        """The PDU link's report, with the state while it is not up, at monotonic time `at`."""
         told = self.pdu_link.report()
         if not self.is_up:
-            # An attempt that waits may know more by now.
+            # A waiting attempt may know more by now.
             latest = told.reason if self.state == "waiting" else ""
             reason = self._progress() or latest or self.reason
             told = replace(told, state=self.state, reason=reason, notices=[])
@@ -132,11 +131,11 @@ class Opening:
         return replace(told, since_s=at - self._told_since)
 
     async def close(self) -> None:
-        """Close the PDU link, in whatever state it is."""
+        """Close the PDU link, whatever its state."""
         await self.pdu_link.close()
 
     async def _renew(self) -> None:
-        """Put another PDU link in place of this one. Its clock goes on where this one's stands."""
+        """Replace the PDU link with a new one, whose clock continues the old one's time."""
         began_s = time.monotonic() - self.pdu_link.now()
         await self.pdu_link.close()
         self.pdu_link = self._make(self._setup, self._patience, began_s)
@@ -146,14 +145,14 @@ class Opening:
         self._patience, self._knows_when = patience, knows_when
 
     async def _unless_told(self, work: Coroutine[object, object, T]) -> T | None:
-        """Do `work`, which is given up when told to try again: None. Raises what `work` raises."""
+        """Do `work`; returns None if a retry is requested meanwhile. Raises what `work` raises."""
         working = asyncio.ensure_future(work)
         told = asyncio.ensure_future(self._told_to.wait())
         try:
             await asyncio.wait((working, told), return_when=asyncio.FIRST_COMPLETED)
         finally:
             told.cancel()
-            # Waited for, so that nothing of it is left when another attempt begins.
+            # Wait for its end, so that it cannot interfere with the next attempt.
             if not working.done():
                 working.cancel()
                 await asyncio.wait((working,))

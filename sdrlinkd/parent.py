@@ -1,8 +1,8 @@
-"""Ending with the process that started this one, also when that was killed.
+"""Ends this process together with the process that started it, even if that one was killed.
 
-The kernel's parent-death signal goes out when the starter's *thread* ends, and not at all to who
-was orphaned before asking for it. A pipe has neither fault: its other end is open for as long as
-the starter lives.
+The kernel's parent-death signal is sent when the parent's *thread* ends, and never to a process
+that was orphaned before it requested the signal. A pipe has neither problem: its other end stays
+open for as long as the parent lives.
 """
 
 import contextlib
@@ -16,7 +16,7 @@ STOP_S = 20.0
 
 
 def end_with_parent() -> None:
-    """Stop when standard input, a pipe of the starter's, ends: where VARIABLE asks for it."""
+    """Stop this process when stdin, a pipe from the parent, ends, if VARIABLE is set."""
     if os.environ.pop(VARIABLE, ""):
         threading.Thread(target=_wait, name="parent", daemon=True).start()
 

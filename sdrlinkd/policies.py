@@ -1,4 +1,4 @@
-"""The policies in force: those of the file, and what was set since."""
+"""The policies in force: those of the file, with the changes made since."""
 
 import logging
 from collections.abc import Callable, Mapping
@@ -13,19 +13,20 @@ from sdrlinkd.link import Link, TopicPolicy
 log = logging.getLogger("sdrlinkd")
 
 FIXED = ("dictionary", "stamp", "stop")
-"""Keys that cannot be set: the other end must know of two, and `stop` is made at the start."""
+"""Keys that cannot be changed at run time: receivers must know two of them, and the stop message is
+made at the start."""
 
 
 class Policies:
-    """Changes one topic's policy while running; everything else stays."""
+    """Changes policies of single topics while the daemon runs."""
 
     def __init__(self, setup: Setup, link: Link) -> None:
         self._setup = setup
         self._link = link
         self.changed: dict[int, set[str]] = {}
-        """Keys by topic id that were set since the file was read."""
+        """Keys that were set since the file was read, by topic id."""
         self.announce: Callable[[Mapping[int, TopicPolicy]], None] | None = None
-        """Called with the policies in force when they have changed."""
+        """Called with the policies in force after a change."""
         link.set_policies(setup.policies)
 
     def reload(self, policies: Mapping[int, TopicPolicy]) -> None:
@@ -44,7 +45,10 @@ class Policies:
         return topic.id
 
     def set(self, name: str, changes: Mapping[str, Any]) -> dict[str, Any]:
-        """Apply `changes`; what was and what is now. Raises UserError, changing nothing."""
+        """Apply `changes`; returns the values before and after.
+
+        Raises UserError and then changes nothing.
+        """
         topic_id = self.topic_id(name)
         known = [key for key in TopicPolicy.__struct_fields__ if key not in FIXED]
         for key in changes:
@@ -58,7 +62,7 @@ class Policies:
             raise UserError(explain_policy(changes)) from None
         self._link.set_policy(topic_id, new)
         self.changed.setdefault(topic_id, set()).update(changes)
-        # As the link has it, not as we gave it.
+        # Report the policy as the link has it, not as it was given.
         new = self._link.policy(topic_id)
         self._announce()
         told = {key: _told(getattr(new, key)) for key in changes}
@@ -76,5 +80,5 @@ class Policies:
 
 
 def _told(value: object) -> object:
-    """A value as JSON can say it, which knows no infinity."""
+    """A value as JSON can express it, which has no infinity."""
     return "inf" if value == float("inf") else value

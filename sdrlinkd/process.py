@@ -1,4 +1,4 @@
-"""Programs as processes of their own: started, waited for, stopped, and none is left behind."""
+"""Child processes: start them, wait for them, stop them, and leave none behind."""
 
 import contextlib
 import os
@@ -18,28 +18,28 @@ from sdrlinkd import parent
 STOP_TIMEOUT_S = 20.0
 PATIENCE_S = 60.0
 LOOK_S = 0.01
-"""A process that is waited for is looked at so often."""
+"""Polling interval in s while waiting for a process."""
 NOT_STARTED = -1
-"""In place of a file."""
+"""File descriptor of a process that was not started."""
 
 
 class ProcessError(Exception):
-    """A process did not do what was waited for; the message has its name and its last words."""
+    """A process did not do what was awaited; the message holds its name and its last output."""
 
 
 def module(name: str, *arguments: object) -> list[str]:
-    """The words of a command that runs a Python module by our own interpreter."""
+    """The command line that runs a Python module with our own interpreter."""
     return [sys.executable, "-m", name, *map(str, arguments)]
 
 
 class Process:
-    """A program that runs by itself once started; what it says is kept, and shown when it fails.
+    """A child process; its output is kept and shown when it fails.
 
-    `log` is a file for all that it says; without one, output and errors are kept apart. It
-    ends with us, also when we are killed, where it calls `end_with_parent` or reads its input.
-    Ctrl-C does not reach it: that is ours to pass on, in the right order. Without a `session` of
-    its own, a scheduler that groups by sessions weighs it as one of ours; so it is where time is
-    measured.
+    `log` is a file for all of its output; without one, stdout and stderr are kept separately. The
+    process ends with us, even when we are killed, if it calls `end_with_parent` or reads its
+    input. Ctrl-C does not reach it: we pass that on, in the right order. With `session` false it
+    stays in our session, so a scheduler that groups by sessions weighs it together with us; use
+    this where time is measured.
     """
 
     def __init__(
@@ -65,7 +65,7 @@ class Process:
         self._read_to = 0
 
     def start(self) -> None:
-        """Start it; whoever stops it is told of it before."""
+        """Start the process; a Ctrl-C meanwhile is delivered once the process can be stopped."""
         with _interrupts_later():
             self._output = self._errors = self._kept(self._log_path)
             if self._log_path is None:
@@ -86,39 +86,39 @@ class Process:
 
     @property
     def pid(self) -> int:
-        """The process number, once the process is started."""
+        """The process id, once the process is started."""
         return self._started.pid
 
     @property
     def is_running(self) -> bool:
-        """Whether it has begun and not ended."""
+        """Whether the process has started and not ended."""
         return self._process is not None and self._process.poll() is None
 
     @property
     def code(self) -> int | None:
-        """Its exit code, or minus the signal that ended it; None before."""
+        """The exit code, or minus the signal that ended the process; None while it runs."""
         return self._started.poll()
 
     def out(self) -> str:
-        """What it has written to its output, or to its log."""
+        """What the process has written to stdout, or to its log."""
         return _text(self._output)
 
     def err(self) -> str:
-        """What it has written to its errors, or to its log."""
+        """What the process has written to stderr, or to its log."""
         return _text(self._errors)
 
     def log(self) -> str:
-        """All that it has said."""
+        """All output of the process, stdout first."""
         return self.out() if self._log_path is not None else self.out() + self.err()
 
     def last_words(self) -> str:
-        """The last line that it has said, errors first; else how it ended."""
+        """The last line of stderr, or failing that of stdout; without output, the exit code."""
         lines = [*self.out().splitlines(), *self.err().splitlines()]
         said = [line for line in lines if line.strip()]
         return said[-1].strip() if said else f"not a word, exit code {self.code}"
 
     def tell(self, line: str) -> None:
-        """Write a line to its input. Raises ProcessError when nobody reads it any more."""
+        """Write a line to the process's stdin. Raises ProcessError when it no longer reads."""
         try:
             self._input.write(line.encode() + b"\n")
             self._input.flush()
@@ -128,12 +128,12 @@ class Process:
             raise ProcessError(f"{self.name}: {self.last_words()}") from None
 
     def close_input(self) -> None:
-        """Let it find the end of its input; that also tells it that nobody waits for it."""
+        """Close the process's stdin, which also signals that nobody waits for it."""
         with contextlib.suppress(BrokenPipeError):
             self._input.close()
 
     def line(self, within_s: float = PATIENCE_S) -> str:
-        """Wait for the next line of its output. Raises ProcessError."""
+        """Wait for the next line of stdout and return it. Raises ProcessError."""
         found: list[str] = []
 
         def is_there() -> bool:
@@ -148,18 +148,21 @@ class Process:
         return found[0]
 
     def wait(self, within_s: float = PATIENCE_S) -> int:
-        """Wait for its end; its exit code. Raises ProcessError."""
+        """Wait until the process ends; returns its exit code. Raises ProcessError."""
         try:
             return self._started.wait(within_s)
         except subprocess.TimeoutExpired:
             raise ProcessError(f"{self.name}: not done within {within_s:g} s") from None
 
     def send_signal(self, number: int) -> None:
-        """Send it a signal; nothing when it has ended."""
+        """Send the process a signal; does nothing once it has ended."""
         self._started.send_signal(number)
 
     def stop(self, number: int = signal.SIGTERM, within_s: float = STOP_TIMEOUT_S) -> int | None:
-        """Ask it to end, and make sure; its exit code. None when it was not started."""
+        """Send signal `number`, and kill the process if it has not ended within `within_s`.
+
+        Returns its exit code; None if it was not started.
+        """
         if self._process is None:
             return None
         self._process.send_signal(number)
@@ -171,7 +174,7 @@ class Process:
         return self.code
 
     def kill(self) -> None:
-        """End it at once, with all that it has started; nothing when it was not started."""
+        """Kill the process and its children at once; does nothing if it was not started."""
         if self._process is None:
             return
         if self.is_running:
@@ -182,13 +185,13 @@ class Process:
 
     @property
     def _input(self) -> IO[bytes]:
-        # Always there, as asked for.
+        # Never None, as Popen gets stdin=PIPE.
         return cast("IO[bytes]", self._started.stdin)
 
     def _kept(self, path: Path | None) -> int:
-        """A file to write to and to read from, for as long as this object is there."""
+        """A file descriptor to write and read, open for as long as this object exists."""
         if path is not None:
-            # What it said before it was started again stays.
+            # A restart appends to the output of the runs before.
             begin = os.O_TRUNC if self._process is None else 0
             file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | begin, 0o644)
         else:
@@ -207,7 +210,7 @@ class Process:
         try:
             self.start()
         except BaseException:
-            # An interrupt that came while it started; nobody would stop it then.
+            # After an interrupt during the start, nobody else would stop the process.
             self.stop()
             raise
         return self
@@ -224,11 +227,11 @@ def wait_until(
 ) -> None:
     """Wait until `condition()` holds.
 
-    Raises ProcessError, with last words, where one of `processes` ends before or time runs out.
+    Raises ProcessError with the last output if one of `processes` ends first or time runs out.
     """
     deadline = time.monotonic() + within_s
     while True:
-        # Before the condition: what a process does at last counts.
+        # Read before the condition, so that what a process does just before it ends counts.
         ended = [each for each in processes if not each.is_running]
         if condition():
             return
@@ -241,7 +244,7 @@ def wait_until(
 
 
 def _bytes(file: int, begin: int = 0) -> bytes:
-    """From `begin` on, whatever offset the process writes at."""
+    """The file's content from `begin` on, independent of the offset at which it is written."""
     return b"" if file == NOT_STARTED else os.pread(file, os.fstat(file).st_size - begin, begin)
 
 
@@ -251,7 +254,7 @@ def _text(file: int) -> str:
 
 @contextlib.contextmanager
 def _interrupts_later() -> Iterator[None]:
-    """A Ctrl-C in the moment in which a process runs that nobody knows of yet comes after it."""
+    """Delay Ctrl-C until the end of this context, so that a new process is never orphaned."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

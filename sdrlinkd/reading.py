@@ -1,4 +1,4 @@
-"""Reading a ZeroMQ socket from the event loop, without a thread and without waiting."""
+"""Reads a ZeroMQ socket from the event loop, without a thread and without blocking."""
 
 import asyncio
 from collections.abc import Callable
@@ -12,10 +12,10 @@ DRAIN_LIMIT = 64
 
 
 class SocketReader(Generic[Received]):
-    """Calls `take` with each message that `receive` yields, `DRAIN_LIMIT` at most a turn.
+    """Calls `take` with each message from `receive`, at most `DRAIN_LIMIT` per turn of the loop.
 
-    ZeroMQ's descriptor is edge-triggered: after any use of the socket it may have become readable
-    without a new edge, so whoever sends on it calls `recheck`.
+    ZeroMQ's descriptor is edge-triggered. After any use of the socket it may be readable without a
+    new edge, so code that sends on the socket must call `recheck`.
     """
 
     def __init__(
@@ -35,7 +35,7 @@ class SocketReader(Generic[Received]):
         self.recheck()
 
     def recheck(self) -> None:
-        """Look again in the next turn of the loop, if there is something to read."""
+        """Read in the next turn of the loop, if there is something to read."""
         if self._again is None and self._readable():
             self._again = self._loop.call_soon(self._drain)
 
@@ -51,7 +51,7 @@ class SocketReader(Generic[Received]):
     def _drain(self) -> None:
         if self._again is not None:
             self._again.cancel()
-        # Armed first, so that not even a bug in `take` leaves messages without a reader.
+        # Scheduled first, so that messages are still read after an exception in `take`.
         self._again = self._loop.call_soon(self._drain)
         try:
             for _ in range(DRAIN_LIMIT):

@@ -12,16 +12,16 @@ from sdrlinkd.policies import Policies
 log = logging.getLogger("sdrlinkd")
 
 OF_THE_RADIO = ("modem", "gnuradio", "channel", "access", "rate")
-"""Sections that nobody has used while there is no radio, besides those of radios that may be away.
-"""
+"""Sections that are unused while there is no radio, besides the sections of radios that may be
+absent."""
 ANYTIME = ("topic",)
 
 
 class Reloading:
-    """Applies what may change: the topic policies and, while there is no radio, its settings.
+    """Applies changes of topic policies and, while there is no radio, of its settings.
 
-    `read` reads the configuration anew; `check` raises UserError for what the file alone tells to
-    be wrong; `setup` is what was begun with.
+    `read` reads the configuration again. `check` raises UserError for errors that the file alone
+    shows. `setup` is the one with which the daemon started.
     """
 
     def __init__(
@@ -39,7 +39,10 @@ class Reloading:
         self._opening = opening
 
     def reload(self) -> str:
-        """Apply what has changed; returns which parts were. Raises UserError, changing nothing."""
+        """Apply changes, and return a text that names them.
+
+        Raises UserError and then changes nothing.
+        """
         changed = self._read()
         if changed.registry.digest() != self._setup.registry.digest():
             raise UserError(
@@ -61,7 +64,7 @@ class Reloading:
         return "topic policies and the radio's settings"
 
     def on_signal(self) -> None:
-        """Apply what has changed, on SIGHUP, and tell the log."""
+        """Apply changes on SIGHUP, and log the result."""
         try:
             told = self.reload()
         except UserError as error:
@@ -70,7 +73,7 @@ class Reloading:
             log.info("re-read: %s; all other keys need a restart", told)
 
     def _fixed(self, config: Config) -> list[str]:
-        """Keys that have changed and may not without a restart."""
+        """Changed keys that need a restart."""
         free = {*_of_the_radio(config), *ANYTIME}
         return [
             key
@@ -80,7 +83,7 @@ class Reloading:
 
 
 def _of_the_radio(config: Config) -> list[str]:
-    """The sections that nobody has used while there is no radio."""
+    """The sections that are unused while there is no radio."""
     own = backend_of(config)
     radios = [*BUILT_IN.values(), *([own] if own is not None and own.name not in BUILT_IN else [])]
     return [*OF_THE_RADIO, *(each.name for each in radios if each.may_be_away)]

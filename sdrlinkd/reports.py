@@ -1,153 +1,219 @@
-"""The status schema: what each part tells of itself.
+"""The status schema: what each part of the daemon reports about itself.
 
-Frozen, with the unit in the name; counters only grow; `*_per_s` are means over the last
-`RATE_WINDOW_S`. One `Snapshot` is built from all of them, and every view renders that snapshot.
+Reports are frozen. A unit is part of the field's name. Counters count from the daemon's start and
+only grow; `*_per_s` are means over the last `RATE_WINDOW_S`. One `Snapshot` holds all reports, and
+every view renders that snapshot.
 """
 
 import msgspec
 
 RATE_WINDOW_S = 5.0
+"""Window in s of all rates and recent shares."""
 
 
 class TopicReport(msgspec.Struct, frozen=True, kw_only=True):
-    """A topic of the registry on its way out."""
+    """A topic of the registry, as this robot sends it."""
 
     topic_id: int
+    """Id of the topic on the air."""
     name: str
+    """Name on the bus where the topic is subscribed, else `/` and the name in the registry."""
     type: str
+    """ROS message type."""
     subscribed: bool
+    """Whether the bus accepts messages for this topic."""
     qos: str
+    """Default class of its messages: urgent | latency | default | bulk"""
     priority: int
+    """Default priority of its messages within the class, 0 to 127; 127 is sent first."""
     accepted: int = 0
+    """Messages submitted, including those that were then dropped."""
     accepted_per_s: float = 0.0
+    """Messages submitted per second."""
     accepted_bytes_per_s: float = 0.0
+    """Payload bytes submitted per second."""
     sent: int = 0
+    """Messages that have left completely."""
     sent_bytes: int = 0
+    """Payload bytes of the sent messages; compressed size where the topic is compressed."""
     queued: int = 0
+    """Messages in the queue of which no part has been sent yet."""
     reoffered: int = 0
-    """Messages among those accepted that were sent again to robots that came late."""
+    """Latched messages sent again to late joiners; `accepted` includes them."""
     dropped: dict[str, int] = {}
+    """Messages dropped, by reason (`tx_*`)."""
     lifespan_s: float | None = None
-    """Age after which its messages are not sent any more; null: they have no end."""
+    """Default age in s after which a message is not sent any more; null: no limit."""
     lifespan_from: str = ""
-    """Whose lifespan that is: topic | class; empty: nobody's."""
+    """Where the default lifespan is set: topic | class; empty: nowhere."""
     queue_ms: float | None = None
-    """What messages waited lately: for others before them; for the air; for another chance."""
+    """Recent mean of the time that messages waited behind others, in ms; null: unknown."""
     access_ms: float | None = None
+    """Recent mean of the time that messages waited for the channel, in ms; null: unknown."""
     again_ms: float | None = None
+    """Recent mean of the time that messages waited in the retry queue, in ms; null: unknown."""
 
 
 class LatencyReport(msgspec.Struct, frozen=True, kw_only=True):
-    """How late messages of one topic of one source come: means over the last ones, all in ms.
+    """How late messages of one topic from one source arrive, as means over the last messages in ms.
 
-    Their age = wait + reassembly + air + handover; wait = queue + access + again, as far as the
-    source told (null: it did not). `period` is the time between two messages, `jitter` its standard
-    deviation (the Pound paper's Jd); `percentiles` are of all ages since the start.
+    A message's age is wait + reassembly + air + handover; its wait is queue + access + again.
     """
 
     wait_ms: float
+    """From submission to the preamble of the burst with the first fragment, in ms."""
     queue_ms: float | None = None
+    """Part of the wait behind other messages, in ms; null: the source has not reported it."""
     access_ms: float | None = None
+    """Part of the wait for the channel, in ms; null: the source has not reported it."""
     again_ms: float | None = None
+    """Part of the wait in the retry queue, in ms; null: the source has not reported it."""
     reassembly_ms: float
+    """From the preamble of the burst with the first fragment to that with the last, in ms."""
     air_ms: float
+    """From that preamble to the end of the last fragment, in ms."""
     handover_ms: float
+    """From the end of the last fragment to the handover to the bus, in ms."""
     period_ms: float | None = None
+    """Time between two messages, in ms; null: fewer than two have arrived."""
     jitter_ms: float | None = None
+    """Standard deviation of the time between messages, in ms: Jd in the Pound paper."""
     percentiles_ms: dict[str, float] = {}
+    """Percentiles of all ages since the start, in ms: 50, 90, 99, 99.9 and max."""
 
 
 class ClockReport(msgspec.Struct, frozen=True, kw_only=True):
-    """Another robot's clock, as far as it is known here.
-
-    `offset_ms`: its link's clock behind ours, ± `bound_us`; `wall_offset_ms` and `wall_bound_us`
-    are that of the hosts' clocks since 1970. `skew_ppm`: what we gain on it.
-    """
+    """What this robot knows about another robot's clock."""
 
     state: str
-    """unsynced | coarse | synced | holdover"""
+    """How well the clock is known: unsynced | coarse | synced | holdover (no recent CLOCK)"""
     offset_ms: float | None = None
+    """Our link's clock minus the other robot's, in ms; null: unknown."""
     bound_us: float | None = None
+    """Largest possible error of `offset_ms`, in µs."""
     skew_ppm: float | None = None
+    """Rate at which our link's clock gains on the other, in ppm."""
     wall_offset_ms: float | None = None
+    """Our host's time since 1970 minus the other host's, in ms; null: unknown."""
     wall_bound_us: float | None = None
+    """Largest possible error of `wall_offset_ms`, in µs."""
     period_s: float = 0.0
-    """Time between its CLOCK records."""
+    """Time between its last two CLOCK records, in s."""
     samples: int = 0
+    """Time stamps taken, of both directions."""
     steps: int = 0
     """How often the clock jumped."""
     contradicted: int = 0
-    """Stamps that did not fit the others."""
+    """Time stamps rejected because they contradict the others."""
     refused: int = 0
-    """Records of another boot, or not newer than the last one."""
+    """CLOCK records rejected: of another boot, or not newer than the last one."""
     resets: int = 0
-    """How often it started anew, with another clock."""
+    """How often the robot restarted with another clock."""
 
 
 class ReceivedTopicReport(msgspec.Struct, frozen=True, kw_only=True):
-    """A topic of one source, as heard here. `pdr` is delivered over begun messages."""
+    """A topic of one source, as this robot receives it."""
 
     src: int
+    """Id of the robot that sends the topic."""
     topic_id: int
+    """Id of the topic on the air."""
     name: str
+    """`/` and the topic's name in the registry; for an unknown topic, its id."""
     republished_as: str
+    """Name on the bus; empty: nothing has been published yet."""
     delivered: int = 0
+    """Messages handed to the bus."""
     delivered_per_s: float = 0.0
+    """Messages handed to the bus per second."""
     delivered_bytes: int = 0
+    """Payload bytes handed to the bus."""
     delivered_bytes_per_s: float = 0.0
+    """Payload bytes handed to the bus per second."""
     dropped: dict[str, int] = {}
+    """Messages dropped, by reason (`rx_*`)."""
     pdr: float | None = None
+    """Share of the messages that were delivered rather than dropped, 0 to 1; null: no messages."""
     age_ms_last: float | None = None
+    """Age of the last message at its handover, in ms; null: unknown."""
     age_ms_p50: float | None = None
+    """Median age of the recent messages, in ms; null: unknown."""
     age_ms_p99: float | None = None
+    """99th percentile of the ages of the recent messages, in ms; null: unknown."""
     latency: LatencyReport | None = None
+    """The parts of the age; null: no age is known."""
     stops: int = 0
-    """Stop messages published because nothing came."""
+    """Stop messages published because the topic fell silent."""
 
 
 class NeighborReport(msgspec.Struct, frozen=True, kw_only=True):
-    """A source of PDUs. `per` is PDUs known lost over PDUs sent, from sequence numbers."""
+    """A robot that this robot hears."""
 
     src: int
+    """Id of the robot."""
     is_self: bool
+    """Whether it is this robot itself, which hears its own PDUs."""
     last_heard_s_ago: float
+    """Time since its last PDU, in s."""
     pdus_heard: int
+    """PDUs heard, without duplicates."""
     pdus_lost: int
+    """PDUs lost, by gaps in the sequence numbers."""
     per: float
+    """Share of its PDUs that were lost since the start, 0 to 1."""
     per_lately: float | None = None
-    """PDUs known lost over PDUs sent in the last `RATE_WINDOW_S`; null: nothing was due from it."""
+    """Share of its PDUs that were lost in the last `RATE_WINDOW_S`, 0 to 1; null: none was sent."""
     duplicates: int
+    """PDUs heard again and ignored."""
     usual_gap_s: float = 0.0
-    """The longest pause between its PDUs lately."""
+    """Longest recent pause between its PDUs, in s."""
     hops_left: int
+    """How many more times its last PDU may be relayed."""
     reboots: int
+    """How often the robot restarted since it was first heard."""
     snr_db: float | None = None
+    """Recent mean SNR of its PDUs, in dB; null: the PDU link measures none."""
     registry: str = "unknown"
-    """same | differs | unknown"""
+    """Its registry compared with ours: same | differs | unknown"""
     snr_there_db: float | None = None
-    """How this neighbor hears us, by its own report; `per_there` likewise."""
+    """SNR at which it hears us by its own report, in dB; null: not reported."""
     per_there: float | None = None
+    """Share of our PDUs that it lost by its own report, 0 to 1; null: not reported."""
     mcs: int = 0
-    """The MCS with which we send to it."""
+    """MCS with which we send default and bulk traffic to it."""
     clock: ClockReport | None = None
+    """What is known about its clock; null: nothing."""
 
 
 class TxReport(msgspec.Struct, frozen=True, kw_only=True):
     """The transmit ledger: accepted = sent + queued + in_flight + every reason of `dropped`."""
 
     accepted: int
+    """Messages that entered the ledger: submitted, refused by the bus, reoffered or relayed."""
     sent: int
+    """Messages that have left completely."""
     queued: int
+    """Messages in the queue of which no part has been sent yet."""
     queued_bytes: int
+    """Payload bytes of the queued messages."""
     in_flight: int
+    """Messages of which a part is composed and that are neither sent nor dropped yet."""
     dropped: dict[str, int]
+    """Messages dropped, by reason (`tx_*`)."""
     queued_by_class: dict[str, int]
+    """Queued messages by class."""
     entries: int
+    """Entries composed into PDUs."""
     pdus_composed: int
+    """PDUs composed."""
     pdus_sent: int
+    """PDUs in bursts that left."""
     pdus_failed: int
+    """PDUs in bursts that failed."""
     bursts_sent: int
+    """Bursts that left."""
     bursts_failed: int
+    """Bursts that did not leave and were given up."""
 
 
 class RxReport(msgspec.Struct, frozen=True, kw_only=True):
@@ -158,130 +224,171 @@ class RxReport(msgspec.Struct, frozen=True, kw_only=True):
     """
 
     pdus_heard: int
+    """PDUs received from the PDU link."""
     pdus_used: int
+    """PDUs with entries for this robot."""
     pdus_dropped: dict[str, int]
+    """Other PDUs, by reason (`rx_*`, `sec_*`)."""
     started: int
+    """Messages of which at least one part has arrived."""
     delivered: int
+    """Messages handed to the bus."""
     held: int
+    """Incomplete messages that wait for more fragments."""
     held_bytes: int
+    """Memory of the incomplete messages, in bytes."""
     dropped: dict[str, int]
+    """Messages dropped, by reason (`rx_*`)."""
     control_bad: int = 0
-    """Control entries skipped because they could not be read (rx_control_bad)."""
+    """Unreadable control entries that were skipped (rx_control_bad)."""
 
 
 class RelayReport(msgspec.Struct, frozen=True, kw_only=True):
-    """PDUs that are forwarded; each also counts as a message of the transmit ledger."""
+    """PDUs that this robot relays; each also counts as a message in the transmit ledger."""
 
     accepted: int = 0
+    """PDUs to be relayed, including those that were then dropped."""
     sent: int = 0
+    """PDUs relayed."""
     dropped: dict[str, int] = {}
+    """PDUs dropped, by reason (`tx_*`)."""
 
 
 class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
-    """Everything that the link reports."""
+    """The link: ledgers, topics, neighbors, access, and use of the channel."""
 
     pdu_size: int
+    """Size of every PDU, in octets."""
     access: str
+    """State and times of the access policy in force, as text for people."""
     access_policy: str = "none"
-    """The access policy in force; where access.policy is auto, the one that was chosen."""
+    """Access policy in force; where access.policy is auto, the one that was chosen."""
     access_reason: str = ""
     """Why the access policy in force was chosen."""
     access_share_pct: float = 100.0
-    """Share of the air that the policy in force carries on this radio, when all always send."""
+    """Share of the airtime in % that this policy can use with this radio under full load."""
     airtime_s: float
-    """Time on the air, all bursts together."""
+    """Airtime of all bursts that left, in s."""
     air_sent_pct: float = 0.0
-    """Share of the air that our bursts took over the last `RATE_WINDOW_S`."""
+    """Airtime of our bursts over the last `RATE_WINDOW_S`, in %."""
     air_heard_pct: float = 0.0
-    """Share of the air that bursts of others took in that time, as far as they were heard."""
+    """Airtime of the bursts heard from others over the last `RATE_WINDOW_S`, in %."""
     airtime_by_class_s: dict[str, float] = {}
-    """Time on the air by the class of what was inside, bursts that failed included."""
+    """Airtime by the class of the PDUs, in s; includes bursts that failed."""
     control_airtime_s: float = 0.0
-    """Time on the air of PDUs with nothing but records."""
+    """Airtime of PDUs that hold only control records, in s."""
     control_period_s: float = 0.0
-    """Longest time between PDUs with nothing but CLOCK and RECEIPT records."""
+    """Longest time in s between PDUs that hold only CLOCK and RECEIPT records."""
     bursts_by_mcs: dict[int, int]
+    """Bursts that left, by MCS."""
     bursts_late: int
-    """Bursts that came too late for their slot and were sent again."""
+    """How often a burst missed its slot and was put into the retry queue."""
     mcs_lowest: int | None = None
-    """The slowest MCS that may be chosen; null: it is fixed."""
+    """Slowest MCS that rate control may choose; null: the MCS is fixed."""
     mcs_changes: list[tuple[float, int, int]]
-    """(when by the link's clock, neighbor, MCS from then on), the last ones."""
+    """Latest MCS changes: (time on the link's clock in s, neighbor, new MCS)."""
     control_channel: bool
+    """Whether the registry leaves a topic id free for control records."""
     registry_digest: str
+    """Digest of our registry, in hex; robots with the same registry have the same digest."""
     relayed: RelayReport = RelayReport()
+    """PDUs of other robots that this robot relays."""
     fragments_repaired: int = 0
-    """Fragments computed from parity."""
+    """Lost fragments that were computed from parity."""
     receipts_untold: int = 0
-    """RECEIPTs to others that found no room."""
+    """RECEIPT records for others that were never sent, as too many were waiting."""
     receipts_unasked: int = 0
-    """RECEIPTs of others of which nothing was known here any more."""
+    """RECEIPT records received for messages that no longer await one."""
     tx: TxReport
+    """The transmit ledger."""
     rx: RxReport
+    """The receive ledgers."""
     topics: list[TopicReport]
+    """All topics of the registry, as this robot sends them."""
     received: list[ReceivedTopicReport]
+    """Topics received from other robots."""
     neighbors: list[NeighborReport]
+    """Robots heard, in ascending order of ids."""
 
 
 class PduLinkReport(msgspec.Struct, frozen=True, kw_only=True):
-    """What carries the PDUs, and how it fares."""
+    """The PDU link, which carries the PDUs, and its state."""
 
     kind: str
+    """The configured backend."""
     state: str
-    """opening | up | waiting (for a radio that is not there yet) | refused (by a radio that does
-    not take its settings) | down | ended (a recording is over)"""
+    """State of the PDU link: opening | up | waiting (for a radio that is absent) | refused (the
+    radio does not accept its settings) | down | ended (a recording is over)"""
     detail: str = ""
+    """The PDU link and its main settings, as text for people."""
     reason: str = ""
-    """Why the link is not up, in a sentence."""
+    """Why the link is not up, as a sentence; empty: it is up."""
     since_s: float = 0.0
-    """How long it has been in this state."""
+    """Time in the present state, in s."""
     level_dbfs: float | None = None
-    """Mean power of what the radio received lately; full scale is 0."""
+    """Recent mean power of the received samples, in dB relative to full scale; null: unknown."""
     clipped_pct: float = 0.0
-    """Share of the samples received lately that stood at full scale."""
+    """Share of the recently received samples at full scale, in %."""
     max_cfo_hz: float | None = None
-    """Bursts are looked for up to so far off in frequency."""
+    """Largest frequency offset at which the receiver searches for bursts, in Hz."""
     counters: dict[str, int] = {}
+    """Counters of the radio and the modem by name."""
     realtime_ratio: float | None = None
-    """How many times faster than real time the receiver works, in processor time."""
+    """Speed of the receiver as a multiple of real time, by CPU time; null: unknown."""
     notices: list[str] = []
+    """What a person should know about the PDU link, in sentences."""
 
 
 class BusReport(msgspec.Struct, frozen=True, kw_only=True):
-    """What the local bus took and handed over."""
+    """The traffic of the local bus."""
 
     runtime_dir: str
+    """Directory of the daemon's sockets."""
     received: int
+    """Messages received from producers, including those that were refused."""
     published: int
+    """Messages from other robots handed to consumers."""
     control_requests: int
+    """Requests answered on the control socket."""
     bad_envelope_last: str = ""
+    """What was wrong with the last refused message; empty: none was refused."""
 
 
 class VerdictReport(msgspec.Struct, frozen=True, kw_only=True):
-    """How the daemon and its link fare, in a word and in plain sentences."""
+    """The state of the daemon and its link, in one word and in plain sentences."""
 
     level: str = "OK"
-    """OK | DEGRADED | DOWN"""
+    """The verdict: OK | DEGRADED | DOWN"""
     reasons: list[str] = []
-    """Why it is not OK, the worst first."""
+    """Why the level is not OK, the worst reason first."""
 
 
 class Snapshot(msgspec.Struct, frozen=True, kw_only=True):
     """Everything that one daemon reports at one moment."""
 
     version: str
+    """Version of sdrlinkd."""
     node: int
+    """Id of this robot."""
     namespace: str
+    """ROS namespace of this robot's topics."""
     state: str
-    """running | draining"""
+    """State of the daemon: running | draining (it sends the queue and then stops)"""
     taken_at_unix_ns: int
+    """Time of the snapshot by the host's clock, in ns since 1970."""
     uptime_s: float
+    """Time since the daemon's start, in s."""
     loop_lag_ms: float
+    """Delay of the event loop's timer: the recent maximum, which decays; in ms."""
     host_clock_steps: int = 0
-    """How often this host's clock was set, by more than it strays."""
+    """How often this host's clock was set while the daemon ran."""
     verdict: VerdictReport = VerdictReport()
+    """OK, DEGRADED or DOWN, with reasons."""
     carrier: PduLinkReport
+    """The PDU link."""
     bus: BusReport
+    """The local bus."""
     link: LinkReport
+    """The link: ledgers, topics, neighbors and airtime."""
     notices: list[str] = []
-    """Sentences a person should read: what is switched off, disagrees or was refused."""
+    """What a person should know: what is switched off, disagrees or was refused."""

@@ -1,4 +1,4 @@
-"""Tables that fit the screen: columns leave by rank, names wrap, a figure is never cut."""
+"""Tables that fit the screen: columns drop out by rank, names wrap, figures are never cut."""
 
 import os
 import re
@@ -13,24 +13,25 @@ from rich.table import Table
 from rich.text import Text
 
 NOTHING = "–"
-"""What stands where there is no figure."""
+"""Placeholder for a missing figure."""
 FILE_WIDTH = 100
-"""Columns of what is no terminal, such as a file or a pipe; COLUMNS says otherwise."""
+"""Width in characters of a file or pipe; the COLUMNS variable overrides it."""
 SCREEN = (80, 24)
-"""The smallest screen that everything is made for: columns and lines."""
+"""Smallest supported screen: columns and lines."""
 GAP = 2
 LEAST_NAME = 12
 
 Bar = Callable[[int], Text]
-"""A cell that draws itself in so many characters."""
+"""A cell that draws itself in a given number of characters."""
 Cell = str | Text | Bar
 
 
 class Column(NamedTuple):
-    """A column. Of those that do not fit, the one of the highest rank leaves first; 0: none.
+    """A column of a table.
 
-    A figure has its width. Words wrap at `/`, `_` and spaces, down to `least` characters. The cells
-    of a bar column are functions of the width, from `least` to `most` characters.
+    Where columns do not fit, the one of the highest rank is left out first; rank 0 always stays.
+    Figures keep their width. Words wrap at `/`, `_` and spaces, down to `least` characters. The
+    cells of a bar column are functions of the width, from `least` to `most` characters.
     """
 
     name: str
@@ -53,14 +54,15 @@ def figure(title: str, rank: int = 0) -> Column:
 
 
 def bar(title: str, rank: int, least: int = 10, most: int = 30) -> Column:
-    """A column that is drawn into the room that is left."""
+    """A column of bars, drawn into the remaining width."""
     return Column(title, rank, "bar", least, most)
 
 
 class FittedTable:
-    """A table of rich that chooses its columns when it knows the width.
+    """A rich table that chooses its columns once the width is known.
 
-    `rule`: a line below the heads and an empty one around; without it a table is as low as can be.
+    `rule` puts a line below the heads and an empty line around the table; without it the table
+    takes the fewest lines.
     """
 
     def __init__(
@@ -79,7 +81,7 @@ class FittedTable:
         self.rows.append((cells, style))
 
     def widths(self, width: int) -> dict[int, int]:
-        """Characters of each column that stays, by its place, on a screen of `width`."""
+        """Width of each column shown on a screen of `width`, by the column's index."""
         natural = {place: self._natural(place) for place in range(len(self.columns))}
         least = {place: self._least(place, natural[place]) for place in natural}
         room = width - (2 if self._rule else 0) + GAP
@@ -93,7 +95,7 @@ class FittedTable:
         while sum(natural.values()) + GAP * len(natural) > room:
             elastic = [place for place in natural if natural[place] > least[place]]
             if not elastic:
-                # A screen too small for anything: words in pieces, before a figure is cut.
+                # On a tiny screen, break words into pieces rather than cut a figure.
                 elastic = [
                     place for place in natural
                     if self.columns[place].kind == "words" and natural[place] > 1
@@ -135,7 +137,7 @@ class FittedTable:
         return table
 
     def texts(self, widths: dict[int, int]) -> list[list[Text]]:
-        """The cells of every row, for a table of another library that is given the widths."""
+        """The cells of every row, fitted to `widths`, for a table of another library."""
         told = []
         for cells, style in self.rows:
             row = [self._drawn(cells[place], n) for place, n in widths.items()]
@@ -182,9 +184,9 @@ def _length(cell: Cell) -> int:
 
 
 def wrapped(text: str, width: int) -> str:
-    """`text` in lines of at most `width`, broken at spaces; what is longer, before `/`, after `_`.
+    """`text` in lines of at most `width` characters, broken at spaces.
 
-    What is longer still is broken anywhere.
+    A longer word is broken before `/` and after `_`, and failing that, anywhere.
     """
     lines = []
     for paragraph in text.split("\n"):
@@ -205,7 +207,7 @@ def wrapped(text: str, width: int) -> str:
 
 
 def screen_console(*, stderr: bool = False) -> Console:
-    """The console of a command: as wide as the terminal, else as COLUMNS says, else 100."""
+    """The console of a command: as wide as the terminal, else COLUMNS, else 100 characters."""
     stream = sys.stderr if stderr else sys.stdout
     if stream.isatty() or os.environ.get("COLUMNS", "").isdigit():
         return Console(stderr=stderr)

@@ -1,22 +1,22 @@
-"""Messages that the daemon itself sends, each at its time."""
+"""Generated traffic: messages that the daemon itself sends, each at its time."""
 
 from collections.abc import Iterator
 from typing import Generic, Protocol, TypeVar
 
 
 class Timed(Protocol):
-    """A message that is due `at` seconds after the beginning."""
+    """A message that is due `at` seconds after the start."""
 
     @property
     def at(self) -> float:
-        """When the message is due, in s after the beginning."""
+        """Time in s after the start at which the message is due."""
 
 
 _Message = TypeVar("_Message", bound=Timed)
 
 
 class OwnTraffic(Generic[_Message]):
-    """A plan in the order of time; nothing of it is due before it has begun."""
+    """A plan of messages in order of time; none is due before `begin` is called."""
 
     def __init__(self, plan: Iterator[_Message]) -> None:
         self._plan = plan
@@ -24,16 +24,16 @@ class OwnTraffic(Generic[_Message]):
         self._upcoming = next(plan, None)
 
     def begin(self, now: float) -> None:
-        """Begin the plan at `now`, in s; beginning twice is fine."""
+        """Start the plan at `now`, in s; later calls have no effect."""
         self._began_at = min(self._began_at, now)
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing of the plan is still to come."""
+        """Whether all messages of the plan have been taken."""
         return self._upcoming is None
 
     def due(self, now: float) -> Iterator[tuple[float, _Message]]:
-        """(when it was due, message) for each that is due until `now`."""
+        """(due time in s, message) for each message due up to `now`."""
         while (message := self._upcoming) is not None and self._began_at + message.at <= now:
             yield self._began_at + message.at, message
             self._upcoming = next(self._plan, None)

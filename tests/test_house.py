@@ -17,6 +17,7 @@ LONGEST = 300
 LONGER = {
     "sdrlinkd/link/link.py": "the link's whole face: many questions, a line or two each",
     "sdrlinkd/link/transmit/scheduler.py": "one decision from the opportunity to the burst",
+    "sdrlinkd/reports.py": "the reference of the snapshot: a docstring for every field",
 }
 """Files that may be longer, and why."""
 

@@ -1,4 +1,4 @@
-"""The world outside: recordings, message types, a robot for demonstrations."""
+"""Adapters to the outside: recordings, message types, chronyd, and a robot for demonstrations."""
 
 from sdrlinkd.adapters.bags import Bag, BagMessage, BagTopic, open_bag
 from sdrlinkd.adapters.chrony import ChronySocket

@@ -1,4 +1,4 @@
-"""Recordings: rosbag2 (SQLite, MCAP) verbatim, ROS 1 bags converted, damaged ones in part."""
+"""Reads bags: rosbag2 (SQLite, MCAP) verbatim, ROS 1 bags converted, damaged bags partly."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -11,12 +11,12 @@ from sdrlinkd.adapters.salvage import Piece, looks_cut, salvage
 from sdrlinkd.adapters.typestore import Ros1Converter, ros2_types
 from sdrlinkd.errors import BagError
 
-# Characters of a reader's error that are shown: as much as a person reads.
+# Most characters of a reader's error that are shown.
 MAX_REASON = 200
 
 
 class BagTopic(NamedTuple):
-    """A topic of a recording; its name begins with a slash, whatever the recording says."""
+    """A topic of a recording; its name begins with a slash, even if the recorded name does not."""
 
     name: str
     type: str
@@ -24,7 +24,7 @@ class BagTopic(NamedTuple):
 
 
 class BagMessage(NamedTuple):
-    """A message of a recording: CDR bytes as recorded, and the time in ns."""
+    """A message of a recording: its CDR bytes, and its time in ns."""
 
     topic: str
     type: str
@@ -37,22 +37,22 @@ class Bag(Protocol):
 
     path: Path
     damage: str
-    """What could not be read, in words; empty when all could."""
+    """What could not be read, in words; empty if everything could."""
 
     def topics(self) -> list[BagTopic]:
         """Topics in the order of their names."""
 
     def messages(self) -> Iterator[BagMessage]:
-        """All messages in the order of time."""
+        """All messages in order of time."""
 
     def close(self) -> None:
-        """Close the file of the recording."""
+        """Close the recording's files."""
 
 
 def open_bag(path: Path) -> Bag:
     """The recording at `path`: a rosbag2 folder, an .mcap, .db3 or ROS 1 .bag file.
 
-    A damaged one opens with what can be read; see `damage`. Raises BagError when that is nothing.
+    A damaged bag opens with its readable part; see `damage`. Raises BagError if there is none.
     """
     try:
         if looks_cut(path):
@@ -69,7 +69,7 @@ def open_bag(path: Path) -> Bag:
     except PermissionError as error:
         raise BagError(f"{path}: cannot be read ({error.strerror})") from None
     except Exception as error:
-        # A reader has many ways to say "damaged", running out of memory among them.
+        # Readers report damage by many exceptions, including running out of memory.
         return _DamagedBag(path, _one_line(error))
 
 
@@ -102,7 +102,7 @@ class _WholeBag:
         except GeneratorExit:
             raise
         except Exception as error:
-            # A reader has many ways to say "damaged".
+            # Readers report damage by many exceptions.
             self.damage = (
                 f"{self.path}: unreadable after {done} of {total} messages ({_one_line(error)})"
             )
@@ -112,7 +112,7 @@ class _WholeBag:
 
 
 class _DamagedBag:
-    """What salvage finds of a bag, held in memory: order and counts are known at the end."""
+    """The readable part of a damaged bag, kept in memory to sort and count its messages."""
 
     def __init__(self, path: Path, why: str) -> None:
         self.path = path
@@ -147,17 +147,17 @@ class _DamagedBag:
                 self._converters[kind] = converter
             cdr = converter.convert(piece.data, kind)
         except Exception:
-            # A damaged message fails in as many ways as there are types.
+            # The conversion of a damaged message may raise any exception.
             self._unconvertible[kind] += 1
             return None
         return BagMessage(_absolute(piece.topic), kind, piece.time_ns, cdr)
 
 
 def _absolute(name: str) -> str:
-    """A topic's name with its slash; ROS 1 records names as a publisher has given them."""
+    """A topic's name with a leading slash; ROS 1 records names as the publisher gave them."""
     return f"/{name.removeprefix('/')}"
 
 
 def _one_line(error: Exception) -> str:
-    """An error's text on one line; some readers draw pictures over many lines."""
+    """An error's text on one line, as some readers' errors span many lines."""
     return (" ".join(str(error).split()) or type(error).__name__)[:MAX_REASON]

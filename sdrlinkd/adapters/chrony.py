@@ -1,4 +1,4 @@
-"""Another robot's clock for chronyd: samples for its SOCK reference clock. No clock is set here."""
+"""Feeds another robot's clock to chronyd's SOCK reference clock; it sets no clock itself."""
 
 import socket
 import struct
@@ -12,7 +12,7 @@ LEAP_NORMAL = 0
 
 
 class ChronySocket:
-    """Sends to chronyd's `refclock SOCK PATH`; while nobody listens there, samples are lost."""
+    """Sends samples to chronyd's `refclock SOCK PATH`; samples are lost while chronyd is away."""
 
     def __init__(self, path: Path) -> None:
         self._path = str(path)
@@ -20,7 +20,7 @@ class ChronySocket:
         self.sent = self.lost = 0
 
     def send(self, now_ns: int, offset_s: float) -> None:
-        """Send a sample: the true time is the system's, `now_ns` since 1970, plus `offset_s`."""
+        """Send a sample: the true time is the system time `now_ns` (since 1970) plus `offset_s`."""
         seconds, rest_ns = divmod(now_ns, 1_000_000_000)
         sample = SAMPLE.pack(seconds, rest_ns // 1000, offset_s, 0, LEAP_NORMAL, 0, MAGIC)
         try:
@@ -30,5 +30,5 @@ class ChronySocket:
             self.lost += 1
 
     def close(self) -> None:
-        """Close the socket; chronyd keeps its own."""
+        """Close our socket; chronyd's stays."""
         self._socket.close()

@@ -1,4 +1,4 @@
-"""A recording as a plan: what is due when."""
+"""Turns a recording into a plan of messages with their due times."""
 
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple, Protocol
@@ -8,7 +8,7 @@ from sdrlinkd.adapters.pacing import first_seconds
 
 
 class Due(NamedTuple):
-    """A message to send, `at` seconds after the beginning."""
+    """A message to send `at` seconds after the start."""
 
     at: float
     topic_id: int
@@ -16,16 +16,16 @@ class Due(NamedTuple):
 
 
 class Playable(Protocol):
-    """What can be played: a bag, or the built-in robot."""
+    """A source that can be played: a bag, or the built-in robot."""
 
     def messages(self) -> Iterator[BagMessage]:
-        """All messages in the order of time."""
+        """All messages in order of time."""
 
 
 def due_messages(
     recording: Playable, duration_s: float, begin_s: float, topic_ids: Mapping[str, int]
 ) -> Iterator[Due]:
-    """Messages of topics that have an id, in the first `duration_s`, due from `begin_s` on."""
+    """Messages of the first `duration_s`, of topics in `topic_ids`, due from `begin_s` on."""
     first_ns: int | None = None
     for message in first_seconds(recording.messages(), duration_s):
         if first_ns is None:

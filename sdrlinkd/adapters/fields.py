@@ -1,4 +1,4 @@
-"""Messages from fields as people write them, in TOML or YAML; checked against the definition."""
+"""Makes messages from fields that people write in TOML or YAML, checked against their type."""
 
 import difflib
 import struct
@@ -19,9 +19,9 @@ _NUMBERS = {
 
 
 def cdr_from_fields(kind: str, given: Mapping[Any, Any], where: str) -> bytes:
-    """CDR of a message of `kind` with the fields of `given`; the others have their defaults.
+    """CDR of a message of type `kind` with the fields `given`, and defaults for the others.
 
-    Error messages call it `where`. Raises UserError with the field, what was given and what is
+    `where` names the message in errors. Raises UserError with the field, what was given and what is
     allowed.
     """
     return to_cdr(_message(kind, given, where), kind)
@@ -43,7 +43,7 @@ def _message(kind: str, given: Any, where: str) -> Any:  # noqa: ANN401
 
 
 def _field(kind: Any, given: Any, old: Any, where: str) -> Any:  # noqa: ANN401
-    """`given` as a field of `kind`, whose default is `old`; `where` names it in errors."""
+    """`given` as a field of type `kind`, whose default is `old`; `where` names it in errors."""
     node, inner = kind
     if node == Nodetype.NAME:
         return _message(inner, given, where)

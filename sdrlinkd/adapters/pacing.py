@@ -1,4 +1,4 @@
-"""Playing a recording at the pace it was made, or another."""
+"""Plays a recording at its original speed or another."""
 
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -12,9 +12,9 @@ def paced(
     clock: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
 ) -> Iterator[BagMessage]:
-    """Each message at its time, `rate` times as fast as recorded; infinity: at once.
+    """Yields each message at its time, `rate` times as fast as recorded; infinity: at once.
 
-    The wait is to an absolute time, so a late message does not delay those after it.
+    Waits end at absolute times, so a late message does not delay those after it.
     """
     start = clock()
     first_ns: int | None = None
@@ -29,7 +29,7 @@ def paced(
 
 
 def first_seconds(messages: Iterable[BagMessage], duration_s: float) -> Iterator[BagMessage]:
-    """Messages of the first `duration_s` of a recording."""
+    """The messages of the first `duration_s` of a recording."""
     first_ns: int | None = None
     for message in messages:
         if first_ns is None:

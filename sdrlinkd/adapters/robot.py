@@ -1,4 +1,4 @@
-"""A small robot for demonstrations: it drives a path and publishes what robots publish."""
+"""A simulated robot for demonstrations: it drives a path and publishes typical topics."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -17,7 +17,7 @@ IMU_HZ = 50
 CMD_VEL_HZ = 10
 SCAN_BEAMS = 360
 
-# A room the robot circles in, metres; walls are what its laser sees.
+# Half the side of the room in which the robot drives, in m; its laser sees the walls.
 ROOM_HALF_M = 6.0
 PATH_RADIUS_M = 2.5
 PATH_PERIOD_S = 12.0
@@ -31,7 +31,7 @@ _TYPES = {
 
 
 class Pose:
-    """Where the robot is at `t` s on its figure of eight, and how it moves along it."""
+    """The robot's pose and motion at `t` s on its figure-eight path."""
 
     def __init__(self, t: float) -> None:
         w = 2 * math.pi / PATH_PERIOD_S
@@ -47,7 +47,7 @@ class Pose:
         self.acceleration = (dx * ddx + dy * ddy) / self.speed
 
 
-# Fills in a message of one type; the classes come from the message definitions at run time.
+# Fills in a message of one type; message classes are made from their definitions at run time.
 Builder = Callable[[Any, Pose, Random], None]
 
 
@@ -96,7 +96,7 @@ def _scan(message: Any, pose: Pose, rng: Random) -> None:  # noqa: ANN401
 class BuiltInRobot:
     """A robot with odometry at 30 Hz, laser scans and velocity commands at 10 Hz, IMU at 50 Hz.
 
-    The same seed gives the same bytes. It reads like a bag.
+    The same seed gives the same bytes. It has the interface of a bag.
     """
 
     damage = ""
@@ -105,19 +105,19 @@ class BuiltInRobot:
         self._namespace = "/" + namespace.strip("/")
         self._duration_s = duration_s
         self._seed = seed
-        # The first of each type takes long: its serialiser is made. Not when time is measured.
+        # Serialize each type once now: the first time is slow and would disturb measurements.
         for kind, _ in _TYPES.values():
             to_cdr(empty(kind), kind)
 
     def topics(self) -> list[BagTopic]:
-        """The topics that the robot publishes, and how many messages of each."""
+        """The topics that the robot publishes, with their numbers of messages."""
         return [
             BagTopic(self._namespace + name, kind, math.ceil(rate * self._duration_s))
             for name, (kind, rate) in _TYPES.items()
         ]
 
     def messages(self) -> Iterator[BagMessage]:
-        """All messages of the robot in the order of time."""
+        """All messages of the robot in order of time."""
         builders = {"/cmd_vel": _twist, "/imu": _imu, "/odom": _odometry, "/scan": _scan}
         streams = [
             self._stream(name, kind, rate, builders[name], Random(self._seed + i))
@@ -126,7 +126,7 @@ class BuiltInRobot:
         return merge(*streams, key=lambda message: message.time_ns)
 
     def close(self) -> None:
-        """Release nothing: the robot holds no file."""
+        """Do nothing, as the robot has no file."""
 
     def _stream(
         self, name: str, kind: str, rate: int, build: Builder, rng: Random

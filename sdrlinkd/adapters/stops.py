@@ -1,4 +1,4 @@
-"""Messages that are handed over when a command topic falls silent."""
+"""Stop messages, which are published when a command topic falls silent."""
 
 from rosbags.interfaces import Nodetype
 
@@ -11,10 +11,10 @@ HEADER = "std_msgs/msg/Header"
 
 
 def stop_messages(setup: Setup) -> dict[int, bytes]:
-    """The stop messages as CDR by topic id, of all topics whose type is known.
+    """The stop messages as CDR by topic id, for all topics whose type is known.
 
-    Fields are those of the policy's `stop`, the others zero. Raises ConfigError where a policy asks
-    for what cannot be made.
+    Their fields are those of the policy's `stop`, all others zero. Raises ConfigError if a policy's
+    stop message cannot be made.
     """
     try:
         return _made(setup)

@@ -1,4 +1,4 @@
-"""What is in a recording: how long, how often, how large."""
+"""Summarizes a recording: its duration, and the rates and sizes of its messages."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -7,7 +7,7 @@ from sdrlinkd.adapters.bags import Bag
 
 
 class TopicSummary(NamedTuple):
-    """A topic of a recording, sizes in bytes of CDR; `rate_hz` is None for a single moment."""
+    """A topic of a recording; sizes are bytes of CDR, `rate_hz` is None without a time span."""
 
     name: str
     type: str
@@ -18,7 +18,7 @@ class TopicSummary(NamedTuple):
 
 
 class BagSummary(NamedTuple):
-    """A whole recording, with its topics in the order of their names."""
+    """A whole recording, with its topics in order of their names."""
 
     duration_s: float
     n_messages: int
@@ -27,7 +27,7 @@ class BagSummary(NamedTuple):
 
 
 class _Seen:
-    """Number, sizes and times of a topic's messages, as far as they are read."""
+    """Number, sizes and times of a topic's messages read so far."""
 
     def __init__(self) -> None:
         self.n = self.n_bytes = self.max_bytes = self.first_ns = self.last_ns = 0
@@ -45,7 +45,7 @@ class _Seen:
 
 
 def summarise(bag: Bag, progress: Callable[[int], None]) -> BagSummary:
-    """The summary of `bag`, all of which is read; `progress(messages read)` on the way."""
+    """The summary of `bag`, which is read completely; calls `progress(messages read)` meanwhile."""
     seen = {(topic.name, topic.type): _Seen() for topic in bag.topics()}
     whole = _Seen()
     for message in bag.messages():

@@ -1,4 +1,4 @@
-"""/tf on a slow link: only the frames that matter, one name for each robot's, fewer messages."""
+"""Reduces /tf for a slow link: selected frames, unique names per robot, combined messages."""
 
 from fnmatch import fnmatchcase
 from typing import Any
@@ -11,7 +11,7 @@ TYPE = "tf2_msgs/msg/TFMessage"
 
 
 class Transforms:
-    """Chooses, names and gathers the transforms of one topic on its way out."""
+    """Selects, renames and combines the transforms of one outgoing topic."""
 
     def __init__(self, params: TransformParams) -> None:
         self._params = params
@@ -19,7 +19,7 @@ class Transforms:
         self._due_at = float("-inf")
 
     def take(self, payload: bytes, now: float) -> tuple[bytes | None, str]:
-        """(the message to send now, ""), or (None, the ledger's reason why there is none)."""
+        """(the message to send now, ""), or (None, the ledger's reason for sending none)."""
         try:
             message = from_cdr(payload, TYPE)
         except CdrError:
@@ -33,7 +33,7 @@ class Transforms:
         return gathered, "" if gathered is not None else "tx_combined"
 
     def flush(self, now: float) -> bytes | None:
-        """The transforms gathered so far as one message, when it is time for it; else None."""
+        """The combined transforms as one message if one is due; else None."""
         if not self._latest or now < self._due_at:
             return None
         self._due_at = now + self._params.combine_s

@@ -1,4 +1,4 @@
-"""ROS message types: definitions, CDR and defaults, by rosbags."""
+"""ROS message types: definitions, CDR and defaults, with the rosbags library."""
 
 from functools import cache
 from typing import Any
@@ -17,7 +17,7 @@ def ros2_types() -> Typestore:
 
 
 def knows(kind: str) -> bool:
-    """Whether messages of `kind` can be read here."""
+    """Whether the message type `kind` is known."""
     return kind in ros2_types().fielddefs
 
 
@@ -27,15 +27,15 @@ def to_cdr(message: object, kind: str) -> bytes:
 
 
 def from_cdr(data: bytes, kind: str) -> Any:  # noqa: ANN401
-    """The message in CDR bytes. Raises CdrError for what is not valid CDR of `kind`."""
+    """The message in CDR bytes. Raises CdrError if they are not valid CDR of type `kind`."""
     try:
         return ros2_types().deserialize_cdr(data, kind)
-    except Exception as error:  # the library's generated code raises whatever it meets
+    except Exception as error:  # the library's generated code may raise anything
         raise CdrError(f"not valid CDR of {kind}: {str(error).rstrip('.')}") from None
 
 
 def empty(kind: str) -> Any:  # noqa: ANN401
-    """A message of `kind` with all fields at their defaults. Raises UserError when unknown."""
+    """A message of type `kind` with default fields. Raises UserError if the type is unknown."""
     if not knows(kind):
         raise UserError(
             f"type {kind} is not known; allowed: ROS 2 types such as nav_msgs/msg/Odometry"
@@ -44,7 +44,7 @@ def empty(kind: str) -> Any:  # noqa: ANN401
 
 
 class Ros1Converter:
-    """Converts ROS 1 messages to ROS 2 CDR, field by field where the definitions differ."""
+    """Converts ROS 1 messages to ROS 2 CDR, field by field if the definitions differ."""
 
     def __init__(self, source: Typestore) -> None:
         self._source = source

@@ -1,4 +1,4 @@
-"""The local ZeroMQ bus of one daemon; the document beside this file is its contract."""
+"""The local ZeroMQ bus of one daemon, specified by README.md in this folder (the bus document)."""
 
 from sdrlinkd.bus.bus import PDU_TAP, Bus
 from sdrlinkd.bus.intake import Ingress

@@ -1,4 +1,4 @@
-"""What the bus announces of itself: topics, their types, and how large a message may be."""
+"""The bus's announcement to producers: topics, their types, and the largest message of each."""
 
 from collections.abc import Mapping
 
@@ -12,7 +12,7 @@ from sdrlinkd.wire import MAX_PDU_SIZE, max_message_size
 
 
 def announcement(setup: Setup, policies: Mapping[int, TopicPolicy], boot: str) -> bytes:
-    """The welcome (bus document, 4.1) as version and map; `policies` are those in force."""
+    """The encoded announcement (bus document, 4.1); `policies` are the policies in force."""
     takes = {
         name: _taken(setup, topic_id, policies.get(topic_id, DEFAULT_POLICY))
         for name, topic_id in setup.topics_in.items()
@@ -29,7 +29,7 @@ def _taken(setup: Setup, topic_id: int, policy: TopicPolicy) -> Taken:
     if policy.max_bytes and not is_filtered:
         cap = policy.max_bytes
         limits.append((cap, f"topic.{topic.name}.max_bytes = {cap}", "tx_size_cap"))
-    # What is compressed or filtered may be smaller on the air: only the daemon can tell.
+    # Compressed or filtered messages shrink before they are sent, so only the daemon can decide.
     if policy.compress == "none" and not is_filtered:
         size, queue = config.link.pdu_size, config.queue.max_bytes
         carried = max_message_size(size)

@@ -27,12 +27,13 @@ from sdrlinkd.localtime import UNKNOWN, LocalTimes
 from sdrlinkd.reading import SocketReader
 from sdrlinkd.reports import BusReport
 
-# ZeroMQ hardly queues for us: what arrives is taken at once, so that every drop is ours and named.
-# Not too small either: when a producer leaves while its pipe stands full, libzmq drops the rest.
+# The daemon reads incoming messages at once rather than let ZeroMQ queue them, so that it counts
+# every drop under a reason. Not smaller: when a producer with a full pipe leaves, libzmq drops the
+# rest.
 IN_HWM = 1000
 LINGER_MS = 200
-# At the end, messages on their way are waited for until none has come for a while; a producer that
-# never stops cannot hold up the end for long.
+# On shutdown, wait until no message has arrived for QUIET_S; the deadline bounds the wait for a
+# producer that never stops.
 QUIET_S = 0.01
 QUIET_ROUNDS = 3
 LAST_MESSAGES_S = 0.3
@@ -61,7 +62,7 @@ class Bus:
         self._published = 0
         self._taps = 0
         self.has_consumer = asyncio.Event()
-        """Set once somebody has subscribed to messages from the air."""
+        """Set once a consumer has subscribed to messages from the air."""
         self._boot = secrets.token_hex(4)
         self._welcome = announcement(setup, setup.policies, self._boot)
         loop = asyncio.get_running_loop()
@@ -84,13 +85,13 @@ class Bus:
 
     @property
     def is_tapped(self) -> bool:
-        """Whether anybody watches PDUs on the bus."""
+        """Whether a client watches PDUs on the bus."""
         return self._taps > 0
 
     def publish(
         self, message: Delivered, age_s: float | None, received_ns: int, times: LocalTimes = UNKNOWN
     ) -> None:
-        """Hand a message from the air to its consumers; `age_s` is None where it is not known."""
+        """Hand a message from the air to its consumers; `age_s` is None if unknown."""
         topic = self._topic_out(message.src, message.topic_id)
         header = envelope.OutHeader(
             s=message.src,
@@ -115,7 +116,7 @@ class Bus:
         self._out_reader.recheck()
 
     def publish_stop(self, src: int, topic_id: int, payload: bytes) -> None:
-        """Hand a topic's stop message to its consumers, in place of a message that did not come."""
+        """Hand a topic's stop message to its consumers, as the topic has fallen silent."""
         header = envelope.OutHeader(
             s=src, n=0, tr=time.time_ns(), ty=self._types[topic_id], stop=True
         )
@@ -123,24 +124,24 @@ class Bus:
         self._out_reader.recheck()
 
     def announce(self, policies: Mapping[int, TopicPolicy]) -> None:
-        """Tell producers what the policies now in force, by topic id, change for them."""
+        """Announce the limits that `policies`, by topic id, now set for producers."""
         self._welcome = announcement(self._setup, policies, self._boot)
         self._out.setsockopt(zmq.XPUB_WELCOME_MSG, b"\0" + self._welcome)
         self._undropped.send(b"", [b"\0" + self._welcome])
 
     def tell(self, verdict: Verdict) -> None:
-        """Tell the producer of a message what became of it."""
+        """Send a message's verdict to its producer."""
         name = self._names_in[verdict.topic_id]
         self._tell(envelope.Receipt(verdict.receipt, name, *verdict[2:]))
 
     def _tell(self, told: envelope.Receipt) -> None:
         frame = envelope.VERSION_BYTE + msgspec.msgpack.encode(told)
         topic = RECEIPT_PREFIX + told.id.encode() + b"\0"
-        # Our clients' names are a producer's and a number.
+        # Our clients' ids are PRODUCER.NUMBER, so each producer gets a lane of its own.
         self._undropped.send(topic.rpartition(b".")[0], [topic, frame])
 
     def tap(self, direction: str, data: bytes) -> None:
-        """Show a PDU to those who watch PDUs."""
+        """Publish a PDU to the clients that watch PDUs; `direction` is rx or tx."""
         header = msgspec.msgpack.encode({"dir": direction, "t": time.time_ns()})
         self._out.send_multipart([PDU_TAP, envelope.VERSION_BYTE + header, data])
         self._out_reader.recheck()
@@ -153,12 +154,12 @@ class Bus:
         return topic
 
     def names_out(self) -> dict[tuple[int, int], str]:
-        """Bus topics published so far, by (source, topic id)."""
+        """Names of the bus topics published so far, by (source, topic id)."""
         return {key: frame[:-1].decode() for key, frame in self._frames_out.items()}
 
     async def stop_ingress(self) -> None:
-        """Take what has arrived, then close: producers see the sockets go."""
-        # Not unbound before: libzmq would close the connections, and what they still hold is lost.
+        """Take the messages that have arrived, then close the sockets of producers."""
+        # Do not unbind first: libzmq would close the connections and lose what they still hold.
         deadline = time.monotonic() + LAST_MESSAGES_S
         quiet = 0
         while quiet < QUIET_ROUNDS and time.monotonic() < deadline:
@@ -174,7 +175,7 @@ class Bus:
             socket.close()
 
     def close(self) -> None:
-        """Close all sockets; consumers get what ZeroMQ already has for them."""
+        """Close all sockets; consumers still get what ZeroMQ has queued for them."""
         self._close_ingress()
         self._undropped.close(1e-3 * LINGER_MS)
         self._out_reader.close()
@@ -206,10 +207,10 @@ class Bus:
     def _take_subscription(self, frames: list[bytes]) -> None:
         subscribed, topic = frames[0][:1] == b"\x01", frames[0][1:]
         if topic == PDU_TAP:
-            # XPUB tells of the first watcher and of the last one that goes, and of none between.
+            # XPUB reports only the first watcher to subscribe and the last one to leave.
             self._taps = int(subscribed)
         elif subscribed and topic.startswith(ACK_PREFIX):
-            # Subscriptions are processed in order: those before this one are active now.
+            # Subscriptions are processed in order, so the earlier ones are active now.
             self._acknowledge(topic)
         elif subscribed and topic.startswith(b"/"):
             self.has_consumer.set()

@@ -11,12 +11,12 @@ from sdrlinkd.errors import EnvelopeError
 VERSION_BYTE = b"\x01"
 MAX_HEADER_BYTES = 256
 MOST_LOOKED_AT = 16 * MAX_HEADER_BYTES
-"""Octets of a longer header that are still looked at, to answer who sent it."""
+"""Largest header in octets that is parsed to find the sender of a refused message."""
 MOST_SHOWN = 240
 
 
 class InHeader(msgspec.Struct, frozen=True, gc=False):
-    """What a producer may say of a message (bus document, 3.1); unknown fields are ignored."""
+    """Header of a message from a producer (bus document, 3.1); unknown fields are ignored."""
 
     q: Literal["urgent", "latency", "default", "bulk"] | None = None
     p: Annotated[int, Meta(ge=0, le=127)] | None = None
@@ -28,7 +28,7 @@ class InHeader(msgspec.Struct, frozen=True, gc=False):
 
 
 class OutHeader(msgspec.Struct, omit_defaults=True, gc=False):
-    """What a consumer learns of a message (bus document, 3.2)."""
+    """Header of a message to consumers (bus document, 3.2)."""
 
     s: int
     n: int
@@ -51,7 +51,7 @@ class OutHeader(msgspec.Struct, omit_defaults=True, gc=False):
 class Receipt(msgspec.Struct, frozen=True, omit_defaults=True):
     """What became of a message at robot `d` (bus document, 4.4).
 
-    `took` is its age there in s; `left` robots have still to answer.
+    `took` is the message's age there in s; `left` is the number of robots that have not answered.
     """
 
     id: str
@@ -64,7 +64,11 @@ class Receipt(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Taken(msgspec.Struct, frozen=True):
-    """A topic that is taken, up to `most` octets by the setting `key`; others end as `over`."""
+    """A topic that the bus accepts, up to `most` octets.
+
+    `ty` is the message type, `key` the setting that limits the size, and `over` the ledger's reason
+    for a larger message.
+    """
 
     ty: str
     most: int
@@ -73,7 +77,7 @@ class Taken(msgspec.Struct, frozen=True):
 
 
 class Welcome(msgspec.Struct, frozen=True):
-    """What a new subscriber is told (bus document, 4.1); `boot` is new with each start."""
+    """The announcement to a new subscriber (bus document, 4.1); `boot` is new with each start."""
 
     daemon: str
     version: str
@@ -91,9 +95,9 @@ _to_msgpack = msgspec.msgpack.Encoder()
 
 
 def decode(frames: Sequence[bytes]) -> tuple[bytes, InHeader | None, bytes]:
-    """(topic with its NUL, header or None when it says nothing, payload).
+    """The envelope in `frames`: (topic with its NUL, header or None if empty, payload).
 
-    Raises EnvelopeError that says what is wrong.
+    Raises EnvelopeError with the cause.
     """
     if len(frames) != 3:
         raise EnvelopeError(f"{len(frames)} frames; an envelope has 3: topic, header, payload")
@@ -115,9 +119,9 @@ def decode(frames: Sequence[bytes]) -> tuple[bytes, InHeader | None, bytes]:
 
 
 def wanted_of(frames: Sequence[bytes]) -> tuple[str, int | None, dict[str, object]]:
-    """(receipt's id, destination, all fields) of a message that `decode` refuses.
+    """(receipt id, destination, all header fields) of a message that `decode` refuses.
 
-    What cannot be read is "", None or empty.
+    A part that cannot be read is "", None or empty.
     """
     header = frames[1] if len(frames) > 1 else b""
     if len(header) > MOST_LOOKED_AT:
@@ -139,7 +143,7 @@ def wanted_of(frames: Sequence[bytes]) -> tuple[str, int | None, dict[str, objec
 
 
 def shown(words: str) -> str:
-    """A program's words, or an error that cites them, made printable and cut for a screen."""
+    """Text from another program, or an error that quotes it, made printable and cut to length."""
     plain = "".join(each if each.isprintable() else "?" for each in words[: MOST_SHOWN + 1])
     return plain if len(plain) <= MOST_SHOWN else plain[: MOST_SHOWN - 1] + "…"
 

@@ -1,4 +1,4 @@
-"""Messages from producers: decoded and checked, then handed on or refused by name."""
+"""Decodes and checks messages from producers; passes them on, or refuses them with a reason."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -20,7 +20,7 @@ from sdrlinkd.wire import BROADCAST
 
 
 class Ingress(Protocol):
-    """What takes messages from the bus."""
+    """The receiver of messages from the bus."""
 
     def submit(
         self,
@@ -29,7 +29,7 @@ class Ingress(Protocol):
         overrides: Overrides = AS_CONFIGURED,
         published_ns: int | None = None,
     ) -> None:
-        """Take a good message; `published_ns` is in ns since 1970, if its producer tells it."""
+        """Take a valid message; `published_ns` is in ns since 1970, None if not given."""
 
     def refuse(
         self,
@@ -38,7 +38,10 @@ class Ingress(Protocol):
         receipt: str = "",
         dst: int | None = None,
     ) -> None:
-        """Count a message that cannot be taken by the ledger's reason; the rest as in Overrides."""
+        """Count a refused message under the ledger's `reason`.
+
+        `receipt` is its receipt id and `dst` its destination, as in Overrides.
+        """
 
 
 TellRefused = Callable[[envelope.Receipt], None]
@@ -46,7 +49,10 @@ LONGEST_NAME = 256
 
 
 class Intake:
-    """Checks what producers send. `tell` answers for messages of no topic: the link knows none."""
+    """Checks messages from producers.
+
+    `tell` sends receipts for messages of unknown topics, which the link never sees.
+    """
 
     def __init__(self, setup: Setup, ingress: Ingress, tell: TellRefused) -> None:
         self._topic_ids = {name.encode() + b"\0": id_ for name, id_ in setup.topics_in.items()}
@@ -59,11 +65,11 @@ class Intake:
 
     @property
     def last_bad(self) -> str:
-        """What was wrong with the last message that was not taken."""
+        """What was wrong with the last refused message."""
         return envelope.shown(self._last_bad())
 
     def take(self, frames: list[bytes]) -> None:
-        """Check a message as it came; hand it on, or refuse it."""
+        """Decode and check a message, then pass it on or refuse it."""
         try:
             topic, header, payload = envelope.decode(frames)
         except EnvelopeError as error:
@@ -72,7 +78,7 @@ class Intake:
         receipt, dst = ("", None) if header is None else (header.id or "", header.d)
         topic_id = self._topic_ids.get(topic)
         if topic_id is None:
-            # Whoever asks has the time to look for what was meant; a flood of them leaves none.
+            # Search for the intended name only when the text is read: a flood leaves no time.
             words = partial(unknown_topic, name := _name(topic), self._names)
             self._refuse_unowned("tx_unknown_topic", words, name, receipt, dst)
             return

@@ -1,4 +1,4 @@
-"""Opening the runtime directory and the sockets in it, without harm to another daemon."""
+"""Opens the runtime directory and the sockets in it, without harm to another daemon."""
 
 import fcntl
 import os
@@ -12,14 +12,14 @@ from sdrlinkd.client import endpoint
 from sdrlinkd.errors import BusError
 
 LOCK_NAME = "lock"
-# A Unix socket's path is at most 107 bytes; the longest of our socket names counts.
+# A Unix socket's path has at most 107 bytes, including the longest of our socket names.
 MAX_DIRECTORY_BYTES = 107 - len("/in-pub.sock")
 
 
 class RuntimeDirectory:
-    """The directory of one daemon's sockets, held by a lock for as long as it runs.
+    """The directory of one daemon's sockets, locked for as long as the daemon runs.
 
-    The lock comes first: ZeroMQ lets a second bind steal a live path without a word.
+    The lock is taken first, as ZeroMQ silently lets a second bind take over a live path.
     """
 
     def __init__(self, path: Path) -> None:
@@ -58,7 +58,7 @@ class RuntimeDirectory:
         name: str,
         options: Mapping[int, int | bytes],
     ) -> zmq.Socket[bytes]:
-        """A socket bound to `name` here, for the owner and the group only. Raises BusError."""
+        """A socket bound to `name` in this directory, for owner and group only. Raises BusError."""
         path = self.path / name
         if _is_live(path):
             raise BusError(
@@ -80,7 +80,7 @@ class RuntimeDirectory:
         return bound
 
     def close(self) -> None:
-        """Remove the sockets bound here and give up the lock."""
+        """Remove the sockets that were bound here and release the lock."""
         for path in self._bound:
             path.unlink(missing_ok=True)
         os.ftruncate(self._lock, 0)
@@ -88,11 +88,11 @@ class RuntimeDirectory:
 
 
 def is_foreign(about: os.stat_result, uid: int) -> bool:
-    """Whether others than user `uid` and root own a directory, or may write to it.
+    """Whether users other than `uid` and root own a directory or may write to it.
 
-    They could have prepared it to receive the sockets of user `uid`.
+    Such a user could have prepared the directory to intercept the sockets of user `uid`.
     """
-    # Where the sticky bit is set, as on /tmp, nobody can replace what is another's.
+    # With the sticky bit, as on /tmp, nobody can replace another user's files.
     is_open = bool(about.st_mode & 0o002) and not about.st_mode & 0o1000
     return about.st_uid not in (0, uid) or is_open
 
@@ -106,7 +106,7 @@ def _refuse_foreign(path: Path) -> None:
 
 
 def _is_live(path: Path) -> bool:
-    """Whether some program accepts connections at `path`."""
+    """Whether a program accepts connections at `path`."""
     if not path.exists():
         return False
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:

@@ -1,4 +1,4 @@
-"""What is told once and must arrive: acknowledgements, announcements, receipts."""
+"""Sends what must not be dropped: acknowledgements, announcements and receipts."""
 
 import asyncio
 import time
@@ -10,7 +10,7 @@ import zmq
 
 RETRY_S = 0.001
 STUCK_S = 1.0
-"""Seconds; who has not read for so long loses what is for it, as with messages."""
+"""Time in s after which a subscriber that does not read loses what is meant for it."""
 
 Frames = Sequence[bytes]
 
@@ -25,10 +25,10 @@ class _Lane:
 class Undropped:
     """Sends on an XPUB socket, and waits while a subscriber's queue is full.
 
-    ZeroMQ drops what such a queue has no room for: right for messages, which are numbered, and
-    wrong for an answer that somebody waits for. Order is kept within a lane; a subscriber that does
-    not read holds up its lane alone, and that for STUCK_S at most. `used` is called after each use
-    of the socket.
+    ZeroMQ drops what does not fit into a full queue. That suits messages, which are numbered, but
+    not answers that a client waits for. Order is kept within a lane. A subscriber that does not
+    read delays only its own lane, for at most STUCK_S. `used` is called after each use of the
+    socket.
     """
 
     def __init__(
@@ -41,18 +41,18 @@ class Undropped:
         self._socket = socket
         self._used = used
         self._lanes: dict[bytes, _Lane] = {}
-        """Lanes whose subscriber's queue was full, by name."""
+        """Lanes with a full subscriber's queue, by lane name."""
         self._retry: asyncio.TimerHandle | None = None
 
     def send(self, name: bytes, frames: Frames) -> None:
-        """Send `frames` in lane `name`: at once, or as soon as there is room."""
+        """Send `frames` in lane `name`, now or as soon as there is room."""
         lane = self._lanes.get(name)
         if lane is not None and not lane.is_stuck:
             lane.waiting.append(frames)
         elif self._fits(frames):
             self._lanes.pop(name, None)
         elif lane is not None:
-            # Stuck: sent as messages are, and dropped where there is still no room.
+            # A stuck lane is sent like messages: dropped where there is still no room.
             self._socket.send_multipart(frames, zmq.NOBLOCK)
         else:
             self._lanes[name] = _Lane(deque([frames]), time.monotonic())
@@ -61,7 +61,7 @@ class Undropped:
         self._used()
 
     def close(self, at_most_s: float) -> None:
-        """Send what waits, for at most `at_most_s`."""
+        """Send what still waits, for at most `at_most_s`."""
         deadline = time.monotonic() + at_most_s
         while self._retry is not None and time.monotonic() < deadline:
             time.sleep(RETRY_S)
@@ -92,8 +92,8 @@ class Undropped:
                 self._socket.send_multipart(waiting.popleft(), zmq.NOBLOCK)
 
     def _fits(self, frames: Frames) -> bool:
-        """Whether all subscribers of these frames had room; if so, they have them now."""
-        # Not for messages: those do not wait for the slowest of their consumers.
+        """Send `frames` if all their subscribers have room, and return whether they had."""
+        # Only for this send: messages must not wait for their slowest consumer.
         self._socket.setsockopt(zmq.XPUB_NODROP, 1)
         try:
             self._socket.send_multipart(frames, zmq.NOBLOCK)

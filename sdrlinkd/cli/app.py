@@ -20,7 +20,7 @@ DEBUG_VARIABLE = "SDRLINKD_DEBUG"
 
 
 class Commands(TyperGroup):
-    """Loads a command when it is called: short ones and completion do not wait for the modem."""
+    """Loads a command only when it is called, so that most need not wait for the modem's import."""
 
     def __init__(self, **settings: Any) -> None:  # noqa: ANN401 (as the library has it)
         super().__init__(**settings)
@@ -28,7 +28,7 @@ class Commands(TyperGroup):
         self.commands = {**listed, **self.commands}
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 (as above)
-        """(name, command, rest of the arguments) of what is called, once its modules are loaded."""
+        """(name, command, remaining arguments) of the called command, after loading its modules."""
         name, listed, rest = super().resolve_command(ctx, args)
         if name is None or listed is None:
             return None, None, rest
@@ -58,9 +58,9 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")
 
 
 def main() -> None:
-    """Run sdrlinkctl; exit code 2 for what a person can mend, 130 after Ctrl-C."""
+    """Run sdrlinkctl; the exit code is 2 for errors that a person can fix, 130 after Ctrl-C."""
     end_with_parent()
-    # A closed terminal or a kill unwinds like Ctrl-C, so that nothing is left running.
+    # A closed terminal or a kill ends the program like Ctrl-C, so that nothing is left running.
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda got, _: sys.exit(128 + got))
     sys.exit(run(sys.argv[1:]))

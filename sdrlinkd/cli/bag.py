@@ -1,4 +1,4 @@
-"""`bag info` and `bag play`: what is in a recording, and a recording into a running daemon."""
+"""`bag info` and `bag play`: summarizes a recording, and plays one to a running daemon."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -55,7 +55,7 @@ def info(bag: Annotated[Path, typer.Argument(help="rosbag2 folder, .mcap, .db3 o
 
 
 def table_of(found: BagSummary) -> FittedTable:
-    """The table of a recording, with a row for each topic."""
+    """The table of a recording, with a row per topic."""
     table = FittedTable(
         "",
         (figure("count"), figure("Hz"), figure("mean B", 2), figure("max B", 3), words("topic"),
@@ -104,7 +104,7 @@ def play(
 
     total = sum(topic.n_messages for topic in opened.topics() if topic.name in route)
     if duration is not None:
-        # Only who reads them knows how many there are.
+        # Only reading all of them shows how many there are.
         total = sum(1 for _ in messages())
     sent, refused = 0, dict[str, list[str]]()
     with Publisher(runtime_dir) as publisher, Progress(*COLUMNS, console=console) as progress:
@@ -135,7 +135,7 @@ def _route(
     only: list[str],
     remap: list[str],
 ) -> tuple[dict[str, str], dict[str, str]]:
-    """({topic of the bag: the daemon's}, {topic left out: why}). Raises UserError."""
+    """({topic of the bag: the daemon's topic}, {topic left out: reason}). Raises UserError."""
     mapping = {}
     for rule in remap:
         source, separator, target = rule.partition(":=")

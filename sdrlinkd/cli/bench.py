@@ -1,4 +1,4 @@
-"""`bench`: the project's measurements, where they are at hand."""
+"""`bench`: runs the project's benchmarks, if they are installed."""
 
 import importlib.util
 import subprocess

@@ -1,20 +1,20 @@
-"""What `bench` can measure: the one list, which `make bench` and the tests use, too."""
+"""The list of benchmarks, for `bench`, `make bench` and the tests."""
 
 from typing import NamedTuple
 
 
 class Benchmark(NamedTuple):
-    """A module below `benchmarks`, by whose name it is called."""
+    """A benchmark: a module of `benchmarks`, called by the module's name."""
 
     sentence: str
     minutes: float
-    """About so long takes a whole run on two cores."""
+    """Approximate duration of a complete run on two cores, in minutes."""
     needs: tuple[str, ...] = ()
-    """Debian packages without which there is nothing to measure."""
+    """Debian packages that the benchmark requires."""
     peers: tuple[str, ...] = ()
-    """Packages and programs of others, which are measured beside where they are there."""
+    """Packages and programs of others, which are measured for comparison if installed."""
     has_rows: bool = True
-    """Whether it prints rows with targets: then it takes --quick, --json and --seed, and `make
+    """Whether it prints rows with targets; it then accepts --quick, --json and --seed, and `make
     bench` runs it."""
 
 

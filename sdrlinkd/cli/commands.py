@@ -1,10 +1,10 @@
-"""The commands of sdrlinkctl: the line of help of each, and where it is."""
+"""The commands of sdrlinkctl, with their help lines and modules."""
 
 from typing import NamedTuple
 
 
 class Listed(NamedTuple):
-    """A command as help shows it, before it is loaded."""
+    """A command as the help shows it, before its modules are loaded."""
 
     help: str
     modules: tuple[str, ...]
@@ -75,4 +75,4 @@ COMMANDS = {
         "Show a how-to page, a configuration key, a ledger name or a command.", ("help",)
     ),
 }
-"""All commands by name, in the order of help."""
+"""All commands by name, in the order of the help."""

@@ -1,4 +1,4 @@
-"""Compiles the modem before a command that needs it, and shows how far that is."""
+"""Compiles the modem for a command that needs it, and shows the progress."""
 
 from rich.console import Console
 
@@ -6,8 +6,8 @@ LIVE_S = 0.2
 
 
 def compile_first(console: Console) -> None:
-    """Compile the modem where that has not been done, and show how far it is."""
-    # This brings the modem, which takes its time to load.
+    """Compile the modem if necessary, and show the progress."""
+    # This imports the modem, which is slow to load.
     from sdrlinkd.compiling import EVERY_S, compile_modem
 
     def say(line: str) -> None:

@@ -1,4 +1,4 @@
-"""What the shell completes: names that the running daemon knows, and values that are allowed."""
+"""Shell completions: names that the running daemon knows, and allowed values."""
 
 from collections.abc import Callable
 
@@ -12,11 +12,11 @@ from sdrlinkd.errors import UserError
 from sdrlinkd.reports import Snapshot
 
 PATIENCE_S = 1.0
-"""Longest wait in s for the daemon: nobody waits longer for TAB."""
+"""Longest wait in s for the daemon after a press of TAB."""
 
 
 def one_of(*values: str) -> Callable[[str], list[str]]:
-    """A completion that offers those of `values` that begin with what is typed."""
+    """A completion that offers the `values` that begin with the typed text."""
 
     def complete(incomplete: str) -> list[str]:
         return _begun(values, incomplete)
@@ -25,20 +25,20 @@ def one_of(*values: str) -> Callable[[str], list[str]]:
 
 
 def topic_names(context: typer.Context, incomplete: str) -> list[str]:
-    """Names of topics that the daemon sends, as far as they begin with `incomplete`."""
+    """Names of topics that the daemon sends and that begin with `incomplete`."""
     snapshot = _snapshot(context)
     return _begun([each.name for each in snapshot.link.topics] if snapshot else (), incomplete)
 
 
 def heard_names(context: typer.Context, incomplete: str) -> list[str]:
-    """Names on the bus of topics that the daemon hears, as far as they begin with `incomplete`."""
+    """Bus names of topics that the daemon receives and that begin with `incomplete`."""
     snapshot = _snapshot(context)
     heard = snapshot.link.received if snapshot else ()
     return _begun([each.republished_as or each.name for each in heard], incomplete)
 
 
 def robot_names(context: typer.Context, incomplete: str) -> list[str]:
-    """Ids of the robots that the daemon hears, and 255 for everyone."""
+    """Ids of the robots that the daemon hears, and 255 for all robots."""
     snapshot = _snapshot(context)
     heard = snapshot.link.neighbors if snapshot else ()
     return _begun([*(str(each.src) for each in heard if not each.is_self), "255"], incomplete)

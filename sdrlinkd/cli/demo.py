@@ -1,4 +1,4 @@
-"""`demo`: the paper's experiment on this machine, in one command."""
+"""`demo`: runs the paper's experiment on this machine."""
 
 from dataclasses import replace
 from enum import StrEnum
@@ -32,7 +32,7 @@ from sdrlinkd.wire import MAX_PDU_SIZE, MIN_PDU_SIZE
 
 
 class LinkKind(StrEnum):
-    """What carries the PDUs: modem and loopback radio, modem and recording, neither."""
+    """The PDU link: modem with loopback radio, modem with recording, or the direct link."""
 
     OFDM = "ofdm"
     IQFILE = "iqfile"
@@ -40,7 +40,7 @@ class LinkKind(StrEnum):
 
 
 class ChannelKind(StrEnum):
-    """The channel of the simulated air."""
+    """The model of the simulated channel."""
 
     AWGN = "awgn"
     RAYLEIGH = "rayleigh"
@@ -154,7 +154,7 @@ def demo(
 
 
 def _measure(console: Console, source: Source, options: Options) -> float:
-    """The rate in samples a second that this machine carries; a line on the screen says why."""
+    """The sample rate in Hz that this machine sustains; prints a line with the reason."""
     with console.status("measuring what this machine carries"):
         found = find_rate(source, options)
     tried = ", ".join(

@@ -1,4 +1,4 @@
-"""`doctor`: whether this machine can carry a node, line by line. Needs no daemon."""
+"""`doctor`: checks whether this machine can run a node. Needs no daemon."""
 
 import asyncio
 import os
@@ -62,7 +62,7 @@ def _look(setup: "Setup | None", runtime_dir: Path | None) -> tuple[list["Findin
     config = setup.config if setup is not None else Config()
     radio = backend_of(config)
     device = config.soapy.device if config.backend == "soapy" else ""
-    # Before we are a load ourselves.
+    # Read the load before our own checks add to it.
     load, stat, wall, monotonic = os.getloadavg()[0], _stat(), time.time_ns(), time.monotonic_ns()
     headroom = []
     if radio is not None or setup is None:
@@ -101,7 +101,7 @@ def _radio(setup: "Setup | None", device: str) -> list["Finding"]:
     is_on_usb = not driver or (driver in ON_USB and not is_networked(device))
     usb = check_usb(driver, ROOT) if is_on_usb else []
     if any(not each.problem for each in there.devices):
-        # A radio works: that its ids are not known here, or that it is not on USB, is no matter.
+        # The radio works, so unknown USB ids or a missing USB connection do not matter.
         usb = [each for each in usb if each.state is State.GOOD]
     return usb + check_radio(config, there)
 

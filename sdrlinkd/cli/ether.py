@@ -70,7 +70,7 @@ def ether(
 
 
 def main() -> None:
-    """Run the hub; exit code 2 for what a person can mend."""
+    """Run the hub; the exit code is 2 for errors that a person can fix."""
     end_with_parent()
     try:
         app(prog_name="sdrlink-ether")

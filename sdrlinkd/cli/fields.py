@@ -1,4 +1,4 @@
-"""Fields of a snapshot by name, for scripts: `link.topics.odom.sent`, `neighbors.2.snr_db`."""
+"""Selects fields of a snapshot by name: `link.topics.odom.sent`, `neighbors.2.snr_db`."""
 
 import csv
 import sys
@@ -12,24 +12,24 @@ from sdrlinkd.errors import UserError
 from sdrlinkd.reports import Snapshot
 
 SHORT = ("link",)
-"""Sections that may be left out at the beginning of a field's name."""
+"""Sections that may be omitted at the start of a field's name."""
 USUAL = (
     "taken_at_unix_ns", "verdict.level", "carrier.state", "carrier.level_dbfs",
     "carrier.clipped_pct", "link.air_sent_pct", "link.air_heard_pct", "link.tx.accepted",
     "link.tx.sent", "link.tx.queued", "link.tx.queued_bytes", "link.rx.pdus_heard",
     "link.rx.started", "link.rx.delivered",
 )  # fmt: skip
-"""Fields that --csv prints where none is named."""
+"""Fields that --csv prints by default."""
 
 
 def fields_of(snapshot: Snapshot, names: Sequence[str]) -> list[Any]:
-    """The values of fields by `names`. Raises UserError, which says what there is."""
+    """The values of the fields `names`. Raises UserError that lists the existing fields."""
     whole = msgspec.to_builtins(snapshot, str_keys=True)
     return [_field(whole, name) for name in names]
 
 
 def as_text(value: object) -> str:
-    """A bare value: nothing for null, JSON for what has parts."""
+    """A value as text: empty for null, JSON for values with parts."""
     if value is None:
         return ""
     if isinstance(value, str):
@@ -38,7 +38,7 @@ def as_text(value: object) -> str:
 
 
 class CsvLines:
-    """Prints snapshot after snapshot as one line of `names` each, the names above the first."""
+    """Prints each snapshot as one line with the fields `names`, after a first line of names."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self._names = names
@@ -54,7 +54,7 @@ class CsvLines:
 
 
 def paths(value: object, at: str = "") -> Iterator[str]:
-    """Names of all single values in `value`, for the shell's completion."""
+    """Names of all single values in `value`, for shell completion."""
     if isinstance(value, dict | list):
         if at and isinstance(value, list):
             yield at
@@ -79,19 +79,19 @@ def _field(whole: dict[str, Any], name: str) -> object:
 
 
 def _step(value: object, step: str) -> tuple[object] | None:
-    """The part of `value` called `step`, in a tuple, as it may be None itself; else None."""
+    """The part of `value` named `step`, in a tuple because it may be None; None if missing."""
     parts = _parts(value)
     if step in parts:
         return (parts[step],)
     if isinstance(value, list) and step.isdigit() and not _is_by_robot(value):
         return (value[int(step)],) if int(step) < len(value) else None
-    # The end of a topic's name will do where it is the only one.
+    # The last part of a topic's name suffices if it is unique.
     ends = [each for key, each in parts.items() if key.rsplit("/", 1)[-1] == step]
     return (ends[0],) if len(ends) == 1 else None
 
 
 def _parts(value: object) -> dict[str, Any]:
-    """The parts of a value by key; of a list by topic name or robot number, else by index."""
+    """The parts of a value by key; parts of a list by topic name or robot id, or else by index."""
     if isinstance(value, dict):
         return value
     if not isinstance(value, list):

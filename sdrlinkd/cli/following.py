@@ -1,4 +1,4 @@
-"""Looking at a daemon again and again, also over its restart."""
+"""Polls a daemon, also across its restarts."""
 
 import os
 import time
@@ -14,11 +14,11 @@ from sdrlinkd.reports import Snapshot
 
 WATCH_PERIOD_S = 0.5
 PATIENCE_S = 2.0
-"""Longest wait for an answer in s; a daemon that is busier is as good as away."""
+"""Longest wait for an answer in s; a slower daemon counts as away."""
 
 
 class Follower:
-    """Asks one daemon again and again, also after it was away."""
+    """A client that polls one daemon, also after it was away."""
 
     def __init__(self, directory: str | os.PathLike[str] | None) -> None:
         self.directory: Path = runtime_dir(directory)
@@ -26,7 +26,7 @@ class Follower:
         self._away_since: float | None = None
 
     def look(self) -> Snapshot | None:
-        """The daemon's snapshot of now; None when nobody answers. Raises RefusedError."""
+        """The daemon's present snapshot; None if it does not answer. Raises RefusedError."""
         try:
             snapshot = msgspec.convert(self.ask("status"), Snapshot)
         except NoDaemonError:
@@ -43,18 +43,18 @@ class Follower:
         try:
             return self._control.ask(verb, arguments)
         except NoDaemonError:
-            # A new connection tells at once whether anybody is there.
+            # A new connection shows at once whether a daemon is there.
             self.close()
             raise
 
     @property
     def waiting(self) -> str:
-        """What to show while the daemon is away."""
+        """The text to show while the daemon is away."""
         for_s = 0.0 if self._away_since is None else time.monotonic() - self._away_since
         return f"waiting for sdrlinkd in {self.directory} ({for_s:.0f} s)"
 
     def close(self) -> None:
-        """Close the connection; the next question opens another one."""
+        """Close the connection; the next request opens a new one."""
         if self._control is not None:
             self._control.close()
             self._control = None

@@ -1,4 +1,4 @@
-"""`init`: a configuration and a registry to begin with. Needs no daemon."""
+"""`init`: writes a first configuration and registry. Needs no daemon."""
 
 import os
 import tempfile
@@ -131,7 +131,7 @@ def _topics(
 
 
 def _topics_of(bag: Path) -> list[FoundTopic]:
-    # This brings the message types.
+    # This imports the message types, which are slow to load.
     from sdrlinkd.adapters import open_bag
 
     opened = open_bag(bag)
@@ -175,7 +175,7 @@ def _socket_folder() -> Path:
 
 
 def _write(files: dict[str, bytes], out: Path, force: bool) -> None:
-    """Write all the files, or none. Raises UserError."""
+    """Write all files or none. Raises UserError."""
     there = [name for name in files if (out / name).exists()]
     if there and not force:
         names = ", ".join(str(out / name) for name in there)
@@ -186,7 +186,7 @@ def _write(files: dict[str, bytes], out: Path, force: bool) -> None:
         for name in files:
             if (out / name).is_dir():
                 raise IsADirectoryError(EISDIR, "it is a folder", str(out / name))
-        # On the same file system, so that they only have to be renamed.
+        # A folder on the same file system, so that files only have to be renamed.
         with tempfile.TemporaryDirectory(dir=out, prefix=".init-") as aside:
             for name, content in files.items():
                 (Path(aside) / name).write_bytes(content)
@@ -197,7 +197,7 @@ def _write(files: dict[str, bytes], out: Path, force: bool) -> None:
 
 
 def _try_out(files: dict[str, bytes], out: Path) -> None:
-    """Try whether a daemon would take the files. Raises UserError."""
+    """Check that a daemon accepts the files. Raises UserError."""
     from sdrlinkd.config import make_setup, parse_config
 
     with tempfile.TemporaryDirectory() as trial:
@@ -209,7 +209,7 @@ def _try_out(files: dict[str, bytes], out: Path) -> None:
 
 
 def _next(files: dict[str, bytes], out: Path, preset: RadioPreset | None, hub: str) -> list[str]:
-    """Lines on what to type next; `preset` is None where nobody says which radio it is."""
+    """Lines on what to type next; `preset` is None if the kind of radio is unknown."""
     configs = [out / name for name in files if name.endswith(".toml")]
     is_real = preset is not None and preset.is_real
     is_here = len(configs) > 1 and not is_real and not hub

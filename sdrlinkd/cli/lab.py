@@ -1,4 +1,4 @@
-"""`lab`: a scenario with real daemons on one simulated air, in one command."""
+"""`lab`: runs a scenario with real daemons on one simulated air."""
 
 import time
 from enum import StrEnum
@@ -29,7 +29,7 @@ PICTURE = "lab.png"
 
 
 class Policy(StrEnum):
-    """How robots share the air."""
+    """How the robots share the channel."""
 
     NONE = "none"
     CSMA = "csma"
@@ -91,7 +91,7 @@ def lab(
 
         def watch(state: LabState) -> None:
             if state.snapshots and not told:
-                # Not before they answer.
+                # Only once the daemons answer.
                 told.extend(each.bus.runtime_dir for each in state.snapshots)
                 others = "".join(f", {Path(each).name}" for each in told[1:])
                 hint = f"look at one: sdrlinkctl latency --runtime-dir {told[0]}{others}"

@@ -1,4 +1,4 @@
-"""`latency`: how late messages come, why, and how well other robots' clocks are known."""
+"""`latency`: shows how late messages arrive and why, and how well other clocks are known."""
 
 import time
 from typing import Annotated

@@ -1,7 +1,7 @@
-"""`list`: the daemons of this host.
+"""`list`: lists the daemons of this host.
 
-A daemon that runs listens on its control socket, and the kernel tells of every socket that somebody
-listens on: nothing is registered, so nothing can be stale.
+A running daemon listens on its control socket, and the kernel lists all listening sockets. So no
+registration is needed, and nothing can be stale.
 """
 
 import contextlib
@@ -22,15 +22,15 @@ from sdrlinkd.tables import screen_console
 
 SOCKETS = Path("/proc/net/unix")
 LISTENS = 0x10000
-"""Linux's __SO_ACCEPTCON, among the flags of a socket."""
+"""Linux's __SO_ACCEPTCON flag of a listening socket."""
 SOCKET_NAMES = (CONTROL_SOCKET, IN_SOCKET, OUT_SOCKET)
 PATIENCE_S = 1.0
 LOCK = "lock"
-"""File beside a daemon's sockets that holds its process id."""
+"""File with the daemon's process id, in the folder of its sockets."""
 
 
 class Listed(NamedTuple):
-    """A daemon; `snapshot` is None where it does not answer, and `problem` says why."""
+    """A daemon; if it does not answer, `snapshot` is None and `problem` says why."""
 
     directory: Path
     pid: int | None
@@ -56,11 +56,11 @@ def list_daemons(as_json: AsJson = False) -> None:
 
 
 def directories() -> list[Path]:
-    """Runtime directories whose three sockets somebody listens on."""
+    """Runtime directories in which a program listens on all three sockets."""
     try:
         lines = SOCKETS.read_text(errors="surrogateescape").splitlines()[1:]
     except OSError:
-        # Not this kernel: then only the usual place.
+        # This kernel does not list sockets, so use only the usual directory.
         return [usual_directory()]
     listening = set(_listening(lines))
     return sorted(
@@ -72,13 +72,13 @@ def directories() -> list[Path]:
 
 
 def _listening(lines: Iterable[str]) -> Iterable[Path]:
-    """Paths of the sockets that somebody listens on.
+    """Paths of the listening sockets.
 
-    Each line is: Num RefCount Protocol Flags Type St Inode Path.
+    Each line has the form: Num RefCount Protocol Flags Type St Inode Path.
     """
     for line in lines:
         parts = line.split(maxsplit=7)
-        # A name that begins with @ is no file.
+        # A name that begins with @ is an abstract socket, not a file.
         if len(parts) < 8 or not int(parts[3], 16) & LISTENS or parts[7].startswith("@"):
             continue
         path = Path(parts[7])
@@ -89,7 +89,7 @@ def _listening(lines: Iterable[str]) -> Iterable[Path]:
 
 
 def _resolved(path: Path) -> Iterable[Path]:
-    """Whole paths of a socket whose daemon named it relative to where it was started."""
+    """Absolute paths of a socket whose daemon used a path relative to its working directory."""
     for link in Path("/proc").glob("[0-9]*/cwd"):
         with contextlib.suppress(OSError):
             whole = link.readlink() / path

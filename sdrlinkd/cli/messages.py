@@ -1,4 +1,4 @@
-"""`pub` and `echo`: single messages by hand, as `ros2 topic` does."""
+"""`pub` and `echo`: publish and show single messages, like `ros2 topic`."""
 
 import time
 from io import StringIO
@@ -98,7 +98,7 @@ def pub(
 def _show_receipts(
     publisher: Publisher, waiting: dict[str, int], until: float | None = None
 ) -> None:
-    """Show receipts until all messages `waiting`, by name, are answered, or until that time."""
+    """Show receipts until all messages in `waiting`, by id, are answered, or until time `until`."""
     while waiting:
         told = publisher.receipt(None if until is None else max(0.0, until - time.monotonic()))
         if told is None:
@@ -147,12 +147,12 @@ def echo(
 
 
 def _print(console: Console, text: str, style: str | None = None) -> None:
-    # The terminal breaks long lines; in a file they stay whole.
+    # The terminal wraps long lines; in a file they stay whole.
     console.print(text, style=style, highlight=False, markup=False, soft_wrap=True)
 
 
 def as_yaml(message: Message) -> str:
-    """A message's fields as YAML, long arrays cut; in brackets why it cannot be shown so."""
+    """A message's fields as YAML, with long arrays cut; if impossible, the reason in brackets."""
     size = len(message.payload)
     if not knows(message.type):
         return f"({message.type} is not known here; --raw shows {size} bytes)\n"
@@ -174,7 +174,7 @@ def _headline(message: Message) -> str:
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401
-    """A message as dicts, lists and numbers, long lists cut."""
+    """A message as dicts, lists and numbers, with long lists cut."""
     if hasattr(value, "__msgtype__"):
         names = [name for name in value.__dataclass_fields__ if not name.startswith("_")]
         return {name: _plain(getattr(value, name)) for name in names}

@@ -1,4 +1,4 @@
-"""Names of topics as people type them."""
+"""Resolves topic names as people type them."""
 
 from sdrlinkd.client import unknown_topic
 from sdrlinkd.errors import UserError
@@ -6,9 +6,9 @@ from sdrlinkd.reports import Snapshot, TopicReport
 
 
 def topic_sent(given: str, snapshot: Snapshot) -> TopicReport:
-    """The topic of this robot that `given` means, on the bus or in the registry.
+    """This robot's topic with the bus name or registry name `given`.
 
-    Raises UserError when there is none.
+    Raises UserError if there is none.
     """
     sent = {each.name: each for each in snapshot.link.topics if each.subscribed}
     topic = sent.get(given) or sent.get(_on_bus(given, snapshot))
@@ -18,9 +18,9 @@ def topic_sent(given: str, snapshot: Snapshot) -> TopicReport:
 
 
 def refuse_own(given: str, snapshot: Snapshot, rx_format: str) -> None:
-    """Raise UserError when this robot itself sends `given`, which nobody hears here.
+    """Raise UserError if this robot itself sends `given`, which is not republished here.
 
-    The error names what is heard instead: other robots' topics, which appear under `rx_format`.
+    The error names other robots' topics instead, which appear under `rx_format`.
     """
     own = {each.name for each in snapshot.link.topics}
     name = given if given in own else _on_bus(given, snapshot)
@@ -41,7 +41,7 @@ def _on_bus(short: str, snapshot: Snapshot) -> str:
 
 
 def _republished(name: str, rx_format: str) -> bool:
-    """Whether what another robot sends may appear under `name`."""
+    """Whether another robot's topic may appear under `name`."""
     return any(name.startswith(_place(rx_format, str(robot)) + "/") for robot in range(256))
 
 

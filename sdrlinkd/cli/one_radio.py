@@ -1,4 +1,4 @@
-"""The radio of a command that needs no daemon: of a configuration, or named by itself."""
+"""The radio of a command that needs no daemon, from a configuration or from options."""
 
 import math
 from collections.abc import Callable
@@ -35,7 +35,7 @@ def _between(option: str, least: int, most: int) -> Callable[[str], float]:
 
 
 class Factor(StrEnum):
-    """The radio's rate divided by the modem's."""
+    """Ratio of the radio's sample rate to the modem's."""
 
     ONE = "1"
     TWO = "2"
@@ -85,7 +85,7 @@ Antenna = Annotated[str, typer.Option(metavar="NAME", help="Of --device.")]
 
 
 class NamedRadio(NamedTuple):
-    """What the command line says of the radio."""
+    """The radio as given on the command line."""
 
     config: Path | None
     device: str
@@ -98,14 +98,14 @@ class NamedRadio(NamedTuple):
 
 
 class OneRadio(NamedTuple):
-    """A configuration with a radio, and the id of the robot that has it."""
+    """A configuration with a radio, and the id of its robot."""
 
     config: Config
     node_id: int
 
 
 def receiving(named: NamedRadio) -> OneRadio:
-    """The radio that the command line names, which will send nothing. Raises UserError."""
+    """The radio that the command line names, for receiving only. Raises UserError."""
     _refuse_none(named)
     if named.config is None:
         soapy = SoapyParams(
@@ -121,9 +121,9 @@ def receiving(named: NamedRadio) -> OneRadio:
 
 
 def sending(named: NamedRadio, transmit: bool) -> OneRadio:
-    """The radio that the command line names, which may send. Raises UserError.
+    """The radio that the command line names, for sending. Raises UserError.
 
-    `transmit` or the configuration has to allow it.
+    Either `transmit` or the configuration must allow sending.
     """
     _refuse_none(named)
     if named.config is not None:
@@ -162,7 +162,7 @@ def _unasked(allowed: str) -> UserError:
 
 
 def _of_daemon(path: Path, named: NamedRadio, tx_enabled: bool | None) -> OneRadio:
-    """The radio of a daemon's configuration; `tx_enabled` None: as the configuration says."""
+    """The radio of a daemon's configuration; `tx_enabled` None: as configured."""
     for option, key, value in (
         ("--device", "soapy.device", named.device),
         ("--frequency", "modem.frequency_hz", named.frequency_hz),
@@ -194,7 +194,7 @@ def _by_itself(named: NamedRadio, soapy: SoapyParams) -> Config:
 
 
 def _deaf_between_bursts(config: Config) -> Config:
-    """The configuration without listening, which a half-duplex radio need not do in a replay."""
+    """The configuration without listening, which a half-duplex radio does not need in a replay."""
     return replace(config, soapy=replace(config.soapy, longest_tx_s=10.0, listen_s=0.0))
 
 

@@ -1,4 +1,4 @@
-"""Where a command's report and pictures go: checked before a long run, written after it."""
+"""Files of a command's report and pictures: checked before a long run, written after it."""
 
 from collections.abc import Sequence
 from importlib import import_module
@@ -13,7 +13,7 @@ REPORT = "report.json"
 
 
 def load_pictures(package: str) -> ModuleType:
-    """The module `package`.pictures, loaded late: matplotlib is slow to load, and an extra."""
+    """The module `package`.pictures, imported late as matplotlib is slow to load and optional."""
     try:
         return import_module(f"{package}.pictures")
     except ImportError:
@@ -23,7 +23,7 @@ def load_pictures(package: str) -> ModuleType:
 
 
 def make_folder(out: Path, pictures: Sequence[str]) -> None:
-    """Make a folder in which the report and these pictures can be written. Raises UserError."""
+    """Make a folder and check that report and pictures can be written there. Raises UserError."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         for name in (REPORT, *pictures):

@@ -1,4 +1,4 @@
-"""What `lab` and the hub share: a scenario, and what the command line says otherwise."""
+"""Scenarios with changes from the command line, for `lab` and the hub."""
 
 import math
 from enum import StrEnum
@@ -22,7 +22,7 @@ class Pace(StrEnum):
 def chosen_scenario(
     path: Path, seed: int | None, duration_s: float | None, pace: Pace | None
 ) -> Scenario:
-    """The scenario in `path`, with what is given in place of its own. Raises UserError."""
+    """The scenario in `path`, with the given values in place of its own. Raises UserError."""
     if duration_s is not None and not math.isfinite(duration_s):
         raise UserError(f"--duration: got {duration_s}; allowed: a number of seconds")
     changes = {"seed": seed, "duration_s": duration_s, "pace": pace.value if pace else None}

@@ -1,4 +1,4 @@
-"""`pdu watch` and `pdu decode`: what is on the air, octet by octet."""
+"""`pdu watch` and `pdu decode`: show PDUs octet by octet."""
 
 from pathlib import Path
 from typing import Annotated
@@ -93,7 +93,7 @@ def watch(
 
 
 def _ask_hello(directory: Path) -> None:
-    """Ask whether the daemon is there. Raises NoDaemonError when it has gone."""
+    """Check that the daemon answers. Raises NoDaemonError if it does not."""
     with ControlClient(directory) as control:
         control.ask("hello")
 

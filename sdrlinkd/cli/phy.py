@@ -1,4 +1,4 @@
-"""`phy`: the modem's tables, and what is in a recording of samples. Needs no daemon."""
+"""`phy`: shows the modem's tables, and analyzes a recording of samples. Needs no daemon."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -81,7 +81,7 @@ def info(
 
 
 def table_of(told: "ModemInfo") -> FittedTable:
-    """The table of `phy info`, with a row for each MCS."""
+    """The table of `phy info`, with a row per MCS."""
     table = FittedTable(
         f"PDUs of {told.pdu_size} B, bursts up to {told.max_burst_s * 1e3:g} ms",
         (
@@ -200,7 +200,7 @@ def grid_named(name: str) -> "phy.Numerology":
 
 
 def open_recording(file: Path, type_name: str, rate: float | None) -> "IqRecording":
-    """Open a recording, with a warning on the screen where it is damaged."""
+    """Open a recording; prints a warning if it is damaged."""
     from sdrlinkd.iq import IqRecording
 
     recording = IqRecording(file, type_name, rate)
@@ -214,7 +214,7 @@ def open_recording(file: Path, type_name: str, rate: float | None) -> "IqRecordi
 
 @contextmanager
 def show_progress(what: str, recording: "IqRecording") -> Iterator["OnProgress"]:
-    """Show a bar while a recording is read; yields what takes the samples done."""
+    """Show a progress bar while a recording is read; yields a function of the samples read."""
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn())
     console = Console(stderr=True)
     hidden = not console.is_terminal
@@ -268,7 +268,7 @@ def _print_counters(console: Console, counters: dict[str, int], recording: "IqRe
 
 
 def _picture_of(file: Path, what: str) -> Path:
-    """The path of a picture, in the current folder: the recording's folder is the user's."""
+    """The default path of a picture, in the current folder and not beside the recording."""
     stem = file.name.removesuffix(".sigmf-meta").removesuffix(".sigmf-data")
     return Path(f"{stem}.{what}.png")
 

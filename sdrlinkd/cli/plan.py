@@ -1,4 +1,4 @@
-"""`plan`: whether the traffic fits the air, and what to change."""
+"""`plan`: predicts whether the traffic fits the channel, and advises what to change."""
 
 from pathlib import Path
 from typing import Annotated
@@ -76,7 +76,7 @@ def plan(
 
 
 def lines(made: Plan) -> list[FittedTable | str]:
-    """The plan as a person reads it: a table, the verdict, advice and notes."""
+    """The plan for the screen: a table, the verdict, advice and notes."""
     table = FittedTable("plan", COLUMNS)
     for each in made.topics:
         worst = f"{1e3 * each.worst_s:.1f} ms" if each.worst_s < float("inf") else "never ends"

@@ -1,4 +1,4 @@
-"""`set` and `why`: a topic's policy, changed and explained while the daemon runs."""
+"""`set` and `why`: change and explain a topic's policy while the daemon runs."""
 
 from typing import Annotated, Any
 

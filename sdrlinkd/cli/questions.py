@@ -1,4 +1,4 @@
-"""Questions with a default, for what the command line does not say."""
+"""Questions with a default, for settings missing on the command line."""
 
 import sys
 from collections.abc import Callable
@@ -17,7 +17,7 @@ TOPICS = "scan:sensor_msgs/msg/LaserScan odom:nav_msgs/msg/Odometry cmd_vel:geom
 
 
 class Questions:
-    """Asks where a terminal is there; else what is missing is an error that names the option."""
+    """Asks on a terminal; without one, a missing setting is an error that names the option."""
 
     def __init__(self) -> None:
         self._can_ask = sys.stdin.isatty()
@@ -35,17 +35,17 @@ class Questions:
         return self._answer("--robots", "how many robots share the air", "2", text, _count)
 
     def frequency(self, given: str) -> str:
-        """The middle of the channel with its unit, as given or as answered."""
+        """The centre frequency with its unit, as given or as answered."""
         return self._answer("--frequency", _BAND, "433.92 MHz", given, _frequency)
 
     def device(self, given: str, preset: RadioPreset) -> str:
-        """The value of soapy.device; asked only where the preset does not know it."""
+        """The value of soapy.device; asked only if the preset has none."""
         if not given and preset.device:
             return ""
         return self._answer("--device", "which device", "", given, _device)
 
     def own_ids(self, given: str, robots: int) -> list[int]:
-        """Ids of the robots to write for; not asked where there is only one."""
+        """Ids of the robots to write for; not asked if there is only one."""
         if not given and robots == 1:
             return [1]
         return self._answer(
@@ -54,7 +54,7 @@ class Questions:
         )  # fmt: skip
 
     def topics(self) -> list[str]:
-        """The topics as answered: NAME:TYPE each, or one path of a bag, or `graph`."""
+        """The topics as answered: NAME:TYPE each, or the path of a bag, or `graph`."""
         what = "which topics: NAME:TYPE with blanks between, a bag's path, or graph (ROS 2, now)"
         return self._answer("--topic", what, TOPICS, "", str.split)
 

@@ -1,4 +1,4 @@
-"""`radio`: what radios are here, and what a daemon would do with each. Needs no daemon."""
+"""`radio`: lists the attached radios, and how a daemon would drive them. Needs no daemon."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
@@ -52,7 +52,7 @@ def probe(
 
 
 def table_of(device: "DeviceProbe", ahead: "Assessment", rate_hz: float) -> FittedTable:
-    """The table of a radio: what it is, what it can do, and what a daemon would do with it."""
+    """The table of a radio: identity, capabilities, and how a daemon would drive it."""
     table = FittedTable(
         device.label or device.device, (words("", least=20), words("")), heads=False
     )

@@ -1,4 +1,4 @@
-"""`record`: what a radio hears, as a SigMF recording in which every burst is annotated."""
+"""`record`: captures a radio's samples as a SigMF recording with annotated bursts."""
 
 import asyncio
 from enum import StrEnum
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 class Written(StrEnum):
-    """Sample types that a recording may have."""
+    """Sample types in which a recording can be written."""
 
     CI16 = "ci16_le"
     CF32 = "cf32_le"
@@ -136,7 +136,7 @@ async def _capture(radio: OneRadio, wish: "CaptureWish") -> "CaptureReport":
 
 
 def _refuse_existing(out: Path, force: bool) -> str:
-    """The recording's name without an ending. Raises UserError where it would be replaced."""
+    """The recording's name without suffix. Raises UserError if files would be replaced."""
     stem = str(out).removesuffix(".sigmf-meta").removesuffix(".sigmf-data")
     for path in (Path(f"{stem}.sigmf-data"), Path(f"{stem}.sigmf-meta")):
         if path.exists() and not force:

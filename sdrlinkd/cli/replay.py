@@ -1,4 +1,4 @@
-"""`replay`: a recording back onto the air."""
+"""`replay`: sends a recording back onto the air."""
 
 import asyncio
 from pathlib import Path

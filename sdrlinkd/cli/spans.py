@@ -1,17 +1,17 @@
-"""Means and spreads of the latest figures, as `ros2 topic` tells them."""
+"""Statistics of the latest figures, as `ros2 topic` reports them."""
 
 import math
 from collections import deque
 
 
 class Spread:
-    """Mean, least, most and standard deviation of the last `window` values."""
+    """Mean, minimum, maximum and standard deviation of the last `window` values."""
 
     def __init__(self, window: int) -> None:
         self._values: deque[float] = deque(maxlen=window)
 
     def add(self, value: float) -> None:
-        """Take in a value; beyond `window`, the oldest is dropped."""
+        """Add a value; beyond `window` values, the oldest is dropped."""
         self._values.append(value)
 
     def __len__(self) -> int:
@@ -29,17 +29,17 @@ class Spread:
 
     @property
     def mean(self) -> float:
-        """The mean of the values; 0 where there are none."""
+        """The mean of the values; 0 if there are none."""
         return self.total / len(self._values) if self._values else 0.0
 
     @property
     def least(self) -> float:
-        """The smallest value; 0 where there is none."""
+        """The smallest value; 0 if there is none."""
         return min(self._values, default=0.0)
 
     @property
     def most(self) -> float:
-        """The largest value; 0 where there is none."""
+        """The largest value; 0 if there is none."""
         return max(self._values, default=0.0)
 
     @property
@@ -50,14 +50,14 @@ class Spread:
 
 
 class Rate:
-    """`ros2 topic hz`: times between messages, in s."""
+    """Like `ros2 topic hz`: measures the times between messages, in s."""
 
     def __init__(self, window: int) -> None:
         self._between = Spread(window)
         self._last_s: float | None = None
 
     def add(self, at_s: float, size: int, age_s: float | None) -> None:  # noqa: ARG002
-        """Take in a message that came at `at_s`."""
+        """Add a message that came at `at_s`."""
         if self._last_s is not None:
             self._between.add(at_s - self._last_s)
         self._last_s = at_s
@@ -71,14 +71,14 @@ class Rate:
 
 
 class Bandwidth:
-    """`ros2 topic bw`: bytes of payload a second."""
+    """Like `ros2 topic bw`: measures payload bytes per second."""
 
     def __init__(self, window: int) -> None:
         self._sizes = Spread(window)
         self._times: deque[float] = deque(maxlen=window)
 
     def add(self, at_s: float, size: int, age_s: float | None) -> None:  # noqa: ARG002
-        """Take in a message of `size` bytes that came at `at_s`."""
+        """Add a message of `size` bytes that came at `at_s`."""
         self._sizes.add(size)
         self._times.append(at_s)
 
@@ -87,7 +87,7 @@ class Bandwidth:
         sizes = self._sizes
         if len(sizes) < 2 or self._times[-1] <= self._times[0]:
             return []
-        # The first message came before the time that is counted.
+        # The measured time starts with the first message, which therefore does not count.
         per_s = (sizes.total - sizes.first) / (self._times[-1] - self._times[0])
         of_sizes = (
             f"mean: {_bytes(sizes.mean)} min: {_bytes(sizes.least)} max: {_bytes(sizes.most)}"
@@ -96,21 +96,21 @@ class Bandwidth:
 
 
 class Delay:
-    """`ros2 topic delay`: the ages at which messages are handed over, in s."""
+    """Like `ros2 topic delay`: measures the ages of messages at their handover, in s."""
 
     def __init__(self, window: int) -> None:
         self._ages = Spread(window)
         self._unknown = 0
 
     def add(self, at_s: float, size: int, age_s: float | None) -> None:  # noqa: ARG002
-        """Take in a message's age in s; None where it is not known."""
+        """Add a message's age in s; None if unknown."""
         if age_s is None:
             self._unknown += 1
         else:
             self._ages.add(age_s)
 
     def lines(self) -> list[str]:
-        """The lines to print; messages of unknown age are counted, and in no figure."""
+        """The lines to print; messages of unknown age are counted but in no statistics."""
         told = [f"{self._unknown} messages of unknown age"] if self._unknown else []
         if not len(self._ages):
             return told

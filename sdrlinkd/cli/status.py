@@ -1,4 +1,4 @@
-"""`status`, `check`, `reload`: what a running daemon says of itself."""
+"""`status`, `check`, `reload`: query a running daemon, and have it reload."""
 
 import sys
 import time
@@ -26,7 +26,7 @@ NO_DAEMON = 4
 
 
 def ask_status(control: ControlClient) -> Snapshot:
-    """The daemon's snapshot, asked over the control socket."""
+    """The daemon's snapshot, requested over the control socket."""
     return msgspec.convert(control.ask("status"), Snapshot)
 
 
@@ -75,13 +75,13 @@ def status(
             show(snapshot)
         else:
             console = screen_console()
-            # The shell's next prompt takes a line, too.
+            # Leave a line for the shell's next prompt.
             console.print(StatusScreen(snapshot, None if everything else _height(console) - 1))
     raise typer.Exit(EXIT_CODES.get(snapshot.verdict.level, 1))
 
 
 def _printer(*, as_json: bool, as_csv: bool, names: list[str]) -> Callable[[Snapshot], None] | None:
-    """What prints a snapshot for programs; None when it is for people."""
+    """A function that prints a snapshot for programs; None if the output is for people."""
 
     def as_object(snapshot: Snapshot) -> None:
         typer.echo(msgspec.json.encode(snapshot).decode())
@@ -98,7 +98,7 @@ def _printer(*, as_json: bool, as_csv: bool, names: list[str]) -> Callable[[Snap
 
 
 def _watch(follower: Follower, show: Callable[[Snapshot], None] | None, *, whole: bool) -> None:
-    """Show snapshot after snapshot until Ctrl-C."""
+    """Show snapshots repeatedly until Ctrl-C."""
     console = screen_console()
     with follower:
         if show is not None or not console.is_terminal:
@@ -114,7 +114,7 @@ def _watch(follower: Follower, show: Callable[[Snapshot], None] | None, *, whole
         with Live(console=console, screen=True, auto_refresh=False) as live:
             while True:
                 snapshot = follower.look()
-                # The terminal may have another size by now.
+                # The terminal may have been resized.
                 height = None if whole else _height(console)
                 live.update(
                     Text(follower.waiting, style="bold yellow")
@@ -126,7 +126,7 @@ def _watch(follower: Follower, show: Callable[[Snapshot], None] | None, *, whole
 
 
 def _height(console: Console) -> int:
-    """Lines of the terminal; where there is none, those of the smallest one."""
+    """Height of the terminal in lines; without a terminal, that of the smallest screen."""
     return console.height if console.is_terminal else SCREEN[1]
 
 
@@ -149,7 +149,7 @@ def check(runtime_dir: RuntimeDir = None, as_json: AsJson = False) -> None:
 
 
 def ledger_lines(link: LinkReport) -> list[str]:
-    """The ledger's three identities with their numbers, a line each."""
+    """The ledger's three identities with their numbers, one per line."""
     tx, rx = link.tx, link.rx
     return [
         _identity("messages out", tx.accepted, {"sent": tx.sent, "queued": tx.queued,

@@ -1,4 +1,4 @@
-"""Lets Ctrl-C end a command well instead of breaking it off."""
+"""Lets Ctrl-C stop a command cleanly."""
 
 import asyncio
 import contextlib
@@ -10,7 +10,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 @contextlib.contextmanager
 def stopped_by_signals(stop: Callable[[], None]) -> Iterator[None]:
-    """Let Ctrl-C, a kill and a closed terminal call `stop`, on the main thread's event loop."""
+    """Make Ctrl-C, a kill and a closed terminal call `stop` on the main thread's event loop."""
     loop = asyncio.get_running_loop()
     before = {number: signal.getsignal(number) for number in SIGNALS}
     for number in SIGNALS:

@@ -1,4 +1,4 @@
-"""`topic hz`, `topic bw`, `topic delay`: how often, how much and how late, as `ros2 topic` does."""
+"""`topic hz`, `topic bw`, `topic delay`: measure a topic, like `ros2 topic`."""
 
 import math
 import time

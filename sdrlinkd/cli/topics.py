@@ -1,4 +1,4 @@
-"""`topics`: what a daemon sends and hears, by name."""
+"""`topics`: lists the topics that a daemon sends and receives."""
 
 import msgspec
 import typer
@@ -28,7 +28,7 @@ def topics(context: typer.Context, runtime_dir: RuntimeDir = None, as_json: AsJs
 
 
 def tables(link: LinkReport) -> list[FittedTable]:
-    """The table of topics sent and, where any is heard, that of topics heard."""
+    """The table of sent topics and, if there are any, that of received topics."""
     sent = FittedTable("sent", (figure("id"), words("topic"), words("type", 2), words("", 1)))
     for topic in link.topics:
         left_out = "" if topic.subscribed else "not taken: see the key `topics`"

@@ -1,4 +1,4 @@
-"""`phy decode-wifi`: 802.11a frames in a recording, to try the modem's parts on foreign signals."""
+"""`phy decode-wifi`: decodes 802.11a frames, to test the modem's parts on foreign signals."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 PIECE = 1 << 20
 SHORT_TRAINING = 320
 LONGEST_FRAME = 1 << 17
-"""Samples, more than any frame has: 4095 octets at 6 Mbit/s take 109 920."""
+"""Upper limit of a frame's length in samples: 4095 octets at 6 Mbit/s take 109 920."""
 
 _KINDS = {
     0b0000: "association request", 0b0001: "association response", 0b0100: "probe request",
@@ -65,7 +65,7 @@ def decode_wifi(
 def _frames(
     recording: "IqRecording", progress: "OnProgress"
 ) -> Iterator[tuple[int, "WifiFrame | HtFrame"]]:
-    """(sample at which a frame begins, frame) for all frames, read piece by piece."""
+    """(index of a frame's first sample, frame) for all frames, read piece by piece."""
     from phy.wifi import receive
 
     total, first = recording.info.n_samples, 0
@@ -76,7 +76,7 @@ def _frames(
         for frame in receive(recording.read(first, PIECE)):
             if told_from <= first + frame.start < told_to:
                 yield first + frame.start, frame
-        # The next piece needs the short training before the first that it tells.
+        # The next piece must include the short training before its first possible frame.
         first = told_to - SHORT_TRAINING
         progress(told_to)
 
@@ -133,6 +133,6 @@ def _kind(psdu: bytes) -> str:
 
 
 def _addresses(psdu: bytes) -> str:
-    """Sender and receiver as text; acknowledgements tell the receiver alone."""
+    """Sender and receiver as text; acknowledgements contain only the receiver."""
     to, by = psdu[4:10].hex(":"), psdu[10:16].hex(":")
     return f"{by} → {to}" if len(psdu) >= 20 else f"→ {to}"

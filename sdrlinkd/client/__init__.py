@@ -1,4 +1,4 @@
-"""For programs on the robot: publish to other robots, and hear them. Needs pyzmq only.
+"""For programs on the robot: publish to other robots and receive from them. Needs only pyzmq.
 
 with Publisher() as out:
     out.send("/robot_1/odom", cdr_bytes)
@@ -11,8 +11,8 @@ with Publisher() as out:
     out.send("/robot_1/cmd_vel", cdr_bytes, receipt=True)
     print(out.receipt(timeout_s=5.0))
 
-A message that the daemon does not take is refused by `send` (MessageRefusedError). In a callback of
-a ROS node `send(..., timeout_s=0)` never blocks. Runs on Python 3.10 and newer.
+`send` raises MessageRefusedError for a message that the daemon does not accept. In a callback of a
+ROS node, use `send(..., timeout_s=0)`, which never blocks. Runs on Python 3.10 and newer.
 """
 
 from sdrlinkd.client.announced import (

@@ -1,6 +1,6 @@
-"""What the daemon takes, as it announces it (bus document, section 4.1), and what it does not.
+"""Which messages the daemon accepts, as it announces (bus document, section 4.1), and the errors.
 
-The daemon refuses with the same words: they are told here and nowhere else.
+The daemon refuses messages with the same error texts; they are defined only here.
 """
 
 from collections.abc import Iterable, Mapping
@@ -14,15 +14,15 @@ MAX_PRIORITY = 127
 BROADCAST = 255
 CDR_HEADER_SIZE = 4
 MOST_NAMES = 20
-"""Names that an error message lists: whoever has more topics looks them up."""
+"""Most topic names that an error text lists."""
 
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """What the daemon says of a topic that it takes.
+    """A topic that the daemon accepts.
 
-    `most` is the size of the largest message in octets, `key` the setting that it follows from,
-    and `over` the ledger's name for one that is larger.
+    `type` is its ROS message type, `most` the size of the largest message in octets, `key` the
+    setting that limits the size, and `over` the ledger's reason for dropping a larger message.
     """
 
     type: str
@@ -32,7 +32,7 @@ class Topic:
 
 
 class Announced:
-    """A daemon's announcement; `boot` is another one after each of its starts."""
+    """A daemon's announcement of the topics it accepts; `boot` changes with each of its starts."""
 
     def __init__(self, fields: Mapping[str, Any]) -> None:
         self.boot: str = fields.get("boot", "")
@@ -45,7 +45,7 @@ class Announced:
         self.frames = {name: name.encode() + b"\0" for name in self.topics}
 
     def check(self, name: str, size: int, type_: str | None) -> None:
-        """Raise MessageRefusedError if `size` octets for topic `name` are not taken."""
+        """Raise MessageRefusedError if the daemon refuses `size` octets of `type_` for `name`."""
         topic = self.topics.get(name)
         if topic is None:
             raise MessageRefusedError("tx_unknown_topic", unknown_topic(name, self.topics))
@@ -64,7 +64,7 @@ def check_wishes(
     lifespan_ms: object = None,
     published_ns: object = None,
 ) -> None:
-    """Raise MessageRefusedError for what no daemon takes, whatever its topics are."""
+    """Raise MessageRefusedError for values that every daemon refuses."""
     words = ""
     if qos is not None and qos not in QOS:
         words = f"qos: got {_shown(qos)}; allowed: {', '.join(QOS)}"
@@ -81,12 +81,12 @@ def check_wishes(
 
 
 def unknown_topic(name: str, known: Iterable[str]) -> str:
-    """The error text for a topic that the daemon does not take."""
-    # Loaded only for whoever made a mistake.
+    """The error text for a topic that the daemon does not accept."""
+    # Imported only after a mistake, as it is rarely needed.
     from difflib import get_close_matches
 
     names = list(known)
-    # Of `odom`, the last part says more than the whole.
+    # For a bare name such as `odom`, the last parts of the known names match better.
     by_last_part = {_last_part(each): each for each in names}
     close = get_close_matches(name, names, 1) or [
         by_last_part[each] for each in get_close_matches(_last_part(name), by_last_part, 1)
@@ -98,7 +98,7 @@ def unknown_topic(name: str, known: Iterable[str]) -> str:
 
 
 def too_short(name: str, size: int) -> str:
-    """The error text for a message with less than a CDR header."""
+    """The error text for a message shorter than a CDR header."""
     return f"{name}: too short: {size} B; CDR begins with a header of {CDR_HEADER_SIZE} B"
 
 
@@ -108,7 +108,7 @@ def too_large(name: str, size: int, most: int, key: str) -> str:
 
 
 def wrong_type(name: str, given: str, registered: str) -> str:
-    """The error text for a type that is not the registry's."""
+    """The error text for a message type that differs from the registry's."""
     return f"type: got {_shown(given)}; allowed: {registered}, which {name} has in the registry"
 
 
@@ -125,5 +125,5 @@ def _is_within(value: object, most: int) -> bool:
 
 
 def _is_above_0(value: object) -> bool:
-    # Not for NaN, which is neither.
+    # The comparison is false for NaN, as it should be.
     return isinstance(value, int | float) and not isinstance(value, bool) and value > 0

@@ -16,11 +16,11 @@ from sdrlinkd.client.paths import IN_SOCKET, OUT_SOCKET, chosen_dir, endpoint
 from sdrlinkd.client.producer import STILL_THERE_S, Producer, wishes
 from sdrlinkd.client.publisher import RECONNECT_MS
 
-# For Python 3.10, which has no asyncio.timeout, and whose asyncio.TimeoutError is one of its own.
+# Runs on Python 3.10, which lacks asyncio.timeout and has an asyncio.TimeoutError of its own.
 
 
 class AsyncPublisher(AsyncSocket):
-    """A `Publisher` that awaits instead of blocking. For one event loop, and any of its tasks."""
+    """A `Publisher` that awaits instead of blocking, for all tasks of one asyncio event loop."""
 
     def __init__(
         self,
@@ -58,10 +58,10 @@ class AsyncPublisher(AsyncSocket):
         receipt: bool = False,
         timeout_s: float | None = None,
     ) -> str | None:
-        """Publish `cdr` under `topic`; with `receipt`, the name under which it is answered.
+        """Publish `cdr` under `topic`; with `receipt`, returns the message's id.
 
-        Raises NoDaemonError after the timeout, at once when that is 0, and MessageRefusedError for
-        what the daemon does not take: as `Publisher.send`.
+        As `Publisher.send`, it raises NoDaemonError after the timeout (at once when that is 0) and
+        MessageRefusedError for a message that the daemon does not accept.
         """
         producer = self._producer
         fields = wishes(qos, priority, dst, lifespan_ms, type, published_ns)
@@ -69,7 +69,7 @@ class AsyncPublisher(AsyncSocket):
         if producer.is_time_to_look():
             await self._hear()
         if not producer.takes(topic, cdr, type):
-            # Nothing is refused by hearsay: the daemon may have been restarted.
+            # Ask before refusing: a restarted daemon may accept other topics.
             await self._ask(deadline)
             producer.check(topic, cdr, type)
         name = None
@@ -85,7 +85,7 @@ class AsyncPublisher(AsyncSocket):
             except zmq.Again:
                 if not await self._is_writable(deadline):
                     raise no_daemon(self.runtime_dir) from None
-                # The one that listens now may be another daemon.
+                # Another daemon may be listening by now.
                 await self._ask(deadline, must_answer=receipt)
                 producer.check(topic, cdr, type)
         self._sent = True
@@ -94,9 +94,9 @@ class AsyncPublisher(AsyncSocket):
         return name
 
     async def receipt(self, timeout_s: float | None = None) -> Receipt | None:
-        """The next answer to messages sent with `receipt`, as `Publisher.receipt`.
+        """The next receipt of the messages sent with `receipt`, as `Publisher.receipt`.
 
-        None when `timeout_s` passed first, or when no answer is owed any more.
+        None after `timeout_s`, or when no receipt is outstanding.
         """
         awaited, deadline = self._producer.awaited, Deadline(timeout_s)
         while awaited:
@@ -107,12 +107,12 @@ class AsyncPublisher(AsyncSocket):
             if not left_s:
                 return None
             await self._until(lambda: awaited.has_come, Deadline(min(left_s, STILL_THERE_S)))
-        # Who asks again and again lets others go on.
+        # Let other tasks run, even if the caller polls in a loop.
         await asyncio.sleep(0)
         return None
 
     async def wait_for_daemon(self, timeout_s: float | None = None) -> None:
-        """Wait until the daemon answers, for at most `timeout_s`, else the publisher's.
+        """Wait until the daemon answers, for at most `timeout_s` (default: the publisher's).
 
         Raises NoDaemonError.
         """
@@ -120,7 +120,7 @@ class AsyncPublisher(AsyncSocket):
         await self._ask(Deadline(wait_s), must_answer=True)
 
     async def flush(self) -> None:
-        """Wait until the daemon has taken everything sent, as `Publisher.flush`.
+        """Wait until the daemon has received everything sent, as `Publisher.flush`.
 
         Raises NoDaemonError.
         """
@@ -138,14 +138,14 @@ class AsyncPublisher(AsyncSocket):
             raise no_daemon(self.runtime_dir) from None
         finally:
             self._answered(question)
-        # A new daemon answers that the subscription is active once more.
+        # A second boot id means that a restarted daemon answered, too.
         if len(set(answers)) > 1:
             raise restarted(self.runtime_dir)
 
     async def _ask(self, deadline: Deadline, *, must_answer: bool = False) -> None:
-        """Ask what the daemon takes now. Raises NoDaemonError when no answer comes in time.
+        """Ask the daemon what it accepts now. Raises NoDaemonError when no answer comes in time.
 
-        Where nothing may be waited for, what is known has to do, unless it `must_answer`.
+        With no time left, use the last announcement; with `must_answer`, only if it is confirmed.
         """
         producer = self._producer
         if not deadline.left_s:
@@ -160,7 +160,7 @@ class AsyncPublisher(AsyncSocket):
             raise no_daemon(self.runtime_dir)
 
     async def _is_writable(self, deadline: Deadline) -> bool:
-        """Whether the daemon takes messages before the deadline."""
+        """Whether the socket becomes writable before the deadline."""
         poller = zmq.asyncio.Poller()
         poller.register(self._socket, zmq.POLLOUT)
         return bool(await poller.poll(deadline.left_ms))
@@ -175,12 +175,12 @@ class AsyncPublisher(AsyncSocket):
         self._producer.forget(question)
 
     async def _until(self, is_done: Callable[[], bool], deadline: Deadline) -> bool:
-        """Hear the daemon until `is_done`; whether that was before the deadline."""
+        """Take the daemon's messages until `is_done`; False if the deadline came first."""
 
         async def listen() -> None:
             while not is_done():
                 if self._is_listening:
-                    # One task listens for all, and tells all what it has heard.
+                    # One task listens for all tasks and wakes them when something arrives.
                     await self._news.wait()
                     continue
                 self._is_listening = True
@@ -199,8 +199,8 @@ class AsyncPublisher(AsyncSocket):
         return True
 
     async def _hear(self) -> None:
-        """Take what the daemon has sent so far, unless a task listens already; does not wait."""
-        # What is taken from under a listener would not wake it.
+        """Take what the daemon has sent so far, without waiting, unless a task already listens."""
+        # Taking a message that a listener polls for would not wake that listener.
         if not self._is_listening:
             await self._drain()
 

@@ -1,4 +1,4 @@
-"""What the asyncio clients have in common."""
+"""The base of the asyncio clients."""
 
 from pathlib import Path
 from types import TracebackType
@@ -23,11 +23,11 @@ class AsyncSocket:
 
     @property
     def directory(self) -> Path:
-        """Another word for `runtime_dir`, as for the constructor."""
+        """Alias of `runtime_dir`, as in the constructor."""
         return self.runtime_dir
 
     async def close(self) -> None:
-        """Close the sockets; what was sent has 200 ms to leave."""
+        """Close the sockets; messages sent have 200 ms to leave."""
         self._context.destroy(LINGER_MS)
 
     async def __aenter__(self) -> "Self":

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class AsyncSubscriber(AsyncSocket):
-    """A `Subscriber` that is an asynchronous iterator; enter it with `async with`."""
+    """A `Subscriber` for asyncio: an asynchronous iterator, to be entered with `async with`."""
 
     def __init__(
         self,
@@ -47,7 +47,7 @@ class AsyncSubscriber(AsyncSocket):
         again, asked = Deadline(0), list[bytes]()
         while True:
             if not again.left_s:
-                # On a full stream an answer may be dropped with the messages: ask once more.
+                # A full queue may drop the answer along with messages, so ask again.
                 again = Deadline(ASK_AGAIN_S)
                 asked.append(new_ack_topic())
                 self._socket.subscribe(asked[-1])
@@ -59,7 +59,7 @@ class AsyncSubscriber(AsyncSocket):
             self._socket.unsubscribe(token)
 
     async def receive(self) -> Message:
-        """The next message, for which this waits."""
+        """Wait for the next message and return it."""
         while True:
             message = decode_in(await self._socket.recv_multipart())
             if message is not None:

@@ -1,4 +1,4 @@
-"""Receipts that a producer waits for: every message that asked is answered, come what may."""
+"""Receipts that a producer waits for: every message that asks for one gets one, in any case."""
 
 import secrets
 from collections import deque
@@ -8,7 +8,7 @@ from sdrlinkd.client.announced import BROADCAST
 from sdrlinkd.client.messages import RECEIPT_PREFIX, Receipt
 
 DAEMON_GONE = "daemon_gone"
-"""Why nothing is known of a message that a daemon took with it."""
+"""Reason of the receipt for a message whose daemon has ended or does not answer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,7 @@ class _Asked:
 
 
 class AwaitedReceipts:
-    """Messages that were sent with a wish for a receipt, and the receipts that came."""
+    """Messages that await a receipt, and the receipts that have arrived."""
 
     def __init__(self) -> None:
         self._token = secrets.token_hex(4)
@@ -33,27 +33,27 @@ class AwaitedReceipts:
 
     @property
     def has_come(self) -> bool:
-        """Whether a receipt from the daemon is there to be taken."""
+        """Whether a receipt from the daemon is ready to be taken."""
         return bool(self._came)
 
     def new_id(self) -> str:
-        """A new name for the next message that wants a receipt."""
+        """A new id for the next message that asks for a receipt."""
         self._count += 1
         return f"{self._token}.{self._count}"
 
     def expect(self, id_: str, topic: str, dst: int | None, boot: str) -> None:
-        """Note that message `id_` was handed to the daemon of that boot."""
+        """Note that message `id_` was handed to the daemon with boot id `boot`."""
         self._open[id_] = _Asked(topic, BROADCAST if dst is None else dst, boot)
 
     def take(self, receipt: Receipt) -> None:
-        """Take a receipt from the daemon; one for a message that was given up tells nothing new."""
+        """Take a receipt from the daemon, and ignore one for a message that was given up."""
         if receipt.id in self._open:
             self._came.append(receipt)
             if not receipt.left:
                 del self._open[receipt.id]
 
     def next(self, boot: str) -> Receipt | None:
-        """The receipt that came first, or one for a message that a daemon of another boot had."""
+        """The oldest receipt, or else one for a message lost with a daemon other than `boot`."""
         if self._came:
             return self._came.popleft()
         for id_, asked in self._open.items():

@@ -1,4 +1,4 @@
-"""What the blocking clients have in common."""
+"""The base of the blocking clients."""
 
 from pathlib import Path
 from types import TracebackType
@@ -13,7 +13,7 @@ from sdrlinkd.client.paths import endpoint
 LINGER_MS = 200
 
 if TYPE_CHECKING:
-    # ROS 2 Humble has Python 3.10, where typing has none; only type checkers need this one.
+    # ROS 2 Humble has Python 3.10, whose typing lacks Self; only type checkers need this import.
     from typing_extensions import Self
 
 
@@ -28,7 +28,7 @@ class Endpoint:
 
     @property
     def directory(self) -> Path:
-        """Another word for `runtime_dir`, as for the constructor."""
+        """Alias of `runtime_dir`, as in the constructor."""
         return self.runtime_dir
 
     def _connect(self, name: str, socket: "zmq.Socket[bytes] | None" = None) -> None:
@@ -42,7 +42,7 @@ class Endpoint:
         return bool(self._socket.poll(milliseconds(timeout_s)))
 
     def close(self) -> None:
-        """Close the socket; what was sent has 200 ms to leave."""
+        """Close the socket; messages sent have 200 ms to leave."""
         self._socket.close()
         self._context.term()
 

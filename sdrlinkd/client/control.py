@@ -1,4 +1,4 @@
-"""Asking the daemon: status, checks, and the few things that can be changed."""
+"""Requests to the daemon: status, checks, and the few settings that can be changed."""
 
 import os
 import secrets
@@ -16,7 +16,7 @@ PROTOCOL = b"sdrl1"
 
 
 class RefusedError(Exception):
-    """A request that the daemon refuses; `code` is for programs, the message for people."""
+    """The daemon refused a request; `code` is for programs, the message for people."""
 
     def __init__(self, code: str, reason: str) -> None:
         super().__init__(reason)
@@ -24,7 +24,10 @@ class RefusedError(Exception):
 
 
 class ControlClient(Endpoint):
-    """One request at a time over the control socket. Raises NoDaemonError where there is none."""
+    """A client of the control socket, for one request at a time.
+
+    Raises NoDaemonError if no daemon runs.
+    """
 
     def __init__(
         self,
@@ -42,7 +45,7 @@ class ControlClient(Endpoint):
         self._connect(CONTROL_SOCKET)
 
     def ask(self, verb: str, arguments: dict[str, Value] | None = None) -> Any:  # noqa: ANN401
-        """The daemon's answer to `verb`. Raises RefusedError, or NoDaemonError when none comes."""
+        """The daemon's answer to `verb`. Raises RefusedError and, without answer, NoDaemonError."""
         request_id = secrets.token_bytes(4)
         deadline = time.monotonic() + self._timeout_s
         self._socket.sndtimeo = int(self._timeout_s * 1000)
@@ -56,7 +59,7 @@ class ControlClient(Endpoint):
             if not self._poll(left_s):
                 break
             _, answered_id, status, body = self._socket.recv_multipart()
-            # A late answer to an earlier request that timed out is not for us.
+            # Skip a late answer to an earlier request that timed out.
             if answered_id == request_id:
                 answer = unpack(body)
                 if status != b"ok":

@@ -1,14 +1,14 @@
-"""What can go wrong for a program on the robot."""
+"""Errors that the client raises."""
 
 
 class NoDaemonError(ConnectionError):
-    """No sdrlinkd listens in the runtime directory."""
+    """No sdrlinkd answers in the runtime directory."""
 
 
 class MessageRefusedError(ValueError):
-    """A message that the daemon does not take; the text says what was given and what is allowed.
+    """The daemon does not accept a message; the text says what was given and what is allowed.
 
-    `reason` is the ledger's name for it (bus document, section 6.1).
+    `reason` is the ledger's name for the error (bus document, section 6.1).
     """
 
     def __init__(self, reason: str, words: str) -> None:
@@ -17,7 +17,7 @@ class MessageRefusedError(ValueError):
 
 
 class EnvelopeMismatchError(ValueError):
-    """What arrived is not an envelope of version 1."""
+    """A message from the daemon does not follow version 1 of the envelope."""
 
 
 def no_daemon(runtime_dir: object) -> NoDaemonError:
@@ -29,7 +29,7 @@ def no_daemon(runtime_dir: object) -> NoDaemonError:
 
 
 def restarted(runtime_dir: object) -> NoDaemonError:
-    """The error for a daemon that went while something was on its way to it."""
+    """The error for a daemon that restarted before it had received everything sent."""
     return NoDaemonError(
         f"the sdrlinkd in {runtime_dir} was restarted meanwhile; what was sent last may be lost"
     )

@@ -1,7 +1,7 @@
-"""MessagePack as far as the bus header needs it: one map of text keys to plain values.
+"""The part of MessagePack that the bus header needs: one map of text keys to plain values.
 
-The client runs in a robot's own interpreter (ROS 2 brings ZeroMQ and little else), so it carries
-these few lines instead of a dependency. https://github.com/msgpack/msgpack/blob/master/spec.md
+The client runs in the robot's own interpreter, where ROS 2 provides ZeroMQ and little else, so
+these few lines replace a dependency. https://github.com/msgpack/msgpack/blob/master/spec.md
 """
 
 import struct
@@ -12,7 +12,7 @@ Value = None | bool | int | float | str | bytes
 
 
 def pack_map(values: Mapping[str, Value]) -> bytes:
-    """MessagePack bytes of a map with at most 15 entries."""
+    """MessagePack bytes of a map with at most 15 entries. Raises ValueError for a larger one."""
     if len(values) > 15:
         raise ValueError("a bus header has at most 15 fields")
     parts = [bytes((0x80 | len(values),))]
@@ -25,7 +25,7 @@ def pack_map(values: Mapping[str, Value]) -> bytes:
 
 
 def unpack(data: bytes) -> Any:  # noqa: ANN401
-    """The value that `data` holds. Raises ValueError when it is not one MessagePack value."""
+    """The value in `data`. Raises ValueError if `data` is not exactly one MessagePack value."""
     try:
         value, at = _unpack(memoryview(data), 0)
     except (struct.error, IndexError, RecursionError, TypeError) as error:
@@ -56,7 +56,7 @@ def _pack(value: Value) -> bytes:
     return b"\xc5" + struct.pack(">H", len(value)) + value
 
 
-# First byte of a value: how the rest is laid out (struct format), or the format of its length.
+# By the first byte of a value: the struct format of the rest, or the format of its length.
 _FIXED = {
     0xCA: ">f", 0xCB: ">d", 0xCC: ">B", 0xCD: ">H", 0xCE: ">I", 0xCF: ">Q",
     0xD0: ">b", 0xD1: ">h", 0xD2: ">i", 0xD3: ">q",

@@ -8,28 +8,32 @@ from sdrlinkd.client.errors import EnvelopeMismatchError
 from sdrlinkd.client.flatmap import unpack
 
 ENVELOPE_VERSION = b"\x01"
-# A topic that only one client asks for; the daemon answers on it when the subscription is active,
-# and again when a message under SYNC_PREFIX with the same token has been taken.
+# Only one client subscribes to an ack topic. The daemon answers on it when the subscription is
+# active, and again when it has received a message under SYNC_PREFIX with the same token.
 ACK_PREFIX = b"\0ack\0"
 SYNC_PREFIX = b"\0sync\0"
 RECEIPT_PREFIX = b"\0receipt\0"
 WELCOME_PREFIX = b"\0" + ENVELOPE_VERSION
-"""What an announcement begins with, which is one frame."""
+"""First bytes of an announcement, which is a single frame."""
 
 
 @dataclass(frozen=True, slots=True)
 class Message:
     """A message that another robot sent.
 
-    `number` runs per (source, topic): a step of more than one is what this consumer missed on the
-    bus. `lost_pdus` is how many PDUs of the source are known lost on the air so far. `age_us` is
-    how old the message was when it was handed over, None when unknown. Parts of that age are
-    `waited_us` at its source, `reassembly_us` while its fragments came, and `on_air_us` of the last
-    one.
+    `number` counts messages per (source, topic); a step of more than one means that this consumer
+    missed messages on the bus. `lost_pdus` is the number of the source's PDUs known to be lost on
+    the air so far. `received_ns` is when the message arrived, in ns since 1970 by this host's
+    clock.
 
-    `published_ns` and `sampled_ns` (of messages with a std_msgs/Header) are when it was published
-    and measured, in ns since 1970 by this host's clock, each with the bound of its error; None when
-    unknown. `is_stop`: nothing came for too long, and this is the stop message of a command topic.
+    `age_us` is the message's age at its handover in µs, None when unknown. Parts of that age are
+    `waited_us` (at its source), `reassembly_us` (from the first fragment to the last) and
+    `on_air_us` (the last fragment).
+
+    `published_ns` is when the message was published, and `sampled_ns` the stamp of its
+    std_msgs/Header; both are in ns since 1970 by this host's clock, each with the bound of its
+    error in µs, and None when unknown. `is_stop` marks the stop message of a command topic, which
+    the daemon publishes when the topic falls silent.
     """
 
     topic: str
@@ -56,9 +60,9 @@ class Message:
 class Receipt:
     """What became of a message at robot `dst`: `fate` is delivered, expired, dropped or unknown.
 
-    `reason` is one of the ledger's, or `daemon_gone`: the daemon was restarted or does not answer,
-    and nobody knows. `took_s` is the message's age when it was delivered there. `left` robots have
-    still to answer.
+    `reason` is one of the ledger's, or `daemon_gone` if the fate is unknown because our own daemon
+    restarted or does not answer. `took_s` is the message's age in s at its delivery. `left` is the
+    number of robots that have not answered yet.
     """
 
     id: str
@@ -71,7 +75,7 @@ class Receipt:
 
 
 def decode_receipt(frames: Sequence[bytes]) -> Receipt | None:
-    """A receipt from the daemon's frames; None for anything else."""
+    """The receipt in the daemon's frames; None for any other message."""
     if len(frames) != 2 or not frames[0].startswith(RECEIPT_PREFIX):
         return None
     fields = unpack(frames[1][1:])
@@ -87,7 +91,10 @@ def decode_receipt(frames: Sequence[bytes]) -> Receipt | None:
 
 
 def decode_in(frames: Sequence[bytes]) -> Message | None:
-    """A message from the daemon's frames; None for its own announcements."""
+    """The message in the daemon's frames; None for the daemon's own announcements.
+
+    Raises EnvelopeMismatchError.
+    """
     if frames[0].startswith(b"\0"):
         return None
     if len(frames) != 3 or frames[1][:1] != ENVELOPE_VERSION:
@@ -116,8 +123,8 @@ def decode_in(frames: Sequence[bytes]) -> Message | None:
 
 
 def topic_filter(topic: str) -> bytes:
-    """The subscription for `topic`: exact, or a prefix when it ends with `*`."""
-    # Of everything, only topics: the daemon has announcements of its own.
+    """The ZeroMQ subscription for `topic`: exact, or a prefix when it ends with `*`."""
+    # A bare `*` becomes "/", so that it does not match the daemon's own announcements.
     return (topic[:-1] or "/").encode() if topic.endswith("*") else topic.encode() + b"\0"
 
 
@@ -127,5 +134,5 @@ def new_ack_topic() -> bytes:
 
 
 def sync_frames(ack_topic: bytes) -> list[bytes]:
-    """The message that asks for a second answer on `ack_topic`."""
+    """The message that requests a second answer on `ack_topic`."""
     return [SYNC_PREFIX + ack_topic.removeprefix(ACK_PREFIX), ENVELOPE_VERSION + b"\x80", b""]

@@ -12,10 +12,10 @@ SYSTEM_DIR = Path("/run/sdrlinkd")
 
 
 def runtime_dir(given: str | os.PathLike[str] | None = None) -> Path:
-    """The daemon's runtime directory, as given or where it is by default.
+    """The daemon's runtime directory: `given`, or the default.
 
-    The latter is $SDRLINKD_RUNTIME_DIR, else the system service's (/run/sdrlinkd) when it runs,
-    else the user's own.
+    The default is $SDRLINKD_RUNTIME_DIR, else the system service's directory (/run/sdrlinkd) if it
+    runs, else the user's own.
     """
     chosen = given or os.environ.get("SDRLINKD_RUNTIME_DIR")
     if chosen:
@@ -29,14 +29,14 @@ def runtime_dir(given: str | os.PathLike[str] | None = None) -> Path:
 def chosen_dir(
     runtime_dir_: str | os.PathLike[str] | None, directory: str | os.PathLike[str] | None
 ) -> Path:
-    """The runtime directory, for a caller who may name it by either word; TypeError for both."""
+    """The runtime directory, given under either name. Raises TypeError if both are given."""
     if runtime_dir_ is not None and directory is not None:
         raise TypeError("runtime_dir and directory are two names of one thing; give runtime_dir")
     return runtime_dir(directory if runtime_dir_ is None else runtime_dir_)
 
 
 def is_there(path: Path) -> bool:
-    """Whether `path` exists, as far as this user may know: outside the group one may not look."""
+    """Whether `path` exists; False where this user is not allowed to look."""
     try:
         return path.exists()
     except (OSError, ValueError):

@@ -1,7 +1,7 @@
-"""What a producer knows of its daemon, and what it says to it; without a socket.
+"""The state of a producer's conversation with its daemon, without a socket.
 
-The publishers bring frames and time: one subscription tells of announcements, acknowledgements and
-receipts, in the order in which the daemon sent them.
+The publishers own the sockets and pass the frames. One subscription carries announcements,
+acknowledgements and receipts, in the order in which the daemon sent them.
 """
 
 import time
@@ -22,36 +22,36 @@ from sdrlinkd.client.messages import (
 )
 
 LOOK_S = 0.02
-"""Seconds from one look whether the daemon has announced something to the next, at least."""
+"""Shortest time in s between two checks for news from the daemon."""
 
 STILL_THERE_S = 1.0
-"""Seconds of silence after which who waits for receipts asks whether the daemon is there."""
+"""Silence in s after which a producer that awaits receipts probes the daemon."""
 GONE_S = 5.0
-"""Seconds without an answer after which the daemon is taken for gone."""
+"""Time in s without an answer to a probe after which the daemon counts as gone."""
 
 
 class Producer:
-    """One producer's half of the conversation. `is_checked`: it refuses what the daemon would."""
+    """One producer's side of the protocol. With `is_checked`, it refuses what the daemon would."""
 
     def __init__(self, is_checked: bool) -> None:
         self._is_checked = is_checked
         self._look_at = 0.0
         self._questions: dict[bytes, list[str]] = {}
-        """Boots of the daemons that answered, by the topic of the answer."""
+        """Boot ids of the daemons that answered, by ack topic."""
         self._unprompted: bytes | None = None
         self._unprompted_at = self._heard_at = time.monotonic()
         self._confirmed = ""
-        """Boot of the daemon that has our subscriptions."""
+        """Boot id of the daemon that has confirmed our subscriptions."""
         self.known: Announced | None = None
         self.awaited = AwaitedReceipts()
 
     @property
     def topics(self) -> tuple[bytes, ...]:
-        """Subscriptions that a producer has from the beginning."""
+        """Topics that a producer subscribes to from the start."""
         return WELCOME_PREFIX, self.awaited.prefix
 
     def is_time_to_look(self) -> bool:
-        """Whether it is worth a look at the socket."""
+        """Whether the last check of the socket is at least LOOK_S ago; if so, note a new one."""
         now = time.monotonic()
         if now < self._look_at:
             return False
@@ -79,24 +79,24 @@ class Producer:
             self._questions.get(topic, []).append(known.boot)
 
     def ask(self) -> bytes:
-        """A new topic for an acknowledgement, to be subscribed to."""
+        """A new ack topic; subscribing to it makes the daemon answer."""
         topic = new_ack_topic()
         self._questions[topic] = []
         return topic
 
     def answers(self, topic: bytes) -> list[str]:
-        """Boots of the daemons that have answered on `topic` so far."""
+        """Boot ids of the daemons that have answered on ack topic `topic` so far."""
         return self._questions[topic]
 
     def forget(self, topic: bytes) -> None:
-        """Await no answer on `topic` any more."""
+        """Stop waiting for answers on ack topic `topic`."""
         self._questions.pop(topic, None)
 
     def unprompted(self) -> tuple[bytes | None, bytes | None]:
-        """Topics to (subscribe to, unsubscribe from), for questions that nobody waits for.
+        """Ack topics to (subscribe to, unsubscribe from), for probes in the background.
 
-        They ask whether a new daemon has the subscriptions, and whether that which owes receipts is
-        there.
+        A probe finds out whether a new daemon has our subscriptions, and whether the daemon that
+        owes us receipts still runs.
         """
         now = time.monotonic()
         if self._unprompted is not None:
@@ -115,16 +115,16 @@ class Producer:
 
     @property
     def is_subscribed(self) -> bool:
-        """Whether no receipt of a message sent now can be missed."""
+        """Whether the daemon has our subscriptions, so that no receipt can be missed."""
         return self.known is not None and self.known.boot == self._confirmed
 
     @property
     def boot(self) -> str:
-        """The boot of the daemon that is known; empty where none is."""
+        """Boot id of the known daemon; empty while none is known."""
         return "" if self.known is None else self.known.boot
 
     def takes(self, topic: str, cdr: bytes, type_: str | None) -> bool:
-        """Whether the daemon takes such a message, by what is known."""
+        """Whether the daemon accepts such a message, by its last announcement."""
         known = self.known
         if known is None:
             return False
@@ -136,14 +136,14 @@ class Producer:
         )  # fmt: skip
 
     def check(self, topic: str, cdr: bytes, type_: str | None) -> None:
-        """Raise MessageRefusedError if such a message is not taken, by what is known."""
+        """Raise MessageRefusedError if the last announcement rules such a message out."""
         if self._is_checked and self.known is not None:
             self.known.check(topic, len(cdr), type_)
 
     def encode(
         self, topic: str, cdr: bytes, fields: dict[str, Value], published_ns: int | None
     ) -> list[bytes]:
-        """The three frames of a message, stamped with `published_ns` or now."""
+        """The three frames of a message, stamped with `published_ns` or the present time."""
         given = {key: value for key, value in fields.items() if value is not None}
         given["t"] = time.time_ns() if published_ns is None else published_ns
         frame = None if self.known is None else self.known.frames.get(topic)
@@ -160,6 +160,6 @@ def wishes(
     type_: str | None,
     published_ns: int | None,
 ) -> dict[str, Any]:
-    """Header fields of a message. Raises MessageRefusedError for what no daemon takes."""
+    """Header fields of a message. Raises MessageRefusedError for values every daemon refuses."""
     check_wishes(qos, priority, dst, lifespan_ms, published_ns)
     return {"q": qos, "p": priority, "d": dst, "ls": lifespan_ms, "ty": type_}

@@ -1,4 +1,4 @@
-"""Publish from ordinary, blocking programs."""
+"""Publish messages from ordinary, blocking programs."""
 
 import os
 from collections.abc import Callable
@@ -14,19 +14,20 @@ from sdrlinkd.client.paths import IN_SOCKET, OUT_SOCKET, chosen_dir
 from sdrlinkd.client.producer import STILL_THERE_S, Producer, wishes
 
 RECONNECT_MS = 20
-"""Faster than a PUSH socket's 100 ms: who takes messages should have said first which."""
+"""Shorter than the PUSH socket's 100 ms, so that a new daemon's announcement arrives first."""
 
 
 class Publisher(Endpoint):
-    """Hands messages to the local daemon. For one thread at a time.
+    """Hands messages to the local daemon, from one thread at a time.
 
     `send` blocks for at most `timeout_s` while the daemon is away or busy, then raises
-    NoDaemonError: nothing is ever queued for a daemon that is not there. With 0 it never blocks:
-    that is for callbacks, such as those of a ROS 2 executor, which must not hold up their node.
+    NoDaemonError; nothing is ever queued for an absent daemon. With a timeout of 0 it never blocks,
+    which suits callbacks that must not delay their node, such as those of a ROS 2 executor.
 
-    What the daemon would refuse is refused here, by its own words and with its own limits, which it
-    announces; also after it was restarted with others. `checked=False` leaves topics, types and
-    sizes to the daemon, for measurements: its ledger counts them.
+    The publisher refuses what the daemon would refuse, with the daemon's error texts and the limits
+    that the daemon announces, also after a restart with other limits. With `checked=False` it does
+    not check topics, types and sizes; the daemon's ledger then counts the refused messages. This is
+    for measurements.
     """
 
     def __init__(
@@ -37,9 +38,9 @@ class Publisher(Endpoint):
         checked: bool = True,
         directory: str | os.PathLike[str] | None = None,
     ) -> None:
-        """Make a publisher without waiting for the daemon: see `wait_for_daemon`.
+        """Make a publisher without waiting for the daemon; see `wait_for_daemon`.
 
-        `runtime_dir` is where the daemon's sockets are; `directory` is another word for it.
+        `runtime_dir` is where the daemon's sockets are; `directory` is an alias of it.
         """
         super().__init__(zmq.PUSH, chosen_dir(runtime_dir, directory))
         self._socket.immediate = True
@@ -68,16 +69,16 @@ class Publisher(Endpoint):
         receipt: bool = False,
         timeout_s: float | None = None,
     ) -> str | None:
-        """Publish `cdr` under `topic`. What is left out comes from the daemon's configuration.
+        """Publish `cdr` under `topic`. Options left out come from the daemon's configuration.
 
-        The message's age counts from `published_ns` since 1970, else from now. With `receipt`, each
-        robot that it is for answers what became of it, under the name that is returned; see the
-        method `receipt`.
+        The message's age counts from `published_ns` (ns since 1970), or from now. With `receipt`,
+        each robot that the message is for reports what became of it, and `send` returns the id of
+        these receipts; see the method `receipt`.
 
-        Blocks for at most `timeout_s`, else the publisher's: 0 never blocks and raises
-        NoDaemonError at once where the daemon is not connected (yet) or does not keep up. Raises
-        MessageRefusedError for a message that the daemon does not take: an unknown topic, another
-        type than the registry's, one that is too large, or a value out of range.
+        Blocks for at most `timeout_s` (default: the publisher's). With 0 it never blocks, and
+        raises NoDaemonError at once if the daemon is not connected (yet) or does not keep up.
+        Raises MessageRefusedError for a message that the daemon does not accept: an unknown topic,
+        a type other than the registry's, too large a message, or a value out of range.
         """
         producer = self._producer
         fields = wishes(qos, priority, dst, lifespan_ms, type, published_ns)
@@ -85,7 +86,7 @@ class Publisher(Endpoint):
         if producer.is_time_to_look():
             self._hear()
         if not producer.takes(topic, cdr, type):
-            # Nothing is refused by hearsay: the daemon may have been restarted.
+            # Ask before refusing: a restarted daemon may accept other topics.
             self._ask(deadline)
             producer.check(topic, cdr, type)
         name = None
@@ -101,7 +102,7 @@ class Publisher(Endpoint):
             except zmq.Again:
                 if not (deadline.left_s and self._socket.poll(deadline.left_ms, zmq.POLLOUT)):
                     raise no_daemon(self.runtime_dir) from None
-                # The one that listens now may be another daemon.
+                # Another daemon may be listening by now.
                 self._ask(deadline, must_answer=receipt)
                 producer.check(topic, cdr, type)
         self._sent = True
@@ -110,10 +111,10 @@ class Publisher(Endpoint):
         return name
 
     def receipt(self, timeout_s: float | None = None) -> Receipt | None:
-        """The next answer to messages sent with `receipt`.
+        """The next receipt of the messages sent with `receipt`.
 
-        None when `timeout_s` passed first, or when no answer is owed any more. Every message is
-        answered: with `unknown` where its daemon has ended, or has not answered for 6 s.
+        None after `timeout_s`, or when no receipt is outstanding. Every message gets its receipts:
+        if its daemon has ended or has not answered for 6 s, the fate is `unknown`.
         """
         awaited, deadline = self._producer.awaited, Deadline(timeout_s)
         while awaited:
@@ -127,7 +128,7 @@ class Publisher(Endpoint):
         return None
 
     def wait_for_daemon(self, timeout_s: float | None = None) -> None:
-        """Wait until the daemon answers, for at most `timeout_s`, else the publisher's.
+        """Wait until the daemon answers, for at most `timeout_s` (default: the publisher's).
 
         Raises NoDaemonError.
         """
@@ -135,13 +136,13 @@ class Publisher(Endpoint):
         self._ask(Deadline(wait_s), must_answer=True)
 
     def flush(self, timeout_s: float = 5.0) -> None:
-        """Wait until the daemon has taken everything sent. Raises NoDaemonError.
+        """Wait until the daemon has received everything sent. Raises NoDaemonError.
 
-        If a daemon was killed before this was called, what it had taken is gone with it: where that
-        matters, ask for receipts.
+        Messages that a daemon had received before it was killed are lost, and `flush` cannot detect
+        that; request receipts where it matters.
 
-        ZeroMQ may drop the end of a long burst when the sender goes at once; who leaves the `with`
-        block without an error has flushed.
+        Without a flush, ZeroMQ may drop the last messages when the program ends right after many
+        sends. Leaving the `with` block without an error flushes.
         """
         deadline = Deadline(timeout_s)
         question = self._question()
@@ -158,19 +159,19 @@ class Publisher(Endpoint):
             raise no_daemon(self.runtime_dir) from None
         finally:
             self._answered(question)
-        # A new daemon answers that the subscription is active once more.
+        # A second boot id means that a restarted daemon answered, too.
         if len(set(answers)) > 1:
             raise restarted(self.runtime_dir)
 
     def close(self) -> None:
-        """Close the sockets; what was sent has 200 ms to leave."""
+        """Close the sockets; messages sent have 200 ms to leave."""
         self._told.close()
         super().close()
 
     def _ask(self, deadline: Deadline, *, must_answer: bool = False) -> None:
-        """Ask what the daemon takes now. Raises NoDaemonError when no answer comes in time.
+        """Ask the daemon what it accepts now. Raises NoDaemonError when no answer comes in time.
 
-        Where nothing may be waited for, what is known has to do, unless it `must_answer`.
+        With no time left, use the last announcement; with `must_answer`, only if it is confirmed.
         """
         producer = self._producer
         if not deadline.left_s:
@@ -194,7 +195,7 @@ class Publisher(Endpoint):
         self._producer.forget(question)
 
     def _until(self, is_done: Callable[[], bool], deadline: Deadline) -> bool:
-        """Hear the daemon until `is_done`; whether that was before the deadline."""
+        """Take the daemon's messages until `is_done`; False if the deadline came first."""
         while not is_done():
             if not self._told.poll(deadline.left_ms):
                 return False
@@ -202,7 +203,7 @@ class Publisher(Endpoint):
         return True
 
     def _hear(self) -> None:
-        """Take what the daemon has sent so far."""
+        """Take what the daemon has sent so far, without waiting."""
         try:
             while True:
                 self._producer.take(self._told.recv_multipart(zmq.NOBLOCK))

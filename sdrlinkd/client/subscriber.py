@@ -1,4 +1,4 @@
-"""Subscribe from ordinary, blocking programs."""
+"""Subscribe to messages from ordinary, blocking programs."""
 
 import os
 from collections.abc import Iterator
@@ -16,10 +16,10 @@ ASK_AGAIN_S = 0.2
 
 
 class Subscriber(Endpoint):
-    """Receives what other robots sent. A topic that ends with `*` is a prefix.
+    """Receives messages from other robots. A topic that ends with `*` is a prefix.
 
-    `depth` messages wait for a slow reader, 0: without bound; what is beyond is missing, and shows
-    as a step in `Message.number`.
+    Up to `depth` messages wait for a slow reader (0: no limit). Messages beyond that are dropped,
+    which shows as a step in `Message.number`.
     """
 
     def __init__(
@@ -30,9 +30,9 @@ class Subscriber(Endpoint):
         depth: int = RECEIVE_HWM,
         directory: str | os.PathLike[str] | None = None,
     ) -> None:
-        """Subscribe; wait for the daemon for at most `timeout_s`, then raise NoDaemonError.
+        """Subscribe, and wait for the daemon for at most `timeout_s`. Raises NoDaemonError.
 
-        `runtime_dir` is where the daemon's sockets are; `directory` is another word for it.
+        `runtime_dir` is where the daemon's sockets are; `directory` is an alias of it.
         """
         super().__init__(zmq.SUB, chosen_dir(runtime_dir, directory))
         self._socket.rcvhwm = depth
@@ -42,7 +42,7 @@ class Subscriber(Endpoint):
         self._wait_until_subscribed(timeout_s)
 
     def receive(self, timeout_s: float | None = None) -> Message | None:
-        """The next message; None when `timeout_s` passed without one."""
+        """The next message; None if none arrives within `timeout_s`."""
         deadline = Deadline(timeout_s)
         while True:
             if not self._poll(deadline.left_s):
@@ -58,11 +58,11 @@ class Subscriber(Endpoint):
                 yield message
 
     def _wait_until_subscribed(self, timeout_s: float) -> None:
-        """Wait until all subscriptions are active: they are answered in order, ours last."""
+        """Wait until the daemon answers an ack topic: then all earlier subscriptions are active."""
         deadline, again, asked = Deadline(timeout_s), Deadline(0), list[bytes]()
         while deadline.left_s:
             if not again.left_s:
-                # On a full stream an answer may be dropped with the messages: ask once more.
+                # A full queue may drop the answer along with messages, so ask again.
                 again = Deadline(ASK_AGAIN_S)
                 asked.append(new_ack_topic())
                 self._socket.subscribe(asked[-1])

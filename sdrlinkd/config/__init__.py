@@ -1,4 +1,4 @@
-"""Configuration: TOML → types → what the parts are built with."""
+"""The configuration: from TOML to typed structs to the objects that build the parts."""
 
 from sdrlinkd.config.backends import backend_of, typed_config
 from sdrlinkd.config.describe import allowed as allowed_text

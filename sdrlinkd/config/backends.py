@@ -1,4 +1,4 @@
-"""Which words the key `backend` takes, and the configuration's type for those of other packages."""
+"""The allowed values of the key `backend`, and the configuration's type with plugin radios."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -13,7 +13,7 @@ from sdrlinkd.errors import ConfigError
 
 
 def backend_of(config: Config) -> Backend | None:
-    """The radio that `config.backend` names; None: what carries the PDUs is none.
+    """The radio that `config.backend` names; None if the PDU link is not a radio.
 
     Raises ConfigError.
     """
@@ -21,12 +21,12 @@ def backend_of(config: Config) -> Backend | None:
 
 
 def config_type(raw: Mapping[str, object]) -> type[Config]:
-    """The type of a configuration with these keys: `Config`, and sections of other packages.
+    """The type of a configuration with these keys: `Config` and the sections of other packages.
 
-    Of a package, the code is loaded only where `raw` names its radio. Raises ConfigError.
+    A package's code is loaded only if `raw` names its radio. Raises ConfigError.
     """
     if all(key in Config.__struct_fields__ for key in raw) and _is_ours(raw.get("backend")):
-        # The common case need not look for packages.
+        # In the common case there is no need to search for packages.
         return Config
     names = [each for each in backends.installed_names() if each not in Config.__struct_fields__]
     named = [each for each in names if each in raw or each == raw.get("backend")]
@@ -34,7 +34,7 @@ def config_type(raw: Mapping[str, object]) -> type[Config]:
 
 
 def typed_config(raw: Mapping[str, object]) -> Config:
-    """The configuration that another daemon tells, from plain values. Raises ConfigError."""
+    """The configuration in plain values, as another daemon reports it. Raises ConfigError."""
     try:
         return msgspec.convert(raw, config_type(raw))
     except msgspec.ValidationError as error:
@@ -57,9 +57,9 @@ def _found(name: str) -> Backend:
 
 @cache
 def _extended(names: tuple[str, ...], named: tuple[Backend, ...]) -> type[Config]:
-    """`Config` with all `names` as words for `backend`, and a section for each of them.
+    """`Config` with all `names` as further values of `backend`, and a section for each of them.
 
-    The sections of those that are not `named` are not looked into: there are none.
+    The sections of packages that are not `named` are not checked: the file has none.
     """
     if not names:
         return Config

@@ -1,4 +1,4 @@
-"""What a key allows, in words, from its type."""
+"""Describes in words which values a key allows, from its type."""
 
 import math
 
@@ -31,7 +31,7 @@ def allowed(kind: inspect.Type) -> str:
     if is_table(kind):
         return "a table"
     if isinstance(kind, inspect.UnionType):
-        # Words first: they are the likelier choice.
+        # Literal words first, as they are the likelier choice.
         types = sorted(kind.types, key=lambda each: not isinstance(each, inspect.LiteralType))
         return " or ".join(
             allowed(each) for each in types if not isinstance(each, inspect.NoneType)
@@ -40,7 +40,7 @@ def allowed(kind: inspect.Type) -> str:
 
 
 def given(value: object) -> str:
-    """A value as a person would recognise it."""
+    """A value as text that a person recognises."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
@@ -53,7 +53,7 @@ def given(value: object) -> str:
 
 
 def keys_of(kind: inspect.Type) -> list[str] | None:
-    """The keys that a table of `kind` may have; None when any will do."""
+    """The keys that a table of `kind` may have; None if any key is allowed."""
     return (
         [field.encode_name for field in kind.fields]
         if isinstance(kind, inspect.StructType)
@@ -67,7 +67,7 @@ def is_table(kind: inspect.Type) -> bool:
 
 
 def child(kind: inspect.Type, key: str) -> inspect.Type | None:
-    """The type of `key` inside a table of `kind`; None where there is none."""
+    """The type of `key` in a table of `kind`; None if there is no such key."""
     if isinstance(kind, inspect.StructType):
         return next((field.type for field in kind.fields if field.encode_name == key), None)
     if isinstance(kind, inspect.DictType):

@@ -1,4 +1,4 @@
-"""What the sections of the link must agree on."""
+"""Checks that the link's sections of the configuration agree with each other."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,9 +12,9 @@ from sdrlinkd.wire import Registry
 
 
 def check_relay(config: Config, node_id: int, registry: Registry) -> None:
-    """Check what relays and parity need of the rest of the link.
+    """Check that the settings of relays and parity fit the rest of the link.
 
-    Raises ConfigError that begins with the key, and says what was given and what is allowed.
+    Raises ConfigError, which begins with the key and says what was given and what is allowed.
     """
     relay = Relay(config.relay, node_id)
     if config.relay.policy == "routes" and not config.relay.routes:
@@ -37,7 +37,7 @@ def check_relay(config: Config, node_id: int, registry: Registry) -> None:
 def load_dictionaries(
     policies: Mapping[int, TopicPolicy], registry: Registry, base: Path
 ) -> dict[int, ZstdCompressionDict]:
-    """The zstd dictionaries that policies name, by topic id. Raises ConfigError."""
+    """The zstd dictionaries that `policies` name, by topic id. Raises ConfigError."""
     found = {}
     for topic_id, policy in policies.items():
         if not policy.dictionary:

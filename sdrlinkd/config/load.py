@@ -1,4 +1,4 @@
-"""TOML into `Config`, with errors that cite file, line, key, given and allowed."""
+"""Reads TOML into `Config`; errors cite file, line and key, and what was given and is allowed."""
 
 import re
 import tomllib
@@ -47,7 +47,7 @@ def parse_config(text: str, source: str = "config") -> Config:
 
 
 def parse_toml(text: str, source: str, kind: type[S]) -> S:
-    """TOML `text` as a struct. Raises ConfigError that cites `source`, key, given and allowed."""
+    """TOML `text` as a struct of type `kind`. Raises ConfigError that cites `source` and key."""
     return _typed(_read(text, source), text, source, kind)
 
 
@@ -67,7 +67,7 @@ def _typed(raw: dict[str, object], text: str, source: str, kind: type[S]) -> S:
 
 
 def explain_policy(changes: Mapping[str, object]) -> str:
-    """Which of `changes` to a topic's policy is not allowed, and what is."""
+    """The error text for `changes` to a topic's policy: which key is wrong, and what is allowed."""
     kind = describe.type_of(TopicPolicy)
     for key, value in changes.items():
         inner = describe.child(kind, key)
@@ -137,7 +137,7 @@ def _explain(
 
 
 def _first_bad_key(table: dict[str, object], kind: inspect.Type | None) -> str:
-    """Key of the value in `table` that does not convert."""
+    """The first key in `table` whose value does not convert."""
     struct = kind.value_type if isinstance(kind, inspect.DictType) else None
     for key, value in table.items():
         try:

@@ -1,11 +1,11 @@
-"""What nobody can know before the radio is opened; `--check` says so."""
+"""Lists what `--check` cannot verify before the radio is opened."""
 
 from sdrlinkd.config.backends import backend_of
 from sdrlinkd.config.schema import Config
 
 
 def unchecked(config: Config) -> list[str]:
-    """In words, one thing each; empty where the file alone decides. Raises ConfigError."""
+    """What cannot be checked without the radio, a text each; may be empty. Raises ConfigError."""
     radio, policy = backend_of(config), config.access.policy
     found = radio.unchecked(config.backend_settings) if radio is not None else []
     if config.backend == "gnuradio":

@@ -1,10 +1,10 @@
-"""How far off in frequency bursts are looked for, in words."""
+"""Describes the receiver's search range in frequency, in words."""
 
 from sdrlinkd.config.pdu_links import ModemParams
 
 
 def cfo_told(modem: ModemParams) -> str:
-    """How far off bursts are looked for, and why, in a line."""
+    """The frequency offset up to which bursts are searched, and why, in one line."""
     searched = f"bursts are looked for up to {modem.searched_cfo_hz / 1e3:.3g} kHz off"
     if modem.max_cfo_hz != "auto":
         return f"{searched} (modem.max_cfo_hz)"
@@ -15,7 +15,7 @@ def cfo_told(modem: ModemParams) -> str:
 
 
 def cfo_warning(modem: ModemParams) -> str:
-    """What to do where two radios may be too far apart to hear each other; empty elsewhere."""
+    """A warning if two radios may be too far apart in frequency to hear each other; else empty."""
     if modem.frequency_hz == 0 or modem.searched_cfo_hz >= modem.apart_hz:
         return ""
     apart = "" if modem.max_cfo_hz == "auto" else f", but they can be {modem.apart_hz:g} Hz apart"

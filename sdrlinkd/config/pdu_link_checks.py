@@ -1,4 +1,4 @@
-"""What the sections of modem, radios and simulated air must agree on."""
+"""Checks that the sections of modem, radios and simulated air agree with each other."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -15,9 +15,9 @@ S = TypeVar("S", bound=msgspec.Struct)
 
 
 def check_pdu_link(config: Config) -> None:
-    """Check what modem, radios and simulated air must agree on.
+    """Check that the settings of modem, radios and simulated air agree with each other.
 
-    Raises ConfigError that begins with the key, and says what was given and what is allowed.
+    Raises ConfigError, which begins with the key and says what was given and what is allowed.
     """
     _check_sharing(config)
     if config.backend == "gnuradio":
@@ -64,7 +64,7 @@ def _check_sharing(config: Config) -> None:
 
 
 def with_paths(config: Config, base: Path) -> Config:
-    """`config` with file names made whole that are relative to `base`; the registry's stays."""
+    """`config` with relative file names resolved against `base`, except the registry's."""
     base, radio = base.absolute(), backend_of(config)
     named = {name: each.files for name, each in BUILT_IN.items()}
     if radio is not None:
@@ -84,7 +84,7 @@ def with_paths(config: Config, base: Path) -> Config:
 
 
 def _with_whole(section: S, keys: Iterable[str], base: Path) -> S:
-    """`section` with the file names under `keys` made whole; empty ones name no file."""
+    """`section` with the file names under `keys` resolved; empty ones stay empty."""
     given = {key: getattr(section, key) for key in keys}
     whole = {key: str(base / name) for key, name in given.items() if name}
     return msgspec.structs.replace(section, **whole) if whole else section

@@ -1,28 +1,28 @@
-"""Where in a TOML file a key stands: errors cite it as `file:line: section.key`."""
+"""Finds the line of a key in a TOML file; errors cite it as `file:line: section.key`."""
 
 import re
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-# Keys and, inside lists, places.
+# Keys, and the indices inside lists.
 KeyPath = list[str | int]
 
 _KEY = re.compile(r"[A-Za-z_]\w*(?:\.(?:\w+|\"[^\"]*\"))*")
 
 
 def cite(source: str, text: str, path: KeyPath) -> str:
-    """`file:line: section.key`, as far as the line can be found."""
+    """`file:line: section.key`, without the line if it cannot be found."""
     line = _line_of(text, path)
     name = ".".join(step for step in path if isinstance(step, str))
     return f"{source}:{line}: {name}" if line else f"{source}: {name}"
 
 
 def located(message: str, source: str) -> str:
-    """`message`, which begins with a key, after the file and the line that it is about.
+    """`message`, which begins with a key, prefixed with the file and the key's line.
 
-    Without a file, `source` is empty. The line is that of the key, of the next key that the message
-    names where the first one is not written down, or of the section.
+    `source` is empty if there is no file. If the file does not contain the key, the line is that
+    of the next key in the message, or else of the section.
     """
     if not source:
         return message
@@ -40,7 +40,7 @@ def located(message: str, source: str) -> str:
 
 
 def _keys_in(message: str) -> Iterator[KeyPath]:
-    """Words of a message that may be keys, in order; whether they are, the file shows."""
+    """Words of a message that look like keys, in order; the file shows whether they are."""
     for found in _KEY.finditer(message):
         yield [part.strip('"') for part in re.findall(r"\"[^\"]*\"|\w+", found[0])]
 
@@ -48,7 +48,7 @@ def _keys_in(message: str) -> Iterator[KeyPath]:
 def _line_of(text: str, path: KeyPath, *, exact: bool = False) -> int | None:
     """Line of `path` in the TOML text.
 
-    The section's line when the key is not spelled plainly, unless it must be `exact`.
+    If the key does not appear literally, it is the section's line, or None with `exact`.
     """
     section: KeyPath = []
     tables: Counter[str] = Counter()
@@ -60,7 +60,7 @@ def _line_of(text: str, path: KeyPath, *, exact: bool = False) -> int | None:
             tables[".".join(parts)] += header[1] == "[["
             section = _section(parts, tables)
             is_around = section == path[: len(section)] and not (exact and len(section) < 2)
-            # `[[link]]` where a table is wanted.
+            # The file has `[[link]]` where a table is required.
             if is_around or (best is None and section[: len(path)] == path):
                 best = number
             continue
@@ -73,7 +73,7 @@ def _line_of(text: str, path: KeyPath, *, exact: bool = False) -> int | None:
 
 
 def _section(parts: list[str], tables: Counter[str]) -> KeyPath:
-    """A header's path, with the place of each array of tables that it is in."""
+    """The path of a section header, with the index in each array of tables around it."""
     section: KeyPath = []
     for i, part in enumerate(parts):
         section.append(part)

@@ -1,4 +1,4 @@
-"""Times, frequencies and rates that are written with their unit: `"300 ms"`, `"433.92 MHz"`."""
+"""Reads times, frequencies and rates written with a unit: `"300 ms"`, `"433.92 MHz"`."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -11,14 +11,14 @@ from sdrlinkd.units import bits_per_second, hertz, seconds
 
 
 class _Quantity(NamedTuple):
-    """A unit that a key's ending tells, and how text with it is read."""
+    """The unit that a key's `ending` implies, and the function that reads text with such a unit."""
 
     ending: str
     read: Callable[[str, str], float]
     example: str
 
 
-# The first that fits: a bit rate ends like a time.
+# The first matching ending counts: `_bit_s` must come before `_s`.
 _QUANTITIES = (
     _Quantity("_bit_s", bits_per_second, '"100 kbit/s"'),
     _Quantity("_s", seconds, '"300 ms"'),
@@ -28,10 +28,10 @@ _QUANTITIES = (
 
 
 def as_numbers(raw: object, kind: inspect.Type | None, key: str = "") -> object:
-    """`raw`, read from TOML, with numbers in place of text with a unit.
+    """`raw`, read from TOML, with text that has a unit converted to numbers.
 
-    That is done for keys whose kind is a number. Text that cannot be read stays: the check of types
-    then refuses it.
+    This applies to keys of a numeric type. Text that cannot be read stays, and the type check then
+    refuses it.
     """
     if isinstance(raw, dict):
         table = next((each for each in _kinds(kind) if each and describe.is_table(each)), None)
@@ -53,7 +53,7 @@ def as_numbers(raw: object, kind: inspect.Type | None, key: str = "") -> object:
 
 
 def example(key: str | int, kind: inspect.Type) -> str:
-    """How the value of `key` may be written with its unit, for error messages; else empty."""
+    """A hint for errors how to write the value of `key` with a unit; empty if it has none."""
     quantity = _quantity_of(str(key), kind)
     return f", or with its unit, such as {quantity.example}" if quantity else ""
 
@@ -65,7 +65,7 @@ def _quantity_of(key: str, kind: inspect.Type | None) -> _Quantity | None:
 
 
 def _words(kind: inspect.Type | None) -> set[object]:
-    """Words that a key of `kind` takes as they are."""
+    """Literal words that a key of `kind` allows."""
     literals = [each for each in _kinds(kind) if isinstance(each, inspect.LiteralType)]
     return {value for each in literals for value in each.values}
 

@@ -1,4 +1,4 @@
-"""Which robot this is: told, or read from names (paper section 4.3)."""
+"""Finds this robot's id: configured, or read from names (paper section 4.3)."""
 
 import re
 from collections.abc import Iterable
@@ -7,17 +7,17 @@ from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError
 
 MOST = 254
-"""Largest id of a robot: 255 is everyone."""
+"""Largest id of a robot; 255 is the broadcast address."""
 MOST_LISTED = 4
 _DIGITS = re.compile(r"[0-9]+")
 _ALLOWED = f"robot_id from 0 to {MOST}"
 
 
 def robot_id(config: Config, topics: Iterable[str]) -> int:
-    """The id as configured; with −1 the rightmost run of digits in the namespace.
+    """This robot's id as configured; with −1, the rightmost run of digits in the namespace.
 
-    Without a namespace, it is the last number in the names of `topics`, the ones taken from the
-    bus: those that hold digits must agree. Raises ConfigError.
+    Without a namespace, it is the last number in the names of `topics`, the topics taken from the
+    bus; all names that contain digits must agree. Raises ConfigError.
     """
     if config.robot_id >= 0:
         return config.robot_id
@@ -54,7 +54,7 @@ def _from_namespace(namespace: str, where: str) -> int:
 
 
 def _last_number(name: str) -> str:
-    """The rightmost digits in `name`, without leading zeros; empty where there are none."""
+    """The rightmost run of digits in `name`, without leading zeros; empty if there is none."""
     runs = _DIGITS.findall(name)
     return (runs[-1].lstrip("0") or "0") if runs else ""
 
@@ -64,7 +64,7 @@ def _fits(number: str) -> bool:
 
 
 def _listed(found: dict[str, str]) -> str:
-    """The numbers found, each with one name that holds it, for an error message."""
+    """The numbers found, each with one name that contains it, for an error message."""
     names = {number: name for name, number in reversed(found.items())}
     told = [f"{_short(number)} in {name}" for number, name in reversed(names.items())]
     more = len(told) - MOST_LISTED

@@ -1,4 +1,4 @@
-"""The configuration file as types: the parts' own parameters, composed."""
+"""The configuration file as a type, composed of the parts' own parameters."""
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -35,9 +35,9 @@ from sdrlinkd.link import (
 )
 
 WITHOUT_AIR = ("direct", "gnuradio")
-"""Backends that carry PDUs, not samples."""
+"""Backends that carry PDUs instead of samples."""
 BACKENDS = ("direct", *BUILT_IN, "gnuradio")
-"""All that the key `backend` takes, but for radios of other packages."""
+"""All values of the key `backend`, except the radios of other packages."""
 
 if TYPE_CHECKING:
     BackendName = str
@@ -46,43 +46,43 @@ else:
 
 
 class BusParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where the local ZeroMQ bus is, and what it takes."""
+    """Location and limits of the local ZeroMQ bus."""
 
     runtime_dir: str = ""
-    """Directory of the sockets; empty: systemd's, or the user's own."""
+    """Directory of the sockets; empty: systemd's or the user's runtime directory."""
     max_message_bytes: Annotated[int, Meta(ge=64, le=1 << 24)] = 1 << 20
 
 
 class ChronyParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Another robot's clock as a source for this host's chronyd."""
+    """Another robot's clock as a reference clock for this host's chronyd."""
 
     socket: str = ""
-    """The socket's path, as in chrony.conf: `refclock SOCK PATH`; empty: none."""
+    """Path of chronyd's socket, as in chrony.conf: `refclock SOCK PATH`; empty: none."""
     robot: Annotated[int, Meta(ge=0, le=254)] = 0
-    """The robot whose clock is the true one."""
+    """Id of the robot whose clock is the reference."""
 
 
 class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One daemon's configuration. Every key has a default; see etc/sdrlinkd.toml."""
 
     namespace: str = "robot_1"
-    """ROS namespace of this robot's topics; empty: the registry holds absolute names."""
+    """ROS namespace of this robot's topics; empty: the registry has absolute names."""
     robot_id: Annotated[int, Meta(ge=-1, le=254)] = -1
-    """Source id on the air; -1: the last number in the namespace, or, without one, in the names of
-    the topics taken."""
+    """This robot's id on the air; -1: the last number in the namespace or, without a namespace, in
+    the names of the topics taken from the bus."""
     registry: str = "registry.csv"
-    """Topic registry, relative to the configuration file; the same file at all nodes."""
+    """File with the topic registry, relative to the configuration file; the same at all nodes."""
     topics: list[str] = []
     """Registry names to take from the bus; empty: all."""
     rx_format: str = "/rx_robot_{src_id}"
     """Namespace under which another robot's topics are republished."""
     rx_depth: Annotated[int, Meta(ge=0)] = 256
-    """Messages kept for a consumer that does not read; 0: without bound."""
+    """Messages kept for a consumer that does not read; 0: no limit."""
     backend: BackendName = "direct"
     drain_s: Annotated[float, Meta(ge=0, le=60)] = 1.0
-    """Time to send what is queued when the daemon is stopped."""
+    """Time in s for sending the queue when the daemon is stopped."""
     seed: int | None = None
-    """Seed of all chance; absent: from the operating system."""
+    """Seed of all random numbers; absent: from the operating system."""
     link: LinkParams = LinkParams()
     queue: QueueParams = QueueParams()
     reassembly: ReassemblyParams = ReassemblyParams()
@@ -105,7 +105,7 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     channel: ChannelParams = ChannelParams()
     play: PlayParams = PlayParams()
     topic: dict[str, TopicPolicy] = {}
-    """Policies by registry name: `[topic.odom]`."""
+    """Topic policies by registry name, as in `[topic.odom]`."""
 
     @property
     def backend_settings(self) -> msgspec.Struct:
@@ -115,13 +115,13 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     @property
     def radio_needs(self) -> ModemNeeds:
-        """What the modem asks of its radio."""
+        """What the modem requires of its radio."""
         modem = self.modem
         return ModemNeeds(modem.rate_hz, modem.oversampling, modem.frequency_hz, modem.block_s)
 
     @property
     def hears_self(self) -> bool:
-        """Whether this node takes its own PDUs (the paper's experiment)."""
+        """Whether this node accepts its own PDUs, as in the paper's experiment."""
         return bool(getattr(self.backend_settings, "hear_self", False))
 
     @property

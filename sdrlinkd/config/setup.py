@@ -1,4 +1,4 @@
-"""From a configuration to what the parts are built with; every contradiction is found here."""
+"""Resolves a configuration into what the parts are built with, and finds every contradiction."""
 
 import re
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ _RX_NAME = re.compile(r"(/[A-Za-z_]\w*)+/?", re.ASCII)
 _PLACEHOLDER = re.compile(r"\{(src_id|src)\}")
 
 TF_TYPE = "tf2_msgs/msg/TFMessage"
-# Types whose messages have no upper size, and which a small PDU may not carry whole.
+# Types whose messages have no upper size limit, so that a small PDU size may be too small.
 UNBOUNDED_TYPES = {
     "nav_msgs/msg/OccupancyGrid",
     "nav_msgs/msg/Path",
@@ -36,36 +36,36 @@ UNBOUNDED_TYPES = {
 
 @dataclass(frozen=True)
 class Setup:
-    """What one node is: everything that follows from its configuration and registry."""
+    """One node's setup: everything that follows from its configuration and registry."""
 
     config: Config
     registry: Registry
     node_id: int
     topics_in: dict[str, int]
-    """Bus topic → topic id, of the topics taken from the bus."""
+    """Topic ids of the topics taken from the bus, by bus topic."""
     policies: dict[int, TopicPolicy]
     dictionaries: dict[int, ZstdCompressionDict]
     transforms: list[int]
-    """Ids of the topics that [tf] is about."""
+    """Ids of the topics to which [tf] applies."""
     warnings: list[str]
     topic_warnings: dict[int, str]
-    """Warnings by topic id that matter once the topic is used."""
+    """Warnings by topic id, which matter only once the topic is used."""
     source: str = ""
-    """The file that all this is from, if any."""
+    """The configuration file; empty if there is none."""
 
     def republished_as(self, src: int, topic_id: int) -> str:
-        """The bus topic under which another robot's message appears."""
+        """The bus topic under which messages of robot `src` appear."""
         topic = self.registry.by_id(topic_id)
         name = topic.name if topic else str(topic_id)
         return _PLACEHOLDER.sub(str(src), self.config.rx_format).rstrip("/") + "/" + name
 
     @property
     def all_warnings(self) -> list[str]:
-        """The warnings on the configuration as a whole and on its topics."""
+        """The warnings about the configuration as a whole and about its topics."""
         return [*self.warnings, *self.topic_warnings.values()]
 
     def summary(self) -> list[str]:
-        """The lines that `--check` prints of the configuration."""
+        """The lines about the configuration that `--check` prints."""
         config = self.config
         size = config.link.pdu_size
         return [

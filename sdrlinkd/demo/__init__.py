@@ -1,4 +1,4 @@
-"""The paper's experiment with real daemons: send a robot's messages across, see what arrives."""
+"""The paper's experiment with real daemons: sends a robot's messages and measures what arrives."""
 
 from sdrlinkd.demo.folder import run_folder
 from sdrlinkd.demo.hearing import Hearing

@@ -1,4 +1,4 @@
-"""The folder of a run, and what runs that were killed have left."""
+"""The temporary folder of a run; removes the folders of killed runs."""
 
 import contextlib
 import fcntl
@@ -15,11 +15,11 @@ LOCK = "run.lock"
 
 @contextlib.contextmanager
 def run_folder() -> Iterator[Path]:
-    """A folder while it is used by `with`. Those of runs that have died are removed before."""
+    """A temporary folder for use in `with`; first removes the folders of runs that have died."""
     _sweep(Path(tempfile.gettempdir()))
     with tempfile.TemporaryDirectory(prefix=PREFIX) as name:
         folder = Path(name)
-        # Locked before it has its name: else another run could take it for that of a dead one.
+        # Lock the file before renaming it; else another run could take it for that of a dead run.
         unnamed = folder / f"{LOCK}.new"
         with unnamed.open("w") as file:
             fcntl.flock(file, fcntl.LOCK_EX)
@@ -36,6 +36,6 @@ def _sweep(temporary: Path) -> None:
 
 
 def _remove(file: IO[str], folder: Path) -> None:
-    """Unless its run holds the lock, which makes it a BlockingIOError."""
+    """Remove a run's folder. Raises BlockingIOError if the run still holds its lock."""
     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     shutil.rmtree(folder, ignore_errors=True)

@@ -1,4 +1,4 @@
-"""Who listens to a daemon's bus while it runs."""
+"""Listens to a daemon's bus on a thread."""
 
 import contextlib
 import threading
@@ -13,9 +13,9 @@ POLL_S = 0.1
 
 
 class Hearing(threading.Thread):
-    """Takes what a daemon republishes, on a thread of its own; `take(message, at)` is told of it.
+    """Receives what a daemon republishes on its own thread, and calls `take(message, at)`.
 
-    `at` is when it came, by the monotonic clock; `topic` as a Subscriber wants it.
+    `at` is the arrival time on the monotonic clock. `topic` is a filter as for Subscriber.
     """
 
     def __init__(
@@ -29,7 +29,7 @@ class Hearing(threading.Thread):
         self.last_at = 0.0
 
     def run(self) -> None:
-        """Receive until told to end."""
+        """Receive until the context ends."""
         while not self._done.is_set():
             message = self._subscriber.receive(timeout_s=POLL_S)
             if message is not None:

@@ -1,4 +1,4 @@
-"""The configurations of a run: one node; for a recording, one that writes, one that plays."""
+"""Writes the configurations of a run: one node, or one that records and one that plays."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,12 +11,13 @@ MAX_CFO_HZ = 1e5
 LONGEST_PAUSE_S = 3.0
 N_ENTRY_IDS = 256
 SHARE_AT_REST = 0.6
-"""Of the time in which a topic uses up its ids; they rest for 1.25 reassembly timeouts."""
+"""Reassembly timeout as a share of the time in which a topic uses all its entry ids; an id rests
+for 1.25 timeouts."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """What a run may be told. From `mcs` on only for `ofdm` and `iqfile`."""
+    """Options of a run; those from `mcs` on apply only to the links `ofdm` and `iqfile`."""
 
     link: str
     pdu_size: int = 64
@@ -28,20 +29,21 @@ class Options:
     channel: str = "awgn"
     rate_hz: float = 5e6
     recording: Path | None = None
-    """Where `iqfile` keeps its recording; None: nowhere."""
+    """Path where `iqfile` keeps its recording; None: it is not kept."""
 
 
 def write_config(
     directory: Path, source: Source, options: Options, role: str, recording: Path
 ) -> Path:
-    """The configuration of a node whose sockets are in `directory`.
+    """Write the configuration of a node with sockets in `directory`; returns the file's path.
 
-    `role`: "both" for a node that hears itself, "record" and "play" for the two of a recording.
+    `role` is "both" for a node that hears itself, and "record" or "play" for the two nodes of a
+    recording.
     """
     directory.mkdir(exist_ok=True)
     (directory / "registry.csv").write_text(source.registry.csv())
-    # A machine that stands still for a moment loses nothing, as long as there are entry ids: they
-    # rest for the reassembly timeout.
+    # A long timeout avoids losses when the machine stalls. But entry ids rest for that time, so it
+    # is limited by the time in which a topic uses all its ids.
     ids_last_s = N_ENTRY_IDS / (source.fastest_hz * options.speed)
     timeout_s = max(0.02, min(LONGEST_PAUSE_S, SHARE_AT_REST * ids_last_s))
     backend = {"direct": "direct", "ofdm": "loopback", "iqfile": "iqfile"}[options.link]

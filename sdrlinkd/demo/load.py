@@ -1,4 +1,4 @@
-"""How much of the time a process works, and how much it waits for a processor."""
+"""Measures how much of the time a process runs, and how much it waits for a CPU."""
 
 import contextlib
 import time
@@ -7,14 +7,17 @@ from typing import NamedTuple
 
 
 class Load(NamedTuple):
-    """Shares of the time, of the busiest thread: it ran or wanted to, and it only wanted to."""
+    """Load of a process's busiest thread, as shares of the time.
+
+    `busy` is the share in which it ran or waited for a CPU, `waited` the part in which it waited.
+    """
 
     busy: float
     waited: float
 
 
 class LoadOf:
-    """The load of a process since this was made."""
+    """Measures the load of a process from the creation of this object on."""
 
     def __init__(self, pid: int) -> None:
         self._tasks = Path(f"/proc/{pid}/task")
@@ -22,7 +25,7 @@ class LoadOf:
         self._before = self._times()
 
     def read(self) -> Load:
-        """The load since this was made up to now, by thread."""
+        """The load of the busiest thread since the creation of this object."""
         span_s = time.monotonic() - self._began
         loads = []
         for task, (ran_s, waited_s) in self._times().items():
@@ -32,10 +35,10 @@ class LoadOf:
         return max(loads, default=Load(0.0, 0.0))
 
     def _times(self) -> dict[str, tuple[float, float]]:
-        """By thread, in s: it ran, and it waited."""
+        """(time running, time waiting for a CPU) in s, by thread."""
         found = {}
         for task in self._tasks.iterdir():
-            # Threads end at any time.
+            # Threads may end at any time.
             with contextlib.suppress(OSError):
                 ran, waited, _ = (task / "schedstat").read_text().split()
                 found[task.name] = (int(ran) * 1e-9, int(waited) * 1e-9)

@@ -1,4 +1,4 @@
-"""Daemons of their own process, and the consumer that listens to one."""
+"""Daemons as child processes, and a consumer that records what one republishes."""
 
 import contextlib
 import time
@@ -15,18 +15,18 @@ from sdrlinkd.errors import UserError
 from sdrlinkd.process import Process, module
 from sdrlinkd.reports import Snapshot
 
-# Compiling the modem from nothing takes a while on a small machine.
+# Compiling the modem from scratch takes a while on a small machine.
 START_TIMEOUT_S = 120.0
 
 
 def daemon_process(config: Path) -> Process:
-    """A daemon that is yet to be started."""
+    """A daemon's process, not started yet."""
     return Process(module("sdrlinkd", "--config", config), log=config.parent / "log")
 
 
 @contextlib.contextmanager
 def daemon(config: Path) -> Iterator[Process]:
-    """A daemon that runs while the context lasts, once its PDU link is up."""
+    """A daemon that runs within the context, which is entered once its PDU link is up."""
     process = daemon_process(config)
     try:
         process.start()
@@ -43,17 +43,17 @@ def snapshot_of(directory: Path) -> Snapshot:
 
 
 def problems_of(directory: Path) -> list[str]:
-    """Where its ledger does not add up."""
+    """Discrepancies in the ledger of the daemon whose sockets are in `directory`."""
     with ControlClient(directory) as control:
         problems: list[str] = control.ask("check")["problems"]
         return problems
 
 
 def wait_until_up(process: Process, directory: Path) -> None:
-    """Wait until the daemon has its PDU link. Raises UserError with its log when it fails."""
+    """Wait until the daemon's PDU link is up. Raises UserError with its log if that fails."""
     deadline = time.monotonic() + START_TIMEOUT_S
     while process.is_running and time.monotonic() < deadline:
-        # It answers before its modem is ready.
+        # The daemon answers before its modem is ready.
         with contextlib.suppress(NoDaemonError):
             pdu_link = snapshot_of(directory).carrier
             if pdu_link.state in ("up", "ended"):
@@ -65,9 +65,9 @@ def wait_until_up(process: Process, directory: Path) -> None:
 
 
 class Consumer(Hearing):
-    """Takes what a daemon republishes into a trace.
+    """Records what a daemon republishes in a trace.
 
-    `by_age`: the messages were recorded before, so that only their age tells how long they took.
+    `by_age`: take latencies from the messages' ages, as the samples were recorded before.
     """
 
     def __init__(self, directory: Path, trace: Trace, by_age: bool = False) -> None:

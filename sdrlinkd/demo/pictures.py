@@ -1,4 +1,4 @@
-"""The paper's Figures 6 and 7 for our runs."""
+"""Draws the paper's Figures 6 and 7 for our runs."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ SENT_MARK_EVERY = 50
 
 
 def latency_cdf(runs: dict[str, Trace], path: Path, caption: str) -> None:
-    """Figure 6: distribution of the end-to-end latency, one line a run."""
+    """Draw Figure 6: the distribution of the end-to-end latency, with one line per run."""
     figure, panels = make_figure(size=(7.2, 3.8))
     axes = panels[0, 0]
     for (name, trace), look in zip(runs.items(), looks(runs).values(), strict=True):
@@ -33,7 +33,7 @@ def latency_cdf(runs: dict[str, Trace], path: Path, caption: str) -> None:
 
 
 def paths(runs: dict[str, Trace], path: Path, caption: str) -> None:
-    """Figure 7: the path sent and the path received; a column a run, a row an odometry topic."""
+    """Draw Figure 7: paths sent and received, a column per run and a row per odometry topic."""
     topics = next(iter(runs.values())).odometry_topics()
     n_rows = max(1, len(topics))
     figure, panels = make_figure(n_rows, len(runs), (4.2 * len(runs), 4.2 * n_rows))

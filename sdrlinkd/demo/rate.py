@@ -1,4 +1,4 @@
-"""Which rate this machine carries, measured with what is to run then."""
+"""Finds the sample rate that this machine sustains, measured with the demonstration itself."""
 
 import time
 from collections.abc import Callable
@@ -17,13 +17,14 @@ from sdrlinkd.demo.trace import Trace
 RATES_HZ = (5e6, 2e6, 1e6, 5e5)
 MEASURE_S = 2.0
 MOST_BUSY = 2 / 3
-"""Of the time. The rest is for what else comes up."""
+"""Largest load of the daemon's busiest thread, as a share of the time; the rest is reserve."""
 MOST_AIR = 0.8
-"""Of the time on the air. With more, messages would wait for it longer than for a machine."""
+"""Largest share of airtime; with more, messages would wait longer for the channel than for the CPU.
+"""
 
 
 class Tried(NamedTuple):
-    """A rate; shares of the time for which a processor is busy at it, and the air."""
+    """A tried sample rate in Hz, with the shares of time in which the CPU and the air are busy."""
 
     rate_hz: float
     busy: float
@@ -31,7 +32,7 @@ class Tried(NamedTuple):
 
 
 class Found(NamedTuple):
-    """A rate, and those that were tried."""
+    """The chosen sample rate in Hz, and all tried ones."""
 
     rate_hz: float
     tried: list[Tried]
@@ -41,7 +42,7 @@ Measure = Callable[[Source, Options], Tried]
 
 
 def tried_out(source: Source, options: Options) -> Tried:
-    """A daemon sends the first seconds of `source` over noisy air to itself."""
+    """Try a rate: a daemon sends the first seconds of `source` to itself over a noisy channel."""
     trace = Trace({topic.name: topic.type for topic in source.registry.topics})
     with run_folder() as folder:
         config = write_config(folder / "node", source, options, "both", folder)
@@ -58,9 +59,9 @@ def tried_out(source: Source, options: Options) -> Tried:
 
 
 def find_rate(source: Source, options: Options, measure: Measure = tried_out) -> Found:
-    """The highest of RATES_HZ at which a third of the time is free; else where most is.
+    """The highest of RATES_HZ that leaves a third of the CPU time free, or else the most.
 
-    Lower ones at which the air would be too full are none.
+    Lower rates at which the channel would be too full are not tried.
     """
     tried: list[Tried] = []
     for rate_hz in RATES_HZ:

@@ -1,4 +1,4 @@
-"""report.json: what one demonstration measured."""
+"""report.json: the measurements of one demonstration."""
 
 from collections.abc import Sequence
 
@@ -15,7 +15,7 @@ QUANTILES = {"p50": 0.50, "p90": 0.90, "p99": 0.99}
 
 
 class TopicResult(Struct, frozen=True, kw_only=True):
-    """One topic of one run."""
+    """The results of one topic in one run."""
 
     name: str
     type: str
@@ -28,7 +28,7 @@ class TopicResult(Struct, frozen=True, kw_only=True):
 
 
 class PhyResult(Struct, frozen=True, kw_only=True):
-    """What the modem was told, and what its receiver counted."""
+    """The modem's settings, and its receiver's counters."""
 
     mcs: str
     mcs_index: int
@@ -41,17 +41,17 @@ class PhyResult(Struct, frozen=True, kw_only=True):
     pdus_bad: int
     headers_bad: int
     samples_lost: int
-    """What the receiver could not take in time."""
+    """Samples lost because the receiver did not keep up."""
     snr_db_measured: float | None
     realtime_ratio: float | None
     busy: float | None = None
-    """Share of the time in which the daemon's busiest thread ran or wanted to."""
+    """Share of the time in which the daemon's busiest thread ran or waited for a CPU."""
     waited: float | None = None
-    """Of that, share of the time in which other programs had the processors."""
+    """Share of the time in which that thread waited because other programs had the CPUs."""
 
 
 class RunResult(Struct, frozen=True, kw_only=True):
-    """One run: a link, a source, and how it went."""
+    """The results of one run: a link, a source, and the measurements."""
 
     name: str
     source: str
@@ -76,14 +76,14 @@ class RunResult(Struct, frozen=True, kw_only=True):
 
 
 class DemoReport(Struct, frozen=True, kw_only=True):
-    """All runs of one call."""
+    """The results of all runs of one call."""
 
     version: str
     runs: list[RunResult]
 
 
 def latency_ms(pairs: Sequence[Pair]) -> dict[str, float]:
-    """Quantiles of the end-to-end latency; empty when nothing arrived."""
+    """Quantiles of the end-to-end latency in ms; empty if nothing arrived."""
     ordered = latencies_s(pairs) * 1e3
     if not len(ordered):
         return {}
@@ -92,7 +92,7 @@ def latency_ms(pairs: Sequence[Pair]) -> dict[str, float]:
 
 
 def topic_results(trace: Trace) -> list[TopicResult]:
-    """Each topic's share, in the order of names."""
+    """The results of each topic, in order of names."""
     pairs, _ = trace.matches()
     results = []
     for name in sorted(trace.sent):
@@ -128,7 +128,7 @@ def run_result(
     ledger_adds_up: bool,
     phy: PhyResult | None = None,
 ) -> RunResult:
-    """The figures of a finished run."""
+    """The results of a finished run."""
     pairs, foreign = trace.matches()
     topics = topic_results(trace)
     errors = [topic.path_error_m for topic in topics if topic.path_error_m is not None]
@@ -159,7 +159,7 @@ def run_result(
 
 
 def phy_result(options: Options, receiver: Snapshot, load: Load | None) -> PhyResult:
-    """What the modem of the receiving node counted, and its load where it kept time."""
+    """The counters of the receiving node's modem, and its load if it ran in real time."""
     counters = receiver.carrier.counters
     snr = [each.snr_db for each in receiver.link.neighbors if each.snr_db is not None]
     return PhyResult(

@@ -1,4 +1,4 @@
-"""One run: real daemons, a producer, a consumer, and the clock between them."""
+"""Runs the demonstration once: real daemons, a producer and a consumer on one clock."""
 
 import time
 from collections.abc import Callable
@@ -15,18 +15,18 @@ from sdrlinkd.demo.source import Source
 from sdrlinkd.demo.trace import Sample, Trace
 from sdrlinkd.reports import Snapshot
 
-# Nothing has moved for so long: what is missing will not come.
+# Time in s without any progress after which missing messages are given up.
 QUIET_S = 3.0
-# Nothing is on its way any more; what is in the receiver comes within this.
+# Time in s for what is still in the receiver, once nothing is in transit.
 SETTLE_S = 0.3
 
 Progress = Callable[[int, int], None]
 
 
 def run_demo(source: Source, options: Options, progress: Progress) -> tuple[RunResult, Trace]:
-    """Send `source` through daemons; its figures, and the samples behind them.
+    """Send `source` through daemons; returns the results, and the trace behind them.
 
-    `progress(sent, received)` is called as the run goes on.
+    `progress(sent, received)` is called during the run.
     """
     trace = Trace({topic.name: topic.type for topic in source.registry.topics})
     with run_folder() as folder:
@@ -57,7 +57,7 @@ def run_demo(source: Source, options: Options, progress: Progress) -> tuple[RunR
 def _to_itself(
     folder: Path, source: Source, options: Options, trace: Trace, progress: Progress
 ) -> tuple[Snapshot, float, list[str], Load]:
-    """One node that hears itself: (its snapshot, duration in s, problems of the ledger, load)."""
+    """Run one node that hears itself: (snapshot, duration in s, ledger discrepancies, load)."""
     config = write_config(folder / "node", source, options, "both", folder)
     directory = config.parent
     with daemon(config) as process, Consumer(directory, trace) as consumer:
@@ -73,7 +73,7 @@ def _to_itself(
 def _over_recording(
     folder: Path, source: Source, options: Options, trace: Trace, progress: Progress
 ) -> tuple[Snapshot, Snapshot, float, list[str]]:
-    """A node that records, then one that plays: (both snapshots, duration in s, problems)."""
+    """Run a node that records, then one that plays: (both snapshots, duration in s, problems)."""
     recording = options.recording or folder / "recording"
     config = write_config(folder / "sender", source, options, "record", recording.absolute())
     with daemon(config):
@@ -104,7 +104,7 @@ def _produce(
 
 
 def _wait_until_sent(directory: Path, n_sent: int) -> Snapshot:
-    """Until all has left, or nothing moves for a while."""
+    """Wait until all messages have left, or nothing moves for a while; returns the snapshot."""
     return _watch(
         directory,
         lambda at: at.bus.received == n_sent and not at.link.tx.queued and not at.link.tx.in_flight,
@@ -115,7 +115,7 @@ def _wait_until_sent(directory: Path, n_sent: int) -> Snapshot:
 def _wait_until_through(
     directory: Path, consumer: Consumer, n_sent: int, progress: Callable[[], None]
 ) -> Snapshot:
-    """Until nothing is on its way any more, or nothing moves for a while."""
+    """Wait until no message is in transit, or nothing moves for a while; returns the snapshot."""
 
     def is_through(at: Snapshot) -> bool:
         progress()
@@ -133,7 +133,7 @@ def _wait_until_through(
 def _wait_until_played(
     directory: Path, consumer: Consumer, progress: Callable[[], None]
 ) -> Snapshot:
-    """Until the recording is over and all that was in it has come."""
+    """Wait until the recording is over and all its messages have come; returns the snapshot."""
 
     def is_over(at: Snapshot) -> bool:
         progress()
@@ -146,7 +146,7 @@ def _wait_until_played(
 def _watch(
     directory: Path, is_done: Callable[[Snapshot], bool], moving: Callable[[Snapshot], object]
 ) -> Snapshot:
-    """The snapshot when `is_done` has held while nothing moved for SETTLE_S; at last QUIET_S."""
+    """The snapshot once `is_done` holds and nothing moved for SETTLE_S, or else for QUIET_S."""
     seen: object = None
     still_since = time.monotonic()
     while True:

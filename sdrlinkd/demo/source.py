@@ -1,4 +1,4 @@
-"""What the demonstration sends: a bag or the built-in robot, and the registry for it."""
+"""The demonstration's source: a bag or the built-in robot, with a registry for it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from sdrlinkd.wire import Registry, make_registry
 
 NAMESPACE = "robot_1"
 BUILT_IN_DURATION_S = 15.0
-# The sixteenth topic id is the control channel's: ages and beacons.
+# The sixteenth topic id is for the control channel: ages and beacons.
 MAX_BAG_TOPICS = 15
 
 # The registry of the paper's Table 4.
@@ -27,23 +27,23 @@ BUILT_IN_REGISTRY = (
 
 
 class Recording(Protocol):
-    """What can be played: a bag, or the built-in robot."""
+    """A recording that can be played: a bag, or the built-in robot."""
 
     damage: str
 
     def topics(self) -> list[BagTopic]:
-        """The topics that the source publishes."""
+        """The topics of the recording."""
 
     def messages(self) -> Iterator[BagMessage]:
-        """Its messages in the order of time."""
+        """The recording's messages in order of time."""
 
     def close(self) -> None:
-        """Release what the source reads from."""
+        """Close the recording's files."""
 
 
 @dataclass
 class Source:
-    """A recording, the registry it is sent under, and what of it is left out."""
+    """A recording, the registry under which it is sent, and the topics left out."""
 
     title: str
     recording: Recording
@@ -53,19 +53,19 @@ class Source:
     topics: list[BagTopic]
     left_out: list[str] = field(default_factory=list)
     fastest_hz: float = 300.0
-    """No topic is more frequent, as far as is known."""
+    """Upper limit of the topics' rates in Hz, as far as known."""
 
     def messages(self) -> Iterator[BagMessage]:
-        """The messages to send, in the order of time."""
+        """The messages to send, in order of time."""
         wanted = {topic.name for topic in self.topics}
         messages = first_seconds(self.recording.messages(), self.duration_s)
         return (message for message in messages if message.topic in wanted)
 
     def expected(self) -> int:
-        """How many messages that will be."""
+        """The number of messages to send."""
         if self.duration_s == float("inf"):
             return sum(topic.n_messages for topic in self.topics)
-        # Only who reads them knows how many there are.
+        # Only reading all of them shows how many there are.
         return sum(1 for _ in self.messages())
 
 
@@ -78,9 +78,9 @@ def open_source(
     namespace: str = NAMESPACE,
     topics_key: str = "--topics",
 ) -> Source:
-    """A recording, or a built-in robot in `namespace`, and what of it. Raises UserError.
+    """The source for a bag, or for a built-in robot in `namespace`. Raises UserError.
 
-    `topics_key` is where a person has named the topics.
+    `topics_key` is the option or key by which a person selected `topics`, for errors.
     """
     if bag is None:
         source = _built_in(registry_path, duration_s or BUILT_IN_DURATION_S, seed, namespace)
@@ -96,7 +96,7 @@ def open_source(
 def _built_in(registry_path: Path | None, duration_s: float, seed: int, namespace: str) -> Source:
     robot = BuiltInRobot(namespace, duration_s, seed)
     registry = load_registry(registry_path) if registry_path else make_registry(BUILT_IN_REGISTRY)
-    # The robot ends by itself.
+    # The robot's duration already limits its messages.
     endless = float("inf")
     topics = robot.topics()
     source = Source(
@@ -129,7 +129,7 @@ def _from_bag(path: Path, registry_path: Path | None, duration_s: float) -> Sour
 
 
 def _match(source: Source) -> None:
-    """Leave out what the registry does not have."""
+    """Leave out topics that the registry does not have."""
     prefix = f"/{source.namespace}/" if source.namespace else "/"
     kept = []
     for topic in source.topics:

@@ -1,10 +1,10 @@
-"""Our figures beside the paper's Table 6."""
+"""Tables of our results, with the paper's Table 6 for comparison."""
 
 from sdrlinkd.demo.report import RunResult, TopicResult
 from sdrlinkd.demo.trace import ODOMETRY
 from sdrlinkd.tables import NOTHING, FittedTable, figure, words
 
-# GRCon 2025, Table 6: /odom alone, 15 entries a message.
+# GRCon 2025, Table 6: only /odom, with 15 entries per message.
 PAPER_TABLE_6 = {
     "ofdm": ("38.0", "1328", "12", "0.01", "228.6"),
     "direct": ("15.0", "452", "452", "1.00", "21767.9"),
@@ -16,7 +16,7 @@ COLUMNS = (
 
 
 def table_6(runs: list[RunResult]) -> FittedTable:
-    """A row a run, one for each of its odometry topics, and the paper's."""
+    """The table with a row per run, a row for each of its odometry topics, and the paper's rows."""
     table = FittedTable("The paper's Table 6, and this run", COLUMNS)
     for run in runs:
         table.add(run.name, *_figures(run, run), style="bold")
@@ -31,7 +31,7 @@ def table_6(runs: list[RunResult]) -> FittedTable:
 
 
 def topic_table(run: RunResult) -> FittedTable:
-    """The table of a run, a row for each topic."""
+    """The table of a run, with a row per topic."""
     columns = (words("topic"), words("type", 1), figure("sent"), figure("recv"), figure("PDR"))
     table = FittedTable(f"{run.name}: {run.source} in PDUs of {run.pdu_size} B", columns)
     for topic in run.topics:

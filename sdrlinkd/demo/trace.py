@@ -1,4 +1,4 @@
-"""What was sent and what came back, and the paper's figures of merit over both."""
+"""Records of messages sent and received, and the paper's figures of merit."""
 
 from collections import defaultdict
 from collections.abc import Sequence
@@ -17,9 +17,10 @@ Path2D = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """A message at one end: payload, and when by the one monotonic clock, in s.
+    """A message at the producer or consumer: its payload, and its time on the monotonic clock in s.
 
-    `age_s`: how long it took by the link's own count, where reception was later than the radio's.
+    `age_s` is its age by the link, for runs in which it was handed over later than it was on the
+    air.
     """
 
     at: float
@@ -27,13 +28,13 @@ class Sample:
     age_s: float | None = None
 
 
-# What was sent, and the same as received.
+# A message as sent and as received.
 Pair = tuple[Sample, Sample]
 
 
 @dataclass
 class Trace:
-    """Messages per registry name at the producer and at the consumer."""
+    """Messages at the producer and at the consumer, by registry name."""
 
     types: dict[str, str]
     sent: dict[str, list[Sample]] = field(default_factory=lambda: defaultdict(list))
@@ -46,18 +47,19 @@ class Trace:
 
     @property
     def last_sent_at(self) -> float:
-        """When the last message was sent."""
+        """Time at which the last message was sent, on the monotonic clock."""
         return max((samples[-1].at for samples in self.sent.values() if samples), default=0.0)
 
     @property
     def n_received(self) -> int:
-        """Messages the consumer got, whatever they hold."""
+        """Messages received by the consumer, whatever their content."""
         return sum(len(samples) for samples in self.received.values())
 
     def matches(self) -> tuple[dict[str, list[Pair]], int]:
-        """((sent, received) pairs per topic, received messages that nobody sent).
+        """((sent, received) pairs by topic, number of received messages that nobody sent).
 
-        Order holds within a topic, so each received message is looked for behind the one before.
+        Messages of a topic keep their order, so each received message is searched after the last
+        match.
         """
         pairs: dict[str, list[Pair]] = {}
         foreign = 0
@@ -91,12 +93,12 @@ class Trace:
 
 
 def latencies_s(pairs: Sequence[Pair]) -> NDArray[np.float64]:
-    """Publish at the producer to reception at the consumer, ascending, in s."""
+    """Times from publishing at the producer to reception at the consumer, ascending, in s."""
     return np.sort([got.at - was.at for was, got in pairs])
 
 
 def goodput_bytes_per_s(pairs: Sequence[Pair]) -> float:
-    """Payload bytes delivered over the time from the first publish to the last reception."""
+    """Payload bytes delivered per s, from the first publishing to the last reception."""
     if not pairs:
         return 0.0
     span_s = max(got.at for _, got in pairs) - min(was.at for was, _ in pairs)
@@ -104,10 +106,10 @@ def goodput_bytes_per_s(pairs: Sequence[Pair]) -> float:
 
 
 def path_error_m(sent: Path2D, received: Path2D) -> float | None:
-    """Mean distance of two paths on a common grid of arc length (paper section 6).
+    """Mean distance in m of two paths on a common grid of arc length (paper section 6).
 
-    Interpolating both over their own normalised length discounts harmless stretching in time.
-    None when either has no two distinct points.
+    Both are interpolated over their own normalised length, so that harmless stretching in time does
+    not count. None if either path has no two distinct points.
     """
     grids = [_along(path) for path in (sent, received)]
     if grids[0] is None or grids[1] is None:
@@ -127,14 +129,14 @@ def _along(path: Path2D) -> Path2D | None:
 
 
 def _as_on_air(sent: Sample, received: Sample) -> Sample:
-    """The reception as it was on the air, when that was recorded and played later."""
+    """The reception, with its time on the air if the samples were recorded and played later."""
     if received.age_s is None:
         return received
     return Sample(sent.at + received.age_s, received.payload)
 
 
 def _next_match(sent: Sequence[Sample], at: int, received: Sample) -> int | None:
-    """Index from `at` of the first message that `received` can be: sent before, the same bytes."""
+    """Index, from `at` on, of the first sent message with the same bytes that was sent earlier."""
     for i in range(at, len(sent)):
         if sent[i].at > received.at:
             return None

@@ -1,18 +1,18 @@
-"""Whether a run brought what its link should bring, and if not, why."""
+"""Judges whether a run delivered what its link should deliver, and if not, why."""
 
 import phy
 from sdrlinkd.demo.report import PhyResult, RunResult
 
 CLEAN_PER = 1e-6
 MARGIN_DB = 0.5
-"""By which the law of packet errors may be off."""
+"""Margin in dB for errors of the model of packet errors."""
 STOOD_STILL = 0.5
-"""Who waited for half of what is lost, has lost it by waiting."""
+"""Losses are blamed on waiting for a CPU if it explains at least this share of them."""
 SATURATED = 0.9
 
 
 def is_clean(result: RunResult) -> bool:
-    """Whether nothing on its air takes messages: no fading, and SNR enough for its MCS."""
+    """Whether the run's channel loses no messages: no fading, and enough SNR for the MCS."""
     heard = result.phy
     if heard is None:
         return True
@@ -22,14 +22,14 @@ def is_clean(result: RunResult) -> bool:
 
 
 def is_good(result: RunResult) -> bool:
-    """Whether all arrived that should have, unchanged, and the ledger knows of each."""
+    """Whether all messages that should arrive did so, unchanged, and the ledger adds up."""
     if not result.ledger_adds_up or (result.received and not result.bytes_identical):
         return False
     return result.received == result.sent or not is_clean(result)
 
 
 def verdict(result: RunResult) -> str:
-    """What is missing or wrong and why, in a sentence; empty when nothing is."""
+    """What is missing or wrong, and why, in a sentence; empty if the run was good."""
     missing = result.sent - result.received
     if missing <= 0:
         wrong = "" if result.bytes_identical else "what arrived is not what was sent"

@@ -1,7 +1,7 @@
-"""Whether this machine can carry a node: what is looked at, what is found, what to do about it.
+"""Checks whether this machine can run a node, and says what to do if it cannot.
 
-A check takes what it looks at as arguments and returns findings. It prints nothing and changes
-nothing; a radio is opened to listen only.
+A check takes its input as arguments and returns findings. It prints nothing and changes nothing; a
+radio is opened only to receive.
 """
 
 from sdrlinkd.doctor.clock import KernelClock, check_clock, kernel_clock

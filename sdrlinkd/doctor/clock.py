@@ -1,4 +1,4 @@
-"""This host's clock: whether something keeps it, and whether it stepped while we looked."""
+"""Checks this host's clock: whether it is synchronized, and whether it was stepped meanwhile."""
 
 import ctypes
 import os
@@ -13,14 +13,14 @@ _ERROR = 5
 
 
 class KernelClock(NamedTuple):
-    """What the kernel says of this host's clock; `error_s` is the largest error in s."""
+    """The kernel's state of this host's clock; `error_s` is the largest error in s."""
 
     is_synchronised: bool
     error_s: float
 
 
 class _Timex(ctypes.Structure):
-    """struct timex of adjtimex(2), as far as we read it; the rest is room."""
+    """struct timex of adjtimex(2), with the fields that we read; the rest is padding."""
 
     _fields_ = (
         ("modes", ctypes.c_uint),
@@ -34,7 +34,7 @@ class _Timex(ctypes.Structure):
 
 
 def kernel_clock() -> KernelClock | None:
-    """The kernel's word, by adjtimex(2), which without modes changes nothing; None: no word."""
+    """The kernel's clock state by adjtimex(2), which changes nothing here; None if unavailable."""
     timex = _Timex()
     try:
         state = ctypes.CDLL(None, use_errno=True).adjtimex(ctypes.byref(timex))
@@ -47,10 +47,10 @@ def kernel_clock() -> KernelClock | None:
 
 
 def check_clock(kernel: KernelClock | None, step_s: float, chrony: str) -> list[Finding]:
-    """Whether something keeps this host's clock, and whether it stepped while we looked.
+    """Findings on whether this host's clock is synchronized, and whether it was stepped meanwhile.
 
-    `step_s`: by how much the wall clock ran away from the monotonic one. `chrony`: the socket in
-    the configuration, "" for none.
+    `step_s` is the change of the wall clock relative to the monotonic clock, in s. `chrony` is the
+    socket in the configuration, "" for none.
     """
     found = [
         _synchronised(kernel),

@@ -1,4 +1,4 @@
-"""The runtime directory: whether a daemon can have its sockets there, and programs reach them."""
+"""Checks the runtime directory: whether a daemon can make its sockets there."""
 
 import os
 import stat
@@ -10,7 +10,7 @@ from sdrlinkd.doctor.finding import Finding, bad, good, good_if
 
 
 def check_directory(path: Path, uid: int) -> list[Finding]:
-    """Whether a daemon of user `uid` can have its sockets in `path`."""
+    """Findings on whether a daemon of user `uid` can make its sockets in `path`."""
     what = "runtime directory"
     length = len(os.fsencode(path))
     if length > MAX_DIRECTORY_BYTES:

@@ -1,4 +1,4 @@
-"""Whether Python, the packages and the compiled modem are there."""
+"""Checks Python, the packages and the compiled modem."""
 
 import os
 import re
@@ -20,11 +20,11 @@ def check_environment(
     phy_home: Path,
     cache: Path,
 ) -> list[Finding]:
-    """Whether Python, the packages and the compiled modem are as they must be.
+    """Findings on Python, the packages and the compiled modem.
 
-    `requirements`: as the package's metadata lists them. `version_of` raises PackageNotFoundError.
-    `home`: the folder that sdrlinkd is in; `phy_home`: that of phy. `cache`: where compiled code is
-    kept.
+    `requirements` are those of the package's metadata. `version_of` raises PackageNotFoundError.
+    `home` is the folder with sdrlinkd, `phy_home` the one with phy, and `cache` the folder of the
+    compiled code.
     """
     found = ".".join(map(str, sys.version_info[:3]))
     return [

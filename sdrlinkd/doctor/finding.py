@@ -1,4 +1,4 @@
-"""Findings: what a check says of what it looked at."""
+"""Findings: the results of checks."""
 
 from enum import StrEnum
 
@@ -6,16 +6,16 @@ import msgspec
 
 
 class State(StrEnum):
-    """Whether what was looked at is as it must be."""
+    """Whether the checked item is as it must be."""
 
     GOOD = "good"
     BAD = "bad"
     NONE = "not applicable"
-    """Not needed by this configuration, or not to be known here."""
+    """Not needed by this configuration, or impossible to check here."""
 
 
 class Finding(msgspec.Struct, frozen=True):
-    """One line for people: what was looked at, what was found and, where it is bad, what to do."""
+    """One line for people: what was checked, what was found and, if bad, what to do."""
 
     what: str
     state: State
@@ -24,17 +24,17 @@ class Finding(msgspec.Struct, frozen=True):
 
 
 def good(what: str, told: str) -> Finding:
-    """A finding that something is as it must be."""
+    """A finding that an item is as it must be."""
     return Finding(what, State.GOOD, told)
 
 
 def bad(what: str, told: str, to_do: str) -> Finding:
-    """A finding about which a person must do something."""
+    """A finding that requires a person to act."""
     return Finding(what, State.BAD, told, to_do)
 
 
 def none(what: str, told: str) -> Finding:
-    """A finding about which nothing is to be done."""
+    """A finding that requires no action."""
     return Finding(what, State.NONE, told)
 
 

@@ -1,4 +1,4 @@
-"""How much of a core a node takes here: a daemon runs, on its modem and simulated noise."""
+"""Measures how much of a CPU core a node needs, with a daemon on simulated noise."""
 
 import os
 import tempfile
@@ -16,31 +16,31 @@ from sdrlinkd.doctor.finding import Finding, bad, good_if
 from sdrlinkd.errors import UserError
 
 MOST = 0.8
-"""The rest of a core is for what comes at once."""
+"""Largest load, as a share of a core; the rest is for peaks."""
 SNR_DB = 15.0
 TOPIC, TYPE = "load", "std_msgs/UInt8MultiArray"
 _MESSAGE = bytes(1000)
 _AHEAD = 200
-"""Messages that wait while the air is full."""
+"""Number of messages kept in the queue to fill the channel."""
 
 
 class Headroom(NamedTuple):
-    """Shares of one core that a daemon takes, by the time of the samples.
+    """Shares of one core that a daemon needs, relative to the time of the processed samples.
 
-    Other programs that hold it up do not make them look small.
+    So delays by other programs do not make the shares look small.
     """
 
     rate_hz: float
     silent: float
-    """Share while nobody sends: the search alone."""
+    """Share on a silent channel, for the search alone."""
     full: float
-    """Share while the air is full: every burst is made, and received."""
+    """Share on a full channel, where every burst is both sent and received."""
     samples_lost: int
-    """Samples lost while the air was full: the receiver did not keep up."""
+    """Samples lost on a full channel because the receiver did not keep up."""
 
 
 def headroom_found(modem: ModemParams, pdu_size: int, seconds: float) -> Finding:
-    """The finding on CPU headroom: measured, or why it cannot be."""
+    """The finding on CPU headroom: the measurement, or why it is impossible."""
     try:
         return check_headroom(measure_headroom(modem, pdu_size, seconds))
     except UserError as error:
@@ -49,7 +49,7 @@ def headroom_found(modem: ModemParams, pdu_size: int, seconds: float) -> Finding
 
 
 def measure_headroom(modem: ModemParams, pdu_size: int, seconds: float) -> Headroom:
-    """Run a daemon for `seconds`, half of that on a silent air. Raises UserError."""
+    """Run a daemon for `seconds`, half of them on a silent channel. Raises UserError."""
     with tempfile.TemporaryDirectory(prefix="sdrlinkd-doctor-") as name:
         folder = Path(name)
         daemon = daemon_process(_config(folder, modem, pdu_size))
@@ -74,7 +74,7 @@ def measure_headroom(modem: ModemParams, pdu_size: int, seconds: float) -> Headr
 
 
 def check_headroom(found: Headroom) -> Finding:
-    """Whether the modem keeps up with the samples where the air is full."""
+    """The finding on whether the modem keeps up with the samples on a full channel."""
     lost = f"; {found.samples_lost} samples were lost" if found.samples_lost else ""
     return good_if(
         found.full <= MOST and not found.samples_lost, "CPU headroom",
@@ -104,7 +104,7 @@ def _config(folder: Path, modem: ModemParams, pdu_size: int) -> Path:
 
 
 def _run(seconds: float, out: Publisher | None) -> None:
-    """Let `seconds` pass; with `out`, the daemon's queue never runs dry."""
+    """Let `seconds` pass; with `out`, keep the daemon's queue filled meanwhile."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         if out is not None:
@@ -114,7 +114,7 @@ def _run(seconds: float, out: Publisher | None) -> None:
 
 
 class _Spent(NamedTuple):
-    """What a daemon has spent and done since it began."""
+    """CPU time and processed samples of a daemon since its start."""
 
     cpu_s: float
     samples: int
@@ -122,12 +122,12 @@ class _Spent(NamedTuple):
 
     @classmethod
     def by(cls, pid: int, folder: Path) -> "_Spent":
-        """What the daemon of process `pid` has spent, with its sockets in `folder`."""
+        """The figures of the daemon with process id `pid` and sockets in `folder`."""
         counters = snapshot_of(folder).carrier.counters
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
         cpu_s = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
         return cls(cpu_s, counters.get("samples", 0), counters.get("samples_lost", 0))
 
     def share_since(self, earlier: "_Spent", rate_hz: float) -> float:
-        """CPU time since `earlier`, as a share of the time of the samples that came."""
+        """CPU time since `earlier`, as a share of the time of the samples received since."""
         return (self.cpu_s - earlier.cpu_s) * rate_hz / max(1, self.samples - earlier.samples)

@@ -1,6 +1,6 @@
-"""How late this machine wakes a thread, and hands over from one thread to another.
+"""Measures how late this machine wakes threads and hands over to the event loop.
 
-A real radio's messages are later by this than the air alone makes them.
+With a real radio, this adds to the latency of messages.
 """
 
 import asyncio
@@ -13,26 +13,26 @@ import numpy as np
 from sdrlinkd.doctor.finding import Finding, good, good_if
 
 PERIOD_S = 0.001
-"""A radio's blocks come so often."""
+"""Typical interval in s between a radio's blocks."""
 
 
 class HostTerm(NamedTuple):
-    """How late this machine is, in s, at the 99th percentile of `n` trials."""
+    """Delays of this machine in s: the 99th percentiles of `n` trials."""
 
     wakes_s: float
-    """From the moment a thread wants to wake to when it does."""
+    """From a thread's planned wake-up until it runs."""
     hands_over_s: float
-    """From when it wakes to the event loop."""
+    """From then until the event loop runs its callback."""
     n: int
 
     @property
     def host_s(self) -> float:
-        """What this machine adds to a message's latency in s: the worst case of both."""
+        """Latency in s that this machine adds to a message: the sum of both delays."""
         return self.wakes_s + self.hands_over_s
 
 
 async def measure_host(n: int) -> HostTerm:
-    """How late a radio's thread wakes and hands a block to the event loop; takes `n` ms."""
+    """Measure how late a thread like a radio's wakes and hands over; takes `n` ms."""
     loop = asyncio.get_running_loop()
     wakes, arrives = np.zeros(n), np.zeros(n)
     done = asyncio.Event()
@@ -45,7 +45,7 @@ async def measure_host(n: int) -> HostTerm:
     def wake() -> None:
         due = time.monotonic()
         for i in range(n):
-            # A machine that stands still is late once for it, not for all that was missed.
+            # A stall counts as one late wake-up, not as one for every missed period.
             due = max(due + PERIOD_S, time.monotonic())
             time.sleep(max(0.0, due - time.monotonic()))
             woke = time.monotonic()
@@ -61,9 +61,9 @@ async def measure_host(n: int) -> HostTerm:
 
 
 def check_host(found: HostTerm, lead_s: float | None) -> Finding:
-    """Whether this machine is in time for its radio.
+    """The finding on whether this machine is fast enough for its radio.
 
-    `lead_s`: how long ahead bursts are handed over to the radio; None without a real one.
+    `lead_s` is the time by which bursts are handed to the radio early; None without a real radio.
     """
     told = (
         f"wakes {1e3 * found.wakes_s:.2f} ms late and hands over in "

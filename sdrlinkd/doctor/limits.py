@@ -1,4 +1,4 @@
-"""What the system grants: real-time priority, memory, buffers of sockets and USB."""
+"""Checks the system's limits: real-time priority, memory, buffers of sockets and USB."""
 
 import os
 import resource
@@ -11,23 +11,23 @@ from sdrlinkd.doctor.finding import Finding, bad, good, good_if, none
 from sdrlinkd.doctor.usb import is_networked
 
 NETWORK_BUFFER = 24_912_805
-"""Bytes that UHD's manual wants for a receiving socket."""
+"""Size in bytes of a receiving socket's buffer that UHD's manual recommends."""
 USB_BUFFER_MB = 16
-"""MB of the kernel for all transfers under way on USB; 0: without bound."""
+"""Memory in MB that the kernel must allow for USB transfers; a kernel limit of 0 means no limit."""
 REALTIME = 10
 
 
 class Granted(NamedTuple):
-    """What the system grants, as found on this machine."""
+    """What the system grants to this user on this machine."""
 
     can_hurry: bool
-    """Whether a thread could take real-time priority when it was tried."""
+    """Whether a thread can get real-time priority, as tried."""
     nice: int
-    """The best niceness that this user may take."""
+    """Lowest niceness that this user may set."""
     shared_memory: bool
-    """Whether memory for two processes could be had."""
+    """Whether shared memory for two processes is available."""
     files: int
-    """RLIMIT_NOFILE."""
+    """Limit of open files, RLIMIT_NOFILE."""
 
 
 def granted() -> Granted:
@@ -40,7 +40,7 @@ def granted() -> Granted:
 
 
 def _can_hurry() -> bool:
-    """Whether real-time priority is granted: tried in a child, which gives it back by ending."""
+    """Whether real-time priority is granted, as tried in a child process, which then ends."""
     code = f"import os; os.sched_setscheduler(0, os.SCHED_RR, os.sched_param({REALTIME}))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)  # noqa: S603
     return done.returncode == 0
@@ -55,9 +55,10 @@ def _can_share() -> bool:
 
 
 def check_limits(granted: Granted, device: str, root: Path) -> list[Finding]:
-    """Whether priority, memory, files and buffers suffice.
+    """Findings on whether priority, memory, files and buffers suffice.
 
-    `device`: as soapy.device, "" without a radio. `root`: / or a copy of its /proc and /sys.
+    `device` has the form of soapy.device, "" without a radio. `root` is / or a copy of its /proc
+    and /sys.
     """
     return [
         _hurry(granted, is_needed=bool(device)),

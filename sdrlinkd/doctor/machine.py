@@ -1,23 +1,23 @@
-"""The computer: its cores, who else uses them, and whether they are slowed down."""
+"""Checks the computer: its cores, their load, and whether they are slowed down."""
 
 from pathlib import Path
 
 from sdrlinkd.doctor.finding import Finding, bad, good, good_if, none
 
 BUSY = 1.0
-"""Programs that want to run, for each core; where there are more, they wait for each other."""
+"""Load average per core above which programs wait for each other."""
 STOLEN = 0.05
-"""Share of its time; a virtual machine that loses more of it to others loses samples."""
+"""Share of stolen CPU time above which a virtual machine loses samples."""
 SLOW_GOVERNORS = ("powersave", "conservative")
 
 
 def check_machine(
     cores: int, load: float, stat: tuple[str, str], cpus: Path, *, is_timed: bool
 ) -> list[Finding]:
-    """Whether the computer has the cores and the time that a node needs.
+    """Findings on whether the computer has the cores and the CPU time that a node needs.
 
-    `load`: programs that wanted to run, a mean of the last minute. `stat`: /proc/stat twice, some
-    time between. `cpus`: /sys/devices/system/cpu. `is_timed`: a radio, real or simulated, wants its
+    `load` is the load average of the last minute. `stat` holds /proc/stat, read twice some time
+    apart. `cpus` is /sys/devices/system/cpu. `is_timed`: a real or simulated radio needs its
     samples in time.
     """
     return [
@@ -47,7 +47,7 @@ def _stolen(before: str, after: str) -> Finding:
 
 
 def _times(stat: str) -> list[int]:
-    """The times of all cores together, in ticks: user, nice, system, idle, …, stolen."""
+    """The CPU times of all cores together, in ticks: user, nice, system, idle, …, stolen."""
     line = next((line for line in stat.splitlines() if line.startswith("cpu ")), "")
     return [int(each) for each in line.split()[1:9] if each.isdigit()]
 

@@ -1,4 +1,4 @@
-"""The radio: whether it is there, and takes what the configuration asks of it."""
+"""Checks the radio: whether it is present and supports the configuration."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -9,14 +9,14 @@ from sdrlinkd.doctor.finding import Finding, bad, good, good_if, none
 
 FIRST_SOCKET = "air.sock"
 LISTENERS = ("csma", "minislot")
-"""Policies that live of hearing others begin."""
+"""Access policies that depend on hearing others start."""
 
 
 def check_radio(config: Config | None, found: ProbeReport | None) -> list[Finding]:
-    """Whether the radio is there, and takes what the configuration asks of it.
+    """Findings on whether the radio is present and supports the configuration.
 
-    `config`: None where only what is here is asked for. `found`: by SoapySDR, of the configured
-    device or all; None where no radio is to be looked at.
+    `config` is None to list only what is present. `found` is SoapySDR's probe of the configured
+    device or of all devices; None if no radio is to be checked.
     """
     if config is not None and config.backend != "soapy":
         return [_without(config)]

@@ -1,4 +1,4 @@
-"""Radios on USB: whether they are plugged in, and whether this user may open them."""
+"""Checks radios on USB: whether they are plugged in, and whether this user may open them."""
 
 import grp
 import os
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from sdrlinkd.doctor.finding import Finding, bad, good, none
 
-# Vendor and product ids, as lsusb shows them, by SoapySDR's driver.
+# Vendor and product ids, as lsusb shows them, by SoapySDR driver.
 KNOWN = {
     "hackrf": {"1d50:6089": "HackRF One", "1d50:604b": "HackRF Jawbreaker"},
     "uhd": {"2500:0020": "USRP B200/B210", "2500:0021": "USRP B2x0", "2500:0022": "USRP B205mini"},
@@ -21,11 +21,11 @@ KNOWN = {
 
 ON_USB = tuple(KNOWN)
 NETWORKED = ("addr=", "remote", "hostname=", "uri=ip:")
-"""Parts of soapy.device that tell of a radio behind a network."""
+"""Parts of soapy.device that indicate a radio on the network."""
 
 
 def is_networked(device: str) -> bool:
-    """Whether `device`, as soapy.device, is reached by a network and not by USB."""
+    """Whether `device`, in the form of soapy.device, is connected by network and not by USB."""
     return any(key in device for key in NETWORKED)
 
 
@@ -37,9 +37,9 @@ class _Plugged(NamedTuple):
 
 
 def check_usb(driver: str, root: Path) -> list[Finding]:
-    """Whether radios that are known here are plugged in, and this user may open them.
+    """Findings on whether known radios are plugged in and this user may open them.
 
-    `driver`: of soapy.device, "" for any. `root`: / or a copy of its /sys and /dev.
+    `driver` is that of soapy.device, "" for any. `root` is / or a copy of its /sys and /dev.
     """
     what = "USB device"
     plugged = [each for each in _plugged(root) if driver in ("", each.driver)]

@@ -1,6 +1,6 @@
-"""How a daemon and its link fare, in plain words: a verdict, and what has changed.
+"""The health of a daemon and its link in plain sentences: a verdict, and changes for the log.
 
-The package owns the memory that both need; it reads snapshots and nothing else.
+This package keeps the history that both need; its only input is snapshots.
 """
 
 from sdrlinkd.health.health import Health

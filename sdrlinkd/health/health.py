@@ -1,4 +1,4 @@
-"""Looks at a daemon's snapshots, about one a second."""
+"""Evaluates a daemon's snapshots, about one per second."""
 
 from sdrlinkd.health.lately import Lately
 from sdrlinkd.health.limit import Limiter
@@ -8,21 +8,21 @@ from sdrlinkd.reports import Snapshot, VerdictReport
 
 
 class Health:
-    """How one daemon fares. Time is the snapshots' `uptime_s`."""
+    """The health of one daemon; its time is the snapshots' `uptime_s`."""
 
     def __init__(self) -> None:
         self._lately = Lately()
         self._story = Story()
         self._limiter: Limiter[Line] = Limiter()
         self.shares_air = False
-        """Whether other robots may be on the air of what carries the PDUs."""
+        """Whether other robots may use the PDU link's channel."""
 
     def judge(self, snapshot: Snapshot) -> VerdictReport:
-        """The verdict on any snapshot, without remembering it."""
+        """The verdict on a snapshot, which is not remembered."""
         return judge(snapshot, self._lately, self.shares_air)
 
     def look(self, snapshot: Snapshot) -> list[Line]:
-        """Lines for the log on what has changed since the last look; about once a second."""
+        """Log lines on changes since the last call; to be called about once a second."""
         now = snapshot.uptime_s
         lines = []
         for line in self._story.tell(snapshot, self._lately):

@@ -1,15 +1,15 @@
-"""What has grown within the last seconds, between snapshots."""
+"""Growth of counters within the last seconds, from snapshots."""
 
 from collections import deque
 
 from sdrlinkd.reports import RATE_WINDOW_S, Snapshot
 
 SHED = ("tx_overflow_old", "tx_overflow_new", "tx_topic_full", "tx_expired", "tx_stalled")
-"""Reasons that more air would have cured."""
+"""Reasons of drops that more airtime would have prevented."""
 
 
 def shed_by_topic(snapshot: Snapshot) -> dict[str, int]:
-    """Messages dropped so far because there was too little air, by topic."""
+    """Messages dropped so far for lack of airtime, by topic."""
     return {
         topic.name: sum(topic.dropped.get(reason, 0) for reason in SHED)
         for topic in snapshot.link.topics
@@ -17,13 +17,13 @@ def shed_by_topic(snapshot: Snapshot) -> dict[str, int]:
 
 
 class Lately:
-    """Remembers snapshots of the last `RATE_WINDOW_S`, taken about once a second."""
+    """Counters of the snapshots of the last `RATE_WINDOW_S`, taken about once a second."""
 
     def __init__(self) -> None:
         self._seen: deque[tuple[float, dict[str, int], int]] = deque()
 
     def note(self, snapshot: Snapshot) -> None:
-        """Remember a snapshot, and forget those before the window."""
+        """Add a snapshot, and drop those before the window."""
         now = snapshot.uptime_s
         while self._seen and now - self._seen[0][0] > RATE_WINDOW_S:
             self._seen.popleft()
@@ -31,7 +31,7 @@ class Lately:
         self._seen.append((now, shed_by_topic(snapshot), lost))
 
     def shed(self, snapshot: Snapshot) -> dict[str, int]:
-        """Messages dropped lately for want of air, by topic, the most first."""
+        """Messages dropped within the window for lack of airtime, by topic, the most first."""
         if not self._seen:
             return {}
         _, before, _ = self._seen[0]
@@ -40,7 +40,7 @@ class Lately:
         return dict(sorted(kept.items(), key=lambda each: -each[1]))
 
     def samples_lost(self, snapshot: Snapshot) -> int:
-        """Samples that the receiver did not get lately."""
+        """Samples that the receiver lost within the window."""
         if not self._seen:
             return 0
         return snapshot.carrier.counters.get("samples_lost", 0) - self._seen[0][2]

@@ -1,4 +1,4 @@
-"""A log that tells each thing once, also where it goes on and off all day."""
+"""Limits the rate of log lines by subject, for conditions that change all day."""
 
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -6,9 +6,9 @@ from typing import Generic, TypeVar
 T = TypeVar("T")
 
 MOST = 4
-"""Lines on one subject that may come in a row."""
+"""Most lines on one subject in a row."""
 REFILL_S = 15.0
-"""Seconds in which one more line on a subject may come."""
+"""Time in s after which one more line on a subject is allowed."""
 
 
 @dataclass(slots=True)
@@ -20,13 +20,13 @@ class _Subject:
 
 
 class Limiter(Generic[T]):
-    """Lets lines through by subject; of those held back, the last comes later, with their count."""
+    """Limits lines by subject; the last suppressed line is logged later, with their number."""
 
     def __init__(self) -> None:
         self._subjects: dict[str, _Subject] = {}
 
     def take(self, subject: str, line: T, now: float) -> T | None:
-        """`line` if it may be told now; None when it is held back."""
+        """`line` if it may be logged now; None if it is held back."""
         known = self._refilled(subject, now)
         if known.tokens >= 1 and not known.untold:
             known.tokens -= 1
@@ -36,7 +36,7 @@ class Limiter(Generic[T]):
         return None
 
     def late(self, now: float) -> list[tuple[T, int]]:
-        """Lines held back whose time has come, and how many before it were not told at all."""
+        """Held-back lines that may be logged now, each with the number of lines it replaces."""
         told = []
         for subject, known in self._subjects.items():
             if known.untold and self._refilled(subject, now).tokens >= 1:

@@ -1,4 +1,4 @@
-"""The story of a drive: what a log should tell of the change from one snapshot to the next."""
+"""Log lines on what has changed from one snapshot to the next."""
 
 from collections.abc import Iterator
 from enum import Enum
@@ -11,7 +11,7 @@ from sdrlinkd.reports import NeighborReport, Snapshot
 
 
 class Level(Enum):
-    """How urgent a line is, as journald's priorities."""
+    """Urgency of a line, as a priority of journald."""
 
     INFO = "info"
     WARNING = "warning"
@@ -19,7 +19,7 @@ class Level(Enum):
 
 
 class Line(NamedTuple):
-    """What happened to `subject`, for people."""
+    """A log line for people about `subject`."""
 
     subject: str
     level: Level
@@ -27,7 +27,7 @@ class Line(NamedTuple):
 
 
 class Story:
-    """Compares each snapshot with what was told of those before."""
+    """Compares each snapshot with what was logged about earlier ones."""
 
     def __init__(self) -> None:
         self._state = ""
@@ -42,7 +42,7 @@ class Story:
         self._steps = 0
 
     def tell(self, snapshot: Snapshot, lately: Lately) -> Iterator[Line]:
-        """Lines on what is new in a snapshot."""
+        """Log lines on what is new in a snapshot."""
         yield from self._radio(snapshot)
         for robot in snapshot.link.neighbors:
             if not robot.is_self:

@@ -1,34 +1,34 @@
-"""The verdict on a daemon: OK, DEGRADED or DOWN, and why, the worst first."""
+"""The verdict on a daemon: OK, DEGRADED or DOWN, with reasons, the worst first."""
 
 from sdrlinkd.health.lately import Lately
 from sdrlinkd.health.words import pdu_link_name, percent, span
 from sdrlinkd.reports import RATE_WINDOW_S, NeighborReport, PduLinkReport, Snapshot, VerdictReport
 
 SILENT_S = 5.0
-"""Seconds; a robot not heard for so long, and for much longer than usual, is missed."""
+"""Time in s after which a robot that is not heard is missed, if its usual gaps are much shorter."""
 SILENT_TIMES = 3.0
 GONE_S = 600.0
-"""Seconds of silence after which a robot is not expected any more."""
+"""Time of silence in s after which a robot is not expected any more."""
 LOSSY = 0.03
-"""Share of PDUs lost that is worth a word."""
+"""Share of lost PDUs from which a loss is reported."""
 AWAY_S = 1.0
 CLIPPED_PCT = 0.1
 LATE_LOOP_MS = 250.0
 
 
 def is_away(pdu_link: PduLinkReport) -> bool:
-    """Whether what carried PDUs is gone; a moment's pause does not count."""
+    """Whether the PDU link is down, for longer than a short pause."""
     return pdu_link.state == "down" and pdu_link.since_s >= AWAY_S
 
 
 def is_silent(robot: NeighborReport) -> bool:
-    """Whether a robot that was heard is missed now."""
+    """Whether a robot that was heard before is missed now."""
     patience_s = max(SILENT_S, SILENT_TIMES * robot.usual_gap_s)
     return robot.last_heard_s_ago > patience_s
 
 
 def judge(snapshot: Snapshot, lately: Lately, shares_air: bool) -> VerdictReport:
-    """The verdict on `snapshot`; with `shares_air`, other robots should be heard."""
+    """The verdict on `snapshot`; `shares_air`: other robots should be heard."""
     down = _down(snapshot)
     if down:
         return VerdictReport(level="DOWN", reasons=[down])
@@ -59,7 +59,7 @@ def _down(snapshot: Snapshot) -> str:
 
 
 def _robots(snapshot: Snapshot, shares_air: bool) -> list[str]:
-    """Reasons that lie with the robots that we hear, and with how they hear us."""
+    """Reasons that concern the robots that we hear, and how they hear us."""
     robots = [each for each in snapshot.link.neighbors if not each.is_self]
     reasons = []
     if not robots and shares_air:

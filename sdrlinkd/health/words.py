@@ -1,4 +1,4 @@
-"""What carries the PDUs, and spans of time, as people say them."""
+"""Words for people: the PDU link's name, time spans, shares."""
 
 from sdrlinkd.reports import PduLinkReport
 
@@ -11,12 +11,12 @@ _NAMES = {
 
 
 def pdu_link_name(pdu_link: PduLinkReport) -> str:
-    """The word for what carries the PDUs, which may be missing."""
+    """The word for the PDU link, for sentences on its absence."""
     return _NAMES.get(pdu_link.kind, "radio")
 
 
 def span(seconds: float) -> str:
-    """A time span as people say it: `12 s`, `3 min 20 s`, `2 h 5 min`."""
+    """A time span as text: `12 s`, `3 min 20 s`, `2 h 5 min`."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"
@@ -26,5 +26,5 @@ def span(seconds: float) -> str:
 
 
 def percent(share: float) -> str:
-    """A share as people say it: `4 %`; below one, with one digit more."""
+    """A share as text: `4 %`; below 1 %, with one more digit."""
     return f"{100 * share:.0f} %" if share >= 0.0095 else f"{100 * share:.1f} %"

@@ -1,4 +1,4 @@
-"""New teams: the configurations and the registry that they begin with, as text."""
+"""Makes the first configurations and registry of a new team, as text."""
 
 from sdrlinkd.init.choosing import MOST_TOPICS, Choice, FoundTopic, choose, named
 from sdrlinkd.init.copying import copy_of, dictionaries_of

@@ -1,4 +1,4 @@
-"""Which topics go into a registry that has room for few."""
+"""Chooses the topics for a registry, which has room for few."""
 
 import re
 from collections.abc import Iterable
@@ -9,7 +9,7 @@ from sdrlinkd.errors import RegistryError, UserError
 from sdrlinkd.wire import make_registry
 
 MOST_TOPICS = 15
-"""The sixteenth topic id is the control channel's: ages, beacons, receipts."""
+"""Most topics of a registry; the sixteenth id is for control: ages, beacons, receipts."""
 RULE = "small types before large ones (images, clouds, maps), then the busiest"
 
 _OWN = re.compile(r"(rosout|parameter_events)|.*(_action/(status|feedback)|transition_event)")
@@ -17,7 +17,7 @@ _ROBOT = re.compile(r"/robot_\d+/(?=.)")
 
 
 class FoundTopic(NamedTuple):
-    """A topic as the registry names it; `n_messages` of a recording, 0 where nobody knows."""
+    """A topic with its registry name; `n_messages` is its number in a recording, 0 if unknown."""
 
     name: str
     type: str
@@ -25,17 +25,17 @@ class FoundTopic(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """What the registry gets, and what it does not, with the reason."""
+    """The chosen topics, and the topics left out, with the reasons."""
 
     taken: list[FoundTopic]
     left_out: dict[str, str]
 
 
 def choose(found: Iterable[FoundTopic], wanted: list[str], source: str) -> Choice:
-    """At most MOST_TOPICS of `found`: those that are `wanted`, or by RULE where nobody says.
+    """Choose at most MOST_TOPICS of `found`: those `wanted` or, without wishes, by RULE.
 
-    Names lose the namespace of a robot (`/robot_1/`), as one registry serves all. Raises UserError
-    that cites `source` where nothing is left, or a wanted topic is not there.
+    A robot's namespace (`/robot_1/`) is removed from names, as one registry serves all robots.
+    Raises UserError that cites `source` if nothing is left or a wanted topic is missing.
     """
     merged: dict[str, FoundTopic] = {}
     left_out: dict[str, str] = {}

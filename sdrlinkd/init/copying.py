@@ -1,4 +1,4 @@
-"""Another robot's configuration, from that of a daemon that runs."""
+"""Makes another robot's configuration from that of a running daemon."""
 
 import re
 from pathlib import Path
@@ -14,10 +14,10 @@ _LAST_NUMBER = re.compile(r"[0-9]+(?=[^0-9]*$)")
 
 
 def copy_of(config: Config, own_id: int, number: int) -> str:
-    """`config` of robot `own_id` for robot `number`, as TOML: what differs from the defaults.
+    """`config` of robot `own_id`, changed for robot `number`, as TOML without default values.
 
-    Sockets are not copied: they are each daemon's own. Dictionaries lie beside the file, under
-    their own names.
+    Socket paths are not copied, as each daemon has its own. Dictionaries are expected in the file's
+    folder, under their own names.
     """
     namespace, told_id = _identity(config, own_id, number)
     copy = msgspec.structs.replace(
@@ -41,7 +41,7 @@ def copy_of(config: Config, own_id: int, number: int) -> str:
 
 
 def dictionaries_of(config: Config) -> dict[str, bytes]:
-    """What `copy_of` expects beside the file, by name. Raises UserError."""
+    """The dictionary files that `copy_of` expects in its folder, by name. Raises UserError."""
     found: dict[str, bytes] = {}
     for name, policy in config.topic.items():
         if not policy.dictionary:
@@ -63,7 +63,7 @@ def dictionaries_of(config: Config) -> dict[str, bytes]:
 
 
 def _identity(config: Config, own_id: int, number: int) -> tuple[str, int]:
-    """Namespace and robot_id. A number in the namespace changes only where it is the robot's."""
+    """(namespace, robot_id); a number in the namespace changes only if it is the robot's id."""
     last = _LAST_NUMBER.search(config.namespace)
     if last is None or int(last[0]) != own_id:
         return config.namespace, number

@@ -1,4 +1,4 @@
-"""The topics of a running ROS 2 graph, asked of ROS's own command line."""
+"""Lists the topics of a running ROS 2 graph by ROS's own command line."""
 
 import re
 import shutil
@@ -12,9 +12,9 @@ _LINE = re.compile(r"(/\S+) \[([^\],]+)\]")
 
 
 def topics_of_graph() -> list[FoundTopic]:
-    """Topics that `ros2 topic list -t` names, but for those of several types.
+    """The topics that `ros2 topic list -t` lists, except those with several types.
 
-    Raises UserError where there is no ROS 2 in this shell.
+    Raises UserError if this shell has no ROS 2.
     """
     program = shutil.which("ros2")
     if program is None:

@@ -1,10 +1,10 @@
-"""What is known to work with each kind of radio, to begin with."""
+"""Initial settings that are known to work with each kind of radio."""
 
 from typing import NamedTuple
 
 
 class RadioPreset(NamedTuple):
-    """How a configuration for one kind of radio begins."""
+    """Initial settings for one kind of radio."""
 
     title: str
     backend: str
@@ -12,18 +12,18 @@ class RadioPreset(NamedTuple):
     rate: str = "2 Msps"
     oversampling: int = 1
     soapy: tuple[tuple[str, str], ...] = ()
-    """Gains and antennas: lines of TOML with a comment. Sending is always off to begin with."""
+    """Gains and antennas, as lines of TOML with a comment; sending is always off at first."""
     slot: str = ""
-    """Slot of robots that take turns; empty: made from the radio."""
+    """Length of a tdma slot, as text; empty: derived from the radio."""
 
     @property
     def is_real(self) -> bool:
-        """Whether the radio sends real waves."""
+        """Whether this is a physical radio."""
         return self.backend == "soapy"
 
     @property
     def shares_air(self) -> bool:
-        """Whether several robots hear each other by this radio."""
+        """Whether several robots can hear each other with this radio."""
         return self.backend in ("soapy", "ether")
 
 
@@ -59,4 +59,4 @@ RADIOS = {
                             rate="5 Msps"),
     "direct": RadioPreset("none: one daemon that hears itself, without a modem", "direct"),
 }  # fmt: skip
-"""Presets by the name that a person gives."""
+"""Presets by name."""

@@ -1,4 +1,4 @@
-"""From a few answers to the files of a team."""
+"""Makes the files of a team from a few answers."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -12,17 +12,17 @@ REGISTRY = "registry.csv"
 
 
 class Team(NamedTuple):
-    """What a person says of a team. Its robots are numbered 1 to `robots`."""
+    """A person's answers about a team, whose robots are numbered 1 to `robots`."""
 
     radio: RadioPreset
     robots: int
     frequency: str
-    """Middle of the channel as written, with its unit; empty where there is no real radio."""
+    """Centre frequency as text with its unit; empty without a physical radio."""
     device: str
     """The value of soapy.device; empty: the preset's."""
     topics: list[FoundTopic]
     air: Path
-    """Folder of the hub, for a simulated air."""
+    """Folder of the hub's sockets, for a simulated air."""
     sockets: Path
     """Folder of the daemons' sockets, where several run on one computer."""
     hub: str = ""
@@ -30,7 +30,7 @@ class Team(NamedTuple):
 
 
 def team_files(team: Team, ids: list[int]) -> dict[str, str]:
-    """File names and their text: the registry, and a configuration for each of `ids`."""
+    """The team's files, text by name: the registry, and a configuration for each of `ids`."""
     names = {number: f"robot_{number}.toml" for number in ids}
     if len(ids) == 1:
         names = {ids[0]: "sdrlinkd.toml"}
@@ -110,7 +110,7 @@ def _access(team: Team) -> str:
 
 
 def _text(key: str, value: str, comment: str = "") -> str:
-    """A line with a text that a person gave, quoted as TOML wants it."""
+    """A line that assigns text from a person, quoted for TOML."""
     return _line(tomli_w.dumps({key: value}).rstrip("\n"), comment)
 
 

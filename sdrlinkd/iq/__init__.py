@@ -1,4 +1,4 @@
-"""Recordings of samples: made from a radio, looked into, sent again."""
+"""Recordings of samples: captured from a radio, analyzed, and replayed."""
 
 from sdrlinkd.iq.capture import Capture, CaptureReport, CaptureState, CaptureWish
 from sdrlinkd.iq.modem_info import McsInfo, ModemInfo, modem_info

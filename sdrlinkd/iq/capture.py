@@ -1,4 +1,4 @@
-"""From a radio into a recording, with annotations of every burst; nothing is ever sent."""
+"""Captures a radio's samples into a recording with annotated bursts; nothing is ever sent."""
 
 import asyncio
 import sys
@@ -15,13 +15,17 @@ from sdrlinkd.iq.keeper import Keeper
 
 LOOK_S = 0.1
 SWITCH_INTERVAL_S = 1e-4
-"""Seconds; by default, who looks for bursts keeps the interpreter from the radio for 5 ms."""
+"""Interpreter's switch interval in s; with the default, the burst search delays the radio by 5 ms.
+"""
 WAITING_S = 1.0
-"""Seconds of samples that may wait for a slow disk."""
+"""Longest stretch of samples in s that waits for a slow disk."""
 
 
 class CaptureWish(NamedTuple):
-    """What to record: up to `seconds` (None: until stopped), bursts of `network` (None: all)."""
+    """Settings of a capture.
+
+    It records up to `seconds` (None: until stopped) and annotates bursts of `network` (None: all).
+    """
 
     path: Path
     type_name: str
@@ -31,7 +35,7 @@ class CaptureWish(NamedTuple):
 
 
 class CaptureState(NamedTuple):
-    """How far a recording has come, for the screen."""
+    """Progress of a capture, for the screen."""
 
     recorded_s: float
     searched_s: float
@@ -39,17 +43,17 @@ class CaptureState(NamedTuple):
     n_bursts: int
     n_gaps: int
     is_recorded: bool
-    """Everything is recorded, and bursts are still looked for."""
+    """Whether recording is over and only the search for bursts continues."""
     radio: str
 
 
 class CaptureReport(NamedTuple):
-    """What is in the recording. `n_full` values, two a sample, are at full scale: clipped."""
+    """What a recording holds; `n_full` values, two per sample, are at full scale, i.e. clipped."""
 
     n_samples: int
     seconds: float
     searched_s: float
-    """Seconds from the start in which bursts were looked for."""
+    """Length in s, from the start, of the part that was searched for bursts."""
     n_bursts: int
     pdus_good: int
     pdus_bad: int
@@ -59,13 +63,13 @@ class CaptureReport(NamedTuple):
     peak_dbfs: float
     n_full: int
     problem: str
-    """Why the recording ended early."""
+    """Why the recording ended early; empty if it did not."""
 
 
 class Capture:
-    """One recording from one radio, which is open while it is used by `async with`.
+    """One capture from one radio, which is open within `async with`.
 
-    Raises UserError when radio or files cannot be had.
+    Raises UserError if the radio or the files cannot be opened.
     """
 
     def __init__(self, radio: Radio, tuning: Tuning, wish: CaptureWish) -> None:
@@ -75,7 +79,7 @@ class Capture:
         self._problem = ""
 
     async def __aenter__(self) -> Self:
-        # Without this, the first burst would wait for compiled code.
+        # Otherwise the first burst would wait for the code to be compiled.
         await asyncio.to_thread(phy.warm_up)
         try:
             await self._radio.open(self._tuning)
@@ -88,13 +92,13 @@ class Capture:
         await self._radio.close()
 
     def stop(self) -> None:
-        """Receive no more; when asked again, look for no more bursts either."""
+        """Stop receiving; a second call also stops the search for bursts."""
         if self._ended.is_set() and self._keeper is not None:
             self._keeper.give_up()
         self._ended.set()
 
     async def run(self, watch: Callable[[CaptureState], None]) -> CaptureReport:
-        """Record until there is enough, the radio's stream ends or `stop` is called."""
+        """Record until the wished length, the end of the radio's stream, or a call of `stop`."""
         try:
             finder, keeper = self._begin()
         except BackendError as error:
@@ -156,7 +160,7 @@ class Capture:
     async def _receive(self, keeper: Keeper) -> None:
         try:
             async for block in self._radio.blocks(keeper.put):
-                # What was not heard on the radio's thread, as in lock-step.
+                # Blocks that were not handled on the radio's thread, as in lock-step.
                 await asyncio.to_thread(keeper.put, block)
         except BackendError as error:
             self._problem = str(error)

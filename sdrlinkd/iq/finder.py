@@ -1,4 +1,4 @@
-"""Finds the bursts of a recording while it grows, and says in words how each was received."""
+"""Finds the bursts of a growing recording, and describes in words how each was received."""
 
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -9,11 +9,11 @@ from sdrlinkd.iq.recording import MAX_FREQUENCY
 
 PIECE = 1 << 16
 LEAST = 1 << 14
-"""Samples that are worth a look while more may come."""
+"""Fewest samples that are searched while more may come."""
 
 
 class BurstFinder:
-    """Looks for bursts by `read(first, n)`, behind whoever writes the recording. For one thread."""
+    """Searches a recording for bursts by `read(first, n)`, behind its writer; for one thread."""
 
     def __init__(
         self,
@@ -29,18 +29,18 @@ class BurstFinder:
         self._receiver = phy.Receiver(network, MAX_FREQUENCY, grid)
         self._gaps: deque[tuple[int, int]] = deque()
         self.next_index = 0
-        """Everything before this sample was looked at."""
+        """Index of the first sample that was not searched yet."""
         self.annotations: list[Annotation] = []
         self.n_bursts = 0
 
     @property
     def n_good(self) -> int:
-        """Number of PDUs whose CRC was right."""
+        """Number of PDUs with a correct CRC."""
         return self._receiver.counters["pdus_good"]
 
     @property
     def n_bad(self) -> int:
-        """Number of PDUs whose CRC was wrong."""
+        """Number of PDUs with a wrong CRC."""
         return self._receiver.counters["pdus_bad"]
 
     def miss(self, start: int, n: int, reason: str) -> None:
@@ -50,7 +50,7 @@ class BurstFinder:
         self.annotations.append(Annotation(start, n, GAP_LABEL, told))
 
     def look(self, end: int, least: int = 1) -> bool:
-        """Look at the next piece before `end`; False: there are not even `least` samples."""
+        """Search the next piece before `end`; False if there are fewer than `least` samples."""
         first = self.next_index
         if first + least > end:
             return False

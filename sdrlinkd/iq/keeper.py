@@ -1,4 +1,4 @@
-"""Keeps received blocks in a recording, and looks for bursts in it while there is time."""
+"""Writes received blocks to a recording, and searches it for bursts while there is time."""
 
 import queue
 import threading
@@ -14,11 +14,11 @@ LEAST_WAITING = 16
 
 
 class Keeper:
-    """Writes what comes, on its own thread, and then looks for bursts in what is written.
+    """Writes blocks on its own thread, and then searches the written samples for bursts.
 
-    So a receiver that is too slow loses nothing: it is done later than the recording. `ended` is
-    called on that thread when no more blocks are wanted: there are `most` samples, or the disk
-    takes no more. `waiting` blocks may wait for the disk; then the radio does.
+    So a slow receiver loses nothing; it only finishes after the recording. `ended` is called on
+    that thread when no more blocks are needed: there are `most` samples, or the disk fails. Up to
+    `waiting` blocks wait for the disk; after that, the radio has to wait.
     """
 
     def __init__(
@@ -40,29 +40,29 @@ class Keeper:
         self._thread = threading.Thread(target=self._work, name="keeper", daemon=True)
         self.level = LevelMeter(rate_hz)
         self.end = 0
-        """Number of samples kept, gaps included."""
+        """Number of samples written, including gaps."""
         self.n_gaps = self.n_lost = 0
         self.problem = ""
-        """Why the disk takes no more."""
+        """Why no more can be written; empty if all is well."""
         self.failure: Exception | None = None
-        """What should not happen, and ended the thread."""
+        """An unexpected exception that ended the thread, if any."""
         self._thread.start()
 
     def put(self, block: RxBlock) -> None:
-        """Keep a block; may wait. From any thread, but one at a time."""
+        """Write a block; may wait. Any thread may call it, but only one at a time."""
         if self._is_full:
             return
         if block.samples is not None:
-            # Samples may lie in memory that the next block overwrites.
+            # The samples may be in memory that the next block overwrites.
             block = replace(block, samples=block.samples.copy())
         self._blocks.put(block)
 
     def give_up(self) -> None:
-        """Look for no more bursts than were found."""
+        """Stop the search for bursts."""
         self._is_given_up = True
 
     def finish(self) -> None:
-        """Find the bursts that are left and complete the files, as no block will come."""
+        """Find the remaining bursts and complete the files, after the last block."""
         self._blocks.put(None)
         self._thread.join()
 
@@ -124,7 +124,7 @@ class Keeper:
         self._finder.miss(first, n, reason)
 
     def _began_ns(self, block: RxBlock) -> int:
-        """When a block's first sample was there, in ns since 1970 by this host's clock."""
+        """Time of a block's first sample in ns since 1970, by this host's clock."""
         age_ns = time.monotonic_ns() - block.host_ns + round(1e9 * block.n / self._rate_hz)
         return time.time_ns() - age_ns
 

@@ -1,4 +1,4 @@
-"""Levels of received samples: their mean, their peak, and the latest."""
+"""Levels of received samples: mean, peak and recent level."""
 
 import math
 
@@ -7,23 +7,23 @@ import numpy as np
 from backends import Samples
 
 FULL = 0.97
-"""Values from here on are taken for clipped: where DC is taken away, full scale is no more at 1."""
+"""Values from here on count as clipped; DC removal may move full scale away from 1."""
 RECENT_S = 0.2
 LEAST = 1e-20
 
 
 class LevelMeter:
-    """Powers relative to a tone of full scale: of all samples, and of the latest."""
+    """Measures power relative to a full-scale tone, of all samples and of the latest ones."""
 
     def __init__(self, rate_hz: float) -> None:
         self._rate_hz = rate_hz
         self._energy = self._recent = self._peak = 0.0
         self.n_samples = 0
         self.n_full = 0
-        """Values, two a sample, at or beyond full scale."""
+        """Number of values, two per sample, at or beyond full scale."""
 
     def add(self, samples: Samples) -> None:
-        """Take the next samples into account."""
+        """Add the next samples."""
         n = len(samples)
         if not n:
             return

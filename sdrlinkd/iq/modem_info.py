@@ -1,4 +1,4 @@
-"""What the modem offers at a rate: grid, rates, airtimes."""
+"""What the modem offers at a sample rate: grid, bit rates, airtimes."""
 
 import msgspec
 
@@ -8,7 +8,7 @@ from sdrlinkd.errors import UserError
 
 
 class McsInfo(msgspec.Struct, frozen=True, kw_only=True):
-    """One MCS at one rate and PDU size. `rate_bit_s` is without preamble and header."""
+    """One MCS at one sample rate and PDU size; `rate_bit_s` excludes preamble and header."""
 
     mcs: int
     name: str
@@ -17,11 +17,11 @@ class McsInfo(msgspec.Struct, frozen=True, kw_only=True):
     burst_pdus: int
     burst_ms: float
     burst_goodput_bit_s: float
-    """PDU bits over the time of the longest burst."""
+    """PDU bits per s in the longest burst, including preamble and header."""
 
 
 class ModemInfo(msgspec.Struct, frozen=True, kw_only=True):
-    """The grid at one rate, and every MCS on it."""
+    """The OFDM grid at one sample rate, with every MCS."""
 
     rate_hz: float
     pdu_size: int
@@ -34,12 +34,12 @@ class ModemInfo(msgspec.Struct, frozen=True, kw_only=True):
     occupied_hz: float
     symbol_us: float
     echoes_us: float
-    """Echoes that the cyclic prefix takes."""
+    """Longest multipath delay that the cyclic prefix absorbs, in µs."""
     preamble_us: float
-    """Preamble and header of each burst."""
+    """Length of preamble and header of each burst, in µs."""
     frequency_hz: float
     max_cfo_hz: float
-    """Bursts are looked for up to so far off in frequency, as `cfo` says in words."""
+    """Largest frequency offset at which bursts are searched, in Hz; `cfo` says it in words."""
     cfo: str
     mcs: list[McsInfo]
 
@@ -52,9 +52,9 @@ def modem_info(
     frequency_hz: float = SIMULATED_HZ,
     crystal_ppm: float = ModemParams().crystal_ppm,
 ) -> ModemInfo:
-    """What the modem offers at a rate, with PDUs and bursts of these sizes.
+    """What the modem offers at a sample rate, with PDUs and bursts of these sizes.
 
-    The frequency offset follows from the middle of the channel and the radios' crystals. Raises
+    The searched frequency offset follows from the centre frequency and the radios' crystals. Raises
     UserError.
     """
     params = ModemParams(rate_hz=rate_hz, frequency_hz=frequency_hz, crystal_ppm=crystal_ppm)

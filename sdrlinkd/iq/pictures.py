@@ -1,4 +1,4 @@
-"""Pictures of a recording: its spectrum, and its equalised points."""
+"""Pictures of a recording: its spectrum and its constellation."""
 
 from pathlib import Path
 
@@ -9,12 +9,12 @@ from sdrlinkd.iq.recording import Points
 from sdrlinkd.iq.spectrum import Spectrum
 from sdrlinkd.pictures import COLORS, OURS, make_figure, save
 
-# dB below the loudest at which nothing more is told apart.
+# Dynamic range of the color scale, in dB below the strongest value.
 RANGE_DB = 70
 
 
 def draw_spectrum(spectrum: Spectrum, rate_hz: float | None, title: str, path: Path) -> None:
-    """Draw power over frequency, and below it over time as well."""
+    """Draw power over frequency, and below it a waterfall of power over frequency and time."""
     unit, scale = ("MHz", rate_hz / 1e6) if rate_hz else ("cycles a sample", 1.0)
     time_unit, time_scale = ("s", 1 / rate_hz) if rate_hz else ("samples", 1.0)
     figure, panels = make_figure(2, 1, (8.0, 7.5), sharex=True, height_ratios=(2, 3))
@@ -46,7 +46,7 @@ def draw_spectrum(spectrum: Spectrum, rate_hz: float | None, title: str, path: P
 
 
 def draw_constellation(points: Points, title: str, path: Path) -> None:
-    """Draw the equalised points beside those that were meant, one panel for each modulation."""
+    """Draw the equalised points and the ideal ones, one panel per modulation."""
     found = sorted(points.by_modulation, key=lambda each: each.bits)
     figure, panels = make_figure(1, len(found), (5.0 * len(found), 5.4))
     figure.suptitle(title)

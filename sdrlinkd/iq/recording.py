@@ -1,4 +1,4 @@
-"""A recording, read piece by piece, and what a receiver finds in it."""
+"""Reads a recording piece by piece, and runs a receiver over it."""
 
 from collections import defaultdict
 from collections.abc import Callable, Iterator
@@ -15,21 +15,21 @@ from sdrlinkd.errors import UserError
 PIECE = 1 << 18
 MAX_POINTS = 20_000
 MAX_FREQUENCY = 0.25
-"""The largest frequency offset sought, in cycles a sample: as far as a receiver can search, for
-whatever crystals the radios have."""
+"""Largest frequency offset that is searched, in cycles per sample: the receiver's full range, as
+the radios' crystals are unknown."""
 
 Progress = Callable[[int], None]
 
 
 class Points(NamedTuple):
-    """Equalised points by modulation, the last MAX_POINTS of each, and the bursts they are of."""
+    """Equalised points by modulation, the last MAX_POINTS of each, and their bursts."""
 
     by_modulation: dict[phy.Modulation, NDArray[np.complex64]]
     bursts: list[phy.BurstQuality]
 
 
 class IqRecording:
-    """A recording opened for reading, to be used by `with`. Raises UserError when it cannot be."""
+    """A recording opened for reading, for use in `with`. Raises UserError if that fails."""
 
     def __init__(self, path: Path, type_name: str = "", rate_hz: float | None = None) -> None:
         try:
@@ -48,7 +48,10 @@ class IqRecording:
     def decode(
         self, network: int | None, progress: Progress, grid: phy.Numerology = phy.OFDM_64_16
     ) -> Iterator[tuple[phy.Event, phy.Receiver]]:
-        """What a receiver of `network` (None: any) finds; `progress(samples read)` on the way."""
+        """The events of a receiver of `network` (None: any), with that receiver.
+
+        `progress(samples read)` is called meanwhile.
+        """
         receiver = phy.Receiver(network, MAX_FREQUENCY, grid)
         yield from self._decode(receiver, progress)
 

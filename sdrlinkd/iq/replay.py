@@ -1,4 +1,4 @@
-"""A recording's stretches onto a radio, each at its time."""
+"""Replays the stretches of a recording on a radio, each at its time."""
 
 import asyncio
 import math
@@ -25,20 +25,21 @@ from sdrlinkd.iq.replay_plan import ReplayPlan
 from sdrlinkd.iq.stretches import Stretch
 
 AHEAD_S = 0.25
-"""Seconds by which bursts are handed over before the radio must have them."""
+"""Time in s by which bursts are handed to the radio before it needs them."""
 AHEAD_BLOCKS = 24
-"""Blocks by which they are at least, where no clock paces blocks: some wait to be looked at."""
+"""Number of blocks by which bursts are handed over early, at least, on an unpaced radio, where some
+blocks wait to be processed."""
 TICK_S = 0.005
 GONE_S = 0.12
-"""Seconds after its end for which a burst is in the radio's memory at most."""
+"""Longest time in s after its end for which a burst stays in the radio's memory."""
 LOADED = 4
 LOOK_S = 0.1
 MOST_AHEAD = 256
-"""Bursts that the radio has at a time."""
+"""Most bursts that the radio holds at a time."""
 
 
 class ReplayState(NamedTuple):
-    """How far a replay has come, for the screen."""
+    """Progress of a replay, for the screen."""
 
     seconds: float
     n_sent: int
@@ -46,7 +47,7 @@ class ReplayState(NamedTuple):
 
 
 class ReplayReport(NamedTuple):
-    """What became of `n_bursts`; those that are in no other count were not handed over."""
+    """What became of `n_bursts`; bursts in none of the other counts were not handed over."""
 
     n_bursts: int
     sent: int
@@ -54,14 +55,14 @@ class ReplayReport(NamedTuple):
     underflow: int
     lost: int
     slipped: int
-    """Bursts that were sent, but not at their time."""
+    """Bursts that were sent, but not at their planned time."""
     slip_s: float
-    """The largest difference from a burst's time in s."""
+    """Largest deviation from a burst's planned time, in s."""
     problem: str
 
 
 class _Out:
-    """The bursts that a radio has, in memory for two of `room_s`."""
+    """The bursts held by a radio whose memory has room for two bursts of `room_s`."""
 
     def __init__(self, room_s: float, rate_hz: float) -> None:
         self._room = round(2 * room_s * rate_hz)
@@ -70,13 +71,13 @@ class _Out:
         self._n = 0
 
     def add(self, burst: TxBurst) -> None:
-        """Note that the radio has this burst, too."""
+        """Note that the radio holds this burst."""
         n = len(burst.samples)
         self._bursts.append((burst.start + n, n))
         self._n += n
 
     def has_room(self, n: int, now: int) -> bool:
-        """Whether the radio can take `n` samples, wherever its memory wraps around."""
+        """Whether the radio has room for `n` samples, wherever its memory wraps around."""
         while self._bursts and self._bursts[0][0] + self._gone_after < now:
             self._n -= self._bursts.popleft()[1]
         if not self._bursts:
@@ -85,9 +86,9 @@ class _Out:
 
 
 class Replay:
-    """Sends what is planned of a recording, `times` times.
+    """Sends the planned stretches of a recording `times` times.
 
-    The radio is open while this is used by `async with`. Raises UserError.
+    The radio is open within `async with`. Raises UserError.
     """
 
     def __init__(
@@ -117,7 +118,7 @@ class Replay:
 
     @property
     def seconds(self) -> float:
-        """How long the whole replay takes in s."""
+        """Length of the whole replay in s."""
         return self._times * self._period / self._tuning.rate_hz
 
     async def __aenter__(self) -> Self:
@@ -127,7 +128,7 @@ class Replay:
             await self._radio.close()
             raise UserError(str(error)) from None
         can = self._radio.capabilities
-        # Where nobody waits for the clock, blocks are made before they are looked at.
+        # An unpaced radio makes blocks before they are processed.
         spare_s = AHEAD_S if can.paced else max(AHEAD_S, AHEAD_BLOCKS * can.block_s)
         ahead_s = can.lead_s + can.turnaround_s + spare_s
         self._ahead, self._paced = math.ceil(ahead_s * self._tuning.rate_hz), can.paced
@@ -137,11 +138,11 @@ class Replay:
         await self._radio.close()
 
     def stop(self) -> None:
-        """Hand over no more bursts; those on their way are lost."""
+        """Hand over no more bursts; pending bursts are lost."""
         self._stopped.set()
 
     async def run(self, watch: Callable[[ReplayState], None]) -> ReplayReport:
-        """Send until all bursts have left, or cannot, or `stop` is called. Raises UserError."""
+        """Send until all bursts are settled or `stop` is called. Raises UserError."""
         if not self._radio.capabilities.transmits:
             raise UserError(
                 f"this radio does not send ({self._radio.detail}); allowed: one that does"
@@ -154,7 +155,7 @@ class Replay:
             await self._stopped.wait()
             for task in helping:
                 task.cancel()
-            # What is on its way is lost.
+            # Pending bursts are lost.
             await self._radio.close()
         return self._report()
 
@@ -174,7 +175,7 @@ class Replay:
         return np.nan_to_num(samples)
 
     async def _receive(self, tasks: asyncio.TaskGroup) -> None:
-        """Take the received stream as the clock; unpaced, it waits until all is sent."""
+        """Use the received stream as the clock; an unpaced stream waits until all is sent."""
         try:
             async for block in self._radio.blocks():
                 self._seen = block.index + block.n, block.host_ns
@@ -209,7 +210,7 @@ class Replay:
             tasks.create_task(self._settle(burst, self._radio.send(burst)))
 
     async def _first(self) -> TxBurst | None:
-        """The next burst to hand over, if it is read; unpaced streams wait until it is."""
+        """The next burst to hand over, if it has been read; an unpaced stream waits for that."""
         if self._head is None and self._n_taken < self._n:
             if self._paced and self._loaded.empty():
                 return None
@@ -230,7 +231,7 @@ class Replay:
 
     @property
     def _now(self) -> int:
-        """Index of the sample that is on its way now."""
+        """Index of the sample that is on the air now."""
         if self._seen is None:
             return 0
         end, host_ns = self._seen

@@ -1,4 +1,4 @@
-"""What of a recording is to be sent, and how strong."""
+"""Plans a replay: which parts of a recording are sent, and at which power."""
 
 import math
 from typing import NamedTuple
@@ -13,13 +13,13 @@ ROOM_S = 0.5
 
 
 class ReplayPlan(NamedTuple):
-    """What of a recording is not silence, and by how much its samples are multiplied."""
+    """The stretches of a recording that are not silence, and the gain for their samples."""
 
     stretches: list[Stretch]
     gain: float
     silence_dbfs: float
     room_s: float
-    """Length of bursts in s of which a radio must have room for two: on their way, and more."""
+    """Burst length in s; the radio's memory must have room for two such bursts."""
 
 
 def plan_replay(
@@ -29,10 +29,11 @@ def plan_replay(
     backoff_db: float | None,
     progress: Progress,
 ) -> ReplayPlan:
-    """The plan for a modem of `rate_hz`. Raises UserError.
+    """The plan for a modem with sample rate `rate_hz`. Raises UserError.
 
-    `silence_dbfs`: what is below is silence (None: a little above the quietest there is).
-    `backoff_db`: mean power of the strongest stretch below full scale (None: as recorded).
+    `silence_dbfs` is the power below which samples are silence (None: a little above the quietest
+    part). `backoff_db` is the mean power of the strongest stretch below full scale (None: as
+    recorded).
     """
     _check_rate(recording, rate_hz)
     silence = silence_of(recording) if silence_dbfs is None else 10 ** (silence_dbfs / 10)

@@ -10,23 +10,23 @@ from sdrlinkd.iq.recording import IqRecording, Progress
 
 N_BINS = 512
 MAX_COLUMNS = 800
-# Frames looked at in a column; a longer recording is sampled, not read whole.
+# Most frames per column; a longer recording is sampled, not read completely.
 MAX_FRAMES = 64
 
 
 class Spectrum(NamedTuple):
-    """Powers in dBFS a bin (Hann window); frequencies in cycles a sample, times in samples."""
+    """Powers in dBFS per bin (Hann window); frequencies in cycles per sample, times in samples."""
 
     frequency: NDArray[np.float64]
     mean: NDArray[np.float64]
     peak: NDArray[np.float64]
     time: NDArray[np.float64]
     waterfall: NDArray[np.float64]
-    """`[n_columns, N_BINS]`"""
+    """Power over time and frequency, of shape `[n_columns, N_BINS]`."""
 
 
 def spectrum_of(recording: IqRecording, progress: Progress) -> Spectrum:
-    """Mean, peak and course of the spectrum over the whole recording."""
+    """Mean, peak and waterfall of the spectrum over the whole recording."""
     n_samples = recording.info.n_samples
     n_columns = max(1, min(MAX_COLUMNS, n_samples // N_BINS))
     step = n_samples / n_columns

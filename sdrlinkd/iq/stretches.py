@@ -1,4 +1,4 @@
-"""The stretches of a recording that are not silent."""
+"""Finds the stretches of a recording that are not silent."""
 
 from typing import NamedTuple
 
@@ -10,11 +10,11 @@ from sdrlinkd.errors import UserError
 from sdrlinkd.iq.recording import PIECE, IqRecording, Progress
 
 WINDOW = 32
-"""Samples whose mean power is looked at."""
+"""Length in samples of a window, whose mean power is measured."""
 ABOVE_DB = 7.0
-"""dB above the quietest from which on there is no silence."""
+"""Power above the quietest part, in dB, from which samples are not silence."""
 PAUSE = 8
-"""Windows of silence that end a stretch: fewer may lie within a burst, or between two."""
+"""Number of silent windows that ends a stretch; fewer may occur within a burst or between two."""
 N_LOOKS = 256
 LOOK = 1 << 13
 QUIET_PERCENT = 2
@@ -22,7 +22,7 @@ LEAST = 1e-20
 
 
 class Stretch(NamedTuple):
-    """`n` samples from `start` on that are not silence."""
+    """A stretch of `n` samples from `start` on that are not silence."""
 
     start: int
     n: int
@@ -33,10 +33,10 @@ class Stretch(NamedTuple):
 
 
 def silence_of(recording: IqRecording) -> float:
-    """The power below which a recording is silent: a little above the quietest there is.
+    """The power below which a recording counts as silent: a little above its quietest part.
 
-    What is only now and then more than 0, and then by the least step, is silent, too. Where samples
-    are missing, nobody knows.
+    Samples that are mostly 0 and otherwise the smallest step count as silent, too. Gaps without
+    samples are not considered.
     """
     n_samples, kind = recording.info.n_samples, recording.info.type
     firsts = np.linspace(0, max(0, n_samples - LOOK), N_LOOKS).astype(int)
@@ -79,7 +79,7 @@ def _heard_powers(recording: IqRecording, first: int) -> NDArray[np.float32]:
 
 
 def _powers(samples: Samples) -> NDArray[np.float32]:
-    """Mean power of each window; the last may be shorter."""
+    """Mean power of each window; the last window may be shorter."""
     rest = -len(samples) % WINDOW
     parts = np.nan_to_num(np.pad(samples, (0, rest))).view(np.float32)
     powers: NDArray[np.float32] = np.square(parts).reshape(-1, 2 * WINDOW).sum(axis=1) / WINDOW
@@ -92,7 +92,7 @@ def _loud_runs(loud: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _stretch(recording: IqRecording, begin: int, end: int) -> Stretch:
-    """The stretch of windows `begin` to `end`, and one around it: slow rises begin early."""
+    """The stretch of windows `begin` to `end`, plus one on each side, as slow rises start early."""
     start = max(0, begin - 1) * WINDOW
     samples = recording.read(start, (end + 1) * WINDOW - start)
     parts = np.nan_to_num(samples).view(np.float32)

@@ -1,4 +1,4 @@
-"""The hub of a scenario."""
+"""Makes the hub of a scenario, which simulates its air."""
 
 from pathlib import Path
 

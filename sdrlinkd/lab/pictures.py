@@ -1,4 +1,4 @@
-"""A run as a picture: who got what of whom over time, how far apart, how late, by which MCS."""
+"""Pictures of a run: what each robot received from each other over time, and the MCS used."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ MOST_NAMED = 12
 
 
 def draw(report: LabReport, scenario: Scenario, path: Path, caption: str) -> None:
-    """PDR over time; distance and MCS where they change; latency by pair. PNG at `path`."""
+    """Draw the PDR in each tenth of the run, latencies, and the MCS between each two robots."""
     distances = _distances(report, scenario)
     adaptive = any(robot.mcs_changes for robot in report.robots)
     heights = [2.4, *([1.8] if distances else []), *([2.4] if adaptive else [])]

@@ -1,4 +1,4 @@
-"""report.json of a lab run: who got what of whom, and what it cost."""
+"""report.json of a lab run: what each robot received from each other, and the airtime it took."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,7 +12,7 @@ TENTHS = 10
 
 
 class PairResult(Struct, frozen=True, kw_only=True):
-    """What one robot got of another."""
+    """What one robot received from another."""
 
     sender: int
     receiver: int
@@ -20,11 +20,11 @@ class PairResult(Struct, frozen=True, kw_only=True):
     received: int
     pdr: float
     pdr_tenths: list[float | None]
-    """In each tenth of the run, by the time of sending; null: nothing was sent."""
+    """PDR in each tenth of the run, by the time of sending; null: nothing was sent."""
     latency_ms: dict[str, float]
     bytes_identical: bool
     topics: dict[str, list[int]]
-    """By name: sent, received."""
+    """[sent, received] messages, by topic name."""
 
 
 class RobotResult(Struct, frozen=True, kw_only=True):
@@ -36,9 +36,9 @@ class RobotResult(Struct, frozen=True, kw_only=True):
     airtime_share: float
     bursts_by_mcs: dict[int, int]
     mcs_changes: list[tuple[float, int, int]]
-    """(when in s, for whom, MCS from then on)."""
+    """Changes of the MCS, as (time in s, neighbor, new MCS)."""
     snr_db: dict[int, float]
-    """At which it hears the others, the last time."""
+    """Last SNR in dB at which it heard each other robot."""
     bursts_sent: int
     bursts_failed: int
     bursts_late: int
@@ -50,7 +50,7 @@ class RobotResult(Struct, frozen=True, kw_only=True):
     hub_outages: int
     dropped: dict[str, int]
     left: int
-    """Messages not sent when it was over."""
+    """Messages that were not sent by the end of the run."""
     ledger_adds_up: bool
 
 
@@ -64,12 +64,12 @@ class LabReport(Struct, frozen=True, kw_only=True):
     duration_s: float
     source: str
     pdr: float
-    """Of all pairs together."""
+    """PDR of all pairs together, 0 to 1."""
     worst_pdr: float
     robots: list[RobotResult]
     pairs: list[PairResult]
     out_of_reach: list[tuple[int, int]]
-    """(sender, receiver) that the scenario never lets hear each other; not in any PDR."""
+    """(sender, receiver) pairs that never hear each other in the scenario; not in any PDR."""
     damage: str
 
 
@@ -98,7 +98,7 @@ def pair_result(
 
 
 def robot_result(snapshot: Snapshot, problems: Sequence[str], until_s: float) -> RobotResult:
-    """What a daemon tells of itself."""
+    """The figures of one robot, from its daemon's snapshot."""
     link, counters = snapshot.link, snapshot.carrier.counters
     pdus = {k: v for k, v in link.rx.pdus_dropped.items() if k not in ("rx_control", "rx_dup")}
     dropped = {**link.tx.dropped, **link.rx.dropped, **pdus}

@@ -14,7 +14,7 @@ from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.lab.scenario import RobotParams, Scenario
 
 SEED_STEP = 1000
-# Keys of the daemons that follow from the rest of a scenario.
+# Keys of the daemons' configuration that the scenario determines.
 OURS = (
     "namespace", "robot_id", "seed", "registry", "topics", "rx_format", "rx_depth", "backend",
     "play", "bus.runtime_dir", "ether.dir",
@@ -48,7 +48,7 @@ def _open_sources(scenario: Scenario, bag: Path | None) -> dict[int, Source]:
 
 
 def seed_of(scenario: Scenario, robot: RobotParams) -> int:
-    """The seed of one robot's own chance."""
+    """The seed of one robot's random numbers."""
     return scenario.seed * SEED_STEP + robot.id
 
 
@@ -63,7 +63,7 @@ def write_daemon_config(
 ) -> Path:
     """The configuration of a robot's daemon, whose sockets are in `folder`.
 
-    Raises ConfigError when the scenario's [daemon] does not fit; `name` is the scenario's.
+    Raises ConfigError if the scenario's [daemon] is not valid; `name` is the scenario's name.
     """
     folder.mkdir()
     (folder / "registry.csv").write_text(source.registry.csv())
@@ -93,7 +93,7 @@ def write_daemon_config(
     try:
         parse_config(text, f"{name}: [daemon]")
     except ConfigError as error:
-        # The line would be one of a file that nobody has seen.
+        # Remove the line number, which is that of a temporary file.
         raise ConfigError(re.sub(r"(\[daemon\]):\d+", r"\1", str(error))) from None
     path = folder / "sdrlinkd.toml"
     path.write_text(text)
@@ -101,7 +101,7 @@ def write_daemon_config(
 
 
 def _refuse_ours(given: Mapping[str, Any], wanted: Mapping[str, Any], name: str) -> None:
-    """Of some keys only the lab can know what they must be. Raises ConfigError."""
+    """Refuse keys whose values only the lab can set. Raises ConfigError."""
     for section in TABLES:
         if not isinstance(wanted.get(section, {}), dict):
             raise ConfigError(
@@ -125,7 +125,7 @@ def _refuse_ours(given: Mapping[str, Any], wanted: Mapping[str, Any], name: str)
 
 
 def _merged(one: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-    """`one`, with what `other` says in its place, table by table."""
+    """`one`, overridden by `other`, table by table."""
     merged = dict(one)
     for key, value in other.items():
         there = merged.get(key)

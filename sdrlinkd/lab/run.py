@@ -1,4 +1,4 @@
-"""One run: a hub, a daemon for each robot, who sends and who listens; all stopped at the end."""
+"""Runs a scenario: a hub, a daemon per robot, producers and consumers; all stop at the end."""
 
 import contextlib
 import time
@@ -25,17 +25,17 @@ from sdrlinkd.process import Process, module
 from sdrlinkd.reports import Snapshot
 
 POLL_S = 0.5
-# When the hub's time has come, what is in the daemons and on the buses comes within this.
+# Longest time in s, after the hub's end, for messages still in daemons and on buses.
 CATCH_UP_S = 20.0
 SETTLED_S = 0.3
 ACQUAINTED_S = 5.0
-# A hub loads compiled code first.
+# The hub first loads compiled code.
 START_TIMEOUT_S = 120.0
 
 
 @dataclass(frozen=True)
 class LabOptions:
-    """A scenario and where its parts lie."""
+    """A scenario, and the paths of its parts."""
 
     path: Path
     scenario: Scenario
@@ -66,7 +66,7 @@ Watch = Callable[[LabState], None]
 
 
 def run_lab(options: LabOptions, watch: Watch) -> LabReport:
-    """Run a scenario to its end. Raises UserError; whatever happens, nothing is left running."""
+    """Run a scenario to its end, and leave nothing running in any case. Raises UserError."""
     scenario = options.scenario
     with contextlib.ExitStack() as stack:
         folder = stack.enter_context(run_folder())
@@ -114,7 +114,7 @@ def _start_hub(stack: contextlib.ExitStack, directory: Path, options: LabOptions
 def _start_robots(
     stack: contextlib.ExitStack, configs: dict[int, Path], sources: dict[int, Source], by_age: bool
 ) -> list[_Robot]:
-    """All daemons at once: each takes a while."""
+    """Start all daemons in parallel, as each takes a while."""
     processes = {}
     for robot_id, config in configs.items():
         processes[robot_id] = process = daemon_process(config)
@@ -130,7 +130,7 @@ def _start_robots(
 
 
 def _begin(stack: contextlib.ExitStack, robots: list[_Robot], scenario: Scenario) -> float:
-    """Have them send; when that began, on the clock of the samples sent."""
+    """Start the senders; returns the start time, on the clock of the sent samples."""
     sending = {robot.id for robot in scenario.robot if robot.sends}
     if scenario.pace == "lockstep":
         return 0.0
@@ -142,9 +142,9 @@ def _begin(stack: contextlib.ExitStack, robots: list[_Robot], scenario: Scenario
 
 
 def _acquainted(robots: list[_Robot], scenario: Scenario) -> None:
-    """When all have heard of those in their reach, or for as long as that should take.
+    """Wait until all robots have heard those in reach, for at most ACQUAINTED_S.
 
-    A robot that has no schedule yet would have its first messages wait for one.
+    Otherwise the first messages would wait until a robot has a schedule.
     """
     deadline = time.monotonic() + ACQUAINTED_S
     wanted = {
@@ -197,7 +197,7 @@ def _ask(watcher: HubWatch) -> Answer:
 
 
 def _settled(robots: list[_Robot]) -> list[Snapshot]:
-    """The snapshots when nothing is on its way any more, or has moved for a while."""
+    """Wait until no message is in transit or nothing changes any more; returns the snapshots."""
     deadline = time.monotonic() + CATCH_UP_S
     seen: object = None
     still_since = time.monotonic()
@@ -266,7 +266,7 @@ def _report(
 
 
 def _sent(robots: list[_Robot], scenario: Scenario) -> dict[int, dict[str, list[Sample]]]:
-    """By robot and registry name."""
+    """The messages sent, by robot and registry name."""
     if scenario.pace == "lockstep":
         sending = {robot.id for robot in scenario.robot if robot.sends}
         return {

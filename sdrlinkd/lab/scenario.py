@@ -14,9 +14,9 @@ from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.lab.traces import read_outages
 
 MAX_ROBOTS = 64
-# Nobody drives faster.
+# Highest plausible speed.
 MAX_SPEED_M_S = 1e4
-# Not even a preamble is found below this.
+# SNR in dB below which not even a preamble is detected.
 LEAST_SNR_DB = -6.0
 REACH_STEPS = 200
 
@@ -24,29 +24,29 @@ Waypoint = Annotated[list[float], Meta(min_length=3, max_length=3)]
 
 
 class RobotParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """One robot: where it is, what radio it has and what it sends."""
+    """One robot: its path, its radio and what it sends."""
 
     id: Annotated[int, Meta(ge=0, le=254)]
     path: list[Waypoint] = []
-    """[t in s, x in m, y in m]: it drives straight from one to the next, and stays at the last."""
+    """Waypoints [t in s, x in m, y in m], connected by straight lines; it stays at the last one."""
     topics: list[str] = []
-    """What it sends of the recording, or of what the built-in robot has; []: all."""
+    """Topics of the recording, or of the built-in robot, that it sends; []: all."""
     sends: bool = True
     radio: RadioParams = RadioParams()
 
 
 class OutageParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Times at which nothing gets through."""
+    """Outages: times at which nothing gets through."""
 
     trace: str = ""
-    """A log of received messages with sequence numbers, one JSON object a line, found by --traces:
-    where messages are missing in it, the air is dead."""
+    """Log of received messages with sequence numbers, one JSON object per line, in the folder of
+    --traces; where messages are missing, there is an outage."""
     period_s: Annotated[float, Meta(gt=0)] = 0.5
-    """Time between two messages of the log."""
+    """Time between two messages of the log, in s."""
     from_s: Annotated[float, Meta(ge=0)] = 0.0
-    """Where in the log the run begins."""
+    """Time in the log at which the run starts, in s."""
     times: list[Annotated[list[float], Meta(min_length=2, max_length=2)]] = []
-    """[begin, end] in s, besides."""
+    """Further outages, as [begin, end] in s."""
 
 
 class Scenario(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -54,14 +54,15 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     title: str = ""
     pace: Literal["realtime", "lockstep"] = "realtime"
-    """By the clock; or as fast as the slowest goes, the same result for the same seed."""
+    """realtime: in real time; lockstep: as fast as the slowest node, with the same result for the
+    same seed."""
     duration_s: Annotated[float, Meta(gt=0, le=1e5)] = 20.0
-    """How long the robots send."""
+    """Time for which the robots send, in s."""
     settle_s: Annotated[float, Meta(ge=0, le=100)] = 2.0
-    """How long what was sent may be on its way after that."""
+    """Time after that for messages in transit, in s."""
     seed: Annotated[int, Meta(ge=0, lt=1 << 31)] = 1
     bag: str = ""
-    """Recording that the robots send from; "": the built-in robot. --bag goes before it."""
+    """Recording that the robots send; "": the built-in robot. --bag overrides it."""
     air: AirParams = AirParams()
     robot: Annotated[list[RobotParams], Meta(min_length=1, max_length=MAX_ROBOTS)]
     link: list[LinkOverride] = []
@@ -76,7 +77,7 @@ class Scenario(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
     @property
     def until_s(self) -> float:
-        """When the experiment is over, in s of its time."""
+        """End of the experiment, in s of its time."""
         return self.duration_s + self.settle_s
 
     def in_reach(self, sender: int, receiver: int) -> bool:
@@ -115,7 +116,7 @@ def load_scenario(path: Path) -> Scenario:
 
 
 def outages_of(scenario: Scenario, traces: Path | None) -> list[Outage]:
-    """All outages of a run. Raises UserError when the log cannot be found."""
+    """All outages of a run. Raises UserError if the log cannot be found."""
     params = scenario.outages
     outages = [Outage(begin, end) for begin, end in params.times]
     if params.trace:

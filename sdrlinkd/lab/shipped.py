@@ -1,4 +1,4 @@
-"""Scenarios that come with the program, by their bare names."""
+"""Scenarios that are shipped with the program, by name."""
 
 import sysconfig
 from difflib import get_close_matches
@@ -20,7 +20,7 @@ def shipped_scenarios() -> dict[str, Path]:
 
 
 def find_scenario(given: Path) -> Path:
-    """The file `given`, or the shipped one of that name. Raises UserError when it is neither."""
+    """The file `given`, or the shipped scenario of that name. Raises UserError if there is none."""
     shipped = shipped_scenarios()
     if given.exists() or len(given.parts) != 1:
         return given

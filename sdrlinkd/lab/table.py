@@ -1,4 +1,4 @@
-"""A run on the screen: all robots while it goes on, all pairs when it is over."""
+"""Tables of a run: all robots while it runs, all pairs at its end."""
 
 from rich.console import Group
 from rich.progress_bar import ProgressBar
@@ -21,7 +21,7 @@ LIVE = (
 
 
 def live_table(title: str, state: LabState) -> Group:
-    """The table of a running experiment, a row for each robot."""
+    """The table of a running experiment, with a row per robot."""
     table = FittedTable(title, LIVE)
     for snapshot in state.snapshots:
         table.add(*_live_row(snapshot, state.now_s))
@@ -30,7 +30,7 @@ def live_table(title: str, state: LabState) -> Group:
 
 
 def pair_table(report: LabReport) -> FittedTable:
-    """A row a direction; where there are many, a row a receiver."""
+    """The table of a finished run, with a row per direction or, if there are many, per receiver."""
     if len(report.pairs) > MOST_ROWS:
         return _receiver_table(report)
     table = FittedTable(
@@ -83,7 +83,7 @@ def _receiver_table(report: LabReport) -> FittedTable:
 
 
 def _bars(pair: PairResult) -> str:
-    """A series as ten little columns."""
+    """The PDR of each tenth as ten small bars."""
     shades = "▁▁▂▃▄▅▆▇█"
     return "".join(
         "·" if share is None else " " if not share else shades[min(8, int(share * 8 + 0.5))]

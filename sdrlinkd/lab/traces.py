@@ -1,4 +1,4 @@
-"""Outages as they were measured: from logs of what arrived."""
+"""Reads measured outages from logs of received messages."""
 
 import json
 from itertools import pairwise
@@ -11,9 +11,10 @@ LARGEST = 1 << 62
 
 
 def read_outages(path: Path, period_s: float, from_s: float) -> list[Outage]:
-    """Where messages are missing in a log of one a `period_s`; 0 is `from_s` into the log.
+    """Outages where messages are missing in a log with one message per `period_s`.
 
-    Each line is JSON with `seqnum`, at the top or in `payload`. Raises UserError.
+    Time 0 is `from_s` into the log. Each line is JSON with `seqnum`, at the top level or in
+    `payload`. Raises UserError.
     """
     numbers = sorted(set(_numbers(path)))
     if len(numbers) < 2:
@@ -45,7 +46,7 @@ def _numbers(path: Path) -> list[int]:
             found = json.loads(line)
             number = found["seqnum"] if "seqnum" in found else found["payload"]["seqnum"]
         except (ValueError, KeyError, TypeError, RecursionError):
-            # A damaged line tells nothing.
+            # Skip a damaged line.
             continue
         if type(number) is int and 0 <= number <= LARGEST:
             numbers.append(number)

@@ -1,4 +1,4 @@
-"""Producers and consumers of a run: what each robot sends, and what each got of whom."""
+"""Producers and consumers of a run."""
 
 import threading
 import time
@@ -14,7 +14,7 @@ FOREVER = float("inf")
 
 
 def plan(source: Source, duration_s: float) -> dict[str, list[Sample]]:
-    """What a robot sends in lock-step, by registry name, at times of the air."""
+    """The messages that a robot sends in lock-step, by registry name, at times of the air."""
     prefix = f"/{source.namespace}/" if source.namespace else "/"
     names = [topic.name for topic in source.topics]
     ids = {name: i for i, name in enumerate(names)}
@@ -25,7 +25,7 @@ def plan(source: Source, duration_s: float) -> dict[str, list[Sample]]:
 
 
 class Player(threading.Thread):
-    """Publishes what a robot sends on its daemon's bus, by the clock, on a thread of its own."""
+    """Publishes a robot's messages on its daemon's bus in real time, on its own thread."""
 
     def __init__(self, source: Source, directory: Path) -> None:
         super().__init__(name="player", daemon=True)
@@ -37,7 +37,7 @@ class Player(threading.Thread):
         self.problem = ""
 
     def run(self) -> None:
-        """Until all is sent, or told to stop."""
+        """Publish until all is sent or the thread is told to stop."""
         prefix = f"/{self._source.namespace}/" if self._source.namespace else "/"
         self.began_at = time.monotonic()
         try:
@@ -65,16 +65,16 @@ class Player(threading.Thread):
 
 
 class Listener(Hearing):
-    """Takes everything that a daemon republishes.
+    """Records everything that a daemon republishes.
 
-    `by_age`: the air has a time of its own, so only a message's age tells how long it took.
+    `by_age`: take the latency from the message's age, as the air does not run in real time.
     """
 
     def __init__(self, directory: Path, by_age: bool) -> None:
         super().__init__(directory, self._note)
         self._by_age = by_age
         self.received: dict[int, dict[str, list[Sample]]] = defaultdict(lambda: defaultdict(list))
-        """By source and registry name."""
+        """Received messages by source and registry name."""
 
     def _note(self, message: Message, at: float) -> None:
         age_s = None
@@ -86,6 +86,6 @@ class Listener(Hearing):
 
 
 def trace_of(source: Source, sent: dict[str, list[Sample]], got: dict[str, list[Sample]]) -> Trace:
-    """One robot's messages at another."""
+    """The trace of one robot's messages at another robot."""
     types = {topic.name: topic.type for topic in source.registry.topics}
     return Trace(types, sent, got)

@@ -1,4 +1,4 @@
-"""The link: queues, packing, duplicates, ages and the ledger, as a calculator over `now`."""
+"""The link: queues, packing, duplicates, ages and the ledger, computed from inputs and `now`."""
 
 from sdrlinkd.link.access import (
     AccessParams,

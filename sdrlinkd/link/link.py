@@ -1,4 +1,4 @@
-"""The link: one node's whole traffic, as a calculator over bytes and `now`."""
+"""The link: all traffic of one node, computed from bytes and `now`, without waiting or I/O."""
 
 from collections.abc import Mapping
 from math import inf
@@ -60,11 +60,12 @@ NOTHING_NOTED: Mapping[int, str] = {}
 
 
 class Link:
-    """Joins the queue, the burst scheduler and the inbox. Never waits, never reads a clock.
+    """The link: joins the queue, the burst scheduler and the inbox; never waits or reads a clock.
 
-    `now`, `start` and `at` are seconds on one clock of the caller's choice; `rng` is all chance.
-    `hears_self`: the paper's loopback experiment. A compressed message may grow to `max_expanded`.
-    Messages may be submitted from the start; what needs a radio is made by `attach`.
+    `now`, `start` and `at` are seconds on one clock of the caller's choice. `rng` is the only
+    source of randomness. `hears_self` accepts our own PDUs, for the paper's loopback experiment.
+    `max_expanded` is the largest size in bytes of a decompressed message. Messages may be submitted
+    from the start; `attach` makes the parts that need a radio.
     """
 
     def __init__(
@@ -122,16 +123,16 @@ class Link:
     # The radio.
 
     def attach(self, traits: PduLinkTraits, access: AccessParams, rate: RateParams) -> Fit:
-        """Fit the link to the radio that is there. Raises ConfigError, changing nothing."""
+        """Fit the link to a radio that is up. Raises ConfigError and then changes nothing."""
         fit = fit_to(traits, access, rate, self.own_id, self._rng)
         self.use(fit)
         return fit
 
     def use(self, fit: Fit) -> None:
-        """Send and hear by a radio as `fit` says, from now on.
+        """Use the radio that `fit` describes from now on.
 
-        `attach` makes it of the radio's traits; one with an access policy of one's own may be
-        given, too.
+        `attach` derives `fit` from the radio's traits; callers may pass one with an access policy
+        of their own.
         """
         if isinstance(self._scheduler, NoRadio):
             self._scheduler = BurstScheduler(
@@ -141,7 +142,7 @@ class Link:
         else:
             self._scheduler.refit(fit)
         if fit.is_lockstep:
-            # Its time begins now, whatever ours was.
+            # The radio's time starts now, whatever our time was.
             self._outbox.drop_all("tx_radio_down")
             self._intake.begin_anew()
         self._clocks.set_resolution(fit.stamp_s)
@@ -155,11 +156,11 @@ class Link:
         return burst
 
     def next_wakeup(self, now: float) -> float:
-        """When there may next be something to send; not after `now`: at once."""
+        """Earliest time at which there may be something to send; if not after `now`: at once."""
         return self._scheduler.next_wakeup(now)
 
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
-        """Settle a burst by what the radio says became of it."""
+        """Settle a burst by the outcome that the radio reports."""
         self._scheduler.confirm(burst, outcome, now)
         self._tell_dropped()
 
@@ -171,8 +172,10 @@ class Link:
         now: float | None = None,
         ended_at: float | None = None,
     ) -> list[Delivered]:
-        """Take a PDU whose burst's preamble arrived at `at`, and whose last sample at `ended_at`
-        (absent: `at`, as is `now`); the messages that it completed.
+        """Take a PDU from the air, and return the messages that it completes.
+
+        The preamble of its burst arrived at `at`, and the PDU's last sample at `ended_at`; `now`
+        and `ended_at` default to `at`.
         """
         now, ended_at = at if now is None else now, at if ended_at is None else ended_at
         return self._dispatch(self._reception.hear(data, at, snr_db, now, ended_at))
@@ -186,7 +189,7 @@ class Link:
         now: float,
         overrides: Overrides = AS_CONFIGURED,
     ) -> str | None:
-        """Queue a message; None, or the ledger's reason for refusing it."""
+        """Queue a message; returns None, or the ledger's reason for refusing it."""
         intake, bytes_per_s = self._intake, self._scheduler.bytes_per_s
         refused = intake.submit(topic_id, payload, now, overrides, bytes_per_s)
         if overrides.receipt:
@@ -208,22 +211,22 @@ class Link:
     def refuse(
         self, reason: str, topic_id: int | None = None, receipt: str = "", dst: int | None = None
     ) -> None:
-        """Count a message that the bus could not hand over, and tell its producer who asked."""
+        """Count a message that the bus refused, and report it if its producer wants a receipt."""
         self._intake.refuse(reason, topic_id)
         if receipt and topic_id is not None:
             self._refused(receipt, topic_id, reason, dst)
 
     def delivered(self, message: Delivered, now: float) -> float | None:
-        """The age in seconds at which `message` is handed over at `now`; None when unknown."""
+        """Note that `message` is handed over at `now`; returns its age in s, None if unknown."""
         return self._reception.deliver(message, now)
 
     def take_verdicts(self) -> list[Verdict]:
-        """What became of messages whose producers want to know, since the last call."""
+        """Verdicts since the last call on messages whose producers want receipts."""
         return self._receipts.take()
 
     @property
     def silence_at(self) -> float:
-        """When the first command topic falls silent, if nothing comes before; s."""
+        """Time in s at which the next command topic falls silent unless a message arrives."""
         return self._reception.silence_at
 
     def take_silent(self, now: float) -> list[tuple[int, int]]:
@@ -245,35 +248,35 @@ class Link:
         self._reception.set_policy(topic_id, policy)
 
     def policy(self, topic_id: int) -> TopicPolicy:
-        """The policy of a topic that is in force."""
+        """The policy in force for a topic."""
         return self._intake.policy(topic_id)
 
     def set_wall(self, wall: Wall) -> None:
-        """Tell others what our host's clock is ahead of the link's."""
+        """Set the offset of our host's clock from the link's, to be announced to others."""
         self._clocks.set_wall(wall)
 
     def wall_offset(self, src: int, now: float) -> tuple[int, float, float] | None:
-        """Our host's time since 1970 less that of robot `src`; see `Clocks.wall_offset`."""
+        """Our host's time since 1970 minus that of robot `src`; see `Clocks.wall_offset`."""
         return self._clocks.wall_offset(src, now)
 
     def clock_state(self, src: int, now: float) -> State:
-        """How well a robot's clock is known; our own is."""
+        """How well a robot's clock is known; our own always is."""
         return self._clocks.state(src, now)
 
     def clock_estimate(self, src: int, now: float) -> Estimate | None:
-        """Our link's clock less that of robot `src`; None: not known."""
+        """Our link's clock minus that of robot `src`; None if unknown."""
         return self._clocks.estimate(src, now)
 
     # Time.
 
     def expire_queue(self, now: float) -> None:
-        """Let time pass where there is nothing yet to send with: what is too old goes by name."""
+        """Drop messages that are too old, while there is no radio yet."""
         self._composer.expire(now)
         self._tell_dropped()
         self._receipts.expire(now)
 
     def handle_timers(self, now: float) -> None:
-        """Let time pass: expiries, reassembly timeouts, rate samples."""
+        """Run all timers up to `now`: expiries, reassembly timeouts, rate samples."""
         scheduler = self._scheduler
         self._composer.expire(now)
         for offer in self._latched.due(now, scheduler.bytes_per_s):
@@ -293,30 +296,30 @@ class Link:
 
     @property
     def holds_parts(self) -> bool:
-        """Whether messages of others wait for the rest of them."""
+        """Whether incomplete messages from others wait for more fragments."""
         return self._reception.holds_parts
 
     @property
     def relays(self) -> bool:
-        """Whether PDUs of others are forwarded."""
+        """Whether this node relays PDUs of others."""
         return self._reception.relays
 
     def drain(self) -> None:
-        """Nothing more will come: partial PDUs go at once, beacons end."""
+        """Prepare to stop: send partial PDUs at once, and send no more beacons."""
         self._control_records.end()
         self._composer.end_flush()
 
     def shut_down(self) -> None:
-        """Drop what could not be sent any more, by name."""
+        """Drop all messages that were not sent, as tx_shutdown."""
         self._scheduler.clear()
         self._outbox.drop_all("tx_shutdown")
         self._tell_dropped()
         self._receipts.expire(inf)
 
-    # What people ask.
+    # Status and explanations.
 
     def why(self, topic_id: int, told: Told, now: float) -> list[str]:
-        """What happens to a topic, in plain words."""
+        """What happens to a topic's messages and why, in plain sentences."""
         name = self.registry.topics[topic_id].name
         return self._why.explain(topic_id, name, told, now, self._air_use)
 
@@ -327,22 +330,22 @@ class Link:
     def notices(self, now: float, of_topics: Mapping[int, str] = NOTHING_NOTED) -> list[str]:
         """What a person should know about this link, in sentences.
 
-        `of_topics`: what should be known of topics by id, once a producer uses them.
+        `of_topics`: notices by topic id, which apply once a producer uses the topic.
         """
         return self._reporter.notices(now, of_topics, self._scheduler)
 
     def audit(self) -> list[str]:
-        """Where the ledger does not add up; empty when it does."""
+        """Discrepancies in the ledger, as sentences; empty when it adds up."""
         return self._intake.audit() + self._reception.audit()
 
-    # Inside.
+    # Internal.
 
     @property
     def _air_use(self) -> AirUse:
         return AirUse(self._scheduler.report(), self._reception.heard_s)
 
     def _dispatch(self, events: list[Event]) -> list[Delivered]:
-        """Do what the inbox found to be done, in order; the messages to be handed over."""
+        """Handle the inbox's events in order; returns the messages to hand over."""
         delivered = []
         for event in events:
             match event:
@@ -353,7 +356,7 @@ class Link:
                 case RecordHeard():
                     self._record_heard(event)
                 case Newcomer():
-                    # It does not have what was latched before.
+                    # The new robot lacks the messages latched before.
                     self._latched.newcomer(event.src, event.at)
                 case Ended(src, topic_id, entry_id, reason, age_s, at):
                     receipt = make_receipt(src, topic_id, entry_id, reason, age_s)
@@ -365,7 +368,7 @@ class Link:
     def _record_heard(self, event: RecordHeard) -> None:
         src, record, at = event
         if isinstance(record, Clock):
-            # Who hears itself knows its own clock.
+            # If we hear ourselves, our own CLOCK is no news.
             if src != self.own_id:
                 self._clocks.hear(src, record, at)
         elif isinstance(record, Receipt):

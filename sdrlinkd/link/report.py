@@ -1,4 +1,4 @@
-"""The link's report: what each part tells of itself, joined; frozen structs out."""
+"""Builds the link's report from the reports of its parts."""
 
 from collections.abc import Hashable, Mapping
 from typing import Any, NamedTuple
@@ -34,8 +34,8 @@ Scheduler = BurstScheduler | NoRadio
 
 
 class Names(NamedTuple):
-    """Names on the bus: topics subscribed to, by topic id, and what (source, topic id) is
-    republished as.
+    """Names on the bus: of subscribed topics by topic id, and of republished topics by (source,
+    topic id).
     """
 
     subscribed: Mapping[int, str]
@@ -46,7 +46,7 @@ NO_NAMES = Names({}, {})
 
 
 class Reporter:
-    """Joins the reports of the link's parts, and adds rates."""
+    """Combines the reports of the link's parts and adds rates."""
 
     def __init__(
         self, params: LinkParams, registry: Registry, digest: RegistryDigest, outbox: Outbox,
@@ -68,12 +68,12 @@ class Reporter:
         self._rates = RateMeter(RATE_WINDOW_S)
 
     def sample(self, now: float, scheduler: Scheduler) -> None:
-        """Remember where counters stand at `now`, if the last time is long enough ago."""
+        """Sample the counters at `now`, if the last sample is old enough."""
         if self._rates.is_due(now):
             self._rates.sample(self._counters(scheduler.airtime_s), now)
 
     def report(self, now: float, names: Names, scheduler: Scheduler) -> LinkReport:
-        """The whole link at `now`."""
+        """The report of the whole link at `now`."""
         sent = scheduler.report()
         per_s = self._rates.all_per_s(self._counters(sent.airtime_s), now)
         records = self._control_records
@@ -106,7 +106,7 @@ class Reporter:
     def notices(self, now: float, of_topics: Mapping[int, str], scheduler: Scheduler) -> list[str]:
         """What a person should know about this link, in sentences.
 
-        `of_topics`: what should be known of topics by id, once a producer uses them.
+        `of_topics`: notices by topic id, which apply once a producer uses the topic.
         """
         intake, topics = self._intake, self._registry.topics
         notices = [text for each, text in of_topics.items() if intake.tally(each).accepted]
@@ -130,7 +130,7 @@ class Reporter:
         return notices + self._neighbors.disagreements(self._registry, self._digest)
 
     def _never_met(self, least_s: float) -> list[str]:
-        """Topics whose messages are too old before they can arrive, `least_s` after they came."""
+        """Sentences on topics with a lifespan below `least_s`, the shortest possible latency."""
         notices = []
         for topic in self._registry.topics:
             lifespan_s = self._intake.lifespan(topic.id).seconds
@@ -142,7 +142,7 @@ class Reporter:
         return notices
 
     def _counters(self, sent_s: float) -> dict[Hashable, int]:
-        """All counters of which people are shown rates; airtimes in µs."""
+        """All counters for which rates are reported; airtimes are in µs."""
         return {
             ("air", "sent"): round(1e6 * sent_s),
             ("air", "heard"): round(1e6 * self._reception.heard_s),
@@ -231,7 +231,7 @@ class Reporter:
 
 
 def _access(settled: Settled | None) -> dict[str, Any]:
-    """The policy in force, by the report's names."""
+    """The access policy in force, by the field names of `LinkReport`."""
     if settled is None:
         return {"access": "none", "access_reason": "as there is no radio yet"}
     return {

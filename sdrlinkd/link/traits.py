@@ -1,4 +1,4 @@
-"""What the link must know of that which carries its PDUs."""
+"""What the link must know about its PDU link."""
 
 from collections.abc import Callable, Collection
 from math import inf
@@ -6,58 +6,58 @@ from typing import NamedTuple
 
 
 class PduLinkTraits(NamedTuple):
-    """A radio as access policies and rate control see it; times in s.
+    """The traits of a PDU link for access policies and rate control; times are in s.
 
-    `lead_s`: a burst decided now leaves so much later at the earliest. `react_s`: so long after a
-    sample was on the air can a decision follow from it. `detect_s`: so long must a burst last to
-    be noticed. `gap_s` stays free between two bursts of one node. `needed_snr_db` and
-    `longest_burst_s` are those of each MCS, `pdu_burst_s` is a burst of one PDU.
+    `lead_s` is the shortest time from a decision until the burst leaves. `react_s` is the time from
+    a sample on the air until a decision can follow from it. `detect_s` is the shortest length of a
+    burst that is detected. `gap_s` stays free between two bursts of one node. `needed_snr_db`,
+    `longest_burst_s` and `pdu_burst_s` (the length of a burst with one PDU) are tuples by MCS.
     """
 
     kind: str = "direct"
     is_lockstep: bool = False
-    """Time is that of the samples, and waits for everybody."""
+    """Whether it runs in lock-step: time is that of the samples and waits for all nodes."""
     transmits: bool = True
     senses: bool = False
     shares_air: bool = False
-    """Other robots may be on its air."""
+    """Whether other robots may use the same channel."""
     turnaround_s: float = 0.0
     index_error_s: float = 0.0
-    """How wrong times may be after a gap."""
+    """Largest error of times after a gap in the samples."""
     lead_s: float = 0.0
     react_s: float = 0.0
     detect_s: float = 0.0
     overhead_s: float = 0.0
-    """What a burst takes besides its PDUs."""
+    """Time that a burst takes in addition to its PDUs."""
     gap_s: float = 0.0
     tx_window_s: float = inf
-    """It sends without listening for so long at most."""
+    """Longest TX window, in which the radio sends without listening."""
     tx_window_follow_s: float = 0.0
-    """What is decided so long before a burst is over leaves right behind it, else in the next
-    TX window."""
+    """Shortest time before the end of a burst at which the next one must be decided to follow in
+    the same TX window."""
     rx_window_s: float = 0.0
-    """It listens for so long between two TX windows."""
+    """Time for which the radio listens between two TX windows."""
     ahead_s: float = 0.0
-    """A burst whose time is fixed may be decided so much before it has to be."""
+    """Time by which a burst at a fixed time may be decided earlier than necessary."""
     longest_burst_s: tuple[float, ...] = (0.0,)
-    """By MCS."""
+    """Length of the longest burst, by MCS."""
     pdu_burst_s: tuple[float, ...] = (0.0,)
     mcs: int = 0
-    """The fixed one."""
+    """The configured MCS, used without rate control."""
     needed_snr_db: tuple[float, ...] = (0.0,)
     stamp_s: float = 2e-4
-    """How wrong the times may be at which bursts left and came."""
+    """Largest error of the times at which bursts left and came."""
 
     def longest_in_use_s(self, usable: Collection[int]) -> float:
-        """The longest burst of any of these MCS."""
+        """Length of the longest burst of the MCS in `usable`, in s."""
         return max(self.longest_burst_s[mcs] for mcs in usable)
 
 
 class Sensed(NamedTuple):
-    """What the receiver knows of the air: it has listened up to `until`.
+    """The receiver's view of the channel, up to `until`.
 
-    The channel is idle since `idle_since`; while it is busy, that is later than `until`. `burst_at`
-    is when the last burst's preamble came, None when only its energy was noticed.
+    The channel has been idle since `idle_since`; while it is busy, that is later than `until`.
+    `burst_at` is the time of the last burst's preamble, None if only energy was detected.
     """
 
     until: float = inf
@@ -66,12 +66,12 @@ class Sensed(NamedTuple):
 
 
 class Opportunity(NamedTuple):
-    """The PDU link can take a burst that leaves at `earliest` or later.
+    """An opportunity to send: the PDU link can take a burst that leaves at `earliest` or later.
 
-    `airtime_s(mcs, n_pdus)` is a burst's length; `most_pdus(mcs, airtime_s)` how many PDUs fit, 0
-    when not even one does; the PDU link's own limit is heeded. What begins at `start` is no longer
-    than `made_by(start)`, or one PDU: a longer burst would not be there in time. None: any length
-    is.
+    `airtime_s(mcs, n_pdus)` is the length of a burst in s. `most_pdus(mcs, airtime_s)` is how many
+    PDUs fit within the PDU link's own limit, 0 if none does. A burst at `start` must not be longer
+    than `made_by(start)` or one PDU, as a longer one would not be modulated in time; None: no such
+    limit.
     """
 
     earliest: float

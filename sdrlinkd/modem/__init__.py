@@ -1,4 +1,4 @@
-"""The modem: PDUs through OFDM and a radio."""
+"""The modem: carries PDUs as OFDM bursts over a radio."""
 
 from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.link import ModemLink

@@ -1,14 +1,14 @@
-"""How long bursts are, and how many PDUs fit into one."""
+"""Lengths of bursts, and how many PDUs fit into one."""
 
 import phy
 from sdrlinkd.config import ModemParams
 
-# Samples by which a time may be off in floating point.
+# Largest rounding error of a time, in samples.
 ROUNDING = 1e-2
 
 
 class Airtimes:
-    """Lengths of bursts with PDUs of one size; those of several PDUs last `max_burst_s` at most."""
+    """Lengths of bursts for one PDU size; bursts of several PDUs last at most `max_burst_s`."""
 
     def __init__(self, params: ModemParams, pdu_size: int) -> None:
         self._rate_hz = params.rate_hz
@@ -30,12 +30,12 @@ class Airtimes:
 
     @property
     def overhead_s(self) -> float:
-        """Time in s for preamble, header, and the last symbol that is not full."""
+        """Time in s of preamble, header, and the unused rest of the last symbol."""
         one = phy.layout(self._grid, 0, 1, self._pdu_size)
         return (one.n_samples - (one.n_symbols - 1) * one.grid.n_symbol) / self._rate_hz
 
     def most_pdus(self, mcs: int, airtime_s: float) -> int:
-        """How many PDUs fit into a burst of at most `airtime_s`; 0 when not even one does."""
+        """How many PDUs fit into a burst of at most `airtime_s`; 0 if none does."""
         given = airtime_s * self._rate_hz + ROUNDING
         if self.samples(mcs, 1) > given:
             return 0

@@ -1,23 +1,23 @@
-"""The received stream as the clock: `now` is an index over the rate."""
+"""A clock that runs by the received samples: `now` is the sample index over the sample rate."""
 
 
 class StreamClock:
     """Seconds since index 0 of a stream; `host_s` is the monotonic clock at each call.
 
-    Until the first block the clock stands at 0; or, where it `began_s` by the host's clock, it runs
-    with that.
+    Until the first block the clock stands at 0. If `began_s` is given, on the monotonic clock, it
+    runs from there instead.
 
-    In a paced stream, time goes on between blocks with the monotonic clock, by the block that came
-    with the least delay lately; so it does when blocks stop coming, until they return. In lock-step
-    it stands still between blocks. It never goes back.
+    Between the blocks of a paced stream, and when blocks stop coming, the clock runs with the
+    monotonic clock, aligned to the recent block with the shortest delay. In lock-step it stands
+    still between blocks. It never goes back.
     """
 
     QUIET_S = 0.1
-    """Seconds without a block after which an unpaced stream has stopped."""
+    """Time in s without a block after which an unpaced stream has stopped."""
     GONE_S = 0.25
-    """Seconds without a block after which a paced stream has stopped."""
+    """Time in s without a block after which a paced stream has stopped."""
     LATELY_S = 0.25
-    """The least delay is that of the last one to two spans of so many seconds, in which crystals
+    """Span in s; the shortest delay is taken over the last one to two spans, in which crystals
     drift apart by some µs."""
 
     def __init__(
@@ -42,11 +42,11 @@ class StreamClock:
         return 0 if self._seen is None else self._seen[0]
 
     def observe(self, end: int, host_s: float) -> None:
-        """Note that samples before `end` were there at `host_s`; by one thread after another."""
+        """Note that the samples before `end` had arrived at `host_s`; one thread at a time."""
         late_s = host_s - end / self._rate_hz
         if host_s >= self._until:
             self._before, self._least = self._least, late_s
-            # Nothing came for a whole span: the least delay from before it is too old.
+            # After a whole span without blocks, the earlier shortest delay is too old.
             if host_s >= self._until + self.LATELY_S:
                 self._before = late_s
             self._until = host_s + self.LATELY_S
@@ -55,7 +55,7 @@ class StreamClock:
         self._seen = end, host_s, min(self._before, self._least)
 
     def now(self, host_s: float) -> float:
-        """Seconds on the stream's clock."""
+        """Time in s on the stream's clock."""
         if self._seen is None:
             if self._began_s is not None:
                 self._latest = max(self._latest, host_s - self._began_s)
@@ -71,10 +71,10 @@ class StreamClock:
         return self._latest
 
     def index(self, host_s: float) -> int:
-        """Index of the sample that is now on its way."""
+        """Index of the sample that is on the air now."""
         return round(self.now(host_s) * self._rate_hz)
 
     def is_gone(self, host_s: float) -> bool:
-        """Whether a paced stream has begun and delivers no more."""
+        """Whether a paced stream had started and no longer delivers blocks."""
         seen = self._seen
         return self._paced and seen is not None and host_s - seen[1] > self.GONE_S

@@ -1,4 +1,4 @@
-"""Loading of the PHY's compiled code."""
+"""Loads the PHY's compiled code."""
 
 import asyncio
 
@@ -6,5 +6,5 @@ import phy
 
 
 async def load_phy() -> None:
-    """Compile the PHY, or load what is compiled, off the event loop."""
+    """Compile the PHY, or load its compiled code, off the event loop."""
     await asyncio.to_thread(phy.warm_up)

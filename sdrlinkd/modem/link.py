@@ -1,4 +1,4 @@
-"""The modem link: PDUs to bursts at the last moment, samples to PDUs, off the event loop."""
+"""The modem link: decides bursts at the last moment; the PHY runs off the event loop."""
 
 import asyncio
 import contextlib
@@ -25,17 +25,18 @@ from sdrlinkd.pdulink import Carry, Heard, PduListener
 from sdrlinkd.reports import PduLinkReport
 
 TIMER_S = 0.001
-"""The event loop's timers count in this; shorter waits would be busy ones."""
+"""Resolution of the event loop's timers in s; shorter waits would be busy waiting."""
 INFINITE = float("inf")
 
 
 class ModemLink:
-    """A PDU link over a radio: the PHY off the event loop, everything else on it.
+    """A PDU link over a radio. The PHY runs off the event loop, all else on it.
 
-    In lock-step all of it is done within the block that brought it. `listens`: somebody wants to
-    know whether the channel is busy. `lead_grows`: whether, on such a radio, bursts of a fixed time
-    are handed over earlier when the machine proves to be slow. `began_s`: the link's clock has run
-    since then (monotonic); None: it begins with the samples. `load` compiles the PHY, or loads it.
+    In lock-step, each block is completely processed before the next one. `listens`: whether the
+    receiver senses if the channel is busy. `lead_grows`: whether, for such a radio, bursts at fixed
+    times are handed over earlier once the machine proves slow. `began_s`: start of the link's clock
+    on the monotonic clock; None: the link's clock starts with the samples. `load` compiles or loads
+    the PHY.
     """
 
     def __init__(
@@ -75,7 +76,7 @@ class ModemLink:
         self._problem = ""
 
     def now(self) -> float:
-        """Seconds on the received stream's clock."""
+        """Time in s on the received stream's clock."""
         return self._clock.now(time.monotonic())
 
     async def open(self, listener: PduListener) -> Carry:
@@ -95,7 +96,7 @@ class ModemLink:
         traits = pdu_link_traits(self._kind, can, params, self._airtimes)
         self._lead_grows = self._may_lead_grow(traits)
         if not can.paced:
-            # Time is that of the samples; where it has run before, it goes on from there.
+            # Time is that of the samples; a clock that already runs continues.
             began_s = None if can.lockstep else self._began_s
             self._clock = StreamClock(params.rate_hz, can.paced, can.lockstep, began_s)
         lead, ahead = traits.lead_s * params.rate_hz, traits.ahead_s * params.rate_hz
@@ -117,7 +118,7 @@ class ModemLink:
         return partial(self._carry, rx)
 
     async def _carry(self, rx: Demodulation) -> None:
-        """Receive, and send what is to be sent, until cancelled. Raises LinkRefusedError."""
+        """Receive and send until cancelled. Raises LinkRefusedError."""
         refusal = ""
         async with asyncio.TaskGroup() as tasks:
             self._tx.start(tasks, self._left)
@@ -134,17 +135,17 @@ class ModemLink:
         raise LinkRefusedError(refusal)
 
     def wake(self) -> None:
-        """Look again for something to send."""
+        """Check again whether there is something to send."""
         self._moved.set()
 
     async def idle(self) -> None:
-        """Wait until every burst taken is settled."""
+        """Wait until every burst handed over is settled."""
         while self._tx.on_air:
             self._moved.clear()
             await self._moved.wait()
 
     async def close(self) -> None:
-        """Close the radio; what has not left is lost."""
+        """Close the radio; bursts that have not left are lost."""
         await self._radio.close()
         listener, self._listener = self._listener, None
         if listener is not None:
@@ -155,7 +156,7 @@ class ModemLink:
         self._tx.close()
 
     def report(self) -> PduLinkReport:
-        """State, counters of radio and receiver, and whether the PHY keeps up."""
+        """The report: state, counters of radio and receiver, and whether the PHY keeps up."""
         return modem_report(
             self._kind,
             "down" if self._is_gone else self._state,
@@ -182,11 +183,11 @@ class ModemLink:
         return 0 if self._can.lockstep else self._clock.index(time.monotonic())
 
     async def _receive(self, receiver: Demodulation) -> None:
-        """Take blocks from the radio; when the receiver is far behind, the radio has to wait."""
+        """Take blocks from the radio, which has to wait if the receiver falls far behind."""
         paced = self._can.paced
 
         def hear(block: RxBlock) -> None:
-            """Hear a block, on the radio's thread."""
+            """Demodulate a block on the radio's thread."""
             self._clock.observe(block.index + block.n, block.host_ns * 1e-9)
             receiver.hear(block)
 
@@ -200,16 +201,16 @@ class ModemLink:
         self._moved.set()
 
     def _deliver(self, events: Sequence[phy.Event], end: int) -> None:
-        """Pass on events that the samples before index `end` completed."""
+        """Pass on the events that the samples before index `end` completed."""
         if not self._can.paced:
-            # Blocks wait for the receiver, and the clock with them.
+            # Without pace, blocks wait for the receiver, and so does the clock.
             self._clock.observe(end, time.monotonic())
         if self._rx is not None and self._rx.wakes:
             self._moved.set()
         self._tell(events)
 
     def _step(self, events: Sequence[phy.Event], end: int) -> None:
-        """Do everything that follows from a block, in lock-step."""
+        """Process everything that follows from a block, in lock-step."""
         self._deliver(events, end)
         if self._listener is not None:
             self._listener.advance(self.now())
@@ -227,7 +228,7 @@ class ModemLink:
             self._listener.heard(heard)
 
     async def _send_when_due(self) -> None:
-        """Send one burst at a time, each decided at the last moment; for ever."""
+        """Send one burst at a time, each decided at the last moment, forever."""
         paced = self._can.paced
         while True:
             self._moved.clear()
@@ -241,13 +242,13 @@ class ModemLink:
                     await self._moved.wait()
 
     def _turn(self) -> float:
-        """Send the next burst if it may go; 0 when one went, else how long nothing will, in s."""
+        """Send the next burst if it may leave; returns 0, or the time in s until one may leave."""
         listener, rate = self._listener, self._params.rate_hz
         can_send = self._state == "up" and self._can.transmits
         if listener is None or self._rx is None or not can_send:
             return INFINITE
         if self._is_gone or (self._began_s is not None and not self._clock.end):
-            # Until a block comes: with the first, where the stream begins on our clock is known.
+            # Wait for a block: the first one shows where the stream starts on our clock.
             self._rx.wakes = True
             return INFINITE
         now = self.now()
@@ -274,8 +275,8 @@ class ModemLink:
         if self._can.paced:
             self._rx.wakes = burst is None
         if burst is None:
-            # What waits and may not go yet is looked at again with the next block; but a partial
-            # PDU may have begun to wait for more.
+            # Messages that may not leave yet are checked again with the next block. But a partly
+            # filled PDU may have started to wait for more messages.
             wait_s = listener.next_wakeup(now) - now
             return wait_s if wait_s > 0 else INFINITE
         start = round(burst.start * rate)
@@ -284,7 +285,7 @@ class ModemLink:
         return 0.0
 
     def _left(self, burst: Burst, report: BurstReport) -> None:
-        """Take what became of a burst: adapt the lead, and tell the listener."""
+        """Handle the outcome of a burst: adapt the lead, and inform the listener."""
         if self._lead_grows and report.outcome is Outcome.LATE:
             self._plan.was_late()
         elif self._lead_grows:

@@ -1,16 +1,16 @@
-"""When the next burst may leave, in samples."""
+"""Plans when the next burst may leave, in samples."""
 
 from backends import GAP, TxWindows
 
 EASE = 64
-"""Bursts in time after which most of what was added to the lead is gone."""
+"""Number of bursts in time after which most of an increase of the lead has decayed."""
 
 
 class AirPlan:
-    """Keeps what is committed to the air below `lead + ahead` plus one burst.
+    """Keeps the airtime committed in advance below `lead + ahead` plus one burst.
 
-    A burst begins at the earliest `lead` after it is composed, and is composed at the earliest
-    `lead + ahead` before the one before it has left.
+    A burst starts at least `lead` after it is composed. It is composed at most `lead + ahead`
+    before the end of the burst before it.
     """
 
     def __init__(self, lead: int, ahead: int = 0) -> None:
@@ -27,12 +27,12 @@ class AirPlan:
         return max(now + self._lead, self._free_at)
 
     def was_late(self) -> None:
-        """Begin earlier from now on, as a burst was late: up to what `ahead` allows."""
+        """Increase the lead, within what `ahead` allows, as a burst was late."""
         added = self._lead - self._least
         self._lead += max(0, min(self._lead, self._ahead - added)) // 2
 
     def was_in_time(self) -> None:
-        """Begin a little later again, as a burst was in time: less lead may do."""
+        """Decrease the lead a little, as a burst was in time."""
         self._lead -= (self._lead - self._least + EASE - 1) // EASE
 
     def commit(self, start: int, n_samples: int) -> None:
@@ -41,9 +41,7 @@ class AirPlan:
 
 
 class TxWindowPlan(AirPlan):
-    """When bursts may leave on a radio that sends in TX windows: in the one that is open, or the
-    next.
-    """
+    """Plans bursts for a radio that sends in TX windows: in the open window, or in the next."""
 
     def __init__(self, lead: int, ahead: int, tx_windows: TxWindows, rate_hz: float) -> None:
         super().__init__(lead, ahead)

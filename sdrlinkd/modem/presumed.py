@@ -1,4 +1,4 @@
-"""The radio of a configuration, as far as it is known before it is open."""
+"""What is known about a configured radio before it is opened."""
 
 from random import Random
 from typing import NamedTuple
@@ -11,25 +11,25 @@ from sdrlinkd.modem.traits import pdu_link_traits
 
 
 class PresumedRadio(NamedTuple):
-    """The traits of a radio, and of what it carries, as far as they are known.
+    """The presumed traits of a radio that is not open yet.
 
-    `presumption` says what only the radio can tell.
+    `presumption` says in words what only the radio itself can tell.
     """
 
     traits: PduLinkTraits
     airtimes: Airtimes
     longest_s: float
-    """The longest burst of any MCS in use."""
+    """Length of the longest burst of any MCS in use, in s."""
     full_duplex: bool
     presumption: str
     is_sure: bool
-    """Whether the radio, once it is open, will be like that."""
+    """Whether the open radio will certainly have these traits."""
 
 
 def presume_radio(config: Config, turnaround_s: float | None = None) -> PresumedRadio:
-    """The radio of `config`. Raises UserError where that has none.
+    """The presumed radio of `config`. Raises UserError if it has none.
 
-    `turnaround_s` is taken in place of the one that is configured.
+    `turnaround_s` replaces the configured turnaround.
     """
     backend = backend_of(config)
     if backend is None:
@@ -51,7 +51,7 @@ def presume_radio(config: Config, turnaround_s: float | None = None) -> Presumed
 
 
 def access_words(config: Config, own_id: int) -> list[str]:
-    """What access comes to, in words. Raises ConfigError where it is sure to be refused."""
+    """The access policy that results, in words. Raises ConfigError if it will surely be refused."""
     if config.backend in WITHOUT_AIR:
         return [f'access none, as no other robot shares the air of the backend "{config.backend}"']
     radio = presume_radio(config)

@@ -1,4 +1,4 @@
-"""From the configuration to a radio, and to a modem with one."""
+"""Makes a radio, and a modem with a radio, from the configuration."""
 
 import math
 from collections.abc import Awaitable, Callable
@@ -32,8 +32,8 @@ def make_modem(
 ) -> ModemLink:
     """The modem on the radio that `config.backend` names. Raises UserError.
 
-    `patience`: of a radio that is not there when it is opened; `began_s`: the link's clock has run
-    since then (monotonic); `load` compiles the PHY, or loads it.
+    `patience`: how long opening waits for an absent radio. `began_s`: start of the link's clock on
+    the monotonic clock. `load` compiles or loads the PHY.
     """
     check_airtime(config)
     access, backend = config.access, backend_of(config)
@@ -44,7 +44,7 @@ def make_modem(
         config.backend,
         listens=may_share(access, node_id),
         lead_grows=lambda traits: _has_slots(config, node_id, traits),
-        # In a recording, time begins with its first sample.
+        # In a recording, time starts with its first sample.
         began_s=None if backend is None or backend.starts_time else began_s,
         load=load,
     )
@@ -59,8 +59,8 @@ def make_radio(
 ) -> Radio:
     """The radio that `config.backend` names, at the modem's rate. Raises UserError.
 
-    No burst that it is given is longer than `longest_s`. `patience`: of a radio that is not there
-    when it is opened.
+    `longest_s` is the length of the longest burst that it will get. `patience`: how long opening
+    waits for an absent radio.
     """
     backend = backend_of(config)
     if backend is None:
@@ -85,7 +85,7 @@ def make_radio(
 
 
 def _has_slots(config: Config, node_id: int, traits: PduLinkTraits) -> bool:
-    """Whether access comes to tdma; what is refused shows when the link is fitted to the radio."""
+    """Whether the access policy will be tdma; errors show when the link is fitted to the radio."""
     longest_s = traits.longest_in_use_s(
         RateControl(config.rate, traits.needed_snr_db, traits.mcs).usable
     )
@@ -101,7 +101,7 @@ def _longest_burst_s(config: Config) -> float:
 
 
 def check_airtime(config: Config) -> None:
-    """Raise ConfigError where one PDU is on the air for so long that fragments are given up."""
+    """Raise ConfigError if one PDU takes so much airtime that receivers give up its message."""
     modem, size = config.modem, config.link.pdu_size
     airtime_s = phy.layout(phy.GRIDS[modem.grid], modem.mcs, 1, size).n_samples / modem.rate_hz
     if airtime_s > config.reassembly.timeout_s / 2:
@@ -114,9 +114,9 @@ def check_airtime(config: Config) -> None:
 
 
 def _channel(config: Config, seed: int) -> Channel:
-    """The simulated air; its noise is `snr_db` below bursts of the modem's own power.
+    """The simulated channel, with noise `snr_db` below bursts of the modem's own power.
 
-    That is in the modem's band: a faster radio hears more of it.
+    This holds in the modem's band; a radio at a higher sample rate receives more noise.
     """
     modem, air = config.modem, config.channel
     more_db = 10 * math.log10(modem.oversampling)

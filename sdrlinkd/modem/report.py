@@ -20,7 +20,7 @@ def modem_report(
 ) -> PduLinkReport:
     """The report of a modem and its radio.
 
-    `problem`: what ended the stream, if something did; `stream_end`: samples so far.
+    `problem` is why the stream ended, empty if it runs; `stream_end` is the number of samples.
     """
     levels = radio.levels
     reason = problem

@@ -1,4 +1,4 @@
-"""Where the receiver runs: on the radio's thread, on one of its own, or, in lock-step, at once."""
+"""Runs the receiver: on the radio's thread, on its own thread or, in lock-step, synchronously."""
 
 import asyncio
 import queue
@@ -12,34 +12,34 @@ from backends import RxBlock
 from sdrlinkd.modem.load import LoadMeter
 from sdrlinkd.modem.sensing_receiver import SensingReceiver
 
-# Blocks that may wait for the receiver.
+# Most blocks that wait for the receiver.
 MAX_BLOCKS = 16
 
 Deliver = Callable[[Sequence[phy.Event], int], None]
 
 
 class Demodulation(Protocol):
-    """Takes blocks; hands events, and the index after their block, to `deliver`."""
+    """Demodulates blocks; passes events, and the index after their block, to `deliver`."""
 
     load: LoadMeter
     wakes: bool
-    """Deliver after every block, also when it brought no events."""
+    """Whether to deliver after every block, even without events."""
 
     def hear(self, block: RxBlock) -> None:
-        """Demodulate a block now, on whatever thread calls."""
+        """Demodulate a block now, on the calling thread."""
 
     async def put(self, block: RxBlock) -> None:
-        """Hand over a block; may wait while too many are waiting already."""
+        """Hand over a block; may wait while too many blocks are queued."""
 
     async def finish(self) -> None:
-        """End the stream: deliver what its last samples hold."""
+        """End the stream, and deliver the events of its last samples."""
 
     def stop(self) -> None:
-        """End at once, whatever waits."""
+        """Stop at once, even if blocks are queued."""
 
 
 class ReceiverHere:
-    """Demodulates in `put`: in lock-step nothing goes on until it has."""
+    """Demodulates within `put`, for lock-step, where nothing proceeds until a block is done."""
 
     def __init__(self, receiving: SensingReceiver, rate_hz: float, deliver: Deliver) -> None:
         self._receiving = receiving
@@ -49,31 +49,31 @@ class ReceiverHere:
         self.wakes = True
 
     async def put(self, block: RxBlock) -> None:
-        """Demodulate a block, and do everything that follows from it."""
+        """Demodulate a block, and process everything that follows from it."""
         self.hear(block)
 
     def hear(self, block: RxBlock) -> None:
-        """Demodulate a block, and deliver what it completes."""
+        """Demodulate a block, and deliver the events that it completes."""
         began = time.thread_time()
         events = self._receiving.hear(block)
         self.load.add(time.thread_time() - began, block.n / self._rate_hz)
         self._deliver(events, block.index + block.n)
 
     async def finish(self) -> None:
-        """Deliver what the last samples hold."""
+        """Deliver the events of the last samples."""
         end = self._receiving.next_index
         self._deliver(self._receiving.flush(), end)
 
     def stop(self) -> None:
-        """End nothing: there is no thread."""
+        """Do nothing, as there is no thread."""
 
 
 class ReceiverThread:
-    """Demodulates on a thread: `deliver` is called on the event loop.
+    """Demodulates on a thread, and calls `deliver` on the event loop.
 
-    It is called when there are events, or while `wakes` is set. `hear` demodulates on the radio's
-    thread. What a radio does not bring there is `put`, and demodulated on a thread of our own. A
-    stream is heard, or put, as a whole.
+    `deliver` is called when there are events, or for every block while `wakes` is set. A radio that
+    calls `hear` has its blocks demodulated on its own thread. Blocks of other radios are passed to
+    `put` and demodulated on our thread. All blocks of a stream take the same way.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class ReceiverThread:
         self._thread = threading.Thread(target=self._work, name="phy-rx", daemon=True)
 
     def hear(self, block: RxBlock) -> None:
-        """Demodulate a block on the thread that calls."""
+        """Demodulate a block on the calling thread."""
         began = time.thread_time()
         events = self._receiving.hear(block)
         if block.samples is not None:
@@ -101,24 +101,24 @@ class ReceiverThread:
             self._call(self._deliver, events, block.index + block.n)
 
     async def put(self, block: RxBlock) -> None:
-        """Hand over a block; waits while too many are waiting already."""
+        """Hand over a block; waits while too many blocks are queued."""
         self._begin()
         while self._blocks.qsize() >= MAX_BLOCKS and not self._is_stopped:
             self._has_room.clear()
             self._is_waited_for = True
-            # The thread may have made room before it could see that somebody waits.
+            # The thread may have made room before it saw that this task waits.
             if self._blocks.qsize() > MAX_BLOCKS // 2:
                 await self._has_room.wait()
         self._blocks.put(block)
 
     async def finish(self) -> None:
-        """End the stream: deliver what its last samples hold, and end the thread."""
+        """End the stream and the thread, and deliver the events of the last samples."""
         self._begin()
         self._blocks.put(None)
         await self._ended.wait()
 
     def stop(self) -> None:
-        """End the thread, whatever waits; nobody has to wait for it any more."""
+        """End the thread, even if blocks are queued, and release a waiting `put`."""
         self._is_stopped = True
         self._blocks.put(None)
         if self._thread.ident:
@@ -132,7 +132,7 @@ class ReceiverThread:
     def _work(self) -> None:
         while (block := self._blocks.get()) is not None:
             self.hear(block)
-            # Not for every block: who waits is woken once half of the room is free.
+            # To avoid a wake-up per block, a waiting `put` resumes once half of the room is free.
             if self._is_waited_for and self._blocks.qsize() <= MAX_BLOCKS // 2:
                 self._is_waited_for = False
                 self._call(self._has_room.set)

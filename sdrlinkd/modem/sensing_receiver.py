@@ -1,4 +1,4 @@
-"""The receiver and the energy detector, fed block by block."""
+"""Feeds the receiver and the energy detector block by block."""
 
 from collections.abc import Sequence
 
@@ -6,12 +6,12 @@ import phy
 from backends import SENDING, RxBlock
 from sdrlinkd.link import Sensed
 
-# The energy of a burst whose header was read may seem to end this much later than it says.
+# The energy of a burst may seem to end later than its header says, by this many samples.
 TAIL = 2 * phy.SENSE_WINDOW
 
 
 class SensingReceiver:
-    """Takes samples; gives events and the state of the air. Hears in one thread."""
+    """Turns samples into events and the state of the channel; `hear` is for one thread only."""
 
     def __init__(
         self, receiver: phy.Receiver, sense: phy.EnergyDetector | None, rate_hz: float
@@ -21,16 +21,16 @@ class SensingReceiver:
         self._rate_hz = rate_hz
         self._unheard_until = 0
         self.sensed = Sensed() if sense is None else Sensed(until=0.0)
-        """The state of the air after the last block; may be read from any thread."""
+        """State of the channel after the last block; may be read from any thread."""
 
     def hear(self, block: RxBlock) -> Sequence[phy.Event]:
-        """Take a block; the events that it completes."""
+        """Take a block, and return the events that it completes."""
         if block.samples is None:
             events = self._receiver.gap(block.n)
             if self._sense is not None:
                 self._sense.gap(block.n)
                 if block.gap_reason != SENDING:
-                    # Who began to send in this gap may still be on the air.
+                    # A burst that started in this gap may still be on the air.
                     self._unheard_until = block.index + block.n
         else:
             events = self._receiver.push(block.samples)
@@ -41,7 +41,7 @@ class SensingReceiver:
         return events
 
     def flush(self) -> Sequence[phy.Event]:
-        """End the stream; the events that its last samples hold."""
+        """End the stream, and return the events of its last samples."""
         return self._receiver.flush()
 
     @property
@@ -59,6 +59,6 @@ class SensingReceiver:
         if energy_end > end + TAIL:
             end, burst_at = energy_end, None
             if energy_end + TAIL > until:
-                # It may well go on.
+                # The energy may continue, so the channel counts as busy.
                 end = until + 1
         return Sensed(until / rate, end / rate, burst_at)

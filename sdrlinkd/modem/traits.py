@@ -1,4 +1,4 @@
-"""What the link must know of a modem on a radio."""
+"""Derives the PDU link's traits from a radio and the modem's settings."""
 
 import math
 
@@ -9,19 +9,19 @@ from sdrlinkd.link import PduLinkTraits
 from sdrlinkd.modem.airtimes import Airtimes
 
 HANDOVER_S = 5e-4
-"""Seconds after which a burst composed for a free air begins: time to modulate it."""
+"""Time in s from composing a burst to its start on a free channel, for modulation."""
 STAMP_SAMPLES = 1.0
-"""Samples by which a preamble may be from where it is found."""
+"""Largest error of a detected preamble's position, in samples."""
 REACTION_S = 0.002
-"""Seconds from the last sample of a block to a decision that it leads to."""
+"""Time in s from the last sample of a block to a decision that follows from it."""
 
 
 def pdu_link_traits(
     kind: str, can: Capabilities, params: ModemParams, airtimes: Airtimes
 ) -> PduLinkTraits:
-    """What the link must know of a radio that `can` do this, with these parameters.
+    """The traits of a modem with these parameters, on a radio with the capabilities `can`.
 
-    In lock-step composing takes no time, but it happens only when there is a block.
+    In lock-step, composing takes no time but happens only once per block.
     """
     follow_s, pause_s, longest_s = can.tx_windows or TxWindows(0.0, 0.0, math.inf)
     return PduLinkTraits(
@@ -35,7 +35,7 @@ def pdu_link_traits(
         stamp_s=STAMP_SAMPLES / params.rate_hz + can.index_error_s,
         lead_s=can.lead_s + can.turnaround_s + (HANDOVER_S if can.paced else 0.0),
         react_s=can.block_s + (REACTION_S if can.paced else 0.0),
-        # A burst that begins within one window may show in the next one only.
+        # A burst that starts within one window may be detected only in the next one.
         detect_s=2 * phy.SENSE_WINDOW / params.rate_hz,
         overhead_s=airtimes.overhead_s,
         gap_s=GAP / params.rate_hz,

@@ -1,4 +1,4 @@
-"""Bursts on their way to the radio: modulated off the event loop, settled when they have left."""
+"""Sends bursts: modulates them off the event loop, and settles them once they have left."""
 
 import asyncio
 import math
@@ -16,7 +16,7 @@ from sdrlinkd.pdulink import PduListener
 
 INFINITE = float("inf")
 SHORT = 20_000
-"""Samples up to which a burst is modulated on the event loop: a thread and back takes longer."""
+"""Longest burst in samples that is modulated on the event loop: using a thread takes longer."""
 OUTCOMES = {
     TxOutcome.SENT: Outcome.SENT,
     TxOutcome.LATE: Outcome.LATE,
@@ -26,17 +26,17 @@ OUTCOMES = {
 
 
 class BurstReport(NamedTuple):
-    """What became of a burst, up to which index, and, in words, what went wrong."""
+    """The outcome of a burst, the index of its end and, in words, what went wrong."""
 
     outcome: Outcome
     end: int
     problem: str = ""
     start: int | None = None
-    """Index at which the burst began, if it left."""
+    """Index of the burst's first sample, if it left."""
 
 
 class Transmission:
-    """The sending half of the modem: modulates bursts and hands them to the radio."""
+    """The transmit side of the modem: modulates bursts and hands them to the radio."""
 
     def __init__(self, params: ModemParams, radio: Radio) -> None:
         self._radio = radio
@@ -55,17 +55,17 @@ class Transmission:
         self.counters = {"bursts_slipped": 0, "samples_sent": 0}
 
     def start(self, tasks: asyncio.TaskGroup, left: Callable[[Burst, BurstReport], None]) -> None:
-        """Begin to take bursts; `left` is told what became of each."""
+        """Start to accept bursts; `left` is called with the report of each."""
         self._tasks, self._left = tasks, left
         self._at_once = self._radio.capabilities.lockstep
 
     def send(self, burst: Burst, start: int) -> None:
-        """Send a burst that begins at index `start`."""
+        """Send a burst whose first sample has index `start`."""
         if self._tasks is None:
             raise RuntimeError("send before start")
         self.on_air.append(burst)
         known = (self._late, self._late_by_radio)
-        # While a burst is with the thread, a short one must not overtake it.
+        # A short burst must not overtake one that the thread still modulates.
         is_short = burst.airtime_s * self._rate_hz <= SHORT and not self._in_thread
         if self._at_once or is_short:
             answer = self._hand_over(burst, start, self._modulate(burst.pdus, burst.mcs), known)
@@ -75,20 +75,20 @@ class Transmission:
             self._tasks.create_task(self._transmit(burst, start, known))
 
     def lose(self, listener: PduListener, now: float) -> None:
-        """Settle all bursts on their way as lost: the radio is closed."""
+        """Settle all pending bursts as lost, as the radio is closed."""
         for burst in self.on_air:
             listener.settled(burst, Outcome.LOST, now)
         self.on_air.clear()
 
     def close(self) -> None:
-        """End the thread that modulates, once it is done."""
+        """Stop the modulating thread after its current burst."""
         self._thread.shutdown(wait=True, cancel_futures=True)
 
     async def _transmit(self, burst: Burst, start: int, known: tuple[int, int]) -> None:
         loop = asyncio.get_running_loop()
         try:
             if burst not in self.on_air:
-                # Lost already: the radio is closed.
+                # The burst is already settled as lost, as the radio is closed.
                 return
             samples = await loop.run_in_executor(
                 self._thread, self._modulate, burst.pdus, burst.mcs
@@ -100,16 +100,16 @@ class Transmission:
     def _hand_over(
         self, burst: Burst, start: int, samples: Samples, known: tuple[int, int]
     ) -> Awaitable[TxReport] | None:
-        """Hand a burst to the radio; None where it must not go, as one before it has to go again.
+        """Hand a burst to the radio; None if it must not overtake a late burst.
 
-        That is so where a burst not yet `known` to be late when this one was composed was late:
-        this one must not overtake it. The radio may have told already what has not been settled.
+        That is the case if a burst has become late that was not `known` to be late when this one
+        was composed. The radio's counter may show that before the late burst is settled.
         """
         latest = None
         if burst.latest != INFINITE:
             if known != (self._late, self._radio.counters["late"]):
                 return None
-            # `start` is where it was rounded to; between it and `latest` there may be no sample.
+            # `start` is rounded to a sample; `latest` may round to the same one.
             latest = start + math.floor((burst.latest - burst.start) * self._rate_hz)
         self.counters["samples_sent"] += len(samples)
         return self._radio.send(TxBurst(start, samples, latest))
@@ -137,7 +137,7 @@ class Transmission:
             self._left(burst, told)
 
     def _modulate(self, pdus: Sequence[bytes], mcs: int) -> Samples:
-        """The samples of a burst, with room for its peaks."""
+        """The samples of a burst, scaled to leave room for its peaks."""
         began = time.perf_counter()
         samples: Samples = self._transmitter.modulate(pdus, mcs) * self._amplitude
         self.tempo.note(len(samples), time.perf_counter() - began)

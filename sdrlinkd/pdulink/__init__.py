@@ -1,4 +1,4 @@
-"""PDU links: what carries PDUs between nodes, behind one seam; and the one without a radio."""
+"""PDU links, which carry PDUs between nodes: their common interface, and the direct link."""
 
 from sdrlinkd.pdulink.base import Carry, Heard, PduLink, PduListener
 from sdrlinkd.pdulink.direct import DirectLink

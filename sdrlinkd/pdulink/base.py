@@ -1,4 +1,4 @@
-"""The seam between the link and what carries its PDUs."""
+"""The interface between the link and its PDU link."""
 
 from collections.abc import Callable, Coroutine, Sequence
 from typing import NamedTuple, Protocol
@@ -8,9 +8,9 @@ from sdrlinkd.reports import PduLinkReport
 
 
 class Heard(NamedTuple):
-    """A PDU from the air: its bytes, when its burst's preamble arrived, and how good it was.
+    """A PDU from the air: its bytes, the time of its burst's preamble, and its SNR.
 
-    `ended_at` is when its last sample arrived; None: that takes no time.
+    `ended_at` is when its last sample arrived; None: at the same time.
     """
 
     data: bytes
@@ -20,25 +20,25 @@ class Heard(NamedTuple):
 
 
 class PduListener(Protocol):
-    """Whom a PDU link tells and asks. It is called on the event loop and must not wait."""
+    """The user of a PDU link. Its methods are called on the event loop and must not wait."""
 
     def attach(self, traits: PduLinkTraits) -> None:
-        """Fit to the PDU link, which is there now. Raises ConfigError when that does not do."""
+        """Fit to the PDU link, which has just opened. Raises ConfigError if it is not suitable."""
 
     def heard(self, pdus: Sequence[Heard]) -> None:
         """Take PDUs that have arrived."""
 
     def advance(self, now: float) -> None:
-        """Let time come so far; called where time is that of the samples and nobody's clock."""
+        """Advance to time `now`; called only in lock-step."""
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
-        """The burst that the PDU link shall send now; None: nothing, or not yet."""
+        """The burst to send now; None: nothing to send, or not yet."""
 
     def next_wakeup(self, now: float) -> float:
-        """When there may next be something to send; up to `now`: there is already."""
+        """Earliest time at which there may be something to send; if not after `now`: at once."""
 
     def settled(self, burst: Burst, outcome: Outcome, at: float) -> None:
-        """Take what became of a burst: its last bit left, or did not."""
+        """Take the outcome of a burst, which has left completely or not."""
 
 
 Carry = Callable[[], Coroutine[object, object, None]]
@@ -46,29 +46,29 @@ Carry = Callable[[], Coroutine[object, object, None]]
 
 
 class PduLink(Protocol):
-    """Carries PDUs: the direct link, a modem with a radio, a GNU Radio flowgraph.
+    """A PDU link carries PDUs: the direct link, a modem with a radio, a GNU Radio flowgraph.
 
-    It asks for a burst only at the moment that it can take one, never before.
+    It requests a burst only when it can take one, never earlier.
     """
 
     def now(self) -> float:
-        """Seconds on the link's clock."""
+        """Time in s on the link's clock."""
 
     async def open(self, listener: PduListener) -> Carry:
-        """Begin to listen, and tell the listener what there is; what carries PDUs from now on.
+        """Open the link, pass its traits to the listener, and return what carries PDUs.
 
-        Raises LinkAbsentError or LinkRefusedError where another try may succeed, and UserError
-        where a person has to mend something first. Then it can only be closed.
+        Raises LinkAbsentError or LinkRefusedError if another try may succeed, and UserError if a
+        person has to fix something first. After an error, the link can only be closed.
         """
 
     def wake(self) -> None:
-        """Look again for something to send."""
+        """Check again whether there is something to send."""
 
     async def idle(self) -> None:
-        """Wait until every burst taken is settled."""
+        """Wait until every burst handed over is settled."""
 
     async def close(self) -> None:
-        """Stop; closing twice is fine. What has not left is settled as lost."""
+        """Close the link, also repeatedly; bursts that have not left are settled as lost."""
 
     def report(self) -> PduLinkReport:
         """The state of the PDU link, and its counters."""

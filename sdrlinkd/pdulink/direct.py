@@ -1,4 +1,4 @@
-"""The direct link: PDUs come straight back, as in the paper's loopback without a PHY."""
+"""The direct link, which returns PDUs to this node, as in the paper's loopback without a PHY."""
 
 import asyncio
 import time
@@ -15,7 +15,7 @@ from sdrlinkd.reports import PduLinkReport
 
 
 class DirectLink:
-    """Loops bursts back to this node, paced and impaired as configured."""
+    """A PDU link that loops bursts back to this node, paced and impaired as configured."""
 
     def __init__(self, params: DirectParams, pdu_size: int, rng: Random) -> None:
         self._params = params
@@ -33,17 +33,17 @@ class DirectLink:
         self._all_settled.set()
 
     def now(self) -> float:
-        """Seconds of the monotonic clock: there are no samples to count."""
+        """Time in s of the monotonic clock, as there are no samples to count."""
         return time.monotonic()
 
     async def open(self, listener: PduListener) -> Carry:
-        """Attach the listener: there is nothing to open."""
+        """Attach the listener; there is nothing to open."""
         self._listener = listener
         listener.attach(PduLinkTraits())
         return partial(self._carry, listener)
 
     async def _carry(self, listener: PduListener) -> None:
-        """Ask for a burst when the one before has left, but never without a turn of the loop."""
+        """Request a burst when the last one has left, but always after a turn of the event loop."""
         while True:
             await asyncio.sleep(max(0.0, self._free_at - self.now()))
             self._bell.hush()
@@ -55,7 +55,7 @@ class DirectLink:
             await self._bell.wait(max(0.0, listener.next_wakeup(start) - start))
 
     def wake(self) -> None:
-        """Look again for something to send."""
+        """Check again whether there is something to send."""
         self._bell.ring()
 
     def _airtime_s(self, _: int, n_pdus: int) -> float:
@@ -68,7 +68,7 @@ class DirectLink:
         return int(min(most, airtime_s / self._airtime_per_pdu_s))
 
     def _send(self, burst: Burst, start: float) -> None:
-        """Put a burst on its way; its PDUs arrive when the last of them has left."""
+        """Send a burst; its PDUs arrive when the last of them has left."""
         airtime_s = self._airtime_per_pdu_s * len(burst.pdus)
         self._free_at = start + airtime_s
         self._pdus += len(burst.pdus)
@@ -80,11 +80,11 @@ class DirectLink:
             self._left(burst, start)
 
     async def idle(self) -> None:
-        """Wait until every burst taken is settled."""
+        """Wait until every burst handed over is settled."""
         await self._all_settled.wait()
 
     async def close(self) -> None:
-        """Stop; what is still on its way is lost."""
+        """Close the link; PDUs in transit are lost."""
         listener, self._listener = self._listener, None
         for timer in self._timers:
             timer.cancel()

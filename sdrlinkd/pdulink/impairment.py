@@ -1,4 +1,4 @@
-"""What happens to a PDU between two nodes, as a seeded calculator."""
+"""Simulates what happens to a PDU between two nodes, with a seeded random generator."""
 
 from random import Random
 from typing import NamedTuple
@@ -14,7 +14,7 @@ class Arrival(NamedTuple):
 
 
 class Impairment:
-    """Loses, delays, reorders, duplicates and corrupts PDUs; counts what it did."""
+    """Loses, delays, reorders, duplicates and corrupts PDUs, and counts each effect."""
 
     def __init__(self, params: DirectParams, rng: Random) -> None:
         self._params = params
@@ -25,7 +25,7 @@ class Impairment:
         self.counters = {"lost": 0, "duplicated": 0, "corrupted": 0}
 
     def arrivals(self, data: bytes) -> list[Arrival]:
-        """How often, when and in what shape a PDU arrives."""
+        """The copies of a PDU that arrive, with their delays and content; empty if it is lost."""
         if self._clean:
             return [Arrival(0.0, data)]
         params, chance = self._params, self._rng.random

@@ -1,4 +1,4 @@
-"""Whether traffic fits the air, before anything is sent."""
+"""Predicts whether traffic fits the channel, before anything is sent."""
 
 from sdrlinkd.plan.air import Setting
 from sdrlinkd.plan.model import ClassPlan, Plan, TopicPlan, make_plan

@@ -1,4 +1,4 @@
-"""What to change where the air cannot carry the traffic. What is told has been tried."""
+"""Advice on what to change if the channel cannot carry the traffic; all advice is verified."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -6,17 +6,17 @@ from collections.abc import Callable, Sequence
 from sdrlinkd.plan.traffic import Load
 
 LEAST = 0.02
-"""Share of a topic's messages; to send less than this of them is not worth the advice."""
+"""Smallest share of a topic's messages that the advice may leave."""
 STEPS = 10
 
 Carries = Callable[[Sequence[Load]], bool]
-"""Whether the air carries these loads."""
+"""Returns whether the channel carries the given loads."""
 
 
 def slower(loads: Sequence[Load], asked: Sequence[float], carries: Carries) -> str:
-    """Advice on which topic to send how often.
+    """Advice on which topics to send less often.
 
-    `asked`: what each takes, as a share of what the air carries.
+    `asked` has the airtime of each topic, as a share of what the channel carries.
     """
     largest = max(range(len(loads)), key=asked.__getitem__)
     name, faster = loads[largest].name, "use a higher MCS or rate"
@@ -40,7 +40,7 @@ def _periods(loads: Sequence[Load]) -> str:
 
 
 def _most(loads: Sequence[Load], which: set[int], carries: Carries) -> list[Load] | None:
-    """`loads`, with `which` as often as the air carries them; None where that is hardly ever."""
+    """`loads` with those in `which` as frequent as the channel carries; None if below LEAST."""
     found, low, high = None, LEAST, 1.0
     factor = low
     for _ in range(STEPS):
@@ -59,6 +59,6 @@ def _most(loads: Sequence[Load], which: set[int], carries: Carries) -> list[Load
 
 
 def _up(value: float) -> float:
-    """`value` in three digits, never less."""
+    """`value` rounded up to three digits."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 2)
     return float(f"{math.ceil(value / unit - 1e-9) * unit:.6g}")

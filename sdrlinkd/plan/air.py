@@ -1,4 +1,4 @@
-"""What the topics of a plan share."""
+"""The setting that all topics of a plan share."""
 
 from typing import NamedTuple
 
@@ -7,9 +7,10 @@ from sdrlinkd.modem import Airtimes
 
 
 class Setting(NamedTuple):
-    """What all loads of a plan share; times in s.
+    """The setting of a plan, common to all loads; times are in s.
 
-    No burst is longer than `longest_s`; `host_s` is what the machines at both ends add at most.
+    `longest_s` is the length of the longest burst, and `host_s` the largest latency that the
+    machines at both ends add.
     """
 
     airtimes: Airtimes
@@ -22,7 +23,7 @@ class Setting(NamedTuple):
     traits: PduLinkTraits
     host_s: float
     notes: tuple[str, ...] = ()
-    """What a person should know of how this was planned."""
+    """What a person should know about the assumptions of the plan, in sentences."""
 
     @property
     def one_s(self) -> float:
@@ -31,5 +32,5 @@ class Setting(NamedTuple):
 
     @property
     def each_s(self) -> float:
-        """Time in s that a further PDU takes in a burst."""
+        """Time in s that each further PDU adds to a burst."""
         return self.airtimes.airtime_s(self.mcs, 2) - self.one_s

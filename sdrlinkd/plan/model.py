@@ -1,4 +1,4 @@
-"""Airtime and worst-case latency of topics, and what to change where the air cannot carry them."""
+"""Computes the airtime and worst-case latency of topics, with advice if they do not fit."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -19,11 +19,11 @@ from sdrlinkd.plan.traffic import LeftOut, Load, after_policy
 from sdrlinkd.wire import ENTRY_HEADER_SIZE, STAMP_SIZE, equal_payload, fragment_count
 
 FULL = 0.95
-"""Share of the air; more than this cannot be relied on."""
+"""Largest share of airtime that a plan may use."""
 
 
 class TopicPlan(NamedTuple):
-    """A topic in the plan: its share of the air, PDUs a message, worst latency and its bound."""
+    """A topic in the plan: its share of airtime, PDUs per message, and worst-case latency."""
 
     name: str
     qos: str
@@ -37,30 +37,30 @@ class TopicPlan(NamedTuple):
 
     @property
     def is_late(self) -> bool:
-        """Whether messages can be worthless before they arrive."""
+        """Whether messages can exceed their lifespan before they arrive."""
         return self.worst_s > self.lifespan_s
 
 
 class ClassPlan(NamedTuple):
-    """A class in the plan: the share of the air of all its topics."""
+    """A class in the plan: the share of airtime of all its topics."""
 
     qos: str
     air: float
 
 
 class Plan(NamedTuple):
-    """What is to be expected; `advice` says what to change where it is not feasible."""
+    """A plan; `advice` says what to change if it is not feasible."""
 
     topics: list[TopicPlan]
     classes: list[ClassPlan]
     air: float
-    """Share of what the policy lets pass that all robots together ask for."""
+    """Airtime that all robots together need, as a share of what the access policy leaves them."""
     is_feasible: bool
     advice: list[str]
     robots: int = 1
     policy: str = "none"
     carries: float = 1.0
-    """Share of the air that bursts can take with that policy on this radio."""
+    """Share of airtime that bursts can use with the access policy on this radio."""
     notes: list[str] = []  # noqa: RUF012  # never changed
     left_out: list[LeftOut] = []  # noqa: RUF012
 
@@ -71,7 +71,7 @@ def make_plan(
     setting: Setting,
     left_out: Sequence[LeftOut] = (),
 ) -> Plan:
-    """The plan for every robot sending the same `loads` under these policies."""
+    """The plan if every robot sends the same `loads` under these policies."""
     given = ((load, policies.get(load.topic_id, DEFAULT_POLICY)) for load in loads)
     known = [(after_policy(load, policy), policy) for load, policy in given]
     topics, asked = _judged(known, setting)
@@ -95,7 +95,7 @@ def make_plan(
 def _judged(
     known: Sequence[tuple[Load, TopicPolicy]], setting: Setting
 ) -> tuple[list[TopicPlan], list[float]]:
-    """Each topic, and what all robots take for it of what the policy lets pass."""
+    """(topics, airtime of all robots for each as a share of what the access policy leaves them)."""
     burst_s = min(setting.longest_s, _backlog_s(known, setting))
     supply = supply_of(setting.settled, setting.traits, setting.robots, burst_s, setting.each_s)
     tasks = [_task(load, policy, known, setting, supply) for load, policy in known]
@@ -116,7 +116,7 @@ def _is_carried(topics: Sequence[TopicPlan], asked: Sequence[float]) -> bool:
 
 
 def _backlog_s(known: Sequence[tuple[Load, TopicPolicy]], setting: Setting) -> float:
-    """Length in s of a burst that has one message of each topic."""
+    """Airtime in s of one message of each topic, in one burst."""
     pdus = sum(_pdus(load.largest, setting.pdu_size, policy.stamp) for load, policy in known)
     return setting.one_s + (pdus - 1) * setting.each_s
 
@@ -127,7 +127,7 @@ def _task(
 ) -> Task:  # fmt: skip
     qos = QOS_BY_LABEL[policy.qos]
     one_s, each_s = setting.one_s, setting.each_s
-    # What is foreseen cuts bulk into bursts.
+    # Predictable urgent messages cut bulk messages into several bursts.
     beats = sum(other.rate_hz for other, how in known if QOS_BY_LABEL[how.qos] < qos)
     most = max(1, setting.airtimes.most_pdus(setting.mcs, setting.longest_s))
     gap_s = setting.traits.gap_s
@@ -144,7 +144,7 @@ def _task(
 
 
 def _pdus(size: float, pdu_size: int, stamp: bool) -> int:
-    """Number of PDUs of a message that has them to itself."""
+    """Number of PDUs of a message that does not share them."""
     k = equal_payload(pdu_size, 1)
     whole = max(1, math.ceil(size))
     n = fragment_count(whole, k)

@@ -1,9 +1,9 @@
 """Worst-case latency of periodic topics, by response-time analysis.
 
-A message waits for what is more urgent and for one burst of what is not (Joseph and Pandya 1986,
-with blocking): `R = G + B + C + Σ ⌈R / T_j⌉ C_j` over all topics j that go before it, where G is
-what a turn is waited for, and all else is served in turns. Where R is longer than the topic's own
-period, its next messages are looked at, too (Lehoczky 1990).
+A message waits for more urgent messages and for one burst of less urgent ones (Joseph and Pandya
+1986, with blocking): `R = G + B + C + Σ ⌈R / T_j⌉ C_j` over all topics j served before it. G is the
+wait for a turn, B the blocking, C the message's own airtime; all but G is served in turns. If R is
+longer than the topic's own period, its next messages are analyzed, too (Lehoczky 1990).
 """
 
 import math
@@ -18,17 +18,19 @@ from sdrlinkd.plan.traffic import Load
 FOREVER = float("inf")
 ROUNDS = 5000
 MOST_WAITING = 200
-"""Messages of one topic that may wait; with more, there is no end."""
+"""Most messages of one topic that may wait; with more, the latency counts as unbounded."""
 RECORDS_S, RECORDS = 1.0, 0.02
-"""Seconds for one PDU of a beacon's records; share of the air for CLOCKs and RECEIPTs of all."""
+"""Period in s of one PDU with a beacon's records, and share of airtime for all CLOCKs and RECEIPTs.
+"""
 LEVEL = Qos.LATENCY
-"""Up to this class, robots go before others' lower ones; within a level, they take turns."""
+"""Least urgent class of the higher level, which all robots serve first; within a level they take
+turns."""
 
 
 class Task(NamedTuple):
-    """A topic as the analysis sees it: a message takes `cost_s` of air, every `period_s`.
+    """A topic in the analysis: a message takes `cost_s` of airtime, every `period_s`.
 
-    The largest message takes `most_s`, in so many `bursts`.
+    The largest message takes `most_s`, in `bursts` bursts.
     """
 
     load: Load
@@ -43,7 +45,7 @@ class Task(NamedTuple):
 
 
 def worst_s(task: Task, tasks: Sequence[Task], setting: Setting, supply: Supply) -> float:
-    """The largest age in s at which a message of `task` is handed over; infinity: no end."""
+    """Largest age in s at which a message of `task` is handed over; infinity: unbounded."""
     lower = [other for other in tasks if other.rank > task.rank]
     before = [other for other in tasks if other.rank <= task.rank and other is not task]
     beside = _beside(task, lower, supply)
@@ -51,7 +53,7 @@ def worst_s(task: Task, tasks: Sequence[Task], setting: Setting, supply: Supply)
     if demand * (1 + supply.others) > supply.share:
         return FOREVER
     found_s, done_s = 0.0, 0.0
-    # Where one is not done before the next comes, a later one of the same topic may be the latest.
+    # If a message is not done before the next one comes, a later one may have the largest latency.
     for number in range(1, MOST_WAITING):
         rest_s = supply.gap_s + _blocked_s(task, before, lower, setting, supply)
         done_s = _done_s(number, rest_s, task, before, beside, setting, supply)
@@ -66,20 +68,20 @@ def worst_s(task: Task, tasks: Sequence[Task], setting: Setting, supply: Supply)
 def _blocked_s(
     task: Task, before: Sequence[Task], lower: Sequence[Task], setting: Setting, supply: Supply
 ) -> float:
-    """The longest wait in s for what has begun: a beacon, or a burst of what is less urgent."""
+    """Longest wait in s for a burst that has begun: a beacon, or less urgent messages."""
     blocked_s = setting.one_s
     if lower:
         blocked_s = min(setting.longest_s, max(other.most_s for other in lower))
         if task.qos < max(other.qos for other in lower):
-            # Periodic topics are foreseen: it ends about when they are due, as far as blocks tell.
+            # Periodic topics are predicted, so the burst ends about when they are due.
             blocked_s = (SHARED_OVERRUN if supply.others else OVERRUN) * setting.each_s
             blocked_s += 0.0 if setting.traits.is_lockstep else setting.traits.react_s
             often = setting.one_s * sum(1 / each.period_s for each in (task, *before)) > IDLE_SHARE
             if often or supply.closed_s:
-                # The air is not kept free for so much, nor for what comes while it is another's.
+                # The channel is not kept free for so frequent messages, nor in others' turns.
                 blocked_s = setting.one_s
     if supply.others:
-        # A burst of another robot has begun.
+        # Another robot may have begun a burst, too.
         blocked_s += min(setting.longest_s, max((t.most_s for t in lower), default=setting.one_s))
     return blocked_s
 
@@ -88,7 +90,7 @@ def _done_s(
     number: int, rest_s: float, task: Task, before: Sequence[Task], beside: Sequence[Task],
     setting: Setting, supply: Supply,
 ) -> float:  # fmt: skip
-    """When `number` messages of a topic are through that come from 0 on, one a period, in s."""
+    """Time in s at which `number` messages of a topic, one per period from 0 on, are sent."""
     robots = 1 + supply.others
     own_s = number * (task.most_s + task.bursts * supply.passed_s)
     until_s = rest_s + supply.takes(own_s)
@@ -97,7 +99,7 @@ def _done_s(
             math.ceil(until_s / other.period_s) * other.most_s * robots for other in before
         )
         busy_s += supply.others * math.ceil(until_s / task.period_s) * task.most_s
-        # Keeping the air free for them costs what does not fill a PDU.
+        # Keeping the channel free for them wastes the time that does not fill a PDU.
         idle_s = sum(
             math.ceil(until_s / other.period_s) * setting.each_s / 2
             for other in before
@@ -124,14 +126,14 @@ def _done_s(
 
 
 def _level(task: Task) -> bool:
-    """Whether a topic is of the lower level, which lets the other level go first on all robots."""
+    """Whether a topic is of the lower level, which all robots serve after the higher one."""
     return task.qos > LEVEL
 
 
 def _beside(task: Task, lower: Sequence[Task], supply: Supply) -> list[Task]:
-    """Tasks less urgent, of which other robots send all the same while this one waits.
+    """Less urgent tasks that other robots send while `task` waits.
 
-    Within a level, robots take turns whatever they have.
+    Within a level, robots take turns regardless of what they send.
     """
     return [other for other in lower if supply.others and _level(other) == _level(task)]
 
@@ -139,7 +141,7 @@ def _beside(task: Task, lower: Sequence[Task], supply: Supply) -> list[Task]:
 def _between_s(
     worst_s: float, turns: int, beside: Sequence[Task], setting: Setting, supply: Supply
 ) -> float:
-    """Time in s of other robots' bursts `beside`: one each before our turns, or all there are."""
+    """Airtime in s of other robots' tasks `beside`: one burst each per turn of ours, or all."""
     if not beside:
         return 0.0
     longest_s = min(setting.longest_s, max(other.most_s for other in beside))

@@ -1,4 +1,4 @@
-"""What a configuration says of the air, as a plan needs it."""
+"""Derives the setting of a plan from a configuration."""
 
 from random import Random
 
@@ -11,8 +11,8 @@ from sdrlinkd.modem import PresumedRadio, presume_radio
 from sdrlinkd.plan.air import Setting
 
 HOST_S = 0.01
-"""What the machines at both ends add, at most: buses, event loops and demodulation, on a machine
-with two cores that has something else to do, too."""
+"""Largest latency in s that the machines at both ends add (buses, event loops and demodulation), on
+a machine with two cores that also runs other programs."""
 
 
 LAST_ID = 254
@@ -25,9 +25,9 @@ def setting_of(
     turnaround_s: float | None = None,
     host_s: float = HOST_S,
 ) -> Setting:
-    """The setting for as many robots as access.nodes lists, or `robots`; all send the same.
+    """The setting for `robots` robots (default: as access.nodes lists), which all send the same.
 
-    `turnaround_s`: of the radio, if not as configured. Raises UserError, ConfigError.
+    `turnaround_s` replaces the radio's configured turnaround. Raises UserError, ConfigError.
     """
     radio = presume_radio(config, turnaround_s)
     access = config.access

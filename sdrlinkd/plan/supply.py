@@ -1,4 +1,4 @@
-"""When a robot's radio gets to the air: what a message waits before its turn, and between turns."""
+"""Models when a robot may send: the wait for a turn, and between turns."""
 
 import math
 from typing import NamedTuple
@@ -7,18 +7,19 @@ from sdrlinkd.link import PduLinkTraits, Qos, Settled
 
 INFINITE = float("inf")
 SECTIONS = 2
-"""Sections of mini-slots: the higher level, and the lower."""
+"""Number of sections of mini-slots: the higher level and the lower."""
 RARE = 0.01
-"""Share of waits; csma draws by chance, and a wait that only so many exceed counts as longest."""
+"""Share of csma's random waits that may exceed the wait that counts as the longest."""
 
 
 class Supply(NamedTuple):
-    """When a robot may send, with times in s.
+    """When a robot may send; times are in s.
 
-    `gap_s`: from a message that has just missed its chance to the first sample that can be its own,
-    on an air that is otherwise idle. A turn then lasts `open_s`, and the next begins `closed_s`
-    after it. `pause_s`: before each burst at the least, by class; `others`: robots whose bursts
-    come between ours; each of ours waits for `passed_s` of mini-slots that are let pass.
+    `gap_s` is the longest time, on an otherwise idle channel, from a message that has just missed
+    its turn to its first possible sample. A turn then lasts `open_s`, and the next one starts
+    `closed_s` after it. `pause_s` is the shortest pause before each burst, by class. `others` is
+    the number of robots whose bursts come between ours. Each of our bursts waits for `passed_s`
+    while unused mini-slots pass.
     """
 
     gap_s: float
@@ -30,11 +31,11 @@ class Supply(NamedTuple):
 
     @property
     def share(self) -> float:
-        """Share of the time that is this robot's own."""
+        """Share of the time in which this robot may send."""
         return 1.0 if self.open_s == INFINITE else self.open_s / (self.open_s + self.closed_s)
 
     def takes(self, demand_s: float) -> float:
-        """Time in s from the begin of a turn to the end of `demand_s` on the air."""
+        """Time in s from the start of a turn until `demand_s` of airtime is served."""
         if self.open_s == INFINITE:
             return demand_s
         turns = max(0, math.ceil(demand_s / self.open_s - 1e-9) - 1)
@@ -46,7 +47,7 @@ def supply_of(
 ) -> Supply:
     """The supply of one of `robots`.
 
-    `burst_s`: the longest burst of its own, `pdu_s`: one PDU in it.
+    `burst_s` is the length of its longest burst, `pdu_s` that of one PDU.
     """
     access = settled.access
     decided_s = traits.lead_s + traits.ahead_s
@@ -59,13 +60,13 @@ def supply_of(
         gap_s = access.round_s - slot_s + missed_s + decided_s + traits.react_s
         return Supply(gap_s, open_s, access.round_s - open_s)
     if traits.tx_window_s < INFINITE:
-        # Too late for a TX window is who comes `follow` before it ends.
+        # A message that comes less than `follow` before the end of a TX window misses it.
         closed_s = traits.tx_window_follow_s + traits.rx_window_s
         return Supply(closed_s, traits.tx_window_s, closed_s)
     if settled.policy == "minislot":
         slot_s = access.pause_s
         pauses = tuple(slot_s * (1 + robots * (qos > Qos.LATENCY)) for qos in Qos)
-        # On an idle air, up to a whole round; two robots may wish for one at the same time.
+        # On an idle channel, wait up to a whole round; two robots may want the same one.
         return Supply(
             access.round_s + decided_s, pause_s=pauses, passed_s=robots * slot_s, others=robots - 1
         )
@@ -77,9 +78,9 @@ def supply_of(
 def _one_window_a_slot(
     traits: PduLinkTraits, round_s: float, open_s: float, burst_s: float
 ) -> Supply:
-    """The supply where a radio sends one TX window in a slot, and none in turns within its pause.
+    """The supply of a radio that sends one TX window per slot, and none within its pause.
 
-    Where the pause between TX windows is longer than what others have in between, turns are lost.
+    If the pause between TX windows is longer than the others' slots in between, turns are lost.
     """
     frames = max(1, math.ceil((burst_s + traits.rx_window_s) / round_s))
     return Supply(frames * round_s + traits.tx_window_follow_s, open_s, frames * round_s - open_s)
@@ -88,6 +89,6 @@ def _one_window_a_slot(
 def _by_chance(settled: Settled, robots: int, decided_s: float) -> Supply:
     access = settled.access
     waits = tuple(access.mean_wait_s(qos) for qos in Qos)
-    # Slots passed are geometric: ln(1/RARE) times their mean are exceeded by so many.
+    # The slots passed are geometric, so a share of RARE exceeds ln(1/RARE) times their mean.
     longest_s = math.log(1 / RARE) * max(waits)
     return Supply(longest_s + decided_s, pause_s=waits, others=robots - 1)

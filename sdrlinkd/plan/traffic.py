@@ -1,4 +1,4 @@
-"""What producers will send: as a person says, or as a recording shows."""
+"""The traffic of producers, as given by a person or taken from a recording."""
 
 import math
 import re
@@ -13,11 +13,11 @@ from sdrlinkd.wire import Registry
 
 _LOAD = re.compile(r"/?([\w/]+):([0-9.]+)(?:hz)?:([0-9.]+[a-z]*)", re.IGNORECASE)
 SAMPLES = 50
-"""Messages of a recording that are compressed to see what they become."""
+"""Number of messages of a recording that are compressed to estimate sizes."""
 
 
 class Load(NamedTuple):
-    """A topic's messages a second, and bytes of a typical and of the largest, as on the air."""
+    """A topic's load: messages per second, and typical and largest size in bytes on the air."""
 
     topic_id: int
     name: str
@@ -27,7 +27,7 @@ class Load(NamedTuple):
 
 
 class LeftOut(NamedTuple):
-    """A topic of a recording that is not planned, and why."""
+    """A topic of a recording that is left out of the plan, and why."""
 
     name: str
     messages: int
@@ -35,7 +35,7 @@ class LeftOut(NamedTuple):
 
 
 def parse_load(text: str, registry: Registry) -> Load:
-    """A load written as `scan:50:1KB`: topic, messages a second, bytes. Raises UserError."""
+    """A load written as `scan:50:1KB`: topic, messages per second, size. Raises UserError."""
     found = _LOAD.fullmatch(text.replace(" ", ""))
     topic = registry.by_name(found[1]) if found else None
     if found is None or float(found[2]) <= 0:
@@ -55,9 +55,9 @@ def loads_from_bag(
     policies: Mapping[int, TopicPolicy],
     taken: Collection[str] = (),
 ) -> tuple[list[Load], list[LeftOut]]:
-    """Loads from (topic, time in s, payload) of a recording, compressed as policies say.
+    """Loads of a recording, given as (topic, time in s, payload), with the policies' compression.
 
-    `taken`: registry names that the daemon takes from the bus; empty: all.
+    `taken` has the registry names of topics that the daemon takes from the bus; empty: all.
     """
     times: dict[int, list[float]] = defaultdict(list)
     sizes: dict[int, list[int]] = defaultdict(list)
@@ -90,7 +90,7 @@ def loads_from_bag(
 
 
 def after_policy(load: Load, policy: TopicPolicy) -> Load:
-    """The load that is left when it is throttled and decimated."""
+    """The load that remains after throttling and decimation by `policy`."""
     rate_hz = load.rate_hz / policy.decimate
     if policy.period_s:
         rate_hz = min(rate_hz, 1 / policy.period_s)

@@ -1,6 +1,6 @@
 """The wire format, version 0: PDUs, entries, control records, registry, reassembly.
 
-Bytes in, fields out, and back. The document beside this file says what the bytes mean.
+It converts bytes to fields and back. README.md in this folder (the wire document) defines them.
 """
 
 from sdrlinkd.wire.builder import VERSION, PduBuilder, build_full

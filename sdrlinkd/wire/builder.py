@@ -1,4 +1,4 @@
-"""Filling a PDU entry by entry, up to its capacity."""
+"""Fills a PDU entry by entry, up to its capacity."""
 
 import binascii
 import struct
@@ -19,16 +19,15 @@ _SOLE = struct.Struct(">9BH")
 
 @lru_cache(maxsize=8)
 def _budgets(pdu_size: int) -> tuple[int, ...]:
-    """`entry_budget` for 0 to 15 entries, and 0 for a sixteenth."""
+    """`entry_budget` for 0 to 15 entries, followed by 0 for 16 entries."""
     return (*(entry_budget(pdu_size, n) for n in range(MAX_ENTRIES + 1)), 0)
 
 
 class PduBuilder:
-    """Fills a PDU and knows the bytes left; what to put in is the caller's business.
+    """Fills a PDU and tracks the bytes left; the caller decides on the content.
 
-    `room` is the payload that one more entry could have, `room_beside_stamp` that which it could
-    have if a STAMP were added as well; negative: none fits. Control records join in one entry, the
-    last.
+    `room` is the largest payload of one more entry, and `room_beside_stamp` the largest one if a
+    STAMP is added, too; negative: no entry fits. All control records share one entry, the last.
     """
 
     __slots__ = (
@@ -53,7 +52,7 @@ class PduBuilder:
         return not self._topic_ids and not self._records
 
     def add(self, topic_id: int, entry_id: int, index: int, total: int, payload: bytes) -> None:
-        """Add an entry. Raises ValueError when it does not fit or a field is out of range."""
+        """Add an entry. Raises ValueError if it does not fit or a field is out of range."""
         size = len(payload)
         if size > self.room or index >= total or not 0 <= topic_id <= 15:
             raise ValueError(
@@ -70,7 +69,7 @@ class PduBuilder:
         self._note_room()
 
     def add_record(self, record: bytes) -> bool:
-        """Add a control record; False, and nothing is added, when it does not fit."""
+        """Add a control record; returns False, without adding it, if it does not fit."""
         n = len(self._topic_ids) + 1
         size = self._records_size + len(record)
         if n > MAX_ENTRIES or self._used + ENTRY_HEADER_SIZE + size > self._budgets[n]:
@@ -81,19 +80,19 @@ class PduBuilder:
         return True
 
     def add_stamp(self, topic_id: int, entry_id: int, age_us: int, asks: bool = False) -> bool:
-        """Add a STAMP record; False when it does not fit. `asks`: its sender wants a RECEIPT.
+        """Add a STAMP record; False if it does not fit. `asks`: the sender wants a RECEIPT.
 
-        Every message has one, so it is built without the detour by `build_records`.
+        Every message has a STAMP, so for speed it is built without `build_records`.
         """
         value_size = STAMP_SIZE - TLV_HEADER_SIZE + asks
         record = STAMP_RECORD.pack(RecordType.STAMP, value_size, topic_id, entry_id, age_us)
         return self.add_record(record + ASKS if asks else record)
 
     def _note_room(self) -> None:
-        """Bring `room` and `room_beside_stamp` up to date."""
+        """Update `room` and `room_beside_stamp`."""
         budgets, size = self._budgets, self._records_size
         n = len(self._topic_ids)
-        # With a control entry: its header, its records, and one entry more in the count.
+        # A control entry takes its header, its records, and one more entry in the count.
         with_control = budgets[min(n + 2, MAX_ENTRIES + 1)] - self._used - size
         self.room_beside_stamp = with_control - STAMP_SIZE - 2 * ENTRY_HEADER_SIZE
         if size:
@@ -104,7 +103,7 @@ class PduBuilder:
     def build(
         self, flags: int, src: int, dst: int, seq: int, hop: int, control_entry_id: int = 0
     ) -> bytes:
-        """The PDU's octets. Raises ValueError without entries, or for a field out of range."""
+        """The PDU's octets. Raises ValueError if it has no entries or a field is out of range."""
         ids = self._topic_ids
         if self._records:
             header = ENTRY_HEADER.pack(control_entry_id, 0, 1, self._records_size)
@@ -134,7 +133,7 @@ def build_full(
     flags: int, src: int, dst: int, seq: int, hop: int,
     topic_id: int, entry_id: int, index: int, total: int, payload: bytes,
 ) -> bytes:  # fmt: skip
-    """The octets of a PDU with one entry and no PAD, from fields that are in range."""
+    """The octets of a PDU with one entry and no PAD; fields must be in range."""
     body = b"".join(
         (
             _SOLE.pack(flags, src, dst, seq, hop << 4 | 1, topic_id << 4, entry_id, index, total,

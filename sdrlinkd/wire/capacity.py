@@ -1,4 +1,4 @@
-"""How many bytes fit: the arithmetic of a PDU (paper section 5.2).
+"""The arithmetic of a PDU: how many bytes fit (paper section 5.2).
 
 `pdu_size` is the paper's P_max, `n` its E (entries in a PDU), `k` its k_i (payload bytes of an
 entry). All results are bytes.
@@ -14,7 +14,7 @@ MAX_PDU_SIZE = 2047
 
 
 def entry_budget(pdu_size: int, n: int) -> int:
-    """Bytes left for `n` entry records, headers included: B = P_max − (7 + ⌈n/2⌉)."""
+    """Bytes left for `n` entry records, including their headers: B = P_max − (7 + ⌈n/2⌉)."""
     return pdu_size - (HEADER_SIZE + (n + 1) // 2 + CRC_SIZE)
 
 
@@ -24,7 +24,7 @@ def equal_payload(pdu_size: int, n: int) -> int:
 
 
 def pad_length(pdu_size: int, payload_sizes: list[int]) -> int:
-    """Zero bytes before the CRC, L_pad (paper section 5.3); negative when it does not fit."""
+    """Zero bytes before the CRC, L_pad (paper section 5.3); negative if the entries do not fit."""
     n = len(payload_sizes)
     return entry_budget(pdu_size, n) - sum(ENTRY_HEADER_SIZE + k for k in payload_sizes)
 
@@ -35,5 +35,5 @@ def max_message_size(pdu_size: int) -> int:
 
 
 def fragment_count(size: int, k: int) -> int:
-    """Fragments of at most `k` bytes for a message of `size` bytes; an empty message has one."""
+    """Number of fragments of at most `k` bytes for `size` bytes; an empty message has one."""
     return max(1, -(-size // k))

@@ -16,11 +16,11 @@ NO_AGE = 0xFFFF
 RECEIPT_UNIT_US = 100
 RECEIPT_UNIT_S = RECEIPT_UNIT_US / 1e6
 MAX_SINCE = 0xFFFF
-"""Largest time in a RECEIPT, in its unit of 0.1 ms."""
+"""Largest time in a RECEIPT, in units of 0.1 ms."""
 
 
 class RecordType(IntEnum):
-    """Type of a record, its first octet. Numbers are never reused."""
+    """Type of a control record, its first octet; numbers are never reused."""
 
     STAMP = 1
     BEACON = 2
@@ -34,7 +34,7 @@ class RecordType(IntEnum):
 
 
 class Stamp(NamedTuple):
-    """Age of a message at this burst's preamble, in µs; `asks`: its sender wants a RECEIPT."""
+    """STAMP record: age of a message at its burst's preamble in µs; `asks`: a RECEIPT is wanted."""
 
     topic_id: int
     entry_id: int
@@ -43,16 +43,16 @@ class Stamp(NamedTuple):
 
 
 class Beacon(NamedTuple):
-    """A sign of life: `boot_id` changes with every start, `number` counts up modulo 2^16."""
+    """BEACON record: `boot_id` changes with every start, `number` counts up modulo 2^16."""
 
     boot_id: int
     number: int
 
 
 class LinkReport(NamedTuple):
-    """How well the sender of this record hears `node` (wire document, 6.3).
+    """LINK_REPORT record: how well its sender hears `node` (wire document, 6.3).
 
-    SNR is in quarter decibels (signed), PER in 1/255; `mcs` is what the sender would like to hear.
+    SNR is in quarter decibels (signed), PER in 1/255; `mcs` is the MCS that the sender suggests.
     """
 
     node: int
@@ -62,10 +62,11 @@ class LinkReport(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """The TDMA schedule that the sender keeps (wire document, 6.4).
+    """FRAME record: the TDMA schedule that its sender keeps (wire document, 6.4).
 
-    It tells whose schedule it is, over how many hops it came, which it is, and where it stands: µs
-    since the frame began, at this burst's preamble.
+    `root` is the robot whose schedule it is, `level` the number of hops from there, `schedule` an
+    identification of its times, and `phase_us` the time in µs since the frame's start at this
+    burst's preamble.
     """
 
     root: int
@@ -75,10 +76,10 @@ class Frame(NamedTuple):
 
 
 class Receipt(NamedTuple):
-    """What became of a message of `node` here (wire document, 6.7).
+    """RECEIPT record: what became of a message of `node` at the sender (wire document, 6.7).
 
-    `node` 255 is whoever this PDU is for. The message's age then (65535: not known, or older) and
-    what has passed since are in 0.1 ms.
+    `node` 255 means the destination of this PDU. The message's age at that time (65535: unknown or
+    older) and the time since then are in units of 0.1 ms.
     """
 
     topic_id: int
@@ -90,9 +91,10 @@ class Receipt(NamedTuple):
 
 
 class Waits(NamedTuple):
-    """Shares, in 1/255, of what messages of a topic waited at their source (wire document, 6.8).
+    """WAITS record: shares, in 1/255, of the wait of a topic's messages at their source.
 
-    They waited in the queue, for the air, and for another chance after a burst that did not leave.
+    They waited in the queue, for the channel, and for a retry after a burst that did not leave
+    (wire document, 6.8).
     """
 
     topic_id: int
@@ -102,9 +104,9 @@ class Waits(NamedTuple):
 
 
 class Parity(NamedTuple):
-    """Octets from `at` on of parity fragment `number` of a message (wire document, 6.5).
+    """PARITY record: octets from `at` on of a message's parity fragment `number`.
 
-    The message has `total` fragments of `k` octets, and `size` octets in all.
+    The message has `total` fragments of `k` octets, and `size` octets in all (wire document, 6.5).
     """
 
     topic_id: int
@@ -137,19 +139,19 @@ _FORMATS = {
     RecordType.FRAME: struct.Struct(">BBHI"),
     RecordType.WAITS: struct.Struct(">BBBB"),
 }
-# Fields behind those that a record always has.
+# Optional octets after the fields that a record always has.
 ASKS = b"\x01"
 _WHOSE = struct.Struct(">BHH")
-# What the parser needs of a type, by its number: the fields' class and format.
+# By type number: the class and the format of a record's fields, for the parser.
 _KNOWN = {int(number): (kind, _FORMATS[number]) for kind, number in _TYPES.items()}
 
 _PARITY = struct.Struct(">BBBBBHHI")
 PARITY_OVERHEAD = TLV_HEADER_SIZE + _PARITY.size
-"""Octets of a PARITY record beside its octets of parity."""
+"""Octets of a PARITY record without its parity."""
 STAMP_SIZE = TLV_HEADER_SIZE + _FORMATS[RecordType.STAMP].size
 STAMP_RECORD = struct.Struct(">BBBBI")
 ASKING_STAMP_SIZE = STAMP_SIZE + len(ASKS)
-# Octets that a record's value always has, by its type's number.
+# Smallest length of a record's value in octets, by type number.
 _LEAST = {
     **{int(number): fields.size for number, fields in _FORMATS.items()},
     int(RecordType.DIGEST): RegistryDigest.OVERALL_SIZE,
@@ -159,15 +161,15 @@ _LEAST = {
 
 
 def build_records(records: Iterable[Record]) -> bytes:
-    """The payload of one control entry. Raises ValueError when a field is out of range."""
+    """The payload of one control entry. Raises ValueError if a field is out of range."""
     return b"".join(_build(record) for record in records)
 
 
 def record_spans(octets: bytes | bytearray, begin: int, end: int) -> list[tuple[int, int, int]]:
-    """(type, where the value begins, its length) of records in a payload `octets[begin:end]`.
+    """(type, start of the value, its length) of the records in the payload `octets[begin:end]`.
 
-    Raises PduError (rx_control_bad) when a record overruns the payload or is too short for its
-    type: then none of them is used.
+    Raises PduError (rx_control_bad) if a record overruns the payload or is too short for its type;
+    then none of them is used.
     """
     spans = []
     at = begin
@@ -188,8 +190,8 @@ def record_spans(octets: bytes | bytearray, begin: int, end: int) -> list[tuple[
 def parse_records(payload: bytes) -> list[Record]:
     """The records in a control entry's payload; unknown types are skipped.
 
-    A known record may be longer than we know it: later versions append fields. Raises PduError
-    as `record_spans` does.
+    A known record may be longer than expected, as later versions append fields. Raises PduError
+    like `record_spans`.
     """
     records: list[Record] = []
     for number, at, length in record_spans(payload, 0, len(payload)):
@@ -244,7 +246,7 @@ def _fixed(record: FixedRecord, number: RecordType) -> bytes:
 
 
 def _with_more(record: FixedRecord, more: bytes) -> FixedRecord:
-    """The record with fields behind those that its type always has; unknown ones are left out."""
+    """The record with the optional fields in `more`; unknown fields are ignored."""
     if isinstance(record, Stamp):
         return record._replace(asks=bool(more[0] & ASKS[0]))
     if isinstance(record, Receipt) and len(more) >= _WHOSE.size:

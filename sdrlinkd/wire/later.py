@@ -1,4 +1,4 @@
-"""A PDU that leaves later than it was made for: postponed, or forwarded by a relay."""
+"""Adjusts a PDU that leaves later than planned: postponed, or forwarded by a relay."""
 
 import struct
 from binascii import crc_hqx
@@ -18,21 +18,21 @@ from sdrlinkd.wire.control import (
 from sdrlinkd.wire.pdu import identity
 from sdrlinkd.wire.registry import CONTROL_TOPIC_ID
 
-# Where in a record's value the time stands that counts up to the burst's preamble.
+# Offset in a record's value of the time that counts up to the burst's preamble.
 _AGE, _PHASE = 2, 4
 _POSTPONED = {int(RecordType.STAMP): _AGE, int(RecordType.FRAME): _PHASE}
-# The schedule is told by those who keep it.
+# A relay does not adjust FRAME: each robot announces the schedule itself.
 _FORWARDED = {int(RecordType.STAMP): _AGE}
 _U32 = struct.Struct(">I")
-# RECEIPT counts up in a smaller field, and not always.
+# The time in a RECEIPT has a smaller field, and may be absent.
 _SINCE, _SINCE_END = 6, 8
 _U16 = struct.Struct(">H")
 HOP = 4
-"""Octet of hops left and number of entries."""
+"""Index of the octet with the hops left and the number of entries."""
 
 
 def postponed(pdu: bytes, by_us: int) -> bytes:
-    """A PDU of our own, with control channel, as it is when its burst leaves `by_us` µs later."""
+    """A PDU of our own, with control channel, adjusted for a burst that leaves `by_us` µs later."""
     data = bytearray(pdu)
     _move(data, by_us, _POSTPONED)
     for kind, at, length in _records(data):
@@ -43,9 +43,9 @@ def postponed(pdu: bytes, by_us: int) -> bytes:
 
 
 def forwarded(pdu: bytes, by_us: int, has_control: bool) -> bytes:
-    """A good PDU of another node with a hop less, in a burst `by_us` µs after the one it came in.
+    """A valid PDU of another node with one hop less, sent `by_us` µs after the burst it came in.
 
-    Raises ValueError when it has no hop to spare.
+    Raises ValueError if it has no hop left.
     """
     data = bytearray(pdu)
     if data[HOP] >> 4 < 2:
@@ -57,10 +57,10 @@ def forwarded(pdu: bytes, by_us: int, has_control: bool) -> bytes:
 
 
 def lasting_identity(pdu: bytes) -> tuple[int, int, int]:
-    """`identity` of a good PDU with control channel, ages in its STAMPs taken as zero.
+    """`identity` of a valid PDU with control channel, with the ages in its STAMPs taken as zero.
 
-    A relay adds to those ages what it held the PDU for. CRC-16 is linear: the share of four octets
-    is that of the same in a body of zeros.
+    A relay adds the time for which it held the PDU to those ages. CRC-16 is linear, so the
+    contribution of four octets is their CRC in a body of zeros.
     """
     src, seq, crc = identity(pdu)
     end = len(pdu) - CRC_SIZE
@@ -70,7 +70,7 @@ def lasting_identity(pdu: bytes) -> tuple[int, int, int]:
 
 
 def _times(pdu: bytes | bytearray, kinds: dict[int, int]) -> Iterator[int]:
-    """Where in a good PDU the times of records of `kinds` stand."""
+    """Indices in a valid PDU of the times in records of `kinds`."""
     for kind, at, _ in _records(pdu):
         offset = kinds.get(kind)
         if offset is not None:
@@ -78,9 +78,9 @@ def _times(pdu: bytes | bytearray, kinds: dict[int, int]) -> Iterator[int]:
 
 
 def _records(pdu: bytes | bytearray) -> Iterator[tuple[int, int, int]]:
-    """(type, where the value begins, its length) of all records in a good PDU.
+    """(type, start of the value, its length) of all records in a valid PDU.
 
-    Control entries that cannot be read have none.
+    Unreadable control entries are skipped.
     """
     n_entries = HEADER.unpack_from(pdu)[HOP] & 0x0F
     at = HEADER_SIZE + (n_entries + 1) // 2

@@ -18,7 +18,7 @@ from sdrlinkd.wire.capacity import CRC_SIZE, ENTRY_HEADER_SIZE, HEADER_SIZE
 
 
 class Entry(NamedTuple):
-    """One fragment of a message: entry `index` of `total` under (topic id, entry id)."""
+    """One entry of a PDU: fragment `index` of `total` of message (topic id, entry id)."""
 
     topic_id: int
     entry_id: int
@@ -28,7 +28,7 @@ class Entry(NamedTuple):
 
 
 class Pdu(NamedTuple):
-    """The fields of a PDU. `qos` is the two-bit Q field, `hop` the hops left."""
+    """The fields of a PDU; `qos` is the two-bit Q field, `hop` the hops left."""
 
     qos: int
     compressed: bool
@@ -42,7 +42,7 @@ class Pdu(NamedTuple):
 def build(pdu: Pdu, pdu_size: int) -> bytes:
     """The PDU as exactly `pdu_size` bytes.
 
-    Raises ValueError when a field is out of range or the entries do not fit: the sender's bug.
+    Raises ValueError if a field is out of range or the entries do not fit, a bug of the sender.
     """
     if not 0 <= pdu.qos <= 3:
         raise ValueError(f"qos is {pdu.qos}, allowed 0 to 3")
@@ -53,7 +53,7 @@ def build(pdu: Pdu, pdu_size: int) -> bytes:
 
 
 def flags(qos: int, compressed: bool = False) -> int:
-    """The first octet of a PDU of this version."""
+    """The first octet of a PDU of this version, with its class and compression flag."""
     return VERSION << 4 | qos << 2 | (FLAG_COMPRESSED if compressed else 0)
 
 
@@ -66,7 +66,7 @@ def parse(data: bytes, pdu_size: int) -> Pdu:
     if len(data) != pdu_size:
         raise PduError("rx_short", f"{len(data)} bytes where a PDU has {pdu_size}")
     end = pdu_size - CRC_SIZE
-    # A CRC with no final xor over data and its own CRC leaves zero.
+    # Without a final xor, the CRC over data and its own CRC is zero.
     if binascii.crc_hqx(data, 0):
         raise PduError("rx_crc", "CRC-16 does not match")
     first, src, dst, seq, hop_count = HEADER.unpack_from(data)
@@ -102,10 +102,10 @@ def parse(data: bytes, pdu_size: int) -> Pdu:
 
 
 def identity(data: bytes) -> tuple[int, int, int]:
-    """(src, seq, CRC with the hop nibble taken as zero): what makes two receptions one PDU.
+    """(src, seq, CRC with the hop nibble taken as zero), equal for all receptions of one PDU.
 
-    A relay changes the hop nibble and with it the CRC. CRC-16 is linear, so the share of the
-    nibble is taken out again with one look-up instead of a second pass over the PDU.
+    A relay changes the hop nibble and with it the CRC. CRC-16 is linear, so one table look-up
+    removes the nibble's contribution, without a second pass over the PDU.
     """
     crc = data[-2] << 8 | data[-1]
     return data[1], data[3], crc ^ _hop_shares(len(data))[data[4] >> 4]
@@ -113,6 +113,6 @@ def identity(data: bytes) -> tuple[int, int, int]:
 
 @lru_cache(maxsize=8)
 def _hop_shares(pdu_size: int) -> tuple[int, ...]:
-    """CRC of a body that is zero but for each of the 16 hop nibbles."""
+    """CRCs of bodies that are zero except for the hop nibble, for its 16 values."""
     rest = bytes(pdu_size - HEADER_SIZE - CRC_SIZE)
     return tuple(binascii.crc_hqx(bytes((0, 0, 0, 0, hop << 4)) + rest, 0) for hop in range(16))

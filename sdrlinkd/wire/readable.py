@@ -1,4 +1,4 @@
-"""What the control entries of a PDU say, without those that cannot be read (section 6)."""
+"""Reads the control entries of a PDU, and skips unreadable ones (wire document, section 6)."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from sdrlinkd.wire.registry import CONTROL_TOPIC_ID
 
 
 class ControlEntries(NamedTuple):
-    """`records` of the entries that can be read, of `n_entries`; `n_bad` cannot."""
+    """The `records` of all readable control entries; `n_bad` of the `n_entries` are unreadable."""
 
     records: list[Record]
     n_entries: int
@@ -19,7 +19,7 @@ class ControlEntries(NamedTuple):
 def read_control_entries(pdu: Pdu) -> ControlEntries:
     """The control entries of a PDU with control channel.
 
-    An entry that cannot be read costs itself, and all of it.
+    An unreadable entry is skipped completely; the other entries are still used.
     """
     records: list[Record] = []
     n_entries = n_bad = 0

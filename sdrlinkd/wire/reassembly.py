@@ -1,4 +1,4 @@
-"""Fragments back into messages (wire document, section 5.3)."""
+"""Joins fragments into messages (wire document, section 5.3)."""
 
 from collections import OrderedDict
 from dataclasses import dataclass, field
@@ -7,21 +7,21 @@ from typing import NamedTuple
 from sdrlinkd.wire.control import Parity
 from sdrlinkd.wire.pdu import Entry
 
-# What a held fragment costs beside its payload, so that many tiny ones count too.
+# Memory in bytes counted for an incomplete message besides its payload, so that tiny ones count.
 PARTIAL_OVERHEAD = 512
 FRAGMENT_OVERHEAD = 128
 
 
 @dataclass(frozen=True, slots=True)
 class ReassemblyLimits:
-    """How long and how much the receiver keeps of incomplete messages."""
+    """How long, and in how much memory, the receiver keeps incomplete messages."""
 
     timeout_s: float = 1.0
-    """Seconds without a new fragment after which a message is given up."""
+    """Time in s without a new fragment after which a message is given up."""
     source_bytes: int = 1 << 20
-    """Most memory for one source, overheads included."""
+    """Largest memory for one source in bytes, including overhead."""
     total_bytes: int = 8 << 20
-    """Most memory for all sources together."""
+    """Largest memory for all sources together in bytes, including overhead."""
 
 
 class Lost(NamedTuple):
@@ -35,7 +35,7 @@ class Lost(NamedTuple):
 
 @dataclass(slots=True)
 class Partial:
-    """A message that is not complete yet: its fragments by number."""
+    """An incomplete message, with its fragments by number."""
 
     total: int
     touched_at: float
@@ -43,9 +43,9 @@ class Partial:
     parts: dict[int, bytes] = field(default_factory=dict)
     cost: int = PARTIAL_OVERHEAD
     shape: tuple[int, int, int] | None = None
-    """(parity fragments, octets of a fragment, octets of the message), when parity came."""
+    """(number of parity fragments, octets of a fragment, octets of the message) of the parity."""
     parity: dict[int, dict[int, bytes]] = field(default_factory=dict)
-    """Pieces of parity fragments: by where they begin, by number."""
+    """Pieces of parity fragments, by offset and then by number."""
 
 
 @dataclass(slots=True)
@@ -55,26 +55,26 @@ class _Source:
 
 
 class Reassembly:
-    """Joins fragments per (source, topic id, entry id), in any order, duplicates ignored.
+    """Joins fragments per (source, topic id, entry id), in any order, and ignores duplicates.
 
-    The oldest activity stands first in each source's table, so timeouts and evictions look at
-    fronts only. What is given up appears in `take_lost`.
+    Each source's table is ordered by last activity, the oldest first, so timeouts and evictions
+    check only its front. `take_lost` returns the messages that were given up.
     """
 
     def __init__(self, limits: ReassemblyLimits) -> None:
         self._limits = limits
         self._sources: dict[int, _Source] = {}
-        # Given up and not taken yet; see `take_lost`.
+        # Messages given up and not yet returned by `take_lost`.
         self.lost: list[Lost] = []
         self._next_expiry = float("inf")
         self.held_bytes = 0
         self.held = 0
         self.started = 0
         self.began_at = 0.0
-        """When the first fragment came of the message that `add` returned last."""
+        """Arrival time of the first fragment of the message that `add` returned last."""
 
     def add(self, src: int, entry: Entry, now: float) -> bytes | None:
-        """Take one entry; the whole message when it is the last missing one, else None."""
+        """Take one entry; returns the message if that completes it, else None."""
         topic_id, entry_id, index, total, payload = entry
         source = self._sources.get(src)
         if total == 1:
@@ -88,7 +88,7 @@ class Reassembly:
         key = (topic_id, entry_id)
         partial = source.partials.get(key)
         if partial is not None:
-            # Never add to what the sender may have forgotten: its entry id can be another's now.
+            # After the timeout, the sender may use the entry id for another message.
             if self._is_silent(partial, now):
                 self._give_up(src, source, key, "rx_partial_timeout")
                 partial = None
@@ -109,7 +109,10 @@ class Reassembly:
         return None
 
     def hold(self, src: int, parity: Parity, now: float) -> Partial | None:
-        """Keep parity with its message; None where that is awaited no more, or does not agree."""
+        """Keep parity with its incomplete message and return that message.
+
+        None if no such message is held, or if the parity is not new or does not match it.
+        """
         source, key = self._sources.get(src), (parity.topic_id, parity.entry_id)
         partial = None if source is None else source.partials.get(key)
         if source is None or partial is None or self._is_silent(partial, now):
@@ -129,7 +132,7 @@ class Reassembly:
         return source.partials.get(key)
 
     def expire(self, now: float) -> None:
-        """Give up messages that have been silent for the timeout."""
+        """Give up messages without a new fragment for the timeout."""
         if now < self._next_expiry:
             return
         self._next_expiry = float("inf")
@@ -145,19 +148,19 @@ class Reassembly:
                 del self._sources[src]
 
     def holds(self, src: int, topic_id: int, entry_id: int) -> bool:
-        """Whether fragments of a message are kept."""
+        """Whether fragments of a message are held."""
         source = self._sources.get(src)
         return source is not None and (topic_id, entry_id) in source.partials
 
     def take_lost(self) -> list[Lost]:
-        """The messages that were given up since the last call."""
+        """The messages given up since the last call."""
         lost, self.lost = self.lost, []
         return lost
 
     def _keep(
         self, src: int, source: _Source, key: tuple[int, int], n_bytes: int, now: float
     ) -> None:
-        """Note that something came for a message that waits, and keep within the bounds."""
+        """Note that `n_bytes` came for an incomplete message, and enforce the memory limits."""
         partial = source.partials[key]
         partial.touched_at = now
         source.partials.move_to_end(key)

@@ -1,4 +1,4 @@
-"""The topic registry: which name and type each topic id stands for (wire document, section 7)."""
+"""The topic registry: the name and type of each topic id (wire document, section 7)."""
 
 import hashlib
 import re
@@ -12,17 +12,17 @@ from sdrlinkd.errors import RegistryError
 MAX_TOPICS = 16
 CONTROL_TOPIC_ID = 0xF
 BROADCAST = 0xFF
-"""The robot id that means everyone."""
+"""The robot id that means all robots."""
 
 _NAME = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _TYPE = re.compile(r"([A-Za-z]\w*)/(?:msg/)?([A-Za-z]\w*)", re.ASCII)
-# A line before the first topic; the latter is the paper's.
+# Accepted header lines; the second one is the paper's.
 _HEADERS = (["name", "type"], ["topic", "type"])
 
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """A line of the registry. `name` has no leading slash; `type` reads `pkg/msg/Name`."""
+    """A line of the registry; `name` has no leading slash, `type` has the form `pkg/msg/Name`."""
 
     id: int
     name: str
@@ -31,7 +31,7 @@ class Topic:
 
 @dataclass(frozen=True, slots=True)
 class RegistryDigest:
-    """What two nodes compare: 8 bytes over all, and one byte for each topic to name the culprit."""
+    """Digest by which two nodes compare registries: 8 bytes over all, and one byte per topic."""
 
     overall: bytes
     per_topic: bytes
@@ -44,11 +44,11 @@ class RegistryDigest:
         return cls(value[: cls.OVERALL_SIZE], value[cls.OVERALL_SIZE :])
 
     def shortened(self) -> "RegistryDigest":
-        """The digest without the octets by topic, for PDUs too small for them."""
+        """The digest without the octets per topic, for PDUs too small for them."""
         return RegistryDigest(self.overall, b"")
 
     def differing_ids(self, other: "RegistryDigest") -> list[int]:
-        """Topic ids on which the two registries disagree, as far as single octets can tell."""
+        """Topic ids that differ between two registries, as far as single octets show."""
         if self.overall == other.overall or not (self.per_topic and other.per_topic):
             return []
         most = max(len(self.per_topic), len(other.per_topic))
@@ -59,7 +59,7 @@ class RegistryDigest:
 
 
 class Registry:
-    """Name ↔ topic id, both ways. Topic ids are the order of the lines."""
+    """Maps names to topic ids and back; topic ids follow the order of the lines."""
 
     def __init__(self, topics: Sequence[Topic]) -> None:
         self.topics = tuple(topics)
@@ -70,7 +70,7 @@ class Registry:
 
     @property
     def has_control(self) -> bool:
-        """Whether topic id 0xF is the control channel: unless the registry needs all sixteen."""
+        """Whether topic id 0xF is the control channel, i.e. the registry has at most 15 topics."""
         return len(self.topics) < MAX_TOPICS
 
     def by_id(self, topic_id: int) -> Topic | None:
@@ -82,7 +82,7 @@ class Registry:
         return self._by_name.get(name.removeprefix("/"))
 
     def suggest(self, name: str) -> str:
-        """What a person who wrote `name` may have meant; for error messages."""
+        """A suggestion for error messages, of the name that `name` may be meant to be."""
         close = get_close_matches(name.removeprefix("/"), self._by_name, n=1)
         hint = f"; did you mean {close[0]}?" if close else ""
         return f"the registry has {', '.join(self._by_name) or 'no topics'}{hint}"
@@ -109,10 +109,10 @@ class Registry:
 
 
 def parse_registry(text: str, source: str = "registry") -> Registry:
-    """The registry in CSV text: one `name,type` a line (wire document, 7.1).
+    """The registry in CSV text, with one `name,type` per line (wire document, 7.1).
 
-    Empty lines and `#` comments are skipped, and a header `name,type` or `Topic, Type`. Raises
-    RegistryError that cites `source` and the line.
+    Empty lines, `#` comments and a header `name,type` or `Topic, Type` are skipped. Raises
+    RegistryError, which cites `source` and the line.
     """
     pairs: list[tuple[str, str, str]] = []
     for number, raw in enumerate(text.removeprefix("\ufeff").split("\n"), start=1):
@@ -130,7 +130,7 @@ def parse_registry(text: str, source: str = "registry") -> Registry:
 
 
 def make_registry(pairs: Iterable[tuple[str, str]], source: str = "registry") -> Registry:
-    """The registry of (name, type) pairs. Raises RegistryError as `parse_registry` does."""
+    """The registry of (name, type) pairs. Raises RegistryError like `parse_registry`."""
     return _assemble([(name, kind, source) for name, kind in pairs], source)
 
 

@@ -1,4 +1,4 @@
-"""What can still be read of damaged recordings. The readers of rosbags need whole files."""
+"""Reads the intact part of damaged bags, as the readers of rosbags need intact files."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -22,7 +22,7 @@ _PER_MESSAGE = re.compile(r"compression_mode:\s*[\'\"]?message", re.IGNORECASE)
 
 
 def looks_cut(path: Path) -> bool:
-    """Whether a database in `path` is shorter than it says; SQLite would read zeros there."""
+    """Whether a database in `path` is shorter than its header says; SQLite would read zeros."""
     return any(sqlite.is_cut(file) for file in _files(path) if file.suffix == ".db3")
 
 
@@ -49,7 +49,7 @@ def _readable_part(file: Path) -> Iterator[Piece]:
     except GeneratorExit:
         raise
     except Exception:
-        # Where a damaged file stops making sense, its readable part ends.
+        # The readable part of a damaged file ends where parsing fails.
         return
 
 

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 
 class Piece(NamedTuple):
-    """A message that could still be read; `definition` only where the bag's format needs it."""
+    """A message that could be read; `definition` is set only if the bag's format needs it."""
 
     topic: str
     type: str

@@ -15,7 +15,7 @@ _RECORD = struct.Struct("<BQ")
 
 
 def salvage(path: Path) -> Iterator[Piece]:
-    """Every message up to the point where the file ends or stops making sense."""
+    """Every message up to the point where the file ends or parsing fails."""
     data = path.read_bytes()
     if not data.startswith(MAGIC):
         return
@@ -56,7 +56,7 @@ def _records(data: bytes, *, cut_chunks: bool) -> Iterator[tuple[int, bytes]]:
 
 
 def _inflate(chunk: bytes) -> bytes:
-    """The records of a chunk, as many as its compressed bytes still yield."""
+    """The records of a chunk, as far as its compressed bytes can be decompressed."""
     try:
         compression, at = _text(chunk, 28)
         packed = chunk[at + 8 :]

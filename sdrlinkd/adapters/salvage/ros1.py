@@ -16,7 +16,7 @@ Fields = dict[bytes, bytes]
 
 
 def salvage(path: Path) -> Iterator[Piece]:
-    """Every message up to the point where the file ends or stops making sense."""
+    """Every message up to the point where the file ends or parsing fails."""
     data = path.read_bytes()
     if not data.startswith(MAGIC):
         return
@@ -52,14 +52,14 @@ def _records(data: bytes) -> Iterator[tuple[Fields, bytes]]:
         if not header:
             return
         content, at = _sized(data, at)
-        # A cut chunk still holds records; a cut message is none.
+        # A truncated chunk still has usable records, but a truncated message is lost.
         if at > len(data) and header.get(b"op") != bytes((_CHUNK,)):
             return
         yield header, content
 
 
 def _sized(data: bytes, at: int) -> tuple[bytes, int]:
-    """(a field that follows its length, index after it); it is cut where the file ends."""
+    """(field that follows its length, index after it); the end of the file may cut the field."""
     if at + 4 > len(data):
         return b"", len(data) + 1
     end = at + 4 + struct.unpack_from("<I", data, at)[0]

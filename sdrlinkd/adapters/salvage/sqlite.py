@@ -24,13 +24,13 @@ def is_cut(path: Path) -> bool:
 
 
 def salvage(path: Path) -> Iterator[Piece]:
-    """Every row before the first page that is missing or makes no sense."""
+    """Every row before the first page that is missing or cannot be parsed."""
     page_size, _ = _layout(path)
     if page_size < MIN_PAGE_SIZE:
         return
     with tempfile.TemporaryDirectory() as folder:
-        # SQLite refuses a file with fewer pages than its header says; of a copy that says what
-        # there is, it reads all rows but those that reach into missing pages.
+        # SQLite refuses a file with fewer pages than its header says. With a corrected header in a
+        # copy, it reads all rows except those that extend into missing pages.
         copy = Path(folder) / "copy.db3"
         shutil.copyfile(path, copy)
         pages = copy.stat().st_size // page_size
@@ -55,7 +55,7 @@ def _rows(database: sqlite3.Connection) -> Iterator[Piece]:
 
 
 def _layout(path: Path) -> tuple[int, int]:
-    """(page size in bytes, pages) by the header; zeros where there is none."""
+    """(page size in bytes, number of pages) from the header; zeros if there is none."""
     with path.open("rb") as file:
         header = file.read(_HEADER_BYTES)
     if len(header) < _HEADER_BYTES or not header.startswith(b"SQLite format 3\0"):

@@ -1,4 +1,4 @@
-"""What commands show, and how it is laid out. Every figure comes from the reports."""
+"""The layout of the commands' screens; every figure comes from the reports."""
 
 from sdrlinkd.cli.screens.daemons import daemons_table
 from sdrlinkd.cli.screens.figures import (

@@ -11,7 +11,7 @@ from sdrlinkd.tables import NOTHING, FittedTable, figure, words
 
 
 def daemons_table(found: Sequence[tuple[str, int | None, Snapshot | str]]) -> FittedTable:
-    """A table with a row for each daemon: (runtime directory, process id, snapshot or problem)."""
+    """A table with a row per daemon: (runtime directory, process id, snapshot or problem)."""
     table = FittedTable(
         "",
         (

@@ -1,4 +1,4 @@
-"""How figures are written on all screens."""
+"""Formats figures in the same way on all screens."""
 
 from sdrlinkd.reports import ClockReport
 from sdrlinkd.tables import NOTHING
@@ -7,14 +7,14 @@ BLOCKS = "▁▂▃▄▅▆▇█"
 
 
 def milliseconds(value: float | None) -> str:
-    """An age or a delay in ms, with decimals below 100."""
+    """An age or a delay in ms as text, with decimals below 100."""
     if value is None:
         return NOTHING
     return f"{value:.2f}" if value < 100 else f"{value:.0f}"
 
 
 def duration(seconds: float) -> str:
-    """A time span as people say it, from a number of seconds."""
+    """A time span, given in s, as text for people."""
     if seconds < 60:
         return f"{seconds:.1f} s"
     if seconds < 3600:
@@ -31,12 +31,12 @@ def size(n_bytes: float) -> str:
 
 
 def rate(per_s: float) -> str:
-    """A number of things a second; nothing for 0."""
+    """A rate per second; empty for 0."""
     return f"{per_s:.1f}" if per_s else NOTHING
 
 
 def bytes_rate(per_s: float) -> str:
-    """A number of bytes a second; nothing for 0."""
+    """A rate in bytes per second; empty for 0."""
     return f"{size(per_s)}/s" if per_s else NOTHING
 
 
@@ -58,7 +58,7 @@ def clock_state(clock: ClockReport) -> str:
 
 
 def sparkline(values: list[float | None], low: float, high: float, width: int) -> str:
-    """The last `width` values as little columns between `low` and `high`; a gap where None."""
+    """The last `width` values as small bars between `low` and `high`; None leaves a gap."""
     drawn = []
     for value in values[-width:]:
         if value is None:

@@ -1,4 +1,4 @@
-"""The screen of `latency`: where the time goes, as figures and as a waterfall."""
+"""The screen of `latency`: the parts of the delay, as figures and as a waterfall."""
 
 from collections.abc import Callable, Sequence
 
@@ -18,7 +18,7 @@ PARTS = (
     ("air", "air_ms", "█", "blue"),
     ("rx", "handover_ms", "·", "green"),
 )
-"""Name, field, character and colour of each part, in the order of time."""
+"""Name, field, character and colour of each part, in order of time."""
 MEANING = (
     "queue: for others before it; access: for the air; again: after a burst that did not leave; "
     "frags: from its first fragment to its last; air: the last one; rx: demodulated and given to "
@@ -29,7 +29,7 @@ MEANING = (
 def latency_screen(
     link: LinkReport, heard: Sequence[ReceivedTopicReport], *, whole: bool
 ) -> list[RenderableType]:
-    """The waterfalls of `heard`, with all percentiles if `whole`, and the clocks below them."""
+    """The waterfalls of `heard`, with all percentiles if `whole`, followed by the clocks."""
     timed = [(each, each.latency) for each in heard if each.latency is not None]
     clocks = _clocks(link)
     if not timed:
@@ -80,7 +80,7 @@ def _waterfall(latency: LatencyReport, longest_ms: float) -> Callable[[int], Tex
 
 def _part_ms(latency: LatencyReport, field: str) -> float | None:
     if field == "unsplit_ms":
-        # The source has not told what its part is made of.
+        # The source has not reported the parts of its wait.
         return latency.wait_ms if latency.queue_ms is None else None
     value: float | None = getattr(latency, field)
     return value

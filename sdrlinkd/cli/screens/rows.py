@@ -1,4 +1,4 @@
-"""The tables of `status` and `top`: which columns there are, and who comes first."""
+"""The tables of `status` and `top`: their columns and the order of their rows."""
 
 from collections.abc import Sequence
 
@@ -16,12 +16,12 @@ from sdrlinkd.reports import NeighborReport, ReceivedTopicReport, Snapshot, Topi
 from sdrlinkd.tables import NOTHING, FittedTable, figure, words
 
 BY_POLICY = ("tx_throttled", "tx_unchanged", "tx_superseded")
-"""Drops that somebody asked for."""
+"""Reasons of drops that a policy requests."""
 LEVEL_STYLES = {"OK": "bold green", "DEGRADED": "bold yellow", "DOWN": "bold red"}
 
 
 def robots_table(reports: Sequence[NeighborReport], *, rule: bool) -> FittedTable:
-    """The robots that are heard, and how they hear us: the worst first."""
+    """The table of robots that are heard, and how they hear us, the worst first."""
     table = FittedTable(
         "robots heard" if rule else "",
         (
@@ -50,7 +50,7 @@ def robots_table(reports: Sequence[NeighborReport], *, rule: bool) -> FittedTabl
 
 
 def sent_table(reports: Sequence[TopicReport], *, rule: bool) -> FittedTable:
-    """The topics on their way out: those that lose most first."""
+    """The table of outgoing topics, those with the most losses first."""
     table = FittedTable(
         "sent" if rule else "",
         (
@@ -77,7 +77,7 @@ def sent_table(reports: Sequence[TopicReport], *, rule: bool) -> FittedTable:
 
 
 def heard_table(reports: Sequence[ReceivedTopicReport], *, rule: bool) -> FittedTable:
-    """The topics from the air: those that lose most first."""
+    """The table of received topics, those with the most losses first."""
     table = FittedTable(
         "heard" if rule else "",
         (
@@ -104,7 +104,7 @@ def heard_table(reports: Sequence[ReceivedTopicReport], *, rule: bool) -> Fitted
 
 
 def drops(snapshot: Snapshot) -> list[tuple[str, str, int]]:
-    """(what, reason, count) for each reason of a drop, the most frequent first."""
+    """(what, reason, count) for each reason of drops, the most frequent first."""
     link = snapshot.link
     found = [
         *(("message out", *each) for each in link.tx.dropped.items()),
@@ -115,14 +115,14 @@ def drops(snapshot: Snapshot) -> list[tuple[str, str, int]]:
 
 
 def is_idle(topic: TopicReport | ReceivedTopicReport) -> bool:
-    """Whether no message comes on a topic any more, or ever did, and none waits."""
+    """Whether a topic has no recent messages and none in the queue."""
     if isinstance(topic, TopicReport):
         return not (topic.accepted_per_s or topic.queued)
     return not topic.delivered_per_s
 
 
 def failed(topic: TopicReport) -> int:
-    """Number of messages dropped that nobody asked to drop."""
+    """Number of messages dropped for reasons other than those in BY_POLICY."""
     return sum(count for reason, count in topic.dropped.items() if reason not in BY_POLICY)
 
 

@@ -1,4 +1,4 @@
-"""The screen of `status`: the verdict, and then as much as fits, the worst first."""
+"""The screen of `status`: the verdict, followed by as much as fits, the worst first."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ REASON_LINES = 2
 
 
 class StatusScreen:
-    """A snapshot in at most `height` lines; None: all of it, however long."""
+    """A snapshot in at most `height` lines; None: all of it."""
 
     def __init__(self, snapshot: Snapshot, height: int | None) -> None:
         self._snapshot = snapshot
@@ -38,14 +38,14 @@ class StatusScreen:
 
 @dataclass
 class _Block:
-    """A part of the screen that can be cut at its end: rows of a table, or lines of text."""
+    """A part of the screen whose end can be cut off: a table's rows, or lines of text."""
 
     thing: str
-    """What a row is called: topic, robot, …; empty: goes without being named."""
+    """The word for a row: topic, robot, …; empty: omitted rows are not mentioned."""
     table: FittedTable | None
     lines: list[Text]
     turn: int = 0
-    """Gets its first line when each table has so many rows."""
+    """Number of rows that each table gets before this block gets its first line."""
 
     def heights(self, width: int) -> list[int]:
         """Lines that each row or text takes."""
@@ -76,7 +76,7 @@ def verdict(snapshot: Snapshot, width: int, *, whole: bool = False) -> Text:
 
 
 def head(snapshot: Snapshot, width: int) -> list[Text]:
-    """The lines below the verdict: robot, radio, air, and the two ledgers."""
+    """The lines below the verdict: robot, radio, channel, and the two ledgers."""
     pdu_link, link = snapshot.carrier, snapshot.link
     named = f" ({snapshot.namespace})" if snapshot.namespace else ""
     lag = f", loop lag {snapshot.loop_lag_ms:.1f} ms"
@@ -140,7 +140,7 @@ def _fitted(snapshot: Snapshot, width: int, height: int) -> list[RenderableType]
     room = height - sum(1 + line.plain.count("\n") for line in top)
     shown = _chosen(blocks, width, room)
     if any(n < len(block.heights(width)) for block, n in zip(blocks, shown, strict=True)):
-        # What is left out takes a line to say so.
+        # The line on what is left out needs room, too.
         shown = _chosen(blocks, width, room - 1)
         room -= 1
     left = room - sum(_cost(block, width, n) for block, n in zip(blocks, shown, strict=True))
@@ -155,7 +155,7 @@ def _fitted(snapshot: Snapshot, width: int, height: int) -> list[RenderableType]
 
 
 def _blocks(snapshot: Snapshot, width: int) -> list[_Block]:
-    """The blocks from the screen's top down; the first one gets its line first."""
+    """The blocks from top to bottom; the first one gets its line first."""
     link = snapshot.link
     busy_out = [topic for topic in link.topics if not is_idle(topic)]
     busy_in = [topic for topic in link.received if not is_idle(topic)]
@@ -172,7 +172,7 @@ def _blocks(snapshot: Snapshot, width: int) -> list[_Block]:
 
 
 def _chosen(blocks: Sequence[_Block], width: int, room: int) -> list[int]:
-    """How many rows each block shows: they take turns until nothing more fits."""
+    """How many rows each block shows: blocks get rows in turn until nothing more fits."""
     heights = [block.heights(width) for block in blocks]
     shown = [0] * len(blocks)
     grew, turn = True, 0
@@ -209,7 +209,7 @@ def _dropped(snapshot: Snapshot, width: int) -> list[Text]:
 
 
 def _idle(snapshot: Snapshot, width: int) -> list[Text]:
-    """A line that names the topics on which nothing moves; none where all move."""
+    """A line with the names of idle topics; empty if there are none."""
     link = snapshot.link
     out = [each.name.rsplit("/", 1)[-1] for each in link.topics if is_idle(each)]
     into = [each.republished_as or each.name for each in link.received if is_idle(each)]
@@ -221,7 +221,7 @@ def _idle(snapshot: Snapshot, width: int) -> list[Text]:
 
 
 def _one_line(label: str, groups: Sequence[tuple[str, Sequence[str]]], width: int) -> Text:
-    """A line with as many words as it holds, and how many more there are at its end."""
+    """A line with as many words as fit, and the number of omitted words at its end."""
     words = [
         (f"{'; ' if started else ''}{title}" if not at else ", ") + word
         for started, (title, group) in enumerate(g for g in groups if g[1])
@@ -244,14 +244,14 @@ def _notes(snapshot: Snapshot, width: int) -> list[Text]:
 
 
 def _clocks(snapshot: Snapshot, width: int) -> list[Text]:
-    """A line on how well other robots' clocks are known; none where nobody tells."""
+    """A line on how well other robots' clocks are known; empty if none is reported."""
     known = [(each.src, each.clock) for each in snapshot.link.neighbors if each.clock]
     told = "; ".join(f"{src} {clock_state(clock)}" for src, clock in known)
     return [_labelled("clocks", f"of robots: {told}", width)] if told else []
 
 
 def _receipts(snapshot: Snapshot, width: int) -> list[Text]:
-    """A line on receipts that reached nobody; none where there are no such."""
+    """A line on receipts that were unsent or unexpected; empty if there are none."""
     link = snapshot.link
     parts = (
         (link.receipts_untold, "to others found no room"),
@@ -262,7 +262,7 @@ def _receipts(snapshot: Snapshot, width: int) -> list[Text]:
 
 
 def _labelled(label: str, told: str, width: int) -> Text:
-    """A sentence behind its label, with its further lines indented below it."""
+    """A sentence after its label, with further lines indented."""
     lines = wrapped(told, width - INDENT).split("\n")
     text = Text(label.ljust(INDENT), style="")
     text.stylize("bold", 0, len(label))

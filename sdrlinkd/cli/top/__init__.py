@@ -13,7 +13,7 @@ def top(runtime_dir: RuntimeDir = None) -> None:
     """The link, live: verdict, robots both ways, topics, the last minutes; why and set, too."""
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise UserError("top: needs a terminal; for a file there is `sdrlinkctl status --watch`")
-    # The screen's library takes a while to load.
+    # The screen's library is slow to load.
     from sdrlinkd.cli.top.live import TopApp
 
     def ask(verb: str, arguments: dict[str, Any]) -> Any:  # noqa: ANN401

@@ -1,4 +1,4 @@
-"""What `top` opens above its screen: an explanation, and a form for a topic's policy."""
+"""Dialogs of `top`: an explanation, and a form for a topic's policy."""
 
 import asyncio
 from collections.abc import Callable
@@ -18,7 +18,7 @@ Ask = Callable[[str, dict[str, Any]], Any]
 
 
 class Explanation(ModalScreen[None]):
-    """A box of sentences, which any key closes."""
+    """A box with sentences; any key closes it."""
 
     def __init__(self, title: str, lines: list[str]) -> None:
         super().__init__()
@@ -37,7 +37,7 @@ class Explanation(ModalScreen[None]):
 
 
 class PolicyForm(ModalScreen[str]):
-    """Fields of a policy; Enter sends those that were filled in, Escape goes back."""
+    """A form for a policy; Enter sends the fields that were filled in, Escape cancels."""
 
     BINDINGS: ClassVar[list[BindingType]] = [("escape", "cancel", "Back")]
     FIELDS = (
@@ -53,7 +53,7 @@ class PolicyForm(ModalScreen[str]):
         self._topic, self._now, self._ask = topic, now, ask
 
     def compose(self) -> ComposeResult:
-        """The form, with an empty line for each field: what stays empty is not changed."""
+        """The form, with an empty line per field; fields left empty are not changed."""
         with Vertical(classes="box"):
             yield Label(f"policy of {self._topic}", classes="title", markup=False)
             for key, label, help_text in self.FIELDS:
@@ -68,7 +68,7 @@ class PolicyForm(ModalScreen[str]):
         self.dismiss("")
 
     async def on_input_submitted(self) -> None:
-        """Set what was filled in; what the daemon refuses is shown, and the form stays."""
+        """Set the fields that were filled in; if the daemon refuses, show why and keep the form."""
         try:
             changes = self._changes()
             if not changes:
@@ -84,7 +84,7 @@ class PolicyForm(ModalScreen[str]):
         )
 
     def _changes(self) -> dict[str, Any]:
-        """The fields that were filled in, as the daemon takes them. Raises UserError."""
+        """The fields that were filled in, as values for the daemon. Raises UserError."""
         given = {key: self.query_one(f"#{key}", Input).value.strip() for key, *_ in self.FIELDS}
         return {key: _value(key, text) for key, text in given.items() if text}
 

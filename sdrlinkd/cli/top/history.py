@@ -1,4 +1,4 @@
-"""The last minutes of a link, as series of figures; from one snapshot to the next."""
+"""Time series of a link's figures over the last minutes, from snapshots."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -9,11 +9,11 @@ from sdrlinkd.reports import Snapshot
 
 PERIOD_S = 1.0
 SPAN = 240
-"""Snapshots that are remembered: 4 minutes."""
+"""Number of snapshots that are kept, i.e. 4 minutes."""
 
 
 class Series(NamedTuple):
-    """A figure over time, drawn between `low` and `high`; `high` 0: up to its largest."""
+    """A figure over time, drawn between `low` and `high`; `high` 0: up to its maximum."""
 
     name: str
     low: float
@@ -21,7 +21,7 @@ class Series(NamedTuple):
     values: deque[float | None]
 
     def line(self, width: int) -> str:
-        """The series in `width` characters: name, last value, and means as little columns."""
+        """The series in `width` characters: name, last value, and means as small bars."""
         last = self.values[-1] if self.values else None
         told = "–" if last is None else f"{last:.1f}" if abs(last) < 1000 else f"{last:.0f}"
         room = width - 15
@@ -31,7 +31,7 @@ class Series(NamedTuple):
 
 
 class History:
-    """The figures of the last snapshots, as series; None is a moment without the daemon."""
+    """Time series of the last snapshots' figures; None marks a moment without the daemon."""
 
     def __init__(self) -> None:
         self._before: tuple[int, int] | None = None
@@ -44,7 +44,7 @@ class History:
         ]  # fmt: skip
 
     def add(self, snapshot: Snapshot | None) -> None:
-        """Take in the figures of one more moment; None: the daemon is away."""
+        """Add the figures of a snapshot; None: the daemon is away."""
         values = [None] * len(self.series) if snapshot is None else self._figures(snapshot)
         for series, value in zip(self.series, values, strict=True):
             series.values.append(value)
@@ -52,7 +52,7 @@ class History:
             self._before = None
 
     def _figures(self, snapshot: Snapshot) -> list[float | None]:
-        """The worst SNR, what arrived lately, the air, the queue and the latest age."""
+        """The worst SNR, recent deliveries, the channel's use, the queue and the latest age."""
         link = snapshot.link
         snr = [each.snr_db for each in link.neighbors if each.snr_db is not None]
         ages = [
@@ -69,14 +69,14 @@ class History:
         ]
 
     def _pdr(self, snapshot: Snapshot) -> float | None:
-        """Share in % of messages lately ended that were delivered; None where none has ended."""
+        """Share in % of recent messages that were delivered; None if there were none."""
         rx = snapshot.link.rx
         now = (rx.delivered, sum(rx.dropped.values()))
         before, self._before = self._before, now
         if before is None:
             return None
         arrived, lost = (later - earlier for later, earlier in zip(now, before, strict=True))
-        # Fewer than before: another daemon answers now.
+        # Smaller counters mean that another daemon answers now.
         if arrived < 0 or lost < 0 or not arrived + lost:
             return None
         return 100.0 * arrived / (arrived + lost)

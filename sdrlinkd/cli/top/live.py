@@ -1,4 +1,4 @@
-"""The live screen. It renders snapshots and asks the daemon; it holds no figures of its own."""
+"""The live screen of `top`: it renders snapshots and has no figures of its own."""
 
 import asyncio
 from collections.abc import Callable
@@ -35,8 +35,8 @@ HELP = [
 class TopApp(App[None]):
     """The live screen of `top`.
 
-    `look` is called every `period_s`; it tells None while the daemon is away, and `waiting` is
-    shown.
+    `look` is called every `period_s`. While the daemon is away, it returns None, and the text of
+    `waiting` is shown.
     """
 
     TITLE = "sdrlinkctl top"
@@ -97,7 +97,7 @@ class TopApp(App[None]):
         yield Footer(show_command_palette=False)
 
     def on_mount(self) -> None:
-        """Begin to look at the daemon."""
+        """Start to poll the daemon."""
         self._table.focus()
         if self._period_s:
             self.set_interval(self._period_s, self._follow)
@@ -112,8 +112,8 @@ class TopApp(App[None]):
         self.show(snapshot)
 
     def show(self, snapshot: Snapshot | None) -> None:
-        """Show one more moment of the link; None: nobody answers."""
-        # While it quits, there is an answer still to come, and no screen any more.
+        """Show a new snapshot; None: the daemon does not answer."""
+        # While the app quits, an answer may still come when there is no screen any more.
         if not self.is_running or not self._table.is_attached:
             return
         self._history.add(snapshot)
@@ -125,11 +125,11 @@ class TopApp(App[None]):
         self._draw()
 
     def on_resize(self) -> None:
-        """Draw anew: other columns may fit now."""
+        """Redraw, as other columns may fit now."""
         self._draw()
 
     def _draw(self) -> None:
-        """Draw the last snapshot; while the daemon is away, it is dimmed and has no new verdict."""
+        """Draw the last snapshot, dimmed and without a verdict while the daemon is away."""
         at, width = self._snapshot, self.size.width
         if at is None or not width:
             return
@@ -148,7 +148,7 @@ class TopApp(App[None]):
         self._draw_topics(at, width)
 
     def _series(self, width: int) -> Text:
-        """The series as text, two on a line."""
+        """The series as text, two per line."""
         half = (width - 2) // 2
         lines = [*(series.line(half) for series in self._history.series), MINUTES]
         pairs = [lines[at : at + 2] for at in range(0, len(lines), 2)]
@@ -170,7 +170,7 @@ class TopApp(App[None]):
         scrolled = self._table.scroll_y
         self._rows = topic_rows(at, self._order, self._filter.value)
         table = topics_table(self._rows)
-        # The bar at the right takes two.
+        # The scroll bar at the right takes two characters.
         widths = table.widths(width - 2)
         self._table.clear(columns=True)
         for place, n in widths.items():
@@ -193,14 +193,14 @@ class TopApp(App[None]):
         return self._rows[index] if 0 <= index < len(self._rows) else None
 
     def action_sort(self) -> None:
-        """Sort the topics by the next order."""
+        """Switch to the next sort order of the topics."""
         orders = [*ORDERS]
         self._order = orders[(orders.index(self._order) + 1) % len(orders)]
         self.notify(f"sorted by {self._order}", timeout=2)
         self._draw()
 
     def action_filter(self) -> None:
-        """Ask for a text that topics must hold."""
+        """Ask for a text that topics must contain."""
         self._filter.display = True
         self._filter.focus()
 
@@ -210,11 +210,11 @@ class TopApp(App[None]):
         self.on_input_submitted()
 
     def on_input_changed(self) -> None:
-        """Draw anew while the filter is typed."""
+        """Redraw while the filter is typed."""
         self._draw()
 
     def on_input_submitted(self) -> None:
-        """Go back to the table; the filter's text stays in force."""
+        """Return to the table; the filter stays in force."""
         self._filter.display = bool(self._filter.value)
         self._table.focus()
 

@@ -1,4 +1,4 @@
-"""The topics of `top`, out and in, in one table that can be sorted and searched."""
+"""The table of topics of `top`, sent and received, which can be sorted and filtered."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from sdrlinkd.tables import NOTHING, FittedTable, figure, words
 
 
 class TopicRow(NamedTuple):
-    """A topic on its way out (`source` is None), or of another robot."""
+    """A row of the table: an outgoing topic (`source` is None), or another robot's topic."""
 
     name: str
     source: int | None
@@ -21,7 +21,7 @@ class TopicRow(NamedTuple):
     messages: int
     queued: int
     lost: int
-    """Out: dropped, but for what a policy asks to drop."""
+    """Messages lost; for outgoing topics without drops that a policy requests."""
     pdr: float | None
     age_ms: float | None
     p99_ms: float | None
@@ -45,11 +45,11 @@ ORDERS: dict[str, Callable[[TopicRow], tuple[object, ...]]] = {
     "bytes": lambda row: (-row.bytes_per_s, row.name),
     "age": lambda row: (-(row.p99_ms or 0.0), row.name),
 }
-"""How rows are sorted, by name; the first is where it starts."""
+"""Sort orders by name; the first one is the default."""
 
 
 def topic_rows(snapshot: Snapshot, order: str, wanted: str) -> list[TopicRow]:
-    """The rows of topics whose name, class or robot holds `wanted`, sorted by `order`."""
+    """The rows of topics whose name, class or robot contains `wanted`, sorted by `order`."""
     rows = [
         *(_out(topic) for topic in snapshot.link.topics),
         *(_in(topic) for topic in snapshot.link.received),
@@ -59,7 +59,7 @@ def topic_rows(snapshot: Snapshot, order: str, wanted: str) -> list[TopicRow]:
 
 
 def topics_table(rows: list[TopicRow]) -> FittedTable:
-    """The table of topics, with a line for each row."""
+    """The table with these rows of topics."""
     table = FittedTable(
         "",
         (

@@ -1,7 +1,7 @@
-"""Medium access: when a node may send on an air that it shares.
+"""Medium access: when a node may send on a shared channel.
 
-This room owns the access policies, each a state machine over the link's clock, and the choice of
-one that fits the radio. It never looks into a message, and decides nothing but the time.
+This package holds the access policies, each a state machine over the link's clock, and chooses one
+that fits the radio. It never reads a message, and decides only when to send.
 """
 
 from sdrlinkd.link.access.auto import Settled, may_share, percent, settle

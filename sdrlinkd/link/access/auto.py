@@ -1,4 +1,4 @@
-"""Which policy fits the radio, and what each of them carries on it."""
+"""Chooses the access policy that fits the radio, by the share of airtime that each can use."""
 
 from collections.abc import Mapping
 from random import Random
@@ -13,16 +13,16 @@ from sdrlinkd.link.access.params import AccessParams
 from sdrlinkd.link.traits import PduLinkTraits
 
 SOON_S = 0.001
-"""Mini-slots are for radios that hear another begin, and hold back, within this."""
+"""Longest reaction time in s for mini-slots: from another's start until our radio holds back."""
 FAIR = 0.5
-"""A policy that carries less than this of what the best one does is not taken."""
+"""A policy is refused if it carries less than this share of what the best policy carries."""
 
 
 Policy = Literal["auto", "none", "csma", "minislot", "tdma"]
 
 
 class Settled(NamedTuple):
-    """The policy in force, and why. `shares`: of the air, what each policy carries."""
+    """The policy in force, and why; `shares` is the share of airtime that each policy can use."""
 
     access: Access
     policy: Policy
@@ -31,7 +31,7 @@ class Settled(NamedTuple):
 
     @property
     def share(self) -> float:
-        """The share of the air that the policy in force carries."""
+        """The share of airtime that the policy in force can use, 0 to 1."""
         return self.shares[self.policy]
 
     @property
@@ -41,22 +41,22 @@ class Settled(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """The policy in force, why, and what it carries, in a sentence for people."""
+        """The policy in force, the reason, and its share of airtime, as a sentence for people."""
         return f"{self.policy}, {self.reason}; it carries {percent(self.share)} of the air"
 
 
 def settle(
     params: AccessParams, own_id: int, traits: PduLinkTraits, longest_burst_s: float, rng: Random
 ) -> Settled:
-    """What access comes to on this radio, for bursts of at most `longest_burst_s`.
+    """The access policy for this radio and bursts of at most `longest_burst_s`, with the reason.
 
-    The same at all robots of a team whose parameters and radios are the same. Raises ConfigError
-    where the radio cannot carry the policy, or another one carries twice as much.
+    Robots with the same parameters and radios get the same result. Raises ConfigError if the radio
+    does not support the policy, or if another policy carries twice as much.
     """
     check_access(params, own_id)
     policy, reason = params.policy, "as configured"
     if not traits.transmits:
-        # Who never sends needs no turn, whatever the others do.
+        # A robot that never sends needs no turn, whatever the others do.
         policy, reason = "none", "as this radio only receives here"
     shares: dict[str, float] = {}
     if policy != "none" and (policy == "csma" or _others(params, own_id)):
@@ -78,7 +78,7 @@ def settle(
 
 
 def may_share(params: AccessParams, own_id: int) -> bool:
-    """Whether the robot has to listen before it talks, as far as that is known without a radio."""
+    """Whether the robot may share the channel, as far as that is known without a radio."""
     if params.policy == "auto":
         return bool(_others(params, own_id))
     return params.policy != "none"
@@ -87,10 +87,10 @@ def may_share(params: AccessParams, own_id: int) -> bool:
 def air_shares(
     params: AccessParams, own_id: int, traits: PduLinkTraits, longest_burst_s: float
 ) -> dict[str, float]:
-    """Of the air, what each policy carries with times made from the radio; 0: it cannot."""
+    """The share of airtime that each policy can use with the radio's times; 0: unsupported."""
     shares: dict[str, float] = {}
     policies: tuple[Policy, ...] = ("csma", "minislot", "tdma")
-    # csma need not know who there is: one more robot, then.
+    # csma does not need `nodes`; without them, assume one other robot.
     nodes = params.nodes or [own_id, (own_id + 1) % 255]
     for policy in policies:
         wanted = AccessParams(policy=policy, nodes=nodes, persist=params.persist)
@@ -104,7 +104,7 @@ def air_shares(
 
 
 def percent(share: float) -> str:
-    """A share as people write it: `93 %`, `6.6 %`."""
+    """A share from 0 to 1 as text in per cent: `93 %`, `6.6 %`."""
     return f"{100 * share:.2g} %" if share < 0.995 else "100 %"
 
 
@@ -115,7 +115,7 @@ def _others(params: AccessParams, own_id: int) -> set[int]:
 def _chosen(
     params: AccessParams, own_id: int, traits: PduLinkTraits, shares: Mapping[str, float]
 ) -> tuple[Policy, str]:
-    """The (policy, reason) that `auto` comes to on this radio."""
+    """The (policy, reason) that `auto` chooses for this radio."""
     if not (traits.shares_air and traits.senses):
         return "none", f'as no other robot shares the air of the backend "{traits.kind}"'
     if not _others(params, own_id):

@@ -1,4 +1,4 @@
-"""The one interface of all access policies."""
+"""The common interface of all access policies."""
 
 import math
 from math import inf
@@ -14,10 +14,10 @@ MOST_ON_THEIR_WAY = 8
 
 
 class Slot(NamedTuple):
-    """A burst may leave at `start` and must be over at `end`.
+    """A time slot: a burst may leave at `start` and must be over at `end`.
 
-    Where it comes too late for `start`, it may still leave if it is over at `late_end`. Behind its
-    first PDU, it holds none of a class less urgent than `least`.
+    A burst that misses `start` may still leave if it is over at `late_end`. After its first PDU,
+    the burst holds no PDU of a class less urgent than `least`.
     """
 
     start: float
@@ -32,7 +32,7 @@ class Slot(NamedTuple):
 
 
 class Wish(NamedTuple):
-    """A burst of class `qos` that takes `need_s` or more wants to leave at `earliest` or later."""
+    """A request to send a burst of class `qos`, at least `need_s` long, at `earliest` or later."""
 
     earliest: float
     qos: Qos
@@ -41,76 +41,84 @@ class Wish(NamedTuple):
 
 
 class Access(Protocol):
-    """Says when; a state machine over the link's clock, asked again with every block received."""
+    """An access policy: it decides when to send.
+
+    It is a state machine over the link's clock, and is queried again with every received block.
+    """
 
     @property
     def state(self) -> str:
-        """For people: what it is doing and with which times."""
+        """The policy's state and times, as text for people."""
 
     @property
     def round_s(self) -> float:
-        """So long at most until everybody had a turn; 0 where there are no turns."""
+        """Longest time in s until every robot has had a turn; 0 if there are no turns."""
 
     @property
     def pause_s(self) -> float:
-        """The channel stays idle for so long at least after each burst."""
+        """Shortest idle time of the channel after each burst, in s."""
 
     @property
     def share(self) -> float:
-        """Of the air, what one robot has when all want to send, were it not for their bursts."""
+        """Share of airtime in which one robot may start bursts, not counting others' bursts: its
+        slots in tdma, else 1.
+        """
 
     @property
     def step_s(self) -> float:
-        """In a turn that was not used from its begin, bursts begin so far apart; 0: anywhere."""
+        """Grid in s of burst starts in a turn that is not used from its start; 0: no grid."""
 
     @property
     def others_follow(self) -> bool:
-        """Whether the air that we leave free can be another's."""
+        """Whether other robots may use the airtime that we leave free."""
 
     @property
     def keeps_schedule(self) -> bool:
-        """Whether it ever tells others of a schedule."""
+        """Whether the policy announces a schedule to other robots."""
 
     def mean_wait_s(self, qos: Qos) -> float:
-        """From when the channel falls idle to a burst of that class, on average."""
+        """Mean time in s from an idle channel to a burst of class `qos`."""
 
     def carries(self, burst_s: float) -> float:
-        """Share of the air that bursts of that length take, of all robots together, when each
-        always has one more to send: of class default, and whole.
+        """Share of airtime that bursts of length `burst_s` take, all robots together, under full
+        load: every robot always has another complete burst of class default to send.
         """
 
     def slot(self, wish: Wish) -> Slot | None:
-        """Where it may leave; None: not now."""
+        """The slot in which the requested burst may leave; None: not now."""
 
     def sent(self, end: float, src: int | None) -> None:
-        """A burst of ours will be on the air until `end`; `src`: whose PDUs it forwards, if any."""
+        """Note that our burst will be on the air until `end`.
+
+        `src` is the robot whose PDUs the burst relays; None: our own.
+        """
 
     def not_sent(self, start: float) -> None:
-        """The burst that was to begin at `start` did not leave."""
+        """Note that the burst planned for `start` did not leave."""
 
     def heard(self, src: int, at: float, is_relayed: bool) -> None:
-        """A PDU of `src` came in a burst whose preamble was at `at`, perhaps from a relay."""
+        """Note a PDU of robot `src`, in a burst whose preamble was at `at`, possibly relayed."""
 
     def told_of(self, node: int, at: float) -> None:
-        """At `at` another robot told that it hears `node`."""
+        """Note that another robot reported at `at` that it hears robot `node`."""
 
     def beacon(self, src: int, at: float) -> None:
-        """A beacon of `src` came at `at`, from itself."""
+        """Note a beacon that came at `at` directly from robot `src`."""
 
     def frame(self, start: float) -> Frame | None:
-        """What to tell others of the schedule in a burst that leaves at `start`."""
+        """The schedule to announce in a burst that leaves at `start`; None: none is kept."""
 
     def take_frame(self, src: int, frame: Frame, at: float) -> None:
-        """What `src` tells of the schedule, in a burst whose preamble was at `at`."""
+        """Take the schedule that robot `src` announced in a burst whose preamble was at `at`."""
 
     def notices(self, now: float) -> list[str]:
-        """What a person should know of how the air is shared, in sentences."""
+        """What a person should know about the sharing of the channel, in sentences."""
 
 
 class BusyChannel:
-    """What policies have in common: when the channel was busy last, by others or by us.
+    """The base of all policies, which knows when the channel was last busy, by others or by us.
 
-    As it stands: no turns, no pauses, nobody in our way, no schedule.
+    Its defaults are those of a policy without turns, pauses and schedule.
     """
 
     round_s = 0.0
@@ -122,12 +130,12 @@ class BusyChannel:
 
     def __init__(self) -> None:
         self._own_ends = [NEVER]
-        """Of the last bursts, ascending: some may be on their way to the radio still."""
+        """Ends of our last bursts, ascending; some may not have left yet."""
         self._scheduled = Sightings()
-        """Who takes turns by a schedule."""
+        """Robots that announce a tdma schedule."""
 
     def mean_wait_s(self, qos: Qos) -> float:  # noqa: ARG002  # not all ask for it
-        """From when the channel falls idle to a burst of that class, on average: none."""
+        """Mean time in s from an idle channel to a burst of class `qos`: 0."""
         return 0.0
 
     def sent(self, end: float, src: int | None) -> None:  # noqa: ARG002  # not all ask for it
@@ -135,7 +143,7 @@ class BusyChannel:
         self._own_ends = [*self._own_ends[-MOST_ON_THEIR_WAY:], end]
 
     def not_sent(self, start: float) -> None:
-        """Forget the burst that was to begin at `start`: it did not leave."""
+        """Forget the burst planned for `start`, which did not leave."""
         for end in self._own_ends:
             if end > start:
                 self._own_ends.remove(end)
@@ -144,23 +152,23 @@ class BusyChannel:
             self._own_ends = [NEVER]
 
     def heard(self, src: int, at: float, is_relayed: bool) -> None:
-        """Ignore whose burst was heard: no turn depends on it."""
+        """Ignore the source of a burst, as no turn depends on it."""
 
     def told_of(self, node: int, at: float) -> None:
-        """Ignore who hears whom: no turn depends on it."""
+        """Ignore which robots others hear, as no turn depends on it."""
 
     def beacon(self, src: int, at: float) -> None:
-        """Ignore who is there: no turn depends on it."""
+        """Ignore beacons, as no turn depends on them."""
 
     def frame(self, start: float) -> Frame | None:
-        """The schedule to tell others of: none is kept."""
+        """The schedule to announce: None, as no schedule is kept."""
 
     def take_frame(self, src: int, frame: Frame, at: float) -> None:  # noqa: ARG002  # not all ask
-        """Remember that robot `src` keeps a schedule, and so has another policy."""
+        """Remember that robot `src` keeps a schedule and so uses another policy."""
         self._scheduled.add(src, at)
 
     def notices(self, now: float) -> list[str]:
-        """Who shares the air in another way."""
+        """Sentences on robots that use another access policy."""
         return [
             f"robot {src} takes turns by a tdma schedule and this robot does not: what both send "
             "collides; give both the same [access], and radios of one kind where access.policy is "
@@ -170,11 +178,11 @@ class BusyChannel:
 
     @property
     def own_end(self) -> float:
-        """When our own last burst ends."""
+        """Time when our own last burst ends."""
         return self._own_ends[-1]
 
     def idle_since(self, sensed: Sensed) -> float | None:
-        """Since when the channel is idle; None while it is busy."""
+        """Time since which the channel has been idle; None while it is busy."""
         end = max(sensed.idle_since, self.own_end)
         return end if end <= sensed.until else None
 

@@ -1,4 +1,4 @@
-"""From what is wanted and what the radio can do to a policy, or to a refusal that says why."""
+"""Builds an access policy from the settings and the radio's traits, or refuses with a reason."""
 
 import math
 from random import Random
@@ -13,18 +13,18 @@ from sdrlinkd.link.access.tdma import Tdma
 from sdrlinkd.link.traits import PduLinkTraits
 
 GUARD_SHARE = 0.1
-"""A tdma slot is so long that its guard takes no more than this."""
+"""Largest share of a tdma slot that its guard time may take."""
 CLOCK_ERROR_S = 1.5e-4
-"""Clocks of two robots in tdma: 40 ppm for as long as one follows another unheard (FORGET_S)."""
+"""Error in s of two robots' clocks in tdma: 40 ppm while one follows another unheard (FORGET_S)."""
 MARGIN_S = 5e-6
-"""Echoes and paths of a kilometre or so."""
+"""Margin in s for multipath and for propagation over about a kilometre."""
 LONGEST_ROUND_S = 1.0
 LONGEST_APART_S = 0.1
-"""What listens before it talks is of no use where others are heard later."""
+"""Longest reaction time in s of a radio for which listening before sending makes sense."""
 
 
 def check_access(params: AccessParams, own_id: int) -> None:
-    """What can be told without a radio. Raises ConfigError."""
+    """Check what can be checked without a radio. Raises ConfigError."""
     if params.policy in ("minislot", "tdma") or (params.policy == "auto" and params.nodes):
         if own_id not in params.nodes:
             raise ConfigError(
@@ -39,9 +39,9 @@ def check_access(params: AccessParams, own_id: int) -> None:
 def make_access(
     params: AccessParams, own_id: int, traits: PduLinkTraits, longest_burst_s: float, rng: Random
 ) -> Access:
-    """The policy, any but auto, for bursts of at most `longest_burst_s`.
+    """The configured policy (not auto) for bursts of at most `longest_burst_s`.
 
-    Raises ConfigError when the radio cannot carry it.
+    Raises ConfigError if the radio does not support it.
     """
     check_access(params, own_id)
     if params.policy == "auto":
@@ -77,14 +77,14 @@ def make_access(
 
 
 def make_free(traits: PduLinkTraits, is_alone: bool = False) -> Free:
-    """No policy; `is_alone`: and nobody to share the air with."""
+    """The policy `none`; with `is_alone`, no other robot should be on this channel."""
     return Free(
         2 * traits.turnaround_s, traits.gap_s, traits.tx_window_s, traits.rx_window_s, is_alone
     )
 
 
 def reaction_s(traits: PduLinkTraits) -> float:
-    """So far apart must two begin that the second can hear the first and still hold back."""
+    """Shortest distance of two starts, in s, at which the second robot hears the first in time."""
     return traits.lead_s + traits.react_s + traits.detect_s + MARGIN_S
 
 
@@ -96,13 +96,13 @@ def _make_tdma(
     apart_s: float,
     rng: Random,
 ) -> Tdma:
-    # Here two do not count from the end of the same burst, but each from its own clock.
+    # In tdma, robots do not count from the end of a common burst but by their own clocks.
     apart_s += CLOCK_ERROR_S
     minislot_s = params.minislot_s or apart_s
     least_s = traits.turnaround_s + CLOCK_ERROR_S + MARGIN_S + 2 * traits.index_error_s
     guard_s = params.guard_s or least_s
     _refuse_short("guard_s", guard_s, least_s - CLOCK_ERROR_S, traits)
-    # In two bursts, so that an urgent message may come between.
+    # Room for the gaps of two bursts, so that an urgent message may come between them.
     longest_s = longest_burst_s + traits.overhead_s + 2 * traits.gap_s
     bursts = max(1, math.ceil(guard_s * (1 / GUARD_SHARE - 1) / longest_s))
     slot_s = params.slot_s or 1e-5 * math.ceil(1e5 * (bursts * longest_s + guard_s))
@@ -118,7 +118,7 @@ def _make_tdma(
         slot_s,
         guard_s,
         minislot_s,
-        # Where a slot would be over before anybody could know it unused, its owner need not hurry.
+        # No reuse where a slot would end before others could find it unused.
         params.reuse and apart_s <= minislot_s < slot_s - guard_s - traits.overhead_s,
         rng,
         look_s=traits.react_s + traits.ahead_s,

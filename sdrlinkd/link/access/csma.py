@@ -1,10 +1,10 @@
 """`csma`: listen before talk, p-persistent.
 
-Stations that wait for the same busy channel would all begin when it falls idle. So each lets DWAIT
-pass, then its class's own slots, then draws in how many further slots chance has it: the geometric
-distribution that a throw with PERSIST in every idle slot gives. The draw is kept while the air
-stays idle, for drawing anew at every look would favour who looks most often; a channel that was
-busy since, a message of another class, or a start that has passed makes it void.
+Stations that wait for the same busy channel would all start when it falls idle. So each waits for
+DWAIT, then for the slots of its class, and then for a random number of further slots. That number
+has the geometric distribution that a trial with PERSIST in every idle slot gives. The draw is kept
+while the channel stays idle, since a new draw at every query would favor stations that query more
+often. It becomes void when the channel was busy, the class changes, or the start has passed.
 """
 
 import math
@@ -16,7 +16,7 @@ from sdrlinkd.link.access.base import NEVER, BusyChannel, Slot, Wish, next_on_gr
 from sdrlinkd.link.access.steps import after
 from sdrlinkd.link.qos import Qos
 
-# Slots that a class lets pass on an idle channel, and how much more eager than PERSIST it is.
+# By class: slots to wait on an idle channel, and the factor on PERSIST.
 WINDOWS = {
     Qos.URGENT: (0, 8.0),
     Qos.LATENCY: (1, 4.0),
@@ -26,17 +26,17 @@ WINDOWS = {
 
 
 class State(Enum):
-    """Whether the start of the next burst is drawn."""
+    """State of the backoff: whether a start has been drawn for the next burst."""
 
     OPEN = auto()
     DRAWN = auto()
 
 
 class Happens(Enum):
-    """What changes whether a start is drawn."""
+    """Events that change the backoff state."""
 
     DRAWS = auto()
-    """A start is drawn, in place of one that is void."""
+    """A start is drawn and replaces a void one."""
     BEGINS = auto()
     """The burst begins at its start."""
 
@@ -49,10 +49,10 @@ STEPS: Mapping[tuple[State, Happens], State] = {
 
 
 class Csma(BusyChannel):
-    """Once the channel is idle: DWAIT, the class's own wait, then in each SLOTTIME a chance of
-    PERSIST.
+    """p-persistent CSMA: on an idle channel wait for DWAIT and for the slots of the class, then
+    send in each SLOTTIME with probability PERSIST.
 
-    Two that choose the same slot collide; nothing tells them.
+    Two stations that choose the same slot collide, and neither of them notices.
     """
 
     others_follow = True
@@ -74,9 +74,9 @@ class Csma(BusyChannel):
         self._detect_s = detect_s
         self._rng = rng
         self.backoff = State.OPEN
-        """Whether a start is drawn."""
+        """Whether a start has been drawn."""
         self._drawn = (NEVER, Qos.BULK, NEVER)
-        """(since when the channel is idle, class, start)."""
+        """The drawn start as (time since which the channel is idle, class, start)."""
         self._backoffs = 0
 
     @property
@@ -88,13 +88,13 @@ class Csma(BusyChannel):
         )
 
     def mean_wait_s(self, qos: Qos) -> float:
-        """DWAIT, the class's own wait, and slots until chance has it."""
+        """Mean wait in s: DWAIT, the slots of the class, and the mean of the random slots."""
         waits, eagerness = WINDOWS[qos]
         passed = 1 / min(1.0, eagerness * self._persist) - 1
         return self._dwait_s + (waits + passed) * self._slottime_s
 
     def carries(self, burst_s: float) -> float:
-        """What does not collide, beside the slots that all let pass."""
+        """Share of airtime of bursts that do not collide, less the slots that pass idle."""
         waits, eagerness = WINDOWS[Qos.DEFAULT]
         chance, n = min(1.0, eagerness * self._persist), self._robots
         anybody = 1 - (1 - chance) ** n
@@ -103,7 +103,7 @@ class Csma(BusyChannel):
         return nobody_else * burst_s / (burst_s + idle_s)
 
     def slot(self, wish: Wish) -> Slot | None:
-        """The slot drawn, once all before it were heard to be idle."""
+        """The drawn slot, once all slots before it were sensed idle."""
         earliest, qos, _, sensed = wish
         idle_since = self.idle_since(sensed)
         if idle_since is None:

@@ -1,4 +1,4 @@
-"""`none`: an air of our own."""
+"""`none`: the policy for a channel without other robots, or that is not shared."""
 
 from math import inf
 
@@ -6,14 +6,15 @@ from sdrlinkd.link.access.base import BusyChannel, Slot, Wish
 from sdrlinkd.link.access.sightings import Sightings
 
 DEAF_S = 0.02
-"""A radio that is deaf for longer than most bursts last is no radio for several without turns."""
+"""Deaf time in s, longer than most bursts, above which several radios need turns."""
 
 
 class Free(BusyChannel):
-    """Sends whenever there is something to send.
+    """The policy `none`: send whenever there is something to send.
 
-    `deaf_s`: then it hears nothing for longer; `gap_s` stays free between two bursts, and `pause_s`
-    after it has sent for `tx_window_s`. `is_alone`: nobody else should be on this air.
+    `deaf_s` is how long the radio cannot hear around each transmission, beyond the burst itself.
+    `gap_s` stays free between two bursts, and `pause_s` after the radio has sent for `tx_window_s`.
+    With `is_alone`, no other robot should be on this channel.
     """
 
     def __init__(
@@ -37,26 +38,26 @@ class Free(BusyChannel):
         return "none"
 
     def slot(self, wish: Wish) -> Slot | None:
-        """A slot where it is wanted, at once."""
+        """A slot at the requested time."""
         return Slot(wish.earliest)
 
     def carries(self, burst_s: float) -> float:
-        """All of the air but gaps, and what the radio listens between two TX windows."""
+        """All airtime except gaps and the listening time between two TX windows."""
         tx_window_s, pause_s = self._tx_windows
         listens = pause_s / (tx_window_s + pause_s) if tx_window_s < inf else 0.0
         gaps = self._gap_s / (burst_s + self._gap_s) if self._gap_s else 0.0
         return (1 - gaps) * (1 - listens)
 
     def sent(self, end: float, src: int | None) -> None:
-        """Ignore it: nothing here depends on when our bursts end."""
+        """Ignore our bursts, as nothing depends on when they end."""
 
     def heard(self, src: int, at: float, is_relayed: bool) -> None:
-        """Remember that somebody else is on this air after all."""
+        """Remember that another robot is on this channel after all."""
         if self._is_alone and not is_relayed:
             self._others.add(src, at)
 
     def notices(self, now: float) -> list[str]:
-        """Two that are deaf so long lose most of each other's bursts."""
+        """Warnings about other robots, as radios with a long deaf time miss each other's bursts."""
         notices = super().notices(now)
         others = self._others.lately(now)
         if others and not notices:

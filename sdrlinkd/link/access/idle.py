@@ -1,19 +1,19 @@
-"""Why the air was idle while messages waited, by what the access policy makes of it."""
+"""Explains why the channel was idle while messages waited, by the access policy in force."""
 
 from sdrlinkd.link.access.auto import Settled, percent
 from sdrlinkd.link.access.minislot import MiniSlots
 
 IDLE = 0.3
-"""An air that is idle for more than this while messages wait is not what they wait for."""
+"""Share of idle time above which waiting messages do not wait for a busy channel."""
 MORE = 1.25
-"""A policy that carries so many times as much is worth naming."""
+"""Another policy is mentioned if it carries at least this many times as much."""
 NOT_OTHERS = "what waits does not wait for others, but for this radio"
 
 
 def idle_words(settled: Settled | None, idle: float) -> str | None:
-    """Why the air was idle for that share of the time while messages waited; None: it was not.
+    """Why the channel was idle for the share `idle` of the time while messages waited.
 
-    `settled` is the policy in force; None while there is no radio.
+    None if it was not idle. `settled` is the policy in force; None while there is no radio.
     """
     if idle < IDLE:
         return None

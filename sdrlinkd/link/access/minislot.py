@@ -1,11 +1,11 @@
-"""`minislot`: once the channel falls idle, each node may begin only in a mini-slot of its own.
+"""`minislot`: once the channel falls idle, each node may start only in its own mini-slot.
 
-All who hear the channel fall idle count from the same moment, so one mini-slot a robot is enough
-for no two to begin at once; it must be as long as it takes to hear another begin and to hold back.
-The order turns with who sent last, or the first robot of the list would have the air for itself.
-That order is known to who read the last burst's header. Who did not comes after all who did, in the
-order of the list. What kept the channel busy is all the state there is (FIRST), besides the round
-that we are in since.
+All robots that hear the channel fall idle count from the same moment, so with one mini-slot each,
+no two start at once. A mini-slot must be long enough to hear another robot start and to hold back.
+The order rotates with the last sender; otherwise the first robot of the list would have the channel
+to itself. A robot knows this order if it could read the header of the last burst. Robots that could
+not read it come after all that could, in the order of the list. The only state is what kept the
+channel busy last (FIRST), and the current round since then.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,26 +16,26 @@ from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.traits import Sensed
 
 LEVELS = 2
-"""Urgent and latency begin before default and bulk."""
+"""Levels of mini-slots: urgent and latency start before default and bulk."""
 SECTIONS = LEVELS + 1
-"""Last come those who could not read who sent last, and so do not know the order."""
+"""Sections of a round: the levels, then the robots that do not know the last sender."""
 DRIFT = 4e-5
-"""Two clocks of 20 ppm part by that much a second since they heard the channel fall idle."""
+"""Drift of two 20 ppm clocks, in s per second since the channel fell idle."""
 
 
 class Ended(Enum):
-    """What kept the channel busy last, as far as a robot can tell."""
+    """What kept the channel busy last, as far as this robot knows."""
 
     OWN = auto()
     """Our own burst."""
     FORWARDED = auto()
-    """Our burst, with PDUs of another."""
+    """Our burst with another robot's PDUs."""
     READ = auto()
-    """A burst that we read, from its source."""
+    """A burst that we could read, from its source."""
     RELAYED = auto()
-    """A burst that we read, from a relay: nobody else knows from which."""
+    """A burst that we could read, from a relay; receivers do not know which relay."""
     UNREAD = auto()
-    """Energy alone, or a robot that is not listed."""
+    """A burst that we could not read, or one of a robot that is not listed."""
 
 
 FIRST: Mapping[Ended, int] = {
@@ -44,18 +44,18 @@ FIRST: Mapping[Ended, int] = {
     Ended.READ: 1,
     Ended.RELAYED: 0,
 }
-"""So many places after the source of its PDUs is the robot that comes first then. After what is
-not here, the order is not known."""
+"""By what kept the channel busy: how many places after the source of its PDUs the first robot of
+the next round is. For other events the order is unknown."""
 
 
 class MiniSlots(BusyChannel):
-    """Collision-free among nodes that hear each other, and the more urgent class first.
+    """Mini-slot access, without collisions among nodes that hear each other, urgent classes first.
 
-    Mini-slot 0 begins `minislot_s` after the channel falls idle. First come those of the higher
-    level, one a node, then those of the lower; in a level, the one whose PDUs were sent last comes
-    last, or, when a relay has sent them, first. When all are passed they begin anew, a little wider
-    the longer it is quiet: clocks part. A node begins only when it has heard the one before its own
-    pass.
+    Mini-slot 0 starts `minislot_s` after the channel falls idle. The mini-slots of the higher level
+    come first, one per node, then those of the lower level. Within a level, the node whose PDUs
+    were sent last comes last, or first if a relay has sent them. After the last mini-slot a new
+    round starts. Mini-slots grow with the time of silence, because clocks drift. A node starts only
+    when it has heard the mini-slot before its own pass unused.
     """
 
     others_follow = True
@@ -70,12 +70,12 @@ class MiniSlots(BusyChannel):
         self.round_s = SECTIONS * len(nodes) * minislot_s
         self._detect_s = detect_s
         self._last = (-1, NEVER, False)
-        """(source, when its burst began, whether it was relayed) of the last PDU."""
+        """The last PDU heard, as (source, start of its burst, whether it was relayed)."""
         self._own_src: int | None = None
-        """Whose PDUs we sent last, if we forwarded them."""
+        """Source of the PDUs that we sent last, if we relayed them."""
         self._n_slots = SECTIONS * len(nodes)
         self._round = (NEVER, 0.0)
-        """(since when the channel is idle, when it began after that) of the round we are in."""
+        """The current round, as (time since which the channel is idle, start after that in s)."""
 
     @property
     def state(self) -> str:
@@ -86,21 +86,21 @@ class MiniSlots(BusyChannel):
         )
 
     def mean_wait_s(self, qos: Qos) -> float:
-        """Half the robots of a level come before, and all of the higher one."""
+        """Mean wait in s: all mini-slots of the higher level, and half of those of our level."""
         n = len(self._nodes)
         return self._minislot_s * (1 + (n - 1) / 2 + (n if qos > Qos.LATENCY else 0))
 
     @property
     def turn_s(self) -> float:
-        """From when the channel falls idle to the first of the lower level, in s."""
+        """Time in s from an idle channel to the first mini-slot of the lower level."""
         return self._minislot_s * (1 + len(self._nodes))
 
     def carries(self, burst_s: float) -> float:
-        """Whoever is next in order begins when all of the higher level were passed."""
+        """Share of airtime of bursts that start once the mini-slots of the higher level passed."""
         return burst_s / (burst_s + self.turn_s)
 
     def slot(self, wish: Wish) -> Slot | None:
-        """Our next mini-slot, once all before it were heard to be idle."""
+        """Our next mini-slot, once all mini-slots before it were sensed idle."""
         earliest, qos, _, sensed = wish
         idle_since = self.idle_since(sensed)
         if idle_since is None:
@@ -117,21 +117,21 @@ class MiniSlots(BusyChannel):
         self._round = (idle_since, begin)
         if start > sensed.until + width_s - drift_s - self._detect_s:
             return None
-        # Who came first because it was urgent does not keep the air for what is not.
+        # A burst in an urgent mini-slot carries only urgent classes after its first PDU.
         least = Qos.LATENCY if qos <= Qos.LATENCY else Qos.BULK
         return Slot.exact(max(start, earliest), least=least)
 
     def sent(self, end: float, src: int | None) -> None:
-        """What we send ourselves, we do not hear."""
+        """Remember our own burst, which we do not hear."""
         super().sent(end, src)
         self._own_src = src
 
     def heard(self, src: int, at: float, is_relayed: bool) -> None:
-        """The order in a level follows from who sent last."""
+        """Remember the last sender, which determines the order within a level."""
         self._last = (src, at, is_relayed)
 
     def _place(self, idle_since: float, qos: Qos, sensed: Sensed) -> int:
-        """Number of our mini-slot after what kept the channel busy."""
+        """Index of our mini-slot in the round after the last event on the channel."""
         n = len(self._nodes)
         level = 0 if qos <= Qos.LATENCY else 1
         ended, src = self._what_ended(idle_since, sensed)
@@ -141,7 +141,7 @@ class MiniSlots(BusyChannel):
         return level * n + (self._rank - first) % n
 
     def _what_ended(self, idle_since: float, sensed: Sensed) -> tuple[Ended, int]:
-        """(what kept the channel busy up to then, the source of its PDUs)."""
+        """(what kept the channel busy until `idle_since`, source of its PDUs)."""
         src, at, is_relayed = self._last
         if idle_since == self.own_end:
             ended, src = Ended.OWN, self._nodes[self._rank]

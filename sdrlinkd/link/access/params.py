@@ -1,4 +1,4 @@
-"""What steers medium access. Defaults, ranges and meaning stand here and nowhere else."""
+"""Settings of medium access; their defaults, ranges and meanings are defined only here."""
 
 from typing import Annotated, Literal
 
@@ -9,26 +9,27 @@ Seconds = Annotated[float, Meta(ge=0, le=10)]
 
 
 class AccessParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How robots share the air; the same at all of them. Times of 0 are made from the radio's."""
+    """How robots share the channel, the same at all robots; a time of 0 follows from the radio."""
 
     policy: Literal["auto", "none", "csma", "minislot", "tdma"] = "auto"
-    """auto: none where `nodes` lists nobody else, minislot where the radio reacts soon, else tdma.
-    """
+    """Access policy; auto: none if `nodes` lists no other robot, minislot if the radio reacts fast
+    enough, else tdma."""
     nodes: list[Annotated[int, Meta(ge=0, le=254)]] = []
-    """Robots that share it, in one order at all of them; for auto, minislot and tdma."""
+    """Ids of the robots that share the channel, in the same order at all robots; for auto, minislot
+    and tdma."""
     force: bool = False
-    """Take a policy that carries less than half of what the best one would."""
+    """Whether to accept a policy that carries less than half of what the best policy would."""
     persist: Annotated[float, Meta(gt=0, le=1)] = 0.05
-    """csma: chance to send in an idle slot (PERSIST)."""
+    """csma: probability of sending in an idle slot (PERSIST)."""
     dwait_s: Seconds = 0.0
-    """csma: pause after the channel was busy (DWAIT)."""
+    """csma: pause after a busy channel in s (DWAIT)."""
     slottime_s: Seconds = 0.0
-    """csma: SLOTTIME; shorter than it takes to hear each other, it is none."""
+    """csma: slot time in s (SLOTTIME); it must be long enough to hear another robot's start."""
     minislot_s: Seconds = 0.0
-    """minislot, tdma: distance of the moments at which different robots may begin."""
+    """minislot, tdma: distance in s between the starts allowed to different robots."""
     slot_s: Seconds = 0.0
-    """tdma: a robot's slot."""
+    """tdma: length of a robot's slot in s."""
     guard_s: Seconds = 0.0
-    """tdma: pause at the end of each slot."""
+    """tdma: guard time at the end of each slot in s."""
     reuse: bool = True
-    """tdma: others may use a slot whose owner is silent."""
+    """tdma: whether others may use a slot whose owner is silent."""

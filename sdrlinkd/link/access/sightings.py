@@ -1,11 +1,11 @@
-"""Robots that lately did something a person should know of."""
+"""Robots that recently did something that a person should know about."""
 
 FORGET_S = 60.0
-"""A robot that has not done it for so long is no longer named."""
+"""Time in s after which a robot is no longer listed."""
 
 
 class Sightings:
-    """Which robots did one such thing, how often, and when last (link clock, s)."""
+    """Which robots did a certain thing, how often, and when last (link's clock, in s)."""
 
     def __init__(self) -> None:
         self._seen: dict[int, tuple[int, float]] = {}
@@ -16,11 +16,11 @@ class Sightings:
         self._seen[src] = n + 1, at
 
     def clear(self, src: int) -> None:
-        """Forget robot `src`: what was seen of it has ended."""
+        """Forget robot `src`, which has stopped doing it."""
         self._seen.pop(src, None)
 
     def lately(self, now: float, least: int = 1) -> list[int]:
-        """Who did it `least` times or more, without a long pause, in ascending order."""
+        """Robots seen recently, at least `least` times without a long pause, in ascending order."""
         return [
             src for src, (n, _) in sorted(self._seen.items())
             if n >= least and self._is_lately(src, now)

@@ -1,4 +1,4 @@
-"""State machines written as a table: (state, what happens) → state."""
+"""State machines as tables: (state, event) → next state."""
 
 from collections.abc import Mapping
 from enum import Enum
@@ -11,7 +11,7 @@ H = TypeVar("H", bound=Enum)
 
 
 def after(table: Mapping[tuple[S, H], S], state: S, happens: H) -> S:
-    """The state that follows. Raises IllegalStepError."""
+    """The state that follows `state` when `happens` occurs. Raises IllegalStepError."""
     following = table.get((state, happens))
     if following is None:
         raise IllegalStepError(f"{happens.name} in {state.name}")

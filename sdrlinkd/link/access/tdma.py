@@ -1,4 +1,4 @@
-"""`tdma`: each node has slots of its own, and clocks from what it hears."""
+"""`tdma`: each node has its own time slots, synchronized by the bursts it hears."""
 
 import math
 from binascii import crc_hqx
@@ -15,35 +15,34 @@ from sdrlinkd.link.traits import Sensed
 from sdrlinkd.wire import Frame
 
 LISTEN_S = 2.5
-"""Who hears no schedule for so long, and a second more for each robot before it, begins one."""
+"""A robot starts a schedule after hearing none for this time in s, plus 1 s per robot before it."""
 QUIET_S = 0.05
-"""The lowest robot begins one when it has heard nobody for so long, and a frame at least."""
+"""The lowest robot starts a schedule after this much silence in s, and at least one frame."""
 FORGET_S = 3.0
-"""A schedule not heard of for so long has lost its root; for twice as long, it is believed only
-from those as near to it as we were."""
+"""Time in s without news of a root after which it counts as lost. For twice that time, its schedule
+is accepted only from robots as close to it as we were."""
 LISTEN_SHARE = 0.25
-"""Of its own slots, while nobody follows it: others may have theirs at the same time."""
+"""Share of its own slots in which a root without followers listens: others may be using them."""
 MAX_LEVEL = 255
 PAUSE_AFTER = 2 / 3
 UNSCHEDULED = 3
-"""After so many beacons without a schedule, a robot has none."""
+"""Number of beacons without a schedule after which a robot counts as having none."""
 
 
 class Tdma(BusyChannel):
-    """Slots in the order of `nodes`, over and over; the last `guard_s` of each is silent.
+    """TDMA: slots in the order of `nodes`, repeated; the last `guard_s` of each slot is silent.
 
-    No burst goes on over two thirds of a slot: an urgent message that comes while its robot has the
-    slot need not wait for the next.
+    A burst that starts in the first two thirds of a slot ends there, so that an urgent message that
+    arrives during its robot's slot does not have to wait for the next one.
 
-    The schedule is that of the lowest robot heard of, directly or through others (its root); each
-    tells it on with its own count of hops (level). With `reuse`, a slot whose owner is silent, or
-    silent again, is open to the others in order, one `minislot_s` after another; but not to who
-    knows of a robot it does not hear: that one may well be sending.
+    All robots keep the schedule of the lowest robot known to them, directly or through others (the
+    root). Each robot announces it with its own hop count (level). With `reuse`, a slot whose owner
+    is silent, or silent again, is open to the others in order, one per `minislot_s`. A robot that
+    knows of a robot it cannot hear does not take part, as that robot may be sending.
 
-    Robots that kept schedules of their own out of each other's reach may come back with slots at
-    the same time, and as long as all send in all of theirs, nobody hears anybody. A root that has
-    had no follower for FORGET_S listens through some of its slots, by chance, and goes where the
-    others are.
+    Robots that kept their own schedules out of each other's range may meet again with overlapping
+    slots. If all of them sent in all of their slots, none would hear another. So a root without
+    followers for FORGET_S listens in some of its slots, at random, and adopts the others' phase.
     """
 
     keeps_schedule = True
@@ -76,27 +75,27 @@ class Tdma(BusyChannel):
         self._gap_s = gap_s
         self.round_s = self._frame_s = slot_s * len(nodes)
         self.share = (slot_s - guard_s) / self._frame_s
-        # With reuse, others may have begun.
+        # With reuse, another robot may have started in our slot.
         self.step_s = reuse * minislot_s * len(nodes)
-        # Micro-seconds are what travels.
+        # Rounded to µs, as sent on the air.
         times = (round(1e6 * slot_s), round(1e6 * guard_s), round(1e6 * minislot_s) * reuse)
         self._times_crc = crc_hqx(pack(">III", *times) + bytes(nodes), 0)
         self._origin = 0.0
         self._root, self._level, self._parent = own_id, 0, own_id
         self._lost = (-1, 0, 0.0)
-        """(root, level at which we followed it, until when it is not believed)."""
+        """The lost root, as (root, our level then, time until which it is not accepted)."""
         self.role = State.LISTENING
-        """Whose schedule is kept."""
+        """State of the schedule: listening, root or follower."""
         self._told_at = 0.0
         self._begins_at = LISTEN_S + sum(node < own_id for node in nodes)
         self._strangers = Sightings()
-        """Schedules that are not ours."""
+        """Robots that announce another schedule."""
         self._unscheduled = Sightings()
-        """Beacons since a robot told of a schedule: who has one tells it beside each."""
+        """Beacons by robot since it last announced a schedule; with a schedule, each has one."""
         self._heard_at: dict[int, float] = {}
         self._followed_at = 0.0
         self._listens = (-inf, False)
-        """Of our latest slot: its begin, and whether we listen through it."""
+        """Our latest slot, as (its start, whether we only listen in it)."""
         self._told_of_at: dict[int, float] = {}
 
     @property
@@ -113,12 +112,12 @@ class Tdma(BusyChannel):
         )
 
     def carries(self, burst_s: float) -> float:
-        """The share of the air that bursts take of slots less guards and gaps."""
+        """Share of airtime of bursts, as slots lose guard times and gaps."""
         open_s = self._slot_s - self._guard_s
         return open_s / self._slot_s * burst_s / (burst_s + self._gap_s)
 
     def slot(self, wish: Wish) -> Slot | None:
-        """In our own slot, or in one that nobody uses."""
+        """A time in our own slot, or in one that its owner does not use."""
         earliest, _, need_s, sensed = wish
         if self.role is State.LISTENING:
             if earliest < self._begins_at and not self._is_first(earliest, sensed):
@@ -136,32 +135,32 @@ class Tdma(BusyChannel):
             start = self._start(begin, turn, earliest, sensed)
             if start is not None and start + need_s <= end:
                 if start >= earliest + self._look_s:
-                    # Decided at the last look before.
+                    # Too early: decide at the last query before that start.
                     return None
                 pause = begin + PAUSE_AFTER * (self._slot_s - self._guard_s)
                 planned_end = pause if start + need_s <= pause else end
                 if self._reuse:
-                    # The others count on it.
+                    # With reuse, others rely on a start at exactly this time.
                     return Slot.exact(start, planned_end)
                 return Slot(start, planned_end, end)
         return None
 
     def heard(self, src: int, at: float, is_relayed: bool) -> None:
-        """Note that robot `src` is not hidden from us."""
+        """Note that we hear robot `src` directly."""
         if not is_relayed:
             self._heard_at[src] = at
 
     def told_of(self, node: int, at: float) -> None:
-        """Note that robot `node` is there, whether we hear it or not."""
+        """Note that robot `node` exists, whether we hear it or not."""
         if node != self._own_id:
             self._told_of_at[node] = at
 
     def beacon(self, src: int, at: float) -> None:
-        """Note a beacon of robot `src`: a schedule should come with it."""
+        """Note a beacon of robot `src`, which should come with a schedule."""
         self._unscheduled.add(src, at)
 
     def frame(self, start: float) -> Frame | None:
-        """The schedule as we keep it, for a burst that leaves at `start`; None while listening."""
+        """Our schedule, for a burst that leaves at `start`; None while listening."""
         if self.role is State.LISTENING:
             return None
         self._forget(start)
@@ -169,7 +168,7 @@ class Tdma(BusyChannel):
         return Frame(self._root, self._level, self._times_crc, round(1e6 * phase_s))
 
     def take_frame(self, src: int, frame: Frame, at: float) -> None:
-        """Follow the lowest root, by the fewest hops."""
+        """Follow the lowest root, over the fewest hops."""
         self._unscheduled.clear(src)
         if frame.schedule != self._times_crc:
             self._strangers.add(src, at)
@@ -181,7 +180,7 @@ class Tdma(BusyChannel):
         if frame.root == self._own_id:
             self._followed_at = at
         if frame.root >= self._own_id:
-            # They will follow us; until then we go on where they are.
+            # They will follow us; until then we adopt their phase.
             if self.role is State.LISTENING:
                 self._go(Happens.ADOPTS)
                 self._origin, self._followed_at = origin, at
@@ -189,7 +188,7 @@ class Tdma(BusyChannel):
                 self._go(Happens.ADOPTS)
                 self._origin = origin
         elif frame.root == self._lost[0] and told[1] > self._lost[1] and at < self._lost[2]:
-            # Somebody who has not forgotten it yet.
+            # This robot has not noticed yet that the root is lost.
             return
         elif frame.level < MAX_LEVEL and (
             src == self._parent or told < (self._root, self._level) or self.role is State.LISTENING
@@ -199,7 +198,7 @@ class Tdma(BusyChannel):
             self._origin, self._told_at = origin, at
 
     def notices(self, now: float) -> list[str]:
-        """Robots that keep another schedule, or none, in sentences."""
+        """Sentences on robots that keep another schedule or none."""
         return [
             f"robot {src} is heard and keeps no tdma schedule: what it sends falls into others' "
             "slots; give it the same [access], and a radio of the same kind where access.policy "
@@ -215,12 +214,12 @@ class Tdma(BusyChannel):
         self.role = after(STEPS, self.role, happens)
 
     def _is_first(self, earliest: float, sensed: Sensed) -> bool:
-        """Whether we are the lowest, and nobody seems to be there."""
+        """Whether we are the lowest robot and have heard nobody so far."""
         lowest = self._own_id == min(self._nodes)
         return lowest and earliest >= max(QUIET_S, self._frame_s) and sensed.idle_since <= 0
 
     def _forget(self, now: float) -> None:
-        """Go on by our own clock where nobody has heard our root for long."""
+        """Become the root, by our own clock, after FORGET_S without news of our root."""
         if self.role is State.FOLLOWER and now - self._told_at > FORGET_S:
             self._go(Happens.LOSES)
             self._lost = (self._root, self._level, now + 2 * FORGET_S)
@@ -228,12 +227,12 @@ class Tdma(BusyChannel):
             self._followed_at = now
 
     def _is_alone(self, now: float) -> bool:
-        """Whether nobody keeps our schedule, nor we another's; a root is given some time."""
+        """Whether we follow nobody and have had no follower for FORGET_S."""
         is_root = self.role is not State.FOLLOWER
         return is_root and now - self._followed_at >= FORGET_S
 
     def _listens_through(self, begin: float, now: float) -> bool:
-        """Whether our slot that begins then stays empty, to hear who else sends in it."""
+        """Whether we only listen in our slot that starts at `begin`, to hear who sends in it."""
         if len(self._nodes) == 1 or not self._is_alone(now):
             return False
         if abs(begin - self._listens[0]) > self._slot_s / 2:
@@ -241,14 +240,14 @@ class Tdma(BusyChannel):
         return self._listens[1]
 
     def _knows_of_hidden(self, now: float) -> bool:
-        """Whether others hear somebody whom we do not."""
+        """Whether others hear a robot that we do not hear."""
         return any(
             now - told_at < FORGET_S and now - self._heard_at.get(node, -inf) >= FORGET_S
             for node, told_at in self._told_of_at.items()
         )
 
     def _start(self, begin: float, turn: int, earliest: float, sensed: Sensed) -> float | None:
-        """Where we may begin in the slot that begins at `begin`, `turn` robots after its owner."""
+        """Earliest start for us in the slot at `begin`, as the robot `turn` after its owner."""
         if turn == 0 and (earliest <= begin or not self._reuse):
             return max(begin, earliest)
         if turn == 0 and begin < self.own_end and earliest <= self.own_end + 2 * self._gap_s:

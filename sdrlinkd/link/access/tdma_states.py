@@ -1,11 +1,11 @@
-"""Whose schedule a robot keeps in tdma, and what changes that.
+"""The states of a robot's tdma schedule, and the events that change them.
 
-Nobody is the master by configuration, so any robot may be missing. The schedule is that of the
-lowest robot heard of, its root: a rule that all can apply alone, and that has one answer once all
-have heard of each other. A robot that comes first listens, so as not to begin a second schedule
-beside one that it has not heard yet; who is lowest waits least. A root that falls silent is
-followed for FORGET_S, for losing a second of beacons must not break the team apart; then everybody
-goes on by its own clock, which is still nearly the old one, and the lowest wins again.
+No robot is configured as the master, so any robot may be absent. The schedule is that of the lowest
+robot known, the root. Each robot can apply this rule by itself, and it has one answer once all
+robots know of each other. A new robot listens first, so that it does not start a second schedule
+beside one that it has not heard yet; the lowest robot waits least. A silent root is followed for
+FORGET_S, as the loss of a second of beacons must not split the team. After that, each robot
+continues by its own clock, which still nearly agrees, and the lowest robot becomes the root again.
 
 ::
 
@@ -22,27 +22,27 @@ from enum import Enum, auto
 
 
 class State(Enum):
-    """Whose schedule a robot keeps."""
+    """State of a robot's schedule."""
 
     LISTENING = auto()
-    """None yet."""
+    """The robot keeps no schedule yet."""
     ROOT = auto()
-    """Its own."""
+    """The robot keeps its own schedule."""
     FOLLOWER = auto()
-    """That of a lower robot."""
+    """The robot keeps the schedule of a lower robot."""
 
 
 class Happens(Enum):
-    """What changes whose schedule it keeps."""
+    """Events that change the schedule's state."""
 
     BEGINS = auto()
-    """It has listened for long enough, and heard none."""
+    """The robot has listened for long enough and heard no schedule."""
     ADOPTS = auto()
-    """It keeps its own schedule at the place of another, whose robots will follow it."""
+    """The robot keeps its own schedule in the phase of another, whose robots will follow it."""
     FOLLOWS = auto()
-    """It hears of a lower root, or of its own by fewer hops."""
+    """The robot hears of a lower root, or of its root over fewer hops."""
     LOSES = auto()
-    """Nothing was heard of its root for FORGET_S."""
+    """The robot has had no news of its root for FORGET_S."""
 
 
 STEPS: Mapping[tuple[State, Happens], State] = {

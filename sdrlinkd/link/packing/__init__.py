@@ -1,7 +1,7 @@
-"""PDUs made of the messages that go next.
+"""Packs the next messages of the queue into PDUs.
 
-This room owns entry ids, the fragments that a message is cut into, and the records that ride where
-room is left. It is told how much may be packed, and never decides when something leaves.
+This package holds entry ids, the fragments of messages, and the control records that use spare
+room. Its callers decide how much it may pack, and when a PDU leaves.
 """
 
 from sdrlinkd.link.packing.composer import Composer, ComposerReport

@@ -1,16 +1,16 @@
-"""From queued messages to PDUs: the paper's packing policy (section 5.2), class by class.
+"""Composes PDUs from queued messages, by the paper's packing policy (section 5.2), per class.
 
-Among topics of equal class and priority: with two or more pending, PDUs of two entries, a fragment
-having k = max(k*(2), k_min) bytes, round robin; with one, a single entry of k = P_max − 13. k
-freezes at a message's first fragment. Greedy: further entries of the same topics while they fit.
-Lower classes fill what is left over.
+If two or more topics of equal class and priority have messages, a PDU holds two entries, with
+fragments of k = max(k*(2), k_min) bytes, round robin. If only one topic has messages, a PDU holds a
+single entry of k = P_max − 13 bytes. k is fixed at a message's first fragment. With `greedy`,
+further entries of the same topics are added while they fit. Lower classes fill the remaining room.
 
-Why so: a header costs 8 bytes and an entry 5, so one large entry wastes least; but a topic that had
-every PDU for itself would hold up its equals for as long as its message is. k freezes because a
-receiver puts fragments back by index · k. All PDUs of a burst are of one source: a relay that mixed
-its own with those that it forwards would leave its hearers in doubt whose burst it was, and
-mini-slots are ordered by just that. The age goes with a message's last fragment, where it is known
-best: earlier fragments may have waited since.
+The reasons: a header costs 8 bytes and an entry 5, so one large entry wastes least. But a topic
+with every PDU to itself would delay topics of equal rank by the length of its message. k is fixed
+because a receiver places fragments at index · k. All PDUs of a burst have one source: if a relay
+mixed its own PDUs with relayed ones, receivers could not tell whose burst it was, and mini-slots
+are ordered by that. The age is sent with a message's last fragment, where it is most exact: the
+message may wait between its fragments.
 """
 
 from collections.abc import Sequence
@@ -37,17 +37,17 @@ from sdrlinkd.wire import (
 )
 
 MAX_PDUS = 63
-"""PDUs of a burst, whatever carries it."""
-# Lanes looked at while one PDU is filled; past that the room left is not worth the search.
+"""Most PDUs in a burst, for every PDU link."""
+# Lanes searched while one PDU is filled; after that, the remaining room is not worth the search.
 MAX_LANES_PER_PDU = 4 * MAX_ENTRIES
-# Less room for one more entry than this, and a STAMP does not even fit behind other records.
+# With less room for another entry than this, a STAMP does not even fit after other records.
 MIN_ROOM_FOR_STAMP = STAMP_SIZE - ENTRY_HEADER_SIZE - 1
 FLAGS = {(qos, z): flags(WIRE_BITS[qos], z) for qos in Qos for z in (False, True)}
 """A PDU's first octet, by (class, whether its messages are compressed)."""
 
 
 class ComposerReport(NamedTuple):
-    """What was composed since the start."""
+    """Counts of what was composed since the start."""
 
     entries: int
     pdus: int
@@ -56,7 +56,7 @@ class ComposerReport(NamedTuple):
 
 
 class Composer:
-    """Fills PDUs from the outbox. Chance (sequence start, entry ids) comes from `rng`."""
+    """Fills PDUs from the outbox; `rng` chooses the first sequence number and the entry ids."""
 
     def __init__(
         self,
@@ -87,7 +87,7 @@ class Composer:
         parity = {qos: classes.of(qos).parity * has_control for qos in Qos}
         self._writer = EntryWriter(outbox, self.entry_ids, self.k_single, self._k_shared, parity)
         self.asking = self._writer.asking
-        """Messages just stamped whose producers want to know what becomes of them."""
+        """Messages just stamped whose producers want receipts."""
         self._head_of_line = HeadOfLine(outbox, self.entry_ids, reassembly_timeout_s)
         self._single_entry = SingleEntry(outbox, params, src, has_control)
         self._flush = Flush(params.flush_s, outbox, self.k_single, reassembly_timeout_s)
@@ -95,13 +95,13 @@ class Composer:
         self._entries = 0
 
     def fill(self, start: float, allowance: Allowance, source: int | None = None) -> list[BuiltPdu]:
-        """The PDUs of a burst whose preamble leaves at `start`; empty when nothing is to be sent.
+        """The PDUs of a burst whose preamble leaves at `start`; empty if there is nothing to send.
 
-        All are of one source, `source` if given: who hears the burst knows by that who may follow.
+        All PDUs have one source, `source` if given: receivers derive from it who may send next.
         """
         built: list[BuiltPdu] = []
         levels, most_of = self._outbox.levels, allowance.most
-        # What a class is owed takes room from others; it makes no burst longer.
+        # PDUs owed to a class take room from other classes and do not lengthen the burst.
         owed = list(allowance.owed[: max(1, max(most_of) - 1)])
         while levels and len(built) < MAX_PDUS:
             n, first, most = len(built), None, most_of[levels[0].qos]
@@ -110,7 +110,7 @@ class Composer:
             if owed and n + len(owed) >= most and (n or most < 2):
                 first = owed.pop(0)
             elif owed and not n and self._next_src(owed[0]) != self._next_src():
-                # It cannot join, so it goes alone.
+                # The owed PDU has another source, so it is sent alone.
                 first, owed, most = owed[0], [], 0
             elif n >= most:
                 break
@@ -131,7 +131,7 @@ class Composer:
         return built
 
     def fill_with_records(self, start: float) -> list[BuiltPdu]:
-        """A PDU of its own for the records that wait, in a burst at `start`; empty: none does."""
+        """A PDU with only the waiting records, for a burst at `start`; empty if none waits."""
         draft = Draft(self._pdu_size)
         self._piggyback.ride(draft, start)
         if draft.is_empty:
@@ -141,7 +141,7 @@ class Composer:
         return [self._finish(draft)]
 
     def next_wakeup(self, now: float) -> float:
-        """When `fill` may next have something to send; −inf: now; infinity: nothing waits."""
+        """Time at which `fill` may next have something to send; −inf: now; infinity: no traffic."""
         if not self._outbox.levels:
             return float("inf")
         if self._flush.is_on and self._flush.must_wait(now):
@@ -153,25 +153,25 @@ class Composer:
         )
 
     def take_asking(self) -> list[Outgoing]:
-        """The messages of `asking`, each told once."""
+        """The messages in `asking`, which is then emptied."""
         asking = [*self.asking]
         self.asking.clear()
         return asking
 
     def report(self) -> ComposerReport:
-        """What was composed so far."""
+        """Counts of what was composed so far."""
         return ComposerReport(self._entries, self._pdus, sorted(self.entry_ids.starved))
 
     def expire(self, now: float) -> None:
-        """Drop what is in vain by now, though no burst could go."""
+        """Drop messages that are pointless to send at `now`, although no burst could leave."""
         self._head_of_line.expire(now)
 
     def abandon(self, lane: Lane, now: float) -> None:
-        """Send no more of the message that `lane` is in the middle of."""
+        """Send no more fragments of the message that `lane` has begun."""
         self._head_of_line.abandon(lane, now)
 
     def end_flush(self) -> None:
-        """Let no PDU wait for more from now on."""
+        """From now on, no partly filled PDU waits for more messages."""
         self._flush.end()
 
     def _next_pdu(
@@ -179,8 +179,8 @@ class Composer:
     ) -> BuiltPdu | None:
         """The next PDU of a burst whose preamble leaves at `start`, or None.
 
-        The most urgent comes first, or class `first`; None also where that is not of `source`.
-        What is in vain is withdrawn; see `HeadOfLine`.
+        It starts with the most urgent class, or with class `first`. It is None if that PDU's source
+        is not `source`. Messages that are pointless to send are dropped; see `HeadOfLine`.
         """
         outbox = self._outbox
         levels = outbox.levels
@@ -213,9 +213,9 @@ class Composer:
         return self._finish(draft)
 
     def _next_full(self, start: float, most: int, source: int | None) -> list[BuiltPdu]:
-        """The next `most` PDUs or fewer, where they are alike: fragments that fill them.
+        """Up to `most` next PDUs, if each is filled by one fragment of the same message.
 
-        What `_next_pdu` would give one after another, without looking round after each.
+        The PDUs are those that `_next_pdu` would return one by one, without its search for each.
         """
         if source is not None and source != self._src:
             return []
@@ -233,7 +233,7 @@ class Composer:
         return built
 
     def _next_src(self, first: Qos | None = None) -> int:
-        """Whose PDU goes next, or next of a class, as far as one can tell."""
+        """Probable source of the next PDU, or of the next PDU of class `first`."""
         levels = self._outbox.levels if self._outbox.relays else []
         for level in [each for each in levels if first is None or each.qos is first][:1]:
             head = level.lanes[0].head
@@ -242,14 +242,14 @@ class Composer:
         return self._src
 
     def _next_whole(self, level: Level, start: float) -> Outgoing | None:
-        """Another robot's PDU, if that is what goes next of a level."""
+        """The next message of a level, if it is another robot's PDU."""
         lane = level.lanes[0]
         return self._live(lane, start) if lane.head and lane.head.is_whole else None
 
     def _live(self, lane: Lane, start: float) -> Outgoing | None:
-        """The lane's next message that may still go.
+        """The lane's next message that is still worth sending.
 
-        That the head is no good is rare, so what follows from it is left to `HeadOfLine`.
+        A head that is pointless to send is rare, so `HeadOfLine` handles that case.
         """
         head = lane.current or (lane.waiting[0] if lane.waiting else None)
         if head is not None and head.in_vain(start, self._patience_s):
@@ -266,9 +266,9 @@ class Composer:
         return BuiltPdu(data, draft.carried, draft.qos)
 
     def _may_fit(self, level: Level, room: int) -> bool:
-        """Whether some lane's next entry may fit: a quick no spares the look at each.
+        """Whether the next entry of any lane may fit; a quick no saves trying each lane.
 
-        A fragment that is not its message's last has at least k_shared bytes.
+        Every fragment but a message's last has at least k_shared bytes.
         """
         if room >= self._k_shared or room <= 0:
             return room > 0

@@ -19,7 +19,7 @@ NO_DST = -1
 
 
 class BuiltPdu(NamedTuple):
-    """A PDU, the messages it carries an entry of, and the highest class inside."""
+    """A finished PDU, the messages of its entries, and the most urgent class inside."""
 
     data: bytes
     carried: list[Outgoing]
@@ -27,12 +27,12 @@ class BuiltPdu(NamedTuple):
 
     @property
     def src(self) -> int:
-        """The robot that its source field names."""
+        """Id of the PDU's source robot."""
         return self.data[1]
 
 
 class Draft(PduBuilder):
-    """A PDU in the making, with what its entries have in common and whose they are."""
+    """A PDU being filled, with the common properties of its entries and their messages."""
 
     __slots__ = ("carried", "dst", "is_compressed", "qos")
 
@@ -44,23 +44,23 @@ class Draft(PduBuilder):
         self.qos = Qos.BULK
 
     def suits(self, message: Outgoing) -> bool:
-        """Whether entries of `message` may join those that are there."""
+        """Whether entries of `message` may join the entries already in the PDU."""
         return self.dst == NO_DST or (
             self.dst == message.dst and self.is_compressed == message.is_compressed
         )
 
     def address(self, dst: int, qos: Qos) -> None:
-        """Say where a PDU with nothing but records goes, and how urgently."""
+        """Set destination and class of a PDU that holds only control records."""
         self.dst, self.qos = dst, qos
 
     def take(self, message: Outgoing, payload: bytes) -> None:
-        """Add the next fragment of `message`, which is `payload`."""
+        """Add `payload`, the next fragment of `message`."""
         self.add(message.topic_id, message.entry_id, message.next_index, message.total, payload)
         self.carried.append(message)
         self.join(message)
 
     def join(self, message: Outgoing) -> None:
-        """Note that an entry of `message` is in it, or what goes ahead of one."""
+        """Note that the PDU holds an entry of `message`, or the STAMP sent ahead of one."""
         self.dst = message.dst
         self.is_compressed = message.is_compressed
         if message.qos < self.qos:
@@ -68,10 +68,10 @@ class Draft(PduBuilder):
 
 
 class EntryWriter:
-    """Cuts what goes next in a lane into entries, and puts them into a draft with its age.
+    """Cuts a lane's next message into entries and puts them into a draft, with the message's age.
 
-    `parity`: fragments of parity for each one of a large message, by class. `k_single` and
-    `k_shared` are the payload bytes of an entry that has a PDU to itself, or shares one.
+    `parity` is the number of parity fragments per fragment of a large message, by class. `k_single`
+    and `k_shared` are the payload bytes of an entry alone in a PDU and of one that shares a PDU.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class EntryWriter:
         self._k_shared = k_shared
         self._parity = parity
         self.asking: list[Outgoing] = []
-        """Messages just stamped whose producers want to know what becomes of them."""
+        """Messages just stamped whose producers want receipts."""
 
     def place(self, lane: Lane, head: Outgoing, level: Level, draft: Draft, start: float) -> bool:
         """Put the lane's next entry into the draft if it fits."""
@@ -97,7 +97,7 @@ class EntryWriter:
         is_last = at + length >= size
         needs_stamp = is_last and not head.stamped
         if needs_stamp and length + bool(head.receipt) > draft.room_beside_stamp:
-            # The age goes ahead in a PDU of its own only where even an empty one is too small.
+            # Send the age ahead in its own PDU only if both do not fit even into an empty one.
             return draft.is_empty and self._send_stamp_ahead(lane, head, k, draft, start)
         if length > draft.room or not (lane.current or self._begin(lane, head, k, start)):
             return False
@@ -113,10 +113,10 @@ class EntryWriter:
         return True
 
     def _place_parity(self, lane: Lane, head: Outgoing, draft: Draft, start: float) -> bool:
-        """Put parity of the message whose fragments have all gone into the draft, if it fits."""
+        """Add parity of `head`, whose fragments have all been composed, to the draft if it fits."""
         records = head.parity
         if head in draft.carried:
-            # One PDU must not take both with it.
+            # Loss of one PDU must not take both a fragment and its parity.
             return False
         n = len(records)
         while records and draft.add_record(records[-1]):
@@ -133,13 +133,13 @@ class EntryWriter:
         return True
 
     def _end(self, lane: Lane, head: Outgoing, start: float) -> None:
-        """The message is through, unless parity follows."""
+        """End the message, unless parity follows."""
         if not head.parity:
             self._entry_ids.retire(head, start)
             self._outbox.end(lane)
 
     def _parity_of(self, head: Outgoing) -> list[bytes]:
-        """Records, the first one last; beside them the age goes again, in case it was lost, too."""
+        """The parity records of `head` in reverse order, sized to leave room for its age again."""
         ids, room = (head.topic_id, head.entry_id), self._k_single - ASKING_STAMP_SIZE
         share = self._parity[head.qos]
         return parity_records(head.payload, head.k, head.total, ids, share, room)[::-1]
@@ -159,7 +159,7 @@ class EntryWriter:
         return max(k, fragment_count(size, MAX_FRAGMENTS)) if size > k * MAX_FRAGMENTS else k
 
     def _begin(self, lane: Lane, head: Outgoing, k: int, start: float) -> bool:
-        """Make `head` the message being fragmented; False while the topic has no free id."""
+        """Make `head` the lane's current message; False while the topic has no free entry id."""
         entry_id = self._entry_ids.take(head.topic_id, start)
         if entry_id is None:
             return False
@@ -169,7 +169,7 @@ class EntryWriter:
         return True
 
     def stamp(self, draft: Draft, message: Outgoing, start: float) -> None:
-        """Add the message's age to `draft` where it fits."""
+        """Add the message's age to `draft` if it fits."""
         age_us = min(max(round((start - message.arrived_at) * 1e6), 0), MAX_AGE_US)
         asks = bool(message.receipt)
         if not draft.add_stamp(message.topic_id, message.entry_id, age_us, asks):

@@ -1,4 +1,4 @@
-"""Which entry id the next message of a topic gets (wire document, section 4.2)."""
+"""Assigns entry ids to the messages of a topic (wire document, section 4.2)."""
 
 from collections import Counter, deque
 from collections.abc import Iterable
@@ -6,37 +6,37 @@ from random import Random
 
 from sdrlinkd.link.queue import Outgoing
 
-# A receiver may hear the last fragment late (reordering, relays), so ids rest a little longer
-# than it waits for missing ones.
+# A receiver may hear the last fragment late (reordering, relays), so an id rests a little longer
+# than the receiver waits for missing fragments.
 REST_FACTOR = 1.25
 
 
 class EntryIds:
-    """A shuffled permutation of 0…255 for one topic, in which a used id rests before its return.
+    """The entry ids 0…255 of one topic in random order; a used id rests before it is used again.
 
-    Two fragmented messages under one id within the reassembly timeout could be joined into one
-    that nobody sent. A single-entry message leaves nothing behind at the receiver, so its id is
-    free again at once.
+    A receiver could join fragments of two messages that use one id within the reassembly timeout
+    into a message that nobody sent. A single-entry message leaves nothing at the receiver, so its
+    id is free again at once.
     """
 
     def __init__(self, rng: Random, rest_s: float) -> None:
         self.idle = deque(rng.sample(range(256), 256))
-        """Ids that are free, the longest free first."""
+        """Free ids, the longest free first."""
         self.resting: deque[tuple[float, int]] = deque()
-        """(until when, id), in the order in which they will be free."""
+        """Resting ids as (time when free, id), in order of that time."""
         self._rest_s = rest_s
 
     def wake(self, now: float) -> None:
-        """Make ids free that have rested for long enough at `now`."""
+        """Free the ids that have rested for long enough at `now`."""
         while self.resting and self.resting[0][0] <= now:
             self.idle.append(self.resting.popleft()[1])
 
     def rest(self, entry_id: int, now: float) -> None:
-        """The last fragment under the id went at `now`."""
+        """Let an id rest, as the last fragment under it was sent at `now`."""
         self.resting.append((now + self._rest_s, entry_id))
 
     def hold(self, entry_id: int) -> bool:
-        """Its last fragment has not left after all; whether it was at rest. See `rest`."""
+        """Stop the rest of an id whose last fragment has not left; False if it was not resting."""
         for i, (_, resting) in enumerate(self.resting):
             if resting == entry_id:
                 del self.resting[i]
@@ -44,24 +44,24 @@ class EntryIds:
         return False
 
     def next_free(self) -> float:
-        """When an id will be free: −inf at once, +inf never until one comes back."""
+        """Time at which an id will be free; −inf: now; +inf: not before an id starts to rest."""
         if self.idle:
             return float("-inf")
         return self.resting[0][0] if self.resting else float("inf")
 
 
 class TopicEntryIds:
-    """The ids of all topics, as messages take and leave them."""
+    """The entry ids of all topics: messages take ids and return them."""
 
     def __init__(self, rng: Random, rest_s: float) -> None:
         self._rng = rng
         self._rest_s = rest_s
         self._by_topic: dict[int, EntryIds] = {}
         self.starved: Counter[int] = Counter()
-        """How often a topic had to wait because all its ids were at rest."""
+        """By topic id: how often the topic had to wait because none of its entry ids was free."""
 
     def take(self, topic_id: int, now: float) -> int | None:
-        """An id for the topic's next message; None while none is free."""
+        """An entry id for the topic's next message; None while none is free."""
         ids = self._by_topic.get(topic_id) or self._new(topic_id)
         if ids.resting:
             ids.wake(now)
@@ -71,7 +71,7 @@ class TopicEntryIds:
         return None
 
     def retire(self, message: Outgoing, now: float) -> None:
-        """Let its id rest, or go on at once: no more fragments of `message` will be made."""
+        """Return the id of `message`, which has no more fragments: it rests, or is free at once."""
         ids = self._by_topic[message.topic_id]
         if message.rests_id:
             ids.rest(message.entry_id, now)
@@ -79,20 +79,20 @@ class TopicEntryIds:
             ids.idle.append(message.entry_id)
 
     def not_left(self, messages: Iterable[Outgoing]) -> None:
-        """Keep the ids of `messages`: fragments of them leave later than they were made for."""
+        """Hold the ids of `messages`, whose fragments leave later than planned."""
         for message in messages:
             if not message.is_whole and not message.is_held:
                 message.hold_id(self._by_topic[message.topic_id].hold(message.entry_id))
 
     def left(self, messages: Iterable[Outgoing], start: float) -> None:
-        """Let ids rest whose fragments were held back, and leave in a burst at `start`."""
+        """Let the held ids of `messages` rest, as their fragments leave in a burst at `start`."""
         for message in messages:
             if message.is_held:
                 message.hold_id(False)
                 self._by_topic[message.topic_id].rest(message.entry_id, start)
 
     def next_free(self, message: Outgoing) -> float:
-        """When `message` can have one; −inf: at once."""
+        """Time at which an entry id is free for `message`; −inf: now."""
         if message.is_whole:
             return float("-inf")
         ids = self._by_topic.get(message.topic_id) or self._new(message.topic_id)

@@ -1,4 +1,4 @@
-"""How long what fills no PDU waits for more (paper section 4.3, Flush Timeout)."""
+"""How long messages that do not fill a PDU wait for more (paper section 4.3, Flush Timeout)."""
 
 from math import inf
 from typing import Literal
@@ -9,11 +9,11 @@ from sdrlinkd.link.queue import Outbox
 NOW = "now"
 FlushTime = Literal["now"] | float
 BEGUN_PART = 0.5
-"""Of the time that receivers wait for the rest of a message, so much may pass here."""
+"""Share of the receivers' reassembly timeout for which the rest of a message may wait here."""
 
 
 def flush_told(flush_s: FlushTime) -> str:
-    """What the setting means, in a line."""
+    """The meaning of the setting `flush_s`, as one line of text."""
     if flush_s == NOW:
         return f'link.flush_s = "{NOW}": a PDU that is not full leaves as soon as the radio is free'
     how_long = f"for more, up to {flush_s:g} s"
@@ -26,10 +26,10 @@ def flush_told(flush_s: FlushTime) -> str:
 
 
 class Flush:
-    """Whether what is in `outbox` waits. `size`: bytes that fill a PDU with one entry.
+    """Decides whether the messages in `outbox` wait until they fill a PDU of `size` bytes.
 
-    Nobody waits for: urgent and latency, messages with a lifespan, and the rest of a message that
-    receivers would give up after `patience_s`.
+    Urgent and latency messages and messages with a lifespan never wait. The rest of a message waits
+    for only part of `patience_s`, after which receivers would give it up.
     """
 
     def __init__(self, flush_s: FlushTime, outbox: Outbox, size: int, patience_s: float) -> None:
@@ -37,16 +37,16 @@ class Flush:
         self._size = size
         self._begun_s = BEGUN_PART * patience_s
         self.is_on = flush_s != NOW
-        """Whether anything ever waits."""
-        # The paper's 0.0: never by time.
+        """Whether messages ever wait."""
+        # 0.0 means, as in the paper, that the wait does not end by time.
         self._longest_s = float(flush_s or inf) if flush_s != NOW else 0.0
 
     def end(self) -> None:
-        """Let nothing wait from now on."""
+        """From now on, let no message wait."""
         self.is_on = False
 
     def must_wait(self, now: float) -> bool:
-        """Whether all that is there waits for more; the outbox is not empty."""
+        """Whether the messages in the outbox, which must not be empty, wait for more."""
         return (
             self.is_on
             and now < self.due_at()
@@ -54,7 +54,7 @@ class Flush:
         )
 
     def due_at(self) -> float:
-        """When it goes even so; infinity: never by time."""
+        """Time at which the messages are sent without more; infinity: never by time."""
         outbox = self._outbox
         if outbox.levels[0].qos <= Qos.LATENCY or outbox.has_lifespans():
             return -inf

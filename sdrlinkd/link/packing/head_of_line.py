@@ -1,14 +1,14 @@
-"""The messages that go next, while they are worth it."""
+"""Keeps only messages at the head of each lane that are still worth sending."""
 
 from sdrlinkd.link.packing.entry_ids import TopicEntryIds
 from sdrlinkd.link.queue import Lane, Outbox, Outgoing
 
 
 class HeadOfLine:
-    """Drops heads that are in vain, fragments and all: see `Outgoing.in_vain`.
+    """Drops head-of-line messages that are pointless to send, with all fragments.
 
-    Only what stands first in a lane is looked at. What waits behind it is looked at when its turn
-    comes, so the cost does not grow with the queue.
+    `Outgoing.in_vain` defines pointless. Only the first message of a lane is checked, so the cost
+    does not grow with the queue; later messages are checked when they become the head.
     """
 
     def __init__(self, outbox: Outbox, entry_ids: TopicEntryIds, patience_s: float) -> None:
@@ -18,7 +18,7 @@ class HeadOfLine:
         self._patience_s = patience_s
 
     def next_live(self, lane: Lane, now: float) -> Outgoing | None:
-        """The lane's next message that may still go; those before it are dropped."""
+        """The lane's next message that is worth sending; the messages before it are dropped."""
         head = lane.head
         while head is not None and (reason := head.in_vain(now, self._patience_s)):
             if lane.current is None:
@@ -30,11 +30,11 @@ class HeadOfLine:
         return head
 
     def expire(self, now: float) -> None:
-        """Look at the heads of all lanes."""
+        """Check the heads of all lanes at `now`, and drop those that are pointless to send."""
         for level in tuple(self._outbox.levels):
             for lane in tuple(level.lanes):
                 self.next_live(lane, now)
 
     def abandon(self, lane: Lane, now: float) -> None:
-        """Send no more of the message that `lane` is in the middle of."""
+        """Send no more fragments of the message that `lane` has begun."""
         self._entry_ids.retire(self._outbox.withdraw_head(lane), now)

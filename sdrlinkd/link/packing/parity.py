@@ -1,8 +1,9 @@
-"""Parity for large messages: what a lost PDU took can be computed from the others.
+"""Parity for large messages, from which receivers compute fragments of lost PDUs.
 
-A Reed-Solomon code over the fragments, byte by byte (zfec): the j-th byte of every parity fragment
-follows from the j-th bytes of all fragments. So parity can be cut into pieces at will; any `n` of
-fragments and parity fragments tell all others, for each piece apart.
+The code is Reed-Solomon over the fragments, byte by byte (zfec): the j-th byte of every parity
+fragment follows from the j-th bytes of all fragments. So parity can be cut into pieces anywhere.
+For each piece, any `n` fragments and parity fragments of a message with `n` fragments determine all
+others.
 """
 
 import math
@@ -19,17 +20,17 @@ from sdrlinkd.wire import (
 )
 
 MOST = 256
-"""Fragments and parity fragments of a message."""
+"""Most fragments and parity fragments of a message, together."""
 LEAST_FRAGMENTS = 4
-"""Fewer are not worth it."""
+"""Fewest fragments for which parity is sent."""
 
 
 def parity_records(
     payload: bytes, k: int, total: int, ids: tuple[int, int], share: float, room: int
 ) -> list[bytes]:
-    """Records for `share` times as many parity fragments, those of a place one after the other.
+    """Records with `share` parity fragments per fragment, ordered by position in the fragments.
 
-    `ids`: (topic id, entry id). `room`: bytes of records that a PDU holds.
+    `ids` is (topic id, entry id), and `room` is the number of record bytes that fit into a PDU.
     """
     n_parity = min(math.ceil(share * total), MOST - total)
     if total < LEAST_FRAGMENTS or n_parity < 1:
@@ -38,7 +39,7 @@ def parity_records(
     fragments[-1] = fragments[-1].ljust(k, b"\0")
     numbers = list(range(total, total + n_parity))
     made = zfec.Encoder(total, total + n_parity).encode(fragments, numbers)
-    # So long that a PDU is filled by whole records.
+    # Choose a length at which whole records fill a PDU.
     longest = TLV_HEADER_SIZE + MAX_VALUE_SIZE
     length = room // -(-room // longest) - PARITY_OVERHEAD
     return [
@@ -51,7 +52,7 @@ def parity_records(
 
 
 def is_sound(parity: Parity) -> bool:
-    """Whether a record does not contradict itself."""
+    """Whether the fields of a record are consistent."""
     k, total = parity.k, parity.total
     return (
         k * (total - 1) < parity.size <= k * total
@@ -61,7 +62,7 @@ def is_sound(parity: Parity) -> bool:
 
 
 def missing_fragments(partial: Partial) -> dict[int, bytes]:
-    """The fragments that `partial` lacks, by number, if its parity tells; else nothing."""
+    """The fragments that `partial` lacks, by number, if its parity suffices; else empty."""
     if partial.shape is None:
         return {}
     (n_parity, k, size), total, there = partial.shape, partial.total, partial.parity
@@ -76,7 +77,7 @@ def missing_fragments(partial: Partial) -> dict[int, bytes]:
     for at, pieces in sorted(there.items()):
         end = at + len(next(iter(pieces.values())))
         blocks = {i: part[at:end].ljust(end - at, b"\0") for i, part in partial.parts.items()}
-        # As the library wants them: a fragment in its own place, parity in the others'.
+        # zfec requires each fragment at its own index, and parity at the missing ones.
         parity = iter(sorted(pieces))
         numbers = [i if i in blocks else total + next(parity) for i in range(total)]
         shares = [blocks[i] if i < total else pieces[i - total] for i in numbers]
@@ -87,7 +88,7 @@ def missing_fragments(partial: Partial) -> dict[int, bytes]:
 
 
 def _covers(there: dict[int, dict[int, bytes]], k: int) -> bool:
-    """Whether pieces from these places on, one after the other, make a fragment."""
+    """Whether the pieces at these offsets together cover a fragment of `k` bytes."""
     end = 0
     for at in sorted(there):
         if at != end:

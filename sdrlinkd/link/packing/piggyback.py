@@ -1,4 +1,4 @@
-"""Control records that ride in spare room."""
+"""Piggyback records: control records that use spare room in PDUs."""
 
 from collections.abc import Iterable
 from math import inf
@@ -15,7 +15,7 @@ from sdrlinkd.wire import (
 )
 
 LASTING = frozenset({RecordType.CLOCK, RecordType.RECEIPT})
-"""A beacon does not speak of the same."""
+"""Record types that a new beacon does not replace."""
 
 
 class _Waiting(NamedTuple):
@@ -23,60 +23,61 @@ class _Waiting(NamedTuple):
     due_at: float
     receipt: Receipt | None = None
     since: float = 0.0
-    """When what the receipt tells of came about."""
+    """Time of the event that the receipt reports."""
 
 
 class PiggybackRecords:
-    """What waits for a PDU with room; each record knows from when on it deserves one of its own."""
+    """Records that wait for a PDU with room; each has a time from which it gets its own PDU."""
 
     def __init__(self) -> None:
         self.waiting: dict[tuple[int, ...], _Waiting] = {}
-        """Records by type, and by what tells two of one type apart."""
+        """Waiting records by type, and by what distinguishes two records of one type."""
         self.due_at = inf
-        """When the first of them deserves a PDU of its own."""
+        """Earliest time at which a record gets its own PDU; infinity: no record waits."""
 
     def holds(self, kind: RecordType) -> bool:
-        """Whether a record of that type waits."""
+        """Whether a record of type `kind` waits."""
         return any(key[0] == kind for key in self.waiting)
 
     def count(self, kind: RecordType) -> int:
-        """How many records of that type wait."""
+        """How many records of type `kind` wait."""
         return sum(key[0] == kind for key in self.waiting)
 
     def offer(self, records: Iterable[Record], due_at: float = -inf) -> None:
-        """Add a beacon's records, in place of those of the beacon before."""
+        """Add a beacon's records, which replace those of the last beacon."""
         kept = {key: each for key, each in self.waiting.items() if key[0] in LASTING}
         built = (build_records([record]) for record in records)
-        # Two octets behind the header tell one from another of its type.
+        # The two octets after the header distinguish records of one type.
         self.waiting = {(*each[:1], *each[2:4]): _Waiting(each, due_at) for each in built}
         self.waiting |= kept
         self._note_due()
 
     def put(self, record: Record, due_at: float) -> None:
-        """Add a record, in place of one of its type, which keeps the time it is due."""
+        """Add a record; it replaces one of its type, and then keeps that one's due time."""
         built = build_records([record])
         known = self.waiting.get((built[0],))
         self.waiting[built[0],] = _Waiting(built, due_at if known is None else known.due_at)
         self._note_due()
 
     def put_receipt(self, receipt: Receipt, due_at: float, since: float) -> None:
-        """Add a RECEIPT of what came about at `since`."""
+        """Add a RECEIPT that reports an event at `since`."""
         built = build_records([receipt])
         key = (built[0], receipt.node, receipt.topic_id, receipt.entry_id)
         self.waiting[key] = _Waiting(built, due_at, receipt, since)
         self._note_due()
 
     def renew(self, record: Record) -> None:
-        """Put `record` in place of one of its type that still waits; add nothing."""
+        """Replace a waiting record of the same type with `record`; do nothing if none waits."""
         built = build_records([record])
         for key, each in self.waiting.items():
             if key[0] == built[0]:
                 self.waiting[key] = each._replace(built=built)
 
     def ride(self, pdu: PduBuilder, start: float) -> None:
-        """Move into `pdu`, whose burst leaves at `start`, as many as it has room for.
+        """Move as many records as fit into `pdu`, whose burst leaves at `start`.
 
-        A receipt that is older than its field can say would be taken for another message's.
+        Receipts older than their field can express are dropped: they could be mistaken for those of
+        another message.
         """
         oldest = start - MAX_SINCE * RECEIPT_UNIT_S
         for key in [

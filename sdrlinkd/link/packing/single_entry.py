@@ -1,4 +1,4 @@
-"""PDUs that hold one thing alone: another robot's PDU, or a fragment that fills one."""
+"""PDUs with a single content: another robot's PDU, or one fragment that fills the PDU."""
 
 from sdrlinkd.link.packing.draft import BuiltPdu
 from sdrlinkd.link.params import LinkParams
@@ -8,7 +8,7 @@ from sdrlinkd.wire import build_full, equal_payload, flags, forwarded
 
 
 class SingleEntry:
-    """Makes the PDUs in which nothing has to be packed, so nothing has to be weighed."""
+    """Builds PDUs that need no packing decisions."""
 
     def __init__(self, outbox: Outbox, params: LinkParams, src: int, has_control: bool) -> None:
         self._outbox = outbox
@@ -18,7 +18,7 @@ class SingleEntry:
         self._has_control = has_control
 
     def relayed(self, head: Outgoing, start: float) -> BuiltPdu:
-        """Another robot's PDU, which was first in its lane."""
+        """Another robot's PDU `head`, taken from the head of its lane."""
         lane = head.lane
         self._outbox.begin(lane, 0, 0, 1, start)
         head.advance(1, start)
@@ -28,14 +28,14 @@ class SingleEntry:
         return BuiltPdu(forwarded(head.payload, held_us, self._has_control), [head], head.qos)
 
     def fills_some(self, head: Outgoing) -> bool:
-        """Whether the next fragment of `head` fills a PDU, and is not its last."""
-        # The last one is another matter: its age may be due, and there may be room.
+        """Whether the next fragment of `head` fills a PDU and is not the last one."""
+        # The last fragment differs: it may need a STAMP and may leave room.
         return head.k == self._k and (len(head.payload) - 1) // self._k > head.next_index
 
     def filled(self, lane: Lane, start: float, seq: int, most: int) -> list[BuiltPdu]:
-        """The next fragments, `most` or fewer, of the message that `lane` is in the middle of.
+        """PDUs with the next fragments, `most` or fewer, of the message that `lane` has begun.
 
-        The lane has its level to itself, and the message some fragments that fill a PDU.
+        Requires that the lane is alone in its level, and that the next fragment fills a PDU.
         """
         head, k = lane.current, self._k
         if head is None:

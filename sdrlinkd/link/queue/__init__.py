@@ -1,7 +1,7 @@
-"""Messages that wait to be sent: who goes first, and who is not taken at all.
+"""The queue of messages to be sent: their order, and which messages are refused.
 
-This room owns the queue, the policies of topics, and the ledger's table of reasons. It never makes
-a PDU, and knows neither radio nor air.
+This package holds the queue, the topics' policies, and the ledger's table of reasons. It builds no
+PDUs and knows nothing of radio or channel.
 """
 
 from sdrlinkd.link.queue.admission import NOT_TAKEN

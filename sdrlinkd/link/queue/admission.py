@@ -1,13 +1,13 @@
-"""What a topic's policy lets into the queue at all."""
+"""Decides which messages a topic's policy lets into the queue."""
 
 from sdrlinkd.link.queue.policy import TopicPolicy
 
 NOT_TAKEN = frozenset({"tx_size_cap", "tx_unchanged", "tx_decimated", "tx_throttled", "tx_too_big"})
-"""Reasons for which a message never was in the queue."""
+"""Reasons under which a message is refused before it enters the queue."""
 
 
 class Admission:
-    """Size cap, throttle, decimation and change detection of one topic."""
+    """Admission control of one topic: size cap, throttle, decimation and change detection."""
 
     __slots__ = ("_due_at", "_last", "_number", "_policy")
 
@@ -18,7 +18,7 @@ class Admission:
         self._last: bytes | None = None
 
     def refuse(self, payload: bytes, now: float) -> str | None:
-        """The ledger's reason for keeping a message out; None: it may enter, and is remembered."""
+        """The ledger's reason for refusing a message; None: it is admitted and remembered."""
         policy = self._policy
         if policy.max_bytes and len(payload) > policy.max_bytes:
             return "tx_size_cap"
@@ -31,7 +31,7 @@ class Admission:
         if policy.period_s:
             if now < self._due_at:
                 return "tx_throttled"
-            # On a grid, so that a period that is no multiple of the producer's holds on average.
+            # A grid keeps the period on average even if it is no multiple of the producer's.
             late_s = now - self._due_at
             self._due_at = now + policy.period_s - (late_s if late_s < policy.period_s else 0.0)
         if policy.on_change:

@@ -1,4 +1,4 @@
-"""Messages as zstd frames, and back within bounds."""
+"""Compresses messages into zstd frames, and decompresses them within a size limit."""
 
 from collections.abc import Iterable, Mapping
 
@@ -6,7 +6,7 @@ import zstandard
 
 LEVEL = 3
 LEAST_BYTES = 64
-"""Without a dictionary, nothing smaller is worth the try."""
+"""Smallest message in bytes that is compressed without a dictionary."""
 
 
 class Deflated:
@@ -19,7 +19,7 @@ class Deflated:
         )
 
     def shrink(self, payload: bytes) -> bytes | None:
-        """The frame, or None when the message is no larger as it is."""
+        """The message as a zstd frame; None if that is not smaller."""
         if len(payload) < self._least:
             return None
         frame = self._zstd.compress(payload)
@@ -27,7 +27,7 @@ class Deflated:
 
 
 def train_dictionary(samples: Iterable[bytes], size: int) -> bytes:
-    """A dictionary of at most `size` bytes. Raises ValueError where there is too little."""
+    """A zstd dictionary of at most `size` bytes. Raises ValueError if there are too few samples."""
     try:
         return zstandard.train_dictionary(size, [*samples]).as_bytes()
     except zstandard.ZstdError as error:
@@ -35,7 +35,7 @@ def train_dictionary(samples: Iterable[bytes], size: int) -> bytes:
 
 
 class Inflated:
-    """The way back: nothing grows beyond what it may, whatever the frame says."""
+    """Decompresses messages; never beyond the size limit, whatever a frame's header says."""
 
     def __init__(self, dictionaries: Mapping[int, zstandard.ZstdCompressionDict]) -> None:
         self._by_id = {
@@ -45,7 +45,7 @@ class Inflated:
         self._plain = zstandard.ZstdDecompressor()
 
     def expand(self, frame: bytes, most: int) -> tuple[bytes, str | None]:
-        """(message, None), or (nothing, the ledger's reason)."""
+        """(message, None), or (empty, the ledger's reason) if the frame cannot be decompressed."""
         try:
             told = zstandard.get_frame_parameters(frame)
             if told.content_size > most:

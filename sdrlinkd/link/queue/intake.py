@@ -1,4 +1,4 @@
-"""How messages enter the queue: by their topic's policy, or as another robot's PDU."""
+"""Puts messages into the queue, by their topic's policy or as another robot's PDU."""
 
 from collections import Counter
 from collections.abc import Hashable, Mapping
@@ -20,16 +20,16 @@ from sdrlinkd.reports import RelayReport, TopicReport
 from sdrlinkd.wire import Pdu, Registry, Topic, max_message_size
 
 RELAYED = 256
-"""Lanes of others' PDUs have this and their source in place of a topic id."""
+"""Lanes of relayed PDUs have this plus their source in place of a topic id."""
 UNLIKELY_AGE_S = 10.0
-"""A message without a lifespan that was published so long ago comes from another clock or a
-recording: its age counts from now."""
+"""Age in s above which a message without a lifespan was probably stamped by another clock or comes
+from a recording; its age then counts from its submission."""
 
 
 class Intake:
-    """Every topic's policy and tally, and the way into `outbox`.
+    """Holds every topic's policy and counters, and puts messages into `outbox`.
 
-    `bytes_per_s` is what the air carries at the moment; infinity while nobody knows.
+    `bytes_per_s` is the present capacity of the channel; infinity while it is unknown.
     """
 
     def __init__(
@@ -49,9 +49,9 @@ class Intake:
             for topic in registry.topics
         ]
         self._refused = TxTally()
-        """Messages that never became a topic's: bad envelopes, unknown topics."""
+        """Messages without a topic of ours: bad envelopes, unknown topics."""
         self._relayed = TxTally()
-        """PDUs of others; each counts as a message."""
+        """Relayed PDUs of others; each counts as a message."""
 
     def submit(
         self,
@@ -61,7 +61,7 @@ class Intake:
         overrides: Overrides = AS_CONFIGURED,
         bytes_per_s: float = inf,
     ) -> str | None:
-        """Queue a message; None, or the ledger's reason why it was refused."""
+        """Queue a message; returns None, or the ledger's reason for refusing it."""
         topic = self._topics[topic_id]
         topic.tally.accept(len(payload))
         refused = topic.admission.refuse(payload, now)
@@ -71,7 +71,7 @@ class Intake:
         return self._enqueue(topic_id, payload, now, now, overrides, bytes_per_s)
 
     def offer_again(self, offer: Offer, now: float, bytes_per_s: float) -> None:
-        """Queue a latched message for a robot that came late, as old as it is."""
+        """Queue a latched message for a late joiner; its age counts from its first submission."""
         topic_id, (payload, at, overrides), dst = offer
         topic = self._topics[topic_id]
         lifespan_s = overrides.lifespan_s or self.lifespan(topic_id, overrides.qos).seconds
@@ -83,9 +83,10 @@ class Intake:
     def forward(
         self, pdu: Pdu, data: bytes, at: float, until: float, bytes_per_s: float
     ) -> str | None:
-        """Queue another robot's PDU that came at `at` and is worthless after `until`.
+        """Queue another robot's PDU, which arrived at `at` and is worthless after `until`.
 
-        It has the highest priority of the topics inside. None, or why it was refused.
+        It gets the highest priority of its topics. Returns None, or the ledger's reason for
+        refusing it.
         """
         tally = self._relayed
         tally.accept()
@@ -98,22 +99,22 @@ class Intake:
         return self._outbox.put(message, DEFAULT_POLICY, bytes_per_s)
 
     def refuse(self, reason: str, topic_id: int | None = None) -> None:
-        """Count a message that the bus could not hand over."""
+        """Count a message that the bus refused."""
         tally = self._refused if topic_id is None else self._topics[topic_id].tally
         tally.accept()
         tally.drop(reason)
 
     def begin_anew(self) -> None:
-        """Forget when messages came: another clock begins."""
+        """Forget the arrival times of messages, as another clock starts."""
         for topic in self._topics:
             topic.apply(topic.policy)
 
     def tally(self, topic_id: int) -> TxTally:
-        """The counters of one topic."""
+        """The message counters of one topic."""
         return self._topics[topic_id].tally
 
     def policy(self, topic_id: int) -> TopicPolicy:
-        """The policy of a topic that is in force."""
+        """The policy in force for a topic."""
         return self._topics[topic_id].policy
 
     def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
@@ -123,26 +124,26 @@ class Intake:
             topic.apply(policy)
 
     def destination(self, topic_id: int) -> int:
-        """The robot that a topic's messages go to by default."""
+        """Default destination robot of a topic's messages."""
         return self._topics[topic_id].dst
 
     def treatment(self, topic_id: int) -> tuple[Qos, int]:
-        """Class and priority that a topic's messages get by default."""
+        """Default class and priority of a topic's messages."""
         topic = self._topics[topic_id]
         return topic.qos, topic.priority
 
     def lifespan(self, topic_id: int, qos: Qos | None = None) -> Lifespan:
-        """Lifespan of a topic's messages that name none; of class `qos`, else of the topic's."""
+        """Default lifespan of a topic's messages of class `qos` (None: the topic's class)."""
         topic = self._topics[topic_id]
         return lifespan_of(topic.policy, topic.qos if qos is None else qos, self._classes)
 
     def report_relayed(self) -> RelayReport:
-        """PDUs of others on their way through this robot."""
+        """The report on PDUs that this robot relays."""
         tally = self._relayed
         return RelayReport(accepted=tally.accepted, sent=tally.sent, dropped=dict(tally.dropped))
 
     def report(self, topic: Topic) -> TopicReport:
-        """One topic on its way out, but for rates and names on the bus."""
+        """The report on one outgoing topic, without rates and bus names."""
         tally, (qos, priority) = self.tally(topic.id), self.treatment(topic.id)
         lifespan = self.lifespan(topic.id)
         return TopicReport(
@@ -163,7 +164,7 @@ class Intake:
         )
 
     def totals(self) -> tuple[int, int, dict[str, int]]:
-        """(messages accepted, sent, dropped by reason), relayed PDUs among them."""
+        """(messages accepted, sent, dropped by reason), including relayed PDUs."""
         tallies = self._tallies()
         return (
             sum(tally.accepted for tally in tallies),
@@ -172,7 +173,7 @@ class Intake:
         )
 
     def counters(self) -> dict[Hashable, int]:
-        """The counters of which people are shown rates."""
+        """The counters for which rates are reported."""
         found: dict[Hashable, int] = {}
         for topic_id, topic in enumerate(self._topics):
             found["tx", topic_id] = topic.tally.accepted
@@ -180,7 +181,7 @@ class Intake:
         return found
 
     def audit(self) -> list[str]:
-        """What does not add up in the TX ledger; empty when all does."""
+        """Discrepancies in the transmit ledger, as sentences; empty when it adds up."""
         outbox, lives = self._outbox, self._outbox.lives
         problems = tx_balance(self._tallies(), outbox.queued, outbox.in_flight)
         if lives.illegal_steps:
@@ -221,12 +222,12 @@ class Intake:
             at + lifespan_s,
             topic.stamp or (bool(receipt) and self._has_control),
             topic.tally,
-            # Without a control channel it has been answered already: nobody can know.
+            # Without a control channel its receipt was already answered as unknown.
             receipt=receipt if self._has_control else "",
             is_compressed=frame is not None,
         )
         if message.expires_at <= now:
-            # It must not take the place of one that is fresh.
+            # An expired message must not displace a fresh one.
             self._outbox.lives.drop(message, "tx_expired")
             return "tx_expired"
         return self._outbox.put(message, topic.policy, bytes_per_s)

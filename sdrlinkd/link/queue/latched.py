@@ -1,4 +1,4 @@
-"""`transient_local`: the last message of a topic, for robots that come late."""
+"""`transient_local`: latches the last message of a topic and replays it to late joiners."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -8,14 +8,14 @@ from sdrlinkd.link.qos import Overrides
 from sdrlinkd.wire import BROADCAST
 
 SHARE = 0.02
-"""Of the air, at most, for what is offered again."""
+"""Largest share of airtime for replayed messages."""
 MOST_CREDIT_S = 1.0
 WAIT_S = 0.2
-"""A robot that has just come is rarely the only one."""
+"""Wait in s after a new robot, as others often follow soon."""
 
 
 class Kept(NamedTuple):
-    """A message as it was submitted at `at`."""
+    """A latched message, as submitted at `at`."""
 
     payload: bytes
     at: float
@@ -23,7 +23,7 @@ class Kept(NamedTuple):
 
 
 class Offer(NamedTuple):
-    """What is to be sent again, and to whom."""
+    """A latched message to replay, and its destination."""
 
     topic_id: int
     kept: Kept
@@ -37,7 +37,7 @@ class _Topic:
 
 
 class Latched:
-    """Keeps them and says when one is to be sent again."""
+    """Keeps latched messages, and decides when one is replayed."""
 
     def __init__(self) -> None:
         self._topics: dict[int, _Topic] = {}
@@ -46,21 +46,21 @@ class Latched:
         self._came_at = float("-inf")
 
     def keep(self, topic_id: int, kept: Kept) -> None:
-        """The newest one, which everybody who is there is sent anyway."""
+        """Latch a topic's newest message, which robots already present receive anyway."""
         self._topics[topic_id] = _Topic(kept)
 
     def forget(self, topic_id: int) -> None:
-        """Keep no message of a topic that is volatile now."""
+        """Drop the latched message of a topic that is now volatile."""
         self._topics.pop(topic_id, None)
 
     def newcomer(self, node: int, now: float) -> None:
-        """A robot was heard for the first time, or has started anew."""
+        """Note a robot that was heard for the first time or has restarted."""
         self._came_at = now
         for topic in self._topics.values():
             topic.owed.add(node)
 
     def due(self, now: float, bytes_per_s: float) -> Iterator[Offer]:
-        """What may be sent again at `now`, on an air that carries so much."""
+        """Messages to replay at `now`, on a channel that carries `bytes_per_s`."""
         passed_s = 0.0 if self._looked_at is None else max(0.0, now - self._looked_at)
         self._credit_s = min(MOST_CREDIT_S, self._credit_s + SHARE * passed_s)
         self._looked_at = now

@@ -1,4 +1,4 @@
-"""The ledger: what entered, and what became of it (bus document, section 6)."""
+"""The ledger: counts every message that enters and what becomes of it (bus document, section 6)."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -65,23 +65,23 @@ RX_REASONS = {
 
 @dataclass(slots=True)
 class TxTally:
-    """Messages of one topic on their way out."""
+    """Counters of the messages of one outgoing topic."""
 
     accepted: int = 0
     accepted_bytes: int = 0
     sent: int = 0
     sent_bytes: int = 0
     reoffered: int = 0
-    """Of those accepted: sent again to robots that came late."""
+    """Latched messages sent again to late joiners; `accepted` includes them."""
     dropped: Counter[str] = field(default_factory=Counter)
 
     def accept(self, n_bytes: int = 0) -> None:
-        """Count one message that came; `n_bytes` from a producer."""
+        """Count one message that entered, with `n_bytes` of payload from a producer."""
         self.accepted += 1
         self.accepted_bytes += n_bytes
 
     def accept_again(self) -> None:
-        """Count one message that is sent again to robots that came late."""
+        """Count one latched message that is sent again to late joiners."""
         self.accepted += 1
         self.reoffered += 1
 
@@ -97,14 +97,14 @@ class TxTally:
 
 @dataclass(slots=True)
 class RxTally:
-    """Messages of one topic from one source."""
+    """Counters of the messages of one topic from one source."""
 
     delivered: int = 0
     delivered_bytes: int = 0
     dropped: Counter[str] = field(default_factory=Counter)
 
     def deliver(self, n_bytes: int) -> None:
-        """Count one message as handed over."""
+        """Count one message as delivered."""
         self.delivered += 1
         self.delivered_bytes += n_bytes
 
@@ -114,7 +114,7 @@ class RxTally:
 
 
 def balance(name: str, entered: int, parts: dict[str, int]) -> list[str]:
-    """Empty when `entered` is the sum of `parts`, else one sentence that says by how much not."""
+    """Empty if `entered` is the sum of `parts`; else one sentence with the discrepancy."""
     total = sum(parts.values())
     if total == entered and min(parts.values(), default=0) >= 0:
         return []
@@ -123,7 +123,7 @@ def balance(name: str, entered: int, parts: dict[str, int]) -> list[str]:
 
 
 def tx_balance(tallies: Sequence[TxTally], queued: int, in_flight: int) -> list[str]:
-    """Where the transmit ledger does not add up, over all topics."""
+    """Discrepancies in the transmit ledger over all topics; empty when it adds up."""
     dropped = sum((each.dropped for each in tallies), Counter[str]())
     return balance(
         "tx messages",

@@ -1,4 +1,4 @@
-"""How long a message is worth sending, and who says so."""
+"""How long a message is worth sending, and where that is set."""
 
 from math import inf
 from typing import NamedTuple
@@ -9,17 +9,17 @@ from sdrlinkd.link.schedule import ClassesParams
 
 
 class Lifespan(NamedTuple):
-    """`seconds` after it is made; `source`: topic | class, empty where it has no end."""
+    """A lifespan in seconds, and where it is set: topic | class; empty: no limit."""
 
     seconds: float
     source: str
 
 
 def lifespan_of(policy: TopicPolicy, qos: Qos, classes: ClassesParams) -> Lifespan:
-    """Of a message of class `qos` that names none itself.
+    """The lifespan of a message of class `qos` that has none of its own.
 
-    The topic's own goes before that of the class. What is kept for robots that come late is worth
-    something however old it is, so the class says nothing of it.
+    The topic's lifespan takes precedence over that of the class. The class's does not apply to
+    latched messages, which late joiners need at any age.
     """
     if policy.lifespan_s is not None:
         found = Lifespan(policy.lifespan_s, "topic")

@@ -1,4 +1,4 @@
-"""What becomes of messages: the only place where one takes a step of its life."""
+"""The life cycle of outgoing messages; all their state changes happen here."""
 
 from collections.abc import Iterable
 from typing import ClassVar
@@ -8,27 +8,27 @@ from sdrlinkd.link.queue.message import Fate, Outgoing, Step
 
 
 class Lives:
-    """Takes messages from step to step, and counts each in its topic's tally."""
+    """Moves messages through their states, and counts each outcome in the topic's tally."""
 
     is_strict: ClassVar[bool] = False
-    """An illegal step raises, as in tests; else it is counted."""
+    """Whether an illegal step raises IllegalStepError, as in tests, or is only counted."""
 
     def __init__(self) -> None:
         self.in_flight: set[Outgoing] = set()
-        """Begun, and neither sent nor dropped yet."""
+        """Messages begun, and neither sent nor dropped yet."""
         self._dropped_asking: list[tuple[Outgoing, str]] = []
         self.illegal_steps = 0
-        """Steps that STEPS does not have: bugs of ours, survived."""
+        """Steps that STEPS does not contain: bugs of ours that were survived."""
 
     def begin(self, message: Outgoing) -> None:
-        """The first fragment of `message` is about to be made."""
+        """Note that the first fragment of `message` is about to be composed."""
         if message.step(Step.BEGIN):
             self.in_flight.add(message)
         else:
             self._refuse(message, Step.BEGIN)
 
     def left(self, carried: Iterable[Iterable[Outgoing]]) -> None:
-        """Settle what `carried` lists: for each PDU that left, the messages with a part in it."""
+        """Settle a burst that left; `carried` lists the messages with a part in each PDU."""
         for messages in carried:
             for message in messages:
                 message.confirm()
@@ -42,7 +42,10 @@ class Lives:
                     message.tally.send(len(message.payload))
 
     def failed(self, carried: Iterable[Iterable[Outgoing]]) -> list[Outgoing]:
-        """Drop what `carried` lists, as its PDUs did not leave; those of which more was to come."""
+        """Drop the messages in `carried`, whose PDUs did not leave.
+
+        Returns the messages that had more fragments to send.
+        """
         unfinished: list[Outgoing] = []
         for messages in carried:
             for message in messages:
@@ -54,7 +57,7 @@ class Lives:
         return unfinished
 
     def drop(self, message: Outgoing, reason: str) -> None:
-        """End `message` under a reason of the ledger; the caller takes it out of its lane."""
+        """Drop `message` under a reason of the ledger; the caller removes it from its lane."""
         if not message.step(Step.DROP):
             self._refuse(message, Step.DROP)
             return
@@ -64,19 +67,19 @@ class Lives:
             self._dropped_asking.append((message, reason))
 
     def drop_in_flight(self, reason: str) -> None:
-        """Drop all that is begun and not settled."""
+        """Drop all messages that are in flight."""
         for message in list(self.in_flight):
             self.drop(message, reason)
 
     def take_dropped_asking(self) -> list[tuple[Outgoing, str]]:
-        """Messages dropped since the last call whose producers want to know, and why each was."""
+        """Messages dropped since the last call whose producers want receipts, with the reasons."""
         dropped = self._dropped_asking
         if dropped:
             self._dropped_asking = []
         return dropped
 
     def _refuse(self, message: Outgoing, step: Step) -> None:
-        """Count a step that STEPS does not have, or raise IllegalStepError."""
+        """Count a step that STEPS does not contain, or raise IllegalStepError."""
         if self.is_strict:
             raise IllegalStepError(f"{step.name} where a message is {message.fate.name}")
         self.illegal_steps += 1

@@ -1,6 +1,6 @@
-"""A message on its way out, and the order that it waits in.
+"""An outgoing message, and the structure of the queue in which it waits.
 
-A *lane* is one topic at one class, priority and destination; inside it messages keep their order.
+A *lane* is one topic at one class, priority and destination; messages keep their order within it.
 Lanes of equal class and priority form a *level*.
 """
 
@@ -13,7 +13,7 @@ from sdrlinkd.link.queue.ledger import TxTally
 
 
 class Fate(IntEnum):
-    """Where a message stands in the ledger."""
+    """State of a message in the ledger."""
 
     QUEUED = auto()
     IN_FLIGHT = auto()
@@ -22,14 +22,14 @@ class Fate(IntEnum):
 
 
 class Step(IntEnum):
-    """What can become of a message."""
+    """Events in the life of a message."""
 
     BEGIN = auto()
-    """Its first fragment is cut."""
+    """The first fragment of the message is cut."""
     LEAVE = auto()
-    """The radio has sent all of it."""
+    """The radio has sent the whole message."""
     DROP = auto()
-    """It ends under one of the ledger's reasons."""
+    """The message is dropped under one of the ledger's reasons."""
 
 
 STEPS: Mapping[tuple[Fate, Step], Fate] = {
@@ -38,12 +38,12 @@ STEPS: Mapping[tuple[Fate, Step], Fate] = {
     (Fate.IN_FLIGHT, Step.LEAVE): Fate.SENT,
     (Fate.IN_FLIGHT, Step.DROP): Fate.DROPPED,
 }
-"""A message's life: the steps that are allowed, and where each leads. What entered is the sum of
-those that stand in each fate, so this is the ledger, too."""
+"""State machine of a message: the allowed steps and the resulting states. The number of messages
+entered is the sum over all states, so this table also defines the ledger."""
 
 
 class Outgoing:
-    """One message on its way out. Everyone reads its fields; only its verbs change them."""
+    """One outgoing message. Any code may read its fields; only its methods change them."""
 
     __slots__ = (
         "arrived_at", "dst", "entry_id", "expires_at", "fate", "is_compressed", "is_expected",
@@ -68,9 +68,10 @@ class Outgoing:
         is_compressed: bool = False,
         is_whole: bool = False,
     ) -> None:
-        """Queued. `receipt`: its producer wants to know what becomes of it, under that name.
+        """Make a queued message.
 
-        `is_whole`: the payload is another robot's PDU, to be sent on.
+        `receipt` is the producer's id for the receipt, empty if none is wanted. `is_whole` means
+        that the payload is another robot's PDU to be relayed.
         """
         self.topic_id = topic_id
         self.payload = payload
@@ -86,38 +87,38 @@ class Outgoing:
         self.is_whole = is_whole
         self.fate = Fate.QUEUED
         self.lane: Lane
-        # Set when the first fragment is cut, then frozen.
+        # Set when the first fragment is cut, and fixed from then on.
         self.entry_id = 0
         self.k = 0
         self.total = 0
         self.next_index = 0
         self.last_at = 0.0
-        """When the burst with its last fragment so far was to leave."""
+        """Planned start of the burst with the latest fragment."""
         self.rests_id = False
         self.is_held = False
-        """Its entry id waits for fragments that leave later than they were made for."""
+        """Whether the entry id is held, as fragments leave later than planned."""
         self.unconfirmed = 0
-        """PDUs with a part of it of which the radio has not told yet."""
+        """Number of PDUs with a part of the message whose outcome the radio has not reported."""
         self.parity: list[bytes] = []
-        """Control records that follow its last fragment, the first one last."""
+        """Parity records that follow the last fragment, in reverse order."""
         self.is_expected = False
-        """The far ends were asked what becomes of it."""
+        """Whether receipts were requested from the receivers."""
 
     @property
     def src(self) -> int:
-        """Whose PDU it is, where it is whole."""
+        """Source of the PDU, if the message is a relayed PDU."""
         return self.payload[1]
 
     @property
     def is_through(self) -> bool:
-        """Whether all of it is in PDUs."""
+        """Whether all parts of the message are in PDUs."""
         return self.next_index == self.total and not self.parity
 
     def in_vain(self, now: float, patience_s: float) -> str:
-        """The ledger's reason for sending no more of it; empty while it is worth sending.
+        """The ledger's reason to stop sending the message; empty while it is worth sending.
 
-        Receivers give up a message of which nothing came for `patience_s`. What has gone whole but
-        for its parity is never in vain: somebody may lack just that.
+        Receivers give up a message when no part arrives for `patience_s`. A message that lacks only
+        its parity is always worth sending, as a receiver may need just that.
         """
         if self.parity:
             return ""
@@ -126,7 +127,7 @@ class Outgoing:
         return "tx_stalled" if self.k and now > self.last_at + patience_s else ""
 
     def step(self, step: Step) -> bool:
-        """Take a step of its life; False where STEPS has no such step, and nothing changes."""
+        """Take a step; False, without a change, if STEPS does not contain it."""
         fate = STEPS.get((self.fate, step))
         if fate is None:
             return False
@@ -138,26 +139,26 @@ class Outgoing:
         self.lane = lane
 
     def cut(self, entry_id: int, k: int, total: int, start: float) -> None:
-        """Note that it becomes `total` fragments of `k` bytes, for bursts from `start` on."""
+        """Note that the message becomes `total` fragments of `k` bytes, sent from `start` on."""
         self.entry_id, self.k, self.total, self.last_at = entry_id, k, total, start
         self.rests_id = total > 1
 
     def advance(self, n: int, start: float) -> None:
-        """Note that the next `n` fragments are in a PDU each, for a burst at `start`."""
+        """Note that the next `n` fragments are in one PDU each, for a burst at `start`."""
         self.next_index += n
         self.unconfirmed += n
         self.last_at = start
 
     def follow_with(self, parity: list[bytes]) -> None:
-        """Have records of parity follow the last fragment; the first record stands last."""
+        """Add parity records, in reverse order, to be sent after the last fragment."""
         self.parity = parity
 
     def give_parity(self) -> bytes:
-        """The next record, which is in a PDU now."""
+        """Take out the next parity record, which is now in a PDU."""
         return self.parity.pop()
 
     def ride(self) -> None:
-        """Note that one more PDU has a part of the message that is no fragment."""
+        """Note that one more PDU holds parity of the message."""
         self.unconfirmed += 1
 
     def stamp(self) -> None:
@@ -165,19 +166,19 @@ class Outgoing:
         self.stamped = True
 
     def keep_id(self) -> None:
-        """Have the entry id rest, however short the message is: something of it has left ahead."""
+        """Make the entry id rest after use, even for a short message, as its STAMP went ahead."""
         self.rests_id = True
 
     def hold_id(self, is_held: bool) -> None:
-        """Note whether the entry id waits for fragments that leave later."""
+        """Note whether the entry id is held for fragments that leave later than planned."""
         self.is_held = is_held
 
     def expect(self) -> None:
-        """Note that the far ends have been asked what becomes of the message."""
+        """Note that receipts were requested from the receivers."""
         self.is_expected = True
 
     def confirm(self) -> None:
-        """Note that the radio has told of one PDU with a part of the message."""
+        """Note that the radio has reported the outcome of one PDU with a part of the message."""
         self.unconfirmed -= 1
 
 
@@ -196,7 +197,7 @@ class Lane:
 
     @property
     def head(self) -> Outgoing | None:
-        """The message whose fragment goes next."""
+        """The message whose fragment is sent next."""
         return self.current or (self.waiting[0] if self.waiting else None)
 
 
@@ -213,5 +214,5 @@ class Level:
 
 
 def with_first(levels: Sequence[Level], first: Qos) -> list[Level]:
-    """In service order, but those of class `first` before all others."""
+    """The levels in service order, except that those of class `first` come first."""
     return sorted(levels, key=lambda level: (level.qos is not first, level.key))

@@ -1,7 +1,7 @@
-"""What waits to be sent, and who goes next.
+"""The queue of messages to be sent, and their order.
 
-Service order is level by level, inside a level by earliest expiry, and among equals round robin: a
-lane that gave an entry goes to the back.
+Levels are served in order. Within a level, the earliest expiry comes first, and lanes with equal
+expiry are served round robin: a lane that gave an entry goes to the back.
 """
 
 from bisect import bisect_left, insort
@@ -20,7 +20,7 @@ from sdrlinkd.wire import ENTRY_HEADER_SIZE
 
 @dataclass(slots=True)
 class _Queued:
-    """One topic's messages of which nothing has been sent yet, the oldest first."""
+    """One topic's messages of which no part has been sent yet, the oldest first."""
 
     messages: OrderedDict[Outgoing, None] = field(default_factory=OrderedDict)
     n_bytes: int = 0
@@ -35,12 +35,12 @@ def _order(lane: Lane) -> tuple[float, int]:
 
 
 class Outbox:
-    """The queue of one node. Every operation costs the same with ten messages or ten thousand."""
+    """The queue of one node. The cost of an operation does not depend on the queue's length."""
 
     def __init__(self, limits: QueueParams) -> None:
         self._limits = limits
         self._lanes: dict[tuple[int, int, int, int], Lane] = {}
-        # Levels with lanes, in service order.
+        # Non-empty levels in service order.
         self.levels: list[Level] = []
         self._level_by_key: dict[tuple[int, int], Level] = {}
         self._by_class: dict[Qos, OrderedDict[Outgoing, None]] = {q: OrderedDict() for q in Qos}
@@ -51,16 +51,17 @@ class Outbox:
         self.queued_bytes = 0
         self._with_lifespan = 0
         self.relays = False
-        """Whether other robots' PDUs have ever waited here."""
+        """Whether the queue has ever held PDUs of other robots."""
         self.lives = Lives()
 
     def __bool__(self) -> bool:
         return bool(self.levels)
 
     def put(self, message: Outgoing, policy: TopicPolicy, bytes_per_s: float) -> str | None:
-        """Queue `message`, and drop what has to go for it; None, or why it was dropped itself.
+        """Queue `message`, dropping others to make room if necessary.
 
-        Bounds in seconds are by `bytes_per_s`, what the air carries at the moment.
+        Returns None, or the ledger's reason if `message` itself was dropped. Limits in seconds are
+        converted with `bytes_per_s`, the present capacity of the channel.
         """
         limits, size = self._limits, len(message.payload)
         most = min(limits.max_bytes, limits.max_airtime_s * bytes_per_s)
@@ -81,8 +82,8 @@ class Outbox:
         return None
 
     def begin(self, lane: Lane, entry_id: int, k: int, total: int, start: float) -> None:
-        """The lane's first waiting message is cut, under that id, into `total` fragments of `k`
-        bytes, for bursts from `start` on.
+        """Begin the lane's first waiting message: cut it, under `entry_id`, into `total` fragments
+        of `k` bytes, sent from `start` on.
         """
         message = lane.waiting.popleft()
         self._forget_queued(message)
@@ -91,17 +92,17 @@ class Outbox:
         self.lives.begin(message)
 
     def end(self, lane: Lane) -> None:
-        """All of the lane's message is in PDUs."""
+        """End the lane's current message, all of which is in PDUs."""
         lane.current = None
 
     def drop_all(self, reason: str) -> None:
-        """Drop what waits, in service order, and what is in flight."""
+        """Drop all waiting messages, in service order, and all messages in flight."""
         while self.levels:
             self.lives.drop(self.withdraw_head(self.levels[0].lanes[0]), reason)
         self.lives.drop_in_flight(reason)
 
     def served(self, lane: Lane) -> None:
-        """The lane gave an entry; it goes behind its equals, or away when it is empty."""
+        """Move a lane that gave an entry behind its equals, or remove it if it is empty."""
         head = lane.current or (lane.waiting[0] if lane.waiting else None)
         if head is None:
             self._unlink(lane)
@@ -115,7 +116,7 @@ class Outbox:
         self._link(lane, head)
 
     def withdraw_head(self, lane: Lane) -> Outgoing:
-        """Take the lane's head out, fragments and all."""
+        """Remove the lane's head, with all its fragments, and return it."""
         if lane.current is not None:
             message, lane.current = lane.current, None
         else:
@@ -125,19 +126,19 @@ class Outbox:
         return message
 
     def next_class(self) -> Qos | None:
-        """The class of what goes next; None when nothing waits."""
+        """The class of the next message; None if the queue is empty."""
         return self.levels[0].qos if self.levels else None
 
     def destinations(self) -> set[int]:
-        """The robots that something waits for, BROADCAST among them."""
+        """Destinations of all messages in the queue, which may include BROADCAST."""
         return {dst for level in self.levels for dst in level.per_dst}
 
     def waiting_classes(self) -> set[Qos]:
-        """The classes of which something waits."""
+        """Classes of all messages in the queue."""
         return {level.qos for level in self.levels}
 
     def oldest_arrival(self) -> float:
-        """When the longest waiting head arrived; infinity when nothing waits."""
+        """Earliest arrival time of all lanes' heads; infinity if the queue is empty."""
         return min(
             (
                 lane.head.arrived_at
@@ -149,15 +150,15 @@ class Outbox:
         )
 
     def first_begun(self) -> float:
-        """Of messages begun and not through, when the first was last served; infinity: none is."""
+        """Earliest time at which an unfinished message was last served; infinity: none is begun."""
         return min((each.last_at for each in self._begun()), default=inf)
 
     def has_lifespans(self) -> bool:
-        """Whether anything that waits, or its rest, will be worthless some day."""
+        """Whether any message in the queue, or begun, has a lifespan."""
         return self._with_lifespan > 0 or any(each.expires_at < inf for each in self._begun())
 
     def pending_bytes(self, enough: int) -> int:
-        """Bytes of all that waits, entry headers included; counting stops at `enough`."""
+        """Bytes that wait, including entry headers; counting stops at `enough`."""
         total = -ENTRY_HEADER_SIZE
         for level in self.levels:
             for lane in level.lanes:
@@ -173,20 +174,20 @@ class Outbox:
 
     @property
     def in_flight(self) -> int:
-        """Messages begun, and neither sent nor dropped yet."""
+        """Number of messages begun, and neither sent nor dropped yet."""
         return len(self.lives.in_flight)
 
     def queued_by_class(self) -> dict[Qos, int]:
-        """Messages of each class of which nothing has been sent yet."""
+        """Number of messages of each class of which no part has been sent yet."""
         return {qos: len(queue) for qos, queue in self._by_class.items()}
 
     def queued_of_topic(self, topic_id: int) -> int:
-        """Messages of one topic of which nothing has been sent yet."""
+        """Number of messages of one topic of which no part has been sent yet."""
         topic = self._by_topic.get(topic_id)
         return len(topic.messages) if topic is not None else 0
 
     def _begun(self) -> Iterator[Outgoing]:
-        """Messages of which something has been sent, and something has not."""
+        """Messages that are partly sent."""
         for level in self.levels:
             for lane in level.lanes:
                 if lane.current is not None:
@@ -240,7 +241,7 @@ class Outbox:
             del self.levels[bisect_left(self.levels, level.key, key=lambda each: each.key)]
 
     def _can_make_room(self, message: Outgoing, most_bytes: float) -> bool:
-        """Whether it fits when all that waits in its class and below is shed."""
+        """Whether `message` would fit if all messages of its class and below were dropped."""
         limits, size = self._limits, len(message.payload)
         if self.queued < limits.max_messages and self.queued_bytes + size <= most_bytes:
             return True
@@ -255,7 +256,7 @@ class Outbox:
         return next(iter(self._by_class[lowest]))
 
     def _withdraw_waiting(self, message: Outgoing) -> Outgoing:
-        """`message` is the oldest of its class or topic, so first among its lane's waiting."""
+        """Remove `message`, the oldest of its class or topic and so the first of its lane."""
         lane = message.lane
         lane.waiting.popleft()
         self._forget_queued(message)

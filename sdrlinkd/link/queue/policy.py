@@ -1,4 +1,4 @@
-"""How a topic's messages are treated, on their way out and where they arrive."""
+"""The policy of a topic, at the sender and at the receiver."""
 
 from math import inf
 from typing import Annotated, Any, Literal
@@ -17,49 +17,54 @@ class TopicPolicy(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     qos: Literal["urgent", "latency", "default", "bulk"] = "default"
     priority: Annotated[int, Meta(ge=0, le=MAX_PRIORITY)] = 64
-    """127 is the most urgent."""
+    """Priority within the class, 0 to 127; 127 is the most urgent."""
     history: Literal["keep_last", "keep_all"] = "keep_last"
-    """keep_all: `depth` does not count."""
+    """Queue history: keep_last keeps the last `depth` messages, keep_all ignores `depth`."""
     depth: Amount = 0
-    """Messages that may wait, latest wins; 0: as many as the queue holds."""
+    """Most messages that wait in the queue, where newer ones replace older ones; 0: no limit but
+    the queue's."""
     lifespan_s: Positive | None = None
-    """Seconds after which a message is worthless: neither sent nor handed over any more; absent:
-    not sent after that of its class."""
+    """Age in s after which a message is neither sent nor handed over. If absent, it is not sent
+    after the lifespan of its class."""
     deadman_s: Annotated[float, Meta(ge=0, le=60)] = 0.0
-    """Where it arrives: without a message handed over for so long, `stop` is, once; 0: never."""
+    """At the receiver: time in s without a message after which `stop` is published, once; 0:
+    never."""
     stop: dict[str, Any] = {}
-    """Fields of that message; those that are not named are zero, so that {} is a zero Twist."""
+    """Fields of the stop message; fields not named are zero, so that {} is a zero Twist."""
     durability: Literal["volatile", "transient_local"] = "volatile"
-    """transient_local: robots that come late get the last message."""
+    """transient_local: late joiners get the last message; volatile: they do not."""
     dst: Annotated[int, Meta(ge=0, le=255)] | None = None
     """Destination robot; absent: `link.dst`."""
     stamp: bool = True
-    """Send the age along, so that the far end knows how late each message is."""
+    """Whether to send each message's age, so that the receiver knows how late it is."""
     period_s: Annotated[float, Meta(ge=0, le=3600)] = 0.0
-    """Send no more often than this; 0: as often as they come."""
+    """Shortest time in s between two messages sent; 0: no throttle."""
     decimate: Annotated[int, Meta(ge=1)] = 1
-    """Send one in so many."""
+    """Send one message in this many."""
     on_change: bool = False
-    """Send only what differs from the last one."""
+    """Whether to send only messages that differ from the last one."""
     max_bytes: Amount = 0
-    """Refuse larger messages, sent or heard; 0: whatever fits the link."""
+    """Size in bytes above which messages are refused, sent or heard; 0: no limit but the link's."""
     compress: Literal["none", "zstd"] = "none"
-    """A message that does not shrink goes as it is."""
+    """Compression; a message that zstd does not shrink is sent uncompressed."""
     dictionary: str = ""
-    """zstd dictionary for small messages, relative to the configuration; the same at all robots."""
+    """File with a zstd dictionary for small messages, relative to the configuration; the same at
+    all robots."""
     queue_bytes: Amount = 0
-    """Bytes that may wait; more, and the oldest goes; 0: as many as the queue holds."""
+    """Most bytes that wait in the queue, beyond which the oldest messages are dropped; 0: no limit
+    but the queue's."""
     queue_s: Annotated[float, Meta(ge=0)] = 0.0
-    """Seconds on the air of what may wait; more, and the oldest goes; 0: no bound."""
+    """Most airtime in s that waits in the queue, beyond which the oldest messages are dropped; 0:
+    no limit."""
 
     @property
     def kept(self) -> int:
-        """Messages that may wait; 0: as many as the queue holds."""
+        """Most messages that wait in the queue; 0: no limit but the queue's."""
         return self.depth if self.history == "keep_last" else 0
 
     @property
     def own_lifespan_s(self) -> float:
-        """That of the topic itself; inf where it has none."""
+        """The topic's own lifespan in s; infinity if it has none."""
         return inf if self.lifespan_s is None else self.lifespan_s
 
 

@@ -1,4 +1,4 @@
-"""A topic on its way out: its policy, resolved once, and its tally."""
+"""The sender's state of a topic: its policy, resolved once, and its counters."""
 
 import zstandard
 
@@ -10,7 +10,7 @@ from sdrlinkd.link.queue.policy import TopicPolicy
 
 
 class TopicState:
-    """What the sender knows of one topic."""
+    """The sender's state of one topic."""
 
     __slots__ = (
         "_default_dst", "_dictionary", "_has_control", "admission", "deflated", "dst", "policy",
@@ -27,7 +27,7 @@ class TopicState:
         self.apply(TopicPolicy())
 
     def apply(self, policy: TopicPolicy) -> None:
-        """From now on; messages that wait keep what they have."""
+        """Apply `policy` to messages from now on; messages in the queue keep their settings."""
         self.policy = policy
         self.qos = QOS_BY_LABEL[policy.qos]
         self.priority = policy.priority

@@ -1,7 +1,8 @@
-"""What became of messages whose producers want to know.
+"""Receipts: what became of messages, for producers that want to know.
 
-This room owns the table of messages that robots have still to answer, and the verdicts for their
-producers. It never sends: a RECEIPT for another robot is made here and handed to `transmit`.
+This package holds the table of messages for which receipts are outstanding, and the verdicts for
+their producers. It never sends: it makes RECEIPT records for other robots and hands them to
+`transmit`.
 """
 
 from sdrlinkd.link.receipts.receipts import Receipts, Verdict, make_receipt

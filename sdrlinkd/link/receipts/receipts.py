@@ -1,4 +1,4 @@
-"""What became of messages whose producers want to know."""
+"""Matches RECEIPT records to messages, and makes the verdicts for their producers."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -9,23 +9,23 @@ from sdrlinkd.link.receive import DELIVERED
 from sdrlinkd.wire import BROADCAST, NO_AGE, RECEIPT_UNIT_S, Receipt
 
 EARLIER_S = 0.05
-"""So much may the far end's word of when a message was submitted be too early."""
+"""Tolerance in s for a receipt that implies too early a submission of its message."""
 MOST_PENDING = 4096
 REASONS = (
     DELIVERED, "rx_expired", "rx_partial_timeout", "rx_partial_superseded", "rx_partial_evicted",
     "rx_partial_memory", "rx_size_cap", "rx_bad_zstd", "rx_inflates", "rx_no_dictionary",
     "rx_bad_cdr", "rx_unknown_topic", "rx_no_age",
 )  # fmt: skip
-"""By status, from 1 (wire document, section 6.7)."""
+"""Reasons by status, from 1 (wire document, section 6.7)."""
 STATUS = {reason: number for number, reason in enumerate(REASONS, 1)}
 EXPIRED = ("rx_expired", "tx_expired")
 
 
 class Verdict(NamedTuple):
-    """For the producer: `fate` is delivered, expired, dropped or unknown; at robot `dst`.
+    """What became of a message at robot `dst`: `fate` is delivered, expired, dropped or unknown.
 
-    `took_s` is the message's age when it was delivered there, where that is known; `left` robots
-    have still to answer.
+    `took_s` is the message's age in s at its delivery, None if unknown. `left` is the number of
+    robots that have not answered yet.
     """
 
     receipt: str
@@ -47,13 +47,13 @@ class _Pending:
 def make_receipt(
     src: int, topic_id: int, entry_id: int, reason: str, age_s: float | None
 ) -> Receipt:
-    """What robot `src` is told of its message."""
+    """The RECEIPT record for robot `src` about its message."""
     age = NO_AGE if age_s is None else min(max(round(age_s / RECEIPT_UNIT_S), 0), NO_AGE)
     return Receipt(topic_id, entry_id, STATUS[reason], src, age)
 
 
 class Receipts:
-    """The sender's half: who has still to answer. Every robot asked is told of exactly once."""
+    """Outstanding receipts at the sender; each robot asked yields exactly one verdict."""
 
     def __init__(self, own_id: int, timeout_s: float) -> None:
         self._own_id = own_id
@@ -62,10 +62,10 @@ class Receipts:
         self._n_pending = 0
         self._verdicts: list[Verdict] = []
         self.unasked = 0
-        """RECEIPTs of which nothing was known any more."""
+        """RECEIPT records received for messages that no longer await one."""
 
     def expect(self, message: Outgoing, present: Iterable[int], now: float) -> None:
-        """Await answers to a message in a burst at `now`; a broadcast one is for all `present`."""
+        """Await receipts for a message in a burst at `now`; for a broadcast, from all `present`."""
         message.expect()
         awaited = set(present) if message.dst == BROADCAST else {message.dst}
         pending = _Pending(message, now + self._timeout_s, awaited or {BROADCAST})
@@ -77,16 +77,16 @@ class Receipts:
         self._n_pending += 1
 
     def hear(self, src: int, receipt: Receipt, at: float) -> None:
-        """Take the answer of robot `src`, in a burst whose preamble came at `at`.
+        """Take a RECEIPT of robot `src`, in a burst whose preamble came at `at`.
 
-        An answer names the robot whose message it was; one that names none (BROADCAST) is for the
-        robot that its PDU is for.
+        A RECEIPT names the robot that sent the message. If it names none (BROADCAST), that robot is
+        the destination of the PDU.
         """
         if receipt.node not in (self._own_id, BROADCAST):
             return
         age_s = None if receipt.age_100us == NO_AGE else RECEIPT_UNIT_S * receipt.age_100us
         ended_at = at - RECEIPT_UNIT_S * receipt.since_100us
-        # Entry ids come again: the last one that was there in time is meant.
+        # Entry ids repeat: the RECEIPT is for the latest message that fits its times.
         latest = ended_at + EARLIER_S - (age_s or 0.0)
         for pending in reversed(self._pending.get((receipt.topic_id, receipt.entry_id), ())):
             if pending.message.arrived_at > latest:
@@ -103,7 +103,7 @@ class Receipts:
         self.unasked += 1
 
     def dropped(self, message: Outgoing, reason: str) -> None:
-        """Tell of a message that did not get on the air, or not whole."""
+        """Make the verdicts for a message that was not sent, or not completely."""
         for pending in self._pending.get((message.topic_id, message.entry_id), ()):
             if pending.message is message:
                 for left, dst in _counted_down(pending.awaited):
@@ -114,9 +114,7 @@ class Receipts:
             self._tell(message, message.dst, reason, None)
 
     def expire(self, now: float) -> None:
-        """Give up robots that have not answered for the timeout: they do not know, or were not
-        heard.
-        """
+        """Make the verdict `unknown` for robots that have not answered within the timeout."""
         if not self._n_pending:
             return
         late = [each for of in self._pending.values() for each in of if each.until <= now]
@@ -125,11 +123,11 @@ class Receipts:
             self._forget(pending)
 
     def refused(self, receipt: str, topic_id: int, dst: int, reason: str) -> None:
-        """Tell of a message that was not taken."""
+        """Make the verdict for a message that was refused."""
         self._verdicts.append(Verdict(receipt, topic_id, dst, "dropped", reason))
 
     def unknowable(self, receipt: str, topic_id: int, dst: int) -> None:
-        """Tell of a message that nobody can answer for want of a control channel."""
+        """Make the verdict `unknown` for a message sent without a control channel."""
         self._verdicts.append(Verdict(receipt, topic_id, dst, "unknown"))
 
     def take(self) -> list[Verdict]:
@@ -169,5 +167,5 @@ class Receipts:
 
 
 def _counted_down(robots: set[int]) -> Iterable[tuple[int, int]]:
-    """Pairs of (how many robots come after it, robot)."""
+    """Pairs of (number of robots that follow, robot)."""
     return zip(range(len(robots) - 1, -1, -1), sorted(robots), strict=True)

@@ -1,7 +1,7 @@
-"""PDUs heard, and the messages that they make.
+"""Receives PDUs and turns them into messages.
 
-This room owns the reassembly, the duplicate filter, ages, and what is known of neighbors. It never
-sends: what others want to know of a PDU, it returns as events.
+This package holds the reassembly, the duplicate filter, message ages, and the state of neighbors.
+It never sends; it reports events to its caller instead.
 """
 
 from sdrlinkd.link.receive.ages import MAX_WAITING, Ages

@@ -1,4 +1,4 @@
-"""Whether a whole message is handed over, by its topic's policy."""
+"""Decides whether a complete message is handed over, by its topic's policy."""
 
 from math import inf
 
@@ -8,9 +8,9 @@ from sdrlinkd.wire import Registry
 
 
 class Acceptance:
-    """Policies of topics where their messages arrive.
+    """The topics' policies at the receiver.
 
-    A compressed message may grow to its topic's `max_bytes`, else to `max_expanded`.
+    A compressed message may expand to its topic's `max_bytes`, or by default to `max_expanded`.
     """
 
     def __init__(self, registry: Registry, inflated: Inflated, max_expanded: int) -> None:
@@ -25,7 +25,7 @@ class Acceptance:
         self._policies[topic_id] = policy
 
     def policy(self, topic_id: int) -> TopicPolicy:
-        """The policy of a topic; the default one where nobody set another."""
+        """The policy of a topic, by default the default policy."""
         return self._policies.get(topic_id, DEFAULT_POLICY)
 
     def judge(
@@ -36,9 +36,9 @@ class Acceptance:
         origin_at: float | None,
         now: float,
     ) -> tuple[bytes, str | None]:
-        """(the message as it was submitted, the ledger's reason for dropping it or None).
+        """(the message as submitted, the ledger's reason for dropping it or None).
 
-        `origin_at` is when it was submitted, None where no STAMP told.
+        `origin_at` is when the message was submitted, None if no STAMP came.
         """
         if topic_id >= self._n_topics:
             return payload, "rx_unknown_topic"
@@ -48,7 +48,7 @@ class Acceptance:
             payload, reason = self._inflated.expand(payload, most)
         if reason is None:
             reason = _refusal(payload, policy, origin_at, now)
-        # Without a control channel nobody can know.
+        # Without a control channel there are no STAMPs, so the age is never known.
         if reason == "rx_no_age" and not self._has_control:
             reason = None
         return payload, reason
@@ -57,7 +57,7 @@ class Acceptance:
 def _refusal(
     payload: bytes, policy: TopicPolicy, origin_at: float | None, now: float
 ) -> str | None:
-    """Why a whole message is not handed over."""
+    """The ledger's reason for not handing over a complete message; None: it is handed over."""
     if len(payload) < CDR_HEADER_SIZE:
         return "rx_bad_cdr"
     if policy.max_bytes and len(payload) > policy.max_bytes:

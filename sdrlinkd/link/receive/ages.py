@@ -1,4 +1,4 @@
-"""How old messages are: STAMP records meet the messages they speak of."""
+"""The ages of messages: matches STAMP records with their messages."""
 
 from collections import OrderedDict
 from collections.abc import Callable
@@ -10,9 +10,9 @@ MAX_WAITING = 1024
 
 
 class Origin(NamedTuple):
-    """When a message was submitted, in the receiver's own time, and when its stamp's burst came.
+    """Origin of a message: when it was submitted (`at`), and when its STAMP came (`stamped_at`).
 
-    `asks`: its sender wants a RECEIPT.
+    Both are on the receiver's clock. `asks`: the sender wants a RECEIPT.
     """
 
     at: float | None
@@ -24,9 +24,10 @@ UNKNOWN = Origin(None, 0.0)
 
 
 class Ages:
-    """Origin times, in the receiver's own time, of messages that are not complete yet.
+    """Origins, on the receiver's clock, of messages that are not complete yet.
 
-    Age travels, not time: origin = preamble time − age, so no clock needs to be in step.
+    A STAMP carries an age instead of a time: origin = preamble time − age. So the robots' clocks
+    need not be synchronized.
     """
 
     def __init__(self, timeout_s: float) -> None:
@@ -43,8 +44,9 @@ class Ages:
             self._origins.popitem(last=False)
 
     def take(self, src: int, topic_id: int, entry_id: int) -> Origin:
-        """The origin of a message that is now complete, or given up; `at` is None when no stamp
-        came.
+        """Take out the origin of a message that is complete or given up.
+
+        Its `at` is None if no STAMP came.
         """
         if not self._origins:
             return UNKNOWN
@@ -55,7 +57,7 @@ class Ages:
         return self._origins.get((src, topic_id, entry_id), UNKNOWN)
 
     def expire(self, now: float, is_held: Callable[[int, int, int], bool]) -> None:
-        """Forget stamps whose message never became complete, but for those it is still awaited."""
+        """Forget old stamps, except those of messages that are still incomplete (`is_held`)."""
         for _ in range(len(self._origins)):
             key, origin = next(iter(self._origins.items()))
             if now - origin.stamped_at < self._timeout_s:

@@ -1,17 +1,17 @@
-"""Command topics that fall silent: who obeys them must be told to stop."""
+"""Detects command topics that fall silent, whose consumers then need a stop message."""
 
 
 class Deadman:
-    """Armed by a fresh message, due once when no other follows in time."""
+    """Dead-man timers of topics: a message arms the timer, which expires once if none follows."""
 
     def __init__(self) -> None:
         self._due_at: dict[tuple[int, int], float] = {}
         self.stops: dict[tuple[int, int], int] = {}
-        """Times that it came to that, by (source, topic id)."""
+        """How often a topic fell silent, by (source, topic id)."""
 
     @property
     def next_at(self) -> float:
-        """When the first one is due, if nothing comes before."""
+        """Time at which the first timer expires; infinity if none is armed."""
         return min(self._due_at.values(), default=float("inf"))
 
     def fresh(self, src: int, topic_id: int, now: float, deadman_s: float) -> None:
@@ -19,12 +19,12 @@ class Deadman:
         self._due_at[src, topic_id] = now + deadman_s
 
     def forget(self, topic_id: int) -> None:
-        """Let a topic be silent from now on."""
+        """Disarm a topic's timers."""
         for key in [key for key in self._due_at if key[1] == topic_id]:
             del self._due_at[key]
 
     def take_due(self, now: float) -> list[tuple[int, int]]:
-        """(source, topic id) of those that fell silent, each once."""
+        """(source, topic id) of topics that fell silent, each once."""
         due = [key for key, at in self._due_at.items() if at <= now]
         for key in due:
             del self._due_at[key]

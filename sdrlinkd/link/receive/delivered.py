@@ -1,4 +1,4 @@
-"""A whole message from the air."""
+"""A complete message from the air."""
 
 from typing import NamedTuple
 
@@ -6,17 +6,17 @@ from sdrlinkd.link.receive.latency import Parts
 
 CDR_HEADER_SIZE = 4
 DELIVERED = "delivered"
-"""What became of it, beside the reasons of the ledger for which messages are dropped."""
+"""Outcome of a delivered message, in place of a ledger's reason."""
 
 
 class Delivered(NamedTuple):
-    """A whole message from the air.
+    """A complete message from the air.
 
-    `number` runs per (source, topic) from 1; `lost_pdus` are those known missing from the source
-    so far; `origin_at` is when it was submitted, in the receiver's own time (absent when no STAMP
-    came), so its age at any moment is that moment less `origin_at`. Its first fragment came in a
-    burst whose preamble was at `began_at`, the last fragment in one at `heard_at`, whose last
-    sample of interest was there at `ended_at`.
+    `number` counts messages per (source, topic) from 1. `lost_pdus` is the number of the source's
+    PDUs known to be lost so far. `origin_at` is when the message was submitted, on the receiver's
+    clock, and None if no STAMP came; the age at any time is that time minus `origin_at`.
+    `began_at` is the preamble of the burst with the first fragment, `heard_at` that of the burst
+    with the last one, and `ended_at` the last fragment's last sample.
     """
 
     src: int
@@ -32,7 +32,7 @@ class Delivered(NamedTuple):
     ended_at: float = 0.0
 
     def parts(self, now: float) -> Parts:
-        """Of its age at `now`; for messages that had a STAMP."""
+        """The parts of the message's age at `now`; without a STAMP the wait counts as 0."""
         origin_at = self.began_at if self.origin_at is None else self.origin_at
         return Parts(
             self.began_at - origin_at,

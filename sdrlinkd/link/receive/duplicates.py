@@ -1,29 +1,29 @@
-"""Which PDUs of a source were heard, which twice, and how many are missing."""
+"""The duplicate filter, which also counts lost PDUs."""
 
 WINDOW = 128
 
 
 class SequenceTrack:
-    """One source's sequence numbers: duplicates within the last 128 PDUs, and known losses.
+    """The sequence numbers of one source: duplicates within the last 128 PDUs, and known losses.
 
-    A PDU is the same one when sequence number and CRC (hop nibble taken as zero) are the same.
-    Sequence numbers are modulo 256, so a step of up to 127 ahead is that many PDUs, less one,
-    lost; an older number is a late arrival when it was missing, and otherwise the sender began
-    anew or was away for longer than the numbers can tell.
+    Two PDUs are the same if sequence number and CRC (with the hop nibble taken as zero) are equal.
+    Sequence numbers are modulo 256. A step of n, up to 127 ahead, means that n − 1 PDUs are lost.
+    An older number that was missing is a late arrival. Any other older number means that the sender
+    restarted, or was away for longer than the numbers can tell.
     """
 
     __slots__ = ("_crc", "_newest", "_position", "lost", "restarts")
 
     def __init__(self) -> None:
         self._newest = -1
-        # By sequence number: the CRC heard, and at which extended position.
+        # By sequence number: the CRC last heard, and its extended position.
         self._crc = [-1] * 256
         self._position = [-(WINDOW + 1)] * 256
         self.lost = 0
         self.restarts = 0
 
     def heard(self, seq: int, crc: int) -> bool:
-        """Take note of a PDU; False when it is a duplicate."""
+        """Note a PDU; False if it is a duplicate."""
         newest = self._newest
         if newest < 0:
             self._accept(seq, crc, 256 + seq)
@@ -45,7 +45,7 @@ class SequenceTrack:
         return True
 
     def restart(self, seq: int, crc: int) -> None:
-        """The source counts from anew; what was heard before says nothing about what comes."""
+        """Start over with a source that counts from a new number, and forget what was heard."""
         self.restarts += 1
         self._crc = [-1] * 256
         self._accept(seq, crc, self._newest + 256 + ((seq - self._newest) & 0xFF))

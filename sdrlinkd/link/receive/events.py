@@ -1,4 +1,4 @@
-"""What receiving comes to: whole messages, and what else a PDU means to the link."""
+"""Events that a received PDU causes in the link, besides complete messages."""
 
 from typing import NamedTuple
 
@@ -7,9 +7,9 @@ from sdrlinkd.wire import Pdu, Record, Stamp
 
 
 class PduHeard(NamedTuple):
-    """A good PDU, for whomever, that is not our own voice; its burst's preamble came at `at`.
+    """A valid PDU from another robot, for any destination; its burst's preamble came at `at`.
 
-    `is_relayed`: another robot than its source has sent it.
+    `is_relayed`: a robot other than its source has sent it.
     """
 
     pdu: Pdu
@@ -19,7 +19,7 @@ class PduHeard(NamedTuple):
 
 
 class RecordHeard(NamedTuple):
-    """A control record that receiving itself has no use for came from `src` at `at`."""
+    """A control record from `src` came at `at` that other parts of the link need."""
 
     src: int
     record: Record
@@ -27,16 +27,16 @@ class RecordHeard(NamedTuple):
 
 
 class Newcomer(NamedTuple):
-    """A robot was heard for the first time, or has started anew."""
+    """A robot was heard for the first time, or has restarted."""
 
     src: int
     at: float
 
 
 class Ended(NamedTuple):
-    """A message whose sender wants to know has ended: delivered, or dropped for `reason`.
+    """A message whose sender wants a receipt was delivered, or dropped; `reason` says which.
 
-    `age_s` is its age then, None where no STAMP told.
+    `age_s` is its age at that moment in s, None if no STAMP came.
     """
 
     src: int
@@ -48,9 +48,9 @@ class Ended(NamedTuple):
 
 
 class PduToRelay(NamedTuple):
-    """A PDU is to be forwarded; all its messages are worthless after `until`.
+    """A PDU to be relayed; all its messages are worthless after `until`.
 
-    `is_ours_too`: it is for this robot, as well as for others.
+    `is_ours_too`: the PDU is for this robot as well as for others.
     """
 
     pdu: Pdu

@@ -1,4 +1,4 @@
-"""Messages at the moment that they are handed over: how old they are, and who falls silent."""
+"""Latencies of messages at their handover, and topics that fall silent."""
 
 from typing import NamedTuple
 
@@ -11,9 +11,9 @@ from sdrlinkd.wire import Waits
 
 
 class AgeReport(NamedTuple):
-    """How late messages of one topic of one source came; None: no STAMP has told.
+    """How late messages of one topic from one source arrived; None: no STAMP came.
 
-    `stops`: stop messages published because nothing came.
+    `stops` is the number of stop messages published because the topic fell silent.
     """
 
     last_ms: float | None = None
@@ -29,11 +29,11 @@ class Handover:
     def __init__(self) -> None:
         self._latencies: dict[tuple[int, int], Latency] = {}
         self._waits: dict[tuple[int, int], Waits] = {}
-        """Why messages waited at their source, as that tells."""
+        """Why messages waited at their source, as the source reports."""
         self._deadman = Deadman()
 
     def deliver(self, message: Delivered, policy: TopicPolicy, now: float) -> float | None:
-        """Note that `message` is handed over at `now`; its age in s, None when unknown."""
+        """Note that `message` is handed over at `now`; returns its age in s, None if unknown."""
         key = message.src, message.topic_id
         if policy.deadman_s:
             self._deadman.fresh(*key, now, policy.deadman_s)
@@ -45,12 +45,12 @@ class Handover:
         return latency.add(message.parts(now), now)
 
     def take_waits(self, src: int, waits: Waits) -> None:
-        """Remember what robot `src` tells of the waits of one of its topics."""
+        """Remember the WAITS record of robot `src` on one of its topics."""
         self._waits[src, waits.topic_id] = waits
 
     @property
     def silence_at(self) -> float:
-        """When the first command topic falls silent, if nothing comes before; s."""
+        """Time in s at which the next command topic falls silent unless a message arrives."""
         return self._deadman.next_at
 
     def take_silent(self, now: float) -> list[tuple[int, int]]:
@@ -58,11 +58,11 @@ class Handover:
         return self._deadman.take_due(now)
 
     def forget(self, topic_id: int) -> None:
-        """Let a topic be silent from now on."""
+        """Disarm a topic's dead-man timers."""
         self._deadman.forget(topic_id)
 
     def report(self, src: int, topic_id: int) -> AgeReport:
-        """How late messages of a topic of robot `src` came, and why."""
+        """How late messages of a topic from robot `src` arrived, and why."""
         key, stops = (src, topic_id), self._deadman.stops.get((src, topic_id), 0)
         latency = self._latencies.get(key)
         if latency is None:

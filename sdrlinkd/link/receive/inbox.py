@@ -1,4 +1,4 @@
-"""The receive half of the link: from PDUs heard to messages delivered."""
+"""The receive side of the link, from PDUs heard to complete messages."""
 
 from collections.abc import Sequence
 from math import inf
@@ -45,9 +45,9 @@ _NO_CONTROL = ControlEntries([], 0, 0)
 
 
 class Inbox:
-    """Checks, duplicate suppression, reassembly and the RX ledger of one node.
+    """One node's checks, duplicate filter, reassembly and receive ledger.
 
-    Whatever else a PDU means to the link comes back as events, in the order in which it was found.
+    All results are returned as events, in the order in which they were found.
     """
 
     def __init__(
@@ -80,8 +80,9 @@ class Inbox:
     def hear(
         self, data: bytes, at: float, snr_db: float | None, now: float, ended_at: float
     ) -> list[Event]:
-        """Take a PDU whose burst's preamble arrived at `at`, and whose last sample at `ended_at`;
-        what follows from it.
+        """Take a PDU and return the events that follow from it.
+
+        The preamble of its burst arrived at `at`, and the PDU's last sample at `ended_at`.
         """
         self._ledger.hear()
         events: list[Event] = []
@@ -137,7 +138,7 @@ class Inbox:
                 events.append(RecordHeard(pdu.src, record, at))
         repaired = self._repaired(pdu.src, records, at) if records else []
         if self._reassembly.lost:
-            # Parity needs room, too.
+            # Parity takes memory, too, so older messages may have been evicted.
             self._note_lost(now, events)
         entries = [*pdu.entries, *repaired] if repaired else pdu.entries
         if len(entries) == control.n_entries:
@@ -149,12 +150,15 @@ class Inbox:
 
     @property
     def held(self) -> Held:
-        """Messages that wait for the rest of them, and those that were begun."""
+        """Numbers of begun and of incomplete messages."""
         reassembly = self._reassembly
         return Held(reassembly.started, reassembly.held, reassembly.held_bytes)
 
     def expire(self, now: float) -> list[Event]:
-        """Give up what has waited too long; the messages whose senders want to know of it."""
+        """Give up messages that have waited too long.
+
+        Returns events for those whose senders want receipts.
+        """
         events: list[Event] = []
         self._reassembly.expire(now)
         self._note_lost(now, events)
@@ -166,12 +170,12 @@ class Inbox:
         return events
 
     def _announce(self, src: int, at: float, events: list[Event]) -> None:
-        """Tell of a robot that is new; we are not new to ourselves."""
+        """Add a Newcomer event for robot `src`, unless it is this robot."""
         if src != self._own_id:
             events.append(Newcomer(src, at))
 
     def _fresh_until(self, pdu: Pdu) -> float:
-        """When all messages in `pdu` will be too old; inf where that is not known."""
+        """Time at which all messages in `pdu` will be too old; infinity if unknown."""
         until = -inf
         for entry in pdu.entries:
             topic_id = entry.topic_id
@@ -184,7 +188,7 @@ class Inbox:
         return until if until > -inf else inf
 
     def _repaired(self, src: int, records: list[Record], at: float) -> list[Entry]:
-        """Fragments that were missing, where these records bring the parity that tells them."""
+        """Missing fragments that can be computed now, with the parity in `records`."""
         partials = {}
         for record in records:
             if isinstance(record, Parity) and is_sound(record):

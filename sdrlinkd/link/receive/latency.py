@@ -1,4 +1,4 @@
-"""How late messages of one topic come, and why: ages, jitter, and the parts of the delay."""
+"""Latency statistics of one topic: ages, jitter, and the parts of the delay."""
 
 from collections import deque
 from statistics import fmean, pstdev
@@ -13,8 +13,11 @@ PERCENTILES = (50.0, 90.0, 99.0, 99.9)
 
 
 class Parts(NamedTuple):
-    """Of a message's age, in s: it waited at its source (and at relays), its fragments came one
-    after another, the last one was on the air, and it was demodulated and handed over.
+    """The parts of a message's age, in s.
+
+    `wait_s` is the wait at the source and at relays, `reassembly_s` the time between the first and
+    the last fragment, `air_s` the time of the last fragment on the air, and `handover_s` the time
+    for demodulation and handover.
     """
 
     wait_s: float
@@ -24,7 +27,7 @@ class Parts(NamedTuple):
 
 
 class Latency:
-    """The last ages in full, all of them in a histogram."""
+    """The latest ages with their parts, and a histogram of all ages."""
 
     __slots__ = ("_came_at", "_histogram", "_intervals", "_parts")
 
@@ -35,7 +38,7 @@ class Latency:
         self._histogram = HdrHistogram(1, LONGEST_US, DIGITS)
 
     def add(self, parts: Parts, now: float) -> float:
-        """A message is handed over at `now`; its age in s."""
+        """Add a message handed over at `now`; returns its age in s."""
         age_s = sum(parts)
         self._parts.append(parts)
         if self._came_at is not None:
@@ -45,30 +48,33 @@ class Latency:
         return age_s
 
     def last_ms(self) -> float | None:
-        """Age of the newest message."""
+        """Age of the latest message in ms; None before the first."""
         return sum(self._parts[-1]) * 1e3 if self._parts else None
 
     def quantile_ms(self, q: float) -> float | None:
-        """The `q` quantile (nearest rank) of the recent ages."""
+        """The `q` quantile (nearest rank) of the recent ages in ms; None before the first."""
         if not self._parts:
             return None
         ordered = sorted(map(sum, self._parts))
         return ordered[min(len(ordered) - 1, int(q * len(ordered)))] * 1e3
 
     def parts(self) -> Parts:
-        """Recent means; 0 before the first message."""
+        """Means of the parts over the recent messages; 0 before the first."""
         if not self._parts:
             return Parts(0.0, 0.0, 0.0, 0.0)
         return Parts(*map(fmean, zip(*self._parts, strict=True)))
 
     def period_ms(self) -> tuple[float, float] | None:
-        """Mean and standard deviation of the time between messages, the Pound paper's Jd."""
+        """(mean, standard deviation) in ms of the time between recent messages; None: too few.
+
+        The standard deviation is the Pound paper's Jd.
+        """
         if not self._intervals:
             return None
         return 1e3 * fmean(self._intervals), 1e3 * pstdev(self._intervals)
 
     def percentiles_ms(self) -> dict[str, float]:
-        """Of all ages since the start, within 1 %; `max`, too."""
+        """Percentiles in ms of all ages since the start, within 1 %, and their maximum as `max`."""
         found = self._histogram.get_percentile_to_value_dict([*PERCENTILES, 100.0])
         told = {f"{p:g}": 1e-3 * found[p] for p in PERCENTILES}
         return {**told, "max": 1e-3 * found[100.0]}

@@ -1,4 +1,4 @@
-"""Who is heard, how well, and whether both mean the same by a topic id."""
+"""The robots that are heard: how well, and whether their registries agree with ours."""
 
 from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, field
@@ -11,14 +11,15 @@ from sdrlinkd.wire import Beacon, Registry, RegistryDigest
 SNR_WEIGHT = 0.2
 GAP_DECAY = 0.98
 LONGEST_GAP_S = 16.0
-"""A half-duplex robot that has nothing to say is heard this often."""
+"""Longest pause in s that counts: an idle half-duplex robot is heard at least this often."""
 PRESENT_S = 10.0
-"""A robot not heard for so long takes no share of the air, and answers nothing."""
+"""Time in s without a PDU after which a robot counts as absent: it uses no airtime and answers
+nothing."""
 
 
 @dataclass(slots=True)
 class Neighbor:
-    """One source of PDUs, as it is heard here."""
+    """One robot that is heard, with its statistics."""
 
     src: int
     track: SequenceTrack = field(default_factory=SequenceTrack)
@@ -26,7 +27,7 @@ class Neighbor:
     duplicates: int = 0
     last_heard_at: float = 0.0
     usual_gap_s: float = 0.0
-    """The longest pause between its PDUs lately."""
+    """Longest recent pause between its PDUs, in s."""
     hops_left: int = 0
     snr_db: float | None = None
     mean_snr_db: float | None = None
@@ -36,9 +37,9 @@ class Neighbor:
     _reported: tuple[int, int] = (0, 0)
 
     def heard_at(self, at: float) -> None:
-        """Note when one more PDU came."""
+        """Note the time of one more PDU."""
         if self.last_heard_at:
-            # A pause is forgotten after some hundred PDUs without one as long; an outage is none.
+            # A long pause decays over some hundred PDUs; an outage does not count as a pause.
             gap_s = min(at - self.last_heard_at, LONGEST_GAP_S)
             self.usual_gap_s = max(gap_s, GAP_DECAY * self.usual_gap_s)
         self.last_heard_at = at
@@ -61,7 +62,7 @@ class Neighbor:
             self.mean_snr_db += SNR_WEIGHT * (snr_db - self.mean_snr_db)
 
     def take_quality(self) -> tuple[float, float] | None:
-        """(mean SNR in dB, share of PDUs lost since the last call); None: nothing was heard."""
+        """(mean SNR in dB, share of PDUs lost since the last call); None if nothing was heard."""
         heard = self.heard - self._reported[0]
         lost = max(0, self.track.lost - self._reported[1])
         if not heard or self.mean_snr_db is None:
@@ -70,18 +71,18 @@ class Neighbor:
         return self.mean_snr_db, lost / (heard + lost)
 
     def take_beacon(self, beacon: Beacon) -> bool:
-        """Note who it is; True when it has started anew since we last heard a beacon."""
+        """Note a beacon of the robot; True if it has restarted since its last beacon."""
         rebooted = self.boot_id not in (None, beacon.boot_id)
         self.boot_id = beacon.boot_id
         self.reboots += rebooted
         return rebooted
 
     def take_digest(self, digest: RegistryDigest) -> None:
-        """Note which registry it has."""
+        """Note the digest of the robot's registry."""
         self.digest = digest
 
     def disagreement(self, registry: Registry, own: RegistryDigest) -> str | None:
-        """In words, where this neighbor's registry differs from ours; None when it does not."""
+        """A sentence on how this neighbor's registry differs from ours; None if it does not."""
         if self.digest is None or self.digest.overall == own.overall:
             return None
         differing = []
@@ -99,7 +100,7 @@ class Neighbor:
 
 
 class Neighbors:
-    """All robots heard, by their ids; `own_id` is among them where a robot hears itself."""
+    """All robots heard, by id; `own_id` is one of them if this robot hears itself."""
 
     def __init__(self, own_id: int) -> None:
         self._own_id = own_id
@@ -109,16 +110,16 @@ class Neighbors:
         return iter(self._by_src.values())
 
     def get(self, src: int) -> Neighbor | None:
-        """What is known of robot `src`; None: it was never heard."""
+        """The statistics of robot `src`; None if it was never heard."""
         return self._by_src.get(src)
 
     def meet(self, src: int) -> Neighbor:
-        """Begin to follow robot `src`, which was not heard before."""
+        """Add robot `src`, which was not heard before."""
         neighbor = self._by_src[src] = Neighbor(src)
         return neighbor
 
     def present(self, now: float) -> list[int]:
-        """The other robots that were heard within PRESENT_S, in the order of their first PDU."""
+        """Ids of the other robots heard within PRESENT_S, in the order of their first PDU."""
         return [
             each.src
             for each in self
@@ -128,7 +129,7 @@ class Neighbors:
     def take_qualities(self) -> Iterator[tuple[int, float, float]]:
         """(robot, mean SNR in dB, share of its PDUs lost) of the others heard since the last call.
 
-        Each is taken as it is asked for.
+        A robot's counts start anew only when the iterator reaches it.
         """
         for each in self:
             quality = each.take_quality() if each.src != self._own_id else None
@@ -136,7 +137,7 @@ class Neighbors:
                 yield each.src, *quality
 
     def report(self, now: float, own: RegistryDigest) -> list[NeighborReport]:
-        """Each of them in ascending order of ids, but for clocks and what they tell of us."""
+        """Reports on all robots by ascending id, without clocks and their reports about us."""
         reports = []
         for src, each in sorted(self._by_src.items()):
             lost, registry = each.track.lost, "unknown"
@@ -161,7 +162,7 @@ class Neighbors:
         return reports
 
     def counters(self) -> dict[Hashable, int]:
-        """The counters of which people are shown rates."""
+        """The counters for which rates are reported."""
         found: dict[Hashable, int] = {}
         for src, each in self._by_src.items():
             found["pdus", src] = each.heard
@@ -169,6 +170,6 @@ class Neighbors:
         return found
 
     def disagreements(self, registry: Registry, own: RegistryDigest) -> list[str]:
-        """In words, whose registry differs from ours, in ascending order of ids."""
+        """Sentences on robots whose registry differs from ours, by ascending id."""
         told = (each.disagreement(registry, own) for _, each in sorted(self._by_src.items()))
         return [each for each in told if each is not None]

@@ -1,4 +1,4 @@
-"""Everything between a PDU heard and a message handed over, by one door."""
+"""The receive side as one object, from a PDU heard to a message handed over."""
 
 from collections.abc import Hashable
 
@@ -18,9 +18,9 @@ from sdrlinkd.wire import Registry, Waits
 
 
 class Reception:
-    """Inbox, handover, neighbors, and the RX ledger of one node.
+    """Inbox, handover, neighbors and receive ledger of one node.
 
-    A compressed message may grow to its topic's `max_bytes`, else to `max_expanded`.
+    A compressed message may expand to its topic's `max_bytes`, or by default to `max_expanded`.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class Reception:
     ) -> None:
         self._own_src = bytes((own_id,))
         self.neighbors = Neighbors(own_id)
-        """Who is heard, and how well."""
+        """The robots that are heard."""
         self._relay = Relay(relay, own_id)
         self._acceptance = Acceptance(registry, inflated, max_expanded)
         self._ledger = RxLedger(registry)
@@ -50,23 +50,27 @@ class Reception:
     def hear(
         self, data: bytes, at: float, snr_db: float | None, now: float, ended_at: float
     ) -> list[Event]:
-        """Take a PDU whose burst's preamble arrived at `at`, and whose last sample at `ended_at`;
-        what follows from it.
+        """Take a PDU and return the events that follow from it.
+
+        The preamble of its burst arrived at `at`, and the PDU's last sample at `ended_at`.
         """
         if data[1:2] != self._own_src:
             self._air.add(at, ended_at)
         return self._inbox.hear(data, at, snr_db, now, ended_at)
 
     def expire(self, now: float) -> list[Event]:
-        """Give up what has waited too long; the messages whose senders want to know of it."""
+        """Give up messages that have waited too long.
+
+        Returns events for those whose senders want receipts.
+        """
         return self._inbox.expire(now)
 
     def relay_refused(self) -> None:
-        """Take one PDU back from rx_relayed to rx_not_for_us: the queue refused it."""
+        """Move one PDU from rx_relayed to rx_not_for_us, as the queue refused it."""
         self._ledger.relay_refused()
 
     def deliver(self, message: Delivered, now: float) -> float | None:
-        """Note that `message` is handed over at `now`; its age in s, None when unknown."""
+        """Note that `message` is handed over at `now`; returns its age in s, None if unknown."""
         return self._handover.deliver(message, self._acceptance.policy(message.topic_id), now)
 
     def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
@@ -76,12 +80,12 @@ class Reception:
             self._handover.forget(topic_id)
 
     def take_waits(self, src: int, waits: Waits) -> None:
-        """Remember what robot `src` tells of the waits of one of its topics."""
+        """Remember the WAITS record of robot `src` on one of its topics."""
         self._handover.take_waits(src, waits)
 
     @property
     def silence_at(self) -> float:
-        """When the first command topic falls silent, if nothing comes before; s."""
+        """Time in s at which the next command topic falls silent unless a message arrives."""
         return self._handover.silence_at
 
     def take_silent(self, now: float) -> list[tuple[int, int]]:
@@ -90,40 +94,40 @@ class Reception:
 
     @property
     def relays(self) -> bool:
-        """Whether PDUs of others are forwarded."""
+        """Whether this node relays PDUs of others."""
         return self._relay.is_on
 
     @property
     def holds_parts(self) -> bool:
-        """Whether messages of others wait for the rest of them."""
+        """Whether incomplete messages from others wait for more fragments."""
         return self._inbox.held.held > 0
 
     @property
     def heard_s(self) -> float:
-        """Airtime of others' bursts, in s."""
+        """Airtime of bursts heard from others, in s."""
         return self._air.heard_s
 
     @property
     def fragments_repaired(self) -> int:
-        """Fragments computed from parity so far."""
+        """Number of lost fragments computed from parity so far."""
         return self._ledger.fragments_repaired
 
     def report(self) -> RxReport:
-        """The RX half of the ledger."""
+        """The report on the receive ledger."""
         return self._ledger.report(self._inbox.held)
 
     def report_topics(self) -> list[ReceivedTopicReport]:
-        """Each topic of each source, but for rates, ages, and names on the bus."""
+        """Reports on each topic of each source, without rates, ages and bus names."""
         return self._ledger.report_topics()
 
     def report_ages(self, src: int, topic_id: int) -> AgeReport:
-        """How late messages of a topic of robot `src` came, and why."""
+        """How late messages of a topic from robot `src` arrived, and why."""
         return self._handover.report(src, topic_id)
 
     def counters(self) -> dict[Hashable, int]:
-        """The counters of which people are shown rates."""
+        """The counters for which rates are reported."""
         return {**self._ledger.counters(), **self.neighbors.counters()}
 
     def audit(self) -> list[str]:
-        """What does not add up in the RX ledgers; empty when all does."""
+        """Discrepancies in the receive ledgers, as sentences; empty when they add up."""
         return self._ledger.audit(self._inbox.held)

@@ -1,4 +1,4 @@
-"""Which PDUs of others are sent on."""
+"""Decides which PDUs of others are relayed."""
 
 import re
 from typing import Annotated, Literal
@@ -14,19 +14,19 @@ _ANY = -1
 
 
 class RelayParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Forwarding for robots that do not hear each other."""
+    """Settings of relays, which forward PDUs between robots that do not hear each other."""
 
     policy: Literal["none", "routes", "flood"] = "none"
-    """routes: what `routes` names; flood: everything, while its hops last."""
+    """What is relayed; routes: what `routes` names; flood: every PDU until its hops are used up."""
     routes: list[str] = []
-    """From robot > to robot: "1>3", "any>3", "1>all" (broadcasts), "any>any"."""
+    """Routes as "FROM>TO", by robot id: "1>3", "any>3", "1>all" (broadcasts), "any>any"."""
     lifespan_s: Annotated[float, Meta(gt=0, le=10)] = 1.0
-    """A PDU that waited for longer is not sent on. Keep it below what a topic takes to use an entry
-    id again."""
+    """Longest wait in s of a PDU to be relayed. Keep it below the time after which a topic reuses
+    an entry id."""
 
 
 class Relay:
-    """Decides by source and destination. Raises ConfigError for routes that cannot be read."""
+    """Decides by source and destination what is relayed. Raises ConfigError for invalid routes."""
 
     def __init__(self, params: RelayParams, own_id: int) -> None:
         self._own_id = own_id
@@ -38,11 +38,11 @@ class Relay:
 
     @property
     def is_on(self) -> bool:
-        """Whether anything is sent on."""
+        """Whether this node relays any PDUs."""
         return self._floods or bool(self._routes)
 
     def wants(self, pdu: Pdu) -> bool:
-        """Whether a PDU that was heard is to be sent on: never back to where it came from."""
+        """Whether a PDU is relayed; it never goes back to its source."""
         src, dst = pdu.src, pdu.dst
         if pdu.hop < 2 or self._own_id in (src, dst) or src == dst:
             return False

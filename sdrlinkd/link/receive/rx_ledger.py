@@ -1,4 +1,4 @@
-"""The receive half of the ledger: every PDU and every message ends under one name."""
+"""The receive ledger: every PDU and every message ends under exactly one name."""
 
 from collections import Counter
 from collections.abc import Hashable
@@ -10,7 +10,7 @@ from sdrlinkd.wire import Registry
 
 
 class Held(NamedTuple):
-    """Messages begun since the start, and those of them that wait for the rest."""
+    """Messages begun since the start, and those that are still incomplete."""
 
     started: int
     held: int
@@ -28,22 +28,22 @@ class RxLedger:
         self._pdus_dropped: Counter[str] = Counter()
         self._control_bad = 0
         self.fragments_repaired = 0
-        """Fragments computed from parity."""
+        """Number of lost fragments computed from parity."""
 
     def hear(self) -> None:
-        """Count a PDU that came."""
+        """Count a received PDU."""
         self._pdus_heard += 1
 
     def use(self) -> None:
-        """Count a PDU that brought entries."""
+        """Count a PDU with entries for this robot."""
         self._pdus_used += 1
 
     def drop_pdu(self, reason: str) -> None:
-        """Count a PDU that ended under a reason of RX_PDU_REASONS."""
+        """Count a PDU under a reason of RX_PDU_REASONS."""
         self._pdus_dropped[reason] += 1
 
     def relay_refused(self) -> None:
-        """Take one PDU back from rx_relayed to rx_not_for_us: the queue refused it."""
+        """Move one PDU from rx_relayed to rx_not_for_us, as the queue refused it."""
         self._pdus_dropped["rx_relayed"] -= 1
         self._pdus_dropped["rx_not_for_us"] += 1
 
@@ -56,14 +56,14 @@ class RxLedger:
         self.fragments_repaired += n
 
     def tally(self, src: int, topic_id: int) -> RxTally:
-        """The messages of one topic of one source."""
+        """The message counters of one topic from one source."""
         tally = self._tallies.get((src, topic_id))
         if tally is None:
             tally = self._tallies[src, topic_id] = RxTally()
         return tally
 
     def report(self, held: Held) -> RxReport:
-        """The sums over all topics."""
+        """The report with the sums over all topics."""
         return RxReport(
             pdus_heard=self._pdus_heard,
             pdus_used=self._pdus_used,
@@ -77,7 +77,7 @@ class RxLedger:
         )
 
     def report_topics(self) -> list[ReceivedTopicReport]:
-        """Each topic of each source, but for rates, ages, and names on the bus."""
+        """Reports on each topic of each source, without rates, ages and bus names."""
         reports = []
         for (src, topic_id), tally in sorted(self._tallies.items()):
             topic = self._registry.by_id(topic_id)
@@ -97,7 +97,7 @@ class RxLedger:
         return reports
 
     def counters(self) -> dict[Hashable, int]:
-        """The counters of which people are shown rates."""
+        """The counters for which rates are reported."""
         found: dict[Hashable, int] = {}
         for key, tally in self._tallies.items():
             found["rx", *key] = tally.delivered
@@ -105,7 +105,7 @@ class RxLedger:
         return found
 
     def audit(self, held: Held) -> list[str]:
-        """What does not add up; empty when all does."""
+        """Discrepancies in the receive ledgers, as sentences; empty when they add up."""
         return balance(
             "rx pdus", self._pdus_heard, {"used": self._pdus_used, **self._pdus_dropped}
         ) + balance(

@@ -1,7 +1,7 @@
-"""How long the next burst may be, and whether it had better wait.
+"""Decides how long the next burst may be, and whether it should wait.
 
-This room owns the forecasts of what is due, the classes' caps and shares, and their credit. It
-knows no queue and no radio: what waits and what the air takes are arguments.
+This package holds the forecasts of messages that are due, the caps and shares of the classes, and
+their credit. It knows neither queue nor radio; their state is passed in as arguments.
 """
 
 from sdrlinkd.link.schedule.allowance import (

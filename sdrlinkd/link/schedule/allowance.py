@@ -1,4 +1,4 @@
-"""How many PDUs the next burst may hold, by the class of what goes next."""
+"""How many PDUs the next burst may hold, by class."""
 
 from collections.abc import Callable, Collection
 from math import inf
@@ -9,23 +9,24 @@ from sdrlinkd.link.schedule.forecast import Forecasts
 from sdrlinkd.link.schedule.params import ClassesParams
 
 ALIVE_S = 1.0
-"""A class has something alive for so long after its last message."""
+"""Time in s after its last message for which a topic counts as alive."""
 OVERRUN = 0.25
-"""A burst may last beyond the time that a message is due by this share of a PDU, rather than leave
+"""Share of a PDU by which a burst may end after the time that a message is due, rather than leave
 more than that unused."""
 SHARED_OVERRUN = 0.9
-"""The same where others share the air: who finds it free first has to wait for his turn, and who
-finds it busy begins when it falls free."""
+"""OVERRUN for a shared channel: a robot that finds it free must first wait for its turn, while one
+that finds it busy starts as soon as it falls free."""
 IDLE_SHARE = 0.1
-"""No more of the air is kept free for what is due."""
+"""Largest share of airtime that is kept free for messages that are due."""
 MOST_IDLE_S = 0.02
 
 
 class Allowance(NamedTuple):
-    """`most[qos]`: a PDU that begins with that class may join a burst of fewer.
+    """How many PDUs a burst may hold, by class.
 
-    `owed`: classes that are to have the burst's last PDUs, even if others could fill them.
-    `until`: where the most urgent class that waits gets none, it is to be asked again then.
+    A PDU whose first entry is of class `qos` may join a burst of fewer than `most[qos]` PDUs.
+    `owed` lists the classes that get the burst's last PDUs, even if others could fill them. `until`
+    is when to query again if the most urgent waiting class gets no PDU.
     """
 
     most: tuple[int, ...]
@@ -38,18 +39,18 @@ class Allowance(NamedTuple):
         return cls((n_pdus,) * len(Qos))
 
     def above(self, qos: Qos) -> "Allowance":
-        """For classes more urgent than `qos` alone, with room for one PDU behind them."""
+        """The allowance for only the classes more urgent than `qos`, with room for one more PDU."""
         most = (max(0, n - 1) if each < qos else 0 for each, n in zip(Qos, self.most, strict=True))
         return Allowance(tuple(most))
 
     def least(self, least: Qos) -> "Allowance":
-        """Classes less urgent than `least` may begin a burst, but not join one."""
+        """This allowance, except that classes less urgent than `least` may only start a burst."""
         most = (n if qos <= least else min(n, 1) for qos, n in zip(Qos, self.most, strict=True))
         return self._replace(most=tuple(most))
 
 
 class Limits:
-    """Caps by class, and gaps for what is due."""
+    """Limits of the next burst: caps by class, and airtime kept free for messages that are due."""
 
     def __init__(self, params: ClassesParams, forecasts: Forecasts) -> None:
         self._cap_s = {qos: params.of(qos).max_burst_s or inf for qos in Qos}
@@ -68,10 +69,10 @@ class Limits:
         is_shared: bool = False,
         asked: Collection[Qos] = tuple(Qos),
     ) -> Allowance:
-        """For a burst that leaves at `start` and is no longer than `longest_s`.
+        """The allowance for a burst that leaves at `start` and is at most `longest_s` long.
 
-        `ready_s` after a message is due, it can leave at the earliest; up to `notice_s` after it
-        has come, nobody knows. Classes that nobody `asked` about get none.
+        A message can leave `ready_s` after it is due, at the earliest, and is noticed up to
+        `notice_s` after it was made. Classes not in `asked` get no PDU.
         """
         forecasts = self._forecasts
         overrun = SHARED_OVERRUN if is_shared else OVERRUN
@@ -86,7 +87,7 @@ class Limits:
                 most.append(0)
                 continue
             if qos <= forecasts.most_urgent:
-                # Nothing goes before it, so nothing shortens its bursts.
+                # No topic is more urgent, so nothing shortens bursts of this class.
                 most.append(most_pdus(longest_s))
                 continue
             cap_s = longest_s
@@ -103,7 +104,7 @@ class Limits:
         return Allowance(tuple(most), until=until)
 
     def kept_free(self, passed_s: float) -> None:
-        """The air was idle for so long because of this."""
+        """Note that the channel was idle for `passed_s` because of these limits."""
         self._idle_s = max(0.0, self._idle_s - passed_s)
 
     def _before(
@@ -114,7 +115,7 @@ class Limits:
         airtime_s: Callable[[int], float],
         overrun: float,
     ) -> int:
-        """PDUs for `free_s`; 0: better wait for what comes then, or `wait_s` later."""
+        """Number of PDUs that fit into `free_s`; 0: wait for the message due then (± `wait_s`)."""
         one_s = airtime_s(1)
         each_s = airtime_s(2) - one_s
         if each_s <= 0:

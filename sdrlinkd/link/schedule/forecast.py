@@ -1,4 +1,4 @@
-"""When the next message of a periodic topic is due."""
+"""Forecasts when the next message of a periodic topic is due."""
 
 from collections.abc import Hashable
 from dataclasses import dataclass
@@ -7,26 +7,26 @@ from math import inf
 from sdrlinkd.link.qos import Qos
 
 MEMORY = 16
-"""So many messages are remembered, in effect."""
+"""Effective number of messages that the estimate remembers."""
 LEARNED = 3
-"""From so many on, a period is believed."""
+"""Number of messages from which a period is trusted."""
 STEADY = 0.2
-"""A topic is periodic when its messages come within this share of the period."""
+"""Largest jitter of a periodic topic, as a share of its period."""
 FASTEST_S = 0.002
-"""Faster than that, no gap is worth keeping."""
+"""Shortest period in s for which airtime is kept free."""
 MISSED = 3
-"""After so many periods without a message, a topic has ended."""
+"""Number of periods without a message after which a topic has ended."""
 MOST = 128
-"""Topics that are followed, the latest heard."""
+"""Largest number of topics that are tracked; the topics heard last are kept."""
 AT_LEAST_S = 1e-4
-"""Nothing is more punctual than that."""
+"""Time in s that is added to a topic's jitter."""
 
 
 @dataclass(slots=True, eq=False)
 class Forecast:
-    """One topic's beat: a line through its messages' times, by growing-memory α–β tracking.
+    """The period and phase of one topic: a line through its messages' times.
 
-    `jitter_s` is the mean distance from it.
+    The line is tracked by a growing-memory α–β filter; `jitter_s` is the mean distance from it.
     """
 
     qos: Qos
@@ -37,11 +37,11 @@ class Forecast:
     jitter_s: float = 0.0
 
     def note(self, qos: Qos, at: float) -> None:
-        """Move the line on by a message of class `qos` that came at `at`."""
+        """Update the line with a message of class `qos` that came at `at`."""
         self.qos = qos
         step_s, self.seen_at = at - self.seen_at, at
         if self.n == 1 or step_s <= 0 or step_s > 2 * MISSED * max(self.period_s, FASTEST_S):
-            # The first step, two at once, or a long pause: begin anew.
+            # Start over on the second message, two messages at once, or a long pause.
             self.n, self.beat_at, self.jitter_s = (2 if step_s > 0 else 1), at, 0.0
             self.period_s = step_s if self.n == 2 else 0.0
             return
@@ -57,7 +57,7 @@ class Forecast:
 
     @property
     def is_periodic(self) -> bool:
-        """Whether the next one's time is known."""
+        """Whether the time of the next message can be predicted."""
         return (
             self.n >= LEARNED
             and self.period_s >= FASTEST_S
@@ -65,21 +65,21 @@ class Forecast:
         )
 
     def is_alive(self, now: float) -> bool:
-        """Whether more messages of the topic are to be expected."""
+        """Whether more messages of the topic are expected."""
         return now - self.seen_at <= MISSED * self.period_s
 
     @property
     def spread_s(self) -> float:
-        """So long before or after its time a message may well come."""
+        """Time in s by which a message may come before or after its predicted time."""
         return self.jitter_s + AT_LEAST_S
 
     def is_late(self, now: float) -> bool:
-        """Whether one has not come although it was due: it may come at any time."""
+        """Whether a message is overdue, so that it may come at any time."""
         over_s = now - self.beat_at - self.period_s
         return self.spread_s < over_s < self.period_s / 2
 
     def due(self, now: float) -> float:
-        """When the next one should come; one that is late is waited for, for a while."""
+        """Predicted time of the next message; a late one is still expected for `spread_s`."""
         next_at = self.beat_at + self.period_s
         while next_at + self.spread_s < now:
             next_at += self.period_s
@@ -87,28 +87,28 @@ class Forecast:
 
 
 class Forecasts:
-    """The periodic topics of this node, and of those whom it hears."""
+    """The topics of this node and of the nodes it hears, with their forecasts."""
 
     def __init__(self) -> None:
         self._by_key: dict[Hashable, Forecast] = {}
         self.most_urgent = Qos.BULK
-        """Nothing that is followed is more urgent than this."""
+        """The most urgent class of any message so far."""
 
     def note(self, key: Hashable, qos: Qos, at: float) -> None:
-        """A message of that class was submitted, here or elsewhere, at `at` of our time."""
+        """Note a message of class `qos`, submitted here or elsewhere at `at` on our clock."""
         if qos < self.most_urgent:
             self.most_urgent = qos
         found = self._by_key.get(key)
         if found is None:
             if len(self._by_key) >= MOST:
-                # Whoever makes up robots shall not keep us busy.
+                # Bounds the effort if someone forges PDUs of many robots.
                 del self._by_key[min(self._by_key, key=lambda each: self._by_key[each].seen_at)]
             self._by_key[key] = Forecast(qos, at)
         elif at > found.seen_at:
             found.note(qos, at)
 
     def next_due(self, now: float, below: Qos) -> Forecast | None:
-        """The topic more urgent than `below` that is due first; None when none is periodic."""
+        """The periodic topic more urgent than `below` that is due first; None if there is none."""
         first, first_at = None, inf
         for each in self._by_key.values():
             if each.qos < below and each.is_periodic and each.is_alive(now):
@@ -118,7 +118,7 @@ class Forecasts:
         return first
 
     def is_unforeseen(self, now: float, below: Qos, alive_s: float) -> bool:
-        """Whether a topic more urgent than `below` is alive whose next message nobody knows."""
+        """Whether a topic more urgent than `below` is alive and cannot be predicted now."""
         return any(
             each.qos < below
             and now - each.seen_at < alive_s

@@ -1,4 +1,4 @@
-"""What each class is given."""
+"""Settings of the traffic classes."""
 
 from typing import Annotated
 
@@ -13,47 +13,47 @@ Lifespan = Annotated[float, Meta(gt=0)]
 
 
 class ClassParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How one class shares the air with the others."""
+    """How one class shares the airtime with the others."""
 
     share: Share = 0.0
-    """Of the time on the air, whatever the more urgent classes want."""
+    """Guaranteed share of our airtime, 0 to 1, even if more urgent classes want it."""
     max_burst_s: Seconds = 0.0
-    """Longest burst while something more urgent may come that nobody can foresee; 0: that of the
-    modem."""
+    """Longest burst in s while a more urgent message may come at an unpredictable time; 0: that of
+    the modem."""
     parity: Annotated[float, Meta(ge=0, le=1)] = 0.0
-    """Fragments of parity for each one of a large message: so large a share of its PDUs may be
-    lost."""
+    """Parity fragments per fragment of a large message: the share of its PDUs that may be lost."""
     lifespan_s: Lifespan = float("inf")
-    """Seconds after which a message is not sent any more, where neither it nor its topic says."""
+    """Age in s after which a message is not sent any more, if neither it nor its topic has a
+    lifespan."""
 
 
 class UrgentParams(ClassParams, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What must come now or not at all."""
+    """The class urgent: messages that must arrive now or not at all."""
 
     lifespan_s: Lifespan = 1.0
 
 
 class LatencyParams(ClassParams, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What is worth little when it is old."""
+    """The class latency: messages that lose their value with age."""
 
     share: Share = 0.1
     lifespan_s: Lifespan = 2.0
 
 
 class DefaultParams(ClassParams, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The class of messages that name none."""
+    """The class default: messages without a configured class."""
 
     share: Share = 0.05
 
 
 class BulkParams(ClassParams, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The class of messages that may fill the air."""
+    """The class bulk: messages that may fill the remaining airtime."""
 
     share: Share = 0.05
 
 
 class ClassesParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What every class is given."""
+    """Settings of all traffic classes."""
 
     urgent: UrgentParams = UrgentParams()
     latency: LatencyParams = LatencyParams()
@@ -61,6 +61,6 @@ class ClassesParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     bulk: BulkParams = BulkParams()
 
     def of(self, qos: Qos) -> ClassParams:
-        """What one class is given."""
+        """The settings of one class."""
         params: ClassParams = getattr(self, qos.label)
         return params

@@ -1,4 +1,4 @@
-"""Guaranteed shares of the air, so that no class starves."""
+"""Guaranteed shares of airtime, so that no class starves."""
 
 from collections.abc import Collection, Sequence
 
@@ -7,10 +7,10 @@ from sdrlinkd.link.schedule.params import ClassesParams
 
 
 class Shares:
-    """What each class is owed, in s on the air.
+    """The airtime credit of each class, in s.
 
-    While something of a class waits, it earns its share of every burst and pays for what it gets;
-    one that gets more than its share owes nothing later.
+    While messages of a class wait, it earns its share of every burst and pays for what it gets.
+    Exceeding the share incurs no debt.
     """
 
     def __init__(self, params: ClassesParams) -> None:
@@ -20,7 +20,10 @@ class Shares:
         """Whether any class has credit."""
 
     def spend(self, airtime_s: float, classes: Sequence[Qos], waiting: Collection[Qos]) -> None:
-        """Settle a burst of that length: the class of each of its PDUs, and what still waits."""
+        """Settle a burst of length `airtime_s`.
+
+        `classes` has the class of each of its PDUs, `waiting` the classes that still wait.
+        """
         each_s = airtime_s / max(1, len(classes))
         for qos, share in self._share.items():
             if qos not in waiting:
@@ -31,13 +34,13 @@ class Shares:
         self.is_owed = any(self._credit_s.values())
 
     def idle(self, passed_s: float, waiting: Collection[Qos]) -> None:
-        """Credit classes that waited while the air was kept free for so long."""
+        """Credit the classes that waited while the channel was kept free for `passed_s`."""
         for qos in waiting:
             self._credit_s[qos] += self._share[qos] * passed_s
         self.is_owed = any(self._credit_s.values())
 
     def owed(self, pdu_s: float) -> list[Qos]:
-        """A class for each PDU of that length that it has earned and did not get."""
+        """Classes with credit, once for each PDU of length `pdu_s` that they are owed."""
         if pdu_s <= 0 or max(self._credit_s.values()) < pdu_s:
             return []
         n_pdus = ((qos, int(credit_s / pdu_s)) for qos, credit_s in self._credit_s.items())

@@ -1,6 +1,6 @@
-"""What a person is told: rates over the last minutes, and why a topic fares as it does.
+"""Status for people: recent rates, and explanations of what happens to a topic.
 
-This room owns the memory of where counters stood. It counts nothing itself, and decides nothing.
+This package keeps samples of counters. It counts nothing itself and takes no decisions.
 """
 
 from sdrlinkd.link.status.meters import RateMeter

@@ -1,11 +1,11 @@
-"""Rates, sampled so that the path of a message pays nothing for them."""
+"""Rates computed from samples of counters, at no cost for the processing of messages."""
 
 from collections import deque
 from collections.abc import Hashable, Mapping
 
 
 class RateMeter:
-    """Mean rates over a sliding window, from counters that are sampled now and then."""
+    """Mean rates over a sliding window, from counters that are sampled periodically."""
 
     def __init__(self, window_s: float, step_s: float = 0.5) -> None:
         self._window_s = window_s
@@ -21,11 +21,11 @@ class RateMeter:
         self._samples.append((now, dict(counters)))
 
     def is_due(self, now: float) -> bool:
-        """Whether the last sample is old enough for another."""
+        """Whether the last sample is old enough to take another."""
         return not self._samples or now - self._samples[-1][0] >= self._step_s
 
     def grown(self, key: Hashable, value: int, now: float) -> int:
-        """How much `key`, whose counter stands at `value` now, has grown within the window."""
+        """Growth of the counter `key`, which is at `value` now, within the window."""
         if not self._samples or now - self._began_at <= self._window_s:
             return value
         for at, counters in self._samples:
@@ -34,11 +34,11 @@ class RateMeter:
         return 0
 
     def all_per_s(self, counters: Mapping[Hashable, int], now: float) -> dict[Hashable, float]:
-        """Rates of all `counters`, which stand there now."""
+        """Rates per second of all `counters`, given with their present values."""
         return {key: self.per_s(key, value, now) for key, value in counters.items()}
 
     def per_s(self, key: Hashable, value: int, now: float) -> float:
-        """Rate of `key`, whose counter stands at `value` now."""
+        """Rate per second of the counter `key`, which is at `value` now."""
         for at, counters in self._samples:
             if now - at > self._window_s:
                 continue

@@ -1,4 +1,4 @@
-"""What happens to a topic, in plain words."""
+"""Explains what happens to a topic's messages, in plain sentences."""
 
 from collections.abc import Collection, Hashable
 from math import inf
@@ -14,27 +14,27 @@ from sdrlinkd.wire import BROADCAST
 MINUTE_S = 60.0
 STEP_S = 2.0
 FULL = 0.85
-"""No policy leaves much less than the rest idle."""
+"""Share of airtime from which the channel counts as full; policies leave about the rest idle."""
 OVERFLOW = ("tx_overflow_old", "tx_overflow_new", "tx_topic_full", "tx_superseded", "tx_expired")
-"""Reasons that more air would have cured."""
+"""Reasons of drops that more airtime would have prevented."""
 
 
 class Told(NamedTuple):
-    """Where policies come from: the file, and keys that were set since."""
+    """Where a policy comes from: the file, and the keys that were set since."""
 
     source: str
     changed: Collection[str]
 
 
 class AirUse(NamedTuple):
-    """What was used of the air since the start: what we sent, and others' bursts in s."""
+    """Use of the channel since the start: our report, and the airtime of others' bursts in s."""
 
     sent: TransmitReport
     heard_s: float
 
 
 class Why:
-    """Remembers the last minute of each topic, and of the air."""
+    """Explains a topic from the counters of the last minute, of topics and channel."""
 
     def __init__(self, intake: Intake, outbox: Outbox) -> None:
         self._intake = intake
@@ -45,9 +45,9 @@ class Why:
     def sample(
         self, now: float, n_topics: int, scheduler: BurstScheduler | NoRadio, heard_s: float
     ) -> None:
-        """Remember where all counters stand at `now`, if the last time is some seconds ago.
+        """Sample all counters at `now`, if the last sample is some seconds old.
 
-        `heard_s` is the airtime of others' bursts so far.
+        `heard_s` is the airtime of others' bursts so far, in s.
         """
         self._began_at = min(self._began_at, now)
         if self._meter.is_due(now):
@@ -55,7 +55,7 @@ class Why:
             self._meter.sample(self._counters(n_topics, air), now)
 
     def explain(self, topic_id: int, name: str, told: Told, now: float, air: AirUse) -> list[str]:
-        """What happens to a topic, in sentences for a person."""
+        """What happens to a topic's messages and why, in plain sentences."""
         policy, tally = self._intake.policy(topic_id), self._intake.tally(topic_id)
         came = self._lately(("accepted", topic_id), tally.accepted, now)
         sent = self._lately(("sent", topic_id), tally.sent, now)
@@ -114,7 +114,7 @@ class Why:
     def _too_old(self, topic_id: int, policy: TopicPolicy) -> str:
         lifespan = self._intake.lifespan(topic_id)
         if not lifespan.source:
-            # Each message says it itself.
+            # The limit is set by each message itself.
             return "were older than their producer allows before their turn came"
         of_class = lifespan.source == "class"
         whose = f", the lifespan of class {policy.qos}," if of_class else ""
@@ -138,7 +138,7 @@ class Why:
         )
 
     def _idle(self, now: float, air: AirUse) -> list[str]:
-        """An air that is full, or idles between turns."""
+        """A sentence on how busy the channel was, or why it was idle."""
         over_s = min(MINUTE_S, now - self._began_at)
         if over_s <= 0:
             return []
@@ -171,7 +171,7 @@ class Why:
 
 
 def _both(air: AirUse) -> dict[str, float]:
-    """Airtime in s, ours and that of others."""
+    """Airtime in s so far: ours (`sent`) and that of others (`heard`)."""
     return {"sent": air.sent.airtime_s, "heard": air.heard_s}
 
 

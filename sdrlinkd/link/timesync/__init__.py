@@ -1,7 +1,7 @@
-"""Clocks of other robots, from when bursts were sent and heard.
+"""Estimates other robots' clocks from the times at which bursts were sent and heard.
 
-This room owns what is known of each robot's clock, and the CLOCK records that tell of ours. It
-reads no clock, and decides nothing of when a record is sent.
+This package holds the estimate of each robot's clock, and makes the CLOCK records about ours. It
+reads no clock, and does not decide when a record is sent.
 """
 
 from sdrlinkd.link.timesync.clocks import ClockParams, Clocks

@@ -1,4 +1,4 @@
-"""This robot's CLOCK records, and the clocks of all others."""
+"""Makes this robot's CLOCK records, and tracks the clocks of all others."""
 
 from collections import OrderedDict
 from typing import Annotated, Literal
@@ -21,26 +21,27 @@ from sdrlinkd.wire import (
 
 REMEMBERED = 64
 RIDES_FROM = 0.75
-"""Of a period after the last one, a record is ready for spare room."""
+"""Share of a period after the last CLOCK from which the next one may use spare room."""
 HOST_DRIFT = 1e-4
-"""Of a host's clock against its radio's, which it has told of at its last CLOCK."""
+"""Largest drift of a host's clock against its radio's since the last CLOCK, in s per s."""
 FORGOTTEN_S = 30.0
-"""A robot not heard for so long is not told of any more."""
+"""Time in s without a CLOCK after which a robot is left out of our CLOCK records."""
 
 
 class ClockParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How robots learn each other's clocks."""
 
     period_s: Annotated[float, Meta(ge=0, le=10)] = 0.2
-    """Between CLOCK records, where there is room for them; 0: none."""
+    """Time between CLOCK records in s, if there is room for them; 0: no CLOCK records."""
     filter: Literal["envelope", "paper"] = "envelope"
-    """How an offset is made of the times of bursts; paper: as the Sensors 2023 paper has it."""
+    """Filter that estimates the clock offset from burst times; paper: that of the Sensors 2023
+    paper."""
     share: Annotated[float, Meta(gt=0, le=0.5)] = 0.02
-    """Of all airtime, for PDUs with nothing but CLOCK and RECEIPT records, all robots together."""
+    """Share of airtime for PDUs that hold only CLOCK and RECEIPT records, all robots together."""
 
 
 class Clocks:
-    """Numbers of own CLOCKs, when they left, and a PeerClock for each robot heard."""
+    """Our own CLOCK records and when they left, and a PeerClock for each robot heard."""
 
     def __init__(self, params: ClockParams, boot_id: int, own_id: int) -> None:
         self._period_s = params.period_s
@@ -52,26 +53,24 @@ class Clocks:
         self.due_at = 0.0 if params.period_s else float("inf")
         self.peers: dict[int, PeerClock] = {}
         self._wall: Wall | None = None
-        """Our own host's."""
+        """Clock of our own host."""
         self._resolution_s = 2e-5
-        """How exact times of bursts are."""
+        """Resolution of burst times, in s."""
 
     def set_resolution(self, resolution_s: float) -> None:
-        """Take times of bursts to be exact to this from now on; clocks already known are not
-        looked at again.
-        """
+        """Set the resolution of burst times in s, for clocks that become known from now on."""
         self._resolution_s = resolution_s
 
     def set_wall(self, wall: Wall) -> None:
-        """Tell others what our host's clock is ahead of our link's."""
+        """Set the offset of our host's clock from our link's, to be announced to others."""
         self._wall = wall
 
     def end(self) -> None:
-        """Make no more CLOCK records."""
+        """Send no more CLOCK records."""
         self.due_at = float("inf")
 
     def record(self, start: float, room: int) -> Clock:
-        """The next one, at `start`; it tells of at most `room` robots."""
+        """The next CLOCK record, for a burst at `start`, with arrivals of at most `room` robots."""
         self.due_at = start + RIDES_FROM * self._period_s
         stamped, left_s = self._number, start
         if self._left:
@@ -89,7 +88,7 @@ class Clocks:
         arrivals = [each for each in told if each is not None and tellable(each)]
         most = min(max(room, 0), MAX_ARRIVALS)
         if len(arrivals) > most:
-            # In turn, so that everybody hears of himself.
+            # Rotate, so that each robot gets the arrivals of its own CLOCKs.
             first = self._number * most % len(arrivals)
             arrivals = arrivals[first:] + arrivals[:first]
         return Clock(
@@ -97,7 +96,7 @@ class Clocks:
         )
 
     def rode(self) -> int:
-        """Note that the record went into a burst; its number."""
+        """Note that the record was put into a burst; returns its number."""
         number, self._number = self._number, (self._number + 1) % CLOCK_NUMBERS
         return number
 
@@ -116,7 +115,7 @@ class Clocks:
         peer.hear(clock, at, self._own_id, self._left)
 
     def report(self, src: int, now: float) -> ClockReport | None:
-        """What is known of a robot's clock; None: nothing, or it is our own."""
+        """What is known about a robot's clock; None if nothing is, or if it is our own."""
         peer = self.peers.get(src)
         if peer is None:
             return None
@@ -129,7 +128,7 @@ class Clocks:
         )
 
     def estimate(self, src: int, now: float) -> Estimate | None:
-        """Our link's clock less that of robot `src`; None: not known."""
+        """Our link's clock minus that of robot `src`; None if unknown."""
         peer = self.peers.get(src)
         return None if peer is None else peer.estimate(now)
 
@@ -137,10 +136,9 @@ class Clocks:
         return PaperClock() if self._filter == "paper" else DualEnvelope(self._resolution_s)
 
     def wall_offset(self, src: int, now: float) -> tuple[int, float, float] | None:
-        """Our host's time since 1970 less that of robot `src`.
+        """Our host's time since 1970 minus that of robot `src`; None if unknown.
 
-        (difference in ns, bound of its error in s, of that what the two hosts' clocks have to
-        answer for); None: not known.
+        (difference in ns, bound of its error in s, part of that bound due to the two hosts' clocks)
         """
         if self._wall is None:
             return None
@@ -157,7 +155,7 @@ class Clocks:
         return offset_ns, known.bound(now) + hosts_s, hosts_s
 
     def state(self, src: int, now: float) -> State:
-        """How well a robot's clock is known; our own is."""
+        """How well a robot's clock is known; our own always is."""
         if src == self._own_id:
             return State.SYNCED
         peer = self.peers.get(src)

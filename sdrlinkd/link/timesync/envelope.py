@@ -1,19 +1,19 @@
-"""Where two clocks stand, by the least delay of each direction.
+"""Estimates the offset of two clocks from the shortest delays of each direction.
 
-What comes from the other robot bounds the offset from above, what it says of ours from below: no
-delay is negative. The least of each need not belong together, so N messages a way bring the error
-down as 1/N, where a filter of round trips gains 1/√N. Delays are taken beyond the airtime, which
-both know.
+No delay is negative, so a burst from the other robot bounds the offset from above, and its report
+about our burst bounds it from below. The shortest delays of the two directions need not belong
+together, so with N messages each way the error falls as 1/N; a filter over round trips gains only
+1/√N. Delays are counted beyond the airtime, which both robots know.
 
 Geometry: over local time x, each sample of one direction is a point above the line of the true
-offset, each of the other a point below it. Clocks drift, so the line has a slope, the skew, of at
-most MOST. All lines that pass between the two clouds are possible. For one slope, the highest and
-the lowest of them are those that touch a cloud; their mean is the best guess and half their
-distance the bound, because delays are positive and their least values are not known (`_bounds`).
-Over slopes, a line is the likelier the closer the samples lie to it: with delays that are
-exponential beyond their least, the likelihood of a slope is the product of 1/(mean excess)^n of
-both directions (`_weights`), times a prior of what crystals are like. The offset is the mean over
-slopes by that weight; its bound covers every possible line, however unlikely.
+offset, and each sample of the other a point below it. Clocks drift, so the line has a slope, the
+skew, of at most MOST. Every line between the two clouds is possible. For a given slope, the highest
+and the lowest possible line each touch a cloud. Their mean is the best estimate and half their
+distance is the bound, because delays are positive and their smallest values are unknown
+(`_bounds`). Among slopes, a line is more likely the closer the samples are to it. If delays beyond
+their smallest value are exponential, the likelihood of a slope is the product of 1/(mean excess)^n
+over both directions (`_weights`), times a prior for crystals. The offset is the mean over slopes
+with these weights; its bound covers every possible line, however unlikely.
 """
 
 from collections import deque
@@ -26,29 +26,30 @@ from sdrlinkd.link.timesync.side import Side
 
 WINDOW_S = 60.0
 PRIOR_PPM = 30.0
-"""About the difference of two ordinary clocks."""
+"""Typical difference of two ordinary clocks, in ppm."""
 MOST = 1.2e-3
-"""No two crystals differ by more."""
+"""Largest difference of two clocks' rates, in s per s."""
 MISS_S = 5e-4
-"""By so much must a sample contradict the others."""
+"""Margin in s by which a sample must violate the bound to count as contradicting the others."""
 RUNNING, AMONG = 3, 8
-"""So many that do among so many: the clock was stepped; fewer: bad stamps, unless"""
+"""A clock was stepped if RUNNING of the last AMONG samples of a direction contradict the others.
+With fewer, they are bad stamps, unless the rule of PAIR applies."""
 PAIR, LATELY, OPPOSITE = 2, 25, 4
-"""two do among so many, and of the other direction, in that time, as many as this or more came, all
-of them as much too late."""
+"""A clock was also stepped if PAIR of the last LATELY samples contradict, and at least OPPOSITE
+samples of the other direction came meanwhile, all of them late by at least as much."""
 FLOOR_SHARE = 0.05
-"""Of the airtime of both ways; delays shorter than the airtime by more cannot be."""
+"""Share of the airtime of both directions by which delays may come out shorter than the airtime."""
 NEGLIGIBLE = 3e-4
-"""A slope so much less likely than the best."""
+"""Likelihood of a slope, relative to the most likely one, below which it is ignored."""
 GRID = 33
 
 _Slopes = NDArray[np.float64]
 
 
 class Estimate(NamedTuple):
-    """Local minus remote time at local time `at`: `offset_s`, never wrong by more than `bound_s`.
+    """Local minus remote time at local time `at`: `offset_s`, with an error of at most `bound_s`.
 
-    `skew` is what it gains a second, `skew_bound` how wrong that may be.
+    `skew` is the growth of the offset in s per s, with an error of at most `skew_bound`.
     """
 
     at: float
@@ -62,14 +63,15 @@ class Estimate(NamedTuple):
         return self.offset_s + self.skew * (now - self.at)
 
     def bound(self, now: float) -> float:
-        """How wrong the offset may be at `now`, in s."""
+        """Largest error of the offset at `now`, in s."""
         return self.bound_s + self.skew_bound * max(0.0, now - self.at)
 
 
 class DualEnvelope:
-    """The clocks of two robots; all times in s. `resolution_s`: of the stamps.
+    """Estimates the offset of two robots' clocks; all times are in s.
 
-    A sample that contradicts the others is held back until it is known which of them are wrong.
+    `resolution_s` is the resolution of the time stamps. A sample that contradicts the others is
+    held back until it is clear which of them are wrong.
     """
 
     def __init__(self, resolution_s: float = 2e-5) -> None:
@@ -82,24 +84,24 @@ class DualEnvelope:
         self.estimate: Estimate | None = None
         self.samples = 0
         self.steps = 0
-        """Times that a clock was seen to jump."""
+        """How often a clock was seen to jump."""
         self.contradicted = 0
-        """Single stamps that did not fit."""
+        """Time stamps rejected because they contradict the others."""
         self.narrowed = 0
-        """Times that older samples were dropped because delays came out shorter than airtime."""
+        """How often older samples were dropped because delays came out shorter than the airtime."""
 
     def heard(self, sent_there: float, came_here: float, airtime_s: float) -> None:
-        """A burst of the other robot: its own time of sending, ours of hearing."""
+        """Take a burst of the other robot: sent at its time, heard at ours."""
         self._airtime_s[0] = airtime_s
         self._note(self._above, self._below, came_here, came_here - sent_there - airtime_s, 1.0)
 
     def was_heard(self, sent_here: float, came_there: float, airtime_s: float) -> None:
-        """A burst of ours: our own time of sending, its of hearing."""
+        """Take a burst of ours: sent at our time, heard at the other robot's."""
         self._airtime_s[1] = airtime_s
         self._note(self._below, self._above, sent_here, came_there - sent_here - airtime_s, -1.0)
 
     def solve(self, now: float) -> Estimate | None:
-        """The estimate at `now` from all samples; None while one direction has none."""
+        """The estimate at `now` from all samples; None while a direction has none."""
         for side in (self._above, self._below):
             side.forget_before(now - WINDOW_S)
         least_gap_s = -FLOOR_SHARE * sum(self._airtime_s) - 2 * self._resolution_s
@@ -114,7 +116,7 @@ class DualEnvelope:
         return None
 
     def forget(self) -> None:
-        """Forget all samples: the other clock is another one now."""
+        """Forget all samples, as the other robot has a new clock."""
         for side, running in self._running.items():
             side.clear()
             running.clear()
@@ -146,7 +148,7 @@ class DualEnvelope:
         return len(late_s) >= OPPOSITE and bool(late_s.min() >= max(misses_s))
 
     def _restart(self, side: Side, other: Side, slope: float) -> None:
-        """From what contradicts what was before, and what came the other way meanwhile."""
+        """Start over with the contradicting samples, and those of the other direction since."""
         contradicting = [each for each in self._running[side] if each is not None]
         for running in self._running.values():
             running.clear()
@@ -166,10 +168,10 @@ class DualEnvelope:
 
 
 class _Fit:
-    """The common slope of both envelopes.
+    """Fits a common slope to both envelopes.
 
-    Those slopes are possible by which no delay is negative; some are more likely: delays are taken
-    to be exponential, and clocks to differ by about 30 ppm.
+    A slope is possible if no delay becomes negative. Likelihoods assume that delays are exponential
+    and that clocks differ by about 30 ppm.
     """
 
     def __init__(self, above: Side, below: Side, now: float, resolution_s: float) -> None:
@@ -185,13 +187,13 @@ class _Fit:
             best = int(np.argmax(gaps_s))
             low, high = slopes[max(0, best - 1)], slopes[min(GRID - 1, best + 1)]
         self.gap_s = float(gaps_s[best])
-        """The widest."""
+        """Largest gap between the two envelopes over all slopes, in s."""
         steps = (high - low) * 2.0 ** np.arange(26)
         self._lowest = self._last_possible(slopes[best], np.maximum(slopes[best] - steps, -MOST))
         self._highest = self._last_possible(slopes[best], np.minimum(slopes[best] + steps, MOST))
 
     def estimate(self) -> Estimate:
-        """The mean over all likely slopes; bounds over all possible ones."""
+        """The estimate: means over all likely slopes, bounds over all possible ones."""
         slopes = np.linspace(self._lowest, self._highest, GRID)
         likely = np.flatnonzero(self._weights(slopes) > NEGLIGIBLE)
         first, last = max(0, likely[0] - 1), min(GRID - 1, likely[-1] + 1)
@@ -201,7 +203,7 @@ class _Fit:
         above, below = self._bounds(slopes)
         offset_s = float((above - below) @ weights / 2)
         skew = float(slopes @ weights)
-        # With samples all in the past, both bounds grow with the slope.
+        # All samples are in the past, so the offset at `now` grows with the slope for both bounds.
         least_s = -float(self._bounds(np.array([self._lowest]))[1][0])
         most_s = float(self._bounds(np.array([self._highest]))[0][0])
         return Estimate(
@@ -213,7 +215,7 @@ class _Fit:
         )
 
     def _bounds(self, slopes: _Slopes) -> tuple[_Slopes, _Slopes]:
-        """(upper, minus lower) bound of the offset now, for each slope."""
+        """(upper bounds, negated lower bounds) of the offset now, for each slope."""
         above = (self._v[0] - slopes[:, None] * self._x[0]).min(axis=1)
         below = (self._v[1] + slopes[:, None] * self._x[1]).min(axis=1)
         return above, below
@@ -223,22 +225,22 @@ class _Fit:
         return above + below
 
     def _weights(self, slopes: _Slopes) -> _Slopes:
-        """How likely each is, against the likeliest."""
+        """Likelihood of each slope relative to the most likely one."""
         above, below = self._bounds(slopes)
         (n_above, x_above, v_above), (n_below, x_below, v_below) = self._totals
-        # Of samples close together the lowest is that for one slope; for others it may not be.
+        # Each bucket keeps its lowest sample for one slope, which may not be lowest for others.
         excess = np.maximum(v_above - slopes * x_above - above, 0.0) + self._resolution_s
         lack = np.maximum(v_below + slopes * x_below - below, 0.0) + self._resolution_s
-        # Crystals that are far off are rare, but there are some.
+        # The constant keeps crystals with a large error possible, though unlikely.
         unusual = -np.log(np.exp(-((1e6 * slopes / PRIOR_PPM) ** 2) / 2) + 1e-6)
         costs = n_above * np.log(excess) + n_below * np.log(lack) + unusual
         weights: _Slopes = np.exp(costs.min() - costs)
         return weights
 
     def _last_possible(self, inner: float, outer: _Slopes) -> float:
-        """The farthest slope from `inner` on for which no delay is negative; not nearer, at least.
+        """The farthest slope from `inner` for which no delay is negative, rounded outwards.
 
-        `outer`: slopes ever farther away.
+        `outer` lists slopes at increasing distance.
         """
         possible = self._gaps(outer) >= 0
         if possible.all():

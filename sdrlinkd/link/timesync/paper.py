@@ -1,19 +1,19 @@
 """The filter of the Sensors 2023 paper, as printed: Equations 1 to 9, Algorithm 3.
 
-Where readings differ:
+Where the sources differ:
 
-- Equation 5 has no absolute value, Algorithm 3 (line 12) and PX4's source have: it is taken.
-- In the text, Equation 5 holds from the first sample on; then an estimate that begins at 0 never
-  gets near a clock that is more than 100 ms away. In Algorithm 3 (line 14) and in PX4, only who has
-  converged looks at the deviation: so here.
-- PX4's comment says that five deviant samples reset; its source, like line 17, takes six. Samples
-  whose round trip is too long come between them uncounted.
-- A round trip that is too long is counted, and nothing follows from the count; PX4 logs it.
-- Equation 1 takes one remote stamp. What the remote robot takes to answer is then part of the
-  round trip, and half of it of the offset. With a fourth stamp, as in MAVLink's and XRCE-DDS's own
-  messages, `update_four` leaves it out; PX4 does not.
-- Skew is per sample, not per second, and between samples nothing is extrapolated.
-- Before it has converged, PX4 takes a remote stamp to mean now; here `synced` is None.
+- Equation 5 has no absolute value, but Algorithm 3 (line 12) and PX4's source do; we follow them.
+- In the text, Equation 5 applies from the first sample on. An estimate that starts at 0 then never
+  approaches a clock that is more than 100 ms away. In Algorithm 3 (line 14), in PX4 and here, the
+  deviation is checked only after convergence.
+- PX4's comment says that five deviant samples cause a reset; its source, like line 17, requires
+  six. Samples with too long a round trip in between do not count.
+- Round trips that are too long are counted, but the count has no effect; PX4 logs it.
+- Equation 1 uses one remote stamp. The remote robot's response time is then part of the round trip,
+  and half of it is part of the offset. With a fourth stamp, as in MAVLink's and XRCE-DDS's own
+  messages, `update_four` excludes that time; PX4 does not.
+- Skew is per sample, not per second, and nothing is extrapolated between samples.
+- Before convergence, PX4 takes a remote stamp to mean now; here `synced` is None.
 """
 
 import math
@@ -42,14 +42,14 @@ class PaperFilter:
         return self.n >= CONVERGENCE_WINDOW
 
     def update(self, t_packet_creation: float, t_remote_stamp: float, t_current: float) -> None:
-        """Algorithm 3, UPDATE: a packet of ours, its answer's stamp, and when the answer came."""
+        """Algorithm 3, UPDATE: when our packet was made, the answer's stamp, when that came."""
         if t_remote_stamp <= 0:
             return
         offset_observed = (t_packet_creation + t_current - 2 * t_remote_stamp) / 2
         self._take(offset_observed, t_current - t_packet_creation)
 
     def update_four(self, t1: float, t2: float, t3: float, t4: float) -> None:
-        """The same where the remote robot tells when it received (t2) and when it sent (t3)."""
+        """UPDATE with four stamps: the remote robot reports when it received (t2) and sent (t3)."""
         self._take(((t1 + t4) - (t2 + t3)) / 2, (t4 - t1) - (t3 - t2))
 
     def synced(self, t_remote: float) -> float | None:
@@ -57,7 +57,7 @@ class PaperFilter:
         return t_remote + self.offset_estimated if self.converged else None
 
     def reset_filter(self) -> None:
-        """Begin anew (Algorithm 3, RESET_FILTER)."""
+        """Reset the filter (Algorithm 3, RESET_FILTER)."""
         self.resets += 1
         self.n = 0
         self.offset_estimated = 0.0
@@ -82,7 +82,7 @@ class PaperFilter:
         self.high_rtt_count = 0
 
     def _add_sample(self, offset_observed: float) -> None:
-        """Move offset and skew on by one sample (Equations 2 and 3)."""
+        """Update offset and skew by one sample (Equations 2 and 3)."""
         before = self.offset_estimated
         if self.n == 0:
             self.offset_estimated = offset_observed
@@ -94,7 +94,7 @@ class PaperFilter:
 
 
 def gains(n: int) -> tuple[float, float]:
-    """α and β after `n` samples: Equations 7 to 9."""
+    """(α, β) after `n` samples, by Equations 7 to 9."""
     if n >= CONVERGENCE_WINDOW:
         return ALPHA_MIN, BETA_MIN
     p = 1 - math.exp(0.5 * (1 - 1 / (1 - n / CONVERGENCE_WINDOW)))

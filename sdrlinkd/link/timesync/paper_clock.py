@@ -1,9 +1,10 @@
 """The Sensors paper's filter as a link's clock estimate: `clock.filter = "paper"`.
 
-The paper smooths one offset for each round trip. Two CLOCK records make one here: ours, which the
-other robot heard, and its own, which we heard. Their four times are those of a four-stamp exchange.
-The paper tells no bound. Half a round trip is one, for no delay is negative, so the largest of the
-last round trips gives it. Until the filter has converged, after 500 round trips, nothing is known.
+The paper smooths one offset per round trip. Here two CLOCK records make a round trip: ours, which
+the other robot heard, and its own, which we heard. Their four times are those of a four-stamp
+exchange. The paper gives no bound. Half a round trip is a bound, as no delay is negative, so we use
+the largest of the last round trips. Until the filter has converged, after 500 round trips, there is
+no estimate.
 """
 
 from collections import deque
@@ -12,11 +13,14 @@ from sdrlinkd.link.timesync.envelope import MOST, Estimate
 from sdrlinkd.link.timesync.paper import PaperFilter
 
 LATELY = 64
-"""Round trips of which the longest gives the bound."""
+"""Number of recent round trips of which the longest gives the bound."""
 
 
 class PaperClock:
-    """The clocks of two robots by the paper's filter; the face of `DualEnvelope`, times in s."""
+    """Estimates the offset of two robots' clocks by the paper's filter; times are in s.
+
+    It has the same interface as `DualEnvelope`.
+    """
 
     def __init__(self) -> None:
         self._filter = PaperFilter()
@@ -26,30 +30,30 @@ class PaperClock:
         self._trips_s: deque[float] = deque(maxlen=LATELY)
         self.estimate: Estimate | None = None
         self.samples = 0
-        """Round trips that were taken."""
+        """Round trips taken."""
         self.contradicted = 0
-        """Round trips that were too long, or an offset too far from the one known."""
+        """Round trips that were too long, or whose offset was too far from the known one."""
 
     @property
     def steps(self) -> int:
-        """Times that the filter began anew by itself, over all boots of the other robot."""
+        """How often the filter reset itself, over all boots of the other robot."""
         return self._steps + self._filter.resets
 
     def heard(self, sent_there: float, came_here: float, airtime_s: float) -> None:
-        """Take a burst of the other robot: its own time of sending, ours of hearing."""
+        """Take a burst of the other robot: sent at its time, heard at ours."""
         self._came = (sent_there, came_here - airtime_s)
         self._take()
 
     def was_heard(self, sent_here: float, came_there: float, airtime_s: float) -> None:
-        """Take a burst of ours: our own time of sending, its of hearing."""
+        """Take a burst of ours: sent at our time, heard at the other robot's."""
         self._went = (sent_here, came_there - airtime_s)
         self._take()
 
     def solve(self, now: float) -> Estimate | None:
         """The estimate at `now`; None until the filter has converged.
 
-        As the paper has it, nothing is extrapolated: the bound grows by what two crystals may
-        differ.
+        As in the paper, nothing is extrapolated; the bound grows with the largest difference of two
+        crystals.
         """
         self.estimate = None
         if self._filter.converged:
@@ -58,7 +62,7 @@ class PaperClock:
         return self.estimate
 
     def forget(self) -> None:
-        """Forget all samples: the other clock is another one now."""
+        """Forget all samples, as the other robot has a new clock."""
         self._steps = self.steps
         self._filter = PaperFilter()
         self._came = self._went = self.estimate = None

@@ -1,4 +1,4 @@
-"""What is known of one robot's clock, and how well."""
+"""The state of one robot's clock: its estimate, and how good that is."""
 
 from collections import OrderedDict
 from enum import Enum
@@ -10,18 +10,18 @@ from sdrlinkd.reports import ClockReport
 from sdrlinkd.wire import CLOCK_NUMBERS, UNKNOWN_WALL, Arrival, Clock
 
 COARSE_S = 0.005
-"""A bound above it is a coarse one."""
+"""Bound in s above which a clock counts as coarse."""
 UNKNOWN_S = 1.0
-"""A bound above it is none."""
+"""Bound in s above which a clock counts as unknown."""
 SILENT_S = 5.0
-"""Without news for so long, or this many periods of the other robot, the estimate only ages."""
+"""Time in s without a CLOCK after which a clock is in holdover, or SILENT_PERIODS if longer."""
 SILENT_PERIODS = 4
 SOLVE_S = 0.2
 REMEMBERED = 16
 
 
 Offset = DualEnvelope | PaperClock
-"""What makes an estimate of the times of bursts each way."""
+"""An estimator of a clock's offset from burst times in both directions."""
 
 
 class State(Enum):
@@ -34,16 +34,16 @@ class State(Enum):
 
 
 class Wall(NamedTuple):
-    """A host's time since 1970 less its link's clock, in ns, and how wrong that may be in s."""
+    """A host's time since 1970 minus its link's clock, in ns, and its largest error in s."""
 
     ns: int
     error_s: float
 
 
 class PeerClock:
-    """One robot's CLOCK records and when they came. Times in s of our own link's clock.
+    """One robot's CLOCK records and when they came; times are in s on our own link's clock.
 
-    `offset` estimates what its clock is behind ours.
+    `offset` estimates by how much the robot's clock is behind ours.
     """
 
     def __init__(self, src: int, offset: Offset) -> None:
@@ -51,9 +51,9 @@ class PeerClock:
         self.offset = offset
         self.wall: Wall | None = None
         self.refused = 0
-        """Records with another boot id, or a number that was not newer: not used."""
+        """CLOCK records rejected: of another boot, or not newer than the last one."""
         self.resets = 0
-        """It has started anew, with another clock."""
+        """How often the robot restarted with another clock."""
         self.last_at = 0.0
         self.period_s = 0.0
         self._boot_id: int | None = None
@@ -65,7 +65,7 @@ class PeerClock:
         self._has_news = False
 
     def hear(self, clock: Clock, at: float, own_id: int, left: dict[int, float]) -> None:
-        """A CLOCK whose burst came at `at`; `left`: when our own left, by their numbers."""
+        """Take a CLOCK whose burst came at `at`; `left`: when our own CLOCKs left, by number."""
         if not self._is_acceptable(clock, at):
             self.refused += 1
             return
@@ -76,7 +76,7 @@ class PeerClock:
         came = self._arrivals.get(clock.stamped)
         if came is not None:
             self.offset.heard(left_there, came, 0.0)
-            # What it tells again of the same CLOCK, or of those before, is nothing new.
+            # Later news of this CLOCK, or of earlier ones, would add nothing.
             while clock.stamped in self._arrivals:
                 self._arrivals.popitem(last=False)
             self._has_news = True
@@ -92,19 +92,19 @@ class PeerClock:
                 came_there = 1e-9 * (clock.left_ns + after_ns)
                 self.offset.was_heard(left_at, came_there, 0.0)
                 self._has_news = True
-                # One of ours in each of its: more would be a lie.
+                # A CLOCK has at most one arrival of ours; any more are false.
                 break
         self.estimate(at)
 
     def arrival(self, base_s: float) -> Arrival | None:
-        """The last CLOCK heard, for our own to tell."""
+        """The arrival of the last CLOCK heard, to be announced in our own; None if none came."""
         if not self._arrivals:
             return None
         number, at = next(reversed(self._arrivals.items()))
         return Arrival(self.src, number, round(1e9 * (at - base_s)))
 
     def estimate(self, now: float) -> Estimate | None:
-        """Own minus its link's clock; made anew where there is something new."""
+        """Our link's clock minus the robot's, recomputed if there is news; None if unknown."""
         is_due = now - self._solved_at >= SOLVE_S or self.offset.estimate is None
         if self._has_news and is_due:
             self._has_news, self._solved_at = False, now
@@ -112,7 +112,7 @@ class PeerClock:
         return self.offset.estimate
 
     def state(self, now: float) -> State:
-        """How well its clock is known."""
+        """How well the robot's clock is known."""
         known = self.estimate(now)
         if known is None or known.bound(now) > UNKNOWN_S:
             return State.UNSYNCED
@@ -121,7 +121,7 @@ class PeerClock:
         return State.COARSE if known.bound(now) > COARSE_S else State.SYNCED
 
     def report(self, now: float) -> ClockReport:
-        """How well its clock is known, and what its records were like."""
+        """The report on the robot's clock and its CLOCK records."""
         state, known, offset = self.state(now), self.estimate(now), self.offset
         is_known = known is not None and state is not State.UNSYNCED
         return ClockReport(
@@ -142,14 +142,14 @@ class PeerClock:
             self._boot_id = clock.boot_id
             return True
         if clock.boot_id == self._boot_id and at - self.last_at > WINDOW_S:
-            # Its numbers may have gone round.
+            # Its numbers may have wrapped around.
             self._arrivals.clear()
             return True
         if clock.boot_id == self._boot_id:
             newer = (clock.number - self._last_number) % CLOCK_NUMBERS
             return 0 < newer < CLOCK_NUMBERS // 2
         if clock.boot_id != self._strange_boot_id:
-            # It may be a recording of before; who has really started anew says so again.
+            # This may be a replayed PDU; a robot that really restarted sends the same id again.
             self._strange_boot_id = clock.boot_id
             return False
         self._boot_id, self._strange_boot_id = clock.boot_id, None

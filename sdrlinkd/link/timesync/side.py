@@ -1,4 +1,4 @@
-"""Least delays of one direction, as they came."""
+"""The samples of one direction with the shortest delays, over time."""
 
 import math
 
@@ -6,16 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 BUCKET_S = 0.1
-"""Of samples that close together the one with the least delay is kept, and the sum of all."""
+"""Length of a bucket in s, which keeps the sample with the shortest delay and the sum of all."""
 
 
 class Side:
-    """Upper bounds of an offset that drifts: the oldest first, no older than `window_s`."""
+    """Upper bounds of a drifting offset, the oldest first, none older than `window_s`."""
 
     def __init__(self, window_s: float) -> None:
         self._window_s = window_s
         self._most = math.ceil(window_s / BUCKET_S) + 2
-        # Twice as long, so that moving down is rare.
+        # Twice the needed length, so that rows are rarely moved.
         self._rows = np.zeros((5, 2 * self._most))
         self._begin = self._end = 0
         self._bucket = -math.inf
@@ -34,7 +34,7 @@ class Side:
         return self._rows[1, self._begin : self._end]
 
     def lowest(self, steepest: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(times, bounds) of those on which a line can rest that rises or falls no steeper."""
+        """(times, bounds) of the samples that a line with a slope within ±`steepest` can touch."""
         x, v = self.x, self.v
         later, earlier = v + steepest * x, v - steepest * x
         keep = later <= np.minimum.accumulate(later[::-1])[::-1]
@@ -47,8 +47,9 @@ class Side:
         return float(n), float(x / n), float(v / n)
 
     def add(self, x: float, v: float, slope: float) -> None:
-        """One more, unless it is older than the last; `slope`: what bounds are thought to gain a
-        second.
+        """Add a sample, unless it is older than the last one.
+
+        `slope` is the expected growth of the bounds, in s per s.
         """
         rows, bucket = self._rows, math.floor(x / BUCKET_S)
         if bucket < self._bucket:

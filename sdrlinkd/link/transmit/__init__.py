@@ -1,7 +1,7 @@
-"""Bursts: when one leaves, how long it is and how fast, and what goes again.
+"""Bursts: when they leave, their length and MCS, and retries.
 
-This room owns the burst scheduler, the choice of MCS, the retry queue and the pace of control
-records. It asks `access` when the air is ours, and `packing` for PDUs.
+This package holds the burst scheduler, rate control, the retry queue and the timing of control
+records. It queries `access` for slots and `packing` for PDUs.
 """
 
 from sdrlinkd.link.transmit.beacons import Beacons

@@ -1,4 +1,4 @@
-"""What a node tells of itself and of others, about once a second."""
+"""Beacons: what a node announces about itself and its neighbors, about once a second."""
 
 from math import inf
 from random import Random
@@ -7,13 +7,13 @@ from sdrlinkd.link.receive import Neighbors
 from sdrlinkd.link.transmit.rate import RateControl
 from sdrlinkd.wire import Beacon, LinkReport, Record, RegistryDigest, build_records, equal_payload
 
-# Two robots that started together must not stay in step.
+# Keeps the beacons of robots that started together from colliding forever.
 JITTER = 0.1
 SNR_RANGE = (-128, 127)
 
 
 class Beacons:
-    """When the next beacon is due, and what is in it."""
+    """Decides when the next beacon is due, and makes its records."""
 
     def __init__(self, period_s: float, pdu_size: int, digest: RegistryDigest, rng: Random) -> None:
         self._period_s = period_s
@@ -26,11 +26,11 @@ class Beacons:
         self.due_at = 0.0 if period_s > 0 else inf
 
     def end(self) -> None:
-        """Make no more beacons."""
+        """Send no more beacons."""
         self.due_at = inf
 
     def take(self, start: float, neighbors: Neighbors, rate: RateControl) -> list[Record]:
-        """The records of a beacon in a burst that leaves at `start`: who we are, and how well we
+        """The records of a beacon in a burst that leaves at `start`: our identity, and how well we
         hear each of `neighbors`.
         """
         records: list[Record] = [Beacon(self.boot_id, self._number), self._digest]

@@ -1,4 +1,4 @@
-"""What leaves together, and what became of it."""
+"""A burst of PDUs, and its outcome."""
 
 from enum import Enum
 from typing import NamedTuple
@@ -8,34 +8,34 @@ from sdrlinkd.link.queue import Outgoing
 
 
 class Burst(NamedTuple):
-    """PDUs that leave together, and the messages each carries an entry of.
+    """PDUs that leave together, and the messages of which each holds an entry.
 
-    They leave at `start`, in s on the link's clock; at the latest at `latest`, or not at all.
+    The burst leaves at `start`, in s on the link's clock, and not after `latest`.
     """
 
     pdus: list[bytes]
     carried: list[list[Outgoing]]
     classes: list[Qos]
-    """Of each PDU, the highest inside."""
+    """The most urgent class inside each PDU."""
     mcs: int = 0
     qos: Qos = Qos.DEFAULT
     start: float = 0.0
     latest: float = float("inf")
     airtime_s: float = 0.0
     number: int = 0
-    """In the order in which they were composed."""
+    """Running number of the burst, in order of composition."""
     first_start: float = 0.0
-    """Where it was to leave at first; later than that when it came too late."""
+    """The first planned start; `start` is later after a retry."""
     n_records: int = 0
-    """PDUs with nothing but a beacon's, CLOCK and RECEIPT records."""
+    """Number of PDUs that hold only control records."""
     ready_at: float = 0.0
-    """From when on the radio could have taken it."""
+    """Time from which the radio could have taken the burst."""
     clock: int | None = None
     """Number of the CLOCK record inside, if any."""
 
 
 class Outcome(Enum):
-    """What the radio says of a burst after its last sample."""
+    """Outcome of a burst, as the radio reports it after the last sample."""
 
     SENT = "sent"
     LATE = "late"

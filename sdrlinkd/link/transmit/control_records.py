@@ -1,12 +1,12 @@
-"""When control records go: in spare room, or in PDUs that take a bounded share of the air.
+"""Times the sending of control records: in spare room, or in PDUs with a bounded share of airtime.
 
-Four kinds of them have one pace here: beacons (with digest, link reports and WAITS), the schedule
-of the access policy (FRAME), clocks (CLOCK), and RECEIPTs. Each is made when its time has come,
-rides where a broadcast PDU has room, and knows from when on it deserves a PDU of its own. That
-costs air which messages could have, and a half-duplex radio is deaf meanwhile. So PDUs with nothing
-but records take no more than `clock.share` of it, all robots taken together: with n robots, one has
-such a PDU every n · pdu_s / share at most. Beacons are held to that, too, unless rate control or a
-schedule lives on them.
+It handles four kinds of records: beacons (with digest, link reports and WAITS), the schedule of the
+access policy (FRAME), clocks (CLOCK), and RECEIPTs. Each record is made when it is due, uses spare
+room in a broadcast PDU, and from a certain time on gets its own PDU. Such a PDU takes airtime from
+messages, and a half-duplex radio is deaf while it sends. So PDUs that hold only records take at
+most `clock.share` of the airtime, all robots together: with n robots, each sends at most one such
+PDU every n · pdu_s / share. This limits beacons, too, unless rate control or a schedule depends on
+them.
 """
 
 from math import inf
@@ -20,16 +20,16 @@ from sdrlinkd.link.transmit.tx_delay import TxDelayMeters
 from sdrlinkd.wire import ARRIVAL_SIZE, CLOCK_SIZE, Frame, Receipt, Record, RecordType
 
 PATIENCE_S = 0.05
-"""What a RECEIPT waits for spare room at least."""
+"""Shortest time in s that a RECEIPT waits for spare room."""
 MOST_RECEIPTS = 256
 LESS = 1.05
-"""A little less than the share, for robots not heard yet."""
+"""Factor on the period, which leaves a little of the share for robots not heard yet."""
 
 
 class ControlRecords:
-    """Makes records when they are due, and says when one deserves a PDU of its own.
+    """Makes control records when they are due, and decides when one gets its own PDU.
 
-    `record_room`: octets of records in a PDU with nothing else.
+    `record_room` is the number of record octets in a PDU that holds only records.
     """
 
     def __init__(
@@ -50,48 +50,49 @@ class ControlRecords:
         self._neighbors = neighbors
         self._most_arrivals = (record_room - CLOCK_SIZE) // ARRIVAL_SIZE
         self.fits = self._most_arrivals > 0 or not params.period_s
-        """Whether PDUs have room for clocks, if there are any to be told."""
+        """Whether PDUs have room for CLOCK records, if these are configured."""
         if not self.fits:
             clocks.end()
         self.period_s = params.period_s
-        """Between PDUs of our own with nothing but records, in s."""
+        """Shortest time in s between our PDUs that hold only records."""
         self.clock_waits = False
         """Whether a CLOCK waits for a burst."""
         self.receipts_untold = 0
-        """RECEIPTs to others that found no room."""
+        """RECEIPT records for others that were never sent, as too many were waiting."""
         self._n_others = 0
-        # Starts of the bursts with the last CLOCK, and with the last PDU of records alone.
+        # Starts of the bursts with the last CLOCK, and with the last PDU of only records.
         self._clock_told_at = self._told_alone_at = -inf
         self._clock_offered_at = 0.0
         self._clock_overdue_at = inf
 
     @property
     def due_at(self) -> float:
-        """From when on a PDU with nothing but records may go."""
+        """Time from which a PDU with only records may be sent."""
         due_at = min(self._beacons.due_at, self._piggyback.due_at)
         return min(due_at, self._clock_alone_at) if self._n_others else due_at
 
     def is_due(self, start: float) -> bool:
-        """Whether a record that waits deserves a PDU of its own at `start`."""
+        """Whether a waiting record gets its own PDU at `start`."""
         return self._piggyback.due_at <= start
 
     def tells_schedule(self, start: float) -> bool:
-        """Whether a burst at `start` may hold the schedule, whose phase is that of its start."""
+        """Whether a burst at `start` may hold the schedule, whose phase depends on the start."""
         return start >= self._beacons.due_at or self._piggyback.holds(RecordType.FRAME)
 
     def collect(self, start: float, frame: Frame | None, rate: RateControl) -> bool:
-        """Make what is due for a burst at `start`; whether something cannot wait for spare room.
+        """Make the records that are due for a burst at `start`.
 
-        `frame` is the schedule that the access policy keeps, if any.
+        Returns whether a record cannot wait for spare room. `frame` is the access policy's
+        schedule, if any.
         """
         cannot_wait = False
         if start >= self._beacons.due_at:
-            # The beacon before found no room for a whole period.
+            # The last beacon has found no room for a whole period.
             cannot_wait = self.is_due(start)
             self._offer_beacon(start, frame, rate)
         elif frame is not None and self._piggyback.holds(RecordType.FRAME):
             self._piggyback.renew(frame)
-            # A schedule does not wait for spare room.
+            # A schedule must not wait for spare room.
             cannot_wait = True
         if start >= self._clocks.due_at and self._n_others:
             self._offer_clock(start)
@@ -99,7 +100,7 @@ class ControlRecords:
         return cannot_wait
 
     def took_clock(self) -> int | None:
-        """The number of the CLOCK that the burst just composed holds; None: it still waits."""
+        """The number of the CLOCK in the burst just composed; None: the CLOCK still waits."""
         self.clock_waits = self._piggyback.holds(RecordType.CLOCK)
         if self.clock_waits:
             return None
@@ -107,43 +108,43 @@ class ControlRecords:
         return self._clocks.rode()
 
     def told_alone(self, start: float) -> None:
-        """Note that a PDU with nothing but records leaves at `start`."""
+        """Note that a PDU with only records leaves at `start`."""
         self._told_alone_at = start
 
     def left(self, clock: int, start: float) -> None:
-        """Note that the burst with that CLOCK has left at `start`."""
+        """Note that the burst with CLOCK number `clock` left at `start`."""
         self._clocks.left(clock, start)
 
     def receipt(self, receipt: Receipt, now: float) -> None:
-        """Have a RECEIPT told of what came about at `now`, unless too many wait already."""
+        """Queue a RECEIPT for an event at `now`, unless too many are waiting."""
         if self._piggyback.count(RecordType.RECEIPT) >= MOST_RECEIPTS:
             self.receipts_untold += 1
             return
         self._piggyback.put_receipt(receipt, self._alone_from(now + PATIENCE_S), now)
 
     def look_round(self, now: float, pdu_s: float) -> None:
-        """See who else is there: nobody else wants to know our clock, and all share the air.
+        """Count the other robots present, which need our clock and share the airtime.
 
-        `pdu_s` is the airtime of a PDU with nothing but records.
+        `pdu_s` is the airtime of a PDU with only records, in s.
         """
         self._n_others = len(self._neighbors.present(now))
         needed_s = LESS * (1 + self._n_others) * pdu_s / self._params.share
         self.period_s = max(self._params.period_s, needed_s)
 
     def end(self) -> None:
-        """Make no more beacons and clocks."""
+        """Send no more beacons and CLOCK records."""
         self._beacons.end()
         self._clocks.end()
 
     @property
     def _clock_alone_at(self) -> float:
-        """From when on the next CLOCK does not wait for spare room."""
+        """Time from which the next CLOCK gets its own PDU."""
         if self._clocks.due_at == inf:
             return inf
         return max(self._clock_told_at + self._params.period_s, self._told_alone_at + self.period_s)
 
     def _alone_from(self, at: float) -> float:
-        """From when on what should go at `at` may have a PDU with nothing else."""
+        """Earliest time from `at` on for a PDU that holds only records."""
         return max(at, self._told_alone_at + self.period_s) if self._n_others else at
 
     def _offer_beacon(self, start: float, frame: Frame | None, rate: RateControl) -> None:
@@ -151,7 +152,7 @@ class ControlRecords:
         records += self._tx_delays.records()
         if frame is not None:
             records.append(frame)
-        # Rate control and schedules live on beacons; all else bears a wait.
+        # Rate control and schedules depend on beacons; all other records can wait.
         is_needed = rate.adapts or frame is not None
         self._piggyback.offer(records, start if is_needed else self._alone_from(start))
 

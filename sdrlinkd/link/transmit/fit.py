@@ -1,4 +1,4 @@
-"""What follows from the radio that is there: the access policy, the MCS in use, and its times."""
+"""Fits the link to a radio: access policy, rate control, and times."""
 
 from random import Random
 from typing import NamedTuple
@@ -8,33 +8,33 @@ from sdrlinkd.link.traits import PduLinkTraits
 from sdrlinkd.link.transmit.rate import RateControl, RateParams
 
 NOTICE_S = 5e-4
-"""From a producer's clock to our queue, in real time."""
+"""Time in s from a message's publication to our queue, in real time."""
 
 
 class Fit(NamedTuple):
-    """How the link uses one radio; times in s."""
+    """How the link uses one radio; times are in s."""
 
     settled: Settled
     """The access policy in force, and why."""
     rate: RateControl
     lead_s: float
-    """A burst decided now leaves so much later at the earliest."""
+    """Shortest time from a decision until the burst leaves."""
     least_s: float
-    """No message can be younger when it arrives."""
+    """Smallest possible age of a message at its arrival."""
     record_pdu_s: float
-    """What a PDU with nothing but records takes of the air."""
+    """Airtime lost to a PDU that holds only records, including turnarounds."""
     notice_s: float
-    """So long after a message has been made, nobody here knows of it."""
+    """Longest time from a message's publication until this node knows of it."""
     stamp_s: float
-    """How wrong the times may be at which bursts left and came."""
+    """Largest error of the times at which bursts left and came."""
     is_lockstep: bool
-    """The link's time begins when the radio is there."""
+    """Whether the radio runs in lock-step; the link's time then starts with the radio."""
 
 
 def fit_to(
     traits: PduLinkTraits, access: AccessParams, rate: RateParams, own_id: int, rng: Random
 ) -> Fit:
-    """Settle access and rate for the radio that is there. Raises ConfigError."""
+    """Choose access policy and rate control for a radio with these traits. Raises ConfigError."""
     control = RateControl(rate, traits.needed_snr_db, traits.mcs)
     longest_s = traits.longest_in_use_s(control.usable)
     settled = settle(access, own_id, traits, longest_s, rng)
@@ -46,7 +46,7 @@ def fit_to(
         control,
         traits.lead_s,
         traits.lead_s + min(lengths_s, default=0.0),
-        # A burst on its own makes a half-duplex radio deaf for much longer than it lasts.
+        # A single burst makes a half-duplex radio deaf for much longer than its own length.
         max(lengths_s, default=0.0) + 2 * traits.turnaround_s,
         traits.ahead_s if traits.is_lockstep else NOTICE_S,
         traits.stamp_s,

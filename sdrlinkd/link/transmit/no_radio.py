@@ -1,4 +1,4 @@
-"""The burst scheduler's part while there is no radio: messages may wait, and nothing leaves."""
+"""Stands in for the burst scheduler while there is no radio: messages wait, and none leaves."""
 
 from math import inf
 
@@ -11,7 +11,7 @@ from sdrlinkd.wire import Record
 
 
 class NoRadio:
-    """Answers as a burst scheduler does, truthfully: nothing was sent, nothing will be."""
+    """A burst scheduler without a radio: nothing was sent, and nothing will be."""
 
     bytes_per_s = inf
     airtime_s = 0.0
@@ -20,35 +20,35 @@ class NoRadio:
     has_work = False
 
     def more_to_send(self) -> None:
-        """Ignore what has come: nothing is decided, so nothing has to be decided anew."""
+        """Ignore new messages, as there is no decision to revise."""
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
-        """The next burst: none, as there is nothing to send with."""
+        """The next burst: None, as there is no radio."""
 
     def next_wakeup(self, now: float) -> float:  # noqa: ARG002  # the same at any time
-        """When there may next be something to send: never, the radio has to come first."""
+        """Earliest time at which there may be something to send: infinity."""
         return inf
 
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
-        """Ignore a burst: none of ours can have left."""
+        """Ignore an outcome, as no burst of ours can have left."""
 
     def pdu_heard(self, event: PduHeard) -> None:
-        """Ignore who is heard: there is no policy to tell."""
+        """Ignore a PDU, as there is no access policy to inform."""
 
     def record_heard(self, src: int, record: Record, at: float) -> None:
-        """Ignore what others tell: there is no policy to tell it to."""
+        """Ignore a record, as there is no access policy to inform."""
 
     def clear(self) -> None:
-        """Forget bursts that go again: there are none."""
+        """Do nothing, as there are no bursts to retry."""
 
     def access_notices(self, now: float) -> list[str]:  # noqa: ARG002  # the same at any time
-        """Notices of the access policy: none, as none is in force."""
+        """Notices of the access policy: none, as no policy is in force."""
         return []
 
     def heard_by(self, src: int) -> HeardThere:  # noqa: ARG002  # the same for all
-        """How robot `src` hears us: it does not."""
+        """How robot `src` hears us: unknown, as we do not send."""
         return HeardThere(None, None, 0)
 
     def report(self) -> TransmitReport:
-        """What was sent: nothing."""
+        """The report: nothing was sent."""
         return TransmitReport()

@@ -1,4 +1,4 @@
-"""What others' traffic means for ours: whose turn it is, how fast to send, and what is due next."""
+"""Uses others' traffic for our own: for access, rate control, and forecasts."""
 
 from sdrlinkd.link.qos import CLASSES, Qos
 from sdrlinkd.link.receive import PduHeard
@@ -8,7 +8,7 @@ from sdrlinkd.wire import CONTROL_TOPIC_ID, Beacon, Frame, LinkReport, Record
 
 
 class Overheard:
-    """Hands what was heard to the access policy, to rate control, and to the forecasts."""
+    """Passes what was heard to the access policy, to rate control, and to the forecasts."""
 
     def __init__(self, fit: Fit, forecasts: Forecasts, own_id: int, has_control: bool) -> None:
         self._access, self._rate = fit.settled.access, fit.rate
@@ -17,7 +17,7 @@ class Overheard:
         self._has_control = has_control
 
     def pdu(self, event: PduHeard) -> None:
-        """Take note of a good PDU that somebody else has sent."""
+        """Note a valid PDU that another robot has sent."""
         pdu, stamps, at, is_relayed = event
         src = pdu.src
         self._access.heard(src, at, is_relayed)
@@ -26,7 +26,7 @@ class Overheard:
         qos = CLASSES[pdu.qos]
         if not self._access.others_follow or qos > Qos.LATENCY or src == self._own_id:
             return
-        # What others send at their beat needs the air then, too.
+        # Periodic urgent messages of others need the channel at their times, too.
         ages = {} if is_relayed else {(each.topic_id, each.entry_id): each for each in stamps}
         for entry in pdu.entries:
             if not entry.index and not (entry.topic_id == CONTROL_TOPIC_ID and self._has_control):
@@ -35,7 +35,7 @@ class Overheard:
                 self._forecasts.note((src, entry.topic_id), qos, origin)
 
     def record(self, src: int, record: Record, at: float) -> None:
-        """Take note of what robot `src` tells of who hears whom, and of its schedule."""
+        """Note a record of robot `src` on whom it hears, its presence, or its schedule."""
         if isinstance(record, LinkReport):
             if record.node == self._own_id:
                 self._rate.take(src, record, at)

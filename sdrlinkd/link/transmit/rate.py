@@ -1,4 +1,4 @@
-"""Which MCS a burst gets: from what the neighbors say of us."""
+"""Rate control: chooses the MCS of a burst from the neighbors' reports about us."""
 
 from collections import deque
 from collections.abc import Iterable
@@ -11,8 +11,8 @@ from msgspec import Meta
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.wire import BROADCAST, LinkReport
 
-# More loss than this is answered by caution, less than that takes it back. Not by much: collisions
-# are losses, too, and slower bursts only collide more.
+# A PER above HIGH_PER adds to a penalty, and one below LOW_PER reduces it. The penalty is limited,
+# because collisions cause losses, too, and slower bursts only collide more.
 MAX_PENALTY_DB = 4.0
 HIGH_PER, LOW_PER = 0.1, 0.02
 PENALTY_STEP_DB = 1.0
@@ -22,25 +22,25 @@ KEPT_CHANGES = 256
 
 
 class RateParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Choice of the MCS by what the neighbors report; else `modem.mcs` stays."""
+    """Settings of rate control by the neighbors' reports; without it, `modem.mcs` is used."""
 
     adapt: bool = False
     min_mcs: Annotated[int, Meta(ge=0, le=9)] = 0
     max_mcs: Annotated[int, Meta(ge=0, le=9)] = 9
     margin_db: Annotated[float, Meta(ge=-10, le=40)] = 2.0
-    """SNR kept in hand over what an MCS needs."""
+    """SNR margin in dB above what an MCS needs, for default and bulk."""
     urgent_margin_db: Annotated[float, Meta(ge=-10, le=40)] = 5.0
-    """The same for urgent and latency."""
+    """SNR margin in dB above what an MCS needs, for urgent and latency."""
     hysteresis_db: Annotated[float, Meta(ge=0, le=20)] = 1.5
-    """An MCS is left upwards only with so much more."""
+    """Additional SNR in dB required to change to a faster MCS."""
     stale_s: Annotated[float, Meta(gt=0, le=600)] = 3.0
-    """Without a report for so long, `min_mcs` it is."""
+    """Time in s without a report from a neighbor after which `min_mcs` is used."""
     forget_s: Annotated[float, Meta(gt=0, le=86400)] = 60.0
-    """A robot not heard for so long holds nobody back."""
+    """Time in s after which a robot that is not heard no longer limits the MCS."""
 
 
 class RateChange(NamedTuple):
-    """At `at`, bursts that `node` must read went over to `mcs`."""
+    """A change, at `at`, of the MCS for bursts to `node`."""
 
     at: float
     node: int
@@ -48,8 +48,8 @@ class RateChange(NamedTuple):
 
 
 class HeardThere(NamedTuple):
-    """A neighbor's word of us: SNR in dB and PER, None while it has told nothing; and what we send
-    to it with.
+    """A neighbor's report about us: SNR in dB and PER, None before its first report; and the MCS
+    with which we send to it.
     """
 
     snr_db: float | None
@@ -59,7 +59,7 @@ class HeardThere(NamedTuple):
 
 @dataclass(slots=True)
 class _Peer:
-    """What one neighbor says of us."""
+    """The state of one neighbor, with its last report about us."""
 
     heard_at: float
     told_at: float = float("-inf")
@@ -70,9 +70,10 @@ class _Peer:
 
 
 class RateControl:
-    """MCS by neighbor, with hysteresis and a margin by class.
+    """Chooses the MCS by neighbor, with hysteresis and a margin by class.
 
-    `needed_snr_db[mcs]` is what each MCS needs. A broadcast suits the worst neighbor.
+    `needed_snr_db[mcs]` is the SNR in dB that an MCS needs. A broadcast uses the MCS of the worst
+    neighbor.
     """
 
     def __init__(self, params: RateParams, needed_snr_db: tuple[float, ...], fixed: int) -> None:
@@ -82,14 +83,14 @@ class RateControl:
         self._highest = min(params.max_mcs, len(needed_snr_db) - 1)
         self._lowest = min(params.min_mcs, self._highest)
         self.adapts = params.adapt
-        """Whether reports decide."""
+        """Whether the neighbors' reports determine the MCS."""
         self.lowest = self._lowest if params.adapt else self._fixed
-        """The MCS of what everybody should be able to read."""
+        """The MCS of bursts that every robot should be able to read."""
         self.usable = range(self.lowest, (self._highest if params.adapt else self._fixed) + 1)
-        """The MCS that may be chosen."""
+        """All MCS that may be chosen."""
         self._peers: dict[int, _Peer] = {}
         self.changes: deque[RateChange] = deque(maxlen=KEPT_CHANGES)
-        """The last ones, for default and bulk."""
+        """Latest changes of the MCS for default and bulk."""
 
     def heard(self, src: int, now: float) -> None:
         """Note that robot `src` was heard at `now`."""
@@ -103,7 +104,7 @@ class RateControl:
         """Take the report of robot `src` on how well it hears us."""
         peer = self._peers.setdefault(src, _Peer(now))
         if now - peer.told_at > self._params.stale_s:
-            # What went wrong before tells nothing of now.
+            # Earlier losses say nothing about the present.
             peer.penalty_db = 0.0
         peer.told_at = now
         peer.snr_db = SNR_STEP_DB * report.snr_quarter_db
@@ -131,11 +132,11 @@ class RateControl:
         )
 
     def suggested(self, snr_db: float) -> int:
-        """The MCS that we would like a neighbor heard at `snr_db` to send with."""
+        """The MCS that we suggest to a neighbor that we hear at `snr_db`."""
         return self._best(snr_db - self._params.margin_db)
 
     def heard_there(self, src: int) -> HeardThere:
-        """How robot `src` says it hears us, and the MCS last used for it, for default and bulk."""
+        """How robot `src` reports that it hears us, and our last MCS to it for default and bulk."""
         peer = self._peers.get(src)
         if peer is None:
             return HeardThere(None, None, self.lowest)

@@ -1,4 +1,4 @@
-"""What the burst scheduler tells of itself."""
+"""The burst scheduler's report."""
 
 from collections.abc import Mapping, Sequence
 from math import inf
@@ -13,14 +13,14 @@ NO_BURSTS: Mapping[int, int] = {}
 
 
 class TransmitReport(NamedTuple):
-    """What was sent, how, and by which access policy; as it stands, before there is a radio."""
+    """What was sent, how, and by which access policy; the defaults apply without a radio."""
 
     settled: Settled | None = None
-    """The access policy in force."""
+    """The access policy in force; None without a radio."""
     bytes_per_s: float = inf
-    """What the air carries at the moment; infinity while nobody knows."""
+    """Present capacity of the channel in payload bytes per s; infinity while it is unknown."""
     used_s: Mapping[Qos, float] = NOTHING_USED
-    """Airtime composed, by the class of each PDU, bursts that failed included."""
+    """Airtime composed, by the class of each PDU, in s; includes bursts that failed."""
     airtime_s: float = 0.0
     control_airtime_s: float = 0.0
     bursts_by_mcs: Mapping[int, int] = NO_BURSTS
@@ -30,5 +30,5 @@ class TransmitReport(NamedTuple):
     pdus_sent: int = 0
     pdus_failed: int = 0
     mcs_lowest: int | None = None
-    """The slowest MCS that may be chosen; None: it is fixed."""
+    """Slowest MCS that may be chosen; None: the MCS is fixed."""
     mcs_changes: Sequence[RateChange] = ()

@@ -1,4 +1,4 @@
-"""Bursts that came too late for their slot: nothing of them left, so they may go again."""
+"""The retry queue: bursts that missed their slot and are sent in a later one."""
 
 from bisect import insort
 
@@ -6,21 +6,21 @@ from sdrlinkd.link.transmit.burst import Burst
 from sdrlinkd.wire import postponed
 
 GIVE_UP_S = 2.0
-"""A burst that still has found no slot in time so long after its first is given up."""
+"""Time in s after its first slot after which a burst that missed all its slots is given up."""
 
 
 class RetryQueue:
-    """The same PDUs wait for another slot, in their order; ages inside grow with the wait."""
+    """Late bursts that wait for another slot, in order; the ages inside grow with the wait."""
 
     def __init__(self, has_control: bool) -> None:
         self._has_control = has_control
         self.waiting: list[Burst] = []
-        """The bursts that go again, in the order in which they were composed."""
+        """The waiting bursts, in the order in which they were composed."""
         self.count = 0
-        """Bursts that were given back so far."""
+        """Number of late bursts so far."""
 
     def give_back(self, burst: Burst) -> bool:
-        """Keep a burst that did not leave; False when it has been tried for long enough."""
+        """Queue a burst that missed its slot; False if it has been tried for too long."""
         self.count += 1
         if burst.start - burst.first_start > GIVE_UP_S:
             return False
@@ -28,11 +28,11 @@ class RetryQueue:
         return True
 
     def clear(self) -> None:
-        """Forget the bursts that go again."""
+        """Drop all waiting bursts."""
         self.waiting.clear()
 
     def take(self, start: float) -> Burst:
-        """The burst that goes next, as it leaves at `start`."""
+        """Take out the next burst, adjusted to leave at `start`."""
         burst = self.waiting.pop(0)
         pdus = burst.pdus
         by_us = round(1e6 * (start - burst.start))

@@ -1,12 +1,12 @@
-"""The next burst: when it may leave, how long it may be, how fast, and what goes again.
+"""The burst scheduler: when the next burst leaves, its length, MCS and content, and retries.
 
-One burst is decided in five steps. (1) What goes next, by class: it gives the MCS. (2) The access
-policy says when such a burst may leave, and when it must be over. (3) Forecasts and caps say how
-many PDUs of each class it may hold: a bulk burst that is on the air when a command comes delays it
-by all of its length, so bursts end before the next urgent message is due, and are short while one
-may come that nobody can foresee. (4) Records that are due are made, and the composer fills the
-PDUs. (5) The burst's airtime is put to the classes' accounts. A burst that came too late for its
-slot goes again, unchanged but for the ages inside, before anything new is composed.
+A burst is decided in five steps. (1) The class of the next message determines the MCS. (2) The
+access policy says when such a burst may leave and when it must be over. (3) Forecasts and caps
+limit the number of PDUs of each class: a bulk burst that is on the air when a command comes delays
+it by up to the burst's length. So bursts end before the next urgent message is due, and are short
+while one may come at an unpredictable time. (4) Records that are due are made, and the composer
+fills the PDUs. (5) The burst's airtime is charged to the classes. A burst that missed its slot is
+sent again, unchanged except for the ages inside, before a new one is composed.
 """
 
 from collections import Counter
@@ -34,7 +34,10 @@ from sdrlinkd.wire import Record
 
 
 class _Held(NamedTuple):
-    """The air is kept free from `since` to `until`; settled while nothing new has come."""
+    """A time for which the channel is kept free, from `since` to `until`.
+
+    `is_settled`: no new message has come since that was decided.
+    """
 
     since: float
     until: float
@@ -45,7 +48,9 @@ _NOT_HELD = _Held(inf, -inf, is_settled=False)
 
 
 class BurstScheduler:
-    """Asks access when, limits how long, the composer what; late bursts go again."""
+    """Decides the next burst, with the access policy, the limits and the composer; retries late
+    bursts.
+    """
 
     def __init__(
         self, fit: Fit, outbox: Outbox, composer: Composer, control_records: ControlRecords,
@@ -64,16 +69,16 @@ class BurstScheduler:
         self._number = 0
         self._retry = RetryQueue(has_control)
         self._used_s = dict.fromkeys(Qos, 0.0)
-        """Airtime composed so far by the class of each PDU, bursts that failed included."""
+        """Airtime composed so far by the class of each PDU, in s; includes bursts that failed."""
         self.airtime_s = 0.0
-        """Airtime of bursts that left."""
+        """Airtime of all bursts that left, in s."""
         self._control_airtime_s = 0.0
-        """Airtime of PDUs with nothing but records."""
+        """Airtime of PDUs that hold only records, in s."""
         self._bursts_by_mcs: Counter[int] = Counter()
         self._bursts_sent = self._bursts_failed = 0
         self._pdus_sent = self._pdus_failed = 0
         self.bytes_per_s = inf
-        """What the air carries at the moment; infinity before the first burst."""
+        """Present capacity of the channel in payload bytes per s; infinity while unknown."""
         self._shares = Shares(classes)
         self._limits = Limits(classes, forecasts)
         self._held = _NOT_HELD
@@ -81,13 +86,13 @@ class BurstScheduler:
         self.refit(fit)
 
     def refit(self, fit: Fit) -> None:
-        """Go on with another radio: what waits and what was counted stays."""
+        """Continue with another radio; waiting bursts and counters stay."""
         self._fit = fit
         self._access, self._rate = fit.settled.access, fit.rate
         self._overheard = Overheard(fit, self._forecasts, self._own_id, self._has_control)
 
     def more_to_send(self) -> None:
-        """Decide anew whether to wait: something has come."""
+        """Revise the decision to keep the channel free, as a message has come."""
         if self._held.is_settled:
             self._held = self._held._replace(is_settled=False)
 
@@ -111,7 +116,7 @@ class BurstScheduler:
         start = slot.start
         allowance = self._allowance(slot, mcs, opportunity, start >= records_due_at)
         frame = access.frame(start) if access.keeps_schedule else None
-        # A schedule's phase holds for the planned start only.
+        # A schedule's phase is valid only for the planned start.
         is_timed = frame is not None and records.tells_schedule(start)
         cannot_wait = records.collect(start, frame, rate)
         built, n_records = self._fill(start, allowance, cannot_wait)
@@ -125,7 +130,7 @@ class BurstScheduler:
             self._kept_free(start)
         carried = [pdu.carried for pdu in built]
         if not any(carried) and airtime_s(rate.lowest, 1) <= slot.end - start:
-            # Beacons are for everybody.
+            # A burst of only records is for all robots, so use the slowest MCS.
             mcs = rate.lowest
         length_s = airtime_s(mcs, len(built))
         if n_records:
@@ -154,7 +159,7 @@ class BurstScheduler:
         )
 
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
-        """Settle a burst by what the radio says became of it."""
+        """Settle a burst by the outcome that the radio reports."""
         is_sent = outcome is Outcome.SENT
         if not is_sent:
             self._access.not_sent(burst.start)
@@ -182,7 +187,7 @@ class BurstScheduler:
         return bool(self._retry.waiting)
 
     def next_wakeup(self, now: float) -> float:
-        """When there may next be something to send; not after `now`: at once."""
+        """Earliest time at which there may be something to send; if not after `now`: at once."""
         if self._retry.waiting:
             return now
         wakes_at = self._composer.next_wakeup(now)
@@ -191,37 +196,37 @@ class BurstScheduler:
         return min(self._control_records.due_at, wakes_at)
 
     def clear(self) -> None:
-        """Forget the bursts that go again."""
+        """Drop all bursts that wait for another slot."""
         self._retry.clear()
 
     @property
     def least_s(self) -> float:
-        """No message of ours can be younger when it arrives."""
+        """Smallest possible age of our messages at their arrival, in s."""
         return self._fit.least_s
 
     @property
     def record_pdu_s(self) -> float:
-        """The airtime of a PDU with nothing but records."""
+        """Airtime lost to a PDU that holds only records, in s, including turnarounds."""
         return self._fit.record_pdu_s
 
     def pdu_heard(self, event: PduHeard) -> None:
-        """Take note of a good PDU that somebody else has sent."""
+        """Note a valid PDU that another robot has sent."""
         self._overheard.pdu(event)
 
     def record_heard(self, src: int, record: Record, at: float) -> None:
-        """Take note of a record that another robot has sent to all."""
+        """Note a record that another robot has sent to all."""
         self._overheard.record(src, record, at)
 
     def access_notices(self, now: float) -> list[str]:
-        """What a person should know of the access policy."""
+        """What a person should know about the access policy, in sentences."""
         return self._access.notices(now)
 
     def heard_by(self, src: int) -> HeardThere:
-        """How robot `src` hears us, and what we send to it with."""
+        """How robot `src` hears us, and the MCS with which we send to it."""
         return self._rate.heard_there(src)
 
     def report(self) -> TransmitReport:
-        """What was sent so far, and how."""
+        """The report on what was sent so far, and how."""
         rate = self._rate
         return TransmitReport(
             self._fit.settled,
@@ -240,7 +245,7 @@ class BurstScheduler:
         )
 
     def _again(self, opportunity: Opportunity) -> Burst | None:
-        """A burst that came too late for its slot, in another one."""
+        """The first burst of the retry queue in a new slot; None if there is no slot yet."""
         again = self._retry.waiting[0]
         airtime_s = opportunity.airtime_s(again.mcs, len(again.pdus))
         slot = self._access.slot(
@@ -258,16 +263,16 @@ class BurstScheduler:
     def _fill(
         self, start: float, allowance: Allowance, cannot_wait: bool
     ) -> tuple[list[BuiltPdu], int]:
-        """(PDUs, how many of them hold nothing but records) of a burst at `start`.
+        """(PDUs, how many of them hold only records) of a burst at `start`.
 
-        A record that is due rides in spare room; where traffic leaves none for too long, or there
-        is no traffic, it gets a PDU of its own.
+        A record that is due uses spare room. It gets its own PDU if traffic leaves no room for too
+        long, or if there is no traffic.
         """
         composer, records = self._composer, self._control_records
         may_tell = allowance.most[Qos.DEFAULT] > 0
         if cannot_wait and may_tell:
-            # Behind what is more urgent than records are. Clocks cannot wait for the end of what
-            # is relayed, and no burst holds both.
+            # Records come after more urgent classes. Only our own PDUs may precede them: clocks
+            # cannot wait until all relayed PDUs are sent, and a burst has only one source.
             built = composer.fill(start, allowance.above(Qos.DEFAULT), self._own_id)
         else:
             built = composer.fill(start, allowance)
@@ -308,7 +313,7 @@ class BurstScheduler:
         return allowance._replace(owed=tuple(self._shares.owed(two_s - one_s)))
 
     def _spend(self, length_s: float, classes: list[Qos]) -> None:
-        """Put a burst to the accounts of its PDUs' classes."""
+        """Charge a burst of `length_s` to the classes of its PDUs."""
         each_s = length_s / len(classes)
         for qos in classes:
             self._used_s[qos] += each_s
@@ -316,7 +321,7 @@ class BurstScheduler:
             self._shares.spend(length_s, classes, self._outbox.waiting_classes())
 
     def _kept_free(self, start: float) -> None:
-        """Settle what was not sent so that something more urgent could be."""
+        """Account for the time in which the channel was kept free for a more urgent message."""
         held, self._held = self._held, _NOT_HELD
         passed_s = min(start, held.until) - held.since
         if passed_s > 0:
@@ -324,6 +329,6 @@ class BurstScheduler:
             self._shares.idle(passed_s, self._outbox.waiting_classes())
 
     def _relayed_src(self, pdus: list[bytes]) -> int | None:
-        """The robot whose PDUs a burst forwards, if any."""
+        """The robot whose PDUs a burst relays; None: our own."""
         src = pdus[0][1]
         return None if src == self._own_id else src

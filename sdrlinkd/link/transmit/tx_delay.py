@@ -1,4 +1,4 @@
-"""Why messages waited at their source: for others before them, for the air, for another chance."""
+"""Measures why messages waited at their source: behind others, for the channel, or for a retry."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -7,13 +7,13 @@ from sdrlinkd.link.transmit.burst import Burst
 from sdrlinkd.wire import Waits
 
 WEIGHT = 1 / 32
-"""Of the newest message."""
+"""Weight of the newest message in the means."""
 WHOLE = 255
 
 
 @dataclass(slots=True)
 class TopicTxDelay:
-    """Means of the last messages, in s."""
+    """Mean waits of a topic's recent messages, in s."""
 
     queue_s: float = 0.0
     access_s: float = 0.0
@@ -23,13 +23,13 @@ class TopicTxDelay:
 
 
 class TxDelayMeters:
-    """One message of each burst is looked at: the first, which waited for the air."""
+    """Measures the wait of one message per burst: the first one, which waited for the channel."""
 
     def __init__(self) -> None:
         self._of_topic: dict[int, TopicTxDelay] = {}
 
     def left(self, burst: Burst) -> None:
-        """Look at a burst that has left."""
+        """Measure a burst that has left."""
         message = burst.carried[0][0] if burst.carried[0] else None
         if message is None or message.is_whole or message.arrived_at > burst.first_start:
             return
@@ -43,7 +43,7 @@ class TxDelayMeters:
         topic.again_s += weight * (burst.start - burst.first_start - topic.again_s)
 
     def report_ms(self, topic_id: int) -> dict[str, float]:
-        """Why messages of a topic waited, lately, by the names of `TopicReport`; empty: unknown."""
+        """Recent mean waits of a topic by the field names of `TopicReport`; empty: unknown."""
         topic = self._of_topic.get(topic_id)
         if topic is None:
             return {}

@@ -1,4 +1,4 @@
-"""GNU Radio as the PHY, without a need for GNU Radio on our side."""
+"""GNU Radio as the PHY; the daemon itself does not need GNU Radio installed."""
 
 from sdrlinkd.config import Config
 from sdrlinkd.pdulink.gnuradio.link import GnuRadioLink

@@ -1,4 +1,4 @@
-"""A GNU Radio flowgraph as the PHY: PDUs go to it one by one, at the pace that it sustains."""
+"""A GNU Radio flowgraph as the PHY; it gets PDUs one by one, at the rate that it sustains."""
 
 import asyncio
 import time
@@ -12,13 +12,13 @@ from sdrlinkd.pdulink.gnuradio.transport import Transport
 from sdrlinkd.reports import PduLinkReport
 
 LOOK_S = 0.02
-"""Seconds after which a flowgraph that takes nothing is asked again."""
+"""Interval in s for checking whether a flowgraph accepts PDUs again."""
 PACE_S = 1e-3
-"""Seconds by which a flowgraph's delay is not known."""
+"""Uncertainty of a flowgraph's delay in s."""
 
 
 class GnuRadioLink:
-    """Sends bursts of one PDU to a flowgraph; what that does not take waits in the queue."""
+    """A PDU link that sends bursts of one PDU to a flowgraph; the rest waits in our queue."""
 
     def __init__(self, params: GnuRadioParams, pdu_size: int, transport: Transport) -> None:
         self._params = params
@@ -34,7 +34,7 @@ class GnuRadioLink:
         self._counters = {"pdus_out": 0, "pdus_in": 0}
 
     def now(self) -> float:
-        """Seconds of the monotonic clock: there are no samples to count."""
+        """Time in s of the monotonic clock, as there are no samples to count."""
         return time.monotonic()
 
     async def open(self, listener: PduListener) -> Carry:
@@ -50,7 +50,7 @@ class GnuRadioLink:
         return partial(self._carry, listener)
 
     async def _carry(self, listener: PduListener) -> None:
-        """Ask for a PDU when the one before is over and the flowgraph takes another."""
+        """Request a PDU when the last one is over and the flowgraph accepts another."""
         while True:
             await asyncio.sleep(max(0.0, self._free_at - self.now()))
             self._settle()
@@ -67,21 +67,21 @@ class GnuRadioLink:
             await self._bell.wait(max(0.0, listener.next_wakeup(start) - start))
 
     def wake(self) -> None:
-        """Look again for something to send."""
+        """Check again whether there is something to send."""
         self._bell.ring()
 
     async def idle(self) -> None:
-        """Wait until every burst taken is settled."""
+        """Wait until every burst handed over is settled."""
         await self._settled.wait()
 
     async def close(self) -> None:
-        """Close the sockets; what has not left is settled as lost."""
+        """Close the sockets; bursts that have not left are settled as lost."""
         self._settle(Outcome.LOST)
         self._listener = None
         self._transport.close()
 
     def report(self) -> PduLinkReport:
-        """The state of the flowgraph, and counters of PDUs."""
+        """The report: the state of the flowgraph, and counters of PDUs."""
         params, is_open = self._params, self._listener is not None
         state = "up" if is_open and self._is_taken else "down"
         reason = f"nobody takes PDUs at {params.send} ({params.transport})"

@@ -1,4 +1,4 @@
-"""Our PDUs as GNU Radio's: a pair of metadata and octets, named as the paper names them."""
+"""Our PDUs as PDUs of GNU Radio: a pair of metadata, with the paper's names, and octets."""
 
 import time
 from typing import Any

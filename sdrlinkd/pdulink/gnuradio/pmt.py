@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 DEPTH = 32
-"""Levels of nesting; a value with more is not meant for us."""
+"""Most levels of nesting; a deeper value is not meant for us."""
 _TRUE, _FALSE, _SYMBOL, _INT32, _DOUBLE, _COMPLEX, _NIL, _PAIR, _VECTOR, _DICT = range(10)
 _UNIFORM, _UINT64, _TUPLE, _INT64 = 0x0A, 0x0B, 0x0C, 0x0D
 _KINDS = tuple(
@@ -32,14 +32,14 @@ class Pair(NamedTuple):
 
 
 def dumps(value: Any) -> bytes:  # noqa: ANN401
-    """Bytes of a value. Raises ValueError when there is no PMT for it."""
+    """A value as PMT bytes. Raises ValueError if it has no PMT."""
     out = bytearray()
     _write(value, out)
     return bytes(out)
 
 
 def loads(data: bytes) -> Any:  # noqa: ANN401
-    """The value that `data` begins with. Raises ValueError when that is no PMT."""
+    """The value at the start of `data`. Raises ValueError if it is not a PMT."""
     try:
         value, _ = _read(data, 0, DEPTH)
     except (struct.error, IndexError, UnicodeDecodeError) as error:
@@ -89,7 +89,7 @@ def _write_items(value: list[Any] | tuple[Any, ...], out: bytearray) -> None:
 
 
 def _write_dict(value: dict[Any, Any], out: bytearray) -> None:
-    # As GNU Radio has it: the key added last comes first.
+    # As in GNU Radio, the key added last comes first.
     for key, item in reversed(value.items()):
         out.append(_DICT)
         _write(Pair(key, item), out)
@@ -104,7 +104,7 @@ def _write_uniform(value: Any, out: bytearray) -> None:  # noqa: ANN401
         if value.ndim != 1 or kind not in _KINDS:
             raise ValueError(f"no uniform vector for {value.dtype} {value.shape}")
         tag, data, n = _KINDS.index(kind), value.astype(kind).tobytes(), len(value)
-    # One byte of padding, as GNU Radio has it.
+    # One byte of padding, as in GNU Radio.
     out += struct.pack(">BBIBB", _UNIFORM, tag, n, 1, 0) + data
 
 

@@ -1,4 +1,4 @@
-"""How PDUs get to a flowgraph and back: PMT messages over ZeroMQ, or octets over UDP or TCP."""
+"""Transports of PDUs to a flowgraph and back: PMTs over ZeroMQ, or octets over UDP or TCP."""
 
 import asyncio
 import binascii
@@ -15,13 +15,13 @@ from sdrlinkd.reading import SocketReader
 
 Take = Callable[[bytes], None]
 AHEAD = 16
-"""PDUs that may wait in ZeroMQ for a flowgraph."""
+"""Most PDUs that wait in ZeroMQ for a flowgraph."""
 RETRY_S = 0.5
 RECEIVE_BYTES = 1 << 16
 
 
 class Transport(Protocol):
-    """PDUs to a flowgraph and back; `take` gets every one that comes, on the event loop."""
+    """Carries PDUs to a flowgraph and back; `take` gets each PDU received, on the event loop."""
 
     counters: dict[str, int]
 
@@ -32,17 +32,17 @@ class Transport(Protocol):
         """Whether a PDU can be handed over now."""
 
     def send(self, pdu: bytes) -> bool:
-        """Hand a PDU over; False when nobody took it."""
+        """Send a PDU; False if no flowgraph accepted it."""
 
     def close(self) -> None:
-        """Close the sockets; closing twice is fine."""
+        """Close the sockets; may be called repeatedly."""
 
 
 class ZmqTransport:
-    """PDUs by gr-zeromq's message blocks.
+    """Carries PDUs by gr-zeromq's message blocks.
 
-    We bind `send` and connect to `receive`, as its own sinks and sources do; @ before an endpoint
-    binds it, > connects.
+    We bind `send` and connect to `receive`, as gr-zeromq's own sinks and sources do. An @ before an
+    endpoint binds it, a > connects.
     """
 
     def __init__(self, send: str, receive: str, publishes: bool) -> None:
@@ -83,7 +83,7 @@ class ZmqTransport:
         self._reader = SocketReader(asyncio.get_running_loop(), into, into.recv, taken)
 
     def is_ready(self) -> bool:
-        """Whether a flowgraph takes a PDU now, or has subscribed."""
+        """Whether a flowgraph accepts a PDU now, or has subscribed."""
         out = self._out
         if out is None:
             return False
@@ -95,7 +95,7 @@ class ZmqTransport:
         return self._subscribed > 0
 
     def send(self, pdu: bytes) -> bool:
-        """Hand a PDU over; False when nobody took it."""
+        """Send a PDU; False if no flowgraph accepted it."""
         if self._out is None:
             return False
         try:
@@ -113,9 +113,9 @@ class ZmqTransport:
 
 
 class UdpTransport(asyncio.DatagramProtocol):
-    """PDUs by a socket_pdu of UDP, one in a datagram.
+    """Carries PDUs by a UDP socket_pdu, one per datagram.
 
-    We send to `send`; answers come back to us, or to `receive` where that is given.
+    We send to `send`. PDUs come back to our port, or to `receive` if that is given.
     """
 
     def __init__(self, send: str, receive: str) -> None:
@@ -140,19 +140,19 @@ class UdpTransport(asyncio.DatagramProtocol):
             ) from None
 
     def datagram_received(self, data: bytes, addr: object) -> None:  # noqa: ARG002
-        """Take a datagram, which is a PDU."""
+        """Take a datagram, which holds one PDU."""
         self._take(data)
 
     def error_received(self, exc: Exception) -> None:  # noqa: ARG002
-        """Count that nobody listens where we send."""
+        """Count an error, as no program listens at the address we send to."""
         self.counters["refused"] += 1
 
     def is_ready(self) -> bool:
-        """Whether the socket is open: datagrams do not wait."""
+        """Whether the socket is open; datagrams never wait."""
         return self._socket is not None
 
     def send(self, pdu: bytes) -> bool:
-        """Hand a PDU over; False while there is no socket."""
+        """Send a PDU; False while there is no socket."""
         if self._socket is None:
             return False
         self._socket.sendto(pdu, self._peer)
@@ -166,9 +166,9 @@ class UdpTransport(asyncio.DatagramProtocol):
 
 
 class TcpTransport(asyncio.Protocol):
-    """PDUs by a socket_pdu that is a TCP server: octets without frames.
+    """Carries PDUs by a socket_pdu that is a TCP server, as octets without framing.
 
-    All PDUs have the same size, and begin where their CRC says so.
+    All PDUs have the same size; the CRC shows where a PDU begins.
     """
 
     def __init__(self, send: str, pdu_size: int) -> None:
@@ -183,7 +183,7 @@ class TcpTransport(asyncio.Protocol):
         self.counters = {"bad_octets": 0, "connections": 0}
 
     async def open(self, take: Take) -> None:
-        """Connect to the flowgraph, now or when it is there."""
+        """Connect to the flowgraph, now or once it appears."""
         self._take = take
         await self._connect()
 
@@ -205,18 +205,18 @@ class TcpTransport(asyncio.Protocol):
         self._retry = loop.call_later(RETRY_S, again)
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Note that a flowgraph is there."""
+        """Note that the flowgraph is connected."""
         self._socket = cast(asyncio.Transport, transport)
         self._have.clear()
         self.counters["connections"] += 1
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002
-        """Connect anew after a while, as the flowgraph is gone."""
+        """Reconnect after a while, as the flowgraph is gone."""
         self._socket = None
         self._later()
 
     def data_received(self, data: bytes) -> None:
-        """Take octets, and the PDUs that they complete."""
+        """Take octets, and pass on the PDUs that they complete."""
         self._have += data
         size = self._pdu_size
         while len(self._have) >= size:
@@ -229,18 +229,18 @@ class TcpTransport(asyncio.Protocol):
             self._take(pdu)
 
     def is_ready(self) -> bool:
-        """Whether the flowgraph is connected, and what was sent has left."""
+        """Whether the flowgraph is connected and all octets sent have left."""
         return self._socket is not None and not self._socket.get_write_buffer_size()
 
     def send(self, pdu: bytes) -> bool:
-        """Hand a PDU over; False while not connected."""
+        """Send a PDU; False while not connected."""
         if self._socket is None:
             return False
         self._socket.write(pdu)
         return True
 
     def close(self) -> None:
-        """Disconnect, and try no more."""
+        """Disconnect, and do not reconnect."""
         self._is_closed = True
         for each in (self._retry, self._trying):
             if each is not None:
