@@ -10,6 +10,7 @@ class LoopbackParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     """Settings of a radio that receives its own signal through the simulated air."""
 
     hear_self: bool = True
+    """Take this robot's own PDUs."""
     paced: bool = True
     """Run in real time; false: as fast as possible."""
 
@@ -28,6 +29,7 @@ class IqFileParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     paced: bool = True
     """Run in real time; false: as fast as possible."""
     hear_self: bool = True
+    """Take this robot's own PDUs."""
     wait_for_consumer: bool = False
     """Start to play when the first consumer subscribes."""
 
@@ -51,6 +53,7 @@ class ZmqParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     pattern: Literal["push", "pub", "req"] = "push"
     """PUSH and PULL; PUB and SUB, which drop what a slow peer cannot take; REQ and REP."""
     format: Literal["cf32_le", "ci16_le"] = "cf32_le"
+    """Sample type in both directions."""
     lead_s: Annotated[float, Meta(ge=0, le=1)] = 0.02
     """Lead of sending over receiving: what may be in transit through the peer."""
     paced: bool = True

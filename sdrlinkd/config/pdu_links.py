@@ -13,11 +13,13 @@ class DirectParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     """The direct link, which returns PDUs to this daemon without a modem, with faults on demand."""
 
     hear_self: bool = True
+    """Take this robot's own PDUs, as in the paper's loopback experiment."""
     rate_bit_s: Annotated[float, Meta(ge=0, le=1e12)] = 0.0
     """Rate of the link in bit/s; 0: unlimited."""
     loss: Annotated[float, Meta(ge=0, le=1)] = 0.0
     """Share of PDUs that are lost, 0 to 1."""
     delay_s: Annotated[float, Meta(ge=0, le=60)] = 0.0
+    """Delay of every PDU, in s."""
     jitter_s: Annotated[float, Meta(ge=0, le=60)] = 0.0
     """Upper end of a random extra delay in s, uniform from 0; it reorders PDUs."""
     duplicate: Annotated[float, Meta(ge=0, le=1)] = 0.0
@@ -25,6 +27,7 @@ class DirectParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     corrupt: Annotated[float, Meta(ge=0, le=1)] = 0.0
     """Share of PDUs that arrive with a flipped bit, 0 to 1."""
     max_pdus_per_burst: Annotated[int, Meta(ge=1, le=63)] = 16
+    """Most PDUs of one burst."""
 
 
 class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -131,14 +134,18 @@ class ChannelParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     clock_ppm: Annotated[float, Meta(ge=-200, le=200)] = 0.0
     """Offset of the sender's crystal from the receiver's in ppm: carrier and sample clock."""
     delay_s: Annotated[float, Meta(ge=0, le=1)] = 0.0
+    """Delay of the signal, in s."""
     delay_spread_s: Annotated[float, Meta(ge=0, le=1e-3)] = 1e-7
     """RMS delay spread of the multipath, in s."""
     loss_db: Decibel = 0.0
+    """Attenuation of the signal, in dB."""
     tx_image_db: Decibel = float("inf")
     """IQ imbalance of the sender: level of its image below the signal, in dB."""
     tx_leak_db: Decibel = float("inf")
     """Level of the sender's LO leakage below the signal, in dB."""
     rx_image_db: Decibel = float("inf")
+    """IQ imbalance of the receiver: level of the image below the signal, in dB."""
     rx_dc_dbfs: Annotated[float, Meta(le=0)] = float("-inf")
+    """DC offset of the receiver in dBFS; -inf: none."""
     adc_bits: Annotated[int, Meta(ge=0, le=24)] = 0
     """Resolution of the receiver's ADC in bits; 0: ideal."""

@@ -51,6 +51,7 @@ class BusParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     runtime_dir: str = ""
     """Directory of the sockets; empty: systemd's or the user's runtime directory."""
     max_message_bytes: Annotated[int, Meta(ge=64, le=1 << 24)] = 1 << 20
+    """Largest message that the bus takes."""
 
 
 class ChronyParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -79,6 +80,7 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     rx_depth: Annotated[int, Meta(ge=0)] = 256
     """Messages kept for a consumer that does not read; 0: no limit."""
     backend: BackendName = "direct"
+    """What carries the PDUs: a radio, a simulation, a flowgraph, or `direct`, without a modem."""
     drain_s: Annotated[float, Meta(ge=0, le=60)] = 1.0
     """Time in s for sending the queue when the daemon is stopped."""
     seed: int | None = None

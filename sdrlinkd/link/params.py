@@ -12,7 +12,9 @@ class QueueParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Limits of the queue for the radio, all topics together."""
 
     max_messages: Annotated[int, Meta(ge=1, le=1_000_000)] = 10_000
+    """Most messages that may wait."""
     max_bytes: Annotated[int, Meta(ge=1)] = 16 << 20
+    """Most bytes of payload that may wait."""
     max_airtime_s: Annotated[float, Meta(gt=0)] = float("inf")
     """Limit as airtime in s: the bytes that the channel carries in this time."""
 
@@ -24,7 +26,9 @@ class ReassemblyParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown
     """Time in s without a new fragment after which a message is given up; the same at all nodes. A
     topic can send 256 fragmented messages in 1.25 times this."""
     source_bytes: Annotated[int, Meta(ge=1 << 16)] = 1 << 20
+    """Memory for incomplete messages of one robot."""
     total_bytes: Annotated[int, Meta(ge=1 << 16)] = 8 << 20
+    """Memory for incomplete messages of all robots together."""
 
 
 class LinkParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -23,9 +23,13 @@ class SoapyParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     tx_gains: dict[str, Gain] = {}
     """TX gain of each element, by the driver's names."""
     rx_gains: dict[str, Gain] = {}
+    """RX gain in dB by element, instead of `rx_gain_db`: `{ LNA = 16, VGA = 20 }`."""
     tx_antenna: str = ""
+    """Name of the antenna port that sends; empty: the driver's default."""
     rx_antenna: str = ""
+    """Name of the antenna port that receives; empty: the driver's default."""
     channel: Annotated[int, Meta(ge=0, le=15)] = 0
+    """Number of the channel, for devices with several."""
     bandwidth_hz: Annotated[float, Meta(ge=0, le=2e8)] = 0.0
     """Bandwidth of the analogue filters; 0: the driver's choice."""
     offset_tuning: Literal["auto", "on", "off"] = "auto"
@@ -38,6 +42,7 @@ class SoapyParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     ppm: Annotated[float, Meta(ge=-200, le=200)] = 0.0
     """Correction of the crystal, which the device applies."""
     clock_source: str = ""
+    """Reference clock, such as "external" or "gpsdo"; empty: the driver's default."""
     stream_args: dict[str, str] = {}
     """Arguments of its streams, such as `num_recv_frames` of UHD."""
     settings: dict[str, str] = {}

@@ -16,6 +16,7 @@ class TopicPolicy(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Policy of one topic; a producer may override class, priority, lifespan and destination."""
 
     qos: Literal["urgent", "latency", "default", "bulk"] = "default"
+    """Class of the messages, unless the producer names one."""
     priority: Annotated[int, Meta(ge=0, le=MAX_PRIORITY)] = 64
     """Priority within the class, 0 to 127; 127 is the most urgent."""
     history: Literal["keep_last", "keep_all"] = "keep_last"

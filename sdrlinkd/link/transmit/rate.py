@@ -25,8 +25,11 @@ class RateParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     """Settings of rate control by the neighbors' reports; without it, `modem.mcs` is used."""
 
     adapt: bool = False
+    """Choose the MCS by the neighbors' reports; false: `modem.mcs`, always."""
     min_mcs: Annotated[int, Meta(ge=0, le=9)] = 0
+    """Slowest MCS to choose; also the one for a robot whose report is missing."""
     max_mcs: Annotated[int, Meta(ge=0, le=9)] = 9
+    """Fastest MCS to choose."""
     margin_db: Annotated[float, Meta(ge=-10, le=40)] = 2.0
     """SNR margin in dB above what an MCS needs, for default and bulk."""
     urgent_margin_db: Annotated[float, Meta(ge=-10, le=40)] = 5.0
