@@ -137,7 +137,9 @@ def _match(source: Source) -> None:
         if entry is None:
             source.left_out.append(f"{topic.name}: not in the registry")
         elif entry.type != topic.type:
-            source.left_out.append(f"{topic.name}: is {topic.type}, the registry has {entry.type}")
+            source.left_out.append(
+                f"{topic.name}: type {topic.type}, but the registry has {entry.type}"
+            )
         else:
             kept.append(topic)
     source.topics = kept

@@ -155,7 +155,7 @@ def test_options_go_before_the_scenario(refused, monkeypatch, tmp_path):
 
 
 def test_without_a_scenario_all_hear_all(stopped, tmp_path):
-    assert "all hear all at 20 dB" in stopped("--dir", tmp_path / "air")
+    assert "all robots in range, at 20 dB" in stopped("--dir", tmp_path / "air")
 
 
 @pytest.mark.parametrize("duration_s", ["0.01", "0.1", "1e5"])

@@ -151,7 +151,7 @@ def test_an_error_cites_key_given_and_allowed(text, parts):
 
 def test_check_says_what_the_flush_time_means():
     summary = make_setup(parse_config("[link]\nflush_s = 0.0"), ETC).summary()
-    assert any("link.flush_s = 0.0: a PDU that is not full waits until" in each for each in summary)
+    assert any("link.flush_s = 0.0: a partly filled PDU waits until" in each for each in summary)
     assert any('link.flush_s = "now"' in each for each in make_setup(Config(), ETC).summary())
 
 

@@ -139,14 +139,14 @@ def test_what_only_the_radio_can_tell_is_named(check, text, parts):
     assert (code, err) == (0, "")
     for part in parts:
         assert part in out
-    assert "the configuration is good" not in out
-    assert out.endswith("the file is good; what is not checked shows when the daemon starts\n")
+    assert "the configuration is valid" not in out
+    assert out.endswith("the file is valid; the daemon checks the rest when it starts\n")
 
 
 @pytest.mark.parametrize("text", ["", LOOPBACK, 'backend = "iqfile"\n[iqfile]\ntransmit = "x"'])
 def test_what_the_file_alone_decides_is_good(check, text):
     code, out, _ = check(text)
-    assert (code, out.endswith("the configuration is good\n")) == (0, True)
+    assert (code, out.endswith("the configuration is valid\n")) == (0, True)
 
 
 def test_large_fragments_that_keep_topics_apart_are_warned_of(check):

@@ -77,7 +77,7 @@ def test_one_robot_gets_the_plain_name_and_its_number(init, tmp_path, capsys):
         "sdrlinkd.toml", "registry.csv",
     }  # fmt: skip
     assert "robot 2, namespace robot_2" in checked(tmp_path / "team" / "sdrlinkd.toml", capsys)
-    assert "the other robots need the same registry.csv" in said
+    assert "each other robot needs the same registry.csv" in said
 
 
 def test_nothing_is_replaced_unasked(init, tmp_path):
@@ -87,7 +87,7 @@ def test_nothing_is_replaced_unasked(init, tmp_path):
     path.write_text("mine")
     code, _, err = init(*ours)
     assert code == 2
-    assert "sdrlinkd.toml: there already; allowed: another --out, or --force" in err
+    assert "sdrlinkd.toml: already there; allowed: another --out, or --force" in err
     assert path.read_text() == "mine"
     assert init(*ours, "--force")[0] == 0
     assert path.read_text() != "mine"
@@ -98,7 +98,7 @@ def test_nothing_is_replaced_unasked(init, tmp_path):
     [
         (("--radio", "hackrff"), '--radio: got "hackrff"; allowed: hackrf, usrp'),
         (("--radio", "hackrff"), "did you mean hackrf?"),
-        ((), "--radio: not given, and no terminal to ask at; which radio? such as hackrf"),
+        ((), "--radio: not given, and no terminal to ask on; which radio? such as hackrf"),
         (("--radio", "usrp"), "--robots: not given"),
         (("--radio", "usrp", "--robots", "2"), "--frequency: not given"),
         (("--radio", "usrp", "--robots", "2", "--frequency", "433"), "with its unit"),
@@ -261,7 +261,7 @@ def test_what_a_person_gives_is_quoted(init, tmp_path):
 def test_all_files_or_none(init, tmp_path):
     (tmp_path / "team" / "sdrlinkd.toml").mkdir(parents=True)
     code, _, err = init("--radio", "direct", "--id", "1", *ODOM, "--force")
-    assert (code, "sdrlinkd.toml cannot be written (it is a folder)" in err) == (2, True)
+    assert (code, "sdrlinkd.toml cannot be written (it is a directory)" in err) == (2, True)
     assert [each.name for each in (tmp_path / "team").iterdir()] == ["sdrlinkd.toml"]
 
 
@@ -278,9 +278,9 @@ def test_what_is_missing_is_asked_with_a_default(tmp_path, capsys):
     os.close(theirs)
     assert process.returncode == 0, said
     for part in (
-        'got "hackrff"; allowed', "how many robots share the air [2]",
-        "which frequency, one that antenna and licence are for [433.92 MHz]",
-        "which of them is this one, 1 to 2, or all [1]", "HackRF One (half duplex",
+        'got "hackrff"; allowed', "how many robots share the channel [2]",
+        "which frequency (one that your antenna and licence cover) [433.92 MHz]",
+        "which robot is this, 1 to 2, or all [1]", "HackRF One (half duplex",
     ):  # fmt: skip
         assert part in said
     assert "robot 2" in checked(tmp_path / "team" / "sdrlinkd.toml", capsys)

@@ -162,9 +162,8 @@ class BusyChannel:
     def notices(self, now: float) -> list[str]:
         """Who shares the air in another way."""
         return [
-            f"robot {src} takes turns by a tdma schedule and this robot does not: what both send "
-            "collides; give both the same [access], and radios of one kind where access.policy is "
-            "auto"
+            f"robot {src} keeps a tdma schedule and this robot does not: their bursts collide; "
+            "give both the same [access], and radios of one kind where access.policy is auto"
             for src in self._scheduled.lately(now)
         ]
 
