@@ -27,7 +27,7 @@ def iqfile_unchecked(iqfile: IqFileParams) -> list[str]:
     """What of [iqfile] nobody can know before the recording is opened."""
     if not iqfile.receive:
         return []
-    return [f"whether {iqfile.receive} can be read (the recording is not opened)"]
+    return [f"whether {iqfile.receive} is readable (the recording is not opened)"]
 
 
 def ether_problem(ether: EtherParams, _needs: ModemNeeds) -> str:
@@ -42,7 +42,7 @@ def ether_problem(ether: EtherParams, _needs: ModemNeeds) -> str:
 
 def ether_unchecked(ether: EtherParams) -> list[str]:
     """What of [ether] nobody can know before the hub is asked."""
-    return [f"whether a hub answers in {ether.dir} (nobody is asked)"]
+    return [f"whether a hub answers in {ether.dir} (it is not queried)"]
 
 
 def ether_presumption(
@@ -51,8 +51,8 @@ def ether_presumption(
     """Presume of a radio on the ether: its hub says what it is like, once it is asked."""
     turn_s = ETHER_TURNAROUND_S if turnaround_s is None else turnaround_s
     told = (
-        f"ether: taken for half duplex, turnaround {1e3 * turn_s:g} ms, in blocks of "
-        f"{1e3 * needs.block_s:g} ms: the hub tells when the daemon is there"
+        f"ether: assumed half duplex, turnaround {1e3 * turn_s:g} ms, blocks of "
+        f"{1e3 * needs.block_s:g} ms; the hub reports the actual values at start"
     )
     return Presumption(simulated(needs, turn_s, ETHER_LEAD_S), told, is_sure=False)
 
@@ -70,7 +70,7 @@ def zmq_problem(zmq: ZmqParams, _needs: ModemNeeds) -> str:
 
 def zmq_unchecked(_zmq: ZmqParams) -> list[str]:
     """What of [zmq] nobody can know before the flowgraph is asked."""
-    return ["whether the flowgraph answers, and sends this rate and format (it is not asked)"]
+    return ["whether the flowgraph answers, and sends this rate and format (it is not queried)"]
 
 
 def zmq_presumption(zmq: ZmqParams, needs: ModemNeeds, turnaround_s: float | None) -> Presumption:

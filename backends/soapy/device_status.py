@@ -31,13 +31,13 @@ class DeviceStatus:
     def trouble(self) -> str:
         """Why nothing comes from it, while it is away or not there yet; else empty."""
         if self.away:
-            return f"{self.away}; it is looked for until it is back"
+            return f"{self.away}; the daemon retries until it is back"
         return self.waits_for
 
     @property
     def told(self) -> str:
         """The news about it, in words for people; empty where there are none."""
-        return f"away ({self.away}), looked for until it is back" if self.away else self.notice
+        return f"gone ({self.away}), retrying until it is back" if self.away else self.notice
 
     def counted(self, report: CountersReport) -> None:
         """Take what the process has counted; it counts from 0."""

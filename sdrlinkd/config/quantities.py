@@ -55,7 +55,7 @@ def as_numbers(raw: object, kind: inspect.Type | None, key: str = "") -> object:
 def example(key: str | int, kind: inspect.Type) -> str:
     """How the value of `key` may be written with its unit, for error messages; else empty."""
     quantity = _quantity_of(str(key), kind)
-    return f", or with its unit, such as {quantity.example}" if quantity else ""
+    return f", or with a unit, such as {quantity.example}" if quantity else ""
 
 
 def _quantity_of(key: str, kind: inspect.Type | None) -> _Quantity | None:

@@ -31,10 +31,10 @@ def test_info_for_people_and_programs(ctl):
     assert code == 0
     for part in ("1 Msps: 64 subcarriers 15.625 kHz apart", "16QAM 3/4", "64QAM 3/4", "3.55 ms"):
         assert part in out
-    assert "bursts are looked for up to 196 kHz off: two crystals of ±40 ppm" in out
+    assert "the receiver searches for bursts up to 196 kHz off: two crystals of ±40 ppm" in out
     code, out, _ = ctl("info", "--rate", "1e6", "--frequency", "5.9e9")
     assert "up to 250 kHz off" in out
-    assert "raise modem.rate_hz, or tell better crystals" in out
+    assert "raise modem.rate_hz, or state better crystals" in out
     code, out, _ = ctl("info", "--json")
     told = json.loads(out)
     assert (told["rate_hz"], len(told["mcs"])) == (5e6, 10)
@@ -111,7 +111,7 @@ def test_a_recording_cut_in_mid_sample_is_read_as_far_as_it_goes(ctl, tmp_path):
     code, out, err = ctl("decode", tmp_path / "rec")
     assert code == 0
     assert "2 of 2 PDUs" in out
-    assert "ends with 3 bytes that are no whole ci16_le sample" in err
+    assert "ends with 3 bytes, less than a ci16_le sample" in err
 
 
 def test_bad_input_is_refused_in_one_line(ctl, tmp_path):
@@ -122,12 +122,15 @@ def test_bad_input_is_refused_in_one_line(ctl, tmp_path):
     write_bursts(tmp_path / "rec", mcs_list=(1,))
     for arguments, says in (
         (("decode", tmp_path / "none"), "no such recording"),
-        (("decode", tmp_path / "what.dat"), "its sample type is not known"),
+        (("decode", tmp_path / "what.dat"), "unknown sample type"),
         (("decode", tmp_path / "what.dat", "--type", "ci12"), "allowed: cf32_le, ci16_le"),
         (("decode", tmp_path / "lone"), "lone.sigmf-data: no such file"),
         (("spectrum", tmp_path / "odd"), 'got "cf64_le"; allowed: cf32_le'),
-        (("decode", tmp_path / "rec", "--type", "ci8"), "is ci16_le, but ci8 was asked for"),
-        (("decode", tmp_path / "rec", "--rate", "1e6"), "is 2000000.0, but 1000000.0 was asked"),
+        (("decode", tmp_path / "rec", "--type", "ci8"), "is ci16_le, but ci8 was requested"),
+        (
+            ("decode", tmp_path / "rec", "--rate", "1e6"),
+            "is 2000000.0, but 1000000.0 was requested",
+        ),
         (("spectrum", tmp_path / "rec", "--out", tmp_path / "no/dir.png"), "No such file"),
     ):
         code, out, err = ctl(*arguments)

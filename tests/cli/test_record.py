@@ -153,7 +153,7 @@ def test_values_out_of_range_are_refused_with_what_is_allowed(ctl, tmp_path, opt
         ("loopback", "", ("--oversampling", "2"), "--oversampling: given with --config"),
         ("iqfile", '[iqfile]\ntransmit = "sent"\n', (), "this radio does not receive ("),
         ("iqfile", '[iqfile]\nreceive = "none"\n', (), "none: no such recording"),
-        ("iqfile", '[iqfile]\nreceive = "rec"\n', ("--force",), "is played and cannot be written"),
+        ("iqfile", '[iqfile]\nreceive = "rec"\n', ("--force",), "being played and cannot be"),
         ("ether", '[ether]\ndir = "nowhere"\n', (), "nowhere"),
         ("soapy", '[soapy]\ndevice = "driver=x"\n', (), "modem.frequency_hz: got 0 (not set)"),
     ],

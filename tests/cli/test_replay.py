@@ -58,7 +58,7 @@ def test_raw_samples_are_sent_too(ctl, config, tmp_path):
     assert (code, out) == (0, "sent 1 of 1 stretches; silence between them is below -200.0 dBFS\n")
     code, _, err = ctl(*given)
     assert code == 2
-    assert "raw.bin: its sample type is not known; name one" in err
+    assert "raw.bin: unknown sample type; name one" in err
 
 
 def test_what_is_not_sent_is_told_by_the_exit_code(ctl, config, tmp_path):
@@ -82,9 +82,9 @@ def test_what_is_not_sent_is_told_by_the_exit_code(ctl, config, tmp_path):
         (DEVICE, "--gain: not given, and replay needs it to transmit; allowed: a gain in dB, or"),
         ((*DEVICE[:2], "--transmit", "--gain", 0), "--frequency: not given; allowed with --device"),
         ((*DEVICE, "--gain", 0), 'soapy.device: got "driver=none", but SoapySDR'),
-        ((*DEVICE, "--gain", 0, "--rate", 1e6), "is sampled at 2000000 Hz; the modem is set to"),
+        ((*DEVICE, "--gain", 0, "--rate", 1e6), "sampled at 2000000 Hz, but the modem is set to"),
         ((*DEVICE, "--gain", 0, "--backoff-db", 2), "--backoff-db: got 2; its peaks would be"),
-        ((*DEVICE, "--gains", "A=1", "--silence-db", 0), "nothing in it is stronger than 0.0 dBFS"),
+        ((*DEVICE, "--gains", "A=1", "--silence-db", 0), "nothing in it exceeds 0.0 dBFS"),
         ((*DEVICE, "--gains", "A="), '--gains: got "A="; allowed: ELEMENT=DB'),
     ],
 )  # fmt: skip
@@ -108,7 +108,7 @@ SOAPY = 'backend = "soapy"\n[soapy]\ndevice = "driver=none"\n'
         (f"{SOAPY}tx_gain_db = 0\n", ("--transmit",), "soapy.device: got"),
         ('backend = "loopback"\n', ("--gain", 0), "--gain: given with --config; allowed: [soa"),
         ('backend = "iqfile"\n[iqfile]\nreceive = "rec"\n', (), "this radio does not send (from"),
-        ('backend = "iqfile"\n[iqfile]\ntransmit = "rec"\n', (), "is played and cannot be written"),
+        ('backend = "iqfile"\n[iqfile]\ntransmit = "rec"\n', (), "being played and cannot be"),
     ],
 )  # fmt: skip
 def test_configurations_that_do_not_send_are_refused(ctl, config, tmp_path, text, arguments, says):
@@ -127,7 +127,11 @@ def test_a_recording_of_another_rate_says_how_to_go_on(ctl, config, tmp_path):
     write_bursts(tmp_path / "rec")
     code, _, err = ctl("replay", tmp_path / "rec", "--config", config(rate_hz=5e6))
     assert code == 2
-    for part in ("at 2000000 Hz; the modem is set to 5000000 Hz", "modem.oversampling", "resample"):
+    for part in (
+        "at 2000000 Hz, but the modem is set to 5000000 Hz",
+        "modem.oversampling",
+        "resample",
+    ):
         assert part in err
     code, _, err = ctl("replay", tmp_path / "none", "--config", config())
     assert code == 2

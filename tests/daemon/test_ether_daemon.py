@@ -73,10 +73,10 @@ def test_a_second_robot_of_one_id_is_refused_and_the_first_is_told(start_daemon,
         wait_for(lambda: second.snapshot().carrier.state == "refused", 60)
         level, reason = verdict(second)
         assert level == "DOWN"
-        assert f"robot 1 is on this air already: process {first.pid} on " in reason
+        assert f"robot 1 is already on this channel: process {first.pid} on " in reason
         assert "another robot_id" in reason
         wait_for(lambda: "the hub refuses the settings: " in second.log())
-        told = f"asked for our id 1 on this air and was refused: process {second.pid} on "
+        told = f"requested our id 1 on this channel and was refused: process {second.pid} on "
         wait_for(lambda: told in first.snapshot().carrier.detail)
         assert first.snapshot().carrier.state == "up"
         assert list(ask(hub).nodes) == [1]

@@ -264,7 +264,7 @@ def test_a_driver_that_is_not_installed_is_for_a_person_to_mend(write_config, tm
         ),
         (
             ("noise_db=-50", "noise_db=-50,rate_error=0.01,lie=no"),
-            "refused", ["the device made it", "a rate that it keeps"],
+            "refused", ["the device chose", "a rate that it accepts"],
         ),
     ],
 )  # fmt: skip

@@ -140,10 +140,10 @@ def test_of_a_large_bag_the_small_and_busy_topics_stay(init, tmp_path, capsys):
     assert [each.name for each in choice.taken] == [f"t{i:02}" for i in range(15, 0, -1)]
     assert set(choice.left_out) == {"t00", "image", "rosout"}
     assert "small types before large ones" in choice.left_out["image"]
-    assert choice.left_out["rosout"] == "ROS's own"
+    assert choice.left_out["rosout"] == "ROS internal"
     wanted = choose(found, ["/robot_1/image", "t00"], "a bag")
     assert [each.name for each in wanted.taken] == ["image", "t00"]
-    assert wanted.left_out["t01"] == "not asked for"
+    assert wanted.left_out["t01"] == "not requested"
 
 
 def test_robots_of_one_team_share_a_line():
@@ -151,7 +151,7 @@ def test_robots_of_one_team_share_a_line():
     found = [FoundTopic(f"/robot_{i}/odom", kind, 5) for i, kind in enumerate(kinds)]
     choice = choose(found, [], "a bag")
     assert choice.taken == [FoundTopic("odom", "a/msg/B", 10)]
-    assert choice.left_out == {"/robot_2/odom": "is a/msg/C, another robot's is a/msg/B"}
+    assert choice.left_out == {"/robot_2/odom": "type a/msg/C, but another robot's is a/msg/B"}
 
 
 def test_a_bag_makes_the_registry(init, tmp_path, capsys):
@@ -181,7 +181,7 @@ def test_the_graph_is_asked_of_ros_itself(init, tmp_path, monkeypatch):
     assert (code, "source ROS 2's setup.bash" in err) == (2, True)
     monkeypatch.setenv("PATH", f"{ros2.parent}:/usr/bin:/bin")
     code, _, err = init(*ours)
-    assert (code, "left out: parameter_events (ROS's own)" in err) == (0, True)
+    assert (code, "left out: parameter_events (ROS internal)" in err) == (0, True)
     registry = load_registry(tmp_path / "team" / "registry.csv")
     assert [(each.name, each.type) for each in registry.topics] == [
         ("odom", "nav_msgs/msg/Odometry")

@@ -89,10 +89,10 @@ def test_what_the_daemon_refuses_is_planned_and_told():
 
 def test_what_is_presumed_is_told():
     for device, part in (
-        ("driver=hackrf", "driver=hackrf: half duplex, as drivers of the kind hackrf"),
-        ("driver=loopback,model=hackrf", "half duplex, as drivers of the kind hackrf"),
-        ("driver=uhd,serial=1", "full duplex, as drivers of the kind uhd"),
-        ("driver=something", "for its driver is not known here"),
+        ("driver=hackrf", "driver=hackrf: half duplex, as known for drivers of the kind hackrf"),
+        ("driver=loopback,model=hackrf", "half duplex, as known for drivers of the kind hackrf"),
+        ("driver=uhd,serial=1", "full duplex, as known for drivers of the kind uhd"),
+        ("driver=something", "because its driver is unknown"),
     ):
         text = (ETC / "radios" / "usrp.toml").read_text()
         config = parse_config(text.replace("driver=uhd", device))
@@ -104,13 +104,13 @@ def test_without_an_air_the_key_and_an_example_are_named(capsys):
     said = capsys.readouterr().err
     assert code == 2
     for part in (
-        'backend: got "direct", which has no air to plan for',
+        'backend: got "direct", which has no channel to plan',
         'allowed: backend = "soapy"',
         'device = "driver=hackrf"',
         "etc/radios/hackrf.toml",
     ):
         assert part in said
-    with pytest.raises(UserError, match="has no air"):
+    with pytest.raises(UserError, match="has no channel"):
         setting_of(parse_config('backend = "gnuradio"'), 1)
 
 
