@@ -70,8 +70,10 @@ def presume_full_duplex(
     turnaround_s: float | None,
 ) -> Presumption:
     """Presume that an unknown radio is full duplex, or half-duplex if `turnaround_s` is given."""
-    duplex = "sends while it listens" if turnaround_s is None else "cannot hear while it sends"
-    told = f"taken for a radio that {duplex} and keeps time: nothing is known of its kind"
+    duplex = (
+        "sends and receives at once" if turnaround_s is None else "cannot receive while it sends"
+    )
+    told = f"unknown kind: assumed to be a radio that {duplex} and keeps time"
     return Presumption(simulated(needs, turnaround_s), told, is_sure=False)
 
 
@@ -135,8 +137,8 @@ class Backend(NamedTuple):
             # Third-party code may fail in any way.
             raise BackendError(
                 f'backend: got "{self.name}", whose code cannot be loaded: {self.make} '
-                f"({type(error).__name__}: {error}); allowed: another backend, or a package that "
-                "is whole"
+                f"({type(error).__name__}: {error}); allowed: another backend, or an intact "
+                "package"
             ) from error
         made: Radio = make(settings, request)  # type: ignore[operator]
         return made

@@ -108,7 +108,7 @@ class IqFileRadio:
             info = describe(self._receive, self._receive_type)
             if info.rate_hz is not None and abs(info.rate_hz / tuning.rate_hz - 1) > 1e-6:
                 raise BackendError(
-                    f"{info.path}: is sampled at {info.rate_hz:g} Hz; the modem is set to "
+                    f"{info.path}: sampled at {info.rate_hz:g} Hz, but the modem is set to "
                     f"{tuning.rate_hz:g} Hz"
                 )
             self._damage = info.damage

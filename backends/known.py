@@ -31,7 +31,7 @@ def iqfile_unchecked(iqfile: IqFileParams) -> list[str]:
     """What cannot be checked about [iqfile] before the recording is opened."""
     if not iqfile.receive:
         return []
-    return [f"whether {iqfile.receive} can be read (the recording is not opened)"]
+    return [f"whether {iqfile.receive} is readable (the recording is not opened)"]
 
 
 def ether_problem(ether: EtherParams, _needs: ModemNeeds) -> str:
@@ -54,7 +54,7 @@ def ether_problem(ether: EtherParams, _needs: ModemNeeds) -> str:
 def ether_unchecked(ether: EtherParams) -> list[str]:
     """What cannot be checked about [ether] before the hub answers."""
     where = f"at {ether.hub}" if ether.hub else f"in {ether.dir}"
-    return [f"whether a hub answers {where} (nobody is asked)"]
+    return [f"whether a hub answers {where} (it is not queried)"]
 
 
 def ether_presumption(
@@ -64,8 +64,8 @@ def ether_presumption(
     lead_s = ETHER_REMOTE_LEAD_S if ether.hub else ETHER_LEAD_S
     turn_s = ETHER_TURNAROUND_S if turnaround_s is None else turnaround_s
     told = (
-        f"ether: taken for half duplex, turnaround {1e3 * turn_s:g} ms, in blocks of "
-        f"{1e3 * needs.block_s:g} ms: the hub tells when the daemon is there"
+        f"ether: assumed half duplex, turnaround {1e3 * turn_s:g} ms, blocks of "
+        f"{1e3 * needs.block_s:g} ms; the hub reports the actual values at start"
     )
     return Presumption(simulated(needs, turn_s, lead_s), told, is_sure=False)
 
@@ -83,7 +83,7 @@ def zmq_problem(zmq: ZmqParams, _needs: ModemNeeds) -> str:
 
 def zmq_unchecked(_zmq: ZmqParams) -> list[str]:
     """What cannot be checked about [zmq] before the flowgraph answers."""
-    return ["whether the flowgraph answers, and sends this rate and format (it is not asked)"]
+    return ["whether the flowgraph answers, and sends this rate and format (it is not queried)"]
 
 
 def zmq_presumption(zmq: ZmqParams, needs: ModemNeeds, turnaround_s: float | None) -> Presumption:

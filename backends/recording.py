@@ -61,7 +61,7 @@ def refuse_same(receive: Path, transmit: Path) -> None:
     """Raise BackendError if both name the same recording: writing would empty it."""
     if sigmf_paths(receive)[1].resolve() == sigmf_paths(transmit)[1].resolve():
         raise BackendError(
-            f"{transmit}: is played and cannot be written to; name another recording"
+            f"{transmit}: is being played and cannot be written to; name another recording"
         )
 
 
@@ -92,7 +92,7 @@ def describe(path: Path, type_name: str = "", rate_hz: float | None = None) -> R
         type_name = type_name or RAW_TYPES.get(path.suffix, "")
         if not type_name:
             raise BackendError(
-                f"{path}: its sample type is not known; name one, or use a SigMF recording or one "
+                f"{path}: unknown sample type; name one, or use a SigMF recording or one "
                 f"of the endings {', '.join(RAW_TYPES)}"
             )
         return _described(path, sample_type(type_name, str(path)), rate_hz, None, [])
@@ -123,7 +123,7 @@ def _from_sigmf(
             f"{meta_path}: not SigMF metadata ({type(error).__name__}: {error})"
         ) from None
     if framed:
-        raise BackendError(f"{meta_path}: {framed[0]}: only data without headers can be read")
+        raise BackendError(f"{meta_path}: {framed[0]}: only data without headers is readable")
     if channels != 1:
         raise BackendError(f"{meta_path}: core:num_channels: got {channels}; allowed: 1")
     given_rate = general.get("core:sample_rate")
@@ -132,11 +132,11 @@ def _from_sigmf(
         raise BackendError(f"{meta_path}: core:sample_rate: got {given_rate}; allowed: above 0")
     if type_name and type_name != stated_type:
         raise BackendError(
-            f"{meta_path}: core:datatype is {stated_type}, but {type_name} was asked for"
+            f"{meta_path}: core:datatype is {stated_type}, but {type_name} was requested"
         )
     if rate_hz is not None and stated_rate is not None and rate_hz != stated_rate:
         raise BackendError(
-            f"{meta_path}: core:sample_rate is {stated_rate}, but {rate_hz} was asked for"
+            f"{meta_path}: core:sample_rate is {stated_rate}, but {rate_hz} was requested"
         )
     if not data_path.is_file():
         raise BackendError(f"{data_path}: no such file; {meta_path.name} describes it")
@@ -181,10 +181,10 @@ def _described(
     n_samples, rest = divmod(path.stat().st_size, kind.size)
     damage = []
     if rest:
-        damage.append(f"{path}: ends with {rest} bytes that are no whole {kind.name} sample")
+        damage.append(f"{path}: ends with {rest} bytes, less than a {kind.name} sample")
     if any(start > n_samples for start in starts):
         damage.append(
             f"{path}: holds {n_samples} samples, but a capture begins at "
-            f"{max(starts):.0f}; it was cut"
+            f"{max(starts):.0f}; it is truncated"
         )
     return RecordingInfo(path, kind, n_samples, rate, frequency, "; ".join(damage))

@@ -92,8 +92,8 @@ def find_backend(name: str) -> Backend:
     if len(found) > 1:
         packages = " and ".join(sorted(_package(each) for each in found))
         raise BackendError(
-            f'backend: got "{name}", a name that several packages give to their radio: {packages}; '
-            "allowed: a name that one package gives: uninstall the others"
+            f'backend: got "{name}", which several packages define: {packages}; '
+            "allowed: a name that one package defines; uninstall the others"
         )
     return _loaded(found[0])
 
@@ -129,14 +129,16 @@ def _loaded(point: "EntryPoint") -> Backend:
     except TypeError:
         is_usable = False
     if not is_usable:
-        raise _broken(point, "has settings that are no msgspec.Struct whose keys have defaults")
+        raise _broken(
+            point, "has settings that are not a msgspec.Struct with a default for each key"
+        )
     return entry
 
 
 def _broken(point: "EntryPoint", how: str) -> BackendError:
     return BackendError(
-        f'backend: got "{point.name}", which package {_package(point)} brings, but its entry '
-        f"{point.value} {how}; allowed: another backend, or a package that is whole"
+        f'backend: got "{point.name}" of package {_package(point)}, but its entry '
+        f"{point.value} {how}; allowed: another backend, or an intact package"
     )
 
 

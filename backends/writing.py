@@ -47,7 +47,7 @@ class RecordingWriter:
         self._meta_path, data_path = sigmf_paths(path)
         self._type = sample_type(type_name, str(path))
         if self._type.offset:
-            raise BackendError(f"{path}: {type_name} is only read; write ci8 instead")
+            raise BackendError(f"{path}: {type_name} is read-only; write ci8 instead")
         self._general = {
             "core:datatype": type_name,
             "core:sample_rate": rate_hz,

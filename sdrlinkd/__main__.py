@@ -54,9 +54,9 @@ def _checked(setup: Setup) -> list[str]:
     """The lines that `--check` prints about the configuration and the radio. Raises UserError."""
     told = daemon.check(setup)
     verdict = (
-        "the file is good; what is not checked shows when the daemon starts"
+        "the file is valid; the daemon checks the rest when it starts"
         if unchecked(setup.config)
-        else "the configuration is good"
+        else "the configuration is valid"
     )
     return [*setup.summary(), *told, verdict]
 
@@ -70,7 +70,9 @@ def _parser() -> argparse.ArgumentParser:
         help=f"configuration (TOML); default {DEFAULT_CONFIG}",
     )  # fmt: skip
     parser.add_argument(
-        "--check", action="store_true", help="read the configuration, say what follows, stop"
+        "--check",
+        action="store_true",
+        help="check the configuration, print what follows from it, and exit",
     )
     parser.add_argument(
         "--log-level", choices=("debug", "info", "warning", "error"), default="info"

@@ -34,7 +34,7 @@ def compile_modem(
         so_far_s = time.monotonic() - began
         if so_far_s - last >= every_s:
             last = so_far_s
-            told(f"compiling the modem: {done} of {total} kernels, {so_far_s:.0f} s so far, once")
+            told(f"compiling the modem, once: {done} of {total} kernels, {so_far_s:.0f} s so far")
 
     phy.warm_up(progress)
     if last >= 0:
@@ -42,11 +42,11 @@ def compile_modem(
     folder = phy.temporary_cache()
     if folder is not None and os.access(folder, os.W_OK):
         say(
-            f"the compiled modem is kept in {folder}: neither the program's folder nor the "
-            "user's cache can be written; NUMBA_CACHE_DIR names a lasting one"
+            f"the compiled modem is cached in {folder}: neither the program's folder nor the "
+            "user's cache is writable; set NUMBA_CACHE_DIR to a permanent folder"
         )
     elif folder is not None:
         say(
-            "the compiled modem cannot be kept, and is compiled anew at every start: no folder can "
-            "be written; NUMBA_CACHE_DIR names one"
+            "the compiled modem cannot be cached, so every start compiles it again: no folder is "
+            "writable; set NUMBA_CACHE_DIR to a folder that is"
         )

@@ -84,9 +84,9 @@ class Control:
     def _answer(self, name: str, body: bytes, frame: zmq.Frame) -> tuple[bytes, object]:
         verb = self._verbs.get(name)
         if verb is None:
-            return error("unknown_verb", f"{name}; this daemon has {', '.join(self._verbs)}")
+            return error("unknown_verb", f"{name}; allowed: {', '.join(self._verbs)}")
         if verb.changes and _uid(frame) not in self._allowed_uids:
-            return error("denied", f"{name} changes the daemon: only root and its own user may")
+            return error("denied", f"{name} changes the daemon; allowed: root and its own user")
         try:
             arguments = msgspec.msgpack.decode(body, type=Arguments) if body else {}
         except msgspec.DecodeError as problem:
@@ -98,8 +98,8 @@ class Control:
         except UserError as problem:
             return error("refused", str(problem))
         except Exception as problem:
-            log.exception("a bug of ours in the verb %s", name)
-            return error("internal", f"a bug of ours, see the daemon's log: {problem}")
+            log.exception("internal error in the verb %s", name)
+            return error("internal", f"internal error, see the daemon's log: {problem}")
 
     def _reply(self, identity: bytes, request_id: bytes, answer: tuple[bytes, object]) -> None:
         status, body = answer

@@ -41,6 +41,6 @@ class Loading:
             self.told = ""
 
     def _watch(self, done: int, total: int) -> None:
-        self.told = f"the modem is being compiled, once: {done} of {total} kernels"
+        self.told = f"compiling the modem, once: {done} of {total} kernels"
         if self._is_given_up.is_set():
             raise _GivenUpError

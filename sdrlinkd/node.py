@@ -279,9 +279,9 @@ class Node:
             name = self._setup.republished_as(src, topic_id)
             stop = self._stops.get(topic_id)
             if stop is None:
-                log.error("%s: silent, but of its type no stop message can be made", name)
+                log.error("%s: silent, but no stop message can be made for its type", name)
                 continue
-            log.warning("%s: silent, so the stop message was published", name)
+            log.warning("%s: silent, published the stop message", name)
             self.bus.publish_stop(src, topic_id, stop)
 
     def audit(self) -> list[str]:

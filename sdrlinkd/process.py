@@ -115,7 +115,7 @@ class Process:
         """The last line of stderr, or failing that of stdout; without output, the exit code."""
         lines = [*self.out().splitlines(), *self.err().splitlines()]
         said = [line for line in lines if line.strip()]
-        return said[-1].strip() if said else f"not a word, exit code {self.code}"
+        return said[-1].strip() if said else f"no output, exit code {self.code}"
 
     def tell(self, line: str) -> None:
         """Write a line to the process's stdin. Raises ProcessError when it no longer reads."""
@@ -152,7 +152,7 @@ class Process:
         try:
             return self._started.wait(within_s)
         except subprocess.TimeoutExpired:
-            raise ProcessError(f"{self.name}: not done within {within_s:g} s") from None
+            raise ProcessError(f"{self.name}: did not finish within {within_s:g} s") from None
 
     def send_signal(self, number: int) -> None:
         """Send the process a signal; does nothing once it has ended."""
@@ -239,7 +239,7 @@ def wait_until(
             raise ProcessError(f"{ended[0].name} has ended: {ended[0].last_words()}")
         if time.monotonic() > deadline:
             said = "".join(f"; {each.name}: {each.last_words()}" for each in processes)
-            raise ProcessError(f"waited in vain for {within_s:g} s{said}")
+            raise ProcessError(f"timed out after {within_s:g} s{said}")
         time.sleep(every_s)
 
 

@@ -58,7 +58,7 @@ class Reloading:
         self._check(changed)
         fixed = self._fixed(changed.config)
         if fixed:
-            raise UserError(f"{', '.join(fixed)}: changed; restart the daemon for that")
+            raise UserError(f"{', '.join(fixed)}: changed; restart the daemon to apply it")
         self._policies.reload(changed.policies)
         self._opening.try_again(changed)
         return "topic policies and the radio's settings"
@@ -68,7 +68,7 @@ class Reloading:
         try:
             told = self.reload()
         except UserError as error:
-            log.error("not reloaded, all stays as it was: %s", error)  # noqa: TRY400
+            log.error("not reloaded, nothing changed: %s", error)  # noqa: TRY400
         else:
             log.info("re-read: %s; all other keys need a restart", told)
 

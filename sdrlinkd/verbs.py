@@ -51,20 +51,20 @@ def make_verbs(
         return {"why": node.why(topic_id, told)}
 
     verbs = {
-        "hello": Verb(hello, "who answers, and what it can do"),
+        "hello": Verb(hello, "who answers, and its verbs"),
         "status": Verb(lambda _: node.snapshot(control.requests), "the whole snapshot"),
         "topics": Verb(lambda _: node.snapshot(control.requests).link.topics, "topics sent"),
-        "peers": Verb(lambda _: node.snapshot(control.requests).link.neighbors, "who is heard"),
+        "peers": Verb(lambda _: node.snapshot(control.requests).link.neighbors, "robots heard"),
         "config": Verb(lambda _: opening.config, "the configuration in force"),
         "check": Verb(
             lambda _: {"problems": node.audit(), "ledger": node.snapshot(control.requests).link},
-            "whether the ledger adds up",
+            "verify that the ledger adds up",
         ),
-        "why": Verb(why, "what happens to a topic, in plain words"),
+        "why": Verb(why, "explain in plain words what happens to a topic"),
         "set": Verb(set_policy, "change a topic's policy", changes=True),
         "reload": Verb(
             reload_policies,
-            "read the topic policies anew and, while there is no radio, its settings",
+            "re-read the topic policies and, while there is no radio, its settings",
             changes=True,
         ),
     }

@@ -129,7 +129,7 @@ def test_a_modem_that_talks_nonsense_is_left_out(monkeypatch, capsys, tmp_path, 
 def test_a_peer_that_fails_in_its_second_pass_keeps_its_first(monkeypatch, capsys):
     def measured_by(name, *, seed, **_):
         if name == "xrce" and seed == 2:
-            raise ProcessError("fcu has ended: not a word, exit code 1")
+            raise ProcessError("fcu has ended: no output, exit code 1")
         if name == "mavlink":
             raise PeerError("mavlink: pip install: no network")
         return f"{name}{seed}"
@@ -139,7 +139,7 @@ def test_a_peer_that_fails_in_its_second_pass_keeps_its_first(monkeypatch, capsy
     assert found == {"xrce": ["xrce1"], "direct": ["direct1", "direct2", "direct3"]}
     assert capsys.readouterr().err == (
         "not measured: mavlink: pip install: no network\n"
-        "not measured: xrce: fcu has ended: not a word, exit code 1\n"
+        "not measured: xrce: fcu has ended: no output, exit code 1\n"
     )
 
 

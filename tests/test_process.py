@@ -58,9 +58,9 @@ def test_what_it_is_told_it_reads_and_the_end_of_its_input_too():
 
 @pytest.mark.parametrize(("code", "says"), [
     ("sys.exit('no radio')", "it has ended: no radio"),
-    ("sys.exit(3)", "it has ended: not a word, exit code 3"),
+    ("sys.exit(3)", "it has ended: no output, exit code 3"),
     ("print('half', end=''); sys.exit(3)", "it has ended: half"),
-    ("os.kill(os.getpid(), 9)", "it has ended: not a word, exit code -9"),
+    ("os.kill(os.getpid(), 9)", "it has ended: no output, exit code -9"),
 ])  # fmt: skip
 def test_who_ends_without_a_line_is_quoted(code, says):
     with program(code, name="it") as process, pytest.raises(ProcessError) as error:
@@ -78,9 +78,9 @@ def test_what_is_said_at_last_counts():
 def test_nobody_waits_for_ever():
     with program("print('still here'); time.sleep(60)", name="it") as process:
         process.line()
-        with pytest.raises(ProcessError, match=r"waited in vain for 0\.05 s; it: still here"):
+        with pytest.raises(ProcessError, match=r"timed out after 0\.05 s; it: still here"):
             process.line(0.05)
-        with pytest.raises(ProcessError, match=r"it: not done within 0\.05 s"):
+        with pytest.raises(ProcessError, match=r"it: did not finish within 0\.05 s"):
             process.wait(0.05)
         begun = time.monotonic()
     assert time.monotonic() - begun < 10

@@ -163,27 +163,27 @@ class EtherHub:
     def _refusal(self, identity: bytes, hello: protocol.Hello) -> str:
         if hello.version != protocol.VERSION:
             return (
-                f"this hub speaks version {protocol.VERSION} of the ether's protocol, the radio "
-                f"version {hello.version}; run hub and daemons from one version of sdrlinkd"
+                f"this hub speaks version {protocol.VERSION} of the ether protocol, the radio "
+                f"version {hello.version}; run hub and daemons from the same sdrlinkd version"
             )
         for name, theirs, ours in (
             ("rate_hz", hello.rate_hz, self._air.rate_hz),
             ("frequency_hz", hello.frequency_hz, self._air.frequency_hz),
         ):
             if not abs(theirs - ours) <= 1e-6 * ours:
-                return f"modem.{name}: got {theirs:g}; allowed: {ours:g}, that of this air"
+                return f"modem.{name}: got {theirs:g}; allowed: {ours:g}, as on this channel"
         there = self._members.get(hello.node)
         if there is not None and there.identity != identity and self._is_alive(there):
             there.notice = (
-                f"another daemon asked for our id {hello.node} on this air and was refused: "
+                f"another daemon requested our id {hello.node} on this channel and was refused: "
                 f"{hello.who}; give it another robot_id"
             )
             return (
-                f"robot {hello.node} is on this air already: {there.who}; give one of the two "
+                f"robot {hello.node} is already on this channel: {there.who}; give one of the two "
                 "another robot_id"
             )
         if not self._paced and self._step and there is None:
-            return f"robot {hello.node} came too late: an air in lock-step begins with all robots"
+            return f"robot {hello.node} joined too late: in lock-step all robots start together"
         return ""
 
     def _take_from_radio(self, frames: list[bytes]) -> None:

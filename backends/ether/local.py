@@ -79,7 +79,7 @@ class LocalRadio:
     @property
     def detail(self) -> str:
         """The kind of air, in one line for people."""
-        return "simulated air in this process"
+        return "simulated channel in this process"
 
     @property
     def trouble(self) -> str:

@@ -97,13 +97,13 @@ class EtherRadio:
         """The hub's air, and whether the hub is present, in one line for people."""
         if self._antenna is None:
             return "no hub yet"
-        parts = [self._welcome.air, "the hub is away" if self._is_away else "", self._notice]
+        parts = [self._welcome.air, "the hub is gone" if self._is_away else "", self._notice]
         return ", ".join(part for part in parts if part)
 
     @property
     def trouble(self) -> str:
         """Why nothing comes while the hub is away; else empty."""
-        return "it answers no more; it is asked until it is back" if self._is_away else ""
+        return "it no longer answers; the daemon retries until it is back" if self._is_away else ""
 
     @property
     def levels(self) -> Levels | None:
@@ -296,4 +296,4 @@ class EtherRadio:
         self._beside.append(_Beside([], 0, welcome))
         self._last_host_ns = now_ns
         n = max(1, round(away_s * self._tuning.rate_hz))
-        return self._joined.rejoin(n, "the hub was away", at_ns)
+        return self._joined.rejoin(n, "the hub was gone", at_ns)

@@ -31,13 +31,13 @@ class DeviceStatus:
     def trouble(self) -> str:
         """Why the device delivers nothing while it is away or not present yet; else empty."""
         if self.away:
-            return f"{self.away}; it is looked for until it is back"
+            return f"{self.away}; the daemon retries until it is back"
         return self.waits_for
 
     @property
     def told(self) -> str:
         """News about the device, in words for people; empty if there are none."""
-        return f"away ({self.away}), looked for until it is back" if self.away else self.notice
+        return f"gone ({self.away}), retrying until it is back" if self.away else self.notice
 
     def counted(self, report: CountersReport) -> None:
         """Store what the running process has counted; each process counts from 0."""

@@ -123,7 +123,7 @@ class SoapyRadio:
         try:
             child = self._child = self._make_child(self._patience)
         except OSError as error:
-            raise AbsentError(f"the radio process cannot be started ({error.strerror})") from None
+            raise AbsentError(f"cannot start the radio process ({error.strerror})") from None
         answer = await asyncio.to_thread(self._opened, child)
         if isinstance(answer, Opened):
             self._found = answer.found
@@ -133,7 +133,7 @@ class SoapyRadio:
         if isinstance(answer, Failed):
             raise answer.error()
         raise AbsentError(
-            f'soapy.device: got "{self._settings.device}", whose driver does not answer for '
+            f'soapy.device: got "{self._settings.device}", whose driver has not answered for '
             f"{OPEN_S:g} s; unplug the device and plug it in again, or name another one"
         )
 
@@ -266,7 +266,7 @@ class SoapyRadio:
                 block = assembler.next(child, LOOK_S)
             except EOFError:
                 child = self._reopen(child)
-                return None if child is None else assembler.gap("the radio was away", self._known)
+                return None if child is None else assembler.gap("the radio was gone", self._known)
             if block is not None:
                 return block
             if assembler.quiet_s > HUNG_S + self._settings.longest_tx_s:

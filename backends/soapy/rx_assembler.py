@@ -13,7 +13,7 @@ from backends.soapy.settings import DeviceInfo
 REASONS = {
     GapReason.OVERFLOW: "the radio lost samples",
     GapReason.SENDING: SENDING,
-    GapReason.RESTART: "the radio was started anew",
+    GapReason.RESTART: "the radio was restarted",
 }
 SLOW = "the daemon was too slow"
 

@@ -28,8 +28,8 @@ def open_endpoint(
     except zmq.ZMQError as error:
         socket.close()
         raise BackendError(
-            f'{key}: got "{endpoint}", which cannot be used ({error.strerror}); allowed: an '
-            'endpoint of ZeroMQ such as "tcp://127.0.0.1:52001" or "ipc:///tmp/air", with @ before '
+            f'{key}: got "{endpoint}", which is unusable ({error.strerror}); allowed: a '
+            'ZeroMQ endpoint such as "tcp://127.0.0.1:52001" or "ipc:///tmp/air", with @ before '
             "it to bind and > to connect"
         ) from None
     return socket

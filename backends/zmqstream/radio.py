@@ -31,7 +31,7 @@ QUIET_S = 0.25
 """A paced peer that sends nothing for this long counts as absent."""
 WILD = 1e3
 """Samples beyond this are taken as a wrong item type: no radio's samples are so large."""
-NOT_THERE = "nothing comes from the peer"
+NOT_THERE = "no samples from the peer"
 
 
 class ZmqRadio:
@@ -167,8 +167,8 @@ class ZmqRadio:
         if len(data) % self._type.size:
             self._refuse(
                 len(data) // self._type.size,
-                f"messages of {len(data)} B hold no whole {self._type.name} samples of "
-                f"{self._type.size} B: the peer sends another item type; set zmq.format",
+                f"messages of {len(data)} B are not whole {self._type.name} samples of "
+                f"{self._type.size} B: the peer sends a different item type; set zmq.format",
             )
             return
         samples = self._type.decode(data)
@@ -177,7 +177,7 @@ class ZmqRadio:
         if len(parts) and not max(parts.max(), -parts.min()) < WILD:
             self._refuse(
                 len(samples),
-                f"samples beyond ±{WILD:g}, or no numbers: the peer sends another item type than "
+                f"samples beyond ±{WILD:g}, or not numbers: the peer does not send "
                 f"{self._type.name}; set zmq.format",
             )
             return

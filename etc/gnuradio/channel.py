@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""The air between daemons, as a GNU Radio flowgraph: raw samples over ZeroMQ.
+"""A simulated channel between daemons, as a GNU Radio flowgraph: raw samples over ZeroMQ.
 
-Each node hears the sum of all others, and noise.
+Each node receives the sum of all others, plus noise.
 """
 
 import argparse
@@ -31,25 +31,29 @@ def options() -> argparse.Namespace:
         action="append",
         required=True,
         metavar=("SEND", "RECEIVE"),
-        help="a node's endpoints: SEND it binds, RECEIVE is bound here; one --node for each",
+        help="endpoints of a node: it binds SEND, this binds RECEIVE; one --node for each",
     )
-    parser.add_argument("--pattern", choices=ENDS, default="push", help="ZeroMQ sockets")
-    parser.add_argument("--format", choices=("cf32", "sc16"), default="cf32", help="of a sample")
+    parser.add_argument("--pattern", choices=ENDS, default="push", help="ZeroMQ socket pattern")
+    parser.add_argument("--format", choices=("cf32", "sc16"), default="cf32", help="sample type")
     parser.add_argument("--rate", type=float, default=1e6, metavar="HZ")
-    parser.add_argument("--snr-db", type=float, default=30.0, metavar="DB", help="of a burst")
+    parser.add_argument("--snr-db", type=float, default=30.0, metavar="DB", help="SNR of a burst")
     parser.add_argument(
         "--power-dbfs", type=float, default=-12.0, metavar="DB", help="mean power of a burst"
     )
     parser.add_argument(
-        "--cfo-hz", type=float, default=0.0, metavar="HZ", help="between first and last node"
+        "--cfo-hz",
+        type=float,
+        default=0.0,
+        metavar="HZ",
+        help="frequency offset between first and last node",
     )
-    parser.add_argument("--delay", type=int, default=0, metavar="SAMPLES", help="of the air")
+    parser.add_argument("--delay", type=int, default=0, metavar="SAMPLES", help="propagation delay")
     parser.add_argument(
-        "--block", type=int, default=512, metavar="SAMPLES", help="come at once, in real time"
+        "--block", type=int, default=512, metavar="SAMPLES", help="samples per block, in real time"
     )
     asked = parser.parse_args()
     if len(asked.node) < 2:
-        parser.error("an air needs two nodes: --node SEND RECEIVE --node SEND RECEIVE")
+        parser.error("a channel needs two nodes: --node SEND RECEIVE --node SEND RECEIVE")
     return asked
 
 

@@ -29,12 +29,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--loop",
         nargs="+",
         metavar="ENDPOINT",
-        help="a daemon hears itself: SEND RECEIVE; udp, tcp: HOST:PORT",
+        help="one daemon that hears itself: SEND RECEIVE; udp, tcp: HOST:PORT",
     )
     parser.add_argument("--transport", choices=("zeromq", *SERVERS), default="zeromq")
-    parser.add_argument("--pattern", choices=ENDS, default="push", help="of zeromq")
+    parser.add_argument("--pattern", choices=ENDS, default="push", help="ZeroMQ socket pattern")
     parser.add_argument(
-        "--pdu-size", type=int, default=1024, metavar="BYTES", help="largest; tcp: of every PDU"
+        "--pdu-size", type=int, default=1024, metavar="BYTES", help="largest PDU; tcp: every PDU"
     )
     parser.add_argument("--rate", type=float, default=1e6, metavar="HZ")
     parser.add_argument("--snr-db", type=float, default=25.0, metavar="DB")

@@ -2,7 +2,7 @@
 """GNU Radio's GFSK modem as the PHY of two daemons, or of one that hears itself.
 
 PDUs come and go as PMT messages over ZeroMQ, or over UDP or TCP. A frame is a preamble, an access
-code, twice its length, and the PDU with a CRC-32, whitened.
+code, the length (sent twice), and the PDU with a CRC-32, whitened.
 """
 
 import argparse
@@ -31,7 +31,7 @@ def options() -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.ArgumentDefaultsHelpFormatter
     )
     daemons.add_options(parser)
-    parser.add_argument("--samples", type=int, default=4, metavar="N", help="for a bit")
+    parser.add_argument("--samples", type=int, default=4, metavar="N", help="samples per bit")
     return parser.parse_args()
 
 

@@ -24,7 +24,7 @@ def options() -> argparse.Namespace:
     )
     daemons.add_options(parser)
     parser.add_argument(
-        "--bits", type=int, choices=(1, 2), default=1, help="a carrier: BPSK or QPSK"
+        "--bits", type=int, choices=(1, 2), default=1, help="bits per subcarrier: BPSK or QPSK"
     )
     return parser.parse_args()
 

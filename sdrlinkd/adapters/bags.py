@@ -121,8 +121,8 @@ class _DamagedBag:
         found = [message for piece in salvage(path) if (message := self._message(piece))]
         self._found = sorted(found, key=lambda message: message.time_ns)
         if not found:
-            raise BagError(f"{path}: cannot be read ({why}), and nothing in it can be saved")
-        self.damage = f"{path}: damaged ({why}); {len(found)} messages could be read"
+            raise BagError(f"{path}: cannot be read ({why}), and nothing in it can be recovered")
+        self.damage = f"{path}: damaged ({why}); {len(found)} messages recovered"
         for kind, count in self._unconvertible.items():
             self.damage += f"; {count} of type {kind} could not be converted"
 

@@ -32,7 +32,7 @@ def _made(setup: Setup) -> dict[int, bytes]:
             if policy is not None and (policy.deadman_s or given):
                 raise ConfigError(
                     f"{where}.deadman_s: got {policy.deadman_s:g}, but the type {topic.type} is "
-                    "not known here, so no stop message can be made; allowed: 0"
+                    "unknown here, so no stop message can be made; allowed: 0"
                 )
             continue
         try:

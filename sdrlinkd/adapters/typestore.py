@@ -38,7 +38,7 @@ def empty(kind: str) -> Any:  # noqa: ANN401
     """A message of type `kind` with default fields. Raises UserError if the type is unknown."""
     if not knows(kind):
         raise UserError(
-            f"type {kind} is not known; allowed: ROS 2 types such as nav_msgs/msg/Odometry"
+            f"type {kind} is unknown; allowed: ROS 2 types such as nav_msgs/msg/Odometry"
         )
     return default_message(ros2_types(), kind)
 

@@ -35,8 +35,8 @@ class RuntimeDirectory:
             self._lock = os.open(path / LOCK_NAME, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o640)
         except OSError as error:
             raise BusError(
-                f"bus.runtime_dir: {path} cannot be used ({error.strerror}); name a directory "
-                "this user may write to"
+                f"bus.runtime_dir: {path} is unusable ({error.strerror}); name a directory "
+                "that this user may write to"
             ) from None
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -101,7 +101,7 @@ def _refuse_foreign(path: Path) -> None:
     if is_foreign(path.stat(), os.getuid()):
         raise BusError(
             f"bus.runtime_dir: {path} belongs to another user or is open to all; name a directory "
-            "of this user's own"
+            "that this user owns"
         )
 
 

@@ -40,7 +40,7 @@ class Commands(TyperGroup):
 app = typer.Typer(
     name="sdrlinkctl",
     cls=Commands,
-    help="Shows and steers sdrlinkd: ROS 2 messages between robots over software radio.",
+    help="Inspects and controls sdrlinkd: ROS 2 messages between robots over software radio.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
@@ -50,11 +50,11 @@ RuntimeDir = Annotated[
     typer.Option(
         "--runtime-dir",
         envvar="SDRLINKD_RUNTIME_DIR",
-        help="Directory of the daemon's sockets; by default the system service's or your own.",
+        help="Directory of the daemon's sockets; default: the system service's, else your own.",
         show_default=False,
     ),
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for programs.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print machine-readable JSON.")]
 
 
 def main() -> None:
@@ -84,8 +84,8 @@ def run(arguments: list[str]) -> int:
         if os.environ.get(DEBUG_VARIABLE):
             raise
         sys.stderr.write(
-            f"sdrlinkctl: a bug of ours: {type(error).__name__}: {error}; {DEBUG_VARIABLE}=1 shows "
-            "where, please report it\n"
+            f"sdrlinkctl: internal error: {type(error).__name__}: {error}; please report it with "
+            f"the traceback that {DEBUG_VARIABLE}=1 prints\n"
         )
         return 1
     return 0
@@ -98,7 +98,7 @@ def connect(runtime_dir: Path | None, timeout_s: float = 5.0) -> ControlClient:
 
 @app.callback(invoke_without_command=True)
 def _root(
-    version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
 ) -> None:
     if version:
         typer.echo(f"sdrlinkctl {__version__}")

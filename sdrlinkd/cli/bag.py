@@ -37,7 +37,7 @@ app.add_typer(bags, name="bag")
 
 @bags.command()
 def info(bag: Annotated[Path, typer.Argument(help="rosbag2 folder, .mcap, .db3 or .bag")]) -> None:
-    """How long a recording is; how many messages of each topic, how often and how large."""
+    """Show a recording's duration, and the count, rate and sizes of each topic's messages."""
     opened = open_bag(bag)
     console = Console(stderr=True)
     with Progress(
@@ -73,16 +73,16 @@ def table_of(found: BagSummary) -> FittedTable:
 def play(
     bag: Annotated[Path, typer.Argument(help="rosbag2 folder, .mcap, .db3 or .bag")],
     rate: Annotated[
-        float, typer.Option("--rate", "-r", min=0.001, help="Times as fast as recorded.")
+        float, typer.Option("--rate", "-r", min=0.001, help="Playback speed; 1: as recorded.")
     ] = 1.0,
     duration: Annotated[
-        float | None, typer.Option(min=0.001, help="Only the first seconds of the recording.")
+        float | None, typer.Option(min=0.001, help="Play only this many seconds from its start.")
     ] = None,
     topics: Annotated[
-        list[str] | None, typer.Option("--topics", help="Only this topic; may be repeated.")
+        list[str] | None, typer.Option("--topics", help="Play only this topic; repeatable.")
     ] = None,
     remap: Annotated[
-        list[str] | None, typer.Option(help="FROM:=TO, the daemon's topic for one of the bag.")
+        list[str] | None, typer.Option(help="FROM:=TO: play the bag's FROM as the daemon's TO.")
     ] = None,
     runtime_dir: RuntimeDir = None,
 ) -> None:
@@ -96,7 +96,9 @@ def play(
     for name, reason in left_out.items():
         console.print(f"left out: {name} ({reason})", style="yellow", markup=False)
     if not route:
-        raise UserError(f"{bag}: the daemon takes none of its topics; it takes {', '.join(taken)}")
+        raise UserError(
+            f"{bag}: the daemon carries none of its topics; it carries {', '.join(taken)}"
+        )
 
     def messages() -> Iterator[BagMessage]:
         taken_ones = (m for m in opened.messages() if m.topic in route)
@@ -157,9 +159,9 @@ def _route(
             candidates.append(f"/{namespace.strip('/')}{topic.name}")
         target = next((name for name in candidates if name in taken), "")
         if not target:
-            left_out[topic.name] = "the daemon's registry does not have it"
+            left_out[topic.name] = "not a topic that the daemon carries"
         elif taken[target].type != topic.type:
-            left_out[topic.name] = f"is {topic.type}, the registry has {taken[target].type}"
+            left_out[topic.name] = f"type {topic.type}, but the registry has {taken[target].type}"
         else:
             route[topic.name] = target
     return route, left_out

@@ -20,10 +20,10 @@ def bench(
         typer.Argument(help="; ".join(BENCHMARKS), autocompletion=lambda: list(BENCHMARKS)),
     ],
 ) -> None:
-    """Measure beside peers: `bench pound --quick`; further options are the benchmark's own."""
+    """Run a benchmark, such as `bench pound --quick`; further options are the benchmark's own."""
     if name not in BENCHMARKS:
         raise UserError(f"bench: got {name}; allowed: {', '.join(BENCHMARKS)}")
     if importlib.util.find_spec("benchmarks") is None:
-        raise UserError("the benchmarks are in the source tree only; run this in a checkout of it")
+        raise UserError("the benchmarks are only in the source tree; run this in a checkout of it")
     done = subprocess.run([sys.executable, "-m", f"benchmarks.{name}", *context.args], check=False)  # noqa: S603
     raise typer.Exit(done.returncode)

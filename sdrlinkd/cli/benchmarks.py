@@ -20,38 +20,38 @@ class Benchmark(NamedTuple):
 
 BENCHMARKS: dict[str, Benchmark] = {
     "bus": Benchmark("The inner path: bus, queue, PDUs and back.", 1),
-    "modem_path": Benchmark("The modem in a daemon: latency, and how much faster than time.", 2),
+    "modem_path": Benchmark("The modem in a daemon: latency, and speed relative to real time.", 2),
     "phy_per": Benchmark(
-        "SNR that the modem needs, through all that radios do to a signal.", 15,
+        "SNR that the modem needs, with the impairments of real radios.", 15,
         peers=("libliquid-dev", "gcc", "gnuradio"),
     ),
     "phy_speed": Benchmark(
-        "Samples a second of one core, sent and received.", 2,
+        "Samples per second on one core, transmit and receive.", 2,
         peers=("libliquid-dev", "gcc", "gnuradio"),
     ),
-    "access": Benchmark("Medium access of two robots on one channel, by samples.", 3),
+    "access": Benchmark("Medium access of two robots on one channel, at sample level.", 3),
     "ether": Benchmark("The simulated air with eight daemons, and in real time with two.", 3),
     "radio": Benchmark(
-        "Daemons on test radios by SoapySDR, under full load.", 5,
+        "Daemons on SoapySDR test radios, under full load.", 5,
         needs=("libsoapysdr-dev", "g++"), peers=("gnuradio",),
     ),
     "flowgraphs": Benchmark("GNU Radio's flowgraphs as a modem.", 10, needs=("gnuradio",)),
     "pound": Benchmark(
-        "Section VI of the Pound paper, beside what a team would use instead.", 30,
+        "Section VI of the Pound paper, next to common alternatives.", 30,
         peers=("iproute2", "eclipse-zenoh", "ros-jazzy-rclpy"),
     ),
-    "timesync": Benchmark("Clock filters on the same stamps.", 4),
+    "timesync": Benchmark("Clock filters on the same time stamps.", 4),
     "latency": Benchmark(
-        "The Sensors paper's assessment, beside MAVLink and XRCE-DDS.", 15, peers=("pymavlink",)
+        "The Sensors paper's assessment, next to MAVLink and XRCE-DDS.", 15, peers=("pymavlink",)
     ),
-    "phy_curves": Benchmark("Draws error rates beside what any code could do.", 5, has_rows=False),
-    "structure": Benchmark("How the code is built: calls of one message.", 0.2, has_rows=False),
+    "phy_curves": Benchmark("Plots error rates next to the bound for any code.", 5, has_rows=False),
+    "structure": Benchmark("Structure of the code: calls per message.", 0.2, has_rows=False),
     "radio.team": Benchmark(
         "Odometry and images over two test radios, both ways.", 1,
         needs=("libsoapysdr-dev", "g++"), has_rows=False,
     ),
     "peers.pound": Benchmark(
-        "Laser and image through each peer of `pound`, nothing of ours.", 10,
+        "Laser and image through each peer of `pound`, without sdrlinkd.", 10,
         needs=("iproute2",), peers=("eclipse-zenoh", "ros-jazzy-rclpy"), has_rows=False,
     ),
 }  # fmt: skip

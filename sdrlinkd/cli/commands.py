@@ -13,62 +13,61 @@ class Listed(NamedTuple):
 
 COMMANDS = {
     "status": Listed(
-        "The verdict in plain words, and one screen of reasons; the exit code is the verdict, too.",
+        "Show the link's verdict and its reasons on one screen; the exit code is the verdict, too.",
         ("status",),
     ),
     "top": Listed(
-        "The link, live: verdict, robots both ways, topics, the last minutes; why and set, too.",
+        "Live view: verdict, neighbors, topics, the last minutes; explains and sets policies.",
         ("top",),
     ),
-    "list": Listed("The daemons of this host.", ("listing",)),
-    "init": Listed("Write a configuration and a registry to begin with.", ("init",)),
+    "list": Listed("List the daemons of this host.", ("listing",)),
+    "init": Listed("Write a first configuration and registry.", ("init",)),
     "doctor": Listed(
-        "Check machine, environment, radio, permissions and clock, and say what to do.",
+        "Check machine, environment, radio, permissions and clock, and say what to fix.",
         ("doctor",),
     ),
     "topics": Listed(
-        "Topics of the registry, and those heard from other robots.", ("topics", "dictionary")
+        "List topics of the registry, and those received from other robots.",
+        ("topics", "dictionary"),
     ),
-    "topic": Listed("Rate, bandwidth and delay of a topic heard.", ("topic",)),
+    "topic": Listed("Rate, bandwidth and delay of a received topic.", ("topic",)),
     "latency": Listed(
-        "How late messages come and why, topic by topic; and the clocks of the robots heard.",
+        "Show the latency of each received topic, its causes, and the clocks of the neighbors.",
         ("latency",),
     ),
     "check": Listed(
         "Verify the running daemon's ledger; exit code 1 when it does not add up.", ("status",)
     ),
-    "why": Listed("What happens to a topic, in plain words.", ("policy",)),
+    "why": Listed("Explain in plain words what happens to a topic.", ("policy",)),
     "set": Listed(
-        "Change a topic's policy until the next restart or reload; shows what was and what is.",
+        "Change a topic's policy until the next restart or reload; prints old and new values.",
         ("policy",),
     ),
-    "reload": Listed("Have the daemon read its topic policies anew.", ("status",)),
+    "reload": Listed("Make the daemon re-read its topic policies.", ("status",)),
     "pub": Listed("Publish a message to the daemon.", ("messages",)),
-    "echo": Listed("Show messages heard from other robots.", ("messages",)),
+    "echo": Listed("Show messages received from other robots.", ("messages",)),
     "bag": Listed("Recordings of messages.", ("bag",)),
     "plan": Listed(
-        "Airtime and worst-case latency by topic; exit code 1 when the air cannot carry it.",
+        "Plan airtime and worst-case latency by topic; exit code 1 when the traffic does not fit.",
         ("plan",),
     ),
     "pdu": Listed("PDUs on the air.", ("pdu",)),
     "phy": Listed("The modem, and recordings of samples.", ("phy", "wifi")),
-    "radio": Listed("Radios of this machine, by SoapySDR.", ("radio",)),
-    "record": Listed(
-        "Record what a radio hears, without a daemon. Nothing is ever sent.", ("record",)
-    ),
+    "radio": Listed("Radios of this machine, through SoapySDR.", ("radio",)),
+    "record": Listed("Record what a radio hears, without a daemon; never transmits.", ("record",)),
     "replay": Listed(
-        "Send what is in a recording, without a daemon: each burst at its time.", ("replay",)
+        "Transmit a recording without a daemon, each burst at its recorded time.", ("replay",)
     ),
     "demo": Listed(
-        "Send a robot's messages through daemons and radios; measure what the paper measured.",
+        "Send a robot's messages through daemons and radios; repeat the paper's measurements.",
         ("demo",),
     ),
     "lab": Listed(
-        "Run several robots' daemons on one simulated air; measure who got what of whom.",
+        "Run several robots' daemons on one simulated channel; measure the delivery of each pair.",
         ("lab",),
     ),
     "bench": Listed(
-        "Measure beside peers: `bench pound --quick`; further options are the benchmark's own.",
+        "Run a benchmark, such as `bench pound --quick`; further options are the benchmark's own.",
         ("bench",),
     ),
     "help": Listed(

@@ -55,24 +55,26 @@ PICTURES = ("latency_cdf.png", "path.png")
 def demo(
     link: Annotated[
         list[LinkKind] | None,
-        typer.Option(help="What carries the PDUs; may be repeated. By default all, one by one."),
+        typer.Option(help="What carries the PDUs; repeatable. Default: all, one after another."),
     ] = None,
     bag: Annotated[
-        Path | None, typer.Option(help="Send this recording; by default a built-in robot drives.")
+        Path | None, typer.Option(help="Recording to send; default: a built-in robot's drive.")
     ] = None,
     registry: Annotated[
-        Path | None, typer.Option(help="Topic registry; by default the bag's own topics.")
+        Path | None, typer.Option(help="Topic registry; default: the bag's own topics.")
     ] = None,
     topics: Annotated[
-        list[str] | None, typer.Option("--topics", help="Only this topic; may be repeated.")
+        list[str] | None, typer.Option("--topics", help="Send only this topic; repeatable.")
     ] = None,
     duration: Annotated[
         float | None,
-        typer.Option(min=0.1, max=1e6, help="Seconds of it; by default all (built-in: 15)."),
+        typer.Option(
+            min=0.1, max=1e6, help="Seconds of it to send; default: all (built-in robot: 15)."
+        ),
     ] = None,
-    speed: Annotated[float, typer.Option(min=0.01, help="Times as fast as recorded.")] = 1.0,
+    speed: Annotated[float, typer.Option(min=0.01, help="Playback speed; 1: as recorded.")] = 1.0,
     pdu_size: Annotated[
-        int, typer.Option(min=MIN_PDU_SIZE, max=MAX_PDU_SIZE, help="Octets of a PDU.")
+        int, typer.Option(min=MIN_PDU_SIZE, max=MAX_PDU_SIZE, help="PDU size in octets.")
     ] = 64,
     mcs: Annotated[
         int, typer.Option(min=0, max=9, help="Modulation and code rate; `phy info` lists them.")
@@ -83,24 +85,24 @@ def demo(
     ppm: Annotated[
         float,
         typer.Option(
-            "--cfo-ppm", min=-40, max=40, help="Sender's crystal against the receiver's, in ppm."
+            "--cfo-ppm", min=-40, max=40, help="Crystal offset between sender and receiver, in ppm."
         ),
     ] = 10.0,
     channel: Annotated[
-        ChannelKind, typer.Option(help="The simulated air: noise alone, or echoes that fade.")
+        ChannelKind, typer.Option(help="Simulated channel: noise only, or fading multipath.")
     ] = ChannelKind.AWGN,
     rate: Annotated[
         float | None,
         typer.Option(
             min=1e4,
             max=2e8,
-            help="Samples a second of the modem; by default what this machine carries, up to 5e6.",
+            help="The modem's sample rate; default: what this machine sustains, up to 5e6.",
         ),
     ] = None,
     record: Annotated[
-        Path | None, typer.Option(help="Keep the recording of iqfile under this name (SigMF).")
+        Path | None, typer.Option(help="Keep the SigMF recording of iqfile under this name.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of all chance.")] = 1,
+    seed: Annotated[int, typer.Option(help="Random seed.")] = 1,
     json_file: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="Also write the report here.")
     ] = None,
@@ -108,7 +110,7 @@ def demo(
         "build/demo"
     ),
 ) -> None:
-    """Send a robot's messages through daemons and radios; measure what the paper measured."""
+    """Send a robot's messages through daemons and radios; repeat the paper's measurements."""
     console = screen_console()
     pictures = load_pictures("sdrlinkd.demo")
     make_folder(out, PICTURES)
@@ -155,13 +157,13 @@ def demo(
 
 def _measure(console: Console, source: Source, options: Options) -> float:
     """The sample rate in Hz that this machine sustains; prints a line with the reason."""
-    with console.status("measuring what this machine carries"):
+    with console.status("measuring what this machine sustains"):
         found = find_rate(source, options)
     tried = ", ".join(
-        f"{100 * each.busy:.0f} % of the time at {each.rate_hz / 1e6:g}" for each in found.tried
+        f"{100 * each.busy:.0f} % at {each.rate_hz / 1e6:g} Msps" for each in found.tried
     )
     rate = f"rate: {found.rate_hz / 1e6:g} Msps"
-    _say(console, f"{rate}; a processor of this machine is busy with it for {tried} Msps")
+    _say(console, f"{rate}; load on one CPU core: {tried}")
     return found.rate_hz
 
 

@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 @topics_app.command("train-dict")
 def train_dict(
     bag: Annotated[Path, typer.Argument(help="rosbag2 folder, .mcap, .db3 or .bag")],
-    topic: Annotated[str, typer.Argument(help="As it is called in the recording.")],
+    topic: Annotated[str, typer.Argument(help="Topic name in the recording.")],
     out: Annotated[
-        Path | None, typer.Option(help="File to write; by default odom.zdict for /odom.")
+        Path | None, typer.Option(help="File to write; default: odom.zdict for /odom.")
     ] = None,
-    size: Annotated[str, typer.Option(help="Bytes of the dictionary.")] = "8k",
+    size: Annotated[str, typer.Option(help="Size of the dictionary in bytes.")] = "8k",
 ) -> None:
-    """Train on every other message of a recording, and try it on the rest."""
+    """Train a zstd dictionary on every other message of a recording; test it on the rest."""
     from zstandard import ZstdCompressionDict
 
     from sdrlinkd.adapters import open_bag
@@ -53,7 +53,7 @@ def train_dict(
     except OSError as error:
         raise UserError(f"{out}: cannot be written ({error.strerror})") from None
     typer.echo(
-        f"{out}: {len(made)} B from {len(payloads[::2])} messages; {len(rest)} others take "
+        f"{out}: {len(made)} B from {len(payloads[::2])} messages; {len(rest)} others shrink to "
         f"{100 * with_it / raw:.0f} % of their size with it, {100 * without / raw:.0f} % with zstd "
         "alone"
     )

@@ -29,21 +29,21 @@ WAKES = 1000
 @app.command()
 def doctor(
     config: Annotated[
-        Path | None, typer.Option("--config", help="What the machine is to carry.")
+        Path | None, typer.Option("--config", help="Configuration that this machine has to run.")
     ] = None,
     runtime_dir: RuntimeDir = None,
     as_json: AsJson = False,
 ) -> None:
-    """Check machine, environment, radio, permissions and clock, and say what to do.
+    """Check machine, environment, radio, permissions and clock, and say what to fix.
 
-    A radio is opened, and nothing is sent. Exit code 1 where something must be done.
+    Opens the radio, but transmits nothing. Exit code 1 if something needs fixing.
     """
     from sdrlinkd.config import load_config, make_setup
 
     setup = None
     if config is not None:
         setup = make_setup(load_config(config), config.parent, str(config))
-    with Console(stderr=True).status("looking"):
+    with Console(stderr=True).status("checking"):
         found, host = _look(setup, runtime_dir)
     is_bad = any(each.state == "bad" for each in found)
     if as_json:
@@ -95,7 +95,7 @@ def _radio(setup: "Setup | None", device: str) -> list["Finding"]:
     try:
         there = probe_devices(device)
     except BackendError as error:
-        to_do = "name one device with soapy.device, such as driver=hackrf, and look again"
+        to_do = "name one device with soapy.device, such as driver=hackrf, and check again"
         return [Finding("device", State.BAD, str(error), to_do)]
     driver = driver_of(device)
     is_on_usb = not driver or (driver in ON_USB and not is_networked(device))

@@ -26,12 +26,13 @@ def ether(
     scenario: Annotated[
         Path | None,
         typer.Argument(
-            help="Robots and air: a file, or a shipped one by name; by default all hear all.",
+            help="Scenario: a file or the name of a shipped one; default: all robots in range.",
             autocompletion=scenario_names,
         ),
     ] = None,
     directory: Annotated[
-        Path, typer.Option("--dir", help="Folder for the hub's sockets; daemons name it, too.")
+        Path,
+        typer.Option("--dir", help="Folder of the hub's sockets, as in the daemons' ether.dir."),
     ] = DEFAULT_DIRECTORY,
     listen: Annotated[
         str,
@@ -44,14 +45,14 @@ def ether(
         Path | None, typer.Option(help="Folder of the logs that a scenario replays.")
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, max=MAX_SEED, help="Of all chance on the air.")
+        int | None, typer.Option(min=0, max=MAX_SEED, help="Random seed of the channel.")
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(min=1e-3, max=1e5, help="Of a lock-step run.")
+        float | None, typer.Option(min=1e-3, max=1e5, help="Seconds of a lock-step run.")
     ] = None,
-    pace: Annotated[Pace | None, typer.Option(help="By the clock, or in lock-step.")] = None,
+    pace: Annotated[Pace | None, typer.Option(help="Real time or lock-step.")] = None,
 ) -> None:
-    """Serve one simulated air to daemons with `backend = "ether"`, until Ctrl-C."""
+    """Serve one simulated channel to daemons with `backend = "ether"` until Ctrl-C."""
     chosen = None
     if scenario is not None:
         scenario = find_scenario(scenario)
@@ -60,13 +61,12 @@ def ether(
     hub = make_hub(chosen, directory, traces, listen)
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: hub.stop())
-    also = f", and at {listen}" if listen else ""
-    title = "all hear all at 20 dB"
+    title = "all robots in range, at 20 dB"
     if chosen is not None and scenario is not None:
         title = chosen.title or scenario.stem
-    hub.run(
-        lambda: typer.echo(f"sdrlink-ether {__version__}: {title}; sockets in {directory}{also}")
-    )
+    also = f", and at {listen}" if listen else ""
+    served = f"sdrlink-ether {__version__}: {title}; sockets in {directory}{also}"
+    hub.run(lambda: typer.echo(served))
 
 
 def main() -> None:

@@ -116,7 +116,7 @@ def _unknown(name: str, step: str, before: str, value: object) -> str:
     known = list(_parts(value))
     where = f"in {before}" if before else "in the snapshot"
     if not known:
-        return f"--field {name}: {where} there is nothing to choose from"
+        return f"--field {name}: no fields {where}"
     close = get_close_matches(step, [*known, *(key.rsplit("/", 1)[-1] for key in known)], n=1)
     hint = f"; did you mean {close[0]}?" if close else ""
     return f"--field {name}: no {step} {where}{hint}; allowed: {', '.join(known)}"

@@ -38,27 +38,29 @@ def init(
         typer.Option(help=", ".join(RADIOS), autocompletion=lambda: list(RADIOS)),
     ] = "",
     robots: Annotated[
-        int | None, typer.Option(min=1, max=MOST_ROBOTS, help="So many share the air.")
+        int | None,
+        typer.Option(min=1, max=MOST_ROBOTS, help="Number of robots that share the channel."),
     ] = None,
     frequency: Annotated[
-        str, typer.Option(metavar="HZ", help='Middle of the channel, such as "433.92 MHz".')
+        str, typer.Option(metavar="HZ", help='Centre frequency, such as "433.92 MHz".')
     ] = "",
     own: Annotated[
-        str, typer.Option("--id", help="Which robot this is, from 1 on; all: a file for each.")
+        str, typer.Option("--id", help="Id of this robot, from 1; all: a file for each robot.")
     ] = "",
     topic: Annotated[
         list[str] | None,
-        typer.Option(help="NAME:TYPE; with --bag or --from-graph NAME; repeatable."),
+        typer.Option(help="NAME:TYPE, or NAME with --bag or --from-graph; repeatable."),
     ] = None,
-    bag: Annotated[Path | None, typer.Option(help="The topics are those of a recording.")] = None,
+    bag: Annotated[Path | None, typer.Option(help="Take the topics from a recording.")] = None,
     from_graph: Annotated[
-        bool, typer.Option("--from-graph", help="The topics are those that ROS 2 has now.")
+        bool, typer.Option("--from-graph", help="Take the topics from the running ROS 2 graph.")
     ] = False,
     from_daemon: Annotated[
-        bool, typer.Option("--from-daemon", help="As the running daemon, for another --id.")
+        bool,
+        typer.Option("--from-daemon", help="Copy the running daemon's files for another --id."),
     ] = False,
     device: Annotated[
-        str, typer.Option(metavar="ARGS", help='As soapy.device, such as "driver=hackrf".')
+        str, typer.Option(metavar="ARGS", help='Value of soapy.device, such as "driver=hackrf".')
     ] = "",
     hub: Annotated[
         str,
@@ -68,12 +70,12 @@ def init(
         ),
     ] = "",
     out: Annotated[Path, typer.Option(help="Folder to write to.")] = Path(),
-    force: Annotated[bool, typer.Option("--force", help="Replace files.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
     runtime_dir: RuntimeDir = None,
 ) -> None:
-    """Write a configuration and a registry to begin with.
+    """Write a first configuration and registry.
 
-    What no option says is asked, where a terminal is there to answer.
+    On a terminal, init asks for what the options leave open.
     """
     questions = Questions()
     if from_daemon:
@@ -146,7 +148,7 @@ def _tell(choice: Choice) -> None:
     for name, reason in choice.left_out.items():
         console.print(f"left out: {name} ({reason})", style="yellow")
     if any(reason.startswith("no room") for reason in choice.left_out.values()):
-        console.print("choose others with --topic NAME, repeated", style="yellow")
+        console.print("select topics with --topic NAME, repeatable", style="yellow")
 
 
 def _copied(questions: Questions, own: str, runtime_dir: Path | None) -> dict[str, bytes]:
@@ -161,7 +163,7 @@ def _copied(questions: Questions, own: str, runtime_dir: Path | None) -> dict[st
         raise UserError('--id: got "all"; allowed with --from-daemon: one robot')
     prefix = f"/{config.namespace.strip('/')}/" if config.namespace else "/"
     lines = "".join(f"{each['name'].removeprefix(prefix)},{each['type']}\n" for each in topics)
-    registry = "# Topic registry: the same file at all robots.\n" + lines
+    registry = "# Topic registry: all robots need the same file.\n" + lines
     return {
         REGISTRY: registry.encode(),
         "sdrlinkd.toml": copy_of(config, own_id, ids[0]).encode(),
@@ -179,14 +181,14 @@ def _write(files: dict[str, bytes], out: Path, force: bool) -> None:
     there = [name for name in files if (out / name).exists()]
     if there and not force:
         names = ", ".join(str(out / name) for name in there)
-        raise UserError(f"{names}: there already; allowed: another --out, or --force to replace")
+        raise UserError(f"{names}: already there; allowed: another --out, or --force to replace")
     _try_out(files, out)
     try:
         out.mkdir(parents=True, exist_ok=True)
         for name in files:
             if (out / name).is_dir():
-                raise IsADirectoryError(EISDIR, "it is a folder", str(out / name))
-        # A folder on the same file system, so that files only have to be renamed.
+                raise IsADirectoryError(EISDIR, "it is a directory", str(out / name))
+        # On the same file system, so that they only have to be renamed.
         with tempfile.TemporaryDirectory(dir=out, prefix=".init-") as aside:
             for name, content in files.items():
                 (Path(aside) / name).write_bytes(content)
@@ -226,7 +228,7 @@ def _next(files: dict[str, bytes], out: Path, preset: RadioPreset | None, hub: s
     lines += [f"  sdrlinkd --config {each}{behind}" for each in configs[: None if is_here else 1]]
     if len(configs) > 1 and not is_here:
         rest = ", ".join(each.name for each in configs[1:])
-        lines.append(f"  bring {REGISTRY} and {rest} to the other robots, one each")
+        lines.append(f"  copy {REGISTRY} and one of {rest} to each other robot")
     elif len(configs) == 1 and (preset is None or preset.shares_air):
-        lines.append(f"  the other robots need the same {REGISTRY}, and an --id each")
+        lines.append(f"  each other robot needs the same {REGISTRY} and its own --id")
     return lines

@@ -42,31 +42,33 @@ def lab(
     scenario: Annotated[
         Path,
         typer.Argument(
-            help="Robots and air: a file, or the name of a shipped one, such as two-robots.",
+            help="Scenario: a file, or the name of a shipped one, such as two-robots.",
             autocompletion=scenario_names,
         ),
     ],
     bag: Annotated[
-        Path | None, typer.Option(help="What the robots send; by default a built-in robot's.")
+        Path | None,
+        typer.Option(help="Recording that the robots send; default: a built-in robot's messages."),
     ] = None,
     traces: Annotated[
         Path | None, typer.Option(help="Folder of the logs whose outages a scenario replays.")
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(min=0.5, max=1e5, help="Seconds that the robots send.")
+        float | None, typer.Option(min=0.5, max=1e5, help="Seconds of traffic.")
     ] = None,
     pace: Annotated[
-        Pace | None, typer.Option(help="By the clock; or in lock-step, the same for each seed.")
+        Pace | None,
+        typer.Option(help="In real time, or in lock-step, where a seed repeats exactly."),
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, max=MAX_SEED, help="Of all chance.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, max=MAX_SEED, help="Random seed.")] = None,
     access: Annotated[
-        Policy | None, typer.Option(help="Another access policy than the scenario's.")
+        Policy | None, typer.Option(help="Access policy; default: that of the scenario.")
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder for report.json and lab.png.")] = Path(
         "build/lab"
     ),
 ) -> None:
-    """Run several robots' daemons on one simulated air; measure who got what of whom."""
+    """Run several robots' daemons on one simulated channel; measure the delivery of each pair."""
     console = screen_console()
     scenario = find_scenario(scenario)
     chosen = chosen_scenario(scenario, seed, duration, pace)
@@ -94,7 +96,7 @@ def lab(
                 # Only once the daemons answer.
                 told.extend(each.bus.runtime_dir for each in state.snapshots)
                 others = "".join(f", {Path(each).name}" for each in told[1:])
-                hint = f"look at one: sdrlinkctl latency --runtime-dir {told[0]}{others}"
+                hint = f"inspect one: sdrlinkctl latency --runtime-dir {told[0]}{others}"
                 console.print(hint, highlight=False, markup=False, soft_wrap=True)
             if console.is_terminal:
                 live.update(live_table(title, state), refresh=True)
@@ -119,18 +121,18 @@ def _summary(report: LabReport, wall_s: float) -> list[str]:
     ]
     if report.out_of_reach:
         pairs = ", ".join(f"{sender} → {receiver}" for sender, receiver in report.out_of_reach)
-        lines.append(f"never in reach of each other, and in no figure: {pairs}")
+        lines.append(f"never in range of each other, and excluded from all figures: {pairs}")
     for robot in report.robots:
         text = (
             f"robot {robot.id}: {robot.access}; {100 * robot.airtime_share:.1f} % of the air, "
             f"{robot.bursts_sent} bursts, {robot.bursts_failed} failed, {robot.bursts_late} late "
-            f"and sent again; {robot.pdus_bad} PDUs and {robot.headers_bad} headers bad; "
+            f"and resent; {robot.pdus_bad} PDUs and {robot.headers_bad} headers bad; "
             f"dropped: {robot.dropped or 'nothing'}"
         )
         if robot.left:
-            text += f"; {robot.left} messages were left"
+            text += f"; {robot.left} messages unsent"
         if robot.samples_lost:
-            text += f"; this machine was too slow: {robot.samples_lost} samples lost"
+            text += f"; CPU too slow: {robot.samples_lost} samples dropped"
         if not robot.ledger_adds_up:
             text += "; THE LEDGER DOES NOT ADD UP"
         lines.append(text)

@@ -23,15 +23,18 @@ from sdrlinkd.tables import screen_console
 def latency(
     topic: Annotated[
         str | None,
-        typer.Argument(help="Only this one, in full.", autocompletion=heard_names),
+        typer.Argument(help="Show only this topic, in full.", autocompletion=heard_names),
     ] = None,
     runtime_dir: RuntimeDir = None,
     as_json: AsJson = False,
     watch: Annotated[
-        bool, typer.Option("--watch", "-w", help="Keep the screen fresh, also over a restart.")
+        bool,
+        typer.Option(
+            "--watch", "-w", help="Refresh the screen until Ctrl-C, even across a restart."
+        ),
     ] = False,
 ) -> None:
-    """How late messages come and why, topic by topic; and the clocks of the robots heard."""
+    """Show the latency of each received topic, its causes, and the clocks of the neighbors."""
     if watch and not as_json:
         _watch(Follower(runtime_dir), topic)
     with connect(runtime_dir) as control:

@@ -40,7 +40,7 @@ class Listed(NamedTuple):
 
 @app.command("list")
 def list_daemons(as_json: AsJson = False) -> None:
-    """The daemons of this host."""
+    """List the daemons of this host."""
     found = [_look(directory) for directory in directories()]
     if as_json:
         typer.echo(msgspec.json.encode([_told(each) for each in found]).decode())
@@ -100,7 +100,7 @@ def _resolved(path: Path) -> Iterable[Path]:
 def _look(directory: Path) -> Listed:
     snapshot, problem = None, "no answer"
     if not os.access(directory / CONTROL_SOCKET, os.W_OK):
-        problem = "not open to this user"
+        problem = "this user has no access"
     try:
         with connect(directory, PATIENCE_S) as control:
             snapshot = msgspec.convert(control.ask("status"), Snapshot)

@@ -29,16 +29,18 @@ MAX_SHOWN_ITEMS = 12
 def pub(
     topic: Annotated[
         str,
-        typer.Argument(help="Its name on the bus or in the registry.", autocompletion=topic_names),
+        typer.Argument(
+            help="Topic name on the bus or in the registry.", autocompletion=topic_names
+        ),
     ],
     values: Annotated[
-        str, typer.Argument(help="Fields in YAML: '{linear: {x: 0.5}}'; the rest is default.")
+        str, typer.Argument(help="Fields in YAML: '{linear: {x: 0.5}}'; others keep their default.")
     ] = "{}",
     cdr_file: Annotated[
         Path | None, typer.Option("--cdr", help="Send this file's CDR bytes instead.")
     ] = None,
     rate: Annotated[
-        float, typer.Option("--rate", "-r", min=0.0, max=1e6, help="Hz; 0: once.")
+        float, typer.Option("--rate", "-r", min=0.0, max=1e6, help="Rate in Hz; 0: send once.")
     ] = 0.0,
     times: Annotated[int, typer.Option("--times", "-t", min=0, help="0: until Ctrl-C.")] = 0,
     qos: Annotated[
@@ -51,10 +53,11 @@ def pub(
         typer.Option(min=0, max=255, help="Destination robot.", autocompletion=robot_names),
     ] = None,
     lifespan: Annotated[
-        str | None, typer.Option(help="Worthless after: 300ms, 2s; plain numbers are seconds.")
+        str | None,
+        typer.Option(help="Discard when older than this: 300ms, 2s; plain numbers are seconds."),
     ] = None,
     receipt: Annotated[
-        bool, typer.Option("--receipt", help="Say what became of each message, robot by robot.")
+        bool, typer.Option("--receipt", help="Report the outcome of each message at each robot.")
     ] = False,
     runtime_dir: RuntimeDir = None,
 ) -> None:
@@ -123,11 +126,12 @@ def echo(
     raw: Annotated[bool, typer.Option("--raw", help="Show the CDR bytes in hex.")] = False,
     count: Annotated[int, typer.Option("--count", "-n", min=0, help="0: until Ctrl-C.")] = 0,
     timeout: Annotated[
-        float | None, typer.Option(min=0, max=1e6, help="Stop after this many silent seconds.")
+        float | None,
+        typer.Option(min=0, max=1e6, help="Stop after this many seconds without a message."),
     ] = None,
     runtime_dir: RuntimeDir = None,
 ) -> None:
-    """Show messages heard from other robots."""
+    """Show messages received from other robots."""
     console = Console()
     shown = 0
     with connect(runtime_dir) as control:
@@ -142,7 +146,7 @@ def echo(
                 return
     if count or not shown:
         raise UserError(
-            f"{topic}: {shown} messages in the time given; `sdrlinkctl topics` lists what is heard"
+            f"{topic}: {shown} messages before --timeout; `sdrlinkctl topics` lists received topics"
         )
 
 

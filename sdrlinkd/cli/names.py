@@ -29,9 +29,9 @@ def refuse_own(given: str, snapshot: Snapshot, rx_format: str) -> None:
     short = name.removeprefix(_on_bus("", snapshot))
     heard = _place(rx_format, "N") + "/" + short
     robots = sorted(each.src for each in snapshot.link.neighbors)
-    so_far = f"heard so far: {', '.join(map(str, robots))}" if robots else "none is heard so far"
+    so_far = f"heard so far: {', '.join(map(str, robots))}" if robots else "none heard so far"
     raise UserError(
-        f"topic: got {given}, which this robot sends; you hear {heard} of robot N ({so_far})"
+        f"topic: got {given}, which this robot sends; robot N's appears as {heard} ({so_far})"
     )
 
 

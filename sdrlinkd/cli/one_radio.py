@@ -27,7 +27,7 @@ def _between(option: str, least: int, most: int) -> Callable[[str], float]:
             value = math.nan
         if not least <= value <= most:
             raise UserError(
-                f"{option}: got {text}; allowed: {least} to {most}, or with its unit, such as 2 MHz"
+                f"{option}: got {text}; allowed: {least} to {most}, or with a unit, such as 2 MHz"
             )
         return value
 
@@ -44,18 +44,18 @@ class Factor(StrEnum):
 
 ConfigFile = Annotated[
     Path | None,
-    typer.Option("--config", metavar="FILE", help="The radio is that of a daemon's configuration."),
+    typer.Option("--config", metavar="FILE", help="Use the radio of this daemon configuration."),
 ]
 Device = Annotated[
     str,
-    typer.Option(metavar="ARGS", help='The radio is this one, as "driver=hackrf" (SoapySDR).'),
+    typer.Option(metavar="ARGS", help='Use this SoapySDR device, such as "driver=hackrf".'),
 ]
 Frequency = Annotated[
     float | None,
     typer.Option(
         metavar='"433.92 MHz"',
         parser=_between("--frequency", 1, 10**11),
-        help="Of --device: middle of the channel, in Hz or with its unit.",
+        help="With --device: centre frequency, in Hz or with a unit.",
     ),
 ]
 Rate = Annotated[
@@ -63,11 +63,11 @@ Rate = Annotated[
     typer.Option(
         metavar='"2 Msps"',
         parser=_between("--rate", 10**4, 2 * 10**8),
-        help="Of --device: samples a second, as a number or with its unit.",
+        help="With --device: sample rate, in samples/s or with a unit.",
     ),
 ]
 Oversampling = Annotated[
-    Factor, typer.Option(help="Of --device: it runs at so many times the rate.")
+    Factor, typer.Option(help="With --device: its sample rate divided by --rate.")
 ]
 Gain = Annotated[
     float | None,
@@ -75,13 +75,13 @@ Gain = Annotated[
         metavar="DB",
         min=-MOST_GAIN_DB,
         max=MOST_GAIN_DB,
-        help="Of --device: all elements together.",
+        help="With --device: gain of all elements together.",
     ),
 ]
 Gains = Annotated[
-    str, typer.Option(metavar='"LNA=16,VGA=20"', help="Of --device: in dB by element.")
+    str, typer.Option(metavar='"LNA=16,VGA=20"', help="With --device: gain of each element in dB.")
 ]
-Antenna = Annotated[str, typer.Option(metavar="NAME", help="Of --device.")]
+Antenna = Annotated[str, typer.Option(metavar="NAME", help="With --device: antenna port.")]
 
 
 class NamedRadio(NamedTuple):
@@ -132,12 +132,12 @@ def sending(named: NamedRadio, transmit: bool) -> OneRadio:
             raise _unasked(f"--transmit, or soapy.tx_enabled = true in {named.config}")
         return found._replace(config=_deaf_between_bursts(found.config))
     if not transmit:
-        raise _unasked("--transmit, when frequency, gain and antenna are right")
+        raise _unasked("--transmit, once frequency, gain and antenna are right")
     gains = _by_element(named.gains)
     if named.gain_db is None and not gains:
         raise UserError(
-            "--gain: not given, and nothing is sent before it is; allowed: a gain in dB, or "
-            '--gains "ELEMENT=DB,…"; begin low: `sdrlinkctl radio probe` shows the range'
+            "--gain: not given, and replay needs it to transmit; allowed: a gain in dB, or "
+            '--gains "ELEMENT=DB,…"; start low; `sdrlinkctl radio probe` shows the range'
         )
     soapy = SoapyParams(
         device=named.device,
@@ -152,13 +152,13 @@ def sending(named: NamedRadio, transmit: bool) -> OneRadio:
 def _refuse_none(named: NamedRadio) -> None:
     if named.config is None and not named.device:
         raise UserError(
-            "no radio is named; allowed: --config FILE, or --device ARGS with --frequency and "
-            "--rate; those here are shown by: sdrlinkctl radio probe"
+            "no radio given; allowed: --config FILE, or --device ARGS with --frequency and "
+            "--rate; `sdrlinkctl radio probe` lists the attached radios"
         )
 
 
 def _unasked(allowed: str) -> UserError:
-    return UserError(f"replay sends, and no radio sends unasked; allowed: {allowed}")
+    return UserError(f"replay has no permission to transmit; allowed: {allowed}")
 
 
 def _of_daemon(path: Path, named: NamedRadio, tx_enabled: bool | None) -> OneRadio:
@@ -173,7 +173,7 @@ def _of_daemon(path: Path, named: NamedRadio, tx_enabled: bool | None) -> OneRad
         ("--antenna", "[soapy]", named.antenna),
     ):
         if value is not None and value != "":
-            raise UserError(f"{option}: given beside --config; allowed: {key} in {path} says it")
+            raise UserError(f"{option}: given with --config; allowed: {key} in {path}")
     config = load_config(path)
     if tx_enabled is not None:
         config = replace(config, soapy=replace(config.soapy, tx_enabled=tx_enabled))

@@ -18,7 +18,7 @@ def load_pictures(package: str) -> ModuleType:
         return import_module(f"{package}.pictures")
     except ImportError:
         raise UserError(
-            "the pictures need matplotlib; install it with: pip install 'sdrlinkd[plots]'"
+            "the plots need matplotlib; install it with: pip install 'sdrlinkd[plots]'"
         ) from None
 
 

@@ -32,13 +32,13 @@ SILENCE_MS = 1000
 QOS_NAMES = ("default", "latency", "bulk", "urgent")
 
 RegistryOption = Annotated[
-    Path | None, typer.Option("--registry", help="Topic registry, to show names for topic ids.")
+    Path | None, typer.Option("--registry", help="Topic registry that names the topic ids.")
 ]
 
 
 @pdus.command()
 def decode(
-    octets: Annotated[str, typer.Argument(metavar="HEX", help="The PDU's octets; - reads stdin.")],
+    octets: Annotated[str, typer.Argument(metavar="HEX", help="Octets of the PDU; -: read stdin.")],
     registry: RegistryOption = None,
 ) -> None:
     """Show the header, topic ids and entry layout of a PDU."""
@@ -61,8 +61,10 @@ def decode(
 
 @pdus.command()
 def watch(
-    count: Annotated[int, typer.Option("--count", "-n", min=0, help="0: until Ctrl-C.")] = 0,
-    layout: Annotated[bool, typer.Option("--layout", help="All fields of each PDU.")] = False,
+    count: Annotated[
+        int, typer.Option("--count", "-n", min=0, help="PDUs to show; 0: until Ctrl-C.")
+    ] = 0,
+    layout: Annotated[bool, typer.Option("--layout", help="Show all fields of each PDU.")] = False,
     registry: RegistryOption = None,
     runtime_dir: RuntimeDir = None,
 ) -> None:
@@ -152,7 +154,7 @@ def _records(payload: bytes) -> list[str]:
     try:
         return [f"         {record}" for record in parse_records(payload)]
     except PduError:
-        return ["         (cannot be read as control records, so it is skipped: rx_control_bad)"]
+        return ["         (not valid control records; skipped as rx_control_bad)"]
 
 
 def _topic(topic_id: int, registry: Registry | None) -> str:

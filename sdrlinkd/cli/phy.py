@@ -30,37 +30,38 @@ RecordingFile = Annotated[
     Path, typer.Argument(metavar="FILE", help="SigMF recording, or raw samples (.cf32, .i16, …).")
 ]
 SampleType = Annotated[
-    str, typer.Option("--type", help="Of raw samples: cf32_le, ci16_le, ci8 or cu8.")
+    str, typer.Option("--type", help="Sample type of a raw file: cf32_le, ci16_le, ci8 or cu8.")
 ]
 Rate = Annotated[
-    float | None, typer.Option(min=1, help="Samples a second, where the file does not tell.")
+    float | None, typer.Option(min=1, help="Sample rate, if the file does not state it.")
 ]
 Network = Annotated[int, typer.Option(min=-1, max=7, help="Only bursts of this network; -1: all.")]
 Grid = Annotated[
-    str, typer.Option(help="FFT size/prefix: 64/16, 64/8, 128/16 or 256/32, as in modem.grid.")
+    str,
+    typer.Option(help="FFT size/cyclic prefix: 64/16, 64/8, 128/16 or 256/32, as in modem.grid."),
 ]
 Out = Annotated[
-    Path | None, typer.Option(help="PNG to write; by default in this folder, named like FILE.")
+    Path | None, typer.Option(help="PNG to write; default: named like FILE, in the current folder.")
 ]
 
 
 @phys.command()
 def info(
-    rate: Annotated[float, typer.Option(min=1e4, max=2e8, help="Samples a second.")] = 5e6,
+    rate: Annotated[float, typer.Option(min=1e4, max=2e8, help="Sample rate.")] = 5e6,
     pdu_size: Annotated[
-        int, typer.Option(min=MIN_PDU_SIZE, max=MAX_PDU_SIZE, help="Octets of a PDU.")
+        int, typer.Option(min=MIN_PDU_SIZE, max=MAX_PDU_SIZE, help="PDU size in octets.")
     ] = 1024,
     max_burst: Annotated[float, typer.Option(min=1e-6, max=1, help="Longest burst in s.")] = 0.005,
     grid: Grid = "64/16",
     frequency: Annotated[
-        float, typer.Option(min=1, max=1e11, help="Middle of the channel in Hz.")
+        float, typer.Option(min=1, max=1e11, help="Centre frequency in Hz.")
     ] = 2.45e9,
     crystal_ppm: Annotated[
-        float, typer.Option(min=0, max=200, help="How far every radio's crystal may be off.")
+        float, typer.Option(min=0, max=200, help="Largest crystal error of any radio.")
     ] = 40.0,
     json: AsJson = False,
 ) -> None:
-    """Subcarriers, rates and airtimes of every MCS."""
+    """Show subcarriers, and the rates and airtimes of every MCS."""
     from sdrlinkd.iq import modem_info
 
     told = modem_info(rate, pdu_size, max_burst, grid_named(grid), frequency, crystal_ppm)
@@ -73,7 +74,7 @@ def info(
         f"{told.spacing_hz / 1e3:g} kHz apart, "
         f"{told.n_data} for data, {told.n_pilots} pilots, {told.occupied_hz / 1e6:.3g} MHz wide\n"
         f"symbols of {told.symbol_us:g} µs, of these {told.echoes_us:g} µs for echoes; "
-        f"preamble and header {told.preamble_us:g} µs a burst\n{told.cfo}",
+        f"preamble and header {told.preamble_us:g} µs per burst\n{told.cfo}",
         highlight=False,
         soft_wrap=True,
     )
@@ -109,10 +110,12 @@ def decode(
     rate: Rate = None,
     network: Network = -1,
     grid: Grid = "64/16",
-    registry: Annotated[Path | None, typer.Option(help="Names the topics.")] = None,
+    registry: Annotated[
+        Path | None, typer.Option(help="Topic registry that names the topics.")
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
 ) -> None:
-    """Bursts in a recording, how well they were received, and their PDUs."""
+    """Show the bursts in a recording, their signal quality and their PDUs."""
     names = load_registry(registry) if registry else None
     console = Console(soft_wrap=True)
     counters: dict[str, int] = {}
@@ -144,7 +147,7 @@ def decode(
 def spectrum(
     file: RecordingFile, type_name: SampleType = "", rate: Rate = None, out: Out = None
 ) -> None:
-    """Draw power over frequency and time."""
+    """Plot power over frequency and time."""
     from sdrlinkd.iq import spectrum_of
 
     pictures = load_pictures("sdrlinkd.iq")
@@ -171,7 +174,7 @@ def constellation(
     grid: Grid = "64/16",
     out: Out = None,
 ) -> None:
-    """Draw the equalised points of the bursts in a recording."""
+    """Plot the equalized constellation of the bursts in a recording."""
     pictures = load_pictures("sdrlinkd.iq")
     console = Console()
     with (
@@ -182,7 +185,7 @@ def constellation(
     if not points.by_modulation:
         raise UserError(
             f"{file}: no burst was found in {recording.info.n_samples} samples; "
-            "`sdrlinkctl phy spectrum` shows what is there"
+            "`sdrlinkctl phy spectrum` plots the signal"
         )
     path = out or _picture_of(file, "constellation")
     title = f"{file.name}, {len(points.bursts)} bursts"
@@ -228,7 +231,7 @@ def _burst_line(burst: "phy.BurstQuality", n_good: int, ending: str, rate_hz: fl
 
     at = f"{burst.start / rate_hz:.6f} s" if rate_hz else f"sample {burst.start}"
     offset = (
-        f"{burst.cfo * rate_hz / 1e3:+.3f} kHz" if rate_hz else f"{burst.cfo:+.6f} cycles a sample"
+        f"{burst.cfo * rate_hz / 1e3:+.3f} kHz" if rate_hz else f"{burst.cfo:+.6f} cycles/sample"
     )
     return (
         f"{at}  {phy.MCS_TABLE[burst.mcs].name}  {n_good} of {burst.n_pdus} PDUs of "
@@ -276,7 +279,7 @@ def _picture_of(file: Path, what: str) -> Path:
 def _rate_told(rate_hz: float | None, asked: float | None) -> str:
     if rate_hz is None:
         return (
-            "its rate is not known, so frequencies are in cycles a sample and times in samples: "
-            "--rate tells it"
+            "sample rate unknown: frequencies are in cycles per sample, times in samples; set it "
+            "with --rate"
         )
-    return f"at {rate_hz / 1e6:g} Msps, {'as told' if asked else 'by its metadata'}"
+    return f"at {rate_hz / 1e6:g} Msps, {'as given' if asked else 'from its metadata'}"

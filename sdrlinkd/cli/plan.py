@@ -35,20 +35,23 @@ def plan(
     topic: Annotated[
         list[str] | None, typer.Option(help="NAME:RATE:SIZE, such as scan:50:1KB; repeatable.")
     ] = None,
-    bag: Annotated[Path | None, typer.Option(help="Rates and sizes from a recording.")] = None,
+    bag: Annotated[Path | None, typer.Option(help="Take rates and sizes from a recording.")] = None,
     robots: Annotated[
         int | None,
-        typer.Option(min=1, max=255, help="So many send the same; else as access.nodes lists."),
+        typer.Option(
+            min=1, max=255, help="Robots that each send this traffic; default: access.nodes."
+        ),
     ] = None,
     turnaround: Annotated[
-        str | None, typer.Option(help="Of the radio, from hearing to sending; else as configured.")
+        str | None,
+        typer.Option(help="The radio's receive-to-transmit turnaround; default: as configured."),
     ] = None,
     host: Annotated[
-        str, typer.Option(help="What the machines add; `sdrlinkctl doctor` measures it.")
+        str, typer.Option(help="Latency of the hosts; `sdrlinkctl doctor` measures it.")
     ] = f"{1e3 * HOST_S:g}ms",
     as_json: AsJson = False,
 ) -> None:
-    """Airtime and worst-case latency by topic; exit code 1 when the air cannot carry it."""
+    """Plan airtime and worst-case latency by topic; exit code 1 when the traffic does not fit."""
     setup = make_setup(load_config(config), config.parent, str(config))
     turnaround_s = None if turnaround is None else seconds(turnaround, "--turnaround")
     setting = setting_of(setup.config, setup.node_id, robots, turnaround_s, seconds(host, "--host"))
@@ -79,7 +82,7 @@ def lines(made: Plan) -> list[FittedTable | str]:
     """The plan for the screen: a table, the verdict, advice and notes."""
     table = FittedTable("plan", COLUMNS)
     for each in made.topics:
-        worst = f"{1e3 * each.worst_s:.1f} ms" if each.worst_s < float("inf") else "never ends"
+        worst = f"{1e3 * each.worst_s:.1f} ms" if each.worst_s < float("inf") else "unbounded"
         table.add(
             each.name, each.qos, f"{each.rate_hz:.3g}", f"{each.size:.0f}", str(each.pdus),
             f"{each.rate_mbps:.3g}", f"{100 * each.air:.1f} %", worst,
@@ -92,16 +95,16 @@ def lines(made: Plan) -> list[FittedTable | str]:
     if made.robots > 1 and made.policy == "none":
         all_of = f" by each of {made.robots} robots"
     verdict = "feasible" if made.is_feasible else "NOT feasible"
-    asked = f"{100 * made.air:.3g} % of what the air carries asked for{all_of}: {verdict}"
+    asked = f"{100 * made.air:.3g} % of the channel's capacity requested{all_of}: {verdict}"
     left_out = [f"left out: {name} ({n} messages): {why}" for name, n, why in made.left_out]
     return [table, asked, *made.advice, *made.notes, *left_out]
 
 
 def _nothing(left_out: list[LeftOut]) -> str:
     if not left_out:
-        return "nothing to plan; name --bag FILE, or topics with --topic NAME:RATE:SIZE"
+        return "nothing to plan; give --bag FILE, or topics with --topic NAME:RATE:SIZE"
     names = ", ".join(f"{each.name} ({each.why})" for each in left_out)
-    return f"--bag: nothing in it is planned: {names}; name topics with --topic NAME:RATE:SIZE"
+    return f"--bag: no topic in it can be planned: {names}; give topics with --topic NAME:RATE:SIZE"
 
 
 def _from_bag(path: Path, setup: Setup) -> tuple[list[Load], list[LeftOut]]:

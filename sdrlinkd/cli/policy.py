@@ -10,7 +10,7 @@ from sdrlinkd.cli.completion import one_of, robot_names, topic_names
 from sdrlinkd.errors import UserError
 from sdrlinkd.units import octets, seconds
 
-Topic = Annotated[str, typer.Argument(help="Its name on the bus or in the registry.",
+Topic = Annotated[str, typer.Argument(help="Topic name on the bus or in the registry.",
                                       autocompletion=topic_names)]  # fmt: skip
 Text = str | None
 QOS = ("urgent", "latency", "default", "bulk")
@@ -22,13 +22,17 @@ def set_policy(
     qos: Annotated[
         Text, typer.Option(help="urgent, latency, default or bulk.", autocompletion=one_of(*QOS))
     ] = None,
-    priority: Annotated[int | None, typer.Option(help="0 to 127, the most urgent.")] = None,
-    period: Annotated[Text, typer.Option(help="Send no more often: 0.1, 100ms; 0: always.")] = None,
-    lifespan: Annotated[Text, typer.Option(help="Worthless after: 300ms, 2s, inf.")] = None,
-    deadman: Annotated[
-        Text, typer.Option(help="Silent for so long, and the stop message is published here.")
+    priority: Annotated[int | None, typer.Option(help="0 to 127; 127 is the most urgent.")] = None,
+    period: Annotated[
+        Text, typer.Option(help="Least time between messages: 0.1, 100ms; 0: none.")
     ] = None,
-    depth: Annotated[int | None, typer.Option(help="Messages that may wait; 0: all.")] = None,
+    lifespan: Annotated[
+        Text, typer.Option(help="Discard messages older than: 300ms, 2s, inf.")
+    ] = None,
+    deadman: Annotated[
+        Text, typer.Option(help="Publish the stop message here after this long without a message.")
+    ] = None,
+    depth: Annotated[int | None, typer.Option(help="Most messages queued; 0: no limit.")] = None,
     history: Annotated[
         Text,
         typer.Option(help="keep_last or keep_all.", autocompletion=one_of("keep_last", "keep_all")),
@@ -42,22 +46,27 @@ def set_policy(
     ] = None,
     dst: Annotated[
         int | None,
-        typer.Option(help="Robot that it is for; 255: everyone.", autocompletion=robot_names),
+        typer.Option(help="Destination robot; 255: all.", autocompletion=robot_names),
     ] = None,
-    decimate: Annotated[int | None, typer.Option(help="Send one in so many.")] = None,
+    decimate: Annotated[int | None, typer.Option(help="Send one message in this many.")] = None,
     on_change: Annotated[
-        bool | None, typer.Option("--on-change/--always", help="Send only what differs.")
+        bool | None,
+        typer.Option(
+            "--on-change/--always", help="Send a message only if it differs from the last one."
+        ),
     ] = None,
     compress: Annotated[
         Text, typer.Option(help="none or zstd.", autocompletion=one_of("none", "zstd"))
     ] = None,
-    max_bytes: Annotated[Text, typer.Option(help="Refuse larger ones: 64k; 0: none.")] = None,
-    queue_bytes: Annotated[Text, typer.Option(help="Bytes that may wait; 0: no bound.")] = None,
-    queue_s: Annotated[Text, typer.Option(help="The same as time on the air.")] = None,
+    max_bytes: Annotated[
+        Text, typer.Option(help="Refuse larger messages: 64k; 0: no limit.")
+    ] = None,
+    queue_bytes: Annotated[Text, typer.Option(help="Most bytes queued; 0: no limit.")] = None,
+    queue_s: Annotated[Text, typer.Option(help="Most airtime queued; 0: no limit.")] = None,
     runtime_dir: RuntimeDir = None,
     as_json: AsJson = False,
 ) -> None:
-    """Change a topic's policy until the next restart or reload; shows what was and what is."""
+    """Change a topic's policy until the next restart or reload; prints old and new values."""
     given: dict[str, Any] = {
         "qos": qos,
         "priority": priority,
@@ -92,7 +101,7 @@ def set_policy(
 
 @app.command()
 def why(topic: Topic, runtime_dir: RuntimeDir = None, as_json: AsJson = False) -> None:
-    """What happens to a topic, in plain words."""
+    """Explain in plain words what happens to a topic."""
     with connect(runtime_dir) as control:
         lines = control.ask("why", {"topic": topic})["why"]
     if as_json:

@@ -32,7 +32,7 @@ class Questions:
     def robots(self, given: int | None) -> int:
         """The number of robots that share the air, as given or as answered."""
         text = "" if given is None else str(given)
-        return self._answer("--robots", "how many robots share the air", "2", text, _count)
+        return self._answer("--robots", "how many robots share the channel", "2", text, _count)
 
     def frequency(self, given: str) -> str:
         """The centre frequency with its unit, as given or as answered."""
@@ -49,13 +49,13 @@ class Questions:
         if not given and robots == 1:
             return [1]
         return self._answer(
-            "--id", f"which of them is this one, 1 to {robots}, or all", "1", given,
+            "--id", f"which robot is this, 1 to {robots}, or all", "1", given,
             lambda text: _ids(text, robots),
         )  # fmt: skip
 
     def topics(self) -> list[str]:
         """The topics as answered: NAME:TYPE each, or the path of a bag, or `graph`."""
-        what = "which topics: NAME:TYPE with blanks between, a bag's path, or graph (ROS 2, now)"
+        what = "which topics: NAME:TYPE NAME:TYPE …, the path of a bag, or graph (ROS 2, running)"
         return self._answer("--topic", what, TOPICS, "", str.split)
 
     def _answer(
@@ -64,7 +64,7 @@ class Questions:
         if given or not self._can_ask:
             if not given:
                 raise UserError(
-                    f"{option}: not given, and no terminal to ask at; {question}?"
+                    f"{option}: not given, and no terminal to ask on; {question}?"
                     + (f" such as {default}" if default else "")
                 )
             return read(given)
@@ -75,7 +75,7 @@ class Questions:
                 typer.echo(str(error), err=True)
 
 
-_BAND = "which frequency, one that antenna and licence are for"
+_BAND = "which frequency (one that your antenna and licence cover)"
 
 
 def _radio(text: str) -> RadioPreset:
@@ -96,7 +96,9 @@ def _count(text: str) -> int:
 def _frequency(text: str) -> str:
     value = hertz(text, "--frequency")
     if not 1e5 <= value <= 1e11:
-        raise UserError(f"--frequency: got {text}; allowed: with its unit, such as 433.92 MHz")
+        raise UserError(
+            f"--frequency: got {text}; allowed: with its unit, 100 kHz to 100 GHz, such as 2.4 GHz"
+        )
     return text
 
 

@@ -14,26 +14,26 @@ from sdrlinkd.tables import FittedTable, screen_console, words
 if TYPE_CHECKING:
     from backends import Assessment, DeviceProbe, DirectionProbe
 
-radios = typer.Typer(help="Radios of this machine, by SoapySDR.", no_args_is_help=True)
+radios = typer.Typer(help="Radios of this machine, through SoapySDR.", no_args_is_help=True)
 app.add_typer(radios, name="radio")
 
 
 @radios.command()
 def probe(
     device: Annotated[
-        str, typer.Argument(help='As soapy.device: "driver=hackrf"; by default all there are.')
+        str, typer.Argument(help='Value of soapy.device, such as "driver=hackrf"; default: all.')
     ] = "",
     rate: Annotated[
-        float, typer.Option(min=1e4, max=2e8, help="Samples a second of the modem (modem.rate_hz).")
+        float, typer.Option(min=1e4, max=2e8, help="The modem's sample rate (modem.rate_hz).")
     ] = 1e6,
     json: AsJson = False,
 ) -> None:
-    """Devices found, and what the daemon would do with each. Nothing is sent."""
+    """List the attached radios and how the daemon would drive them; nothing is transmitted."""
     from backends import BackendError, assess_device, probe_devices
 
     console = screen_console()
     try:
-        with Console(stderr=True).status("looking at radios"):
+        with Console(stderr=True).status("probing radios"):
             found = probe_devices(device)
     except BackendError as error:
         raise UserError(str(error)) from None
@@ -58,7 +58,7 @@ def table_of(device: "DeviceProbe", ahead: "Assessment", rate_hz: float) -> Fitt
     )
     table.add("soapy.device", f'"{device.device}"')
     if device.problem:
-        table.add("cannot be used", device.problem)
+        table.add("unusable", device.problem)
         return table
     table.add("radio", f"{device.driver} {device.hardware}")
     for does, direction in (("receives", device.rx), ("sends", device.tx)):
@@ -70,11 +70,11 @@ def table_of(device: "DeviceProbe", ahead: "Assessment", rate_hz: float) -> Fitt
     )
     table.add("with " + modem, ahead.how)
     if device.tx is not None:
-        turn = f" + turnaround {1e3 * ahead.turnaround_s:.3g}" if ahead.turnaround_s else ""
+        turn = f" + turnaround {1e3 * ahead.turnaround_s:.3g} ms" if ahead.turnaround_s else ""
         table.add(
-            "latency to expect",
-            f"{1e3 * ahead.latency_s:.3g} ms and the airtime: handed over {1e3 * ahead.lead_s:.3g} "
-            f"ms ahead{turn} + received in pieces of {1e3 * ahead.piece_s:.3g} ms",
+            "expected latency",
+            f"{1e3 * ahead.latency_s:.3g} ms plus airtime: lead {1e3 * ahead.lead_s:.3g} ms{turn} "
+            f"+ receive blocks of {1e3 * ahead.piece_s:.3g} ms",
         )
     for warning in ahead.warnings:
         table.add("warning", warning)

@@ -45,7 +45,7 @@ class Written(StrEnum):
 
 @app.command()
 def record(
-    out: Annotated[Path, typer.Argument(help="For OUT.sigmf-data and OUT.sigmf-meta.")],
+    out: Annotated[Path, typer.Argument(help="Name for OUT.sigmf-data and OUT.sigmf-meta.")],
     config: ConfigFile = None,
     device: Device = "",
     frequency: Frequency = None,
@@ -56,16 +56,23 @@ def record(
     antenna: Antenna = "",
     duration: Annotated[
         float | None,
-        typer.Option("--seconds", min=1e-3, max=1e6, help="By default until Ctrl-C."),
+        typer.Option(
+            "--seconds", min=1e-3, max=1e6, help="Seconds to record; default: until Ctrl-C."
+        ),
     ] = None,
-    type_name: Annotated[Written, typer.Option("--type", help="Of the samples.")] = Written.CI16,
+    type_name: Annotated[
+        Written, typer.Option("--type", help="Sample type of the recording.")
+    ] = Written.CI16,
     network: Network = -1,
     grid: Annotated[
-        str, typer.Option(help="Of the bursts: FFT size/prefix; by default --config's, or 64/16.")
+        str,
+        typer.Option(
+            help="FFT size/cyclic prefix of the bursts; default: that of --config, else 64/16."
+        ),
     ] = "",
-    force: Annotated[bool, typer.Option("--force", help="Replace a recording.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing recording.")] = False,
 ) -> None:
-    """Record what a radio hears, without a daemon. Nothing is ever sent."""
+    """Record what a radio hears, without a daemon; never transmits."""
     from backends import BackendError, refuse_same
     from sdrlinkd.iq import CaptureWish
 
@@ -140,7 +147,7 @@ def _refuse_existing(out: Path, force: bool) -> str:
     stem = str(out).removesuffix(".sigmf-meta").removesuffix(".sigmf-data")
     for path in (Path(f"{stem}.sigmf-data"), Path(f"{stem}.sigmf-meta")):
         if path.exists() and not force:
-            raise UserError(f"{path}: is there already; allowed: another name, or --force")
+            raise UserError(f"{path}: already there; allowed: another name, or --force")
     return stem
 
 
@@ -156,13 +163,13 @@ def _table(
     )
     bursts = f"{report.n_bursts}, {report.pdus_good} PDUs good, {report.pdus_bad} bad"
     if report.searched_s < report.seconds:
-        bursts += f", in the first {report.searched_s:.1f} s: the rest was not searched"
+        bursts += f", in the first {report.searched_s:.1f} s; the rest was not searched"
     table.add_row("bursts", bursts)
     lost_ms = 1e3 * report.samples_lost / rate_hz
     table.add_row(
         "gaps",
-        f"{report.n_gaps}, {report.samples_lost} samples ({lost_ms:.1f} ms) missing: annotated, "
-        "and silent"
+        f"{report.n_gaps}, {report.samples_lost} samples ({lost_ms:.1f} ms) missing: annotated "
+        "and zero-filled"
         if report.n_gaps
         else "none",
     )

@@ -45,10 +45,11 @@ def replay(
     gains: Gains = "",
     antenna: Antenna = "",
     transmit: Annotated[
-        bool, typer.Option("--transmit", help="The radio may send; or soapy.tx_enabled says so.")
+        bool, typer.Option("--transmit", help="Permit transmission, like soapy.tx_enabled = true.")
     ] = False,
     times: Annotated[
-        int, typer.Option("--repeat", min=1, max=1_000_000, help="Send it so many times.")
+        int,
+        typer.Option("--repeat", min=1, max=1_000_000, help="Send the recording this many times."),
     ] = 1,
     backoff: Annotated[
         float | None,
@@ -56,7 +57,7 @@ def replay(
             "--backoff-db",
             min=0,
             max=100,
-            help="Mean power of its strongest burst below full scale; by default as recorded.",
+            help="Mean power of the strongest burst below full scale; default: as recorded.",
         ),
     ] = None,
     silence: Annotated[
@@ -65,12 +66,12 @@ def replay(
             "--silence-db",
             min=-200,
             max=0,
-            help="What is below, in dBFS, is not sent; by default 7 dB above its quietest.",
+            help="Level in dBFS below which nothing is sent; default: 7 dB above the quietest.",
         ),
     ] = None,
     type_name: SampleType = "",
 ) -> None:
-    """Send what is in a recording, without a daemon: each burst at its time."""
+    """Transmit a recording without a daemon, each burst at its recorded time."""
     from sdrlinkd.iq import plan_replay
 
     console = Console(soft_wrap=True)
@@ -138,17 +139,16 @@ def _refuse_itself(file: Path, radio: OneRadio) -> None:
 
 
 def _lines(report: "ReplayReport", plan: "ReplayPlan") -> list[str]:
-    silence = f"between them is silence, below {plan.silence_dbfs:.1f} dBFS"
+    silence = f"silence between them is below {plan.silence_dbfs:.1f} dBFS"
     lines = [f"sent {report.sent} of {report.n_bursts} stretches; {silence}"]
     kept = report.n_bursts - report.sent - report.late - report.underflow - report.lost
     if report.sent < report.n_bursts:
         lines.append(
-            f"late {report.late}, underflow {report.underflow}, lost {report.lost}, not handed to "
+            f"late {report.late}, underflow {report.underflow}, lost {report.lost}, never given to "
             f"the radio {kept}"
         )
     if report.slipped:
         lines.append(
-            f"{report.slipped} were not sent at their time, but up to {1e3 * report.slip_s:.3f} ms "
-            "off"
+            f"{report.slipped} were sent up to {1e3 * report.slip_s:.3f} ms off their recorded time"
         )
     return lines

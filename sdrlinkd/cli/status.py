@@ -35,31 +35,38 @@ def status(
     runtime_dir: RuntimeDir = None,
     as_json: AsJson = False,
     watch: Annotated[
-        bool, typer.Option("--watch", "-w", help="Keep the screen fresh, also over a restart.")
+        bool,
+        typer.Option(
+            "--watch", "-w", help="Refresh the screen until Ctrl-C, even across a restart."
+        ),
     ] = False,
     everything: Annotated[
-        bool, typer.Option("--all", "-a", help="Show everything, not only what fits the screen.")
+        bool,
+        typer.Option("--all", "-a", help="Show everything, even what does not fit the screen."),
     ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing.")] = False,
     field: Annotated[
         list[str] | None,
         typer.Option(
-            help="Print this value alone, such as link.tx.sent or topics.odom.sent; repeatable.",
+            help="Print only this field, such as link.tx.sent or topics.odom.sent; repeatable.",
             autocompletion=field_names,
         ),
     ] = None,
     as_csv: Annotated[
-        bool, typer.Option("--csv", help="Print the fields in one line, below their names.")
+        bool,
+        typer.Option(
+            "--csv", help="Print the fields as one CSV line, below a line of their names."
+        ),
     ] = False,
 ) -> None:
-    """The verdict in plain words, and one screen of reasons; the exit code is the verdict, too.
+    """Show the link's verdict and its reasons on one screen; the exit code is the verdict, too.
 
     0: OK; 1: DEGRADED; 3: DOWN; 4: no daemon answers.
     """
     if quiet and watch:
-        raise UserError("--quiet: got it with --watch; allowed: one of the two")
+        raise UserError("--quiet: given with --watch; allowed: only one of them")
     if as_json and (as_csv or field):
-        raise UserError("--json: got it with --csv or --field; allowed: one of the two")
+        raise UserError("--json: given with --csv or --field; allowed: only one of them")
     show = _printer(as_json=as_json, as_csv=as_csv, names=field or [])
     if watch:
         _watch(Follower(runtime_dir), show, whole=everything)
@@ -167,7 +174,7 @@ def _identity(name: str, entered: int, parts: dict[str, int]) -> str:
 
 @app.command()
 def reload(runtime_dir: RuntimeDir = None) -> None:
-    """Have the daemon read its topic policies anew."""
+    """Make the daemon re-read its topic policies."""
     with connect(runtime_dir) as control:
         answer = control.ask("reload")
     typer.echo(f"reloaded: {answer['reloaded']}; {answer['unchanged']}")

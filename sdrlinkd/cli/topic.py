@@ -15,7 +15,7 @@ from sdrlinkd.client import Subscriber
 from sdrlinkd.errors import UserError
 from sdrlinkd.reports import Snapshot
 
-topic_app = typer.Typer(help="Rate, bandwidth and delay of a topic heard.", no_args_is_help=True)
+topic_app = typer.Typer(help="Rate, bandwidth and delay of a received topic.", no_args_is_help=True)
 app.add_typer(topic_app, name="topic")
 
 TELL_S = 1.0
@@ -23,11 +23,17 @@ WINDOW = 10_000
 
 Heard = Annotated[
     str,
-    typer.Argument(metavar="NAME", help="Such as /rx_robot_2/odom.", autocompletion=heard_names),
+    typer.Argument(
+        metavar="NAME", help="Bus topic, such as /rx_robot_2/odom.", autocompletion=heard_names
+    ),
 ]
-Window = Annotated[int, typer.Option("--window", "-w", min=2, help="Messages that count.")]
-Count = Annotated[int, typer.Option("--count", "-n", min=0, help="0: until Ctrl-C.")]
-Duration = Annotated[float | None, typer.Option(min=0.01, max=1e6, help="Seconds.")]
+Window = Annotated[
+    int, typer.Option("--window", "-w", min=2, help="Number of latest messages averaged.")
+]
+Count = Annotated[
+    int, typer.Option("--count", "-n", min=0, help="Messages to receive; 0: until Ctrl-C.")
+]
+Duration = Annotated[float | None, typer.Option(min=0.01, max=1e6, help="Seconds to measure.")]
 
 
 @topic_app.command()
@@ -38,7 +44,7 @@ def hz(
     duration: Duration = None,
     runtime_dir: RuntimeDir = None,
 ) -> None:
-    """How often it comes: the mean rate in Hz, and the times between messages."""
+    """Measure a topic's rate: mean in Hz, and the intervals between messages."""
     _measure(name, Rate(window), Rate(1 << 24), count, duration, runtime_dir)
 
 
@@ -50,7 +56,7 @@ def bw(
     duration: Duration = None,
     runtime_dir: RuntimeDir = None,
 ) -> None:
-    """How much it brings: bytes of payload a second, and the sizes of messages."""
+    """Measure a topic's bandwidth: payload bytes per second, and message sizes."""
     _measure(name, Bandwidth(window), Bandwidth(1 << 24), count, duration, runtime_dir)
 
 
@@ -62,7 +68,7 @@ def delay(
     duration: Duration = None,
     runtime_dir: RuntimeDir = None,
 ) -> None:
-    """How late it comes: the age of each message when it is handed over; no clocks need agree."""
+    """Measure a topic's delay: the age of messages at delivery; needs no synchronized clocks."""
     _measure(name, Delay(window), Delay(1 << 24), count, duration, runtime_dir)
 
 
@@ -98,7 +104,7 @@ def _measure(
             typer.echo(f"{name}: {heard} messages in {time.monotonic() - began_s:.1f} s")
             _say(whole.lines())
     if not heard:
-        raise UserError(f"{name}: nothing was heard; `sdrlinkctl topics` lists what is heard")
+        raise UserError(f"{name}: no message received; `sdrlinkctl topics` lists received topics")
 
 
 def _refuse_own(name: str, snapshot: Snapshot) -> None:
@@ -106,7 +112,7 @@ def _refuse_own(name: str, snapshot: Snapshot) -> None:
     if name in heard or name not in {each.name for each in snapshot.link.topics}:
         return
     raise UserError(
-        f"{name}: this robot sends it; what others send appears under a name such as "
+        f"{name}: this robot sends it; received topics have names such as "
         f"{heard[0] if heard else '/rx_robot_2/odom'} (sdrlinkctl topics)"
     )
 

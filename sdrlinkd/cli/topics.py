@@ -8,13 +8,13 @@ from sdrlinkd.cli.status import ask_status
 from sdrlinkd.reports import LinkReport
 from sdrlinkd.tables import FittedTable, figure, screen_console, words
 
-topics_app = typer.Typer(help="Topics of the registry, and those heard from other robots.")
+topics_app = typer.Typer(help="List topics of the registry, and those received from other robots.")
 app.add_typer(topics_app, name="topics")
 
 
 @topics_app.callback(invoke_without_command=True)
 def topics(context: typer.Context, runtime_dir: RuntimeDir = None, as_json: AsJson = False) -> None:
-    """Topics of the registry, and those heard from other robots."""
+    """List topics of the registry, and those received from other robots."""
     if context.invoked_subcommand:
         return
     with connect(runtime_dir) as control:
@@ -31,7 +31,7 @@ def tables(link: LinkReport) -> list[FittedTable]:
     """The table of sent topics and, if there are any, that of received topics."""
     sent = FittedTable("sent", (figure("id"), words("topic"), words("type", 2), words("", 1)))
     for topic in link.topics:
-        left_out = "" if topic.subscribed else "not taken: see the key `topics`"
+        left_out = "" if topic.subscribed else "not sent: see the key `topics`"
         sent.add(str(topic.topic_id), topic.name, topic.type, left_out)
     heard = FittedTable("heard", (words("topic"), figure("from robot")))
     for each in link.received:

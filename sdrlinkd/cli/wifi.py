@@ -35,7 +35,7 @@ def decode_wifi(
     type_name: SampleType = "",
     json: Annotated[bool, typer.Option("--json", help="One JSON object a line.")] = False,
 ) -> None:
-    """802.11a frames in a recording at 20 Msps; 802.11n frames are told as such, not read."""
+    """Decode 802.11a frames in a recording at 20 Msps; 802.11n frames are listed, not decoded."""
     from phy.wifi import HtFrame
 
     console = Console(soft_wrap=True)
@@ -57,8 +57,8 @@ def decode_wifi(
                 console.print(line, highlight=False, markup=False)
         n_samples = recording.info.n_samples
     if not json:
-        told = f"{n} frames, {n_right} with right FCS, in {n_samples} samples"
-        told += f"; {n_ht} frames of 802.11n, which are not read" if n_ht else ""
+        told = f"{n} frames, {n_right} with good FCS, in {n_samples} samples"
+        told += f"; {n_ht} frames of 802.11n, not decoded" if n_ht else ""
         console.print(told, highlight=False)
 
 
@@ -95,7 +95,7 @@ def _ht_line(at: int, frame: "HtFrame") -> str:
     width = "40" if signal.is_40_mhz else "20"
     return (
         f"{at / 20e6:.6f} s  802.11n {_format(frame)}, MCS {signal.mcs}, {width} MHz  "
-        f"{signal.n_bytes} B, not read  SNR {frame.snr_db:.1f} dB  "
+        f"{signal.n_bytes} B, not decoded  SNR {frame.snr_db:.1f} dB  "
         f"CFO {frame.cfo_hz / 1e3:+.2f} kHz"
     )
 

@@ -69,9 +69,9 @@ def check_wishes(
     if qos is not None and qos not in QOS:
         words = f"qos: got {_shown(qos)}; allowed: {', '.join(QOS)}"
     elif priority is not None and not _is_within(priority, MAX_PRIORITY):
-        words = f"priority: got {_shown(priority)}; allowed: 0 to {MAX_PRIORITY}, the most urgent"
+        words = f"priority: got {_shown(priority)}; allowed: 0 to {MAX_PRIORITY} (most urgent)"
     elif dst is not None and not _is_within(dst, BROADCAST):
-        words = f"dst: got {_shown(dst)}; allowed: a robot's id, 0 to 254, or 255 for everyone"
+        words = f"dst: got {_shown(dst)}; allowed: a robot's id, 0 to 254, or 255 for all"
     elif lifespan_ms is not None and not _is_above_0(lifespan_ms):
         words = f"lifespan_ms: got {_shown(lifespan_ms)}; allowed: a number above 0"
     elif published_ns is not None and not _is_within(published_ns, (1 << 63) - 1):
@@ -109,7 +109,7 @@ def too_large(name: str, size: int, most: int, key: str) -> str:
 
 def wrong_type(name: str, given: str, registered: str) -> str:
     """The error text for a message type that differs from the registry's."""
-    return f"type: got {_shown(given)}; allowed: {registered}, which {name} has in the registry"
+    return f"type: got {_shown(given)}; allowed: {registered}, the type of {name} in the registry"
 
 
 def _last_part(name: str) -> str:

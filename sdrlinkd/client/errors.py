@@ -24,12 +24,12 @@ def no_daemon(runtime_dir: object) -> NoDaemonError:
     """The error for a runtime directory without a daemon."""
     return NoDaemonError(
         f"no sdrlinkd answers in {runtime_dir}; start one (sdrlinkd --config FILE), or name its "
-        "directory with SDRLINKD_RUNTIME_DIR; a service's is open to members of its group only"
+        "directory with SDRLINKD_RUNTIME_DIR; only members of its group may open a service's"
     )
 
 
 def restarted(runtime_dir: object) -> NoDaemonError:
     """The error for a daemon that restarted before it had received everything sent."""
     return NoDaemonError(
-        f"the sdrlinkd in {runtime_dir} was restarted meanwhile; what was sent last may be lost"
+        f"the sdrlinkd in {runtime_dir} has restarted; the last messages may be lost"
     )

@@ -31,7 +31,7 @@ def chosen_dir(
 ) -> Path:
     """The runtime directory, given under either name. Raises TypeError if both are given."""
     if runtime_dir_ is not None and directory is not None:
-        raise TypeError("runtime_dir and directory are two names of one thing; give runtime_dir")
+        raise TypeError("runtime_dir and directory mean the same; give only runtime_dir")
     return runtime_dir(directory if runtime_dir_ is None else runtime_dir_)
 
 

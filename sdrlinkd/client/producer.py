@@ -71,7 +71,7 @@ class Producer:
             known = Announced(unpack(told))
         except (ValueError, KeyError, TypeError, AttributeError):
             raise EnvelopeMismatchError(
-                "the daemon announces itself in words of another version; update it or the client"
+                "the daemon uses another version of the announcement; update it or the client"
             ) from None
         self.known = known
         if topic.startswith(ACK_PREFIX):

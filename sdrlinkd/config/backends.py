@@ -39,8 +39,8 @@ def typed_config(raw: Mapping[str, object]) -> Config:
         return msgspec.convert(raw, config_type(raw))
     except msgspec.ValidationError as error:
         raise ConfigError(
-            f"configuration of the daemon: cannot be read here ({error}); allowed: that of a "
-            "daemon of this version, with the package of its radio installed here, too"
+            f"configuration of the daemon: unreadable here ({error}); allowed: that of a "
+            "daemon of this version, with the package of its radio also installed here"
         ) from None
 
 

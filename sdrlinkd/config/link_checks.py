@@ -30,7 +30,7 @@ def check_relay(config: Config, node_id: int, registry: Registry) -> None:
         if config.classes.of(qos).parity and not registry.has_control:
             raise ConfigError(
                 f"classes.{qos.label}.parity: got {config.classes.of(qos).parity:g}; it "
-                "needs a control channel, a registry of at most 15 topics; allowed here: 0"
+                "needs the control channel, so at most 15 topics; allowed here: 0"
             )
 
 
@@ -54,7 +54,7 @@ def load_dictionaries(
             ) from None
         if not made.dict_id():
             raise ConfigError(
-                f"{key}: {str(path)!r} is no trained dictionary; allowed: a "
+                f"{key}: {str(path)!r} is not a trained dictionary; allowed: a "
                 "file made by `sdrlinkctl topics train-dict`"
             )
         found[topic_id] = made

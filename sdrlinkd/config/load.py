@@ -74,7 +74,7 @@ def explain_policy(changes: Mapping[str, object]) -> str:
         try:
             msgspec.convert({key: value}, TopicPolicy)
         except msgspec.ValidationError:
-            what = describe.allowed(inner) if inner is not None else "nothing of that name"
+            what = describe.allowed(inner) if inner is not None else "no such key"
             return f"{key}: got {describe.given(value)}; allowed: {what}"
     return f"{', '.join(changes)}: not allowed together"
 

@@ -9,7 +9,7 @@ def unchecked(config: Config) -> list[str]:
     radio, policy = backend_of(config), config.access.policy
     found = radio.unchecked(config.backend_settings) if radio is not None else []
     if config.backend == "gnuradio":
-        found = ["whether the flowgraph answers (it is not asked)"]
+        found = ["whether the flowgraph answers (it is not queried)"]
     if policy not in ("none", "auto") and found:
         found = [*found, f'whether access.policy "{policy}" fits what the radio can do']
     return found

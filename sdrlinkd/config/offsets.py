@@ -5,7 +5,7 @@ from sdrlinkd.config.pdu_links import ModemParams
 
 def cfo_told(modem: ModemParams) -> str:
     """The frequency offset up to which bursts are searched, and why, in one line."""
-    searched = f"bursts are looked for up to {modem.searched_cfo_hz / 1e3:.3g} kHz off"
+    searched = f"the receiver searches for bursts up to {modem.searched_cfo_hz / 1e3:.3g} kHz off"
     if modem.max_cfo_hz != "auto":
         return f"{searched} (modem.max_cfo_hz)"
     return (
@@ -22,5 +22,5 @@ def cfo_warning(modem: ModemParams) -> str:
     key = "modem.rate_hz" if modem.max_cfo_hz == "auto" else "modem.max_cfo_hz"
     return (
         f"{cfo_told(modem)}{apart}; radios farther apart do not hear each other: raise {key}, or "
-        "tell better crystals (modem.crystal_ppm)"
+        "state better crystals (modem.crystal_ppm)"
     )

@@ -53,7 +53,7 @@ def _check_sharing(config: Config) -> None:
     if policy not in ("auto", "none") and config.backend in WITHOUT_AIR:
         raise ConfigError(
             f'access.policy: got "{policy}", but the backend "{config.backend}" has no '
-            "air that we could hear; "
+            "channel to sense; "
             'allowed: "auto" or "none", or a backend with a radio'
         )
     if config.rate.min_mcs > config.rate.max_mcs:

@@ -55,7 +55,7 @@ def as_numbers(raw: object, kind: inspect.Type | None, key: str = "") -> object:
 def example(key: str | int, kind: inspect.Type) -> str:
     """A hint for errors how to write the value of `key` with a unit; empty if it has none."""
     quantity = _quantity_of(str(key), kind)
-    return f", or with its unit, such as {quantity.example}" if quantity else ""
+    return f", or with a unit, such as {quantity.example}" if quantity else ""
 
 
 def _quantity_of(key: str, kind: inspect.Type | None) -> _Quantity | None:

@@ -28,16 +28,16 @@ def robot_id(config: Config, topics: Iterable[str]) -> int:
     numbers = set(found.values())
     if len(numbers) > 1:
         raise ConfigError(
-            f'{where}, and namespace is "", so the last number in the topics\' names is meant, but '
+            f'{where}, and namespace is "", so it is the last number in the topics\' names, but '
             f"they disagree: {_listed(found)}; allowed: {_ALLOWED}, a namespace, or topics with "
             "one robot's names"
         )
     number = numbers.pop() if numbers else ""
     if _fits(number):
         return int(number)
-    problem = f"is {_listed(found)}, above {MOST}" if found else "is not there: no name has digits"
+    problem = f"is {_listed(found)}, above {MOST}" if found else "is missing: no name has digits"
     raise ConfigError(
-        f'{where}, and namespace is "", so the last number in the topics\' names is meant, but it '
+        f'{where}, and namespace is "", so it is the last number in the topics\' names, but it '
         f'{problem}; allowed: {_ALLOWED}, or a namespace such as "robot_1"'
     )
 
@@ -46,7 +46,7 @@ def _from_namespace(namespace: str, where: str) -> int:
     number = _last_number(namespace)
     if _fits(number):
         return int(number)
-    problem = f"is {_short(number)}, above {MOST}" if number else "is not there"
+    problem = f"is {_short(number)}, above {MOST}" if number else "is missing"
     raise ConfigError(
         f'{where} (the last number in the namespace), but in "{_short(namespace)}" it {problem}; '
         f'allowed: {_ALLOWED}, or a namespace such as "robot_1"'

@@ -77,7 +77,7 @@ class Setup:
                 f"  {topic_id:>2}  {name}  {self.registry.topics[topic_id].type}"
                 for name, topic_id in self.topics_in.items()
             ),
-            f"heard messages appear as {self.republished_as(2, 0)} (from robot 2)",
+            f"received messages appear as {self.republished_as(2, 0)} (from robot 2)",
             *(f"warning: {warning}" for warning in self.all_warnings),
             *(f"not checked: {each}" for each in unchecked(config)),
         ]
@@ -104,14 +104,14 @@ def _resolve(config: Config, base: Path, source: str) -> Setup:
     check_access(config.access, node_id)
     if config.rate.adapt and not (registry.has_control and config.link.beacon_s):
         raise ConfigError(
-            "rate.adapt: got true; it needs beacons (link.beacon_s) and a control "
-            "channel, a registry of at most 15 topics; allowed here: false"
+            "rate.adapt: got true; it needs beacons (link.beacon_s) and the control "
+            "channel, so at most 15 topics; allowed here: false"
         )
     check_relay(config, node_id, registry)
     if config.chrony.socket and config.chrony.robot == node_id:
         raise ConfigError(
             f"chrony.robot: got {node_id}, this robot itself; allowed: another robot, "
-            "whose clock is the true one"
+            "whose clock is the reference"
         )
     policies = _policies(config, registry)
     return Setup(
@@ -134,7 +134,7 @@ def load_registry(path: Path) -> Registry:
         text = path.read_text()
     except (OSError, ValueError) as error:
         raise RegistryError(
-            f"{str(path)!r}: the topic registry cannot be read ({error}); "
+            f"{str(path)!r}: the topic registry is unreadable ({error}); "
             "it is a CSV of `name,type` lines, named by the key `registry`"
         ) from None
     return parse_registry(text, str(path))
@@ -158,7 +158,7 @@ def _check_texts(config: Config) -> None:
             f"{MIN_BEACON_S}"
         )
     if "\0" in config.bus.runtime_dir:
-        raise ConfigError("bus.runtime_dir: holds a NUL; allowed: a directory's name")
+        raise ConfigError("bus.runtime_dir: contains a NUL; allowed: a directory's name")
     most = equal_payload(config.link.pdu_size, 1)
     if config.link.min_fragment > most:
         raise ConfigError(
@@ -206,7 +206,7 @@ def _policies(config: Config, registry: Registry) -> dict[int, TopicPolicy]:
                 f"{registry.suggest(name)}"
             )
         if topic.id in policies:
-            raise ConfigError(f'topic."{name}": stands twice, with and without the slash')
+            raise ConfigError(f'topic."{name}": listed twice, with and without the slash')
         policies[topic.id] = policy
     return policies
 
@@ -216,11 +216,11 @@ def _warnings(config: Config, registry: Registry) -> list[str]:
     shared = equal_payload(size, 2)
     lonely = (
         f"link.min_fragment = {least} is more than the {shared} B that each of two topics gets in "
-        f"a PDU of {size} B: topics seldom share a PDU; at most {shared} lets them"
+        f"a PDU of {size} B: topics seldom share a PDU; set it to at most {shared}"
     )
     full = (
-        f"{len(registry)} topics take every topic id: no ages, no beacons, no link reports, no "
-        f"receipts; at most {len(registry) - 1} leave one for them"
+        f"{len(registry)} topics use every topic id: no ages, no beacons, no link reports, no "
+        f"receipts; with at most {len(registry) - 1} topics the daemon has them"
     )
     deaf = "" if config.backend in WITHOUT_AIR else cfo_warning(config.modem)
     return [deaf] * bool(deaf) + [lonely] * (least > shared) + [full] * (not registry.has_control)

@@ -89,7 +89,7 @@ def open_source(
     if topics:
         _select(source, topics, topics_key)
     if not source.topics:
-        raise UserError(f"{source.title}: no topic is left to send")
+        raise UserError(f"{source.title}: no topic left to send")
     return source
 
 
@@ -116,12 +116,12 @@ def _from_bag(path: Path, registry_path: Path | None, duration_s: float) -> Sour
     else:
         found.sort(key=lambda topic: -topic.n_messages)
         left_out += [
-            f"{topic.name}: a registry made from a bag has room for {MAX_BAG_TOPICS} topics"
+            f"{topic.name}: a registry made from a bag holds {MAX_BAG_TOPICS} topics"
             for topic in found[MAX_BAG_TOPICS:]
         ]
         found = sorted(found[:MAX_BAG_TOPICS])
         if not found:
-            raise UserError(f"{path}: holds no messages")
+            raise UserError(f"{path}: contains no messages")
         registry = make_registry([(topic.name, topic.type) for topic in found], str(path))
     source = Source(path.name, bag, registry, "", duration_s, found, left_out)
     _match(source)
@@ -137,7 +137,9 @@ def _match(source: Source) -> None:
         if entry is None:
             source.left_out.append(f"{topic.name}: not in the registry")
         elif entry.type != topic.type:
-            source.left_out.append(f"{topic.name}: is {topic.type}, the registry has {entry.type}")
+            source.left_out.append(
+                f"{topic.name}: type {topic.type}, but the registry has {entry.type}"
+            )
         else:
             kept.append(topic)
     source.topics = kept

@@ -32,22 +32,22 @@ def verdict(result: RunResult) -> str:
     """What is missing or wrong, and why, in a sentence; empty if the run was good."""
     missing = result.sent - result.received
     if missing <= 0:
-        wrong = "" if result.bytes_identical else "what arrived is not what was sent"
+        wrong = "" if result.bytes_identical else "received messages differ from those sent"
         wrong = wrong if result.ledger_adds_up else "its ledger does not add up"
-        return wrong and f"{result.name}: {wrong}, which is a bug of ours"
+        return wrong and f"{result.name}: {wrong}, which is a bug in sdrlinkd"
     text = f"{result.name}: {missing} of {result.sent} messages did not arrive: "
     heard = result.phy
     if heard is not None and (heard.samples_lost or (heard.busy or 0.0) > SATURATED):
         return text + _why_slow(heard, result.duration_s)
     if heard is not None and not is_clean(result):
         needed_db = phy.needed_snr_db(heard.mcs_index, result.pdu_size, CLEAN_PER) + MARGIN_DB
-        fades = "" if heard.channel == "awgn" else f" on a channel that fades ({heard.channel})"
+        fades = "" if heard.channel == "awgn" else f" with fading ({heard.channel})"
         return text + (
-            f"{heard.mcs} brings everything from {needed_db:.0f} dB on, and this air has "
+            f"{heard.mcs} loses nothing from {needed_db:.0f} dB upward, but this channel has "
             f"{heard.snr_db:g} dB{fades}"
         )
     named = ", ".join(f"{count} {name}" for name, count in result.dropped.items())
-    return text + (named or "no reason is known, which is a bug of ours")
+    return text + (named or "unknown reason, which is a bug in sdrlinkd")
 
 
 def _why_slow(heard: PhyResult, duration_s: float) -> str:
@@ -58,10 +58,10 @@ def _why_slow(heard: PhyResult, duration_s: float) -> str:
         lost = f"the receiver lost {lost_s:.1f} s of the {duration_s:.1f} s"
     waited = heard.waited or 0.0
     if (heard.busy or 0.0) - waited > SATURATED:
-        return f"{lost}, as a processor of this machine is too slow for {rate}; try a lower --rate"
+        return f"{lost}: the CPU is too slow for {rate}; try a lower --rate"
     if waited * duration_s > STOOD_STILL * lost_s:
         return (
-            f"{lost}, as other programs had the processors for {waited * duration_s:.1f} s; end "
+            f"{lost}: other programs used the CPU for {waited * duration_s:.1f} s; end "
             f"them, or try a lower --rate than {rate}"
         )
-    return f"{lost}, as the daemon stood still; was it suspended, or the machine?"
+    return f"{lost}: the daemon stalled; was it or the machine suspended?"

@@ -56,15 +56,15 @@ def check_clock(kernel: KernelClock | None, step_s: float, chrony: str) -> list[
         _synchronised(kernel),
         good_if(
             abs(step_s) < STEP_S, "clock's steps",
-            "none while we looked" if abs(step_s) < STEP_S else f"it jumped by {step_s:+.3f} s",
-            "have one program set it, slowly: chrony with makestep only at its start",
+            "none during this check" if abs(step_s) < STEP_S else f"it jumped by {step_s:+.3f} s",
+            "let one program slew it: chrony, with makestep only at its start",
         ),
     ]  # fmt: skip
     if chrony:
         found.append(
             good_if(
                 Path(chrony).exists() and os.access(chrony, os.W_OK), "chrony.socket", chrony,
-                f"chronyd does not listen there: `refclock SOCK {chrony}` in chrony.conf, and "
+                f"chronyd does not listen there: put `refclock SOCK {chrony}` in chrony.conf, and "
                 "start chronyd before the daemon",
             )
         )  # fmt: skip
@@ -74,11 +74,11 @@ def check_clock(kernel: KernelClock | None, step_s: float, chrony: str) -> list[
 def _synchronised(kernel: KernelClock | None) -> Finding:
     what = "clock"
     if kernel is None:
-        return none(what, "the kernel does not tell")
+        return none(what, "the kernel does not report it")
     if kernel.is_synchronised:
-        return good(what, f"kept by NTP or the like, within {1e3 * kernel.error_s:.0f} ms")
+        return good(what, f"synchronized by NTP or similar, within {1e3 * kernel.error_s:.0f} ms")
     return none(
         what,
-        "nothing keeps it: ages of messages need no clock; stamps in ROS messages do (chrony, or "
-        "[chrony] by another robot)",
+        "not synchronized: message ages do not need it; stamps in ROS messages do (chrony, or "
+        "[chrony] from another robot)",
     )

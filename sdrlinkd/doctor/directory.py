@@ -24,19 +24,19 @@ def check_directory(path: Path, uid: int) -> list[Finding]:
         above = next((each for each in path.parents if each.exists()), Path("/"))
         return [
             good_if(
-                os.access(above, os.W_OK | os.X_OK), what, f"{path}, made at start",
-                f"{above} is not writable for this user: another bus.runtime_dir, or "
+                os.access(above, os.W_OK | os.X_OK), what, f"{path}, created at start",
+                f"{above} is not writable for this user: set another bus.runtime_dir, or "
                 "systemd's RuntimeDirectory=",
             )
         ]  # fmt: skip
     about = path.stat()
     if not stat.S_ISDIR(about.st_mode):
-        return [bad(what, f"{path} is no directory", "another bus.runtime_dir")]
+        return [bad(what, f"{path} is not a directory", "another bus.runtime_dir")]
     if is_foreign(about, uid):
         return [
             bad(
                 what, f"{path} belongs to another user, or is open to all",
-                "a directory of this user's own as bus.runtime_dir",
+                "set bus.runtime_dir to a directory that this user owns",
             )
         ]  # fmt: skip
     if not os.access(path, os.R_OK | os.X_OK):
@@ -47,5 +47,5 @@ def check_directory(path: Path, uid: int) -> list[Finding]:
             )
         ]  # fmt: skip
     told = f"{path}, mode {stat.S_IMODE(about.st_mode):o}"
-    running = "; a daemon's sockets are there" if (path / CONTROL_SOCKET).exists() else ""
+    running = "; holds a daemon's sockets" if (path / CONTROL_SOCKET).exists() else ""
     return [good(what, told + running)]

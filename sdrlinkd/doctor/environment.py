@@ -30,12 +30,12 @@ def check_environment(
     return [
         good_if(
             sys.version_info >= LEAST_PYTHON, "Python", found,
-            f"needs {'.'.join(map(str, LEAST_PYTHON))} or newer",
+            f"install Python {'.'.join(map(str, LEAST_PYTHON))} or newer",
         ),
         _packages(requirements, version_of),
         good_if(
             home == phy_home, "modem's package", f"phy in {phy_home}",
-            "another project's phy is in the way: install sdrlinkd into an environment of its own",
+            "another project's phy shadows it: install sdrlinkd into its own environment",
         ),
         _compiled(cache),
     ]  # fmt: skip
@@ -56,8 +56,8 @@ def _packages(requirements: list[str], version_of: Callable[[str], str]) -> Find
         if least and _numbers(version) < _numbers(least):
             wrong.append(f"{name} {version} is older than {least}")
     if wrong:
-        return bad("packages", ", ".join(wrong), "install sdrlinkd anew: pip install .")
-    return good("packages", f"{count}, all there")
+        return bad("packages", ", ".join(wrong), "reinstall sdrlinkd: pip install .")
+    return good("packages", f"{count}, all installed")
 
 
 def _numbers(version: str) -> list[int]:

@@ -45,7 +45,7 @@ def headroom_found(modem: ModemParams, pdu_size: int, seconds: float) -> Finding
         return check_headroom(measure_headroom(modem, pdu_size, seconds))
     except UserError as error:
         said = str(error).splitlines()[-1]
-        return bad("CPU headroom", f"no daemon ran to be measured: {said}", "mend that first")
+        return bad("CPU headroom", f"could not start a daemon to measure: {said}", "fix that first")
 
 
 def measure_headroom(modem: ModemParams, pdu_size: int, seconds: float) -> Headroom:
@@ -75,12 +75,12 @@ def measure_headroom(modem: ModemParams, pdu_size: int, seconds: float) -> Headr
 
 def check_headroom(found: Headroom) -> Finding:
     """The finding on whether the modem keeps up with the samples on a full channel."""
-    lost = f"; {found.samples_lost} samples were lost" if found.samples_lost else ""
+    lost = f"; {found.samples_lost} samples dropped" if found.samples_lost else ""
     return good_if(
         found.full <= MOST and not found.samples_lost, "CPU headroom",
         f"at {found.rate_hz / 1e6:g} Msps a daemon takes {100 * found.full:.0f} % of a core on a "
-        f"full air, {100 * found.silent:.0f} % on a silent one{lost}",
-        f"a lower modem.rate_hz at all robots, such as {found.rate_hz / 2e6:g} Msps",
+        f"full channel, {100 * found.silent:.0f} % on a silent one{lost}",
+        f"lower modem.rate_hz at all robots, such as {found.rate_hz / 2e6:g} Msps",
     )  # fmt: skip
 
 

@@ -66,7 +66,7 @@ def check_host(found: HostTerm, lead_s: float | None) -> Finding:
     `lead_s` is the time by which bursts are handed to the radio early; None without a real radio.
     """
     told = (
-        f"wakes {1e3 * found.wakes_s:.2f} ms late and hands over in "
+        f"wakes {1e3 * found.wakes_s:.2f} ms late and delivers in "
         f"{1e3 * found.hands_over_s:.2f} ms (p99 of {found.n}); "
         f"for plan: --host {1e3 * found.host_s:.1f}ms"
     )
@@ -74,5 +74,5 @@ def check_host(found: HostTerm, lead_s: float | None) -> Finding:
         return good("host's lateness", told)
     return good_if(
         found.host_s < lead_s, "host's lateness", told,
-        f"bursts will be late: end other programs, or more than soapy.lead_s = {lead_s:g}",
+        f"bursts will be late: end other programs, or raise soapy.lead_s = {lead_s:g}",
     )  # fmt: skip

@@ -64,7 +64,7 @@ def check_limits(granted: Granted, device: str, root: Path) -> list[Finding]:
         _hurry(granted, is_needed=bool(device)),
         good_if(
             granted.shared_memory, "shared memory", "for samples between daemon and radio process",
-            "memfd_create is forbidden here: a seccomp profile of the container?",
+            "memfd_create is forbidden here: check the container's seccomp profile",
         ),
         good_if(
             granted.files >= 256, "open files", f"{granted.files} allowed", "ulimit -n 1024",
@@ -79,7 +79,7 @@ def _hurry(granted: Granted, *, is_needed: bool) -> Finding:
         return good(what, "granted")
     instead = f"not granted; niceness down to {granted.nice}"
     if not is_needed:
-        return none(what, f"{instead}; only a real radio's process asks for it")
+        return none(what, f"{instead}; only the process of a real radio uses it")
     return bad(
         what, instead,
         "the systemd unit has LimitRTPRIO=50; by hand: `@sdrlink - rtprio 50` in "
@@ -94,16 +94,16 @@ def _buffer(device: str, root: Path) -> Finding:
     if is_networked(device):
         limit = _number(root / "proc/sys/net/core/rmem_max")
         if limit is None:
-            return none(what, "net.core.rmem_max is not to be seen")
+            return none(what, "the kernel does not show net.core.rmem_max")
         return good_if(
             limit >= NETWORK_BUFFER, what, f"net.core.rmem_max = {limit}",
             f"sudo sysctl -w net.core.rmem_max={NETWORK_BUFFER} (and in /etc/sysctl.d)",
         )  # fmt: skip
     limit = _number(root / "sys/module/usbcore/parameters/usbfs_memory_mb")
     if limit is None:
-        return none(what, "the kernel shows no usbfs_memory_mb")
+        return none(what, "the kernel does not show usbfs_memory_mb")
     return good_if(
-        limit == 0 or limit >= USB_BUFFER_MB, what, f"{limit} MB of the kernel for USB",
+        limit == 0 or limit >= USB_BUFFER_MB, what, f"{limit} MB of kernel memory for USB",
         f"echo {USB_BUFFER_MB} | sudo tee /sys/module/usbcore/parameters/usbfs_memory_mb",
     )  # fmt: skip
 

@@ -23,11 +23,11 @@ def check_machine(
     return [
         good_if(
             cores > 1 or not is_timed, "cores", f"{cores}",
-            "two cores at least: one for the modem, one for all else",
+            "use at least two cores: one for the modem, one for everything else",
         ),
         good_if(
-            load <= BUSY * cores, "load", f"{load:.2f} on {cores} cores, in the last minute",
-            "end other programs, or give the daemon cores of its own (systemd: AllowedCPUs=)",
+            load <= BUSY * cores, "load", f"{load:.2f} on {cores} cores in the last minute",
+            "end other programs, or give the daemon its own cores (systemd: AllowedCPUs=)",
         ),
         _stolen(*stat),
         _governor(cpus, is_timed=is_timed),
@@ -38,11 +38,11 @@ def _stolen(before: str, after: str) -> Finding:
     first, last = _times(before), _times(after)
     spent = [late - early for early, late in zip(first, last, strict=False)]
     if len(spent) < 8 or sum(spent) <= 0:
-        return none("stolen time", "/proc/stat does not tell")
+        return none("stolen time", "/proc/stat does not report it")
     share = spent[7] / sum(spent)
     return good_if(
-        share <= STOLEN, "stolen time", f"{100 * share:.0f} % of this machine went to others",
-        "a virtual machine that shares its cores loses samples: a host of its own, or fixed cores",
+        share <= STOLEN, "stolen time", f"{100 * share:.0f} % of the CPU time was stolen",
+        "a virtual machine with shared cores drops samples: use a dedicated host or pinned cores",
     )  # fmt: skip
 
 
@@ -60,11 +60,11 @@ def _governor(cpus: Path, *, is_timed: bool) -> Finding:
         except OSError:
             continue
     if not found:
-        return none("frequency governor", "the machine shows none")
+        return none("frequency governor", "this machine has none")
     told = ", ".join(sorted(found))
     if is_timed and found & set(SLOW_GOVERNORS):
         return bad(
             "frequency governor", told,
-            "a slowed core comes late: sudo cpupower frequency-set -g performance",
+            "a throttled core is late: sudo cpupower frequency-set -g performance",
         )  # fmt: skip
     return good("frequency governor", told)

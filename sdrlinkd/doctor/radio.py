@@ -21,7 +21,7 @@ def check_radio(config: Config | None, found: ProbeReport | None) -> list[Findin
     if config is not None and config.backend != "soapy":
         return [_without(config)]
     if found is None:
-        return [none("radio", "not looked at")]
+        return [none("radio", "not checked")]
     is_needed = config is not None
     if not found.binding:
         told = "; ".join(found.notes)
@@ -31,7 +31,7 @@ def check_radio(config: Config | None, found: ProbeReport | None) -> list[Findin
     findings = [good("SoapySDR", f"{found.binding}; driver modules: {modules}")]
     if not found.devices:
         told = "; ".join(found.notes) or "no device was found"
-        wanted = "plug it in, install its driver's module, see the lines above"
+        wanted = "plug it in, or install its driver module; see the lines above"
         return [*findings, bad("device", told, wanted) if is_needed else none("device", told)]
     for device in found.devices:
         findings += _of_device(device, config)
@@ -43,20 +43,22 @@ def _without(config: Config) -> Finding:
         folder = config.ether.dir
         return good_if(
             (Path(folder) / FIRST_SOCKET).exists(), "hub of the air", folder,
-            f"no hub serves it: sdrlink-ether --dir {folder}",
+            f"no hub runs there; start one: sdrlink-ether --dir {folder}",
         )  # fmt: skip
     if config.backend == "iqfile" and config.iqfile.receive:
         path = Path(config.iqfile.receive)
         is_there = any(Path(f"{path}{end}").is_file() for end in ("", ".sigmf-meta"))
-        return good_if(is_there, "recording", str(path), "name one that is there: iqfile.receive")
+        return good_if(
+            is_there, "recording", str(path), "set iqfile.receive to an existing recording"
+        )
     if config.backend in BUILT_IN or config.backend in WITHOUT_AIR:
-        return none("radio", f'backend = "{config.backend}" has none')
-    return none("radio", f'backend = "{config.backend}" is another package\'s: not looked at')
+        return none("radio", f'backend = "{config.backend}" uses none')
+    return none("radio", f'backend = "{config.backend}" belongs to another package: not checked')
 
 
 def _of_device(device: DeviceProbe, config: Config | None) -> list[Finding]:
     if device.problem:
-        return [bad("device", f'"{device.device}": {device.problem}', "see the text")]
+        return [bad("device", f'"{device.device}": {device.problem}', "fix what the message says")]
     findings = [good("device", f"{device.driver} {device.hardware}, {_duplex(device)}")]
     if config is None:
         return findings
@@ -74,13 +76,13 @@ def _of_device(device: DeviceProbe, config: Config | None) -> list[Finding]:
             soapy.tx_antenna if name == "sends" else soapy.rx_antenna,
         )  # fmt: skip
     if not soapy.tx_enabled:
-        findings.append(none("device sends", "soapy.tx_enabled = false: this robot only listens"))
+        findings.append(none("device sends", "soapy.tx_enabled = false: this robot only receives"))
     policy = config.access.policy
     if policy in LISTENERS and not device.full_duplex:
         findings.append(
             bad(
-                "access.policy", f'"{policy}" needs to hear others begin, and this radio is '
-                "half duplex", 'access.policy = "tdma" at all robots, with slots of 0.3 s',
+                "access.policy", f'"{policy}" must hear other robots\' bursts begin, and this '
+                "radio is half duplex", 'access.policy = "tdma" at all robots, with slots of 0.3 s',
             )
         )  # fmt: skip
     return findings

@@ -44,15 +44,15 @@ def check_usb(driver: str, root: Path) -> list[Finding]:
     what = "USB device"
     plugged = [each for each in _plugged(root) if driver in ("", each.driver)]
     if driver and driver not in KNOWN:
-        return [none(what, f'"{driver}" is none that is known here')]
+        return [none(what, f'"{driver}" is not a driver known here')]
     if not plugged:
         if not driver:
-            return [none(what, "no radio that is known here is plugged in")]
+            return [none(what, "no known radio is plugged in")]
         ids = ", ".join(KNOWN[driver])
         return [
             bad(
                 what, f"no {driver} is plugged in (lsusb would show {ids})",
-                "plug it in; try another cable and port, without a hub",
+                "plug it in; try another cable or port, without a hub",
             )
         ]  # fmt: skip
     return [_of(each, what) for each in plugged]
@@ -61,7 +61,7 @@ def check_usb(driver: str, root: Path) -> list[Finding]:
 def _of(each: _Plugged, what: str) -> Finding:
     told = f"{each.title} ({each.ids}) at {each.node}"
     if os.access(each.node, os.R_OK | os.W_OK):
-        return good(what, f"{told}, this user may open it")
+        return good(what, f"{told}; this user may open it")
     try:
         group = grp.getgrgid(each.node.stat().st_gid).gr_name
     except (OSError, KeyError):
@@ -69,9 +69,9 @@ def _of(each: _Plugged, what: str) -> Finding:
     join = (
         f"sudo usermod -aG {group} $USER, then log in again"
         if group != "root"
-        else "its udev rules are missing: the driver's package brings them; plug it in anew"
+        else "its udev rules are missing: install the driver's package, then plug it in again"
     )
-    return bad(what, f"{told}, and this user may not open it", join)
+    return bad(what, f"{told}; this user may not open it", join)
 
 
 def _plugged(root: Path) -> list[_Plugged]:

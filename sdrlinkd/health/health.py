@@ -30,7 +30,7 @@ class Health:
             if passed is not None:
                 lines.append(passed)
         for line, n in self._limiter.late(now):
-            more = f" ({n} lines on this were left out)" if n else ""
+            more = f" ({n} similar lines suppressed)" if n else ""
             lines.append(line._replace(text=line.text + more))
         self._lately.note(snapshot)
         return lines

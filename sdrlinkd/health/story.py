@@ -50,7 +50,7 @@ class Story:
         yield from self._queue(snapshot, lately)
         yield from self._samples(snapshot, lately)
         if snapshot.host_clock_steps > self._steps:
-            yield Line("host clock", Level.WARNING, "this host's clock was set: it jumped")
+            yield Line("host clock", Level.WARNING, "this host's clock was stepped")
         self._steps = snapshot.host_clock_steps
 
     def _radio(self, snapshot: Snapshot) -> Iterator[Line]:
@@ -61,7 +61,7 @@ class Story:
         self._state = state
         if state == "up":
             away = "" if self._away_at is None else f" after {span(now - self._away_at)}"
-            word = "back" if self._was_up else "there"
+            word = "back" if self._was_up else "up"
             self._was_up, self._away_at = True, None
             yield Line("radio", Level.INFO, f"the {name} is {word}{away}: {pdu_link.detail}")
             return
@@ -73,13 +73,13 @@ class Story:
             yield Line(
                 "radio",
                 Level.ERROR,
-                f"the settings do not fit the {name}: {pdu_link.reason}. It is tried again after a "
-                "reload (SIGHUP)" + (", and when it is plugged in anew" if name == "radio" else ""),
+                f"the {name} refuses the settings: {pdu_link.reason}. The daemon retries after a "
+                "reload (SIGHUP)" + (" or when it is plugged in again" if name == "radio" else ""),
             )
         elif state == "ended":
-            yield Line("radio", Level.INFO, f"the {name} is over")
+            yield Line("radio", Level.INFO, f"the {name} has ended")
         elif self._was_up:
-            yield Line("radio", Level.WARNING, f"the {name} is away: {pdu_link.reason}")
+            yield Line("radio", Level.WARNING, f"the {name} is gone: {pdu_link.reason}")
         elif state == "down":
             yield Line("radio", Level.WARNING, f"no {name} yet: {pdu_link.reason}")
 
@@ -98,7 +98,7 @@ class Story:
             self._silent.remove(src)
             yield Line(subject, Level.INFO, f"robot {src} is heard again{snr}")
         if before is not None and robot.reboots > before.reboots:
-            yield Line(subject, Level.INFO, f"robot {src} has started anew")
+            yield Line(subject, Level.INFO, f"robot {src} has restarted")
         yield from self._registry(robot, before, snapshot)
         yield from self._mcs(robot, snapshot)
         known = before.clock if before is not None else None
@@ -113,8 +113,10 @@ class Story:
             return
         subject = f"robot {src}'s registry"
         if robot.registry == "differs":
-            where = [each for each in snapshot.notices if each.startswith(f"robot {src} has anoth")]
-            text = where[0] if where else f"robot {src} has another registry"
+            where = [
+                each for each in snapshot.notices if each.startswith(f"robot {src} has a diff")
+            ]
+            text = where[0] if where else f"robot {src} has a different registry"
             yield Line(subject, Level.WARNING, text)
         elif was == "differs":
             yield Line(subject, Level.INFO, f"robot {src} has the same registry now")
@@ -127,11 +129,11 @@ class Story:
         if robot.mcs <= lowest and src not in self._lowest:
             self._lowest.add(src)
             hears = f": it hears us at {robot.snr_there_db:.0f} dB"
-            text = f"the MCS to robot {src} is down to {robot.mcs}, the lowest{hears}"
+            text = f"the MCS to robot {src} fell to {robot.mcs}, the lowest{hears}"
             yield Line(subject, Level.WARNING, text)
         elif robot.mcs > lowest and src in self._lowest:
             self._lowest.remove(src)
-            yield Line(subject, Level.INFO, f"the MCS to robot {src} is up again: {robot.mcs}")
+            yield Line(subject, Level.INFO, f"the MCS to robot {src} rose again to {robot.mcs}")
 
     def _queue(self, snapshot: Snapshot, lately: Lately) -> Iterator[Line]:
         shed, now = lately.shed(snapshot), snapshot.uptime_s
@@ -143,21 +145,21 @@ class Story:
             yield Line(
                 "queue",
                 Level.WARNING,
-                f"more to send than the air carries: messages are dropped, most of {worst}; "
+                f"traffic exceeds the channel capacity: messages are dropped, most of {worst}; "
                 f"sdrlinkctl why {worst} says more",
             )
         elif not shed and self._shedding_at is not None:
             lasted, dropped = span(now - self._shedding_at), total - self._shed_before
             self._shedding_at = None
-            text = f"the air carries all there is to send again: {dropped} dropped in {lasted}"
+            text = f"traffic fits the channel again: {dropped} messages dropped in {lasted}"
             yield Line("queue", Level.INFO, text)
 
     def _samples(self, snapshot: Snapshot, lately: Lately) -> Iterator[Line]:
         lost, now = lately.samples_lost(snapshot), snapshot.uptime_s
         if lost > 0 and self._losing_at is None:
             self._losing_at = now
-            text = f"the receiver loses samples ({lost} so far): this machine is too slow for them"
+            text = f"the receiver drops samples ({lost} so far): the CPU is too slow"
             yield Line("samples", Level.WARNING, text)
         elif lost <= 0 and self._losing_at is not None:
             lasted, self._losing_at = span(now - self._losing_at), None
-            yield Line("samples", Level.INFO, f"no samples are lost any more, after {lasted}")
+            yield Line("samples", Level.INFO, f"the receiver keeps up again, after {lasted}")

@@ -38,7 +38,7 @@ def judge(snapshot: Snapshot, lately: Lately, shares_air: bool) -> VerdictReport
         *_machine(snapshot, lately),
     ]
     if snapshot.state == "draining":
-        reasons.insert(0, "stopping: what is queued is sent, nothing more is taken")
+        reasons.insert(0, "stopping: sends what is queued, accepts nothing more")
     return VerdictReport(level="DEGRADED" if reasons else "OK", reasons=reasons)
 
 
@@ -50,11 +50,11 @@ def _down(snapshot: Snapshot) -> str:
     if pdu_link.state == "waiting":
         return f"no {name} since {since}: {pdu_link.reason}"
     if pdu_link.state == "refused":
-        return f"the settings do not fit the {name}: {pdu_link.reason}"
+        return f"the {name} refuses the settings: {pdu_link.reason}"
     if is_away(pdu_link):
         return f"no {name} since {since}" + (f": {pdu_link.reason}" if pdu_link.reason else "")
     if pdu_link.state == "ended":
-        return f"the {name} is over"
+        return f"the {name} has ended"
     return ""
 
 
@@ -79,7 +79,7 @@ def _robots(snapshot: Snapshot, shares_air: bool) -> list[str]:
 def _quality(robot: NeighborReport) -> list[str]:
     reasons = []
     if robot.registry == "differs":
-        reasons.append(f"robot {robot.src} has another topic registry")
+        reasons.append(f"robot {robot.src} has a different topic registry")
     if robot.per_there is not None and robot.per_there >= LOSSY:
         reasons.append(
             f"robot {robot.src} hears us{_at(robot.snr_there_db)}, {percent(robot.per_there)} lost"
@@ -102,18 +102,18 @@ def _queue(snapshot: Snapshot, lately: Lately) -> list[str]:
     worst = next(iter(shed))
     others = f" and {len(shed) - 1} other topics" if len(shed) > 1 else ""
     dropped = f"{sum(shed.values())} messages dropped in {RATE_WINDOW_S:g} s"
-    return [f"more to send than the air carries: {dropped}, most of {worst}{others}"]
+    return [f"traffic exceeds the channel capacity: {dropped}, most of {worst}{others}"]
 
 
 def _machine(snapshot: Snapshot, lately: Lately) -> list[str]:
     pdu_link, reasons = snapshot.carrier, []
     lost = lately.samples_lost(snapshot)
     if lost > 0:
-        reasons.append(f"{lost} samples lost in {RATE_WINDOW_S:g} s: this machine is too slow")
+        reasons.append(f"{lost} samples dropped in {RATE_WINDOW_S:g} s: the CPU is too slow")
     if pdu_link.clipped_pct >= CLIPPED_PCT:
         reasons.append(
             f"the receiver clips {pdu_link.clipped_pct:.2g} % of the samples: lower its gain"
         )
     if snapshot.loop_lag_ms >= LATE_LOOP_MS:
-        reasons.append(f"the daemon runs {snapshot.loop_lag_ms:.0f} ms late: this machine is busy")
+        reasons.append(f"the event loop lags {snapshot.loop_lag_ms:.0f} ms: the CPU is busy")
     return reasons

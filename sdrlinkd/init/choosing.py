@@ -47,7 +47,7 @@ def choose(found: Iterable[FoundTopic], wanted: list[str], source: str) -> Choic
         elif there is None:
             merged[short.name] = short
         elif there.type != short.type:
-            left_out[topic.name] = f"is {short.type}, another robot's is {there.type}"
+            left_out[topic.name] = f"type {short.type}, but another robot's is {there.type}"
         else:
             merged[short.name] = there._replace(n_messages=there.n_messages + short.n_messages)
     if wanted:
@@ -56,7 +56,7 @@ def choose(found: Iterable[FoundTopic], wanted: list[str], source: str) -> Choic
         (each for each in merged.values() if not _OWN.fullmatch(each.name)),
         key=lambda each: (_is_large(each), -each.n_messages, each.name),
     )
-    left_out |= {each.name: "ROS's own" for each in merged.values() if _OWN.fullmatch(each.name)}
+    left_out |= {each.name: "ROS internal" for each in merged.values() if _OWN.fullmatch(each.name)}
     left_out |= {
         each.name: f"no room: {MOST_TOPICS} topics, {RULE}" for each in ranked[MOST_TOPICS:]
     }
@@ -91,13 +91,13 @@ def _select(
             raise UserError(f'--topic: got "{name}"; allowed: {", ".join(merged)} ({source})')
     if len(names) > MOST_TOPICS:
         raise UserError(f"--topic: {len(names)} topics; allowed: at most {MOST_TOPICS}")
-    rest = {name: "not asked for" for name in merged if name not in names}
+    rest = {name: "not requested" for name in merged if name not in names}
     return Choice([merged[name] for name in names], left_out | rest)
 
 
 def _some(topics: list[FoundTopic], source: str) -> list[FoundTopic]:
     if not topics:
-        raise UserError(f"{source}: has no topic that a registry could hold")
+        raise UserError(f"{source}: has no topic that fits a registry")
     return topics
 
 
@@ -105,7 +105,7 @@ def _unusable(topic: FoundTopic) -> str:
     try:
         make_registry([(topic.name, topic.type)])
     except RegistryError:
-        return f"a registry cannot name it ({topic.type})"
+        return f"not a valid registry type ({topic.type})"
     return ""
 
 

@@ -51,13 +51,13 @@ def dictionaries_of(config: Config) -> dict[str, bytes]:
             content = Path(policy.dictionary).read_bytes()
         except OSError as error:
             raise UserError(
-                f"{key}: {policy.dictionary} of the running daemon cannot be read "
+                f"{key}: {policy.dictionary} of the running daemon is unreadable "
                 f"({error.strerror}); allowed: a file that this user may read"
             ) from None
         if found.setdefault(_beside(policy.dictionary), content) != content:
             raise UserError(
-                f"{key}: {policy.dictionary} has the name of another topic's dictionary; allowed: "
-                "files with names of their own"
+                f"{key}: {policy.dictionary} has the same name as another topic's dictionary; "
+                "allowed: distinct file names"
             )
     return found
 

@@ -19,7 +19,7 @@ def topics_of_graph() -> list[FoundTopic]:
     program = shutil.which("ros2")
     if program is None:
         raise UserError(
-            "--from-graph: there is no `ros2` in PATH; source ROS 2's setup.bash first, or name "
+            "--from-graph: `ros2` is not in PATH; source ROS 2's setup.bash first, or give "
             "--bag FILE or --topic NAME:TYPE"
         )
     try:

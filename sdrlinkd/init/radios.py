@@ -27,20 +27,20 @@ class RadioPreset(NamedTuple):
         return self.backend in ("soapy", "ether")
 
 
-_LOW = "dB; begin low: sdrlinkctl radio probe shows the range"
+_LOW = "dB; start low: sdrlinkctl radio probe shows the range"
 _ANY = (("tx_gain_db = 30.0", _LOW), ("rx_gain_db = 30.0", ""))
 
 RADIOS = {
     "hackrf": RadioPreset(
-        "HackRF One (half duplex: some tenths of a second late)", "soapy", "driver=hackrf",
+        "HackRF One (half duplex: latency of some tenths of a second)", "soapy", "driver=hackrf",
         oversampling=4, slot="0.3 s",
         soapy=(
-            ("tx_gains = { AMP = 0, VGA = 20 }", "dB; begin low"),
-            ("rx_gains = { AMP = 0, LNA = 24, VGA = 20 }", "its input bears -5 dBm, no more"),
+            ("tx_gains = { AMP = 0, VGA = 20 }", "dB; start low"),
+            ("rx_gains = { AMP = 0, LNA = 24, VGA = 20 }", "its input takes at most -5 dBm"),
         ),
     ),
     "usrp": RadioPreset(
-        "USRP, by UHD", "soapy", "driver=uhd",
+        "USRP, through UHD", "soapy", "driver=uhd",
         soapy=(
             ("tx_gain_db = 40.0", _LOW),
             ("rx_gain_db = 40.0", ""),
@@ -52,8 +52,8 @@ RADIOS = {
     "lime": RadioPreset("LimeSDR", "soapy", "driver=lime", soapy=_ANY),
     "bladerf": RadioPreset("bladeRF", "soapy", "driver=bladerf", soapy=_ANY),
     "pluto": RadioPreset("ADALM-Pluto", "soapy", "driver=plutosdr", soapy=_ANY),
-    "soapy": RadioPreset("another one that SoapySDR knows (--device)", "soapy", soapy=_ANY),
-    "ether": RadioPreset("none: a simulated air, many daemons on one computer", "ether",
+    "soapy": RadioPreset("another SoapySDR device (--device)", "soapy", soapy=_ANY),
+    "ether": RadioPreset("none: a simulated channel, many daemons on one computer", "ether",
                          rate="5 Msps"),
     "loopback": RadioPreset("none: one daemon that hears itself through the modem", "loopback",
                             rate="5 Msps"),

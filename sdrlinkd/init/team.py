@@ -43,7 +43,7 @@ def team_files(team: Team, ids: list[int]) -> dict[str, str]:
 def _registry(topics: list[FoundTopic]) -> str:
     lines = "".join(f"{topic.name},{topic.type}\n" for topic in topics)
     return (
-        "# Topic registry: one `name,type` a line; the line's place is the topic id.\n"
+        "# Topic registry: one `name,type` per line; its position, from 0, is the topic id.\n"
         "# Every robot of the team needs this same file. At most 15 topics.\n" + lines
     )
 
@@ -57,7 +57,7 @@ def _config(team: Team, number: int, has_neighbors: bool) -> str:
         parts.append(
             "[soapy]\n"
             + _text("device", team.device or radio.device, "sdrlinkctl radio probe shows it")
-            + _line("tx_enabled = false", "nothing is sent until you set this to true")
+            + _line("tx_enabled = false", "nothing is transmitted until you set this to true")
             + "".join(_line(*each) for each in radio.soapy)
         )
     if radio.backend == "ether":
@@ -77,8 +77,8 @@ def _hub(team: Team) -> str:
 
 def _head(team: Team, number: int) -> str:
     return (
-        f"# Robot {number} of {team.robots}, begun by `sdrlinkctl init`. All keys and what they "
-        "mean:\n# etc/sdrlinkd.toml in the source; installed: share/sdrlinkd/sdrlinkd.toml.\n"
+        f"# Robot {number} of {team.robots}, written by `sdrlinkctl init`. All keys and their "
+        "meaning:\n# etc/sdrlinkd.toml in the source; installed: share/sdrlinkd/sdrlinkd.toml.\n"
         + _line(f'namespace = "robot_{number}"', f"its topics: /robot_{number}/…")
         + _line(f'registry = "{REGISTRY}"', "the same file at all robots")
         + _line(f'backend = "{team.radio.backend}"')
@@ -89,10 +89,10 @@ def _modem(team: Team) -> str:
     radio = team.radio
     lines = [_line(f'rate_hz = "{radio.rate}"', "the channel's width; the same at all robots")]
     if radio.oversampling > 1:
-        told = "the radio runs at so many times that rate"
+        told = "the radio runs at this multiple of that rate"
         lines.append(_line(f"oversampling = {radio.oversampling}", told))
     if radio.is_real:
-        lines.append(_text("frequency_hz", team.frequency, "what antenna and licence are for"))
+        lines.append(_text("frequency_hz", team.frequency, "one that antenna and licence cover"))
     lines.append(_line("mcs = 1", "QPSK 1/2; sdrlinkctl phy info lists them"))
     return "[modem]\n" + "".join(lines)
 
@@ -100,11 +100,11 @@ def _modem(team: Team) -> str:
 def _access(team: Team) -> str:
     nodes = ", ".join(str(number) for number in range(1, team.robots + 1))
     lines = [
-        _line('policy = "auto"', "what the radio can do best; the same at all robots"),
+        _line('policy = "auto"', "best policy for the radio; the same at all robots"),
         _line(f"nodes = [{nodes}]"),
     ]
     if team.radio.slot:
-        told = "a turn: room for this radio to change its direction"
+        told = "long enough for the turnaround of this radio"
         lines += [_line(f'slot_s = "{team.radio.slot}"', told), _line("reuse = false")]
     return "[access]\n" + "".join(lines)
 

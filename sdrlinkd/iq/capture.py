@@ -138,7 +138,7 @@ class Capture:
             frequency_hz,
             hardware=radio.detail,
             description=f"Bursts of sdrlinkd's OFDM modem, {wish.grid.n_fft} subcarriers and a "
-            f"prefix of {wish.grid.n_cp} samples, are annotated",
+            f"cyclic prefix of {wish.grid.n_cp} samples, are annotated",
             recorder=f"sdrlinkd {__version__}",
         )
         finder = BurstFinder(writer.read, rate_hz, frequency_hz, wish.network, wish.grid)

@@ -39,7 +39,7 @@ class IqRecording:
             raise UserError(str(error)) from None
         if not self.info.n_samples:
             self._reader.close()
-            raise UserError(f"{self.info.path}: holds no samples")
+            raise UserError(f"{self.info.path}: contains no samples")
 
     def read(self, first: int, n: int) -> Samples:
         """Up to `n` samples of the recording from `first` on."""

@@ -41,8 +41,8 @@ def plan_replay(
     level_db = 10 * math.log10(max(silence, LEAST))
     if not found:
         raise UserError(
-            f"{recording.info.path}: nothing in it is stronger than {level_db:.1f} dBFS; allowed: "
-            "--silence-db with another level below which it is silent"
+            f"{recording.info.path}: nothing in it exceeds {level_db:.1f} dBFS; allowed: "
+            "a lower --silence-db"
         )
     longest_s = max(each.n for each in found) / rate_hz
     gain = _gain(recording, found, backoff_db)
@@ -53,9 +53,9 @@ def _check_rate(recording: IqRecording, rate_hz: float) -> None:
     stated = recording.info.rate_hz
     if stated is not None and abs(stated / rate_hz - 1) > RATE_TOLERANCE:
         raise UserError(
-            f"{recording.info.path}: is sampled at {stated:.10g} Hz; the modem is set to "
-            f"{rate_hz:.10g} Hz; allowed: modem.rate_hz (--rate) as the recording's, with "
-            "modem.oversampling (--oversampling) where the radio must be faster, or resample it"
+            f"{recording.info.path}: sampled at {stated:.10g} Hz, but the modem is set to "
+            f"{rate_hz:.10g} Hz; allowed: modem.rate_hz (--rate) of the recording, with "
+            "modem.oversampling (--oversampling) if the radio must be faster; or resample it"
         )
 
 

@@ -110,7 +110,7 @@ def _too_long(recording: IqRecording, start: int, most: int, silence: float) -> 
     )
     level_db = 10 * np.log10(max(silence, LEAST))
     return UserError(
-        f"{recording.info.path}: what begins at {at} goes on without silence for more than "
-        f"{allowed}; allowed: shorter ones. Silence is below {level_db:.1f} dBFS here: "
-        "--silence-db names another level"
+        f"{recording.info.path}: the stretch at {at} lasts longer than "
+        f"{allowed} without silence; allowed: shorter ones. Silence is below "
+        f"{level_db:.1f} dBFS here; change it with --silence-db"
     )

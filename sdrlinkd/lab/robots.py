@@ -29,7 +29,7 @@ def open_sources(scenario: Scenario, bag: Path | None) -> dict[int, Source]:
     except UserError as error:
         if bag is not None:
             raise
-        raise UserError(f"{error}; what a recording has: name it with --bag") from None
+        raise UserError(f"{error}; give a recording that has it with --bag") from None
 
 
 def _open_sources(scenario: Scenario, bag: Path | None) -> dict[int, Source]:
@@ -111,7 +111,7 @@ def _refuse_ours(given: Mapping[str, Any], wanted: Mapping[str, Any], name: str)
         section, _, inner = key.partition(".")
         if section in wanted and (not inner or inner in wanted[section]):
             raise ConfigError(
-                f"{name}: daemon.{key}: the lab itself says what it is, by [[robot]] and [air]; "
+                f"{name}: daemon.{key}: the lab sets it from [[robot]] and [air]; "
                 "allowed: other keys of sdrlinkd.toml"
             )
     for key, value in wanted.get("modem", {}).items():

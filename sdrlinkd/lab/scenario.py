@@ -122,8 +122,7 @@ def outages_of(scenario: Scenario, traces: Path | None) -> list[Outage]:
     if params.trace:
         if traces is None:
             raise UserError(
-                f"the scenario replays the outages of {params.trace}; name the folder it lies in "
-                "with --traces"
+                f"the scenario replays the outages of {params.trace}; give its folder with --traces"
             )
         outages += read_outages(traces / params.trace, params.period_s, params.from_s)
     return outages
@@ -135,7 +134,7 @@ def _check(scenario: Scenario, source: str) -> None:
     for robot_id in ids:
         if ids.count(robot_id) > 1:
             raise ConfigError(
-                f"{source}: robot.id: got {robot_id} twice; allowed: each robot an id of its own"
+                f"{source}: robot.id: got {robot_id} twice; allowed: a unique id for each robot"
             )
     for robot in scenario.robot:
         _check_path(robot, source)
@@ -154,7 +153,7 @@ def _check(scenario: Scenario, source: str) -> None:
         if end <= begin:
             raise ConfigError(
                 f"{source}: outages.times: got [{begin:g}, {end:g}]; allowed: an end after its "
-                "begin"
+                "start"
             )
 
 
@@ -171,7 +170,7 @@ def _check_path(robot: RobotParams, source: str) -> None:
         if t1 <= t0:
             raise ConfigError(
                 f"{source}: robot.path of robot {robot.id}: got t = {t1:g} s after {t0:g} s; "
-                "allowed: times that grow"
+                "allowed: increasing times"
             )
         speed = ((x1 - x0) ** 2 + (y1 - y0) ** 2) ** 0.5 / (t1 - t0)
         if speed > MAX_SPEED_M_S:

@@ -34,7 +34,7 @@ def pair_table(report: LabReport) -> FittedTable:
     if len(report.pairs) > MOST_ROWS:
         return _receiver_table(report)
     table = FittedTable(
-        f"{report.title or report.scenario}: who got what of whom",
+        f"{report.title or report.scenario}: delivery by pair",
         (
             words("from"), words("to"), figure("sent"), figure("received"), figure("PDR"),
             figure("p50 ms"), figure("p99 ms"), words("PDR in each tenth", 1),
@@ -57,7 +57,7 @@ def pair_table(report: LabReport) -> FittedTable:
 
 def _receiver_table(report: LabReport) -> FittedTable:
     table = FittedTable(
-        f"{report.title or report.scenario}: who got what of all others",
+        f"{report.title or report.scenario}: delivery from all others",
         (
             figure("robot"), figure("sent to it", 1), figure("received"), figure("PDR"),
             figure("worst from"), figure("p50 ms", 2), figure("p99 ms"),

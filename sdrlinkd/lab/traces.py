@@ -19,8 +19,8 @@ def read_outages(path: Path, period_s: float, from_s: float) -> list[Outage]:
     numbers = sorted(set(_numbers(path)))
     if len(numbers) < 2:
         raise UserError(
-            f"{path}: holds no two lines with a seqnum; allowed: a log of received messages, one "
-            "JSON object a line"
+            f"{path}: has fewer than two lines with a seqnum; allowed: a log of received "
+            "messages, one JSON object per line"
         )
     first = numbers[0]
     outages = []
@@ -38,7 +38,7 @@ def _numbers(path: Path) -> list[int]:
         lines = path.read_text(errors="replace").splitlines()
     except OSError as error:
         raise UserError(
-            f"{path}: cannot be read ({error.strerror}); --traces names the folder of the logs"
+            f"{path}: cannot be read ({error.strerror}); give the folder of the logs with --traces"
         ) from None
     numbers = []
     for line in lines:

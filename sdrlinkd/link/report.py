@@ -113,17 +113,17 @@ class Reporter:
         if not self._registry.has_control:
             notices.append(
                 "the registry uses all 16 topic ids, so there is no control channel: no ages, no "
-                "beacons, no registry check; drop one topic to have them"
+                "beacons, no registry check; remove one topic to get them"
             )
         if not self._control_records.fits:
             notices.append(
-                f"PDUs of {self._pdu_size} B have no room for CLOCK records, so nobody knows "
-                "anybody's clock; give all robots a larger link.pdu_size"
+                f"PDUs of {self._pdu_size} B have no room for CLOCK records, so no robot "
+                "learns another's clock; raise link.pdu_size at all robots"
             )
         notices += [
             f"{topics[topic_id].name} had to wait for a free entry id: fragmented messages come "
-            "faster than 256 in 1.25 reassembly timeouts; give all robots a larger link.pdu_size "
-            "or a shorter reassembly.timeout_s"
+            "faster than 256 in 1.25 reassembly timeouts; raise link.pdu_size or shorten "
+            "reassembly.timeout_s at all robots"
             for topic_id in self._composer.report().starved
         ]
         notices += self._never_met(scheduler.least_s) + scheduler.access_notices(now)

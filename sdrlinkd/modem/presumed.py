@@ -34,8 +34,8 @@ def presume_radio(config: Config, turnaround_s: float | None = None) -> Presumed
     backend = backend_of(config)
     if backend is None:
         raise UserError(
-            f'backend: got "{config.backend}", which has no air to plan for: it hands PDUs on as '
-            'they are; allowed: backend = "soapy", with [soapy] device = "driver=hackrf", or '
+            f'backend: got "{config.backend}", which has no channel to plan: it passes PDUs on '
+            'unchanged; allowed: backend = "soapy", with [soapy] device = "driver=hackrf", or '
             '"ether", with [ether] dir = "FOLDER", or "zmq"; examples: etc/radios/hackrf.toml, '
             "etc/radios/usrp.toml"
         )
@@ -53,9 +53,9 @@ def presume_radio(config: Config, turnaround_s: float | None = None) -> Presumed
 def access_words(config: Config, own_id: int) -> list[str]:
     """The access policy that results, in words. Raises ConfigError if it will surely be refused."""
     if config.backend in WITHOUT_AIR:
-        return [f'access none, as no other robot shares the air of the backend "{config.backend}"']
+        return [f'access none, because no other robot shares the backend "{config.backend}"']
     radio = presume_radio(config)
-    unsure = "" if radio.is_sure else "; what is not known without the radio: the radio itself"
+    unsure = "" if radio.is_sure else "; unknown until the radio is open: the radio itself"
     how = f" ({radio.presumption}{unsure})" if radio.presumption else ""
     try:
         settled = settle(config.access, own_id, radio.traits, radio.longest_s, Random(0))

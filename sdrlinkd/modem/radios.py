@@ -109,7 +109,7 @@ def check_airtime(config: Config) -> None:
             f"modem.rate_hz: got {modem.rate_hz:g}; a PDU of {size} B takes {airtime_s:.2g} s on "
             f"the air with {phy.MCS_TABLE[modem.mcs].name}; allowed: at most half of "
             f"reassembly.timeout_s, {config.reassembly.timeout_s / 2:g} s: raise modem.rate_hz or "
-            "modem.mcs, or make link.pdu_size smaller"
+            "modem.mcs, or reduce link.pdu_size"
         )
 
 

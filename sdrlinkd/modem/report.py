@@ -25,7 +25,7 @@ def modem_report(
     levels = radio.levels
     reason = problem
     if state == "down" and not problem:
-        reason = radio.trouble or ("it delivers nothing" if stream_end else "")
+        reason = radio.trouble or ("it delivers no samples" if stream_end else "")
     return PduLinkReport(
         kind=kind,
         state=state,
@@ -51,15 +51,15 @@ def _notices(
 ) -> list[str]:
     notices = [problem] if problem else []
     if state == "down" and not problem and stream_end:
-        notices.append(f"the radio delivers nothing ({radio.detail}); what is to be sent waits")
+        notices.append(f"the radio delivers no samples ({radio.detail}); messages stay queued")
     if radio.counters.get("overflows"):
         lost = radio.counters["samples_lost"]
         kept = 1 - lost / max(1, stream_end)
         notices.append(
-            f"the receiver fell behind {radio.counters['overflows']} times and lost {lost} "
-            f"samples: it keeps up with {kept:.2f} of real time at {params.rate_hz / 1e6:g} Msps "
-            f"(demodulation alone with {realtime_ratio:.2f}); lower modem.rate_hz"
+            f"the receiver fell behind {radio.counters['overflows']} times and dropped {lost} "
+            f"samples: it reaches {kept:.2f} of real time at {params.rate_hz / 1e6:g} Msps "
+            f"(demodulation alone {realtime_ratio:.2f}); lower modem.rate_hz"
         )
     if state != "down" and not radio.capabilities.transmits:
-        notices.append("this radio only receives: what is to be sent stays in the queue")
+        notices.append("this radio only receives: messages to send stay queued")
     return notices

@@ -20,7 +20,7 @@ def slower(loads: Sequence[Load], asked: Sequence[float], carries: Carries) -> s
     """
     largest = max(range(len(loads)), key=asked.__getitem__)
     name, faster = loads[largest].name, "use a higher MCS or rate"
-    told = f"{100 * sum(asked):.0f} % of what the air carries is asked for. "
+    told = f"{100 * sum(asked):.0f} % of the channel's capacity is requested. "
     who = f"{name} takes the most, {100 * asked[largest]:.0f} %: "
     alone = _most(loads, {largest}, carries)
     if alone is not None:
@@ -29,10 +29,10 @@ def slower(loads: Sequence[Load], asked: Sequence[float], carries: Carries) -> s
         return f"{told}{who}send it at {at_hz:.3g} Hz or less ({period}), {smaller}"
     every = _most(loads, set(range(len(loads))), carries)
     if every is None:
-        never = "even at a fiftieth of the rates it does not fit"
+        never = "even a fiftieth of the rates does not fit"
         return f"{told}{who}{never}; {faster}, or fewer robots"
     smaller = f"make them smaller (compress), or {faster}"
-    return f"{told}{who}to slow it alone is not enough. Slow all ({_periods(every)}), {smaller}"
+    return f"{told}{who}slowing it alone is not enough. Slow all ({_periods(every)}), {smaller}"
 
 
 def _periods(loads: Sequence[Load]) -> str:

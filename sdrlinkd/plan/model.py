@@ -154,7 +154,7 @@ def _pdus(size: float, pdu_size: int, stamp: bool) -> int:
 
 def _late(topics: Sequence[TopicPlan]) -> list[str]:
     return [
-        f"{topic.name} can take {1e3 * topic.worst_s:.0f} ms and is worthless after "
+        f"{topic.name} can take {1e3 * topic.worst_s:.0f} ms but expires after "
         f"{1e3 * topic.lifespan_s:.0f} ms: raise its class or priority, or its lifespan_s"
         for topic in topics
         if topic.is_late

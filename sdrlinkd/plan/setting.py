@@ -38,7 +38,7 @@ def setting_of(
         access = msgspec.structs.replace(access, policy=policy, nodes=nodes)
     if access.policy == "csma" and not access.nodes:
         access = msgspec.structs.replace(access, nodes=[own_id, own_id % LAST_ID + 1])
-        guessed = ["access.nodes lists nobody: planned for two robots (--robots)"]
+        guessed = ["access.nodes is empty: planned for two robots (--robots)"]
     n = max(1, len(set(access.nodes)))
     forced = msgspec.structs.replace(access, force=True)
     settled = settle(forced, own_id, radio.traits, radio.longest_s, Random(0))
@@ -68,11 +68,13 @@ def _notes(
     notes.append(_times(radio.traits, host_s))
     if n > 1 and settled.policy == "none":
         notes.append(
-            f"without turns, what {n} robots send at once collides where they share the air; that "
-            f"is not in this plan (each carries up to {percent(settled.share)} alone)"
+            f"without an access policy, simultaneous bursts of {n} robots collide on a shared "
+            f"channel; this plan ignores that (alone, each can use up to {percent(settled.share)})"
         )
     if settled.policy == "csma":
-        notes.append("csma: what collides is lost, and one in a hundred waits longer than this")
+        notes.append(
+            "csma: collided bursts are lost, and one message in a hundred waits longer than this"
+        )
     return notes
 
 
@@ -81,7 +83,7 @@ def _times(traits: PduLinkTraits, host_s: float) -> str:
     if traits.tx_window_s < float("inf"):
         windows = f", {1e3 * traits.rx_window_s:.0f} ms between two TX windows"
     return (
-        f"in each worst case: lead {1e3 * traits.lead_s:.3g} ms{windows}, "
-        f"reception {1e3 * traits.react_s:.3g} ms, the machines {1e3 * host_s:.3g} ms "
+        f"each worst case includes: lead {1e3 * traits.lead_s:.3g} ms{windows}, "
+        f"reception {1e3 * traits.react_s:.3g} ms, hosts {1e3 * host_s:.3g} ms "
         "(--host; `sdrlinkctl doctor` measures it)"
     )

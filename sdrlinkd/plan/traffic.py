@@ -40,8 +40,8 @@ def parse_load(text: str, registry: Registry) -> Load:
     topic = registry.by_name(found[1]) if found else None
     if found is None or float(found[2]) <= 0:
         raise UserError(
-            f"--topic: got {text}; allowed: NAME:RATE:SIZE, such as scan:50:1KB (50 a second, 1 KB "
-            "each)"
+            f"--topic: got {text}; allowed: NAME:RATE:SIZE, such as scan:50:1KB (50 per second, "
+            "1 KB each)"
         )
     if topic is None:
         raise UserError(f"--topic: {found[1]}: unknown topic; {registry.suggest(found[1])}")
@@ -69,7 +69,7 @@ def loads_from_bag(
             others[name, "not in the registry"] += 1
             continue
         if wanted and topic.name not in wanted:
-            others[name, "not among those that the key `topics` takes"] += 1
+            others[name, "not selected by the key `topics`"] += 1
             continue
         policy = policies.get(topic.id, DEFAULT_POLICY)
         times[topic.id].append(at)

@@ -175,7 +175,7 @@ def record_spans(octets: bytes | bytearray, begin: int, end: int) -> list[tuple[
     at = begin
     while at < end:
         if at + TLV_HEADER_SIZE > end:
-            raise PduError("rx_control_bad", "a control record is cut in its header")
+            raise PduError("rx_control_bad", "a control record is truncated in its header")
         number, length = octets[at], octets[at + 1]
         at += TLV_HEADER_SIZE
         if at + length > end:

@@ -155,8 +155,8 @@ def _assemble(pairs: list[tuple[str, str, str]], source: str) -> Registry:
     if len(topics) > MAX_TOPICS:
         raise RegistryError(
             f"{source}: {len(topics)} topics; allowed: at most {MAX_TOPICS - 1}, or {MAX_TOPICS} "
-            f"without ages, beacons and link reports (a PDU's topic id has 4 bits); take "
-            f"{len(topics) - MAX_TOPICS + 1} lines out, the same ones at all robots"
+            f"without ages, beacons and link reports (a PDU's topic id has 4 bits); remove "
+            f"{len(topics) - MAX_TOPICS + 1} lines, the same ones at all robots"
         )
     if not topics:
         raise RegistryError(f"{source}: no topics; write at least one line such as "

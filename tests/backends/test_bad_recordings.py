@@ -204,9 +204,9 @@ def test_recordings_of_several_channels_are_refused(write):
 
 def test_what_is_asked_for_must_be_what_the_metadata_says(write):
     path = write()
-    wanted = f"{path}.sigmf-meta: core:sample_rate is 1000000.0, but 2000000.0 was asked for"
+    wanted = f"{path}.sigmf-meta: core:sample_rate is 1000000.0, but 2000000.0 was requested"
     assert refusal(path, "", 2e6) == wanted
-    wanted = f"{path}.sigmf-meta: core:datatype is ci8, but ci16_le was asked for"
+    wanted = f"{path}.sigmf-meta: core:datatype is ci8, but ci16_le was requested"
     assert refusal(path, "ci16_le") == wanted
     assert describe(path, "ci8", 1e6).n_samples == 20
 
@@ -219,7 +219,7 @@ def test_half_a_sample_at_the_end_is_damage_that_does_not_keep_from_reading(
     whole = read(tmp_path / "cut")
     data = tmp_path / "cut.sigmf-data"
     os.truncate(data, data.stat().st_size - SAMPLE_TYPES[type_name].size + rest)
-    wanted = f"{data}: ends with {rest} bytes that are no whole {type_name} sample"
+    wanted = f"{data}: ends with {rest} bytes, less than a {type_name} sample"
     assert describe(tmp_path / "cut").damage == wanted
     assert np.array_equal(read(tmp_path / "cut"), whole[:9])
 
@@ -228,7 +228,7 @@ def test_a_capture_beyond_the_end_is_damage(write):
     path = write(with_capture(sample_start=20))
     assert not describe(path).damage
     damage = describe(write(with_capture(sample_start=21))).damage
-    wanted = "x.sigmf-data: holds 20 samples, but a capture begins at 21; it was cut"
+    wanted = "x.sigmf-data: holds 20 samples, but a capture begins at 21; it is truncated"
     assert damage.endswith(wanted)
     both = describe(write(with_capture(sample_start=21), bytes(39))).damage
     assert both.count("x.sigmf-data") == 2

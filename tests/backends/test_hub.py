@@ -92,7 +92,7 @@ def test_another_version_is_refused_and_told_what_to_do(tmp_path):
         reason = radio.hear(protocol.Refused).reason
     assert f"speaks version {protocol.VERSION} " in reason
     assert f"the radio version {protocol.VERSION + 6};" in reason
-    assert "run hub and daemons from one version of sdrlinkd" in reason
+    assert "run hub and daemons from the same sdrlinkd version" in reason
 
 
 @pytest.mark.parametrize(
@@ -116,11 +116,13 @@ async def test_a_second_robot_of_one_id_is_refused_and_the_first_is_told(tmp_pat
             blocks = first.blocks()
             taken = await take(blocks, N)
             reason = await refusal(tmp_path)
-            assert "robot 1 is on this air already: process 17 on earth" in reason
+            assert "robot 1 is already on this channel: process 17 on earth" in reason
             assert "give one of the two another robot_id" in reason
             while "somebody else" not in first.detail:
                 taken += await take(blocks, 1)
-            assert "another daemon asked for our id 1 on this air and was refused" in first.detail
+            assert (
+                "another daemon requested our id 1 on this channel and was refused" in first.detail
+            )
             taken += await take(blocks, taken[-1].index + 10 * N)
             assert all(block.samples is not None for block in taken), "it goes on as before"
             assert ask(tmp_path).nodes == {1: "process 17 on earth"}

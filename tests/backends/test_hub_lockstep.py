@@ -142,7 +142,7 @@ async def test_who_comes_when_it_has_begun_is_refused(tmp_path):
     with lockstep(tmp_path, {1: RadioParams()}):
         async with opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio:
             await take(radio.blocks(), N)
-            with pytest.raises(BackendError, match="robot 2 came too late: an air in lock-step"):
+            with pytest.raises(BackendError, match="robot 2 joined too late: in lock-step"):
                 async with opened(EtherRadio(hub_in(tmp_path), 2, "")):
                     pass
 

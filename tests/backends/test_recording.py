@@ -88,7 +88,7 @@ def test_the_octets_of_rtl_sdr_are_read(tmp_path):
 
 def test_octets_without_a_sign_are_not_written(tmp_path):
     """Skipped samples would be zero octets, which are not silence in unsigned types."""
-    with pytest.raises(BackendError, match="sent: cu8 is only read; write ci8 instead"):
+    with pytest.raises(BackendError, match="sent: cu8 is read-only; write ci8 instead"):
         RecordingWriter(tmp_path / "sent", "cu8", RATE, 0)
 
 

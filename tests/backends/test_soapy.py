@@ -217,7 +217,7 @@ def test_of_what_a_process_prints_the_last_line_is_kept():
 @needs_radio
 async def test_the_device_that_is_no_radio_is_told_as_such():
     null = SoapySettings(device="driver=null,type=null", rate_hz=0.0, frequency_hz=0.0)
-    with pytest.raises(BackendError, match="built into SoapySDR and is no radio"):
+    with pytest.raises(BackendError, match="built into SoapySDR and not a radio"):
         await SoapyRadio(null, longest_s=0.1).open(TUNING)
 
 
@@ -241,7 +241,7 @@ def test_a_probe_tells_what_devices_can_do_and_which_module_is_missing():
     for args in ("driver=null", "driver=null,type=null"):
         no_radio = probe_devices(args)
         assert not no_radio.devices
-        assert "is built into SoapySDR and is no radio" in no_radio.notes[0]
+        assert "is built into SoapySDR and not a radio" in no_radio.notes[0]
     absent = probe_devices("driver=loopback,serial=X")
     assert not absent.devices
     assert "there is no such device" in absent.notes[0]
@@ -254,4 +254,4 @@ async def test_a_device_that_lies_about_its_rate_is_found_out():
         async for _ in each.blocks():
             if each.counters.get("rate_faults"):
                 break
-        assert "Msps, not at 0.1 as the device says" in each.detail
+        assert "Msps, but the device claims 0.1" in each.detail

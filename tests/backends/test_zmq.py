@@ -71,9 +71,9 @@ async def test_sixteen_bits_are_scaled(peer):
 @pytest.mark.parametrize(
     ("message", "told"),
     [
-        (bytes(12), "no whole cf32_le samples"),
+        (bytes(12), "not whole cf32_le samples"),
         (np.full(2 * N, 30000, np.int16).tobytes() + struct.pack("<f", 1e9) * 2, "beyond"),
-        (np.full(N, np.nan, np.complex64).tobytes(), "no numbers"),
+        (np.full(N, np.nan, np.complex64).tobytes(), "not numbers"),
     ],
 )
 async def test_another_item_type_is_a_gap_that_is_told(peer, message, told):
@@ -96,12 +96,12 @@ async def test_without_a_peer_time_goes_on_and_bursts_do_not_leave_twice(peer, t
         sends = await hand_over(radio, [TxBurst(round(0.1 * RATE), noise(N))])
         taken = await take(blocks, round(2 * QUIET * RATE))
         assert all(block.samples is None for block in taken)
-        assert "nothing comes from the peer" in radio.detail
+        assert "no samples from the peer" in radio.detail
         assert radio.counters["outages"] == 1
         assert sends[0].done()
         peer.push(noise(3 * N).tobytes())
         await take(blocks, taken[-1].index + taken[-1].n + 3 * N)
-        assert "nothing comes" not in radio.detail
+        assert "no samples" not in radio.detail
 
 
 async def test_srsrans_requests_are_answered_too(tmp_path):

@@ -59,5 +59,5 @@ def test_a_path_that_is_too_long_or_no_directory_is_named(tmp_path):
     with pytest.raises(BusError, match="allows 95"):
         RuntimeDirectory(tmp_path / ("x" * 100))
     (tmp_path / "file").write_text("")
-    with pytest.raises(BusError, match="cannot be used"):
+    with pytest.raises(BusError, match="is unusable"):
         RuntimeDirectory(tmp_path / "file")

@@ -27,7 +27,7 @@ SNAPSHOT = Snapshot(
     loop_lag_ms=0.42,
     verdict=VerdictReport(
         level="DEGRADED",
-        reasons=["robot 2 has another registry", "robot 2 hears us at 3 dB, 4 % lost"],
+        reasons=["robot 2 has a different registry", "robot 2 hears us at 3 dB, 4 % lost"],
     ),
     carrier=PduLinkReport(
         kind="direct", state="up", detail="1 Mbit/s, loss 0.1", level_dbfs=-31.25, clipped_pct=0.5
@@ -104,7 +104,7 @@ SNAPSHOT = Snapshot(
             ),
         ],
     ),
-    notices=["robot 2 has another registry, differing in topic id 2 (ours: imu)"],
+    notices=["robot 2 has a different registry: topic id 2 (ours: imu)"],
 )  # fmt: skip
 
 LONG = "front_left_stereo_camera_2/image_rect_color/compressed_depth"

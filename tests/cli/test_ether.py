@@ -160,7 +160,7 @@ def test_options_go_before_the_scenario(refused, monkeypatch, tmp_path):
 
 
 def test_without_a_scenario_all_hear_all(stopped, tmp_path):
-    assert "all hear all at 20 dB" in stopped("--dir", tmp_path / "air")
+    assert "all robots in range, at 20 dB" in stopped("--dir", tmp_path / "air")
 
 
 @pytest.mark.parametrize("duration_s", ["0.01", "0.1", "1e5"])
@@ -212,11 +212,11 @@ def test_daemons_outlive_their_hub(start_hub, start_daemon, tmp_path_factory):
         talk(b"before")
         before = {robot: carrier(node).counters for robot, node in nodes.items()}
         hub.kill()
-        wait_for(lambda: all("hub is away" in carrier(node).detail for node in nodes.values()), 60)
+        wait_for(lambda: all("hub is gone" in carrier(node).detail for node in nodes.values()), 60)
         for node in nodes.values():
             assert carrier(node).state == "down"
-            assert any("the radio delivers nothing" in text for text in carrier(node).notices)
-        # Messages sent without an air wait for it.
+            assert any("the radio delivers no samples" in text for text in carrier(node).notices)
+        # What is said while there is no air waits for it.
         say[1].send("/robot_1/cmd_vel", CDR + b"meanwhile")
         wait_for(lambda: nodes[1].snapshot().link.tx.queued == 1)
         # The first one back sends at once: that is robot 2, because otherwise it would not hear
@@ -229,7 +229,7 @@ def test_daemons_outlive_their_hub(start_hub, start_daemon, tmp_path_factory):
         for robot, node in nodes.items():
             counted = carrier(node).counters
             assert counted["hub_outages"] == before[robot]["hub_outages"] + 1
-            assert "the hub is away" not in carrier(node).detail
+            assert "the hub is gone" not in carrier(node).detail
             assert carrier(node).notices == []
         assert heard[2].receive(60).payload == CDR + b"meanwhile"
         talk(b"after")

@@ -100,7 +100,7 @@ def test_a_run_is_told_drawn_and_written(lab, tmp_path, monkeypatch):
     assert listener.ledger_adds_up
     # It only announces itself.
     assert 0 < listener.bursts_sent < 6 < sender.bursts_sent
-    assert "Two small robots: who got what of whom" in out
+    assert "Two small robots: delivery by pair" in out
     assert "PDR 0.8000 in all, 0.8000 at worst; in lock-step" in out
     assert "robot 2: tdma: 2 slots" in out
     assert "out/report.json, lab.png" in out
@@ -167,12 +167,12 @@ def test_what_cannot_be_read_or_written_is_told_before_the_run(lab, asked, tmp_p
     [
         ({"pdr": 0.91239, "worst_pdr": 0.5}, "PDR 0.9124 in all, 0.5000 at worst; in lock-step"),
         ({"pace": "realtime"}, "at worst; in real time, took 0 s"),
-        ({"out_of_reach": [(1, 3), (3, 1)]}, "in no figure: 1 → 3, 3 → 1"),
+        ({"out_of_reach": [(1, 3), (3, 1)]}, "excluded from all figures: 1 → 3, 3 → 1"),
         ({"robots": [robot(1, dropped={"tx_expired": 3})]}, "dropped: {'tx_expired': 3}"),
-        ({"robots": [robot(1, left=4)]}, "; 4 messages were left"),
-        ({"robots": [robot(1, samples_lost=77)]}, "too slow: 77 samples lost"),
+        ({"robots": [robot(1, left=4)]}, "; 4 messages unsent"),
+        ({"robots": [robot(1, samples_lost=77)]}, "too slow: 77 samples dropped"),
         ({"robots": [robot(1, bursts_failed=5, bursts_late=6)]}, "30 bursts, 5 failed, 6 late"),
-        ({"title": "50 [/b] robots"}, "50 [/b] robots: who got what"),
+        ({"title": "50 [/b] robots"}, "50 [/b] robots: delivery"),
     ],
 )
 def test_what_a_run_came_to_is_said(lab, come_to, tmp_path, given, says):

@@ -31,10 +31,10 @@ def test_info_for_people_and_programs(ctl):
     assert code == 0
     for part in ("1 Msps: 64 subcarriers 15.625 kHz apart", "16QAM 3/4", "64QAM 3/4", "3.55 ms"):
         assert part in out
-    assert "bursts are looked for up to 196 kHz off: two crystals of ±40 ppm" in out
+    assert "the receiver searches for bursts up to 196 kHz off: two crystals of ±40 ppm" in out
     code, out, _ = ctl("info", "--rate", "1e6", "--frequency", "5.9e9")
     assert "up to 250 kHz off" in out
-    assert "raise modem.rate_hz, or tell better crystals" in out
+    assert "raise modem.rate_hz, or state better crystals" in out
     code, out, _ = ctl("info", "--json")
     told = json.loads(out)
     assert (told["rate_hz"], len(told["mcs"])) == (5e6, 10)
@@ -90,9 +90,9 @@ def test_pictures_are_drawn(ctl, tmp_path, monkeypatch, picture):
 @pytest.mark.parametrize(
     ("file", "options", "told"),
     [
-        ("rec", (), "; at 2 Msps, by its metadata"),
-        ("raw.i16", ("--rate", "4e6"), "; at 4 Msps, as told"),
-        ("raw.i16", (), "; its rate is not known, so frequencies are in cycles a sample"),
+        ("rec", (), "; at 2 Msps, from its metadata"),
+        ("raw.i16", ("--rate", "4e6"), "; at 4 Msps, as given"),
+        ("raw.i16", (), "; sample rate unknown: frequencies are in cycles per sample"),
     ],
 )
 def test_a_spectrum_says_of_which_rate_it_is(ctl, tmp_path, monkeypatch, file, options, told):
@@ -111,7 +111,7 @@ def test_a_recording_cut_in_mid_sample_is_read_as_far_as_it_goes(ctl, tmp_path):
     code, out, err = ctl("decode", tmp_path / "rec")
     assert code == 0
     assert "2 of 2 PDUs" in out
-    assert "ends with 3 bytes that are no whole ci16_le sample" in err
+    assert "ends with 3 bytes, less than a ci16_le sample" in err
 
 
 def test_bad_input_is_refused_in_one_line(ctl, tmp_path):
@@ -122,12 +122,15 @@ def test_bad_input_is_refused_in_one_line(ctl, tmp_path):
     write_bursts(tmp_path / "rec", mcs_list=(1,))
     for arguments, says in (
         (("decode", tmp_path / "none"), "no such recording"),
-        (("decode", tmp_path / "what.dat"), "its sample type is not known"),
+        (("decode", tmp_path / "what.dat"), "unknown sample type"),
         (("decode", tmp_path / "what.dat", "--type", "ci12"), "allowed: cf32_le, ci16_le"),
         (("decode", tmp_path / "lone"), "lone.sigmf-data: no such file"),
         (("spectrum", tmp_path / "odd"), 'got "cf64_le"; allowed: cf32_le'),
-        (("decode", tmp_path / "rec", "--type", "ci8"), "is ci16_le, but ci8 was asked for"),
-        (("decode", tmp_path / "rec", "--rate", "1e6"), "is 2000000.0, but 1000000.0 was asked"),
+        (("decode", tmp_path / "rec", "--type", "ci8"), "is ci16_le, but ci8 was requested"),
+        (
+            ("decode", tmp_path / "rec", "--rate", "1e6"),
+            "is 2000000.0, but 1000000.0 was requested",
+        ),
         (("spectrum", tmp_path / "rec", "--out", tmp_path / "no/dir.png"), "No such file"),
     ):
         code, out, err = ctl(*arguments)
@@ -163,7 +166,7 @@ def test_wifi_frames_for_people_and_programs(ctl, wifi_file):
     assert beacon.endswith("beacon 00:01:02:03:04:05 → ff:ff:ff:ff:ff:ff")
     assert "6 Mbit/s BPSK 1/2  64 B  FCS wrong" in broken
     assert ack.endswith("ack → 02:04:06:08:0a:0c")
-    assert summary == f"3 frames, 2 with right FCS, in {path.stat().st_size // 8} samples"
+    assert summary == f"3 frames, 2 with good FCS, in {path.stat().st_size // 8} samples"
     code, out, _ = ctl("decode-wifi", path, "--json")
     told = [json.loads(line) for line in out.strip().split("\n")]
     assert [(bytes.fromhex(each["psdu"]), each["mbps"]) for each in told] == sent
@@ -179,10 +182,10 @@ def test_frames_of_802_11n_are_told_as_such(ctl, tmp_path):
     code, out, _ = ctl("decode-wifi", path)
     assert code == 0
     mixed, greenfield, summary = out.strip().split("\n")
-    assert "802.11n HT-mixed, MCS 3, 20 MHz  138 B, not read  SNR" in mixed
-    assert "802.11n HT-greenfield, MCS 7, 40 MHz  900 B, not read  SNR" in greenfield
-    assert summary.startswith("0 frames, 0 with right FCS, in")
-    assert summary.endswith("; 2 frames of 802.11n, which are not read")
+    assert "802.11n HT-mixed, MCS 3, 20 MHz  138 B, not decoded  SNR" in mixed
+    assert "802.11n HT-greenfield, MCS 7, 40 MHz  900 B, not decoded  SNR" in greenfield
+    assert summary.startswith("0 frames, 0 with good FCS, in")
+    assert summary.endswith("; 2 frames of 802.11n, not decoded")
     assert "wrong" not in out
     _, out, _ = ctl("decode-wifi", path, "--json")
     told = [json.loads(line) for line in out.strip().split("\n")]
@@ -208,7 +211,7 @@ def test_a_recording_without_wifi_frames_is_said_to_have_none(ctl, tmp_path):
     path = tmp_path / "quiet.cf32"
     np.zeros(5000, np.complex64).tofile(path)
     code, out, _ = ctl("decode-wifi", path)
-    assert (code, out.strip()) == (0, "0 frames, 0 with right FCS, in 5000 samples")
+    assert (code, out.strip()) == (0, "0 frames, 0 with good FCS, in 5000 samples")
     code, _, err = ctl("decode-wifi", tmp_path / "missing.cf32")
     assert code != 0
     assert "missing.cf32" in err

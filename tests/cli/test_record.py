@@ -76,8 +76,7 @@ def test_types_networks_seconds_and_a_recording_that_is_replaced(ctl, config, tm
     code, out, err = ctl(*given)
     assert (code, out) == (2, "")
     assert err == (
-        f"sdrlinkctl: {tmp_path}/rec.sigmf-data: is there already; allowed: another name, or "
-        "--force\n"
+        f"sdrlinkctl: {tmp_path}/rec.sigmf-data: already there; allowed: another name, or --force\n"
     )
     code, out, _ = ctl(*given, "--force", "--network", 1, "--grid", "64/16")
     assert code == 0
@@ -96,7 +95,7 @@ def test_clipping_is_told_with_what_to_do(ctl, config, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ((), "no radio is named; allowed: --config FILE, or --device ARGS with --frequency and"),
+        ((), "no radio given; allowed: --config FILE, or --device ARGS with --frequency and"),
         (("--device", "driver=none"), "--rate: not given; allowed with --device: samples a second"),
         (("--device", "driver=none", "--rate", "2e6"), "--frequency: not given; allowed with"),
         ((*DEVICE, "--gains", "LNA"), '--gains: got "LNA"; allowed: ELEMENT=DB, such as "LNA=16'),
@@ -149,12 +148,12 @@ def test_values_out_of_range_are_refused_with_what_is_allowed(ctl, tmp_path, opt
         ("direct", "", (), 'backend: got "direct", which has no radio; allowed: "loopback"'),
         ("gnuradio", '[gnuradio]\nsend = "tcp://127.0.0.1:1"\nreceive = "tcp://127.0.0.1:2"\n', (),
          'backend: got "gnuradio", which has no radio; allowed:'),
-        ("loopback", "", ("--gain", "0"), "--gain: given beside --config; allowed: [soapy] in"),
-        ("loopback", "", ("--rate", "2e6"), "--rate: given beside --config; allowed: modem.rate_h"),
-        ("loopback", "", ("--oversampling", "2"), "--oversampling: given beside --config"),
+        ("loopback", "", ("--gain", "0"), "--gain: given with --config; allowed: [soapy] in"),
+        ("loopback", "", ("--rate", "2e6"), "--rate: given with --config; allowed: modem.rate_h"),
+        ("loopback", "", ("--oversampling", "2"), "--oversampling: given with --config"),
         ("iqfile", '[iqfile]\ntransmit = "sent"\n', (), "this radio does not receive ("),
         ("iqfile", '[iqfile]\nreceive = "none"\n', (), "none: no such recording"),
-        ("iqfile", '[iqfile]\nreceive = "rec"\n', ("--force",), "is played and cannot be written"),
+        ("iqfile", '[iqfile]\nreceive = "rec"\n', ("--force",), "being played and cannot be"),
         ("ether", '[ether]\ndir = "nowhere"\n', (), "nowhere"),
         ("soapy", '[soapy]\ndevice = "driver=x"\n', (), "modem.frequency_hz: got 0 (not set)"),
     ],

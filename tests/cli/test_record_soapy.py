@@ -197,7 +197,7 @@ def test_the_commands_do_the_same(device, tmp_path, capsys):
         replay = ["replay", str(tmp_path / "made"), "--device", device(0), *given, "40"]
         assert run([*replay, "--transmit"]) == 0
         assert capsys.readouterr().out.startswith(
-            "sent 3 of 3 stretches; between them is silence, below -"
+            "sent 3 of 3 stretches; silence between them is below -"
         )
         # The recording contains what was sent once it is longer by what may be in flight.
         size = data.stat().st_size

@@ -43,7 +43,7 @@ def test_bursts_are_sent_and_decode_again(ctl, config, tmp_path):
     write_bursts(tmp_path / "rec")
     code, out, err = ctl("replay", tmp_path / "rec", "--config", config(), "--repeat", 2)
     assert (code, err) == (0, "")
-    assert out.startswith("sent 6 of 6 stretches; between them is silence, below -3")
+    assert out.startswith("sent 6 of 6 stretches; silence between them is below -3")
     assert "late" not in out
     _, out, _ = ctl("phy", "decode", tmp_path / "sent")
     assert "pdus_good 12" in out
@@ -55,10 +55,10 @@ def test_raw_samples_are_sent_too(ctl, config, tmp_path):
     samples.tofile(tmp_path / "raw.bin")
     given = ("replay", tmp_path / "raw.bin", "--config", config())
     code, out, _ = ctl(*given, "--type", "cf32_le")
-    assert (code, out) == (0, "sent 1 of 1 stretches; between them is silence, below -200.0 dBFS\n")
+    assert (code, out) == (0, "sent 1 of 1 stretches; silence between them is below -200.0 dBFS\n")
     code, _, err = ctl(*given)
     assert code == 2
-    assert "raw.bin: its sample type is not known; name one" in err
+    assert "raw.bin: unknown sample type; name one" in err
 
 
 def test_what_is_not_sent_is_told_by_the_exit_code(ctl, config, tmp_path):
@@ -77,14 +77,14 @@ def test_what_is_not_sent_is_told_by_the_exit_code(ctl, config, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (("--transmit",), "no radio is named; allowed: --config FILE, or --device ARGS"),
-        (DEVICE[:4], "replay sends, and no radio sends unasked; allowed: --transmit, when"),
-        (DEVICE, "--gain: not given, and nothing is sent before it is; allowed: a gain in dB, or"),
+        (("--transmit",), "no radio given; allowed: --config FILE, or --device ARGS"),
+        (DEVICE[:4], "replay has no permission to transmit; allowed: --transmit, once"),
+        (DEVICE, "--gain: not given, and replay needs it to transmit; allowed: a gain in dB, or"),
         ((*DEVICE[:2], "--transmit", "--gain", 0), "--frequency: not given; allowed with --device"),
         ((*DEVICE, "--gain", 0), 'soapy.device: got "driver=none", but SoapySDR'),
-        ((*DEVICE, "--gain", 0, "--rate", 1e6), "is sampled at 2000000 Hz; the modem is set to"),
+        ((*DEVICE, "--gain", 0, "--rate", 1e6), "sampled at 2000000 Hz, but the modem is set to"),
         ((*DEVICE, "--gain", 0, "--backoff-db", 2), "--backoff-db: got 2; its peaks would be"),
-        ((*DEVICE, "--gains", "A=1", "--silence-db", 0), "nothing in it is stronger than 0.0 dBFS"),
+        ((*DEVICE, "--gains", "A=1", "--silence-db", 0), "nothing in it exceeds 0.0 dBFS"),
         ((*DEVICE, "--gains", "A="), '--gains: got "A="; allowed: ELEMENT=DB'),
     ],
 )  # fmt: skip
@@ -103,12 +103,12 @@ SOAPY = 'backend = "soapy"\n[soapy]\ndevice = "driver=none"\n'
     ("text", "arguments", "says"),
     [
         ('backend = "direct"\n', (), 'backend: got "direct", which has no radio; allowed:'),
-        (SOAPY, (), "no radio sends unasked; allowed: --transmit, or soapy.tx_enabled = true in"),
+        (SOAPY, (), "to transmit; allowed: --transmit, or soapy.tx_enabled = true in"),
         (SOAPY, ("--transmit",), "soapy.tx_gain_db: not set; allowed with soapy.tx_enabled = true"),
         (f"{SOAPY}tx_gain_db = 0\n", ("--transmit",), "soapy.device: got"),
-        ('backend = "loopback"\n', ("--gain", 0), "--gain: given beside --config; allowed: [soa"),
+        ('backend = "loopback"\n', ("--gain", 0), "--gain: given with --config; allowed: [soa"),
         ('backend = "iqfile"\n[iqfile]\nreceive = "rec"\n', (), "this radio does not send (from"),
-        ('backend = "iqfile"\n[iqfile]\ntransmit = "rec"\n', (), "is played and cannot be written"),
+        ('backend = "iqfile"\n[iqfile]\ntransmit = "rec"\n', (), "being played and cannot be"),
     ],
 )  # fmt: skip
 def test_configurations_that_do_not_send_are_refused(ctl, config, tmp_path, text, arguments, says):
@@ -127,7 +127,11 @@ def test_a_recording_of_another_rate_says_how_to_go_on(ctl, config, tmp_path):
     write_bursts(tmp_path / "rec")
     code, _, err = ctl("replay", tmp_path / "rec", "--config", config(rate_hz=5e6))
     assert code == 2
-    for part in ("at 2000000 Hz; the modem is set to 5000000 Hz", "modem.oversampling", "resample"):
+    for part in (
+        "at 2000000 Hz, but the modem is set to 5000000 Hz",
+        "modem.oversampling",
+        "resample",
+    ):
         assert part in err
     code, _, err = ctl("replay", tmp_path / "none", "--config", config())
     assert code == 2

@@ -56,8 +56,8 @@ def planned(topic: str) -> Plan:
         TopicPlan("odom", "default", 30.0, 724.0, 1, 0.045, 0.0069, 2.0, 0.174),
     ]
     notes = [
-        "3 robots, 5 Msps, access tdma, as configured; it carries 86 % of the air",
-        "in each worst case: lead 20.5 ms, reception 3 ms, the machines 10 ms (--host)",
+        "3 robots, 5 Msps, access tdma, as configured; 86 % of the airtime is usable",
+        "each worst case includes: lead 20.5 ms, reception 3 ms, hosts 10 ms (--host)",
     ]
     return Plan(topics_of, [], 0.658, True, [], robots=3, policy="tdma", notes=notes)
 

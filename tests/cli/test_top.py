@@ -23,7 +23,7 @@ class Asked:
     def __call__(self, verb, arguments):
         self.requests.append((verb, arguments))
         if verb == "why":
-            return {"why": ["odom: class latency, priority 90, to everyone", "2 wait"]}
+            return {"why": ["odom: class latency, priority 90, to everyone", "2 queued"]}
         if arguments.get("qos") == "fast":
             raise RefusedError("refused", 'qos: got "fast"; allowed: one of "bulk", "default"')
         changes = {key: value for key, value in arguments.items() if key != "topic"}
@@ -68,7 +68,7 @@ async def test_of_a_quiet_daemon_all_is_seen():
     async with make_app().run_test(size=(80, 24)) as pilot:
         await shown(pilot, [SNAPSHOT])
         text = text_of(pilot.app)
-    for part in ("DEGRADED: robot 2 has another registry", "/robot_1/odom", "/rx_robot_2/odom",
+    for part in ("DEGRADED: robot 2 has a different registry", "/robot_1/odom", "/rx_robot_2/odom",
                  "/imu", "15.5", "SNR dB"):  # fmt: skip
         assert part in text
 

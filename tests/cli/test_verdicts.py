@@ -89,7 +89,7 @@ def test_fields_come_line_by_line_or_as_csv(told):
     ("link.tx.snt", "no snt in link.tx; did you mean sent?"),
     ("topics.oodm.sent", "did you mean odom?"),
     ("neighbors.7.snr_db", "no 7 in link.neighbors; allowed: 1, 2"),
-    ("node.x", "in node there is nothing to choose from"),
+    ("node.x", "no fields in node"),
     ("link.topics.99", "no 99 in link.topics"),
 ])  # fmt: skip
 def test_a_field_that_is_not_there_is_refused(told, field, says):

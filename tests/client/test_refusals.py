@@ -31,11 +31,11 @@ ALLOWED = (
 WISHES = [
     ({"qos": "fast"}, 'qos: got "fast"; allowed: bulk, default, latency, urgent'),
     ({"qos": 3}, "qos: got 3; allowed: bulk, default, latency, urgent"),
-    ({"priority": 128}, "priority: got 128; allowed: 0 to 127, the most urgent"),
-    ({"priority": -1}, "priority: got -1; allowed: 0 to 127, the most urgent"),
-    ({"priority": "high"}, 'priority: got "high"; allowed: 0 to 127, the most urgent'),
-    ({"priority": True}, "priority: got True; allowed: 0 to 127, the most urgent"),
-    ({"dst": 256}, "dst: got 256; allowed: a robot's id, 0 to 254, or 255 for everyone"),
+    ({"priority": 128}, "priority: got 128; allowed: 0 to 127 (most urgent)"),
+    ({"priority": -1}, "priority: got -1; allowed: 0 to 127 (most urgent)"),
+    ({"priority": "high"}, 'priority: got "high"; allowed: 0 to 127 (most urgent)'),
+    ({"priority": True}, "priority: got True; allowed: 0 to 127 (most urgent)"),
+    ({"dst": 256}, "dst: got 256; allowed: a robot's id, 0 to 254, or 255 for all"),
     ({"lifespan_ms": 0}, "lifespan_ms: got 0; allowed: a number above 0"),
     ({"lifespan_ms": float("nan")}, "lifespan_ms: got nan; allowed: a number above 0"),
     ({"lifespan_ms": "2s"}, 'lifespan_ms: got "2s"; allowed: a number above 0'),
@@ -55,7 +55,7 @@ MESSAGES = [
     (ODOM, b"abc", {}, "tx_bad_envelope",
      f"{ODOM}: too short: 3 B; CDR begins with a header of 4 B"),
     (ODOM, CDR, {"type": "sensor_msgs/msg/Imu"}, "tx_bad_envelope",
-     f'type: got "sensor_msgs/msg/Imu"; allowed: {TYPE}, which {ODOM} has in the registry'),
+     f'type: got "sensor_msgs/msg/Imu"; allowed: {TYPE}, which {ODOM} in the registry'),
 ]  # fmt: skip
 
 
@@ -271,7 +271,7 @@ def test_runtime_dir_has_one_other_name(tmp_path, make):
 
     assert asyncio.run(opened(runtime_dir=tmp_path)) == (tmp_path, tmp_path)
     assert asyncio.run(opened(directory=tmp_path)) == (tmp_path, tmp_path)
-    with pytest.raises(TypeError, match="give runtime_dir"):
+    with pytest.raises(TypeError, match="give only runtime_dir"):
         asyncio.run(opened(runtime_dir=tmp_path, directory=tmp_path))
 
 

@@ -67,7 +67,7 @@ def test_shipped_registry_is_the_papers_table_4():
         (f"{SOAPY}tx_enabled = true\n[modem]\nfrequency_hz = 4e8", ["soapy.tx_gain_db: not set"]),
         (
             f'{SOAPY}offset_tuning = "on"\n[modem]\nfrequency_hz = 4e8',
-            ['soapy.offset_tuning: got "on"', "modem.oversampling 2 or 4"],
+            ['soapy.offset_tuning: got "on"', "modem.oversampling = 2 or 4"],
         ),
         (f"{SOAPY}tx_gain_db = 'much'", ["f.toml:4", "soapy.tx_gain_db", "a number"]),
         ('backend = "zmq"\n[zmq]\nreceive = "ipc:///x"', ['zmq.send: got ""', "tcp://127.0.0.1"]),
@@ -76,7 +76,7 @@ def test_shipped_registry_is_the_papers_table_4():
         ('backend = "gnuradio"\n[gnuradio]\ntransport = "tcp"', ['gnuradio.send: got ""']),
         (
             'backend = "gnuradio"\n[gnuradio]\nsend = "x"\nreceive = "y"\n[access]\npolicy="csma"',
-            ["access.policy", "gnuradio", "no air that we could hear"],
+            ["access.policy", "gnuradio", "no channel to sense"],
         ),
         (
             'backend = "loopback"\n[modem]\nrate_hz = 1e5\nmax_cfo_hz = 1e5',
@@ -102,13 +102,13 @@ def test_shipped_registry_is_the_papers_table_4():
         ('namespace = "a b1"', ["namespace", '"a b1"']),
         ('rx_format = "x"', ["rx_format", '"x"', "{src_id}"]),
         ("[link]\nmin_fragment = 2000", ["link.min_fragment", "2000", "1011"]),
-        ('registry = "a\\u0000b"', ["registry cannot be read"]),
+        ('registry = "a\\u0000b"', ["registry is unreadable"]),
         ("seed = " + "9" * 5000, ["not TOML"]),
         ("a = " + "[" * 3000, ["not TOML"]),
         ('namespace = "robot_' + "1" * 5000 + '"', ["robot_id"]),
         ('[bus]\nruntime_dir = "a\\u0000b"', ["bus.runtime_dir", "NUL"]),
         ('rx_format = "/x y{src_id}"', ["rx_format"]),
-        ('[topic.odom]\n[topic."/odom"]', ["stands twice"]),
+        ('[topic.odom]\n[topic."/odom"]', ["listed twice"]),
         ("[link]\nbeacon_s = 1e-9", ["link.beacon_s", "at least 0.01"]),
         ("[direct]\nloss = 1.5", ["direct.loss", "1.5", "from 0 to 1"]),
         ('[access]\npolicy = "aloha"', ["f.toml:2", "access.policy", '"aloha"', '"minislot"']),
@@ -116,7 +116,7 @@ def test_shipped_registry_is_the_papers_table_4():
         ("[access]\nnodes = [1, 255]", ["access.nodes", "255", "from 0 to 254"]),
         (
             '[access]\npolicy = "csma"',
-            ["f.toml: access.policy", '"csma"', '"direct" has no air', '"none", or a backend'],
+            ["f.toml: access.policy", '"csma"', '"direct" has no channel', '"none", or a backend'],
         ),
         (
             'backend = "loopback"\n[access]\npolicy = "tdma"\nnodes = [2, 3]',
@@ -151,7 +151,7 @@ def test_an_error_cites_key_given_and_allowed(text, parts):
 
 def test_check_says_what_the_flush_time_means():
     summary = make_setup(parse_config("[link]\nflush_s = 0.0"), ETC).summary()
-    assert any("link.flush_s = 0.0: a PDU that is not full waits until" in each for each in summary)
+    assert any("link.flush_s = 0.0: a partly filled PDU waits until" in each for each in summary)
     assert any('link.flush_s = "now"' in each for each in make_setup(Config(), ETC).summary())
 
 
@@ -167,7 +167,7 @@ def test_a_topic_that_can_be_too_large_is_warned_about():
 
 
 def test_a_missing_registry_says_what_it_is(tmp_path):
-    with pytest.raises(RegistryError, match="registry cannot be read"):
+    with pytest.raises(RegistryError, match="registry is unreadable"):
         make_setup(Config(), tmp_path)
 
 

@@ -23,18 +23,18 @@ MISTAKES = [
     ("[link]\n\nbeacon_s = 1e-9", 3, ["link.beacon_s", "at least 0.01"]),
     ("[link]\nmin_fragment = 2000", 2, ["link.min_fragment: got 2000", "at most 1011"]),
     ("robot_id = 300", 1, ["robot_id: got 300", "from -1 to 254"]),
-    ('namespace = "robot"', 1, ["robot_id", 'in "robot" it is not there', "robot_1"]),
+    ('namespace = "robot"', 1, ["robot_id", 'in "robot" it is missing', "robot_1"]),
     ('namespace = "a b1"', 1, ['namespace: got "a b1"', "a ROS namespace"]),
     ('rx_format = "heard"', 1, ['rx_format: got "heard"', "{src_id}"]),
-    ('registry = "nowhere.csv"', 0, ["registry cannot be read"]),
+    ('registry = "nowhere.csv"', 0, ["registry is unreadable"]),
     ("registry = 5", 1, ["registry: got 5", "text"]),
     ('topics = ["odm"]', 1, ['topics: got "odm"', "did you mean odom"]),
     ('topics = "odom"', 1, ['topics: got "odom"', "a list"]),
     ("[topic.odo]\ndepth = 1", 1, ['topic."odo": unknown topic', "did you mean odom"]),
-    ('[topic.odom]\n[topic."/odom"]', 2, ["stands twice"]),
+    ('[topic.odom]\n[topic."/odom"]', 2, ["listed twice"]),
     ("[topic.odom]\nprio = 3", 2, ["topic.odom.prio: unknown key; did you mean priority"]),
     ('[topic.odom]\nlifespan_s = "0.3 parsec"', 2, ["topic.odom.lifespan_s", '"300 ms"']),
-    ('[topic.odom]\nlifespan_s = "soon"', 2, ['got "soon"', "with its unit"]),
+    ('[topic.odom]\nlifespan_s = "soon"', 2, ['got "soon"', "with a unit"]),
     ("[topic.odom]\ndepth = -1", 2, ["topic.odom.depth: got -1"]),
     (
         '[topic.odom]\ncompress = "zstd"\ndictionary = "none.zdict"', 3,
@@ -43,8 +43,8 @@ MISTAKES = [
     ("[topic.cmd_vel]\nstop = { linear = { q = 1 } }", 2, ["cmd_vel.stop.linear.q", "x, y, z"]),
     ('[tf]\ntopics = ["odom"]', 2, ['tf.topics: got "odom"', "TFMessage: none"]),
     ('backend = "usrp"', 1, ['backend: got "usrp"', '"soapy"']),
-    ('[access]\npolicy = "csma"', 2, ['access.policy: got "csma"', '"direct" has no air']),
-    ('[access]\npolicy = "tdma"\nnodes = [1, 2]', 2, ["access.policy", '"direct" has no air']),
+    ('[access]\npolicy = "csma"', 2, ['access.policy: got "csma"', '"direct" has no channel']),
+    ('[access]\npolicy = "tdma"\nnodes = [1, 2]', 2, ["access.policy", '"direct" has no channel']),
     (f'{LOOPBACK}[access]\npolicy = "aloha"', 3, ['access.policy: got "aloha"', '"minislot"']),
     (f'{LOOPBACK}[access]\npolicy = "tdma"\nnodes = [2, 3]', 4, ["access.nodes: got [2, 3]"]),
     (f'{LOOPBACK}[access]\npolicy = "tdma"', 3, ["access.nodes: got []", "this robot's 1"]),
@@ -75,7 +75,7 @@ MISTAKES = [
     ('backend = "soapy"', 1, ['soapy.device: got ""', "radio probe"]),
     ('backend = "soapy"\n[soapy]\ndevice = "hackrf"', 3, ['got "hackrf"', "driver=hackrf"]),
     (SOAPY, 1, ["modem.frequency_hz: got 0 (not set)", "licence"]),
-    (f"{SOAPY}tx_enabled = true\n{ON_AIR}", 4, ["soapy.tx_gain_db: not set", "begin low"]),
+    (f"{SOAPY}tx_enabled = true\n{ON_AIR}", 4, ["soapy.tx_gain_db: not set", "start low"]),
     (f'{SOAPY}offset_tuning = "on"\n{ON_AIR}', 4, ['soapy.offset_tuning: got "on"']),
     (
         f"{SOAPY.replace('uhd', 'hackrf')}{ON_AIR}rate_hz = 1e6", 6,
@@ -86,7 +86,7 @@ MISTAKES = [
     ("[[link]]\npdu_size = 64", 1, ["link: got", "a table"]),
     ("nonsense", 0, ["not TOML"]),
     ("a = " + "[" * 3000, 0, ["not TOML"]),
-    ('registry = "a\\u0000b"', 0, ["registry cannot be read"]),
+    ('registry = "a\\u0000b"', 0, ["registry is unreadable"]),
     ('[bus]\nruntime_dir = "a\\u0000b"', 2, ["bus.runtime_dir", "NUL"]),
 ]  # fmt: skip
 
@@ -129,7 +129,7 @@ def test_there_are_forty_and_more():
             ["not checked: whether", "frequency, rate, gains", "doctor", '"tdma" fits'],
         ),
         ('backend = "ether"\n[ether]\ndir = "air"', ["not checked: whether a hub answers"]),
-        ('backend = "iqfile"\n[iqfile]\nreceive = "x"', ["not checked: whether", "be read"]),
+        ('backend = "iqfile"\n[iqfile]\nreceive = "x"', ["not checked: whether", "is readable"]),
         ('backend = "zmq"\n[zmq]\nsend = "@a"\nreceive = "b"', ["not checked: whether the flowg"]),
         ('backend = "gnuradio"\n[gnuradio]\nsend = "a"\nreceive = "b"', ["flowgraph answers"]),
     ],
@@ -139,14 +139,14 @@ def test_what_only_the_radio_can_tell_is_named(check, text, parts):
     assert (code, err) == (0, "")
     for part in parts:
         assert part in out
-    assert "the configuration is good" not in out
-    assert out.endswith("the file is good; what is not checked shows when the daemon starts\n")
+    assert "the configuration is valid" not in out
+    assert out.endswith("the file is valid; the daemon checks the rest when it starts\n")
 
 
 @pytest.mark.parametrize("text", ["", LOOPBACK, 'backend = "iqfile"\n[iqfile]\ntransmit = "x"'])
 def test_what_the_file_alone_decides_is_good(check, text):
     code, out, _ = check(text)
-    assert (code, out.endswith("the configuration is good\n")) == (0, True)
+    assert (code, out.endswith("the configuration is valid\n")) == (0, True)
 
 
 def test_large_fragments_that_keep_topics_apart_are_warned_of(check):
@@ -157,8 +157,8 @@ def test_large_fragments_that_keep_topics_apart_are_warned_of(check):
 
 def test_a_registry_beyond_the_limit_says_what_to_do(check, tmp_path):
     for n, parts in (
-        (23, ["23 topics; allowed: at most 15", "take 8 lines out", "all robots"]),
-        (17, ["17 topics; allowed: at most 15", "take 2 lines out"]),
+        (23, ["23 topics; allowed: at most 15", "remove 8 lines", "all robots"]),
+        (17, ["17 topics; allowed: at most 15", "remove 2 lines"]),
     ):
         (tmp_path / "many.csv").write_text("".join(f"t{i},a/B\n" for i in range(n)))
         code, _, err = check('registry = "many.csv"')
@@ -168,7 +168,7 @@ def test_a_registry_beyond_the_limit_says_what_to_do(check, tmp_path):
     (tmp_path / "many.csv").write_text("".join(f"t{i},a/B\n" for i in range(16)))
     code, out, _ = check('registry = "many.csv"')
     assert code == 0
-    assert "warning: 16 topics take every topic id: no ages" in out
+    assert "warning: 16 topics use every topic id: no ages" in out
 
 
 @pytest.mark.parametrize("path", [".", "none.toml"])

@@ -32,8 +32,8 @@ def test_without_a_frequency_that_of_the_simulation_counts():
 def test_check_says_how_far_off_bursts_are_looked_for():
     summary = make_setup(parse_config(f"{SOAPY}frequency_hz = 5.9e9"), ETC).summary()
     assert (
-        "bursts are looked for up to 472 kHz off: two crystals of ±40 ppm (modem.crystal_ppm) at "
-        "5900 MHz can be 472 kHz apart"
+        "the receiver searches for bursts up to 472 kHz off: two crystals of ±40 ppm "
+        "(modem.crystal_ppm) at 5900 MHz can be 472 kHz apart"
     ) in summary
     assert not any("kHz" in line for line in make_setup(parse_config(""), ETC).summary())
 
@@ -43,7 +43,7 @@ def test_what_cannot_be_reached_is_warned_of_with_what_to_do():
     (warning,) = [each for each in setup.warnings if "apart" in each]
     assert "up to 250 kHz off" in warning
     assert "can be 472 kHz apart; radios farther apart do not hear each other" in warning
-    assert "raise modem.rate_hz, or tell better crystals (modem.crystal_ppm)" in warning
+    assert "raise modem.rate_hz, or state better crystals (modem.crystal_ppm)" in warning
     setup = make_setup(parse_config(f"{SOAPY}frequency_hz = 5.9e9\nmax_cfo_hz = 1e5"), ETC)
     (warning,) = [each for each in setup.warnings if "apart" in each]
     assert "raise modem.max_cfo_hz" in warning
@@ -57,4 +57,4 @@ def test_a_slow_simulation_is_not_warned_of():
 def test_what_is_given_counts():
     modem = ModemParams(max_cfo_hz=5e4)
     assert modem.searched_cfo_hz == 5e4
-    assert cfo_told(modem) == "bursts are looked for up to 50 kHz off (modem.max_cfo_hz)"
+    assert cfo_told(modem) == "the receiver searches for bursts up to 50 kHz off (modem.max_cfo_hz)"

@@ -33,7 +33,7 @@ def test_the_rightmost_digits_of_the_namespace(setup, namespace, node_id):
 @pytest.mark.parametrize(
     ("namespace", "problem"),
     [
-        ("robot", 'in "robot" it is not there'),
+        ("robot", 'in "robot" it is missing'),
         ("r255", 'in "r255" it is 255, above 254'),
         ("robot_7/cam_640", 'in "robot_7/cam_640" it is 640, above 254'),
         ("r" + "1" * 5000, "above 254"),

@@ -36,10 +36,10 @@ def test_a_daemon_with_a_cold_cache_takes_messages_says_so_and_can_be_stopped(
     daemon = start_daemon(
         f'drain_s = 0\nbackend = "iqfile"\n[iqfile]\ntransmit = "{tmp_path / "radio"}"\n'
     )
-    wait_for(lambda: "compiling the modem: " in daemon.log(), timeout_s=60)
+    wait_for(lambda: "compiling the modem, once: " in daemon.log(), timeout_s=60)
     with Publisher(daemon.directory) as out:
         out.send("/robot_1/odom", b"\0\1\0\0odom")
-    wait_for(lambda: "the modem is being compiled, once" in daemon.snapshot().carrier.reason)
+    wait_for(lambda: "compiling the modem, once" in daemon.snapshot().carrier.reason)
     snapshot = daemon.snapshot()
     assert snapshot.verdict.level == "DOWN"
     assert snapshot.link.tx.queued == 1
@@ -48,7 +48,7 @@ def test_a_daemon_with_a_cold_cache_takes_messages_says_so_and_can_be_stopped(
     daemon.send_signal(signal.SIGHUP)
     wait_for(lambda: "re-read: " in daemon.log())
     assert daemon.is_up()
-    assert "the modem is being compiled, once" in daemon.snapshot().carrier.reason
+    assert "compiling the modem, once" in daemon.snapshot().carrier.reason
     assert daemon.stop(within_s=60) == 0
     assert "compiled the modem in" not in daemon.log()
 
@@ -76,9 +76,9 @@ def told(monkeypatch):
 
 def test_progress_is_told_now_and_then(told):
     assert told([0.5, 1.0, 9.0, 10.6, 30.0, 31.0]) == [
-        "compiling the modem: 1 of 64 kernels, 0 s so far, once",
-        "compiling the modem: 4 of 64 kernels, 11 s so far, once",
-        "compiling the modem: 5 of 64 kernels, 30 s so far, once",
+        "compiling the modem, once: 1 of 64 kernels, 0 s so far",
+        "compiling the modem, once: 4 of 64 kernels, 11 s so far",
+        "compiling the modem, once: 5 of 64 kernels, 30 s so far",
         "compiled the modem in 31 s",
     ]
 
@@ -95,9 +95,9 @@ def test_a_screen_shows_progress_elsewhere(told):
 
 def test_where_it_is_kept_is_told_in_a_line(told, tmp_path):
     (line,) = told([], tmp_path)
-    assert f"is kept in {tmp_path}: neither" in line
+    assert f"is cached in {tmp_path}: neither" in line
     (line,) = told([], tmp_path / "none")
-    assert "compiled anew at every start" in line
+    assert "every start compiles it again" in line
 
 
 def test_it_can_be_given_up(told):

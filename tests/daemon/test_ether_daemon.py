@@ -61,7 +61,7 @@ def test_without_a_hub_a_daemon_stays_and_joins_when_there_is_one(
                 continue
         with daemon.control() as control:
             assert control.ask("check")["problems"] == []
-        wait_for(lambda: "the hub is there after" in daemon.log())
+        wait_for(lambda: "the hub is up after" in daemon.log())
 
 
 def test_a_second_robot_of_one_id_is_refused_and_the_first_is_told(start_daemon, tmp_path_factory):
@@ -73,10 +73,10 @@ def test_a_second_robot_of_one_id_is_refused_and_the_first_is_told(start_daemon,
         wait_for(lambda: second.snapshot().carrier.state == "refused", 60)
         level, reason = verdict(second)
         assert level == "DOWN"
-        assert f"robot 1 is on this air already: process {first.pid} on " in reason
+        assert f"robot 1 is already on this channel: process {first.pid} on " in reason
         assert "another robot_id" in reason
-        wait_for(lambda: "the settings do not fit the hub: " in second.log())
-        told = f"asked for our id 1 on this air and was refused: process {second.pid} on "
+        wait_for(lambda: "the hub refuses the settings: " in second.log())
+        told = f"requested our id 1 on this channel and was refused: process {second.pid} on "
         wait_for(lambda: told in first.snapshot().carrier.detail)
         assert first.snapshot().carrier.state == "up"
         assert list(ask(hub).nodes) == [1]

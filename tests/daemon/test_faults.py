@@ -273,7 +273,7 @@ def test_a_changed_registry_is_not_reloaded(start_daemon, tmp_path):
 def test_control_refuses_in_words(start_daemon):
     daemon = start_daemon()
     with daemon.control() as control:
-        with pytest.raises(RefusedError, match="this daemon has hello, status"):
+        with pytest.raises(RefusedError, match="allowed: hello, status"):
             control.ask("explode")
         assert control.ask("hello")["node"] == 1
         assert control.ask("config")["link"]["pdu_size"] == 1024

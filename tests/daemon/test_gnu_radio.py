@@ -182,7 +182,7 @@ def test_a_flowgraph_that_is_not_there_is_told_and_waited_for(start_daemon, endp
     wait_for(lambda: robots[0].snapshot().carrier.notices)
     snapshot = robots[0].snapshot()
     assert snapshot.carrier.state == "down"
-    assert f"no flowgraph: nobody takes PDUs at {one[0]}" in snapshot.carrier.notices[0]
+    assert f"no flowgraph: nothing accepts PDUs at {one[0]}" in snapshot.carrier.notices[0]
     with Publisher(robots[0].directory) as publisher:
         publisher.send("/robot_1/odom", bytes(100))
         publisher.flush()

@@ -153,7 +153,7 @@ def test_a_recording_of_another_rate_is_refused_in_one_line(write_config, tmp_pa
     )  # fmt: skip
     assert done.returncode == 2
     *_, last = done.stderr.splitlines()
-    assert "is sampled at 1e+06 Hz; the modem is set to 5e+06 Hz" in last
+    assert "sampled at 1e+06 Hz, but the modem is set to 5e+06 Hz" in last
     assert "Traceback" not in done.stderr
 
 

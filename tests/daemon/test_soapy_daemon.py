@@ -264,7 +264,7 @@ def test_a_driver_that_is_not_installed_is_for_a_person_to_mend(write_config, tm
         ),
         (
             ("noise_db=-50", "noise_db=-50,rate_error=0.01,lie=no"),
-            "refused", ["the device made it", "a rate that it keeps"],
+            "refused", ["the device chose", "a rate that it accepts"],
         ),
     ],
 )  # fmt: skip
@@ -305,7 +305,7 @@ def test_a_radio_that_comes_late_is_waited_for(start_daemon, bus):
         waited_s = late.snapshot().uptime_s - asked_at
         assert message.age_us * 1e-6 <= waited_s + 1.0
     assert_whole(late)
-    wait_for(lambda: "the radio is there after" in late.log())
+    wait_for(lambda: "the radio is up after" in late.log())
     assert "no radio, still trying: soapy.device" in late.log()
 
 
@@ -349,7 +349,7 @@ def test_settings_that_were_refused_are_tried_again(start_daemon, bus, mended_by
     good = on_soapy(1, name)
     robot = start_daemon(good.replace("tx_gain_db = 40.0", "tx_gain_db = 99.0"))
     wait_for(lambda: robot.snapshot().carrier.state == "refused", 60)
-    wait_for(lambda: "the settings do not fit the radio" in robot.log())
+    wait_for(lambda: "the radio refuses the settings" in robot.log())
     if mended_by == "a reload":
         text = robot.config.read_text()
         robot.config.write_text(text.replace("tx_gain_db = 99.0", "tx_gain_db = 40.0"))

@@ -144,7 +144,7 @@ def test_a_command_topic_that_falls_silent_is_stopped_once(pair):
             assert time.monotonic() - began > 0.2
             assert from_cdr(stop.payload, TWIST).linear.z == -0.5
         assert heard.receive(1.0) is None
-    assert two.log().count("the stop message was published") == 2
+    assert two.log().count("published the stop message") == 2
     assert two.snapshot().link.received[0].stops == 2
 
 

@@ -150,7 +150,7 @@ def test_bad_input_is_refused_in_words(tmp_path, capsys):
         (("--topics", "/none"), "allowed: /robot_1/cmd_vel"),
         (("--registry", tmp_path / "many.csv"), "17 topics"),
         (("--registry", tmp_path / "twice.csv"), "twice.csv:2: topic odom is listed twice"),
-        (("--registry", tmp_path / "none.csv"), "cannot be read"),
+        (("--registry", tmp_path / "none.csv"), "is unreadable"),
         (("--duration", "0.1", "--out", tmp_path / "file"), "cannot be written"),
     ):
         assert demo(*arguments) == 2, arguments

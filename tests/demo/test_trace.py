@@ -165,7 +165,8 @@ def test_what_the_registry_lacks_is_left_out_by_name(tmp_path):
     source = open_source(bag, registry, [], None, 1)
     assert [t.name for t in source.topics] == ["/a"]
     assert source.left_out == [
-        "/b: is std_msgs/msg/String, the registry has std_msgs/msg/Bool", "/c: not in the registry",
+        "/b: type std_msgs/msg/String, but the registry has std_msgs/msg/Bool",
+        "/c: not in the registry",
     ]  # fmt: skip
     registry.write_text("".join(f"t{i},a/B\n" for i in range(17)))
     with pytest.raises(RegistryError, match="17 topics"):

@@ -31,9 +31,9 @@ def test_of_a_run_that_brought_everything_nothing_is_told():
 @pytest.mark.parametrize(
     ("changes", "says"),
     [
-        ({"busy": 1.0, "waited": 0.02}, "a processor of this machine is too slow for 5 Msps"),
-        ({"busy": 0.8, "waited": 0.4}, "other programs had the processors for 6.0 s"),
-        ({"busy": 0.3, "waited": 0.01}, "the daemon stood still"),
+        ({"busy": 1.0, "waited": 0.02}, "the CPU is too slow for 5 Msps"),
+        ({"busy": 0.8, "waited": 0.4}, "other programs used the CPU for 6.0 s"),
+        ({"busy": 0.3, "waited": 0.01}, "the daemon stalled"),
     ],
 )
 def test_samples_that_were_lost_have_a_cause_of_their_own(changes, says):
@@ -47,16 +47,16 @@ def test_samples_that_were_lost_have_a_cause_of_their_own(changes, says):
 
 def test_who_falls_behind_loses_messages_before_samples():
     slow = with_phy(replace(SHORT, dropped={"tx_stalled": 4}), busy=0.99, waited=0.03)
-    assert "the receiver fell behind, as a processor of this machine is too slow" in verdict(slow)
+    assert "the receiver fell behind: the CPU is too slow" in verdict(slow)
 
 
 def test_what_the_noise_takes_is_no_fault():
     noisy = with_phy(SHORT, mcs="64QAM 3/4", mcs_index=6)
     assert is_good(noisy)
-    assert "64QAM 3/4 brings everything from 18 dB on, and this air has 15 dB" in verdict(noisy)
+    assert "64QAM 3/4 loses nothing from 18 dB upward, but this channel has 15 dB" in verdict(noisy)
     fading = with_phy(SHORT, channel="rayleigh")
     assert is_good(fading)
-    assert "on a channel that fades (rayleigh)" in verdict(fading)
+    assert "with fading (rayleigh)" in verdict(fading)
 
 
 def test_a_clean_link_has_to_bring_everything():
@@ -71,7 +71,7 @@ def test_changed_bytes_and_a_ledger_that_is_off_are_faults_on_any_air():
     assert is_good(noisy)
     assert not is_good(replace(noisy, bytes_identical=False))
     assert not is_good(replace(noisy, ledger_adds_up=False))
-    assert "not what was sent" in verdict(replace(GOOD, bytes_identical=False))
+    assert "differ from those sent" in verdict(replace(GOOD, bytes_identical=False))
     assert "does not add up" in verdict(replace(GOOD, ledger_adds_up=False))
     # Where nothing arrived, nothing was changed.
     assert is_good(replace(noisy, received=0, bytes_identical=False))

@@ -98,7 +98,7 @@ def test_the_environment(tmp_path):
     wanted = ["zfec>=1.5", "numpy>=1.26", 'matplotlib>=3.8; extra == "plots"']
     found = environment(tmp_path, wanted, {"zfec": "1.10.0", "numpy": "2.0"})
     assert {each.state for each in found.values()} == {GOOD}
-    assert found["packages"].told == "2, all there"
+    assert found["packages"].told == "2, all installed"
     assert "3 kernels" in found["compiled modem"].told
 
 
@@ -124,10 +124,10 @@ def test_the_runtime_directory(tmp_path):
     assert state(tmp_path / "new" / "one").state is GOOD
     assert state(tmp_path).state is GOOD
     (tmp_path / "ctl.sock").touch()
-    assert "a daemon's sockets are there" in state(tmp_path).told
+    assert "holds a daemon's sockets" in state(tmp_path).told
     assert "a socket's path allows 95" in state(tmp_path / ("x" * 95)).told
     (tmp_path / "file").touch()
-    assert "is no directory" in state(tmp_path / "file").told
+    assert "is not a directory" in state(tmp_path / "file").told
     open_to_all = tmp_path / "open"
     open_to_all.mkdir()
     open_to_all.chmod(0o777)

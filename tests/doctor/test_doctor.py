@@ -51,8 +51,10 @@ def test_line_by_line_for_people(write_config, tmp_path, capsys):
     out, err = capsys.readouterr()
     lines = out.splitlines()
     assert {line[0] for line in lines if line[:1] in "✓✗–" and line} == {"✓", "✗", "–"}
-    assert f"→ no hub serves it: sdrlink-ether --dir {tmp_path}/air" in " ".join(out.split())
-    assert "[chrony] by another robot" in out or "kept by NTP" in out
+    assert f"→ no hub runs there; start one: sdrlink-ether --dir {tmp_path}/air" in " ".join(
+        out.split()
+    )
+    assert "[chrony] from another robot" in out or "synchronized by NTP" in out
     assert lines[-1].endswith(" to do")
     assert "Traceback" not in out + err
 

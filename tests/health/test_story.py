@@ -31,21 +31,21 @@ def test_a_radio_that_comes_late_goes_and_comes_back():
     ]
     assert story(*seen) == [
         ("warning", "no radio, still trying: no such device"),
-        ("info", "the radio is there after 12 s: usrp"),
-        ("warning", "the radio is away: the stream failed"),
+        ("info", "the radio is up after 12 s: usrp"),
+        ("warning", "the radio is gone: the stream failed"),
         ("info", "the radio is back after 12 s: usrp"),
         (
             "error",
             (
-                "the settings do not fit the radio: got 99. It is tried again after a reload "
-                "(SIGHUP), and when it is plugged in anew"
+                "the radio refuses the settings: got 99. The daemon retries after a reload "
+                "(SIGHUP) or when it is plugged in again"
             ),
         ),
     ]
 
 
 def test_a_robot_comes_goes_starts_anew_and_comes_back():
-    notice = "robot 2 has another registry, differing in topic id 2"
+    notice = "robot 2 has a different registry: topic id 2"
     seen = [
         snapshot(1.0, robots=[]),
         snapshot(2.0, robots=[robot(1, is_self=True), robot()]),
@@ -61,7 +61,7 @@ def test_a_robot_comes_goes_starts_anew_and_comes_back():
         ("info", "robot 2 is heard at 17 dB"),
         ("warning", "robot 2 is lost: not heard for 6 s"),
         ("info", "robot 2 is heard again"),
-        ("info", "robot 2 has started anew"),
+        ("info", "robot 2 has restarted"),
         ("warning", notice),
         ("info", "robot 2 has the same registry now"),
     ]
@@ -73,8 +73,8 @@ def test_the_slowest_mcs_and_the_way_up_again():
 
     told = story(at(1.0, 4), at(2.0, 0), at(3.0, 0), at(4.0, 2))
     assert told[2:] == [
-        ("warning", "the MCS to robot 2 is down to 0, the lowest: it hears us at 2 dB"),
-        ("info", "the MCS to robot 2 is up again: 2"),
+        ("warning", "the MCS to robot 2 fell to 0, the lowest: it hears us at 2 dB"),
+        ("info", "the MCS to robot 2 rose again to 2"),
     ]
     # A fixed one is not news.
     fixed = [snapshot(second, robots=[robot(mcs=0, snr_there_db=2.0)]) for second in (1.0, 2.0)]
@@ -90,11 +90,11 @@ def test_a_queue_that_overflows_is_told_when_it_begins_and_when_it_ends():
         (
             "warning",
             (
-                "more to send than the air carries: messages are dropped, most of /robot_1/scan; "
-                "sdrlinkctl why /robot_1/scan says more"
+                "traffic exceeds the channel capacity: messages are dropped, most of "
+                "/robot_1/scan; sdrlinkctl why /robot_1/scan says more"
             ),
         ),
-        ("info", "the air carries all there is to send again: 50 dropped in 10 s"),
+        ("info", "traffic fits the channel again: 50 messages dropped in 10 s"),
     ]
 
 
@@ -110,7 +110,7 @@ def test_clocks_that_jump():
     )
     assert told[2:] == [
         ("warning", "robot 2's clock jumped"),
-        ("warning", "this host's clock was set: it jumped"),
+        ("warning", "this host's clock was stepped"),
     ]
 
 
@@ -122,7 +122,7 @@ def test_what_goes_on_and_off_all_day_does_not_fill_the_log():
         lines += health.look(snapshot(float(second), away if is_away else None, []))
     told = [line for line in lines if line.subject == "radio"]
     assert len(told) < 50
-    assert any("left out" in line.text for line in told)
+    assert any("lines suppressed" in line.text for line in told)
     for second in range(600, 640):
         lines += health.look(snapshot(float(second), robots=[]))
     assert [line for line in lines if line.subject == "radio"][-1].text.startswith(

@@ -37,14 +37,14 @@ def test_all_is_well():
         ),
         (
             {"state": "refused", "reason": "soapy.tx_gain_db: got 99"},
-            "the settings do not fit the radio: soapy.tx_gain_db: got 99",
+            "the radio refuses the settings: soapy.tx_gain_db: got 99",
         ),
         (
             {"state": "down", "since_s": 75, "reason": "it delivers nothing"},
             "no radio since 1 min 15 s: it delivers nothing",
         ),
         ({"kind": "gnuradio", "state": "down", "since_s": 2}, "no flowgraph since 2 s"),
-        ({"kind": "iqfile", "state": "ended"}, "the recording is over"),
+        ({"kind": "iqfile", "state": "ended"}, "the recording has ended"),
     ],
 )
 def test_without_a_radio_nothing_else_matters(carrier, reason):
@@ -66,7 +66,7 @@ def test_a_moment_without_samples_is_no_outage():
         ),
         ([robot(per_there=0.02)], []),
         ([robot(per_lately=0.1, snr_db=5.0)], ["we hear robot 2 at 5 dB, 10 % lost"]),
-        ([robot(registry="differs")], ["robot 2 has another topic registry"]),
+        ([robot(registry="differs")], ["robot 2 has a different topic registry"]),
         ([robot(last_heard_s_ago=6.0), robot(3)], ["robot 2 not heard for 6 s"]),
         # Its usual pause is as long: half duplex.
         ([robot(last_heard_s_ago=30.0, usual_gap_s=15.0)], []),
@@ -95,7 +95,7 @@ def test_messages_dropped_for_want_of_air():
     told = verdict(at(1.0), at(2.0, tx_overflow_old=3, tx_expired=2, tx_throttled=90))
     assert told == (
         "DEGRADED",
-        ["more to send than the air carries: 5 messages dropped in 5 s, most of /robot_1/scan"],
+        ["traffic exceeds the channel capacity: 5 messages dropped in 5 s, most of /robot_1/scan"],
     )
     over = [at(float(second), tx_overflow_old=3) for second in range(3, 12)]
     assert verdict(at(1.0), at(2.0, tx_overflow_old=3), *over) == ("OK", [])
@@ -113,9 +113,9 @@ def test_a_machine_that_is_too_slow_and_a_receiver_that_clips():
     assert verdict(*lost) == (
         "DEGRADED",
         [
-            "5000 samples lost in 5 s: this machine is too slow",
+            "5000 samples dropped in 5 s: the CPU is too slow",
             "the receiver clips 1.3 % of the samples: lower its gain",
-            "the daemon runs 300 ms late: this machine is busy",
+            "the event loop lags 300 ms: the CPU is busy",
         ],
     )
 

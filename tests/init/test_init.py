@@ -77,7 +77,7 @@ def test_one_robot_gets_the_plain_name_and_its_number(init, tmp_path, capsys):
         "sdrlinkd.toml", "registry.csv",
     }  # fmt: skip
     assert "robot 2, namespace robot_2" in checked(tmp_path / "team" / "sdrlinkd.toml", capsys)
-    assert "the other robots need the same registry.csv" in said
+    assert "each other robot needs the same registry.csv" in said
 
 
 def test_nothing_is_replaced_unasked(init, tmp_path):
@@ -87,7 +87,7 @@ def test_nothing_is_replaced_unasked(init, tmp_path):
     path.write_text("mine")
     code, _, err = init(*ours)
     assert code == 2
-    assert "sdrlinkd.toml: there already; allowed: another --out, or --force" in err
+    assert "sdrlinkd.toml: already there; allowed: another --out, or --force" in err
     assert path.read_text() == "mine"
     assert init(*ours, "--force")[0] == 0
     assert path.read_text() != "mine"
@@ -98,7 +98,7 @@ def test_nothing_is_replaced_unasked(init, tmp_path):
     [
         (("--radio", "hackrff"), '--radio: got "hackrff"; allowed: hackrf, usrp'),
         (("--radio", "hackrff"), "did you mean hackrf?"),
-        ((), "--radio: not given, and no terminal to ask at; which radio? such as hackrf"),
+        ((), "--radio: not given, and no terminal to ask on; which radio? such as hackrf"),
         (("--radio", "usrp"), "--robots: not given"),
         (("--radio", "usrp", "--robots", "2"), "--frequency: not given"),
         (("--radio", "usrp", "--robots", "2", "--frequency", "433"), "with its unit"),
@@ -145,10 +145,10 @@ def test_of_a_large_bag_the_small_and_busy_topics_stay(init, tmp_path, capsys):
     assert [each.name for each in choice.taken] == [f"t{i:02}" for i in range(15, 0, -1)]
     assert set(choice.left_out) == {"t00", "image", "rosout"}
     assert "small types before large ones" in choice.left_out["image"]
-    assert choice.left_out["rosout"] == "ROS's own"
+    assert choice.left_out["rosout"] == "ROS internal"
     wanted = choose(found, ["/robot_1/image", "t00"], "a bag")
     assert [each.name for each in wanted.taken] == ["image", "t00"]
-    assert wanted.left_out["t01"] == "not asked for"
+    assert wanted.left_out["t01"] == "not requested"
 
 
 def test_robots_of_one_team_share_a_line():
@@ -156,7 +156,7 @@ def test_robots_of_one_team_share_a_line():
     found = [FoundTopic(f"/robot_{i}/odom", kind, 5) for i, kind in enumerate(kinds)]
     choice = choose(found, [], "a bag")
     assert choice.taken == [FoundTopic("odom", "a/msg/B", 10)]
-    assert choice.left_out == {"/robot_2/odom": "is a/msg/C, another robot's is a/msg/B"}
+    assert choice.left_out == {"/robot_2/odom": "type a/msg/C, but another robot's is a/msg/B"}
 
 
 def test_a_bag_makes_the_registry(init, tmp_path, capsys):
@@ -186,7 +186,7 @@ def test_the_graph_is_asked_of_ros_itself(init, tmp_path, monkeypatch):
     assert (code, "source ROS 2's setup.bash" in err) == (2, True)
     monkeypatch.setenv("PATH", f"{ros2.parent}:/usr/bin:/bin")
     code, _, err = init(*ours)
-    assert (code, "left out: parameter_events (ROS's own)" in err) == (0, True)
+    assert (code, "left out: parameter_events (ROS internal)" in err) == (0, True)
     registry = load_registry(tmp_path / "team" / "registry.csv")
     assert [(each.name, each.type) for each in registry.topics] == [
         ("odom", "nav_msgs/msg/Odometry")
@@ -278,7 +278,7 @@ def test_robots_on_computers_of_their_own_share_a_hub(init, tmp_path):
 def test_all_files_or_none(init, tmp_path):
     (tmp_path / "team" / "sdrlinkd.toml").mkdir(parents=True)
     code, _, err = init("--radio", "direct", "--id", "1", *ODOM, "--force")
-    assert (code, "sdrlinkd.toml cannot be written (it is a folder)" in err) == (2, True)
+    assert (code, "sdrlinkd.toml cannot be written (it is a directory)" in err) == (2, True)
     assert [each.name for each in (tmp_path / "team").iterdir()] == ["sdrlinkd.toml"]
 
 
@@ -295,9 +295,9 @@ def test_what_is_missing_is_asked_with_a_default(tmp_path, capsys):
     os.close(theirs)
     assert process.returncode == 0, said
     for part in (
-        'got "hackrff"; allowed', "how many robots share the air [2]",
-        "which frequency, one that antenna and licence are for [433.92 MHz]",
-        "which of them is this one, 1 to 2, or all [1]", "HackRF One (half duplex",
+        'got "hackrff"; allowed', "how many robots share the channel [2]",
+        "which frequency (one that your antenna and licence cover) [433.92 MHz]",
+        "which robot is this, 1 to 2, or all [1]", "HackRF One (half duplex",
     ):  # fmt: skip
         assert part in said
     assert "robot 2" in checked(tmp_path / "team" / "sdrlinkd.toml", capsys)

@@ -70,7 +70,7 @@ def test_the_spectrum_of_a_handful_of_samples_is_drawn_too(tmp_path):
 
 def test_an_empty_recording_is_refused(tmp_path):
     (tmp_path / "none.cf32").write_bytes(b"")
-    with pytest.raises(UserError, match="holds no samples"):
+    with pytest.raises(UserError, match="contains no samples"):
         IqRecording(tmp_path / "none.cf32")
 
 

@@ -187,7 +187,7 @@ async def test_radios_that_cannot_send_are_refused(tmp_path):
 
 async def test_a_recording_of_another_rate_is_refused(tmp_path):
     record(tmp_path / "rec", np.ones(100, np.complex64), rate_hz=1_920_000)
-    says = r"is sampled at 1920000 Hz; the modem is set to 2000000 Hz; allowed: modem.rate_hz"
+    says = r"sampled at 1920000 Hz, but the modem is set to 2000000 Hz; allowed: modem.rate_hz"
     with pytest.raises(UserError, match=says):
         await replayed(tmp_path / "rec", BlockRadio([]))
 

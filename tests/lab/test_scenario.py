@@ -105,14 +105,14 @@ def test_the_line_cited_is_that_of_the_robot_in_error(load, text, says):
     [
         (
             ONE + "path = [[0, 0, 0], [5, 1, 0], [5, 2, 0]]\n",
-            ["robot.path of robot 1", "t = 5 s after 5 s", "times that grow"],
+            ["robot.path of robot 1", "t = 5 s after 5 s", "increasing times"],
         ),
         (ONE + "path = [[5, 0, 0], [4, 1, 0]]\n", ["t = 4 s after 5 s"]),
         (
             ONE + TWO + "path = [[0, 0, 0], [1, 30000, 40000]]\n",
             ["robot.path of robot 2", "5e+04 m/s", "from 0 s to 1 s", "at most 10000 m/s"],
         ),
-        (ONE + TWO + ONE, ["robot.id: got 1 twice", "an id of its own"]),
+        (ONE + TWO + ONE, ["robot.id: got 1 twice", "a unique id"]),
         (
             ONE + TWO + "[[link]]\nsender = 1\nreceiver = 3\n",
             ["link.receiver: got 3", "a robot of this scenario: 1, 2"],
@@ -124,7 +124,7 @@ def test_the_line_cited_is_that_of_the_robot_in_error(load, text, says):
         ),
         (
             ONE + "[outages]\ntimes = [[1, 2], [4, 3]]\n",
-            ["outages.times: got [4, 3]", "an end after its begin"],
+            ["outages.times: got [4, 3]", "an end after its start"],
         ),
         (ONE + "[outages]\ntimes = [[3, 3]]\n", ["got [3, 3]"]),
     ],
@@ -217,7 +217,7 @@ def test_shipped_scenarios_need_no_recording_but_one_that_says_so():
     for name, path in shipped_scenarios().items():
         scenario = load_scenario(path)
         if name == "mrclam-three":
-            with pytest.raises(UserError, match="name it with --bag"):
+            with pytest.raises(UserError, match="give a recording that has it with --bag"):
                 open_sources(scenario, None)
             continue
         for source in open_sources(scenario, None).values():

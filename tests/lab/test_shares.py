@@ -35,12 +35,13 @@ def why(policy):
 
 def test_why_tells_an_air_that_idles_between_turns_from_a_full_one():
     idles = why("minislot")
-    assert idles.startswith("the air was idle 9")
+    assert idles.startswith("the channel was idle 9")
     for part in (
-        "minislot waits up to 71 ms after every burst on this radio and carries 9.1 % of the air",
+        "minislot waits up to 71 ms after every burst on this radio",
+        "and leaves 9.1 % of the airtime usable",
         "; tdma would carry 11 times as much (ours ",
     ):
         assert part in idles
     full = why("tdma")
-    assert full.startswith("the air was full (ours 4")
+    assert full.startswith("the channel was full (ours 4")
     assert "others' 4" in full

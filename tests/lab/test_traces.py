@@ -127,7 +127,7 @@ def test_the_run_begins_somewhere_in_the_log(outages, from_s, expected):
 def test_a_log_that_tells_nothing_is_refused(outages, lines):
     with pytest.raises(UserError) as error:
         outages(lines)
-    assert "log.jsonl: holds no two lines with a seqnum" in str(error.value)
+    assert "log.jsonl: has fewer than two lines with a seqnum" in str(error.value)
     assert "allowed: a log of received messages" in str(error.value)
 
 
@@ -136,7 +136,7 @@ def test_a_log_that_cannot_be_read_is_refused(tmp_path):
         with pytest.raises(UserError) as error:
             read_outages(path, PERIOD_S, 0.0)
         assert f"{path}: cannot be read" in str(error.value)
-        assert "--traces names the folder" in str(error.value)
+        assert "give the folder of the logs" in str(error.value)
 
 
 def test_a_scenario_with_a_trace_needs_the_folder(tmp_path):

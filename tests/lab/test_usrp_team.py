@@ -86,10 +86,10 @@ def test_minislots_do_not_and_why_says_so():
     # Arriving messages are no older than their class allows, plus the time on the air.
     assert max(pair.ages_s) < 2.1
     told = sim.stations[1].link.why(ODOM, FILE, sim.now)
-    assert told[0].endswith("worthless after 2 s as its class says (robot.toml)")
-    assert any("were older than 2 s, the lifespan of class latency," in line for line in told)
-    assert told[-1].startswith("the air was idle 8")
+    assert told[0].endswith("lifespan 2 s from its class (robot.toml)")
+    assert any("older than 2 s, the lifespan of class latency" in line for line in told)
+    assert told[-1].startswith("the channel was idle 8")
     assert (
-        "minislot waits up to 70.7 ms after every burst on this radio and carries 5 % of the air; "
-        "tdma would carry 19 times as much"
+        "minislot waits up to 70.7 ms after every burst on this radio and leaves 5 % of the "
+        "airtime usable; tdma would carry 19 times as much"
     ) in told[-1]

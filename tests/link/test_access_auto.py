@@ -42,7 +42,7 @@ def test_auto_is_the_default():
 @pytest.mark.parametrize("traits", [LOCKSTEP, PACED, SOON, USRP, TX_WINDOWS])
 def test_alone_it_is_none(nodes, traits):
     found = settled(auto(nodes), traits)
-    assert (found.policy, found.reason) == ("none", "as access.nodes lists nobody else")
+    assert (found.policy, found.reason) == ("none", "because access.nodes lists no other robot")
     assert found.access.state == "none"
     assert found.share > 0.9
 
@@ -59,14 +59,14 @@ def test_without_an_air_that_robots_share_it_is_none(kind):
 @pytest.mark.parametrize("policy", ["auto", "minislot", "tdma", "csma"])
 def test_who_only_receives_takes_no_turns(policy):
     found = settled(auto([1, 2], policy=policy), USRP._replace(transmits=False))
-    assert (found.policy, found.reason) == ("none", "as this radio only receives here")
+    assert (found.policy, found.reason) == ("none", "because this radio only receives")
 
 
 def test_minislots_where_the_radio_reacts_within_a_millisecond_else_slots():
     soon, late = settled(auto([1, 2]), SOON), settled(auto([1, 2]), PACED)
     assert (soon.policy, late.policy) == ("minislot", "tdma")
     assert "within 0.18" in soon.reason
-    assert "within 6.08 ms, and mini-slots are for 1 ms and less" in late.reason
+    assert "within 6.08 ms; minislot needs at most 1 ms" in late.reason
     edge = SOON._replace(react_s=0.0)
     rest_s = 0.001 - edge.lead_s - edge.detect_s - 5e-6
     assert settled(auto([1, 2]), edge._replace(react_s=rest_s - 1e-6)).policy == "minislot"
@@ -78,7 +78,7 @@ def test_slots_where_so_many_take_part_that_minislots_carry_less_than_half():
     assert policies == sorted(policies)
     assert set(policies) == {"minislot", "tdma"}
     many = settled(auto(list(range(60))), SOON)
-    assert "with 60 robots mini-slots carry" in many.reason
+    assert "with 60 robots minislot leaves" in many.reason
 
 
 @pytest.mark.parametrize("traits", [SOON, PACED, USRP, TX_WINDOWS])
@@ -107,8 +107,8 @@ def test_what_carries_less_than_half_of_the_best_is_refused(policy):
     with pytest.raises(ConfigError) as error:
         settled(params(policy, [1, 2], force=False), USRP)
     said = str(error.value)
-    assert said.startswith(f'access.policy: got "{policy}", which carries ')
-    for part in ("with 2 robots on this radio, where tdma carries 97 %",
+    assert said.startswith(f'access.policy: got "{policy}", which leaves ')
+    for part in ("with 2 robots on this radio, where tdma leaves 97 %",
                  'allowed: "auto" or "tdma", or access.force = true'):  # fmt: skip
         assert part in said
     forced = settled(params(policy, [1, 2]), USRP)
@@ -124,7 +124,7 @@ def test_the_best_and_half_of_it_are_taken():
 
 
 def test_slots_that_are_mostly_guard_are_refused_too():
-    with pytest.raises(ConfigError, match="where minislot carries"):
+    with pytest.raises(ConfigError, match="where minislot leaves"):
         settled(params("tdma", [1, 2], force=False, slot_s=0.05, guard_s=0.04), SOON)
 
 
@@ -136,8 +136,8 @@ def test_a_link_refuses_it_at_attach_and_reports_what_it_came_to():
     report = link.report(0.0)
     assert report.access.startswith("tdma: 2 slots")
     assert (report.access_policy, round(report.access_share_pct)) == ("tdma", 97)
-    assert report.access_reason.startswith("as this radio hears another begin")
-    assert settled.sentence == (f"tdma, {report.access_reason}; it carries 97 % of the air")
+    assert report.access_reason.startswith("because this radio detects another's burst")
+    assert settled.sentence == (f"tdma, {report.access_reason}; 97 % of the airtime is usable")
 
 
 def test_minislots_wait_for_those_of_the_higher_level_and_say_so():
@@ -159,16 +159,16 @@ def test_robots_that_came_to_different_policies_are_told():
     slots, minislots = settled(auto([1, 2]), USRP).access, settled(auto([1, 2]), SOON).access
     assert notices_of(slots) == notices_of(minislots) == ""
     minislots.take_frame(2, Frame(2, 0, 0x1234, 0), 1.0)
-    assert "robot 2 takes turns by a tdma schedule" in notices_of(minislots)
+    assert "robot 2 keeps a tdma schedule" in notices_of(minislots)
     for _ in range(3):
         assert notices_of(slots) == ""
         slots.beacon(2, 2.0)
-    assert "robot 2 is heard and keeps no tdma schedule" in notices_of(slots)
+    assert "robot 2 keeps no tdma schedule" in notices_of(slots)
     assert notices_of(slots, 70.0) == "", "it left, or was told"
     slots.take_frame(2, Frame(2, 0, slots._times_crc, 0), 1.0)
     assert notices_of(slots) == ""
     slots.take_frame(2, Frame(2, 0, 0x1234, 0), 2.0)
-    assert "another tdma schedule" in notices_of(slots)
+    assert "a different tdma schedule" in notices_of(slots)
     assert notices_of(slots, 70.0) == ""
     assert notices_of(minislots, 70.0) == ""
 
@@ -183,7 +183,7 @@ def test_beacons_reach_the_policy():
         burst = next_burst(teller, now)
         teller.confirm(burst, Outcome.SENT, now)
         hearer.hear(burst.pdus[0], now)
-    assert "robot 2 is heard and keeps no tdma schedule" in notices_of(access)
+    assert "robot 2 keeps no tdma schedule" in notices_of(access)
 
 
 def test_who_takes_itself_for_alone_and_is_not_is_told():
@@ -191,7 +191,7 @@ def test_who_takes_itself_for_alone_and_is_not_is_told():
     alone.heard(4, 1.0, True)
     assert notices_of(alone) == "", "a relay's may be far away"
     alone.heard(4, 1.0, False)
-    assert "robot 4 sends on this air, too" in notices_of(alone)
+    assert "robot 4 shares this channel" in notices_of(alone)
     assert "list all robots in access.nodes" in notices_of(alone)
     assert notices_of(alone, 70.0) == "", "it left"
     wanted = settled(params("none", []), USRP).access

@@ -60,8 +60,8 @@ def test_none_needs_nothing():
 @pytest.mark.parametrize(
     ("traits", "why"),
     [
-        (DEAF, 'the backend "direct" does not hear the air'),
-        (LOCKSTEP._replace(senses=False), 'the backend "ether" does not hear the air'),
+        (DEAF, 'the backend "direct" does not sense the channel'),
+        (LOCKSTEP._replace(senses=False), 'the backend "ether" does not sense the channel'),
     ],
 )
 def test_a_radio_that_cannot_listen_and_talk_is_refused(policy, traits, why):
@@ -101,7 +101,7 @@ def test_too_short_a_minislot_is_refused_with_what_the_radio_needs():
     message = refusal(params("minislot", [1, 2], minislot_s=0.9 * least_s), traits=PACED)
     assert message.startswith(f"access.minislot_s: got {0.9 * least_s:g}; ")
     for part in ("ether: turnaround 0.05 ms, lead 3.05 ms, reaction 3 ms", f"{least_s:.4g} s",
-                 "allowed: that or more at all robots, or 0 (made from the radio)"):  # fmt: skip
+                 "allowed: that or more at all robots, or 0 (derived from the radio)"):  # fmt: skip
         assert part in message
 
 
@@ -143,8 +143,8 @@ def test_too_long_a_round_is_refused_and_tdma_named_instead():
 def test_who_is_heard_too_late_is_refused_and_tdma_named_instead(policy):
     for wanted in (params(policy, [1, 2]), params(policy, [1, 2], slottime_s=0.01)):
         message = refusal(wanted, traits=SLOW)
-        assert message.startswith(f'access.policy: got "{policy}"; robots with this radio hear')
-        for part in ("begin only after 700 ms", "allowed: at most 100 ms: use tdma"):
+        assert message.startswith(f'access.policy: got "{policy}"; this radio detects')
+        for part in ("bursts only after 700 ms", "allowed: at most 100 ms: use tdma"):
             assert part in message
     access = make(params(policy, [1, 2]), traits=SLOW._replace(lead_s=0.05, react_s=0.04))
     apart_s = access._slottime_s if policy == "csma" else access._minislot_s

@@ -191,7 +191,7 @@ def test_another_schedule_is_told_of_and_not_followed(other):
     access.take_frame(1, begun(make(1, **other), 9.0).frame(9.0), 0.7)
     assert access.frame(1.0) is None
     (notice,) = access.notices(1.0)
-    assert notice.startswith("robot 1 keeps another tdma schedule; give both the same nodes, ")
+    assert notice.startswith("robot 1 keeps a different tdma schedule; give both the same nodes, ")
     access.take_frame(1, begun(make(1), 9.0).frame(9.0), 0.7)
     assert access.notices(1.0) == []
     assert access.frame(1.0)[:2] == (1, 1)

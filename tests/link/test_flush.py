@@ -204,19 +204,19 @@ def test_whatever_waits_goes_with_the_rest_or_at_the_end(seed, flush_s):
     assert link.audit() == []
 
 
-TO_THE_END = "waits until it is, however long that takes"
+TO_THE_END = "waits until it is full, however long that takes"
 EXEMPT = "; urgent, latency and messages with a lifespan do not wait"
 
 
 @pytest.mark.parametrize(
     ("flush_s", "told"),
     [
-        ("now", '"now": a PDU that is not full leaves as soon as the radio is free'),
+        ("now", '"now": a partly filled PDU is sent as soon as the radio is free'),
         (
             0.0,
-            f"0.0: a PDU that is not full {TO_THE_END} (the paper's 0.0){EXEMPT}",
+            f"0.0: a partly filled PDU {TO_THE_END} (the paper's 0.0){EXEMPT}",
         ),
-        (0.2, f"0.2: a PDU that is not full waits for more, up to 0.2 s{EXEMPT}"),
+        (0.2, f"0.2: a partly filled PDU waits for more, up to 0.2 s{EXEMPT}"),
     ],
 )
 def test_what_the_setting_means_in_words(flush_s, told):

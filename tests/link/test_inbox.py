@@ -77,7 +77,7 @@ def test_a_different_registry_is_named_on_both_sides():
     for link, src in ((one, 2), (two, 1)):
         assert neighbors(link)[src].registry == "differs"
         (notice,) = link.notices(0.0)
-        assert notice.startswith(f"robot {src} has another registry, differing in topic id 2")
+        assert notice.startswith(f"robot {src} has a different registry: topic id 2")
 
 
 def test_a_reboot_is_seen_and_its_pdus_are_not_taken_for_duplicates():

@@ -130,19 +130,17 @@ def test_why_and_the_report_tell_which():
     link.handle_timers(4.0)
     first, *rest = link.why(0, FILE, 4.0)
     assert first == (
-        "odom: class latency, priority 64, to everyone, worthless after 2 s as its class says "
-        "(robot.toml)"
+        "odom: class latency, priority 64, to everyone, lifespan 2 s from its class (robot.toml)"
     )
     assert (
-        "100 % were older than 2 s, the lifespan of class latency, before their turn came "
-        "(tx_expired, 1)"
+        "100 % expired in the queue: older than 2 s, the lifespan of class latency (tx_expired, 1)"
     ) in rest
     own = link.why(1, FILE, 4.0)
-    assert "worthless after 500 ms (robot.toml)" in own[0]
-    assert "100 % were older than 500 ms before their turn came (tx_expired, 1)" in own
+    assert "lifespan 500 ms (robot.toml)" in own[0]
+    assert "100 % expired in the queue: older than 500 ms (tx_expired, 1)" in own
     asked = link.why(2, FILE, 4.0)
-    assert "worthless" not in asked[0]
-    assert any("were older than their producer allows" in line for line in asked)
+    assert "lifespan" not in asked[0]
+    assert any("older than their producer allows" in line for line in asked)
     report = link.report(4.0)
     assert [(each.lifespan_s, each.lifespan_from) for each in report.topics] == [
         (2.0, "class"),

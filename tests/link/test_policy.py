@@ -141,7 +141,7 @@ def test_a_dictionary_shrinks_small_messages_and_is_part_of_the_digest():
     assert [m.payload for pdu in pdus for m in two.hear(pdu, 0.0)] == samples[:20]
     assert [m for pdu in pdus for m in three.hear(pdu, 0.0)] == []
     assert received(three)[1, 0].dropped["rx_no_dictionary"] == 20
-    assert any("differing in topic id 0" in each for each in three.notices(0.0))
+    assert any("a different registry: topic id 0" in each for each in three.notices(0.0))
     assert neighbors(two)[1].registry == "same"
 
 

@@ -22,8 +22,8 @@ def test_a_throttled_topic():
     link.set_policies({0: TopicPolicy(period_s=0.1, qos="latency", lifespan_s=0.3)})
     now = pass_time(link, 500, 50)
     assert link.why(0, FILE, now) == [
-        "odom: class latency, priority 64, to everyone, worthless after 300 ms (etc/sdrlinkd.toml)",
-        "in the last minute 500 came, 100 were sent (20 %)",
+        "odom: class latency, priority 64, to everyone, lifespan 300 ms (etc/sdrlinkd.toml)",
+        "last minute: 500 messages in, 100 sent (20 %)",
         "80 % throttled to 10 Hz by etc/sdrlinkd.toml (tx_throttled, 400)",
     ]
     link.set_policy(0, TopicPolicy(period_s=1.0, qos="latency"))
@@ -47,16 +47,16 @@ def test_a_topic_that_is_shed_says_what_the_air_was_used_for():
     told = link.why(0, FILE, now)
     assert any("% shed: " in line for line in told)
     assert told[-2].startswith("bulk got ")
-    assert "airtime (the others: urgent" in told[-2]
-    assert told[-1] == "the air was full (ours 100 %, others' 0 %)"
+    assert "airtime (others: urgent" in told[-2]
+    assert told[-1] == "the channel was full (ours 100 %, others' 0 %)"
 
 
 def test_a_topic_of_which_nothing_comes():
     link = make_link(pdu_size=64)
-    assert link.why(0, FILE, 0.0)[1] == "no producer has sent anything yet"
+    assert link.why(0, FILE, 0.0)[1] == "no producer has sent a message yet"
     pass_time(link, 10, 10)
     now = 0.0
     for i in range(80):
         now = 1.0 + i
         link.handle_timers(now)
-    assert link.why(0, FILE, now)[1] == "nothing came from a producer in the last minute"
+    assert link.why(0, FILE, now)[1] == "no producer sent a message in the last minute"

@@ -106,7 +106,7 @@ def test_a_configuration_of_ours_does_not_look_for_packages(acme, monkeypatch):
 
 def test_what_a_daemon_tells_of_its_configuration_is_understood(acme):
     assert typed_config({"backend": "acme", "acme": {"gain": 0.1}}).acme.gain == 0.1
-    with pytest.raises(ConfigError, match="configuration of the daemon: cannot be read here"):
+    with pytest.raises(ConfigError, match="configuration of the daemon: unreadable here"):
         typed_config({"backend": "other", "other": {}})
 
 
@@ -128,8 +128,8 @@ async def test_pdus_go_over_its_air(acme):
 def test_what_is_not_known_of_it_is_said(acme):
     phy.warm_up()
     (told,) = access_words(parse_config(ACME), 1)
-    assert "taken for a radio that sends while it listens" in told
-    assert "what is not known without the radio" in told
+    assert "assumed to be a radio that sends and receives at once" in told
+    assert "unknown until the radio is open" in told
 
 
 def test_a_message_goes_through_a_daemon_with_it(acme, start_daemon):
@@ -151,7 +151,10 @@ BROKEN = {
     "raises": ("raises:ENTRY", "cannot be loaded (ZeroDivisionError: division by zero)"),
     "other": ("acme_radio:AcmeRadio", "is of type type, not backends.Backend"),
     "named": ("acme_radio:ENTRY", 'calls itself "acme"'),
-    "needy": ("needy:ENTRY", "has settings that are no msgspec.Struct whose keys have defaults"),
+    "needy": (
+        "needy:ENTRY",
+        "has settings that are not a msgspec.Struct with a default for each key",
+    ),
 }
 NEEDY = """
 import msgspec
@@ -167,10 +170,10 @@ def test_a_package_that_is_broken_is_named(install, name):
     value, why = BROKEN[name]
     install("broken-sdr", {name: value}, acme_radio=EXAMPLE, raises="1 / 0", needy=NEEDY)
     told = refused(f'drain_s = 1.0\nbackend = "{name}"')
-    assert told.startswith(f'f.toml:2: backend: got "{name}", which package broken-sdr 1.0 brings')
+    assert told.startswith(f'f.toml:2: backend: got "{name}" of package broken-sdr 1.0')
     assert f"but its entry {value} {why}" in told
-    assert told.endswith("; allowed: another backend, or a package that is whole")
-    # Other radios are not affected.
+    assert told.endswith("; allowed: another backend, or an intact package")
+    # Nobody else is harmed.
     assert parse_config('backend = "loopback"').backend == "loopback"
 
 
@@ -185,8 +188,8 @@ def test_a_name_that_two_packages_give_is_refused(install):
     install("acme-sdr", {"acme": "acme_radio:ENTRY"}, acme_radio=EXAMPLE)
     install("acme-fork", {"acme": "acme_radio:ENTRY"})
     assert refused('backend = "acme"') == (
-        'f.toml:1: backend: got "acme", a name that several packages give to their radio: '
-        "acme-fork 1.0 and acme-sdr 1.0; allowed: a name that one package gives: uninstall the "
+        'f.toml:1: backend: got "acme", which several packages define: '
+        "acme-fork 1.0 and acme-sdr 1.0; allowed: a name that one package defines; uninstall the "
         "others"
     )
 

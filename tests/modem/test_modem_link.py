@@ -268,7 +268,7 @@ def test_what_cannot_be_is_refused_in_words(tmp_path):
         ({"rec.sigmf-meta": '{"global": {"core:datatype": "rf32_le"}}', "rec.sigmf-data": ""},
          "allowed: cf32_le, ci16_le, ci8"),
         ({"rec.sigmf-meta": '{"global": {"core:datatype": "ci8", "core:sample_rate": 2e6}}',
-          "rec.sigmf-data": "ab"}, "is sampled at 2e+06 Hz; the modem is set to 1e+06 Hz"),
+          "rec.sigmf-data": "ab"}, "sampled at 2e+06 Hz, but the modem is set to 1e+06 Hz"),
     ],
 )  # fmt: skip
 async def test_a_recording_that_cannot_be_played_is_refused_in_words(tmp_path, files, says):

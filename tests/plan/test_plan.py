@@ -118,7 +118,7 @@ def test_a_lifespan_that_cannot_be_met_is_told():
     plan = planned("scan:5:1KB", "map:5:64KiB", policies=policies)
     assert not plan.is_feasible
     assert "scan can take" in plan.advice[0]
-    assert "worthless after 20 ms" in plan.advice[0]
+    assert "expires after 20 ms" in plan.advice[0]
 
 
 def test_policies_count():
@@ -152,7 +152,7 @@ def test_what_of_a_recording_is_not_planned_is_listed():
     assert [load.name for load in loads] == ["odom"]
     assert left_out == [
         ("/fix", 3, "not in the registry"),
-        ("/scan", 3, "not among those that the key `topics` takes"),
+        ("/scan", 3, "not selected by the key `topics`"),
     ]
 
 
@@ -190,6 +190,6 @@ def test_the_plan_reads_like_this(tmp_path, capsys):
 
 def test_a_plan_without_traffic_or_without_an_air_is_refused(tmp_path, capsys):
     code, told = plan_text(tmp_path, capsys)
-    assert (code, "name --bag FILE" in told.err) == (2, True)
-    with pytest.raises(UserError, match="has no air"):
+    assert (code, "give --bag FILE" in told.err) == (2, True)
+    with pytest.raises(UserError, match="has no channel"):
         setting_of(parse_config(""), 1)

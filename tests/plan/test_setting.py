@@ -71,28 +71,28 @@ def test_the_machines_are_a_term_of_their_own():
     worst_s = [each.topics[0].worst_s for each in (none, default, slow)]
     assert worst_s[1] - worst_s[0] == pytest.approx(HOST_S)
     assert worst_s[2] - worst_s[0] == pytest.approx(0.05)
-    assert any("the machines 50 ms" in note for note in slow.notes)
+    assert any("hosts 50 ms" in note for note in slow.notes)
 
 
 def test_auto_comes_to_what_the_daemon_comes_to():
     two = odom(preset("usrp", "[access]\nnodes = [1, 2]\n"))
     assert two.policy == "tdma"
-    assert any("access tdma, as this radio hears another begin" in note for note in two.notes)
+    assert any("access tdma, because this radio detects another's" in note for note in two.notes)
 
 
 def test_what_the_daemon_refuses_is_planned_and_told():
     minislot = odom(preset("usrp", '[access]\npolicy = "minislot"\nnodes = [1, 2]\n'))
     assert minislot.carries < 0.1
     (refused,) = [note for note in minislot.notes if "the daemon refuses this" in note]
-    assert "which carries 9.2 % of the air with 2 robots on this radio" in refused
+    assert "which leaves 9.2 % of the airtime usable with 2 robots on this radio" in refused
 
 
 def test_what_is_presumed_is_told():
     for device, part in (
-        ("driver=hackrf", "driver=hackrf: half duplex, as drivers of the kind hackrf"),
-        ("driver=loopback,model=hackrf", "half duplex, as drivers of the kind hackrf"),
-        ("driver=uhd,serial=1", "full duplex, as drivers of the kind uhd"),
-        ("driver=something", "for its driver is not known here"),
+        ("driver=hackrf", "driver=hackrf: half duplex, as known for drivers of the kind hackrf"),
+        ("driver=loopback,model=hackrf", "half duplex, as known for drivers of the kind hackrf"),
+        ("driver=uhd,serial=1", "full duplex, as known for drivers of the kind uhd"),
+        ("driver=something", "because its driver is unknown"),
     ):
         text = (ETC / "radios" / "usrp.toml").read_text()
         config = parse_config(text.replace("driver=uhd", device))
@@ -104,13 +104,13 @@ def test_without_an_air_the_key_and_an_example_are_named(capsys):
     said = capsys.readouterr().err
     assert code == 2
     for part in (
-        'backend: got "direct", which has no air to plan for',
+        'backend: got "direct", which has no channel to plan',
         'allowed: backend = "soapy"',
         'device = "driver=hackrf"',
         "etc/radios/hackrf.toml",
     ):
         assert part in said
-    with pytest.raises(UserError, match="has no air"):
+    with pytest.raises(UserError, match="has no channel"):
         setting_of(parse_config('backend = "gnuradio"'), 1)
 
 
@@ -128,13 +128,13 @@ def checked(tmp_path, capsys, text):
 @pytest.mark.parametrize(
     ("name", "access", "expected"),
     [
-        ("usrp", "", (0, "access none, as access.nodes lists nobody else; it carries 100 %")),
-        ("usrp", "[access]\nnodes = [1, 2]\n", (0, "access tdma, as this radio hears another")),
+        ("usrp", "", (0, "access none, because access.nodes lists no other robot; 100 %")),
+        ("usrp", "[access]\nnodes = [1, 2]\n", (0, "access tdma, because this radio")),
         ("usrp", '[access]\npolicy = "minislot"\nnodes = [1, 2]\n',
-         (2, 'access.policy: got "minislot", which carries 9.2 % of the air with 2 robots')),
+         (2, 'access.policy: got "minislot", which leaves 9.2 % of the airtime')),
         ("usrp", '[access]\npolicy = "minislot"\nnodes = [1, 2]\nforce = true\n',
-         (0, "access minislot, as configured; it carries 9.2 % of the air")),
-        ("hackrf", '[access]\npolicy = "csma"\n', (2, 'access.policy: got "csma"; robots with')),
+         (0, "access minislot, as configured; 9.2 % of the airtime")),
+        ("hackrf", '[access]\npolicy = "csma"\n', (2, 'access.policy: got "csma"; this radio')),
     ],
 )  # fmt: skip
 def test_check_tells_what_access_comes_to(tmp_path, capsys, name, access, expected):

@@ -82,7 +82,7 @@ class Device:
     def set_ppm(self, direction: int, channel: int, ppm: float) -> None:
         """Correct the crystal by `ppm`. Raises DriverError if the device does not support it."""
         if not self._handle.call("hasFrequencyCorrection", direction, channel):
-            raise DriverError("this device corrects no crystal")
+            raise DriverError("this device does not support crystal correction")
         self._handle.call("setFrequencyCorrection", direction, channel, ppm)
 
     def clock_sources(self) -> list[str]:

@@ -18,9 +18,9 @@ def no_radio(args: str) -> str:
     if driver_of(args) != "null":
         return ""
     return (
-        f'soapy.device: got "{args}", which is built into SoapySDR and is no radio: it neither '
-        "sends nor receives; allowed: a radio's driver, such as driver=hackrf; those here are "
-        "shown by: sdrlinkctl radio probe"
+        f'soapy.device: got "{args}", which is built into SoapySDR and not a radio: it neither '
+        "sends nor receives; allowed: a radio's driver, such as driver=hackrf; `sdrlinkctl "
+        "radio probe` lists the attached radios"
     )
 
 
@@ -43,7 +43,7 @@ def why_not(library: Library, args: str, error: DriverError) -> str:
     offered = f"; found here: {'; '.join(others)}" if others else "; no device was found here"
     return (
         f'soapy.device: got "{args}", but there is no such device ({text}){offered}. Plug it in, '
-        "see that you may open it (udev rules), and look with: sdrlinkctl radio probe"
+        "check that you may open it (udev rules), and run: sdrlinkctl radio probe"
     )
 
 

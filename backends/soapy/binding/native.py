@@ -89,13 +89,13 @@ class NativeLibrary:
         names = (*NAMES, ctypes.util.find_library("SoapySDR"))
         found = next((each for each in names if _loads(each)), None)
         if found is None:
-            raise DriverError("there is no libSoapySDR")
+            raise DriverError("libSoapySDR not found")
         self._c = _declared(CDLL(found))
 
     @property
     def detail(self) -> str:
         """The version of the C library, in words for people."""
-        return f"SoapySDR {self._c.SoapySDR_getLibVersion().decode()} by its C library"
+        return f"SoapySDR {self._c.SoapySDR_getLibVersion().decode()} through its C library"
 
     def modules(self) -> list[str]:
         """Paths of the driver modules that were loaded."""
@@ -156,7 +156,7 @@ class NativeHandle:
             byref(_Kwargs(len(args), keys, values)),
         )  # fmt: skip
         if not pointer:
-            raise DriverError(self._error() or "the driver gives no stream")
+            raise DriverError(self._error() or "the driver provides no stream")
         return NativeStream(self._c, self._open, c_void_p(pointer), SAMPLE_BYTES[form])
 
     def close(self) -> None:

@@ -23,7 +23,7 @@ class OfficialLibrary:
     @property
     def detail(self) -> str:
         """The version of the library, in words for people."""
-        return f"SoapySDR {SoapySDR.getLibVersion()} by its Python binding"
+        return f"SoapySDR {SoapySDR.getLibVersion()} through its Python binding"
 
     def modules(self) -> list[str]:
         """Paths of the driver modules that were loaded."""
@@ -60,7 +60,7 @@ class OfficialHandle:
         """Open an inactive stream. Raises DriverError."""
         stream = _called(self._open.setupStream, direction, form, [channel], args)
         if stream is None:
-            raise DriverError("the driver gives no stream")
+            raise DriverError("the driver provides no stream")
         return OfficialStream(self._open, stream, SAMPLE_BYTES[form])
 
     def close(self) -> None:

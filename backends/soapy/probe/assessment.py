@@ -73,14 +73,14 @@ def assess_device(device: DeviceProbe, rate_hz: float) -> Assessment:
 
 def _how(device: DeviceProbe) -> str:
     if device.rx is None:
-        return "not usable: it does not receive"
+        return "unusable: it does not receive"
     if device.tx is None:
         return "receives only"
     if not device.full_duplex:
-        return "half duplex: listens, and sends in TX windows between"
+        return "half duplex: receives, and sends in TX windows in between"
     if device.has_time:
-        return "full duplex; bursts leave at times that the device keeps"
-    return "full duplex; bursts are placed by counting samples"
+        return "full duplex; the device times the bursts"
+    return "full duplex; bursts are timed by counting samples"
 
 
 def _warnings(
@@ -89,21 +89,21 @@ def _warnings(
 ) -> list[str]:  # fmt: skip
     found = []
     if not fits:
-        slowest = f" (this driver: from {least / 1e6:g} Msps on)" if least else ""
+        slowest = f" (this driver: at least {least / 1e6:g} Msps)" if least else ""
         found.append(
             f"modem.rate_hz = {rate_hz:g} fits with no oversampling of 1, 2 or 4{slowest}: "
             "choose another rate"
         )
     if device.tx is not None and not device.full_duplex:
         found.append(
-            "what others send while it sends is lost, and each change of direction takes tens of "
-            'ms: one way it carries much, both ways little; access.policy "tdma" with slots of '
-            "300 ms or more, or one direction only"
+            "bursts received while it sends are lost, and each turnaround takes tens of ms: "
+            'throughput is good one way, poor both ways; use access.policy "tdma" with slots of '
+            "300 ms or more, or send in one direction only"
         )
     if not device.has_time:
         found.append(
-            f"no time stamps: indices are known to {1e3 * piece_s:.3g} ms, so are clocks of other "
-            "robots and ages"
+            f"no time stamps: sample times, other robots' clocks and ages are accurate only to "
+            f"{1e3 * piece_s:.3g} ms"
         )
     if transfer_s > LONG_PIECE_S:
         found.append(

@@ -48,8 +48,8 @@ def _why_none(library: Library, args: str, driver: str) -> str:
     if driver and not has_module(library, driver):
         return f'SoapySDR has no driver "{driver}"'
     return (
-        "no device was found. Plugged in, and allowed (udev rules)? A radio's own module must be "
-        "installed, too: soapysdr-module-hackrf, soapysdr-module-uhd, …"
+        "no device found. Is it plugged in, and may you open it (udev rules)? Its driver module "
+        "must be installed, too: soapysdr-module-hackrf, soapysdr-module-uhd, …"
     )
 
 

@@ -55,9 +55,7 @@ def _set_channel(device: Device, settings: SoapySettings, direction: int) -> Non
     n = device.channels(direction)
     if settings.channel >= n:
         can = (
-            f"0 to {n - 1}"
-            if n
-            else f"a device that can do {DIRECTIONS[direction]}: this one cannot"
+            f"0 to {n - 1}" if n else f"a device with {DIRECTIONS[direction]}, which this one lacks"
         )
         raise SettingError(
             f"soapy.channel: got {settings.channel} for {DIRECTIONS[direction]}; allowed: {can}"
@@ -77,7 +75,7 @@ def _set_antenna(device: Device, settings: SoapySettings, direction: int) -> Non
 def _set_rate(device: Device, settings: SoapySettings, direction: int) -> None:
     wanted, offered = settings.rate_hz, device.rates(direction, settings.channel)
     least = profile_of(device.driver).least_rate_hz
-    allowed = f"{_ranges(offered, 1e6)} Msps" + (f", from {least / 1e6:g} on" if least else "")
+    allowed = f"{_ranges(offered, 1e6)} Msps" + (f", at least {least / 1e6:g}" if least else "")
     what = (
         f"modem.rate_hz: got {wanted / 1e6:g} Msps at the radio (modem.rate_hz × "
         "modem.oversampling)"
@@ -88,8 +86,8 @@ def _set_rate(device: Device, settings: SoapySettings, direction: int) -> None:
         got = device.set_rate(direction, settings.channel, wanted)
     if abs(got / wanted - 1) > RATE_TOLERANCE:
         raise SettingError(
-            f"{what}, and the device made it {got / 1e6:g} Msps for {DIRECTIONS[direction]}; "
-            f"allowed: a rate that it keeps: {allowed}"
+            f"{what}, but the device chose {got / 1e6:g} Msps for {DIRECTIONS[direction]}; "
+            f"allowed: a rate that it accepts: {allowed}"
         )
 
 
@@ -102,7 +100,7 @@ def _set_frequency(device: Device, settings: SoapySettings, direction: int) -> N
         got = device.set_frequency(direction, settings.channel, wanted)
     if abs(got - wanted) > FREQUENCY_TOLERANCE_HZ:
         raise SettingError(
-            f"{what}, and the device tuned {DIRECTIONS[direction]} to {got / 1e6:.6f} MHz"
+            f"{what}, but the device tuned {DIRECTIONS[direction]} to {got / 1e6:.6f} MHz"
         )
 
 
@@ -128,7 +126,7 @@ def _set_gains(device: Device, settings: SoapySettings, direction: int) -> dict[
     by_element = settings.rx_gains if direction == RX else settings.tx_gains
     if direction == TX and total is None and not by_element:
         raise SettingError(
-            "soapy.tx_gain_db: not set; nothing is sent before it is: allowed by this device: "
+            "soapy.tx_gain_db: not set, but required to transmit; allowed by this device: "
             f"{_ranges([device.gain_range(direction, channel)])} dB"
         )
     device.set_manual_gain(direction, channel)

@@ -34,6 +34,6 @@ class RateWatch:
         self.faults += 1
         rate = came / due * self._rate_hz / 1e6
         self.notice = (
-            f"samples come at {rate:.3g} Msps, not at {self._rate_hz / 1e6:g} as the device says: "
-            "another rate, or another driver"
+            f"samples arrive at {rate:.3g} Msps, but the device claims {self._rate_hz / 1e6:g}: "
+            "try another rate or another driver"
         )

@@ -19,7 +19,7 @@ class TxStream:
         """Switch the transmitter on. Raises DriverError."""
         n = self.stream.activate()
         if n < 0:
-            raise DriverError(f"the transmitter cannot be switched on ({ERRORS.get(n, n)})")
+            raise DriverError(f"cannot switch the transmitter on ({ERRORS.get(n, n)})")
 
     def converted(self, samples: Samples) -> Values:
         """Convert samples to the stream's format; values beyond full scale are clipped."""

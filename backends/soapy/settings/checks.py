@@ -15,12 +15,12 @@ def soapy_problem(soapy: SoapyParams, needs: ModemNeeds) -> str:
     if not soapy.device:
         return (
             'soapy.device: got ""; allowed with backend = "soapy": a device, such as '
-            '"driver=hackrf"; those here are shown by: sdrlinkctl radio probe'
+            '"driver=hackrf"; `sdrlinkctl radio probe` lists the attached ones'
         )
     if "=" not in soapy.device:
         return (
-            f'soapy.device: got "{soapy.device}"; allowed: KEY=VALUE, with commas between, such as '
-            f'"driver={soapy.device}"; those here are shown by: sdrlinkctl radio probe'
+            f'soapy.device: got "{soapy.device}"; allowed: KEY=VALUE,KEY=VALUE,… such as '
+            f'"driver={soapy.device}"; `sdrlinkctl radio probe` lists the attached ones'
         )
     least_hz = profile_of(driver_of(soapy.device)).least_rate_hz
     if needs.radio_rate_hz < least_hz:
@@ -32,17 +32,17 @@ def soapy_problem(soapy: SoapyParams, needs: ModemNeeds) -> str:
     if not needs.frequency_hz:
         return (
             'modem.frequency_hz: got 0 (not set); allowed with backend = "soapy": a '
-            "frequency that radio, antenna and licence are for, such as 433.5e6"
+            "frequency that your radio, antenna and licence cover, such as 433.5e6"
         )
     if soapy.tx_enabled and soapy.tx_gain_db is None and not soapy.tx_gains:
         return (
             "soapy.tx_gain_db: not set; allowed with soapy.tx_enabled = true: a gain in "
-            "dB, or soapy.tx_gains by element; begin low: sdrlinkctl radio probe shows the range"
+            "dB, or soapy.tx_gains by element; start low; `sdrlinkctl radio probe` shows the range"
         )
     if soapy.offset_tuning == "on" and needs.oversampling == 1:
         return (
             'soapy.offset_tuning: got "on" with modem.oversampling = 1; allowed: '
-            "modem.oversampling 2 or 4, room for the oscillator beside the channel"
+            "modem.oversampling = 2 or 4, which makes room for the oscillator beside the channel"
         )
     return ""
 
@@ -68,12 +68,9 @@ def soapy_presumption(
     if turnaround_s is not None:
         settings = msgspec.structs.replace(settings, turnaround_s=turnaround_s)
     found = presume(settings)
-    how = f"as drivers of the kind {found.driver} are known to be"
+    how = f"as known for drivers of the kind {found.driver}"
     if not found.driver:
-        how = (
-            "taken for one that sends while it listens and keeps time, for its driver is not "
-            "known here"
-        )
+        how = "assumed to send and receive at once and to keep time, because its driver is unknown"
     duplex = "full duplex" if found.capabilities.full_duplex else "half duplex"
     told = f"{soapy.device}: {duplex}, {how}"
     return Presumption(found.capabilities, told, is_sure=bool(found.driver))

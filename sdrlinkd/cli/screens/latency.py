@@ -20,9 +20,9 @@ PARTS = (
 )
 """Name, field, character and colour of each part, in order of time."""
 MEANING = (
-    "queue: for others before it; access: for the air; again: after a burst that did not leave; "
-    "frags: from its first fragment to its last; air: the last one; rx: demodulated and given to "
-    "the bus"
+    "queue: behind other messages; access: for channel access; again: after a failed burst; "
+    "frags: from its first fragment to its last; air: the last one; rx: demodulation and "
+    "delivery to the bus"
 )
 
 
@@ -33,7 +33,7 @@ def latency_screen(
     timed = [(each, each.latency) for each in heard if each.latency is not None]
     clocks = _clocks(link)
     if not timed:
-        return [Text("no message with a STAMP was heard yet"), *clocks]
+        return [Text("no message with a STAMP received yet"), *clocks]
     parts: list[RenderableType] = [_waterfalls(timed)]
     if whole:
         parts += [_percentiles(topic, latency) for topic, latency in timed]
@@ -99,11 +99,11 @@ def _percentiles(topic: ReceivedTopicReport, latency: LatencyReport) -> Text:
     lines = [f"{topic.republished_as or topic.name}: all ages in ms: {told}"]
     if latency.period_ms is not None:
         lines.append(
-            f"one every {milliseconds(latency.period_ms)} ms, "
-            f"give or take {milliseconds(latency.jitter_ms)} (Jd)"
+            f"mean period {milliseconds(latency.period_ms)} ms, "
+            f"jitter {milliseconds(latency.jitter_ms)} ms (Jd)"
         )
     if topic.stops:
-        lines.append(f"stop messages published because nothing came: {topic.stops}")
+        lines.append(f"stop messages published after a silence: {topic.stops}")
     return Text("\n".join(lines))
 
 
@@ -114,7 +114,7 @@ def _clocks(link: LinkReport) -> list[FittedTable]:
     table = FittedTable(
         "clocks",
         (
-            words("robot"), words("state", least=18), figure("its host is behind by"),
+            words("robot"), words("state", least=18), figure("its host lags by"),
             figure("our radio gains", 1), figure("jumps", 2), figure("odd stamps", 3),
         ),
     )  # fmt: skip

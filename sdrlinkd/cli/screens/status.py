@@ -93,7 +93,7 @@ def head(snapshot: Snapshot, width: int) -> list[Text]:
     air += f"; {link.access}" if link.access != "none" else ""
     air += f"; PDUs of {link.pdu_size} B"
     if link.bursts_late:
-        air += f"; {link.bursts_late} bursts late, sent again"
+        air += f"; {link.bursts_late} late bursts resent"
     tx, rx = link.tx, link.rx
     waiting = ", ".join(f"{count} {label}" for label, count in tx.queued_by_class.items() if count)
     queue = f" ({waiting}; {size(tx.queued_bytes)})" if tx.queued else ""
@@ -102,7 +102,7 @@ def head(snapshot: Snapshot, width: int) -> list[Text]:
         f"+ {sum(tx.dropped.values())} dropped"
     )
     into = (
-        f"{rx.pdus_heard} PDUs, {rx.started} begun = {rx.delivered} delivered + {rx.held} "
+        f"{rx.pdus_heard} PDUs, {rx.started} started = {rx.delivered} delivered + {rx.held} "
         f"incomplete + {sum(rx.dropped.values())} lost"
     )
     lines = (("robot", robot), ("radio", radio), ("air", air), ("out", out), ("in", into))
@@ -239,7 +239,7 @@ def _one_line(label: str, groups: Sequence[tuple[str, Sequence[str]]], width: in
 def _notes(snapshot: Snapshot, width: int) -> list[Text]:
     told = [f"note: {notice}" for notice in snapshot.notices]
     if snapshot.bus.bad_envelope_last:
-        told.append(f"note: last refused by the bus: {snapshot.bus.bad_envelope_last}")
+        told.append(f"note: last message refused by the bus: {snapshot.bus.bad_envelope_last}")
     return [Text(wrapped(each, width), style="yellow") for each in told]
 
 
@@ -254,8 +254,8 @@ def _receipts(snapshot: Snapshot, width: int) -> list[Text]:
     """A line on receipts that were unsent or unexpected; empty if there are none."""
     link = snapshot.link
     parts = (
-        (link.receipts_untold, "to others found no room"),
-        (link.receipts_unasked, "came that nothing was known of any more"),
+        (link.receipts_untold, "unsent for lack of room"),
+        (link.receipts_unasked, "unexpected"),
     )
     told = ", ".join(f"{count} {words}" for count, words in parts if count)
     return [Text(wrapped(f"receipts: {told}", width))] if told else []

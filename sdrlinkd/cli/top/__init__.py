@@ -10,10 +10,10 @@ from sdrlinkd.errors import UserError
 
 @app.command()
 def top(runtime_dir: RuntimeDir = None) -> None:
-    """The link, live: verdict, robots both ways, topics, the last minutes; why and set, too."""
+    """Live view: verdict, neighbors, topics, the last minutes; explains and sets policies."""
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        raise UserError("top: needs a terminal; for a file there is `sdrlinkctl status --watch`")
-    # The screen's library is slow to load.
+        raise UserError("top: needs a terminal; `sdrlinkctl status --watch` also writes to a file")
+    # The screen's library takes a while to load.
     from sdrlinkd.cli.top.live import TopApp
 
     def ask(verb: str, arguments: dict[str, Any]) -> Any:  # noqa: ANN401

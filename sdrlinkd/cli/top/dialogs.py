@@ -42,10 +42,10 @@ class PolicyForm(ModalScreen[str]):
     BINDINGS: ClassVar[list[BindingType]] = [("escape", "cancel", "Back")]
     FIELDS = (
         ("qos", "class", "urgent, latency, default or bulk"),
-        ("priority", "priority", "0 to 127, the most urgent"),
-        ("period_s", "period", "send no more often: 100ms; 0: always"),
-        ("lifespan_s", "lifespan", "worthless after: 300ms, 2s, inf"),
-        ("depth", "depth", "messages that may wait; 0: all"),
+        ("priority", "priority", "0 to 127; 127 is the most urgent"),
+        ("period_s", "period", "least time between messages: 100ms; 0: none"),
+        ("lifespan_s", "lifespan", "discard older messages: 300ms, 2s, inf"),
+        ("depth", "depth", "most messages queued; 0: no limit"),
     )
 
     def __init__(self, topic: str, now: dict[str, str], ask: Ask) -> None:

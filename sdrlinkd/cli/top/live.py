@@ -19,16 +19,16 @@ from sdrlinkd.reports import Snapshot
 
 MINUTES = "(the last 4 minutes)"
 HELP = [
-    "w, Enter   why the selected topic is sent, or not",
+    "w, Enter   explain what happens to the selected topic",
     "p          change its policy, until the next restart or reload",
     "s          sort by the next column: worst, name, rate, bytes, age",
-    "/          show only topics that hold a text: a name, a class, robot 2",
+    "/          show only topics that contain a text: a name, a class, robot 2",
     "Escape     show all topics again",
     "↑ ↓        select a topic",
     "q, Ctrl-C  quit",
     "",
-    "The little columns are the last 4 minutes: the worst SNR of all robots heard,",
-    "messages that arrived whole, air in use, messages that wait, the latest age.",
+    "The sparklines show the last 4 minutes: the worst SNR of all neighbors,",
+    "complete messages, airtime in use, queued messages, the latest age.",
 ]
 
 
@@ -228,7 +228,7 @@ class TopApp(App[None]):
         if row is None:
             return
         if row.source is not None:
-            lines = [f"robot {row.source} sends it; ask there: sdrlinkctl why {row.name}"]
+            lines = [f"robot {row.source} sends it; run there: sdrlinkctl why {row.name}"]
         else:
             try:
                 answer = await asyncio.to_thread(self._ask_daemon, "why", {"topic": row.name})
@@ -243,7 +243,7 @@ class TopApp(App[None]):
         if row is None or self._snapshot is None:
             return
         if row.source is not None:
-            self.notify(f"robot {row.source} sends it; its policy is changed there")
+            self.notify(f"robot {row.source} sends it; change its policy there")
             return
         now = next(each for each in self._snapshot.link.topics if each.name == row.name)
         known = {"qos": now.qos, "priority": str(now.priority)}

@@ -42,7 +42,7 @@ class Settled(NamedTuple):
     @property
     def sentence(self) -> str:
         """The policy in force, the reason, and its share of airtime, as a sentence for people."""
-        return f"{self.policy}, {self.reason}; it carries {percent(self.share)} of the air"
+        return f"{self.policy}, {self.reason}; {percent(self.share)} of the airtime is usable"
 
 
 def settle(
@@ -56,8 +56,8 @@ def settle(
     check_access(params, own_id)
     policy, reason = params.policy, "as configured"
     if not traits.transmits:
-        # A robot that never sends needs no turn, whatever the others do.
-        policy, reason = "none", "as this radio only receives here"
+        # Who never sends needs no turn, whatever the others do.
+        policy, reason = "none", "because this radio only receives"
     shares: dict[str, float] = {}
     if policy != "none" and (policy == "csma" or _others(params, own_id)):
         shares = air_shares(params, own_id, traits, longest_burst_s)
@@ -117,26 +117,27 @@ def _chosen(
 ) -> tuple[Policy, str]:
     """The (policy, reason) that `auto` chooses for this radio."""
     if not (traits.shares_air and traits.senses):
-        return "none", f'as no other robot shares the air of the backend "{traits.kind}"'
+        return "none", f'because no other robot shares the backend "{traits.kind}"'
     if not _others(params, own_id):
-        return "none", "as access.nodes lists nobody else"
+        return "none", "because access.nodes lists no other robot"
     apart_s, n = reaction_s(traits), len(set(params.nodes))
-    reacts = f"this radio hears another begin, and holds back, within {1e3 * apart_s:.3g} ms"
+    reacts = f"this radio detects another's burst and defers within {1e3 * apart_s:.3g} ms"
     if apart_s > SOON_S:
-        return "tdma", f"as {reacts}, and mini-slots are for {1e3 * SOON_S:g} ms and less"
+        return "tdma", f"because {reacts}; minislot needs at most {1e3 * SOON_S:g} ms"
     if shares["minislot"] < FAIR * shares["tdma"]:
         return "tdma", (
-            f"as with {n} robots mini-slots carry {percent(shares['minislot'])} of the air and "
-            f"slots {percent(shares['tdma'])}"
+            f"because with {n} robots minislot leaves {percent(shares['minislot'])} of the airtime "
+            f"usable and tdma {percent(shares['tdma'])}"
         )
-    return "minislot", f"as {reacts}"
+    return "minislot", f"because {reacts}"
 
 
 def _refuse_poor(settled: Settled, n: int) -> None:
     best, share = settled.best, settled.share
     if share < FAIR * settled.shares[best]:
         raise ConfigError(
-            f'access.policy: got "{settled.policy}", which carries {percent(share)} of the air '
-            f"with {n} robots on this radio, where {best} carries {percent(settled.shares[best])}; "
+            f'access.policy: got "{settled.policy}", which leaves {percent(share)} of the '
+            f"airtime usable with {n} robots on this radio, where {best} leaves "
+            f"{percent(settled.shares[best])}; "
             f'allowed: "auto" or "{best}", or access.force = true'
         )

@@ -170,9 +170,8 @@ class BusyChannel:
     def notices(self, now: float) -> list[str]:
         """Sentences on robots that use another access policy."""
         return [
-            f"robot {src} takes turns by a tdma schedule and this robot does not: what both send "
-            "collides; give both the same [access], and radios of one kind where access.policy is "
-            "auto"
+            f"robot {src} keeps a tdma schedule and this robot does not: their bursts collide; "
+            "give both the same [access], and radios of one kind where access.policy is auto"
             for src in self._scheduled.lately(now)
         ]
 

@@ -45,7 +45,7 @@ def make_access(
     """
     check_access(params, own_id)
     if params.policy == "auto":
-        raise ValueError("auto is no policy: settle it first")
+        raise ValueError("auto is not a policy: settle it first")
     if params.policy == "none":
         return make_free(traits)
     _refuse_deaf(params, traits)
@@ -53,7 +53,7 @@ def make_access(
     apart_s = reaction_s(traits)
     if params.policy in ("csma", "minislot") and apart_s > LONGEST_APART_S:
         raise ConfigError(
-            f'access.policy: got "{params.policy}"; robots with this radio hear each other begin '
+            f'access.policy: got "{params.policy}"; this radio detects other robots\' bursts '
             f"only after {apart_s * 1e3:.3g} ms; allowed: at most {LONGEST_APART_S * 1e3:g} ms: "
             "use tdma"
         )
@@ -130,8 +130,8 @@ def _make_tdma(
 def _refuse_deaf(params: AccessParams, traits: PduLinkTraits) -> None:
     if not traits.senses:
         raise ConfigError(
-            f'access.policy: got "{params.policy}", but the backend "{traits.kind}" does not hear '
-            'the air; allowed: "none"'
+            f'access.policy: got "{params.policy}", but the backend "{traits.kind}" does not sense '
+            'the channel; allowed: "none"'
         )
 
 
@@ -141,5 +141,5 @@ def _refuse_short(key: str, given_s: float, least_s: float, traits: PduLinkTrait
             f"access.{key}: got {given_s:g}; this radio ({traits.kind}: turnaround "
             f"{traits.turnaround_s * 1e3:.3g} ms, lead {traits.lead_s * 1e3:.3g} ms, reaction "
             f"{traits.react_s * 1e3:.3g} ms) needs at least {least_s:.4g} s; allowed: that or more "
-            "at all robots, or 0 (made from the radio)"
+            "at all robots, or 0 (derived from the radio)"
         )

@@ -63,14 +63,14 @@ class Free(BusyChannel):
         if others and not notices:
             who = ", ".join(map(str, others))
             notices.append(
-                f"robot {who} sends on this air, too, and access.nodes lists nobody else: what is "
-                "sent at once collides; list all robots in access.nodes at all of them"
+                f"robot {who} shares this channel, but access.nodes lists no other robot: "
+                "simultaneous bursts collide; list all robots in access.nodes at all of them"
             )
         if self._deaf_s < DEAF_S:
             return notices
         notice = (
-            "for each burst of its own, this radio hears nothing for "
-            f"{self._deaf_s * 1e3:.3g} ms: where other robots send, too, set "
+            "for each burst it sends, this radio hears nothing for "
+            f"{self._deaf_s * 1e3:.3g} ms: if other robots send, too, set "
             'access.policy = "tdma" at all of them'
         )
         return [*notices, notice]

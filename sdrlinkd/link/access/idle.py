@@ -7,7 +7,7 @@ IDLE = 0.3
 """Share of idle time above which waiting messages do not wait for a busy channel."""
 MORE = 1.25
 """Another policy is mentioned if it carries at least this many times as much."""
-NOT_OTHERS = "what waits does not wait for others, but for this radio"
+NOT_OTHERS = "messages wait for this radio, not for other robots"
 
 
 def idle_words(settled: Settled | None, idle: float) -> str | None:
@@ -18,7 +18,7 @@ def idle_words(settled: Settled | None, idle: float) -> str | None:
     if idle < IDLE:
         return None
     why = NOT_OTHERS if settled is None else _why_idle(settled) + _what_is_better(settled)
-    return f"the air was idle {100 * idle:.0f} % of the time: {why}"
+    return f"the channel was idle {100 * idle:.0f} % of the time: {why}"
 
 
 def _why_idle(settled: Settled) -> str:
@@ -26,16 +26,16 @@ def _why_idle(settled: Settled) -> str:
     if isinstance(access, MiniSlots):
         return (
             f"minislot waits up to {1e3 * access.turn_s:.3g} ms after every burst on this radio "
-            f"and carries {percent(settled.share)} of the air"
+            f"and leaves {percent(settled.share)} of the airtime usable"
         )
     if settled.policy == "csma":
-        waits = f"csma waits {1e3 * access.pause_s:.3g} ms and more after every burst"
-        return f"{waits} on this radio and carries {percent(settled.share)} of the air"
+        waits = f"csma waits at least {1e3 * access.pause_s:.3g} ms after every burst"
+        return f"{waits} on this radio and leaves {percent(settled.share)} of the airtime usable"
     if settled.policy == "tdma":
         own = 100 * access.share
         return (
-            f"of the schedule's {1e3 * access.round_s:.3g} ms, {own:.2g} % are this robot's, and "
-            "others left theirs unused"
+            f"this robot owns {own:.2g} % of the {1e3 * access.round_s:.3g} ms schedule, and "
+            "others left their slots unused"
         )
     return NOT_OTHERS
 

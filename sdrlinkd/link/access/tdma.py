@@ -200,13 +200,12 @@ class Tdma(BusyChannel):
     def notices(self, now: float) -> list[str]:
         """Sentences on robots that keep another schedule or none."""
         return [
-            f"robot {src} is heard and keeps no tdma schedule: what it sends falls into others' "
-            "slots; give it the same [access], and a radio of the same kind where access.policy "
-            "is auto"
+            f"robot {src} keeps no tdma schedule: its bursts fall into other robots' slots; give "
+            "it the same [access], and a radio of the same kind where access.policy is auto"
             for src in self._unscheduled.lately(now, UNSCHEDULED)
         ] + [
-            f"robot {src} keeps another tdma schedule; give both the same nodes, slot_s, guard_s "
-            f"and minislot_s in [access] (ours: {self.state})"
+            f"robot {src} keeps a different tdma schedule; give both the same nodes, slot_s, "
+            f"guard_s and minislot_s in [access] (ours: {self.state})"
             for src in self._strangers.lately(now)
         ]
 

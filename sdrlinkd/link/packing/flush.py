@@ -15,12 +15,14 @@ BEGUN_PART = 0.5
 def flush_told(flush_s: FlushTime) -> str:
     """The meaning of the setting `flush_s`, as one line of text."""
     if flush_s == NOW:
-        return f'link.flush_s = "{NOW}": a PDU that is not full leaves as soon as the radio is free'
+        return f'link.flush_s = "{NOW}": a partly filled PDU is sent as soon as the radio is free'
     how_long = f"for more, up to {flush_s:g} s"
     if float(flush_s) in (0.0, inf):
-        how_long = "until it is, however long that takes" + " (the paper's 0.0)" * (flush_s == 0)
+        how_long = "until it is full, however long that takes" + " (the paper's 0.0)" * (
+            flush_s == 0
+        )
     return (
-        f"link.flush_s = {float(flush_s)}: a PDU that is not full waits {how_long}; "
+        f"link.flush_s = {float(flush_s)}: a partly filled PDU waits {how_long}; "
         "urgent, latency and messages with a lifespan do not wait"
     )
 

@@ -93,7 +93,7 @@ class Neighbor:
             )
         where = f"topic id {', '.join(differing)}" if differing else "some topic"
         return (
-            f"robot {self.src} has another registry, differing in {where}; "
+            f"robot {self.src} has a different registry: {where}; "
             f"ours {own.overall.hex()[:8]}, theirs {self.digest.overall.hex()[:8]}. "
             "Give both the same registry file"
         )

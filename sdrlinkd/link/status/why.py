@@ -62,12 +62,12 @@ class Why:
         lines = [self._treatment(name, policy, told, topic_id)]
         if not came:
             lines.append(
-                "nothing came from a producer in the last minute"
+                "no producer sent a message in the last minute"
                 if tally.accepted
-                else "no producer has sent anything yet"
+                else "no producer has sent a message yet"
             )
         else:
-            lines.append(f"in the last minute {came} came, {sent} were sent ({_share(sent, came)})")
+            lines.append(f"last minute: {came} messages in, {sent} sent ({_share(sent, came)})")
         short = False
         for reason, total in sorted(tally.dropped.items(), key=lambda each: -each[1]):
             n = self._lately(("drop", topic_id, reason), total, now)
@@ -77,7 +77,7 @@ class Why:
                 lines.append(f"{_share(n, came)} {said} ({reason}, {n})")
         waiting = self._outbox.queued_of_topic(topic_id)
         if waiting:
-            lines.append(f"{waiting} wait")
+            lines.append(f"{waiting} queued")
         if short or waiting:
             lines.append(self._air(self._intake.treatment(topic_id)[0], now, air))
             lines += self._idle(now, air)
@@ -89,13 +89,13 @@ class Why:
         line = f"{name}: class {policy.qos}, priority {policy.priority}, to {to}"
         lifespan = self._intake.lifespan(topic_id)
         if lifespan.source:
-            line += f", worthless after {_seconds(lifespan.seconds)}"
+            line += f", lifespan {_seconds(lifespan.seconds)}"
             if lifespan.source == "class":
-                line += " as its class says"
+                line += " from its class"
         if policy.compress != "none":
             line += f", compressed with {policy.compress}"
         if policy.durability == "transient_local":
-            line += ", kept for robots that come late"
+            line += ", last message kept for late joiners"
         by = f"set while running: {', '.join(sorted(told.changed))}" if told.changed else ""
         return f"{line} ({'; '.join(each for each in (told.source, by) if each)})"
 
@@ -104,7 +104,7 @@ class Why:
             by = "sdrlinkctl set" if "period_s" in told.changed else told.source
             return f"throttled to {1 / policy.period_s:.3g} Hz by {by}"
         if reason == "tx_superseded":
-            return f"gave way to newer ones: depth {policy.kept}"
+            return f"replaced by newer ones: depth {policy.kept}"
         if reason == "tx_expired":
             return self._too_old(topic_id, policy)
         if reason in ("tx_overflow_old", "tx_overflow_new", "tx_topic_full"):
@@ -114,11 +114,11 @@ class Why:
     def _too_old(self, topic_id: int, policy: TopicPolicy) -> str:
         lifespan = self._intake.lifespan(topic_id)
         if not lifespan.source:
-            # The limit is set by each message itself.
-            return "were older than their producer allows before their turn came"
+            # Each message says it itself.
+            return "expired in the queue: older than their producer allows"
         of_class = lifespan.source == "class"
-        whose = f", the lifespan of class {policy.qos}," if of_class else ""
-        return f"were older than {_seconds(lifespan.seconds)}{whose} before their turn came"
+        whose = f", the lifespan of class {policy.qos}" if of_class else ""
+        return f"expired in the queue: older than {_seconds(lifespan.seconds)}{whose}"
 
     def _air(self, qos: Qos, now: float, air: AirUse) -> str:
         used = {
@@ -129,12 +129,12 @@ class Why:
         rate = air.sent.bytes_per_s * 8e-6
         carries = f" of {rate:.3g} Mbit/s" if rate < inf else ""
         if not total:
-            return f"nothing has left in the last minute{carries and ', ' + carries.strip()}"
+            return f"nothing was sent in the last minute{carries and ', ' + carries.strip()}"
         others = ", ".join(
             f"{each.label} {_share(n, total)}" for each, n in used.items() if n and each is not qos
         )
         return f"{qos.label} got {_share(used[qos], total)}{carries} airtime" + (
-            f" (the others: {others})" if others else ""
+            f" (others: {others})" if others else ""
         )
 
     def _idle(self, now: float, air: AirUse) -> list[str]:
@@ -149,7 +149,7 @@ class Why:
         busy = min(1.0, sent + heard)
         words = idle_words(air.sent.settled, 1 - busy)
         if words is None:
-            words = f"the air was {'full' if busy > FULL else f'in use {100 * busy:.0f} %'}"
+            words = f"the channel was {'full' if busy > FULL else f'{100 * busy:.0f} % busy'}"
         return [f"{words} (ours {100 * min(1.0, sent):.0f} %, others' {100 * heard:.0f} %)"]
 
     def _lately(self, key: Hashable, value: int, now: float) -> int:

@@ -84,7 +84,7 @@ class GnuRadioLink:
         """The report: the state of the flowgraph, and counters of PDUs."""
         params, is_open = self._params, self._listener is not None
         state = "up" if is_open and self._is_taken else "down"
-        reason = f"nobody takes PDUs at {params.send} ({params.transport})"
+        reason = f"nothing accepts PDUs at {params.send} ({params.transport})"
         if not is_open or self._is_taken:
             reason = ""
         return PduLinkReport(
@@ -94,7 +94,7 @@ class GnuRadioLink:
             detail=f"{params.rate_bit_s / 1e3:g} kbit/s, {params.transport} to {params.send}, from "
             f"{params.receive or 'the same'}",
             counters={**self._counters, **self._transport.counters},
-            notices=[f"no flowgraph: {reason}; what is to be sent waits"] if reason else [],
+            notices=[f"no flowgraph: {reason}; messages stay queued"] if reason else [],
         )
 
     def _airtime(self, _: int, n_pdus: int) -> float:
