@@ -137,6 +137,7 @@ def page() -> str:
 
 def draw() -> list[str]:
     """Draw the pictures of all drawings that are kept; their files' names."""
+    FIGURES.mkdir(exist_ok=True)
     before = {path: path.stat().st_mtime_ns for path in FIGURES.glob("*.png")}
     for (name, drawing), make in DRAWN.items():
         report = kept(name) or {}

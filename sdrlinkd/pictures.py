@@ -87,7 +87,6 @@ def save(figure: Figure, path: Path, caption: str) -> None:
     figure.text(
         0.01, -0.02, caption, fontsize=7, color=QUIET, va="top", parse_math=False
     )  # fmt: skip
-    path.parent.mkdir(parents=True, exist_ok=True)
     # Without the version of the library, one picture has one content.
     figure.savefig(path, dpi=DPI, bbox_inches="tight", metadata={"Software": None})
     plt.close(figure)

@@ -106,6 +106,8 @@ def _latency(axes: Axes, report: LabReport) -> None:
     axes.set_yticks(at, [f"{pair.sender} → {pair.receiver}" for pair in pairs], fontsize=8)
     axes.set_ylim(len(pairs) - 0.4, -0.6)
     axes.set_xscale("log")
+    if not pairs:
+        axes.set_xlim(1, 1000)
     for ticks in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
         ticks(LogFormatter(labelOnlyBase=False, minor_thresholds=(2, 0.5)))
     axes.set_xlabel("latency from publisher to subscriber in ms")

@@ -1,11 +1,22 @@
 """A run as a figure and as tables, whatever its outcome."""
 
+from pathlib import Path
+
 import pytest
 from rich.console import Console
 
-from sdrlinkd.lab import LabState, live_table, pair_table, pictures
+from sdrlinkd.lab import (
+    LabState,
+    Scenario,
+    find_scenario,
+    live_table,
+    load_scenario,
+    pair_table,
+    pictures,
+)
 from tests.lab.reports import lost, pair, report, robot
 
+NOBODY_MOVES = Scenario(robot=[])
 STRANGE = "50 $_$ of [/b] robots [bold"
 """Characters that Matplotlib and Rich would interpret."""
 
@@ -29,9 +40,17 @@ def test_a_title_is_shown_as_it_is(tmp_path):
     check(report(title=STRANGE), tmp_path / "lab.png", f"sdrlinkctl lab {STRANGE}")
 
 
-def check(made, path, caption):
+def test_a_drive_is_drawn_with_its_distance(tmp_path):
+    moved = load_scenario(find_scenario(Path("out-and-back")))
+    check(report(), tmp_path / "lab.png", "", moved)
+    still = (tmp_path / "lab.png").stat().st_size
+    check(report(), tmp_path / "lab.png", "")
+    assert (tmp_path / "lab.png").stat().st_size < still
+
+
+def check(made, path, caption, scenario=NOBODY_MOVES):
     """Assert that it can be drawn and shown."""
-    pictures.draw(made, path, caption)
+    pictures.draw(made, scenario, path, caption)
     picture = path.read_bytes()
     assert picture.startswith(b"\x89PNG")
     assert len(picture) > 5000
