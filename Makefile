@@ -1,4 +1,4 @@
-# make demo   set up, then the main job        make check  format, lint, types, import rules
+# make demo   set up, then the main job        make check  format, lint, types, import rules, prose
 # make quick  set up, then what every edit wants; make test  all tests; make soak, make fuzz  for hours
 # make bench  measurements beside peers        make fresh  README's commands on a minimal Debian (root)
 # make docs   the site, into build/site        make reference, make figures  pages made from the code, pictures
@@ -61,6 +61,7 @@ check: $(DEV_STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python -m docs.site.prose
 
 format: $(DEV_STAMP)
 	$(BIN)/ruff format .

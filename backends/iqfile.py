@@ -145,7 +145,7 @@ class IqFileRadio:
             self._pace.end()
             self._feed.stop()
             if self._writer is not None:
-                # On a full disk, the recording simply ends with its last burst.
+                # On a full disk, the recording ends with its last burst.
                 with contextlib.suppress(BackendError):
                     self._writer.extend_to(self._next)
         self._outstanding.lose()

@@ -25,7 +25,7 @@ def measure(seed: int, quick: bool, no_peers: bool = False) -> Iterator[Row | Dr
     yield from rows.load(found)
     yield from rows.beyond_air(found)
     yield from rows.by_the_air(seed, 3.0 if quick else 20.0)
-    with attempt("two daemons by the clock"):
+    with attempt("two daemons in real time"):
         yield from rows.by_the_clock(5.0 if quick else 30.0)
     yield from rows.shares(seed, 20.0 if quick else 120.0)
     yield from rows.under_stress(seed, seconds, passes, beside)

@@ -76,7 +76,7 @@ def _load(load: Mapping[str, Mapping[str, Mapping[str, float]]]) -> None:
             values = np.array([load[what][name].get(process, 0.0) for name in names])
             axes.barh(
                 names, values, left=base, label=process, color=COLORS[number % len(COLORS)],
-                edgecolor="white", hatch=("", "///", "...", "xxx")[number // 2 % 4],
+                edgecolor="white", hatch=("", "///", "...", "xx")[number // 2 % 4],
             )  # fmt: skip
             base += values
         axes.set_xlabel(unit)

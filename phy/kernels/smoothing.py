@@ -26,11 +26,11 @@ _DRIFT_RISE, _DRIFT_FALL = 0.5, 0.1
 
 
 @njit(nogil=True, cache=True)
-def mean_delay(h: Planes, neighbours: NDArray[np.int64]) -> float:
-    """Mean phase in radians between adjacent subcarriers, over the pairs `neighbours` `[2, n]`."""
+def mean_delay(h: Planes, neighbors: NDArray[np.int64]) -> float:
+    """Mean phase in radians between adjacent subcarriers, over the pairs `neighbors` `[2, n]`."""
     turn = 0j
-    for i in range(neighbours.shape[1]):
-        first, second = neighbours[0, i], neighbours[1, i]
+    for i in range(neighbors.shape[1]):
+        first, second = neighbors[0, i], neighbors[1, i]
         turn += complex(h[0, second], h[1, second]) * complex(h[0, first], -h[1, first])
     return math.atan2(turn.imag, turn.real)
 
@@ -124,7 +124,7 @@ def smooth(variance: float, tones: Tones, channel: Channel, scratch: Scratch) ->
     For each group, `unknown` gets the remaining variance per dimension, `power` the mean power per
     dimension.
     """
-    channel.figures[DELAY] = mean_delay(channel.h, tones.neighbours)
+    channel.figures[DELAY] = mean_delay(channel.h, tones.neighbors)
     lean(-channel.figures[DELAY], tones.subcarriers, channel.centre)
     multiply(channel.h, channel.centre, False, scratch.rest)
     channel.power[:] = 1

@@ -18,7 +18,7 @@ PARTS = (
     ("air", "air_ms", "█", "blue"),
     ("rx", "handover_ms", "·", "green"),
 )
-"""Name, field, character and colour of each part, in order of time."""
+"""Name, field, character and color of each part, in order of time."""
 MEANING = (
     "queue: behind other messages; access: for channel access; again: after a failed burst; "
     "frags: from its first fragment to its last; air: the last one; rx: demodulation and "
