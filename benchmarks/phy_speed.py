@@ -52,7 +52,7 @@ def measure(seed: int, quick: bool) -> Iterator[Row]:
     rounds = 3 if quick else 20
     peers = _measure_peers(seed)
     yield _search("search_msps_noise", 200.0, _noise(seed), rounds, peers)
-    yield _search("search_msps_gfsk_+20db", 40.0, _neighbours(seed), rounds, peers)
+    yield _search("search_msps_gfsk_+20db", 40.0, _neighbors(seed), rounds, peers)
     yield _receive("rx_msps_16x220B_qpsk12", QPSK12, 16, 220, 80.0, seed, rounds, peers)
     yield _receive("rx_msps_16x220B_64qam34", QAM64_34, 16, 220, 35.0, seed, rounds, peers)
     yield _receive("rx_msps_1x64B_qpsk12", QPSK12, 1, 64, 30.0, seed, rounds, peers)
@@ -94,7 +94,7 @@ def _noise(seed: int) -> list[NDArray[np.complex64]]:
     return [front_end.receive(np.zeros(1 << 20, np.complex64))]
 
 
-def _neighbours(seed: int) -> list[NDArray[np.complex64]]:
+def _neighbors(seed: int) -> list[NDArray[np.complex64]]:
     """Neighbors that send all the time, 20 dB over the noise: 20 and 4 samples per bit."""
     signals = []
     for n_samples in (20, 4):

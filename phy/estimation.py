@@ -100,7 +100,7 @@ def tones(grid: Numerology) -> ArgumentBlock[Tones]:
             polarity=POLARITY,
             basis=basis,
             ends=ends,
-            neighbours=np.array(pairs, np.int64).T.copy(),
+            neighbors=np.array(pairs, np.int64).T.copy(),
             twiddles=np.stack((circle.real, circle.imag)).astype(np.float32),
         )
     )

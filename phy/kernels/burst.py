@@ -34,7 +34,7 @@ class Tones(NamedTuple):
     basis: NDArray[np.float32]
     """Orthonormal rows of the smoother `[n, width]`; see `phy.kernels.smoothing`."""
     ends: NDArray[np.int64]
-    neighbours: NDArray[np.int64]
+    neighbors: NDArray[np.int64]
     twiddles: Planes
     """exp(−2πj m / n_fft) `[2, n_fft]`."""
 

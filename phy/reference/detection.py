@@ -38,7 +38,7 @@ def sums(x: NDArray[np.complexfloating], dc: complex) -> tuple[Samples, NDArray[
     P[n] = Σ_{k=0}^{10} b_k Σ_{m=0}^{15} y[n−16(10−k)−m] y*[n−16(11−k)−m]
     E[n] = 11/12 Σ_{m=0}^{191} |y[n−m]|²
     """
-    q = _neighbours(x, dc)
+    q = _neighbors(x, dc)
     n = len(x) - HISTORY
     p = np.zeros(n, np.complex128)
     for k, sign in enumerate(BARKER):
@@ -48,7 +48,7 @@ def sums(x: NDArray[np.complexfloating], dc: complex) -> tuple[Samples, NDArray[
     return p, e
 
 
-def _neighbours(x: NDArray[np.complexfloating], dc: complex) -> Samples:
+def _neighbors(x: NDArray[np.complexfloating], dc: complex) -> Samples:
     """Compare each segment with the one before it: entry i is Σ_{m=0}^{15} y[i+16+m] y*[i+m]."""
     y = x.astype(np.complex128) - dc
     products = y[SEGMENT:] * y[:-SEGMENT].conj()
@@ -93,7 +93,7 @@ class Detector:
         best = int(metric.argmax())
         if metric[best] <= 0:
             return best, None
-        q = _neighbours(x, self.dc)
+        q = _neighbors(x, self.dc)
         plain = abs(q[best : best + SHORT - SEGMENT : SEGMENT].sum())
         if plain > PLAINEST * abs(p[best]):
             return best, None

@@ -96,7 +96,7 @@ def test_points_are_the_standards(modulation):
 
 
 @pytest.mark.parametrize("modulation", Modulation)
-def test_points_have_power_1_and_neighbours_differ_in_one_bit(modulation):
+def test_points_have_power_1_and_neighbors_differ_in_one_bit(modulation):
     table = points(modulation)
     assert np.mean(np.abs(table) ** 2) == pytest.approx(1, abs=1e-6)
     apart = np.abs(table[:, None] - table[None, :])
