@@ -92,7 +92,7 @@ def pages() -> list[Path]:
 def of_page(path: str, text: str) -> Iterator[Finding]:
     """What is wrong with the prose of a page; code, tables and links are not prose."""
     prose = _NOT_PROSE.sub(lambda block: re.sub(r"[^\n]", " ", block[0]), text)
-    for result in LintFile(path, prose).lint(CONFIG):  # type: ignore[arg-type]
+    for result in LintFile(path, prose).lint(CONFIG):
         # Its content begins with a line break of its own.
         yield Finding(path, max(1, result.pos[0] - 1), result.check_result.message)
     yield from _worded(path, prose)
