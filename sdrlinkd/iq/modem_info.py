@@ -18,6 +18,8 @@ class McsInfo(msgspec.Struct, frozen=True, kw_only=True):
     burst_ms: float
     burst_goodput_bit_s: float
     """PDU bits per s in the longest burst, including preamble and header."""
+    snr_db: float
+    """SNR in the sampled band at which 1 % of these PDUs are lost, by the model of rate control."""
 
 
 class ModemInfo(msgspec.Struct, frozen=True, kw_only=True):
@@ -99,4 +101,5 @@ def _mcs_info(
         burst_pdus=n_pdus,
         burst_ms=burst_s * 1e3,
         burst_goodput_bit_s=8 * pdu_size * n_pdus / burst_s,
+        snr_db=round(phy.needed_snr_db(mcs.index, pdu_size), 2),
     )

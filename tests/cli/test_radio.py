@@ -60,7 +60,7 @@ def test_for_programs(capsys):
         ("driver=hackrf", 'no driver "hackrf"'),
         ("driver=loopback,absent=1", "there is no such device"),
         ("driver=loopback,busy=1", "in use"),
-        ("", "no device was found"),
+        ("", "no device found"),
     ],
 )
 def test_what_is_not_there_is_told_apart(capsys, args, part):

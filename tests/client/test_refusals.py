@@ -55,7 +55,7 @@ MESSAGES = [
     (ODOM, b"abc", {}, "tx_bad_envelope",
      f"{ODOM}: too short: 3 B; CDR begins with a header of 4 B"),
     (ODOM, CDR, {"type": "sensor_msgs/msg/Imu"}, "tx_bad_envelope",
-     f'type: got "sensor_msgs/msg/Imu"; allowed: {TYPE}, which {ODOM} in the registry'),
+     f'type: got "sensor_msgs/msg/Imu"; allowed: {TYPE}, the type of {ODOM} in the registry'),
 ]  # fmt: skip
 
 

@@ -102,7 +102,7 @@ def test_traffic_flows_again_when_a_device_is_back(start_daemon, bus, fault):
             air_.inject(unit, fault)
             wait_for(lambda unit=unit: robots[unit - 1].snapshot().carrier.counters["outages"] == 1)
             if fault == "unplug":
-                wait_for(lambda unit=unit: "away" in robots[unit - 1].snapshot().carrier.detail)
+                wait_for(lambda unit=unit: "gone" in robots[unit - 1].snapshot().carrier.detail)
                 wait_for(lambda unit=unit: robots[unit - 1].snapshot().carrier.state == "down")
                 while listener.receive(0) is not None:
                     continue

@@ -15,7 +15,7 @@ FOLDER = ROOT / "docs/howto"
 NAMES = sorted(path.stem for path in FOLDER.glob("*.md") if path.stem != "index")
 TYPED = [name for name in NAMES if commands_of((FOLDER / f"{name}.md").read_text())]
 STARTS_ITS_OWN = re.compile(r"^\$ (sdrlinkd --config|sdrlink-ether)", re.MULTILINE)
-ONE_SCREEN = 62
+ONE_SCREEN = 66
 """Lines of the longest page."""
 
 

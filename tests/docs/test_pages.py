@@ -2,6 +2,7 @@
 
 import re
 import subprocess
+import tempfile
 
 import pytest
 
@@ -103,7 +104,9 @@ def test_the_tutorial_of_two_laptops(reader):
     """Both laptops are this one; what one prints for the other is copied."""
     free_hub = free_hub_port().name
     replaced = {"192.168.1.5:47900": free_hub, "0.0.0.0:47900": free_hub}
-    both = {who: reader(who, replaced=replaced) for who in ("first", "second")}
+    # The hub's folder, which the page leaves at its default, is for all of a computer.
+    scratch = {"TMPDIR": tempfile.mkdtemp(prefix="hub")}
+    both = {who: reader(who, replaced=replaced, environment=scratch) for who in ("first", "second")}
     run = 0
     for step in steps_of(text_of("docs/tutorial/two-laptops.md")):
         if isinstance(step, File):
