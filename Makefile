@@ -1,4 +1,4 @@
-# make demo   set up, then the main job        make check  format, lint, types, import rules, prose
+# make demo   set up, then the main job        make check  format, lint, types, import rules, prose, site
 # make quick  set up, then what every edit wants; make test  all tests; make soak, make fuzz  for hours
 # make bench  measurements beside peers        make fresh  README's commands on a minimal Debian (root)
 # make docs   the site, into build/site        make reference, make figures  pages made from the code, pictures
@@ -62,6 +62,7 @@ check: $(DEV_STAMP)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python -m docs.site.prose
+	$(MAKE) -s docs
 
 format: $(DEV_STAMP)
 	$(BIN)/ruff format .

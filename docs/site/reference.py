@@ -30,6 +30,7 @@ def pages() -> dict[str, str]:
     return {
         "configuration": manual.configuration_page(),
         "snapshot": manual.snapshot_page(),
+        "python": manual.python_client_page(),
         "sdrlinkctl": manual.commands_page(
             "sdrlinkctl",
             typer.main.get_group(app),

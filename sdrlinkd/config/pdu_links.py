@@ -34,7 +34,7 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Parameters of the OFDM modem, for every radio."""
 
     rate_hz: Annotated[float, Meta(ge=1e4, le=2e8)] = 5e6
-    """Sample rate in Hz, which is also the channel's bandwidth; the same at all nodes."""
+    """Sample rate in Hz, the same at all nodes; with grid 64/16 the signal occupies 0.83 of it."""
     frequency_hz: Annotated[float, Meta(ge=0, le=1e11)] = 0.0
     """Centre frequency in Hz; 0: not set, and simulations use SIMULATED_HZ."""
     mcs: Annotated[int, Meta(ge=0, le=9)] = 1

@@ -7,6 +7,7 @@ from sdrlinkd.manual.commands import commands_page
 from sdrlinkd.manual.configuration import configuration_page
 from sdrlinkd.manual.howto import HowTo, find_how_to, how_tos
 from sdrlinkd.manual.keys import Key, Section, find_key, key_names, sections
+from sdrlinkd.manual.python_client import python_client_page
 from sdrlinkd.manual.snapshot import snapshot_page
 
 __all__ = [
@@ -19,6 +20,7 @@ __all__ = [
     "find_key",
     "how_tos",
     "key_names",
+    "python_client_page",
     "sections",
     "snapshot_page",
 ]

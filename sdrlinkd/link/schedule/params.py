@@ -16,7 +16,7 @@ class ClassParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """How one class shares the airtime with the others."""
 
     share: Share = 0.0
-    """Guaranteed share of our airtime, 0 to 1, even if more urgent classes want it."""
+    """Guaranteed share of this robot's airtime, even if more urgent classes want it."""
     max_burst_s: Seconds = 0.0
     """Longest burst in s while a more urgent message may come at an unpredictable time; 0: that of
     the modem."""
