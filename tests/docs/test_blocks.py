@@ -119,6 +119,18 @@ def test_console_blocks_hold_commands():
     assert len(commands_of((ROOT / "README.md").read_text())) >= 2
 
 
+def test_what_the_systemd_page_installs_is_in_the_source():
+    text = "\n".join(body for _, body in blocks("systemd/README.md", "sh"))
+    named = set(re.findall(r"(?<![\w/])((?:etc|systemd)/[\w.*@-]+)", text))
+    assert {"etc/sdrlinkd.toml", "etc/registry.csv", "systemd/*.service"} <= named
+    for each in named:
+        assert list(ROOT.glob(each)), each
+    # What is put into PATH is there to be put.
+    scripts = (ROOT / "pyproject.toml").read_text()
+    for program in re.findall(r"/opt/sdrlinkd/bin/([\w-]+)", text):
+        assert program == "pip" or f"\n{program} = " in scripts, program
+
+
 def test_json_is_json():
     for page in pages():
         for _, text in blocks(page, "json"):
