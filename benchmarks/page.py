@@ -60,13 +60,12 @@ TEXTS = {
     ),
     "flowgraphs": "GNU Radio's flowgraphs as the modem, at 1 Msps and 25 dB.",
     "pound": (
-        "Section VI of the Pound paper: 16QAM 1/2 at 5 Msps, 6 Mbit/s, on the simulated air, by"
-        " the time of the samples. In the same run, what teams use instead, through two network"
-        " namespaces and a token bucket of 6 Mbit/s. The others have a channel of their own in "
-        "each direction, and no turnaround. Our image is later than theirs because the"
-        " laser goes first. Over two hops Pound's own scheme, which orders by priority at each "
-        "hop, is the faster one. The rows `..._rt` are whole daemons in real time; they also "
-        "say how late the machine wakes a sleeping program."
+        "16QAM 1/2 at 5 Msps, 6 Mbit/s, on the simulated air, in simulated time. In the same run, "
+        "what teams use instead, through two network namespaces and a token bucket of 6 Mbit/s. "
+        "The others have a channel of their own in each direction, and no turnaround. "
+        "`pound_like` imitates Pound's scheme, with priorities at each hop: it delivers the laser "
+        "sooner than ours does. Our image is later than that of most others because the laser goes "
+        "first. The rows `..._rt` are whole daemons in real time."
     ),
     "timesync": (
         "The same time stamps through clock filters: five exchanges a second, a tenth lost each"
