@@ -26,7 +26,7 @@ from backends.base import (
     TxReport,
     TxWindows,
 )
-from backends.hub_address import HubAddress, hub_at, hub_in
+from backends.hub_address import HubAddress, hub_at, hub_in, hub_of, is_listening
 from backends.late import LateRadio
 from backends.outstanding import GAP
 from backends.params import EtherParams, IqFileParams, LoopbackParams, ZmqParams
@@ -138,7 +138,9 @@ __all__ = [
     "find_backend",
     "hub_at",
     "hub_in",
+    "hub_of",
     "installed_names",
+    "is_listening",
     "lockstep_capabilities",
     "open_endpoint",
     "probe_devices",

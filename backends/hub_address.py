@@ -1,11 +1,15 @@
 """Where a hub is: in a folder of this computer, or at a port of another one."""
 
+import socket
 from pathlib import Path
 from typing import NamedTuple
 
 from backends.base import BackendError
+from backends.params import EtherParams
 
 AIR, SKY = "air.sock", "sky.sock"
+PATIENCE_S = 2.0
+"""Longest wait for another computer to accept a connection."""
 MAX_PORT = 65534
 """The hub's second socket has the next port."""
 
@@ -47,3 +51,20 @@ def hub_at(text: str, key: str) -> HubAddress:
         f"sdrlink-ether --listen 0.0.0.0:{int(port)}, on that computer",
         is_remote=True,
     )
+
+
+def hub_of(ether: EtherParams) -> HubAddress:
+    """The hub that [ether] names. Raises BackendError."""
+    return hub_at(ether.hub, "ether.hub") if ether.hub else hub_in(Path(ether.dir))
+
+
+def is_listening(hub: HubAddress) -> bool:
+    """Whether a hub's socket is there, or its port accepts a connection; waits for that."""
+    if not hub.is_remote:
+        return Path(hub.air.removeprefix("ipc://")).exists()
+    host, _, port = hub.name.rpartition(":")
+    try:
+        with socket.create_connection((host, int(port)), PATIENCE_S):
+            return True
+    except OSError:
+        return False

@@ -2,7 +2,7 @@
 
 from backends.backend import ModemNeeds, Presumption, simulated
 from backends.base import BackendError
-from backends.hub_address import hub_at
+from backends.hub_address import hub_of
 from backends.params import EtherParams, IqFileParams, ZmqParams
 
 ETHER_LEAD_S = 0.002
@@ -40,7 +40,7 @@ def ether_problem(ether: EtherParams, _needs: ModemNeeds) -> str:
         return f'ether.hub: got "{ether.hub}" beside ether.dir; allowed: one of the two'
     if ether.hub:
         try:
-            hub_at(ether.hub, "ether.hub")
+            hub_of(ether)
         except BackendError as error:
             return str(error)
     if ether.dir or ether.hub:

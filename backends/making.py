@@ -6,7 +6,7 @@ from pathlib import Path
 
 from backends.backend import RadioRequest
 from backends.base import Radio
-from backends.hub_address import hub_at, hub_in
+from backends.hub_address import hub_of
 from backends.params import EtherParams, IqFileParams, LoopbackParams, ZmqParams
 from backends.soapy import SoapyParams, SoapyRadio, SoapySettings
 
@@ -40,8 +40,7 @@ def make_ether(ether: EtherParams, request: RadioRequest) -> Radio:
     from backends.ether import EtherRadio
 
     who = f"process {os.getpid()} on {socket.gethostname()}"
-    hub = hub_at(ether.hub, "ether.hub") if ether.hub else hub_in(Path(ether.dir))
-    return EtherRadio(hub, request.node_id, who, request.patience)
+    return EtherRadio(hub_of(ether), request.node_id, who, request.patience)
 
 
 def make_soapy(soapy: SoapyParams, request: RadioRequest) -> Radio:

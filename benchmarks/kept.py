@@ -2,12 +2,25 @@
 
 import json
 import math
+import os
+import platform
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 DOCS = Path(__file__).parents[1] / "docs"
 FOLDER = DOCS / "measured"
 FIGURES = DOCS / "figures"
+
+
+def circumstances(stolen_pct: float) -> dict[str, Any]:
+    """Machine and day of a run, and how much of the machine a hypervisor gave to others."""
+    return {
+        "machine": f"{platform.machine()}, {os.cpu_count()} cores, "
+        f"Python {platform.python_version()}",
+        "stolen_pct": round(stolen_pct, 2),
+        "date": f"{datetime.now(UTC):%Y-%m-%d}",
+    }
 
 
 def keep(name: str, report: dict[str, Any]) -> Path:

@@ -8,12 +8,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from benchmarks import phy_curves
-from benchmarks.kept import DOCS, FIGURES, kept
+from benchmarks.kept import DOCS, kept
 from benchmarks.latency import pictures as latency_pictures
 from benchmarks.pound import pictures as pound_pictures
 from benchmarks.report import SIGNS
 from benchmarks.timesync import pictures as timesync_pictures
 from sdrlinkd.cli.benchmarks import BENCHMARKS
+from sdrlinkd.demo import PAPER_TABLE_6
 
 PAGE = DOCS / "benchmarks.md"
 DRAWN = {
@@ -144,15 +145,14 @@ def page() -> str:
 
 
 def draw() -> list[str]:
-    """Draw the pictures of all drawings that are kept; their files' names."""
-    FIGURES.mkdir(exist_ok=True)
-    before = {path: path.stat().st_mtime_ns for path in FIGURES.glob("*.png")}
+    """Draw the pictures of all drawings that are kept; the benchmarks that they are of."""
+    drawn = []
     for (name, drawing), make in DRAWN.items():
         report = kept(name) or {}
         if drawing in report.get("drawings", {}):
             make(report["drawings"][drawing])
-    now = {path: path.stat().st_mtime_ns for path in FIGURES.glob("*.png")}
-    return sorted(path.name for path, at in now.items() if before.get(path) != at)
+            drawn.append(name)
+    return drawn
 
 
 def _demo(report: Mapping[str, Any]) -> str:
@@ -165,24 +165,25 @@ def _demo(report: Mapping[str, Any]) -> str:
     ]
     return "\n".join([
         "## demo", "", DEMO, "", "```sh\nsdrlinkctl demo\n```", "",
+        f"*{_where(report)}*", "",
         "| configuration | s | sent | received | PDR | B/s | p50 ms | p99 ms | path error m |",
         "|---|---|---|---|---|---|---|---|---|",
         *rows,
-        "| paper, OFDM, /odom | 38.0 | 1328 | 12 | 0.01 | 228.6 | | | |",
-        "| paper, direct, /odom | 15.0 | 452 | 452 | 1.00 | 21,768 | | | |", "",
+        *(f"| paper, {name}, /odom | {' | '.join(cells)} | | | |"
+          for name, cells in PAPER_TABLE_6.items()), "",
         "![Distribution of the latency](figures/latency_cdf.png)", "",
         "![Paths sent and received](figures/path.png)",
     ])  # fmt: skip
 
 
+def _where(report: Mapping[str, Any]) -> str:
+    return f"{report['machine']}; {report['stolen_pct']:g} % stolen; {report['date']}"
+
+
 def _section(name: str, report: Mapping[str, Any]) -> str:
-    where = (
-        f"{report['machine']}; {report['stolen_pct']:g} % stolen; seed {report['seed']}; "
-        f"{report['date']}"
-    )
     lines = [
         f"## {name}", "", BENCHMARKS[name].sentence + " " + TEXTS.get(name, ""), "",
-        f"```sh\n{report['command']}\n```", "", f"*{where}*", "",
+        f"```sh\n{report['command']}\n```", "", f"*{_where(report)}; seed {report['seed']}*", "",
         "| row | value | target | ok | peers in the same run | paper | trials |",
         "|---|---|---|---|---|---|---|",
         *(_row(row) for row in report["rows"]),

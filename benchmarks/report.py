@@ -2,16 +2,13 @@
 
 import argparse
 import json
-import os
-import platform
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field
-from datetime import UTC, datetime
 from typing import Any, Literal
 
 from benchmarks.absent import attempt, told
-from benchmarks.kept import keep
+from benchmarks.kept import circumstances, keep
 from benchmarks.processes import Stolen
 from sdrlinkd.tables import FittedTable, figure, screen_console, words
 
@@ -102,14 +99,11 @@ def main(
 def _report(
     benchmark: str, rows: list[Row], options: argparse.Namespace, stolen_pct: float
 ) -> dict[str, Any]:
-    machine = f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}"
     quick = " --quick" if options.quick else ""
     return {
         "benchmark": benchmark,
         "command": f"python -m benchmarks.{benchmark}{quick}",
-        "machine": machine,
-        "stolen_pct": round(stolen_pct, 2),
-        "date": f"{datetime.now(UTC):%Y-%m-%d}",
+        **circumstances(stolen_pct),
         "seed": options.seed,
         "rows": [{**asdict(row), "ok": row.ok} for row in rows],
         "not_measured": told(),

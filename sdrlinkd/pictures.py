@@ -67,8 +67,7 @@ def legend_beside(axes: Axes, title: str = "") -> None:
     if axes.get_legend_handles_labels()[0]:
         axes.legend(
             loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=8, title=title,
-            title_fontsize=8,
-            handlelength=3.2,
+            title_fontsize=8, handlelength=3.2,
         )  # fmt: skip
 
 
@@ -84,9 +83,7 @@ def legend_below(figure: Figure, axes: Axes, columns: int) -> None:
 
 def save(figure: Figure, path: Path, caption: str) -> None:
     """Write the picture with a caption below it, which names the command that draws it."""
-    figure.text(
-        0.01, -0.02, caption, fontsize=7, color=QUIET, va="top", parse_math=False
-    )  # fmt: skip
+    figure.text(0.01, -0.02, caption, fontsize=7, color=QUIET, va="top", parse_math=False)
     # Without the version of the library, one picture has one content.
     figure.savefig(path, dpi=DPI, bbox_inches="tight", metadata={"Software": None})
     plt.close(figure)

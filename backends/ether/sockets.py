@@ -11,7 +11,7 @@ import zmq
 
 from backends.base import BackendError, Samples
 from backends.ether import protocol
-from backends.hub_address import HubAddress, hub_in
+from backends.hub_address import AIR, SKY, HubAddress, hub_in
 
 # Plain numbers: enumerations would cost as much as a short message.
 NOBLOCK, MORE, _EVENTS, _POLLIN = (
@@ -21,7 +21,7 @@ NOBLOCK, MORE, _EVENTS, _POLLIN = (
 WAITING = 500
 RECONNECT_MS = 500
 LONGEST_MESSAGE = 1 << 26
-"""Bytes of a message that a listening hub takes: eight million samples."""
+"""Bytes of a message that a hub takes from another computer: eight million samples."""
 
 
 def connect(
@@ -48,14 +48,17 @@ class HubSockets:
     """
 
     def __init__(self, directory: Path, listen: HubAddress | None = None) -> None:
-        self._here = hub_in(directory)
+        here = hub_in(directory)
+        self._files = (directory / AIR, directory / SKY)
         self._lock = _locked(directory)
         self._context: zmq.Context[zmq.Socket[bytes]] = zmq.Context()
-        self._air = self._bind(zmq.ROUTER, self._here.air)
-        self._sky = self._bind(zmq.PULL, self._here.sky)
+        self._air = self._bind(zmq.ROUTER, here.air)
+        self._sky = self._bind(zmq.PULL, here.sky)
         if listen is not None:
-            self._listen(self._air, listen.air)
-            self._listen(self._sky, listen.sky)
+            for socket, endpoint in ((self._air, listen.air), (self._sky, listen.sky)):
+                # It counts for what is bound from now on: strangers get this far, no further.
+                socket.setsockopt(zmq.MAXMSGSIZE, LONGEST_MESSAGE)
+                self._listen(socket, endpoint)
         self._poller = zmq.Poller()
         for each in (self._air, self._sky):
             self._poller.register(each, zmq.POLLIN)
@@ -97,8 +100,8 @@ class HubSockets:
     def close(self) -> None:
         """Close the sockets and free the folder."""
         self._context.destroy(linger=100)
-        for endpoint in (self._here.air, self._here.sky):
-            Path(endpoint.removeprefix("ipc://")).unlink(missing_ok=True)
+        for path in self._files:
+            path.unlink(missing_ok=True)
         self._lock.close()
 
     def _bind(self, kind: int, endpoint: str) -> "zmq.Socket[bytes]":
@@ -107,7 +110,6 @@ class HubSockets:
             socket.setsockopt(zmq.ROUTER_MANDATORY, 1)
         socket.setsockopt(zmq.SNDHWM, WAITING)
         socket.setsockopt(zmq.LINGER, 0)
-        socket.setsockopt(zmq.MAXMSGSIZE, LONGEST_MESSAGE)
         self._listen(socket, endpoint)
         return socket
 

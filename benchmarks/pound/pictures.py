@@ -72,23 +72,24 @@ def _delays(delays: Mapping[str, Mapping[str, Mapping[str, float]]]) -> None:
 
 def _bandwidth_and_loop(shows: Mapping[str, Any]) -> None:
     figure, panels = make_figure(2, 1, (8.0, 7.0))
-    left, right = panels[:, 0]
+    bandwidth, voltage = panels[:, 0]
     for (name, by_size), look in zip(
         shows["mbps"].items(), looks(shows["mbps"], "sdrlinkd").values(), strict=True
     ):
-        left.plot([int(size) / 1024 for size in by_size], list(by_size.values()), color=look.color,
-                  linestyle=look.line, marker=look.marker, markersize=4,
-                  label=name.replace("_", " "))  # fmt: skip
-    left.set(
+        bandwidth.plot(
+            [int(size) / 1024 for size in by_size], list(by_size.values()), color=look.color,
+            linestyle=look.line, marker=look.marker, markersize=4, label=name.replace("_", " "),
+        )  # fmt: skip
+    bandwidth.set(
         xscale="log", xlabel="KiB a message", ylabel="Mbit/s for the user, of 6", ylim=(0, 6.2)
     )
-    left.xaxis.set_major_formatter("{x:g}")
-    legend_beside(left)
+    bandwidth.xaxis.set_major_formatter("{x:g}")
+    legend_beside(bandwidth)
     at = 0.02 * np.arange(len(shows["loop_v"]["local"]))
-    right.plot(at, shows["loop_v"]["local"], color=COLORS[1], lw=4, alpha=0.6, label="local")
-    right.plot(at, shows["loop_v"]["sdrlinkd"], color=OURS, lw=1, label="through sdrlinkd")
-    right.set(xlabel="time in s", ylabel="voltage in V")
+    voltage.plot(at, shows["loop_v"]["local"], color=COLORS[1], lw=4, alpha=0.6, label="local")
+    voltage.plot(at, shows["loop_v"]["sdrlinkd"], color=OURS, lw=1, label="through sdrlinkd")
+    voltage.set(xlabel="time in s", ylabel="voltage in V")
     errors = sorted(shows["loops_mv"].items(), key=lambda each: each[1])
     told = [f"{name.replace('_', ' ')} {mv:.1f} mV" for name, mv in errors]
-    legend_beside(right, "\n".join(["off the local run, rms:", *told]))
+    legend_beside(voltage, "\n".join(["off the local run, rms:", *told]))
     save(figure, FIGURES / "pound_bandwidth_and_loop.png", COMMAND)

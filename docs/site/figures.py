@@ -15,7 +15,8 @@ from typing import Any
 
 import msgspec
 
-from benchmarks.kept import FIGURES, keep
+from benchmarks.kept import FIGURES, circumstances, keep
+from benchmarks.processes import Stolen
 from sdrlinkd.cli.following import Follower
 from sdrlinkd.cli.top.live import TopApp
 from sdrlinkd.process import Process
@@ -39,10 +40,12 @@ def main() -> int:
 
 
 def _demo(out: Path) -> None:
+    stolen = Stolen()
     _run("demo", "--out", str(out))
     for name in ("latency_cdf.png", "path.png"):
         shutil.copy(out / name, FIGURES)
-    keep("demo", msgspec.json.decode((out / "report.json").read_bytes()))
+    report = msgspec.json.decode((out / "report.json").read_bytes())
+    keep("demo", {**circumstances(stolen.pct()), **report})
 
 
 def _lab(out: Path) -> None:

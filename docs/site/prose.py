@@ -17,14 +17,10 @@ from proselint.config import DEFAULT
 from proselint.registry import CheckRegistry
 from proselint.tools import LintFile
 
-ROOT = Path(__file__).parents[2]
+from docs.site.stage import ROOT, documents
+
 MOST_WORDS = 30
 """Words of the longest sentence on a page."""
-BESIDE_CODE = (
-    "backends/README.md", "backends/ether/README.md", "etc/client/README.md",
-    "etc/gnuradio/README.md", "phy/README.md", "sdrlinkd/bus/README.md", "sdrlinkd/link/README.md",
-    "sdrlinkd/wire/README.md", "systemd/README.md", "tests/soapy_loopback/README.md",
-)  # fmt: skip
 PACKAGES = ("sdrlinkd", "backends", "phy", "benchmarks", "docs/site", "etc/gnuradio")
 GENERATED = ("docs/benchmarks.md", "docs/reference/")
 """Pages whose text stands in Python, where it is checked; tables and lists make long sentences."""
@@ -81,14 +77,6 @@ class Finding(NamedTuple):
     text: str
 
 
-def pages() -> list[Path]:
-    """All pages but the generated ones."""
-    found = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / p for p in BESIDE_CODE)]
-    return sorted(
-        path for path in found if not path.relative_to(ROOT).as_posix().startswith(GENERATED)
-    )
-
-
 def of_page(path: str, text: str) -> Iterator[Finding]:
     """What is wrong with the prose of a page; code, tables and links are not prose."""
     prose = _NOT_PROSE.sub(lambda block: re.sub(r"[^\n]", " ", block[0]), text)
@@ -127,9 +115,10 @@ def main() -> int:
     CheckRegistry().register_many(__register__)
     findings: list[Finding] = []
     n_pages = n_modules = 0
-    for path in pages():
-        n_pages += 1
-        findings += of_page(path.relative_to(ROOT).as_posix(), path.read_text())
+    for name in documents():
+        if not name.startswith(GENERATED):
+            n_pages += 1
+            findings += of_page(name, (ROOT / name).read_text())
     for package in PACKAGES:
         for path in sorted((ROOT / package).rglob("*.py")):
             if path == Path(__file__).resolve():

@@ -14,7 +14,7 @@ from sdrlinkd.cli.commands import COMMANDS
 
 DOCS = Path(__file__).parents[1]
 MAN_PAGES = {
-    "sdrlinkctl.1": ("sdrlinkctl", "shows and steers sdrlinkd"),
+    "sdrlinkctl.1": ("sdrlinkctl", "inspects and controls sdrlinkd"),
     "sdrlink-ether.1": ("sdrlink-ether", "the hub of a simulated air for sdrlinkd"),
     "sdrlinkd.toml.5": ("configuration", "the configuration of sdrlinkd"),
     "sdrlinkd.8": ("sdrlinkd", "carries ROS 2 messages between robots over software radio"),
@@ -34,8 +34,8 @@ def pages() -> dict[str, str]:
         "sdrlinkctl": manual.commands_page(
             "sdrlinkctl",
             typer.main.get_group(app),
-            "`sdrlinkctl` shows and steers a running daemon. It also plans, records, replays and "
-            "measures without one. `--install-completion` teaches a shell its commands and the "
+            "`sdrlinkctl` inspects and controls a running daemon. It also plans, records, replays "
+            "and measures without one. `--install-completion` teaches a shell its commands and the "
             "names of topics, robots and fields. `sdrlinkctl help` lists the how-to pages.\n\n"
             "Exit codes: 0, done; 1, the answer is no, or something was lost; 2, a mistake to "
             "correct; 130, interrupted. `status` has codes of its own.",

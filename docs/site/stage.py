@@ -55,6 +55,11 @@ def pages() -> dict[str, str]:
     return {page: each for page, each in found.items() if each not in taken} | BESIDE_CODE
 
 
+def documents() -> list[str]:
+    """All documents that people read, by their path in the tree."""
+    return sorted({*pages().values(), *STANDS_FOR})
+
+
 def staged_text(page: str, source: str, page_of: dict[str, str]) -> str:
     """The document `source` as the page `page`. Raises DeadLinkError."""
 

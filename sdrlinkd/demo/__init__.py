@@ -8,11 +8,12 @@ from sdrlinkd.demo.rate import Found, find_rate
 from sdrlinkd.demo.report import DemoReport, RunResult, TopicResult, latency_ms
 from sdrlinkd.demo.run import run_demo
 from sdrlinkd.demo.source import Source, open_source
-from sdrlinkd.demo.table import table_6, topic_table
+from sdrlinkd.demo.table import PAPER_TABLE_6, table_6, topic_table
 from sdrlinkd.demo.trace import Pair, Sample, Trace
 from sdrlinkd.demo.verdict import is_good, verdict
 
 __all__ = [
+    "PAPER_TABLE_6",
     "DemoReport",
     "Found",
     "Hearing",

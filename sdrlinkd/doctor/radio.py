@@ -3,11 +3,17 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from backends import BUILT_IN, DeviceProbe, DirectionProbe, ProbeReport
+from backends import (
+    BUILT_IN,
+    DeviceProbe,
+    DirectionProbe,
+    ProbeReport,
+    hub_of,
+    is_listening,
+)
 from sdrlinkd.config import WITHOUT_AIR, Config
 from sdrlinkd.doctor.finding import Finding, bad, good, good_if, none
 
-FIRST_SOCKET = "air.sock"
 LISTENERS = ("csma", "minislot")
 """Access policies that depend on hearing others start."""
 
@@ -40,10 +46,10 @@ def check_radio(config: Config | None, found: ProbeReport | None) -> list[Findin
 
 def _without(config: Config) -> Finding:
     if config.backend == "ether":
-        folder = config.ether.dir
+        hub = hub_of(config.ether)
         return good_if(
-            (Path(folder) / FIRST_SOCKET).exists(), "hub of the air", folder,
-            f"no hub runs there; start one: sdrlink-ether --dir {folder}",
+            is_listening(hub), "hub of the air", hub.name,
+            f"no hub runs there; start one: {hub.start}",
         )  # fmt: skip
     if config.backend == "iqfile" and config.iqfile.receive:
         path = Path(config.iqfile.receive)

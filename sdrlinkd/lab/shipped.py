@@ -1,22 +1,15 @@
 """Scenarios that are shipped with the program, by name."""
 
-import sysconfig
 from difflib import get_close_matches
 from pathlib import Path
 
 from sdrlinkd.errors import UserError
-
-# In the source tree, and where a wheel puts them.
-FOLDERS = (
-    Path(__file__).parents[2] / "etc/scenarios",
-    Path(sysconfig.get_path("data")) / "share/sdrlinkd/scenarios",
-)
+from sdrlinkd.shipped import shipped_files
 
 
 def shipped_scenarios() -> dict[str, Path]:
     """The files of shipped scenarios, by name."""
-    found = next((folder for folder in FOLDERS if folder.is_dir()), None)
-    return {} if found is None else {path.stem: path for path in sorted(found.glob("*.toml"))}
+    return shipped_files("etc/scenarios", "scenarios", ".toml")
 
 
 def find_scenario(given: Path) -> Path:

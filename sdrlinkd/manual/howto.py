@@ -1,16 +1,11 @@
 """How-to pages: found in the source tree, or where a wheel puts them."""
 
-import sysconfig
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 
 from sdrlinkd.errors import UserError
-
-FOLDERS = (
-    Path(__file__).parents[2] / "docs/howto",
-    Path(sysconfig.get_path("data")) / "share/sdrlinkd/howto",
-)
+from sdrlinkd.shipped import shipped_files
 
 
 @dataclass(frozen=True)
@@ -27,9 +22,8 @@ class HowTo:
 
 def how_tos() -> list[HowTo]:
     """All pages, by name."""
-    folder = next((each for each in FOLDERS if each.is_dir()), None)
-    paths = sorted(folder.glob("*.md")) if folder else []
-    return [_read(path) for path in paths if path.stem != "index"]
+    files = shipped_files("docs/howto", "howto", ".md")
+    return [_read(path) for name, path in files.items() if name != "index"]
 
 
 def find_how_to(name: str, others: list[str]) -> HowTo:

@@ -32,7 +32,7 @@ def python_client_page() -> str:
 def _head(of: type) -> list[str]:
     if issubclass(of, Exception) or is_dataclass(of):
         return []
-    return [f"    {of.__name__}{_signature(of.__init__, drop_self=True)}", ""]
+    return [f"    {of.__name__}{_signature(of.__init__)}", ""]
 
 
 def _entries(of: type) -> Iterator[str]:
@@ -45,12 +45,13 @@ def _entries(of: type) -> Iterator[str]:
     for name, member in vars(of).items():
         if name.startswith("_") or not inspect.isfunction(member):
             continue
-        yield f"`{name}{_signature(member, drop_self=True)}`\n:   {_indented(_text(member))}\n"
+        yield f"`{name}{_signature(member)}`\n:   {_indented(_text(member))}\n"
 
 
-def _signature(function: object, *, drop_self: bool) -> str:
-    found = inspect.signature(function)  # type: ignore[arg-type]
-    parameters = list(found.parameters.values())[int(drop_self) :]
+def _signature(method: object) -> str:
+    """The signature of a method without `self`."""
+    found = inspect.signature(method)  # type: ignore[arg-type]
+    parameters = list(found.parameters.values())[1:]
     text = str(found.replace(parameters=parameters, return_annotation=inspect.Signature.empty))
     returned = found.return_annotation
     if returned not in (inspect.Signature.empty, None, "None"):

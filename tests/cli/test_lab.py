@@ -217,7 +217,8 @@ def test_scenarios_of_a_wheel_are_found_and_completed(tmp_path, monkeypatch):
     (share / "mine.toml").write_text("")
     (tmp_path / "more").mkdir()
     (tmp_path / "my-own.toml").write_text("")
-    monkeypatch.setattr("sdrlinkd.lab.shipped.FOLDERS", (tmp_path / "none", share))
+    monkeypatch.setattr("sdrlinkd.shipped.IN_TREE", tmp_path / "none")
+    monkeypatch.setattr("sdrlinkd.shipped.INSTALLED", share.parent)
     monkeypatch.chdir(tmp_path)
     assert scenario_names("m") == ["mine", "more/", "my-own.toml"]
     assert find_scenario(Path("mine")) == share / "mine.toml"

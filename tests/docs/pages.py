@@ -2,9 +2,8 @@
 
 import re
 from dataclasses import dataclass
-from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+from docs.site.stage import ROOT
 
 _BLOCK = re.compile(r"^```(\w+) ?(.*?)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 # What a shown line has that a screen must have, too: numbers, paths and lines of tables differ.
@@ -31,18 +30,6 @@ class File:
 
     name: str
     text: str
-
-
-def pages():
-    """All documents that people read, by their path in the tree."""
-    found = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
-    found += [ROOT / each for each in (
-        "backends/README.md", "backends/ether/README.md", "etc/client/README.md",
-        "etc/gnuradio/README.md", "phy/README.md", "sdrlinkd/bus/README.md",
-        "sdrlinkd/link/README.md", "sdrlinkd/wire/README.md", "systemd/README.md",
-        "tests/soapy_loopback/README.md",
-    )]  # fmt: skip
-    return sorted(path.relative_to(ROOT).as_posix() for path in found)
 
 
 def blocks(page, *languages):

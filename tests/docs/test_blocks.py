@@ -13,29 +13,30 @@ import msgspec
 import pytest
 import typer
 
+from docs.site.stage import documents
 from sdrlinkd.cli.app import app
 from sdrlinkd.cli.commands import COMMANDS
 from sdrlinkd.config import parse_config
 from sdrlinkd.lab import Scenario
-from tests.docs.pages import ROOT, blocks, commands_of, pages
+from tests.docs.pages import ROOT, blocks, commands_of
 from tests.machine import lacks
 
 SHELL = [
     pytest.param(page, text, id=f"{page}-{number}")
-    for page in pages()
+    for page in documents()
     for number, (_, text) in enumerate(blocks(page, "sh"))
 ]
 OF_OTHERS = ("backends/README.md",)
 """Pages whose TOML is another package's."""
 TOML = [
     pytest.param(text, id=f"{page}-{number}")
-    for page in pages()
+    for page in documents()
     if page not in OF_OTHERS
     for number, (_, text) in enumerate(blocks(page, "toml"))
 ]
 PYTHON = [
     pytest.param(text, id=f"{page}-{number}")
-    for page in pages()
+    for page in documents()
     for number, (_, text) in enumerate(blocks(page, "python"))
 ]
 
@@ -103,7 +104,7 @@ def test_python_is_python_and_imports_what_is_there(text):
 
 
 def test_every_block_says_its_language():
-    for page in pages():
+    for page in documents():
         text = (ROOT / page).read_text()
         fences = re.findall(r"^```(\w*)", text, re.MULTILINE)
         assert all(fences[::2]), page
@@ -111,7 +112,7 @@ def test_every_block_says_its_language():
 
 
 def test_console_blocks_hold_commands():
-    for page in pages():
+    for page in documents():
         for _, text in blocks(page, "console"):
             assert text.startswith("$ "), page
         for _, text in blocks(page, "sh"):
@@ -132,6 +133,6 @@ def test_what_the_systemd_page_installs_is_in_the_source():
 
 
 def test_json_is_json():
-    for page in pages():
+    for page in documents():
         for _, text in blocks(page, "json"):
             json.loads(text)

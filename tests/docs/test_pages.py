@@ -6,6 +6,7 @@ import tempfile
 
 import pytest
 
+from docs.site.stage import documents
 from tests.backends.hubs import free_hub_port
 from tests.docs.pages import (
     ROOT,
@@ -13,7 +14,6 @@ from tests.docs.pages import (
     File,
     commands_of,
     missing_words,
-    pages,
     steps_of,
 )
 from tests.docs.reader import Reader
@@ -48,7 +48,7 @@ def reader(tmp_path):
 
 
 def test_every_page_with_commands_is_run():
-    for page in pages():
+    for page in documents():
         if commands_of(text_of(page)):
             assert page in HERE or page.startswith(BY_OTHER_TESTS), page
 

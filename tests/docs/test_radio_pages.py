@@ -1,29 +1,19 @@
 """The pages about radios, from first to last command, on test radios that imitate them."""
 
 import contextlib
-import os
-import shutil
-import subprocess
-import sys
-import time
 import uuid
-from pathlib import Path
 
 import pytest
 
-from sdrlinkd.process import Process, wait_until
-from tests.docs.pages import commands_of, missing_words
+from tests.docs.pages import ROOT, commands_of, missing_words
+from tests.docs.reader import Reader
 from tests.soapy_loopback import Bus, missing, module_folder
 
-ROOT = Path(__file__).parents[2]
 PAGES = ROOT / "docs" / "radios"
 NOT_HERE = ("sudo ", "make setup", "export PATH", "hackrf_info")
 """Needs root, or a real HackRF; or it has been done."""
 MAY_SAY_NO = ("sdrlinkctl doctor", "sdrlinkctl status", "sdrlinkctl plan")
 """Commands with an exit code that depends on this machine and its air."""
-ASKED_AGAIN = ("sdrlinkctl status",)
-"""Commands to repeat until they show enough: robots need time to discover each other."""
-PATIENCE_S = 240
 
 pytestmark = [
     pytest.mark.skipif(bool(missing()), reason=missing()),
@@ -32,54 +22,28 @@ pytestmark = [
 ]
 
 
-class Laptop:
-    """A folder, a radio and sockets of its own."""
+class Laptop(Reader):
+    """A reader with a radio, whose driver the page calls `driver`."""
 
     def __init__(self, folder, unit, bus, driver, model):
-        self.folder = folder
-        self._driver = driver
         self.device = f"driver=loopback,model={model},bus={bus},unit={unit}"
-        self.environment = os.environ | {
-            "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
-            "SDRLINKD_RUNTIME_DIR": str(folder / "run"),
-            "SOAPY_SDR_PLUGIN_PATH": str(module_folder()),
-            "SOAPY_SDR_ROOT": "/nonexistent",
-            "COLUMNS": "100",
-        }
-        self._behind = []
-        folder.mkdir()
+        self._driver = driver
+        super().__init__(
+            folder,
+            replaced={driver: self.device},
+            may_say_no=MAY_SAY_NO,
+            environment={
+                "SOAPY_SDR_PLUGIN_PATH": str(module_folder()),
+                "SOAPY_SDR_ROOT": "/nonexistent",
+            },
+        )
 
     def type(self, command):
-        """Type a command; returns the screen. A command with `&` continues to run."""
-        line = command.line.replace(self._driver, self.device)
-        if command.runs_on:
-            return self._leave_running(line.removesuffix("&"), command.shown)
-        done = subprocess.run(
-            line, shell=True, cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=PATIENCE_S,
-            check=False,
-        )  # fmt: skip
-        allowed = (0, 1) if line.startswith(MAY_SAY_NO) else (0,)
-        assert done.returncode in allowed, f"{line}\n{done.stdout}"
+        """Type a command; files that it wrote name this radio then."""
+        screen = super().type(command)
         for path in self.folder.glob("team/*.toml"):
             path.write_text(path.read_text().replace(f'"{self._driver}"', f'"{self.device}"'))
-        return done.stdout
-
-    def _leave_running(self, line, shown):
-        process = Process(
-            ["/bin/sh", "-c", f"exec {line}"], name=line, environment=self.environment,
-            folder=self.folder,
-        )  # fmt: skip
-        self._behind.append(process)
-        process.start()
-        wait_until(lambda: not missing_words(shown, process.log()), PATIENCE_S, process)
-        return process.log()
-
-    def close(self):
-        """End what still runs, the last one first: cleanly, and without a traceback."""
-        for process in reversed(self._behind):
-            process.stop(within_s=30)
-            assert "Traceback" not in process.log(), process.log()
+        return screen
 
 
 @contextlib.contextmanager
@@ -103,17 +67,12 @@ def walk(page, typists, default=""):
             continue
         assert named, f"who types this? {command.line}"
         for who in typists if named == "both" else [named]:
-            screen, until = typists[who].type(command), time.monotonic() + PATIENCE_S
-            while missing_words(command.shown, screen) and command.line.startswith(ASKED_AGAIN):
-                assert time.monotonic() < until, screen
-                screen = typists[who].type(command)
-            assert "Traceback" not in screen
-            assert not missing_words(command.shown, screen), screen
+            typists[who].see(command)
             run += 1
         if command.line.startswith("sdrlinkctl init"):
             # "Copy the folder to the second laptop."
             first, second = typists["first"], typists["second"]
-            shutil.copytree(first.folder / "team", second.folder / "team")
+            first.copy("team", second)
             copied = second.folder / "team" / "robot_2.toml"
             copied.write_text(copied.read_text().replace(first.device, second.device))
     return run

@@ -7,6 +7,7 @@ import pytest
 from msgspec import inspect
 
 from benchmarks import page as benchmarks_page
+from benchmarks.kept import kept
 from sdrlinkd.__main__ import _parser
 from sdrlinkd.cli.app import run
 from sdrlinkd.config import Config
@@ -71,12 +72,13 @@ def test_the_page_of_benchmarks_is_that_of_what_is_kept():
 
 
 def test_pictures_are_drawn_of_what_is_kept(tmp_path, monkeypatch):
-    for module in ("latency.pictures", "pound.pictures", "timesync.pictures", "phy_curves", "page"):
+    for module in ("latency.pictures", "pound.pictures", "timesync.pictures", "phy_curves"):
         monkeypatch.setattr(f"benchmarks.{module}.FIGURES", tmp_path)
-    drawn = benchmarks_page.draw()
-    assert drawn == sorted(path.name for path in tmp_path.iterdir())
+    assert {"pound", "timesync", "phy_curves"} <= set(benchmarks_page.draw())
+    drawn = {path.name for path in tmp_path.iterdir()}
     shown = {name for names in benchmarks_page.PICTURES.values() for name in names}
-    assert set(drawn) <= shown
+    assert len(drawn) >= 5
+    assert drawn <= shown
     assert all((DOCS / "figures" / name).exists() for name in shown)
 
 
@@ -121,3 +123,24 @@ def test_texts_of_a_struct_include_those_of_its_bases():
         three: int = 3
 
     assert field_texts(Derived) == {"one": "The first.", "two": "The second."}
+
+
+def test_the_readme_compares_with_figures_that_are_kept():
+    """Its columns: ours in simulated time, ours in real time, and three others."""
+    rows = {row["name"]: row for row in kept("pound")["rows"]}
+    others = ("nimbro_udp_tcp", "zenoh_block", "fastdds_reliable")
+    text = (ROOT / "README.md").read_text()
+    for title, name in (
+        ("laser, mean delay", "laser_2n_D_ms"),
+        ("its standard deviation", "laser_2n_stdD_ms"),
+        ("image, mean delay", "image_2n_D_ms"),
+        ("fresh scans after an outage of 5 s", "recovery_after_5s_outage_s"),
+    ):
+        told = re.search(rf"^\| {title} \|(.*)\|$", text, re.MULTILINE)[1].split("|")[:5]
+        row, real = rows[name], rows[f"{name}_rt"]
+        measured = [row["value"], real["peers"].get("two daemons and a hub", real["value"])]
+        measured += [row["peers"][other] for other in others]
+        for cell, value in zip(told, measured, strict=True):
+            number = cell.split()[0]
+            decimals = len(number.partition(".")[2])
+            assert float(number) == pytest.approx(value, abs=0.51 * 10**-decimals), (title, cell)

@@ -1,6 +1,7 @@
 """`sdrlinkctl doctor` as a user runs it."""
 
 import json
+import socket
 
 import pytest
 
@@ -57,6 +58,18 @@ def test_line_by_line_for_people(write_config, tmp_path, capsys):
     assert "[chrony] from another robot" in out or "synchronized by NTP" in out
     assert lines[-1].endswith(" to do")
     assert "Traceback" not in out + err
+
+
+def test_a_hub_on_another_computer_is_checked_at_its_port(examine):
+    with socket.socket() as port:
+        port.bind(("127.0.0.1", 0))
+        hub = f"127.0.0.1:{port.getsockname()[1]}"
+        text = f'backend = "ether"\n[ether]\nhub = "{hub}"\n'
+        absent = examine(text)[1]["hub of the air"]
+        port.listen()
+        present = examine(text)[1]["hub of the air"]
+    assert (absent["state"], present["state"]) == ("bad", "good")
+    assert "sdrlink-ether --listen" in absent["to_do"]
 
 
 def test_a_wrong_configuration_is_a_wrong_use(write_config, tmp_path, capsys):
