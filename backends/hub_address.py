@@ -59,7 +59,7 @@ def hub_of(ether: EtherParams) -> HubAddress:
 
 
 def is_listening(hub: HubAddress) -> bool:
-    """Whether a hub's socket is there, or its port accepts a connection; waits for that."""
+    """Whether a hub's socket file exists, or its port accepts a connection within PATIENCE_S."""
     if not hub.is_remote:
         return Path(hub.air.removeprefix("ipc://")).exists()
     host, _, port = hub.name.rpartition(":")

@@ -1,4 +1,4 @@
-"""Results that are kept in docs/measured: docs/benchmarks.md and its pictures are made of them."""
+"""Keeps results in docs/measured, from which docs/benchmarks.md and its pictures are made."""
 
 import json
 import math
@@ -14,7 +14,7 @@ FIGURES = DOCS / "figures"
 
 
 def circumstances(stolen_pct: float) -> dict[str, Any]:
-    """Machine and day of a run, and how much of the machine a hypervisor gave to others."""
+    """Machine and date of a run, and its stolen time in % of all cores."""
     return {
         "machine": f"{platform.machine()}, {os.cpu_count()} cores, "
         f"Python {platform.python_version()}",
@@ -24,7 +24,7 @@ def circumstances(stolen_pct: float) -> dict[str, Any]:
 
 
 def keep(name: str, report: dict[str, Any]) -> Path:
-    """Write the report of benchmark `name`; returns where."""
+    """Write the report of benchmark `name`; returns its path."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     path = FOLDER / f"{name}.json"
     path.write_text(json.dumps(_plain(report), indent=1, ensure_ascii=False) + "\n")
@@ -32,7 +32,7 @@ def keep(name: str, report: dict[str, Any]) -> Path:
 
 
 def kept(name: str) -> dict[str, Any] | None:
-    """The report of benchmark `name` as it was kept last; None where it never was."""
+    """The latest kept report of benchmark `name`; None if there is none."""
     path = FOLDER / f"{name}.json"
     if not path.exists():
         return None
@@ -41,7 +41,7 @@ def kept(name: str) -> dict[str, Any] | None:
 
 
 def _plain(value: object) -> object:
-    """As JSON can hold it: no NaN, no arrays, and five digits of each figure."""
+    """The value as JSON holds it: null for NaN, lists for arrays, five digits of each figure."""
     if isinstance(value, dict):
         return {str(key): _plain(each) for key, each in value.items()}
     if hasattr(value, "tolist"):

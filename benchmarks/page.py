@@ -1,6 +1,6 @@
-"""Writes docs/benchmarks.md, and draws its pictures, of what is kept: `make figures`.
+"""Writes docs/benchmarks.md and draws its pictures from the kept results: `make figures`.
 
-Nothing is measured here. `python -m benchmarks.NAME --keep` measures, and keeps the rows.
+It measures nothing. `python -m benchmarks.NAME --keep` measures and keeps the rows.
 """
 
 import sys
@@ -23,7 +23,7 @@ DRAWN = {
     ("timesync", "filters"): timesync_pictures.draw,
     ("phy_curves", "curves"): phy_curves.draw,
 }
-"""What draws each drawing that is kept, by benchmark and name."""
+"""The function that draws each kept drawing, by benchmark and name of the drawing."""
 
 TEXTS = {
     "bus": (
@@ -81,7 +81,7 @@ TEXTS = {
         "and MAVROS."
     ),
 }
-"""What a reader should know before the rows, by benchmark."""
+"""Text above the table of each benchmark."""
 
 PICTURES = {
     "phy_per": ["per_curves.png"],
@@ -122,7 +122,7 @@ all of them; `--keep` keeps the results, and `make figures` writes this page.
 
 
 def page() -> str:
-    """The page in Markdown, of what is kept."""
+    """The page in Markdown, from the kept results."""
     reports = {name: report for name in BENCHMARKS if (report := kept(name)) and "rows" in report}
     judged = [row for report in reports.values() for row in report["rows"]
               if row["target"] is not None]  # fmt: skip
@@ -145,7 +145,7 @@ def page() -> str:
 
 
 def draw() -> list[str]:
-    """Draw the pictures of all drawings that are kept; the benchmarks that they are of."""
+    """Draw all kept drawings; returns the names of their benchmarks."""
     drawn = []
     for (name, drawing), make in DRAWN.items():
         report = kept(name) or {}
@@ -156,7 +156,7 @@ def draw() -> list[str]:
 
 
 def _demo(report: Mapping[str, Any]) -> str:
-    """The paper's Table 6 by our runs."""
+    """The section of the demo: the paper's Table 6 with our runs."""
     rows = [
         f"| {run['name']} | {run['duration_s']:.1f} | {run['sent']} | {run['received']} "
         f"| {run['pdr']:.3f} | {run['goodput_bytes_per_s']:,.0f} | {run['latency_ms']['p50']:.2f} "

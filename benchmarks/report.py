@@ -17,7 +17,7 @@ SIGNS = {"more": "≥", "less": "≤"}
 
 @dataclass
 class Drawing:
-    """What a picture of this benchmark shows: numbers and names only, as JSON can hold them."""
+    """The data of a picture of this benchmark: numbers and names only, as JSON holds them."""
 
     name: str
     shows: dict[str, Any]

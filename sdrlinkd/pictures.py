@@ -1,6 +1,6 @@
-"""One style for all pictures: readable in grey, legends beside the data, the command below.
+"""One style for all pictures: readable in grey, with the legend beside the data.
 
-Slow to load, and an extra: it needs matplotlib.
+The module needs matplotlib, which is an extra and slow to load.
 """
 
 from collections.abc import Iterable, Iterator
@@ -20,14 +20,14 @@ COLORS = ("#000000", "#E69F00", "#0072B2", "#56B4E9", "#D55E00", "#009E73", "#CC
 LINES = ("-", "--", "-.", ":")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "h", "d", "p")
 OURS = COLORS[0]
-"""The color of what is ours, wherever others are beside it."""
+"""The color of our own results beside those of others."""
 QUIET = "0.45"
 """The color of captions, bounds and targets."""
 DPI = 120
 
 
 class Look(NamedTuple):
-    """How one series is drawn: no two of a picture share color, line and marker."""
+    """Color, line style and marker of one series."""
 
     color: str
     line: str

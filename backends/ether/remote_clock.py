@@ -1,13 +1,14 @@
-"""Times of a hub, which may be on another computer."""
+"""Converts times of a hub, which may run on another computer."""
 
 WINDOW_S = 2.0
 
 
 class HubClock:
-    """Turns times of a hub's monotonic clock into times of ours; on one computer, it is the same.
+    """Converts times of the hub's monotonic clock to ours; on the same computer they are equal.
 
-    The offset is that of the message that travelled fastest in the last 2 to 4 s, so crystals may
-    differ. The shortest travel time stays in it: a millisecond or less on a local network.
+    The offset comes from the message with the shortest travel time in the last 2 to 4 s, so the
+    crystals may differ. That travel time remains as an error: a millisecond or less on a local
+    network.
     """
 
     def __init__(self, is_remote: bool) -> None:

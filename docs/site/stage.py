@@ -1,7 +1,7 @@
 """Collects the pages of the site in build/pages, with links that hold there.
 
-Most pages lie in docs/. Documents beside the code are pages too, so their links, and links to them,
-change on the way. A link to a file that is no page, such as a module, becomes plain text.
+Most pages are in docs/. Documents beside the code are pages too, so staging rewrites their links
+and the links to them. A link to a file that is not a page, such as a module, becomes plain text.
 """
 
 import re

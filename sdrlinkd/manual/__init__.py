@@ -1,6 +1,6 @@
-"""The manual: reference pages made from the code itself, and how-to pages that come with it.
+"""The manual: reference pages made from the code, and the shipped how-to pages.
 
-It turns types, commands and files into Markdown. It prints nothing, and asks no daemon.
+It turns types, commands and files into Markdown. It prints nothing and queries no daemon.
 """
 
 from sdrlinkd.manual.commands import commands_page

@@ -1,4 +1,4 @@
-"""What the source says of a struct's fields: the text below each, which Python itself drops."""
+"""Reads the docstrings of a struct's fields from the source; Python does not keep them."""
 
 import ast
 import functools

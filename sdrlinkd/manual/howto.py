@@ -1,4 +1,4 @@
-"""How-to pages: found in the source tree, or where a wheel puts them."""
+"""The shipped how-to pages."""
 
 from dataclasses import dataclass
 from difflib import get_close_matches

@@ -1,4 +1,4 @@
-"""The configuration's keys as the schema has them: what each takes, and what it is for."""
+"""The keys of the configuration, from its schema: purpose, allowed values, default."""
 
 from dataclasses import dataclass
 
