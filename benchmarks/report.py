@@ -88,7 +88,7 @@ def main(
             sys.stdout.write(json.dumps(report, indent=2) + "\n")
         else:
             screen_console().print(table_of(benchmark, rows))
-        if options.keep:
+        if options.keep and rows:
             path = keep(benchmark, {**report, "drawings": drawings})
             sys.stderr.write(f"kept in {path}\n")
     if all_of_it.failed or not rows:

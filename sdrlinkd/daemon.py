@@ -88,7 +88,7 @@ async def run(setup: Setup, reload: Reload) -> None:
                 task.cancel()
         for problem in node.audit():
             log.error("ledger: %s", problem)
-        log.info("stopped: %s", status_line(node.snapshot(control.requests)))
+        log.info("stopped: %s", traffic_line(node.snapshot(control.requests)))
 
 
 @contextlib.asynccontextmanager
@@ -258,10 +258,15 @@ async def _watch(notifier: Notifier, node: Node, control: Control) -> None:
 
 def status_line(snapshot: Snapshot) -> str:
     """The daemon's state in one line, for systemd and the log."""
-    tx, rx = snapshot.link.tx, snapshot.link.rx
     verdict = ": ".join([snapshot.verdict.level, *snapshot.verdict.reasons[:1]])
+    radio = f"{snapshot.carrier.kind} {snapshot.carrier.state}"
+    return f"{verdict}; {radio}; {traffic_line(snapshot)}"
+
+
+def traffic_line(snapshot: Snapshot) -> str:
+    """What was sent and received so far, in one line."""
+    tx, rx = snapshot.link.tx, snapshot.link.rx
     return (
-        f"{verdict}; {snapshot.carrier.kind} {snapshot.carrier.state}; "
         f"out {tx.sent}/{tx.accepted} sent, {tx.queued} queued, "
         f"{sum(tx.dropped.values())} dropped; "
         f"in {rx.delivered} delivered, {len(snapshot.link.neighbors)} robots heard"

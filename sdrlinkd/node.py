@@ -244,8 +244,15 @@ class Node:
         self._tell_verdicts()
 
     def why(self, topic_id: int, told: Told) -> list[str]:
-        """What happens to a topic's messages and why, in plain sentences."""
-        return self._link.why(topic_id, told, self._pdu_link.now())
+        """What happens to a topic's messages and why, in plain sentences.
+
+        If the verdict on the daemon is not OK, it follows the first sentence.
+        """
+        policy, *rest = self._link.why(topic_id, told, self._pdu_link.now())
+        verdict = self.snapshot(0).verdict
+        if verdict.level == "OK":
+            return [policy, *rest]
+        return [policy, f"the link is {verdict.level}: {'; '.join(verdict.reasons)}", *rest]
 
     def snapshot(self, control_requests: int) -> Snapshot:
         """A snapshot of everything that the daemon reports now."""

@@ -228,7 +228,9 @@ def _next(files: dict[str, bytes], out: Path, preset: RadioPreset | None, hub: s
     lines += [f"  sdrlinkd --config {each}{behind}" for each in configs[: None if is_here else 1]]
     if len(configs) > 1 and not is_here:
         rest = ", ".join(each.name for each in configs[1:])
-        lines.append(f"  copy {REGISTRY} and one of {rest} to each other robot")
+        which = rest if len(configs) == 2 else f"one of {rest}"
+        to = "the other robot" if len(configs) == 2 else "each other robot"
+        lines.append(f"  copy {REGISTRY} and {which} to {to}")
     elif len(configs) == 1 and (preset is None or preset.shares_air):
         lines.append(f"  each other robot needs the same {REGISTRY} and its own --id")
     return lines

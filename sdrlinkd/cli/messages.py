@@ -1,6 +1,7 @@
 """`pub` and `echo`: publish and show single messages, like `ros2 topic`."""
 
 import time
+from collections import Counter
 from io import StringIO
 from pathlib import Path
 from typing import Annotated, Any
@@ -74,7 +75,7 @@ def pub(
     if times > 1 and not rate:
         rate = 1.0
     with Publisher(runtime_dir) as publisher:
-        count, waiting = 0, {}
+        count, waiting, fates = 0, {}, Counter[str]()
         while True:
             name = publisher.send(
                 topic,
@@ -92,26 +93,38 @@ def pub(
             if not rate or count == times:
                 break
             next_at = time.monotonic() + min(1 / rate, 1e6)
-            _show_receipts(publisher, waiting, next_at)
+            fates += _show_receipts(publisher, waiting, next_at)
             time.sleep(max(0.0, next_at - time.monotonic()))
-        _show_receipts(publisher, waiting)
+        fates += _show_receipts(publisher, waiting)
     typer.echo(f"published {count} × {len(payload)} B on {topic} ({kind})")
+    if fates["unknown"]:
+        typer.echo(
+            "no answer to some: `sdrlinkctl status` lists the robots that are heard", err=True
+        )
+    if fates.total() > fates["delivered"]:
+        raise typer.Exit(1)
 
 
 def _show_receipts(
     publisher: Publisher, waiting: dict[str, int], until: float | None = None
-) -> None:
-    """Show receipts until all messages in `waiting`, by id, are answered, or until time `until`."""
+) -> Counter[str]:
+    """Show receipts until all messages in `waiting`, by id, are answered, or until time `until`.
+
+    Returns how many receipts had each fate.
+    """
+    fates: Counter[str] = Counter()
     while waiting:
         told = publisher.receipt(None if until is None else max(0.0, until - time.monotonic()))
         if told is None:
-            return
+            break
+        fates[told.fate] += 1
         robot = "everyone" if told.dst == BROADCAST else f"robot {told.dst}"
         reason = f" ({told.reason})" if told.reason else ""
         took = "" if told.took_s is None else f", {1e3 * told.took_s:.2f} ms old"
         typer.echo(f"message {waiting[told.id]}, {robot}: {told.fate}{reason}{took}")
         if not told.left:
             del waiting[told.id]
+    return fates
 
 
 @app.command()

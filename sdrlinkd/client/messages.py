@@ -60,6 +60,7 @@ class Message:
 class Receipt:
     """What became of a message at robot `dst`: `fate` is delivered, expired, dropped or unknown.
 
+    `dst` is 255 if the message was sent to everyone and no robot was heard that could answer.
     `reason` is one of the ledger's, or `daemon_gone` if the fate is unknown because our own daemon
     restarted or does not answer. `took_s` is the message's age in s at its delivery. `left` is the
     number of robots that have not answered yet.

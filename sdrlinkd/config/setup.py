@@ -68,6 +68,7 @@ class Setup:
         """The lines about the configuration that `--check` prints."""
         config = self.config
         size = config.link.pdu_size
+        other = 1 if self.node_id == 2 else 2
         return [
             f"robot {self.node_id}, namespace {config.namespace or '-'}, backend {config.backend}",
             f"PDUs of {size} B; messages up to {max_message_size(size)} B",
@@ -77,7 +78,7 @@ class Setup:
                 f"  {topic_id:>2}  {name}  {self.registry.topics[topic_id].type}"
                 for name, topic_id in self.topics_in.items()
             ),
-            f"received messages appear as {self.republished_as(2, 0)} (from robot 2)",
+            f"received messages appear as {self.republished_as(other, 0)} (from robot {other})",
             *(f"warning: {warning}" for warning in self.all_warnings),
             *(f"not checked: {each}" for each in unchecked(config)),
         ]

@@ -38,6 +38,7 @@ class Story:
         self._lowest: set[int] = set()
         self._shedding_at: float | None = None
         self._shed_before = 0
+        self._is_shed_by_traffic = True
         self._losing_at: float | None = None
         self._steps = 0
 
@@ -142,16 +143,23 @@ class Story:
             self._shedding_at = now
             self._shed_before = total - sum(shed.values())
             worst = next(iter(shed))
-            yield Line(
-                "queue",
-                Level.WARNING,
-                f"traffic exceeds the channel capacity: messages are dropped, most of {worst}; "
-                f"sdrlinkctl why {worst} says more",
-            )
+            # Without a radio, messages expire whatever the traffic.
+            self._is_shed_by_traffic = snapshot.carrier.state == "up"
+            text = f"messages are dropped, most of {worst}; sdrlinkctl why {worst} says more"
+            if self._is_shed_by_traffic:
+                text = f"traffic exceeds the channel capacity: {text}"
+            else:
+                text = f"there is no {pdu_link_name(snapshot.carrier)}: {text}"
+            yield Line("queue", Level.WARNING, text)
         elif not shed and self._shedding_at is not None:
             lasted, dropped = span(now - self._shedding_at), total - self._shed_before
             self._shedding_at = None
-            text = f"traffic fits the channel again: {dropped} messages dropped in {lasted}"
+            over = (
+                "traffic fits the channel again"
+                if self._is_shed_by_traffic
+                else "messages expire no more"
+            )
+            text = f"{over}: {dropped} messages dropped in {lasted}"
             yield Line("queue", Level.INFO, text)
 
     def _samples(self, snapshot: Snapshot, lately: Lately) -> Iterator[Line]:

@@ -97,10 +97,13 @@ def test_pub_says_what_became_of_each_message(start_daemon, ctl):
     assert code == 0
     assert re.findall(r"message (\d), robot 1: delivered, \d+\.\d\d ms old", out) == list("123")
     # A lone robot knows of nobody who could answer.
-    _, out, _ = ctl("pub", "/robot_1/odom", "{}", *dir_)
+    code, out, err = ctl("pub", "/robot_1/odom", "{}", *dir_)
     assert "message 1, everyone: unknown\n" in out
-    _, out, _ = ctl("pub", "cmd_vel", "{}", "--dst", "7", "-t", "2", "-r", "1000", *dir_)
+    assert "lists the robots that are heard" in err
+    assert code == 1
+    code, out, _ = ctl("pub", "cmd_vel", "{}", "--dst", "7", "-t", "2", "-r", "1000", *dir_)
     assert "message 2, robot 7: dropped (tx_throttled)\n" in out
+    assert code == 1
 
 
 def test_pub_refuses_in_words(start_daemon, ctl):

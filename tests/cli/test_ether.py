@@ -187,6 +187,14 @@ def carrier(node):
     return node.snapshot().carrier
 
 
+def test_why_names_the_missing_hub(start_daemon, ctl, tmp_path_factory):
+    node = start_daemon(on_air(tmp_path_factory.mktemp("air"), 1))
+    wait_for(lambda: carrier(node).state == "waiting", 60)
+    code, out, _ = ctl("why", "cmd_vel", "--runtime-dir", node.directory)
+    assert code == 0
+    assert out.splitlines()[1].startswith("the link is DOWN: no hub since ")
+
+
 @pytest.mark.slow
 def test_daemons_outlive_their_hub(start_hub, start_daemon, tmp_path_factory):
     folder = tmp_path_factory.mktemp("air")

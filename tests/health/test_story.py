@@ -98,6 +98,18 @@ def test_a_queue_that_overflows_is_told_when_it_begins_and_when_it_ends():
     ]
 
 
+def test_a_queue_that_expires_without_a_radio_is_not_blamed_on_traffic():
+    def at(second):
+        dropped = min(max(second - 2, 0), 5) * 10
+        absent = {"state": "waiting", "reason": "no such device"} if second < 20 else None
+        return snapshot(float(second), absent, topics=[topic(dropped={"tx_expired": dropped})])
+
+    told = [text for _, text in story(*map(at, range(1, 30)))]
+    assert any(text.startswith("there is no radio: messages are dropped") for text in told)
+    assert "messages expire no more: 50 messages dropped in 10 s" in told
+    assert not any("capacity" in text for text in told)
+
+
 def test_clocks_that_jump():
     def clock(steps):
         return [robot(clock=ClockReport(state="synced", steps=steps))]

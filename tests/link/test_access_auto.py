@@ -65,8 +65,10 @@ def test_who_only_receives_takes_no_turns(policy):
 def test_minislots_where_the_radio_reacts_within_a_millisecond_else_slots():
     soon, late = settled(auto([1, 2]), SOON), settled(auto([1, 2]), PACED)
     assert (soon.policy, late.policy) == ("minislot", "tdma")
-    assert "within 0.18" in soon.reason
-    assert "within 6.08 ms; minislot needs at most 1 ms" in late.reason
+    assert "takes 0.184 ms" in soon.reason
+    assert (
+        "takes 6.08 ms to notice another robot's burst; minislot allows at most 1 ms" in late.reason
+    )
     edge = SOON._replace(react_s=0.0)
     rest_s = 0.001 - edge.lead_s - edge.detect_s - 5e-6
     assert settled(auto([1, 2]), edge._replace(react_s=rest_s - 1e-6)).policy == "minislot"
@@ -136,7 +138,7 @@ def test_a_link_refuses_it_at_attach_and_reports_what_it_came_to():
     report = link.report(0.0)
     assert report.access.startswith("tdma: 2 slots")
     assert (report.access_policy, round(report.access_share_pct)) == ("tdma", 97)
-    assert report.access_reason.startswith("because this radio detects another's burst")
+    assert report.access_reason.startswith("because this radio takes")
     assert settled.sentence == (f"tdma, {report.access_reason}; 97 % of the airtime is usable")
 
 

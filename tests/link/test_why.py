@@ -53,10 +53,10 @@ def test_a_topic_that_is_shed_says_what_the_air_was_used_for():
 
 def test_a_topic_of_which_nothing_comes():
     link = make_link(pdu_size=64)
-    assert link.why(0, FILE, 0.0)[1] == "no producer has sent a message yet"
+    assert link.why(0, FILE, 0.0)[1] == "no local program has sent a message yet"
     pass_time(link, 10, 10)
     now = 0.0
     for i in range(80):
         now = 1.0 + i
         link.handle_timers(now)
-    assert link.why(0, FILE, now)[1] == "no producer sent a message in the last minute"
+    assert link.why(0, FILE, now)[1] == "no local program sent a message in the last minute"

@@ -121,15 +121,15 @@ def _chosen(
     if not _others(params, own_id):
         return "none", "because access.nodes lists no other robot"
     apart_s, n = reaction_s(traits), len(set(params.nodes))
-    reacts = f"this radio detects another's burst and defers within {1e3 * apart_s:.3g} ms"
+    reacts = f"because this radio takes {1e3 * apart_s:.3g} ms to notice another robot's burst"
     if apart_s > SOON_S:
-        return "tdma", f"because {reacts}; minislot needs at most {1e3 * SOON_S:g} ms"
+        return "tdma", f"{reacts}; minislot allows at most {1e3 * SOON_S:g} ms"
     if shares["minislot"] < FAIR * shares["tdma"]:
         return "tdma", (
             f"because with {n} robots minislot leaves {percent(shares['minislot'])} of the airtime "
             f"usable and tdma {percent(shares['tdma'])}"
         )
-    return "minislot", f"because {reacts}"
+    return "minislot", reacts
 
 
 def _refuse_poor(settled: Settled, n: int) -> None:

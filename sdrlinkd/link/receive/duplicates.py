@@ -10,15 +10,20 @@ class SequenceTrack:
     Sequence numbers are modulo 256. A step of n, up to 127 ahead, means that n − 1 PDUs are lost.
     An older number that was missing is a late arrival. Any other older number means that the sender
     restarted, or was away for longer than the numbers can tell.
+
+    A restarted sender may also continue with a number that looks like a step ahead. Only its boot
+    id tells: `restart` takes back the largest step since `goes_on` last confirmed the old one.
     """
 
-    __slots__ = ("_crc", "_newest", "_position", "lost", "restarts")
+    __slots__ = ("_crc", "_leap", "_newest", "_position", "lost", "restarts")
 
     def __init__(self) -> None:
         self._newest = -1
         # By sequence number: the CRC last heard, and its extended position.
         self._crc = [-1] * 256
         self._position = [-(WINDOW + 1)] * 256
+        # The most losses that one step has shown since the source's boot id was last confirmed.
+        self._leap = 0
         self.lost = 0
         self.restarts = 0
 
@@ -33,6 +38,7 @@ class SequenceTrack:
             return False
         if 0 < ahead < WINDOW:
             self.lost += ahead - 1
+            self._leap = max(self._leap, ahead - 1)
             self._accept(seq, crc, newest + ahead)
             return True
         behind = newest - ((newest - seq) & 0xFF)
@@ -44,9 +50,15 @@ class SequenceTrack:
         self.restart(seq, crc)
         return True
 
+    def goes_on(self) -> None:
+        """Note that the source has not restarted so far: all steps ahead were losses."""
+        self._leap = 0
+
     def restart(self, seq: int, crc: int) -> None:
         """Start over with a source that counts from a new number, and forget what was heard."""
         self.restarts += 1
+        self.lost = max(0, self.lost - self._leap)
+        self._leap = 0
         self._crc = [-1] * 256
         self._accept(seq, crc, self._newest + 256 + ((seq - self._newest) & 0xFF))
 

@@ -129,6 +129,8 @@ class Inbox:
                 if neighbor.take_beacon(record):
                     neighbor.track.restart(seq, crc)
                     self._announce(pdu.src, at, events)
+                else:
+                    neighbor.track.goes_on()
             elif isinstance(record, RegistryDigest):
                 neighbor.take_digest(record)
             elif isinstance(record, Receipt):

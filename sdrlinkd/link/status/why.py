@@ -62,9 +62,9 @@ class Why:
         lines = [self._treatment(name, policy, told, topic_id)]
         if not came:
             lines.append(
-                "no producer sent a message in the last minute"
+                "no local program sent a message in the last minute"
                 if tally.accepted
-                else "no producer has sent a message yet"
+                else "no local program has sent a message yet"
             )
         else:
             lines.append(f"last minute: {came} messages in, {sent} sent ({_share(sent, came)})")
