@@ -10,7 +10,6 @@ import pytest
 from rosbags.rosbag2 import StoragePlugin
 
 from sdrlinkd.adapters import BuiltInRobot, empty, to_cdr
-from sdrlinkd.cli import run
 from sdrlinkd.client import Publisher, Subscriber
 from sdrlinkd.reports import Snapshot
 from tests.adapters.recordings import ros2_bag
@@ -19,19 +18,6 @@ from tests.waiting import wait_for
 from tests.wire.vectors import DOCUMENTED
 
 ODOM = "/robot_1/odom"
-
-
-@pytest.fixture
-def ctl(capsys):
-    """Runs a command line; (exit code, stdout, stderr). No traceback is allowed."""
-
-    def call(*arguments):
-        code = run([str(argument) for argument in arguments])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in out + err
-        return code, out, err
-
-    return call
 
 
 def publish(daemon, count=3):

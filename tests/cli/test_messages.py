@@ -5,25 +5,11 @@ import contextlib
 import pytest
 
 from sdrlinkd.adapters import empty, to_cdr
-from sdrlinkd.cli import run
 from sdrlinkd.client import Publisher
 from tests.programs import sdrlinkctl
 from tests.waiting import wait_for
 
 ODOM = "nav_msgs/msg/Odometry"
-
-
-@pytest.fixture
-def ctl(capsys):
-    """Runs a command line; (exit code, stdout, stderr)."""
-
-    def call(*arguments):
-        code = run([str(argument) for argument in arguments])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in out + err
-        return code, out, err
-
-    return call
 
 
 @pytest.fixture

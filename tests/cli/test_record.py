@@ -7,26 +7,12 @@ from pathlib import Path
 import pytest
 import sigmf
 
-from sdrlinkd.cli import run
 from sdrlinkd.process import wait_until
 from tests.iq.recordings import write_bursts
 from tests.programs import sdrlinkctl
 
 REGISTRY = Path(__file__).parents[2] / "etc/registry.csv"
 DEVICE = ("--device", "driver=none", "--frequency", "433e6", "--rate", "2e6")
-
-
-@pytest.fixture
-def ctl(capsys):
-    """Runs a command line; (exit code, stdout, stderr). No traceback is allowed."""
-
-    def call(*arguments):
-        code = run([str(argument) for argument in arguments])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in out + err
-        return code, out, err
-
-    return call
 
 
 @pytest.fixture

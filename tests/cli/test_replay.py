@@ -5,25 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sdrlinkd.cli import run
 from tests.backends.radios import record
 from tests.iq.recordings import RATE_HZ, write_bursts
 
 REGISTRY = Path(__file__).parents[2] / "etc/registry.csv"
 DEVICE = ("--device", "driver=none", "--frequency", "433e6", "--transmit")
-
-
-@pytest.fixture
-def ctl(capsys):
-    """Runs a command line; (exit code, stdout, stderr). No traceback is allowed."""
-
-    def call(*arguments):
-        code = run([str(argument) for argument in arguments])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in out + err
-        return code, out, err
-
-    return call
 
 
 @pytest.fixture

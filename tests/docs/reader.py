@@ -40,34 +40,36 @@ class Reader:
     def see(self, command):
         """Type a command until the screen has the words shown below it; the last screen."""
         until = time.monotonic() + PATIENCE_S
-        screen = self.type(command)
-        while missing_words(command.shown, screen) and command.line.startswith(ASKED_AGAIN):
-            assert time.monotonic() < until, screen
-            screen = self.type(command)
+        while True:
+            screen, code = self.type(command)
+            is_allowed = code == 0 or (code == 1 and command.line.startswith(self._may_say_no))
+            if is_allowed and not missing_words(command.shown, screen):
+                break
+            if not command.line.startswith(ASKED_AGAIN) or time.monotonic() > until:
+                break
+        assert is_allowed, f"{command.line}: exit code {code}\n{screen}"
         assert "Traceback" not in screen, screen
         assert "internal error" not in screen, screen
         assert not missing_words(command.shown, screen), f"{command.line}\n{screen}"
         return screen
 
     def type(self, command):
-        """What the screen shows; a command that ends in `&` keeps running."""
+        """What the screen shows, and the exit code; a command that ends in `&` keeps running."""
         line = command.line
         for word, here in self._replaced.items():
             line = line.replace(word, here)
         if line.startswith("export "):
             name, _, value = line.removeprefix("export ").partition("=")
             self.environment[name] = value
-            return ""
+            return "", 0
         if command.runs_on:
-            return self.leave_running(line.removesuffix("&").strip(), command.shown)
+            return self.leave_running(line.removesuffix("&").strip(), command.shown), 0
         done = subprocess.run(
             line, shell=True, cwd=self.folder, env=self.environment, stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=PATIENCE_S,
             check=False,
         )  # fmt: skip
-        allowed = (0, 1) if line.startswith(self._may_say_no) else (0,)
-        assert done.returncode in allowed, f"{line}\n{done.stdout}"
-        return done.stdout
+        return done.stdout, done.returncode
 
     def leave_running(self, line, shown=()):
         """Start a program in the background; its log once the words shown are in it."""

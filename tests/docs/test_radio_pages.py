@@ -40,10 +40,10 @@ class Laptop(Reader):
 
     def type(self, command):
         """Type a command; files that it wrote name this radio then."""
-        screen = super().type(command)
+        shown = super().type(command)
         for path in self.folder.glob("team/*.toml"):
             path.write_text(path.read_text().replace(f'"{self._driver}"', f'"{self.device}"'))
-        return screen
+        return shown
 
 
 @contextlib.contextmanager

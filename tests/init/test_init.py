@@ -272,7 +272,7 @@ def test_robots_on_computers_of_their_own_share_a_hub(init, tmp_path):
         written = load_config(tmp_path / "team" / f"robot_{number}.toml")
         assert (written.ether.hub, written.ether.dir, written.bus.runtime_dir) == (hub, "", "")
     assert "sdrlink-ether --listen 0.0.0.0:47900 &" in said
-    assert "copy registry.csv and one of robot_2.toml to each other robot" in said
+    assert "copy registry.csv and robot_2.toml to the other robot" in said
 
 
 def test_all_files_or_none(init, tmp_path):

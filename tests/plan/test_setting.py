@@ -77,7 +77,7 @@ def test_the_machines_are_a_term_of_their_own():
 def test_auto_comes_to_what_the_daemon_comes_to():
     two = odom(preset("usrp", "[access]\nnodes = [1, 2]\n"))
     assert two.policy == "tdma"
-    assert any("access tdma, because this radio detects another's" in note for note in two.notes)
+    assert any("access tdma, because this radio takes" in note for note in two.notes)
 
 
 def test_what_the_daemon_refuses_is_planned_and_told():
