@@ -21,6 +21,7 @@ ODOM = "/robot_1/odom"
 
 
 def publish(daemon, count=3):
+    """Publish odometry."""
     with Publisher(daemon.directory) as out:
         for _ in range(count):
             out.send(ODOM, to_cdr(empty("nav_msgs/msg/Odometry"), "nav_msgs/msg/Odometry"))
@@ -30,6 +31,7 @@ def publish(daemon, count=3):
 def test_status_for_people_and_programs(start_daemon, ctl):
     daemon = start_daemon()
     publish(daemon)
+    wait_for(lambda: daemon.snapshot().link.rx.delivered == 3)
     code, out, _ = ctl("status", "--runtime-dir", daemon.directory)
     assert code == 0
     assert "3 in = 3 sent + 0 queued" in out
@@ -42,6 +44,7 @@ def test_status_for_people_and_programs(start_daemon, ctl):
 def test_topics_check_reload(start_daemon, ctl):
     daemon = start_daemon()
     publish(daemon)
+    wait_for(lambda: daemon.snapshot().link.rx.delivered == 3)
     code, out, _ = ctl("topics", "--runtime-dir", daemon.directory)
     assert code == 0
     assert "/robot_1/odom" in out
