@@ -12,7 +12,7 @@ from posixpath import normpath, relpath
 
 ROOT = Path(__file__).parents[2]
 STAGED = ROOT / "build" / "pages"
-SITE = "zensical.toml"
+SITE, STYLE = "zensical.toml", "tables.css"
 NOT_PAGES = ("man", "measured", "screens", "site")
 """Folders of docs/ that hold no pages."""
 
@@ -96,6 +96,7 @@ def main() -> int:
         return 1
     shutil.copytree(ROOT / "docs" / "figures", STAGED / "figures")
     shutil.copy(Path(__file__).parent / SITE, STAGED.parent)
+    shutil.copy(Path(__file__).parent / STYLE, STAGED)
     sys.stdout.write(f"staged {len(made)} pages\n")
     return 0
 
