@@ -41,7 +41,9 @@ class Policies:
         prefix = f"/{config.namespace.strip('/')}/"
         topic = registry.by_name(name.removeprefix(prefix)) or registry.by_name(name)
         if topic is None:
-            raise UserError(f"topic {name}: unknown; allowed: {registry.suggest(name)}")
+            raise UserError(
+                f"topic {name}: unknown; allowed: {registry.suggest(name)} (as read at the start)"
+            )
         return topic.id
 
     def set(self, name: str, changes: Mapping[str, Any]) -> dict[str, Any]:

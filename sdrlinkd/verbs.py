@@ -12,6 +12,7 @@ from sdrlinkd.node import Node
 from sdrlinkd.opening import Opening
 from sdrlinkd.policies import Policies
 from sdrlinkd.reloading import Reloading
+from sdrlinkd.reports import ReceivedTopicReport
 
 log = logging.getLogger("sdrlinkd")
 
@@ -46,9 +47,13 @@ def make_verbs(
         return policies.set(str(arguments.get("topic", "")), changes)
 
     def why(arguments: dict[str, Any]) -> object:
-        topic_id = policies.topic_id(str(arguments.get("topic", "")))
+        name = str(arguments.get("topic", ""))
+        received = node.snapshot(control.requests).link.received
+        names = {each.republished_as: each.topic_id for each in received}
+        topic_id = names[name] if name in names else policies.topic_id(name)
         told = Told(setup.source, policies.changed.get(topic_id, ()))
-        return {"why": node.why(topic_id, told)}
+        heard = [_received(each) for each in received if each.topic_id == topic_id]
+        return {"why": [*node.why(topic_id, told), *heard]}
 
     verbs = {
         "hello": Verb(hello, "who answers, and its verbs"),
@@ -69,3 +74,12 @@ def make_verbs(
         ),
     }
     return verbs
+
+
+def _received(topic: ReceivedTopicReport) -> str:
+    """What a robot sent of a topic, in one sentence."""
+    words = f"received from robot {topic.src}: {topic.delivered} messages"
+    if topic.republished_as:
+        words += f" as {topic.republished_as}, {topic.delivered_per_s:.3g} a second now"
+    lost = ", ".join(f"{reason} {n}" for reason, n in topic.dropped.items() if n)
+    return f"{words}; lost: {lost}" if lost else words

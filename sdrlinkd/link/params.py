@@ -41,9 +41,8 @@ class LinkParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     greedy: bool = True
     """Whether to fill a PDU with further entries of the same topics."""
     flush_s: Literal["now"] | Annotated[float, Meta(ge=0)] = "now"
-    """Time in s that a PDU may wait until it is full; "now": no wait. 0.0 means, as in the paper,
-    that the wait does not end by time. Urgent and latency messages and messages with a lifespan
-    never wait."""
+    """Time in s that a PDU may wait until it is full; "now": no wait; 0.0: until it is full, as in
+    the paper. Urgent and latency messages and messages with a lifespan never wait."""
     dst: Annotated[int, Meta(ge=0, le=255)] = 255
     """Destination robot of topics without their own destination; 255: everyone."""
     hop_limit: Annotated[int, Meta(ge=1, le=15)] = 1

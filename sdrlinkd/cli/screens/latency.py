@@ -33,7 +33,7 @@ def latency_screen(
     timed = [(each, each.latency) for each in heard if each.latency is not None]
     clocks = _clocks(link)
     if not timed:
-        return [Text("no message with a STAMP received yet"), *clocks]
+        return [Text("no message with a STAMP received yet: ask the daemon that receives"), *clocks]
     parts: list[RenderableType] = [_waterfalls(timed)]
     if whole:
         parts += [_percentiles(topic, latency) for topic, latency in timed]

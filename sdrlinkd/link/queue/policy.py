@@ -25,8 +25,8 @@ class TopicPolicy(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Most messages that wait in the queue, where newer ones replace older ones; 0: no limit but
     the queue's."""
     lifespan_s: Positive | None = None
-    """Age in s after which a message is neither sent nor handed over. If absent, it is not sent
-    after the lifespan of its class."""
+    """Age in s after which a message is neither sent nor handed over. If absent, the lifespan of
+    its class applies, at the sender only."""
     deadman_s: Annotated[float, Meta(ge=0, le=60)] = 0.0
     """At the receiver: time in s without a message after which `stop` is published, once; 0:
     never."""

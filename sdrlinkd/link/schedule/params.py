@@ -18,8 +18,8 @@ class ClassParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     share: Share = 0.0
     """Guaranteed share of this robot's airtime, even if more urgent classes want it."""
     max_burst_s: Seconds = 0.0
-    """Longest burst in s while a more urgent message may come at an unpredictable time; 0: that of
-    the modem."""
+    """Longest burst in s of this class while topics of a more urgent class have no period that can
+    be predicted; 0: that of the modem."""
     parity: Annotated[float, Meta(ge=0, le=1)] = 0.0
     """Parity fragments per fragment of a large message: the share of its PDUs that may be lost."""
     lifespan_s: Lifespan = float("inf")

@@ -101,9 +101,13 @@ class Why:
 
     def _said(self, reason: str, topic_id: int, policy: TopicPolicy, told: Told) -> str:
         if reason == "tx_throttled":
+            if not policy.period_s:
+                return "throttled by a period that is no longer set"
             by = "sdrlinkctl set" if "period_s" in told.changed else told.source
             return f"throttled to {1 / policy.period_s:.3g} Hz by {by}"
         if reason == "tx_superseded":
+            if not policy.kept:
+                return "replaced by newer ones, by a depth that is no longer set"
             return f"replaced by newer ones: depth {policy.kept}"
         if reason == "tx_expired":
             return self._too_old(topic_id, policy)
@@ -127,15 +131,13 @@ class Why:
         }
         total = sum(used.values())
         rate = air.sent.bytes_per_s * 8e-6
-        carries = f" of {rate:.3g} Mbit/s" if rate < inf else ""
+        carries = f"; a full channel carries {rate:.3g} Mbit/s" if rate < inf else ""
         if not total:
-            return f"nothing was sent in the last minute{carries and ', ' + carries.strip()}"
-        others = ", ".join(
-            f"{each.label} {_share(n, total)}" for each, n in used.items() if n and each is not qos
-        )
-        return f"{qos.label} got {_share(used[qos], total)}{carries} airtime" + (
-            f" (others: {others})" if others else ""
-        )
+            return f"nothing was sent in the last minute{carries}"
+        shares = [f"{each.label} {_share(n, total)}" for each, n in used.items() if n]
+        if not used[qos]:
+            shares.insert(0, f"{qos.label} none")
+        return f"this robot's own airtime: {', '.join(shares)}{carries}"
 
     def _idle(self, now: float, air: AirUse) -> list[str]:
         """A sentence on how busy the channel was, or why it was idle."""
