@@ -1,6 +1,12 @@
-"""The OFDM modem: bits to samples and back."""
+"""The OFDM modem: bits to samples and back.
 
-from phy.channel import PROFILES, FrontEnd, FrontEndParams, Path, PathParams
+The arithmetic of bursts (their sizes, rates and error rates) is at hand at once. What touches
+samples needs compiled code and is loaded on first use: a program that only plans never loads it.
+"""
+
+import importlib
+from typing import TYPE_CHECKING
+
 from phy.constellation import Modulation, points
 from phy.error_rate import (
     burst_found_rate,
@@ -9,17 +15,20 @@ from phy.error_rate import (
     pdu_lost_rate,
 )
 from phy.header import MAX_PDU_BYTES, MAX_PDUS, N_NETWORKS
-from phy.kernels.cache import temporary_cache
 from phy.layout import BurstLayout, layout, most_pdus
 from phy.mcs import MCS_TABLE, Mcs
 from phy.numerology import GRIDS, OFDM_64_8, OFDM_64_16, Numerology
-from phy.oversampling import REACH, Downsampler, upsample
 from phy.quality import COUNTERS, BurstOver, BurstQuality, Event, PduHeard
-from phy.receiver import Receiver
-from phy.sensing import WINDOW as SENSE_WINDOW
-from phy.sensing import EnergyDetector
-from phy.transmitter import Transmitter
-from phy.warmup import warm_up
+from phy.sizes import SENSE_WINDOW
+
+if TYPE_CHECKING:
+    from phy.channel import PROFILES, FrontEnd, FrontEndParams, Path, PathParams
+    from phy.kernels.cache import temporary_cache
+    from phy.oversampling import REACH, Downsampler, upsample
+    from phy.receiver import Receiver
+    from phy.sensing import EnergyDetector
+    from phy.transmitter import Transmitter
+    from phy.warmup import warm_up
 
 __all__ = [
     "COUNTERS",
@@ -60,3 +69,23 @@ __all__ = [
     "upsample",
     "warm_up",
 ]
+
+_LATER = {
+    "phy.channel": ("PROFILES", "FrontEnd", "FrontEndParams", "Path", "PathParams"),
+    "phy.kernels.cache": ("temporary_cache",),
+    "phy.oversampling": ("REACH", "Downsampler", "upsample"),
+    "phy.receiver": ("Receiver",),
+    "phy.sensing": ("EnergyDetector",),
+    "phy.transmitter": ("Transmitter",),
+    "phy.warmup": ("warm_up",),
+}
+
+
+def __getattr__(name: str) -> object:
+    """Import an attribute on first use (PEP 562)."""
+    for module, names in _LATER.items():
+        if name in names:
+            found: object = getattr(importlib.import_module(module), name)
+            globals()[name] = found
+            return found
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

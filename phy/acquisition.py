@@ -11,7 +11,8 @@ from phy import header, ofdm, preamble
 from phy.constellation import Modulation
 from phy.convolutional import N_TAIL
 from phy.estimation import in_planes, new_channel, new_scratch, tones
-from phy.header import BurstHeader, parse_header
+from phy.header import BurstHeader
+from phy.header_code import parse_header
 from phy.kernels import acquisition as kernel
 from phy.kernels.acquisition import BACKOFF, Room, Training
 from phy.kernels.argument_block import ArgumentBlock

@@ -5,9 +5,9 @@ from functools import cached_property, lru_cache
 
 from phy import header, preamble
 from phy.crc import CRC32_SIZE
-from phy.ldpc import Segmentation, least_coded, segmentation
 from phy.mcs import MCS_TABLE, Mcs
 from phy.numerology import Numerology
+from phy.segmentation import Segmentation, least_coded, segmentation
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,9 @@ from phy.kernels.sensing import (
     LEAST_FLOOR,
     N_STATE,
     NEXT,
-    WINDOW,
     sense,
 )
 from phy.stream import LARGEST_SAMPLE
-
-__all__ = ["WINDOW", "EnergyDetector"]
 
 
 class EnergyDetector:

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 from phy import header, preamble
 from phy.constellation import Modulation
 from phy.crc import with_crc32
-from phy.header import N_NETWORKS, BurstHeader, header_bits
+from phy.header import N_NETWORKS, BurstHeader
+from phy.header_code import header_bits
 from phy.kernels.acquisition import BACKOFF
 from phy.layout import layout
+from phy.ldpc import packed_form
 from phy.mapping import mapping
 from phy.mcs import HEADER_MCS, MCS_TABLE
 from phy.numerology import OFDM_64_16, Numerology
@@ -61,7 +63,7 @@ class Transmitter:
         payload = burst[len(opening) :]
         by, first = mapping(plan.mcs.modulation, self._grid), header.n_symbols(self._grid)
         white = blocks ^ whitening(len(blocks))
-        by.modulate(white, plan.n_pdus, plan.form.arguments, first, plan.mcs.peak, payload)
+        by.modulate(white, plan.n_pdus, packed_form(plan.form), first, plan.mcs.peak, payload)
         payload[-_FALL:] *= _ramp(_FALL)[::-1]
         return burst
 

@@ -2,7 +2,7 @@
 
 A compiled kernel contains the code of the functions that it calls, and constants of other files.
 numba considers it valid until the function's own file changes; here it is valid until any file in
-the folder changes.
+the folder, or the file of sizes beside it, changes.
 
 numba caches kernels in $NUMBA_CACHE_DIR, beside the source or in the user's cache, and fails if it
 can write to none of them. Here a private temporary folder is the last choice, and if that fails too
@@ -71,7 +71,8 @@ def _temporary() -> str:
 
 
 def _stamp() -> str:
-    sources = b"".join(path.read_bytes() for path in sorted(_HERE.glob("*.py")))
+    files = [*sorted(_HERE.glob("*.py")), _HERE.parent / "sizes.py"]
+    sources = b"".join(path.read_bytes() for path in files)
     return hashlib.sha256(sources).hexdigest()
 
 

@@ -37,8 +37,9 @@ from numpy.typing import NDArray
 from phy.kernels.argument_block import ArgumentBlock, PackedArguments, opener
 from phy.kernels.bits import Words, get, low_ones, put, put_signs, to_octets
 from phy.kernels.ldpc_encoder import parity_of
-from phy.kernels.ldpc_form import N_COLUMNS, Form, open_form
+from phy.kernels.ldpc_form import Form, open_form
 from phy.kernels.ldpc_rows import LANES, ldpc_row
+from phy.sizes import N_COLUMNS
 
 SURE = 4000
 """LLR of a bit that is known to be 0."""

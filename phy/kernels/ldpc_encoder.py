@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from phy.kernels.argument_block import PackedArguments
 from phy.kernels.bits import ONE, Words, from_octets, get, low_ones
 from phy.kernels.inline import step
-from phy.kernels.ldpc_form import N_COLUMNS, Form, open_form
+from phy.kernels.ldpc_form import Form, open_form
+from phy.sizes import N_COLUMNS
 
 _63 = np.uint64(63)
 

@@ -7,9 +7,6 @@ from numpy.typing import NDArray
 
 from phy.kernels.argument_block import opener
 
-N_COLUMNS = 24
-"""Number of block columns of a code."""
-
 
 class Form(NamedTuple):
     """A code, and how much of a block each codeword holds; see `phy.kernels.ldpc` for the terms."""

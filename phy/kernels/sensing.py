@@ -8,7 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-WINDOW = 64
+from phy.sizes import SENSE_WINDOW as WINDOW
+
 # Content of the state: the floor (0: none yet), the index after the last busy window, the index of
 # the next sample, the number of samples in the current window, and their powers.
 FLOOR, BUSY_UNTIL, NEXT, FILLED, POWERS = 0, 1, 2, 3, 4

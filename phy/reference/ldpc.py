@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from phy.ldpc import MAX_ITERATIONS, QuasiCyclic, Segmentation
+from phy.segmentation import MAX_ITERATIONS, QuasiCyclic, Segmentation
 
 Bits = NDArray[np.uint8]
 

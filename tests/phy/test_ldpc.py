@@ -12,17 +12,15 @@ from hypothesis import strategies as st
 from phy.kernels.bits import get, put, put_signs, to_octets
 from phy.kernels.ldpc import decode_codeword
 from phy.kernels.ldpc_rows import MAX_POSTERIOR
-from phy.ldpc import (
+from phy.ldpc import decode, encode, new_workspace, packed_form
+from phy.reference import ldpc as reference
+from phy.segmentation import (
     LIFTINGS,
     QuasiCyclic,
     Segmentation,
-    decode,
-    encode,
     least_coded,
-    new_workspace,
     segmentation,
 )
-from phy.reference import ldpc as reference
 from tests.laws import law, often
 
 RATES = [Fraction(1, 2), Fraction(2, 3), Fraction(3, 4), Fraction(5, 6)]
@@ -132,7 +130,7 @@ def test_every_check_holds_for_every_codeword(code):
 def test_the_vectors_do_what_the_reference_says_bit_for_bit(code):
     """With noise from little to hopeless, and with values at the limits of the range."""
     rng = np.random.default_rng(SEED)
-    work, form = new_workspace().content, whole(code).arguments.content
+    work, form = new_workspace().content, packed_form(whole(code)).content
     outcomes = set()
     for ebn0_db, at_edges in ((9.0, 0), (6.0, 0), (3.0, 0), (2.0, 20), (-3.0, 5)):
         word = encoded(code, random_bits(rng, code.k))

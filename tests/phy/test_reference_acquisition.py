@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from phy import GRIDS, Transmitter, acquisition, header, preamble
+from phy import GRIDS, Transmitter, acquisition, header_code, preamble
+from phy.header import BurstHeader
 from phy.kernels import acquisition as kernel
 from phy.kernels.detector import search, strongest
 from phy.kernels.timing import locate
@@ -149,8 +150,8 @@ def test_headers_repetitions_are_folded_and_read_alike():
     n_listed = n_read = 0
     for seed in range(120):
         draws = rng(seed)
-        told = header.BurstHeader(*(int(draws.integers(1, most)) for most in (10, 64, 2048, 8)))
-        coded = header.header_bits(told, 96)
+        told = BurstHeader(*(int(draws.integers(1, most)) for most in (10, 64, 2048, 8)))
+        coded = header_code.header_bits(told, 96)
         llr = 8 * (1 - 2.0 * coded) + draws.normal(0, draws.uniform(1, 16), 96)
         llr = np.clip(8 * llr, -511, 511).astype(np.int16)
         at_once = np.empty(76, np.int16)
@@ -158,9 +159,9 @@ def test_headers_repetitions_are_folded_and_read_alike():
         assert np.array_equal(folded(llr), at_once)
         likeliest = np.empty(4, np.uint8)
         kernel.decode_block(at_once, np.empty(38, np.uint64), likeliest)
-        expected = header.parse_header(likeliest, at_once)
+        expected = header_code.parse_header(likeliest, at_once)
         assert parse_header(folded(llr)) == expected
         n_read += expected is not None
-        n_listed += expected is not None and header._checked(likeliest.tobytes()) is None
+        n_listed += expected is not None and header_code._checked(likeliest.tobytes()) is None
     assert 20 < n_read < 120
     assert n_listed > 2

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phy import GRIDS, MCS_TABLE, Transmitter, header, reference
+from phy import GRIDS, MCS_TABLE, Transmitter, header_code, reference
 from phy.header import BurstHeader
 from phy.reference.header import checked, header_bits
 from phy.reference.viterbi import encode
@@ -85,12 +85,12 @@ def test_what_cannot_be_sent_is_refused_in_the_same_words(kind, settings, call, 
 def test_headers_are_coded_and_told_as_the_modem_does(mcs, n_pdus, pdu_bytes, network):
     told = BurstHeader(mcs, n_pdus, pdu_bytes, network)
     coded = header_bits(told, 96)
-    assert np.array_equal(coded, header.header_bits(told, 96))
+    assert np.array_equal(coded, header_code.header_bits(told, 96))
     octets = header_octets(coded)
-    assert checked(octets) == header._checked(octets)
+    assert checked(octets) == header_code._checked(octets)
     assert checked(octets) == (told if mcs < 10 and n_pdus and pdu_bytes else None)
     wrong = bytes([octets[0] ^ 1, *octets[1:]])
-    assert checked(wrong) is header._checked(wrong) is None
+    assert checked(wrong) is header_code._checked(wrong) is None
 
 
 def header_octets(coded):

@@ -7,7 +7,8 @@ import pytest
 
 from phy import MCS_TABLE, OFDM_64_8, OFDM_64_16, Modulation, points
 from phy.crc import checked, crc8, with_crc32
-from phy.header import N_BITS, BurstHeader, header_bits, parse_header
+from phy.header import N_BITS, BurstHeader
+from phy.header_code import header_bits, parse_header
 from phy.interleaver import order
 from phy.kernels.acquisition import fold
 from phy.kernels.viterbi import decode_block

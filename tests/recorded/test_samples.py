@@ -6,7 +6,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from phy.ldpc import QuasiCyclic, Segmentation, encode
+from phy.ldpc import encode
+from phy.segmentation import QuasiCyclic, Segmentation
 from phy.wifi import HtFrame, HtSignal, WifiFrame, receive
 from tests.phy.quiet import quiet
 
