@@ -1,7 +1,7 @@
 """One kind of radio, as the rest of the daemon sees it: a row of the registry."""
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from functools import reduce
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -64,6 +64,11 @@ def nothing_unchecked(_settings: Any) -> list[str]:  # noqa: ANN401
     return []
 
 
+async def as_configured(settings: Any, _patience: Patience) -> bool:  # noqa: ANN401
+    """Whether `settings` leave the key `paced` as it is, which is set."""
+    return bool(getattr(settings, "paced", True))
+
+
 def presume_full_duplex(
     _settings: Any,  # noqa: ANN401
     needs: ModemNeeds,
@@ -98,8 +103,9 @@ class Backend(NamedTuple):
     """A kind of radio: its name, its settings, how to make one, and its common properties.
 
     The module in `make` is imported when the first radio is made, so a row costs nothing. The
-    daemon reads two keys of any `settings`: with `hear_self` it accepts its own PDUs, with
-    `wait_for_consumer` it opens the air when the first consumer subscribes.
+    daemon reads three keys of any `settings`: with `hear_self` it accepts its own PDUs, with
+    `wait_for_consumer` it opens the air when the first consumer subscribes, and with `paced` set to
+    false it takes samples as fast as they come.
     """
 
     name: str
@@ -121,6 +127,11 @@ class Backend(NamedTuple):
     """The device may be absent and appear later; the radio's section may change meanwhile."""
     heeds_patience: bool = False
     """The radio waits as RadioRequest.patience says, and notices when its device was replugged."""
+    keeps_pace: Callable[[Any, Patience], Awaitable[bool]] = as_configured
+    """Whether samples come in real time, once the radio is open; false: as fast as they are taken.
+
+    It may wait as RadioRequest.patience says. Raises BackendError.
+    """
     problem: Callable[[Any, ModemNeeds], str] = no_problem
     """What is wrong with the settings for that modem: key, given, allowed; empty: nothing."""
     unchecked: Callable[[Any], list[str]] = nothing_unchecked

@@ -1,7 +1,7 @@
 """What follows from settings alone, for radios without a device; nothing is opened here."""
 
 from backends.backend import ModemNeeds, Presumption, simulated
-from backends.base import BackendError
+from backends.base import BackendError, Patience
 from backends.hub_address import hub_of
 from backends.params import EtherParams, IqFileParams, ZmqParams
 
@@ -32,6 +32,13 @@ def iqfile_unchecked(iqfile: IqFileParams) -> list[str]:
     if not iqfile.receive:
         return []
     return [f"whether {iqfile.receive} is readable (the recording is not opened)"]
+
+
+async def ether_keeps_pace(ether: EtherParams, patience: Patience) -> bool:
+    """Whether the hub keeps real time, as it says. Raises AbsentError when no hub answers."""
+    from backends.ether import hub_keeps_pace
+
+    return await hub_keeps_pace(hub_of(ether), patience)
 
 
 def ether_problem(ether: EtherParams, _needs: ModemNeeds) -> str:

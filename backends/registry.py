@@ -50,6 +50,7 @@ BUILT_IN = {
             make="backends.making:make_ether",
             files=("dir",),
             heeds_patience=True,
+            keeps_pace=known.ether_keeps_pace,
             problem=known.ether_problem,
             unchecked=known.ether_unchecked,
             presume=known.ether_presumption,

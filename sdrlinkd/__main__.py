@@ -11,7 +11,7 @@ import uvloop
 from sdrlinkd import __version__, daemon
 from sdrlinkd.config import Setup, load_config, make_setup, unchecked
 from sdrlinkd.errors import UserError
-from sdrlinkd.journal import JournalFormatter, is_read_by_journal
+from sdrlinkd.journal import log_to_stderr
 from sdrlinkd.parent import end_with_parent
 
 DEFAULT_CONFIG = Path("/etc/sdrlinkd/sdrlinkd.toml")
@@ -21,7 +21,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the daemon; returns 0 after a clean stop, 2 for errors that a person can fix."""
     end_with_parent()
     options = _parser().parse_args(arguments)
-    _log_to_stderr(options.log_level)
+    log_to_stderr(logging.getLevelNamesMapping()[options.log_level.upper()])
     try:
         setup = _read(options.config)
         if options.check:
@@ -36,14 +36,6 @@ def main(arguments: list[str] | None = None) -> int:
         # Ctrl-C before the daemon has installed its own handler.
         return 130
     return 0
-
-
-def _log_to_stderr(level: str) -> None:
-    text = "%(levelname)s %(message)s" if level == "debug" else "%(message)s"
-    handler = logging.StreamHandler()
-    make = JournalFormatter if is_read_by_journal() else logging.Formatter
-    handler.setFormatter(make(text))
-    logging.basicConfig(level=level.upper(), handlers=[handler])
 
 
 def _read(path: Path) -> Setup:

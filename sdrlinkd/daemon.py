@@ -24,7 +24,7 @@ from sdrlinkd.control import Control
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.health import Level
 from sdrlinkd.link import Link
-from sdrlinkd.loading import Loading
+from sdrlinkd.modem import Loading, access_words, check_airtime, make_modem
 from sdrlinkd.node import Node
 from sdrlinkd.opening import Opening
 from sdrlinkd.pdulink import DirectLink, PduLink, make_gnuradio
@@ -170,11 +170,8 @@ def _make_pdu_link(
         return DirectLink(config.direct, config.link.pdu_size, rng)
     if config.backend == "gnuradio":
         return make_gnuradio(config)
-    # With the default, a busy event loop keeps the modem's threads waiting for 5 ms.
+    # With the default, a busy event loop keeps a modem in this process waiting for 5 ms.
     sys.setswitchinterval(SWITCH_INTERVAL_S)
-    # The modem imports numba, which is slow to load.
-    from sdrlinkd.modem import make_modem
-
     return make_modem(config, setup.node_id, rng, patience, began_s, loading)
 
 
@@ -199,9 +196,6 @@ def _chrony(setup: Setup, stack: contextlib.AsyncExitStack) -> "ChronySocket | N
 def check(setup: Setup) -> list[str]:
     """Lines for the user from checks of message types and radio. Raises ConfigError."""
     _types_of(setup)
-    # The modem imports numba, which is slow to load.
-    from sdrlinkd.modem import access_words, check_airtime
-
     try:
         if setup.config.backend not in WITHOUT_AIR:
             check_airtime(setup.config)

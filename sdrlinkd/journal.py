@@ -29,3 +29,12 @@ class JournalFormatter(logging.Formatter):
         """The record as text, with the priority on every line."""
         mark = f"<{_PRIORITIES.get(record.levelno, 5)}>"
         return "\n".join(mark + line for line in super().format(record).splitlines())
+
+
+def log_to_stderr(level: int) -> None:
+    """Log what is as important as `level`, in the form that the reader of stderr expects."""
+    text = "%(levelname)s %(message)s" if level <= logging.DEBUG else "%(message)s"
+    handler = logging.StreamHandler()
+    make = JournalFormatter if is_read_by_journal() else logging.Formatter
+    handler.setFormatter(make(text))
+    logging.basicConfig(level=level, handlers=[handler])

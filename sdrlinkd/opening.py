@@ -70,6 +70,9 @@ class Opening:
         Raises UserError if the first try fails in a way that only a person can fix.
         """
         wait_s, most_s = RETRY_S
+        if self.state == "waiting":
+            # What ends soon after it was opened is not opened again and again.
+            await self._pause(wait_s)
         while True:
             is_first = self._patience is Patience.NONE
             if self._told_to.is_set():
@@ -95,15 +98,15 @@ class Opening:
                     self.state, self.reason = "up", ""
                     return carry
                 continue
-            with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(wait_s if self._knows_when else None):
-                    await self._told_to.wait()
+            await self._pause(wait_s if self._knows_when else None)
             wait_s = min(2 * wait_s, most_s)
 
     async def run(self, carry: Carry) -> None:
-        """Run the PDU link until it refuses its settings or a retry is requested."""
+        """Run the PDU link until it is gone, refuses its settings, or a retry is requested."""
         try:
             await self._unless_told(carry())
+        except LinkAbsentError as error:
+            self._wait("waiting", str(error), Patience.THERE, knows_when=True)
         except LinkRefusedError as error:
             self.refused(str(error))
 
@@ -139,6 +142,12 @@ class Opening:
         began_s = time.monotonic() - self.pdu_link.now()
         await self.pdu_link.close()
         self.pdu_link = self._make(self._setup, self._patience, began_s)
+
+    async def _pause(self, at_most_s: float | None) -> None:
+        """Wait until a retry is requested, or for `at_most_s`."""
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(at_most_s):
+                await self._told_to.wait()
 
     def _wait(self, state: str, reason: str, patience: Patience, knows_when: bool) -> None:
         self.state, self.reason = state, reason

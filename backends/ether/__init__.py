@@ -1,11 +1,14 @@
-"""A simulated air that many nodes share: its world, its medium, its hub process and its radios."""
+"""A simulated air that many nodes share: its world, its medium, its hub process and its radios.
 
-from backends.ether.antenna import Antenna
-from backends.ether.hub import EtherHub
-from backends.ether.local import LocalEther, LocalRadio, lockstep_capabilities
-from backends.ether.medium import Medium, Piece
+What computes samples needs compiled code and is loaded on first use: a program that only asks a
+hub never loads it.
+"""
+
+import importlib
+from typing import TYPE_CHECKING
+
+from backends.ether.pace import hub_keeps_pace
 from backends.ether.protocol import Answer
-from backends.ether.radio import EtherRadio
 from backends.ether.watch import HubWatch
 from backends.ether.world import (
     AirParams,
@@ -16,6 +19,13 @@ from backends.ether.world import (
     Track,
     World,
 )
+
+if TYPE_CHECKING:
+    from backends.ether.antenna import Antenna
+    from backends.ether.hub import EtherHub
+    from backends.ether.local import LocalEther, LocalRadio, lockstep_capabilities
+    from backends.ether.medium import Medium, Piece
+    from backends.ether.radio import EtherRadio
 
 __all__ = [
     "AirParams",
@@ -34,5 +44,24 @@ __all__ = [
     "RadioParams",
     "Track",
     "World",
+    "hub_keeps_pace",
     "lockstep_capabilities",
 ]
+
+_LATER = {
+    "Antenna": "antenna",
+    "EtherHub": "hub",
+    "EtherRadio": "radio",
+    "LocalEther": "local",
+    "LocalRadio": "local",
+    "Medium": "medium",
+    "Piece": "medium",
+    "lockstep_capabilities": "local",
+}
+
+
+def __getattr__(name: str) -> object:
+    """Import an attribute on first use (PEP 562)."""
+    if name not in _LATER:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"backends.ether.{_LATER[name]}"), name)

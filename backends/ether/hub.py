@@ -279,4 +279,5 @@ class EtherHub:
             bursts=self._medium.bursts,
             bursts_late=self._medium.bursts_late,
             samples_lost=self._samples_lost,
+            paced=self._paced,
         )

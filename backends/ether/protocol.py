@@ -106,6 +106,8 @@ class Answer(msgspec.Struct, tag=True, frozen=True, kw_only=True):
     bursts: int
     bursts_late: int
     samples_lost: int
+    paced: bool = True
+    """Whether this air keeps real time; false: lock-step."""
 
 
 ToHub = Hello | Question

@@ -25,7 +25,7 @@ from sdrlinkd.link import (
     ReassemblyParams,
     may_share,
 )
-from sdrlinkd.modem import ModemLink
+from sdrlinkd.modem import modem_on
 from sdrlinkd.pdulink import Heard
 from sdrlinkd.wire import make_registry
 
@@ -54,7 +54,7 @@ class Station:
             LinkParams(pdu_size=pdu_size), QueueParams(), ReassemblyParams(),
             make_registry(TOPICS), own_id, Random(seed), clock=clock,
         )  # fmt: skip
-        self.modem = ModemLink(modem, pdu_size, radio, "ether", may_share(access, own_id))
+        self.modem = modem_on(modem, pdu_size, radio, "ether", may_share(access, own_id))
         self._access = access
         self._arrivals = iter(arrivals)
         self._next = next(self._arrivals, None)

@@ -1,5 +1,48 @@
 """A clock that runs by the received samples: `now` is the sample index over the sample rate."""
 
+from typing import NamedTuple
+
+
+class Seen(NamedTuple):
+    """The last block of a stream.
+
+    The samples before index `end` had arrived at monotonic time `host_s`; `late_s` is the shortest
+    recent difference between arrival and the samples' own time.
+    """
+
+    end: int
+    host_s: float
+    late_s: float
+
+
+class BlockTimes:
+    """When blocks arrive; `observe` is for one thread at a time, `seen` for any thread."""
+
+    LATELY_S = 0.25
+    """Span in s; the shortest delay is taken over the last one to two spans, in which crystals
+    drift apart by some µs."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self._rate_hz = rate_hz
+        self._before = self._least = float("inf")
+        self._until = float("-inf")
+        self.seen: Seen | None = None
+        """The last block; None: no block yet."""
+
+    def observe(self, end: int, host_s: float) -> Seen:
+        """Note that the samples before `end` had arrived at `host_s`."""
+        late_s = host_s - end / self._rate_hz
+        if host_s >= self._until:
+            self._before, self._least = self._least, late_s
+            # After a whole span without blocks, the earlier shortest delay is too old.
+            if host_s >= self._until + self.LATELY_S:
+                self._before = late_s
+            self._until = host_s + self.LATELY_S
+        else:
+            self._least = min(self._least, late_s)
+        seen = self.seen = Seen(end, host_s, min(self._before, self._least))
+        return seen
+
 
 class StreamClock:
     """Seconds since index 0 of a stream; `host_s` is the monotonic clock at each call.
@@ -16,9 +59,6 @@ class StreamClock:
     """Time in s without a block after which an unpaced stream has stopped."""
     GONE_S = 0.25
     """Time in s without a block after which a paced stream has stopped."""
-    LATELY_S = 0.25
-    """Span in s; the shortest delay is taken over the last one to two spans, in which crystals
-    drift apart by some µs."""
 
     def __init__(
         self,
@@ -32,49 +72,22 @@ class StreamClock:
         self._paced = paced
         self._lockstep = lockstep
         self._latest = 0.0
-        self._seen: tuple[int, float, float] | None = None
-        self._before = self._least = float("inf")
-        self._until = float("-inf")
 
-    @property
-    def end(self) -> int:
-        """Index after the last sample received."""
-        return 0 if self._seen is None else self._seen[0]
-
-    def observe(self, end: int, host_s: float) -> None:
-        """Note that the samples before `end` had arrived at `host_s`; one thread at a time."""
-        late_s = host_s - end / self._rate_hz
-        if host_s >= self._until:
-            self._before, self._least = self._least, late_s
-            # After a whole span without blocks, the earlier shortest delay is too old.
-            if host_s >= self._until + self.LATELY_S:
-                self._before = late_s
-            self._until = host_s + self.LATELY_S
-        else:
-            self._least = min(self._least, late_s)
-        self._seen = end, host_s, min(self._before, self._least)
-
-    def now(self, host_s: float) -> float:
-        """Time in s on the stream's clock."""
-        if self._seen is None:
+    def now(self, seen: Seen | None, host_s: float) -> float:
+        """Time in s on the stream's clock, whose last block is `seen`."""
+        if seen is None:
             if self._began_s is not None:
                 self._latest = max(self._latest, host_s - self._began_s)
             return self._latest
-        end, seen_s, least_s = self._seen
         if self._lockstep:
-            now = end / self._rate_hz
+            now = seen.end / self._rate_hz
         elif self._paced:
-            now = max(end / self._rate_hz, host_s - least_s)
+            now = max(seen.end / self._rate_hz, host_s - seen.late_s)
         else:
-            now = end / self._rate_hz + max(0.0, host_s - seen_s - self.QUIET_S)
+            now = seen.end / self._rate_hz + max(0.0, host_s - seen.host_s - self.QUIET_S)
         self._latest = max(self._latest, now)
         return self._latest
 
-    def index(self, host_s: float) -> int:
-        """Index of the sample that is on the air now."""
-        return round(self.now(host_s) * self._rate_hz)
-
-    def is_gone(self, host_s: float) -> bool:
+    def is_gone(self, seen: Seen | None, host_s: float) -> bool:
         """Whether a paced stream had started and no longer delivers blocks."""
-        seen = self._seen
-        return self._paced and seen is not None and host_s - seen[1] > self.GONE_S
+        return self._paced and seen is not None and host_s - seen.host_s > self.GONE_S

@@ -1,4 +1,4 @@
-"""The modem link: decides bursts at the last moment; the PHY runs off the event loop."""
+"""The modem link: decides bursts at the last moment, and hands them to a modem."""
 
 import asyncio
 import contextlib
@@ -7,20 +7,18 @@ import time
 from collections.abc import Awaitable, Callable, Sequence
 from functools import partial
 
-import phy
-from backends import AbsentError, BackendError, LateRadio, Radio, RefusalError, RxBlock, Tuning
+from backends import AbsentError, BackendError, Capabilities, RefusalError
 from sdrlinkd.config import ModemParams
 from sdrlinkd.errors import ConfigError, LinkAbsentError, LinkRefusedError, UserError
-from sdrlinkd.link import Burst, Opportunity, Outcome, PduLinkTraits
+from sdrlinkd.link import Opportunity, Outcome, PduLinkTraits
 from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.clock import StreamClock
-from sdrlinkd.modem.compiled import load_phy
+from sdrlinkd.modem.modem import BurstReport, Modem, NoModem
+from sdrlinkd.modem.on_air import OnAir
 from sdrlinkd.modem.plan import AirPlan, TxWindowPlan
 from sdrlinkd.modem.report import modem_report
-from sdrlinkd.modem.rx_thread import Demodulation, ReceiverHere, ReceiverThread
-from sdrlinkd.modem.sensing_receiver import SensingReceiver
+from sdrlinkd.modem.tempo import Tempo
 from sdrlinkd.modem.traits import pdu_link_traits
-from sdrlinkd.modem.transmission import BurstReport, Transmission
 from sdrlinkd.pdulink import Carry, Heard, PduListener
 from sdrlinkd.reports import PduLinkReport
 
@@ -30,69 +28,57 @@ INFINITE = float("inf")
 
 
 class ModemLink:
-    """A PDU link over a radio. The PHY runs off the event loop, all else on it.
+    """A PDU link over the modem that `choose` makes; it handles PDUs, and never samples.
 
-    In lock-step, each block is completely processed before the next one. `listens`: whether the
-    receiver senses if the channel is busy. `lead_grows`: whether, for such a radio, bursts at fixed
-    times are handed over earlier once the machine proves slow. `began_s`: start of the link's clock
-    on the monotonic clock; None: the link's clock starts with the samples. `load` compiles or loads
-    the PHY.
+    In lock-step, each block is completely processed before the next one. `lead_grows`: whether, for
+    such a radio, bursts at fixed times are handed over earlier once the machine proves slow.
+    `began_s`: start of the link's clock on the monotonic clock; None: the link's clock starts with
+    the samples.
     """
 
     def __init__(
         self,
         params: ModemParams,
         pdu_size: int,
-        radio: Radio,
+        choose: Callable[[], Awaitable[Modem]],
         kind: str,
-        listens: bool = False,
         lead_grows: Callable[[PduLinkTraits], bool] = lambda _: False,
         began_s: float | None = None,
-        load: Callable[[], Awaitable[None]] = load_phy,
     ) -> None:
         self._params = params
         self._began_s = began_s
-        self._radio = radio if began_s is None else LateRadio(radio, self._first_index)
+        self._choose = choose
+        self._modem: Modem = NoModem()
         self._kind = kind
         self._airtimes = Airtimes(params, pdu_size)
-        self._receiver = phy.Receiver(
-            params.network,
-            params.searched_cfo_hz / params.rate_hz,
-            phy.GRIDS[params.grid],
-            centre_cycles=params.centre_hz / params.rate_hz if params.one_crystal else 0.0,
-        )
-        sense = phy.EnergyDetector(params.carrier_db) if listens else None
-        self._receiving = SensingReceiver(self._receiver, sense, params.rate_hz)
         self._may_lead_grow = lead_grows
         self._lead_grows = False
         self._clock = StreamClock(params.rate_hz, paced=True, began_s=began_s)
-        self._load = load
         self._plan = AirPlan(0)
-        self._rx: Demodulation | None = None
-        self._tx = Transmission(params, self._radio)
+        self._tempo = Tempo()
+        self._on_air = OnAir()
+        self._can: Capabilities | None = None
         self._listener: PduListener | None = None
-        self._moved = asyncio.Event()
+        self._moved, self._is_refused = asyncio.Event(), asyncio.Event()
         self._state = "down"
         self._problem = ""
 
     def now(self) -> float:
         """Time in s on the received stream's clock."""
-        return self._clock.now(time.monotonic())
+        return self._clock.now(self._modem.seen, time.monotonic())
 
     async def open(self, listener: PduListener) -> Carry:
-        """Load the PHY, open the radio. Raises LinkAbsentError, LinkRefusedError or UserError."""
+        """Open the modem. Raises LinkAbsentError, LinkRefusedError or UserError."""
         params = self._params
-        await self._load()
-        tuning = Tuning(params.rate_hz, params.centre_hz)
         try:
-            await self._radio.open(tuning)
+            self._modem = await self._choose()
+            can = self._can = await self._modem.open()
         except AbsentError as error:
             raise LinkAbsentError(str(error)) from None
         except RefusalError as error:
             raise LinkRefusedError(str(error)) from None
         except BackendError as error:
             raise UserError(str(error)) from None
-        can = self._can = self._radio.capabilities
         traits = pdu_link_traits(self._kind, can, params, self._airtimes)
         self._lead_grows = self._may_lead_grow(traits)
         if not can.paced:
@@ -103,36 +89,33 @@ class ModemLink:
         self._plan = AirPlan(math.ceil(lead), round(ahead))
         if can.tx_windows is not None:
             self._plan = TxWindowPlan(math.ceil(lead), round(ahead), can.tx_windows, params.rate_hz)
-        rx: Demodulation
-        if can.lockstep:
-            rx = ReceiverHere(self._receiving, params.rate_hz, self._step)
-        else:
-            rx = ReceiverThread(self._receiving, params.rate_hz, self._deliver, not can.paced)
-        self._rx = rx
         try:
             listener.attach(traits)
         except ConfigError as error:
             raise LinkRefusedError(str(error)) from None
         self._listener = listener
         self._state = "up"
-        return partial(self._carry, rx)
+        return partial(self._carry, can)
 
-    async def _carry(self, rx: Demodulation) -> None:
-        """Receive and send until cancelled. Raises LinkRefusedError."""
-        refusal = ""
-        async with asyncio.TaskGroup() as tasks:
-            self._tx.start(tasks, self._left)
-            sending = None if self._can.lockstep else tasks.create_task(self._send_when_due())
-            try:
-                await self._receive(rx)
-            except BackendError as error:
+    async def _carry(self, can: Capabilities) -> None:
+        """Receive and send until cancelled. Raises LinkAbsentError, LinkRefusedError."""
+        running = [asyncio.ensure_future(self._modem.run(self))]
+        if not can.lockstep:
+            running.append(asyncio.ensure_future(self._send_when_due()))
+        refusal = asyncio.ensure_future(self._is_refused.wait())
+        try:
+            self._moved.set()
+            await asyncio.wait((*running, refusal), return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in (*running, refusal):
+                task.cancel()
+            await asyncio.wait((*running, refusal))
+        if self._is_refused.is_set():
+            raise LinkRefusedError(self._problem)
+        for task in running:
+            if not task.cancelled() and (error := task.exception()) is not None:
                 self._state, self._problem = "down", str(error)
-                refusal = str(error) if isinstance(error, RefusalError) else ""
-            if not refusal:
-                await asyncio.Event().wait()
-            elif sending is not None:
-                sending.cancel()
-        raise LinkRefusedError(refusal)
+                raise LinkAbsentError(str(error)) if isinstance(error, AbsentError) else error
 
     def wake(self) -> None:
         """Check again whether there is something to send."""
@@ -140,96 +123,84 @@ class ModemLink:
 
     async def idle(self) -> None:
         """Wait until every burst handed over is settled."""
-        while self._tx.on_air:
+        while self._on_air:
             self._moved.clear()
             await self._moved.wait()
 
     async def close(self) -> None:
-        """Close the radio; bursts that have not left are lost."""
-        await self._radio.close()
+        """Close the modem; bursts that have not left are lost."""
+        await self._modem.close()
         listener, self._listener = self._listener, None
         if listener is not None:
-            self._tx.lose(listener, self.now())
+            for burst in self._on_air.take_all():
+                listener.settled(burst, Outcome.LOST, self.now())
         self._state = "down"
-        if self._rx is not None:
-            self._rx.stop()
-        self._tx.close()
 
     def report(self) -> PduLinkReport:
         """The report: state, counters of radio and receiver, and whether the PHY keeps up."""
+        seen = self._modem.seen
         return modem_report(
             self._kind,
             "down" if self._is_gone else self._state,
             self._problem,
             self._params,
-            self._radio,
-            {**self._tx.counters, **{name: self._receiver.counters[name] for name in phy.COUNTERS}},
-            self._realtime_ratio,
-            self._clock.end,
+            self._modem.status,
+            self._can,
+            0 if seen is None else seen.end,
         )
 
-    @property
-    def _realtime_ratio(self) -> float:
-        return self._rx.load.realtime_ratio if self._rx is not None else 0.0
+    # The modem's user.
 
-    @property
-    def _is_gone(self) -> bool:
-        if self._state != "up" or not self._can.paced:
-            return False
-        return bool(self._radio.trouble) or self._clock.is_gone(time.monotonic())
-
-    def _first_index(self) -> int:
-        """Index of the radio's first sample on the link's clock."""
-        return 0 if self._can.lockstep else self._clock.index(time.monotonic())
-
-    async def _receive(self, receiver: Demodulation) -> None:
-        """Take blocks from the radio, which has to wait if the receiver falls far behind."""
-        paced = self._can.paced
-
-        def hear(block: RxBlock) -> None:
-            """Demodulate a block on the radio's thread."""
-            self._clock.observe(block.index + block.n, block.host_ns * 1e-9)
-            receiver.hear(block)
-
-        self._moved.set()
-        async for block in self._radio.blocks(hear if paced else None):
-            if paced:
-                self._clock.observe(block.index + block.n, block.host_ns * 1e-9)
-            await receiver.put(block)
-        await receiver.finish()
-        self._state = "ended"
-        self._moved.set()
-
-    def _deliver(self, events: Sequence[phy.Event], end: int) -> None:
-        """Pass on the events that the samples before index `end` completed."""
-        if not self._can.paced:
-            # Without pace, blocks wait for the receiver, and so does the clock.
-            self._clock.observe(end, time.monotonic())
-        if self._rx is not None and self._rx.wakes:
+    def delivered(self, heard: Sequence[Heard], _end: int) -> None:
+        """Pass on PDUs; in lock-step, process everything that follows from a block."""
+        if self._modem.wakes:
             self._moved.set()
-        self._tell(events)
-
-    def _step(self, events: Sequence[phy.Event], end: int) -> None:
-        """Process everything that follows from a block, in lock-step."""
-        self._deliver(events, end)
-        if self._listener is not None:
-            self._listener.advance(self.now())
+        listener = self._listener
+        if listener is None:
+            return
+        if heard:
+            listener.heard(heard)
+        if self._can is not None and self._can.lockstep:
+            listener.advance(self.now())
             while self._turn() == 0:
                 pass
 
-    def _tell(self, events: Sequence[phy.Event]) -> None:
-        rate = self._params.rate_hz
-        heard = [
-            Heard(event.data, event.burst.start / rate, event.burst.snr_db, event.at / rate)
-            for event in events
-            if isinstance(event, phy.PduHeard)
-        ]
-        if heard and self._listener is not None:
-            self._listener.heard(heard)
+    def left(self, report: BurstReport) -> None:
+        """Handle the outcome of a burst: adapt the lead, and inform the listener."""
+        if report.modulated_s:
+            self._tempo.note(report.n_samples, report.modulated_s)
+        burst = self._on_air.take(report)
+        if burst is None:
+            return
+        if self._lead_grows and report.outcome is Outcome.LATE:
+            self._plan.was_late()
+        elif self._lead_grows:
+            self._plan.was_in_time()
+        if self._listener is not None:
+            if report.problem:
+                self._problem = report.problem
+            if report.start is not None:
+                burst = burst._replace(start=report.start / self._params.rate_hz)
+            self._listener.settled(burst, report.outcome, report.end / self._params.rate_hz)
+        self._moved.set()
+
+    def ended(self, problem: str, is_refusal: bool) -> None:
+        """Note that the stream has ended."""
+        self._state, self._problem = "down" if problem else "ended", problem
+        if is_refusal:
+            self._is_refused.set()
+        self._moved.set()
+
+    @property
+    def _is_gone(self) -> bool:
+        if self._state != "up" or self._can is None or not self._can.paced:
+            return False
+        modem = self._modem
+        return bool(modem.trouble) or self._clock.is_gone(modem.seen, time.monotonic())
 
     async def _send_when_due(self) -> None:
         """Send one burst at a time, each decided at the last moment, forever."""
-        paced = self._can.paced
+        paced = self._can is not None and self._can.paced
         while True:
             self._moved.clear()
             wait_s = self._turn()
@@ -244,12 +215,12 @@ class ModemLink:
     def _turn(self) -> float:
         """Send the next burst if it may leave; returns 0, or the time in s until one may leave."""
         listener, rate = self._listener, self._params.rate_hz
-        can_send = self._state == "up" and self._can.transmits
-        if listener is None or self._rx is None or not can_send:
+        modem, can = self._modem, self._can
+        if listener is None or can is None or self._state != "up" or not can.transmits:
             return INFINITE
-        if self._is_gone or (self._began_s is not None and not self._clock.end):
+        if self._is_gone or (self._began_s is not None and modem.seen is None):
             # Wait for a block: the first one shows where the stream starts on our clock.
-            self._rx.wakes = True
+            modem.wakes = True
             return INFINITE
         now = self.now()
         wait_s = listener.next_wakeup(now) - now
@@ -264,16 +235,16 @@ class ModemLink:
             self._plan.start(index) / rate,
             airtimes.airtime_s,
             airtimes.most_pdus,
-            self._receiving.sensed,
+            modem.sensed,
         )
-        if self._can.paced:
-            tempo = self._tx.tempo
+        if can.paced:
+            tempo = self._tempo
             opportunity = opportunity._replace(
                 made_by=lambda start: tempo.samples_in(start - now) / rate
             )
         burst = listener.next_burst(opportunity)
-        if self._can.paced:
-            self._rx.wakes = burst is None
+        if can.paced:
+            modem.wakes = burst is None
         if burst is None:
             # Messages that may not leave yet are checked again with the next block. But a partly
             # filled PDU may have started to wait for more messages.
@@ -281,19 +252,5 @@ class ModemLink:
             return wait_s if wait_s > 0 else INFINITE
         start = round(burst.start * rate)
         self._plan.commit(start, self._airtimes.samples(burst.mcs, len(burst.pdus)))
-        self._tx.send(burst, start)
+        modem.send(self._on_air.add(burst, start, rate))
         return 0.0
-
-    def _left(self, burst: Burst, report: BurstReport) -> None:
-        """Handle the outcome of a burst: adapt the lead, and inform the listener."""
-        if self._lead_grows and report.outcome is Outcome.LATE:
-            self._plan.was_late()
-        elif self._lead_grows:
-            self._plan.was_in_time()
-        if self._listener is not None:
-            if report.problem:
-                self._problem = report.problem
-            if report.start is not None:
-                burst = burst._replace(start=report.start / self._params.rate_hz)
-            self._listener.settled(burst, report.outcome, report.end / self._params.rate_hz)
-        self._moved.set()

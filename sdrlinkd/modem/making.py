@@ -1,25 +1,16 @@
-"""Makes a radio, and a modem with a radio, from the configuration."""
+"""Makes a modem from the configuration: in a process of its own, or in this one."""
 
-import math
-from collections.abc import Awaitable, Callable
 from random import Random
 
 import phy
-from backends import (
-    BUILT_IN,
-    BackendError,
-    Channel,
-    OversampledRadio,
-    Patience,
-    Radio,
-    RadioRequest,
-)
-from sdrlinkd.config import Config, backend_of
-from sdrlinkd.errors import ConfigError, UserError
+from backends import Patience, Radio
+from sdrlinkd.config import Config, ModemParams, backend_of
+from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import PduLinkTraits, RateControl, may_share, settle
 from sdrlinkd.modem.airtimes import Airtimes
-from sdrlinkd.modem.compiled import load_phy
 from sdrlinkd.modem.link import ModemLink
+from sdrlinkd.modem.modem import Modem
+from sdrlinkd.modem.process import Loading, ModemHere, ModemProcess, RadioWanted, make_radio
 
 
 def make_modem(
@@ -28,60 +19,47 @@ def make_modem(
     rng: Random,
     patience: Patience = Patience.NONE,
     began_s: float | None = None,
-    load: Callable[[], Awaitable[None]] = load_phy,
+    loading: Loading | None = None,
 ) -> ModemLink:
-    """The modem on the radio that `config.backend` names. Raises UserError.
+    """The modem on the radio that `config.backend` names. Raises ConfigError.
 
     `patience`: how long opening waits for an absent radio. `began_s`: start of the link's clock on
-    the monotonic clock. `load` compiles or loads the PHY.
+    the monotonic clock. `loading` compiles or loads the PHY, and knows how far that is.
     """
     check_airtime(config)
-    access, backend = config.access, backend_of(config)
+    loading = loading or Loading()
+    backend = backend_of(config)
+    listens = may_share(config.access, node_id)
+    # In a recording, time starts with its first sample.
+    starts_s = None if backend is None or backend.starts_time else began_s
+    longest_s = _longest_burst_s(config)
+
+    async def choose() -> Modem:
+        if backend is not None and await backend.keeps_pace(config.backend_settings, patience):
+            wanted = RadioWanted(config, node_id, rng.getrandbits(32), longest_s, patience)
+            return ModemProcess(wanted, listens, starts_s, loading.note)
+        radio = make_radio(config, node_id, rng, longest_s, patience)
+        return ModemHere(config.modem, radio, listens, starts_s, loading)
+
     return ModemLink(
         config.modem,
         config.link.pdu_size,
-        make_radio(config, node_id, rng, _longest_burst_s(config), patience),
+        choose,
         config.backend,
-        listens=may_share(access, node_id),
         lead_grows=lambda traits: _has_slots(config, node_id, traits),
-        # In a recording, time starts with its first sample.
-        began_s=None if backend is None or backend.starts_time else began_s,
-        load=load,
+        began_s=starts_s,
     )
 
 
-def make_radio(
-    config: Config,
-    node_id: int,
-    rng: Random,
-    longest_s: float,
-    patience: Patience = Patience.NONE,
-) -> Radio:
-    """The radio that `config.backend` names, at the modem's rate. Raises UserError.
+def modem_on(
+    params: ModemParams, pdu_size: int, radio: Radio, kind: str, listens: bool = False
+) -> ModemLink:
+    """A modem on `radio`, in this process."""
 
-    `longest_s` is the length of the longest burst that it will get. `patience`: how long opening
-    waits for an absent radio.
-    """
-    backend = backend_of(config)
-    if backend is None:
-        *names, last = (f'"{name}"' for name in BUILT_IN)
-        raise ConfigError(
-            f'backend: got "{config.backend}", which has no radio; allowed: {", ".join(names)} or '
-            f"{last}"
-        )
-    request = RadioRequest(
-        config.radio_needs,
-        node_id,
-        longest_s,
-        patience,
-        lambda: _channel(config, rng.getrandbits(32)),
-    )
-    try:
-        radio = backend.radio(config.backend_settings, request)
-    except BackendError as error:
-        raise UserError(str(error)) from None
-    factor = config.modem.oversampling
-    return OversampledRadio(radio, factor) if factor > 1 else radio
+    async def choose() -> Modem:
+        return ModemHere(params, radio, listens, None, Loading())
+
+    return ModemLink(params, pdu_size, choose, kind)
 
 
 def _has_slots(config: Config, node_id: int, traits: PduLinkTraits) -> bool:
@@ -111,32 +89,3 @@ def check_airtime(config: Config) -> None:
             f"reassembly.timeout_s, {config.reassembly.timeout_s / 2:g} s: raise modem.rate_hz or "
             "modem.mcs, or reduce link.pdu_size"
         )
-
-
-def _channel(config: Config, seed: int) -> Channel:
-    """The simulated channel, with noise `snr_db` below bursts of the modem's own power.
-
-    This holds in the modem's band; a radio at a higher sample rate receives more noise.
-    """
-    modem, air = config.modem, config.channel
-    more_db = 10 * math.log10(modem.oversampling)
-    return Channel(
-        phy.PathParams(
-            rate_hz=modem.rate_hz * modem.oversampling,
-            centre_hz=modem.centre_hz,
-            profile=air.profile,
-            delay_spread_s=air.delay_spread_s,
-            loss_db=air.loss_db,
-            delay_s=air.delay_s,
-            clock_ppm=air.clock_ppm,
-            image_db=air.tx_image_db,
-            leak_db=air.tx_leak_db,
-        ),
-        phy.FrontEndParams(
-            noise_dbfs=-modem.backoff_db - air.snr_db + more_db,
-            image_db=air.rx_image_db,
-            dc_dbfs=air.rx_dc_dbfs,
-            bits=air.adc_bits,
-        ),
-        seed,
-    )

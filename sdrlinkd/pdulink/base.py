@@ -42,7 +42,11 @@ class PduListener(Protocol):
 
 
 Carry = Callable[[], Coroutine[object, object, None]]
-"""Carries PDUs until cancelled. Raises LinkRefusedError when a radio refuses its settings."""
+"""Carries PDUs until cancelled.
+
+Raises LinkAbsentError when what carries them is gone, and LinkRefusedError when a radio refuses its
+settings.
+"""
 
 
 class PduLink(Protocol):

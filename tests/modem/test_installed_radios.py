@@ -4,7 +4,6 @@ import importlib
 import re
 import sys
 from pathlib import Path
-from random import Random
 
 import pytest
 
@@ -12,7 +11,7 @@ import phy
 from sdrlinkd.client import Publisher, Subscriber
 from sdrlinkd.config import Config, make_setup, parse_config, typed_config
 from sdrlinkd.errors import ConfigError, UserError
-from sdrlinkd.modem import access_words, make_modem
+from sdrlinkd.modem import access_words
 from tests.modem.test_modem_link import bursts, running, send
 
 ROOT = Path(__file__).parents[2]
@@ -177,11 +176,12 @@ def test_a_package_that_is_broken_is_named(install, name):
     assert parse_config('backend = "loopback"').backend == "loopback"
 
 
-def test_a_radio_whose_code_is_missing_is_told_when_it_is_made(install):
+async def test_a_radio_whose_code_is_missing_is_told_when_it_is_opened(install):
     text = EXAMPLE.replace('make="acme_radio:', 'make="acme_driver:')
     install("acme-sdr", {"acme": "acme_radio:ENTRY"}, acme_radio=text)
     with pytest.raises(UserError, match=r'got "acme", whose code cannot be loaded: acme_driver:'):
-        make_modem(parse_config(ACME), 1, Random(1))
+        async with running(parse_config(ACME)):
+            pass
 
 
 def test_a_name_that_two_packages_give_is_refused(install):

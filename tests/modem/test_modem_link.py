@@ -71,15 +71,17 @@ def send(modem, listener, bursts):
 async def running(config):
     modem, listener = make_modem(config, 1, Random(1)), Listener()
     listener.now = modem.now
-    carry = await modem.open(listener)
-    task = asyncio.ensure_future(carry())
-    try:
-        yield modem, listener
-    finally:
-        await modem.close()
-        task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await task
+    async with contextlib.AsyncExitStack() as stack:
+        stack.push_async_callback(modem.close)
+        carry = await modem.open(listener)
+        task = asyncio.ensure_future(carry())
+        try:
+            yield modem, listener
+        finally:
+            await modem.close()
+            task.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await task
 
 
 def config(paced, **more):

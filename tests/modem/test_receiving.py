@@ -8,8 +8,8 @@ import pytest
 import phy
 from backends import RxBlock
 from sdrlinkd.link import Sensed
-from sdrlinkd.modem.rx_thread import MAX_BLOCKS, ReceiverHere, ReceiverThread
-from sdrlinkd.modem.sensing_receiver import SensingReceiver
+from sdrlinkd.modem.process.receiving import MAX_BLOCKS, ReceiverHere, ReceiverThread
+from sdrlinkd.modem.process.sensing_receiver import SensingReceiver
 
 
 def make_receiving(senses=False):
@@ -37,8 +37,8 @@ class Told:
     def __init__(self):
         self.heard, self.ends = [], []
 
-    def __call__(self, events, end):
-        self.heard += [event.data for event in events if isinstance(event, phy.PduHeard)]
+    def __call__(self, pdus, end):
+        self.heard += [pdu.data for pdu in pdus]
         self.ends.append(end)
 
 

@@ -8,7 +8,7 @@ import pytest
 import phy
 from backends import RxBlock
 from sdrlinkd.link import Sensed
-from sdrlinkd.modem.sensing_receiver import TAIL, SensingReceiver
+from sdrlinkd.modem.process.sensing_receiver import TAIL, SensingReceiver
 
 RATE = 1e6
 WINDOW = phy.SENSE_WINDOW

@@ -7,8 +7,9 @@ import pytest
 import phy
 from backends import Capabilities, TxOutcome, TxReport
 from sdrlinkd.config import ModemParams
-from sdrlinkd.link import Burst, Outcome, Qos
-from sdrlinkd.modem.transmission import Transmission
+from sdrlinkd.link import Outcome
+from sdrlinkd.modem.modem import BurstOrder
+from sdrlinkd.modem.process.transmission import SHORT, Transmission
 
 
 class Radio:
@@ -31,12 +32,16 @@ class Radio:
         self.taken[number][1].set_result(TxReport(outcome, start, start))
 
 
-LONG_S = 1.0
+LONG = 63
+"""PDUs of a burst that is modulated in a thread."""
 
 
-def made(number, latest=1.0, airtime_s=0.0):
-    pdus, classes = [bytes([number]) * 32], [Qos.DEFAULT]
-    return Burst(pdus, [[]], classes, start=0.5, latest=latest, number=number, airtime_s=airtime_s)
+def made(number, start=0, latest=1_000_000, n_pdus=1, late_known=0):
+    return BurstOrder(number, start, latest, late_known, 0, n_pdus * [bytes([number]) * 32])
+
+
+def test_a_long_burst_is_long():
+    assert phy.layout(phy.OFDM_64_16, 0, LONG, 32).n_samples > SHORT
 
 
 @pytest.mark.parametrize("lockstep", [False, True], ids=["in-a-thread", "here"])
@@ -45,8 +50,8 @@ async def test_what_was_composed_before_a_late_one_was_known_goes_back_too(locks
     """The radio has reported, but no task has been woken up yet."""
     radio, left, settled = Radio(lockstep), [], asyncio.Event()
 
-    def note(burst, report):
-        left.append((burst.number, report.outcome))
+    def note(report):
+        left.append((report.number, report.outcome))
         if len(left) == 2:
             settled.set()
 
@@ -54,20 +59,37 @@ async def test_what_was_composed_before_a_late_one_was_known_goes_back_too(locks
         transmission = Transmission(ModemParams(rate_hz=1e6), radio)
         await asyncio.to_thread(phy.warm_up)
         transmission.start(tasks, note)
-        transmission.send(made(1), 500_000)
+        transmission.send(made(1, 500_000))
         await radio.arrivals.get()
         if composed == "before" and not lockstep:
-            transmission.send(made(2, airtime_s=LONG_S), 510_000)
+            transmission.send(made(2, 510_000, n_pdus=LONG))
         radio.tell(0, TxOutcome.LATE, 500_000)
         if composed == "between" or lockstep:
-            transmission.send(made(2, airtime_s=LONG_S), 510_000)
+            transmission.send(made(2, 510_000, n_pdus=LONG))
         await settled.wait()
         assert left == [(1, Outcome.LATE), (2, Outcome.LATE)]
         assert len(radio.taken) == 1
-        transmission.send(made(1), 520_000)
+        transmission.send(made(3, 520_000, late_known=2))
         await radio.arrivals.get()
         radio.tell(1, TxOutcome.SENT, 520_000)
-    assert left[2:] == [(1, Outcome.SENT)]
+    assert left[2:] == [(3, Outcome.SENT)]
+    transmission.close()
+
+
+async def test_who_does_not_know_of_all_late_ones_goes_back():
+    radio, left = Radio(lockstep=True), []
+    async with asyncio.TaskGroup() as tasks, asyncio.timeout(60):
+        transmission = Transmission(ModemParams(rate_hz=1e6), radio)
+        await asyncio.to_thread(phy.warm_up)
+        transmission.start(tasks, left.append)
+        transmission.send(made(1, 500_000))
+        radio.tell(0, TxOutcome.LATE, 500_000)
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        transmission.send(made(2, 510_000, late_known=0))
+    assert [(each.number, each.outcome) for each in left] == [(1, Outcome.LATE), (2, Outcome.LATE)]
+    assert len(radio.taken) == 1
+    assert left[1].n_samples > 0
     transmission.close()
 
 
@@ -76,10 +98,10 @@ async def test_what_may_leave_whenever_it_can_does_not_wait_for_a_late_one():
     async with asyncio.TaskGroup() as tasks, asyncio.timeout(60):
         transmission = Transmission(ModemParams(rate_hz=1e6), radio)
         await asyncio.to_thread(phy.warm_up)
-        transmission.start(tasks, lambda burst, report: left.append(report.outcome))
-        transmission.send(made(1), 500_000)
+        transmission.start(tasks, lambda report: left.append(report.outcome))
+        transmission.send(made(1, 500_000))
         radio.tell(0, TxOutcome.LATE, 500_000)
-        transmission.send(made(2, latest=float("inf")), 510_000)
+        transmission.send(made(2, 510_000, latest=None))
         radio.tell(1, TxOutcome.SENT, 510_000)
     assert left == [Outcome.LATE, Outcome.SENT]
     assert radio.taken[0][0].latest == 1_000_000
@@ -88,16 +110,16 @@ async def test_what_may_leave_whenever_it_can_does_not_wait_for_a_late_one():
 
 
 async def test_a_short_burst_does_not_overtake_a_long_one():
-    """Short bursts are modulated where they are composed, long ones in a thread."""
+    """Short bursts are modulated on the event loop, long ones in a thread."""
     radio = Radio(lockstep=False)
     async with asyncio.TaskGroup() as tasks, asyncio.timeout(60):
         transmission = Transmission(ModemParams(rate_hz=1e6), radio)
         await asyncio.to_thread(phy.warm_up)
-        transmission.start(tasks, lambda *_: None)
-        transmission.send(made(1), 100)
+        transmission.start(tasks, lambda _: None)
+        transmission.send(made(1, 100))
         assert len(radio.taken) == 1
-        for number, airtime_s in ((2, LONG_S), (3, 0.0), (4, 0.0)):
-            transmission.send(made(number, airtime_s=airtime_s), 1000 * number)
+        for number, n_pdus in ((2, LONG), (3, 1), (4, 1)):
+            transmission.send(made(number, 1000 * number, n_pdus=n_pdus))
         assert len(radio.taken) == 1
         for _ in range(4):
             await radio.arrivals.get()

@@ -1,8 +1,9 @@
-"""Compiles or loads the modem on a thread, while the bus already accepts messages."""
+"""Compiles or loads the modem on a thread, while the event loop does other work."""
 
 import asyncio
 import logging
 import threading
+from collections.abc import Callable
 
 log = logging.getLogger("sdrlinkd")
 
@@ -12,11 +13,15 @@ class _GivenUpError(Exception):
 
 
 class Loading:
-    """Loads the modem once, however many tasks wait for it; `told` is the progress as text."""
+    """Loads the modem once, however many tasks wait for it; `told` is the progress as text.
 
-    def __init__(self) -> None:
+    `tell` is called with each new text, on the loading thread.
+    """
+
+    def __init__(self, tell: Callable[[str], None] = lambda _: None) -> None:
         self._is_given_up = threading.Event()
         self._done: asyncio.Future[None] | None = None
+        self._tell = tell
         self.told = ""
 
     async def __call__(self) -> None:
@@ -26,6 +31,11 @@ class Loading:
             # Retrieve the exception, so that asyncio does not log it if nobody waits any more.
             self._done.add_done_callback(lambda done: done.cancelled() or done.exception())
         await asyncio.shield(self._done)
+
+    def note(self, text: str) -> None:
+        """Take the progress of a modem that is loaded in another process; empty: it is loaded."""
+        self.told = text
+        self._tell(text)
 
     def give_up(self) -> None:
         """Stop after the kernel being compiled; compiled kernels are kept."""
@@ -38,9 +48,9 @@ class Loading:
         try:
             compile_modem(log.info, watch=self._watch)
         finally:
-            self.told = ""
+            self.note("")
 
     def _watch(self, done: int, total: int) -> None:
-        self.told = f"compiling the modem, once: {done} of {total} kernels"
+        self.note(f"compiling the modem, once: {done} of {total} kernels")
         if self._is_given_up.is_set():
             raise _GivenUpError

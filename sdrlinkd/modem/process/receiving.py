@@ -9,21 +9,22 @@ from typing import Protocol
 
 import phy
 from backends import RxBlock
-from sdrlinkd.modem.load import LoadMeter
-from sdrlinkd.modem.sensing_receiver import SensingReceiver
+from sdrlinkd.modem.process.load import LoadMeter
+from sdrlinkd.modem.process.sensing_receiver import SensingReceiver
 
 # Most blocks that wait for the receiver.
 MAX_BLOCKS = 16
 
-Deliver = Callable[[Sequence[phy.Event], int], None]
+Deliver = Callable[[Sequence[phy.PduHeard], int], None]
+Call = Callable[..., object]
 
 
 class Demodulation(Protocol):
-    """Demodulates blocks; passes events, and the index after their block, to `deliver`."""
+    """Demodulates blocks; passes PDUs, and the index after their block, to `deliver`."""
 
     load: LoadMeter
     wakes: bool
-    """Whether to deliver after every block, even without events."""
+    """Whether to deliver after every block, even without PDUs."""
 
     def hear(self, block: RxBlock) -> None:
         """Demodulate a block now, on the calling thread."""
@@ -32,10 +33,14 @@ class Demodulation(Protocol):
         """Hand over a block; may wait while too many blocks are queued."""
 
     async def finish(self) -> None:
-        """End the stream, and deliver the events of its last samples."""
+        """End the stream, and deliver the PDUs of its last samples."""
 
     def stop(self) -> None:
         """Stop at once, even if blocks are queued."""
+
+
+def _pdus(events: Sequence[phy.Event]) -> list[phy.PduHeard]:
+    return [event for event in events if isinstance(event, phy.PduHeard)]
 
 
 class ReceiverHere:
@@ -53,35 +58,41 @@ class ReceiverHere:
         self.hear(block)
 
     def hear(self, block: RxBlock) -> None:
-        """Demodulate a block, and deliver the events that it completes."""
+        """Demodulate a block, and deliver the PDUs that it completes."""
         began = time.thread_time()
         events = self._receiving.hear(block)
         self.load.add(time.thread_time() - began, block.n / self._rate_hz)
-        self._deliver(events, block.index + block.n)
+        self._deliver(_pdus(events), block.index + block.n)
 
     async def finish(self) -> None:
-        """Deliver the events of the last samples."""
+        """Deliver the PDUs of the last samples."""
         end = self._receiving.next_index
-        self._deliver(self._receiving.flush(), end)
+        self._deliver(_pdus(self._receiving.flush()), end)
 
     def stop(self) -> None:
-        """Do nothing, as there is no thread."""
+        """There is no thread to stop."""
 
 
 class ReceiverThread:
-    """Demodulates on a thread, and calls `deliver` on the event loop.
+    """Demodulates on a thread, and calls `deliver` by `call`: on the event loop, or at once.
 
-    `deliver` is called when there are events, or for every block while `wakes` is set. A radio that
+    `deliver` is called when there are PDUs, or for every block while `wakes` is set. A radio that
     calls `hear` has its blocks demodulated on its own thread. Blocks of other radios are passed to
     `put` and demodulated on our thread. All blocks of a stream take the same way.
     """
 
     def __init__(
-        self, receiving: SensingReceiver, rate_hz: float, deliver: Deliver, wakes: bool
+        self,
+        receiving: SensingReceiver,
+        rate_hz: float,
+        deliver: Deliver,
+        wakes: bool,
+        call: Call | None = None,
     ) -> None:
         self._receiving = receiving
         self._rate_hz = rate_hz
         self._deliver = deliver
+        self._call_with = call or self._on_loop
         self.wakes = wakes
         self._blocks: queue.SimpleQueue[RxBlock | None] = queue.SimpleQueue()
         self._loop = asyncio.get_running_loop()
@@ -94,11 +105,11 @@ class ReceiverThread:
     def hear(self, block: RxBlock) -> None:
         """Demodulate a block on the calling thread."""
         began = time.thread_time()
-        events = self._receiving.hear(block)
+        pdus = _pdus(self._receiving.hear(block))
         if block.samples is not None:
             self.load.add(time.thread_time() - began, block.n / self._rate_hz)
-        if events or self.wakes:
-            self._call(self._deliver, events, block.index + block.n)
+        if pdus or self.wakes:
+            self._call_with(self._deliver, pdus, block.index + block.n)
 
     async def put(self, block: RxBlock) -> None:
         """Hand over a block; waits while too many blocks are queued."""
@@ -112,7 +123,7 @@ class ReceiverThread:
         self._blocks.put(block)
 
     async def finish(self) -> None:
-        """End the stream and the thread, and deliver the events of the last samples."""
+        """End the stream and the thread, and deliver the PDUs of the last samples."""
         self._begin()
         self._blocks.put(None)
         await self._ended.wait()
@@ -135,11 +146,11 @@ class ReceiverThread:
             # To avoid a wake-up per block, a waiting `put` resumes once half of the room is free.
             if self._is_waited_for and self._blocks.qsize() <= MAX_BLOCKS // 2:
                 self._is_waited_for = False
-                self._call(self._has_room.set)
+                self._on_loop(self._has_room.set)
         end = self._receiving.next_index
-        self._call(self._deliver, self._receiving.flush(), end)
-        self._call(self._ended.set)
+        self._call_with(self._deliver, _pdus(self._receiving.flush()), end)
+        self._on_loop(self._ended.set)
 
-    def _call(self, what: Callable[..., None], *arguments: object) -> None:
+    def _on_loop(self, what: Callable[..., None], *arguments: object) -> None:
         if not self._loop.is_closed():
             self._loop.call_soon_threadsafe(what, *arguments)

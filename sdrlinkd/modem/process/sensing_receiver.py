@@ -14,7 +14,7 @@ class SensingReceiver:
     """Turns samples into events and the state of the channel; `hear` is for one thread only."""
 
     def __init__(
-        self, receiver: phy.Receiver, sense: phy.EnergyDetector | None, rate_hz: float
+        self, receiver: "phy.Receiver", sense: "phy.EnergyDetector | None", rate_hz: float
     ) -> None:
         self._receiver = receiver
         self._sense = sense
@@ -49,7 +49,7 @@ class SensingReceiver:
         """The index after the last sample heard."""
         return self._receiver.next_index
 
-    def _sense_air(self, sense: phy.EnergyDetector) -> Sensed:
+    def _sense_air(self, sense: "phy.EnergyDetector") -> Sensed:
         rate = self._rate_hz
         until, energy_end = sense.next_index, sense.busy_until
         begin, end = self._receiver.last_burst

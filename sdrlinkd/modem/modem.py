@@ -1,0 +1,127 @@
+"""What the modem link asks of a modem, wherever it runs: bursts of PDUs out, PDUs in."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple, Protocol
+
+from backends import Capabilities
+from sdrlinkd.link import Outcome, Sensed
+from sdrlinkd.modem.clock import Seen
+from sdrlinkd.pdulink import Heard
+
+
+class BurstOrder(NamedTuple):
+    """PDUs to send as one burst, the first sample at index `start` of the received stream.
+
+    If the burst cannot start by `latest`, it is reported late and not sent. It is also not sent if
+    a burst before it was late and is not among the `late_known` late ones that the order's author
+    knew: the order of messages would be lost.
+    """
+
+    number: int
+    start: int
+    latest: int | None
+    late_known: int
+    mcs: int
+    pdus: Sequence[bytes]
+
+
+class BurstReport(NamedTuple):
+    """The outcome of burst `number`, the index of its end and, in words, what went wrong."""
+
+    number: int
+    outcome: Outcome
+    end: int
+    start: int | None = None
+    """Index of the burst's first sample, if it left."""
+    problem: str = ""
+    n_samples: int = 0
+    modulated_s: float = 0.0
+    """Samples that were modulated, and the time in s that this took."""
+
+
+class ModemStatus(NamedTuple):
+    """What a modem tells of itself and its radio."""
+
+    detail: str
+    """The radio in one line for people."""
+    trouble: str
+    """Why the radio delivers nothing now, if it knows."""
+    power_dbfs: float | None
+    clipped: float
+    """Recent mean power of the received samples, and the share that clips."""
+    counters: Mapping[str, int]
+    realtime_ratio: float
+    """Demodulation speed relative to real time; 0: not known yet."""
+
+
+class ModemUser(Protocol):
+    """Who runs a modem. All methods are called on the event loop."""
+
+    def delivered(self, heard: Sequence[Heard], end: int) -> None:
+        """Take the PDUs that the samples before index `end` completed; there may be none."""
+
+    def left(self, report: BurstReport) -> None:
+        """Take the outcome of a burst."""
+
+    def ended(self, problem: str, is_refusal: bool) -> None:
+        """Note that the stream has ended; `problem` is empty at the end of a recording."""
+
+
+class Modem(Protocol):
+    """Turns PDUs into bursts on a radio, and the radio's samples into PDUs."""
+
+    wakes: bool
+    """Whether `delivered` is called for every block, even without PDUs."""
+
+    @property
+    def seen(self) -> Seen | None:
+        """The last block, as the clock needs it; None: no block yet."""
+
+    @property
+    def sensed(self) -> Sensed:
+        """The state of the channel after the last block."""
+
+    @property
+    def trouble(self) -> str:
+        """Why the radio delivers nothing now, if it knows."""
+
+    @property
+    def status(self) -> ModemStatus:
+        """Radio, counters and load."""
+
+    async def open(self) -> Capabilities:
+        """Open the radio and return what it can do. Raises BackendError."""
+
+    async def run(self, user: ModemUser) -> None:
+        """Receive and send until cancelled. Raises AbsentError if the modem's process ends."""
+
+    def send(self, order: BurstOrder) -> None:
+        """Send a burst; `left` follows."""
+
+    async def close(self) -> None:
+        """Close the radio; bursts that have not left are not reported. Closing twice is fine."""
+
+
+class NoModem:
+    """Stands in for a modem until there is one."""
+
+    wakes = False
+    seen: Seen | None = None
+    sensed = Sensed(until=0.0)
+    trouble = ""
+    status = ModemStatus("not open", "", None, 0.0, {}, 0.0)
+
+    async def open(self) -> Capabilities:
+        """Never called."""
+        raise NotImplementedError
+
+    async def run(self, user: ModemUser) -> None:
+        """Never called."""
+        raise NotImplementedError
+
+    def send(self, order: BurstOrder) -> None:
+        """Never called."""
+        raise NotImplementedError
+
+    async def close(self) -> None:
+        """There is nothing to close."""

@@ -1,0 +1,177 @@
+"""The modem process: a radio, its receiver and its modulator, for one daemon."""
+
+import asyncio
+import contextlib
+import os
+import signal
+import socket
+import sys
+import time
+from collections.abc import Sequence
+from random import Random
+
+import msgspec
+import uvloop
+
+from backends import AbsentError, BackendError, Capabilities
+from sdrlinkd.config import typed_config
+from sdrlinkd.errors import UserError
+from sdrlinkd.journal import log_to_stderr
+from sdrlinkd.modem.modem import BurstOrder, BurstReport
+from sdrlinkd.modem.process import protocol
+from sdrlinkd.modem.process.loading import Loading
+from sdrlinkd.modem.process.modem_here import ModemHere
+from sdrlinkd.modem.process.modem_process import BEAT_S
+from sdrlinkd.modem.process.page import Page
+from sdrlinkd.modem.process.radios import make_radio
+from sdrlinkd.pdulink import Heard
+
+SWITCH_INTERVAL_S = 1e-4
+"""With the default, a busy event loop keeps the receiver waiting for 5 ms."""
+
+
+def main() -> None:
+    """Serve the daemon whose socket and page are the two descriptors of the command line."""
+    # The daemon ends this process, once its last bursts have left: signals to the group do not.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    control_fd, page_fd = map(int, sys.argv[1:])
+    control = socket.socket(fileno=control_fd)
+    page = Page(page_fd)
+    os.close(page_fd)
+    start = protocol.to_start(control.recv(protocol.MOST_BYTES))
+    log_to_stderr(start.log_level)
+    with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+        asyncio.Runner(loop_factory=uvloop.new_event_loop).run(_Served(control, page, start).run())
+
+
+class _Served:
+    """The modem of one daemon, and the connection to it."""
+
+    def __init__(self, control: socket.socket, page: Page, start: protocol.Start) -> None:
+        self._control = control
+        self._page = page
+        self._start = start
+        self._modem: ModemHere | None = None
+        self._has_begun, self._is_over = asyncio.Event(), asyncio.Event()
+        self._told: protocol.Status | None = None
+        self._loading = Loading(lambda text: self._say(protocol.Progress(text)))
+
+    async def run(self) -> None:
+        """Open the radio, and serve until the daemon closes its socket."""
+        # The receiver's thread waits when the daemon is behind, so the socket is a blocking one.
+        loop = asyncio.get_running_loop()
+        loop.set_exception_handler(_end_with_traceback)
+        loop.add_reader(self._control, self._listen)
+        beating = asyncio.ensure_future(self._beat())
+        work = asyncio.ensure_future(self._work())
+        over = asyncio.ensure_future(self._is_over.wait())
+        await asyncio.wait((work, over, beating), return_when=asyncio.FIRST_COMPLETED)
+        loop.remove_reader(self._control)
+        self._loading.give_up()
+        for task in (work, over):
+            task.cancel()
+        await asyncio.wait((work, over))
+        if self._modem is not None:
+            await self._modem.close()
+        beating.cancel()
+        if not work.cancelled():
+            work.result()
+
+    async def _work(self) -> None:
+        start = self._start
+        try:
+            config = typed_config(start.config)
+            rng = Random(start.seed)
+            radio = make_radio(config, start.node_id, rng, start.longest_s, start.patience)
+            modem = self._modem = ModemHere(
+                config.modem, radio, start.listens, start.began_s, self._loading, _at_once,
+                self._show,
+            )  # fmt: skip
+            can = await modem.open()
+            if can.lockstep:
+                raise AbsentError("this air has changed to lock-step; join it again")
+            self._tell_status(modem)
+            self._say(protocol.Opened(_plain(can)))
+            await self._has_begun.wait()
+            await modem.run(self)
+        except BackendError as error:
+            self._say(protocol.Failed.of(error))
+        except UserError as error:
+            self._say(protocol.Failed.of(BackendError(str(error))))
+
+    # The modem's user. PDUs are delivered on the receiver's thread.
+
+    def delivered(self, heard: Sequence[Heard], end: int) -> None:
+        """Pass PDUs on to the daemon."""
+        counters = [] if self._modem is None else self._modem.receiver_counters
+        self._say(protocol.Delivered(end, list(heard), counters))
+
+    def left(self, report: BurstReport) -> None:
+        """Pass the outcome of a burst on to the daemon."""
+        self._say(protocol.Left(*report))
+
+    def ended(self, problem: str, is_refusal: bool) -> None:
+        """Tell the daemon that the stream has ended."""
+        if self._modem is not None:
+            self._tell_status(self._modem)
+        self._say(protocol.Ended(problem, is_refusal))
+
+    def _show(self) -> None:
+        modem = self._modem
+        if modem is not None and modem.seen is not None:
+            self._page.show(modem.seen, modem.sensed)
+            modem.wakes = self._page.wakes
+
+    async def _beat(self) -> None:
+        """Show that this process is alive, and what has changed, forever."""
+        while True:
+            self._page.beat(time.monotonic())
+            if self._modem is not None:
+                self._tell_status(self._modem)
+            await asyncio.sleep(BEAT_S)
+
+    def _tell_status(self, modem: ModemHere) -> None:
+        now = protocol.status_of(modem.status)
+        if now != self._told:
+            self._told = now
+            self._say(now)
+
+    def _listen(self) -> None:
+        """Handle all messages that the daemon has sent so far."""
+        while True:
+            try:
+                data = self._control.recv(protocol.MOST_BYTES, socket.MSG_DONTWAIT)
+            except BlockingIOError:
+                return
+            except OSError:
+                data = b""
+            if not data:
+                self._is_over.set()
+                return
+            message = protocol.to_modem(data)
+            if isinstance(message, protocol.Begin):
+                self._has_begun.set()
+            elif self._modem is not None:
+                self._modem.send(BurstOrder(*msgspec.structs.astuple(message)))
+
+    def _say(self, message: msgspec.Struct) -> None:
+        with contextlib.suppress(OSError):
+            self._control.send(protocol.encode(message))
+
+
+def _end_with_traceback(loop: asyncio.AbstractEventLoop, context: dict[str, object]) -> None:
+    """End the process after a bug: the daemon starts it again, and nothing is half done."""
+    loop.default_exception_handler(context)
+    sys.stderr.flush()
+    os._exit(1)
+
+
+def _at_once(what: object, *arguments: object) -> None:
+    what(*arguments)  # type: ignore[operator]
+
+
+def _plain(can: Capabilities) -> dict[str, object]:
+    plain: dict[str, object] = msgspec.to_builtins(can)
+    return plain

@@ -1,0 +1,296 @@
+"""A modem in a process of its own, as its daemon sees it: starts it, talks to it, and ends it.
+
+The interpreter's lock of the daemon keeps no sample waiting there, and a crash of a driver or of
+the modem ends no daemon. A process that has ended, or hangs, is reported as an absent radio: the
+daemon then makes a new modem, whose time goes on.
+"""
+
+import asyncio
+import logging
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import msgspec
+
+import phy
+from backends import AbsentError, BackendError, Capabilities, Patience
+from sdrlinkd.config import Config
+from sdrlinkd.link import Outcome, Sensed
+from sdrlinkd.modem.clock import Seen
+from sdrlinkd.modem.modem import BurstOrder, BurstReport, ModemStatus, ModemUser, NoModem
+from sdrlinkd.modem.process import protocol
+from sdrlinkd.modem.process.page import Page, make_page
+
+BEAT_S = 0.1
+"""Time between two signs of life of the process."""
+HUNG_S = 5.0
+"""Time without a sign of life, while this process was awake, after which it hangs."""
+END_S = 30.0
+"""A process that has not ended this long after it was told to is killed; radios take their time."""
+GONE_S = 1.0
+"""The same for a process that has closed its socket."""
+LOOK_S = 0.01
+"""Time between two looks at whether the process has ended."""
+SOCKET_BYTES = 1 << 20
+
+log = logging.getLogger("sdrlinkd")
+
+
+class RadioWanted(NamedTuple):
+    """Which radio the process makes, and how; see `protocol.Start`."""
+
+    config: Config
+    node_id: int
+    seed: int
+    longest_s: float
+    patience: Patience
+
+
+class _SignsOfLife:
+    """Notices that the process gives no signs of life while this one does."""
+
+    def __init__(self) -> None:
+        self._beat_s = 0.0
+        self._looked_s = time.monotonic()
+        self._missed_s = 0.0
+
+    def are_missing(self, beat_s: float) -> bool:
+        """Whether the last sign, at `beat_s`, has been the same for HUNG_S."""
+        now_s = time.monotonic()
+        # Only time in which this process could run counts: a busy machine delays both.
+        self._missed_s += min(now_s - self._looked_s, 2 * BEAT_S)
+        self._looked_s = now_s
+        if beat_s != self._beat_s:
+            self._beat_s, self._missed_s = beat_s, 0.0
+        return self._missed_s > HUNG_S
+
+
+class ModemProcess:
+    """A modem process with the radio that is `wanted`.
+
+    `listens`: whether the receiver senses if the channel is busy. `began_s`: start of the stream's
+    time on the monotonic clock; None: time starts with the samples. `progress` gets a text while
+    the modem is being compiled, at the end an empty one.
+    """
+
+    def __init__(
+        self,
+        wanted: RadioWanted,
+        listens: bool,
+        began_s: float | None,
+        progress: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        self._wanted = wanted
+        self._listens = listens
+        self._began_s = began_s
+        self._progress = progress
+        self._process: subprocess.Popen[bytes] | None = None
+        self._socket: socket.socket | None = None
+        self._page: Page | None = None
+        self._last: tuple[Seen, Sensed] | None = None
+        self._status = NoModem.status
+        self._receiver_counters: dict[str, int] = {}
+        self._opened: asyncio.Future[Capabilities] | None = None
+        self._over: asyncio.Future[None] | None = None
+        self._user: ModemUser | None = None
+        self._hangs = False
+
+    @property
+    def wakes(self) -> bool:
+        """Whether `delivered` is called for every block, even without PDUs."""
+        return self._page is not None and self._page.wakes
+
+    @wakes.setter
+    def wakes(self, value: bool) -> None:
+        if self._page is not None and self._page.wakes != value:
+            self._page.wakes = value
+
+    @property
+    def seen(self) -> Seen | None:
+        """The last block; None: no block yet."""
+        last = self._read()
+        return None if last is None else last[0]
+
+    @property
+    def sensed(self) -> Sensed:
+        """The state of the channel after the last block."""
+        last = self._read()
+        return Sensed(until=0.0) if last is None else last[1]
+
+    @property
+    def trouble(self) -> str:
+        """Why the radio delivers nothing now, if it knows."""
+        return self._status.trouble
+
+    @property
+    def status(self) -> ModemStatus:
+        """Radio, counters and load, a tenth of a second old at most."""
+        told = self._status
+        return told._replace(counters={**told.counters, **self._receiver_counters})
+
+    async def open(self) -> Capabilities:
+        """Start the process and open the radio there. Raises BackendError."""
+        loop = asyncio.get_running_loop()
+        self._opened, self._over = loop.create_future(), loop.create_future()
+        try:
+            control = self._start()
+        except OSError as error:
+            raise AbsentError(f"cannot start the modem process ({error.strerror})") from None
+        loop.add_reader(control, self._listen, control)
+        return await self._opened
+
+    async def run(self, user: ModemUser) -> None:
+        """Receive and send until cancelled. Raises AbsentError when the process ends or hangs."""
+        if self._over is None:
+            raise RuntimeError("run before open")
+        self._user = user
+        self._say(protocol.Begin())
+        life = _SignsOfLife()
+        while not self._over.done():
+            await asyncio.wait((self._over,), timeout=BEAT_S)
+            if self._page is not None and life.are_missing(self._page.beat_s):
+                self._hangs = True
+                self._kill()
+        self._over.result()
+
+    def send(self, order: BurstOrder) -> None:
+        """Send a burst; `left` follows, or the end of the process."""
+        if not self._say(protocol.Order(*order[:-1], list(order.pdus))) and self._user is not None:
+            lost = BurstReport(order.number, Outcome.LOST, order.start)
+            asyncio.get_running_loop().call_soon(self._user.left, lost)
+
+    async def close(self) -> None:
+        """Close the radio; bursts that have not left are not reported. Closing twice is fine."""
+        if self._socket is not None:
+            asyncio.get_running_loop().remove_reader(self._socket)
+            self._socket.close()
+            self._socket = None
+        await self._end()
+        for future in (self._opened, self._over):
+            if future is not None:
+                future.cancel()
+
+    def _start(self) -> socket.socket:
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        page = make_page()
+        self._page = Page(page)
+        self._page.beat(time.monotonic())
+        for end in (ours, theirs):
+            end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SOCKET_BYTES)
+        inherited = [theirs.fileno(), page]
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "sdrlinkd.modem.process", *map(str, inherited)],
+                stdin=subprocess.DEVNULL,
+                # It finds the modules that this process finds, and no others.
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+                pass_fds=inherited,
+            )
+        finally:
+            theirs.close()
+            os.close(page)
+        ours.setblocking(False)
+        self._socket = ours
+        wanted = self._wanted
+        config = msgspec.to_builtins(wanted.config)
+        self._say(
+            protocol.Start(
+                config, wanted.node_id, wanted.seed, wanted.longest_s, wanted.patience,
+                self._began_s, self._listens, log.getEffectiveLevel(),
+            )
+        )  # fmt: skip
+        return ours
+
+    def _read(self) -> tuple[Seen, Sensed] | None:
+        if self._page is not None:
+            self._last = self._page.read()
+        return self._last
+
+    def _say(self, message: msgspec.Struct) -> bool:
+        """Send a message; false: the process does not take it, and hangs or has ended."""
+        if self._socket is None:
+            return False
+        try:
+            self._socket.send(protocol.encode(message))
+        except OSError:
+            return False
+        return True
+
+    def _listen(self, control: socket.socket) -> None:
+        """Handle all messages that the process has sent so far."""
+        while self._socket is control:
+            try:
+                data = control.recv(protocol.MOST_BYTES)
+            except BlockingIOError:
+                return
+            except OSError:
+                data = b""
+            if not data:
+                asyncio.get_running_loop().remove_reader(control)
+                self._ended(AbsentError(self._how_it_ended()))
+                return
+            self._told(protocol.from_modem(data))
+
+    def _told(self, message: protocol.FromModem) -> None:
+        user, opened = self._user, self._opened
+        if isinstance(message, protocol.Delivered):
+            self._receiver_counters = dict(zip(phy.COUNTERS, message.counters, strict=True))
+            if user is not None:
+                user.delivered(message.heard, message.end)
+        elif isinstance(message, protocol.Left):
+            if user is not None:
+                user.left(BurstReport(*msgspec.structs.astuple(message)))
+        elif isinstance(message, protocol.Status):
+            self._status = ModemStatus(*msgspec.structs.astuple(message))
+        elif isinstance(message, protocol.Ended):
+            if user is not None:
+                user.ended(message.problem, message.is_refusal)
+        elif isinstance(message, protocol.Progress):
+            self._progress(message.text)
+        elif isinstance(message, protocol.Opened):
+            if opened is not None and not opened.done():
+                opened.set_result(msgspec.convert(message.can, Capabilities))
+        else:
+            self._ended(message.error())
+
+    def _ended(self, error: BackendError) -> None:
+        for future in (self._opened, self._over):
+            if future is not None and not future.done():
+                future.set_exception(error)
+                # Nobody may be waiting for this one.
+                future.exception()
+
+    async def _end(self) -> None:
+        """Wait for the process to end; kill it if it hangs, or takes too long."""
+        life, until_s = _SignsOfLife(), time.monotonic() + END_S
+        while self._process is not None and self._process.poll() is None:
+            is_alive = self._page is not None and not life.are_missing(self._page.beat_s)
+            if not is_alive or time.monotonic() > until_s:
+                self._kill()
+            await asyncio.sleep(LOOK_S)
+
+    def _how_it_ended(self) -> str:
+        """How a process ended that has closed its socket, in words."""
+        if self._process is not None:
+            try:
+                self._process.wait(GONE_S)
+            except subprocess.TimeoutExpired:
+                self._kill()
+                self._process.wait()
+        code = 0 if self._process is None else self._process.returncode
+        if self._hangs:
+            how = "hung and was ended"
+        elif code < 0:
+            how = f"ended by signal {-code}"
+        else:
+            how = f"ended with exit code {code}"
+        return f"the modem process {how}; it is started again"
+
+    def _kill(self) -> None:
+        if self._process is not None:
+            self._process.kill()

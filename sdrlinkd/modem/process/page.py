@@ -1,0 +1,80 @@
+"""What the modem process shows its daemon without a message: a page of shared memory.
+
+The process writes the last block and the state of the channel after every block, a thousand times a
+second; the daemon reads them when it decides. A CRC tells a record that was read while it was
+written, whatever order the processor keeps between two processes.
+"""
+
+import mmap
+import os
+import struct
+import zlib
+
+from sdrlinkd.link import Sensed
+from sdrlinkd.modem.clock import Seen
+
+_RECORD = struct.Struct("<qddddd")
+_CRC = struct.Struct("<I")
+_SIZE = _RECORD.size + _CRC.size
+_BEAT, _WAKES = 256, 264
+_TIME = struct.Struct("<d")
+_NOWHERE = float("nan")
+TRIES = 100
+
+
+class Page:
+    """The page behind descriptor `fd`; each field is written by one side only."""
+
+    def __init__(self, fd: int) -> None:
+        self._memory = mmap.mmap(fd, mmap.PAGESIZE)
+        self._last: tuple[Seen, Sensed] | None = None
+
+    def show(self, seen: Seen, sensed: Sensed) -> None:
+        """Write the last block, and the state of the channel after it."""
+        burst_at = _NOWHERE if sensed.burst_at is None else sensed.burst_at
+        record = _RECORD.pack(*seen, sensed.until, sensed.idle_since, burst_at)
+        self._memory[:_SIZE] = record + _CRC.pack(zlib.crc32(record))
+
+    def read(self) -> tuple[Seen, Sensed] | None:
+        """What `show` has written; None: no block yet."""
+        for _ in range(TRIES):
+            data = self._memory[:_SIZE]
+            record = data[: _RECORD.size]
+            if zlib.crc32(record) == _CRC.unpack_from(data, _RECORD.size)[0]:
+                end, host_s, late_s, until, idle_since, burst_at = _RECORD.unpack(record)
+                at = None if burst_at != burst_at else burst_at
+                self._last = Seen(end, host_s, late_s), Sensed(until, idle_since, at)
+                break
+            if not any(data):
+                break
+        return self._last
+
+    def beat(self, now_s: float) -> None:
+        """Note that the process was alive at monotonic time `now_s`."""
+        _TIME.pack_into(self._memory, _BEAT, now_s)
+
+    @property
+    def beat_s(self) -> float:
+        """Monotonic time at which the process was last alive; 0: never."""
+        beat: float = _TIME.unpack_from(self._memory, _BEAT)[0]
+        return beat
+
+    @property
+    def wakes(self) -> bool:
+        """Whether the daemon wants a message after every block."""
+        return bool(self._memory[_WAKES])
+
+    @wakes.setter
+    def wakes(self, value: bool) -> None:
+        self._memory[_WAKES] = value
+
+    def close(self) -> None:
+        """Free the page."""
+        self._memory.close()
+
+
+def make_page() -> int:
+    """Descriptor of a new page; freed with the last process that holds it."""
+    fd = os.memfd_create("sdrlinkd-modem")
+    os.ftruncate(fd, mmap.PAGESIZE)
+    return fd
