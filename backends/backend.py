@@ -42,6 +42,8 @@ class RadioRequest(NamedTuple):
     """What the radio does when its device is absent at opening."""
     make_channel: "Callable[[], Channel]"
     """Makes the configured simulated air, for radios without an air of their own."""
+    pid: int
+    """The process that people know as the user of this radio: its daemon."""
 
 
 class Presumption(NamedTuple):

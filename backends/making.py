@@ -1,6 +1,5 @@
 """Makes each built-in radio from its settings; loads its code with the first of its kind."""
 
-import os
 import socket
 from pathlib import Path
 
@@ -39,7 +38,7 @@ def make_ether(ether: EtherParams, request: RadioRequest) -> Radio:
     """Make a radio on a hub's air; the hub learns this process by its number."""
     from backends.ether import EtherRadio
 
-    who = f"process {os.getpid()} on {socket.gethostname()}"
+    who = f"process {request.pid} on {socket.gethostname()}"
     return EtherRadio(hub_of(ether), request.node_id, who, request.patience)
 
 

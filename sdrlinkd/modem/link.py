@@ -103,6 +103,8 @@ class ModemLink:
         if not can.lockstep:
             running.append(asyncio.ensure_future(self._send_when_due()))
         refusal = asyncio.ensure_future(self._is_refused.wait())
+        # A paced modem wakes us only while something waits.
+        self._modem.wakes = not can.paced
         try:
             self._moved.set()
             await asyncio.wait((*running, refusal), return_when=asyncio.FIRST_COMPLETED)
@@ -134,7 +136,8 @@ class ModemLink:
         if listener is not None:
             for burst in self._on_air.take_all():
                 listener.settled(burst, Outcome.LOST, self.now())
-        self._state = "down"
+        if self._state == "up":
+            self._state = "ended"
 
     def report(self) -> PduLinkReport:
         """The report: state, counters of radio and receiver, and whether the PHY keeps up."""

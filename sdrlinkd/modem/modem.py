@@ -3,10 +3,14 @@
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
+import phy
 from backends import Capabilities
 from sdrlinkd.link import Outcome, Sensed
 from sdrlinkd.modem.clock import Seen
 from sdrlinkd.pdulink import Heard
+
+COUNTERS = ("overflows", "samples_lost", "late", "bursts_slipped", "samples_sent", *phy.COUNTERS)
+"""Counters that every modem has."""
 
 
 class BurstOrder(NamedTuple):
@@ -109,7 +113,7 @@ class NoModem:
     seen: Seen | None = None
     sensed = Sensed(until=0.0)
     trouble = ""
-    status = ModemStatus("not open", "", None, 0.0, {}, 0.0)
+    status = ModemStatus("not open", "", None, 0.0, dict.fromkeys(COUNTERS, 0), 0.0)
 
     async def open(self) -> Capabilities:
         """Never called."""

@@ -29,7 +29,7 @@ def test_every_row_has_its_section(name):
 @every_row
 async def test_every_row_makes_a_radio(name):
     row = find(name)
-    request = RadioRequest(NEEDS, 1, 0.1, Patience.NONE, lambda: AIR)
+    request = RadioRequest(NEEDS, 1, 0.1, Patience.NONE, lambda: AIR, 1)
     radio = row.radio(row.settings(), request)
     for member in ("open", "blocks", "send", "close"):
         assert callable(getattr(radio, member))
@@ -58,7 +58,7 @@ def test_what_is_presumed_of_the_shared_air_is_so(name):
 
 def test_a_row_whose_code_is_missing_says_so():
     row = find("loopback")._replace(make="backends.nowhere:make")
-    request = RadioRequest(NEEDS, 1, 0.1, Patience.NONE, lambda: AIR)
+    request = RadioRequest(NEEDS, 1, 0.1, Patience.NONE, lambda: AIR, 1)
     with pytest.raises(BackendError, match=r'got "loopback", whose code .* backends\.nowhere'):
         row.radio(row.settings(), request)
 

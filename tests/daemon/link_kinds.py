@@ -11,12 +11,15 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from random import Random
 
 from numba.core.dispatcher import Dispatcher
 
 import phy
 from sdrlinkd.__main__ import main
 from sdrlinkd.client import NoDaemonError, Publisher, Subscriber
+from sdrlinkd.modem import making
+from sdrlinkd.modem.process import Loading, ModemHere, make_radio
 from sdrlinkd.process import Process, module
 from tests.backends.hubs import serving
 from tests.conftest import ETC
@@ -110,6 +113,14 @@ def two_on_ether() -> None:
         run("ether", on_ether(1), hears=1, hearer=FOLDER)
 
 
+def here(wanted, listens, began_s, _progress):
+    """A modem in this process, where it can be seen what it compiles."""
+    config, node_id, seed, longest_s, patience = wanted
+    radio = make_radio(config, node_id, Random(seed), longest_s, patience)
+    return ModemHere(config.modem, radio, listens, began_s, Loading())
+
+
+making.ModemProcess = here
 phy.warm_up()
 before = signatures()
 loopback = 'backend = "loopback"\n' + MODEM

@@ -28,6 +28,8 @@ from sdrlinkd.pdulink import Heard
 
 SWITCH_INTERVAL_S = 1e-4
 """With the default, a busy event loop keeps the receiver waiting for 5 ms."""
+ENDS_S = 2.0
+"""Longest time in s in which the stream of a closed radio ends."""
 
 
 def main() -> None:
@@ -54,7 +56,8 @@ class _Served:
         self._page = page
         self._start = start
         self._modem: ModemHere | None = None
-        self._has_begun, self._is_over = asyncio.Event(), asyncio.Event()
+        self._has_begun, self._has_ended = asyncio.Event(), asyncio.Event()
+        self._is_over = asyncio.Event()
         self._told: protocol.Status | None = None
         self._loading = Loading(lambda text: self._say(protocol.Progress(text)))
 
@@ -70,11 +73,15 @@ class _Served:
         await asyncio.wait((work, over, beating), return_when=asyncio.FIRST_COMPLETED)
         loop.remove_reader(self._control)
         self._loading.give_up()
+        if self._modem is not None:
+            # Its stream ends; what it still has to tell is told.
+            await self._modem.close()
+            if self._has_begun.is_set():
+                with contextlib.suppress(TimeoutError):
+                    await asyncio.wait_for(self._has_ended.wait(), ENDS_S)
         for task in (work, over):
             task.cancel()
         await asyncio.wait((work, over))
-        if self._modem is not None:
-            await self._modem.close()
         beating.cancel()
         if not work.cancelled():
             work.result()
@@ -84,7 +91,9 @@ class _Served:
         try:
             config = typed_config(start.config)
             rng = Random(start.seed)
-            radio = make_radio(config, start.node_id, rng, start.longest_s, start.patience)
+            radio = make_radio(
+                config, start.node_id, rng, start.longest_s, start.patience, os.getppid()
+            )
             modem = self._modem = ModemHere(
                 config.modem, radio, start.listens, start.began_s, self._loading, _at_once,
                 self._show,
@@ -117,6 +126,7 @@ class _Served:
         if self._modem is not None:
             self._tell_status(self._modem)
         self._say(protocol.Ended(problem, is_refusal))
+        self._has_ended.set()
 
     def _show(self) -> None:
         modem = self._modem

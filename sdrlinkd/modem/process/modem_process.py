@@ -6,6 +6,7 @@ daemon then makes a new modem, whose time goes on.
 """
 
 import asyncio
+import contextlib
 import logging
 import os
 import socket
@@ -24,6 +25,7 @@ from sdrlinkd.link import Outcome, Sensed
 from sdrlinkd.modem.clock import Seen
 from sdrlinkd.modem.modem import BurstOrder, BurstReport, ModemStatus, ModemUser, NoModem
 from sdrlinkd.modem.process import protocol
+from sdrlinkd.modem.process.modem_here import forever
 from sdrlinkd.modem.process.page import Page, make_page
 
 BEAT_S = 0.1
@@ -98,7 +100,7 @@ class ModemProcess:
         self._opened: asyncio.Future[Capabilities] | None = None
         self._over: asyncio.Future[None] | None = None
         self._user: ModemUser | None = None
-        self._hangs = False
+        self._hangs = self._is_closing = False
 
     @property
     def wakes(self) -> bool:
@@ -157,6 +159,7 @@ class ModemProcess:
                 self._hangs = True
                 self._kill()
         self._over.result()
+        await forever()
 
     def send(self, order: BurstOrder) -> None:
         """Send a burst; `left` follows, or the end of the process."""
@@ -166,14 +169,17 @@ class ModemProcess:
 
     async def close(self) -> None:
         """Close the radio; bursts that have not left are not reported. Closing twice is fine."""
+        self._is_closing = True
         if self._socket is not None:
-            asyncio.get_running_loop().remove_reader(self._socket)
-            self._socket.close()
-            self._socket = None
+            # The process closes its radio then, tells the end of its stream, and ends.
+            with contextlib.suppress(OSError):
+                self._socket.shutdown(socket.SHUT_WR)
         await self._end()
-        for future in (self._opened, self._over):
-            if future is not None:
-                future.cancel()
+        if self._socket is not None:
+            self._listen(self._socket)
+            self._hang_up()
+        if self._opened is not None:
+            self._opened.cancel()
 
     def _start(self) -> socket.socket:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -188,7 +194,7 @@ class ModemProcess:
                 [sys.executable, "-P", "-m", "sdrlinkd.modem.process", *map(str, inherited)],
                 stdin=subprocess.DEVNULL,
                 # It finds the modules that this process finds, and no others.
-                env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(each or "." for each in sys.path)},
                 pass_fds=inherited,
             )
         finally:
@@ -231,10 +237,20 @@ class ModemProcess:
             except OSError:
                 data = b""
             if not data:
-                asyncio.get_running_loop().remove_reader(control)
-                self._ended(AbsentError(self._how_it_ended()))
+                self._hang_up()
                 return
             self._told(protocol.from_modem(data))
+
+    def _hang_up(self) -> None:
+        """Note that no more messages come."""
+        if self._socket is not None:
+            asyncio.get_running_loop().remove_reader(self._socket)
+            self._socket.close()
+            self._socket = None
+            if self._is_closing and self._over is not None and not self._over.done():
+                self._over.set_result(None)
+            elif not self._is_closing:
+                self._ended(AbsentError(self._how_it_ended()))
 
     def _told(self, message: protocol.FromModem) -> None:
         user, opened = self._user, self._opened

@@ -1,6 +1,7 @@
 """Makes the radio that the configuration names."""
 
 import math
+import os
 from random import Random
 from typing import TYPE_CHECKING
 
@@ -21,11 +22,12 @@ def make_radio(
     rng: Random,
     longest_s: float,
     patience: Patience = Patience.NONE,
+    pid: int | None = None,
 ) -> Radio:
     """The radio that `config.backend` names, at the modem's rate. Raises UserError.
 
     `longest_s` is the length of the longest burst that it will get. `patience`: how long opening
-    waits for an absent radio.
+    waits for an absent radio. `pid`: its daemon, None: this process.
     """
     backend = backend_of(config)
     if backend is None:
@@ -40,6 +42,7 @@ def make_radio(
         longest_s,
         patience,
         lambda: _channel(config, rng.getrandbits(32)),
+        os.getpid() if pid is None else pid,
     )
     try:
         radio = backend.radio(config.backend_settings, request)

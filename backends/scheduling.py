@@ -1,0 +1,70 @@
+"""Asks the kernel to run what handles samples in time: short slices, real-time priority, memory.
+
+Nothing here is necessary: what the kernel refuses, it refuses, and everything works, later.
+"""
+
+import ctypes
+import os
+import platform
+import resource
+import struct
+
+SLICE_NS = 100_000
+"""Length of a time slice in ns: the thread waits shorter for its turn, and gets less at a time."""
+REALTIME, NICE = 10, -10
+"""Real-time priority (SCHED_RR), or else niceness."""
+LOCKED_BYTES = 1 << 28
+"""Memory that a process with compiled code may come to need, and so must be allowed to lock."""
+
+# Numbers of sched_setattr and sched_getattr, by the machine's instruction set.
+_CALLS = {"x86_64": (314, 315), "aarch64": (274, 275), "armv7l": (380, 381)}
+# struct sched_attr, sched_setattr(2): size, policy, flags, nice, priority, runtime, deadline,
+# period.
+_ATTRIBUTES = struct.Struct("=IIQiIQQQ")
+_TIMER_SLACK = 29
+"""PR_SET_TIMERSLACK, prctl(2)."""
+_LOCK_ALL = 3
+"""MCL_CURRENT | MCL_FUTURE, mlockall(2)."""
+
+_libc = ctypes.CDLL(None, use_errno=True)
+
+
+def take_short_slices() -> bool:
+    """Ask for slices of SLICE_NS and exact timers, for this thread and those that it starts.
+
+    Needs no privilege. Returns whether the kernel grants the slice: Linux 6.12 and later do.
+    """
+    _libc.prctl(_TIMER_SLACK, 1, 0, 0, 0)
+    calls = _CALLS.get(platform.machine())
+    if calls is None or os.sched_getscheduler(0) != os.SCHED_OTHER:
+        return False
+    nice = os.getpriority(os.PRIO_PROCESS, 0)
+    wanted = _ATTRIBUTES.pack(_ATTRIBUTES.size, os.SCHED_OTHER, 0, nice, 0, SLICE_NS, 0, 0)
+    if _libc.syscall(calls[0], 0, wanted, 0):
+        return False
+    found = ctypes.create_string_buffer(_ATTRIBUTES.size)
+    if _libc.syscall(calls[1], 0, found, _ATTRIBUTES.size, 0):
+        return False
+    # Older kernels accept the call and ignore the slice.
+    return bool(_ATTRIBUTES.unpack(found.raw)[5] == SLICE_NS)
+
+
+def hurry() -> bool:
+    """Take real-time priority or, if that is refused, niceness; returns whether it is real time."""
+    may, _ = resource.getrlimit(resource.RLIMIT_RTPRIO)
+    try:
+        if may >= REALTIME or os.geteuid() == 0:
+            os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(REALTIME))
+            return True
+        os.setpriority(os.PRIO_PROCESS, 0, NICE)
+    except PermissionError:
+        pass
+    return False
+
+
+def lock_memory() -> bool:
+    """Keep all memory of this process in RAM, if it may lock enough; returns whether it does."""
+    may, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
+    if may != resource.RLIM_INFINITY and may < LOCKED_BYTES and os.geteuid() != 0:
+        return False
+    return not _libc.mlockall(_LOCK_ALL)
