@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from benchmarks import processes
 from benchmarks.absent import PeerError
+from benchmarks.environments import ROOT
 from sdrlinkd.client import ControlClient, NoDaemonError
 from sdrlinkd.process import Process, ProcessError, wait_until
 
@@ -58,11 +59,13 @@ def running(
     precede: bool = False,
     own: Mapping[int, str] | None = None,
     ready: Callable[[ControlClient], bool] = hears_one,
+    tree: Path = ROOT,
 ) -> Iterator[Running]:
     """Run daemons, from when all of them are `ready`. Raises PeerError.
 
     `config` is TOML for all of them, `own` for single robots; `scenario` is for the hub of an
-    ether. With `precede` they have priority over other programs on this machine.
+    ether. With `precede` they have priority over other programs on this machine. `tree` is the
+    checkout whose programs are run.
     """
     with TemporaryDirectory(prefix="benchmark-") as name, ExitStack() as stack:
         folder = Path(name)
@@ -80,7 +83,7 @@ def running(
             programs[f"daemon_{robot}"] = ("sdrlinkd", "--config", str(path), *QUIET)
         started = []
         for program, arguments in programs.items():
-            started.append(processes.start_module(stack, program, *arguments))
+            started.append(processes.start_module(stack, program, *arguments, tree=tree))
             if precede:
                 processes.precede(started[-1], real_time=False)
         folders = {robot: folder / str(robot) for robot in robots}
@@ -89,11 +92,14 @@ def running(
 
 
 @contextmanager
-def daemon_at_work(config: Path) -> Iterator[Path]:
-    """Run one daemon, from when its link is up; sockets are beside `config`. Raises PeerError."""
+def daemon_at_work(config: Path, tree: Path = ROOT) -> Iterator[Path]:
+    """Run one daemon of the checkout `tree`, from when its link is up. Raises PeerError.
+
+    Its sockets are beside `config`.
+    """
     with ExitStack() as stack:
         daemon = processes.start_module(
-            stack, "daemon", "sdrlinkd", "--config", str(config), *QUIET
+            stack, "daemon", "sdrlinkd", "--config", str(config), *QUIET, tree=tree
         )
         _wait_for({1: config.parent}, [daemon], is_up)
         yield config.parent

@@ -81,8 +81,11 @@ def interpreter(environment: str) -> str:
     return str(python)
 
 
-def variables() -> dict[str, str]:
-    """The environment variables of an endpoint, without any that would affect the measurement."""
+def variables(tree: Path = ROOT) -> dict[str, str]:
+    """The environment variables of an endpoint, without any that would affect the measurement.
+
+    `tree` is the checkout whose code it runs.
+    """
     # Variables that an rclpy environment passes to its children would break others.
     kept = {
         key: value
@@ -90,7 +93,7 @@ def variables() -> dict[str, str]:
         if key not in ("LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE", "VIRTUAL_ENV")
         and not key.startswith(("PYTHON", "ROS_", "RMW_", "FASTDDS_", "FASTRTPS_", "ZENOH_"))
     }
-    return kept | {"PYTHONPATH": str(ROOT), "PYTHONDONTWRITEBYTECODE": "1"}
+    return kept | {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
 
 
 def _make(environment: str, folder: Path) -> None:

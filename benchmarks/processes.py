@@ -27,19 +27,30 @@ class Usage(NamedTuple):
 
 
 def start_module(
-    stack: ExitStack, name: str, module: str, *arguments: str, environment: str = ""
+    stack: ExitStack,
+    name: str,
+    module: str,
+    *arguments: str,
+    environment: str = "",
+    tree: Path = ROOT,
 ) -> Process:
-    """Start one of our modules in a peer's environment; it is killed with the stack."""
+    """Start a module of the checkout `tree` in a peer's environment; the stack kills it."""
     command = [interpreter(environment), "-m", module, *arguments]
-    process = Process(command, name=name, environment=variables(), session=False)
+    process = Process(command, name=name, environment=variables(tree), folder=tree, session=False)
     stack.callback(process.kill)
     process.start()
     return process
 
 
-def told_by(name: str, *command: object, within_s: float = MOST_S) -> str:
-    """All output of a program, until it ends. Raises PeerError, ProcessError and OSError."""
-    with Process(command, name=name, folder=ROOT, session=False) as process:
+def told_by(name: str, *command: object, within_s: float = MOST_S, tree: Path | None = None) -> str:
+    """All output of a program, until it ends; with `tree`, it runs the code of that checkout.
+
+    Raises PeerError, ProcessError and OSError.
+    """
+    environment = None if tree is None else variables(tree)
+    with Process(
+        command, name=name, environment=environment, folder=tree or ROOT, session=False
+    ) as process:
         if process.wait(within_s):
             raise PeerError(f"{name}: {process.last_words()}")
         return process.out()
@@ -76,6 +87,46 @@ def usage_below(pid: int) -> list[Usage]:
         with contextlib.suppress(FileNotFoundError, ProcessLookupError):
             if _fields(int(folder.name))[1] == str(pid):
                 found.append(usage(int(folder.name)))
+    return found
+
+
+def family(pid: int) -> list[int]:
+    """The process and every running process that it has started, directly or not."""
+    parents = {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+            parents[int(folder.name)] = int(_fields(int(folder.name))[1])
+    found = [pid]
+    for each in found:
+        found += [child for child, parent in parents.items() if parent == each]
+    return found
+
+
+def family_cpu_s(pid: int) -> float:
+    """CPU time in s that a process and all processes below it have used so far.
+
+    A process that has ended counts once its parent has waited for it.
+    """
+    ticks = 0
+    for each in family(pid):
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+            # utime, stime, cutime and cstime are fields 14 to 17.
+            ticks += sum(map(int, _fields(each)[11:15]))
+    return ticks / TICKS_HZ
+
+
+def family_memory_mb(pid: int) -> dict[str, float]:
+    """Memory of a process and of all processes below it, in MB (10^6 bytes): `Pss` and `Rss`.
+
+    A page that several processes share counts in parts for Pss, and in whole for each for Rss.
+    """
+    found = {"Pss": 0.0, "Rss": 0.0}
+    for each in family(pid):
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+            for line in Path(f"/proc/{each}/smaps_rollup").read_text().splitlines():
+                name, _, rest = line.partition(":")
+                if name in found:
+                    found[name] += 1.024e-3 * int(rest.split()[0])
     return found
 
 
