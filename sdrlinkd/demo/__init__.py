@@ -2,7 +2,7 @@
 
 from sdrlinkd.demo.folder import run_folder
 from sdrlinkd.demo.hearing import Hearing
-from sdrlinkd.demo.links import Options
+from sdrlinkd.demo.links import Options, write_config
 from sdrlinkd.demo.nodes import daemon_process, problems_of, snapshot_of, wait_until_up
 from sdrlinkd.demo.rate import Found, find_rate
 from sdrlinkd.demo.report import DemoReport, RunResult, TopicResult, latency_ms
@@ -37,4 +37,5 @@ __all__ = [
     "topic_table",
     "verdict",
     "wait_until_up",
+    "write_config",
 ]
