@@ -1,0 +1,1 @@
+"""Whole daemons in real time: latency, age, load and start, each in turns with another checkout."""
