@@ -3,7 +3,7 @@
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass
 from enum import Enum
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -181,3 +181,11 @@ class Radio(Protocol):
 
     async def close(self) -> None:
         """Stop; pending bursts are lost. Closing twice is fine."""
+
+
+@runtime_checkable
+class RelaxingRadio(Protocol):
+    """A radio that makes longer blocks while the air is quiet, to save CPU time."""
+
+    def relax(self, is_quiet: bool) -> None:
+        """Note that the air is quiet, or no longer is; may be called while a block is made."""

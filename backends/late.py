@@ -4,7 +4,17 @@ import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from dataclasses import replace
 
-from backends.base import Capabilities, Hear, Levels, Radio, RxBlock, Tuning, TxBurst, TxReport
+from backends.base import (
+    Capabilities,
+    Hear,
+    Levels,
+    Radio,
+    RelaxingRadio,
+    RxBlock,
+    Tuning,
+    TxBurst,
+    TxReport,
+)
 
 NOT_OPEN = "the radio was not open yet"
 
@@ -68,6 +78,11 @@ class LateRadio:
         latest = None if burst.latest is None else burst.latest - first
         answer = self._radio.send(burst._replace(start=burst.start - first, latest=latest))
         return self._report(answer, first)
+
+    def relax(self, is_quiet: bool) -> None:
+        """Tell the wrapped radio whether the air is quiet."""
+        if isinstance(self._radio, RelaxingRadio):
+            self._radio.relax(is_quiet)
 
     async def close(self) -> None:
         """Close the wrapped radio; closing twice is fine."""

@@ -25,6 +25,8 @@ from backends.pace import Pace
 MAX_BEHIND_S = 2.0
 # A late reader gets fewer, larger blocks.
 MAX_LATE_BLOCKS = 8
+LONG_S = 0.01
+"""Length of a block in s while nothing is on the air."""
 
 
 class LoopbackRadio:
@@ -48,6 +50,7 @@ class LoopbackRadio:
         # The next block's index and the bursts on the air must change together.
         self._lock = threading.Lock()
         self._next = 0
+        self._is_relaxed = False
         self._is_open = False
         self.counters = {"overflows": 0, "samples_lost": 0, "late": 0}
 
@@ -82,6 +85,7 @@ class LoopbackRadio:
     async def open(self, tuning: Tuning) -> None:
         """Start at index 0, at the rate of `tuning`."""
         self._n = max(1, round(self._block_s * tuning.rate_hz))
+        self._long = max(self._n, round(LONG_S * tuning.rate_hz))
         self._max_behind = round(MAX_BEHIND_S * tuning.rate_hz)
         self._pace = Pace(tuning.rate_hz, self._paced)
         self._is_open = True
@@ -102,7 +106,14 @@ class LoopbackRadio:
                 return answered(TxReport(TxOutcome.LATE, burst.start, burst.start))
             if self._hear_self:
                 self._timeline.add(start, burst.samples, self._path)
+        if self._is_relaxed:
+            self._is_relaxed = False
+            self._pace.wake()
         return self._outstanding.left(start, len(burst.samples))
+
+    def relax(self, is_quiet: bool) -> None:
+        """While the air is quiet, make longer blocks, each up to when a burst is sent."""
+        self._is_relaxed = is_quiet and self._paced
 
     async def close(self) -> None:
         """Stop the feed; pending bursts are lost."""
@@ -115,7 +126,11 @@ class LoopbackRadio:
     def _next_block(self) -> RxBlock:
         """Make the next block. Runs on the feed's thread."""
         first, n = self._next, self._n
-        behind = self._pace.wait_for(first + n)
+        if self._is_relaxed:
+            # A burst ends the wait: what is due by then, in whole blocks of the usual length.
+            short = -self._pace.wait_for(first + self._long)
+            n = max(n, (self._long - max(0, short)) // n * n)
+        behind = max(0, self._pace.wait_for(first + n))
         samples: Samples | None = None
         reason = ""
         if behind > self._max_behind:

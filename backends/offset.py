@@ -10,6 +10,7 @@ from backends.base import (
     Hear,
     Levels,
     Radio,
+    RelaxingRadio,
     RxBlock,
     Samples,
     Tuning,
@@ -76,6 +77,11 @@ class OffsetRadio:
         """Send a burst in the channel; its shift starts with phase 0 at its first sample."""
         samples = burst.samples * self._up.of(0, len(burst.samples))
         return self._radio.send(burst._replace(samples=samples))
+
+    def relax(self, is_quiet: bool) -> None:
+        """Tell the wrapped radio whether the air is quiet."""
+        if isinstance(self._radio, RelaxingRadio):
+            self._radio.relax(is_quiet)
 
     async def close(self) -> None:
         """Close the wrapped radio; closing twice is fine."""

@@ -8,6 +8,7 @@ from backends.base import (
     Hear,
     Levels,
     Radio,
+    RelaxingRadio,
     RxBlock,
     Samples,
     Tuning,
@@ -112,6 +113,11 @@ class OversampledRadio:
         start = (report.start - TRIM) // self._factor + REACH
         end = (report.end + TRIM) // self._factor - REACH
         return TxReport(report.outcome, start, max(start, end))
+
+    def relax(self, is_quiet: bool) -> None:
+        """Tell the wrapped radio whether the air is quiet."""
+        if isinstance(self._radio, RelaxingRadio):
+            self._radio.relax(is_quiet)
 
     async def close(self) -> None:
         """Close the wrapped radio; closing twice is fine."""

@@ -17,6 +17,7 @@ from sdrlinkd.config import (
 from sdrlinkd.errors import UserError
 from sdrlinkd.link import Burst, LinkParams, Outcome, Qos, ReassemblyParams
 from sdrlinkd.modem import make_modem
+from tests.waiting import wait_for
 
 SIZE = 64
 
@@ -124,9 +125,8 @@ async def test_every_pdu_comes_back_and_every_burst_is_settled(paced):
         report = modem.report()
         assert (report.state, report.kind, report.notices) == ("up", "loopback", [])
         assert report.counters["pdus_good"] == len(pdus)
-        # It is told ten times a second.
-        while not modem.report().realtime_ratio:
-            await asyncio.sleep(0.02)
+        # It is told twice a second.
+        await asyncio.to_thread(wait_for, lambda: modem.report().realtime_ratio)
 
 
 async def test_each_burst_leaves_with_its_own_mcs():

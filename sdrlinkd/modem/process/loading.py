@@ -1,15 +1,30 @@
 """Compiles or loads the modem on a thread, while the event loop does other work."""
 
 import asyncio
+import contextlib
 import logging
+import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 log = logging.getLogger("sdrlinkd")
 
 
 class _GivenUpError(Exception):
     """Raised on the loading thread when the modem is no longer needed."""
+
+
+@contextlib.contextmanager
+def _without_scipy() -> Iterator[None]:
+    """Keep numba from importing SciPy: it would take a third of a second, only to look for BLAS."""
+    if "scipy" in sys.modules:
+        yield
+        return
+    sys.modules["scipy"] = None  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        del sys.modules["scipy"]
 
 
 class Loading:
@@ -46,7 +61,8 @@ class Loading:
         from sdrlinkd.compiling import compile_modem
 
         try:
-            compile_modem(log.info, watch=self._watch)
+            with _without_scipy():
+                compile_modem(log.info, watch=self._watch)
         finally:
             self.note("")
 

@@ -28,6 +28,10 @@ from sdrlinkd.pdulink import Heard
 
 SWITCH_INTERVAL_S = 1e-4
 """With the default, a busy event loop keeps the receiver waiting for 5 ms."""
+FULL_STATUS = 5
+"""Number of beats after which the status is told, whatever has changed."""
+RUNNING = {"samples": 0}
+"""Counters that always change."""
 ENDS_S = 2.0
 """Longest time in s in which the stream of a closed radio ends."""
 
@@ -58,7 +62,7 @@ class _Served:
         self._modem: ModemHere | None = None
         self._has_begun, self._has_ended = asyncio.Event(), asyncio.Event()
         self._is_over = asyncio.Event()
-        self._told: protocol.Status | None = None
+        self._noted: object = None
         self._loading = Loading(lambda text: self._say(protocol.Progress(text)))
 
     async def run(self) -> None:
@@ -136,17 +140,21 @@ class _Served:
 
     async def _beat(self) -> None:
         """Show that this process is alive, and what has changed, forever."""
+        beats = 0
         while True:
             self._page.beat(time.monotonic())
             if self._modem is not None:
-                self._tell_status(self._modem)
+                self._tell_status(self._modem, in_any_case=beats % FULL_STATUS == 0)
+            beats += 1
             await asyncio.sleep(BEAT_S)
 
-    def _tell_status(self, modem: ModemHere) -> None:
-        now = protocol.status_of(modem.status)
-        if now != self._told:
-            self._told = now
-            self._say(now)
+    def _tell_status(self, modem: ModemHere, *, in_any_case: bool = True) -> None:
+        """Tell the status; unless `in_any_case`, only if more than running figures has changed."""
+        now = modem.status
+        noted = now.detail, now.trouble, {**now.counters, **RUNNING}
+        if in_any_case or noted != self._noted:
+            self._noted = noted
+            self._say(protocol.status_of(now))
 
     def _listen(self) -> None:
         """Handle all messages that the daemon has sent so far."""

@@ -6,7 +6,16 @@ from collections.abc import Awaitable, Callable, Sequence
 from typing import NoReturn
 
 import phy
-from backends import BackendError, Capabilities, LateRadio, Radio, RefusalError, RxBlock, Tuning
+from backends import (
+    BackendError,
+    Capabilities,
+    LateRadio,
+    Radio,
+    RefusalError,
+    RelaxingRadio,
+    RxBlock,
+    Tuning,
+)
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import Sensed
 from sdrlinkd.modem.clock import BlockTimes, Seen
@@ -15,6 +24,9 @@ from sdrlinkd.modem.process.receiving import Call, Demodulation, ReceiverHere, R
 from sdrlinkd.modem.process.sensing_receiver import SensingReceiver
 from sdrlinkd.modem.process.transmission import Transmission
 from sdrlinkd.pdulink import Heard
+
+QUIET_S = 0.05
+"""Time in s after a burst from which the air counts as quiet: longer than the longest burst."""
 
 
 async def forever() -> NoReturn:
@@ -50,11 +62,14 @@ class ModemHere:
         self._call = call
         self._on_block = on_block
         self._times = BlockTimes(params.rate_hz)
+        self._settles = round(QUIET_S * params.rate_hz)
         self._receiver: phy.Receiver | None = None
         self._receiving: SensingReceiver | None = None
         self._rx: Demodulation | None = None
         self._tx: Transmission | None = None
         self._user: ModemUser | None = None
+        self._quiet_from = 0
+        self._is_quiet = False
 
     @property
     def wakes(self) -> bool:
@@ -148,6 +163,7 @@ class ModemHere:
         """Send a burst; `left` follows."""
         if self._tx is None:
             raise RuntimeError("send before open")
+        self._quiet_from = max(self._quiet_from, order.start + self._settles)
         self._tx.send(order)
 
     async def close(self) -> None:
@@ -173,12 +189,25 @@ class ModemHere:
             self._times.observe(block.index + block.n, block.host_ns * 1e-9)
             receiver.hear(block)
             self._on_block()
+            self._relax(block.index + block.n)
 
         async for block in self._radio.blocks(hear if paced else None):
             if paced:
                 self._times.observe(block.index + block.n, block.host_ns * 1e-9)
             await receiver.put(block)
         await receiver.finish()
+
+    def _relax(self, end: int) -> None:
+        """Tell the radio whether the air was quiet before index `end`, if that has changed."""
+        receiver = self._receiver
+        if receiver is None or self._listens:
+            return
+        busy_until = max(receiver.last_burst[1] + self._settles, self._quiet_from)
+        is_quiet = end > busy_until and not self.wakes
+        if is_quiet != self._is_quiet:
+            self._is_quiet = is_quiet
+            if isinstance(self._radio, RelaxingRadio):
+                self._radio.relax(is_quiet)
 
     def _deliver(self, pdus: Sequence[phy.PduHeard], end: int) -> None:
         """Pass on the PDUs that the samples before index `end` completed."""

@@ -30,6 +30,8 @@ from sdrlinkd.modem.process.page import Page, make_page
 
 BEAT_S = 0.1
 """Time between two signs of life of the process."""
+WATCH_S = 0.5
+"""Time between two looks for them."""
 HUNG_S = 5.0
 """Time without a sign of life, while this process was awake, after which it hangs."""
 END_S = 30.0
@@ -65,7 +67,7 @@ class _SignsOfLife:
         """Whether the last sign, at `beat_s`, has been the same for HUNG_S."""
         now_s = time.monotonic()
         # Only time in which this process could run counts: a busy machine delays both.
-        self._missed_s += min(now_s - self._looked_s, 2 * BEAT_S)
+        self._missed_s += min(now_s - self._looked_s, 2 * WATCH_S)
         self._looked_s = now_s
         if beat_s != self._beat_s:
             self._beat_s, self._missed_s = beat_s, 0.0
@@ -131,7 +133,7 @@ class ModemProcess:
 
     @property
     def status(self) -> ModemStatus:
-        """Radio, counters and load, a tenth of a second old at most."""
+        """Radio, counters and load; running figures are half a second old at most."""
         told = self._status
         return told._replace(counters={**told.counters, **self._receiver_counters})
 
@@ -154,7 +156,7 @@ class ModemProcess:
         self._say(protocol.Begin())
         life = _SignsOfLife()
         while not self._over.done():
-            await asyncio.wait((self._over,), timeout=BEAT_S)
+            await asyncio.wait((self._over,), timeout=WATCH_S)
             if self._page is not None and life.are_missing(self._page.beat_s):
                 self._hangs = True
                 self._kill()
