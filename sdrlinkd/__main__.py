@@ -1,18 +1,18 @@
 """The daemon's command line: `sdrlinkd --config FILE`."""
 
 import argparse
-import asyncio
 import logging
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import uvloop
-
-from sdrlinkd import __version__, daemon
-from sdrlinkd.config import Setup, load_config, make_setup, unchecked
+from sdrlinkd import __version__, spawn
 from sdrlinkd.errors import UserError
 from sdrlinkd.journal import log_to_stderr
 from sdrlinkd.parent import end_with_parent
+
+if TYPE_CHECKING:
+    from sdrlinkd.config import Setup
 
 DEFAULT_CONFIG = Path("/etc/sdrlinkd/sdrlinkd.toml")
 
@@ -23,12 +23,10 @@ def main(arguments: list[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     log_to_stderr(logging.getLevelNamesMapping()[options.log_level.upper()])
     try:
-        setup = _read(options.config)
         if options.check:
-            sys.stdout.write("\n".join([*_checked(setup), ""]))
+            sys.stdout.write("\n".join([*_checked(_read(options.config)), ""]))
             return 0
-        with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-            runner.run(daemon.run(setup, lambda: _read(options.config)))
+        _run(options.config)
     except UserError as error:
         sys.stderr.write(f"sdrlinkd: {error}\n")
         return 2
@@ -38,12 +36,35 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def _read(path: Path) -> Setup:
+def _run(path: Path) -> None:
+    """Run the daemon. Raises UserError."""
+    early = spawn.spawn_early(path)
+    try:
+        # Loaded while the modem process loads its own code.
+        import asyncio
+
+        import uvloop
+
+        from sdrlinkd import daemon
+
+        setup = _read(path)
+        with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+            runner.run(daemon.run(setup, lambda: _read(path), early))
+    finally:
+        early.close()
+
+
+def _read(path: Path) -> "Setup":
+    from sdrlinkd.config import load_config, make_setup
+
     return make_setup(load_config(path), path.parent, str(path))
 
 
-def _checked(setup: Setup) -> list[str]:
+def _checked(setup: "Setup") -> list[str]:
     """The lines that `--check` prints about the configuration and the radio. Raises UserError."""
+    from sdrlinkd import daemon
+    from sdrlinkd.config import unchecked
+
     told = daemon.check(setup)
     verdict = (
         "the file is valid; the daemon checks the rest when it starts"

@@ -32,6 +32,7 @@ from sdrlinkd.policies import Policies
 from sdrlinkd.reloading import Reloading
 from sdrlinkd.reports import Snapshot
 from sdrlinkd.sdnotify import Notifier
+from sdrlinkd.spawn import EarlyModem
 from sdrlinkd.verbs import make_verbs
 
 if TYPE_CHECKING:
@@ -55,11 +56,11 @@ STOP_S = 30.0
 Reload = Callable[[], Setup]
 
 
-async def run(setup: Setup, reload: Reload) -> None:
+async def run(setup: Setup, reload: Reload, early: EarlyModem) -> None:
     """Run the node of `setup` until SIGTERM or SIGINT.
 
-    On SIGHUP, `reload` reads the configuration again. Raises UserError when the node cannot be
-    opened.
+    On SIGHUP, `reload` reads the configuration again. `early` may hold a modem process. Raises
+    UserError when the node cannot be opened.
     """
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
@@ -68,7 +69,7 @@ async def run(setup: Setup, reload: Reload) -> None:
     notifier = Notifier()
     async with contextlib.AsyncExitStack() as stack:
         notifier.extend(START_S)
-        node, control, reloading = await _open(setup, stack, reload)
+        node, control, reloading = await _open(setup, stack, reload, early)
         loop.add_signal_handler(signal.SIGHUP, reloading.on_signal)
         stack.callback(loop.remove_signal_handler, signal.SIGHUP)
         async with _only_one_error(), asyncio.TaskGroup() as tasks:
@@ -107,7 +108,7 @@ async def _only_one_error() -> AsyncIterator[None]:
 
 
 async def _open(
-    setup: Setup, stack: contextlib.AsyncExitStack, reload: Reload
+    setup: Setup, stack: contextlib.AsyncExitStack, reload: Reload, early: EarlyModem
 ) -> tuple[Node, Control, Reloading]:
     config = setup.config
     rng = Random(os.urandom(16) if config.seed is None else config.seed)
@@ -129,7 +130,7 @@ async def _open(
     )
     policies = Policies(setup, link)
     loading = Loading()
-    make = partial(_make_pdu_link, rng, loading)
+    make = partial(_make_pdu_link, rng, loading, early)
     radio = backend_of(config)
     notices_replug = radio is not None and radio.heeds_patience
     opening = Opening(setup, make, notices_replug, lambda: loading.told)
@@ -163,7 +164,12 @@ async def _open(
 
 
 def _make_pdu_link(
-    rng: Random, loading: Loading, setup: Setup, patience: Patience, began_s: float
+    rng: Random,
+    loading: Loading,
+    early: EarlyModem,
+    setup: Setup,
+    patience: Patience,
+    began_s: float,
 ) -> PduLink:
     config = setup.config
     if config.backend == "direct":
@@ -172,7 +178,7 @@ def _make_pdu_link(
         return make_gnuradio(config)
     # With the default, a busy event loop keeps a modem in this process waiting for 5 ms.
     sys.setswitchinterval(SWITCH_INTERVAL_S)
-    return make_modem(config, setup.node_id, rng, patience, began_s, loading)
+    return make_modem(config, setup.node_id, rng, patience, began_s, loading, early)
 
 
 def _types_of(setup: Setup) -> tuple[frozenset[int], dict[int, bytes]]:

@@ -11,6 +11,7 @@ from sdrlinkd.modem.airtimes import Airtimes
 from sdrlinkd.modem.link import ModemLink
 from sdrlinkd.modem.modem import Modem
 from sdrlinkd.modem.process import Loading, ModemHere, ModemProcess, RadioWanted, make_radio
+from sdrlinkd.spawn import EarlyModem
 
 
 def make_modem(
@@ -20,11 +21,13 @@ def make_modem(
     patience: Patience = Patience.NONE,
     began_s: float | None = None,
     loading: Loading | None = None,
+    early: EarlyModem | None = None,
 ) -> ModemLink:
     """The modem on the radio that `config.backend` names. Raises ConfigError.
 
     `patience`: how long opening waits for an absent radio. `began_s`: start of the link's clock on
-    the monotonic clock. `loading` compiles or loads the PHY, and knows how far that is.
+    the monotonic clock. `loading` compiles or loads the PHY, and knows how far that is. `early` may
+    hold a modem process that was already started.
     """
     check_airtime(config)
     loading = loading or Loading()
@@ -37,7 +40,7 @@ def make_modem(
     async def choose() -> Modem:
         if backend is not None and await backend.keeps_pace(config.backend_settings, patience):
             wanted = RadioWanted(config, node_id, rng.getrandbits(32), longest_s, patience)
-            return ModemProcess(wanted, listens, starts_s, loading.note)
+            return ModemProcess(wanted, listens, starts_s, loading.note, early)
         radio = make_radio(config, node_id, rng, longest_s, patience)
         return ModemHere(config.modem, radio, listens, starts_s, loading)
 

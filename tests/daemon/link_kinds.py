@@ -16,6 +16,7 @@ from random import Random
 from numba.core.dispatcher import Dispatcher
 
 import phy
+from sdrlinkd import spawn
 from sdrlinkd.__main__ import main
 from sdrlinkd.client import NoDaemonError, Publisher, Subscriber
 from sdrlinkd.modem import making
@@ -113,7 +114,7 @@ def two_on_ether() -> None:
         run("ether", on_ether(1), hears=1, hearer=FOLDER)
 
 
-def here(wanted, listens, began_s, _progress):
+def here(wanted, listens, began_s, _progress, _early):
     """A modem in this process, where it can be seen what it compiles."""
     config, node_id, seed, longest_s, patience = wanted
     radio = make_radio(config, node_id, Random(seed), longest_s, patience)
@@ -121,6 +122,7 @@ def here(wanted, listens, began_s, _progress):
 
 
 making.ModemProcess = here
+spawn.spawn_early = lambda _: spawn.EarlyModem()
 phy.warm_up()
 before = signatures()
 loopback = 'backend = "loopback"\n' + MODEM

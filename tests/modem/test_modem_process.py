@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import mmap
 import os
 import signal
 from random import Random
@@ -17,11 +18,17 @@ from sdrlinkd.link import Outcome, Sensed
 from sdrlinkd.modem import make_modem
 from sdrlinkd.modem.clock import Seen
 from sdrlinkd.modem.process import modem_process
-from sdrlinkd.modem.process.page import Page, make_page
+from sdrlinkd.modem.process.page import Page
 from tests.laws import law
 from tests.modem.test_modem_link import Listener, bursts, config, send
 
 TIMES = st.floats(0, 1e9)
+
+
+def make_page():
+    fd = os.memfd_create("page")
+    os.ftruncate(fd, mmap.PAGESIZE)
+    return fd
 
 
 @pytest.fixture

@@ -46,19 +46,21 @@ def main() -> None:
     control = socket.socket(fileno=control_fd)
     page = Page(page_fd)
     os.close(page_fd)
-    start = protocol.to_start(control.recv(protocol.MOST_BYTES))
-    log_to_stderr(start.log_level)
     with contextlib.suppress(BrokenPipeError, ConnectionResetError):
-        asyncio.Runner(loop_factory=uvloop.new_event_loop).run(_Served(control, page, start).run())
+        asyncio.Runner(loop_factory=uvloop.new_event_loop).run(_serve(control, page))
+
+
+async def _serve(control: socket.socket, page: Page) -> None:
+    await _Served(control, page).run()
 
 
 class _Served:
     """The modem of one daemon, and the connection to it."""
 
-    def __init__(self, control: socket.socket, page: Page, start: protocol.Start) -> None:
+    def __init__(self, control: socket.socket, page: Page) -> None:
         self._control = control
         self._page = page
-        self._start = start
+        self._start: asyncio.Future[protocol.Start] = asyncio.get_running_loop().create_future()
         self._modem: ModemHere | None = None
         self._has_begun, self._has_ended = asyncio.Event(), asyncio.Event()
         self._is_over = asyncio.Event()
@@ -91,8 +93,12 @@ class _Served:
             work.result()
 
     async def _work(self) -> None:
-        start = self._start
+        # The process may be started before its daemon knows what it wants.
+        loading = asyncio.ensure_future(self._loading())
+        start = await self._start
+        log_to_stderr(start.log_level)
         try:
+            await loading
             config = typed_config(start.config)
             rng = Random(start.seed)
             radio = make_radio(
@@ -169,7 +175,9 @@ class _Served:
                 self._is_over.set()
                 return
             message = protocol.to_modem(data)
-            if isinstance(message, protocol.Begin):
+            if isinstance(message, protocol.Start):
+                self._start.set_result(message)
+            elif isinstance(message, protocol.Begin):
                 self._has_begun.set()
             elif self._modem is not None:
                 self._modem.send(BurstOrder(*msgspec.structs.astuple(message)))

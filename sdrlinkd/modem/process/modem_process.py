@@ -11,7 +11,6 @@ import logging
 import os
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Callable
 from typing import NamedTuple
@@ -26,7 +25,8 @@ from sdrlinkd.modem.clock import Seen
 from sdrlinkd.modem.modem import BurstOrder, BurstReport, ModemStatus, ModemUser, NoModem
 from sdrlinkd.modem.process import protocol
 from sdrlinkd.modem.process.modem_here import forever
-from sdrlinkd.modem.process.page import Page, make_page
+from sdrlinkd.modem.process.page import Page
+from sdrlinkd.spawn import EarlyModem, spawn_modem
 
 BEAT_S = 0.1
 """Time between two signs of life of the process."""
@@ -40,7 +40,6 @@ GONE_S = 1.0
 """The same for a process that has closed its socket."""
 LOOK_S = 0.01
 """Time between two looks at whether the process has ended."""
-SOCKET_BYTES = 1 << 20
 
 log = logging.getLogger("sdrlinkd")
 
@@ -79,7 +78,7 @@ class ModemProcess:
 
     `listens`: whether the receiver senses if the channel is busy. `began_s`: start of the stream's
     time on the monotonic clock; None: time starts with the samples. `progress` gets a text while
-    the modem is being compiled, at the end an empty one.
+    the modem is being compiled, at the end an empty one. `early` may hold a process already.
     """
 
     def __init__(
@@ -88,11 +87,13 @@ class ModemProcess:
         listens: bool,
         began_s: float | None,
         progress: Callable[[str], None] = lambda _: None,
+        early: EarlyModem | None = None,
     ) -> None:
         self._wanted = wanted
         self._listens = listens
         self._began_s = began_s
         self._progress = progress
+        self._early = early or EarlyModem()
         self._process: subprocess.Popen[bytes] | None = None
         self._socket: socket.socket | None = None
         self._page: Page | None = None
@@ -184,26 +185,10 @@ class ModemProcess:
             self._opened.cancel()
 
     def _start(self) -> socket.socket:
-        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        page = make_page()
-        self._page = Page(page)
-        self._page.beat(time.monotonic())
-        for end in (ours, theirs):
-            end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SOCKET_BYTES)
-        inherited = [theirs.fileno(), page]
-        try:
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "sdrlinkd.modem.process", *map(str, inherited)],
-                stdin=subprocess.DEVNULL,
-                # It finds the modules that this process finds, and no others.
-                env={**os.environ, "PYTHONPATH": os.pathsep.join(each or "." for each in sys.path)},
-                pass_fds=inherited,
-            )
-        finally:
-            theirs.close()
-            os.close(page)
-        ours.setblocking(False)
-        self._socket = ours
+        spawned = self._early.take() or spawn_modem()
+        self._process, self._socket = spawned.process, spawned.control
+        self._page = Page(spawned.page)
+        os.close(spawned.page)
         wanted = self._wanted
         config = msgspec.to_builtins(wanted.config)
         self._say(
@@ -212,7 +197,7 @@ class ModemProcess:
                 self._began_s, self._listens, log.getEffectiveLevel(),
             )
         )  # fmt: skip
-        return ours
+        return spawned.control
 
     def _read(self) -> tuple[Seen, Sensed] | None:
         if self._page is not None:

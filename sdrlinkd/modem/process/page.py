@@ -6,7 +6,6 @@ written, whatever order the processor keeps between two processes.
 """
 
 import mmap
-import os
 import struct
 import zlib
 
@@ -71,10 +70,3 @@ class Page:
     def close(self) -> None:
         """Free the page."""
         self._memory.close()
-
-
-def make_page() -> int:
-    """Descriptor of a new page; freed with the last process that holds it."""
-    fd = os.memfd_create("sdrlinkd-modem")
-    os.ftruncate(fd, mmap.PAGESIZE)
-    return fd

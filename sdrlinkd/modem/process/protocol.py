@@ -146,17 +146,16 @@ def status_of(status: ModemStatus) -> Status:
     )
 
 
-ToModem = Begin | Order
+ToModem = Start | Begin | Order
 FromModem = Progress | Opened | Failed | Delivered | Left | Status | Ended
 
 encode = msgspec.msgpack.Encoder().encode
-to_start = msgspec.msgpack.Decoder(Start).decode
 _to_modem = msgspec.msgpack.Decoder(ToModem)
 _from_modem = msgspec.msgpack.Decoder(FromModem)
 
 
 def to_modem(data: bytes) -> ToModem:
-    """Decode a message from the daemon, after Start. Raises msgspec.DecodeError."""
+    """Decode a message from the daemon. Raises msgspec.DecodeError."""
     told: ToModem = _to_modem.decode(data)
     return told
 
