@@ -34,6 +34,7 @@ from backends.params import EtherParams, IqFileParams, LoopbackParams, ZmqParams
 from backends.recording import GAP_LABEL, RecordingInfo, RecordingReader, describe, refuse_same
 from backends.registry import BUILT_IN, find_backend, installed_names
 from backends.samples import SAMPLE_TYPES
+from backends.scheduling import Scheduling, take_short_slices
 from backends.soapy import (
     Assessment,
     DeviceProbe,
@@ -122,6 +123,7 @@ __all__ = [
     "RelaxingRadio",
     "RxBlock",
     "Samples",
+    "Scheduling",
     "SoapyParams",
     "SoapyRadio",
     "SoapySettings",
@@ -147,6 +149,7 @@ __all__ = [
     "open_endpoint",
     "probe_devices",
     "refuse_same",
+    "take_short_slices",
 ]
 
 _LATER = {

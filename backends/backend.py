@@ -129,6 +129,8 @@ class Backend(NamedTuple):
     """The device may be absent and appear later; the radio's section may change meanwhile."""
     heeds_patience: bool = False
     """The radio waits as RadioRequest.patience says, and notices when its device was replugged."""
+    is_hardware: bool = True
+    """Samples come from a device that does not wait; the modem asks for real-time priority."""
     keeps_pace: Callable[[Any, Patience], Awaitable[bool]] = as_configured
     """Whether samples come in real time, once the radio is open; false: as fast as they are taken.
 

@@ -45,8 +45,10 @@ def _run(path: Path) -> None:
 
         import uvloop
 
+        from backends import take_short_slices
         from sdrlinkd import daemon
 
+        take_short_slices()
         setup = _read(path)
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
             runner.run(daemon.run(setup, lambda: _read(path), early))

@@ -335,6 +335,8 @@ class PduLinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """Counters of the radio and the modem by name."""
     realtime_ratio: float | None = None
     """Speed of the receiver as a multiple of real time, by CPU time; null: unknown."""
+    scheduling: str = ""
+    """How the kernel runs the modem's process, as text for people; empty: nothing was asked."""
     notices: list[str] = []
     """What a person should know about the PDU link, in sentences."""
 

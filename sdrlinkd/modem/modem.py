@@ -56,6 +56,10 @@ class ModemStatus(NamedTuple):
     counters: Mapping[str, int]
     realtime_ratio: float
     """Demodulation speed relative to real time; 0: not known yet."""
+    scheduling: str = ""
+    """How the kernel runs the modem's process, in words; empty: not asked for anything."""
+    advice: str = ""
+    """What to do about what the kernel refused, in a sentence; empty: nothing."""
 
 
 class ModemUser(Protocol):

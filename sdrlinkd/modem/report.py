@@ -35,6 +35,7 @@ def modem_report(
         clipped_pct=100 * modem.clipped,
         counters=dict(modem.counters),
         realtime_ratio=round(ratio, 2) if ratio else None,
+        scheduling=modem.scheduling,
         notices=_notices(state, problem, params, modem, can, stream_end),
     )
 
@@ -60,4 +61,6 @@ def _notices(
         )
     if state != "down" and can is not None and not can.transmits:
         notices.append("this radio only receives: messages to send stay queued")
+    if modem.advice:
+        notices.append(modem.advice)
     return notices

@@ -1,20 +1,16 @@
 """The radio process from start to end: signals, priority, and its report when it fails."""
 
-import contextlib
-import os
-import resource
 import signal
 import socket
 import sys
 
+from backends.scheduling import hurry, take_short_slices
 from backends.soapy.binding import DriverError, HostError
 from backends.soapy.protocol import MOST_BYTES, Blame, Failed, SampleRing, to_open
 from backends.soapy.radio_process.session import Session
 from backends.soapy.radio_process.tx_commands import TxCommands
 from backends.soapy.settings import SettingError
 
-REALTIME, NICE = 10, -10
-"""Real-time priority or else niceness, if permitted: samples do not wait."""
 SWITCH_INTERVAL_S = 5e-4
 """Short, because two threads that mostly wait in the driver should not wait for each other."""
 
@@ -25,7 +21,9 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
-    _raise_priority()
+    # Samples do not wait.
+    take_short_slices()
+    hurry()
     control, rx, rx_memory, tx_memory = (int(each) for each in sys.argv[1:5])
     with socket.socket(fileno=control) as control_socket, socket.socket(fileno=rx) as rx_socket:
         rx_socket.setblocking(False)
@@ -39,13 +37,3 @@ def main() -> None:
             commands.say(Failed(str(error), Blame.HOST))
         except DriverError as error:
             commands.say(Failed(str(error), Blame.ABSENT))
-
-
-def _raise_priority() -> None:
-    """Raise the priority of this process as far as permitted."""
-    may, _ = resource.getrlimit(resource.RLIMIT_RTPRIO)
-    with contextlib.suppress(PermissionError):
-        if may >= REALTIME:
-            os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(REALTIME))
-        else:
-            os.setpriority(os.PRIO_PROCESS, 0, NICE)

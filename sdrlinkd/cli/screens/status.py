@@ -119,6 +119,8 @@ def everything(snapshot: Snapshot, width: int) -> list[RenderableType]:
     counted = ", ".join(f"{key} {n}" for key, n in snapshot.carrier.counters.items() if n)
     if counted:
         parts.append(_labelled("counts", counted, width))
+    if snapshot.carrier.scheduling:
+        parts.append(_labelled("modem", f"runs with {snapshot.carrier.scheduling}", width))
     parts += [*_receipts(snapshot, width), Text()]
     parts.append(sent_table(link.topics, rule=True))
     if link.received:

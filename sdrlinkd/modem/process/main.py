@@ -13,8 +13,8 @@ from random import Random
 import msgspec
 import uvloop
 
-from backends import AbsentError, BackendError, Capabilities
-from sdrlinkd.config import typed_config
+from backends import AbsentError, BackendError, Capabilities, Scheduling
+from sdrlinkd.config import backend_of, typed_config
 from sdrlinkd.errors import UserError
 from sdrlinkd.journal import log_to_stderr
 from sdrlinkd.modem.modem import BurstOrder, BurstReport
@@ -65,6 +65,7 @@ class _Served:
         self._has_begun, self._has_ended = asyncio.Event(), asyncio.Event()
         self._is_over = asyncio.Event()
         self._noted: object = None
+        self._scheduling: Scheduling | None = None
         self._loading = Loading(lambda text: self._say(protocol.Progress(text)))
 
     async def run(self) -> None:
@@ -101,6 +102,8 @@ class _Served:
             await loading
             config = typed_config(start.config)
             rng = Random(start.seed)
+            backend = backend_of(config)
+            self._scheduling = Scheduling(is_urgent=backend is not None and backend.is_hardware)
             radio = make_radio(
                 config, start.node_id, rng, start.longest_s, start.patience, os.getppid()
             )
@@ -149,6 +152,8 @@ class _Served:
         beats = 0
         while True:
             self._page.beat(time.monotonic())
+            if self._scheduling is not None:
+                self._scheduling.look()
             if self._modem is not None:
                 self._tell_status(self._modem, in_any_case=beats % FULL_STATUS == 0)
             beats += 1
@@ -157,6 +162,13 @@ class _Served:
     def _tell_status(self, modem: ModemHere, *, in_any_case: bool = True) -> None:
         """Tell the status; unless `in_any_case`, only if more than running figures has changed."""
         now = modem.status
+        if self._scheduling is not None:
+            yields = {"priority_yields": self._scheduling.yields}
+            now = now._replace(
+                counters={**now.counters, **yields},
+                scheduling=self._scheduling.told,
+                advice=self._scheduling.advice,
+            )
         noted = now.detail, now.trouble, {**now.counters, **RUNNING}
         if in_any_case or noted != self._noted:
             self._noted = noted

@@ -125,6 +125,8 @@ class Status(msgspec.Struct, frozen=True, array_like=True, tag="status"):
     clipped: float
     counters: dict[str, int]
     realtime_ratio: float
+    scheduling: str
+    advice: str
 
 
 class Ended(msgspec.Struct, frozen=True, array_like=True, tag="ended"):
@@ -143,6 +145,8 @@ def status_of(status: ModemStatus) -> Status:
         status.clipped,
         dict(status.counters),
         status.realtime_ratio,
+        status.scheduling,
+        status.advice,
     )
 
 
