@@ -15,6 +15,8 @@ with Publisher() as out:
 ROS node, use `send(..., timeout_s=0)`, which never blocks. Runs on Python 3.10 and newer.
 """
 
+from typing import TYPE_CHECKING
+
 from sdrlinkd.client.announced import (
     QOS,
     check_wishes,
@@ -23,8 +25,6 @@ from sdrlinkd.client.announced import (
     unknown_topic,
     wrong_type,
 )
-from sdrlinkd.client.async_publisher import AsyncPublisher
-from sdrlinkd.client.async_subscriber import AsyncSubscriber
 from sdrlinkd.client.awaited import DAEMON_GONE
 from sdrlinkd.client.control import ControlClient, RefusedError
 from sdrlinkd.client.errors import (
@@ -52,6 +52,10 @@ from sdrlinkd.client.paths import (
 )
 from sdrlinkd.client.publisher import Publisher
 from sdrlinkd.client.subscriber import Subscriber
+
+if TYPE_CHECKING:
+    from sdrlinkd.client.async_publisher import AsyncPublisher
+    from sdrlinkd.client.async_subscriber import AsyncSubscriber
 
 __all__ = [
     "ACK_PREFIX",
@@ -86,3 +90,16 @@ __all__ = [
     "unpack",
     "wrong_type",
 ]
+
+
+def __getattr__(name: str) -> object:
+    """Import an asynchronous client on first use (PEP 562): asyncio is slow to load."""
+    if name == "AsyncPublisher":
+        from sdrlinkd.client.async_publisher import AsyncPublisher
+
+        return AsyncPublisher
+    if name == "AsyncSubscriber":
+        from sdrlinkd.client.async_subscriber import AsyncSubscriber
+
+        return AsyncSubscriber
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -9,16 +9,24 @@ from sdrlinkd.link import Outcome, Sensed
 from sdrlinkd.modem.clock import Seen
 from sdrlinkd.pdulink import Heard
 
-COUNTERS = ("overflows", "samples_lost", "late", "bursts_slipped", "samples_sent", *phy.COUNTERS)
+COUNTERS = (
+    "overflows",
+    "samples_lost",
+    "late",
+    "bursts_slipped",
+    "bursts_postponed",
+    "samples_sent",
+    *phy.COUNTERS,
+)
 """Counters that every modem has."""
 
 
 class BurstOrder(NamedTuple):
     """PDUs to send as one burst, the first sample at index `start` of the received stream.
 
-    If the burst cannot start by `latest`, it is reported late and not sent. It is also not sent if
-    a burst before it was late and is not among the `late_known` late ones that the order's author
-    knew: the order of messages would be lost.
+    A modem that cannot modulate it by then starts it later. A burst that cannot start by `latest`
+    is reported late and not sent. Neither is a burst if one before it was late and is not among the
+    `late_known` late ones that the order's author knew: the order of messages would be lost.
     """
 
     number: int
@@ -27,6 +35,8 @@ class BurstOrder(NamedTuple):
     late_known: int
     mcs: int
     pdus: Sequence[bytes]
+    tells_times: bool = False
+    """Whether a burst that starts later must be adjusted; see `wire.postponed`."""
 
 
 class BurstReport(NamedTuple):

@@ -25,7 +25,9 @@ class OnAir:
             latest = start + math.floor((burst.latest - burst.start) * rate_hz)
         self._number += 1
         self._bursts[self._number] = burst
-        return BurstOrder(self._number, start, latest, self._late, burst.mcs, burst.pdus)
+        return BurstOrder(
+            self._number, start, latest, self._late, burst.mcs, burst.pdus, burst.tells_times
+        )
 
     def take(self, report: BurstReport) -> Burst | None:
         """The burst that a report is about; None if it was taken before."""

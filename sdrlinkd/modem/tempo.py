@@ -1,7 +1,7 @@
 """Estimates how long a burst may be so that its samples are modulated in time."""
 
-OVERHEAD_S = 3.5e-4
-"""Time in s from the decision to the radio, without modulation."""
+OVERHEAD_S = 1e-4
+"""Time in s from the decision to the modem, without modulation."""
 PER_SAMPLE_S = 2e-8
 SLOWER, FASTER = 1.02, 0.94
 """Factors on the estimated time per sample, after a burst that took longer, or less long.
@@ -21,6 +21,10 @@ class Tempo:
         """Learn that the modulation of `n_samples` samples took `seconds`."""
         is_slower = seconds > self._per_sample_s * n_samples
         self._per_sample_s *= SLOWER if is_slower else FASTER
+
+    def seconds(self, n_samples: int) -> float:
+        """How long the modulation of `n_samples` samples takes, in s."""
+        return self._per_sample_s * n_samples
 
     def samples_in(self, seconds: float) -> int:
         """How many samples can be modulated and reach the radio within `seconds`."""

@@ -2,14 +2,17 @@
 
 import asyncio
 
+import numpy as np
 import pytest
 
 import phy
-from backends import Capabilities, TxOutcome, TxReport
+from backends import GAP, Capabilities, TxOutcome, TxReport
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import Outcome
 from sdrlinkd.modem.modem import BurstOrder
 from sdrlinkd.modem.process.transmission import SHORT, Transmission
+from sdrlinkd.wire import postponed
+from tests.wire.vectors import BY_NAME
 
 
 class Radio:
@@ -127,3 +130,67 @@ async def test_a_short_burst_does_not_overtake_a_long_one():
         for number in range(4):
             radio.tell(number, TxOutcome.SENT, 0)
     transmission.close()
+
+
+STAMPED = BY_NAME["stamp_alone"].octets
+"""A PDU with a message's age."""
+
+
+@pytest.fixture
+async def late_by():
+    """Sends orders `late` µs after the start that they name; (bursts at the radio, counters)."""
+
+    async def call(*orders, late):
+        radio, now = Radio(lockstep=False), orders[0].start + late
+        async with asyncio.TaskGroup() as tasks, asyncio.timeout(60):
+            transmission = Transmission(ModemParams(rate_hz=1e6), radio, lambda: now)
+            await asyncio.to_thread(phy.warm_up)
+            transmission.start(tasks, lambda _: None)
+            for number, order in enumerate(orders):
+                transmission.send(order)
+                radio.tell(number, TxOutcome.SENT, radio.taken[number][0].start)
+        transmission.close()
+        return [burst for burst, _ in radio.taken], transmission.counters
+
+    return call
+
+
+def same_samples(burst, pdus):
+    """Whether a burst at the radio holds these PDUs."""
+    expected = phy.Transmitter().modulate(pdus, 0) * 10 ** (-ModemParams().backoff_db / 20)
+    return np.array_equal(burst.samples, expected)
+
+
+@pytest.mark.parametrize("tells_times", [True, False])
+async def test_what_comes_too_late_starts_later_and_tells_its_ages_for_that(late_by, tells_times):
+    order = BurstOrder(1, 500_000, None, 0, 0, [STAMPED], tells_times)
+    (burst,), counters = await late_by(order, late=2000)
+    by = burst.start - order.start
+    assert 2000 < by < 2200
+    assert same_samples(burst, [postponed(STAMPED, by) if tells_times else STAMPED])
+    assert (counters["bursts_postponed"], counters["bursts_slipped"]) == (1, 0)
+
+
+async def test_what_comes_in_time_is_sent_as_it_is(late_by):
+    order = BurstOrder(1, 500_000, None, 0, 0, [STAMPED], tells_times=True)
+    (burst,), counters = await late_by(order, late=-1000)
+    assert burst.start == 500_000
+    assert same_samples(burst, [STAMPED])
+    assert counters["bursts_postponed"] == 0
+
+
+async def test_a_burst_behind_a_late_one_starts_after_it(late_by):
+    orders = [
+        BurstOrder(n, 500_000 + 1500 * n, None, 0, 0, [STAMPED], tells_times=True) for n in range(2)
+    ]
+    (first, second), _ = await late_by(*orders, late=2000)
+    assert second.start == first.start + len(first.samples) + GAP
+    assert same_samples(second, [postponed(STAMPED, second.start - orders[1].start)])
+
+
+async def test_what_has_a_deadline_keeps_its_start(late_by):
+    """The radio reports it late, and it waits for another slot."""
+    order = BurstOrder(1, 500_000, 500_100, 0, 0, [STAMPED], tells_times=True)
+    (burst,), _ = await late_by(order, late=2000)
+    assert (burst.start, burst.latest) == (500_000, 500_100)
+    assert same_samples(burst, [STAMPED])

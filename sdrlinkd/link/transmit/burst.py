@@ -32,6 +32,8 @@ class Burst(NamedTuple):
     """Time from which the radio could have taken the burst."""
     clock: int | None = None
     """Number of the CLOCK record inside, if any."""
+    tells_times: bool = False
+    """Whether records inside may tell times up to `start`, such as ages; see `wire.postponed`."""
 
 
 class Outcome(Enum):

@@ -156,6 +156,7 @@ class BurstScheduler:
             n_records=n_records,
             ready_at=ready_at,
             clock=clock,
+            tells_times=self._has_control,
         )
 
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:

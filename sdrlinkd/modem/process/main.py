@@ -39,7 +39,7 @@ ENDS_S = 2.0
 def main() -> None:
     """Serve the daemon whose socket and page are the two descriptors of the command line."""
     # The daemon ends this process, once its last bursts have left: signals to the group do not.
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     control_fd, page_fd = map(int, sys.argv[1:])
@@ -65,6 +65,7 @@ class _Served:
         self._has_begun, self._has_ended = asyncio.Event(), asyncio.Event()
         self._is_over = asyncio.Event()
         self._noted: object = None
+        self._room = memoryview(bytearray(protocol.MOST_BYTES))
         self._scheduling: Scheduling | None = None
         self._loading = Loading(lambda text: self._say(protocol.Progress(text)))
 
@@ -178,15 +179,15 @@ class _Served:
         """Handle all messages that the daemon has sent so far."""
         while True:
             try:
-                data = self._control.recv(protocol.MOST_BYTES, socket.MSG_DONTWAIT)
+                n = self._control.recv_into(self._room, 0, socket.MSG_DONTWAIT)
             except BlockingIOError:
                 return
             except OSError:
-                data = b""
-            if not data:
+                n = 0
+            if not n:
                 self._is_over.set()
                 return
-            message = protocol.to_modem(data)
+            message = protocol.to_modem(self._room[:n])
             if isinstance(message, protocol.Start):
                 self._start.set_result(message)
             elif isinstance(message, protocol.Begin):

@@ -18,7 +18,7 @@ from backends import (
 )
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import Sensed
-from sdrlinkd.modem.clock import BlockTimes, Seen
+from sdrlinkd.modem.clock import BlockTimes, Seen, StreamClock
 from sdrlinkd.modem.modem import BurstOrder, ModemStatus, ModemUser
 from sdrlinkd.modem.process.receiving import Call, Demodulation, ReceiverHere, ReceiverThread
 from sdrlinkd.modem.process.sensing_receiver import SensingReceiver
@@ -62,6 +62,7 @@ class ModemHere:
         self._call = call
         self._on_block = on_block
         self._times = BlockTimes(params.rate_hz)
+        self._clock = StreamClock(params.rate_hz, paced=True, began_s=began_s)
         self._settles = round(QUIET_S * params.rate_hz)
         self._receiver: phy.Receiver | None = None
         self._receiving: SensingReceiver | None = None
@@ -134,7 +135,7 @@ class ModemHere:
         )
         sense = phy.EnergyDetector(params.carrier_db) if self._listens else None
         receiving = self._receiving = SensingReceiver(receiver, sense, params.rate_hz)
-        self._tx = Transmission(params, self._radio)
+        self._tx = Transmission(params, self._radio, self._index if can.paced else None)
         if can.lockstep:
             self._rx = ReceiverHere(receiving, params.rate_hz, self._deliver)
         else:
@@ -178,7 +179,12 @@ class ModemHere:
         """Index of the radio's first sample on the clock that began at `began_s`."""
         if self._began_s is None or self._radio.capabilities.lockstep:
             return 0
-        return round((time.monotonic() - self._began_s) * self._params.rate_hz)
+        return self._index()
+
+    def _index(self) -> int:
+        """Index of the sample that is on the air now."""
+        now_s = self._clock.now(self._times.seen, time.monotonic())
+        return round(now_s * self._params.rate_hz)
 
     async def _receive(self, receiver: Demodulation) -> None:
         """Take blocks from the radio, which has to wait if the receiver falls far behind."""

@@ -104,6 +104,8 @@ class ModemProcess:
         self._over: asyncio.Future[None] | None = None
         self._user: ModemUser | None = None
         self._hangs = self._is_closing = False
+        # Received into, as a new buffer of the largest size for each message would cost more.
+        self._room = memoryview(bytearray(protocol.MOST_BYTES))
 
     @property
     def wakes(self) -> bool:
@@ -166,7 +168,7 @@ class ModemProcess:
 
     def send(self, order: BurstOrder) -> None:
         """Send a burst; `left` follows, or the end of the process."""
-        if not self._say(protocol.Order(*order[:-1], list(order.pdus))) and self._user is not None:
+        if not self._say(protocol.order_of(order)) and self._user is not None:
             lost = BurstReport(order.number, Outcome.LOST, order.start)
             asyncio.get_running_loop().call_soon(self._user.left, lost)
 
@@ -218,15 +220,15 @@ class ModemProcess:
         """Handle all messages that the process has sent so far."""
         while self._socket is control:
             try:
-                data = control.recv(protocol.MOST_BYTES)
+                n = control.recv_into(self._room)
             except BlockingIOError:
                 return
             except OSError:
-                data = b""
-            if not data:
+                n = 0
+            if not n:
                 self._hang_up()
                 return
-            self._told(protocol.from_modem(data))
+            self._told(protocol.from_modem(self._room[:n]))
 
     def _hang_up(self) -> None:
         """Note that no more messages come."""

@@ -14,7 +14,7 @@ import msgspec
 
 from backends import AbsentError, BackendError, Patience, RefusalError
 from sdrlinkd.link import Outcome
-from sdrlinkd.modem.modem import ModemStatus
+from sdrlinkd.modem.modem import BurstOrder, ModemStatus
 from sdrlinkd.pdulink import Heard
 
 MOST_BYTES = 1 << 18
@@ -52,6 +52,7 @@ class Order(msgspec.Struct, frozen=True, array_like=True, tag="order"):
     late_known: int
     mcs: int
     pdus: list[bytes]
+    tells_times: bool
 
 
 class Progress(msgspec.Struct, frozen=True, array_like=True, tag="progress"):
@@ -136,6 +137,12 @@ class Ended(msgspec.Struct, frozen=True, array_like=True, tag="ended"):
     is_refusal: bool
 
 
+def order_of(order: BurstOrder) -> Order:
+    """The message that tells a BurstOrder."""
+    number, start, latest, late_known, mcs, pdus, tells_times = order
+    return Order(number, start, latest, late_known, mcs, list(pdus), tells_times)
+
+
 def status_of(status: ModemStatus) -> Status:
     """The message that tells a ModemStatus."""
     return Status(
@@ -158,13 +165,13 @@ _to_modem = msgspec.msgpack.Decoder(ToModem)
 _from_modem = msgspec.msgpack.Decoder(FromModem)
 
 
-def to_modem(data: bytes) -> ToModem:
+def to_modem(data: bytes | memoryview) -> ToModem:
     """Decode a message from the daemon. Raises msgspec.DecodeError."""
     told: ToModem = _to_modem.decode(data)
     return told
 
 
-def from_modem(data: bytes) -> FromModem:
+def from_modem(data: bytes | memoryview) -> FromModem:
     """Decode a message from the modem process. Raises msgspec.DecodeError."""
     told: FromModem = _from_modem.decode(data)
     return told

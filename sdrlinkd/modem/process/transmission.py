@@ -7,10 +7,12 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import phy
-from backends import BackendError, Radio, Samples, TxBurst, TxOutcome, TxReport
+from backends import GAP, BackendError, Radio, Samples, TxBurst, TxOutcome, TxReport
 from sdrlinkd.config import ModemParams
 from sdrlinkd.link import Outcome
 from sdrlinkd.modem.modem import BurstOrder, BurstReport
+from sdrlinkd.modem.tempo import Tempo
+from sdrlinkd.wire import postponed
 
 SHORT = 20_000
 """Longest burst in samples that is modulated on the event loop: using a thread takes longer."""
@@ -28,10 +30,21 @@ class _Modulated(NamedTuple):
 
 
 class Transmission:
-    """The transmit side of the modem: modulates bursts and hands them to the radio."""
+    """The transmit side of the modem: modulates bursts and hands them to the radio.
 
-    def __init__(self, params: ModemParams, radio: Radio) -> None:
+    `now` gives the index of the sample that is on the air now; None: bursts are never too late, as
+    in lock-step. A burst that would be too late for its start gets a later one before it is
+    modulated, and the times that it tells are adjusted.
+    """
+
+    def __init__(
+        self, params: ModemParams, radio: Radio, now: Callable[[], int] | None = None
+    ) -> None:
         self._radio = radio
+        self._now = now
+        self._rate_hz = params.rate_hz
+        self._tempo = Tempo()
+        self._free_from = 0
         self._grid = phy.GRIDS[params.grid]
         self._transmitter = phy.Transmitter(params.network, self._grid, params.preamble_boost_db)
         self._amplitude = 10 ** (-params.backoff_db / 20)
@@ -43,7 +56,7 @@ class Transmission:
         self._early: list[BurstOrder] = []
         self._late = self._late_by_radio = 0
         self._pending: set[int] = set()
-        self.counters = {"bursts_slipped": 0, "samples_sent": 0}
+        self.counters = {"bursts_slipped": 0, "bursts_postponed": 0, "samples_sent": 0}
 
     def start(self, tasks: asyncio.TaskGroup, left: Callable[[BurstReport], None]) -> None:
         """Start to accept bursts; `left` is called with the report of each."""
@@ -61,6 +74,7 @@ class Transmission:
         self._pending.add(order.number)
         # A short burst must not overtake one that the thread still modulates.
         n = phy.layout(self._grid, order.mcs, len(order.pdus), len(order.pdus[0])).n_samples
+        order = self._in_time(order, n)
         if self._at_once or (n <= SHORT and not self._in_thread):
             made = self._modulate(order)
             answer = self._hand_over(order, made.samples)
@@ -68,6 +82,23 @@ class Transmission:
         else:
             self._in_thread += 1
             self._tasks.create_task(self._transmit(order))
+
+    def _in_time(self, order: BurstOrder, n_samples: int) -> BurstOrder:
+        """The order with a start that can be kept, if it has no deadline before that."""
+        if self._now is None:
+            return order
+        takes = round(self._tempo.seconds(n_samples) * self._rate_hz)
+        start = max(self._now() + takes, self._free_from)
+        by = start - order.start
+        if by > 0 and (order.latest is None or start <= order.latest):
+            self.counters["bursts_postponed"] += 1
+            pdus = order.pdus
+            if order.tells_times:
+                by_us = round(1e6 * by / self._rate_hz)
+                pdus = [postponed(pdu, by_us) for pdu in pdus]
+            order = order._replace(start=start, pdus=pdus)
+        self._free_from = max(self._free_from, order.start + n_samples + GAP)
+        return order
 
     def close(self) -> None:
         """Report no more bursts, and stop the modulating thread after its current one."""
@@ -133,4 +164,6 @@ class Transmission:
         """The samples of a burst, scaled to leave room for its peaks."""
         began = time.perf_counter()
         samples: Samples = self._transmitter.modulate(order.pdus, order.mcs) * self._amplitude
-        return _Modulated(samples, time.perf_counter() - began)
+        took_s = time.perf_counter() - began
+        self._tempo.note(len(samples), took_s)
+        return _Modulated(samples, took_s)
