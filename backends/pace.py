@@ -32,10 +32,9 @@ class Pace:
             return 0
         ahead_s = (self.host_ns(index) - time.monotonic_ns()) * 1e-9
         if ahead_s > 0:
-            if not self._woken.wait(ahead_s):
+            if not self._woken.wait(ahead_s) or self._is_over:
                 return 0
-            if not self._is_over:
-                self._woken.clear()
+            self._woken.clear()
             ahead_s = (self.host_ns(index) - time.monotonic_ns()) * 1e-9
             return min(0, -round(ahead_s * self._rate_hz))
         return round(-ahead_s * self._rate_hz)

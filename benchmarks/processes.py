@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 from benchmarks.absent import PeerError
 from benchmarks.environments import ROOT, interpreter, variables
+from sdrlinkd.family import TICKS_HZ, family, process_fields
 from sdrlinkd.process import Process
 
 REAL_TIME_PRIORITY = 10
 NICE = -10
 MOST_S = 900.0
-TICKS_HZ = os.sysconf("SC_CLK_TCK")
 PAGE_MIB = os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
@@ -74,7 +74,7 @@ def precede(process: Process, *, real_time: bool) -> None:
 
 def usage(pid: int) -> Usage:
     """Resources that a process has used so far, with all its threads."""
-    fields = _fields(pid)
+    fields = process_fields(pid)
     resident = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     # utime and stime are fields 14 and 15.
     return Usage((int(fields[11]) + int(fields[12])) / TICKS_HZ, resident * PAGE_MIB)
@@ -85,34 +85,9 @@ def usage_below(pid: int) -> list[Usage]:
     found = []
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(FileNotFoundError, ProcessLookupError):
-            if _fields(int(folder.name))[1] == str(pid):
+            if process_fields(int(folder.name))[1] == str(pid):
                 found.append(usage(int(folder.name)))
     return found
-
-
-def family(pid: int) -> list[int]:
-    """The process and every running process that it has started, directly or not."""
-    parents = {}
-    for folder in Path("/proc").glob("[0-9]*"):
-        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
-            parents[int(folder.name)] = int(_fields(int(folder.name))[1])
-    found = [pid]
-    for each in found:
-        found += [child for child, parent in parents.items() if parent == each]
-    return found
-
-
-def family_cpu_s(pid: int) -> float:
-    """CPU time in s that a process and all processes below it have used so far.
-
-    A process that has ended counts once its parent has waited for it.
-    """
-    ticks = 0
-    for each in family(pid):
-        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
-            # utime, stime, cutime and cstime are fields 14 to 17.
-            ticks += sum(map(int, _fields(each)[11:15]))
-    return ticks / TICKS_HZ
 
 
 def family_memory_mb(pid: int) -> dict[str, float]:
@@ -128,11 +103,6 @@ def family_memory_mb(pid: int) -> dict[str, float]:
                 if name in found:
                     found[name] += 1.024e-3 * int(rest.split()[0])
     return found
-
-
-def _fields(pid: int) -> list[str]:
-    """Fields of proc(5), from the third on, which is the state."""
-    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
 
 
 class Stolen:

@@ -15,10 +15,10 @@ import zmq
 from benchmarks import daemons, processes
 from benchmarks.absent import PeerError
 from benchmarks.environments import interpreter, variables
-from benchmarks.processes import family_cpu_s
 from benchmarks.realtime.traffic import CDR, stamp
 from benchmarks.realtime.turns import Run
 from sdrlinkd.client import ControlClient
+from sdrlinkd.family import family_cpu_s
 from sdrlinkd.process import Process
 
 SETTLE_S = 2.5

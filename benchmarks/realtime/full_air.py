@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks import daemons
-from benchmarks.processes import family_cpu_s
 from benchmarks.realtime.slice import take_short_slice
 from benchmarks.realtime.traffic import CDR, LOOK_S, READY_S, undisturbed
 from benchmarks.realtime.turns import Run
 from sdrlinkd.client import ControlClient, Publisher, Subscriber
+from sdrlinkd.family import family_cpu_s
 
 SIZE = 900
 BITS_PER_SAMPLE = 0.6

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import daemons
-from benchmarks.processes import family_cpu_s
 from benchmarks.realtime.ages import p99_us
 from benchmarks.realtime.alone import MCS, ODOM_SIZE, PDU_SIZE, RATE_HZ, airtime_ms, seconds
 from benchmarks.realtime.traffic import flow, play
 from benchmarks.realtime.turns import Run
+from sdrlinkd.family import family_cpu_s
 
 ODOM_S = 1 / 25
 SETTLE_S = 2.0

@@ -1,13 +1,14 @@
-"""Measures how much of the time a process runs, and how much it waits for a CPU."""
+"""Measures how much of the time a daemon and its modem run, and wait for a CPU."""
 
 import contextlib
 import time
-from pathlib import Path
 from typing import NamedTuple
+
+from sdrlinkd.family import family_threads
 
 
 class Load(NamedTuple):
-    """Load of a process's busiest thread, as shares of the time.
+    """Load of the busiest thread of a daemon and its modem, as shares of the time.
 
     `busy` is the share in which it ran or waited for a CPU, `waited` the part in which it waited.
     """
@@ -17,10 +18,10 @@ class Load(NamedTuple):
 
 
 class LoadOf:
-    """Measures the load of a process from the creation of this object on."""
+    """Measures the load of a process and all below it, from the creation of this object on."""
 
     def __init__(self, pid: int) -> None:
-        self._tasks = Path(f"/proc/{pid}/task")
+        self._pid = pid
         self._began = time.monotonic()
         self._before = self._times()
 
@@ -37,7 +38,7 @@ class LoadOf:
     def _times(self) -> dict[str, tuple[float, float]]:
         """(time running, time waiting for a CPU) in s, by thread."""
         found = {}
-        for task in self._tasks.iterdir():
+        for task in family_threads(self._pid):
             # Threads may end at any time.
             with contextlib.suppress(OSError):
                 ran, waited, _ = (task / "schedstat").read_text().split()

@@ -1,6 +1,5 @@
 """Measures how much of a CPU core a node needs, with a daemon on simulated noise."""
 
-import os
 import tempfile
 import time
 from pathlib import Path
@@ -14,6 +13,7 @@ from sdrlinkd.config import ModemParams
 from sdrlinkd.demo import daemon_process, snapshot_of, wait_until_up
 from sdrlinkd.doctor.finding import Finding, bad, good_if
 from sdrlinkd.errors import UserError
+from sdrlinkd.family import family_cpu_s
 
 MOST = 0.8
 """Largest load, as a share of a core; the rest is for peaks."""
@@ -114,7 +114,7 @@ def _run(seconds: float, out: Publisher | None) -> None:
 
 
 class _Spent(NamedTuple):
-    """CPU time and processed samples of a daemon since its start."""
+    """CPU time of a daemon and its modem, and processed samples, since the start."""
 
     cpu_s: float
     samples: int
@@ -124,9 +124,7 @@ class _Spent(NamedTuple):
     def by(cls, pid: int, folder: Path) -> "_Spent":
         """The figures of the daemon with process id `pid` and sockets in `folder`."""
         counters = snapshot_of(folder).carrier.counters
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-        cpu_s = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-        return cls(cpu_s, counters.get("samples", 0), counters.get("samples_lost", 0))
+        return cls(family_cpu_s(pid), counters.get("samples", 0), counters.get("samples_lost", 0))
 
     def share_since(self, earlier: "_Spent", rate_hz: float) -> float:
         """CPU time since `earlier`, as a share of the time of the samples received since."""

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from benchmarks.environments import ROOT
-from benchmarks.processes import family, family_cpu_s, family_memory_mb
+from benchmarks.processes import family_memory_mb
 from benchmarks.realtime.alone import LASER, airtime_ms
 from benchmarks.realtime.slice import take_short_slice
 from benchmarks.realtime.traffic import AT, CDR, WARM_UP_S, Record, flow, stamp
 from benchmarks.realtime.trees import checkout
 from sdrlinkd.config import ModemParams
+from sdrlinkd.family import family, family_cpu_s
 from sdrlinkd.localtime import header_stamp_ns
 from sdrlinkd.modem import Airtimes
 

@@ -17,6 +17,7 @@ from sdrlinkd.config import (
 from sdrlinkd.errors import UserError
 from sdrlinkd.link import Burst, LinkParams, Outcome, Qos, ReassemblyParams
 from sdrlinkd.modem import make_modem
+from sdrlinkd.modem.traits import HANDOVER_S
 from tests.waiting import wait_for
 
 SIZE = 64
@@ -189,7 +190,7 @@ async def test_a_carrier_tells_what_it_is():
         traits = listener.traits
         assert (traits.kind, traits.mcs, traits.is_lockstep) == ("loopback", 3, False)
         assert (traits.senses, traits.transmits) == (True, True)
-        assert traits.lead_s == pytest.approx(0.0005)
+        assert traits.lead_s == pytest.approx(HANDOVER_S)
         assert traits.react_s > ModemParams().block_s
         assert traits.detect_s == 2 * phy.SENSE_WINDOW / 1e6
         assert len(traits.needed_snr_db) == len(traits.longest_burst_s) == len(phy.MCS_TABLE)

@@ -18,7 +18,7 @@ from sdrlinkd.link import Outcome, Sensed
 from sdrlinkd.modem import make_modem
 from sdrlinkd.modem.clock import Seen
 from sdrlinkd.modem.process import modem_process
-from sdrlinkd.modem.process.page import Page
+from sdrlinkd.modem.process.page import Page, Shown
 from tests.laws import law
 from tests.modem.test_modem_link import Listener, bursts, config, send
 
@@ -54,7 +54,7 @@ def test_a_page_shows_what_was_written(end, host_s, late_s, until, idle_since, b
     fd = make_page()
     writer, reader = Page(fd), Page(fd)
     os.close(fd)
-    shown = Seen(end, host_s, late_s), Sensed(until, idle_since, burst_at)
+    shown = Shown(Seen(end, host_s, late_s), Sensed(until, idle_since, burst_at), end // 2)
     writer.show(*shown)
     assert reader.read() == shown
     writer.beat(until)
@@ -66,12 +66,12 @@ def test_a_page_shows_what_was_written(end, host_s, late_s, until, idle_since, b
 
 
 @law(60)
-@given(st.integers(0, 51), st.integers(1, 255))
+@given(st.integers(0, 59), st.integers(1, 255))
 def test_a_record_that_is_half_written_is_not_read(at, change):
     fd = make_page()
     writer, reader = Page(fd), Page(fd)
     os.close(fd)
-    before = Seen(1000, 1.0, 0.5), Sensed(1.0, 0.5, None)
+    before = Shown(Seen(1000, 1.0, 0.5), Sensed(1.0, 0.5, None), 900)
     writer.show(*before)
     assert reader.read() == before
     writer._memory[at] ^= change

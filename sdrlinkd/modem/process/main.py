@@ -145,7 +145,7 @@ class _Served:
     def _show(self) -> None:
         modem = self._modem
         if modem is not None and modem.seen is not None:
-            self._page.show(modem.seen, modem.sensed)
+            self._page.show(modem.seen, modem.sensed, modem.n_samples)
             modem.wakes = self._page.wakes
 
     async def _beat(self) -> None:

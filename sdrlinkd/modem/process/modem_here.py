@@ -121,6 +121,11 @@ class ModemHere:
         counters = {} if self._receiver is None else self._receiver.counters
         return [counters.get(name, 0) for name in phy.COUNTERS]
 
+    @property
+    def n_samples(self) -> int:
+        """Samples received, without gaps."""
+        return 0 if self._receiver is None else self._receiver.counters["samples"]
+
     async def open(self) -> Capabilities:
         """Load the PHY, open the radio, and return what it can do. Raises BackendError."""
         params = self._params

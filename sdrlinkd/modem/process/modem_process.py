@@ -25,7 +25,7 @@ from sdrlinkd.modem.clock import Seen
 from sdrlinkd.modem.modem import BurstOrder, BurstReport, ModemStatus, ModemUser, NoModem
 from sdrlinkd.modem.process import protocol
 from sdrlinkd.modem.process.modem_here import forever
-from sdrlinkd.modem.process.page import Page
+from sdrlinkd.modem.process.page import Page, Shown
 from sdrlinkd.spawn import EarlyModem, spawn_modem
 
 BEAT_S = 0.1
@@ -97,7 +97,7 @@ class ModemProcess:
         self._process: subprocess.Popen[bytes] | None = None
         self._socket: socket.socket | None = None
         self._page: Page | None = None
-        self._last: tuple[Seen, Sensed] | None = None
+        self._last: Shown | None = None
         self._status = NoModem.status
         self._receiver_counters: dict[str, int] = {}
         self._opened: asyncio.Future[Capabilities] | None = None
@@ -121,13 +121,13 @@ class ModemProcess:
     def seen(self) -> Seen | None:
         """The last block; None: no block yet."""
         last = self._read()
-        return None if last is None else last[0]
+        return None if last is None else last.seen
 
     @property
     def sensed(self) -> Sensed:
         """The state of the channel after the last block."""
         last = self._read()
-        return Sensed(until=0.0) if last is None else last[1]
+        return Sensed(until=0.0) if last is None else last.sensed
 
     @property
     def trouble(self) -> str:
@@ -137,8 +137,11 @@ class ModemProcess:
     @property
     def status(self) -> ModemStatus:
         """Radio, counters and load; running figures are half a second old at most."""
-        told = self._status
-        return told._replace(counters={**told.counters, **self._receiver_counters})
+        told, last = self._status, self._read()
+        counters = {**told.counters, **self._receiver_counters}
+        if last is not None:
+            counters["samples"] = last.n_samples
+        return told._replace(counters=counters)
 
     async def open(self) -> Capabilities:
         """Start the process and open the radio there. Raises BackendError."""
@@ -201,7 +204,7 @@ class ModemProcess:
         )  # fmt: skip
         return spawned.control
 
-    def _read(self) -> tuple[Seen, Sensed] | None:
+    def _read(self) -> Shown | None:
         if self._page is not None:
             self._last = self._page.read()
         return self._last

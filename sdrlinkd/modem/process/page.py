@@ -8,11 +8,12 @@ written, whatever order the processor keeps between two processes.
 import mmap
 import struct
 import zlib
+from typing import NamedTuple
 
 from sdrlinkd.link import Sensed
 from sdrlinkd.modem.clock import Seen
 
-_RECORD = struct.Struct("<qddddd")
+_RECORD = struct.Struct("<qdddddq")
 _CRC = struct.Struct("<I")
 _SIZE = _RECORD.size + _CRC.size
 _BEAT, _WAKES = 256, 264
@@ -21,28 +22,37 @@ _NOWHERE = float("nan")
 TRIES = 100
 
 
+class Shown(NamedTuple):
+    """What the process has shown last."""
+
+    seen: Seen
+    sensed: Sensed
+    n_samples: int
+    """Samples received, without gaps."""
+
+
 class Page:
     """The page behind descriptor `fd`; each field is written by one side only."""
 
     def __init__(self, fd: int) -> None:
         self._memory = mmap.mmap(fd, mmap.PAGESIZE)
-        self._last: tuple[Seen, Sensed] | None = None
+        self._last: Shown | None = None
 
-    def show(self, seen: Seen, sensed: Sensed) -> None:
-        """Write the last block, and the state of the channel after it."""
+    def show(self, seen: Seen, sensed: Sensed, n_samples: int) -> None:
+        """Write the last block, the state of the channel, and how many samples were received."""
         burst_at = _NOWHERE if sensed.burst_at is None else sensed.burst_at
-        record = _RECORD.pack(*seen, sensed.until, sensed.idle_since, burst_at)
+        record = _RECORD.pack(*seen, sensed.until, sensed.idle_since, burst_at, n_samples)
         self._memory[:_SIZE] = record + _CRC.pack(zlib.crc32(record))
 
-    def read(self) -> tuple[Seen, Sensed] | None:
+    def read(self) -> Shown | None:
         """What `show` has written; None: no block yet."""
         for _ in range(TRIES):
             data = self._memory[:_SIZE]
             record = data[: _RECORD.size]
             if zlib.crc32(record) == _CRC.unpack_from(data, _RECORD.size)[0]:
-                end, host_s, late_s, until, idle_since, burst_at = _RECORD.unpack(record)
+                end, host_s, late_s, until, idle_since, burst_at, n = _RECORD.unpack(record)
                 at = None if burst_at != burst_at else burst_at
-                self._last = Seen(end, host_s, late_s), Sensed(until, idle_since, at)
+                self._last = Shown(Seen(end, host_s, late_s), Sensed(until, idle_since, at), n)
                 break
             if not any(data):
                 break
