@@ -2,8 +2,8 @@
 
 import struct
 import time
-from collections.abc import Collection
-from typing import NamedTuple
+from collections.abc import Callable, Collection
+from typing import NamedTuple, TypeVar
 
 from sdrlinkd.link import Delivered, Link
 
@@ -15,8 +15,14 @@ OLDEST_NS = 10 * SECOND_NS
 """Age in ns above which data count as replayed. For this long after the host's clock was set, older
 messages are not believed.
 """
+TRIES = 4
+INTERRUPTED_S = 5e-5
+"""Reading three clocks takes less than this, in s, unless something comes in between."""
 STEP_NS = SECOND_NS
 """A jump of the clock by more than this, in ns, means that somebody set it."""
+
+
+T = TypeVar("T")
 
 
 class LocalTimes(NamedTuple):
@@ -68,6 +74,19 @@ def header_stamp_ns(cdr: bytes) -> int | None:
 
 def _us(seconds: float) -> int:
     return max(1, round(1e6 * seconds))
+
+
+def at_once(link_now: Callable[[], float], host: Callable[[], T]) -> tuple[float, T]:
+    """Read the link's clock, and what `host` reads, at one moment.
+
+    If this process was interrupted in between, they are read again: a delay between them would be
+    an error of an age. A busy machine may spoil every try; then the last one counts.
+    """
+    for _ in range(TRIES):
+        now, told = link_now(), host()
+        if link_now() - now < INTERRUPTED_S:
+            break
+    return now, told
 
 
 def host_clocks() -> tuple[int, int]:

@@ -24,7 +24,7 @@ from sdrlinkd.link import (
     PduLinkTraits,
     Told,
 )
-from sdrlinkd.localtime import UNKNOWN, PublishClock, host_clocks, local_times
+from sdrlinkd.localtime import UNKNOWN, PublishClock, at_once, host_clocks, local_times
 from sdrlinkd.opening import Opening
 from sdrlinkd.pdulink import Heard, PduLink
 from sdrlinkd.reports import Snapshot
@@ -92,10 +92,9 @@ class Node:
         published_ns: int | None = None,
     ) -> None:
         """Take a message from a producer."""
-        now = self._pdu_link.now()
+        now, clocks = at_once(self._pdu_link.now, host_clocks)
         if published_ns is not None and not self._is_lockstep:
-            # Read the two clocks back to back: a delay between them is an error of the age.
-            age_s = self._publish_clock.age_s(published_ns, *host_clocks())
+            age_s = self._publish_clock.age_s(published_ns, *clocks)
             overrides = overrides._replace(age_s=age_s)
         transforms = self._transforms.get(topic_id)
         if transforms is not None:
@@ -134,7 +133,7 @@ class Node:
 
     def heard(self, pdus: Sequence[Heard]) -> None:
         """Take PDUs from the air, and publish the messages that they complete."""
-        now, now_ns = self._pdu_link.now(), time.time_ns()
+        now, now_ns = at_once(self._pdu_link.now, time.time_ns)
         link = self._link
         for data, at, snr_db, ended_at in pdus:
             if self.bus.is_tapped:

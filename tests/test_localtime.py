@@ -5,7 +5,7 @@ import struct
 import pytest
 
 from sdrlinkd.link import Delivered, Wall
-from sdrlinkd.localtime import UNKNOWN, PublishClock, header_stamp_ns, local_times
+from sdrlinkd.localtime import UNKNOWN, PublishClock, at_once, header_stamp_ns, local_times
 from tests.link.world import make_link
 
 NOW_NS = 1_800_000_000_000_000_000
@@ -88,3 +88,27 @@ def test_a_clock_that_is_slewed_was_not_set():
     for _ in range(100):
         own_ns, now_ns = own_ns + 10**9, now_ns + 10**9 + 500_000
         assert clock.age_s(now_ns - 12 * 10**9, now_ns, own_ns) == pytest.approx(12.0)
+
+
+@pytest.mark.parametrize("interrupted", [0, 1, 3])
+def test_clocks_are_read_again_when_something_came_in_between(interrupted):
+    clock = [100.0]
+    left = [interrupted]
+
+    def host():
+        clock[0] += 0.004 if left[0] else 1e-6
+        left[0] = max(0, left[0] - 1)
+        return clock[0]
+
+    now, told = at_once(lambda: clock[0], host)
+    assert told - now < 2e-6
+
+
+def test_a_machine_that_always_interrupts_gets_an_answer():
+    clock = [0.0]
+
+    def now():
+        clock[0] += 1.0
+        return clock[0]
+
+    assert at_once(now, lambda: "told")[1] == "told"

@@ -16,6 +16,8 @@ from sdrlinkd.wire import postponed
 
 SHORT = 20_000
 """Longest burst in samples that is modulated on the event loop: using a thread takes longer."""
+AGAIN = 2
+"""How many more times a burst is modulated that became late meanwhile."""
 OUTCOMES = {
     TxOutcome.SENT: Outcome.SENT,
     TxOutcome.LATE: Outcome.LATE,
@@ -25,6 +27,7 @@ OUTCOMES = {
 
 
 class _Modulated(NamedTuple):
+    order: BurstOrder
     samples: Samples
     took_s: float
 
@@ -74,54 +77,71 @@ class Transmission:
         self._pending.add(order.number)
         # A short burst must not overtake one that the thread still modulates.
         n = phy.layout(self._grid, order.mcs, len(order.pdus), len(order.pdus[0])).n_samples
-        order = self._in_time(order, n)
         if self._at_once or (n <= SHORT and not self._in_thread):
-            made = self._modulate(order)
-            answer = self._hand_over(order, made.samples)
-            self._tasks.create_task(self._settle(order, answer, made))
+            made = self._made(order, n)
+            answer = self._hand_over(made)
+            self._tasks.create_task(self._settle(made, answer))
         else:
             self._in_thread += 1
-            self._tasks.create_task(self._transmit(order))
-
-    def _in_time(self, order: BurstOrder, n_samples: int) -> BurstOrder:
-        """The order with a start that can be kept, if it has no deadline before that."""
-        if self._now is None:
-            return order
-        takes = round(self._tempo.seconds(n_samples) * self._rate_hz)
-        start = max(self._now() + takes, self._free_from)
-        by = start - order.start
-        if by > 0 and (order.latest is None or start <= order.latest):
-            self.counters["bursts_postponed"] += 1
-            pdus = order.pdus
-            if order.tells_times:
-                by_us = round(1e6 * by / self._rate_hz)
-                pdus = [postponed(pdu, by_us) for pdu in pdus]
-            order = order._replace(start=start, pdus=pdus)
-        self._free_from = max(self._free_from, order.start + n_samples + GAP)
-        return order
+            self._tasks.create_task(self._transmit(order, n))
 
     def close(self) -> None:
         """Report no more bursts, and stop the modulating thread after its current one."""
         self._pending.clear()
         self._thread.shutdown(wait=True, cancel_futures=True)
 
-    async def _transmit(self, order: BurstOrder) -> None:
+    async def _transmit(self, order: BurstOrder, n_samples: int) -> None:
         loop = asyncio.get_running_loop()
         try:
             if order.number not in self._pending:
                 # The radio is closed.
                 return
-            made = await loop.run_in_executor(self._thread, self._modulate, order)
+            made = await loop.run_in_executor(self._thread, self._made, order, n_samples)
         finally:
             self._in_thread -= 1
-        await self._settle(order, self._hand_over(order, made.samples), made)
+        await self._settle(made, self._hand_over(made))
 
-    def _hand_over(self, order: BurstOrder, samples: Samples) -> Awaitable[TxReport] | None:
+    def _made(self, order: BurstOrder, n_samples: int) -> _Modulated:
+        """Modulate a burst so that it can keep its start, or with a later start that it can keep.
+
+        If the modulation was interrupted for so long that the burst is late all the same, it is
+        modulated again.
+        """
+        made = self._modulate(self._in_time(order, n_samples))
+        for _ in range(AGAIN):
+            kept = self._in_time(made.order, 0)
+            if kept is made.order:
+                break
+            made = self._modulate(kept)
+        self._free_from = max(self._free_from, made.order.start + n_samples + GAP)
+        return made
+
+    def _in_time(self, order: BurstOrder, n_samples: int) -> BurstOrder:
+        """The order, if `n_samples` can be modulated before its start, or one with a later start.
+
+        A later start that is after its deadline does not help.
+        """
+        if self._now is None:
+            return order
+        takes = round(self._tempo.seconds(n_samples) * self._rate_hz)
+        start = max(self._now() + takes, self._free_from)
+        by = start - order.start
+        if by <= 0 or (order.latest is not None and start > order.latest):
+            return order
+        self.counters["bursts_postponed"] += 1
+        pdus = order.pdus
+        if order.tells_times:
+            by_us = round(1e6 * by / self._rate_hz)
+            pdus = [postponed(pdu, by_us) for pdu in pdus]
+        return order._replace(start=start, pdus=pdus)
+
+    def _hand_over(self, made: _Modulated) -> Awaitable[TxReport] | None:
         """Hand a burst to the radio; None if it must not overtake a late burst.
 
         That is the case if a burst has become late that was not known to be late when this one was
         composed. The radio's counter may show that before the late burst is settled.
         """
+        order, samples = made.order, made.samples
         if order.latest is not None:
             is_known = order.late_known == self._late
             if not is_known or self._late_by_radio != self._radio.counters["late"]:
@@ -129,9 +149,8 @@ class Transmission:
         self.counters["samples_sent"] += len(samples)
         return self._radio.send(TxBurst(order.start, samples, order.latest))
 
-    async def _settle(
-        self, order: BurstOrder, answer: Awaitable[TxReport] | None, made: _Modulated
-    ) -> None:
+    async def _settle(self, made: _Modulated, answer: Awaitable[TxReport] | None) -> None:
+        order = made.order
         told = BurstReport(
             order.number,
             Outcome.LATE,
@@ -166,4 +185,4 @@ class Transmission:
         samples: Samples = self._transmitter.modulate(order.pdus, order.mcs) * self._amplitude
         took_s = time.perf_counter() - began
         self._tempo.note(len(samples), took_s)
-        return _Modulated(samples, took_s)
+        return _Modulated(order, samples, took_s)
