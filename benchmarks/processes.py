@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from benchmarks.absent import PeerError
 from benchmarks.environments import ROOT, interpreter, variables
-from sdrlinkd.family import TICKS_HZ, family, process_fields
+from sdrlinkd.family import family, family_cpu_s
 from sdrlinkd.process import Process
 
 REAL_TIME_PRIORITY = 10
@@ -73,21 +73,12 @@ def precede(process: Process, *, real_time: bool) -> None:
 
 
 def usage(pid: int) -> Usage:
-    """Resources that a process has used so far, with all its threads."""
-    fields = process_fields(pid)
-    resident = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-    # utime and stime are fields 14 and 15.
-    return Usage((int(fields[11]) + int(fields[12])) / TICKS_HZ, resident * PAGE_MIB)
-
-
-def usage_below(pid: int) -> list[Usage]:
-    """Resources used by each running process that this one has started."""
-    found = []
-    for folder in Path("/proc").glob("[0-9]*"):
+    """Resources that a process and all processes below it have used so far."""
+    pages = 0
+    for each in family(pid):
         with contextlib.suppress(FileNotFoundError, ProcessLookupError):
-            if process_fields(int(folder.name))[1] == str(pid):
-                found.append(usage(int(folder.name)))
-    return found
+            pages += int(Path(f"/proc/{each}/statm").read_text().split()[1])
+    return Usage(family_cpu_s(pid), pages * PAGE_MIB)
 
 
 def family_memory_mb(pid: int) -> dict[str, float]:

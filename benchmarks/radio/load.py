@@ -129,7 +129,7 @@ def _rows_of(
 
 
 NOTES = {
-    "daemon": "of one core, user and system, robot 1's daemon; trials: seconds",
+    "daemon": "of one core, user and system, robot 1's daemon and modem; trials: seconds",
     "radio_process": "of one core, user and system, robot 1's radio process with the test radio's "
     "driver, which simulates converters and air; gnu_radio: source and sink alone, no bursts, with "
     "the same driver; trials: seconds",

@@ -10,8 +10,8 @@ from typing import Any
 from benchmarks import daemons
 from benchmarks.absent import PeerError
 from benchmarks.loopback_radio import a_bus
-from benchmarks.processes import usage, usage_below
 from sdrlinkd.client import ControlClient
+from sdrlinkd.family import family, family_cpu_s
 from sdrlinkd.process import Process
 
 ROBOTS = (1, 2)
@@ -27,7 +27,10 @@ DEVICE = 'device = "driver=loopback,bus={bus},unit={unit},model={model},noise_db
 
 @dataclass(frozen=True)
 class Look:
-    """A daemon at one moment: its status, and CPU time so far of it and its radio process."""
+    """A daemon at one moment: its status, and CPU time so far.
+
+    That of the daemon includes its modem process; that of the radio process stands apart.
+    """
 
     at: float
     status: dict[str, Any]
@@ -50,10 +53,12 @@ class Pair:
         daemon = self.daemons[robot]
         with ControlClient(self.folders[robot]) as control:
             status = control.ask("status")
-        radio = usage_below(daemon.pid)
-        if len(radio) != 1:
-            raise PeerError(f"{daemon.name} has {len(radio)} radio processes; {daemon.log()}")
-        cpu_s = {"daemon": usage(daemon.pid).cpu_s, "radio_process": radio[0].cpu_s}
+        # The daemon, its modem, and the radio process of the modem.
+        below = family(daemon.pid)
+        if len(below) != 3:
+            raise PeerError(f"{daemon.name} has {len(below) - 1} processes; {daemon.log()}")
+        radio_s = family_cpu_s(below[2])
+        cpu_s = {"daemon": family_cpu_s(daemon.pid) - radio_s, "radio_process": radio_s}
         return Look(time.monotonic(), status, cpu_s)
 
 
