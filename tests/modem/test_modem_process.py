@@ -17,7 +17,7 @@ from sdrlinkd.errors import LinkAbsentError, UserError
 from sdrlinkd.link import Outcome, Sensed
 from sdrlinkd.modem import make_modem
 from sdrlinkd.modem.clock import Seen
-from sdrlinkd.modem.process import modem_process
+from sdrlinkd.modem.process import life
 from sdrlinkd.modem.process.page import Page, Shown
 from tests.laws import law
 from tests.modem.test_modem_link import Listener, bursts, config, send
@@ -140,8 +140,8 @@ async def test_when_it_is_killed_all_bursts_are_settled_once_and_the_link_is_abs
 
 
 async def test_a_process_that_hangs_is_ended(monkeypatch):
-    monkeypatch.setattr(modem_process, "HUNG_S", 0.5)
-    monkeypatch.setattr(modem_process, "WATCH_S", 0.1)
+    monkeypatch.setattr(life, "HUNG_S", 0.5)
+    monkeypatch.setattr(life, "WATCH_S", 0.1)
     async with opened(config(paced=True)) as (modem, listener, task, pid):
         send(modem, listener, list(bursts(7, 3)))
         await listener.until(lambda: len(listener.settled_bursts) == 3)

@@ -19,9 +19,9 @@ from sdrlinkd.errors import UserError
 from sdrlinkd.journal import log_to_stderr
 from sdrlinkd.modem.modem import BurstOrder, BurstReport
 from sdrlinkd.modem.process import protocol
+from sdrlinkd.modem.process.life import BEAT_S
 from sdrlinkd.modem.process.loading import Loading
 from sdrlinkd.modem.process.modem_here import ModemHere
-from sdrlinkd.modem.process.modem_process import BEAT_S
 from sdrlinkd.modem.process.page import Page
 from sdrlinkd.modem.process.radios import make_radio
 from sdrlinkd.pdulink import Heard

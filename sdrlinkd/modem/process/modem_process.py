@@ -23,17 +23,11 @@ from sdrlinkd.config import Config
 from sdrlinkd.link import Outcome, Sensed
 from sdrlinkd.modem.clock import Seen
 from sdrlinkd.modem.modem import BurstOrder, BurstReport, ModemStatus, ModemUser, NoModem
-from sdrlinkd.modem.process import protocol
+from sdrlinkd.modem.process import life, protocol
 from sdrlinkd.modem.process.modem_here import forever
 from sdrlinkd.modem.process.page import Page, Shown
 from sdrlinkd.spawn import EarlyModem, spawn_modem
 
-BEAT_S = 0.1
-"""Time between two signs of life of the process."""
-WATCH_S = 0.5
-"""Time between two looks for them."""
-HUNG_S = 5.0
-"""Time without a sign of life, while this process was awake, after which it hangs."""
 END_S = 30.0
 """A process that has not ended this long after it was told to is killed; radios take their time."""
 GONE_S = 1.0
@@ -52,25 +46,6 @@ class RadioWanted(NamedTuple):
     seed: int
     longest_s: float
     patience: Patience
-
-
-class _SignsOfLife:
-    """Notices that the process gives no signs of life while this one does."""
-
-    def __init__(self) -> None:
-        self._beat_s = 0.0
-        self._looked_s = time.monotonic()
-        self._missed_s = 0.0
-
-    def are_missing(self, beat_s: float) -> bool:
-        """Whether the last sign, at `beat_s`, has been the same for HUNG_S."""
-        now_s = time.monotonic()
-        # Only time in which this process could run counts: a busy machine delays both.
-        self._missed_s += min(now_s - self._looked_s, 2 * WATCH_S)
-        self._looked_s = now_s
-        if beat_s != self._beat_s:
-            self._beat_s, self._missed_s = beat_s, 0.0
-        return self._missed_s > HUNG_S
 
 
 class ModemProcess:
@@ -160,10 +135,10 @@ class ModemProcess:
             raise RuntimeError("run before open")
         self._user = user
         self._say(protocol.Begin())
-        life = _SignsOfLife()
+        signs = life.SignsOfLife()
         while not self._over.done():
-            await asyncio.wait((self._over,), timeout=WATCH_S)
-            if self._page is not None and life.are_missing(self._page.beat_s):
+            await asyncio.wait((self._over,), timeout=life.WATCH_S)
+            if self._page is not None and signs.are_missing(self._page.beat_s):
                 self._hangs = True
                 self._kill()
         self._over.result()
@@ -275,9 +250,9 @@ class ModemProcess:
 
     async def _end(self) -> None:
         """Wait for the process to end; kill it if it hangs, or takes too long."""
-        life, until_s = _SignsOfLife(), time.monotonic() + END_S
+        signs, until_s = life.SignsOfLife(), time.monotonic() + END_S
         while self._process is not None and self._process.poll() is None:
-            is_alive = self._page is not None and not life.are_missing(self._page.beat_s)
+            is_alive = self._page is not None and not signs.are_missing(self._page.beat_s)
             if not is_alive or time.monotonic() > until_s:
                 self._kill()
             await asyncio.sleep(LOOK_S)
