@@ -146,9 +146,13 @@ class ModemProcess:
 
     def send(self, order: BurstOrder) -> None:
         """Send a burst; `left` follows, or the end of the process."""
-        if not self._say(protocol.order_of(order)) and self._user is not None:
+        try:
+            self._say(protocol.order_of(order))
+        except BlockingIOError:
+            # The process does not read what it is sent.
             lost = BurstReport(order.number, Outcome.LOST, order.start)
-            asyncio.get_running_loop().call_soon(self._user.left, lost)
+            if self._user is not None:
+                asyncio.get_running_loop().call_soon(self._user.left, lost)
 
     async def close(self) -> None:
         """Close the radio; bursts that have not left are not reported. Closing twice is fine."""
@@ -184,15 +188,14 @@ class ModemProcess:
             self._last = self._page.read()
         return self._last
 
-    def _say(self, message: msgspec.Struct) -> bool:
-        """Send a message; false: the process does not take it, and hangs or has ended."""
-        if self._socket is None:
-            return False
-        try:
-            self._socket.send(protocol.encode(message))
-        except OSError:
-            return False
-        return True
+    def _say(self, message: msgspec.Struct) -> None:
+        """Send a message. Raises BlockingIOError when the process has too many to read.
+
+        That it has ended shows when it is listened to.
+        """
+        if self._socket is not None:
+            with contextlib.suppress(BrokenPipeError, ConnectionResetError):
+                self._socket.send(protocol.encode(message))
 
     def _listen(self, control: socket.socket) -> None:
         """Handle all messages that the process has sent so far."""
