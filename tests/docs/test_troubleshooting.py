@@ -31,7 +31,8 @@ def sentences():
     """All sentences that the daemon and its command line can print."""
     return {
         text_of(node)
-        for path in (ROOT / "sdrlinkd").rglob("*.py")
+        for folder in ("sdrlinkd", "backends")
+        for path in (ROOT / folder).rglob("*.py")
         for node in ast.walk(ast.parse(path.read_text()))
         if isinstance(node, ast.Constant | ast.JoinedStr | ast.BinOp)
     }
