@@ -1,7 +1,9 @@
 """A real daemon on the modem: messages over the air, files that are radios, a PHY too slow."""
 
 import json
+import os
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +11,8 @@ from pathlib import Path
 import pytest
 
 from sdrlinkd.client import Publisher, Subscriber
+from sdrlinkd.family import family
+from tests.conftest import ETC
 from tests.waiting import wait_for
 
 CDR = b"\0\1\0\0"
@@ -178,3 +182,60 @@ def test_a_recording_ends_with_what_the_daemon_plays_into_it(start_daemon, tmp_p
     )
     with Subscriber("/rx_robot_1/*", directory=other.directory) as heard:
         assert all(heard.receive(20) is not None for _ in range(50))
+
+
+def loaded(pid):
+    """Compiled packages that a process has loaded."""
+    maps = Path(f"/proc/{pid}/maps").read_text()
+    return {name for name in ("numpy", "llvmlite", "scipy") if f"/{name}" in maps}
+
+
+def test_a_daemon_loads_no_compiler_and_its_modem_no_scipy(start_daemon):
+    node = start_daemon('backend = "loopback"\n[modem]\nrate_hz = 1e6\n')
+    wait_for(lambda: node.snapshot().carrier.state == "up", 60)
+    daemon, modem = family(node.pid)
+    assert loaded(daemon) == {"numpy"}
+    assert loaded(modem) == {"numpy", "llvmlite"}
+
+
+def test_a_check_loads_no_compiler(tmp_path):
+    done = subprocess.run(
+        [
+            sys.executable, "-X", "importtime", "-m", "sdrlinkd", "--check",
+            "--config", str(ETC / "robot.toml"),
+        ],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    imported = {line.rpartition("|")[2].strip() for line in done.stderr.splitlines()}
+    assert "phy.layout" in imported
+    assert not {each for each in imported if each.split(".")[0] in ("numba", "llvmlite", "scipy")}
+    assert not imported & {"phy.receiver", "phy.transmitter", "phy.channel"}
+
+
+def test_a_killed_modem_is_replaced_and_no_message_is_lost_or_sent_twice(start_daemon):
+    """All but those on their way; the ledger says which."""
+    node = start_daemon('backend = "loopback"\n[modem]\nrate_hz = 1e6\n')
+    wait_for(lambda: node.snapshot().carrier.state == "up", 60)
+    n = 60
+    with (
+        Subscriber("/rx_robot_1/odom", directory=node.directory) as heard,
+        Publisher(node.directory) as out,
+    ):
+        for number in range(n):
+            out.send("/robot_1/odom", b"\0\1\0\0" + number.to_bytes(4, "big"))
+            if number == n // 2:
+                os.kill(family(node.pid)[1], signal.SIGKILL)
+                wait_for(lambda: node.snapshot().carrier.state == "waiting", 60)
+        wait_for(lambda: node.snapshot().carrier.state == "up", 60)
+        wait_for(lambda: not node.snapshot().link.tx.queued, 60)
+        got = []
+        while (message := heard.receive(2)) is not None:
+            got.append(int.from_bytes(message.payload[4:8], "big"))
+    assert got == sorted(set(got)), "in order, none twice"
+    tx = node.snapshot().link.tx
+    assert tx.accepted == n
+    assert n - len(got) == n - tx.sent == sum(tx.dropped.values())
+    assert set(tx.dropped) <= {"tx_radio_failed"}
+    assert got[-1] == n - 1
+    with node.control() as control:
+        assert control.ask("check")["problems"] == []

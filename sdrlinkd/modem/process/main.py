@@ -110,7 +110,7 @@ class _Served:
             )
             modem = self._modem = ModemHere(
                 config.modem, radio, start.listens, start.began_s, self._loading, _at_once,
-                self._show,
+                self._show, lambda: self._page.wakes,
             )  # fmt: skip
             can = await modem.open()
             if can.lockstep:
@@ -146,7 +146,6 @@ class _Served:
         modem = self._modem
         if modem is not None and modem.seen is not None:
             self._page.show(modem.seen, modem.sensed, modem.n_samples)
-            modem.wakes = self._page.wakes
 
     async def _beat(self) -> None:
         """Show that this process is alive, and what has changed, forever."""

@@ -41,7 +41,8 @@ class ModemHere:
     `listens`: whether the receiver senses if the channel is busy. `began_s`: start of the stream's
     time on the monotonic clock; None: time starts with the samples. `load` compiles or loads the
     PHY. PDUs are delivered by `call`; None: on the event loop. `on_block` is called when `seen` and
-    `sensed` have changed, on the thread that demodulates.
+    `sensed` have changed, on the thread that demodulates. `asks` says before each block whether
+    `delivered` is to be called even without PDUs; None: `wakes` says so.
     """
 
     def __init__(
@@ -53,6 +54,7 @@ class ModemHere:
         load: Callable[[], Awaitable[None]],
         call: Call | None = None,
         on_block: Callable[[], None] = lambda: None,
+        asks: Callable[[], bool] | None = None,
     ) -> None:
         self._params = params
         self._began_s = began_s
@@ -61,6 +63,7 @@ class ModemHere:
         self._load = load
         self._call = call
         self._on_block = on_block
+        self._asks = asks
         self._times = BlockTimes(params.rate_hz)
         self._clock = StreamClock(params.rate_hz, paced=True, began_s=began_s)
         self._settles = round(QUIET_S * params.rate_hz)
@@ -198,6 +201,8 @@ class ModemHere:
         def hear(block: RxBlock) -> None:
             """Demodulate a block on the radio's thread."""
             self._times.observe(block.index + block.n, block.host_ns * 1e-9)
+            if self._asks is not None:
+                receiver.wakes = self._asks()
             receiver.hear(block)
             self._on_block()
             self._relax(block.index + block.n)
