@@ -84,7 +84,7 @@ def test_what_the_daemon_refuses_is_planned_and_told():
     minislot = odom(preset("usrp", '[access]\npolicy = "minislot"\nnodes = [1, 2]\n'))
     assert minislot.carries < 0.1
     (refused,) = [note for note in minislot.notes if "the daemon refuses this" in note]
-    assert "which leaves 9.2 % of the airtime usable with 2 robots on this radio" in refused
+    assert "which leaves 9.3 % of the airtime usable with 2 robots on this radio" in refused
 
 
 def test_what_is_presumed_is_told():
@@ -131,9 +131,9 @@ def checked(tmp_path, capsys, text):
         ("usrp", "", (0, "access none, because access.nodes lists no other robot; 100 %")),
         ("usrp", "[access]\nnodes = [1, 2]\n", (0, "access tdma, because this radio")),
         ("usrp", '[access]\npolicy = "minislot"\nnodes = [1, 2]\n',
-         (2, 'access.policy: got "minislot", which leaves 9.2 % of the airtime')),
+         (2, 'access.policy: got "minislot", which leaves 9.3 % of the airtime')),
         ("usrp", '[access]\npolicy = "minislot"\nnodes = [1, 2]\nforce = true\n',
-         (0, "access minislot, as configured; 9.2 % of the airtime")),
+         (0, "access minislot, as configured; 9.3 % of the airtime")),
         ("hackrf", '[access]\npolicy = "csma"\n', (2, 'access.policy: got "csma"; this radio')),
     ],
 )  # fmt: skip
