@@ -171,9 +171,10 @@ async def test_what_comes_too_late_starts_later_and_tells_its_ages_for_that(late
     assert (counters["bursts_postponed"], counters["bursts_slipped"]) == (1, 0)
 
 
-async def test_what_comes_in_time_is_sent_as_it_is(late_by):
+@pytest.mark.parametrize("late", [-1000, 0, 300])
+async def test_what_comes_in_time_or_nearly_is_sent_as_it_is(late_by, late):
     order = BurstOrder(1, 500_000, None, 0, 0, [STAMPED], tells_times=True)
-    (burst,), counters = await late_by(order, late=-1000)
+    (burst,), counters = await late_by(order, late=late)
     assert burst.start == 500_000
     assert same_samples(burst, [STAMPED])
     assert counters["bursts_postponed"] == 0

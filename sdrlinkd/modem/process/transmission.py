@@ -16,6 +16,9 @@ from sdrlinkd.wire import postponed
 
 SHORT = 20_000
 """Longest burst in samples that is modulated on the event loop: using a thread takes longer."""
+LATE_S = 5e-4
+"""Time in s by which a burst may miss its start. A radio that makes blocks can often still keep the
+start then; a burst that is later than this was interrupted."""
 AGAIN = 2
 """How many more times a burst is modulated that became late meanwhile."""
 OUTCOMES = {
@@ -117,16 +120,16 @@ class Transmission:
         return made
 
     def _in_time(self, order: BurstOrder, n_samples: int) -> BurstOrder:
-        """The order, if `n_samples` can be modulated before its start, or one with a later start.
+        """The order, with a later start if its own has passed once `n_samples` are modulated.
 
-        A later start that is after its deadline does not help.
+        A start that is missed by LATE_S is kept. A later start after the deadline does not help.
         """
         if self._now is None:
             return order
         takes = round(self._tempo.seconds(n_samples) * self._rate_hz)
         start = max(self._now() + takes, self._free_from)
         by = start - order.start
-        if by <= 0 or (order.latest is not None and start > order.latest):
+        if by <= LATE_S * self._rate_hz or (order.latest is not None and start > order.latest):
             return order
         self.counters["bursts_postponed"] += 1
         pdus = order.pdus
