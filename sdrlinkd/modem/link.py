@@ -1,6 +1,7 @@
 """The modem link: decides bursts at the last moment, and hands them to a modem."""
 
 import asyncio
+import contextlib
 import math
 import time
 from collections.abc import Awaitable, Callable, Sequence
@@ -11,7 +12,6 @@ from sdrlinkd.config import ModemParams
 from sdrlinkd.errors import ConfigError, LinkAbsentError, LinkRefusedError, UserError
 from sdrlinkd.link import Opportunity, Outcome, PduLinkTraits
 from sdrlinkd.modem.airtimes import Airtimes
-from sdrlinkd.modem.alarm import Alarm
 from sdrlinkd.modem.clock import StreamClock
 from sdrlinkd.modem.modem import BurstReport, Modem, NoModem
 from sdrlinkd.modem.on_air import OnAir
@@ -22,8 +22,8 @@ from sdrlinkd.modem.traits import pdu_link_traits
 from sdrlinkd.pdulink import Carry, Heard, PduListener
 from sdrlinkd.reports import PduLinkReport
 
-LEAST_WAIT_S = 5e-5
-"""Shortest wait in s: a shorter one takes longer to set up than it lasts."""
+TIMER_S = 0.001
+"""Resolution of the event loop's timers in s; shorter waits would be busy waiting."""
 INFINITE = float("inf")
 
 
@@ -204,19 +204,16 @@ class ModemLink:
     async def _send_when_due(self) -> None:
         """Send one burst at a time, each decided at the last moment, forever."""
         paced = self._can is not None and self._can.paced
-        alarm = Alarm(self._moved.set)
-        try:
-            while True:
-                self._moved.clear()
-                wait_s = self._turn()
-                if not wait_s:
-                    await asyncio.sleep(0)
-                    continue
-                if paced and wait_s != INFINITE:
-                    alarm.set(max(LEAST_WAIT_S, wait_s))
-                await self._moved.wait()
-        finally:
-            alarm.close()
+        while True:
+            self._moved.clear()
+            wait_s = self._turn()
+            if not wait_s:
+                await asyncio.sleep(0)
+                continue
+            limit_s = max(TIMER_S, wait_s) if paced and wait_s != INFINITE else None
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(limit_s):
+                    await self._moved.wait()
 
     def _turn(self) -> float:
         """Send the next burst if it may leave; returns 0, or the time in s until one may leave."""
