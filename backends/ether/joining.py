@@ -42,7 +42,12 @@ def join(
         elif time.monotonic() - asked_at >= AGAIN_S:
             asked_at = time.monotonic()
             _say(down, protocol.Question())
-    raise AbsentError(f"{hub.name}: no hub answers there; start one: {hub.start}")
+    raise no_hub(hub)
+
+
+def no_hub(hub: HubAddress) -> AbsentError:
+    """The error when no hub answers at an address."""
+    return AbsentError(f"{hub.name}: no hub answers there; start one: {hub.start}")
 
 
 def _say(down: "zmq.Socket[bytes]", message: protocol.Hello | protocol.Question) -> None:

@@ -6,14 +6,13 @@ import time
 
 import zmq
 
-from backends.base import AbsentError, Patience
+from backends.base import Patience
 from backends.ether import protocol
+from backends.ether.joining import AGAIN_S, LOOK_MS, no_hub
 from backends.ether.sockets import NOBLOCK, connect
 from backends.hub_address import HubAddress
 
 ANSWER_S = 5.0
-AGAIN_S = 0.5
-LOOK_MS = 100
 
 
 async def hub_keeps_pace(hub: HubAddress, patience: Patience) -> bool:
@@ -42,4 +41,4 @@ def _ask(hub: HubAddress, within_s: float, is_over: threading.Event) -> bool:
                 answer = protocol.from_hub(air.recv_multipart()[0])
                 if isinstance(answer, protocol.Answer):
                     return answer.paced
-    raise AbsentError(f"{hub.name}: no hub answers there; start one: {hub.start}")
+    raise no_hub(hub)

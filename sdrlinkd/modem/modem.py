@@ -24,7 +24,7 @@ COUNTERS = (
 class BurstOrder(NamedTuple):
     """PDUs to send as one burst, the first sample at index `start` of the received stream.
 
-    A modem that cannot modulate it by then starts it later. A burst that cannot start by `latest`
+    A modem that would miss that start by far starts it later. A burst that cannot start by `latest`
     is reported late and not sent. Neither is a burst if one before it was late and is not among the
     `late_known` late ones that the order's author knew: the order of messages would be lost.
     """
@@ -130,16 +130,16 @@ class NoModem:
     status = ModemStatus("not open", "", None, 0.0, dict.fromkeys(COUNTERS, 0), 0.0)
 
     async def open(self) -> Capabilities:
-        """Never called."""
-        raise NotImplementedError
+        """Raise RuntimeError: there is no modem yet."""
+        raise RuntimeError("no modem yet")
 
     async def run(self, user: ModemUser) -> None:
-        """Never called."""
-        raise NotImplementedError
+        """Raise RuntimeError: there is no modem yet."""
+        raise RuntimeError(f"no modem yet for {user}")
 
     def send(self, order: BurstOrder) -> None:
-        """Never called."""
-        raise NotImplementedError
+        """Raise RuntimeError: there is no modem yet."""
+        raise RuntimeError(f"no modem yet for burst {order.number}")
 
     async def close(self) -> None:
         """There is nothing to close."""

@@ -10,7 +10,7 @@ from sdrlinkd.modem.airtimes import Airtimes
 
 HANDOVER_S = 2.5e-4
 """Time in s from composing a burst to its start on a free channel, for modulation. A burst that
-takes longer starts later, and tells its ages for that."""
+takes much longer starts later, and tells its ages for that."""
 STAMP_SAMPLES = 1.0
 """Largest error of a detected preamble's position, in samples."""
 REACTION_S = 0.002

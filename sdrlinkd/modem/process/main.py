@@ -7,7 +7,7 @@ import signal
 import socket
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from random import Random
 
 import msgspec
@@ -206,8 +206,9 @@ def _end_with_traceback(loop: asyncio.AbstractEventLoop, context: dict[str, obje
     os._exit(1)
 
 
-def _at_once(what: object, *arguments: object) -> None:
-    what(*arguments)  # type: ignore[operator]
+def _at_once(deliver: Callable[..., object], *arguments: object) -> None:
+    """Deliver on the receiver's thread, without a detour over the event loop."""
+    deliver(*arguments)
 
 
 def _plain(can: Capabilities) -> dict[str, object]:

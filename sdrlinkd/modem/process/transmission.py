@@ -17,8 +17,8 @@ from sdrlinkd.wire import postponed
 SHORT = 20_000
 """Longest burst in samples that is modulated on the event loop: using a thread takes longer."""
 LATE_S = 5e-4
-"""Time in s by which a burst may miss its start. A radio that makes blocks can often still keep the
-start then; a burst that is later than this was interrupted."""
+"""Time in s by which a burst may miss its start: a radio that makes blocks often keeps it all the
+same. What is later than this was interrupted."""
 AGAIN = 2
 """How many more times a burst is modulated that became late meanwhile."""
 OUTCOMES = {
@@ -39,8 +39,8 @@ class Transmission:
     """The transmit side of the modem: modulates bursts and hands them to the radio.
 
     `now` gives the index of the sample that is on the air now; None: bursts are never too late, as
-    in lock-step. A burst that would be too late for its start gets a later one before it is
-    modulated, and the times that it tells are adjusted.
+    in lock-step. A burst that would miss its start by more than LATE_S gets a later one before it
+    is modulated, and the times that it tells are adjusted.
     """
 
     def __init__(
