@@ -19,7 +19,15 @@ from phy.demodulation import Demodulator, PduDecoder
 from phy.header import N_NETWORKS, n_symbols
 from phy.incoming import SLIP_EVERY, IncomingBurst
 from phy.kernels.acquisition import BACKOFF
-from phy.kernels.detector import FORGETS, HISTORY, search, strongest
+from phy.kernels.detector import (
+    DC_IMAG,
+    DC_REAL,
+    FORGETS,
+    HISTORY,
+    N_STATE,
+    search,
+    strongest,
+)
 from phy.layout import layout
 from phy.numerology import OFDM_64_16, Numerology
 from phy.quality import BurstOver, Event, PduHeard
@@ -74,7 +82,7 @@ class Receiver:
         self._decoder = PduDecoder()
         self._work = np.zeros((7, HISTORY + HOP), np.float32)
         self._n_header = n_symbols(grid)
-        self._dc = np.zeros(3)
+        self._search_state = np.zeros(N_STATE)
         # The samples that acquisition needs: how many before the peak, and how many in total.
         self._before = before(grid) - 1 - preamble.guard(grid)
         self._span = before(grid) + needed_after(grid)
@@ -161,7 +169,7 @@ class Receiver:
         first = self._at - HISTORY
         x = self._stream.view(first, self._at + n_hops * HOP)
         age = self._at - self._raised_at
-        found = search(x, n_hops, HOP, THRESHOLD, self._excess, age, self._dc, self._work)
+        found = search(x, n_hops, HOP, THRESHOLD, self._excess, age, self._search_state, self._work)
         if found < 0:
             self._at += n_hops * HOP
         else:
@@ -294,4 +302,4 @@ class Receiver:
 
     @property
     def _dc_value(self) -> complex:
-        return complex(self._dc[0], self._dc[1])
+        return complex(self._search_state[DC_REAL], self._search_state[DC_IMAG])

@@ -2,6 +2,8 @@
 
 There is no running sum from sample to sample, so nothing drifts, every loop is vectorised, and the
 result does not depend on how the stream was cut into chunks.
+
+Almost all hops of a quiet air have no more power than noise has. The metric is not computed there.
 """
 
 import math
@@ -11,6 +13,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from phy.kernels.inline import step
+from phy.kernels.lanes import N_LANES, Lanes, load, pairs, splat, total
 
 SEGMENT = 16
 SHORT = 192
@@ -19,6 +22,17 @@ HISTORY = SHORT - 1
 
 FORGETS = 4096.0
 """Number of samples in which a raised threshold decays by a factor of e."""
+
+# Content of the state of the search: DC, number of hops, and the power of the noise; 0: unknown.
+DC_REAL, DC_IMAG, HOPS, FLOOR = range(4)
+N_STATE = 4
+
+GATE = 1.15
+"""A half of a hop with more power than this times the noise is searched."""
+DOUBLING = 4096
+"""A permanent signal becomes noise: the floor doubles in this many hops above it."""
+_WEIGHT = 1 / 64
+_CREEP = 2 ** (1 / DOUBLING)
 
 # E is over 192 samples, P over the 176 products of samples 16 apart.
 _SHARE = np.float32((SHORT - SEGMENT) / SHORT)
@@ -100,35 +114,91 @@ def search(
     threshold: float,
     excess: float,
     age: int,
-    dc_state: NDArray[np.float64],
+    state: NDArray[np.float64],
     work: NDArray[np.float32],
 ) -> int:
     """Index in `x` of the first sample with |P| > threshold · E, or -1 after `n_hops` hops.
 
-    `x` begins HISTORY samples before the first hop. The threshold was raised by `excess`, `age`
-    samples before the first hop, and decays hop by hop. The DC estimate (`dc_state`: real,
-    imaginary, hops seen) follows the mean slowly; a hop with a crossing does not change it.
+    `x` begins HISTORY samples before the first hop; `hop` is a multiple of 8. The threshold was
+    raised by `excess`, `age` samples before the first hop, and decays hop by hop. `state`
+    `[N_STATE]` has the estimates of DC and noise, which follow the hops without a crossing. Hops
+    with the power of noise are taken to have none.
     """
     for h in range(n_hops):
-        level = threshold + excess * math.exp(-(age + h * hop) / FORGETS)
-        limit = np.float32(level * level)
         begin = h * hop
-        dc = complex(dc_state[0], dc_state[1])
-        detector_sums(x[begin : begin + HISTORY + hop], dc, work, hop)
-        p_re, p_im, energy = work[0], work[1], work[2]
-        crossings = 0
+        early, late, mean = _halves(x, begin + HISTORY, hop, state, work)
+        power, floor = (early + late) / 2, state[FLOOR]
+        is_open = max(early, late) > GATE * floor
+        if is_open:
+            level = threshold + excess * math.exp(-(age + h * hop) / FORGETS)
+            found = _crossing(x[begin : begin + HISTORY + hop], hop, level, state, work)
+            if found >= 0:
+                return begin + found
+        if floor == 0 or power < floor / 2:
+            floor = power
+        elif is_open:
+            floor *= _CREEP
+        else:
+            floor += _WEIGHT * (power - floor)
+        state[FLOOR] = floor
+        state[HOPS] += 1
+        # At first the mean of all hops, for quick settling; later of about the last 64.
+        weight = max(_WEIGHT, 1 / state[HOPS])
+        state[DC_REAL] += weight * mean.real
+        state[DC_IMAG] += weight * mean.imag
+    return -1
+
+
+@step
+def _crossing(
+    x: NDArray[np.complex64],
+    hop: int,
+    level: float,
+    state: NDArray[np.float64],
+    work: NDArray[np.float32],
+) -> int:
+    """Index in `x` of the first sample of the hop with |P| > level · E; -1: none."""
+    limit = np.float32(level * level)
+    detector_sums(x, complex(state[DC_REAL], state[DC_IMAG]), work, hop)
+    p_re, p_im, energy = work[0], work[1], work[2]
+    crossings = 0
+    for i in range(hop):
+        magnitude = p_re[i] * p_re[i] + p_im[i] * p_im[i]
+        # Counted without a branch, so that hops without a crossing are vectorised.
+        crossings += magnitude > limit * (energy[i] * energy[i])
+    if crossings:
         for i in range(hop):
             magnitude = p_re[i] * p_re[i] + p_im[i] * p_im[i]
-            # Counted without a branch, so that hops without a crossing, which are almost all, are
-            # vectorised.
-            crossings += magnitude > limit * (energy[i] * energy[i])
-        if crossings:
-            for i in range(hop):
-                magnitude = p_re[i] * p_re[i] + p_im[i] * p_im[i]
-                if magnitude > limit * (energy[i] * energy[i]):
-                    return begin + HISTORY + i
-        _follow_dc(x[begin + HISTORY : begin + HISTORY + hop], dc_state)
+            if magnitude > limit * (energy[i] * energy[i]):
+                return HISTORY + i
     return -1
+
+
+@step
+def _halves(
+    x: NDArray[np.complex64],
+    begin: int,
+    hop: int,
+    state: NDArray[np.float64],
+    work: NDArray[np.float32],
+) -> tuple[float, float, complex]:
+    """(power of the first half of a hop, that of the second, mean of the hop), all about the DC."""
+    parts, room = x.view(np.float32), work[0]
+    for i in range(0, N_LANES, 2):
+        room[i], room[i + 1] = state[DC_REAL], state[DC_IMAG]
+    dc: Lanes = load(room, 0)
+    none: Lanes = splat(0)
+    sums, early, late = none, none, none
+    # A sample has two parts.
+    first, middle, last = 2 * begin, 2 * begin + hop, 2 * begin + 2 * hop
+    for i in range(first, middle, N_LANES):
+        part: Lanes = load(parts, i) - dc
+        sums, early = sums + part, early + part * part
+    for i in range(middle, last, N_LANES):
+        part = load(parts, i) - dc
+        sums, late = sums + part, late + part * part
+    half = hop // 2
+    return total(early) / half, total(late) / half, complex(pairs(sums)) / hop
 
 
 @njit(nogil=True, cache=True)
@@ -157,19 +227,6 @@ def strongest(
     for i in range(best + SEGMENT, best + SHORT):
         plain += (complex(x[i]) - dc) * (complex(x[i - SEGMENT]) - dc).conjugate()
     return best, p, abs(plain) / abs(p)
-
-
-@step
-def _follow_dc(x: NDArray[np.complex64], dc_state: NDArray[np.float64]) -> None:
-    re, im = 0.0, 0.0
-    for i in range(x.size):
-        re += x[i].real
-        im += x[i].imag
-    dc_state[2] += 1
-    # At first the mean of all hops, for quick settling; later of about the last 64.
-    weight = max(1 / 64, 1 / dc_state[2])
-    dc_state[0] += weight * (re / x.size - dc_state[0])
-    dc_state[1] += weight * (im / x.size - dc_state[1])
 
 
 @njit(nogil=True, cache=True)

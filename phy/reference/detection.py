@@ -29,7 +29,11 @@ FORGETS = 4096
 PLAINEST = 0.7
 """A peak whose sum without the code exceeds this share of it is not a preamble."""
 SLOWEST = 1 / 64
-"""Least weight of each hop's mean in the DC."""
+"""Least weight of each hop's mean in the DC, and of its power in that of the noise."""
+GATE = 1.15
+"""A half of a hop with more power than this times the noise is searched."""
+CREEP = 2 ** (1 / 4096)
+"""Factor by which the noise grows in each hop above it: a permanent signal becomes noise."""
 
 
 def sums(x: NDArray[np.complexfloating], dc: complex) -> tuple[Samples, NDArray[np.float64]]:
@@ -57,10 +61,12 @@ def _neighbors(x: NDArray[np.complexfloating], dc: complex) -> Samples:
 
 
 class Detector:
-    """Detects preambles; keeps the DC of a stream and the threshold raised by false alarms."""
+    """Detects preambles; keeps DC, noise, and the threshold raised by false alarms."""
 
     def __init__(self, start: int) -> None:
         self.dc = 0j
+        self.noise = 0.0
+        """Power of the hops without a burst; 0: unknown."""
         self._hops_seen = 0
         self._excess, self._raised_at = 0.0, start
 
@@ -68,17 +74,30 @@ class Detector:
         """Find the first of 512 samples with |P| > threshold · E, or None.
 
         `x` `[191 + 512]` ends with those samples; the first of them has the absolute index `at`.
-        The result is an absolute index. A hop without a crossing updates the DC.
+        The result is an absolute index. Hops with the power of noise are taken to have no crossing.
+        A hop without a crossing updates DC and noise.
         """
-        level = THRESHOLD + self._excess_at(at)
-        p, e = sums(x, self.dc)
-        over = np.abs(p) ** 2 > level**2 * e**2
-        if over.any():
-            return at + int(over.argmax())
+        y = x[HISTORY:].astype(np.complex128) - self.dc
+        halves = (np.abs(y) ** 2).reshape(2, -1).mean(axis=1)
+        is_open = bool(halves.max() > GATE * self.noise)
+        if is_open:
+            level = THRESHOLD + self._excess_at(at)
+            p, e = sums(x, self.dc)
+            over = np.abs(p) ** 2 > level**2 * e**2
+            if over.any():
+                return at + int(over.argmax())
+        self._follow_noise(float(halves.mean()), is_open)
         self._hops_seen += 1
-        weight = max(SLOWEST, 1 / self._hops_seen)
-        self.dc += weight * (complex(x[HISTORY:].astype(np.complex128).mean()) - self.dc)
+        self.dc += max(SLOWEST, 1 / self._hops_seen) * complex(y.mean())
         return None
+
+    def _follow_noise(self, power: float, is_open: bool) -> None:
+        if self.noise == 0 or power < self.noise / 2:
+            self.noise = power
+        elif is_open:
+            self.noise *= CREEP
+        else:
+            self.noise += SLOWEST * (power - self.noise)
 
     def strongest(self, x: NDArray[np.complexfloating]) -> tuple[int, float | None]:
         """Find the largest |P| / E after 191 samples of `x`; returns (its offset, frequency).

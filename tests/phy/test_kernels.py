@@ -54,7 +54,7 @@ def test_the_metric_is_1_at_the_last_sample_of_the_short_training_and_nowhere_el
     assert metric[away].max() < 0.6
 
 
-def searched(x, threshold=0.25, hop=512, dc=(0.0, 0.0, 0.0), excess=0.0, age=0):
+def searched(x, threshold=0.25, hop=512, dc=(0.0, 0.0, 0.0, 0.0), excess=0.0, age=0):
     state, work = np.array(dc), np.zeros((7, HISTORY + hop), np.float32)
     n_hops = (len(x) - HISTORY) // hop
     return search(x, n_hops, hop, threshold, excess, age, state, work), state
@@ -86,7 +86,7 @@ def test_search_finds_nothing_in_noise_and_learns_its_mean():
     x = 0.1 * noise(rng(), HISTORY + 40 * 512) + np.complex64(0.5 - 0.25j)
     found, state = searched(x, threshold=0.5)
     assert found == -1
-    assert state == pytest.approx([0.5, -0.25, 40], abs=0.01)
+    assert state == pytest.approx([0.5, -0.25, 40, 0.01], abs=0.01)
 
 
 def test_numbers_too_large_or_none_become_0_and_are_counted():

@@ -30,7 +30,7 @@ def planes_of(x):
 
 def searched(x, at, excess=0.0, dc=0j, n_seen=0):
     """(index of the first crossing or None, DC, hops seen) by the kernel, hop by hop."""
-    state, work = np.array([dc.real, dc.imag, n_seen]), np.zeros((7, 191 + 512), np.float32)
+    state, work = np.array([dc.real, dc.imag, n_seen, 0.0]), np.zeros((7, 191 + 512), np.float32)
     n_hops = (len(x) - 191) // 512
     found = search(x, n_hops, 512, detection.THRESHOLD, excess, 0, state, work)
     return (at - 191 + found if found >= 0 else None), complex(state[0], state[1])
