@@ -185,7 +185,10 @@ class Radio(Protocol):
 
 @runtime_checkable
 class RelaxingRadio(Protocol):
-    """A radio that makes longer blocks while the air is quiet, to save CPU time."""
+    """A radio that can make longer blocks while nothing is on the air, to save CPU time.
 
-    def relax(self, is_quiet: bool) -> None:
-        """Note that the air is quiet, or no longer is; may be called while a block is made."""
+    It knows of every burst before it begins.
+    """
+
+    def relax(self, may_relax: bool) -> None:
+        """Allow longer blocks, or no longer allow them; may be called while a block is made."""

@@ -5,8 +5,8 @@ from backends.base import BackendError, Patience
 from backends.hub_address import hub_of
 from backends.params import EtherParams, IqFileParams, ZmqParams
 
-ETHER_LEAD_S = 0.002
-"""From the event loop to the hub, on a busy machine."""
+ETHER_LEAD_S = 0.0008
+"""From the event loop to the hub, and from there to the other radios."""
 ETHER_REMOTE_LEAD_S = 0.02
 """The same over a network: a round trip on a busy wireless one."""
 ETHER_TURNAROUND_S = 1e-4

@@ -79,10 +79,10 @@ class LateRadio:
         answer = self._radio.send(burst._replace(start=burst.start - first, latest=latest))
         return self._report(answer, first)
 
-    def relax(self, is_quiet: bool) -> None:
-        """Tell the wrapped radio whether the air is quiet."""
+    def relax(self, may_relax: bool) -> None:
+        """Tell the wrapped radio whether its blocks may be longer."""
         if isinstance(self._radio, RelaxingRadio):
-            self._radio.relax(is_quiet)
+            self._radio.relax(may_relax)
 
     async def close(self) -> None:
         """Close the wrapped radio; closing twice is fine."""

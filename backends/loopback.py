@@ -18,7 +18,7 @@ from backends.base import (
     TxReport,
 )
 from backends.feed import BlockFeed
-from backends.outstanding import Outstanding, answered
+from backends.outstanding import GAP, Outstanding, answered
 from backends.pace import Pace
 
 # A reader further behind than this misses samples; up to here none are lost.
@@ -50,7 +50,8 @@ class LoopbackRadio:
         # The next block's index and the bursts on the air must change together.
         self._lock = threading.Lock()
         self._next = 0
-        self._is_relaxed = False
+        self._may_relax = False
+        self._quiet_from = 0
         self._is_open = False
         self.counters = {"overflows": 0, "samples_lost": 0, "late": 0}
 
@@ -104,16 +105,16 @@ class LoopbackRadio:
             if start is None:
                 self.counters["late"] += 1
                 return answered(TxReport(TxOutcome.LATE, burst.start, burst.start))
+            self._quiet_from = start + len(burst.samples) + GAP + self._n
             if self._hear_self:
                 self._timeline.add(start, burst.samples, self._path)
-        if self._is_relaxed:
-            self._is_relaxed = False
+        if self._may_relax:
             self._pace.wake()
         return self._outstanding.left(start, len(burst.samples))
 
-    def relax(self, is_quiet: bool) -> None:
-        """While the air is quiet, make longer blocks, each up to when a burst is sent."""
-        self._is_relaxed = is_quiet and self._paced
+    def relax(self, may_relax: bool) -> None:
+        """While nothing is on the air, make longer blocks, each up to when a burst is sent."""
+        self._may_relax = may_relax and self._paced
 
     async def close(self) -> None:
         """Stop the feed; pending bursts are lost."""
@@ -126,7 +127,7 @@ class LoopbackRadio:
     def _next_block(self) -> RxBlock:
         """Make the next block. Runs on the feed's thread."""
         first, n = self._next, self._n
-        if self._is_relaxed:
+        if self._may_relax and first >= self._quiet_from:
             # A burst ends the wait: what is due by then, in whole blocks of the usual length.
             short = -self._pace.wait_for(first + self._long)
             n = max(n, (self._long - max(0, short)) // n * n)

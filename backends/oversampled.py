@@ -114,10 +114,10 @@ class OversampledRadio:
         end = (report.end + TRIM) // self._factor - REACH
         return TxReport(report.outcome, start, max(start, end))
 
-    def relax(self, is_quiet: bool) -> None:
-        """Tell the wrapped radio whether the air is quiet."""
+    def relax(self, may_relax: bool) -> None:
+        """Tell the wrapped radio whether its blocks may be longer."""
         if isinstance(self._radio, RelaxingRadio):
-            self._radio.relax(is_quiet)
+            self._radio.relax(may_relax)
 
     async def close(self) -> None:
         """Close the wrapped radio; closing twice is fine."""

@@ -19,15 +19,7 @@ from phy.demodulation import Demodulator, PduDecoder
 from phy.header import N_NETWORKS, n_symbols
 from phy.incoming import SLIP_EVERY, IncomingBurst
 from phy.kernels.acquisition import BACKOFF
-from phy.kernels.detector import (
-    DC_IMAG,
-    DC_REAL,
-    FORGETS,
-    HISTORY,
-    N_STATE,
-    search,
-    strongest,
-)
+from phy.kernels.detector import FORGETS, HISTORY, N_STATE, dc_of, search, strongest
 from phy.layout import layout
 from phy.numerology import OFDM_64_16, Numerology
 from phy.quality import BurstOver, Event, PduHeard
@@ -302,4 +294,4 @@ class Receiver:
 
     @property
     def _dc_value(self) -> complex:
-        return complex(self._search_state[DC_REAL], self._search_state[DC_IMAG])
+        return dc_of(self._search_state)

@@ -22,9 +22,10 @@ from backends.ether.world import (
 
 if TYPE_CHECKING:
     from backends.ether.antenna import Antenna
+    from backends.ether.ear import Piece
     from backends.ether.hub import EtherHub
     from backends.ether.local import LocalEther, LocalRadio, lockstep_capabilities
-    from backends.ether.medium import Medium, Piece
+    from backends.ether.medium import Medium
     from backends.ether.radio import EtherRadio
 
 __all__ = [
@@ -55,7 +56,7 @@ _LATER = {
     "LocalEther": "local",
     "LocalRadio": "local",
     "Medium": "medium",
-    "Piece": "medium",
+    "Piece": "ear",
     "lockstep_capabilities": "local",
 }
 

@@ -1,16 +1,27 @@
 """One node's radio on a simulated air: makes blocks of what arrives, and tracks its bursts."""
 
 import asyncio
+from typing import NamedTuple
 
 import numpy as np
 
 from backends.base import SENDING, Capabilities, RxBlock, TxBurst, TxOutcome, TxReport
-from backends.ether.medium import NOISE_DBFS, Piece
+from backends.ether import protocol
+from backends.ether.ear import Piece
+from backends.ether.medium import NOISE_DBFS
 from backends.ether.world import RadioParams
 from backends.outstanding import NEVER
 from phy import FrontEnd, FrontEndParams
 
 NOTHING_DB = 300.0
+
+
+class Beside(NamedTuple):
+    """What came together with a block; the event loop reads it together with that block."""
+
+    placed: list[protocol.Placed]
+    step: int
+    welcome: protocol.Welcome | None = None
 
 
 class Antenna:

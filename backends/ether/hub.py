@@ -1,5 +1,6 @@
 """The hub: radios of other processes on one simulated air, paced or in lock-step."""
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -10,15 +11,20 @@ import msgspec
 
 from backends.base import Samples, TxBurst
 from backends.ether import protocol
-from backends.ether.medium import Medium, Piece
+from backends.ether.ear import Piece
+from backends.ether.medium import Medium
 from backends.ether.sockets import HubSockets
 from backends.ether.world import AirParams, RadioParams, World
 from backends.hub_address import HubAddress
 
-# A late hub makes fewer, longer stretches.
-MAX_LATE_BLOCKS = 8
+TRAVEL_S, REMOTE_TRAVEL_S = 0.0003, 0.005
+"""A burst reaches the hub this long before it begins, so that it can reach the other radios.
+
+With `listen`, radios may be on other computers.
+"""
 # In lock-step, the hub checks a radio that is silent for this long.
 LOOK_AFTER_MS = 500
+LARGEST_INDEX = 1 << 62
 
 
 @dataclass
@@ -31,7 +37,6 @@ class _Member:
     token: int
     done: int = 0
     late: int = 0
-    lost: int = 0
     placed: list[protocol.Placed] = field(default_factory=list)
     notice: str = ""
 
@@ -39,8 +44,8 @@ class _Member:
 class EtherHub:
     """A hub: sockets in `directory` and at `listen`. `radios` are expected; others get defaults.
 
-    Paced, it runs in real time. In lock-step it starts when all expected radios have joined, each
-    step waits for every radio, and it stops at `until_s`.
+    Paced, the radios keep the time, and the hub forwards what they send. In lock-step it starts
+    when all expected radios have joined; each step waits for every radio. It stops at `until_s`.
     """
 
     def __init__(
@@ -71,7 +76,8 @@ class EtherHub:
         self._step = 0
         self._looked = 0.0
         self._began = 0.0
-        self._samples_lost = 0
+        self._travel_s = TRAVEL_S if listen is None else REMOTE_TRAVEL_S
+        self._bursts_lost = 0
         self._is_stopped = False
         self._sockets = HubSockets(directory, listen)
 
@@ -91,19 +97,13 @@ class EtherHub:
             self._sockets.close()
 
     def _run_paced(self) -> None:
-        block_s = self._air.block_s
-        self._began = began = time.monotonic() - self._now
+        self._began = time.monotonic() - self._now
         while not self._is_stopped:
-            due = began + self._now + block_s
-            ahead_s = due - time.monotonic()
-            if ahead_s > 0:
-                time.sleep(ahead_s)
-            # A burst is in time if it is taken before the block that it belongs to.
+            self._sockets.wait(LOOK_AFTER_MS)
+            # In whole samples, so that clocks of equal crystals are in step.
+            now_s = time.monotonic() - self._began
+            self._now = math.floor(now_s * self._air.rate_hz) / self._air.rate_hz
             self._sockets.take(self._take_from_radio, self._take_request)
-            late = time.monotonic() - due
-            blocks = 1 + min(int(late / block_s), MAX_LATE_BLOCKS)
-            self._now += blocks * block_s
-            self._hand_out(round(1e9 * (began + self._now)))
 
     def _run_in_lockstep(self) -> None:
         while not self._is_stopped:
@@ -122,7 +122,7 @@ class EtherHub:
             self._step += 1
             self._looked = time.monotonic()
             self._now = min(self._step * self._air.block_s, self._until_s)
-            self._hand_out(0)
+            self._hand_out()
 
     @property
     def _is_over(self) -> bool:
@@ -178,6 +178,8 @@ class EtherHub:
                 f"another daemon requested our id {hello.node} on this channel and was refused: "
                 f"{hello.who}; give it another robot_id"
             )
+            if self._paced:
+                self._reply(there.identity, protocol.News(notice=there.notice))
             return (
                 f"robot {hello.node} is already on this channel: {there.who}; give one of the two "
                 "another robot_id"
@@ -203,44 +205,58 @@ class EtherHub:
                 return
             burst = TxBurst(message.start, samples, message.latest)
             if self._paced:
-                self._send(member.node, message.number, burst, message.late_seen)
+                self._forward(member, message, burst)
             else:
                 late_seen = message.late_seen
                 self._bursts.append((member.node, message.number, burst, late_seen))
 
+    def _forward(self, member: _Member, sent: protocol.Sent, burst: TxBurst) -> None:
+        """In real time: send a burst to those who hear it, and tell the sender where it is."""
+        self._medium.pass_time(member.node, self._now + self._travel_s)
+        may_leave = self._may_leave(member, burst, sent.late_seen)
+        start, arrivals = self._medium.place(member.node, burst) if may_leave else (None, [])
+        for node, at, way in arrivals:
+            there = self._members.get(node)
+            # What is too far away to be numbered, or has no power that can be told, never arrives.
+            if there is not None and abs(at) < LARGEST_INDEX and math.isfinite(way.loss_db):
+                message = protocol.Arriving(sender=member.node, at=at, way=way)
+                if not self._reply(there.identity, message, burst.samples):
+                    self._bursts_lost += 1
+        member.late += start is None
+        placed = [protocol.Placed(sent.number, start, len(burst.samples))]
+        self._reply(member.identity, protocol.News(placed=placed))
+
     def _send(self, node: int, number: int, burst: TxBurst, late_seen: int) -> None:
+        """In lock-step: put a burst on the air."""
         member = self._members.get(node)
         if member is not None:
             start = None
-            # Otherwise this burst would overtake the late one, which has to be sent again.
-            if burst.latest is None or late_seen == member.late:
+            if self._may_leave(member, burst, late_seen):
                 start = self._medium.send(node, burst)
             member.late += start is None
             member.placed.append(protocol.Placed(number, start, len(burst.samples)))
 
-    def _hand_out(self, host_ns: int) -> None:
+    def _may_leave(self, member: _Member, burst: TxBurst, late_seen: int) -> bool:
+        """Whether a burst overtakes none that was late and has to be sent again."""
+        return burst.latest is None or late_seen == member.late
+
+    def _hand_out(self) -> None:
+        """In lock-step: hand out the step to all radios."""
         pieces = {node: self._medium.take(node, self._now) for node in self._members}
         for member in list(self._members.values()):
             each = pieces[member.node] or [Piece(0, None, is_deaf=False)]
             for i, piece in enumerate(each):
                 is_last = i == len(each) - 1
-                self._hand_to(member, piece, host_ns, self._step if is_last else 0)
-
-    def _hand_to(self, member: _Member, piece: Piece, host_ns: int, step: int) -> None:
-        stretch = protocol.Stretch(
-            n=piece.n,
-            is_deaf=piece.is_deaf,
-            host_ns=host_ns,
-            step=step,
-            lost=member.lost,
-            placed=member.placed,
-            notice=member.notice,
-        )
-        if self._reply(member.identity, stretch, piece.samples):
-            member.lost, member.placed, member.notice = 0, [], ""
-        else:
-            member.lost += piece.n
-            self._samples_lost += piece.n
+                stretch = protocol.Stretch(
+                    n=piece.n,
+                    is_deaf=piece.is_deaf,
+                    step=self._step if is_last else 0,
+                    placed=member.placed,
+                    notice=member.notice,
+                )
+                # A radio in lock-step has read everything before it is done.
+                self._reply(member.identity, stretch, piece.samples)
+                member.placed, member.notice = [], ""
 
     def _reply(
         self, identity: bytes, message: msgspec.Struct, samples: Samples | None = None
@@ -278,6 +294,7 @@ class EtherHub:
             is_over=self._is_over,
             bursts=self._medium.bursts,
             bursts_late=self._medium.bursts_late,
-            samples_lost=self._samples_lost,
+            bursts_lost=self._bursts_lost,
             paced=self._paced,
+            host_ns=time.monotonic_ns(),
         )

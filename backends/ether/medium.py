@@ -1,4 +1,4 @@
-"""The air itself: computes what each node's antenna receives from the others."""
+"""The air itself: when bursts leave, and how each node's antenna receives those of the others."""
 
 import math
 from dataclasses import dataclass, field
@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from backends.air import Timeline
 from backends.base import Samples, TxBurst
+from backends.ether.ear import Ear, Piece
+from backends.ether.way import Way
 from backends.ether.world import AirParams, RadioParams, World
 from backends.outstanding import GAP
 from phy import Path, PathParams
@@ -22,12 +23,12 @@ LEAD = MARGIN + 1
 """Number of samples before its start at which a burst must be handed over."""
 
 
-class Piece(NamedTuple):
-    """The next `n` samples of a node: None for silence; `is_deaf`: the node does not hear them."""
+class Arrival(NamedTuple):
+    """A burst that arrives at `node`, at the sample `at` of its count."""
 
-    n: int
-    samples: Samples | None
-    is_deaf: bool
+    node: int
+    at: int
+    way: Way
 
 
 @dataclass
@@ -36,16 +37,21 @@ class _Node:
     rate_hz: float
     """The node's sample rate, as its own crystal makes it."""
     joined_at: float
-    timeline: Timeline = field(default_factory=Timeline)
-    next_index: int = 0
+    ear: Ear = field(default_factory=Ear)
+    on_air: int = 0
+    """Index of the first sample that may not have left yet."""
     free_from: int = 0
-    deaf: list[tuple[int, int]] = field(default_factory=list)
 
     def index(self, t: float) -> int:
         return math.floor((t - self.joined_at) * self.rate_hz)
 
     def time(self, index: int) -> float:
         return self.joined_at + index / self.rate_hz
+
+    @property
+    def turnaround(self) -> int:
+        """Samples before and after its own bursts in which the node hears nothing."""
+        return 0 if self.radio.full_duplex else math.ceil(self.radio.turnaround_s * self.rate_hz)
 
 
 class Medium:
@@ -79,75 +85,75 @@ class Medium:
 
     def next_index(self, node_id: int) -> int:
         """Index of the node's first sample that has not been taken."""
-        return self._nodes[node_id].next_index
+        return self._nodes[node_id].ear.next_index
+
+    def pass_time(self, node_id: int, t: float) -> None:
+        """Note that the node's samples before the time `t` have left: no burst can begin there."""
+        node = self._nodes[node_id]
+        node.on_air = max(node.on_air, node.index(t))
+
+    def place(self, node_id: int, burst: TxBurst) -> tuple[int | None, list[Arrival]]:
+        """Place a burst; returns (its start in the sender's count, arrivals); None: too late."""
+        node = self._nodes[node_id]
+        start = max(burst.start, node.on_air + node.turnaround + MARGIN, node.free_from)
+        if burst.latest is not None and start > burst.latest:
+            self.bursts_late += 1
+            return None, []
+        self.bursts += 1
+        node.free_from = start + len(burst.samples) + GAP
+        sent_at = node.time(start)
+        found = (
+            self._arrival(node_id, node, other_id, other, sent_at, burst.samples)
+            for other_id, other in self._nodes.items()
+            if other_id != node_id
+        )
+        return start, [each for each in found if each is not None]
 
     def send(self, node_id: int, burst: TxBurst) -> int | None:
         """Put a burst on the air; returns its start in the sender's count, None if too late."""
+        start, arrivals = self.place(node_id, burst)
         node = self._nodes[node_id]
-        turnaround = 0
-        if not node.radio.full_duplex:
-            turnaround = math.ceil(node.radio.turnaround_s * node.rate_hz)
-        earliest = max(node.next_index + turnaround + MARGIN, node.free_from)
-        start = max(burst.start, earliest)
-        if burst.latest is not None and start > burst.latest:
-            self.bursts_late += 1
-            return None
-        self.bursts += 1
-        end = start + len(burst.samples)
-        node.free_from = end + GAP
-        if not node.radio.full_duplex:
-            node.deaf.append((start - turnaround, end + turnaround))
-        sent_at = node.time(start)
-        for other_id, other in self._nodes.items():
-            if other_id != node_id:
-                self._carry(node_id, node, other_id, other, sent_at, burst.samples)
+        if start is not None and not node.radio.full_duplex:
+            turnaround = node.turnaround
+            node.ear.be_deaf(start - turnaround, start + len(burst.samples) + turnaround)
+        for node_to, at, way in arrivals:
+            pair = (node_id, node_to)
+            rng = self._rngs.get(pair)
+            if rng is None:
+                rng = self._rngs[pair] = np.random.default_rng([self._seed, *pair])
+            path = path_of(way, self._air.rate_hz, self._air.frequency_hz, rng)
+            self._nodes[node_to].ear.add(at, burst.samples, path)
         return start
 
     def take(self, node_id: int, until: float) -> list[Piece]:
         """Take what the node's antenna receives up to the time `until`, in pieces."""
         node = self._nodes[node_id]
-        end = node.index(until)
-        pieces: list[Piece] = []
-        while node.next_index < end:
-            first = node.next_index
-            is_deaf, upto = _next_stretch(node.deaf, first, end)
-            heard = node.timeline.take(first, upto - first)
-            pieces.append(Piece(upto - first, None if is_deaf else heard, is_deaf))
-            node.next_index = upto
-        node.deaf = [each for each in node.deaf if each[1] > node.next_index]
+        pieces = node.ear.take(node.index(until))
+        node.on_air = node.ear.next_index
         return pieces
 
-    def _carry(
+    def _arrival(
         self, sender_id: int, sender: _Node, to_id: int, to: _Node, at: float, samples: Samples
-    ) -> None:
+    ) -> Arrival | None:
         hop = self._world.hop(sender_id, to_id, at)
         if hop is None:
-            return
+            return None
         arrives = (at + hop.delay_s - to.joined_at) * to.rate_hz
         # Two clocks within one sample are in step, even if the quotient is rounded.
         whole, part = math.floor(arrives), arrives - math.floor(arrives)
         if abs(arrives - round(arrives)) < 1e-3:
             whole, part = round(arrives), 0.0
         power_db = 10 * math.log10(float(np.vdot(samples, samples).real) / len(samples) + 1e-30)
-        params = PathParams(
-            rate_hz=self._air.rate_hz,
-            centre_hz=self._air.frequency_hz,
+        way = Way(
             profile=self._air.profile,
             delay_spread_s=self._air.delay_spread_s,
             loss_db=power_db - NOISE_DBFS - hop.snr_db,
             delay_s=part / self._air.rate_hz,
             clock_ppm=sender.radio.clock_ppm - to.radio.clock_ppm + hop.doppler_ppm,
         )
-        pair = (sender_id, to_id)
-        rng = self._rngs.get(pair)
-        if rng is None:
-            rng = self._rngs[pair] = np.random.default_rng([self._seed, *pair])
-        to.timeline.add(whole, samples, Path(params, rng))
+        return Arrival(to_id, whole, way)
 
 
-def _next_stretch(deaf: list[tuple[int, int]], first: int, end: int) -> tuple[bool, int]:
-    """(whether the node is deaf at `first`, index at which that changes; at most `end`)."""
-    now = [upto for begin, upto in deaf if begin <= first < upto]
-    if now:
-        return True, min(max(now), end)
-    return False, min([begin for begin, _ in deaf if begin > first] + [end])
+def path_of(way: Way, rate_hz: float, centre_hz: float, rng: np.random.Generator) -> Path:
+    """The path of one burst. Raises ValueError for an unknown profile."""
+    return Path(PathParams(rate_hz=rate_hz, centre_hz=centre_hz, **way._asdict()), rng)

@@ -1,9 +1,11 @@
 """Messages between the hub of an ether and its radios, over ZeroMQ.
 
-A radio's DEALER talks to the hub's ROUTER `air`. It sends Hello, receives Welcome or Refused, and
-then one Stretch after another, with samples (complex64) in a second frame if there are any. On a
-second socket it PUSHes to the hub's PULL `sky`: Sent with the samples, Done after each Stretch that
-requests it (lock-step), and Bye. Everything but samples is msgpack.
+A radio's DEALER talks to the hub's ROUTER `air`. It sends Hello and receives Welcome or Refused. In
+lock-step it then receives one Stretch after another, with samples (complex64) in a second frame if
+there are any. In real time it makes its samples itself, and receives an Arriving, with samples, for
+each burst of another radio, and News of its own. On a second socket the radio PUSHes to the hub's
+PULL `sky`: Sent with the samples, Done after each Stretch that requests it (lock-step), and Bye.
+Everything but samples is msgpack.
 """
 
 from collections.abc import Sequence
@@ -14,9 +16,10 @@ import numpy as np
 from msgspec import Meta
 
 from backends.base import Samples
+from backends.ether.way import Way
 from backends.ether.world import RadioParams
 
-VERSION = 1
+VERSION = 2
 
 
 class Hello(msgspec.Struct, tag=True, frozen=True, kw_only=True):
@@ -57,14 +60,26 @@ class Placed(msgspec.Struct, array_like=True, frozen=True):
 
 
 class Stretch(msgspec.Struct, tag=True, frozen=True, kw_only=True):
-    """The next `n` samples. With a `step`, the air waits until the radio answers Done(step)."""
+    """The next `n` samples in lock-step; with a `step`, the air waits for Done(step)."""
 
     n: int
     is_deaf: bool
-    host_ns: int
     step: int = 0
-    lost: int = 0
-    """Number of samples before these that the hub could not deliver."""
+    placed: list[Placed] = []
+    notice: str = ""
+
+
+class Arriving(msgspec.Struct, tag=True, frozen=True, kw_only=True):
+    """A burst of node `sender` arrives at index `at`, as it was sent; `way` changes it."""
+
+    sender: int
+    at: int
+    way: Way
+
+
+class News(msgspec.Struct, tag=True, frozen=True, kw_only=True):
+    """Where the radio's own bursts were placed, or a notice for people."""
+
     placed: list[Placed] = []
     notice: str = ""
 
@@ -105,13 +120,16 @@ class Answer(msgspec.Struct, tag=True, frozen=True, kw_only=True):
     is_over: bool
     bursts: int
     bursts_late: int
-    samples_lost: int
+    bursts_lost: int
+    """Bursts for radios that did not read what the hub sent them."""
     paced: bool = True
     """Whether this air keeps real time; false: lock-step."""
+    host_ns: int = 0
+    """Monotonic time of the answer."""
 
 
 ToHub = Hello | Question
-FromHub = Welcome | Refused | Stretch | Answer
+FromHub = Welcome | Refused | Stretch | Arriving | News | Answer
 FromRadio = Sent | Done | Bye
 
 _encoder = msgspec.msgpack.Encoder()

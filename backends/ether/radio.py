@@ -3,10 +3,8 @@
 import asyncio
 import contextlib
 import threading
-import time
 from collections import deque
 from collections.abc import AsyncIterator, Awaitable
-from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -26,29 +24,20 @@ from backends.base import (
     TxReport,
 )
 from backends.ether import protocol
-from backends.ether.antenna import Antenna
-from backends.ether.downlink import Downlink
+from backends.ether.antenna import Antenna, Beside
+from backends.ether.ear import Piece
 from backends.ether.joining import join
-from backends.ether.medium import LEAD, Piece
+from backends.ether.medium import LEAD
+from backends.ether.real_time import RealTime
 from backends.ether.remote_clock import HubClock
-from backends.ether.sockets import NOBLOCK, connect
+from backends.ether.sockets import NOBLOCK, connect, is_readable, received
 from backends.feed import BlockFeed, Fed
 from backends.hub_address import HubAddress
 from backends.known import ETHER_LEAD_S, ETHER_REMOTE_LEAD_S
 from backends.outstanding import answered
 
 ANSWER_MS = 5000
-# A paced hub that is silent for this long is gone; it is then queried at this interval.
-QUIET_MS = 500
 INFINITE = float("inf")
-
-
-class _Beside(NamedTuple):
-    """What came together with a block; the event loop reads it together with that block."""
-
-    placed: list[protocol.Placed]
-    step: int
-    welcome: protocol.Welcome | None = None
 
 
 class EtherRadio:
@@ -74,15 +63,16 @@ class EtherRadio:
         self._welcome: protocol.Welcome
         self._readable = asyncio.Event()
         self._antenna: Antenna | None = None
-        self._beside: deque[_Beside] = deque()
+        self._beside: deque[Beside] = deque()
         self._number = 0
         self._late_seen = 0
         self._is_over = False
-        self._has_asked = False
-        self._last_host_ns = 0
-        self._is_away = False
+        self._real_time: RealTime | None = None
         self._notice = ""
-        self.counters = {"overflows": 0, "samples_lost": 0, "late": 0, "hub_outages": 0}
+        self.counters = {
+            "overflows": 0, "samples_lost": 0, "late": 0, "hub_outages": 0,
+            "bursts_slow": 0, "bursts_missed": 0,
+        }  # fmt: skip
 
     @property
     def capabilities(self) -> Capabilities:
@@ -106,6 +96,10 @@ class EtherRadio:
         return "it no longer answers; the daemon retries until it is back" if self._is_away else ""
 
     @property
+    def _is_away(self) -> bool:
+        return self._real_time is not None and self._real_time.is_away
+
+    @property
     def levels(self) -> Levels | None:
         """Level of the blocks so far; None before the first measurement."""
         return self._feed.levels
@@ -114,19 +108,23 @@ class EtherRadio:
         """Join the air. Raises BackendError, also when the hub refuses."""
         self._tuning = tuning
         self._down = connect(self._context, zmq.DEALER, self._hub.air)
-        self._downlink = Downlink(self._down)
         self._up = connect(self._context, zmq.PUSH, self._hub.sky)
         self._is_idle.clear()
         await asyncio.to_thread(self._ask)
-        self._down.setsockopt(zmq.RCVTIMEO, QUIET_MS)
-        self._antenna = Antenna(self._welcome.radio, self._welcome.seed, tuning.rate_hz)
+        welcome = self._welcome
+        self._antenna = Antenna(welcome.radio, welcome.seed, tuning.rate_hz)
+        if welcome.paced:
+            self._real_time = RealTime(
+                self._down, self._hello(), welcome, self._antenna, self._clock, self.counters,
+                self._closing,
+            )  # fmt: skip
 
     async def blocks(self, hear: Hear | None = None) -> AsyncIterator[RxBlock]:
         """Yield what the hub hands out. Raises BackendError when the hub refuses a return."""
         antenna = self._joined
         # In lock-step every node waits anyway, so a thread would only add cost.
-        blocks = self._feed.blocks(hear) if self._welcome.paced else self._blocks_here()
-        if not self._welcome.paced:
+        blocks = self._feed.blocks(hear) if self._real_time else self._blocks_here()
+        if self._real_time is None:
             self._say(protocol.Done(token=self._welcome.token, step=0))
         try:
             async for block, is_heard in blocks:
@@ -165,6 +163,11 @@ class EtherRadio:
         samples = np.ascontiguousarray(burst.samples, np.complex64)
         self._say(message, samples.data.cast("B"))
         return answer
+
+    def relax(self, may_relax: bool) -> None:
+        """While nothing is on the air, make longer blocks, if that is allowed."""
+        if self._real_time is not None:
+            self._real_time.may_relax = may_relax
 
     async def close(self) -> None:
         """Leave the air; closing twice is fine."""
@@ -213,24 +216,12 @@ class EtherRadio:
 
     def _next_block(self) -> RxBlock | None:
         """Wait for the next block. Runs on the feed's thread."""
-        while not self._closing.is_set():
-            try:
-                message, samples = self._downlink.next()
-            except zmq.Again:
-                self._look_for_hub()
-                continue
-            if isinstance(message, protocol.Stretch):
-                self._is_away = False
-                return self._receive(*self._downlink.with_more(message, samples))
-            if isinstance(message, protocol.Refused):
-                raise RefusalError(message.reason)
-            if isinstance(message, protocol.Welcome):
-                return self._rejoin(message)
-            if self._is_away and not self._has_asked and self._node not in message.nodes:
-                self._has_asked = True
-                with contextlib.suppress(zmq.Again):
-                    self._down.send(protocol.encode(self._hello()), NOBLOCK)
-        return None
+        if self._real_time is None or (made := self._real_time.next()) is None:
+            return None
+        block, beside = made
+        self._notice = self._real_time.notice
+        self._beside.append(beside)
+        return block
 
     def _is_due(self, end: int) -> bool:
         """On the feed's thread: whether a message came with a block, or a burst has left."""
@@ -250,10 +241,10 @@ class EtherRadio:
             while not self._closing.is_set():
                 readable.clear()
                 # The descriptor only signals new messages, so check for waiting ones first.
-                if not self._downlink.has_more():
+                if not is_readable(self._down):
                     await readable.wait()
                     continue
-                message, samples = self._downlink.read(NOBLOCK)
+                message, samples = received(self._down)
                 if isinstance(message, protocol.Refused):
                     raise RefusalError(message.reason)
                 if isinstance(message, protocol.Stretch):
@@ -263,37 +254,6 @@ class EtherRadio:
                 loop.remove_reader(fd)
 
     def _receive(self, message: protocol.Stretch, samples: Samples | None) -> RxBlock:
-        antenna = self._joined
-        self._last_host_ns = message.host_ns
-        at_ns = self._clock.local_ns(message.host_ns, time.monotonic_ns())
         self._notice = message.notice or self._notice
-        if message.lost:
-            self.counters["overflows"] += 1
-            # These samples are lost too, together with those before them.
-            lost = message.lost + message.n
-            self.counters["samples_lost"] += lost
-            self._beside.append(_Beside(message.placed, message.step))
-            return antenna.miss(lost, "the daemon was too slow", at_ns)
-        piece = Piece(message.n, samples, message.is_deaf)
-        self._beside.append(_Beside(message.placed, message.step))
-        return antenna.receive(piece, at_ns)
-
-    def _look_for_hub(self) -> None:
-        """Query a silent hub: in lock-step other nodes may be slow, otherwise the hub is gone."""
-        if self._welcome.paced and not self._is_away:
-            self._is_away = True
-            self.counters["hub_outages"] += 1
-        self._has_asked = False
-        with contextlib.suppress(zmq.Again):
-            self._down.send(protocol.encode(protocol.Question()), NOBLOCK)
-
-    def _rejoin(self, welcome: protocol.Welcome) -> RxBlock:
-        """Join a hub that has no record of this radio: its sample count restarts."""
-        self._is_away = False
-        now_ns = welcome.host_ns
-        at_ns = self._clock.local_ns(now_ns, time.monotonic_ns())
-        away_s = (now_ns - self._last_host_ns) * 1e-9 if welcome.paced else 0.0
-        self._beside.append(_Beside([], 0, welcome))
-        self._last_host_ns = now_ns
-        n = max(1, round(away_s * self._tuning.rate_hz))
-        return self._joined.rejoin(n, "the hub was gone", at_ns)
+        self._beside.append(Beside(message.placed, message.step))
+        return self._joined.receive(Piece(message.n, samples, message.is_deaf), 0)

@@ -16,14 +16,15 @@ class HubClock:
         self._before = self._least = 0
         self._until_ns: int | None = None
 
-    def local_ns(self, hub_ns: int, now_ns: int) -> int:
-        """Our monotonic time of `hub_ns`, which a message brought at `now_ns`, in order."""
-        if not self._is_remote:
-            return hub_ns
+    def observe(self, hub_ns: int, now_ns: int) -> None:
+        """Note that a message, sent at `hub_ns`, came at our time `now_ns`; in order."""
         offset = now_ns - hub_ns
         if self._until_ns is None or now_ns >= self._until_ns:
             self._before = offset if self._until_ns is None else self._least
             self._least = offset
             self._until_ns = now_ns + round(1e9 * WINDOW_S)
         self._least = min(self._least, offset)
-        return hub_ns + min(self._least, self._before)
+
+    def local_ns(self, hub_ns: int) -> int:
+        """Our monotonic time at the hub's time `hub_ns`."""
+        return hub_ns + min(self._least, self._before) if self._is_remote else hub_ns

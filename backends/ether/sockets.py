@@ -17,7 +17,7 @@ from backends.hub_address import AIR, SKY, HubAddress, hub_in
 NOBLOCK, MORE, _EVENTS, _POLLIN = (
     int(zmq.NOBLOCK), int(zmq.SNDMORE), int(zmq.EVENTS), int(zmq.POLLIN),
 )  # fmt: skip
-# Stretches that may wait for a radio; half a second of blocks.
+# Messages that may wait for a radio.
 WAITING = 500
 RECONNECT_MS = 500
 LONGEST_MESSAGE = 1 << 26
@@ -125,6 +125,12 @@ class HubSockets:
 def is_readable(socket: "zmq.Socket[bytes]") -> bool:
     """Whether a message is waiting."""
     return bool(int(socket.getsockopt(_EVENTS)) & _POLLIN)
+
+
+def received(socket: "zmq.Socket[bytes]") -> tuple[protocol.FromHub, Samples | None]:
+    """The next message and its samples, at a radio. Raises zmq.Again."""
+    frames = socket.recv_multipart(NOBLOCK)
+    return protocol.from_hub(frames[0]), protocol.samples_in(frames)
 
 
 def _drain(socket: "zmq.Socket[bytes]", take: Callable[[list[bytes]], None]) -> None:

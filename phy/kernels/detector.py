@@ -38,6 +38,11 @@ _CREEP = 2 ** (1 / DOUBLING)
 _SHARE = np.float32((SHORT - SEGMENT) / SHORT)
 
 
+def dc_of(state: NDArray[np.float64]) -> complex:
+    """The DC that a search has estimated."""
+    return complex(state[DC_REAL], state[DC_IMAG])
+
+
 @njit(nogil=True, cache=True)
 def detector_sums(x: NDArray[np.complex64], dc: complex, work: NDArray[np.float32], n: int) -> None:
     """P (rows 0, 1: real, imaginary) and E (row 2) of the `n` samples after HISTORY of `x`.

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from backends import Scheduling
 from sdrlinkd import __version__
 from sdrlinkd.cli.compiling import compile_first
 from sdrlinkd.cli.pace import MAX_SEED, Pace, chosen_scenario, scenario_names
@@ -65,6 +66,7 @@ def ether(
     if chosen is not None and scenario is not None:
         title = chosen.title or scenario.stem
     also = f", and at {listen}" if listen else ""
+    Scheduling(is_urgent=False)
     served = f"sdrlink-ether {__version__}: {title}; sockets in {directory}{also}"
     hub.run(lambda: typer.echo(served))
 

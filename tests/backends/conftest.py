@@ -48,4 +48,7 @@ def at_ease(monkeypatch):
     monkeypatch.setattr("backends.loopback.MAX_BEHIND_S", 1e6)
     # Interval at which a waiting thread checks whether it should stop.
     monkeypatch.setattr("backends.ether.hub.LOOK_AFTER_MS", 20)
-    monkeypatch.setattr("backends.ether.radio.QUIET_MS", 50)
+    monkeypatch.setattr("backends.ether.real_time.ASK_S", 0.02)
+    monkeypatch.setattr("backends.ether.presence.ASK_S", 0.02)
+    monkeypatch.setattr("backends.ether.presence.QUIET_S", 0.2)
+    monkeypatch.setattr("backends.ether.real_time.MAX_BEHIND_S", 1e6)

@@ -25,9 +25,6 @@ from sdrlinkd.modem.process.sensing_receiver import SensingReceiver
 from sdrlinkd.modem.process.transmission import Transmission
 from sdrlinkd.pdulink import Heard
 
-QUIET_S = 0.05
-"""Time in s after a burst from which the air counts as quiet: longer than the longest burst."""
-
 
 async def forever() -> NoReturn:
     """Wait until cancelled."""
@@ -66,14 +63,12 @@ class ModemHere:
         self._asks = asks
         self._times = BlockTimes(params.rate_hz)
         self._clock = StreamClock(params.rate_hz, paced=True, began_s=began_s)
-        self._settles = round(QUIET_S * params.rate_hz)
         self._receiver: phy.Receiver | None = None
         self._receiving: SensingReceiver | None = None
         self._rx: Demodulation | None = None
         self._tx: Transmission | None = None
         self._user: ModemUser | None = None
-        self._quiet_from = 0
-        self._is_quiet = False
+        self._may_relax = False
 
     @property
     def wakes(self) -> bool:
@@ -172,7 +167,6 @@ class ModemHere:
         """Send a burst; `left` follows."""
         if self._tx is None:
             raise RuntimeError("send before open")
-        self._quiet_from = max(self._quiet_from, order.start + self._settles)
         self._tx.send(order)
 
     async def close(self) -> None:
@@ -205,7 +199,7 @@ class ModemHere:
                 receiver.wakes = self._asks()
             receiver.hear(block)
             self._on_block()
-            self._relax(block.index + block.n)
+            self._relax()
 
         async for block in self._radio.blocks(hear if paced else None):
             if paced:
@@ -213,17 +207,13 @@ class ModemHere:
             await receiver.put(block)
         await receiver.finish()
 
-    def _relax(self, end: int) -> None:
-        """Tell the radio whether the air was quiet before index `end`, if that has changed."""
-        receiver = self._receiver
-        if receiver is None or self._listens:
-            return
-        busy_until = max(receiver.last_burst[1] + self._settles, self._quiet_from)
-        is_quiet = end > busy_until and not self.wakes
-        if is_quiet != self._is_quiet:
-            self._is_quiet = is_quiet
+    def _relax(self) -> None:
+        """Tell the radio whether its blocks may be longer, if that has changed."""
+        may_relax = not self._listens and not self.wakes
+        if may_relax != self._may_relax:
+            self._may_relax = may_relax
             if isinstance(self._radio, RelaxingRadio):
-                self._radio.relax(is_quiet)
+                self._radio.relax(may_relax)
 
     def _deliver(self, pdus: Sequence[phy.PduHeard], end: int) -> None:
         """Pass on the PDUs that the samples before index `end` completed."""
