@@ -5,7 +5,7 @@ from collections.abc import AsyncIterator, Awaitable
 
 import numpy as np
 
-from backends.air import Channel, Timeline
+from backends.air import AirCost, Channel, Timeline
 from backends.base import (
     Capabilities,
     Hear,
@@ -54,6 +54,7 @@ class LoopbackRadio:
         self._quiet_from = 0
         self._is_open = False
         self.counters = {"overflows": 0, "samples_lost": 0, "late": 0}
+        self._cost = AirCost(self.counters)
 
     @property
     def capabilities(self) -> Capabilities:
@@ -141,9 +142,11 @@ class LoopbackRadio:
             self.counters["samples_lost"] += n
         else:
             n += min(behind, MAX_LATE_BLOCKS * n)
-        with self._lock:
-            heard = self._timeline.take(first, n)
-            self._next += n
-        if not reason:
-            samples = self._front_end.receive(np.zeros(n, np.complex64) if heard is None else heard)
+        with self._cost:
+            with self._lock:
+                heard = self._timeline.take(first, n)
+                self._next += n
+            if not reason:
+                antenna = np.zeros(n, np.complex64) if heard is None else heard
+                samples = self._front_end.receive(antenna)
         return RxBlock(first, n, samples, reason, self._pace.host_ns(first + n))

@@ -16,6 +16,7 @@ import msgspec
 import numpy as np
 import zmq
 
+from backends.air import AirCost
 from backends.base import AbsentError, RefusalError, RxBlock, Samples
 from backends.ether import protocol
 from backends.ether.antenna import Antenna, Beside
@@ -62,6 +63,7 @@ class RealTime:
         self._clock = clock
         self._counters = counters
         self._closing = closing
+        self._cost = AirCost(counters)
         self._presence = Presence(time.monotonic())
         self._has_greeted = False
         self._ready: deque[tuple[RxBlock, Beside]] = deque()
@@ -126,9 +128,10 @@ class RealTime:
 
     def _make(self, n_blocks: int) -> None:
         index, n = self._ear.next_index, n_blocks * self._short
-        for piece in self._ear.take(index + n):
-            index += piece.n
-            self._add(self._antenna.receive(piece, self._clock.local_ns(self._hub_ns(index))))
+        with self._cost:
+            for piece in self._ear.take(index + n):
+                index += piece.n
+                self._add(self._antenna.receive(piece, self._clock.local_ns(self._hub_ns(index))))
         calm = 1 - n / self._rate_hz / CALMS_S
         self._behind_s = BEHIND_S + (self._behind_s - BEHIND_S) * max(0.0, calm)
 

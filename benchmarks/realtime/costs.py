@@ -61,15 +61,15 @@ def idle(tree: Path, seed: int, quick: bool) -> Run:  # noqa: ARG001
         air_s, before_s, began = _air_cpu_s(folder), family_cpu_s(pid), time.monotonic()
         time.sleep(span_s)
         took_s = time.monotonic() - began
-        cpu_pct = 100 * (family_cpu_s(pid) - before_s) / took_s
+        all_pct = 100 * (family_cpu_s(pid) - before_s) / took_s
         air_pct = 100 * (_air_cpu_s(folder) - air_s) / took_s
         looks = [_status(tree, folder) for _ in range(QUICK_LOOKS if quick else LOOKS)]
     values = {
-        "idle_cpu_pct_5msps": cpu_pct,
+        "idle_cpu_pct_5msps": all_pct - air_pct,
         "status_s": statistics.median(each.wall_s for each in looks),
     }
     cpu_s = statistics.median(each.cpu_s for each in looks)
-    air = f"{air_pct:.1f} % is for the simulated air" if air_pct else "the air's part is unknown"
+    air = f"the simulated air's {air_pct:.1f} % apart" if air_pct else "with the simulated air"
     notes = {
         "idle_cpu_pct_5msps": f"of one core, with all processes below it; {air}",
         "status_s": f"{cpu_s:.2f} s of CPU time",
@@ -87,7 +87,7 @@ def _air_cpu_s(folder: Path) -> float:
     """CPU time in s of the simulated air by the daemon's own account; 0: it tells none."""
     with ControlClient(folder) as control:
         carrier: dict[str, Any] = control.ask("status")["carrier"]
-    return float(carrier.get("air_cpu_s") or 0.0)
+    return 1e-3 * float(carrier["counters"].get("air_cpu_ms") or 0.0)
 
 
 def _status(tree: Path, folder: Path) -> Spent:

@@ -116,11 +116,17 @@ def everything(snapshot: Snapshot, width: int) -> list[RenderableType]:
     """The screen of `--all`: every topic, robot and reason."""
     link = snapshot.link
     parts: list[RenderableType] = [verdict(snapshot, width, whole=True), *head(snapshot, width)]
-    counted = ", ".join(f"{key} {n}" for key, n in snapshot.carrier.counters.items() if n)
+    counters = dict(snapshot.carrier.counters)
+    air_ms = counters.pop("air_cpu_ms", 0)
+    counted = ", ".join(f"{key} {n}" for key, n in counters.items() if n)
     if counted:
         parts.append(_labelled("counts", counted, width))
     if snapshot.carrier.scheduling:
         parts.append(_labelled("modem", f"runs with {snapshot.carrier.scheduling}", width))
+    if air_ms:
+        share = air_ms / 10 / max(1.0, snapshot.uptime_s)
+        told = f"simulating it takes {share:.1f} % of a core, which a real radio does not"
+        parts.append(_labelled("air", told, width))
     parts += [*_receipts(snapshot, width), Text()]
     parts.append(sent_table(link.topics, rule=True))
     if link.received:

@@ -30,7 +30,7 @@ SWITCH_INTERVAL_S = 1e-4
 """With the default, a busy event loop keeps the receiver waiting for 5 ms."""
 FULL_STATUS = 5
 """Number of beats after which the status is told, whatever has changed."""
-RUNNING = {"samples": 0}
+RUNNING = {"samples": 0, "air_cpu_ms": 0}
 """Counters that always change."""
 ENDS_S = 2.0
 """Longest time in s in which the stream of a closed radio ends."""
