@@ -38,7 +38,7 @@ _WARIER = 0.1
 # Number of samples after a false alarm at which the search continues.
 RETRY_AFTER = 16
 # Maximum number of samples processed at once, to limit memory on large calls.
-PIECE = 1 << 13
+PIECE = 1 << 16
 # When a PDU fails and the power above the noise is below this share of the burst's, the burst has
 # ended.
 _FADED = 0.25
