@@ -34,7 +34,7 @@ class Channel:
 
 
 class AirCost:
-    """Measures the CPU time that an air takes, which a radio of metal does not.
+    """Measures the CPU time that an air takes, which a physical radio does not take.
 
     Use it as a context, on one thread; its total is the counter `air_cpu_ms`.
     """

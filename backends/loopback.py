@@ -132,6 +132,8 @@ class LoopbackRadio:
             # A burst ends the wait: what is due by then, in whole blocks of the usual length.
             short = -self._pace.wait_for(first + self._long)
             n = max(n, (self._long - max(0, short)) // n * n)
+        elif self._paced:
+            n = self._outstanding.short_of(first, n)
         behind = max(0, self._pace.wait_for(first + n))
         samples: Samples | None = None
         reason = ""
@@ -141,7 +143,7 @@ class LoopbackRadio:
             self.counters["overflows"] += 1
             self.counters["samples_lost"] += n
         else:
-            n += min(behind, MAX_LATE_BLOCKS * n)
+            n += min(behind, MAX_LATE_BLOCKS * self._n)
         with self._cost:
             with self._lock:
                 heard = self._timeline.take(first, n)

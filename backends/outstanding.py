@@ -62,6 +62,14 @@ class Outstanding(Places):
         finally:
             self.lose()
 
+    def short_of(self, first: int, n: int) -> int:
+        """Length of a block of at most `n` samples that ends when the burst on the air has arrived.
+
+        May be called from any thread.
+        """
+        end = self._first_end + GAP
+        return end - first if first < end < first + n else n
+
     def is_due(self, index: int) -> bool:
         """Whether `settle` would report a burst; may be called from any thread."""
         return self._first_end <= index

@@ -60,12 +60,13 @@ def running(
     own: Mapping[int, str] | None = None,
     ready: Callable[[ControlClient], bool] = hears_one,
     tree: Path = ROOT,
+    hooks: Mapping[str, str] = processes.NO_HOOKS,
 ) -> Iterator[Running]:
     """Run daemons, from when all of them are `ready`. Raises PeerError.
 
     `config` is TOML for all of them, `own` for single robots; `scenario` is for the hub of an
     ether. With `precede` they have priority over other programs on this machine. `tree` is the
-    checkout whose programs are run.
+    checkout whose programs are run, with `hooks` as for `start_module`.
     """
     with TemporaryDirectory(prefix="benchmark-") as name, ExitStack() as stack:
         folder = Path(name)
@@ -83,7 +84,9 @@ def running(
             programs[f"daemon_{robot}"] = ("sdrlinkd", "--config", str(path), *QUIET)
         started = []
         for program, arguments in programs.items():
-            started.append(processes.start_module(stack, program, *arguments, tree=tree))
+            started.append(
+                processes.start_module(stack, program, *arguments, tree=tree, hooks=hooks)
+            )
             if precede:
                 processes.precede(started[-1], real_time=False)
         folders = {robot: folder / str(robot) for robot in robots}

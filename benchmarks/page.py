@@ -42,6 +42,13 @@ TEXTS = {
         "older checkout, run in turns with this one. An age's error is measured where the daemon "
         "hands the message over, beside a busy program on every core. Memory is PSS."
     ),
+    "waterfall": (
+        "Odometry of 724 B at 30 Hz through a daemon that hears itself: QPSK 1/2 at 5 Msps, a PDU "
+        "of 1024 B. The median of each stage, in the order in which a message passes them; "
+        "stamping is included. *before*: measured once in the same way, when modem and daemon were "
+        "threads of one interpreter. `to_daemon` and `to_consumer` are ZeroMQ. A burst that is "
+        "made later than planned begins late, so `lead` is negative, and `to_block` the longer."
+    ),
     "phy_per": (
         "The modem alone: the SNR at which so many PDUs are lost, with everything that radios "
         "do to a signal (crystals 80 ppm apart, IQ images, leakage, DC, 8 bits, phase noise). "

@@ -3,7 +3,7 @@
 import contextlib
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import NamedTuple
@@ -16,6 +16,7 @@ from sdrlinkd.process import Process
 REAL_TIME_PRIORITY = 10
 NICE = -10
 MOST_S = 900.0
+NO_HOOKS: Mapping[str, str] = {}
 PAGE_MIB = os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
@@ -33,10 +34,17 @@ def start_module(
     *arguments: str,
     environment: str = "",
     tree: Path = ROOT,
+    hooks: Mapping[str, str] = NO_HOOKS,
 ) -> Process:
-    """Start a module of the checkout `tree` in a peer's environment; the stack kills it."""
+    """Start a module of the checkout `tree` in a peer's environment; the stack kills it.
+
+    `hooks` are environment variables for it; a PYTHONPATH comes before the checkout.
+    """
     command = [interpreter(environment), "-m", module, *arguments]
-    process = Process(command, name=name, environment=variables(tree), folder=tree, session=False)
+    given = variables(tree)
+    path = os.pathsep.join(filter(None, (hooks.get("PYTHONPATH"), given["PYTHONPATH"])))
+    given = {**given, **hooks, "PYTHONPATH": path}
+    process = Process(command, name=name, environment=given, folder=tree, session=False)
     stack.callback(process.kill)
     process.start()
     return process

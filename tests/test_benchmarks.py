@@ -41,6 +41,11 @@ ROWS = {
         "rx_realtime_ratio_5msps",
         "tx_realtime_ratio_5msps",
     },
+    "waterfall": {
+        *(f"{each}_us" for each in ("to_daemon", "accept", "to_compose", "compose", "to_modem")),
+        *(f"{each}_us" for each in ("modulate", "lead", "air", "to_block", "receive", "to_link")),
+        *(f"{each}_us" for each in ("hear", "to_consumer", "all")),
+    },
     "realtime": {
         "laser_ms_mean",
         "laser_ms_std",

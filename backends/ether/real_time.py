@@ -25,6 +25,7 @@ from backends.ether.medium import path_of
 from backends.ether.presence import ASK_S, Presence
 from backends.ether.remote_clock import HubClock
 from backends.ether.sockets import NOBLOCK, is_readable, received
+from backends.outstanding import GAP
 
 BEHIND_S = 0.0002
 """Samples are made this long after their time; longer once a burst was late."""
@@ -90,14 +91,14 @@ class RealTime:
                 self._wait(ASK_S)
                 continue
             is_quiet = self.may_relax and self._ear.next_index >= self._quiet_from
-            n = self._long if is_quiet else self._short
-            due = self._due()
+            n, due = self._long if is_quiet else self._next_end(), self._due()
             if due > MAX_BEHIND_S * self._rate_hz:
                 self._counters["overflows"] += 1
                 self._counters["samples_lost"] += due
                 self._miss(due, "the daemon was too slow")
             elif due >= n:
-                self._make(min(due // self._short, MAX_LATE_BLOCKS + n // self._short))
+                late = (due - n) // self._short
+                self._make(n + self._short * min(late, MAX_LATE_BLOCKS))
             else:
                 self._wait((n - due) / self._rate_hz)
         return self._ready.popleft() if self._ready else None
@@ -113,6 +114,7 @@ class RealTime:
             self._turnaround = math.ceil(welcome.radio.turnaround_s * self._rate_hz)
         self._ear = Ear()
         self._quiet_from = 0
+        self._ends: list[int] = []
         self._free: dict[int, int] = {}
         self._rngs: dict[int, np.random.Generator] = {}
         self._clock.observe(welcome.host_ns, time.monotonic_ns())
@@ -126,8 +128,14 @@ class RealTime:
         now_ns = time.monotonic_ns() - self._clock.local_ns(self._welcome.host_ns)
         return int((1e-9 * now_ns - self._behind_s) * self._rate_hz) - self._ear.next_index
 
-    def _make(self, n_blocks: int) -> None:
-        index, n = self._ear.next_index, n_blocks * self._short
+    def _next_end(self) -> int:
+        """Length of a block: a usual one, or up to where a burst has arrived."""
+        first = self._ear.next_index
+        self._ends = [end for end in self._ends if end > first]
+        return min([self._short, *(end - first for end in self._ends)])
+
+    def _make(self, n: int) -> None:
+        index = self._ear.next_index
         with self._cost:
             for piece in self._ear.take(index + n):
                 index += piece.n
@@ -195,6 +203,7 @@ class RealTime:
             # The sender's next burst must not overlap this one.
             self._free[sender] = begin + len(samples)
         self._quiet_from = max(self._quiet_from, begin + len(samples) + self._short)
+        self._ends.append(begin + len(samples) + GAP)
         self._ear.add(begin, samples, path)
 
     def _hear_of(self, news: protocol.News) -> None:

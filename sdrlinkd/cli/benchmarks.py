@@ -22,6 +22,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "bus": Benchmark("The inner path: bus, queue, PDUs and back.", 1),
     "modem_path": Benchmark("The modem in a daemon: latency, and speed relative to real time.", 2),
     "realtime": Benchmark("Whole daemons in real time: latency, ages, load and start.", 8),
+    "waterfall": Benchmark("Where a message's time goes in a daemon, stage by stage.", 1),
     "phy_per": Benchmark(
         "SNR that the modem needs, with the impairments of real radios.", 15,
         peers=("libliquid-dev", "gcc", "gnuradio"),

@@ -1,7 +1,6 @@
 """The modem link: decides bursts at the last moment, and hands them to a modem."""
 
 import asyncio
-import contextlib
 import math
 import time
 from collections.abc import Awaitable, Callable, Sequence
@@ -19,12 +18,9 @@ from sdrlinkd.modem.plan import AirPlan, TxWindowPlan
 from sdrlinkd.modem.report import modem_report
 from sdrlinkd.modem.tempo import Tempo
 from sdrlinkd.modem.traits import pdu_link_traits
+from sdrlinkd.modem.turns import INFINITE, Turns
 from sdrlinkd.pdulink import Carry, Heard, PduListener
 from sdrlinkd.reports import PduLinkReport
-
-TIMER_S = 0.001
-"""Resolution of the event loop's timers in s; shorter waits would be busy waiting."""
-INFINITE = float("inf")
 
 
 class ModemLink:
@@ -59,7 +55,8 @@ class ModemLink:
         self._on_air = OnAir()
         self._can: Capabilities | None = None
         self._listener: PduListener | None = None
-        self._moved, self._is_refused = asyncio.Event(), asyncio.Event()
+        self._turns = Turns(self._turn, self._is_paced)
+        self._settled, self._is_refused = asyncio.Event(), asyncio.Event()
         self._state = "down"
         self._problem = ""
 
@@ -101,12 +98,11 @@ class ModemLink:
         """Receive and send until cancelled. Raises LinkAbsentError, LinkRefusedError."""
         running = [asyncio.ensure_future(self._modem.run(self))]
         if not can.lockstep:
-            running.append(asyncio.ensure_future(self._send_when_due()))
+            running.append(asyncio.ensure_future(self._turns.run()))
         refusal = asyncio.ensure_future(self._is_refused.wait())
         # A paced modem wakes us only while something waits.
         self._modem.wakes = not can.paced
         try:
-            self._moved.set()
             await asyncio.wait((*running, refusal), return_when=asyncio.FIRST_COMPLETED)
         finally:
             for task in (*running, refusal):
@@ -121,13 +117,13 @@ class ModemLink:
 
     def wake(self) -> None:
         """Check again whether there is something to send."""
-        self._moved.set()
+        self._turns.wake()
 
     async def idle(self) -> None:
         """Wait until every burst handed over is settled."""
         while self._on_air:
-            self._moved.clear()
-            await self._moved.wait()
+            self._settled.clear()
+            await self._settled.wait()
 
     async def close(self) -> None:
         """Close the modem; bursts that have not left are lost."""
@@ -157,7 +153,7 @@ class ModemLink:
     def delivered(self, heard: Sequence[Heard], _end: int) -> None:
         """Pass on PDUs; in lock-step, process everything that follows from a block."""
         if self._modem.wakes:
-            self._moved.set()
+            self._turns.wake()
         listener = self._listener
         if listener is None:
             return
@@ -185,14 +181,18 @@ class ModemLink:
             if report.start is not None:
                 burst = burst._replace(start=report.start / self._params.rate_hz)
             self._listener.settled(burst, report.outcome, report.end / self._params.rate_hz)
-        self._moved.set()
+        self._settled.set()
+        self._turns.wake()
 
     def ended(self, problem: str, is_refusal: bool) -> None:
         """Note that the stream has ended."""
         self._state, self._problem = "down" if problem else "ended", problem
         if is_refusal:
             self._is_refused.set()
-        self._moved.set()
+        self._turns.wake()
+
+    def _is_paced(self) -> bool:
+        return self._can is not None and self._can.paced
 
     @property
     def _is_gone(self) -> bool:
@@ -200,20 +200,6 @@ class ModemLink:
             return False
         modem = self._modem
         return bool(modem.trouble) or self._clock.is_gone(modem.seen, time.monotonic())
-
-    async def _send_when_due(self) -> None:
-        """Send one burst at a time, each decided at the last moment, forever."""
-        paced = self._can is not None and self._can.paced
-        while True:
-            self._moved.clear()
-            wait_s = self._turn()
-            if not wait_s:
-                await asyncio.sleep(0)
-                continue
-            limit_s = max(TIMER_S, wait_s) if paced and wait_s != INFINITE else None
-            with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(limit_s):
-                    await self._moved.wait()
 
     def _turn(self) -> float:
         """Send the next burst if it may leave; returns 0, or the time in s until one may leave."""

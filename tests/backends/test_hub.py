@@ -21,6 +21,7 @@ from backends import (
 )
 from backends.ether import protocol
 from backends.hub_address import AIR, SKY
+from backends.outstanding import GAP
 from tests.backends.hubs import RawRadio, ask, hub_air, serving, until
 from tests.backends.radios import (
     RATE,
@@ -63,6 +64,22 @@ async def test_radios_join_hear_each_other_and_leave(tmp_path):
     where = np.flatnonzero(np.abs(samples) > 1e-3)
     assert first <= where[0] < where[-1] < first + 300
     assert len(where) > 290
+
+
+async def test_a_block_ends_where_a_burst_has_arrived_unless_it_is_late(tmp_path):
+    with serving(tmp_path) as hub:
+        async with (
+            opened(EtherRadio(hub_in(tmp_path), 1, "")) as radio,
+            opened(EtherRadio(hub_in(tmp_path), 2, "")) as other,
+        ):
+            apart = round((hub._medium.time(2, 0) - hub._medium.time(1, 0)) * RATE)
+            burst = TxBurst(9000, noise(730))
+            sending = asyncio.ensure_future(send(other, other.blocks(), [burst]))
+            taken = await take(radio.blocks(), apart + 12_000)
+            (report,), _ = await sending
+    end = apart + report.end + GAP
+    (last,) = [block for block in taken if block.index < end <= block.index + block.n]
+    assert last.index + last.n == end or last.n > N
 
 
 async def test_a_radio_is_what_the_hub_says_it_is(tmp_path):

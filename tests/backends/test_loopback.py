@@ -9,6 +9,7 @@ import pytest
 
 from backends import Channel, LoopbackRadio, TxBurst, TxOutcome
 from backends.loopback import MAX_LATE_BLOCKS
+from backends.outstanding import GAP
 from phy import FrontEndParams, PathParams
 from tests.backends.radios import (
     AIR,
@@ -188,3 +189,13 @@ async def test_a_burst_for_a_time_that_went_by_leaves_behind_the_gap(monkeypatch
         (report,), _ = await send(radio, blocks, [TxBurst(gap.index, noise(100))])
     assert report.outcome is TxOutcome.SENT
     assert report.start >= gap.index + gap.n
+
+
+async def test_a_block_ends_where_a_burst_has_arrived(monkeypatch):
+    """Nothing is gained by waiting for the rest of the block."""
+    monkeypatch.setattr("backends.pace.Pace.wait_for", lambda *_: 0)
+    async with opened(LoopbackRadio(AIR, BLOCK_S)) as radio:
+        _, taken = await send(radio, radio.blocks(), [TxBurst(5000, noise(730))])
+    end = 5730 + GAP
+    short = {block.index: block.n for block in taken if block.n != N}
+    assert short == {end // N * N: end % N}

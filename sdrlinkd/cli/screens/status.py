@@ -125,7 +125,7 @@ def everything(snapshot: Snapshot, width: int) -> list[RenderableType]:
         parts.append(_labelled("modem", f"runs with {snapshot.carrier.scheduling}", width))
     if air_ms:
         share = air_ms / 10 / max(1.0, snapshot.uptime_s)
-        told = f"simulating it takes {share:.1f} % of a core, which a real radio does not"
+        told = f"simulating it takes {share:.1f} % of a core, which a physical radio does not"
         parts.append(_labelled("air", told, width))
     parts += [*_receipts(snapshot, width), Text()]
     parts.append(sent_table(link.topics, rule=True))

@@ -1,0 +1,1 @@
+"""Where a message's time goes, stage by stage, from its producer to its consumer."""
