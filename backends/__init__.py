@@ -34,7 +34,7 @@ from backends.params import EtherParams, IqFileParams, LoopbackParams, ZmqParams
 from backends.recording import GAP_LABEL, RecordingInfo, RecordingReader, describe, refuse_same
 from backends.registry import BUILT_IN, find_backend, installed_names
 from backends.samples import SAMPLE_TYPES
-from backends.scheduling import Scheduling, take_short_slices
+from backends.scheduling import Scheduling, may_lock_memory, take_short_slices
 from backends.soapy import (
     Assessment,
     DeviceProbe,
@@ -146,6 +146,7 @@ __all__ = [
     "installed_names",
     "is_listening",
     "lockstep_capabilities",
+    "may_lock_memory",
     "open_endpoint",
     "probe_devices",
     "refuse_same",

@@ -130,9 +130,12 @@ def hurry() -> bool:
     return False
 
 
-def lock_memory() -> bool:
-    """Keep all memory of this process in RAM, if it may lock enough; returns whether it does."""
+def may_lock_memory() -> bool:
+    """Whether this process may keep all of its memory in RAM."""
     may, _ = resource.getrlimit(resource.RLIMIT_MEMLOCK)
-    if may != resource.RLIM_INFINITY and may < LOCKED_BYTES and os.geteuid() != 0:
-        return False
-    return not _libc.mlockall(_LOCK_ALL)
+    return may == resource.RLIM_INFINITY or may >= LOCKED_BYTES or os.geteuid() == 0
+
+
+def lock_memory() -> bool:
+    """Keep all memory of this process in RAM, if it may; returns whether it does."""
+    return may_lock_memory() and not _libc.mlockall(_LOCK_ALL)

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import NamedTuple
 
+from backends import may_lock_memory, take_short_slices
 from sdrlinkd.doctor.finding import Finding, bad, good, good_if, none
 from sdrlinkd.doctor.usb import is_networked
 
@@ -28,6 +29,10 @@ class Granted(NamedTuple):
     """Whether shared memory for two processes is available."""
     files: int
     """Limit of open files, RLIMIT_NOFILE."""
+    can_lock: bool
+    """Whether a process may keep its memory in RAM."""
+    short_slices: bool
+    """Whether the kernel grants short time slices."""
 
 
 def granted() -> Granted:
@@ -36,7 +41,10 @@ def granted() -> Granted:
     files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     if os.geteuid() == 0:
         best_nice = -20
-    return Granted(_can_hurry(), max(-20, best_nice), _can_share(), files)
+    return Granted(
+        _can_hurry(), max(-20, best_nice), _can_share(), files, may_lock_memory(),
+        take_short_slices(),
+    )  # fmt: skip
 
 
 def _can_hurry() -> bool:
@@ -62,6 +70,8 @@ def check_limits(granted: Granted, device: str, root: Path) -> list[Finding]:
     """
     return [
         _hurry(granted, is_needed=bool(device)),
+        _lock(granted, is_needed=bool(device)),
+        _slices(granted),
         good_if(
             granted.shared_memory, "shared memory", "for samples between daemon and radio process",
             "memfd_create is forbidden here: check the container's seccomp profile",
@@ -85,6 +95,26 @@ def _hurry(granted: Granted, *, is_needed: bool) -> Finding:
         "the systemd unit has LimitRTPRIO=50; by hand: `@sdrlink - rtprio 50` in "
         "/etc/security/limits.d/sdrlinkd.conf and log in again",
     )  # fmt: skip
+
+
+def _lock(granted: Granted, *, is_needed: bool) -> Finding:
+    what = "locked memory"
+    if granted.can_lock:
+        return good(what, "granted")
+    if not is_needed:
+        return none(what, "not granted; only the process of a real radio uses it")
+    return bad(
+        what, "not granted: the modem waits for the disk if memory is scarce",
+        "the systemd unit has LimitMEMLOCK=infinity; by hand: `@sdrlink - memlock unlimited` in "
+        "/etc/security/limits.d/sdrlinkd.conf and log in again",
+    )  # fmt: skip
+
+
+def _slices(granted: Granted) -> Finding:
+    what = "time slices"
+    if granted.short_slices:
+        return good(what, "0.1 ms, for daemon and modem")
+    return none(what, "this kernel grants no short ones, as Linux 6.12 and later do")
 
 
 def _buffer(device: str, root: Path) -> Finding:

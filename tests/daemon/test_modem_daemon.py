@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -237,5 +238,38 @@ def test_a_killed_modem_is_replaced_and_no_message_is_lost_or_sent_twice(start_d
     assert n - len(got) == n - tx.sent == sum(tx.dropped.values())
     assert set(tx.dropped) <= {"tx_radio_failed"}
     assert got[-1] == n - 1
+    with node.control() as control:
+        assert control.ask("check")["problems"] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("who", ["daemon", "modem"])
+def test_what_outlived_its_lifespan_during_a_stop_is_not_sent(start_daemon, who):
+    """Daemon or modem stands still for longer than the messages live."""
+    lifespan_s = 0.5
+    node = start_daemon(f"{LOOPBACK}[classes.latency]\nlifespan_s = {lifespan_s}\n")
+    sent_and_heard(node, 3)
+    modem = next(pid for pid in family(node.pid) if pid != node.pid)
+    stopped = node.pid if who == "daemon" else modem
+    with (
+        Subscriber("/rx_robot_1/odom", directory=node.directory, depth=0) as heard,
+        Publisher(node.directory) as out,
+    ):
+        out.wait_for_daemon()
+        os.kill(stopped, signal.SIGSTOP)
+        for _ in range(300):
+            out.send("/robot_1/odom", CDR + bytes(200), lifespan_ms=round(1e3 * lifespan_s))
+        time.sleep(3 * lifespan_s)
+        os.kill(stopped, signal.SIGCONT)
+        last = CDR + b"the last one"
+        heard_of_old = 0
+        while True:
+            out.send("/robot_1/odom", last)
+            message = heard.receive(1.0)
+            if message is not None and message.payload == last:
+                break
+            heard_of_old += message is not None
+    assert heard_of_old == 0
+    assert node.snapshot().link.tx.dropped == {"tx_expired": 300}
     with node.control() as control:
         assert control.ask("check")["problems"] == []

@@ -71,7 +71,7 @@ def test_bursts_are_as_long_as_allowed_and_of_one_source(seed):
             if rng.random() < 0.8:
                 outbox.lives.left(carried)
             else:
-                for message in outbox.lives.failed(carried):
+                for message in outbox.lives.failed(carried, "tx_radio_failed"):
                     composer.abandon(message.lane, now)
         else:
             composer.expire(now)

@@ -41,8 +41,8 @@ class Lives:
                     self.in_flight.discard(message)
                     message.tally.send(len(message.payload))
 
-    def failed(self, carried: Iterable[Iterable[Outgoing]]) -> list[Outgoing]:
-        """Drop the messages in `carried`, whose PDUs did not leave.
+    def failed(self, carried: Iterable[Iterable[Outgoing]], reason: str) -> list[Outgoing]:
+        """Drop the messages in `carried`, whose PDUs did not leave, under a reason of the ledger.
 
         Returns the messages that had more fragments to send.
         """
@@ -51,7 +51,7 @@ class Lives:
             for message in messages:
                 message.confirm()
                 if message.fate is Fate.IN_FLIGHT:
-                    self.drop(message, "tx_radio_failed")
+                    self.drop(message, reason)
                     if message.lane.current is message:
                         unfinished.append(message)
         return unfinished

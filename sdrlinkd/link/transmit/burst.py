@@ -35,6 +35,11 @@ class Burst(NamedTuple):
     tells_times: bool = False
     """Whether records inside may tell times up to `start`, such as ages; see `wire.postponed`."""
 
+    def is_in_vain(self, now: float) -> bool:
+        """Whether all messages inside have outlived their lifespans, and there are some."""
+        inside = [message for messages in self.carried for message in messages]
+        return bool(inside) and all(message.expires_at <= now for message in inside)
+
 
 class Outcome(Enum):
     """Outcome of a burst, as the radio reports it after the last sample."""

@@ -19,10 +19,10 @@ class RetryQueue:
         self.count = 0
         """Number of late bursts so far."""
 
-    def give_back(self, burst: Burst) -> bool:
-        """Queue a burst that missed its slot; False if it has been tried for too long."""
+    def give_back(self, burst: Burst, now: float) -> bool:
+        """Queue a burst that missed its slot; False if it is in vain, or was tried for too long."""
         self.count += 1
-        if burst.start - burst.first_start > GIVE_UP_S:
+        if burst.is_in_vain(now) or burst.start - burst.first_start > GIVE_UP_S:
             return False
         insort(self.waiting, burst, key=lambda each: each.number)
         return True

@@ -164,7 +164,8 @@ class BurstScheduler:
         is_sent = outcome is Outcome.SENT
         if not is_sent:
             self._access.not_sent(burst.start)
-        if outcome is Outcome.LATE and self._retry.give_back(burst):
+        is_late = outcome is Outcome.LATE
+        if is_late and self._retry.give_back(burst, now):
             self._entry_ids.not_left(chain.from_iterable(burst.carried))
             return
         if is_sent:
@@ -179,7 +180,8 @@ class BurstScheduler:
             return
         self._bursts_failed += 1
         self._pdus_failed += len(burst.pdus)
-        for message in self._lives.failed(burst.carried):
+        reason = "tx_expired" if is_late and burst.is_in_vain(now) else "tx_radio_failed"
+        for message in self._lives.failed(burst.carried, reason):
             self._composer.abandon(message.lane, now)
 
     @property

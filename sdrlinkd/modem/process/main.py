@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import gc
 import os
 import signal
 import socket
@@ -42,6 +43,8 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
+    # What is loaded stays: to look through it again and again would take a tenth of the time.
+    gc.disable()
     control_fd, page_fd = map(int, sys.argv[1:])
     control = socket.socket(fileno=control_fd)
     page = Page(page_fd)
@@ -101,6 +104,8 @@ class _Served:
         log_to_stderr(start.log_level)
         try:
             await loading
+            gc.freeze()
+            gc.enable()
             config = typed_config(start.config)
             rng = Random(start.seed)
             backend = backend_of(config)

@@ -3,7 +3,6 @@
 import asyncio
 import queue
 import threading
-import time
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
@@ -59,9 +58,9 @@ class ReceiverHere:
 
     def hear(self, block: RxBlock) -> None:
         """Demodulate a block, and deliver the PDUs that it completes."""
-        began = time.thread_time()
+        began = self.load.begin()
         events = self._receiving.hear(block)
-        self.load.add(time.thread_time() - began, block.n / self._rate_hz)
+        self.load.end(began, block.n / self._rate_hz)
         self._deliver(_pdus(events), block.index + block.n)
 
     async def finish(self) -> None:
@@ -104,10 +103,10 @@ class ReceiverThread:
 
     def hear(self, block: RxBlock) -> None:
         """Demodulate a block on the calling thread."""
-        began = time.thread_time()
+        began = self.load.begin()
         pdus = _pdus(self._receiving.hear(block))
         if block.samples is not None:
-            self.load.add(time.thread_time() - began, block.n / self._rate_hz)
+            self.load.end(began, block.n / self._rate_hz)
         if pdus or self.wakes:
             self._call_with(self._deliver, pdus, block.index + block.n)
 

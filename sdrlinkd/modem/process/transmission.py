@@ -19,6 +19,10 @@ SHORT = 20_000
 LATE_S = 5e-4
 """Time in s by which a burst may miss its start: a radio that makes blocks often keeps it all the
 same. What is later than this was interrupted."""
+STALE_S = 0.1
+"""A burst that misses its start by more does not leave: this process stood still, and what is in
+the burst may have outlived its lifespan. Its messages are composed again, if they are still wanted.
+"""
 AGAIN = 2
 """How many more times a burst is modulated that became late meanwhile."""
 OUTCOMES = {
@@ -78,6 +82,10 @@ class Transmission:
             self._early.append(order)
             return
         self._pending.add(order.number)
+        if self._now is not None and self._is_stale(order, self._now()):
+            told = BurstReport(order.number, Outcome.LATE, self._now())
+            asyncio.get_running_loop().call_soon(self._end, told)
+            return
         # A short burst must not overtake one that the thread still modulates.
         n = phy.layout(self._grid, order.mcs, len(order.pdus), len(order.pdus[0])).n_samples
         if self._at_once or (n <= SHORT and not self._in_thread):
@@ -118,6 +126,10 @@ class Transmission:
             made = self._modulate(kept)
         self._free_from = max(self._free_from, made.order.start + n_samples + GAP)
         return made
+
+    def _is_stale(self, order: BurstOrder, now: int) -> bool:
+        """Whether the start of a burst has passed long ago, although nothing else has its place."""
+        return max(order.start, self._free_from) < now - STALE_S * self._rate_hz
 
     def _in_time(self, order: BurstOrder, n_samples: int) -> BurstOrder:
         """The order, with a later start if its own has passed once `n_samples` are modulated.
