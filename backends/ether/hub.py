@@ -17,11 +17,8 @@ from backends.ether.sockets import HubSockets
 from backends.ether.world import AirParams, RadioParams, World
 from backends.hub_address import HubAddress
 
-TRAVEL_S, REMOTE_TRAVEL_S = 0.0003, 0.005
-"""A burst reaches the hub this long before it begins, so that it can reach the other radios.
-
-With `listen`, radios may be on other computers.
-"""
+TRAVEL_S = 0.0003
+"""A burst reaches the hub this long before it begins, so that it can reach the other radios."""
 # In lock-step, the hub checks a radio that is silent for this long.
 LOOK_AFTER_MS = 500
 LARGEST_INDEX = 1 << 62
@@ -76,7 +73,6 @@ class EtherHub:
         self._step = 0
         self._looked = 0.0
         self._began = 0.0
-        self._travel_s = TRAVEL_S if listen is None else REMOTE_TRAVEL_S
         self._bursts_lost = 0
         self._is_stopped = False
         self._sockets = HubSockets(directory, listen)
@@ -212,7 +208,7 @@ class EtherHub:
 
     def _forward(self, member: _Member, sent: protocol.Sent, burst: TxBurst) -> None:
         """In real time: send a burst to those who hear it, and tell the sender where it is."""
-        self._medium.pass_time(member.node, self._now + self._travel_s)
+        self._medium.pass_time(member.node, self._now + TRAVEL_S)
         may_leave = self._may_leave(member, burst, sent.late_seen)
         start, arrivals = self._medium.place(member.node, burst) if may_leave else (None, [])
         for node, at, way in arrivals:

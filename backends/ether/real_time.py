@@ -70,6 +70,7 @@ class RealTime:
         self._ready: deque[tuple[RxBlock, Beside]] = deque()
         self._placed: list[protocol.Placed] = []
         self._behind_s = BEHIND_S
+        self._latest_ns = 0
         self.may_relax = False
         """Whether blocks may be longer while the air is quiet; may be set by any thread."""
         self.notice = ""
@@ -123,6 +124,11 @@ class RealTime:
         """The hub's time of the sample before `index`, of the air's count."""
         return self._welcome.host_ns + round(1e9 * index / self._rate_hz)
 
+    def _local_ns(self, index: int) -> int:
+        """The same on our clock; it never goes back, whatever is learnt of the hub's clock."""
+        self._latest_ns = max(self._latest_ns, self._clock.local_ns(self._hub_ns(index)))
+        return self._latest_ns
+
     def _due(self) -> int:
         """Number of samples to make now."""
         now_ns = time.monotonic_ns() - self._clock.local_ns(self._welcome.host_ns)
@@ -139,15 +145,14 @@ class RealTime:
         with self._cost:
             for piece in self._ear.take(index + n):
                 index += piece.n
-                self._add(self._antenna.receive(piece, self._clock.local_ns(self._hub_ns(index))))
+                self._add(self._antenna.receive(piece, self._local_ns(index)))
         calm = 1 - n / self._rate_hz / CALMS_S
         self._behind_s = BEHIND_S + (self._behind_s - BEHIND_S) * max(0.0, calm)
 
     def _miss(self, n: int, reason: str) -> None:
         index = self._ear.next_index + n
         self._ear.take(index)
-        at_ns = self._clock.local_ns(self._hub_ns(index))
-        self._add(self._antenna.miss(n, reason, at_ns))
+        self._add(self._antenna.miss(n, reason, self._local_ns(index)))
 
     def _add(self, block: RxBlock, welcome: protocol.Welcome | None = None) -> None:
         self._ready.append((block, Beside(self._placed, 0, welcome)))
@@ -240,5 +245,4 @@ class RealTime:
         away_s = 1e-9 * (welcome.host_ns - self._hub_ns(self._ear.next_index))
         n = max(1, round(away_s * self._rate_hz))
         self._begin(welcome)
-        at_ns = self._clock.local_ns(welcome.host_ns)
-        self._add(self._antenna.rejoin(n, HUB_WAS_GONE, at_ns), welcome)
+        self._add(self._antenna.rejoin(n, HUB_WAS_GONE, self._local_ns(0)), welcome)
