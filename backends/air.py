@@ -37,7 +37,7 @@ class AirCost:
     """Measures the CPU time that an air takes, which a physical radio does not take.
 
     Use it as a context, on one thread; its total is the counter `air_cpu_ms`. One block in EVERY is
-    measured and stands for all, because to read a thread's CPU time takes 10 µs.
+    measured and stands for all, because reading a thread's CPU time is slow.
     """
 
     EVERY = 8

@@ -1,4 +1,4 @@
-"""A radio's side of an air in real time: it makes its samples itself, of the bursts that arrive.
+"""A radio's side of an air in real time: it makes its samples from the bursts that arrive.
 
 Nothing travels while the air is silent. A burst is on its way before it begins, and samples are
 made a little after their time, so that a burst that was slow still comes in time. A burst that is
@@ -43,7 +43,7 @@ HUB_WAS_GONE = "the hub was gone"
 
 
 class RealTime:
-    """Makes the blocks of robot `node`; for one thread.
+    """Makes the blocks of one radio; for one thread.
 
     `hello` joins the hub again. `counters` are the radio's; `closing` ends every wait.
     """

@@ -8,7 +8,7 @@ class LoadMeter:
 
     SPAN_S = 1.0
     EVERY = 8
-    """One block in this many is measured: to read a thread's CPU time takes 10 µs."""
+    """One block in this many is measured, because reading a thread's CPU time is slow."""
 
     def __init__(self) -> None:
         self._share = 0.0

@@ -220,7 +220,8 @@ class ModemHere:
         if not self._radio.capabilities.paced:
             # Without pace, blocks wait for the receiver, and so does the clock.
             self._times.observe(end, time.monotonic())
-            self._on_block()
+        # Whoever hears of the PDUs decides by the state of the channel after them.
+        self._on_block()
         rate = self._params.rate_hz
         heard = [
             Heard(pdu.data, pdu.burst.start / rate, pdu.burst.snr_db, pdu.at / rate) for pdu in pdus

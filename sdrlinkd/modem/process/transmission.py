@@ -20,8 +20,8 @@ LATE_S = 5e-4
 """Time in s by which a burst may miss its start: a radio that makes blocks often keeps it all the
 same. What is later than this was interrupted."""
 STALE_S = 0.1
-"""A burst that misses its start by more does not leave: this process stood still, and what is in
-the burst may have outlived its lifespan. Its messages are composed again, if they are still wanted.
+"""A burst that misses its start by more is returned as late: this process stood still, and messages
+in the burst may have outlived their lifespans. The link decides whether it is sent again.
 """
 AGAIN = 2
 """How many more times a burst is modulated that became late meanwhile."""
