@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.processes import Stolen
-from benchmarks.radio.pair import ROBOTS, Pair, pair
+from benchmarks.radio_pair import ROBOTS, Pair, pair
 from benchmarks.report import Row
 from sdrlinkd.adapters import BuiltInRobot
 from sdrlinkd.client import Publisher, Subscriber

@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.loopback_radio import NoDriverError, use_driver
-from benchmarks.radio.pair import ROBOTS, Pair, pair
+from benchmarks.radio_pair import ROBOTS, Pair, pair
 from sdrlinkd.client import ControlClient, Publisher, Subscriber
 
 CONFIG = """[modem]

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmarks.realtime import ages, alone, costs, demo, full_air, pair, receiver
+from benchmarks.realtime import ages, alone, costs, demo, full_air, pair, receiver, usrp
 from benchmarks.realtime.turns import Measure, Wanted, in_turns, rows_of
 from benchmarks.report import Row
 
@@ -47,6 +47,10 @@ EXPERIMENTS = (
     )),
     Experiment("full air at 20 Msps", full_air.carried_share, (
         Wanted("loopback_20msps_carried_share", "ratio", 0.95, "more"),
+    )),
+    Experiment("a radio like a USRP", usrp.full_load, (
+        Wanted("usrp_like_5msps_lost_samples", "samples", 0.0),
+        Wanted("usrp_like_5msps_cores", "cores", 1.3),
     )),
     Experiment("start", costs.start, (Wanted("start_s", "s", 0.7),)),
     Experiment("one burst", receiver.one_burst, (
