@@ -1,6 +1,7 @@
 # make demo   set up, then the main job        make check  format, lint, types, import rules, prose, site
 # make quick  set up, then what every edit wants; make test  all tests; make soak, make fuzz  for hours
 # make bench  measurements beside peers        make fresh  README's commands on a minimal Debian (root)
+# make wheel  dist/*.whl, the modem compiled for x86-64 and 64-bit ARM
 # make docs   the site, into build/site        make reference, make figures  pages made from the code, pictures
 PYTHON ?= python3
 VENV := .venv
@@ -18,7 +19,7 @@ TESTS ?= tests
 WORKERS ?= auto
 PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --maxprocesses 8 --dist loadgroup --no-loadscope-reorder
 
-.PHONY: setup demo quick test soak fuzz fresh check format bench docs reference figures system-packages clean
+.PHONY: setup demo quick test soak fuzz fresh check format wheel bench docs reference figures system-packages clean
 
 setup: $(STAMP)
 
@@ -28,7 +29,8 @@ $(STAMP): pyproject.toml constraints.txt sdrlinkd/__init__.py
 	@$(PYTHON) -m venv $(VENV) || \
 		{ echo "python3 has no venv module; on Debian: apt-get install python3-venv"; exit 1; }
 	$(PIP) -e '.[plots]'
-	@$(BIN)/python -m sdrlinkd.cli.compiling
+	@command -v cc gcc clang >/dev/null || $(PIP) ziglang
+	@$(BIN)/sdrlinkctl phy compile || echo "the modem will run on NumPy, slowly: install gcc, then sdrlinkctl phy compile"
 	@touch $@
 
 $(DEV_STAMP): $(STAMP)
@@ -67,6 +69,11 @@ check: $(DEV_STAMP)
 format: $(DEV_STAMP)
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+
+# With the modem compiled for each family of processors.
+wheel: $(DEV_STAMP)
+	for each in x86-64-v3 x86-64 aarch64; do $(BIN)/sdrlinkctl phy compile --for $$each || exit 1; done
+	$(BIN)/python -m hatchling build -t wheel
 
 bench: $(DEV_STAMP)
 	$(BIN)/python -m benchmarks

@@ -1,7 +1,8 @@
 """The OFDM modem: bits to samples and back.
 
 The arithmetic of bursts (their sizes, rates and error rates) is at hand at once. What touches
-samples needs compiled code and is loaded on first use: a program that only plans never loads it.
+samples is loaded on first use: a program that only plans never loads it. `Receiver` and
+`Transmitter` are those of the engine in use.
 """
 
 import importlib
@@ -23,7 +24,7 @@ from phy.sizes import SENSE_WINDOW
 
 if TYPE_CHECKING:
     from phy.channel import PROFILES, FrontEnd, FrontEndParams, Path, PathParams
-    from phy.kernels.cache import temporary_cache
+    from phy.engine import ENGINES, Engine, EngineError
     from phy.oversampling import REACH, Downsampler, upsample
     from phy.receiver import Receiver
     from phy.sensing import EnergyDetector
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "COUNTERS",
+    "ENGINES",
     "GRIDS",
     "MAX_PDUS",
     "MAX_PDU_BYTES",
@@ -47,6 +49,8 @@ __all__ = [
     "BurstQuality",
     "Downsampler",
     "EnergyDetector",
+    "Engine",
+    "EngineError",
     "Event",
     "FrontEnd",
     "FrontEndParams",
@@ -65,24 +69,25 @@ __all__ = [
     "pdu_error_rate",
     "pdu_lost_rate",
     "points",
-    "temporary_cache",
     "upsample",
     "warm_up",
 ]
 
 _LATER = {
     "phy.channel": ("PROFILES", "FrontEnd", "FrontEndParams", "Path", "PathParams"),
-    "phy.kernels.cache": ("temporary_cache",),
+    "phy.engine": ("ENGINES", "Engine", "EngineError"),
     "phy.oversampling": ("REACH", "Downsampler", "upsample"),
-    "phy.receiver": ("Receiver",),
     "phy.sensing": ("EnergyDetector",),
-    "phy.transmitter": ("Transmitter",),
     "phy.warmup": ("warm_up",),
 }
 
 
 def __getattr__(name: str) -> object:
     """Import an attribute on first use (PEP 562)."""
+    if name in {"Receiver", "Transmitter"}:
+        used = importlib.import_module("phy.engine").in_use()
+        kind: object = used.receiver if name == "Receiver" else used.transmitter
+        return kind
     for module, names in _LATER.items():
         if name in names:
             found: object = getattr(importlib.import_module(module), name)

@@ -7,21 +7,28 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from phy import header, ofdm, preamble
+from phy import compute, header, ofdm, preamble
 from phy.constellation import Modulation
 from phy.convolutional import N_TAIL
 from phy.estimation import in_planes, new_channel, new_scratch, tones
 from phy.header import BurstHeader
 from phy.header_code import parse_header
-from phy.kernels import acquisition as kernel
-from phy.kernels.acquisition import BACKOFF, Room, Training
-from phy.kernels.argument_block import ArgumentBlock
-from phy.kernels.burst import Channel
-from phy.kernels.lanes import whole_lanes
-from phy.kernels.timing import AMBIGUITY, SEARCH
 from phy.mapping import axes
 from phy.numerology import Numerology
 from phy.quality import BurstQuality
+from phy.sizes import whole_lanes
+from phy.tables.acquisition import (
+    AMBIGUITY,
+    BACKOFF,
+    FIRST_CLEAN,
+    N_CLEAN,
+    PART,
+    SEARCH,
+    Room,
+    Training,
+)
+from phy.tables.block import ArgumentBlock
+from phy.tables.burst import Channel
 from phy.transmitter import header_samples
 
 # Error that noise may add to the frequency of the detector's peak, in cycles per sample.
@@ -88,19 +95,19 @@ class Acquisition:
         cycles per sample, modulo 1/16.
         """
         grid, room = self._grid, self._room.content
-        start, frequency = kernel.acquire(
+        start, frequency = compute.acquire(
             x, self._nominal, coarse, dc, self._centre_cycles,
-            self._training.packed, self._tones.packed, self._axes.packed,
-            self._channel.packed, self._scratch.packed, self._room.packed,
+            self._training, self._tones, self._axes,
+            self._channel, self._scratch, self._room,
         )  # fmt: skip
         if start < 0:
             return Missed("preamble")
         told = parse_header(room.octets, room.folded)
         if told is None:
             return Missed("header")
-        snr_db, rssi_dbfs, evm_db = kernel.settle(
-            _sent(told, grid), self._training.packed, self._tones.packed,
-            self._channel.packed, self._scratch.packed, self._room.packed,
+        snr_db, rssi_dbfs, evm_db = compute.settle(
+            _sent(told, grid), self._training, self._tones,
+            self._channel, self._scratch, self._room,
         )  # fmt: skip
         quality = BurstQuality(
             base + start, *told, snr_db=snr_db, rssi_dbfs=rssi_dbfs, evm_db=evm_db, cfo=frequency
@@ -121,17 +128,17 @@ def _training(grid: Numerology, aliases: int) -> ArgumentBlock[Training]:
     shift = np.exp(2j * np.pi * AMBIGUITY * np.arange(-aliases, aliases + 1)[:, None] * time[:, 0])
     inverse = np.exp(2j * np.pi * subcarriers * time / n_fft) * (grid.scale / n_fft)
     short_wave = inverse[: preamble.SEGMENT] * preamble.short_subcarriers(grid)[grid.tones]
-    clean = np.roll(short_wave, -kernel.FIRST_CLEAN, axis=0)
-    clean[kernel.N_CLEAN :] = 0
+    clean = np.roll(short_wave, -FIRST_CLEAN, axis=0)
+    clean[N_CLEAN:] = 0
     long = preamble.long_subcarriers(grid)[grid.tones].astype(np.complex64)
     long_start = preamble.long_start(grid)
     header_start = preamble.length(grid) + grid.n_cp
     segments = preamble.SEGMENT * np.arange(preamble.N_SEGMENTS)
-    parts = kernel.PART * np.arange(preamble.N_LONG * n_fft // kernel.PART)
+    parts = PART * np.arange(preamble.N_LONG * n_fft // PART)
     centres = np.concatenate(
         (
-            segments + kernel.FIRST_CLEAN + (kernel.N_CLEAN - 1) / 2,
-            parts + long_start + (kernel.PART - 1) / 2,
+            segments + FIRST_CLEAN + (N_CLEAN - 1) / 2,
+            parts + long_start + (PART - 1) / 2,
         )
     )
     windows = (

@@ -7,9 +7,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from phy.kernels.convolution import convolve
-from phy.kernels.list_viterbi import list_decode
-from phy.kernels.viterbi import MAX_LLR, ViterbiWorkspace, decode_terminated
+from phy import compute
+from phy.sizes import MAX_LLR
 
 N_TAIL = 6
 
@@ -24,6 +23,18 @@ __all__ = [
     "decode_list",
     "encode",
 ]
+
+
+class ViterbiWorkspace:
+    """Working memory of decoding, for blocks of up to `n_steps` bits, including the tail.
+
+    One per thread, because the kernels hold no lock.
+    """
+
+    def __init__(self, n_steps: int) -> None:
+        self.mother = np.zeros(2 * n_steps, np.int16)
+        self.decisions = np.zeros(n_steps, np.uint64)
+        self.n_steps = n_steps
 
 
 @dataclass(frozen=True)
@@ -60,7 +71,7 @@ def encode(data: NDArray[np.uint8], code: CodeRate) -> NDArray[np.uint8]:
     bits = np.zeros((len(data), n_bits + N_TAIL), np.uint8)
     bits[:, :n_bits] = np.unpackbits(data, axis=1)
     mother = np.empty((len(data), 2 * bits.shape[1]), np.uint8)
-    convolve(bits, mother)
+    compute.convolve(bits, mother)
     return mother if code is HALF else mother[:, code.kept(n_bits)]
 
 
@@ -71,11 +82,15 @@ def decode(
     workspace: ViterbiWorkspace,
 ) -> NDArray[np.uint8]:
     """Decode LLRs `[n, n_coded]`, ±MAX_LLR at most, + for 0, to likeliest bytes `[n, n_bytes]`."""
-    return decode_terminated(llr, code.kept(8 * n_bytes), n_bytes, workspace)
+    out = np.empty((len(llr), n_bytes), np.uint8)
+    n_steps = 8 * n_bytes + N_TAIL
+    mother, decisions = workspace.mother[: 2 * n_steps], workspace.decisions[:n_steps]
+    compute.decode_rows(llr, code.kept(8 * n_bytes), mother, decisions, out)
+    return out
 
 
 def decode_list(llr: NDArray[np.int16], n_bytes: int, n_list: int) -> NDArray[np.uint8]:
     """Decode one block at rate 1/2 to the `n_list` likeliest, `[n_list, n_bytes]`, best first."""
     bits = np.empty((n_list, 8 * n_bytes + N_TAIL), np.uint8)
-    list_decode(llr, bits)
+    compute.list_decode(llr, bits)
     return np.packbits(bits[:, : 8 * n_bytes], axis=1)

@@ -3,17 +3,17 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from phy import compute
 from phy.constellation import Modulation
 from phy.crc import checked
 from phy.estimation import new_scratch, tones
-from phy.kernels import demodulator as kernel
-from phy.kernels.argument_block import ArgumentBlock
-from phy.kernels.burst import Channel
 from phy.layout import BurstLayout
 from phy.ldpc import decode, new_workspace
 from phy.mapping import axes
 from phy.numerology import Numerology
 from phy.sequences import whitening
+from phy.tables.block import ArgumentBlock
+from phy.tables.burst import Channel
 
 # Initial room for LLRs: about ten PDUs of usual size.
 _ROOM = 1 << 14
@@ -50,9 +50,9 @@ class Demodulator:
         grid = self._grid
         n = (len(samples) - grid.n_fft) // grid.n_symbol + 1
         to = self._no_points if points is None else points
-        kernel.demodulate(
+        compute.demodulate(
             samples, n, frequency, dc, origin, first_symbol,
-            tones(grid).packed, axes(modulation, grid).packed, channel.packed, self._scratch.packed,
+            tones(grid), axes(modulation, grid), channel, self._scratch,
             to, llr, powers,
         )  # fmt: skip
 

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phy.constellation import Modulation
-from phy.kernels.argument_block import ArgumentBlock
-from phy.kernels.burst import N_FIGURES, Channel, Scratch, Tones
-from phy.kernels.lanes import N_LANES, whole_lanes
 from phy.numerology import Numerology
 from phy.sequences import POLARITY
+from phy.sizes import N_LANES, whole_lanes
+from phy.tables.block import ArgumentBlock
+from phy.tables.burst import N_FIGURES, Channel, Scratch, Tones
 
 # Groups of the smoother, by the distance of their echoes from the mean delay in samples. One more
 # group, made in _basis, holds the echoes farther away, up to a prefix.

@@ -2,12 +2,12 @@
 
 import math
 
+from phy import compute
 from phy.acquisition import Acquired
 from phy.estimation import tones
-from phy.kernels.demodulator import slip
-from phy.kernels.tracking import SLOPE
 from phy.layout import BurstLayout
 from phy.numerology import Numerology
+from phy.tables.burst import SLOPE
 
 SLIP_EVERY = 256
 """Interval in payload symbols at which the FFT windows are aligned to the sender's clock."""
@@ -63,4 +63,4 @@ class IncomingBurst:
         early = round(slope * grid.n_fft / (2 * math.pi))
         if early:
             self._window -= early
-            slip(early, tones(grid).packed, channel.packed)
+            compute.slip(early, tones(grid), channel)

@@ -5,11 +5,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from phy.kernels.argument_block import ArgumentBlock
-from phy.kernels.ldpc import Workspace, decode_blocks, new_workspace
-from phy.kernels.ldpc_encoder import encode_blocks
-from phy.kernels.ldpc_form import Form
+from phy import compute
 from phy.segmentation import MAX_ITERATIONS, Segmentation
+from phy.tables.block import ArgumentBlock
+from phy.tables.code import Form, Workspace, new_workspace
 
 __all__ = ["Workspace", "decode", "encode", "new_workspace", "packed_form"]
 
@@ -34,7 +33,7 @@ def packed_form(form: Segmentation) -> ArgumentBlock[Form]:
 def encode(bits: NDArray[np.uint8], form: Segmentation) -> NDArray[np.uint8]:
     """Encode blocks of bits `[blocks, n_bits]` to coded bits `[blocks, n_coded]`."""
     out = np.empty((len(bits), form.n_coded), np.uint8)
-    encode_blocks(bits, packed_form(form).packed, out)
+    compute.encode_blocks(bits, packed_form(form), out)
     return out
 
 
@@ -53,7 +52,5 @@ def decode(
     out = np.empty((llr.size // form.n_coded, form.n_bits // 8), np.uint8)
     if white is None:
         white = np.zeros(out.size, np.uint8)
-    decode_blocks(
-        llr.reshape(-1), max_iterations, packed_form(form).packed, work.packed, white, out
-    )
+    compute.decode_blocks(llr.reshape(-1), max_iterations, packed_form(form), work, white, out)
     return out

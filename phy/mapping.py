@@ -5,16 +5,15 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from phy import interleaver
+from phy import compute, interleaver
 from phy.constellation import Modulation, points
 from phy.estimation import tones
-from phy.kernels import modulator as kernel
-from phy.kernels.argument_block import ArgumentBlock
-from phy.kernels.burst import Axes
-from phy.kernels.ldpc_form import Form
-from phy.kernels.modulator import Map
 from phy.numerology import Numerology
 from phy.sequences import PADDING
+from phy.tables.block import ArgumentBlock
+from phy.tables.burst import Axes
+from phy.tables.code import Form
+from phy.tables.mapping import Map
 
 
 class Mapping:
@@ -44,7 +43,7 @@ class Mapping:
         """
         grid = self.grid
         out = np.empty(len(coded) // self.symbol_bits * grid.n_symbol, np.complex64)
-        kernel.modulate_bits(coded, first_symbol, peak, tones(grid).packed, self._map.packed, out)
+        compute.modulate_bits(coded, first_symbol, peak, tones(grid), self._map, out)
         return out
 
     def modulate(
@@ -61,9 +60,10 @@ class Mapping:
         The first symbol has number `first_symbol`; the header's first symbol is 0. No magnitude
         exceeds `peak`.
         """
-        kernel.modulate(
+        coded = np.empty(len(out) // self.grid.n_symbol * self.symbol_bits, np.uint8)
+        compute.modulate(
             blocks, n_blocks, PADDING, first_symbol, peak,
-            form.packed, tones(self.grid).packed, self._map.packed, out,
+            form, tones(self.grid), self._map, coded, out,
         )  # fmt: skip
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from phy import compute
 from phy.estimation import new_scratch, tones
-from phy.kernels import demodulator as kernel
-from phy.kernels.lanes import whole_lanes
 from phy.numerology import Numerology
+from phy.sizes import whole_lanes
 
 
 def to_tones(
@@ -25,5 +25,5 @@ def to_tones(
     """
     out = np.empty((len(starts), 2, whole_lanes(grid.n_used)), np.float32)
     scratch = new_scratch(grid)
-    kernel.to_tones(samples, starts, frequency, dc, origin, tones(grid).packed, scratch.packed, out)
+    compute.to_tones(samples, starts, frequency, dc, origin, tones(grid), scratch, out)
     return out

@@ -7,7 +7,7 @@ their images: 802.11's outermost subcarrier is at 0.41 of the modem's rate, its 
 import numpy as np
 from numpy.typing import NDArray
 
-from phy.kernels.resampler import filter_strided
+from phy import compute
 
 REACH = 16
 """Samples at the low rate on each side of a sample that contribute to it."""
@@ -40,7 +40,7 @@ def upsample(burst: NDArray[np.complex64], factor: int) -> NDArray[np.complex64]
     for phase in range(factor):
         # Of every `factor` samples all but one are zero, and so are their products with taps.
         own = _twice(taps[-phase % factor :: factor])
-        filter_strided(padded, min(phase, 1), 1, own, out[phase:], factor, n)
+        compute.filter_strided(padded, min(phase, 1), 1, own, out[phase:], factor, n)
     return out
 
 
@@ -68,7 +68,7 @@ class Downsampler:
         self._end += len(samples)
         n = max(0, (self._end - reach - 1) // factor + 1 - self.next_index)
         out = np.empty(n, np.complex64)
-        filter_strided(x, 0, factor, self._taps, out, 1, n)
+        compute.filter_strided(x, 0, factor, self._taps, out, 1, n)
         self.next_index += n
         self._kept = x[n * factor : -len(_REST)]
         return out

@@ -12,19 +12,19 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from phy import preamble
+from phy import compute, preamble
 from phy.acquisition import Acquired, Acquisition, Missed, before, needed_after
 from phy.constellation import Modulation
 from phy.demodulation import Demodulator, PduDecoder
 from phy.header import N_NETWORKS, n_symbols
 from phy.incoming import SLIP_EVERY, IncomingBurst
-from phy.kernels.acquisition import BACKOFF
-from phy.kernels.detector import FORGETS, HISTORY, N_STATE, dc_of, search, strongest
 from phy.layout import layout
 from phy.numerology import OFDM_64_16, Numerology
 from phy.quality import BurstOver, Event, PduHeard
 from phy.states import Found, State, after
 from phy.stream import SampleStream
+from phy.tables.acquisition import BACKOFF
+from phy.tables.detector import FORGETS, HISTORY, new_search_memory
 
 HOP = 512
 ALIGN_SPAN = preamble.SHORT
@@ -72,9 +72,8 @@ class Receiver:
         self._demodulator = Demodulator(grid)
         self._powers = np.empty(SLIP_EVERY, np.float32)
         self._decoder = PduDecoder()
-        self._work = np.zeros((7, HISTORY + HOP), np.float32)
         self._n_header = n_symbols(grid)
-        self._search_state = np.zeros(N_STATE)
+        self._memory = new_search_memory(HOP)
         # The samples that acquisition needs: how many before the peak, and how many in total.
         self._before = before(grid) - 1 - preamble.guard(grid)
         self._span = before(grid) + needed_after(grid)
@@ -161,7 +160,7 @@ class Receiver:
         first = self._at - HISTORY
         x = self._stream.view(first, self._at + n_hops * HOP)
         age = self._at - self._raised_at
-        found = search(x, n_hops, HOP, THRESHOLD, self._excess, age, self._search_state, self._work)
+        found = compute.search(x, n_hops, HOP, THRESHOLD, self._excess, age, self._memory)
         if found < 0:
             self._at += n_hops * HOP
         else:
@@ -176,7 +175,7 @@ class Receiver:
         if self._stream.end < crossing + ALIGN_SPAN:
             return False
         x = self._stream.view(crossing - HISTORY, crossing + ALIGN_SPAN)
-        offset, p, plain = strongest(x, ALIGN_SPAN, self._dc_value, self._work)
+        offset, p, plain = compute.strongest(x, ALIGN_SPAN, self._memory)
         self._peak = self._at = crossing + offset
         if plain > PLAINEST:
             self._was_nothing(self._peak)
@@ -294,4 +293,4 @@ class Receiver:
 
     @property
     def _dc_value(self) -> complex:
-        return dc_of(self._search_state)
+        return self._memory.content.dc

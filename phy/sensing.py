@@ -5,16 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from phy.kernels.sensing import (
-    BUSY_UNTIL,
-    FILLED,
-    FLOOR,
-    LEAST_FLOOR,
-    N_STATE,
-    NEXT,
-    sense,
-)
+from phy import compute
 from phy.stream import LARGEST_SAMPLE
+from phy.tables.sensing import BUSY_UNTIL, FILLED, FLOOR, LEAST_FLOOR, N_STATE, NEXT
 
 
 class EnergyDetector:
@@ -49,11 +42,8 @@ class EnergyDetector:
 
     def push(self, samples: NDArray[np.complex64]) -> None:
         """Take the next samples `[n]`, complex64, and judge the windows that they complete."""
-        # Make every input read-only and contiguous: otherwise numba compiles the kernel for each
-        # kind.
-        x = np.ascontiguousarray(samples, np.complex64).view()
-        x.setflags(write=False)
-        sense(x, self._threshold, LARGEST_SAMPLE, self._state)
+        x = np.ascontiguousarray(samples, np.complex64)
+        compute.sense(x, self._threshold, LARGEST_SAMPLE, self._state)
 
     def gap(self, n: int) -> None:
         """Note that `n` samples are missing: the floor is kept, an incomplete window dropped.

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from phy.kernels.detector import sanitise
+from phy import compute
 
 # Larger values are treated as errors; their squares must stay finite.
 LARGEST_SAMPLE = 1e6
@@ -37,7 +37,7 @@ class SampleStream:
         room = self._samples[at : at + n]
         room[:] = samples
         self._size += n
-        return int(sanitise(room, LARGEST_SAMPLE))
+        return int(compute.sanitise(room, LARGEST_SAMPLE))
 
     def view(self, first: int, last: int) -> NDArray[np.complex64]:
         """Samples from `first` up to before `last`, as a view valid until the next `append`."""

@@ -11,13 +11,13 @@ from phy.constellation import Modulation
 from phy.crc import with_crc32
 from phy.header import N_NETWORKS, BurstHeader
 from phy.header_code import header_bits
-from phy.kernels.acquisition import BACKOFF
 from phy.layout import layout
 from phy.ldpc import packed_form
 from phy.mapping import mapping
 from phy.mcs import HEADER_MCS, MCS_TABLE
 from phy.numerology import OFDM_64_16, Numerology
 from phy.sequences import whitening
+from phy.tables.acquisition import BACKOFF
 
 # Lengths of a burst's rise and fall in samples; the fall lies after the last FFT window.
 _RISE, _FALL = 8, BACKOFF

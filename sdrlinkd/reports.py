@@ -337,6 +337,8 @@ class PduLinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """Speed of the receiver as a multiple of real time, by CPU time; null: unknown."""
     scheduling: str = ""
     """How the kernel runs the modem's process, as text for people; empty: nothing was asked."""
+    engine: str = ""
+    """What computes the modem, as text for people; empty: not known yet."""
     notices: list[str] = []
     """What a person should know about the PDU link, in sentences."""
 

@@ -23,4 +23,4 @@ def prepare(tree: Path) -> None:
     """Compile a checkout's modules and kernels, where they are not. Raises PeerError."""
     command = [interpreter(""), "-m", "compileall", "-q", *PACKAGES]
     subprocess.run(command, check=False, cwd=tree, env=variables(tree), stdout=sys.stderr)
-    told_by("compiling", interpreter(""), "-m", "sdrlinkd.cli.compiling", tree=tree)
+    told_by("compiling", interpreter(""), "-c", "import phy; phy.warm_up()", tree=tree)

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from phy.kernels.noise import CHUNK, add_noise
+from phy import compute
+from phy.sizes import NOISE_CHUNK
 
 
 @dataclass(frozen=True)
@@ -32,8 +33,8 @@ class FrontEnd:
         self._noise = np.float32(np.sqrt(10 ** (params.noise_dbfs / 10) / 2))
         self._key = int(rng.integers(2**63))
         self._next_index = 0
-        self._bits = np.empty(CHUNK, np.uint32)
-        self._radii = np.empty(CHUNK, np.float32)
+        self._bits = np.empty(NOISE_CHUNK, np.uint32)
+        self._radii = np.empty(NOISE_CHUNK, np.float32)
         self._image = np.float32(10 ** (-params.image_db / 20))
         self._dc = np.complex64(10 ** (params.dc_dbfs / 20))
 
@@ -55,11 +56,8 @@ class FrontEnd:
     def _noisy(self, x: NDArray[np.complex64]) -> NDArray[np.complex64]:
         noisy = np.empty_like(x)
         first, self._next_index = self._next_index, self._next_index + len(x)
-        # Make every input read-only: otherwise numba compiles the kernel again for writable ones.
-        parts = x.view(np.float32)
-        parts.setflags(write=False)
-        add_noise(
-            parts,
+        compute.add_noise(
+            x.view(np.float32),
             self._key,
             first,
             float(self._noise),

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from phy.kernels.resampler import interpolate
+from phy import compute
 
 N_TAPS = 32
 N_PHASES = 512
@@ -30,7 +30,7 @@ def stretch(x: NDArray[np.complex64], delay: float, clock_error: float) -> NDArr
     n = int(np.ceil((len(x) + delay) / (1 + clock_error))) + N_TAPS // 2
     out = np.empty(n, np.complex64)
     parts = np.stack((x.real, x.imag))
-    interpolate(parts, _filters(), -delay, 1 + clock_error, out)
+    compute.interpolate(parts, _filters(), -delay, 1 + clock_error, out)
     return out
 
 

@@ -1,3 +1,4 @@
-"""Compiled loops: the code that must be fast. The rest of the modem reads like the equations."""
+"""Compiled loops: the code that must be fast. The rest of the modem reads like the equations.
 
-from phy.kernels import cache as cache
+They run as a library that `phy.engine` builds. Only the build imports this package, and tests.
+"""

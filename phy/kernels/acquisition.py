@@ -10,97 +10,44 @@ Samples lie in two rows, real and imaginary parts, so that loops are vectorised.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.argument_block import PackedArguments, opener
-from phy.kernels.burst import (
-    GAIN,
-    NO,
-    Planes,
-    Row,
-    open_axes,
-    open_channel,
-    open_scratch,
-    open_tones,
-)
 from phy.kernels.equaliser import equalise, renew, start_tracking
 from phy.kernels.fft import windows_to_tones
 from phy.kernels.inline import step
-from phy.kernels.lanes import N_LANES, Lanes, load, splat, store, total
-from phy.kernels.timing import SEARCH, locate
-from phy.kernels.tracking import PHASE
+from phy.kernels.lanes import Lanes, load, splat, store, total
+from phy.kernels.local import local
+from phy.kernels.openers import (
+    open_axes,
+    open_channel,
+    open_room,
+    open_scratch,
+    open_tones,
+    open_training,
+)
+from phy.kernels.timing import locate
 from phy.kernels.training import estimate, learn, turn_back
-from phy.kernels.viterbi import MAX_LLR, decode_block
+from phy.kernels.viterbi import decode_block
+from phy.sizes import MAX_LLR, N_LANES
+from phy.tables.acquisition import (
+    BACKOFF,
+    FIRST_CLEAN,
+    N_LONG,
+    PART,
+    SEARCH,
+    SEGMENT,
+    Room,
+    Training,
+)
+from phy.tables.block import PackedArguments
+from phy.tables.burst import GAIN, NO, PHASE, Planes
 
 # A literal would make numba compile the callee once more, for this value.
 _0: Any = np.int64(0)
-
-BACKOFF = 3
-"""Number of samples before the first echo at which FFT windows begin."""
-_SEGMENT = 16
-# First samples of a short segment that echoes of the previous segment hardly reach.
-FIRST_CLEAN = BACKOFF + 4
-N_CLEAN = _SEGMENT - 4
-PART = 16
-"""Number of samples of the long training whose phase is evaluated together."""
-N_LONG = 2
-"""Number of symbols in the long training."""
-
-
-class Training(NamedTuple):
-    """Tables about the preamble and the header on one grid, for acquisition."""
-
-    templates: NDArray[np.complex64]
-    """The long symbol, shifted by each multiple of 1/16 to try `[2 aliases + 1, n_fft]`."""
-    long: NDArray[np.float32]
-    """The long training as sent `[2, 2, width]`."""
-    waves: NDArray[np.float32]
-    """Each tone of the preamble in time, `[n_used, 2, 16 + n_fft]`.
-
-    A row holds the clean samples of a short segment, then zeros, then the long symbol.
-    """
-    cover: Row
-    frequencies: NDArray[np.float64]
-    """Frequency corrections to try, in cycles per sample, evenly spaced."""
-    turns: NDArray[np.float32]
-    """Factors that rotate each preamble part back by `frequencies`.
-
-    The shape is `[n_parts, 2, n_frequencies]`.
-    """
-    windows: NDArray[np.int64]
-    """First samples of the FFT windows of the long training and the header."""
-
-
-open_training = opener(Training, "c8[2] f4[3] f4[3] f4[1] f8[1] f4[3] i8[1]")
-
-
-class Room(NamedTuple):
-    """Working memory and results of acquisition; one per thread."""
-
-    planes: Planes
-    """The burst's samples up to the end of its header, rotated back."""
-    wave: Planes
-    """The preamble after the channel, laid out like a row of `Training.waves`."""
-    parts: Planes
-    """Correlation of the preamble's parts with `wave` `[2, n_parts]`."""
-    y: NDArray[np.float32]
-    """Long training and header `[2 + n_header, 2, width]`."""
-    points: NDArray[np.complex64]
-    """The header's equalised points `[n_header, n_data]`."""
-    llr: NDArray[np.int16]
-    """LLRs of the header's coded bits, including repetitions `[n_header · n_data]`."""
-    folded: NDArray[np.int16]
-    """LLRs of the header's coded bits, with repetitions added up `[2 (32 + 6)]`."""
-    decisions: NDArray[np.uint64]
-    octets: NDArray[np.uint8]
-    """The likeliest header, with its check sum `[4]`."""
-
-
-open_room = opener(Room, "f4[2] f4[2] f4[2] f4[3] c8[2] i2[1] i2[1] u8[1] u1[1]")
 
 
 @njit(nogil=True, cache=True)
@@ -113,12 +60,12 @@ def refine(training: Training, h: Planes, room: Room) -> float:
     n_segments, begin = training.cover.size, training.windows[0]
     n_parts, n_fft = training.turns.shape[0], training.templates.shape[1]
     for s in range(n_segments):
-        _agree(room, _SEGMENT * s + FIRST_CLEAN, _0, training.cover[s], s)
+        _agree(room, SEGMENT * s + FIRST_CLEAN, _0, training.cover[s], s)
     for part in range(n_parts - n_segments):
         at = part * PART
-        _agree(room, begin + at, _SEGMENT + at % n_fft, np.float32(1), n_segments + part)
+        _agree(room, begin + at, SEGMENT + at % n_fft, np.float32(1), n_segments + part)
     n = training.frequencies.size
-    likely = np.empty(n)
+    likely = local(np.float64, n)
     for i in range(n):
         re = im = np.float32(0)
         for part in range(n_parts):
@@ -205,7 +152,8 @@ def acquire(
     frequency = coarse + correction
     burst = x[begin : begin + windows[-1] + tones.n_fft]
     turn_back(burst[: windows[1] + tones.n_fft], dc, frequency, planes)
-    amplitude = np.ones(2, np.float32)
+    amplitude = local(np.float32, N_LONG)
+    amplitude[:] = 1
     windows_to_tones(burst, windows[:2], frequency, dc, _0, tones, scratch, y)
     estimate(y, amplitude, training.long, tones, channel, scratch)
     frequency += refine(training, channel.h, room)

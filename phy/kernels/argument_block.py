@@ -1,78 +1,29 @@
-"""Passes many arrays as one argument of a kernel.
+"""Opens packed arguments inside kernels; see `phy.tables.block`."""
 
-numba inspects every array that crosses from the interpreter, and every field of a tuple; decoding a
-short burst takes hardly longer than that. So arguments that stay the same from call to call are
-packed once: an `ArgumentBlock` holds their addresses, and the kernel opens it into the original
-tuple.
-"""
-
-import ctypes
 import itertools
 from collections.abc import Callable
-from typing import Any, Generic, TypeVar
+from typing import Any
 
-import numpy as np
 from llvmlite import ir
-from numba import typeof, types
+from numba import types
 from numba.extending import intrinsic
 from numba.np import numpy_support
 from numba.np.arrayobj import populate_array
-from numpy.typing import NDArray
+
+from phy.tables.block import FIELDS, Field
 
 _I64 = ir.IntType(64)
 
-PackedArguments = NDArray[np.int64]
-"""An argument block in the packed form that kernels take."""
 
-_Content = TypeVar("_Content", bound=tuple[Any, ...])
-_FIELDS: dict[type[Any], list[Any]] = {}
-
-
-class ArgumentBlock(Generic[_Content]):
-    """A named tuple of arrays and numbers; `packed` is its form for kernels.
-
-    Raises TypeError when a field is not of the type that its opener expects: kernels would not
-    notice.
-    """
-
-    def __init__(self, content: _Content) -> None:
-        self.content = content
-        words: list[int] = []
-        for value, kind in zip(content, _FIELDS[type(content)], strict=True):
-            found = typeof(value)
-            if isinstance(value, np.ndarray):
-                found = found.copy(readonly=False)
-                words += [value.ctypes.data, *value.shape]
-            else:
-                words.append(int(np.array(value).view(np.int64)))
-            if found != kind:
-                raise TypeError(f"{type(content).__name__}: got {found}; allowed: {kind}")
-        # The packed form keeps the arrays alive that it points to.
-        buffer: Any = (ctypes.c_int64 * len(words))(*words)
-        buffer.content = content
-        self.packed: PackedArguments = np.frombuffer(buffer, np.int64)
-
-
-def opener(kind: type[Any], fields: str) -> Any:
-    """Make a kernel function that turns the packed form of an argument block into the tuple `kind`.
-
-    `fields` gives the type of each field in order: a scalar's dtype, and for an array also its
-    number of dimensions in brackets, as in "i8 f4[2] c8[1]".
-    """
-    found = [_numba_type(field) for field in fields.split()]
+def opener(kind: type[Any]) -> Any:
+    """Make a kernel function that turns the packed form of an argument block into the tuple."""
+    found = [numba_type(field) for field in FIELDS[kind]]
     result = types.NamedTuple(found, kind)
-    _FIELDS[kind] = found
 
     def typed(_context: Any, words: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
             data = context.make_array(signature.args[0])(context, builder, args[0]).data
-            places = itertools.count()
-
-            def word() -> Any:
-                return builder.load(builder.gep(data, [_I64(next(places))]))
-
-            values = [_open(context, builder, each, word) for each in found]
-            return context.make_tuple(builder, result, values)
+            return context.make_tuple(builder, result, open_words(context, builder, data, found))
 
         return result(words), generate
 
@@ -80,13 +31,27 @@ def opener(kind: type[Any], fields: str) -> Any:
     return intrinsic(typed)
 
 
-def _numba_type(field: str) -> Any:
-    name, _, rest = field.partition("[")
-    scalar = numpy_support.from_dtype(np.dtype(name))
-    return types.Array(scalar, int(rest.rstrip("]")), "C") if rest else scalar
+def numba_type(field: Field) -> Any:
+    """The numba type of a field."""
+    scalar = numpy_support.from_dtype(field.dtype)
+    return types.Array(scalar, field.n_dimensions, "C") if field.n_dimensions else scalar
+
+
+def open_words(context: Any, builder: Any, data: Any, found: list[Any]) -> list[Any]:
+    """The values of types `found` in the 64-bit words at `data`: addresses, sizes and numbers."""
+    places = itertools.count()
+
+    def word() -> Any:
+        return builder.load(builder.gep(data, [_I64(next(places))]))
+
+    return [_open(context, builder, each, word) for each in found]
 
 
 def _open(context: Any, builder: Any, kind: Any, word: Callable[[], Any]) -> Any:
+    if kind == types.complex128:
+        value = context.make_complex(builder, kind)
+        value.real, value.imag = (builder.bitcast(word(), ir.DoubleType()) for _ in range(2))
+        return value._getvalue()  # noqa: SLF001
     if not isinstance(kind, types.Array):
         return builder.bitcast(word(), context.get_value_type(kind))
     array = context.make_array(kind)(context, builder)

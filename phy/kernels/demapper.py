@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from phy.kernels.inline import step
 from phy.kernels.lanes import Lanes, least, magnitude, most, splat, store, with_sign
-from phy.kernels.viterbi import MAX_LLR
+from phy.sizes import MAX_LLR
 
 LLR_SCALE = 8.0
 """Factor from an LLR to its quantised value, in steps of 1/8."""

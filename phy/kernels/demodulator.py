@@ -6,13 +6,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.argument_block import PackedArguments
-from phy.kernels.burst import SLOPE_USED, open_axes, open_channel, open_scratch, open_tones
 from phy.kernels.equaliser import equalise, start_tracking, use_slope
 from phy.kernels.fft import circle, eight_windows, windows_to_tones
-from phy.kernels.lanes import N_LANES, Lanes, load, splat, total
-from phy.kernels.tracking import SLOPE
+from phy.kernels.lanes import Lanes, load, splat, total
+from phy.kernels.local import local
+from phy.kernels.openers import open_axes, open_channel, open_scratch, open_tones
 from phy.kernels.training import estimate
+from phy.sizes import N_LANES
+from phy.tables.block import PackedArguments
+from phy.tables.burst import SLOPE, SLOPE_USED
 
 
 @njit(nogil=True, cache=True)
@@ -88,6 +90,7 @@ def learn_channel(
 ) -> None:
     """Estimate the channel from known symbols, as `estimate` does, and start to track it."""
     tones, channel = open_tones(tones_in), open_channel(channel_in)
-    amplitude = np.ones(sent.shape[0], np.float32)
+    amplitude = local(np.float32, sent.shape[0])
+    amplitude[:] = 1
     estimate(y, amplitude, sent, tones, channel, open_scratch(scratch_in))
     start_tracking(tones, channel, 0.0, False)

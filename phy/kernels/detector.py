@@ -13,19 +13,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from phy.kernels.inline import step
-from phy.kernels.lanes import N_LANES, Lanes, load, pairs, splat, total
-
-SEGMENT = 16
-SHORT = 192
-HISTORY = SHORT - 1
-"""Number of samples before a sample that its metric needs."""
-
-FORGETS = 4096.0
-"""Number of samples in which a raised threshold decays by a factor of e."""
-
-# Content of the state of the search: DC, number of hops, and the power of the noise; 0: unknown.
-DC_REAL, DC_IMAG, HOPS, FLOOR = range(4)
-N_STATE = 4
+from phy.kernels.lanes import Lanes, load, pairs, splat, total
+from phy.kernels.openers import open_search
+from phy.sizes import N_LANES
+from phy.tables.block import PackedArguments
+from phy.tables.detector import DC_IMAG, DC_REAL, FLOOR, FORGETS, HISTORY, HOPS, SEGMENT, SHORT
 
 GATE = 1.15
 """A half of a hop with more power than this times the noise is searched."""
@@ -36,11 +28,6 @@ _CREEP = 2 ** (1 / DOUBLING)
 
 # E is over 192 samples, P over the 176 products of samples 16 apart.
 _SHARE = np.float32((SHORT - SEGMENT) / SHORT)
-
-
-def dc_of(state: NDArray[np.float64]) -> complex:
-    """The DC that a search has estimated."""
-    return complex(state[DC_REAL], state[DC_IMAG])
 
 
 @njit(nogil=True, cache=True)
@@ -119,16 +106,17 @@ def search(
     threshold: float,
     excess: float,
     age: int,
-    state: NDArray[np.float64],
-    work: NDArray[np.float32],
+    memory_in: PackedArguments,
 ) -> int:
     """Index in `x` of the first sample with |P| > threshold · E, or -1 after `n_hops` hops.
 
     `x` begins HISTORY samples before the first hop; `hop` is a multiple of 8. The threshold was
-    raised by `excess`, `age` samples before the first hop, and decays hop by hop. `state`
-    `[N_STATE]` has the estimates of DC and noise, which follow the hops without a crossing. Hops
-    with the power of noise are taken to have none.
+    raised by `excess`, `age` samples before the first hop, and decays hop by hop. The estimates of
+    DC and noise follow the hops without a crossing. Hops with the power of noise are taken to have
+    none.
     """
+    memory = open_search(memory_in)
+    state, work = memory.state, memory.work
     for h in range(n_hops):
         begin = h * hop
         early, late, mean = _halves(x, begin + HISTORY, hop, state, work)
@@ -208,13 +196,16 @@ def _halves(
 
 @njit(nogil=True, cache=True)
 def strongest(
-    x: NDArray[np.complex64], n: int, dc: complex, work: NDArray[np.float32]
+    x: NDArray[np.complex64], n: int, memory_in: PackedArguments
 ) -> tuple[int, complex, float]:
     """(offset, P, |Q| / |P|) at the largest P / E of the `n` samples after HISTORY of `x`.
 
     Q is P without the code: small for our preamble, large for any signal that repeats every 16
     samples or rotates evenly.
     """
+    memory = open_search(memory_in)
+    state, work = memory.state, memory.work
+    dc = complex(state[DC_REAL], state[DC_IMAG])
     detector_sums(x, dc, work, n)
     p_re, p_im, energy = work[0], work[1], work[2]
     best, best_metric = 0, -1.0

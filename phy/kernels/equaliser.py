@@ -6,12 +6,22 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.burst import (
+from phy.kernels.decisions import expected_level
+from phy.kernels.demapper import LLR_SCALE, axis_llrs
+from phy.kernels.inline import step
+from phy.kernels.lanes import Lanes, load, splat, store, store_int16, total
+from phy.kernels.rotation import lean, lean_more
+from phy.kernels.smoothing import follow
+from phy.kernels.tracking import correct, predict
+from phy.sizes import N_LANES
+from phy.tables.burst import (
     CERTAIN,
     DRIFT,
     GAIN,
     N_HEARD,
     NO,
+    PHASE,
+    SLOPE,
     SLOPE_USED,
     Axes,
     Channel,
@@ -19,13 +29,6 @@ from phy.kernels.burst import (
     Scratch,
     Tones,
 )
-from phy.kernels.decisions import expected_level
-from phy.kernels.demapper import LLR_SCALE, axis_llrs
-from phy.kernels.inline import step
-from phy.kernels.lanes import N_LANES, Lanes, load, splat, store, store_int16, total
-from phy.kernels.rotation import lean, lean_more
-from phy.kernels.smoothing import follow
-from phy.kernels.tracking import PHASE, SLOPE, correct, predict
 
 BLOCK = 8
 """Number of symbols from one correction of the channel to the next."""

@@ -12,9 +12,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.burst import Planes, Row, Scratch, Tones
 from phy.kernels.inline import step
-from phy.kernels.lanes import N_LANES, first_halves, load, second_halves, splat, store
+from phy.kernels.lanes import first_halves, load, second_halves, splat, store
+from phy.sizes import N_LANES
+from phy.tables.burst import Planes, Row, Scratch, Tones
 
 
 @njit(nogil=True, cache=True)

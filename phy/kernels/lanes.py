@@ -16,13 +16,7 @@ from numba.core import cgutils
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import intrinsic, lower_builtin, models, register_model
 
-N_LANES = 8
-
-
-def whole_lanes(n: int) -> int:
-    """Round `n` up to a whole number of vectors of N_LANES."""
-    return -(-n // N_LANES) * N_LANES
-
+from phy.sizes import N_LANES
 
 _F32, _I16, _I32 = ir.FloatType(), ir.IntType(16), ir.IntType(32)
 _VECTOR = ir.VectorType(_F32, N_LANES)

@@ -28,53 +28,21 @@ there is. So the information bits are encoded first, which is cheap, and the par
 *Vectors.* A row is written as LLVM vector instructions; `ldpc_rows.py` explains why.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.argument_block import ArgumentBlock, PackedArguments, opener
 from phy.kernels.bits import Words, get, low_ones, put, put_signs, to_octets
 from phy.kernels.ldpc_encoder import parity_of
-from phy.kernels.ldpc_form import Form, open_form
 from phy.kernels.ldpc_rows import LANES, ldpc_row
+from phy.kernels.local import local
+from phy.kernels.openers import open_form, open_workspace
 from phy.sizes import N_COLUMNS
+from phy.tables.block import PackedArguments
+from phy.tables.code import Form, Workspace
 
 SURE = 4000
 """LLR of a bit that is known to be 0."""
-
-
-class Workspace(NamedTuple):
-    """Working memory of decoding; one per thread, because the kernels hold no lock."""
-
-    llr: NDArray[np.int16]
-    """LLRs of a whole codeword `[24 Z]`."""
-    posteriors: NDArray[np.int16]
-    messages: NDArray[np.int16]
-    told: NDArray[np.int16]
-    """What checks last received; `messages` is what they last sent.
-
-    Both are `[edges, Z up to whole vectors]`.
-    """
-    scratch: NDArray[np.int16]
-
-
-open_workspace = opener(Workspace, "i2[1] i2[2] i2[2] i2[2] i2[2]")
-
-
-def new_workspace(max_z: int = 81, max_edges: int = 96) -> ArgumentBlock[Workspace]:
-    """A workspace for codes with up to `max_z` bits per block and up to `max_edges` edges."""
-    lanes = -(-max_z // LANES) * LANES
-    return ArgumentBlock(
-        Workspace(
-            llr=np.zeros(N_COLUMNS * max_z, np.int16),
-            posteriors=np.zeros((N_COLUMNS, 3 * lanes + 2 * LANES), np.int16),
-            messages=np.zeros((max_edges, lanes), np.int16),
-            told=np.zeros((max_edges, lanes), np.int16),
-            scratch=np.zeros((N_COLUMNS, LANES), np.int16),
-        )
-    )
 
 
 @njit(nogil=True, cache=True)
@@ -125,9 +93,9 @@ def decode_blocks(
     n_rows = form.row_ends.size - 1
     n_info = (N_COLUMNS - n_rows) * z
     codeword = work.llr[: N_COLUMNS * z]
-    bits, sent = np.empty(n_info // 64 + 2, np.uint64), np.empty(n_rows * z // 64 + 2, np.uint64)
-    parity = np.empty((n_rows, 2), np.uint64)
-    decided = np.empty(out.shape[1] // 8 + 2, np.uint64)
+    bits, sent = local(np.uint64, n_info // 64 + 2), local(np.uint64, n_rows * z // 64 + 2)
+    parity = local(np.uint64, (n_rows, 2))
+    decided = local(np.uint64, out.shape[1] // 8 + 2)
     for block in range(out.shape[0]):
         at, first_llr = 0, block * ends[-1]
         decided[:] = 0
@@ -140,9 +108,11 @@ def decode_blocks(
             put_signs(llr, middle, end - middle, sent, 0)
             parity_of(bits, form, parity)
             if not _begins_with(parity, sent, z, end - middle):
-                codeword[:share] = llr[begin:middle]
+                for i in range(share):
+                    codeword[i] = llr[begin + i]
                 codeword[share:n_info] = SURE
-                codeword[n_info : n_info + end - middle] = llr[middle:end]
+                for i in range(end - middle):
+                    codeword[n_info + i] = llr[middle + i]
                 codeword[n_info + end - middle :] = 0
                 decode_codeword(codeword, form, max_iterations, work)
                 bits[:] = 0

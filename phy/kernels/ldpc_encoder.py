@@ -8,11 +8,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.argument_block import PackedArguments
 from phy.kernels.bits import ONE, Words, from_octets, get, low_ones
 from phy.kernels.inline import step
-from phy.kernels.ldpc_form import Form, open_form
+from phy.kernels.local import local
+from phy.kernels.openers import open_form
 from phy.sizes import N_COLUMNS
+from phy.tables.block import PackedArguments
+from phy.tables.code import Form
 
 _63 = np.uint64(63)
 
@@ -51,7 +53,7 @@ def parity_of(bits: Words, form: Form, parity: Words) -> None:
     n_rows = parity.shape[0]
     n_info = N_COLUMNS - n_rows
     low_mask, high_mask = low_ones(min(z, 64)), low_ones(max(z - 64, 0))
-    repeated, sums = np.empty((n_info + 1, 5), np.uint64), np.empty((n_rows, 2), np.uint64)
+    repeated, sums = local(np.uint64, (n_info + 1, 5)), local(np.uint64, (n_rows, 2))
     for column in range(n_info):
         low = get(bits, column * z, min(z, 64))
         high = get(bits, column * z + 64, z - 64) if z > 64 else np.uint64(0)
@@ -115,8 +117,8 @@ def encode_blocks(
     """Write the coded bits `[blocks, n_coded]` of blocks of bits `[blocks, n_bits]` to `out`."""
     form = open_form(form_in)
     n_rows = form.row_ends.size - 1
-    bits = np.empty((N_COLUMNS - n_rows) * form.z // 64 + 2, np.uint64)
-    parity = np.empty((n_rows, 2), np.uint64)
+    bits = local(np.uint64, (N_COLUMNS - n_rows) * form.z // 64 + 2)
+    parity = local(np.uint64, (n_rows, 2))
     for block in range(blocks.shape[0]):
         at = 0
         for number in range(form.shares.size):
@@ -134,9 +136,9 @@ def encode_octets(
 ) -> None:
     """Write the coded bits of `n_blocks` blocks of bytes to `out`, one block after another."""
     n_rows, n_octets = form.row_ends.size - 1, octets.size // n_blocks
-    whole = np.empty(n_octets // 8 + 2, np.uint64)
-    bits = np.empty((N_COLUMNS - n_rows) * form.z // 64 + 2, np.uint64)
-    parity = np.empty((n_rows, 2), np.uint64)
+    whole = local(np.uint64, n_octets // 8 + 2)
+    bits = local(np.uint64, (N_COLUMNS - n_rows) * form.z // 64 + 2)
+    parity = local(np.uint64, (n_rows, 2))
     for block in range(n_blocks):
         at, to = 0, block * form.ends[-1]
         from_octets(octets[block * n_octets : (block + 1) * n_octets], whole)

@@ -12,7 +12,9 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-LANES = 32
+from phy.sizes import N_LANES_INT16
+
+LANES = N_LANES_INT16
 MAX_POSTERIOR = 8000
 """Limit of posteriors, so that they fit 16 bits with any message added or subtracted."""
 WEIGHT = 14

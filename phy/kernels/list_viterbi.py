@@ -10,6 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from phy.kernels.convolution import N_STATES, PARITY_A, PARITY_B
+from phy.kernels.local import local
 
 _UNREACHED = -(1 << 30)
 
@@ -21,11 +22,11 @@ def list_decode(llr: NDArray[np.int16], out: NDArray[np.uint8]) -> None:
     Paths begin and end in state 0.
     """
     n_list, n_steps = out.shape
-    metrics = np.full((N_STATES, n_list), _UNREACHED, np.int64)
-    grown = np.empty_like(metrics)
+    metrics, grown = local(np.int64, (N_STATES, n_list)), local(np.int64, (N_STATES, n_list))
+    metrics[:] = _UNREACHED
     metrics[0, 0] = 0
     # Choice of predecessor and of its path: 2 · rank + predecessor.
-    came_from = np.empty((n_steps, N_STATES, n_list), np.int16)
+    came_from = local(np.int16, (n_steps, N_STATES, n_list))
     for t in range(n_steps):
         a, b = int(llr[2 * t]), int(llr[2 * t + 1])
         for state in range(N_STATES):

@@ -1,32 +1,19 @@
 """Converts PDUs to samples, eight OFDM symbols at a time."""
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.argument_block import PackedArguments, opener
-from phy.kernels.burst import Row, Tones, open_tones
 from phy.kernels.fft import transform, transpose
 from phy.kernels.inline import step
-from phy.kernels.lanes import N_LANES, least, load, root, splat, store
+from phy.kernels.lanes import least, load, root, splat, store
 from phy.kernels.ldpc_encoder import encode_octets
-from phy.kernels.ldpc_form import open_form
-
-
-class Map(NamedTuple):
-    """A modulation on a grid, as tables from coded bits to points."""
-
-    bits: int
-    source: NDArray[np.uint32]
-    """Index of the coded bit for each subcarrier bit, highest first `[n_data · bits]`."""
-    real: Row
-    imag: Row
-    """Coordinates of the points, indexed by their bits as a number."""
-
-
-open_map = opener(Map, "i8 u4[1] f4[1] f4[1]")
+from phy.kernels.local import local
+from phy.kernels.openers import open_form, open_map, open_tones
+from phy.sizes import N_LANES
+from phy.tables.block import PackedArguments
+from phy.tables.burst import Row, Tones
+from phy.tables.mapping import Map
 
 
 @step
@@ -109,16 +96,15 @@ def modulate(
     form_in: PackedArguments,
     tones_in: PackedArguments,
     map_in: PackedArguments,
+    coded: NDArray[np.uint8],
     out: NDArray[np.complex64],
 ) -> None:
     """Write whitened blocks of bytes as samples of whole symbols; the first symbol is `number`.
 
-    `padding` fills the rest of the last symbol.
+    `coded` is room for all coded bits; `padding` fills the rest of the last symbol.
     """
-    form, tones = open_form(form_in), open_tones(tones_in)
-    n_symbols = out.size // tones.n_symbol
+    form = open_form(form_in)
     n_coded = n_blocks * form.ends[-1]
-    coded = np.empty(n_symbols * tones.n_data * open_map(map_in).bits, np.uint8)
     encode_octets(octets, n_blocks, form, coded)
     for i in range(coded.size - n_coded):
         coded[n_coded + i] = padding[i]
@@ -137,9 +123,9 @@ def modulate_bits(
     """Write coded bits that fill whole symbols as samples; the first symbol is `number`."""
     tones, by = open_tones(tones_in), open_map(map_in)
     n_bits, n_symbol = tones.n_data * by.bits, tones.n_symbol
-    windows = np.empty((4, N_LANES * tones.n_fft), np.float32)
-    square = np.empty(N_LANES * N_LANES, np.float32)
-    y = np.empty((N_LANES, 2, -(-tones.bins.size // N_LANES) * N_LANES), np.float32)
+    windows = local(np.float32, (4, N_LANES * tones.n_fft))
+    square = local(np.float32, N_LANES * N_LANES)
+    y = local(np.float32, (N_LANES, 2, -(-tones.bins.size // N_LANES) * N_LANES))
     for first in range(0, coded.size // n_bits, N_LANES):
         n = min(N_LANES, coded.size // n_bits - first)
         for i in range(n):

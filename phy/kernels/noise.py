@@ -11,8 +11,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-CHUNK = 1024
-"""Number of samples with one pair of keys; also the size of the working memory."""
+from phy.sizes import NOISE_CHUNK as CHUNK
+
 _U32, _U64, _F32, _I32 = np.uint32, np.uint64, np.float32, np.int32
 _LN_2 = math.log(2)
 _TINY = _F32(2.0**-24)  # what u near 1 is rounded by: no sample is 0

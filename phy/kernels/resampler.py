@@ -6,7 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.lanes import N_LANES, Lanes, load, pairs, splat
+from phy.kernels.lanes import Lanes, load, pairs, splat
+from phy.sizes import N_LANES
 
 
 @njit(nogil=True, cache=True)

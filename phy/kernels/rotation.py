@@ -7,7 +7,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from phy.kernels.inline import step
-from phy.kernels.lanes import N_LANES, load, splat, store
+from phy.kernels.lanes import load, splat, store
+from phy.kernels.local import local
+from phy.sizes import N_LANES
 
 
 @njit(nogil=True, cache=True)
@@ -17,7 +19,7 @@ def lean(slope: float, subcarriers: NDArray[np.int64], out: NDArray[np.float32])
     for k in subcarriers:
         edge = max(edge, abs(k))
     step = complex(math.cos(slope), math.sin(slope))
-    turns = np.empty(edge + 1, np.complex64)
+    turns = local(np.complex64, edge + 1)
     turn = complex(1.0)
     for k in range(edge + 1):
         turns[k] = np.complex64(turn)

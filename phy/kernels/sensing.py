@@ -9,13 +9,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from phy.sizes import SENSE_WINDOW as WINDOW
+from phy.tables.sensing import BUSY_UNTIL, FILLED, FLOOR, LEAST_FLOOR, NEXT, POWERS
 
-# Content of the state: the floor (0: none yet), the index after the last busy window, the index of
-# the next sample, the number of samples in the current window, and their powers.
-FLOOR, BUSY_UNTIL, NEXT, FILLED, POWERS = 0, 1, 2, 3, 4
-N_STATE = POWERS + WINDOW
-
-LEAST_FLOOR = 1e-12
 # A permanent signal becomes noise: the floor doubles in this many busy windows.
 DOUBLING = 1 << 17
 _CREEP = 2 ** (1 / DOUBLING)

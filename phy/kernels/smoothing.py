@@ -16,10 +16,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.burst import DELAY, DRIFT, Channel, Planes, Scratch, Tones
 from phy.kernels.inline import step
-from phy.kernels.lanes import N_LANES, Lanes, load, splat, store, total
+from phy.kernels.lanes import Lanes, load, splat, store, total
 from phy.kernels.rotation import lean
+from phy.sizes import N_LANES
+from phy.tables.burst import DELAY, DRIFT, Channel, Planes, Scratch, Tones
 
 # Rates at which the drift estimate of a channel follows the observations.
 _DRIFT_RISE, _DRIFT_FALL = 0.5, 0.1

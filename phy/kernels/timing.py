@@ -6,21 +6,19 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.burst import Planes
 from phy.kernels.inline import step
-from phy.kernels.lanes import N_LANES, Lanes, load, splat, store, total
+from phy.kernels.lanes import Lanes, load, splat, store, total
+from phy.kernels.local import local
+from phy.sizes import N_LANES
+from phy.tables.acquisition import AMBIGUITY, SEARCH
+from phy.tables.burst import Planes
 
-SEARCH = 24
-"""The search for the first long symbol covers this many samples around its nominal place."""
 # Least share of the samples' power in a match: less is chance, or no preamble.
 MIN_MATCH = 0.12
 # The first echo counts, not the strongest: windows must begin before it. It has at least this share
 # of the strongest one's power, and comes at most MAX_SPREAD samples earlier.
 FIRST_ECHO = 0.1
 MAX_SPREAD = 12
-# In cycles per sample: the detector's peak, over segments of 16 samples, gives the frequency modulo
-# this.
-AMBIGUITY = 1 / 16
 # Longest template in samples for which two in sequence are added with their phases.
 _COHERENT = 64
 # Samples from one phase measurement to the next, on every grid.
@@ -70,7 +68,7 @@ def locate(planes: Planes, templates: NDArray[np.complex64]) -> tuple[int, float
     n_fft]`.
     """
     n_aliases, n = templates.shape
-    strength = np.empty((n_aliases, 2 * SEARCH), np.float32)
+    strength = local(np.float32, (n_aliases, 2 * SEARCH))
     correlate(planes, templates, strength)
     alias, peak, strongest = 0, 0, np.float32(-1)
     for a in range(n_aliases):

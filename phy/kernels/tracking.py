@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phy.kernels.inline import step
+from phy.tables.burst import PHASE, SLOPE
 
-# Rows of the state: [value, rate, var(value), cov, var(rate)], rates per symbol.
-PHASE, SLOPE = 0, 1
+# Columns of the state: [value, rate, var(value), cov, var(rate)], rates per symbol.
 # Process noise per symbol: phase noise of the oscillators, and modelling errors.
 PHASE_NOISE = np.array([5e-5, 1e-10])
 SLOPE_NOISE = np.array([1e-10, 1e-15])

@@ -6,11 +6,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from phy.kernels.burst import GAIN, NO, Channel, Planes, Row, Scratch, Tones
 from phy.kernels.fft import circle
 from phy.kernels.inline import step
-from phy.kernels.lanes import N_LANES, Lanes, load, splat, store, total
+from phy.kernels.lanes import Lanes, load, splat, store, total
+from phy.kernels.local import local
 from phy.kernels.smoothing import smooth
+from phy.sizes import N_LANES
+from phy.tables.burst import GAIN, NO, Channel, Planes, Row, Scratch, Tones
 
 # Number of standard deviations from which a difference in strength is not chance.
 _SURELY = 4.0
@@ -21,7 +23,7 @@ _LARGEST_BOOST = 3.0
 def turn_back(x: NDArray[np.complex64], dc: complex, frequency: float, out: Planes) -> None:
     """Write `x` `[n]` minus `dc`, rotated by −`frequency` cycles a sample, to `out` `[2, …]`."""
     span, n = 32, x.size
-    fine, coarse = np.empty((2, span), np.float32), np.empty((2, -(-n // span)), np.float32)
+    fine, coarse = local(np.float32, (2, span)), local(np.float32, (2, -(-n // span)))
     circle(-frequency, 1.0, fine)
     circle(-frequency * span, 1.0, coarse)
     dc_re, dc_im = np.float32(dc.real), np.float32(dc.imag)
@@ -135,7 +137,8 @@ def learn(
             h_re, h_im = load(channel.h, k), load(channel.h, width + k)
             seen = seen + (a * (h_re * c - h_im * d) + b * (h_re * d + h_im * c))
             expected = expected + (h_re * h_re + h_im * h_im)
-    amplitude = np.ones(n, np.float32)
+    amplitude = local(np.float32, n)
+    amplitude[:] = 1
     match, power = float(total(seen)), float(total(expected))
     if match > 0.0:
         ratio = power / match

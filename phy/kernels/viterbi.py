@@ -29,7 +29,6 @@ from numpy.typing import NDArray
 
 from phy.kernels.convolution import PARITY_A, PARITY_B
 
-MAX_LLR = 511
 UNREACHED = -12000
 N_HALF = 32
 
@@ -40,28 +39,6 @@ _LANES = ir.VectorType(_I32, N_HALF)
 # Sign with which an LLR supports the transition from state 2j on a new bit 0.
 _SIGN_A = [1 - 2 * int(PARITY_A[2 * j]) for j in range(N_HALF)]
 _SIGN_B = [1 - 2 * int(PARITY_B[2 * j]) for j in range(N_HALF)]
-
-
-class ViterbiWorkspace:
-    """Working memory of decoding, for blocks of up to `n_steps` bits, including the tail.
-
-    One per thread, because the kernels hold no lock.
-    """
-
-    def __init__(self, n_steps: int) -> None:
-        self.mother = np.zeros(2 * n_steps, np.int16)
-        self.decisions = np.zeros(n_steps, np.uint64)
-        self.n_steps = n_steps
-
-
-def decode_terminated(
-    llr: NDArray[np.int16], kept: NDArray[np.int32], n_bytes: int, work: ViterbiWorkspace
-) -> NDArray[np.uint8]:
-    """The likeliest bytes `[n, n_bytes]`; `llr[:, i]` is of the mother code's bit `kept[i]`."""
-    out = np.empty((len(llr), n_bytes), np.uint8)
-    n_steps = 8 * n_bytes + 6
-    _decode(llr, kept, work.mother[: 2 * n_steps], work.decisions[:n_steps], out)
-    return out
 
 
 def _constant(values: list[int]) -> ir.Constant:
@@ -146,13 +123,14 @@ def decode_block(
 
 
 @njit(nogil=True, cache=True)
-def _decode(
+def decode_rows(
     llr: NDArray[np.int16],
     kept: NDArray[np.int32],
     mother: NDArray[np.int16],
     decisions: NDArray[np.uint64],
     out: NDArray[np.uint8],
 ) -> None:
+    """Decode LLRs `[n, n_coded]` to bytes `[n, n_bytes]`; column i is bit `kept[i]` of the code."""
     mother[:] = 0
     for block in range(llr.shape[0]):
         for i in range(kept.size):

@@ -124,16 +124,16 @@ class Acquisition:
         self, y: Subcarriers, equaliser: Equaliser
     ) -> tuple[NDArray[np.int16], NDArray[np.complex128]]:
         """Convert header symbols `[n, n_used]` to (LLRs `[n · n_data]`, points `[n, n_data]`)."""
-        read = [equaliser.equalise(each, i, Modulation.BPSK) for i, each in enumerate(y)]
-        return np.concatenate([llr for llr, _ in read]), np.array([points for _, points in read])
+        return equaliser.equalise(y, 0, Modulation.BPSK)
 
     def _learn(self, y: Subcarriers, sent: Subcarriers, equaliser: Equaliser) -> None:
         """Refine the channel with the decoded header: four symbols instead of two.
 
         The header's symbols have turned by the tracked phase, minus the rate for each later symbol.
         """
-        phase, rate = equaliser.tracking.phase.state
-        rotation = phase - rate * np.arange(len(sent))[::-1]
+        tracked = equaliser.tracking.phase
+        later = np.arange(len(sent), dtype=np.float64)[::-1]
+        rotation = np.asarray(tracked.value - tracked.rate * later, np.float64)
         known = np.concatenate((self._long, sent))
         equaliser.channel = learn(
             y, known, preamble.N_LONG, rotation, equaliser.channel, self._grid

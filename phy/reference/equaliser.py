@@ -22,16 +22,16 @@ LEAST_MASS = BLOCK / 4
 
 
 class Decided(NamedTuple):
-    """The likely sent points on the data subcarriers of a symbol, decided from the LLRs."""
+    """The likely sent points on the data subcarriers of symbols, decided from the LLRs."""
 
     mean: Subcarriers
-    """E s `[n_data]`."""
+    """E s `[n, n_data]`."""
     square: NDArray[np.float64]
-    """E|s|² `[n_data]`."""
+    """E|s|² `[n, n_data]`."""
 
 
 class Equaliser:
-    """Equalises one burst symbol by symbol, and updates `channel`."""
+    """Equalises the symbols of one burst in turn, and updates `channel`."""
 
     def __init__(self, grid: Numerology, channel: Channel, tracking: Tracking) -> None:
         self._grid = grid
@@ -42,37 +42,64 @@ class Equaliser:
     def equalise(
         self, y: Subcarriers, number: int, modulation: Modulation
     ) -> tuple[NDArray[np.int16], Subcarriers]:
-        """Convert a symbol `[n_used]` to LLRs in the order of the code, and points.
+        """Convert symbols `[n, n_used]` to LLRs in the order of the code, and points.
 
             u = Y exp(−j(φ + sk)) / Ĥ;  L = |Ĥ|²/N (min_{x: bit 1} |u − x|² − min_{x: bit 0} …)
 
-        LLRs `[n_data · bits]` are in eighths, positive for 0; the equalised points are `[n_data]`.
-        The header's first symbol has `number` 0, and symbols are consecutive.
+        LLRs `[n · n_data · bits]` are in eighths, positive for 0; the equalised points are
+        `[n, n_data]`. The header's first symbol has number 0; the first one here has `number`, and
+        symbols are consecutive.
         """
-        sign = float(polarity(1, number)[0])
-        self.tracking.predict()
-        no = self.tracking.correct(y, sign, self.channel)
-        turned = self.tracking.turned_back(y)
-        data = self._grid.data_at
-        h = self.channel.h[data]
-        u = turned[data] * h.conj() / (np.abs(h) ** 2 + 1e-30)
-        llr, decided = demap(u, np.abs(h) ** 2 / no, modulation)
-        self._learn(turned, decided, sign, self.channel.noise / no)
-        return deinterleaved(llr, modulation, self._grid), u
+        done, parts = 0, []
+        while done < len(y):
+            # With the last symbol of a block the channel changes.
+            n = min(len(y) - done, BLOCK - self._n_heard)
+            parts.append(self._equalise(y[done : done + n], number + done, modulation))
+            done += n
+        return np.concatenate([llr for llr, _ in parts]), np.concatenate([u for _, u in parts])
 
-    def _learn(self, turned: Subcarriers, decided: Decided, sign: float, trust: float) -> None:
-        """Add a symbol to the block's sums: Σ Y (E s)*, Σ E|s|², Σ|E s|².
+    def _equalise(
+        self, y: Subcarriers, number: int, modulation: Modulation
+    ) -> tuple[NDArray[np.int16], Subcarriers]:
+        """Equalise symbols of one block."""
+        grid, signs = self._grid, polarity(len(y), number)
+        pilots, no, angle = y[:, grid.pilots_at], np.empty(len(y)), np.empty(y.shape)
+        for i, sign in enumerate(signs.tolist()):
+            self.tracking.predict()
+            no[i] = self.tracking.correct(pilots[i], sign, self.channel)
+            angle[i] = self.tracking.angle
+        turned = y * np.exp(-1j * angle)
+        h = self.channel.h[grid.data_at]
+        power = np.abs(h) ** 2
+        u = turned[:, grid.data_at] * (h.conj() / (power + 1e-30))
+        llr, decided = demap(u, power / no[:, None], modulation)
+        self._learn(turned, decided, signs, self.channel.noise / no)
+        return deinterleaved(llr, modulation, grid), u
+
+    def _learn(
+        self,
+        turned: Subcarriers,
+        decided: Decided,
+        signs: NDArray[np.float32],
+        trust: NDArray[np.float64],
+    ) -> None:
+        """Add symbols to the block's sums: Σ Y (E s)*, Σ E|s|², Σ|E s|².
 
         Pilots are certain. A symbol with interference counts less: `trust` is N over its own noise.
         """
         grid = self._grid
-        mean, square = np.empty(grid.n_used, np.complex128), np.empty(grid.n_used)
-        mean[grid.data_at], square[grid.data_at] = decided
-        mean[grid.pilots_at], square[grid.pilots_at] = sign * grid.pilot_values, 1.0
-        self._sums += trust * turned * mean.conj()
-        self._masses += trust * square
-        self._certain += trust * float(np.sum(np.abs(mean) ** 2))
-        self._n_heard += 1
+        mean, square = np.empty(turned.shape, np.complex128), np.empty(turned.shape)
+        mean[:, grid.data_at], square[:, grid.data_at] = decided
+        mean[:, grid.pilots_at] = signs[:, None] * grid.pilot_values
+        square[:, grid.pilots_at] = 1.0
+        matched = trust[:, None] * (turned * mean.conj())
+        certain = trust * np.sum(np.abs(mean) ** 2, axis=1)
+        # One after another, so that it does not matter how many come at once.
+        for i in range(len(turned)):
+            self._sums += matched[i]
+            self._masses += trust[i] * square[i]
+            self._certain += float(certain[i])
+        self._n_heard += len(turned)
         if self._n_heard == BLOCK:
             self._correct_channel()
 
@@ -100,22 +127,24 @@ class Equaliser:
 def demap(
     u: Subcarriers, certainty: NDArray[np.float64], modulation: Modulation
 ) -> tuple[NDArray[np.int16], Decided]:
-    """Convert points `[n]` to LLRs `[n · bits]`, and decide what was sent.
+    """Convert points `[n, n_data]` to LLRs `[n, n_data · bits]`, and decide what was sent.
 
-    `certainty` `[n]` is |Ĥ|²/N. Quantised LLRs are eighths, truncated towards 0. BPSK has no
-    imaginary axis.
+    `certainty` `[n, n_data]` is |Ĥ|²/N. Quantised LLRs are eighths, truncated towards 0. BPSK has
+    no imaginary axis.
     """
-    unit = modulation.unit
-    weight = (LLR_SCALE * certainty * unit**2).astype(np.float32)
-    real = (u.real / unit).astype(np.float32)
+    unit, shape = modulation.unit, u.shape
+    weight = (LLR_SCALE * unit**2 * certainty).astype(np.float32).ravel()
+    real = (u.real / unit).astype(np.float32).ravel()
     llr = axis_llrs(real, weight, modulation.axis_bits)
     level, square = expected_levels(llr)
     mean = level.astype(np.complex128)
     imaginary_bits = modulation.bits - modulation.axis_bits
     if imaginary_bits:
-        imaginary = (u.imag / unit).astype(np.float32)
+        imaginary = (u.imag / unit).astype(np.float32).ravel()
         more = axis_llrs(imaginary, weight, imaginary_bits)
         level, more_square = expected_levels(more)
         llr, mean, square = np.concatenate((llr, more)), mean + 1j * level, square + more_square
-    decided = Decided(unit * mean, unit**2 * square.astype(np.float64))
-    return llr.T.reshape(-1).astype(np.int16), decided
+    decided = Decided(
+        (unit * mean).reshape(shape), (unit**2 * square.astype(np.float64)).reshape(shape)
+    )
+    return llr.T.astype(np.int16).reshape(len(u), -1), decided

@@ -6,6 +6,7 @@ has the tables). So a codeword is an array `[24, Z]`, and the Z checks of a bloc
 operation for each of its blocks.
 """
 
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -24,6 +25,7 @@ WEIGHT = 14
 """Factor of messages, in sixteenths (Chen and Fossorier 2002)."""
 
 
+@cache
 def taken(code: QuasiCyclic) -> NDArray[np.int64]:
     """The bit of its block column that each check takes on edge e, in row e `[edges, Z]`."""
     return (np.arange(code.z) + code.shifts[:, None]) % code.z
@@ -41,12 +43,11 @@ def parity(information: Bits, code: QuasiCyclic) -> Bits:
     """
     n_rows = len(code.base)
     u = information.reshape(-1, code.z)
-    sums = np.zeros((n_rows, code.z), np.uint8)
-    takes = taken(code)
-    for row, (first, last) in enumerate(pairwise(code.row_ends)):
-        for edge in range(first, last):
-            if code.columns[edge] < len(u):
-                sums[row] ^= u[code.columns[edge], takes[edge]]
+    # The parity columns come last in every row.
+    edges = np.flatnonzero(code.columns < len(u))
+    begins = np.searchsorted(edges, code.row_ends[:-1])
+    bits = u[code.columns[edges, None], taken(code)[edges]]
+    sums = np.bitwise_xor.reduceat(bits, begins)
     p = np.empty((n_rows, code.z), np.uint8)
     p[0] = np.bitwise_xor.reduce(sums)
     p[1] = sums[0] ^ np.roll(p[0], -1)

@@ -48,5 +48,5 @@ def to_subcarriers(
 def deinterleaved(
     placed: NDArray[np.int16], modulation: Modulation, grid: Numerology
 ) -> NDArray[np.int16]:
-    """Put the values of a symbol's positions `[n_data · bits]` back into the order of the code."""
-    return placed[order(grid.n_data * modulation.bits, modulation.bits)]
+    """Put the values of symbols' positions `[n, n_data · bits]` into the order of the code."""
+    return placed[:, order(grid.n_data * modulation.bits, modulation.bits)].ravel()

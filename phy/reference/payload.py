@@ -10,7 +10,7 @@ from phy.layout import BurstLayout
 from phy.numerology import Numerology
 from phy.reference.acquisition import Acquired
 from phy.reference.ldpc import decode_blocks
-from phy.reference.ofdm import to_subcarriers
+from phy.reference.ofdm import Subcarriers, to_subcarriers
 from phy.sequences import whitening
 
 SLIP_EVERY = 256
@@ -20,7 +20,7 @@ FADED = 0.25
 
 
 class Payload:
-    """Takes a burst's payload symbol by symbol, and decodes each PDU after its last symbol."""
+    """Takes the symbols of a burst's payload, and decodes each PDU after its last one."""
 
     def __init__(
         self, acquired: Acquired, plan: BurstLayout, grid: Numerology, n_header: int
@@ -47,15 +47,26 @@ class Payload:
         """Absolute index after the FFTs of the first `n` symbols."""
         return self.window(n) - self._grid.n_cp
 
-    def take(self, samples: NDArray[np.complex64], dc: complex) -> NDArray[np.complex128]:
-        """Process the next symbol's FFT window `[n_fft]`; returns its points."""
-        found, grid, number = self.acquired, self._grid, self.n_symbols_in
-        origin = self.window(number) - found.origin
-        y = to_subcarriers(samples, np.array([0]), found.frequency, dc, grid, origin)[0]
-        self._powers.append(float(np.mean(np.abs(y) ** 2)))
-        llr, points = found.equaliser.equalise(y, self._n_header + number, self.plan.mcs.modulation)
+    def n_through(self, end: int) -> int:
+        """How many symbols can be taken when the stream reaches index `end`.
+
+        At most those that complete the next PDU, and those before the windows slip.
+        """
+        plan, first = self.plan, self.n_symbols_in
+        arrived = (end - self.end_of(0)) // self._grid.n_symbol
+        limit = first - first % SLIP_EVERY + SLIP_EVERY
+        return min(arrived, plan.symbols_through(self.n_done + 1), limit) - first
+
+    def take(self, samples: NDArray[np.complex64], dc: complex, n: int) -> Subcarriers:
+        """Process the next `n` symbols, from the first FFT window on; returns their points."""
+        found, grid, first = self.acquired, self._grid, self.n_symbols_in
+        origin = self.window(first) - found.origin
+        starts = grid.n_symbol * np.arange(n)
+        y = to_subcarriers(samples, starts, found.frequency, dc, grid, origin)
+        self._powers += np.mean(np.abs(y) ** 2, axis=1).tolist()
+        llr, points = found.equaliser.equalise(y, self._n_header + first, self.plan.mcs.modulation)
         self._llr = np.concatenate((self._llr, llr))
-        self.n_symbols_in += 1
+        self.n_symbols_in += n
         return points
 
     def is_next_in(self) -> bool:

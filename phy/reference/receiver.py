@@ -207,20 +207,23 @@ class Receiver:
         return True
 
     def _payload(self, burst: Payload, events: list[Event]) -> bool:
-        """Process the next symbol, and report the PDUs that it completes."""
-        number = burst.n_symbols_in
-        x = self._view(burst.window(number), burst.end_of(number + 1))
+        """Process the symbols that have come, up to the end of a PDU, and report that PDU."""
+        n = burst.n_through(self.next_index)
+        if n < 1:
+            return False
+        first, last = burst.n_symbols_in, burst.n_symbols_in + n
+        x = self._view(burst.window(first), burst.end_of(last))
         if x is None:
             return False
-        points = burst.take(x, self._detector.dc)
+        points = burst.take(x, self._detector.dc, n)
         if self._on_points is not None:
-            self._on_points(points[None].astype(np.complex64), burst.plan.mcs.modulation)
-        self._at = burst.end_of(number + 1)
+            self._on_points(points.astype(np.complex64), burst.plan.mcs.modulation)
+        self._at = burst.end_of(last)
         while burst.is_next_in():
             data = burst.decode()
             if data is not None:
                 self.counters["pdus_good"] += 1
-                at = burst.end_of(number + 1) + BACKOFF
+                at = burst.end_of(last) + BACKOFF
                 events.append(PduHeard(data, burst.n_done - 1, at, burst.acquired.quality))
             else:
                 self.counters["pdus_bad"] += 1

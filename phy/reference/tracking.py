@@ -4,6 +4,8 @@ The phase changes with the residual offset and the oscillators' noise. The slope
 sender's sampling clock drifts away from ours.
 """
 
+import cmath
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,33 +23,38 @@ FREQUENCY_ERROR_0_DB, FREQUENCY_ERROR_MIN = 0.006, 0.0005
 CLOCK_ERROR, CLOCK_DOUBT = 40e-6, 5e-6
 """Standard deviations of a clock's error: unknown, and derived from the centre frequency."""
 
-_MOVE = np.array([[1.0, 1.0], [0.0, 1.0]])
-
 
 class Kalman:
-    """A Kalman filter with the state (value, rate), one step per symbol."""
+    """A Kalman filter with the state (value, rate), one step per symbol.
+
+    Its matrices are so small that plain numbers are faster.
+    """
 
     def __init__(self, noise: tuple[float, float], rate: float, rate_deviation: float) -> None:
-        self.state = np.array([0.0, rate])
-        self.covariance = np.diag([0.0, rate_deviation**2])
-        self._noise = np.diag(noise)
+        self.value, self.rate = 0.0, rate
+        # The covariance (a b; b c).
+        self._a, self._b, self._c = 0.0, 0.0, rate_deviation**2
+        self._noise = noise
 
     @property
-    def value(self) -> float:
-        """The value, in radians or radians per subcarrier."""
-        return float(self.state[0])
+    def covariance(self) -> tuple[float, float, float]:
+        """Variance of the value, covariance, variance of the rate."""
+        return self._a, self._b, self._c
 
     def predict(self) -> None:
         """Advance by one symbol: x = F x, C = F C Fᵀ + Q, with F = (1 1; 0 1)."""
-        self.state = _MOVE @ self.state
-        self.covariance = _MOVE @ self.covariance @ _MOVE.T + self._noise
+        self.value += self.rate
+        self._a += 2 * self._b + self._c + self._noise[0]
+        self._b += self._c
+        self._c += self._noise[1]
 
     def correct(self, innovation: float, variance: float) -> None:
         """Correct by a measured deviation: x += K i, C −= K C₀, K = C₀ / (C₀₀ + variance)."""
-        first = self.covariance[0]
-        gain = first / (first[0] + variance)
-        self.state = self.state + gain * innovation
-        self.covariance = self.covariance - np.outer(gain, first)
+        a, b = self._a, self._b
+        of_value, of_rate = a / (a + variance), b / (a + variance)
+        self.value += of_value * innovation
+        self.rate += of_rate * innovation
+        self._a, self._b, self._c = a - of_value * a, b - of_value * b, self._c - of_rate * b
 
 
 class Tracking:
@@ -59,6 +66,7 @@ class Tracking:
 
     def __init__(self, grid: Numerology, channel: Channel, clock_error: float | None) -> None:
         self._grid = grid
+        self._k, self._pilots = grid.used[grid.pilots_at], grid.pilot_values
         # Factor from a frequency in subcarrier spacings to the phase per symbol.
         turn = 2 * np.pi * grid.n_symbol / grid.n_fft
         offset = max(FREQUENCY_ERROR_0_DB * np.sqrt(channel.no / channel.gain), FREQUENCY_ERROR_MIN)
@@ -71,21 +79,21 @@ class Tracking:
         self.phase.predict()
         self.slope.predict()
 
-    def turned_back(self, y: Subcarriers) -> Subcarriers:
-        """Rotate a symbol's subcarriers `[n_used]` back: Y exp(−j(φ + sk))."""
-        angle = self.phase.value + self.slope.value * self._grid.used
-        return np.asarray(y * np.exp(-1j * angle))
+    @property
+    def angle(self) -> NDArray[np.float64]:
+        """The phase of each subcarrier in use `[n_used]`: φ + sk."""
+        return np.asarray(self.phase.value + self.slope.value * self._grid.used, np.float64)
 
-    def correct(self, y: Subcarriers, polarity: float, channel: Channel) -> float:
-        """Correct φ and s by a symbol `y` `[n_used]`; returns the noise that its pilots show.
+    def correct(self, pilots: Subcarriers, polarity: float, channel: Channel) -> float:
+        """Correct φ and s by a symbol's pilots `[n_pilots]`; returns the noise that they show.
 
         θ_p = arg(Y_p Ĥ*_p P_p) − φ − s k_p;  S_i = Σ|Ĥ_p|² k_p^i
         Var(φ) = N/2 · S₂ / (S₀S₂ − S₁²),  Var(s) = N/2 · S₀ / (S₀S₂ − S₁²)
         """
-        at, pilots = self._grid.pilots_at, polarity * self._grid.pilot_values
-        weight = np.abs(channel.h[at]) ** 2
-        turned = self.turned_back(y)[at] * channel.h[at].conj() * pilots
-        return self.correct_by(turned, weight, self._grid.used[at], channel.noise)
+        k, h = self._k, channel.h[self._grid.pilots_at]
+        back = np.exp(-1j * (self.phase.value + self.slope.value * k))
+        turned = pilots * h.conj() * (polarity * self._pilots) * back
+        return self.correct_by(turned, np.abs(h) ** 2, k, channel.noise)
 
     def correct_by(
         self, turned: Subcarriers, weight: NDArray[np.float64], k: NDArray[np.int64], no: float
@@ -96,20 +104,19 @@ class Tracking:
         expected ones; `weight` is |Ĥ_p|², `k` are the subcarriers, each `[n]`. The result is the
         noise power on a subcarrier: `no`, or the pilots' own if they disagree by far more.
         """
-        total = turned.sum()
+        total = complex(turned.sum())
         if total == 0:
             return no
         # First the common phase; then the remaining angles are small: arg z ≈ Im z/|z|.
-        common = float(np.angle(total))
-        aligned = turned * np.exp(-1j * common)
-        weighted_theta = aligned.imag
-        heard = weight > 0
-        disagreement = np.sum(np.abs(aligned - weight)[heard] ** 2 / weight[heard])
-        if disagreement > SURPRISE * len(turned) * no:
-            no = float(disagreement / len(turned))
-        s0, s1, s2 = (float(np.sum(weight * k**i)) for i in range(3))
+        common = cmath.phase(total)
+        aligned = turned * cmath.exp(-1j * common)
+        pilots = list(zip(aligned.tolist(), weight.tolist(), k.tolist(), strict=True))
+        disagreement = sum(abs(z - w) ** 2 / w for z, w, _ in pilots if w > 0)
+        if disagreement > SURPRISE * len(pilots) * no:
+            no = disagreement / len(pilots)
+        s0, s1, s2 = (sum(w * k**i for _, w, k in pilots) for i in range(3))
         # The sum Σ θ of the weighted angles is 0 by the choice of the common phase.
-        t1 = float(np.sum(weighted_theta * k))
+        t1 = sum(z.imag * k for z, _, k in pilots)
         det = s0 * s2 - s1 * s1
         if not det > 0:
             return no
@@ -119,4 +126,4 @@ class Tracking:
 
     def slip(self, early: int) -> None:
         """Reduce the slope for windows that begin `early` samples earlier."""
-        self.slope.state[0] -= early * 2 * np.pi / self._grid.n_fft
+        self.slope.value -= early * 2 * np.pi / self._grid.n_fft

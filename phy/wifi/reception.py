@@ -9,15 +9,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from phy import ofdm, preamble
+from phy import compute, ofdm, preamble
 from phy.constellation import Modulation
 from phy.demodulation import Demodulator
 from phy.estimation import in_planes, new_channel, new_scratch, tones
-from phy.kernels.acquisition import BACKOFF
-from phy.kernels.argument_block import ArgumentBlock
-from phy.kernels.burst import Channel
-from phy.kernels.demodulator import learn_channel
 from phy.numerology import OFDM_64_16
+from phy.tables.acquisition import BACKOFF
+from phy.tables.block import ArgumentBlock
+from phy.tables.burst import Channel
 from phy.wifi.bits import Rate, Signal, has_right_fcs, parse_data, parse_signal
 from phy.wifi.high_throughput import HT_SIG_SYMBOLS, HtSignal, parse_ht_signal
 
@@ -180,7 +179,7 @@ def _channel(
     y = ofdm.to_tones(samples[window:], starts, frequency, 0j, _GRID)
     sent = preamble.long_subcarriers(_GRID)[_GRID.tones].astype(np.complex64)
     channel, known = new_channel(_GRID), in_planes(np.tile(sent, (preamble.N_LONG, 1)))
-    learn_channel(y, known, tones(_GRID).packed, channel.packed, new_scratch(_GRID).packed)
+    compute.learn_channel(y, known, tones(_GRID), channel, new_scratch(_GRID))
     return channel
 
 

@@ -52,7 +52,7 @@ COMMANDS = {
         ("plan",),
     ),
     "pdu": Listed("PDUs on the air.", ("pdu",)),
-    "phy": Listed("The modem, and recordings of samples.", ("phy", "wifi")),
+    "phy": Listed("The modem, and recordings of samples.", ("phy", "phy_compile", "wifi")),
     "radio": Listed("Radios of this machine, through SoapySDR.", ("radio",)),
     "record": Listed("Record what a radio hears, without a daemon; never transmits.", ("record",)),
     "replay": Listed(

@@ -39,6 +39,14 @@ class LinkKind(StrEnum):
     DIRECT = "direct"
 
 
+class EngineKind(StrEnum):
+    """What computes the modem."""
+
+    AUTO = "auto"
+    COMPILED = "compiled"
+    NUMPY = "numpy"
+
+
 class ChannelKind(StrEnum):
     """The model of the simulated channel."""
 
@@ -99,6 +107,9 @@ def demo(
             help="The modem's sample rate; default: what this machine sustains, up to 5e6.",
         ),
     ] = None,
+    engine: Annotated[
+        EngineKind, typer.Option(help="What computes the modem: compiled code, or NumPy.")
+    ] = EngineKind.AUTO,
     record: Annotated[
         Path | None, typer.Option(help="Keep the SigMF recording of iqfile under this name.")
     ] = None,
@@ -119,13 +130,14 @@ def demo(
     kinds = list(dict.fromkeys(link or list(LinkKind)))
     options = Options(
         link=kinds[0].value, pdu_size=pdu_size, speed=speed, seed=seed, mcs=mcs, snr_db=snr,
-        clock_ppm=ppm, channel=channel.value, recording=record,
+        clock_ppm=ppm, channel=channel.value, engine=engine.value,
+        recording=record,
     )  # fmt: skip
     source = open_source(bag, registry, topics or [], duration, seed)
     for reason in source.left_out:
         _say(console, f"left out: {reason}", style="yellow")
     if kinds != [LinkKind.DIRECT]:
-        compile_first(console)
+        compile_first(console, engine.value)
         rate = rate or _measure(console, source, options)
         options = replace(options, rate_hz=rate)
     for kind in kinds:

@@ -109,17 +109,15 @@ def _radio(setup: "Setup | None", device: str) -> list["Finding"]:
 def _environment() -> list["Finding"]:
     import phy
     import sdrlinkd
+    from phy import engine
     from sdrlinkd.doctor import check_environment
 
     try:
         requirements = metadata.requires("sdrlinkd") or []
     except metadata.PackageNotFoundError:
         requirements = []
-    phy_folder = Path(phy.__file__).parent
-    cache = Path(os.environ.get("NUMBA_CACHE_DIR") or phy_folder / "kernels" / "__pycache__")
-    return check_environment(
-        requirements, metadata.version, Path(sdrlinkd.__file__).parents[1], phy_folder.parent, cache
-    )
+    home, phy_home = (Path(each.__path__[0]).parent for each in (sdrlinkd, phy))
+    return check_environment(requirements, metadata.version, home, phy_home, engine.fitting())
 
 
 def _stat() -> str:

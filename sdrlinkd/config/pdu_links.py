@@ -67,6 +67,9 @@ class ModemParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     that listen."""
     block_s: Annotated[float, Meta(ge=1e-4, le=0.1)] = 0.001
     """Length in s of the blocks in which samples are received."""
+    engine: Literal["auto", "compiled", "numpy"] = "auto"
+    """What computes the modem: compiled code, or NumPy, which is slow and needs no compiler;
+    "auto": compiled code if this machine has it or can make it."""
     oversampling: Literal[1, 2, 4] = 1
     """Ratio of the radio's sample rate to `rate_hz`; for radios that do not support low rates."""
 

@@ -28,6 +28,7 @@ class Options:
     clock_ppm: float = 10.0
     channel: str = "awgn"
     rate_hz: float = 5e6
+    engine: str = "auto"
     recording: Path | None = None
     """Path where `iqfile` keeps its recording; None: it is not kept."""
 
@@ -67,6 +68,7 @@ def write_config(
             "[modem]",
             f"rate_hz = {options.rate_hz}",
             f"mcs = {options.mcs}",
+            f'engine = "{options.engine}"',
             f"max_cfo_hz = {min(MAX_CFO_HZ, options.rate_hz / 4)}",
             "[channel]",
             f'profile = "{options.channel}"',

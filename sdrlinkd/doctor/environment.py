@@ -1,6 +1,5 @@
 """Checks Python, the packages and the compiled modem."""
 
-import os
 import re
 import sys
 from collections.abc import Callable
@@ -18,13 +17,13 @@ def check_environment(
     version_of: Callable[[str], str],
     home: Path,
     phy_home: Path,
-    cache: Path,
+    library: Path | None,
 ) -> list[Finding]:
     """Findings on Python, the packages and the compiled modem.
 
     `requirements` are those of the package's metadata. `version_of` raises PackageNotFoundError.
-    `home` is the folder with sdrlinkd, `phy_home` the one with phy, and `cache` the folder of the
-    compiled code.
+    `home` is the folder with sdrlinkd, `phy_home` the one with phy, and `library` the compiled
+    modem; None: there is none for this machine.
     """
     found = ".".join(map(str, sys.version_info[:3]))
     return [
@@ -37,7 +36,10 @@ def check_environment(
             home == phy_home, "modem's package", f"phy in {phy_home}",
             "another project's phy shadows it: install sdrlinkd into its own environment",
         ),
-        _compiled(cache),
+        good_if(
+            library is not None, "compiled modem", str(library or "none for this machine"),
+            "without it, the modem runs on NumPy, slowly; compile it: sdrlinkctl phy compile",
+        ),
     ]  # fmt: skip
 
 
@@ -62,20 +64,3 @@ def _packages(requirements: list[str], version_of: Callable[[str], str]) -> Find
 
 def _numbers(version: str) -> list[int]:
     return [int(each) for each in re.findall(r"\d+", version)[:3]]
-
-
-def _compiled(cache: Path) -> Finding:
-    kernels = len(list(cache.rglob("*.nbi"))) if cache.is_dir() else 0
-    compile_it = f"{sys.executable} -c 'import phy; phy.warm_up()'"
-    if kernels:
-        return good("compiled modem", f"{kernels} kernels in {cache}")
-    folder = cache if cache.is_dir() else cache.parent
-    if os.access(folder, os.W_OK):
-        return bad(
-            "compiled modem", f"none in {cache}: the first start takes minutes",
-            f"compile it now: {compile_it}",
-        )  # fmt: skip
-    return bad(
-        "compiled modem", f"none in {cache}, and this user may not write there",
-        f"as the user who may: {compile_it}; or name a folder: export NUMBA_CACHE_DIR=FOLDER",
-    )  # fmt: skip

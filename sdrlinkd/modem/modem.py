@@ -68,6 +68,8 @@ class ModemStatus(NamedTuple):
     """Demodulation speed relative to real time; 0: not known yet."""
     scheduling: str = ""
     """How the kernel runs the modem's process, in words; empty: not asked for anything."""
+    engine: str = ""
+    """What computes the modem, in words; empty: not known yet."""
     advice: str = ""
     """What to do about what the kernel refused, in a sentence; empty: nothing."""
 

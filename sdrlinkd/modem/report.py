@@ -36,6 +36,7 @@ def modem_report(
         counters=dict(modem.counters),
         realtime_ratio=round(ratio, 2) if ratio else None,
         scheduling=modem.scheduling,
+        engine=modem.engine,
         notices=_notices(state, problem, params, modem, can, stream_end),
     )
 

@@ -1,8 +1,6 @@
 """Daemons and compiled code: nothing is compiled while a link runs, and a cold start says so."""
 
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -13,26 +11,20 @@ from sdrlinkd.client import Publisher
 from sdrlinkd.compiling import compile_modem
 from tests.waiting import wait_for
 
-ROOT = Path(__file__).parents[2]
+COMPILED = phy.Engine("compiled", "compiled for x86-64", {}, None, None)
+NUMPY = COMPILED._replace(name="numpy", told="NumPy, which is slow: no linker")
 
 
-@pytest.mark.slow
-def test_no_kind_of_link_compiles_anything(tmp_path):
-    """In one process and by signatures, not files, so it takes seconds whatever is cached."""
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.daemon.link_kinds", str(tmp_path)],
-        cwd=ROOT, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert done.stdout == ""
-
-
-def test_a_daemon_with_a_cold_cache_takes_messages_says_so_and_can_be_stopped(
+def test_a_daemon_without_a_compiled_modem_takes_messages_says_so_and_can_be_stopped(
     start_daemon, tmp_path, monkeypatch
 ):
     """Its radio is opened after the compilation."""
-    (tmp_path / "cold").mkdir()
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cold"))
+    # In the daemon's process and in that of its modem.
+    (tmp_path / "sitecustomize.py").write_text(
+        "from pathlib import Path\nfrom phy.engine import files\n"
+        f"files._folders = lambda: iter([Path({str(tmp_path / 'cold')!r})])\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{Path(phy.__file__).parents[1]}")
     daemon = start_daemon(
         f'drain_s = 0\nbackend = "iqfile"\n[iqfile]\ntransmit = "{tmp_path / "radio"}"\n'
     )
@@ -55,18 +47,18 @@ def test_a_daemon_with_a_cold_cache_takes_messages_says_so_and_can_be_stopped(
 
 @pytest.fixture
 def told(monkeypatch):
-    """What is logged about a warm-up that compiles kernels at these times, with a cache present."""
+    """What is logged about a warm-up that compiles kernels at these times."""
 
-    def call(times, folder=None, **options):
+    def call(times, used=COMPILED, **options):
         clock = iter([0.0, *times, times[-1] if times else 0.0])
         monkeypatch.setattr(compiling.time, "monotonic", lambda: next(clock))
 
-        def warm_up(progress):
+        def warm_up(_, progress):
             for done in range(len(times)):
                 progress(done + 1, 64)
+            return used
 
         monkeypatch.setattr(phy, "warm_up", warm_up)
-        monkeypatch.setattr(phy, "temporary_cache", lambda: folder)
         said = []
         compile_modem(said.append, **options)
         return said
@@ -83,7 +75,7 @@ def test_progress_is_told_now_and_then(told):
     ]
 
 
-def test_of_a_warm_cache_nothing_is_told(told):
+def test_of_a_compiled_modem_nothing_is_told(told):
     assert told([]) == []
 
 
@@ -93,11 +85,9 @@ def test_a_screen_shows_progress_elsewhere(told):
     assert len(passing) == 2
 
 
-def test_where_it_is_kept_is_told_in_a_line(told, tmp_path):
-    (line,) = told([], tmp_path)
-    assert f"is cached in {tmp_path}: neither" in line
-    (line,) = told([], tmp_path / "none")
-    assert "every start compiles it again" in line
+def test_a_modem_that_is_not_compiled_is_told_unless_it_was_asked_for(told):
+    assert told([], NUMPY) == ["the modem runs on NumPy, which is slow: no linker"]
+    assert told([], NUMPY, engine="numpy") == []
 
 
 def test_it_can_be_given_up(told):

@@ -1,7 +1,6 @@
 """Each check by itself, on invented machines."""
 
 import os
-import sys
 from importlib import metadata
 from pathlib import Path
 
@@ -80,11 +79,7 @@ def test_a_machine_that_tells_nothing(tmp_path):
     assert (found["stolen time"], found["frequency governor"]) == (NONE, NONE)
 
 
-def environment(tmp_path, requirements=(), versions=None, kernels=3, phy_home=None):
-    cache = tmp_path / "cache"
-    cache.mkdir()
-    for i in range(kernels):
-        (cache / f"{i}.nbi").touch()
+def environment(tmp_path, requirements=(), versions=None, library=Path("modem.so"), phy_home=None):
 
     def version_of(name):
         if name not in (versions or {}):
@@ -92,7 +87,7 @@ def environment(tmp_path, requirements=(), versions=None, kernels=3, phy_home=No
         return versions[name]
 
     return by_name(
-        check_environment(list(requirements), version_of, tmp_path, phy_home or tmp_path, cache)
+        check_environment(list(requirements), version_of, tmp_path, phy_home or tmp_path, library)
     )
 
 
@@ -101,22 +96,16 @@ def test_the_environment(tmp_path):
     found = environment(tmp_path, wanted, {"zfec": "1.10.0", "numpy": "2.0"})
     assert {each.state for each in found.values()} == {GOOD}
     assert found["packages"].told == "2, all installed"
-    assert "3 kernels" in found["compiled modem"].told
+    assert found["compiled modem"].told == "modem.so"
 
 
 def test_what_the_environment_lacks(tmp_path):
     found = environment(
-        tmp_path, ["zfec>=1.5", "numpy>=1.26"], {"numpy": "1.9"}, 0, Path("/elsewhere")
+        tmp_path, ["zfec>=1.5", "numpy>=1.26"], {"numpy": "1.9"}, None, Path("/elsewhere")
     )
     assert found["packages"].told == "zfec is missing, numpy 1.9 is older than 1.26"
     assert found["modem's package"].state is BAD
-    assert f"{sys.executable} -c 'import phy; phy.warm_up()'" in found["compiled modem"].to_do
-
-
-def test_a_cache_that_may_not_be_written(tmp_path, monkeypatch):
-    monkeypatch.setattr(os, "access", lambda *_: False)
-    found = by_name(check_environment([], str, tmp_path, tmp_path, tmp_path / "cache"))
-    assert "NUMBA_CACHE_DIR" in found["compiled modem"].to_do
+    assert "sdrlinkctl phy compile" in found["compiled modem"].to_do
 
 
 def test_the_runtime_directory(tmp_path):

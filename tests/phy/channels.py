@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from phy.estimation import in_planes, new_channel, new_scratch, tones
-from phy.kernels.burst import DRIFT, GAIN, NO
 from phy.kernels.training import estimate
 from phy.reference import training
+from phy.tables.burst import DRIFT, GAIN, NO
 from tests.phy.signals import noise
 
 

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from phy import OFDM_64_16, Modulation
+from phy import OFDM_64_16, Modulation, compute
 from phy.interleaver import order
-from phy.kernels.convolution import convolve
 from phy.mapping import mapping
 from phy.ofdm import to_tones
 from phy.preamble import BARKER, SEGMENT, SHORT, length, long_symbol, preamble, short_subcarriers
@@ -67,7 +66,7 @@ def subcarriers(signs):
 
 def test_the_signal_field_is_coded():
     coded = np.empty((1, 48), np.uint8)
-    convolve(bits(SIGNAL)[None, :], coded)
+    compute.convolve(bits(SIGNAL)[None, :], coded)
     assert np.array_equal(coded[0], bits(SIGNAL_CODED))
 
 

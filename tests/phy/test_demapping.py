@@ -7,10 +7,10 @@ from phy import OFDM_64_16, Modulation, ofdm, points
 from phy.convolutional import MAX_LLR
 from phy.estimation import in_planes, new_channel, new_scratch, tones
 from phy.interleaver import order
-from phy.kernels.burst import GAIN, NO
 from phy.kernels.equaliser import BLOCK, equalise, start_tracking
 from phy.mapping import axes, mapping
 from phy.sequences import polarity
+from phy.tables.burst import GAIN, NO
 
 SEED = 17
 GRID = OFDM_64_16

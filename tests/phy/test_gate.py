@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from phy import Receiver, Transmitter, preamble
-from phy.kernels.detector import DC_IMAG, DC_REAL, DOUBLING, FLOOR, GATE, HISTORY, N_STATE, search
+from phy import Receiver, Transmitter, compute, preamble
+from phy.kernels.detector import DOUBLING, GATE
 from phy.reference import detection
+from phy.tables.detector import DC_IMAG, DC_REAL, FLOOR, HISTORY, new_search_memory
 from tests.phy.signals import heard, noise, silence
 
 HOP = 512
@@ -18,13 +19,13 @@ class Search:
     """The kernel on one stream after another, with the state that it keeps."""
 
     def __init__(self, floor=0.0):
-        self.state = np.zeros(N_STATE)
+        self._memory = new_search_memory(HOP)
+        self.state = self._memory.content.state
         self.state[FLOOR] = floor
-        self._work = np.zeros((7, HISTORY + HOP), np.float32)
 
     def __call__(self, x, threshold=0.25):
         n_hops = (len(x) - HISTORY) // HOP
-        return search(x, n_hops, HOP, threshold, 0.0, 0, self.state, self._work)
+        return compute.search(x, n_hops, HOP, threshold, 0.0, 0, self._memory)
 
 
 def hops(rng, n, power=1.0):

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from numba import njit
 
-from phy import OFDM_64_16, Modulation
-from phy.kernels.detector import FORGETS, HISTORY, detector_sums, sanitise, search
-from phy.kernels.resampler import interpolate
+from phy import OFDM_64_16, Modulation, compute
+from phy.kernels.detector import detector_sums
 from phy.kernels.rotation import lean, lean_more
 from phy.mapping import mapping
 from phy.numerology import GRIDS
@@ -16,6 +15,7 @@ from phy.reference.mapping import to_subcarriers
 from phy.reference.ofdm import to_samples
 from phy.reference.smoothing import centred
 from phy.stream import SampleStream
+from phy.tables.detector import FORGETS, HISTORY, new_search_memory
 from tests.phy.signals import noise, silence, turned
 
 SEED = 47
@@ -55,9 +55,11 @@ def test_the_metric_is_1_at_the_last_sample_of_the_short_training_and_nowhere_el
 
 
 def searched(x, threshold=0.25, hop=512, dc=(0.0, 0.0, 0.0, 0.0), excess=0.0, age=0):
-    state, work = np.array(dc), np.zeros((7, HISTORY + hop), np.float32)
+    memory = new_search_memory(hop)
+    memory.content.state[:] = dc
     n_hops = (len(x) - HISTORY) // hop
-    return search(x, n_hops, hop, threshold, excess, age, state, work), state
+    found = compute.search(x, n_hops, hop, threshold, excess, age, memory)
+    return found, memory.content.state
 
 
 @pytest.mark.parametrize("lead", [HISTORY, 700, 703, 1500])
@@ -94,7 +96,7 @@ def test_numbers_too_large_or_none_become_0_and_are_counted():
         [1, np.nan, 2j, np.inf, complex(0, -np.inf), complex(np.nan, 1), 99, 101, -101j, 1e38],
         np.complex64,
     )
-    assert sanitise(x, 100) == 7
+    assert compute.sanitise(x, 100) == 7
     assert list(x) == [1, 0, 2j, 0, 0, 0, 99, 0, 0, 0]
 
 
@@ -115,7 +117,7 @@ def test_interpolate_is_a_sum_of_its_filters_taps():
     x = noise(rng(), 50)
     filters = rng().standard_normal((9, 4)).astype(np.float32)
     out = np.empty(70, np.complex64)
-    interpolate(np.stack((x.real, x.imag)), filters, -3.3, 0.9, out)
+    compute.interpolate(np.stack((x.real, x.imag)), filters, -3.3, 0.9, out)
     padded = np.concatenate((silence(20), x, silence(40)))
     for n, got in enumerate(out):
         t = -3.3 + 0.9 * n

@@ -8,11 +8,12 @@ from phy import Modulation, points
 from phy.kernels import lanes
 from phy.kernels.decisions import expected_level
 from phy.kernels.demapper import axis_llrs
-from phy.kernels.lanes import N_LANES, load, splat, store, store_int16
+from phy.kernels.lanes import load, splat, store, store_int16
 from phy.numerology import GRIDS
 from phy.ofdm import to_tones
 from phy.reference import demapper as reference
 from phy.reference.ofdm import to_subcarriers
+from phy.sizes import N_LANES
 from tests.phy.signals import noise
 
 SEED = 49

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from phy.kernels.noise import CHUNK, add_noise
+from phy import compute
+from phy.sizes import NOISE_CHUNK as CHUNK
 
 KEY = 0x0123456789ABCDEF
 
@@ -14,7 +15,7 @@ def made(n, key=KEY, first=0, scale=1.0, x=None):
     out = np.empty(2 * n, np.float32)
     x = np.zeros(2 * n, np.float32) if x is None else x.view(np.float32)
     bits, radii = np.empty(CHUNK, np.uint32), np.empty(CHUNK, np.float32)
-    add_noise(x, key, first, scale, bits, radii, out)
+    compute.add_noise(x, key, first, scale, bits, radii, out)
     return out.view(np.complex64)
 
 

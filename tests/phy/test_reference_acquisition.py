@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from phy import GRIDS, Transmitter, acquisition, header_code, preamble
+from phy import GRIDS, Transmitter, acquisition, compute, header_code, preamble
 from phy.header import BurstHeader
 from phy.kernels import acquisition as kernel
-from phy.kernels.detector import search, strongest
 from phy.kernels.timing import locate
-from phy.kernels.tracking import PHASE
 from phy.reference import acquisition as plain_acquisition
 from phy.reference import detection, offset, timing
 from phy.reference.header import folded, parse_header
+from phy.tables.burst import PHASE
+from phy.tables.detector import new_search_memory
 from tests.phy.channels import assert_same, echoed, in_tones
 from tests.phy.signals import noise, silence, turned
 
@@ -30,10 +30,11 @@ def planes_of(x):
 
 def searched(x, at, excess=0.0, dc=0j, n_seen=0):
     """(index of the first crossing or None, DC, hops seen) by the kernel, hop by hop."""
-    state, work = np.array([dc.real, dc.imag, n_seen, 0.0]), np.zeros((7, 191 + 512), np.float32)
+    memory = new_search_memory(512)
+    memory.content.state[:] = dc.real, dc.imag, n_seen, 0.0
     n_hops = (len(x) - 191) // 512
-    found = search(x, n_hops, 512, detection.THRESHOLD, excess, 0, state, work)
-    return (at - 191 + found if found >= 0 else None), complex(state[0], state[1])
+    found = compute.search(x, n_hops, 512, detection.THRESHOLD, excess, 0, memory)
+    return (at - 191 + found if found >= 0 else None), memory.content.dc
 
 
 @pytest.mark.parametrize("alarms", [0, 2])
@@ -63,7 +64,7 @@ def test_the_peak_and_its_frequency_are_the_same(kind):
     }.get(kind, silence(600))[: 191 + 192]
     if kind != "silence":
         x = x + noise(draws, len(x), 0.05)
-    best, p, plain = strongest(x, 192, 0j, np.zeros((7, 191 + 192), np.float32))
+    best, p, plain = compute.strongest(x, 192, new_search_memory(192))
     where, frequency = detection.Detector(0).strongest(x)
     assert where == best
     assert (frequency is None) == (plain > detection.PLAINEST)

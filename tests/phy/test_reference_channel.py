@@ -10,14 +10,11 @@ import numpy as np
 import pytest
 from numba import njit
 
-from phy import GRIDS, OFDM_64_16, Modulation
+from phy import GRIDS, OFDM_64_16, Modulation, compute
 from phy.estimation import new_scratch, tones
 from phy.kernels import equaliser as equaliser_kernel
 from phy.kernels import tracking as tracking_kernel
-from phy.kernels.burst import DELAY, SLOPE_USED
-from phy.kernels.demodulator import slip
 from phy.kernels.smoothing import follow
-from phy.kernels.tracking import PHASE, SLOPE
 from phy.kernels.training import learn
 from phy.mapping import axes
 from phy.reference import mapping, ofdm, smoothing, training
@@ -25,6 +22,7 @@ from phy.reference.channel import Channel
 from phy.reference.equaliser import BLOCK, Equaliser
 from phy.reference.tracking import Tracking
 from phy.sequences import polarity
+from phy.tables.burst import DELAY, PHASE, SLOPE, SLOPE_USED
 from tests.phy.channels import assert_same, both_estimates, gains_of, in_tones, trained
 from tests.phy.signals import noise
 
@@ -92,8 +90,7 @@ def _correct(turned_by, power, subcarriers, no, tracking):
 
 def state_of(kalman):
     """Value, rate, their variances and covariance, in the kernel's order."""
-    (value, cov), (_, rate) = kalman.covariance
-    return [*kalman.state, value, cov, rate]
+    return [kalman.value, kalman.rate, *kalman.covariance]
 
 
 @every_grid
@@ -122,7 +119,7 @@ def test_pilots_are_tracked_alike(grid, clock_error):
         assert (shown > 6 * channel.no) == (number == 20)
         assert state_of(other.phase) == pytest.approx(ours[PHASE], rel=1e-6, abs=1e-12)
         assert state_of(other.slope) == pytest.approx(ours[SLOPE], rel=1e-6, abs=1e-15)
-    slip(2, tones(grid).packed, block.packed)
+    compute.slip(2, tones(grid), block)
     other.slip(2)
     assert other.slope.value == pytest.approx(ours[SLOPE, 0])
 
@@ -152,8 +149,8 @@ def equalised(grid, modulation, n, lean, no):
         block.content, new_scratch(grid).content, points, llr, 0,
     )  # fmt: skip
     equaliser = Equaliser(grid, channel, Tracking(grid, channel, None))
-    made = [equaliser.equalise(each, 2 + i, modulation) for i, each in enumerate(y)]
-    other = np.concatenate([each for each, _ in made]), np.array([each for _, each in made])
+    made = [equaliser.equalise(each[None], 2 + i, modulation) for i, each in enumerate(y)]
+    other = np.concatenate([each for each, _ in made]), np.concatenate([each for _, each in made])
     return (llr, points, block.content), (*other, equaliser)
 
 

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phy import EnergyDetector, Transmitter
-from phy.kernels.sensing import DOUBLING, LEAST_FLOOR, WINDOW
+from phy.kernels.sensing import DOUBLING, WINDOW
+from phy.tables.sensing import LEAST_FLOOR
 from tests.laws import law
 from tests.phy.signals import noise, noisy, payloads, silence, turned
 

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from phy import OFDM_64_16
+from phy import OFDM_64_16, compute
 from phy.estimation import in_planes, new_channel, new_scratch, tones
-from phy.kernels.convolution import convolve
-from phy.kernels.list_viterbi import list_decode
 from phy.kernels.smoothing import smooth
 from phy.kernels.timing import correlate
 from phy.kernels.training import estimate, learn, least_squares, turn_back
@@ -133,13 +131,13 @@ def test_the_likeliest_code_words_come_first():
     padded = np.zeros((256, n_bits + 6), np.uint8)
     padded[:, :n_bits] = messages
     coded = np.empty((256, 2 * padded.shape[1]), np.uint8)
-    convolve(padded, coded)
+    compute.convolve(padded, coded)
     for seed in range(20):
         llr = np.random.default_rng(seed).integers(-99, 100, coded.shape[1]).astype(np.int16)
         score = (1 - 2 * coded.astype(int)) @ llr
         best = np.argsort(-score, kind="stable")[:n_list]
         out = np.empty((n_list, padded.shape[1]), np.uint8)
-        list_decode(llr, out)
+        compute.list_decode(llr, out)
         assert np.array_equal(viterbi.decode(llr, n_list), out), seed
         found = np.packbits(out[:, :n_bits], axis=1)[:, 0]
         assert list(score[found]) == list(score[best]), seed

@@ -121,8 +121,10 @@ def everything(snapshot: Snapshot, width: int) -> list[RenderableType]:
     counted = ", ".join(f"{key} {n}" for key, n in counters.items() if n)
     if counted:
         parts.append(_labelled("counts", counted, width))
-    if snapshot.carrier.scheduling:
-        parts.append(_labelled("modem", f"runs with {snapshot.carrier.scheduling}", width))
+    carrier = snapshot.carrier
+    runs = [carrier.engine, carrier.scheduling and f"runs with {carrier.scheduling}"]
+    if any(runs):
+        parts.append(_labelled("modem", ", ".join(filter(None, runs)), width))
     if air_ms:
         share = air_ms / 10 / max(1.0, snapshot.uptime_s)
         told = f"simulating it takes {share:.1f} % of a core, which a physical radio does not"

@@ -1,30 +1,17 @@
 """Compiles or loads the modem on a thread, while the event loop does other work."""
 
 import asyncio
-import contextlib
 import logging
-import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+
+from backends import RefusalError
 
 log = logging.getLogger("sdrlinkd")
 
 
 class _GivenUpError(Exception):
     """Raised on the loading thread when the modem is no longer needed."""
-
-
-@contextlib.contextmanager
-def _without_scipy() -> Iterator[None]:
-    """Keep numba from importing SciPy: it would take a third of a second, only to look for BLAS."""
-    if "scipy" in sys.modules:
-        yield
-        return
-    sys.modules["scipy"] = None  # type: ignore[assignment]
-    try:
-        yield
-    finally:
-        del sys.modules["scipy"]
 
 
 class Loading:
@@ -38,14 +25,24 @@ class Loading:
         self._done: asyncio.Future[None] | None = None
         self._tell = tell
         self.told = ""
+        self._engine = ""
 
-    async def __call__(self) -> None:
-        """Wait until the modem is compiled, or loaded."""
+    async def early(self) -> None:
+        """Load what any engine needs, and the compiled modem if there is one."""
+        await asyncio.to_thread(_load_what_is_there)
+
+    async def __call__(self, engine: str = "auto") -> None:
+        """Wait until the modem is compiled, or loaded. Raises RefusalError if it cannot be."""
         if self._done is None:
-            self._done = asyncio.ensure_future(asyncio.to_thread(self._load))
+            self._done = asyncio.ensure_future(asyncio.to_thread(self._load, engine))
             # Retrieve the exception, so that asyncio does not log it if nobody waits any more.
             self._done.add_done_callback(lambda done: done.cancelled() or done.exception())
         await asyncio.shield(self._done)
+
+    @property
+    def engine(self) -> str:
+        """What computes the modem, in words; empty if it is not loaded."""
+        return self._engine
 
     def note(self, text: str) -> None:
         """Take the progress of a modem that is loaded in another process; empty: it is loaded."""
@@ -56,13 +53,15 @@ class Loading:
         """Stop after the kernel being compiled; compiled kernels are kept."""
         self._is_given_up.set()
 
-    def _load(self) -> None:
-        # This imports numba, which is slow to load.
+    def _load(self, engine: str) -> None:
+        # These import NumPy, which is slow to load.
+        import phy
         from sdrlinkd.compiling import compile_modem
 
         try:
-            with _without_scipy():
-                compile_modem(log.info, watch=self._watch)
+            self._engine = compile_modem(log.info, watch=self._watch, engine=engine).told
+        except phy.EngineError as error:
+            raise RefusalError(f"modem.engine: {error}") from None
         finally:
             self.note("")
 
@@ -70,3 +69,11 @@ class Loading:
         self.note(f"compiling the modem, once: {done} of {total} kernels")
         if self._is_given_up.is_set():
             raise _GivenUpError
+
+
+def _load_what_is_there() -> None:
+    import phy
+    from phy import engine
+
+    if engine.fitting() is not None:
+        phy.warm_up()

@@ -99,14 +99,15 @@ class _Served:
 
     async def _work(self) -> None:
         # The process may be started before its daemon knows what it wants.
-        loading = asyncio.ensure_future(self._loading())
+        early = asyncio.ensure_future(self._loading.early())
         start = await self._start
         log_to_stderr(start.log_level)
         try:
-            await loading
+            await early
+            config = typed_config(start.config)
+            await self._loading(config.modem.engine)
             gc.freeze()
             gc.enable()
-            config = typed_config(start.config)
             rng = Random(start.seed)
             backend = backend_of(config)
             self._scheduling = Scheduling(is_urgent=backend is not None and backend.is_hardware)
@@ -166,7 +167,7 @@ class _Served:
 
     def _tell_status(self, modem: ModemHere, *, in_any_case: bool = True) -> None:
         """Tell the status; unless `in_any_case`, only if more than running figures has changed."""
-        now = modem.status
+        now = modem.status._replace(engine=self._loading.engine)
         if self._scheduling is not None:
             yields = {"priority_yields": self._scheduling.yields}
             now = now._replace(

@@ -48,7 +48,7 @@ class ModemHere:
         radio: Radio,
         listens: bool,
         began_s: float | None,
-        load: Callable[[], Awaitable[None]],
+        load: Callable[[str], Awaitable[None]],
         call: Call | None = None,
         on_block: Callable[[], None] = lambda: None,
         asks: Callable[[], bool] | None = None,
@@ -127,7 +127,7 @@ class ModemHere:
     async def open(self) -> Capabilities:
         """Load the PHY, open the radio, and return what it can do. Raises BackendError."""
         params = self._params
-        await self._load()
+        await self._load(params.engine)
         await self._radio.open(Tuning(params.rate_hz, params.centre_hz))
         can = self._radio.capabilities
         receiver = self._receiver = phy.Receiver(

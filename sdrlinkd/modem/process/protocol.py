@@ -127,6 +127,7 @@ class Status(msgspec.Struct, frozen=True, array_like=True, tag="status"):
     counters: dict[str, int]
     realtime_ratio: float
     scheduling: str
+    engine: str
     advice: str
 
 
@@ -153,6 +154,7 @@ def status_of(status: ModemStatus) -> Status:
         dict(status.counters),
         status.realtime_ratio,
         status.scheduling,
+        status.engine,
         status.advice,
     )
 

@@ -8,13 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from phy.kernels.argument_block import opener
+from phy.tables.block import block_of
 
 Row = NDArray[np.float32]
 Planes = NDArray[np.float32]
 """Real parts in one row, imaginary parts in the next, so that loops are vectorised."""
 
 
+@block_of("i8 i8 f8 i8 i8[1] i8[1] f4[1] f4[1] f4[1] f4[2] i8[1] i8[2] f4[2]")
 class Tones(NamedTuple):
     """A grid and its subcarriers in use, data first, then pilots `[n_used]`."""
 
@@ -39,9 +40,7 @@ class Tones(NamedTuple):
     """exp(−2πj m / n_fft) `[2, n_fft]`."""
 
 
-open_tones = opener(Tones, "i8 i8 f8 i8 i8[1] i8[1] f4[1] f4[1] f4[1] f4[2] i8[1] i8[2] f4[2]")
-
-
+@block_of("i8 i8 f8 u4[1]")
 class Axes(NamedTuple):
     """A modulation: bits of each axis, half the level distance, position of each coded bit."""
 
@@ -52,9 +51,7 @@ class Axes(NamedTuple):
     """Position of each bit of the code's order in a symbol whose bits lie plane by plane."""
 
 
-open_axes = opener(Axes, "i8 i8 f8 u4[1]")
-
-
+@block_of("f4[2] f4[2] f4[2] f4[2] f4[1] f4[2] f4[1] f8[1] f8[1] f8[1] f8[2]")
 class Channel(NamedTuple):
     """What is known of a burst's channel; it is updated during the burst."""
 
@@ -90,7 +87,8 @@ class Channel(NamedTuple):
         return float(self.figures[GAIN])
 
 
-open_channel = opener(Channel, "f4[2] f4[2] f4[2] f4[2] f4[1] f4[2] f4[1] f8[1] f8[1] f8[1] f8[2]")
+PHASE, SLOPE = 0, 1
+"""Rows of `tracking`: the phase common to all tones, and its slope over them."""
 
 N_FIGURES = 7
 NO, GAIN, DELAY, DRIFT, N_HEARD, CERTAIN, SLOPE_USED = range(N_FIGURES)
@@ -98,6 +96,7 @@ NO, GAIN, DELAY, DRIFT, N_HEARD, CERTAIN, SLOPE_USED = range(N_FIGURES)
 correction and what was certain in them, Σ |E s|²; the slope that subcarriers are turned back by."""
 
 
+@block_of("f4[2] i8[1] f4[2] f4[1] f4[3] f4[2] f4[1] i2[1] c16[1] f8[1] f4[2] f4[2] f8[1] f8[1]")
 class Scratch(NamedTuple):
     """Working memory of the receiver's kernels; one per thread."""
 
@@ -125,8 +124,3 @@ class Scratch(NamedTuple):
     energies: NDArray[np.float64]
     weights: NDArray[np.float64]
     """Room of the smoother `[2, width]`, `[2, rows of the basis]`, `[groups + 1]` twice."""
-
-
-open_scratch = opener(
-    Scratch, "f4[2] i8[1] f4[2] f4[1] f4[3] f4[2] f4[1] i2[1] c16[1] f8[1] f4[2] f4[2] f8[1] f8[1]"
-)

@@ -1,0 +1,97 @@
+"""Builds the library of the kernels, with numba and a linker, in a process of its own."""
+
+import contextlib
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from phy.engine.entries import ENTRIES
+from phy.engine.targets import Target
+
+Progress = Callable[[int, int], None]
+
+# numba must leave the code as it is: the library may be for another machine.
+_SETTINGS = {"NUMBA_OPT": "0", "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+N_STEPS = len(ENTRIES) + 1
+"""Every kernel, and the linker."""
+
+
+class BuildError(Exception):
+    """A library could not be built; the text says why, and what to do."""
+
+
+def build(target: Target, to: Path, progress: Progress | None = None) -> None:
+    """Compile the kernels for `target` into the library `to`, in another process.
+
+    `progress(done, total)` is called after each kernel, and an exception from it ends the build.
+    Raises BuildError.
+    """
+    linker = _linker(target)
+    if linker is None:
+        raise BuildError("there is no linker: install gcc, or `pip install ziglang`")
+    with tempfile.TemporaryDirectory(prefix="sdrlinkd-build-") as folder:
+        made, linked = Path(folder) / "kernels.o", Path(folder) / "kernels.so"
+        _compile(target, made, progress)
+        _link([*linker, "-shared", "-o", str(linked), str(made), "-lm"])
+        _move(linked, to)
+    if progress is not None:
+        progress(N_STEPS, N_STEPS)
+
+
+def _compile(target: Target, to: Path, progress: Progress | None) -> None:
+    settings = {**os.environ, **_SETTINGS, "NUMBA_CACHE_DIR": str(to.parent)}
+    command = [sys.executable, "-m", "phy.engine", target.name, str(to)]
+    errors = to.with_name("errors")
+    with (
+        errors.open("w") as stderr,
+        subprocess.Popen(  # noqa: S603 (Python, with a target of ours)
+            command, env=settings, stdout=subprocess.PIPE, stderr=stderr
+        ) as run,
+    ):
+        try:
+            for line in run.stdout or ():
+                if progress is not None:
+                    progress(int(line), N_STEPS)
+        except BaseException:
+            run.kill()
+            raise
+    if run.returncode:
+        told = errors.read_text().strip().splitlines()
+        raise BuildError(told[-1] if told else f"the compiler ended with {run.returncode}")
+
+
+def _move(linked: Path, to: Path) -> None:
+    """Put a library in its place; whoever finds it there finds all of it."""
+    beside = to.with_name(f".{to.name}.{os.getpid()}")
+    try:
+        to.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(linked, beside)
+        beside.chmod(0o755)
+        beside.replace(to)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            beside.unlink()
+        raise BuildError(f"{to}: {error.strerror}") from None
+
+
+def _link(command: list[str]) -> None:
+    done = subprocess.run(  # noqa: S603 (a linker of the system's)
+        command, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise BuildError(f"{command[0]}: {done.stderr.strip()}")
+
+
+def _linker(target: Target) -> list[str] | None:
+    if target.is_of_this_machine:
+        for name in ("cc", "gcc", "clang"):
+            if found := shutil.which(name):
+                return [found]
+    if importlib.util.find_spec("ziglang") is not None:
+        return [sys.executable, "-m", "ziglang", "cc", "-target", target.zig]
+    return None
