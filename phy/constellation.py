@@ -16,6 +16,9 @@ class Modulation(Enum):
     QAM64 = 6
     QAM256 = 8
 
+    # That of Enum runs in the interpreter, and every burst takes some.
+    __hash__ = object.__hash__
+
     @property
     def bits(self) -> int:
         """Number of coded bits on one subcarrier."""
@@ -29,14 +32,19 @@ class Modulation(Enum):
     @property
     def unit(self) -> float:
         """Half the distance between neighboring points, at mean power 1."""
-        levels = _levels(self.axis_bits)
-        axes = 1 if self is Modulation.BPSK else 2
-        return float(1 / np.sqrt(axes * np.mean(levels**2)))
+        return _unit(self)
 
     @property
     def axis_bits(self) -> int:
         """Number of coded bits on one axis; BPSK uses the real axis only."""
         return max(1, self.bits // 2)
+
+
+@cache
+def _unit(modulation: Modulation) -> float:
+    levels = _levels(modulation.axis_bits)
+    axes = 1 if modulation is Modulation.BPSK else 2
+    return float(1 / np.sqrt(axes * np.mean(levels**2)))
 
 
 @cache

@@ -38,6 +38,9 @@ class State(Enum):
     PAYLOAD = auto()
     """The symbols that complete the next PDUs have arrived."""
 
+    # That of Enum runs in the interpreter, and a short burst takes thirty.
+    __hash__ = object.__hash__
+
 
 class Found(Enum):
     """The receiver's finding in the samples that it waited for."""
@@ -57,6 +60,8 @@ class Found(Enum):
     """The burst has ended, whole or faded."""
     CUT = auto()
     """Samples are missing here, or the stream ends."""
+
+    __hash__ = object.__hash__
 
 
 NEXT: Mapping[tuple[State, Found], State] = {

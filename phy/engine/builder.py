@@ -1,4 +1,4 @@
-"""Builds the library of the kernels, with numba and a linker, in a process of its own."""
+"""Builds the library of the kernels, with numba and a C compiler."""
 
 import contextlib
 import importlib.util
@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+from phy.engine import library
 from phy.engine.entries import ENTRIES
 from phy.engine.targets import Target
 
@@ -17,8 +18,10 @@ Progress = Callable[[int, int], None]
 
 # numba must leave the code as it is: the library may be for another machine.
 _SETTINGS = {"NUMBA_OPT": "0", "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+_CALLS = Path(__file__).with_name("call.c")
+_OPTIONS = ("-shared", "-fPIC", "-O2", "-Wall", "-Werror", "-fno-strict-aliasing")
 N_STEPS = len(ENTRIES) + 1
-"""Every kernel, and the linker."""
+"""Every kernel, and the calls."""
 
 
 class BuildError(Exception):
@@ -31,13 +34,15 @@ def build(target: Target, to: Path, progress: Progress | None = None) -> None:
     `progress(done, total)` is called after each kernel, and an exception from it ends the build.
     Raises BuildError.
     """
-    linker = _linker(target)
-    if linker is None:
-        raise BuildError("there is no linker: install gcc, or `pip install ziglang`")
+    compiler = _c_compiler(target)
+    if compiler is None:
+        raise BuildError("there is no C compiler: install gcc, or `pip install ziglang`")
     with tempfile.TemporaryDirectory(prefix="sdrlinkd-build-") as folder:
         made, linked = Path(folder) / "kernels.o", Path(folder) / "kernels.so"
         _compile(target, made, progress)
-        _link([*linker, "-shared", "-o", str(linked), str(made), "-lm"])
+        made.with_name("kernels.h").write_text(library.header())
+        sources = [f"-I{folder}", str(_CALLS), str(made)]
+        _link([*compiler, *_OPTIONS, *sources, "-o", str(linked), "-lm"])
         _move(linked, to)
     if progress is not None:
         progress(N_STEPS, N_STEPS)
@@ -80,14 +85,14 @@ def _move(linked: Path, to: Path) -> None:
 
 
 def _link(command: list[str]) -> None:
-    done = subprocess.run(  # noqa: S603 (a linker of the system's)
+    done = subprocess.run(  # noqa: S603 (a compiler of the system's)
         command, capture_output=True, text=True, check=False
     )
     if done.returncode:
         raise BuildError(f"{command[0]}: {done.stderr.strip()}")
 
 
-def _linker(target: Target) -> list[str] | None:
+def _c_compiler(target: Target) -> list[str] | None:
     if target.is_of_this_machine:
         for name in ("cc", "gcc", "clang"):
             if found := shutil.which(name):

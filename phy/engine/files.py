@@ -50,9 +50,11 @@ def target_of(path: Path) -> str:
 @cache
 def source_key() -> str:
     """The key of the kernels' source: a library of any other source is never loaded."""
-    names = ("kernels/*.py", "tables/*.py", "sizes.py", "engine/compile.py", "engine/entries.py")
+    names = ("kernels/*.py", "tables/*.py", "sizes.py")
+    of_engine = ("builder.py", "call.c", "compile.py", "entries.py")
+    found = [path for name in names for path in _PHY.glob(name)]
     key = hashlib.sha256()
-    for each in sorted(path for name in names for path in _PHY.glob(name)):
+    for each in (*sorted(found), *(_PHY / "engine" / name for name in of_engine)):
         key.update(each.read_bytes())
     return key.hexdigest()[:16]
 

@@ -70,8 +70,8 @@ class ArgumentBlock(Generic[_Content]):
         buffer: Any = (ctypes.c_int64 * len(words))(*words)
         buffer.content = content
         self.packed: NDArray[np.int64] = np.frombuffer(buffer, np.int64)
-        self.words = (ctypes.addressof(buffer), len(words))
-        """Address and size of the packed form."""
+        self.address = ctypes.addressof(buffer)
+        """Where the packed form lies."""
 
 
 PackedArguments = NDArray[np.int64] | ArgumentBlock[Any]

@@ -4,9 +4,11 @@ import ctypes.util
 import importlib
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -144,12 +146,12 @@ def without_library(monkeypatch, tmp_path):
     return tmp_path / "libraries"
 
 
-def test_without_a_linker_numpy_computes_and_says_why(without_library, monkeypatch):
+def test_without_a_c_compiler_numpy_computes_and_says_why(without_library, monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda _: None)
     monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
     used = engine.use("auto")
     assert used.name == "numpy"
-    assert "slow: no compiled modem: there is no linker: install gcc" in used.told
+    assert "slow: no compiled modem: there is no C compiler: install gcc" in used.told
     monkeypatch.setattr(choice, "_in_use", None)
     with pytest.raises(engine.EngineError, match="pip install ziglang"):
         engine.use("compiled")
@@ -176,14 +178,14 @@ def test_a_build_can_be_given_up(without_library):
 
 
 def test_where_nothing_can_be_written_there_is_no_library(tmp_path, monkeypatch):
-    monkeypatch.setattr(builder.subprocess, "run", fake_linker)
+    monkeypatch.setattr(builder.subprocess, "run", fake_compiler)
     monkeypatch.setattr(builder, "_compile", lambda *_: None)
     (tmp_path / "file").write_text("")
     with pytest.raises(engine.BuildError, match=r"file/modem\.so: "):
         engine.build(engine.this(), tmp_path / "file" / "modem.so")
 
 
-def fake_linker(command, **_):
+def fake_compiler(command, **_):
     Path(command[command.index("-o") + 1]).write_bytes(b"")
     return subprocess.CompletedProcess(command, 0)
 
@@ -252,25 +254,59 @@ def test_what_is_no_library_is_told(tmp_path):
     (tmp_path / "modem.so").write_text("no library")
     with pytest.raises(OSError, match=r"modem\.so"):
         library.load(tmp_path / "modem.so")
-    with pytest.raises(OSError, match="no kernel"):
+    with pytest.raises(OSError, match="no kernels"):
         library.load(Path(ctypes.util.find_library("m") or "libm.so.6"))
 
 
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        (
-            np.zeros(4, np.complex128),
-            "array 1: got complex128, 1 dim.* allowed: complex64",
-        ),
-        (np.zeros((4, 2), np.complex64), "got complex64, 2 dimensions"),
-        (np.zeros(8, np.complex64)[::2], "got an array with gaps"),
+        (np.zeros(4), r"sanitise, argument 1: got dtype\('float64'\); allowed: a contiguous array"),
+        (np.zeros((4, 2), np.complex64), "array of complex64, 1 dimensions"),
+        (np.zeros(8, np.complex64)[::2], "allowed: a contiguous array"),
+        (np.zeros(8, np.complex64).view(np.recarray), "allowed: a contiguous array"),
+        ([1j], r"got \[1j\]; allowed"),
     ],
 )
 def test_what_a_kernel_does_not_take_is_refused(given, told):
     engine.use("compiled")
     with pytest.raises(TypeError, match=told):
         compute.sanitise(given, 1e6)
+
+
+@pytest.mark.parametrize("given", [(), (1e6,), (np.zeros(2, np.complex64), 1e6, 2)])
+def test_a_kernel_takes_as_many_arguments_as_it_has(given):
+    engine.use("compiled")
+    with pytest.raises(TypeError):
+        compute.sanitise(*given)
+
+
+def test_a_number_or_a_block_that_is_none_is_refused():
+    engine.use("compiled")
+    x = np.zeros(600, np.complex64)
+    with pytest.raises(TypeError, match="real number"):
+        compute.sanitise(x, "1e6")
+    with pytest.raises(AttributeError, match="address"):
+        compute.strongest(x, 100, None)
+
+
+def test_kernels_of_several_threads_run_at_once_and_keep_nothing_alive():
+    engine.use("compiled")
+    x = np.ones(200_000, np.complex64)
+    before = sys.getrefcount(x)
+    with ThreadPoolExecutor(4) as pool:
+        assert set(pool.map(lambda _: compute.sanitise(x, 2.0), range(40))) == {0}
+    assert sys.getrefcount(x) == before
+
+
+@pytest.mark.parametrize("what", ["Python", "NumPy"])
+def test_objects_in_another_form_are_noticed(monkeypatch, what):
+    if what == "Python":
+        monkeypatch.setattr(library, "HEAD_BYTES", 32)
+    else:
+        monkeypatch.setattr(library, "_content_of", lambda _: 0)
+    with pytest.raises(OSError, match=f"this {what} keeps"):
+        library.load(engine.fitting())
 
 
 def test_arrays_that_may_not_be_written_and_empty_ones_are_taken():
@@ -350,3 +386,13 @@ def test_kernels_for_64_bit_arm_repeat_recorded_calls(tmp_path, monkeypatch):
     ran = {line.split()[0] for line in done.stdout.splitlines()}
     # These only measurements and 802.11a need.
     assert set(ENTRIES) - ran == {"encode_blocks", "decode_rows", "learn_channel", "slip"}
+
+
+def test_no_kernel_takes_or_leaves_more_words_than_a_call_has_room_for():
+    def words(fields):
+        return sum(1 + each.n_dimensions + (each.dtype.kind == "c") for each in fields)
+
+    source = Path(library.__file__).with_name("call.c").read_text()
+    room = {key: int(n) for key, n in re.findall(r"(MOST_\w+) = (\d+)", source)}
+    assert max(words(entry.arguments) for entry in ENTRIES.values()) <= room["MOST_WORDS"]
+    assert max(words(entry.results) for entry in ENTRIES.values()) <= room["MOST_RESULTS"]
