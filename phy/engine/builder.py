@@ -34,6 +34,8 @@ def build(target: Target, to: Path, progress: Progress | None = None) -> None:
     `progress(done, total)` is called after each kernel, and an exception from it ends the build.
     Raises BuildError.
     """
+    if importlib.util.find_spec("numba") is None:
+        raise BuildError("numba is not installed: `pip install numba`")
     compiler = _c_compiler(target)
     if compiler is None:
         raise BuildError("there is no C compiler: install gcc, or `pip install ziglang`")

@@ -176,6 +176,9 @@ def _measure(console: Console, source: Source, options: Options) -> float:
     )
     rate = f"rate: {found.rate_hz / 1e6:g} Msps"
     _say(console, f"{rate}; load on one CPU core: {tried}")
+    if not found.is_enough:
+        told = "the modem needs almost a whole core, so messages will wait for it"
+        _say(console, f"{told}; fewer at a time: --speed 0.25, or --topics", style="yellow")
     return found.rate_hz
 
 

@@ -37,6 +37,11 @@ class Found(NamedTuple):
     rate_hz: float
     tried: list[Tried]
 
+    @property
+    def is_enough(self) -> bool:
+        """Whether the chosen rate leaves a third of the CPU time free."""
+        return any(each.busy <= MOST_BUSY for each in self.tried)
+
 
 Measure = Callable[[Source, Options], Tried]
 

@@ -199,6 +199,21 @@ def test_neither_a_daemon_nor_its_modem_loads_a_compiler(start_daemon):
     assert loaded(modem) == {"numpy"}
 
 
+def test_a_link_works_where_no_memory_may_be_written_and_executed(start_daemon):
+    """As in the units; the modem's process inherits it. Linux before 6.3 grants it all the same."""
+    node = start_daemon(
+        'backend = "loopback"\n[modem]\nrate_hz = 1e6\n',
+        before="import ctypes; ctypes.CDLL(None).prctl(65, 1, 0, 0, 0); ",
+    )
+    wait_for(lambda: node.snapshot().carrier.state == "up", 60)
+    with (
+        Subscriber("/rx_robot_1/odom", directory=node.directory) as heard,
+        Publisher(node.directory) as out,
+    ):
+        out.send("/robot_1/odom", b"\0\1\0\0odom")
+        assert heard.receive(20) is not None
+
+
 def test_a_check_loads_no_compiler(tmp_path):
     done = subprocess.run(
         [

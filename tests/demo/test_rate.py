@@ -39,6 +39,7 @@ def test_a_third_of_the_time_stays_free_and_the_air_is_not_full(busy, air_at_5, 
 
     found = find_rate(None, OPTIONS, measure)
     assert found.rate_hz == taken
+    assert found.is_enough == (busy[-1] < 2 / 3)
     assert len(found.tried) == len(asked) == n_tried
     assert asked == [("ofdm", rate_hz) for rate_hz in (5e6, 2e6, 1e6, 5e5)[:n_tried]]
 
@@ -49,7 +50,7 @@ def test_what_is_measured_is_a_daemon_with_this_traffic():
     found = tried_out(source, Options(link="ofdm", rate_hz=2e6))
     assert found.rate_hz == 2e6
     assert 0.1 < found.air < 1.1
-    assert found.busy > 0.05
+    assert found.busy > 0.02
 
 
 def test_of_a_process_the_busiest_thread_counts():

@@ -148,7 +148,10 @@ def without_library(monkeypatch, tmp_path):
 
 def test_without_a_c_compiler_numpy_computes_and_says_why(without_library, monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda _: None)
-    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
+    known = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name == "ziglang" else known(name)
+    )
     used = engine.use("auto")
     assert used.name == "numpy"
     assert "slow: no compiled modem: there is no C compiler: install gcc" in used.told
@@ -157,11 +160,19 @@ def test_without_a_c_compiler_numpy_computes_and_says_why(without_library, monke
         engine.use("compiled")
 
 
-def test_without_numba_numpy_computes_and_says_why(without_library, monkeypatch, tmp_path):
-    (tmp_path / "numba.py").write_text("raise ImportError('numba is not installed')\n")
+def test_without_numba_numpy_computes_and_says_what_to_install(without_library, monkeypatch):
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
+    used = engine.use("auto")
+    assert (used.name, "`pip install numba`" in used.told) == ("numpy", True)
+
+
+def test_with_a_numba_that_fails_numpy_computes_and_says_why(
+    without_library, monkeypatch, tmp_path
+):
+    (tmp_path / "numba.py").write_text("raise ImportError('no numba for this processor')\n")
     monkeypatch.setenv("PYTHONPATH", f"{tmp_path}:{Path(phy.__file__).parents[1]}")
     used = engine.use("auto")
-    assert (used.name, "numba is not installed" in used.told) == ("numpy", True)
+    assert (used.name, "no numba for this processor" in used.told) == ("numpy", True)
     assert not list(without_library.glob("*"))
 
 
