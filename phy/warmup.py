@@ -6,8 +6,6 @@ from phy import engine
 from phy.channel import FrontEnd, FrontEndParams
 from phy.mcs import MCS_TABLE
 
-RATE_HZ = 1e6
-
 
 def warm_up(name: str = "auto", progress: engine.Progress | None = None) -> engine.Engine:
     """Choose the engine, build its library if there is none yet, and compute its tables.

@@ -17,9 +17,15 @@ from phy.engine.targets import Target
 Progress = Callable[[int, int], None]
 
 # numba must leave the code as it is: the library may be for another machine.
-_SETTINGS = {"NUMBA_OPT": "0", "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+_SETTINGS = {
+    "NUMBA_CPU_FEATURES": "",
+    "NUMBA_CPU_NAME": "generic",
+    "NUMBA_DISABLE_JIT": "0",
+    "NUMBA_OPT": "0",
+}
+_ROOT = Path(__file__).parents[2]
 _CALLS = Path(__file__).with_name("call.c")
-_OPTIONS = ("-shared", "-fPIC", "-O2", "-Wall", "-Werror", "-fno-strict-aliasing")
+_OPTIONS = ("-shared", "-fPIC", "-O2", "-fno-strict-aliasing")
 N_STEPS = len(ENTRIES) + 1
 """Every kernel, and the calls."""
 
@@ -52,6 +58,7 @@ def build(target: Target, to: Path, progress: Progress | None = None) -> None:
 
 def _compile(target: Target, to: Path, progress: Progress | None) -> None:
     settings = {**os.environ, **_SETTINGS, "NUMBA_CACHE_DIR": str(to.parent)}
+    settings["PYTHONPATH"] = os.pathsep.join((str(_ROOT), os.environ.get("PYTHONPATH", "")))
     command = [sys.executable, "-m", "phy.engine", target.name, str(to)]
     errors = to.with_name("errors")
     with (

@@ -14,6 +14,7 @@ from phy.engine.targets import FAMILIES, Target, this
 SYMBOL = "phy_"
 """A library's functions are the kernels' names after this."""
 _PHY = Path(__file__).parents[1]
+_BESIDE = _PHY / "engine" / "libraries"
 _PREFIX, _SUFFIX = "kernels-", ".so"
 
 
@@ -43,8 +44,9 @@ def name_of(target: Target) -> str:
 
 
 def target_of(path: Path) -> str:
-    """What a library is for, by its name."""
-    return path.name.removeprefix(_PREFIX).removesuffix(f"-{source_key()}{_SUFFIX}")
+    """What a library is for, in words."""
+    name = path.name.removeprefix(_PREFIX).removesuffix(f"-{source_key()}{_SUFFIX}")
+    return "this machine" if name == this().name else f"any {name}"
 
 
 @cache
@@ -61,7 +63,7 @@ def source_key() -> str:
 
 def _folders() -> Iterator[Path]:
     """Beside the source, the user's cache, and a temporary folder of the user's own."""
-    yield _PHY / "engine" / "libraries"
+    yield _BESIDE
     given = os.environ.get("XDG_CACHE_HOME")
     with contextlib.suppress(RuntimeError):
         yield (Path(given) if given else Path("~/.cache").expanduser()) / "sdrlinkd"
@@ -81,7 +83,12 @@ def _private_folder() -> Path:
 
 
 def _is_trusted(path: Path) -> bool:
-    """Whether only this user, the owner of the source or root can have written a library."""
+    """Whether only this user, the owner of the source or root can have written a library.
+
+    One beside the source is as good as the source.
+    """
+    if path.parent == _BESIDE:
+        return path.is_file()
     try:
         owners = {0, os.geteuid(), Path(__file__).stat().st_uid}
         file, folder = path.stat(), path.parent.stat()

@@ -42,6 +42,6 @@ def compile_(
                 wanted, path,
                 lambda done, total: status.update(f"compiling the modem: {done} of {total} steps"),
             )  # fmt: skip
-        except engine.BuildError as error:
+        except (engine.BuildError, OSError) as error:
             raise UserError(f"the modem was not compiled: {error}") from None
     console.print(f"compiled the modem: {path}", highlight=False, markup=False, soft_wrap=True)
