@@ -72,6 +72,7 @@ format: $(DEV_STAMP)
 
 # With the modem compiled for each family of processors.
 wheel: $(DEV_STAMP)
+	rm -rf phy/engine/libraries
 	for each in x86-64-v3 x86-64 aarch64; do $(BIN)/sdrlinkctl phy compile --for $$each || exit 1; done
 	$(BIN)/python -m hatchling build -t wheel
 

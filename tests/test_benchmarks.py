@@ -66,6 +66,8 @@ ROWS = {
         "rss_mb",
         "rx_us_64B_burst_hot",
         "rx_us_64B_burst_asleep_20ms",
+        "usrp_like_5msps_cores",
+        "usrp_like_5msps_lost_samples",
     },
     "access": {
         "csma_2x15pct_pdr",
