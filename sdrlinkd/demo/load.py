@@ -31,8 +31,10 @@ class LoadOf:
         loads = []
         for task, (ran_s, waited_s) in self._times().items():
             ran_before_s, waited_before_s = self._before.get(task, (0.0, 0.0))
-            waited = (waited_s - waited_before_s) / span_s
-            loads.append(Load((ran_s - ran_before_s) / span_s + waited, waited))
+            # A wait counts when it ends, even that before the span.
+            waited = min(1.0, (waited_s - waited_before_s) / span_s)
+            busy = min(1.0, (ran_s - ran_before_s) / span_s + waited)
+            loads.append(Load(busy, waited))
         return max(loads, default=Load(0.0, 0.0))
 
     def _times(self) -> dict[str, tuple[float, float]]:
