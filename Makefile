@@ -29,7 +29,7 @@ $(STAMP): pyproject.toml constraints.txt sdrlinkd/__init__.py
 	@$(PYTHON) -m venv $(VENV) || \
 		{ echo "python3 has no venv module; on Debian: apt-get install python3-venv"; exit 1; }
 	$(PIP) -e '.[plots]'
-	@command -v cc gcc clang >/dev/null || $(PIP) ziglang
+	@command -v cc >/dev/null || command -v gcc >/dev/null || command -v clang >/dev/null || $(PIP) ziglang
 	@$(BIN)/sdrlinkctl phy compile || echo "the modem will run on NumPy, slowly: install gcc, then sdrlinkctl phy compile"
 	@touch $@
 

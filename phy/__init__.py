@@ -24,7 +24,7 @@ from phy.sizes import SENSE_WINDOW
 
 if TYPE_CHECKING:
     from phy.channel import PROFILES, FrontEnd, FrontEndParams, Path, PathParams
-    from phy.engine import ENGINES, Engine, EngineError
+    from phy.engine import Engine, EngineError
     from phy.oversampling import REACH, Downsampler, upsample
     from phy.receiver import Receiver
     from phy.sensing import EnergyDetector
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "COUNTERS",
-    "ENGINES",
     "GRIDS",
     "MAX_PDUS",
     "MAX_PDU_BYTES",
@@ -75,7 +74,7 @@ __all__ = [
 
 _LATER = {
     "phy.channel": ("PROFILES", "FrontEnd", "FrontEndParams", "Path", "PathParams"),
-    "phy.engine": ("ENGINES", "Engine", "EngineError"),
+    "phy.engine": ("Engine", "EngineError"),
     "phy.oversampling": ("REACH", "Downsampler", "upsample"),
     "phy.sensing": ("EnergyDetector",),
     "phy.warmup": ("warm_up",),

@@ -38,7 +38,7 @@ class State(Enum):
     PAYLOAD = auto()
     """The symbols that complete the next PDUs have arrived."""
 
-    # That of Enum runs in the interpreter, and a short burst takes thirty.
+    # That of Enum runs in the interpreter, and every burst takes a dozen.
     __hash__ = object.__hash__
 
 

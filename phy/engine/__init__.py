@@ -10,11 +10,10 @@ One engine is in use in a process; `use` chooses it, and the first kernel does i
 from phy.engine.builder import BuildError, Progress, build
 from phy.engine.choice import ENGINES, Engine, EngineError, in_use, kernel, use
 from phy.engine.files import fitting, place
-from phy.engine.targets import FAMILIES, TARGETS, Target, this
+from phy.engine.targets import TARGETS, Target, this
 
 __all__ = [
     "ENGINES",
-    "FAMILIES",
     "TARGETS",
     "BuildError",
     "Engine",

@@ -1,8 +1,8 @@
 /* Calls kernels from Python: checks the arguments, and lays them out as 64-bit words (entries.py).
  *
- * A short burst takes a dozen calls, and code that has not run for a while costs several times more,
- * so a call must be little code. It needs Python's stable interface, and the fields that NumPy has
- * kept at their places in every array since version 1.7; neither needs header files.
+ * A short burst takes several calls, and code that has not run for a while costs far more:
+ * a call must be little code. It needs Python's stable interface, and fields that NumPy has kept at
+ * their places in every array since version 1.7. Neither needs header files.
  */
 #include <stdint.h>
 
@@ -32,17 +32,29 @@ typedef struct {
 
 extern char _Py_NoneStruct[];
 extern Object *PyExc_TypeError;
-extern Object *PyCFunction_NewEx(Method *, Object *, Object *), *PyErr_Format(Object *, const char *, ...);
-extern Object *PyComplex_FromDoubles(double, double), *PyErr_Occurred(void), *PyFloat_FromDouble(double);
-extern Object *PyLong_FromLongLong(long long), *PyLong_FromVoidPtr(void *), *PyObject_Type(Object *);
-extern Object *PyObject_GetAttr(Object *, Object *), *PyTuple_New(Size), *PyUnicode_InternFromString(const char *);
+extern Object *PyCFunction_NewEx(Method *, Object *, Object *);
+extern Object *PyComplex_FromDoubles(double, double);
+extern Object *PyErr_Format(Object *, const char *, ...);
+extern Object *PyErr_Occurred(void);
+extern Object *PyFloat_FromDouble(double);
+extern Object *PyLong_FromLongLong(long long);
+extern Object *PyLong_FromVoidPtr(void *);
+extern Object *PyObject_GetAttr(Object *, Object *);
+extern Object *PyObject_Type(Object *);
 extern Object *PyTuple_GetItem(Object *, Size);
+extern Object *PyTuple_New(Size);
+extern Object *PyUnicode_InternFromString(const char *);
 extern Size PyTuple_Size(Object *);
+extern double PyComplex_ImagAsDouble(Object *);
+extern double PyComplex_RealAsDouble(Object *);
+extern double PyFloat_AsDouble(Object *);
 extern int PyTuple_SetItem(Object *, Size, Object *);
-extern double PyComplex_ImagAsDouble(Object *), PyComplex_RealAsDouble(Object *), PyFloat_AsDouble(Object *);
 extern long long PyLong_AsLongLong(Object *);
-extern void *PyEval_SaveThread(void), *PyLong_AsVoidPtr(Object *);
-extern void PyEval_RestoreThread(void *), Py_DecRef(Object *), Py_IncRef(Object *);
+extern void *PyEval_SaveThread(void);
+extern void *PyLong_AsVoidPtr(Object *);
+extern void PyEval_RestoreThread(void *);
+extern void Py_DecRef(Object *);
+extern void Py_IncRef(Object *);
 static Object *call(Object *, Object *const *, Size);
 
 #define KERNEL(name, takes, gives) void phy_##name(int64_t *, int64_t *);
@@ -53,7 +65,9 @@ static Object *call(Object *, Object *const *, Size);
 static Kernel kernels[] = {
 #include "kernels.h"
 };
-enum { N_KERNELS = sizeof kernels / sizeof *kernels, MOST_WORDS = 64, MOST_RESULTS = 8, CONTIGUOUS = 1 };
+enum { N_KERNELS = sizeof kernels / sizeof *kernels, MOST_WORDS = 64, MOST_RESULTS = 8 };
+/* NumPy's flags: contiguous, and at an address that suits the type. */
+enum { CONTIGUOUS = 0x1, ALIGNED = 0x100, SOUND = CONTIGUOUS | ALIGNED };
 static Object *array_type, *address, *dtypes[16];
 
 static int has_type(Object *object, Object *type)
@@ -67,7 +81,8 @@ static Object *refused(const Kernel *kernel, Size i, Object *argument, int dtype
 {
     Object *got = has_type(argument, array_type) ? ((Array *)argument)->dtype : argument;
     return PyErr_Format(
-        PyExc_TypeError, "%s, argument %zd: got %R; allowed: a contiguous array of %S, %d dimensions",
+        PyExc_TypeError,
+        "%s, argument %zd: got %R; allowed: a contiguous, aligned array of %S, %d dimensions",
         kernel->method.name, i + 1, got, dtypes[dtype], n);
 }
 
@@ -76,7 +91,9 @@ static Object *result(const char *gives, const int64_t *left)
     const double *figure = (const double *)left;
     if (*gives == 'i')
         return PyLong_FromLongLong(*left);
-    return *gives == 'd' ? PyFloat_FromDouble(*figure) : PyComplex_FromDoubles(figure[0], figure[1]);
+    if (*gives == 'd')
+        return PyFloat_FromDouble(*figure);
+    return PyComplex_FromDoubles(figure[0], figure[1]);
 }
 
 static Object *call(Object *self, Object *const *arguments, Size n)
@@ -105,7 +122,7 @@ static Object *call(Object *self, Object *const *arguments, Size n)
             int dtype = *type++ - 'A', dimensions = *type - '0';
             Array *array = (Array *)argument;
             if (!has_type(argument, array_type) || array->dtype != dtypes[dtype] ||
-                array->n_dimensions != dimensions || !(array->flags & CONTIGUOUS))
+                array->n_dimensions != dimensions || (array->flags & SOUND) != SOUND)
                 return refused(kernel, i, argument, dtype, dimensions);
             *word++ = (int64_t)array->data;
             for (int k = 0; k < dimensions; k++)
@@ -114,6 +131,7 @@ static Object *call(Object *self, Object *const *arguments, Size n)
     }
     if (i < n || *type)
         return PyErr_Format(PyExc_TypeError, "%s: got %zd arguments", kernel->method.name, n);
+    /* A conversion has failed. */
     if (PyErr_Occurred())
         return 0;
     void *thread = PyEval_SaveThread();
@@ -136,7 +154,7 @@ static Object *call(Object *self, Object *const *arguments, Size n)
     return tuple;
 }
 
-/* The functions of all kernels in the order of kernels.h, for NumPy's type of arrays and its dtypes. */
+/* The functions of all kernels in the order of kernels.h, for NumPy's arrays and its dtypes. */
 Object *phy_functions(Object *type, Object *known)
 {
     Size n = PyTuple_Size(known);

@@ -19,13 +19,17 @@ _PREFIX, _SUFFIX = "kernels-", ".so"
 
 
 def place(target: Target) -> Path:
-    """The file for a library that this user builds, in the first folder that can be written."""
+    """The file for a library that this user builds, in the first folder that is fit for it.
+
+    Raises OSError if nothing can be written.
+    """
     for folder in _folders():
         with contextlib.suppress(OSError):
             folder.mkdir(mode=0o755, parents=True, exist_ok=True)
-            if os.access(folder, os.W_OK):
+            if os.access(folder, os.W_OK) and _is_trusted(folder):
                 return folder / name_of(target)
-    return Path(tempfile.gettempdir()) / name_of(target)
+    # Another user was quicker to take the name of the temporary folder.
+    return Path(tempfile.mkdtemp(prefix="sdrlinkd-")) / name_of(target)
 
 
 def fitting() -> Path | None:
@@ -33,7 +37,7 @@ def fitting() -> Path | None:
     for target in (this(), *(each for each in FAMILIES if each.fits)):
         for folder in _folders():
             found = folder / name_of(target)
-            if _is_trusted(found):
+            if _is_trusted(folder) and _is_trusted(found):
                 return found
     return None
 
@@ -62,39 +66,25 @@ def source_key() -> str:
 
 
 def _folders() -> Iterator[Path]:
-    """Beside the source, the user's cache, and a temporary folder of the user's own."""
+    """Beside the source, the user's cache, and a temporary folder that later processes find."""
     yield _BESIDE
     given = os.environ.get("XDG_CACHE_HOME")
     with contextlib.suppress(RuntimeError):
         yield (Path(given) if given else Path("~/.cache").expanduser()) / "sdrlinkd"
     with contextlib.suppress(OSError):
-        yield _private_folder()
-
-
-def _private_folder() -> Path:
-    """The user's own temporary folder. Raises OSError if others may write to it."""
-    folder = Path(tempfile.gettempdir()) / f"sdrlinkd-{os.geteuid()}"
-    folder.mkdir(mode=0o700, exist_ok=True)
-    found = folder.lstat()
-    is_ours = stat.S_ISDIR(found.st_mode) and found.st_uid == os.geteuid()
-    if not is_ours or stat.S_IMODE(found.st_mode) & 0o077:
-        raise PermissionError(f"{folder}: others may write there")
-    return folder
+        yield Path(tempfile.gettempdir()) / f"sdrlinkd-{os.geteuid()}"
 
 
 def _is_trusted(path: Path) -> bool:
-    """Whether only this user, the owner of the source or root can have written a library.
+    """Whether only this user, the owner of the source or root can have written a file or a folder.
 
-    One beside the source is as good as the source.
+    What is beside the source is as good as the source.
     """
-    if path.parent == _BESIDE:
-        return path.is_file()
     try:
+        found = path.stat()
         owners = {0, os.geteuid(), Path(__file__).stat().st_uid}
-        file, folder = path.stat(), path.parent.stat()
     except OSError:
         return False
-    return stat.S_ISREG(file.st_mode) and all(
-        each.st_uid in owners and not each.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-        for each in (file, folder)
-    )
+    if _BESIDE in (path, path.parent):
+        return True
+    return found.st_uid in owners and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)

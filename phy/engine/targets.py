@@ -33,7 +33,7 @@ class Target(NamedTuple):
 
     @property
     def is_of_this_machine(self) -> bool:
-        """Whether this machine's own linker can make the library."""
+        """Whether a compiler of this machine can make the library."""
         return self.machine == platform.machine()
 
     @property

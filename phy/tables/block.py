@@ -5,7 +5,6 @@ takes hardly longer than that. So arguments that stay the same from call to call
 `ArgumentBlock` holds their addresses, and the kernel opens it into the original tuple.
 """
 
-import ctypes
 from collections.abc import Callable
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -48,7 +47,7 @@ def block_of(told: str) -> Callable[[_Kind], _Kind]:
 
 
 class ArgumentBlock(Generic[_Content]):
-    """A named tuple of arrays and numbers; `packed` is its form for kernels.
+    """A named tuple of arrays and numbers; `packed` is its form for kernels, with their addresses.
 
     Raises TypeError when a field is not of the declared type: kernels would not notice.
     """
@@ -66,12 +65,9 @@ class ArgumentBlock(Generic[_Content]):
                 raise TypeError(f"{where}: got {value!r}; allowed: {field.dtype}")
             else:
                 words.append(int(np.array(value, field.dtype).view(np.int64)))
-        # The packed form keeps the arrays alive that it points to.
-        buffer: Any = (ctypes.c_int64 * len(words))(*words)
-        buffer.content = content
-        self.packed: NDArray[np.int64] = np.frombuffer(buffer, np.int64)
-        self.address = ctypes.addressof(buffer)
-        """Where the packed form lies."""
+        self.packed: NDArray[np.int64] = np.array(words, np.int64)
+        self.address: int = self.packed.ctypes.data
+        """Where the packed form lies; it is valid as long as this object."""
 
 
 PackedArguments = NDArray[np.int64] | ArgumentBlock[Any]

@@ -8,11 +8,11 @@ import pytest
 import phy
 from sdrlinkd import compiling
 from sdrlinkd.client import Publisher
-from sdrlinkd.compiling import compile_modem
+from sdrlinkd.compiling import compile_modem, tell_progress
 from tests.waiting import wait_for
 
 COMPILED = phy.Engine("compiled", "compiled for x86-64", {}, None, None)
-NUMPY = COMPILED._replace(name="numpy", told="NumPy, which is slow: no linker")
+NUMPY = COMPILED._replace(name="numpy", told="NumPy, which is slow: no compiler")
 
 
 def test_a_daemon_without_a_compiled_modem_takes_messages_says_so_and_can_be_stopped(
@@ -55,7 +55,7 @@ def told(monkeypatch):
 
         def warm_up(_, progress):
             for done in range(len(times)):
-                progress(done + 1, 64)
+                progress(done + 1, len(times))
             return used
 
         monkeypatch.setattr(phy, "warm_up", warm_up)
@@ -68,11 +68,22 @@ def told(monkeypatch):
 
 def test_progress_is_told_now_and_then(told):
     assert told([0.5, 1.0, 9.0, 10.6, 30.0, 31.0]) == [
-        "compiling the modem, once: 1 of 64 kernels, 0 s so far",
-        "compiling the modem, once: 4 of 64 kernels, 11 s so far",
-        "compiling the modem, once: 5 of 64 kernels, 30 s so far",
+        "compiling the modem, once: 1 of 6 steps, 0 s so far",
+        "compiling the modem, once: 4 of 6 steps, 11 s so far",
+        "compiling the modem, once: 5 of 6 steps, 30 s so far",
         "compiled the modem in 31 s",
     ]
+
+
+def test_a_compilation_that_failed_halfway_is_not_told_as_done():
+    said = []
+
+    def fail(progress):
+        progress(1, 3)
+        return "NumPy"
+
+    assert tell_progress(fail, said.append) == "NumPy"
+    assert [line.partition(",")[0] for line in said] == ["compiling the modem"]
 
 
 def test_of_a_compiled_modem_nothing_is_told(told):
@@ -86,7 +97,8 @@ def test_a_screen_shows_progress_elsewhere(told):
 
 
 def test_a_modem_that_is_not_compiled_is_told_unless_it_was_asked_for(told):
-    assert told([], NUMPY) == ["the modem runs on NumPy, which is slow: no linker"]
+    (line,) = told([], NUMPY)
+    assert line.startswith("the modem runs on NumPy, which is slow: no compiler; to compile it: ")
     assert told([], NUMPY, engine="numpy") == []
 
 
@@ -98,5 +110,5 @@ def test_it_can_be_given_up(told):
         if done == 2:
             raise GivenUpError(total)
 
-    with pytest.raises(GivenUpError, match="64"):
+    with pytest.raises(GivenUpError, match="3"):
         told([0.5, 1.0, 2.0], watch=stop)

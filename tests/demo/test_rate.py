@@ -50,7 +50,7 @@ def test_what_is_measured_is_a_daemon_with_this_traffic():
     found = tried_out(source, Options(link="ofdm", rate_hz=2e6))
     assert found.rate_hz == 2e6
     assert 0.1 < found.air < 1.1
-    assert found.busy > 0.02
+    assert found.busy > 0.05
 
 
 def test_of_a_process_the_busiest_thread_counts():

@@ -80,7 +80,6 @@ def test_a_machine_that_tells_nothing(tmp_path):
 
 
 def environment(tmp_path, requirements=(), versions=None, library=Path("modem.so"), phy_home=None):
-
     def version_of(name):
         if name not in (versions or {}):
             raise metadata.PackageNotFoundError(name)

@@ -7,7 +7,7 @@ import numpy as np
 
 from phy import compute, engine
 from phy.engine.entries import BLOCK, ENTRIES
-from phy.tables.block import FIELDS, ArgumentBlock
+from phy.tables.block import FIELDS
 
 EXACT, NEAR_INT16, FLOAT32, FLOAT64, ADDRESSES = range(5)
 _KINDS = {"int16": NEAR_INT16, "float32": FLOAT32, "complex64": FLOAT32, "float64": FLOAT64}
@@ -99,7 +99,7 @@ def _words(fields, arrays, first):
     """(words, which of them are addresses); appends the arrays that they point to."""
     words, addresses = [], []
     for field, value in fields:
-        if field is BLOCK or isinstance(value, ArgumentBlock):
+        if field is BLOCK:
             inside, pointing = _words(
                 zip(FIELDS[type(value.content)], value.content, strict=True), arrays, first
             )

@@ -1,5 +1,6 @@
 """Arrays in an argument block reach the kernel unchanged."""
 
+import ctypes
 import gc
 import re
 from typing import NamedTuple
@@ -43,11 +44,17 @@ def test_a_kernel_sees_what_is_in_an_argument_block_and_may_change_it():
     assert list(block.content.row) == [0, 9, 2, 3]
 
 
-def test_who_has_the_words_keeps_the_arrays():
-    words = [ArgumentBlock(content()).packed for _ in range(100)]
+def test_a_block_keeps_the_arrays():
+    blocks = [ArgumentBlock(content()) for _ in range(100)]
     gc.collect()
     _ = [np.full(4, 7.0, np.float32) for _ in range(1000)]
-    assert all(_read(each)[2] == 14.0 for each in words)
+    assert all(_read(each.packed)[2] == 14.0 for each in blocks)
+
+
+def test_a_block_lies_where_it_says():
+    block = ArgumentBlock(content())
+    words = (ctypes.c_int64 * len(block.packed)).from_address(block.address)
+    assert list(words) == block.packed.tolist()
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -237,6 +238,51 @@ def test_a_library_of_another_user_is_not_loaded(folder, monkeypatch):
     assert engine.fitting() is None
 
 
+@pytest.fixture
+def temporary(tmp_path, monkeypatch):
+    """A temporary folder, where nothing else can be written: neither the source nor the cache."""
+    (tmp_path / "file").write_text("")
+    (tmp_path / "tmp").mkdir(mode=0o777)
+    monkeypatch.setattr(files, "_BESIDE", tmp_path / "file" / "libraries")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "tmp"))
+    return tmp_path / "tmp"
+
+
+def test_who_can_write_nowhere_else_keeps_the_library_in_a_temporary_folder(temporary):
+    found = engine.fitting()
+    assert found is None
+    assert not list(temporary.iterdir())
+    path = engine.place(engine.this())
+    assert path.parent == temporary / f"sdrlinkd-{os.geteuid()}"
+    path.write_bytes(b"")
+    path.chmod(0o755)
+    assert engine.fitting() == path
+
+
+def test_a_temporary_folder_that_others_may_write_is_not_used(temporary):
+    own = temporary / f"sdrlinkd-{os.geteuid()}"
+    own.mkdir()
+    own.chmod(0o777)
+    (own / files.name_of(engine.this())).write_bytes(b"")
+    assert engine.fitting() is None
+    path = engine.place(engine.this())
+    assert path.parent.parent == temporary
+    assert path.parent != own
+    assert path.parent.stat().st_mode & 0o777 == 0o700
+
+
+def test_where_nothing_at_all_can_be_written_numpy_computes_and_says_so(temporary, monkeypatch):
+    def none(*_, **__):
+        raise FileNotFoundError(2, "No usable temporary directory found")
+
+    monkeypatch.setattr(tempfile, "mkdtemp", none)
+    monkeypatch.setattr(tempfile, "gettempdir", none)
+    monkeypatch.setattr(choice, "_in_use", None)
+    used = engine.use("auto")
+    assert (used.name, "No usable temporary directory" in used.told) == ("numpy", True)
+
+
 def test_a_library_of_another_source_is_not_loaded(folder, monkeypatch):
     monkeypatch.setattr(files, "source_key", lambda: "0" * 16)
     assert engine.fitting() is None
@@ -272,10 +318,14 @@ def test_what_is_no_library_is_told(tmp_path):
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        (np.zeros(4), r"sanitise, argument 1: got dtype\('float64'\); allowed: a contiguous array"),
+        (
+            np.zeros(4),
+            r"sanitise, argument 1: got dtype\('float64'\); allowed: a contiguous",
+        ),
         (np.zeros((4, 2), np.complex64), "array of complex64, 1 dimensions"),
-        (np.zeros(8, np.complex64)[::2], "allowed: a contiguous array"),
-        (np.zeros(8, np.complex64).view(np.recarray), "allowed: a contiguous array"),
+        (np.zeros(8, np.complex64)[::2], "allowed: a contiguous, aligned array"),
+        (np.frombuffer(bytes(65), np.complex64, offset=1), "allowed: a contiguous, aligned array"),
+        (np.zeros(8, np.complex64).view(np.recarray), "allowed: a contiguous, aligned array"),
         ([1j], r"got \[1j\]; allowed"),
     ],
 )
@@ -332,13 +382,11 @@ def test_arrays_that_may_not_be_written_and_empty_ones_are_taken():
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-def test_a_library_for_any_x86_64_computes_the_same(tmp_path, monkeypatch):
-    if engine.this().machine != "x86_64":
-        return
+def test_a_library_for_the_whole_family_computes_the_same(tmp_path, monkeypatch):
     engine.use("compiled")
     ours = everything()
     path = tmp_path / "modem.so"
-    engine.build(engine.TARGETS["x86-64"], path)
+    engine.build([each for each in targets.FAMILIES if each.fits][-1], path)
     for name, kernel in library.load(path).items():
         monkeypatch.setattr(compute, name, kernel, raising=False)
     # Of noise, sums in another order are allowed.
@@ -397,6 +445,13 @@ def test_kernels_for_64_bit_arm_repeat_recorded_calls(tmp_path, monkeypatch):
     ran = {line.split()[0] for line in done.stdout.splitlines()}
     # These only measurements and 802.11a need.
     assert set(ENTRIES) - ran == {"encode_blocks", "decode_rows", "learn_channel", "slip"}
+
+
+def test_the_calls_compile_without_a_warning(tmp_path):
+    (tmp_path / "kernels.h").write_text(library.header())
+    source = Path(library.__file__).with_name("call.c")
+    command = [sys.executable, "-m", "ziglang", "cc", "-Wall", "-Wextra", "-Werror", "-I", tmp_path]
+    subprocess.run([*command, "-c", source, "-o", tmp_path / "call.o"], check=True)
 
 
 def test_no_kernel_takes_or_leaves_more_words_than_a_call_has_room_for():

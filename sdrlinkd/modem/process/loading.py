@@ -28,7 +28,7 @@ class Loading:
         self._engine = ""
 
     async def early(self) -> None:
-        """Load what any engine needs, and the compiled modem if there is one."""
+        """Load the compiled modem if there is one, before it is known which engine is wanted."""
         await asyncio.to_thread(_load_what_is_there)
 
     async def __call__(self, engine: str = "auto") -> None:
@@ -50,7 +50,7 @@ class Loading:
         self._tell(text)
 
     def give_up(self) -> None:
-        """Stop after the kernel being compiled; compiled kernels are kept."""
+        """End a compilation after the present kernel; the next start begins anew."""
         self._is_given_up.set()
 
     def _load(self, engine: str) -> None:
@@ -66,7 +66,7 @@ class Loading:
             self.note("")
 
     def _watch(self, done: int, total: int) -> None:
-        self.note(f"compiling the modem, once: {done} of {total} kernels")
+        self.note(f"compiling the modem, once: {done} of {total} steps")
         if self._is_given_up.is_set():
             raise _GivenUpError
 
