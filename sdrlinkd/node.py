@@ -143,7 +143,7 @@ class Node:
                 if age_s is not None:
                     times = local_times(link, message, age_s, now, now_ns, self._headers)
                 received_ns = now_ns - round((now - message.heard_at) * 1e9)
-                self.bus.publish(message, age_s, received_ns, times)
+                self.bus.publish(message, age_s, received_ns, times, link.retain(message))
         self._tell_verdicts()
         if link.relays:
             self._pdu_link.wake()

@@ -11,6 +11,7 @@ import zmq
 from sdrlinkd.bus import envelope
 from sdrlinkd.bus.announcement import announcement
 from sdrlinkd.bus.intake import Ingress, Intake
+from sdrlinkd.bus.retained import Retained, Retention
 from sdrlinkd.bus.sockets import RuntimeDirectory
 from sdrlinkd.bus.undropped import Undropped
 from sdrlinkd.client import (
@@ -22,7 +23,14 @@ from sdrlinkd.client import (
     SYNC_PREFIX,
 )
 from sdrlinkd.config import Setup
-from sdrlinkd.link import Delivered, TopicPolicy, Verdict
+from sdrlinkd.link import (
+    DEFAULT_POLICY,
+    NOT_RETAINED,
+    Delivered,
+    Retain,
+    TopicPolicy,
+    Verdict,
+)
 from sdrlinkd.localtime import UNKNOWN, LocalTimes
 from sdrlinkd.reading import SocketReader
 from sdrlinkd.reports import BusReport
@@ -38,6 +46,7 @@ QUIET_S = 0.01
 QUIET_ROUNDS = 3
 LAST_MESSAGES_S = 0.3
 PDU_TAP = b"\0pdu\0"
+LATE_LANE = b"late"
 
 
 class Bus:
@@ -57,6 +66,7 @@ class Bus:
         self._names_in = {id_: name for name, id_ in setup.topics_in.items()}
         self._types = {topic.id: topic.type for topic in setup.registry.topics}
         self._republished_as = setup.republished_as
+        self._retention = Retention()
         self._frames_out: dict[tuple[int, int], bytes] = {}
         self._received = 0
         self._published = 0
@@ -72,6 +82,8 @@ class Bus:
         out_options: dict[int, int | bytes] = {
             zmq.SNDHWM: setup.config.rx_depth,
             zmq.XPUB_WELCOME_MSG: b"\0" + self._welcome,
+            # Report every subscription, not just the first of a topic: its consumer may be late.
+            zmq.XPUB_VERBOSE: 1,
         }
         self._out = self._bind(zmq.XPUB, OUT_SOCKET, out_options)
         self._ingress_readers = [
@@ -89,9 +101,17 @@ class Bus:
         return self._taps > 0
 
     def publish(
-        self, message: Delivered, age_s: float | None, received_ns: int, times: LocalTimes = UNKNOWN
+        self,
+        message: Delivered,
+        age_s: float | None,
+        received_ns: int,
+        times: LocalTimes = UNKNOWN,
+        retain: Retain = NOT_RETAINED,
     ) -> None:
-        """Hand a message from the air to its consumers; `age_s` is None if unknown."""
+        """Hand a message from the air to its consumers; `age_s` is None if unknown.
+
+        `retain` says how many messages of its topic and source are kept for later consumers.
+        """
         topic = self._topic_out(message.src, message.topic_id)
         header = envelope.OutHeader(
             s=message.src,
@@ -112,6 +132,11 @@ class Bus:
             header.dw, header.dr = round(1e6 * wait_s), round(1e6 * reassembly_s)
             header.da = round(1e6 * air_s)
         self._published += 1
+        if retain.depth:
+            # Consumers that subscribed before now get the older messages before this one.
+            self._out_reader.drain()
+            kept = Retained(topic, header, message.payload, retain.lifespan_s)
+            self._retention.keep((message.src, message.topic_id), kept, retain.depth)
         self._out.send_multipart(envelope.encode(topic, header, message.payload))
         self._out_reader.recheck()
 
@@ -126,6 +151,9 @@ class Bus:
     def announce(self, policies: Mapping[int, TopicPolicy]) -> None:
         """Announce the limits that `policies`, by topic id, now set for producers."""
         self._welcome = announcement(self._setup, policies, self._boot)
+        for topic_id in self._types:
+            if not policies.get(topic_id, DEFAULT_POLICY).latched:
+                self._retention.forget_topic(topic_id)
         self._out.setsockopt(zmq.XPUB_WELCOME_MSG, b"\0" + self._welcome)
         self._undropped.send(b"", [b"\0" + self._welcome])
 
@@ -214,6 +242,17 @@ class Bus:
             self._acknowledge(topic)
         elif subscribed and topic.startswith(b"/"):
             self.has_consumer.set()
+            self._publish_again(topic)
+
+    def _publish_again(self, prefix: bytes) -> None:
+        """Publish the kept messages under `prefix` for a consumer that has just subscribed."""
+        now_ns = time.time_ns()
+        for kept in self._retention.matching(prefix):
+            if (header := kept.late(now_ns)) is not None:
+                frames = envelope.encode(kept.frame, header, kept.payload)
+                self._undropped.send(LATE_LANE, frames)
 
     def _acknowledge(self, topic: bytes) -> None:
-        self._undropped.send(topic, [topic, self._welcome])
+        # A consumer takes the answer to mean that it has all kept messages.
+        lane = LATE_LANE if self._undropped.is_waiting(LATE_LANE) else topic
+        self._undropped.send(lane, [topic, self._welcome])

@@ -12,6 +12,8 @@ VERSION_BYTE = b"\x01"
 MAX_HEADER_BYTES = 256
 MOST_LOOKED_AT = 16 * MAX_HEADER_BYTES
 """Largest header in octets that is parsed to find the sender of a refused message."""
+MAX_KEY_BYTES = 32
+"""Longest producer key (`k`) in octets."""
 MOST_SHOWN = 240
 
 
@@ -25,6 +27,7 @@ class InHeader(msgspec.Struct, frozen=True, gc=False):
     t: int | None = None
     ty: str | None = None
     id: str | None = None
+    k: str | None = None
 
 
 class OutHeader(msgspec.Struct, omit_defaults=True, gc=False):
@@ -46,6 +49,7 @@ class OutHeader(msgspec.Struct, omit_defaults=True, gc=False):
     dr: int | None = None
     da: int | None = None
     stop: bool = False
+    late: bool = False
 
 
 class Receipt(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -110,12 +114,18 @@ def decode(frames: Sequence[bytes]) -> tuple[bytes, InHeader | None, bytes]:
         raise EnvelopeError(f"header of {len(header)} bytes; at most {MAX_HEADER_BYTES}")
     try:
         if header[:1] == VERSION_BYTE:
-            return topic, _from_msgpack.decode(header[1:]), payload
-        if header[:1] == b"{":
-            return topic, _from_json.decode(header), payload
+            given = _from_msgpack.decode(header[1:])
+        elif header[:1] == b"{":
+            given = _from_json.decode(header)
+        else:
+            raise EnvelopeError(
+                f"header begins with {header[:1]!r}; allowed: 0x01 (MessagePack) or {{"
+            )
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise EnvelopeError(f"header: {error}") from None
-    raise EnvelopeError(f"header begins with {header[:1]!r}; allowed: 0x01 (MessagePack) or {{")
+    if given.k is not None and len(given.k.encode(errors="replace")) > MAX_KEY_BYTES:
+        raise EnvelopeError(f"header: `k` has more than {MAX_KEY_BYTES} octets")
+    return topic, given, payload
 
 
 def wanted_of(frames: Sequence[bytes]) -> tuple[str, int | None, dict[str, object]]:

@@ -102,6 +102,7 @@ class Intake:
                 header.d,
                 None if header.ls is None else header.ls * 1e-3,
                 receipt=receipt,
+                key=header.k or "",
             )
             self._ingress.submit(topic_id, payload, overrides, header.t)
 
@@ -114,9 +115,7 @@ class Intake:
     def _refuse_envelope(self, frames: list[bytes], words: str) -> None:
         receipt, dst, fields = envelope.wanted_of(frames)
         try:
-            check_wishes(
-                fields.get("q"), fields.get("p"), fields.get("d"), fields.get("ls"), fields.get("t")
-            )
+            check_wishes(*(fields.get(name) for name in ("q", "p", "d", "ls", "t", "k")))
         except MessageRefusedError as error:
             words = str(error)
         self._refuse_unowned("tx_bad_envelope", partial(str, words), _name(frames[0]), receipt, dst)

@@ -88,7 +88,7 @@ def pub(
                 receipt=receipt,
             )
             count += 1
-            if name is not None:
+            if isinstance(name, str):
                 waiting[name] = count
             if not rate or count == times:
                 break

@@ -12,7 +12,8 @@ with Publisher() as out:
     print(out.receipt(timeout_s=5.0))
 
 `send` raises MessageRefusedError for a message that the daemon does not accept. In a callback of a
-ROS node, use `send(..., timeout_s=0)`, which never blocks. Runs on Python 3.10 and newer.
+ROS node, use `send(..., wait=False)`, which never blocks and returns False without a daemon. Runs
+on Python 3.10 and newer.
 """
 
 from typing import TYPE_CHECKING

@@ -13,6 +13,8 @@ QOS = ("bulk", "default", "latency", "urgent")
 MAX_PRIORITY = 127
 BROADCAST = 255
 CDR_HEADER_SIZE = 4
+MAX_KEY_BYTES = 32
+"""Longest producer key in octets of UTF-8."""
 MOST_NAMES = 20
 """Most topic names that an error text lists."""
 
@@ -63,6 +65,7 @@ def check_wishes(
     dst: object = None,
     lifespan_ms: object = None,
     published_ns: object = None,
+    key: object = None,
 ) -> None:
     """Raise MessageRefusedError for values that every daemon refuses."""
     words = ""
@@ -76,6 +79,8 @@ def check_wishes(
         words = f"lifespan_ms: got {_shown(lifespan_ms)}; allowed: a number above 0"
     elif published_ns is not None and not _is_within(published_ns, (1 << 63) - 1):
         words = f"published_ns: got {_shown(published_ns)}; allowed: nanoseconds since 1970"
+    elif key is not None and not _is_short(key):
+        words = f"key: got {_shown(key)}; allowed: text of up to {MAX_KEY_BYTES} bytes"
     if words:
         raise MessageRefusedError("tx_bad_envelope", words)
 
@@ -122,6 +127,10 @@ def _shown(value: object) -> str:
 
 def _is_within(value: object, most: int) -> bool:
     return isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= most
+
+
+def _is_short(value: object) -> bool:
+    return isinstance(value, str) and len(value.encode(errors="replace")) <= MAX_KEY_BYTES
 
 
 def _is_above_0(value: object) -> bool:

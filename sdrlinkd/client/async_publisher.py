@@ -4,13 +4,14 @@ import asyncio
 import os
 from collections.abc import Callable
 from types import TracebackType
+from typing import Any
 
 import zmq
 import zmq.asyncio
 
 from sdrlinkd.client.async_socket import AsyncSocket
 from sdrlinkd.client.deadline import Deadline
-from sdrlinkd.client.errors import no_daemon, restarted
+from sdrlinkd.client.errors import NoDaemonError, no_daemon, restarted
 from sdrlinkd.client.messages import Receipt, sync_frames
 from sdrlinkd.client.paths import IN_SOCKET, OUT_SOCKET, chosen_dir, endpoint
 from sdrlinkd.client.producer import STILL_THERE_S, Producer, wishes
@@ -54,24 +55,44 @@ class AsyncPublisher(AsyncSocket):
         dst: int | None = None,
         lifespan_ms: float | None = None,
         type: str | None = None,  # noqa: A002
+        key: str | None = None,
         published_ns: int | None = None,
         receipt: bool = False,
         timeout_s: float | None = None,
-    ) -> str | None:
+        wait: bool = True,
+    ) -> str | bool | None:
         """Publish `cdr` under `topic`; with `receipt`, returns the message's id.
 
         As `Publisher.send`, it raises NoDaemonError after the timeout (at once when that is 0) and
-        MessageRefusedError for a message that the daemon does not accept.
+        MessageRefusedError for a message that the daemon does not accept. With `wait=False` it
+        returns False instead of waiting, and True or the id for a message handed over.
         """
-        producer = self._producer
-        fields = wishes(qos, priority, dst, lifespan_ms, type, published_ns)
-        deadline = Deadline(self._timeout_s if timeout_s is None else timeout_s)
+        fields = wishes(qos, priority, dst, lifespan_ms, type, published_ns, key)
+        if wait:
+            wait_s = self._timeout_s if timeout_s is None else timeout_s
+            return await self._send(topic, cdr, fields, published_ns, receipt, Deadline(wait_s))
+        try:
+            return await self._send(topic, cdr, fields, published_ns, receipt, Deadline(0)) or True
+        except NoDaemonError:
+            return False
+
+    async def _send(
+        self,
+        topic: str,
+        cdr: bytes,
+        fields: dict[str, Any],
+        published_ns: int | None,
+        receipt: bool,
+        deadline: Deadline,
+    ) -> str | None:
+        """`send` until `deadline`, with the header `fields`."""
+        producer, type_ = self._producer, fields["ty"]
         if producer.is_time_to_look():
             await self._hear()
-        if not producer.takes(topic, cdr, type):
+        if not producer.takes(topic, cdr, type_):
             # Ask before refusing: a restarted daemon may accept other topics.
             await self._ask(deadline)
-            producer.check(topic, cdr, type)
+            producer.check(topic, cdr, type_)
         name = None
         if receipt:
             if not producer.is_subscribed:
@@ -87,10 +108,10 @@ class AsyncPublisher(AsyncSocket):
                     raise no_daemon(self.runtime_dir) from None
                 # Another daemon may be listening by now.
                 await self._ask(deadline, must_answer=receipt)
-                producer.check(topic, cdr, type)
+                producer.check(topic, cdr, type_)
         self._sent = True
         if name is not None:
-            producer.awaited.expect(name, topic, dst, producer.boot)
+            producer.awaited.expect(name, topic, fields["d"], producer.boot)
         return name
 
     async def receipt(self, timeout_s: float | None = None) -> Receipt | None:

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import zmq
 
+from sdrlinkd.client.arrivals import Arrivals
 from sdrlinkd.client.async_socket import AsyncSocket
 from sdrlinkd.client.deadline import Deadline
 from sdrlinkd.client.errors import no_daemon
-from sdrlinkd.client.messages import Message, decode_in, new_ack_topic, topic_filter
+from sdrlinkd.client.messages import Message, new_ack_topic, topic_filter
 from sdrlinkd.client.paths import OUT_SOCKET, chosen_dir, endpoint
 from sdrlinkd.client.subscriber import ASK_AGAIN_S, RECEIVE_HWM
 
@@ -31,6 +32,7 @@ class AsyncSubscriber(AsyncSocket):
         super().__init__(zmq.SUB, chosen_dir(runtime_dir, directory), timeout_s)
         self._topics = topics or ("/*",)
         self._socket.rcvhwm = RECEIVE_HWM
+        self._arrivals = Arrivals()
 
     async def __aenter__(self) -> "Self":
         self._socket.connect(endpoint(self.runtime_dir, OUT_SOCKET))
@@ -41,6 +43,9 @@ class AsyncSubscriber(AsyncSocket):
         except asyncio.TimeoutError:
             await self.close()
             raise no_daemon(self.runtime_dir) from None
+        except BaseException:
+            await self.close()
+            raise
         return self
 
     async def _subscribed(self) -> None:
@@ -53,15 +58,20 @@ class AsyncSubscriber(AsyncSocket):
                 self._socket.subscribe(asked[-1])
             if not await self._socket.poll(again.left_ms):
                 continue
-            if (await self._socket.recv_multipart())[0] in asked:
+            frames = await self._socket.recv_multipart()
+            if frames[0] in asked:
+                self._arrivals.begin()
                 break
+            self._arrivals.hold(frames)
         for token in asked:
             self._socket.unsubscribe(token)
 
     async def receive(self) -> Message:
         """Wait for the next message and return it."""
+        if (first := self._arrivals.next()) is not None:
+            return first
         while True:
-            message = decode_in(await self._socket.recv_multipart())
+            message = self._arrivals.admit(await self._socket.recv_multipart())
             if message is not None:
                 return message
 

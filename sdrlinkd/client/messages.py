@@ -33,7 +33,8 @@ class Message:
     `published_ns` is when the message was published, and `sampled_ns` the stamp of its
     std_msgs/Header; both are in ns since 1970 by this host's clock, each with the bound of its
     error in µs, and None when unknown. `is_stop` marks the stop message of a command topic, which
-    the daemon publishes when the topic falls silent.
+    the daemon publishes when the topic falls silent. `is_late` marks a message that was received
+    before this subscriber subscribed, and kept for it; `age_us` is its age when it was handed over.
     """
 
     topic: str
@@ -54,6 +55,7 @@ class Message:
     reassembly_us: int | None = None
     on_air_us: int | None = None
     is_stop: bool = False
+    is_late: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +122,7 @@ def decode_in(frames: Sequence[bytes]) -> Message | None:
         reassembly_us=fields.get("dr"),
         on_air_us=fields.get("da"),
         is_stop=fields.get("stop", False),
+        is_late=fields.get("late", False),
     )
 
 

@@ -159,7 +159,8 @@ def wishes(
     lifespan_ms: float | None,
     type_: str | None,
     published_ns: int | None,
+    key: str | None = None,
 ) -> dict[str, Any]:
     """Header fields of a message. Raises MessageRefusedError for values every daemon refuses."""
-    check_wishes(qos, priority, dst, lifespan_ms, published_ns)
-    return {"q": qos, "p": priority, "d": dst, "ls": lifespan_ms, "ty": type_}
+    check_wishes(qos, priority, dst, lifespan_ms, published_ns, key)
+    return {"q": qos, "p": priority, "d": dst, "ls": lifespan_ms, "ty": type_, "k": key}

@@ -3,12 +3,13 @@
 import os
 from collections.abc import Callable
 from types import TracebackType
+from typing import Any
 
 import zmq
 
 from sdrlinkd.client.blocking_socket import Endpoint
 from sdrlinkd.client.deadline import Deadline
-from sdrlinkd.client.errors import no_daemon, restarted
+from sdrlinkd.client.errors import NoDaemonError, no_daemon, restarted
 from sdrlinkd.client.messages import Receipt, sync_frames
 from sdrlinkd.client.paths import IN_SOCKET, OUT_SOCKET, chosen_dir
 from sdrlinkd.client.producer import STILL_THERE_S, Producer, wishes
@@ -22,7 +23,8 @@ class Publisher(Endpoint):
 
     `send` blocks for at most `timeout_s` while the daemon is away or busy, then raises
     NoDaemonError; nothing is ever queued for an absent daemon. With a timeout of 0 it never blocks,
-    which suits callbacks that must not delay their node, such as those of a ROS 2 executor.
+    which suits callbacks that must not delay their node, such as those of a ROS 2 executor; with
+    `wait=False` it returns False instead of raising.
 
     The publisher refuses what the daemon would refuse, with the daemon's error texts and the limits
     that the daemon announces, also after a restart with other limits. With `checked=False` it does
@@ -65,30 +67,52 @@ class Publisher(Endpoint):
         dst: int | None = None,
         lifespan_ms: float | None = None,
         type: str | None = None,  # noqa: A002
+        key: str | None = None,
         published_ns: int | None = None,
         receipt: bool = False,
         timeout_s: float | None = None,
-    ) -> str | None:
+        wait: bool = True,
+    ) -> str | bool | None:
         """Publish `cdr` under `topic`. Options left out come from the daemon's configuration.
 
-        The message's age counts from `published_ns` (ns since 1970), or from now. With `receipt`,
-        each robot that the message is for reports what became of it, and `send` returns the id of
-        these receipts; see the method `receipt`.
+        The message's age counts from `published_ns` (ns since 1970), or from now. `key` tells the
+        streams of one topic apart, as those of several publishers: `depth` and `durability` apply
+        to each. With `receipt`, each robot that the message is for reports what became of it, and
+        `send` returns the id of these receipts; see the method `receipt`.
 
         Blocks for at most `timeout_s` (default: the publisher's). With 0 it never blocks, and
-        raises NoDaemonError at once if the daemon is not connected (yet) or does not keep up.
+        raises NoDaemonError at once if the daemon is not connected (yet) or does not keep up. With
+        `wait=False` it never blocks either, and returns False instead; the publisher connects again
+        by itself. It then returns the receipt's id, or else True, for a message handed over.
         Raises MessageRefusedError for a message that the daemon does not accept: an unknown topic,
         a type other than the registry's, too large a message, or a value out of range.
         """
-        producer = self._producer
-        fields = wishes(qos, priority, dst, lifespan_ms, type, published_ns)
-        deadline = Deadline(self._timeout_s if timeout_s is None else timeout_s)
+        fields = wishes(qos, priority, dst, lifespan_ms, type, published_ns, key)
+        if wait:
+            wait_s = self._timeout_s if timeout_s is None else timeout_s
+            return self._send(topic, cdr, fields, published_ns, receipt, Deadline(wait_s))
+        try:
+            return self._send(topic, cdr, fields, published_ns, receipt, Deadline(0)) or True
+        except NoDaemonError:
+            return False
+
+    def _send(
+        self,
+        topic: str,
+        cdr: bytes,
+        fields: dict[str, Any],
+        published_ns: int | None,
+        receipt: bool,
+        deadline: Deadline,
+    ) -> str | None:
+        """`send` until `deadline`, with the header `fields`."""
+        producer, type_ = self._producer, fields["ty"]
         if producer.is_time_to_look():
             self._hear()
-        if not producer.takes(topic, cdr, type):
+        if not producer.takes(topic, cdr, type_):
             # Ask before refusing: a restarted daemon may accept other topics.
             self._ask(deadline)
-            producer.check(topic, cdr, type)
+            producer.check(topic, cdr, type_)
         name = None
         if receipt:
             if not producer.is_subscribed:
@@ -104,10 +128,10 @@ class Publisher(Endpoint):
                     raise no_daemon(self.runtime_dir) from None
                 # Another daemon may be listening by now.
                 self._ask(deadline, must_answer=receipt)
-                producer.check(topic, cdr, type)
+                producer.check(topic, cdr, type_)
         self._sent = True
         if name is not None:
-            producer.awaited.expect(name, topic, dst, producer.boot)
+            producer.awaited.expect(name, topic, fields["d"], producer.boot)
         return name
 
     def receipt(self, timeout_s: float | None = None) -> Receipt | None:

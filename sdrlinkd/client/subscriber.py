@@ -5,10 +5,11 @@ from collections.abc import Iterator
 
 import zmq
 
+from sdrlinkd.client.arrivals import Arrivals
 from sdrlinkd.client.blocking_socket import Endpoint
 from sdrlinkd.client.deadline import Deadline
 from sdrlinkd.client.errors import no_daemon
-from sdrlinkd.client.messages import Message, decode_in, new_ack_topic, topic_filter
+from sdrlinkd.client.messages import Message, new_ack_topic, topic_filter
 from sdrlinkd.client.paths import OUT_SOCKET, chosen_dir
 
 RECEIVE_HWM = 1000
@@ -19,7 +20,8 @@ class Subscriber(Endpoint):
     """Receives messages from other robots. A topic that ends with `*` is a prefix.
 
     Up to `depth` messages wait for a slow reader (0: no limit). Messages beyond that are dropped,
-    which shows as a step in `Message.number`.
+    which shows as a step in `Message.number`. The first messages are those that the daemon has kept
+    of `transient_local` topics (`Message.is_late`).
     """
 
     def __init__(
@@ -36,18 +38,25 @@ class Subscriber(Endpoint):
         """
         super().__init__(zmq.SUB, chosen_dir(runtime_dir, directory))
         self._socket.rcvhwm = depth
+        self._arrivals = Arrivals()
         self._connect(OUT_SOCKET)
         for topic in topics or ("/*",):
             self._socket.subscribe(topic_filter(topic))
-        self._wait_until_subscribed(timeout_s)
+        try:
+            self._wait_until_subscribed(timeout_s)
+        except BaseException:
+            self.close()
+            raise
 
     def receive(self, timeout_s: float | None = None) -> Message | None:
         """The next message; None if none arrives within `timeout_s`."""
         deadline = Deadline(timeout_s)
+        if (first := self._arrivals.next()) is not None:
+            return first
         while True:
             if not self._poll(deadline.left_s):
                 return None
-            message = decode_in(self._socket.recv_multipart())
+            message = self._arrivals.admit(self._socket.recv_multipart())
             if message is not None:
                 return message
 
@@ -68,9 +77,11 @@ class Subscriber(Endpoint):
                 self._socket.subscribe(asked[-1])
             if not self._poll(min(again.left_s, deadline.left_s)):
                 continue
-            if self._socket.recv_multipart()[0] in asked:
+            frames = self._socket.recv_multipart()
+            if frames[0] in asked:
+                self._arrivals.begin()
                 for token in asked:
                     self._socket.unsubscribe(token)
                 return
-        self.close()
+            self._arrivals.hold(frames)
         raise no_daemon(self.runtime_dir)

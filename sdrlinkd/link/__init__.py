@@ -31,7 +31,14 @@ from sdrlinkd.link.queue import (
     train_dictionary,
 )
 from sdrlinkd.link.receipts import Verdict
-from sdrlinkd.link.receive import CDR_HEADER_SIZE, Delivered, Relay, RelayParams
+from sdrlinkd.link.receive import (
+    CDR_HEADER_SIZE,
+    NOT_RETAINED,
+    Delivered,
+    Relay,
+    RelayParams,
+    Retain,
+)
 from sdrlinkd.link.report import Names
 from sdrlinkd.link.schedule import (
     IDLE_SHARE,
@@ -61,6 +68,7 @@ __all__ = [
     "CDR_HEADER_SIZE",
     "DEFAULT_POLICY",
     "IDLE_SHARE",
+    "NOT_RETAINED",
     "OVERRUN",
     "QOS_BY_LABEL",
     "RX_PDU_REASONS",
@@ -99,6 +107,7 @@ __all__ = [
     "ReassemblyParams",
     "Relay",
     "RelayParams",
+    "Retain",
     "Sensed",
     "Settled",
     "State",

@@ -31,6 +31,7 @@ from sdrlinkd.link.receive import (
     Reception,
     RecordHeard,
     RelayParams,
+    Retain,
 )
 from sdrlinkd.link.report import NO_NAMES, Names, Reporter
 from sdrlinkd.link.schedule import ClassesParams, Forecasts
@@ -204,8 +205,9 @@ class Link:
             qos = overrides.qos if overrides.qos is not None else intake.treatment(topic_id)[0]
             self._forecasts.note((self.own_id, topic_id), qos, now)
             self._scheduler.more_to_send()
-            if intake.policy(topic_id).durability == "transient_local":
-                self._latched.keep(topic_id, Kept(payload, now, overrides._replace(receipt="")))
+            if depth := intake.policy(topic_id).latched:
+                kept = Kept(payload, now, overrides._replace(receipt=""))
+                self._latched.keep(topic_id, kept, depth)
         return refused
 
     def refuse(
@@ -219,6 +221,10 @@ class Link:
     def delivered(self, message: Delivered, now: float) -> float | None:
         """Note that `message` is handed over at `now`; returns its age in s, None if unknown."""
         return self._reception.deliver(message, now)
+
+    def retain(self, message: Delivered) -> Retain:
+        """How many messages of this one's topic and source are kept for later consumers."""
+        return self._reception.retain(message)
 
     def take_verdicts(self) -> list[Verdict]:
         """Verdicts since the last call on messages whose producers want receipts."""

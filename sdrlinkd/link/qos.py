@@ -37,6 +37,8 @@ class Overrides(NamedTuple):
     """Age of the message at its submission in s, as its producer reports."""
     receipt: str = ""
     """The producer's id for the receipt of the message; empty: no receipt wanted."""
+    key: str = ""
+    """Tells the streams of a topic apart, as those of several publishers."""
 
 
 AS_CONFIGURED = Overrides()

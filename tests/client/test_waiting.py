@@ -13,10 +13,12 @@ from sdrlinkd.client import (
     NoDaemonError,
     Publisher,
     Subscriber,
+    pack_map,
 )
 from sdrlinkd.client.deadline import Deadline, milliseconds
 
 CDR = b"\0\1\0\0abcd"
+HEADER = b"\x01" + pack_map({"s": 1, "n": 1})
 
 
 @pytest.mark.parametrize(
@@ -76,7 +78,7 @@ def full_stream(tmp_path):
             if said[:1] == b"\1" and said[1:].startswith(b"\0ack\0"):
                 asked.append(said[1:])
                 if len(asked) > 1:
-                    out.send_multipart([b"/rx_robot_1/odom\0", b"{}", CDR])
+                    out.send_multipart([b"/rx_robot_1/odom\0", HEADER, CDR])
                     out.send_multipart([said[1:], b""])
 
     with zmq.Context() as context, context.socket(zmq.XPUB) as out:

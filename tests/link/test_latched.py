@@ -1,8 +1,11 @@
-"""transient_local: a late joiner gets the last message, for little airtime."""
+"""transient_local: a late joiner gets the last messages, for little airtime."""
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from sdrlinkd.link import Outcome, TopicPolicy
+from sdrlinkd.link import Outcome, Overrides, TopicPolicy
+from sdrlinkd.link.queue import MOST_KEYS
 from tests.link.world import compose, compose_at, make_link, topic_of
 
 LATCHED = TopicPolicy(durability="transient_local")
@@ -99,3 +102,76 @@ def test_it_takes_two_per_cent_of_the_air_at_most():
             one.hear(pdu, now)
         one.handle_timers(now + 0.25)
     assert topic_of(one, 0).reoffered == pytest.approx(1 + 60 * 0.02, abs=0.5)
+
+
+def latched(link, depth=0, topic_id=0):
+    """Let `link` keep the last `depth` messages of each key of a topic."""
+    link.set_policies({topic_id: TopicPolicy(durability="transient_local", depth=depth)})
+
+
+def keyed(link, *messages, topic_id=0):
+    """Submit (key, text) messages of a topic."""
+    for key, text in messages:
+        link.submit(topic_id, b"\0\1\0\0" + text.encode(), 0.0, Overrides(key=key))
+
+
+def late_gets(links, now=2.0):
+    """What the last of `links`, which comes late, receives, in order."""
+    run(links[:1], 0.0, 5)
+    late = links[-1].own_id
+    return [payload[4:].decode() for to, _, payload in run(links, now, 20) if to == late]
+
+
+@pytest.mark.parametrize(
+    ("depth", "sent", "owed"),
+    [
+        (0, [("a", "1"), ("b", "2"), ("c", "3")], "123"),
+        (1, [("a", "1"), ("b", "2"), ("a", "3")], "23"),
+        (2, [("a", "1"), ("b", "2"), ("a", "3"), ("a", "4")], "234"),
+        (0, [("", "1"), ("", "2"), ("a", "3")], "23"),
+    ],
+)
+def test_a_late_joiner_is_owed_the_last_of_every_producer_in_their_order(depth, sent, owed):
+    links = team(2)
+    latched(links[0], depth)
+    keyed(links[0], *sent)
+    assert "".join(late_gets(links)) == owed
+    assert links[0].audit() == []
+
+
+def test_what_is_repeated_for_one_producer_displaces_nothing_of_another():
+    """A queue depth of 1 holds for each key, also where messages wait together."""
+    one = make_link(1, pdu_size=220)
+    latched(one, 1)
+    keyed(one, ("a", "1"), ("b", "2"), ("c", "3"), ("b", "4"))
+    other = make_link(2, pdu_size=220)
+    heard = [m for pdu in compose(one, 0.0, 8).pdus for m in other.hear(pdu, 0.0)]
+    assert [each.payload[4:] for each in heard] == [b"1", b"3", b"4"]
+    assert topic_of(one, 0).dropped == {"tx_superseded": 1}
+    assert one.audit() == []
+
+
+def test_of_too_many_producers_the_one_silent_for_longest_goes():
+    links = team(2)
+    latched(links[0])
+    keyed(links[0], *((f"k{i}", f"{i} ") for i in range(MOST_KEYS)), ("k0", "0' "), ("new", "new"))
+    told = "".join(late_gets(links)).split()
+    assert told == [*(str(i) for i in range(2, MOST_KEYS)), "0'", "new"]
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from("abc"), st.integers(0, 9)), max_size=30),
+    st.integers(0, 4),
+)
+def test_any_order_of_any_producers(sent, depth):
+    links = team(2)
+    latched(links[0], depth)
+    keyed(links[0], *((key, f"{key}{number};") for key, number in sent))
+    numbered = list(enumerate(sent))
+    kept = [
+        (at, each)
+        for at, each in numbered
+        if at in [i for i, other in numbered if other[0] == each[0]][-max(1, depth) :]
+    ]
+    assert "".join(late_gets(links)) == "".join(f"{key}{number};" for _, (key, number) in kept)
+    assert links[0].audit() == []

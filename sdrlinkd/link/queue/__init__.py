@@ -7,7 +7,7 @@ PDUs and knows nothing of radio or channel.
 from sdrlinkd.link.queue.admission import NOT_TAKEN
 from sdrlinkd.link.queue.compression import Deflated, Inflated, train_dictionary
 from sdrlinkd.link.queue.intake import Intake
-from sdrlinkd.link.queue.latched import Kept, Latched, Offer
+from sdrlinkd.link.queue.latched import MOST_KEYS, Kept, Latched, Offer
 from sdrlinkd.link.queue.ledger import (
     RX_PDU_REASONS,
     RX_REASONS,
@@ -32,6 +32,7 @@ from sdrlinkd.link.queue.policy import DEFAULT_POLICY, TopicPolicy
 
 __all__ = [
     "DEFAULT_POLICY",
+    "MOST_KEYS",
     "NOT_TAKEN",
     "RX_PDU_REASONS",
     "RX_REASONS",

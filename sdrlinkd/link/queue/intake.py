@@ -200,7 +200,7 @@ class Intake:
         wishes: Overrides,
         bytes_per_s: float,
     ) -> str | None:
-        qos, priority, dst, lifespan_s, age_s, receipt = wishes
+        qos, priority, dst, lifespan_s, age_s, receipt, key = wishes
         topic = self._topics[topic_id]
         if lifespan_s is None:
             lifespan_s = self.lifespan(topic_id, qos).seconds
@@ -224,6 +224,7 @@ class Intake:
             topic.tally,
             # Without a control channel its receipt was already answered as unknown.
             receipt=receipt if self._has_control else "",
+            key=key,
             is_compressed=frame is not None,
         )
         if message.expires_at <= now:

@@ -1,5 +1,6 @@
-"""`transient_local`: latches the last message of a topic and replays it to late joiners."""
+"""`transient_local`: latches the last messages of a topic and replays them to late joiners."""
 
+from collections import OrderedDict, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -12,6 +13,8 @@ SHARE = 0.02
 MOST_CREDIT_S = 1.0
 WAIT_S = 0.2
 """Wait in s after a new robot, as others often follow soon."""
+MOST_KEYS = 32
+"""Most producer keys of a topic; the one that was silent for longest goes first."""
 
 
 class Kept(NamedTuple):
@@ -30,49 +33,75 @@ class Offer(NamedTuple):
     dst: int
 
 
-@dataclass(slots=True)
-class _Topic:
+@dataclass(slots=True, eq=False)
+class _Latched:
+    topic_id: int
     kept: Kept
+    number: int
     owed: set[int] = field(default_factory=set)
 
 
 class Latched:
-    """Keeps latched messages, and decides when one is replayed."""
+    """Keeps latched messages by topic and producer key, and decides when one is replayed.
+
+    Messages are replayed in the order of their submission.
+    """
 
     def __init__(self) -> None:
-        self._topics: dict[int, _Topic] = {}
+        self._topics: dict[int, OrderedDict[str, deque[_Latched]]] = {}
+        self._count = 0
         self._credit_s = 0.0
         self._looked_at: float | None = None
         self._came_at = float("-inf")
+        self._is_owing = False
 
-    def keep(self, topic_id: int, kept: Kept) -> None:
-        """Latch a topic's newest message, which robots already present receive anyway."""
-        self._topics[topic_id] = _Topic(kept)
+    def keep(self, topic_id: int, kept: Kept, depth: int) -> None:
+        """Latch a key's newest message, which robots already present receive anyway.
+
+        Of each key, the last `depth` messages are latched.
+        """
+        keys = self._topics.setdefault(topic_id, OrderedDict())
+        messages = keys.setdefault(kept.overrides.key, deque())
+        keys.move_to_end(kept.overrides.key)
+        self._count += 1
+        messages.append(_Latched(topic_id, kept, self._count))
+        while len(messages) > depth:
+            messages.popleft()
+        if len(keys) > MOST_KEYS:
+            keys.popitem(last=False)
 
     def forget(self, topic_id: int) -> None:
-        """Drop the latched message of a topic that is now volatile."""
+        """Drop the latched messages of a topic that is now volatile."""
         self._topics.pop(topic_id, None)
 
     def newcomer(self, node: int, now: float) -> None:
         """Note a robot that was heard for the first time or has restarted."""
         self._came_at = now
-        for topic in self._topics.values():
-            topic.owed.add(node)
+        for each in self._messages():
+            each.owed.add(node)
+            self._is_owing = True
 
     def due(self, now: float, bytes_per_s: float) -> Iterator[Offer]:
         """Messages to replay at `now`, on a channel that carries `bytes_per_s`."""
         passed_s = 0.0 if self._looked_at is None else max(0.0, now - self._looked_at)
         self._credit_s = min(MOST_CREDIT_S, self._credit_s + SHARE * passed_s)
         self._looked_at = now
-        if now - self._came_at < WAIT_S:
+        if not self._is_owing or now - self._came_at < WAIT_S:
             return
-        for topic_id, topic in self._topics.items():
-            if not topic.owed or self._credit_s < 0:
-                continue
-            self._credit_s -= len(topic.kept.payload) / bytes_per_s
-            wanted = topic.kept.overrides.dst
-            mine = topic.owed if wanted in (None, BROADCAST) else topic.owed & {wanted}
-            topic.owed = set()
+        owing = [each for each in self._messages() if each.owed]
+        for each in sorted(owing, key=lambda latched: latched.number):
+            if self._credit_s < 0:
+                return
+            self._credit_s -= len(each.kept.payload) / bytes_per_s
+            wanted = each.kept.overrides.dst
+            mine = each.owed if wanted in (None, BROADCAST) else each.owed & {wanted}
+            each.owed = set()
             if mine:
                 dst = next(iter(mine)) if len(mine) == 1 else BROADCAST
-                yield Offer(topic_id, topic.kept, dst if wanted is None else wanted)
+                yield Offer(each.topic_id, each.kept, dst if wanted is None else wanted)
+        self._is_owing = False
+
+    def _messages(self) -> Iterator[_Latched]:
+        for keys in self._topics.values():
+            for messages in keys.values():
+                yield from messages

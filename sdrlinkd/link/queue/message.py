@@ -47,7 +47,7 @@ class Outgoing:
 
     __slots__ = (
         "arrived_at", "dst", "entry_id", "expires_at", "fate", "is_compressed", "is_expected",
-        "is_held", "is_whole", "k", "lane", "last_at", "next_index", "parity", "payload",
+        "is_held", "is_whole", "k", "key", "lane", "last_at", "next_index", "parity", "payload",
         "priority", "qos", "receipt", "rests_id", "stamped", "tally", "topic_id", "total",
         "unconfirmed",
     )  # fmt: skip
@@ -65,13 +65,14 @@ class Outgoing:
         tally: TxTally,
         *,
         receipt: str = "",
+        key: str = "",
         is_compressed: bool = False,
         is_whole: bool = False,
     ) -> None:
         """Make a queued message.
 
-        `receipt` is the producer's id for the receipt, empty if none is wanted. `is_whole` means
-        that the payload is another robot's PDU to be relayed.
+        `receipt` is the producer's id for the receipt, empty if none is wanted, and `key` its
+        producer key. `is_whole` means that the payload is another robot's PDU to be relayed.
         """
         self.topic_id = topic_id
         self.payload = payload
@@ -83,6 +84,7 @@ class Outgoing:
         self.stamped = not wants_stamp
         self.tally = tally
         self.receipt = receipt
+        self.key = key
         self.is_compressed = is_compressed
         self.is_whole = is_whole
         self.fate = Fate.QUEUED

@@ -17,17 +17,37 @@ from sdrlinkd.link.queue.message import Lane, Level, Outgoing
 from sdrlinkd.link.queue.policy import TopicPolicy
 from sdrlinkd.wire import ENTRY_HEADER_SIZE
 
+NONE_QUEUED: OrderedDict[Outgoing, None] = OrderedDict()
+
 
 @dataclass(slots=True)
 class _Queued:
     """One topic's messages of which no part has been sent yet, the oldest first."""
 
     messages: OrderedDict[Outgoing, None] = field(default_factory=OrderedDict)
+    by_key: dict[str, OrderedDict[Outgoing, None]] = field(default_factory=dict)
     n_bytes: int = 0
 
     @property
     def oldest(self) -> Outgoing:
         return next(iter(self.messages))
+
+    def of_key(self, key: str) -> OrderedDict[Outgoing, None]:
+        """Messages of one producer key; without a key, those without one."""
+        return self.by_key.get(key) or NONE_QUEUED
+
+    def add(self, message: Outgoing) -> None:
+        self.messages[message] = None
+        self.by_key.setdefault(message.key, OrderedDict())[message] = None
+        self.n_bytes += len(message.payload)
+
+    def remove(self, message: Outgoing) -> None:
+        del self.messages[message]
+        of_key = self.by_key[message.key]
+        del of_key[message]
+        if not of_key:
+            del self.by_key[message.key]
+        self.n_bytes -= len(message.payload)
 
 
 def _order(lane: Lane) -> tuple[float, int]:
@@ -70,8 +90,8 @@ class Outbox:
             return "tx_overflow_new"
         topic, depth = self._by_topic.get(message.topic_id), policy.kept
         if topic is not None:
-            while depth and len(topic.messages) >= depth:
-                self.lives.drop(self._withdraw_waiting(topic.oldest), "tx_superseded")
+            while depth and len(of_key := topic.of_key(message.key)) >= depth:
+                self.lives.drop(self._withdraw_waiting(next(iter(of_key))), "tx_superseded")
             of_topic = min(policy.queue_bytes or inf, (policy.queue_s or inf) * bytes_per_s)
             while topic.messages and topic.n_bytes + size > of_topic:
                 self.lives.drop(self._withdraw_waiting(topic.oldest), "tx_topic_full")
@@ -208,8 +228,7 @@ class Outbox:
         topic = self._by_topic.get(message.topic_id)
         if topic is None:
             topic = self._by_topic[message.topic_id] = _Queued()
-        topic.messages[message] = None
-        topic.n_bytes += len(message.payload)
+        topic.add(message)
         self.queued += 1
         self._with_lifespan += message.expires_at < inf
         self.queued_bytes += len(message.payload)
@@ -256,8 +275,13 @@ class Outbox:
         return next(iter(self._by_class[lowest]))
 
     def _withdraw_waiting(self, message: Outgoing) -> Outgoing:
-        """Remove `message`, the oldest of its class or topic and so the first of its lane."""
+        """Remove `message`; the oldest of its class or topic is the first of its lane."""
         lane = message.lane
+        if lane.waiting[0] is not message:
+            # It is the oldest of its producer key, and other keys of the topic are ahead of it.
+            lane.waiting.remove(message)
+            self._forget_queued(message)
+            return message
         lane.waiting.popleft()
         self._forget_queued(message)
         if lane.current is None:
@@ -266,9 +290,7 @@ class Outbox:
 
     def _forget_queued(self, message: Outgoing) -> None:
         del self._by_class[message.qos][message]
-        topic = self._by_topic[message.topic_id]
-        del topic.messages[message]
-        topic.n_bytes -= len(message.payload)
+        self._by_topic[message.topic_id].remove(message)
         self.queued -= 1
         self._with_lifespan -= message.expires_at < inf
         self.queued_bytes -= len(message.payload)

@@ -8,6 +8,8 @@ from msgspec import Meta
 
 from sdrlinkd.link.qos import MAX_PRIORITY
 
+MOST_LATCHED = 64
+"""Most messages that `keep_all` keeps for late joiners."""
 Positive = Annotated[float, Meta(gt=0)]
 Amount = Annotated[int, Meta(ge=0)]
 
@@ -22,8 +24,8 @@ class TopicPolicy(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     history: Literal["keep_last", "keep_all"] = "keep_last"
     """Queue history: keep_last keeps the last `depth` messages, keep_all ignores `depth`."""
     depth: Amount = 0
-    """Most messages that wait in the queue, where newer ones replace older ones; 0: no limit but
-    the queue's."""
+    """Most messages of a producer key that wait in the queue, where newer ones replace older ones;
+    0: no limit but the queue's."""
     lifespan_s: Positive | None = None
     """Age in s after which a message is neither sent nor handed over. If absent, the lifespan of
     its class applies, at the sender only."""
@@ -33,7 +35,8 @@ class TopicPolicy(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     stop: dict[str, Any] = {}
     """Fields of the stop message; fields not named are zero, so that {} is a zero Twist."""
     durability: Literal["volatile", "transient_local"] = "volatile"
-    """transient_local: late joiners get the last message; volatile: they do not."""
+    """transient_local: late joiners get the last `depth` messages (at least one) of each producer
+    key; volatile: they do not."""
     dst: Annotated[int, Meta(ge=0, le=255)] | None = None
     """Destination robot; absent: `link.dst`."""
     stamp: bool = True
@@ -62,6 +65,13 @@ class TopicPolicy(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     def kept(self) -> int:
         """Most messages that wait in the queue; 0: no limit but the queue's."""
         return self.depth if self.history == "keep_last" else 0
+
+    @property
+    def latched(self) -> int:
+        """Most messages of a producer key that are kept for late joiners; 0: none."""
+        if self.durability == "volatile":
+            return 0
+        return max(1, self.depth) if self.history == "keep_last" else MOST_LATCHED
 
     @property
     def own_lifespan_s(self) -> float:

@@ -6,7 +6,13 @@ It never sends; it reports events to its caller instead.
 
 from sdrlinkd.link.receive.ages import MAX_WAITING, Ages
 from sdrlinkd.link.receive.deadman import Deadman
-from sdrlinkd.link.receive.delivered import CDR_HEADER_SIZE, DELIVERED, Delivered
+from sdrlinkd.link.receive.delivered import (
+    CDR_HEADER_SIZE,
+    DELIVERED,
+    NOT_RETAINED,
+    Delivered,
+    Retain,
+)
 from sdrlinkd.link.receive.duplicates import SequenceTrack
 from sdrlinkd.link.receive.events import (
     Ended,
@@ -26,6 +32,7 @@ __all__ = [
     "DELIVERED",
     "LONGEST_GAP_S",
     "MAX_WAITING",
+    "NOT_RETAINED",
     "PRESENT_S",
     "Ages",
     "Deadman",
@@ -43,5 +50,6 @@ __all__ = [
     "RecordHeard",
     "Relay",
     "RelayParams",
+    "Retain",
     "SequenceTrack",
 ]

@@ -3,8 +3,11 @@
 from math import inf
 
 from sdrlinkd.link.queue import DEFAULT_POLICY, Inflated, TopicPolicy
-from sdrlinkd.link.receive.delivered import CDR_HEADER_SIZE
+from sdrlinkd.link.receive.delivered import CDR_HEADER_SIZE, Retain
 from sdrlinkd.wire import Registry
+
+RETAINED_KEYS = 8
+"""Producer keys of a topic of the registry for which a receiver keeps messages."""
 
 
 class Acceptance:
@@ -27,6 +30,12 @@ class Acceptance:
     def policy(self, topic_id: int) -> TopicPolicy:
         """The policy of a topic, by default the default policy."""
         return self._policies.get(topic_id, DEFAULT_POLICY)
+
+    def retain(self, topic_id: int) -> Retain:
+        """How many messages of a topic are kept for consumers that come later."""
+        policy = self.policy(topic_id)
+        # Producer keys are not on the air: their messages are kept together.
+        return Retain(RETAINED_KEYS * policy.latched, policy.own_lifespan_s)
 
     def judge(
         self,

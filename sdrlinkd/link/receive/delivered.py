@@ -1,5 +1,6 @@
 """A complete message from the air."""
 
+from math import inf
 from typing import NamedTuple
 
 from sdrlinkd.link.receive.latency import Parts
@@ -7,6 +8,18 @@ from sdrlinkd.link.receive.latency import Parts
 CDR_HEADER_SIZE = 4
 DELIVERED = "delivered"
 """Outcome of a delivered message, in place of a ledger's reason."""
+
+
+class Retain(NamedTuple):
+    """How many messages of a topic from one source are kept for later consumers, and until which
+    age in s.
+    """
+
+    depth: int
+    lifespan_s: float
+
+
+NOT_RETAINED = Retain(0, inf)
 
 
 class Delivered(NamedTuple):

@@ -6,7 +6,7 @@ from sdrlinkd.link.params import LinkParams, ReassemblyParams
 from sdrlinkd.link.queue import Inflated, TopicPolicy
 from sdrlinkd.link.receive.acceptance import Acceptance
 from sdrlinkd.link.receive.air_heard import AirHeard
-from sdrlinkd.link.receive.delivered import Delivered
+from sdrlinkd.link.receive.delivered import Delivered, Retain
 from sdrlinkd.link.receive.events import Event
 from sdrlinkd.link.receive.handover import AgeReport, Handover
 from sdrlinkd.link.receive.inbox import Inbox
@@ -72,6 +72,10 @@ class Reception:
     def deliver(self, message: Delivered, now: float) -> float | None:
         """Note that `message` is handed over at `now`; returns its age in s, None if unknown."""
         return self._handover.deliver(message, self._acceptance.policy(message.topic_id), now)
+
+    def retain(self, message: Delivered) -> Retain:
+        """How many messages of this one's topic and source are kept for later consumers."""
+        return self._acceptance.retain(message.topic_id)
 
     def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
         """Treat messages of a topic by `policy` from now on."""
