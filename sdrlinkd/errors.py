@@ -4,6 +4,7 @@
     ├── UserError            what a person or a file gave us; exit code 2, never a traceback
     │   ├── ConfigError      a key of the configuration
     │   ├── RegistryError    a line of the topic registry
+    │   ├── DeclarationError a topic that a producer declares
     │   ├── BusError         sockets, runtime directory, a second instance, no daemon
     │   └── BagError         a recording that cannot be read
     ├── LinkAbsentError      the PDU link is absent now; the daemon retries
@@ -30,6 +31,10 @@ class ConfigError(UserError):
 
 class RegistryError(UserError):
     """A topic registry that cannot be used; the message cites file and line."""
+
+
+class DeclarationError(UserError):
+    """A topic that cannot be declared; the message cites key, given and allowed."""
 
 
 class BusError(UserError):

@@ -60,6 +60,7 @@ from sdrlinkd.link.timesync import (
     State,
     Wall,
 )
+from sdrlinkd.link.topics import HeardTopic, Offer
 from sdrlinkd.link.traits import Opportunity, PduLinkTraits, Sensed
 from sdrlinkd.link.transmit import Burst, Fit, Outcome, RateControl, RateParams
 
@@ -88,11 +89,13 @@ __all__ = [
     "DualEnvelope",
     "Estimate",
     "Fit",
+    "HeardTopic",
     "LatencyParams",
     "Link",
     "LinkParams",
     "Lives",
     "Names",
+    "Offer",
     "Opportunity",
     "Outbox",
     "Outcome",

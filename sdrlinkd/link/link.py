@@ -37,6 +37,7 @@ from sdrlinkd.link.report import NO_NAMES, Names, Reporter
 from sdrlinkd.link.schedule import ClassesParams, Forecasts
 from sdrlinkd.link.status import AirUse, Told, Why
 from sdrlinkd.link.timesync import ClockParams, Clocks, Estimate, State, Wall
+from sdrlinkd.link.topics import HeardTopic, HeardTopics, Offer, OwnTopics, TopicTeller
 from sdrlinkd.link.traits import Opportunity, PduLinkTraits
 from sdrlinkd.link.transmit import (
     Beacons,
@@ -51,7 +52,17 @@ from sdrlinkd.link.transmit import (
     fit_to,
 )
 from sdrlinkd.reports import LinkReport
-from sdrlinkd.wire import Clock, Receipt, Registry, Waits
+from sdrlinkd.wire import (
+    MAX_VALUE_SIZE,
+    TLV_HEADER_SIZE,
+    TOPIC_OVERHEAD,
+    Clock,
+    Receipt,
+    Registry,
+    Topic,
+    Waits,
+    equal_payload,
+)
 
 NO_DICTIONARIES: Mapping[int, ZstdCompressionDict] = {}
 NO_RELAY = RelayParams()
@@ -65,6 +76,7 @@ class Link:
 
     `now`, `start` and `at` are seconds on one clock of the caller's choice. `rng` is the only
     source of randomness. `hears_self` accepts our own PDUs, for the paper's loopback experiment.
+    `has_numbers` lets producers declare topics beyond the registry, and send large messages.
     `max_expanded` is the largest size in bytes of a decompressed message. Messages may be submitted
     from the start; `attach` makes the parts that need a radio.
     """
@@ -83,6 +95,7 @@ class Link:
         clock: ClockParams = NO_CLOCK,
         dictionaries: Mapping[int, ZstdCompressionDict] = NO_DICTIONARIES,
         hears_self: bool = False,
+        has_numbers: bool = False,
         max_expanded: int = 1 << 20,
     ) -> None:
         has_control = registry.has_control
@@ -93,7 +106,11 @@ class Link:
         self._classes = classes
         digest = registry.digest({i: each.dict_id() for i, each in dictionaries.items()})
         self._outbox = Outbox(queue)
-        self._intake = Intake(params, registry, self._outbox, classes, dictionaries)
+        room = equal_payload(params.pdu_size, 1)
+        piece = min(room, TLV_HEADER_SIZE + MAX_VALUE_SIZE) - TOPIC_OVERHEAD
+        self._topics = OwnTopics(registry, has_numbers, piece)
+        self._heard_topics = HeardTopics(registry, has_numbers, self._topics.hash_of)
+        self._intake = Intake(params, self._topics, self._outbox, classes, dictionaries)
         self._latched = Latched()
         self._piggyback = PiggybackRecords()
         self._composer = Composer(
@@ -101,8 +118,8 @@ class Link:
             classes,
         )  # fmt: skip
         self._reception = Reception(
-            params, reassembly, registry, own_id, relay, Inflated(dictionaries), max_expanded,
-            hears_self,
+            params, reassembly, registry, self._heard_topics, own_id, relay, Inflated(dictionaries),
+            max_expanded, hears_self,
         )  # fmt: skip
         self._receipts = Receipts(own_id, params.receipt_s)
         beacons = Beacons(params.beacon_s if has_control else 0.0, params.pdu_size, digest, rng)
@@ -111,14 +128,15 @@ class Link:
         self._tx_delays = TxDelayMeters()
         self._control_records = ControlRecords(
             clock, self._clocks, beacons, self._tx_delays, self._piggyback,
-            self._reception.neighbors, self._composer.k_single,
+            self._reception.neighbors, TopicTeller(self._topics, piece), self._composer.k_single,
         )  # fmt: skip
         self._forecasts = Forecasts()
         self._scheduler: BurstScheduler | NoRadio = NoRadio()
         self._why = Why(self._intake, self._outbox)
         self._reporter = Reporter(
-            params, registry, digest, self._outbox, self._intake, self._composer,
-            self._control_records, self._tx_delays, self._reception, self._receipts, self._clocks,
+            params, self._topics, self._heard_topics, digest, self._outbox, self._intake,
+            self._composer, self._control_records, self._tx_delays, self._reception, self._receipts,
+            self._clocks,
         )  # fmt: skip
 
     # The radio.
@@ -239,12 +257,53 @@ class Link:
         """(source, topic id) of command topics that fell silent, each once."""
         return self._reception.take_silent(now)
 
+    # Topics.
+
+    def declare(self, offer: Offer) -> Topic:
+        """The topic of a producer's offer, from which messages are taken from now on.
+
+        Raises DeclarationError.
+        """
+        topic = self._topics.declare(offer)
+        self._intake.add(topic.id)
+        self._scheduler.more_to_send()
+        return topic
+
+    def topic(self, topic_id: int) -> Topic:
+        """One of this robot's topics."""
+        return self._topics[topic_id]
+
+    def topic_named(self, name: str) -> Topic | None:
+        """The topic of this robot called `name` (with or without leading slash), or None."""
+        return self._topics.by_name(name)
+
+    @property
+    def own_topics(self) -> list[Topic]:
+        """This robot's topics: those of the registry, and those declared since the start."""
+        return list(self._topics)
+
+    def heard_topic(self, src: int, topic_id: int) -> HeardTopic | None:
+        """What a topic id of robot `src` means; None if that is not known (any more)."""
+        return self._heard_topics.topic(src, topic_id)
+
+    def heard_topics(self) -> dict[int, list[HeardTopic]]:
+        """The topics that other robots declared, by source."""
+        return self._heard_topics.declared()
+
+    def take_changed_topics(self) -> list[tuple[int, int]]:
+        """(source, number) of topics whose numbers have another meaning since the last call."""
+        return self._heard_topics.take_changed()
+
     # Policies and clocks.
 
     def set_policies(self, policies: Mapping[int, TopicPolicy]) -> None:
         """Apply per-topic policies by topic id; the others get the defaults."""
-        for topic in self.registry.topics:
+        for topic in self._topics:
             self.set_policy(topic.id, policies.get(topic.id, DEFAULT_POLICY))
+
+    def set_named_policies(self, policies: Mapping[str, TopicPolicy]) -> None:
+        """Treat messages of topics that others declare by the policy of their name."""
+        self._reception.set_named(policies)
 
     def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
         """Change a topic's policy from now on."""
@@ -290,9 +349,12 @@ class Link:
             scheduler.more_to_send()
         self._dispatch(self._reception.expire(now))
         self._control_records.look_round(now, scheduler.record_pdu_s)
+        self._control_records.tell_topics(now, scheduler.record_pdu_s)
         self._tell_dropped()
         self._receipts.expire(now)
-        self._why.sample(now, len(self.registry), scheduler, self._reception.heard_s)
+        self._why.sample(
+            now, (each.id for each in self._topics), scheduler, self._reception.heard_s
+        )
         self._reporter.sample(now, scheduler)
 
     @property
@@ -326,7 +388,7 @@ class Link:
 
     def why(self, topic_id: int, told: Told, now: float) -> list[str]:
         """What happens to a topic's messages and why, in plain sentences."""
-        name = self.registry.topics[topic_id].name
+        name = self._topics[topic_id].name
         return self._why.explain(topic_id, name, told, now, self._air_use)
 
     def report(self, now: float, names: Names = NO_NAMES) -> LinkReport:
@@ -364,6 +426,7 @@ class Link:
                 case Newcomer():
                     # The new robot lacks the messages latched before.
                     self._latched.newcomer(event.src, event.at)
+                    self._control_records.newcomer(event.at)
                 case Ended(src, topic_id, entry_id, reason, age_s, at):
                     receipt = make_receipt(src, topic_id, entry_id, reason, age_s)
                     self._control_records.receipt(receipt, at)
@@ -380,8 +443,7 @@ class Link:
         elif isinstance(record, Receipt):
             self._receipts.hear(src, record, at)
         elif isinstance(record, Waits):
-            if record.topic_id < len(self.registry):
-                self._reception.take_waits(src, record)
+            self._reception.take_waits(src, record)
         else:
             self._scheduler.record_heard(src, record, at)
 

@@ -13,6 +13,7 @@ from sdrlinkd.link.receipts import Receipts
 from sdrlinkd.link.receive import Reception
 from sdrlinkd.link.status import RateMeter
 from sdrlinkd.link.timesync import Clocks
+from sdrlinkd.link.topics import HeardTopics, OwnTopics
 from sdrlinkd.link.transmit import (
     BurstScheduler,
     ControlRecords,
@@ -28,7 +29,7 @@ from sdrlinkd.reports import (
     TopicReport,
     TxReport,
 )
-from sdrlinkd.wire import Registry, RegistryDigest
+from sdrlinkd.wire import RegistryDigest
 
 Scheduler = BurstScheduler | NoRadio
 
@@ -49,12 +50,15 @@ class Reporter:
     """Combines the reports of the link's parts and adds rates."""
 
     def __init__(
-        self, params: LinkParams, registry: Registry, digest: RegistryDigest, outbox: Outbox,
-        intake: Intake, composer: Composer, control_records: ControlRecords,
-        tx_delays: TxDelayMeters, reception: Reception, receipts: Receipts, clocks: Clocks,
+        self, params: LinkParams, topics: OwnTopics, heard_topics: HeardTopics,
+        digest: RegistryDigest, outbox: Outbox, intake: Intake, composer: Composer,
+        control_records: ControlRecords, tx_delays: TxDelayMeters, reception: Reception,
+        receipts: Receipts, clocks: Clocks,
     ) -> None:  # fmt: skip
         self._pdu_size = params.pdu_size
-        self._registry = registry
+        self._own = topics
+        self._heard_topics = heard_topics
+        self._registry = topics.registry
         self._digest = digest
         self._outbox = outbox
         self._intake = intake
@@ -108,7 +112,7 @@ class Reporter:
 
         `of_topics`: notices by topic id, which apply once a producer uses the topic.
         """
-        intake, topics = self._intake, self._registry.topics
+        intake, topics = self._intake, self._own
         notices = [text for each, text in of_topics.items() if intake.tally(each).accepted]
         if not self._registry.has_control:
             notices.append(
@@ -127,12 +131,13 @@ class Reporter:
             for topic_id in self._composer.report().starved
         ]
         notices += self._never_met(scheduler.least_s) + scheduler.access_notices(now)
+        notices += self._heard_topics.notices()
         return notices + self._neighbors.disagreements(self._registry, self._digest)
 
     def _never_met(self, least_s: float) -> list[str]:
         """Sentences on topics with a lifespan below `least_s`, the shortest possible latency."""
         notices = []
-        for topic in self._registry.topics:
+        for topic in self._own:
             lifespan_s = self._intake.lifespan(topic.id).seconds
             if lifespan_s < least_s:
                 notices.append(
@@ -173,7 +178,7 @@ class Reporter:
         self, per_s: Mapping[Hashable, float], names: Mapping[int, str]
     ) -> list[TopicReport]:
         reports = []
-        for topic in self._registry.topics:
+        for topic in self._own:
             report = self._intake.report(topic)
             reports.append(
                 msgspec.structs.replace(

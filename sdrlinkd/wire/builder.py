@@ -6,7 +6,8 @@ from functools import lru_cache
 
 from sdrlinkd.wire.capacity import CRC_SIZE, ENTRY_HEADER_SIZE, MAX_ENTRIES, entry_budget
 from sdrlinkd.wire.control import ASKS, STAMP_RECORD, STAMP_SIZE, TLV_HEADER_SIZE, RecordType
-from sdrlinkd.wire.registry import CONTROL_TOPIC_ID
+from sdrlinkd.wire.declared import FIRST_NUMBER, number_octet, octet
+from sdrlinkd.wire.registry import CONTROL_TOPIC_ID, DECLARED_TOPIC_ID
 
 VERSION = 0
 FLAG_COMPRESSED = 0x02
@@ -52,12 +53,18 @@ class PduBuilder:
         return not self._topic_ids and not self._records
 
     def add(self, topic_id: int, entry_id: int, index: int, total: int, payload: bytes) -> None:
-        """Add an entry. Raises ValueError if it does not fit or a field is out of range."""
+        """Add an entry; one of a declared topic has its number ahead of `payload`.
+
+        Raises ValueError if it does not fit or a field is out of range.
+        """
+        if topic_id >= FIRST_NUMBER:
+            payload = number_octet(topic_id) + payload
+            topic_id = DECLARED_TOPIC_ID
         size = len(payload)
-        if size > self.room or index >= total or not 0 <= topic_id <= 15:
+        if size > self.room or index >= total or topic_id < 0:
             raise ValueError(
                 f"entry {index} of {total}, topic id {topic_id}, {size} bytes: allowed are an "
-                f"index below the total, topic ids 0 to 15 and {self.room} bytes"
+                f"index below the total, a topic id and {self.room} bytes"
             )
         try:
             header = ENTRY_HEADER.pack(entry_id, index, total, size)
@@ -85,7 +92,7 @@ class PduBuilder:
         Every message has a STAMP, so for speed it is built without `build_records`.
         """
         value_size = STAMP_SIZE - TLV_HEADER_SIZE + asks
-        record = STAMP_RECORD.pack(RecordType.STAMP, value_size, topic_id, entry_id, age_us)
+        record = STAMP_RECORD.pack(RecordType.STAMP, value_size, octet(topic_id), entry_id, age_us)
         return self.add_record(record + ASKS if asks else record)
 
     def _note_room(self) -> None:
@@ -134,6 +141,9 @@ def build_full(
     topic_id: int, entry_id: int, index: int, total: int, payload: bytes,
 ) -> bytes:  # fmt: skip
     """The octets of a PDU with one entry and no PAD; fields must be in range."""
+    if topic_id >= FIRST_NUMBER:
+        payload = number_octet(topic_id) + payload
+        topic_id = DECLARED_TOPIC_ID
     body = b"".join(
         (
             _SOLE.pack(flags, src, dst, seq, hop << 4 | 1, topic_id << 4, entry_id, index, total,

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from sdrlinkd.errors import PduError
 from sdrlinkd.wire.clock import CLOCK_SIZE, Clock, build_clock, parse_clock
+from sdrlinkd.wire.declared import TopicPiece, build_topic, parse_topic
 from sdrlinkd.wire.registry import BROADCAST, RegistryDigest
 
 TLV_HEADER_SIZE = 2
@@ -31,6 +32,7 @@ class RecordType(IntEnum):
     FRAME = 7
     CLOCK = 8
     WAITS = 9
+    TOPIC = 15
 
 
 class Stamp(NamedTuple):
@@ -121,7 +123,7 @@ class Parity(NamedTuple):
 
 
 FixedRecord = Stamp | Beacon | LinkReport | Receipt | Frame | Waits
-Record = FixedRecord | RegistryDigest | Parity | Clock
+Record = FixedRecord | RegistryDigest | Parity | Clock | TopicPiece
 
 _TYPES: dict[type[FixedRecord], RecordType] = {
     Stamp: RecordType.STAMP,
@@ -148,6 +150,8 @@ _KNOWN = {int(number): (kind, _FORMATS[number]) for kind, number in _TYPES.items
 _PARITY = struct.Struct(">BBBBBHHI")
 PARITY_OVERHEAD = TLV_HEADER_SIZE + _PARITY.size
 """Octets of a PARITY record without its parity."""
+TOPIC_OVERHEAD = TLV_HEADER_SIZE + 3
+"""Octets of a TOPIC record without its piece of the description."""
 STAMP_SIZE = TLV_HEADER_SIZE + _FORMATS[RecordType.STAMP].size
 STAMP_RECORD = struct.Struct(">BBBBI")
 ASKING_STAMP_SIZE = STAMP_SIZE + len(ASKS)
@@ -157,6 +161,7 @@ _LEAST = {
     int(RecordType.DIGEST): RegistryDigest.OVERALL_SIZE,
     int(RecordType.PARITY): _PARITY.size,
     int(RecordType.CLOCK): CLOCK_SIZE - TLV_HEADER_SIZE,
+    int(RecordType.TOPIC): TOPIC_OVERHEAD - TLV_HEADER_SIZE,
 }
 
 
@@ -208,6 +213,8 @@ def parse_records(payload: bytes) -> list[Record]:
             records.append(Parity._make((*_PARITY.unpack_from(payload, at), data)))
         elif number == RecordType.CLOCK:
             records.append(parse_clock(payload[at : at + length]))
+        elif number == RecordType.TOPIC:
+            records.append(parse_topic(payload[at : at + length]))
     return records
 
 
@@ -224,6 +231,10 @@ def _build(record: Record) -> bytes:
             raise ValueError(f"{record} does not fit its record: {error}") from None
         if len(value) > MAX_VALUE_SIZE:
             raise ValueError(f"{len(record.data)} octets of parity do not fit a record")
+    elif isinstance(record, TopicPiece):
+        number, value = RecordType.TOPIC, build_topic(record)
+        if len(value) > MAX_VALUE_SIZE:
+            raise ValueError(f"{len(record.data)} octets of a description do not fit a record")
     else:
         number = RecordType.CLOCK if isinstance(record, Clock) else _TYPES[type(record)]
         try:

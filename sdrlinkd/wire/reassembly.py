@@ -5,11 +5,13 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from sdrlinkd.wire.control import Parity
+from sdrlinkd.wire.declared import PARTS, Part
 from sdrlinkd.wire.pdu import Entry
 
 # Memory in bytes counted for an incomplete message besides its payload, so that tiny ones count.
 PARTIAL_OVERHEAD = 512
 FRAGMENT_OVERHEAD = 128
+NO_ENTRY = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,19 +20,30 @@ class ReassemblyLimits:
 
     timeout_s: float = 1.0
     """Time in s without a new fragment after which a message is given up."""
-    source_bytes: int = 1 << 20
+    source_bytes: int = 12 << 20
     """Largest memory for one source in bytes, including overhead."""
-    total_bytes: int = 8 << 20
+    total_bytes: int = 48 << 20
     """Largest memory for all sources together in bytes, including overhead."""
 
 
 class Lost(NamedTuple):
-    """An incomplete message that was given up, and the ledger's reason."""
+    """An incomplete message that was given up, and the ledger's reason.
+
+    A large message has topic id and entry id of its last part in `stamped`, if that has arrived.
+    """
 
     src: int
     topic_id: int
-    entry_id: int
+    stamped: tuple[int, int]
     reason: str
+
+
+class Joined(NamedTuple):
+    """A large message that is complete, and the entry id of its last part."""
+
+    topic_id: int
+    payload: bytes
+    entry_id: int
 
 
 @dataclass(slots=True)
@@ -49,8 +62,24 @@ class Partial:
 
 
 @dataclass(slots=True)
+class _Large:
+    """An incomplete large message, with its parts by number."""
+
+    n_parts: int
+    began_at: float
+    touched_at: float
+    parts: dict[int, bytes] = field(default_factory=dict)
+    entry_id: int = NO_ENTRY
+    """Entry id of the last part; NO_ENTRY until that is there."""
+    cost: int = PARTIAL_OVERHEAD
+
+
+@dataclass(slots=True)
 class _Source:
     partials: OrderedDict[tuple[int, int], Partial] = field(default_factory=OrderedDict)
+    large: OrderedDict[tuple[int, int], _Large] = field(default_factory=OrderedDict)
+    parts_at: float = float("-inf")
+    """When a fragment of any part came last."""
     cost: int = 0
 
 
@@ -80,7 +109,7 @@ class Reassembly:
         if total == 1:
             if source is not None and (topic_id, entry_id) in source.partials:
                 self._give_up(src, source, (topic_id, entry_id), "rx_partial_superseded")
-            self.started += 1
+            self.started += topic_id != PARTS
             self.began_at = now
             return payload
         if source is None:
@@ -106,6 +135,44 @@ class Reassembly:
             return b"".join([partial.parts[i] for i in range(total)])
         partial.parts[index] = payload
         self._keep(src, source, key, len(payload), now)
+        return None
+
+    def join(self, src: int, entry_id: int, part: Part, now: float) -> Joined | None:
+        """Take a whole part of a large message; returns the message if that completes it.
+
+        Must follow the call of `add` that returned the part.
+        """
+        source = self._sources.get(src)
+        if source is None:
+            source = self._sources[src] = _Source()
+        key = (part.topic_id, part.number)
+        large = source.large.get(key)
+        if large is not None and large.n_parts != part.parts:
+            self._give_up_large(src, source, key, "rx_partial_superseded")
+            large = None
+        if large is None:
+            large = source.large[key] = _Large(part.parts, self.began_at, now)
+            source.cost += PARTIAL_OVERHEAD
+            self.held_bytes += PARTIAL_OVERHEAD
+            self.held += 1
+            self.started += 1
+        source.large.move_to_end(key)
+        large.touched_at = now
+        if part.part == part.parts - 1:
+            large.entry_id = entry_id
+        if part.part not in large.parts:
+            large.parts[part.part] = part.data
+            cost = len(part.data) + FRAGMENT_OVERHEAD
+            large.cost += cost
+            source.cost += cost
+            self.held_bytes += cost
+        self._next_expiry = min(self._next_expiry, now + self._limits.timeout_s)
+        if len(large.parts) == large.n_parts:
+            self._remove_large(source, key)
+            self.began_at = large.began_at
+            whole = b"".join([large.parts[i] for i in range(large.n_parts)])
+            return Joined(part.topic_id, whole, large.entry_id)
+        self._keep_bounds(src, source)
         return None
 
     def hold(self, src: int, parity: Parity, now: float) -> Partial | None:
@@ -144,13 +211,25 @@ class Reassembly:
                     self._next_expiry = min(self._next_expiry, due)
                     break
                 self._give_up(src, source, key, "rx_partial_timeout")
-            if not source.partials:
+            for large_key, large in list(source.large.items()):
+                due = max(large.touched_at, source.parts_at) + self._limits.timeout_s
+                if now < due:
+                    self._next_expiry = min(self._next_expiry, due)
+                else:
+                    self._give_up_large(src, source, large_key, "rx_part_lost")
+            if not source.partials and not source.large:
                 del self._sources[src]
 
     def holds(self, src: int, topic_id: int, entry_id: int) -> bool:
-        """Whether fragments of a message are held."""
+        """Whether fragments of a message are held, or the last part of a large one."""
         source = self._sources.get(src)
-        return source is not None and (topic_id, entry_id) in source.partials
+        if source is None:
+            return False
+        if (topic_id, entry_id) in source.partials:
+            return True
+        return topic_id == PARTS and any(
+            large.entry_id == entry_id for large in source.large.values()
+        )
 
     def take_lost(self) -> list[Lost]:
         """The messages given up since the last call."""
@@ -163,6 +242,8 @@ class Reassembly:
         """Note that `n_bytes` came for an incomplete message, and enforce the memory limits."""
         partial = source.partials[key]
         partial.touched_at = now
+        if key[0] == PARTS:
+            source.parts_at = now
         source.partials.move_to_end(key)
         cost = n_bytes + FRAGMENT_OVERHEAD
         partial.cost += cost
@@ -174,8 +255,9 @@ class Reassembly:
         partial = source.partials[key] = Partial(total, now, now)
         source.cost += PARTIAL_OVERHEAD
         self.held_bytes += PARTIAL_OVERHEAD
-        self.held += 1
-        self.started += 1
+        # Parts count once their message is known: as one message.
+        self.held += key[0] != PARTS
+        self.started += key[0] != PARTS
         self._next_expiry = min(self._next_expiry, now + self._limits.timeout_s)
         return partial
 
@@ -189,18 +271,37 @@ class Reassembly:
 
     def _keep_bounds(self, src: int, source: _Source) -> None:
         while source.cost > self._limits.source_bytes:
-            self._give_up(src, source, next(iter(source.partials)), "rx_partial_evicted")
+            self._give_up_oldest(src, source, "rx_partial_evicted")
         while self.held_bytes > self._limits.total_bytes:
             greedy = max(self._sources, key=lambda s: self._sources[s].cost)
-            victim = self._sources[greedy]
-            self._give_up(greedy, victim, next(iter(victim.partials)), "rx_partial_memory")
+            self._give_up_oldest(greedy, self._sources[greedy], "rx_partial_memory")
+
+    def _give_up_oldest(self, src: int, source: _Source, reason: str) -> None:
+        """Give up what has been silent for longest: a message, a part, or a large message."""
+        partial = next(iter(source.partials.items()), None)
+        large = next(iter(source.large.items()), None)
+        if large is not None and (partial is None or large[1].touched_at < partial[1].touched_at):
+            self._give_up_large(src, source, large[0], reason)
+        elif partial is not None:
+            self._give_up(src, source, partial[0], reason)
 
     def _give_up(self, src: int, source: _Source, key: tuple[int, int], reason: str) -> None:
         self._remove(source, key)
-        self.lost.append(Lost(src, *key, reason))
+        self.lost.append(Lost(src, key[0], key, "rx_part_lost" if key[0] == PARTS else reason))
+
+    def _give_up_large(self, src: int, source: _Source, key: tuple[int, int], reason: str) -> None:
+        large = self._remove_large(source, key)
+        self.lost.append(Lost(src, key[0], (PARTS, large.entry_id), reason))
+
+    def _remove_large(self, source: _Source, key: tuple[int, int]) -> _Large:
+        large = source.large.pop(key)
+        source.cost -= large.cost
+        self.held_bytes -= large.cost
+        self.held -= 1
+        return large
 
     def _remove(self, source: _Source, key: tuple[int, int]) -> None:
         partial = source.partials.pop(key)
         source.cost -= partial.cost
         self.held_bytes -= partial.cost
-        self.held -= 1
+        self.held -= key[0] != PARTS

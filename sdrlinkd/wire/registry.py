@@ -10,6 +10,7 @@ from typing import ClassVar
 from sdrlinkd.errors import RegistryError
 
 MAX_TOPICS = 16
+DECLARED_TOPIC_ID = 0xE
 CONTROL_TOPIC_ID = 0xF
 BROADCAST = 0xFF
 """The robot id that means all robots."""
@@ -20,9 +21,20 @@ _TYPE = re.compile(r"([A-Za-z]\w*)/(?:msg/)?([A-Za-z]\w*)", re.ASCII)
 _HEADERS = (["name", "type"], ["topic", "type"])
 
 
+def is_topic_name(name: str) -> bool:
+    """Whether `name` is a topic name: parts joined by slashes, perhaps with a leading slash."""
+    return _NAME.fullmatch(name) is not None
+
+
+def topic_type(text: str) -> str | None:
+    """A type in the form `pkg/msg/Name`, given so or as `pkg/Name`; None if it is none."""
+    found = _TYPE.fullmatch(text)
+    return f"{found[1]}/msg/{found[2]}" if found else None
+
+
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """A line of the registry; `name` has no leading slash, `type` has the form `pkg/msg/Name`."""
+    """A topic; `name` has no leading slash, `type` has the form `pkg/msg/Name`."""
 
     id: int
     name: str
@@ -67,6 +79,11 @@ class Registry:
 
     def __len__(self) -> int:
         return len(self.topics)
+
+    @property
+    def has_numbers(self) -> bool:
+        """Whether topic id 0xE is free for declared topics and large messages."""
+        return len(self.topics) <= DECLARED_TOPIC_ID
 
     @property
     def has_control(self) -> bool:
@@ -138,12 +155,12 @@ def _assemble(pairs: list[tuple[str, str, str]], source: str) -> Registry:
     topics: list[Topic] = []
     seen: dict[str, str] = {}
     for raw_name, raw_type, where in pairs:
-        if not _NAME.fullmatch(raw_name):
+        if not is_topic_name(raw_name):
             raise RegistryError(
                 f"{where}: topic name {raw_name!r}; allowed: ROS names such as odom or camera/image"
             )
-        kind = _TYPE.fullmatch(raw_type)
-        if not kind:
+        kind = topic_type(raw_type)
+        if kind is None:
             raise RegistryError(
                 f"{where}: type {raw_type!r}; allowed: package/Name or package/msg/Name"
             )
@@ -151,7 +168,7 @@ def _assemble(pairs: list[tuple[str, str, str]], source: str) -> Registry:
         if name in seen:
             raise RegistryError(f"{where}: topic {name} is listed twice, first at {seen[name]}")
         seen[name] = where
-        topics.append(Topic(len(topics), name, f"{kind[1]}/msg/{kind[2]}"))
+        topics.append(Topic(len(topics), name, kind))
     if len(topics) > MAX_TOPICS:
         raise RegistryError(
             f"{source}: {len(topics)} topics; allowed: at most {MAX_TOPICS - 1}, or {MAX_TOPICS} "

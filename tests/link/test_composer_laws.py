@@ -18,6 +18,7 @@ from sdrlinkd.link import (
 )
 from sdrlinkd.link.packing import Composer, PiggybackRecords
 from sdrlinkd.link.queue import Fate, Intake
+from sdrlinkd.link.topics import OwnTopics
 from sdrlinkd.wire import make_registry, parse
 from tests.laws import law
 from tests.link.world import TOPICS, compose, make_link
@@ -43,7 +44,7 @@ def test_bursts_are_as_long_as_allowed_and_of_one_source(seed):
     rng = Random(seed)
     registry, outbox = make_registry(TOPICS), Outbox(QueueParams(max_messages=rng.randrange(1, 40)))
     params = LinkParams(pdu_size=PDU_SIZE, greedy=rng.random() < 0.5)
-    intake = Intake(params, registry, outbox, CLASSES, {})
+    intake = Intake(params, OwnTopics(registry, False, 100), outbox, CLASSES, {})
     composer = Composer(params, 1, outbox, PiggybackRecords(), rng, 0.5, True, CLASSES)
     stranger = make_link(9, pdu_size=PDU_SIZE, seed=seed, hop_limit=2)
     bursts, now = [], 0.0

@@ -17,6 +17,7 @@ from sdrlinkd.link.queue import (
     TxTally,
 )
 from sdrlinkd.link.schedule import ClassesParams
+from sdrlinkd.link.topics import OwnTopics
 from sdrlinkd.wire import make_registry
 
 LEADING_TO = {
@@ -58,7 +59,7 @@ def test_in_the_field_an_illegal_step_is_counted_told_and_changes_nothing(monkey
     monkeypatch.setattr(Lives, "is_strict", False)
     registry = make_registry([("odom", "nav_msgs/msg/Odometry")])
     outbox = Outbox(QueueParams())
-    intake = Intake(LinkParams(), registry, outbox, ClassesParams(), {})
+    intake = Intake(LinkParams(), OwnTopics(registry, False, 100), outbox, ClassesParams(), {})
     assert intake.audit() == []
     made = message([Step.DROP])
     outbox.lives.drop(made, "tx_expired")

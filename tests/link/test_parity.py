@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from sdrlinkd.link import Outcome, Overrides, Qos
+from sdrlinkd.link import Outcome, Overrides, Qos, ReassemblyParams
 from sdrlinkd.link.packing import parity_records
 from sdrlinkd.wire import Entry, Pdu, build, parse
 from tests.laws import law
@@ -116,7 +116,7 @@ def test_parity_of_a_message_that_is_complete_is_no_part_of_the_next():
 
 
 def test_memory_is_bounded_whatever_comes():
-    receiver = protected(0.0, 2, pdu_size=2047)
+    receiver = protected(0.0, 2, pdu_size=2047, reassembly=ReassemblyParams(total_bytes=8 << 20))
     for src in range(3, 250):
         sender = protected(1.0, src, pdu_size=2047)
         for pdu in pdus_of(sender, bytes(60_000))[20:40]:

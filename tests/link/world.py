@@ -26,6 +26,7 @@ from sdrlinkd.wire import (
     CONTROL_TOPIC_ID,
     Beacon,
     PduBuilder,
+    Registry,
     build_records,
     equal_payload,
     flags,
@@ -56,6 +57,7 @@ def make_link(
     dictionaries=None,
     beacon_s=0.0,
     clock=None,
+    has_numbers=False,
     **params,
 ):
     """A link on its own air; `params` are LinkParams. No beacons unless requested."""
@@ -63,7 +65,7 @@ def make_link(
         LinkParams(beacon_s=beacon_s, **params),
         queue or QueueParams(),
         reassembly or ReassemblyParams(),
-        make_registry(topics),
+        make_registry(topics) if topics else Registry(()),
         own_id,
         Random(seed),
         hears_self=hears_self,
@@ -71,6 +73,7 @@ def make_link(
         relay=relay or RelayParams(),
         dictionaries=dictionaries or {},
         clock=clock or ClockParams(period_s=0.0),
+        has_numbers=has_numbers,
     )
     link.attach(PduLinkTraits(), AccessParams(), RateParams())
     return link

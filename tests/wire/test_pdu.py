@@ -137,7 +137,8 @@ def test_header_field_out_of_range(change):
     "change",
     [
         {"topic_id": -1},
-        {"topic_id": 16},
+        {"topic_id": 256},
+        {"topic_id": 271},
         {"entry_id": -1},
         {"entry_id": 256},
         {"index": -1},

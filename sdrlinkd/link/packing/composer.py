@@ -147,9 +147,12 @@ class Composer:
         if self._flush.is_on and self._flush.must_wait(now):
             return self._flush.due_at()
         return min(
-            self.entry_ids.next_free(lane.waiting[0]) if lane.current is None else float("-inf")
+            self.entry_ids.next_free(head)
+            if lane.current is None or head.needs_id
+            else float("-inf")
             for level in self._outbox.levels
             for lane in level.lanes
+            if (head := lane.head) is not None
         )
 
     def take_asking(self) -> list[Outgoing]:
@@ -206,7 +209,7 @@ class Composer:
             return None
         if draft.room >= MIN_ROOM_FOR_STAMP:
             for message in draft.carried:
-                if not message.stamped:
+                if message.awaits_stamp:
                     self._writer.stamp(draft, message, start)
         if self._piggyback.waiting and draft.dst == BROADCAST:
             self._piggyback.ride(draft, start)
@@ -274,7 +277,7 @@ class Composer:
             return room > 0
         for lane in level.lanes:
             head = lane.current or lane.waiting[0]
-            if len(head.payload) - head.next_index * head.k <= room:
+            if len(head.body) - head.next_index * head.k <= room:
                 return True
         return False
 

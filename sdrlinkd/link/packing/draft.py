@@ -11,8 +11,12 @@ from sdrlinkd.wire import (
     ASKING_STAMP_SIZE,
     MAX_AGE_US,
     MAX_FRAGMENTS,
+    PART_PARITY,
+    PARTS,
     PduBuilder,
     fragment_count,
+    octet,
+    overhead,
 )
 
 NO_DST = -1
@@ -55,7 +59,7 @@ class Draft(PduBuilder):
 
     def take(self, message: Outgoing, payload: bytes) -> None:
         """Add `payload`, the next fragment of `message`."""
-        self.add(message.topic_id, message.entry_id, message.next_index, message.total, payload)
+        self.add(message.channel, message.entry_id, message.next_index, message.total, payload)
         self.carried.append(message)
         self.join(message)
 
@@ -90,23 +94,24 @@ class EntryWriter:
         """Put the lane's next entry into the draft if it fits."""
         if head.parity:
             return self._place_parity(lane, head, draft, start)
-        size = len(head.payload)
-        k = head.k or self._fragment_size(size, level.per_dst[lane.dst])
+        size = len(head.body)
+        k = head.k or self._fragment_size(head, level.per_dst[lane.dst])
         at = head.next_index * k
         length = min(k, size - at)
         is_last = at + length >= size
-        needs_stamp = is_last and not head.stamped
-        if needs_stamp and length + bool(head.receipt) > draft.room_beside_stamp:
+        needs_stamp = is_last and not head.stamped and not head.parts_left
+        beside = overhead(head.channel)
+        if needs_stamp and length + beside + bool(head.receipt) > draft.room_beside_stamp:
             # Send the age ahead in its own PDU only if both do not fit even into an empty one.
             return draft.is_empty and self._send_stamp_ahead(lane, head, k, draft, start)
-        if length > draft.room or not (lane.current or self._begin(lane, head, k, start)):
+        if length + beside > draft.room or not self._has_begun(lane, head, k, start):
             return False
-        draft.take(head, head.payload if length == size else head.payload[at : at + length])
+        draft.take(head, head.body if length == size else head.body[at : at + length])
         head.advance(1, start)
         if is_last:
             if needs_stamp:
                 self.stamp(draft, head, start)
-            if self._parity[head.qos]:
+            if self._parity[head.qos] or head.channel == PARTS:
                 head.follow_with(self._parity_of(head))
             self._end(lane, head, start)
         self._outbox.served(lane)
@@ -133,46 +138,61 @@ class EntryWriter:
         return True
 
     def _end(self, lane: Lane, head: Outgoing, start: float) -> None:
-        """End the message, unless parity follows."""
+        """End the message, unless parity or another part follows."""
         if not head.parity:
             self._entry_ids.retire(head, start)
-            self._outbox.end(lane)
+            if not head.go_on():
+                self._outbox.end(lane)
 
     def _parity_of(self, head: Outgoing) -> list[bytes]:
         """The parity records of `head` in reverse order, sized to leave room for its age again."""
-        ids, room = (head.topic_id, head.entry_id), self._k_single - ASKING_STAMP_SIZE
+        ids, room = (octet(head.channel), head.entry_id), self._k_single - ASKING_STAMP_SIZE
         share = self._parity[head.qos]
-        return parity_records(head.payload, head.k, head.total, ids, share, room)[::-1]
+        if head.channel == PARTS:
+            share = max(PART_PARITY, share)
+        return parity_records(head.body, head.k, head.total, ids, share, room)[::-1]
 
     def _send_stamp_ahead(
         self, lane: Lane, head: Outgoing, k: int, draft: Draft, start: float
     ) -> bool:
-        if not (lane.current or self._begin(lane, head, k, start)):
+        if not self._has_begun(lane, head, k, start):
             return False
         self.stamp(draft, head, start)
         head.keep_id()
         draft.join(head)
         return True
 
-    def _fragment_size(self, size: int, topics_pending: int) -> int:
-        k = self._k_shared if topics_pending >= 2 else self._k_single
+    def _fragment_size(self, message: Outgoing, topics_pending: int) -> int:
+        size, own = len(message.body), overhead(message.channel)
+        if message.channel == PARTS:
+            # Full PDUs, so that a part and its parity are at most 256 fragments.
+            return self._k_single - own
+        k = (self._k_shared if topics_pending >= 2 else self._k_single) - own
         return max(k, fragment_count(size, MAX_FRAGMENTS)) if size > k * MAX_FRAGMENTS else k
 
-    def _begin(self, lane: Lane, head: Outgoing, k: int, start: float) -> bool:
-        """Make `head` the lane's current message; False while the topic has no free entry id."""
-        entry_id = self._entry_ids.take(head.topic_id, start)
+    def _has_begun(self, lane: Lane, head: Outgoing, k: int, start: float) -> bool:
+        """Make `head` the lane's current message, and cut its next part, if that is not done.
+
+        Returns False while the topic has no free entry id.
+        """
+        if lane.current is not None and not head.needs_id:
+            return True
+        entry_id = self._entry_ids.take(head.channel, start)
         if entry_id is None:
             return False
-        size = len(head.payload)
+        size = len(head.body)
         total = 1 if size <= k else fragment_count(size, k)
-        self._outbox.begin(lane, entry_id, k, total, start)
+        if lane.current is None:
+            self._outbox.begin(lane, entry_id, k, total, start)
+        else:
+            head.cut(entry_id, k, total, start)
         return True
 
     def stamp(self, draft: Draft, message: Outgoing, start: float) -> None:
         """Add the message's age to `draft` if it fits."""
         age_us = min(max(round((start - message.arrived_at) * 1e6), 0), MAX_AGE_US)
         asks = bool(message.receipt)
-        if not draft.add_stamp(message.topic_id, message.entry_id, age_us, asks):
+        if not draft.add_stamp(message.channel, message.entry_id, age_us, asks):
             return
         message.stamp()
         if asks and not message.is_expected:

@@ -72,7 +72,7 @@ class TopicEntryIds:
 
     def retire(self, message: Outgoing, now: float) -> None:
         """Return the id of `message`, which has no more fragments: it rests, or is free at once."""
-        ids = self._by_topic[message.topic_id]
+        ids = self._by_topic[message.channel]
         if message.rests_id:
             ids.rest(message.entry_id, now)
         else:
@@ -81,21 +81,22 @@ class TopicEntryIds:
     def not_left(self, messages: Iterable[Outgoing]) -> None:
         """Hold the ids of `messages`, whose fragments leave later than planned."""
         for message in messages:
-            if not message.is_whole and not message.is_held:
-                message.hold_id(self._by_topic[message.topic_id].hold(message.entry_id))
+            if not message.is_whole and not message.held_ids:
+                ids = self._by_topic[message.channel]
+                message.hold_ids(tuple(each for each in message.ids if ids.hold(each)))
 
     def left(self, messages: Iterable[Outgoing], start: float) -> None:
         """Let the held ids of `messages` rest, as their fragments leave in a burst at `start`."""
         for message in messages:
-            if message.is_held:
-                message.hold_id(False)
-                self._by_topic[message.topic_id].rest(message.entry_id, start)
+            for entry_id in message.held_ids:
+                self._by_topic[message.channel].rest(entry_id, start)
+            message.hold_ids(())
 
     def next_free(self, message: Outgoing) -> float:
         """Time at which an entry id is free for `message`; −inf: now."""
         if message.is_whole:
             return float("-inf")
-        ids = self._by_topic.get(message.topic_id) or self._new(message.topic_id)
+        ids = self._by_topic.get(message.channel) or self._new(message.channel)
         return ids.next_free()
 
     def _new(self, topic_id: int) -> EntryIds:

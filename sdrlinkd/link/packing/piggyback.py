@@ -11,10 +11,11 @@ from sdrlinkd.wire import (
     Receipt,
     Record,
     RecordType,
+    TopicPiece,
     build_records,
 )
 
-LASTING = frozenset({RecordType.CLOCK, RecordType.RECEIPT})
+LASTING = frozenset({RecordType.CLOCK, RecordType.RECEIPT, RecordType.TOPIC})
 """Record types that a new beacon does not replace."""
 
 
@@ -64,6 +65,23 @@ class PiggybackRecords:
         built = build_records([receipt])
         key = (built[0], receipt.node, receipt.topic_id, receipt.entry_id)
         self.waiting[key] = _Waiting(built, due_at, receipt, since)
+        self._note_due()
+
+    def put_topic(self, piece: TopicPiece) -> None:
+        """Add a piece of a topic's description, for spare room; see `make_due`."""
+        built = build_records([piece])
+        key = (built[0], piece.number, piece.piece)
+        due_at = self.waiting[key].due_at if key in self.waiting else inf
+        self.waiting[key] = _Waiting(built, due_at)
+
+    def make_due(self, kind: RecordType, room: int, now: float) -> None:
+        """Let waiting records of a type, of `room` octets together, get their own PDU from now."""
+        for key, each in self.waiting.items():
+            if key[0] == kind and each.due_at == inf:
+                room -= len(each.built)
+                if room < 0:
+                    break
+                self.waiting[key] = each._replace(due_at=now)
         self._note_due()
 
     def renew(self, record: Record) -> None:

@@ -4,7 +4,7 @@ from sdrlinkd.link.packing.draft import BuiltPdu
 from sdrlinkd.link.params import LinkParams
 from sdrlinkd.link.qos import WIRE_BITS
 from sdrlinkd.link.queue import Lane, Outbox, Outgoing
-from sdrlinkd.wire import build_full, equal_payload, flags, forwarded
+from sdrlinkd.wire import build_full, equal_payload, flags, forwarded, overhead
 
 
 class SingleEntry:
@@ -30,24 +30,29 @@ class SingleEntry:
     def fills_some(self, head: Outgoing) -> bool:
         """Whether the next fragment of `head` fills a PDU and is not the last one."""
         # The last fragment differs: it may need a STAMP and may leave room.
-        return head.k == self._k and (len(head.payload) - 1) // self._k > head.next_index
+        k = head.k
+        return (
+            k == self._k - overhead(head.channel)
+            and not head.needs_id
+            and (len(head.body) - 1) // k > head.next_index
+        )
 
     def filled(self, lane: Lane, start: float, seq: int, most: int) -> list[BuiltPdu]:
         """PDUs with the next fragments, `most` or fewer, of the message that `lane` has begun.
 
         Requires that the lane is alone in its level, and that the next fragment fills a PDU.
         """
-        head, k = lane.current, self._k
+        head = lane.current
         if head is None:
             return []
-        payload, first = head.payload, head.next_index
-        n = min(most, (len(payload) - 1) // k - first)
+        body, first, k = head.body, head.next_index, head.k
+        n = min(most, (len(body) - 1) // k - first)
         bits, qos = flags(WIRE_BITS[head.qos], head.is_compressed), head.qos
         built = [
             BuiltPdu(
                 build_full(
-                    bits, self._src, head.dst, (seq + i) & 0xFF, self._hop_limit, head.topic_id,
-                    head.entry_id, first + i, head.total, payload[at : at + k],
+                    bits, self._src, head.dst, (seq + i) & 0xFF, self._hop_limit, head.channel,
+                    head.entry_id, first + i, head.total, body[at : at + k],
                 ),
                 [head],
                 qos,

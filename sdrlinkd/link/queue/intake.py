@@ -11,15 +11,25 @@ from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, Overrides, Qos
 from sdrlinkd.link.queue.latched import Offer
 from sdrlinkd.link.queue.ledger import TxTally, tx_balance
 from sdrlinkd.link.queue.lifespan import Lifespan, lifespan_of
-from sdrlinkd.link.queue.message import Outgoing
+from sdrlinkd.link.queue.message import Outgoing, Parting
 from sdrlinkd.link.queue.outbox import Outbox
 from sdrlinkd.link.queue.policy import DEFAULT_POLICY, TopicPolicy
 from sdrlinkd.link.queue.topic_state import TopicState
 from sdrlinkd.link.schedule import ClassesParams
+from sdrlinkd.link.topics import OwnTopics
 from sdrlinkd.reports import RelayReport, TopicReport
-from sdrlinkd.wire import Pdu, Registry, Topic, max_message_size
+from sdrlinkd.wire import (
+    FIRST_NUMBER,
+    PARTS,
+    Pdu,
+    Topic,
+    max_large_size,
+    max_size,
+    octet,
+    part_size,
+)
 
-RELAYED = 256
+RELAYED = 512
 """Lanes of relayed PDUs have this plus their source in place of a topic id."""
 UNLIKELY_AGE_S = 10.0
 """Age in s above which a message without a lifespan was probably stamped by another clock or comes
@@ -35,23 +45,30 @@ class Intake:
     def __init__(
         self,
         params: LinkParams,
-        registry: Registry,
+        topics: OwnTopics,
         outbox: Outbox,
         classes: ClassesParams,
         dictionaries: Mapping[int, ZstdCompressionDict],
     ) -> None:
-        self._max_message_size = max_message_size(params.pdu_size)
-        self._has_control = registry.has_control
+        self._pdu_size = params.pdu_size
+        self._dst = params.dst
+        self._has_control = topics.registry.has_control
+        self._has_numbers = topics.has_numbers
         self._classes = classes
         self._outbox = outbox
-        self._topics = [
-            TopicState(params.dst, registry.has_control, dictionaries.get(topic.id))
-            for topic in registry.topics
-        ]
+        self._own = topics
+        self._topics: dict[int, TopicState] = {}
+        for topic in topics:
+            self.add(topic.id, dictionaries.get(topic.id))
         self._refused = TxTally()
         """Messages without a topic of ours: bad envelopes, unknown topics."""
         self._relayed = TxTally()
         """Relayed PDUs of others; each counts as a message."""
+
+    def add(self, topic_id: int, dictionary: ZstdCompressionDict | None = None) -> None:
+        """Begin to take messages of a topic."""
+        if topic_id not in self._topics:
+            self._topics[topic_id] = TopicState(self._dst, self._has_control, dictionary)
 
     def submit(
         self,
@@ -90,8 +107,7 @@ class Intake:
         """
         tally = self._relayed
         tally.accept()
-        known = [each.topic_id for each in pdu.entries if each.topic_id < len(self._topics)]
-        priority = max((self._topics[each].priority for each in known), default=0)
+        priority = max((self._priority(each.topic_id) for each in pdu.entries), default=0)
         message = Outgoing(
             RELAYED + pdu.src, data, CLASSES[pdu.qos], priority, pdu.dst, at, until, False, tally,
             is_whole=True,
@@ -106,7 +122,7 @@ class Intake:
 
     def begin_anew(self) -> None:
         """Forget the arrival times of messages, as another clock starts."""
-        for topic in self._topics:
+        for topic in self._topics.values():
             topic.apply(topic.policy)
 
     def tally(self, topic_id: int) -> TxTally:
@@ -175,7 +191,7 @@ class Intake:
     def counters(self) -> dict[Hashable, int]:
         """The counters for which rates are reported."""
         found: dict[Hashable, int] = {}
-        for topic_id, topic in enumerate(self._topics):
+        for topic_id, topic in self._topics.items():
             found["tx", topic_id] = topic.tally.accepted
             found["accepted_bytes", topic_id] = topic.tally.accepted_bytes
         return found
@@ -189,7 +205,14 @@ class Intake:
         return problems
 
     def _tallies(self) -> list[TxTally]:
-        return [self._refused, self._relayed, *(topic.tally for topic in self._topics)]
+        return [self._refused, self._relayed, *(topic.tally for topic in self._topics.values())]
+
+    def _priority(self, topic_id: int) -> int:
+        """The priority of another robot's entry of a topic, as far as it is known here."""
+        if FIRST_NUMBER <= topic_id <= PARTS:
+            return DEFAULT_POLICY.priority
+        topic = self._topics.get(topic_id)
+        return 0 if topic is None else topic.priority
 
     def _enqueue(
         self,
@@ -209,13 +232,17 @@ class Intake:
         frame = topic.deflated.shrink(payload) if topic.deflated else None
         if frame is not None:
             payload = frame
-        if len(payload) > self._max_message_size:
-            topic.tally.drop("tx_too_big")
-            return "tx_too_big"
+        qos = topic.qos if qos is None else qos
+        number, parting = self._own.number(topic_id, key), None
+        if len(payload) > max_size(self._pdu_size, number):
+            parting = self._parting(topic, number, len(payload), qos)
+            if parting is None:
+                topic.tally.drop("tx_too_big")
+                return "tx_too_big"
         message = Outgoing(
             topic_id,
             payload,
-            topic.qos if qos is None else qos,
+            qos,
             topic.priority if priority is None else priority,
             topic.dst if dst is None else dst,
             at,
@@ -225,6 +252,8 @@ class Intake:
             # Without a control channel its receipt was already answered as unknown.
             receipt=receipt if self._has_control else "",
             key=key,
+            number=number,
+            parting=parting,
             is_compressed=frame is not None,
         )
         if message.expires_at <= now:
@@ -232,3 +261,12 @@ class Intake:
             self._outbox.lives.drop(message, "tx_expired")
             return "tx_expired"
         return self._outbox.put(message, topic.policy, bytes_per_s)
+
+    def _parting(self, topic: TopicState, number: int, size: int, qos: Qos) -> Parting | None:
+        """How to divide a message that is too large for 255 fragments; None: it cannot be sent."""
+        share = self._classes.of(qos).parity
+        if not self._has_numbers or size > max_large_size(self._pdu_size, share):
+            return None
+        # Of equal size, as parity protects a small last part less.
+        n = -(-size // part_size(self._pdu_size, share))
+        return Parting(-(-size // n), octet(number), topic.count_large())

@@ -8,7 +8,7 @@ TX_REASONS = {
     "tx_bad_envelope": "the bus message violates the envelope format",
     "tx_unknown_topic": "the topic is not in the registry, or not subscribed",
     "tx_denied": "the producer may not publish this",
-    "tx_too_big": "larger than 255 fragments can carry",
+    "tx_too_big": "larger than PDUs of this size can carry",
     "tx_size_cap": "larger than the topic's max_bytes",
     "tx_throttled": "faster than the topic's period",
     "tx_decimated": "decimated: the topic sends one message in several",
@@ -59,7 +59,9 @@ RX_REASONS = {
     "rx_inflates": "its zstd frame exceeds the message size limit",
     "rx_no_dictionary": "compressed with a dictionary that this node does not have",
     "rx_bad_cdr": "no room for the four bytes of CDR encapsulation",
-    "rx_unknown_topic": "a topic id that our registry does not have",
+    "rx_unknown_topic": "a topic id that our registry does not have, or an undeclared number",
+    "rx_part_lost": "a part of a large message is missing",
+    "rx_other_type": "its type has other fields here",
 }
 
 

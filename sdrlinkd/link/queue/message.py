@@ -7,9 +7,11 @@ Lanes of equal class and priority form a *level*.
 from collections import deque
 from collections.abc import Mapping, Sequence
 from enum import IntEnum, auto
+from typing import NamedTuple
 
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue.ledger import TxTally
+from sdrlinkd.wire import PARTS, Part, build_part
 
 
 class Fate(IntEnum):
@@ -42,14 +44,25 @@ STEPS: Mapping[tuple[Fate, Step], Fate] = {
 entered is the sum over all states, so this table also defines the ledger."""
 
 
+class Parting(NamedTuple):
+    """How a large message is divided: octets of a part, and what each part says.
+
+    `number` is the topic's octet, and `serial` counts the topic's large messages modulo 2^16.
+    """
+
+    size: int
+    number: int
+    serial: int
+
+
 class Outgoing:
     """One outgoing message. Any code may read its fields; only its methods change them."""
 
     __slots__ = (
-        "arrived_at", "dst", "entry_id", "expires_at", "fate", "is_compressed", "is_expected",
-        "is_held", "is_whole", "k", "key", "lane", "last_at", "next_index", "parity", "payload",
-        "priority", "qos", "receipt", "rests_id", "stamped", "tally", "topic_id", "total",
-        "unconfirmed",
+        "_parting", "arrived_at", "body", "channel", "dst", "entry_id", "expires_at", "fate",
+        "held_ids", "ids", "is_compressed", "is_expected", "is_whole", "k", "key", "lane",
+        "last_at", "next_index", "parity", "parts_left", "payload", "priority", "qos", "receipt",
+        "rests_id", "stamped", "tally", "topic_id", "total", "unconfirmed",
     )  # fmt: skip
 
     def __init__(
@@ -66,13 +79,17 @@ class Outgoing:
         *,
         receipt: str = "",
         key: str = "",
+        number: int | None = None,
+        parting: "Parting | None" = None,
         is_compressed: bool = False,
         is_whole: bool = False,
     ) -> None:
         """Make a queued message.
 
         `receipt` is the producer's id for the receipt, empty if none is wanted, and `key` its
-        producer key. `is_whole` means that the payload is another robot's PDU to be relayed.
+        producer key. `number` is the topic's number on the air if that is not `topic_id`. `parting`
+        says how to divide a large message, whose parts are cut one after the other. `is_whole`
+        means that the payload is another robot's PDU to be relayed.
         """
         self.topic_id = topic_id
         self.payload = payload
@@ -87,6 +104,13 @@ class Outgoing:
         self.key = key
         self.is_compressed = is_compressed
         self.is_whole = is_whole
+        self.channel = topic_id if number is None else number
+        """The topic id of its entries on the air; PARTS for a large message."""
+        self.body = payload
+        """The octets that are cut into fragments: the message, or its present part."""
+        self._parting = parting
+        self.parts_left = 0
+        """How many parts follow the present one."""
         self.fate = Fate.QUEUED
         self.lane: Lane
         # Set when the first fragment is cut, and fixed from then on.
@@ -97,14 +121,20 @@ class Outgoing:
         self.last_at = 0.0
         """Planned start of the burst with the latest fragment."""
         self.rests_id = False
-        self.is_held = False
-        """Whether the entry id is held, as fragments leave later than planned."""
+        self.ids: tuple[int, ...] = ()
+        """All entry ids that the message has used: one for each part."""
+        self.held_ids: tuple[int, ...] = ()
+        """Those held, as fragments leave later than planned."""
         self.unconfirmed = 0
         """Number of PDUs with a part of the message whose outcome the radio has not reported."""
         self.parity: list[bytes] = []
         """Parity records that follow the last fragment, in reverse order."""
         self.is_expected = False
         """Whether receipts were requested from the receivers."""
+        if parting is not None:
+            self.parts_left = -(-len(payload) // parting.size)
+            self.channel = PARTS
+            self._next_body()
 
     @property
     def src(self) -> int:
@@ -114,7 +144,23 @@ class Outgoing:
     @property
     def is_through(self) -> bool:
         """Whether all parts of the message are in PDUs."""
-        return self.next_index == self.total and not self.parity
+        is_cut = 0 < self.total == self.next_index
+        return is_cut and not self.parity and not self.parts_left
+
+    @property
+    def needs_id(self) -> bool:
+        """Whether the next part of a message that has begun needs an entry id."""
+        return bool(self.ids) and not self.total
+
+    @property
+    def awaits_stamp(self) -> bool:
+        """Whether the age may go with the present fragments: those of the last part."""
+        return not self.stamped and not self.parts_left and self.total > 0
+
+    @property
+    def next_size(self) -> int:
+        """Octets of the present body that are in no PDU yet."""
+        return max(0, len(self.body) - self.next_index * self.k)
 
     def in_vain(self, now: float, patience_s: float) -> str:
         """The ledger's reason to stop sending the message; empty while it is worth sending.
@@ -141,9 +187,17 @@ class Outgoing:
         self.lane = lane
 
     def cut(self, entry_id: int, k: int, total: int, start: float) -> None:
-        """Note that the message becomes `total` fragments of `k` bytes, sent from `start` on."""
+        """Note that the body becomes `total` fragments of `k` bytes, sent from `start` on."""
         self.entry_id, self.k, self.total, self.last_at = entry_id, k, total, start
-        self.rests_id = total > 1
+        self.ids = (*self.ids, entry_id)
+        self.rests_id = total > 1 or self.channel == PARTS
+
+    def go_on(self) -> bool:
+        """Turn to the next part; False if there is none."""
+        if not self.parts_left:
+            return False
+        self._next_body()
+        return True
 
     def advance(self, n: int, start: float) -> None:
         """Note that the next `n` fragments are in one PDU each, for a burst at `start`."""
@@ -171,9 +225,9 @@ class Outgoing:
         """Make the entry id rest after use, even for a short message, as its STAMP went ahead."""
         self.rests_id = True
 
-    def hold_id(self, is_held: bool) -> None:
-        """Note whether the entry id is held for fragments that leave later than planned."""
-        self.is_held = is_held
+    def hold_ids(self, held: tuple[int, ...]) -> None:
+        """Note which entry ids are held for fragments that leave later than planned."""
+        self.held_ids = held
 
     def expect(self) -> None:
         """Note that receipts were requested from the receivers."""
@@ -182,6 +236,16 @@ class Outgoing:
     def confirm(self) -> None:
         """Note that the radio has reported the outcome of one PDU with a part of the message."""
         self.unconfirmed -= 1
+
+    def _next_body(self) -> None:
+        parting = self._parting
+        if parting is not None:
+            n = -(-len(self.payload) // parting.size)
+            at = n - self.parts_left
+            data = self.payload[at * parting.size : (at + 1) * parting.size]
+            self.body = build_part(Part(parting.number, parting.serial, at, n, data))
+            self.parts_left -= 1
+            self.next_index = self.total = 0
 
 
 class Lane:

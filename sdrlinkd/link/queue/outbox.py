@@ -184,7 +184,7 @@ class Outbox:
             for lane in level.lanes:
                 if lane.current is not None:
                     message = lane.current
-                    total += max(0, len(message.payload) - message.next_index * message.k)
+                    total += message.next_size
                     total += ENTRY_HEADER_SIZE
                 for message in lane.waiting:
                     total += len(message.payload) + ENTRY_HEADER_SIZE

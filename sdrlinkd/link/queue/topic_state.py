@@ -13,8 +13,8 @@ class TopicState:
     """The sender's state of one topic."""
 
     __slots__ = (
-        "_default_dst", "_dictionary", "_has_control", "admission", "deflated", "dst", "policy",
-        "priority", "qos", "stamp", "tally",
+        "_default_dst", "_dictionary", "_has_control", "_n_large", "admission", "deflated", "dst",
+        "policy", "priority", "qos", "stamp", "tally",
     )  # fmt: skip
 
     def __init__(
@@ -23,8 +23,14 @@ class TopicState:
         self._default_dst = dst
         self._has_control = has_control
         self._dictionary = dictionary
+        self._n_large = 0
         self.tally = TxTally()
         self.apply(TopicPolicy())
+
+    def count_large(self) -> int:
+        """Count one large message; returns its number modulo 2^16."""
+        self._n_large = (self._n_large + 1) & 0xFFFF
+        return self._n_large
 
     def apply(self, policy: TopicPolicy) -> None:
         """Apply `policy` to messages from now on; messages in the queue keep their settings."""

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from sdrlinkd.link.queue import Outgoing
 from sdrlinkd.link.receive import DELIVERED
-from sdrlinkd.wire import BROADCAST, NO_AGE, RECEIPT_UNIT_S, Receipt
+from sdrlinkd.wire import BROADCAST, NO_AGE, RECEIPT_UNIT_S, Receipt, octet
 
 EARLIER_S = 0.05
 """Tolerance in s for a receipt that implies too early a submission of its message."""
@@ -14,7 +14,7 @@ MOST_PENDING = 4096
 REASONS = (
     DELIVERED, "rx_expired", "rx_partial_timeout", "rx_partial_superseded", "rx_partial_evicted",
     "rx_partial_memory", "rx_size_cap", "rx_bad_zstd", "rx_inflates", "rx_no_dictionary",
-    "rx_bad_cdr", "rx_unknown_topic", "rx_no_age",
+    "rx_bad_cdr", "rx_unknown_topic", "rx_no_age", "rx_part_lost", "rx_other_type",
 )  # fmt: skip
 """Reasons by status, from 1 (wire document, section 6.7)."""
 STATUS = {reason: number for number, reason in enumerate(REASONS, 1)}
@@ -49,7 +49,7 @@ def make_receipt(
 ) -> Receipt:
     """The RECEIPT record for robot `src` about its message."""
     age = NO_AGE if age_s is None else min(max(round(age_s / RECEIPT_UNIT_S), 0), NO_AGE)
-    return Receipt(topic_id, entry_id, STATUS[reason], src, age)
+    return Receipt(octet(topic_id), entry_id, STATUS[reason], src, age)
 
 
 class Receipts:
@@ -72,7 +72,7 @@ class Receipts:
         if self._n_pending >= MOST_PENDING:
             self._give_up(pending)
             return
-        key = (message.topic_id, message.entry_id)
+        key = _key(message)
         self._pending.setdefault(key, []).append(pending)
         self._n_pending += 1
 
@@ -104,7 +104,7 @@ class Receipts:
 
     def dropped(self, message: Outgoing, reason: str) -> None:
         """Make the verdicts for a message that was not sent, or not completely."""
-        for pending in self._pending.get((message.topic_id, message.entry_id), ()):
+        for pending in self._pending.get(_key(message), ()):
             if pending.message is message:
                 for left, dst in _counted_down(pending.awaited):
                     self._tell(message, dst, reason, None, left)
@@ -157,13 +157,18 @@ class Receipts:
         ]
 
     def _forget(self, pending: _Pending) -> None:
-        key = (pending.message.topic_id, pending.message.entry_id)
+        key = _key(pending.message)
         left = [each for each in self._pending[key] if each is not pending]
         self._n_pending -= 1
         if left:
             self._pending[key] = left
         else:
             del self._pending[key]
+
+
+def _key(message: Outgoing) -> tuple[int, int]:
+    """What identifies a message in RECEIPT records, for as long as its entry id rests."""
+    return octet(message.channel), message.entry_id
 
 
 def _counted_down(robots: set[int]) -> Iterable[tuple[int, int]]:

@@ -1,9 +1,11 @@
 """Decides whether a complete message is handed over, by its topic's policy."""
 
+from collections.abc import Mapping
 from math import inf
 
 from sdrlinkd.link.queue import DEFAULT_POLICY, Inflated, TopicPolicy
 from sdrlinkd.link.receive.delivered import CDR_HEADER_SIZE, Retain
+from sdrlinkd.link.topics import HeardTopic
 from sdrlinkd.wire import Registry
 
 RETAINED_KEYS = 8
@@ -17,29 +19,39 @@ class Acceptance:
     """
 
     def __init__(self, registry: Registry, inflated: Inflated, max_expanded: int) -> None:
-        self._n_topics = len(registry)
         self._has_control = registry.has_control
         self._inflated = inflated
         self._max_expanded = max_expanded
         self._policies: dict[int, TopicPolicy] = {}
+        self._named: Mapping[str, TopicPolicy] = {}
 
     def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
         """Treat messages of a topic by `policy` from now on."""
         self._policies[topic_id] = policy
 
-    def policy(self, topic_id: int) -> TopicPolicy:
-        """The policy of a topic, by default the default policy."""
-        return self._policies.get(topic_id, DEFAULT_POLICY)
+    def set_named(self, policies: Mapping[str, TopicPolicy]) -> None:
+        """Treat messages of declared topics by the policy of their name from now on."""
+        self._named = policies
 
-    def retain(self, topic_id: int) -> Retain:
+    def policy_of(self, topic: HeardTopic | None) -> TopicPolicy:
+        """The policy of a topic, by default the default policy."""
+        if topic is None:
+            return DEFAULT_POLICY
+        if topic.about is not None:
+            return self._named.get(topic.name, DEFAULT_POLICY)
+        return self._policies.get(topic.base, DEFAULT_POLICY)
+
+    def retain(self, topic: HeardTopic | None) -> Retain:
         """How many messages of a topic are kept for consumers that come later."""
-        policy = self.policy(topic_id)
-        # Producer keys are not on the air: their messages are kept together.
+        policy = self.policy_of(topic)
+        if topic is not None and topic.about is not None:
+            return Retain(max(topic.about.depth, policy.latched), policy.own_lifespan_s)
+        # The registry has no numbers for producers: their messages are kept together.
         return Retain(RETAINED_KEYS * policy.latched, policy.own_lifespan_s)
 
     def judge(
         self,
-        topic_id: int,
+        topic: HeardTopic,
         payload: bytes,
         is_compressed: bool,
         origin_at: float | None,
@@ -49,9 +61,7 @@ class Acceptance:
 
         `origin_at` is when the message was submitted, None if no STAMP came.
         """
-        if topic_id >= self._n_topics:
-            return payload, "rx_unknown_topic"
-        policy, reason = self.policy(topic_id), None
+        policy, reason = self.policy_of(topic), None
         if is_compressed:
             most = policy.max_bytes or self._max_expanded
             payload, reason = self._inflated.expand(payload, most)

@@ -29,7 +29,8 @@ class Delivered(NamedTuple):
     PDUs known to be lost so far. `origin_at` is when the message was submitted, on the receiver's
     clock, and None if no STAMP came; the age at any time is that time minus `origin_at`.
     `began_at` is the preamble of the burst with the first fragment, `heard_at` that of the burst
-    with the last one, and `ended_at` the last fragment's last sample.
+    with the last one, and `ended_at` the last fragment's last sample. Messages of several producers
+    of a declared topic differ in `series`, the topic's number on the air.
     """
 
     src: int
@@ -43,6 +44,7 @@ class Delivered(NamedTuple):
     snr_db: float | None
     began_at: float = 0.0
     ended_at: float = 0.0
+    series: int = 0
 
     def parts(self, now: float) -> Parts:
         """The parts of the message's age at `now`; without a STAMP the wait counts as 0."""

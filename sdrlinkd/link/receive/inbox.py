@@ -20,9 +20,13 @@ from sdrlinkd.link.receive.events import (
 from sdrlinkd.link.receive.neighbors import Neighbor, Neighbors
 from sdrlinkd.link.receive.relay import Relay
 from sdrlinkd.link.receive.rx_ledger import Held, RxLedger
+from sdrlinkd.link.receive.undeclared import UndeclaredMessages, Whole
+from sdrlinkd.link.topics import HeardTopics
 from sdrlinkd.wire import (
     BROADCAST,
     CONTROL_TOPIC_ID,
+    FIRST_NUMBER,
+    PARTS,
     Beacon,
     ControlEntries,
     Entry,
@@ -35,10 +39,14 @@ from sdrlinkd.wire import (
     Registry,
     RegistryDigest,
     Stamp,
+    TopicPiece,
     identity,
     lasting_identity,
+    numbered,
     parse,
+    parse_part,
     read_control_entries,
+    with_topic,
 )
 
 _NO_CONTROL = ControlEntries([], 0, 0)
@@ -61,6 +69,7 @@ class Inbox:
         relay: Relay,
         acceptance: Acceptance,
         ledger: RxLedger,
+        topics: HeardTopics,
     ) -> None:
         self._pdu_size = params.pdu_size
         self._hop_limit = params.hop_limit
@@ -70,6 +79,9 @@ class Inbox:
         self._relay = relay
         self._acceptance = acceptance
         self._has_control = registry.has_control
+        self._has_numbers = topics.has_numbers
+        self._topics = topics
+        self._undeclared = UndeclaredMessages()
         limits = ReassemblyLimits(
             reassembly.timeout_s, reassembly.source_bytes, reassembly.total_bytes
         )
@@ -92,6 +104,8 @@ class Inbox:
             return self._drop(error.reason, events)
         control = read_control_entries(pdu) if self._has_control else _NO_CONTROL
         records = control.records
+        if self._has_numbers:
+            pdu, records = numbered(pdu), [with_topic(record) for record in records]
         is_relayed = pdu.hop < self._hop_limit
         stamps = [record for record in records if isinstance(record, Stamp)]
         if pdu.src != self._own_id or is_relayed:
@@ -128,6 +142,7 @@ class Inbox:
                     events.append(RecordHeard(pdu.src, record, at))
                 if neighbor.take_beacon(record):
                     neighbor.track.restart(seq, crc)
+                    self._topics.forget(pdu.src)
                     self._announce(pdu.src, at, events)
                 else:
                     neighbor.track.goes_on()
@@ -136,6 +151,9 @@ class Inbox:
             elif isinstance(record, Receipt):
                 if pdu.dst == self._own_id or record.node == self._own_id:
                     events.append(RecordHeard(pdu.src, record, at))
+            elif isinstance(record, TopicPiece):
+                if self._topics.take(pdu.src, record):
+                    self._release(pdu.src, record.number, now, events)
             elif not is_relayed and not isinstance(record, Parity | Stamp):
                 events.append(RecordHeard(pdu.src, record, at))
         repaired = self._repaired(pdu.src, records, at) if records else []
@@ -153,8 +171,12 @@ class Inbox:
     @property
     def held(self) -> Held:
         """Numbers of begun and of incomplete messages."""
-        reassembly = self._reassembly
-        return Held(reassembly.started, reassembly.held, reassembly.held_bytes)
+        reassembly, undeclared = self._reassembly, self._undeclared
+        return Held(
+            reassembly.started,
+            reassembly.held + len(undeclared),
+            reassembly.held_bytes + undeclared.n_bytes,
+        )
 
     def expire(self, now: float) -> list[Event]:
         """Give up messages that have waited too long.
@@ -164,6 +186,8 @@ class Inbox:
         events: list[Event] = []
         self._reassembly.expire(now)
         self._note_lost(now, events)
+        for message in self._undeclared.expire(now):
+            self._end(message, "rx_unknown_topic", now, events)
         self._ages.expire(now, self._reassembly.holds)
         return events
 
@@ -186,7 +210,8 @@ class Inbox:
             origin_at = self._ages.look(pdu.src, topic_id, entry.entry_id).at
             if origin_at is None:
                 return inf
-            until = max(until, origin_at + self._acceptance.policy(topic_id).own_lifespan_s)
+            policy = self._acceptance.policy_of(self._topics.topic(pdu.src, topic_id))
+            until = max(until, origin_at + policy.own_lifespan_s)
         return until if until > -inf else inf
 
     def _repaired(self, src: int, records: list[Record], at: float) -> list[Entry]:
@@ -224,31 +249,78 @@ class Inbox:
             payload = reassembly.add(src, entry, at)
             if payload is None:
                 continue
-            tally = self._ledger.tally(src, topic_id)
-            origin = self._ages.take(src, topic_id, entry.entry_id)
-            payload, reason = self._acceptance.judge(
-                topic_id, payload, pdu.compressed, origin.at, now
-            )
-            if origin.asks:
-                age_s = None if origin.at is None else now - origin.at
-                ended = reason or DELIVERED
-                events.append(Ended(src, topic_id, entry.entry_id, ended, age_s, now))
-            if reason is not None:
-                tally.drop(reason)
-                continue
-            tally.deliver(len(payload))
-            events.append(
-                Delivered(
-                    src, topic_id, payload, tally.delivered, neighbor.track.lost,
-                    origin.at, at, pdu.hop,
-                    neighbor.snr_db, reassembly.began_at, ended_at,
-                )
+            stamped = (topic_id, entry.entry_id)
+            if topic_id == PARTS:
+                part = parse_part(payload)
+                joined = part and reassembly.join(src, entry.entry_id, part, at)
+                if not joined:
+                    continue
+                topic_id, payload, entry_id = joined
+                stamped = (PARTS, entry_id)
+            message = Whole(
+                src, topic_id, payload, pdu.compressed, self._ages.take(src, *stamped), stamped, at,
+                ended_at, reassembly.began_at, pdu.hop, neighbor.snr_db,
             )  # fmt: skip
+            if topic_id >= FIRST_NUMBER and self._topics.topic(src, topic_id) is None:
+                for given_up in self._undeclared.hold(message, now):
+                    self._end(given_up, "rx_unknown_topic", now, events)
+            else:
+                self._take_message(message, neighbor, now, events)
         if reassembly.lost:
             self._note_lost(now, events)
 
+    def _take_message(
+        self, message: Whole, neighbor: Neighbor, now: float, events: list[Event]
+    ) -> None:
+        """Hand over a whole message, or drop it for a reason of the ledger."""
+        src, number = message.src, message.number
+        topic = self._topics.topic(src, number)
+        base = number if topic is None else topic.base
+        payload, reason = message.payload, None
+        if topic is None or self._topics.has_other_hash(topic):
+            reason = "rx_unknown_topic" if topic is None else "rx_other_type"
+        else:
+            payload, reason = self._acceptance.judge(
+                topic, payload, message.is_compressed, message.origin.at, now
+            )
+        if reason is not None:
+            self._end(message, reason, now, events)
+            return
+        self._answer(message, DELIVERED, now, events)
+        tally = self._ledger.tally(src, base)
+        tally.deliver(len(payload))
+        events.append(
+            Delivered(
+                src, base, payload, tally.delivered, neighbor.track.lost, message.origin.at,
+                message.heard_at, message.hops_left, message.snr_db, message.began_at,
+                message.ended_at, number,
+            )
+        )  # fmt: skip
+
+    def _release(self, src: int, number: int, now: float, events: list[Event]) -> None:
+        """Hand over the messages that waited for the declaration of a topic."""
+        neighbor = self._neighbors.get(src)
+        for message in self._undeclared.release(src, number):
+            if neighbor is not None:
+                self._take_message(message, neighbor, now, events)
+
+    def _end(self, message: Whole, reason: str, now: float, events: list[Event]) -> None:
+        """Drop a whole message."""
+        topic = self._topics.topic(message.src, message.number)
+        base = message.number if topic is None else topic.base
+        self._ledger.tally(message.src, base).drop(reason)
+        self._answer(message, reason, now, events)
+
+    def _answer(self, message: Whole, ended: str, now: float, events: list[Event]) -> None:
+        origin = message.origin
+        if origin.asks:
+            age_s = None if origin.at is None else now - origin.at
+            events.append(Ended(message.src, *message.stamped, ended, age_s, now))
+
     def _note_lost(self, now: float, events: list[Event]) -> None:
-        for src, topic_id, entry_id, reason in self._reassembly.take_lost():
-            self._ledger.tally(src, topic_id).drop(reason)
-            if self._ages.take(src, topic_id, entry_id).asks:
-                events.append(Ended(src, topic_id, entry_id, reason, None, now))
+        for src, topic_id, stamped, reason in self._reassembly.take_lost():
+            if topic_id != PARTS:
+                topic = self._topics.topic(src, topic_id)
+                self._ledger.tally(src, topic_id if topic is None else topic.base).drop(reason)
+            if self._ages.take(src, *stamped).asks:
+                events.append(Ended(src, *stamped, reason, None, now))

@@ -1,6 +1,6 @@
 """The receive side as one object, from a PDU heard to a message handed over."""
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 
 from sdrlinkd.link.params import LinkParams, ReassemblyParams
 from sdrlinkd.link.queue import Inflated, TopicPolicy
@@ -13,6 +13,7 @@ from sdrlinkd.link.receive.inbox import Inbox
 from sdrlinkd.link.receive.neighbors import Neighbors
 from sdrlinkd.link.receive.relay import Relay, RelayParams
 from sdrlinkd.link.receive.rx_ledger import RxLedger
+from sdrlinkd.link.topics import HeardTopics
 from sdrlinkd.reports import ReceivedTopicReport, RxReport
 from sdrlinkd.wire import Registry, Waits
 
@@ -28,6 +29,7 @@ class Reception:
         params: LinkParams,
         reassembly: ReassemblyParams,
         registry: Registry,
+        topics: HeardTopics,
         own_id: int,
         relay: RelayParams,
         inflated: Inflated,
@@ -38,11 +40,12 @@ class Reception:
         self.neighbors = Neighbors(own_id)
         """The robots that are heard."""
         self._relay = Relay(relay, own_id)
+        self._topics = topics
         self._acceptance = Acceptance(registry, inflated, max_expanded)
-        self._ledger = RxLedger(registry)
+        self._ledger = RxLedger(topics)
         self._inbox = Inbox(
             params, reassembly, registry, own_id, hears_self, self.neighbors, self._relay,
-            self._acceptance, self._ledger,
+            self._acceptance, self._ledger, topics,
         )  # fmt: skip
         self._handover = Handover()
         self._air = AirHeard()
@@ -71,11 +74,15 @@ class Reception:
 
     def deliver(self, message: Delivered, now: float) -> float | None:
         """Note that `message` is handed over at `now`; returns its age in s, None if unknown."""
-        return self._handover.deliver(message, self._acceptance.policy(message.topic_id), now)
+        return self._handover.deliver(message, self._policy_of(message), now)
 
     def retain(self, message: Delivered) -> Retain:
         """How many messages of this one's topic and source are kept for later consumers."""
-        return self._acceptance.retain(message.topic_id)
+        return self._acceptance.retain(self._topics.topic(message.src, message.series))
+
+    def set_named(self, policies: Mapping[str, TopicPolicy]) -> None:
+        """Treat messages of declared topics by the policy of their name from now on."""
+        self._acceptance.set_named(policies)
 
     def set_policy(self, topic_id: int, policy: TopicPolicy) -> None:
         """Treat messages of a topic by `policy` from now on."""
@@ -85,7 +92,9 @@ class Reception:
 
     def take_waits(self, src: int, waits: Waits) -> None:
         """Remember the WAITS record of robot `src` on one of its topics."""
-        self._handover.take_waits(src, waits)
+        topic = self._topics.topic(src, waits.topic_id)
+        if topic is not None:
+            self._handover.take_waits(src, waits._replace(topic_id=topic.base))
 
     @property
     def silence_at(self) -> float:
@@ -131,6 +140,9 @@ class Reception:
     def counters(self) -> dict[Hashable, int]:
         """The counters for which rates are reported."""
         return {**self._ledger.counters(), **self.neighbors.counters()}
+
+    def _policy_of(self, message: Delivered) -> TopicPolicy:
+        return self._acceptance.policy_of(self._topics.topic(message.src, message.series))
 
     def audit(self) -> list[str]:
         """Discrepancies in the receive ledgers, as sentences; empty when they add up."""

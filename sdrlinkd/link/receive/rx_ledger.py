@@ -5,8 +5,9 @@ from collections.abc import Hashable
 from typing import NamedTuple
 
 from sdrlinkd.link.queue import RxTally, balance
+from sdrlinkd.link.topics import HeardTopics
 from sdrlinkd.reports import ReceivedTopicReport, RxReport
-from sdrlinkd.wire import Registry
+from sdrlinkd.wire import PARTS
 
 
 class Held(NamedTuple):
@@ -20,8 +21,8 @@ class Held(NamedTuple):
 class RxLedger:
     """Counts PDUs heard, and messages by (source, topic id)."""
 
-    def __init__(self, registry: Registry) -> None:
-        self._registry = registry
+    def __init__(self, topics: HeardTopics) -> None:
+        self._topics = topics
         self._tallies: dict[tuple[int, int], RxTally] = {}
         self._pdus_heard = 0
         self._pdus_used = 0
@@ -80,13 +81,14 @@ class RxLedger:
         """Reports on each topic of each source, without rates, ages and bus names."""
         reports = []
         for (src, topic_id), tally in sorted(self._tallies.items()):
-            topic = self._registry.by_id(topic_id)
+            topic = self._topics.topic(src, topic_id)
+            unknown = "(parts)" if topic_id == PARTS else f"(topic id {topic_id})"
             ended = tally.delivered + sum(tally.dropped.values())
             reports.append(
                 ReceivedTopicReport(
                     src=src,
                     topic_id=topic_id,
-                    name="/" + topic.name if topic else f"(topic id {topic_id})",
+                    name="/" + topic.name if topic else unknown,
                     republished_as="",
                     delivered=tally.delivered,
                     delivered_bytes=tally.delivered_bytes,

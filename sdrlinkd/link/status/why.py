@@ -1,6 +1,6 @@
 """Explains what happens to a topic's messages, in plain sentences."""
 
-from collections.abc import Collection, Hashable
+from collections.abc import Collection, Hashable, Iterable
 from math import inf
 from typing import NamedTuple
 
@@ -43,16 +43,17 @@ class Why:
         self._meter = RateMeter(MINUTE_S, STEP_S)
 
     def sample(
-        self, now: float, n_topics: int, scheduler: BurstScheduler | NoRadio, heard_s: float
+        self, now: float, topics: Iterable[int], scheduler: BurstScheduler | NoRadio, heard_s: float
     ) -> None:
         """Sample all counters at `now`, if the last sample is some seconds old.
 
-        `heard_s` is the airtime of others' bursts so far, in s.
+        `topics` are the ids of all topics, and `heard_s` is the airtime of others' bursts so far,
+        in s.
         """
         self._began_at = min(self._began_at, now)
         if self._meter.is_due(now):
             air = AirUse(scheduler.report(), heard_s)
-            self._meter.sample(self._counters(n_topics, air), now)
+            self._meter.sample(self._counters(topics, air), now)
 
     def explain(self, topic_id: int, name: str, told: Told, now: float, air: AirUse) -> list[str]:
         """What happens to a topic's messages and why, in plain sentences."""
@@ -157,13 +158,13 @@ class Why:
     def _lately(self, key: Hashable, value: int, now: float) -> int:
         return self._meter.grown(key, value, now)
 
-    def _counters(self, n_topics: int, air: AirUse) -> dict[Hashable, int]:
+    def _counters(self, topics: Iterable[int], air: AirUse) -> dict[Hashable, int]:
         counters: dict[Hashable, int] = {
             ("air", qos): round(1e6 * used_s) for qos, used_s in air.sent.used_s.items()
         }
         for each, used_s in _both(air).items():
             counters["air", each] = round(1e6 * used_s)
-        for topic_id in range(n_topics):
+        for topic_id in topics:
             tally = self._intake.tally(topic_id)
             counters["accepted", topic_id] = tally.accepted
             counters["sent", topic_id] = tally.sent

@@ -1,12 +1,12 @@
 """Times the sending of control records: in spare room, or in PDUs with a bounded share of airtime.
 
-It handles four kinds of records: beacons (with digest, link reports and WAITS), the schedule of the
-access policy (FRAME), clocks (CLOCK), and RECEIPTs. Each record is made when it is due, uses spare
-room in a broadcast PDU, and from a certain time on gets its own PDU. Such a PDU takes airtime from
-messages, and a half-duplex radio is deaf while it sends. So PDUs that hold only records take at
-most `clock.share` of the airtime, all robots together: with n robots, each sends at most one such
-PDU every n · pdu_s / share. This limits beacons, too, unless rate control or a schedule depends on
-them.
+It handles five kinds of records: beacons (with digest, link reports and WAITS), the schedule of the
+access policy (FRAME), clocks (CLOCK), RECEIPTs, and declarations (TOPIC). Each record is made when
+it is due, uses spare room in a broadcast PDU, and from a certain time on gets its own PDU. Such a
+PDU takes airtime from messages, and a half-duplex radio is deaf while it sends. So PDUs that hold
+only records take at most `clock.share` of the airtime, all robots together: with n robots, each
+sends at most one such PDU every n · pdu_s / share. This limits beacons, too, unless rate control or
+a schedule depends on them. Declarations have a share of their own.
 """
 
 from math import inf
@@ -14,6 +14,7 @@ from math import inf
 from sdrlinkd.link.packing import PiggybackRecords
 from sdrlinkd.link.receive import Neighbors
 from sdrlinkd.link.timesync import ClockParams, Clocks
+from sdrlinkd.link.topics import TopicTeller
 from sdrlinkd.link.transmit.beacons import Beacons
 from sdrlinkd.link.transmit.rate import RateControl
 from sdrlinkd.link.transmit.tx_delay import TxDelayMeters
@@ -40,6 +41,7 @@ class ControlRecords:
         tx_delays: TxDelayMeters,
         piggyback: PiggybackRecords,
         neighbors: Neighbors,
+        teller: TopicTeller,
         record_room: int,
     ) -> None:
         self._params = params
@@ -48,6 +50,8 @@ class ControlRecords:
         self._tx_delays = tx_delays
         self._piggyback = piggyback
         self._neighbors = neighbors
+        self._teller = teller
+        self._room = record_room
         self._most_arrivals = (record_room - CLOCK_SIZE) // ARRIVAL_SIZE
         self.fits = self._most_arrivals > 0 or not params.period_s
         """Whether PDUs have room for CLOCK records, if these are configured."""
@@ -130,6 +134,20 @@ class ControlRecords:
         self._n_others = len(self._neighbors.present(now))
         needed_s = LESS * (1 + self._n_others) * pdu_s / self._params.share
         self.period_s = max(self._params.period_s, needed_s)
+
+    def tell_topics(self, now: float, pdu_s: float) -> None:
+        """Offer the declarations of topics that are due at `now`.
+
+        They use spare room or, within their share of the air, PDUs of `pdu_s` of their own.
+        """
+        for piece in self._teller.due(now):
+            self._piggyback.put_topic(piece)
+        if self._piggyback.holds(RecordType.TOPIC) and self._teller.may_pay(now, pdu_s):
+            self._piggyback.make_due(RecordType.TOPIC, self._room, now)
+
+    def newcomer(self, now: float) -> None:
+        """Tell all declared topics again, as a robot was heard for the first time."""
+        self._teller.newcomer(now)
 
     def end(self) -> None:
         """Send no more beacons and CLOCK records."""

@@ -1,0 +1,163 @@
+"""The topics that other robots declare."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from sdrlinkd.errors import PduError
+from sdrlinkd.wire import (
+    FIRST_NUMBER,
+    Description,
+    Registry,
+    TopicPiece,
+    parse_description,
+)
+
+
+class HeardTopic(NamedTuple):
+    """A topic of another robot: its name and type, and the id under which it is counted."""
+
+    base: int
+    name: str
+    type: str
+    about: Description | None = None
+
+
+@dataclass(slots=True)
+class _Source:
+    known: dict[int, HeardTopic] = field(default_factory=dict)
+    checks: dict[int, int] = field(default_factory=dict)
+    pieces: dict[int, dict[int, bytes]] = field(default_factory=dict)
+    """Pieces of the description that a number's check belongs to."""
+    bases: dict[str, int] = field(default_factory=dict)
+
+
+class HeardTopics:
+    """What the numbers of each source mean, by its TOPIC records.
+
+    `has_numbers`: this robot understands declared topics. `own_hash` is the known hash of a type at
+    this robot, zeros if unknown.
+    """
+
+    def __init__(
+        self, registry: Registry, has_numbers: bool, own_hash: Callable[[str], bytes]
+    ) -> None:
+        self._registry = registry
+        self.has_numbers = has_numbers
+        self._not_understood: set[int] = set()
+        self._own_hash = own_hash
+        self._sources: dict[int, _Source] = {}
+        self.changed: list[tuple[int, int]] = []
+        """(source, number) whose meaning has changed and was not taken yet."""
+        self.refused: Counter[int] = Counter()
+        """Declarations that were refused, by source."""
+        self.last_refusal: dict[int, str] = {}
+        """Why the last declaration of a source was refused."""
+
+    def topic(self, src: int, topic_id: int) -> HeardTopic | None:
+        """The topic that an id of source `src` means; None if that is not known."""
+        if topic_id < FIRST_NUMBER:
+            found = self._registry.by_id(topic_id)
+            return None if found is None else HeardTopic(topic_id, found.name, found.type)
+        source = self._sources.get(src)
+        return None if source is None else source.known.get(topic_id)
+
+    def has_other_hash(self, topic: HeardTopic) -> bool:
+        """Whether the source's type has other fields than the type of that name here."""
+        if topic.about is None or not any(topic.about.hash_):
+            return False
+        own = self._own_hash(topic.type)
+        return any(own) and own != topic.about.hash_
+
+    def take(self, src: int, piece: TopicPiece) -> bool:
+        """Take a TOPIC record of robot `src`; True if the meaning of its number is now known."""
+        number, check, at, n, data = piece
+        if not self.has_numbers:
+            self._not_understood.add(src)
+            return False
+        if number < FIRST_NUMBER or at >= n:
+            return False
+        source = self._sources.setdefault(src, _Source())
+        if source.checks.get(number) != check:
+            source.checks[number] = check
+            source.pieces[number] = {}
+            if source.known.pop(number, None) is not None:
+                self.changed.append((src, number))
+        if number in source.known:
+            return False
+        there = source.pieces[number]
+        there[at] = data
+        if any(i not in there for i in range(n)):
+            return False
+        try:
+            about = parse_description(b"".join(there[i] for i in range(n)), check)
+            self._check(source, about)
+        except PduError as error:
+            self.refused[src] += 1
+            self.last_refusal[src] = str(error)
+            return False
+        finally:
+            there.clear()
+        base = source.bases.setdefault(about.name, number)
+        source.known[number] = HeardTopic(base, about.name, about.type, about)
+        return True
+
+    def forget(self, src: int) -> None:
+        """Forget what a robot declared, as it has restarted."""
+        source = self._sources.pop(src, None)
+        if source is not None:
+            self.changed += [(src, number) for number in source.known]
+
+    def take_changed(self) -> list[tuple[int, int]]:
+        """(source, number) whose meaning has changed since the last call."""
+        changed, self.changed = self.changed, []
+        return changed
+
+    def declared(self) -> dict[int, list[HeardTopic]]:
+        """The declared topics by source, each name once."""
+        return {
+            src: list({topic.name: topic for topic in source.known.values()}.values())
+            for src, source in self._sources.items()
+        }
+
+    def notices(self) -> list[str]:
+        """What a person should know about others' declarations, in sentences."""
+        notices = [
+            f"robot {src} declares topics beyond the registry, which this robot takes only with "
+            "`auto = true`"
+            for src in sorted(self._not_understood)
+        ]
+        notices += [
+            f"robot {src} declared {n} {'topic' if n == 1 else 'topics'} that cannot be used; the "
+            f"last one: {self.last_refusal[src]}"
+            for src, n in sorted(self.refused.items())
+        ]
+        for src, topics in sorted(self.declared().items()):
+            notices += [
+                f"robot {src} sends {topic.name} as {topic.type} with hash {_hash(topic)}, but "
+                f"here that type has hash {self._own_hash(topic.type).hex()}: its fields differ, "
+                "and its messages are dropped (rx_other_type); install the same version of the "
+                "package"
+                for topic in topics
+                if self.has_other_hash(topic)
+            ]
+        return notices
+
+    def _check(self, source: _Source, about: Description) -> None:
+        """Raise PduError if a description contradicts what its source declared before."""
+        for topic in source.known.values():
+            if topic.name == about.name:
+                if topic.type != about.type:
+                    raise PduError(
+                        "rx_control_bad", f"{about.name} is both {topic.type} and {about.type}"
+                    )
+            elif topic.name.lower() == about.name.lower():
+                raise PduError(
+                    "rx_control_bad",
+                    f"{about.name} differs from {topic.name} by upper and lower case only",
+                )
+
+
+def _hash(topic: HeardTopic) -> str:
+    return "" if topic.about is None else topic.about.hash_.hex()

@@ -1,0 +1,168 @@
+"""This robot's topics: those of the registry, and those that its producers declare."""
+
+import hashlib
+from collections import OrderedDict
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from sdrlinkd.errors import DeclarationError
+from sdrlinkd.wire import (
+    FIRST_NUMBER,
+    HASH_SIZE,
+    LAST_NUMBER,
+    MAX_NAME,
+    Description,
+    Registry,
+    Topic,
+    is_topic_name,
+    pieces,
+    topic_type,
+)
+
+MOST_KEYS = 32
+"""Most numbers of a topic: one for each producer key."""
+N_NUMBERS = LAST_NUMBER - FIRST_NUMBER + 1
+
+
+class Offer(NamedTuple):
+    """What a producer says of its topic; `hash_` is the beginning of the type's RIHS01 hash.
+
+    `depth` above 0: transient_local, and that many messages of each producer are kept.
+    """
+
+    name: str
+    type: str
+    hash_: bytes = bytes(HASH_SIZE)
+    depth: int = 0
+    is_best_effort: bool = False
+
+
+class OwnTopics:
+    """The topics of this robot by id, and the numbers of the declared ones on the air.
+
+    Each producer key of a declared topic has a number of its own, so that receivers tell its
+    messages apart; the topic's id is its first number. Numbers derive from names, so that a robot
+    that restarts mostly uses the same ones. `has_numbers`: topic id 0xE is used for them and for
+    large messages. `room` is the largest piece of a description in octets.
+    """
+
+    def __init__(self, registry: Registry, has_numbers: bool, room: int) -> None:
+        self.registry = registry
+        self.has_numbers = has_numbers
+        self._room = room
+        self._by_id = {topic.id: topic for topic in registry.topics}
+        self._by_name = {topic.name: topic for topic in registry.topics}
+        self._by_lower = {name.lower(): name for name in self._by_name}
+        self._hashes: dict[str, bytes] = {}
+        self._keys: dict[int, OrderedDict[str, int]] = {}
+        self.told: dict[int, Description] = {}
+        """What each number means, for other robots."""
+
+    def __iter__(self) -> Iterator[Topic]:
+        return iter(list(self._by_id.values()))
+
+    def __getitem__(self, topic_id: int) -> Topic:
+        return self._by_id[topic_id]
+
+    def __contains__(self, topic_id: int) -> bool:
+        return topic_id in self._by_id
+
+    def by_name(self, name: str) -> Topic | None:
+        """The topic called `name` (with or without leading slash), or None."""
+        return self._by_name.get(name.removeprefix("/"))
+
+    def hash_of(self, type_: str) -> bytes:
+        """The known hash of a type, by its producers here; zeros if unknown."""
+        return self._hashes.get(type_, bytes(HASH_SIZE))
+
+    def declare(self, offer: Offer) -> Topic:
+        """The topic of an offer: one of the registry, a known one, or a new one.
+
+        Raises DeclarationError.
+        """
+        type_ = topic_type(offer.type)
+        if not is_topic_name(offer.name) or len(offer.name) > MAX_NAME:
+            raise DeclarationError(
+                f"name: got {offer.name[:MAX_NAME]!r}; allowed: a ROS name such as odom or "
+                f"camera/image, of up to {MAX_NAME} characters"
+            )
+        if type_ is None or len(type_) > MAX_NAME:
+            raise DeclarationError(
+                f"type: got {offer.type[:MAX_NAME]!r}; allowed: package/msg/Name or package/Name"
+            )
+        name = offer.name.removeprefix("/")
+        self._note_hash(name, type_, offer.hash_)
+        known = self._by_name.get(name)
+        if known is None:
+            return self._new(name, type_, offer)
+        if known.type != type_:
+            raise DeclarationError(f"{name}: got type {type_}; it is declared as {known.type}")
+        if known.id >= FIRST_NUMBER:
+            for number in self._keys[known.id].values():
+                self.told[number] = Description(name, type_, *offer[2:])
+        return known
+
+    def number(self, topic_id: int, key: str) -> int:
+        """The number on the air for messages of a topic from the producer `key`."""
+        keys = self._keys.get(topic_id)
+        if keys is None:
+            return topic_id
+        number = keys.get(key)
+        if number is None:
+            number = self._number_for(topic_id, key)
+        elif len(keys) > 1:
+            keys.move_to_end(key)
+        return number
+
+    def _number_for(self, topic_id: int, key: str) -> int:
+        keys = self._keys[topic_id]
+        if not keys:
+            number = topic_id
+        elif len(keys) >= MOST_KEYS or len(self.told) >= N_NUMBERS:
+            # The producer that was silent for longest gives its number to the new one.
+            _, number = keys.popitem(last=False)
+        else:
+            number = self._free(f"{self._by_id[topic_id].name}\0{key}")
+            self.told[number] = self.told[topic_id]
+        keys[key] = number
+        return number
+
+    def _new(self, name: str, type_: str, offer: Offer) -> Topic:
+        if not self.has_numbers:
+            raise DeclarationError(
+                f"{name}: {self.registry.suggest(name)}; with `auto = true` producers may declare "
+                "topics beyond it"
+            )
+        if (alike := self._by_lower.get(name.lower())) is not None:
+            raise DeclarationError(f"{name}: differs from {alike} by upper and lower case only")
+        if len(self.told) >= N_NUMBERS:
+            raise DeclarationError(f"{name}: a robot declares at most {N_NUMBERS} topics")
+        about = Description(name, type_, *offer[2:])
+        try:
+            pieces(FIRST_NUMBER, about, self._room)
+        except ValueError as error:
+            raise DeclarationError(
+                f"{error} do not fit into 15 PDUs; use a shorter name, or raise link.pdu_size"
+            ) from None
+        topic = Topic(self._free(name), name, type_)
+        self._by_id[topic.id] = self._by_name[name] = topic
+        self._by_lower[name.lower()] = name
+        self._keys[topic.id] = OrderedDict()
+        self.told[topic.id] = about
+        return topic
+
+    def _free(self, text: str) -> int:
+        """A free number, the same one for the same text as far as possible."""
+        first = int.from_bytes(hashlib.sha256(text.encode()).digest()[:4], "big")
+        tried = (FIRST_NUMBER + (first + i) % N_NUMBERS for i in range(N_NUMBERS))
+        return next(number for number in tried if number not in self.told)
+
+    def _note_hash(self, name: str, type_: str, hash_: bytes) -> None:
+        if not any(hash_):
+            return
+        known = self._hashes.setdefault(type_, hash_)
+        if known != hash_:
+            raise DeclarationError(
+                f"{name}: {type_} has hash {hash_.hex()}, but another producer here has "
+                f"{known.hex()}: two versions of its package are installed"
+            )
