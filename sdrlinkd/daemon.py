@@ -21,6 +21,7 @@ from sdrlinkd.bus import Bus, RuntimeDirectory
 from sdrlinkd.client import runtime_dir
 from sdrlinkd.config import WITHOUT_AIR, Config, Setup, backend_of, located
 from sdrlinkd.control import Control
+from sdrlinkd.declaring import Declaring
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.health import Level
 from sdrlinkd.link import Link
@@ -126,6 +127,7 @@ async def _open(
         clock=config.clock,
         dictionaries=setup.dictionaries,
         hears_self=config.hears_self,
+        has_numbers=setup.has_numbers,
         max_expanded=config.bus.max_message_bytes,
     )
     policies = Policies(setup, link)
@@ -146,7 +148,8 @@ async def _open(
     control = Control(context, directory)
     stack.callback(control.close)
     reloading = Reloading(setup, reload, check, policies, opening)
-    control.serve(make_verbs(setup, node, control, policies, opening, reloading))
+    declaring = Declaring(setup, link, policies, node.bus)
+    control.serve(make_verbs(setup, node, control, policies, opening, reloading, declaring))
     stack.push_async_callback(opening.close)
     stack.callback(loading.give_up)
     # All that is loaded so far stays: a collection would scan it and stall the daemon for 50 ms.

@@ -139,11 +139,16 @@ class Node:
             if self.bus.is_tapped:
                 self.bus.tap("rx", data)
             for message in link.hear(data, at, snr_db, now, ended_at):
+                topic = link.heard_topic(message.src, message.series)
                 times, age_s = UNKNOWN, link.delivered(message, now)
+                if topic is None:
+                    continue  # its source has just restarted
                 if age_s is not None:
                     times = local_times(link, message, age_s, now, now_ns, self._headers)
                 received_ns = now_ns - round((now - message.heard_at) * 1e9)
-                self.bus.publish(message, age_s, received_ns, times, link.retain(message))
+                self.bus.publish(message, topic, age_s, received_ns, times, link.retain(message))
+            for src, number in link.take_changed_topics():
+                self.bus.forget_topic(src, number)
         self._tell_verdicts()
         if link.relays:
             self._pdu_link.wake()
@@ -257,7 +262,6 @@ class Node:
         """A snapshot of everything that the daemon reports now."""
         now = self._pdu_link.now()
         pdu_link = self._opening.report(time.monotonic())
-        subscribed = {topic_id: name for name, topic_id in self._setup.topics_in.items()}
         noted = self._link.notices(now, self._setup.topic_warnings)
         snapshot = Snapshot(
             version=__version__,
@@ -270,7 +274,7 @@ class Node:
             host_clock_steps=self._host_clock.steps,
             carrier=pdu_link,
             bus=self.bus.report(control_requests),
-            link=self._link.report(now, Names(subscribed, self.bus.names_out())),
+            link=self._link.report(now, Names(self.bus.names_in(), self.bus.names_out())),
             notices=[*self._setup.warnings, *pdu_link.notices, *noted],
         )
         return msgspec.structs.replace(snapshot, verdict=self.health.judge(snapshot))
@@ -282,13 +286,16 @@ class Node:
     def _stop_silent(self, now: float) -> None:
         """Publish the stop message of each command topic that fell silent, once."""
         for src, topic_id in self._link.take_silent(now):
-            name = self._setup.republished_as(src, topic_id)
+            topic = self._link.heard_topic(src, topic_id)
+            if topic is None:
+                continue
+            name = self._setup.republished(src, topic.name)
             stop = self._stops.get(topic_id)
             if stop is None:
                 log.error("%s: silent, but no stop message can be made for its type", name)
                 continue
             log.warning("%s: silent, published the stop message", name)
-            self.bus.publish_stop(src, topic_id, stop)
+            self.bus.publish_stop(src, topic, stop)
 
     def audit(self) -> list[str]:
         """Discrepancies in the ledger, as sentences; empty when it adds up."""

@@ -8,7 +8,9 @@ import msgspec
 
 from sdrlinkd.config import Setup, explain_policy
 from sdrlinkd.errors import UserError
-from sdrlinkd.link import Link, TopicPolicy
+from sdrlinkd.link import DEFAULT_POLICY, Link, Told, TopicPolicy
+from sdrlinkd.offers import Declaration, merged
+from sdrlinkd.wire import Registry
 
 log = logging.getLogger("sdrlinkd")
 
@@ -27,22 +29,43 @@ class Policies:
         """Keys that were set since the file was read, by topic id."""
         self.announce: Callable[[Mapping[int, TopicPolicy]], None] | None = None
         """Called with the policies in force after a change."""
-        link.set_policies(setup.policies)
+        self._offers: dict[int, Declaration] = {}
+        """What the producers of a topic said of its QoS, by topic id."""
+        self._configured: Mapping[str, TopicPolicy] = {}
+        self._configure(setup.named_policies)
 
-    def reload(self, policies: Mapping[int, TopicPolicy]) -> None:
-        """Put the policies of the file in force again."""
+    def reload(self, policies: Mapping[str, TopicPolicy]) -> None:
+        """Put the policies of the file, by topic name, in force again."""
         self.changed.clear()
-        self._link.set_policies(policies)
-        self._announce()
+        self._configure(policies)
+        self.announce_all()
+
+    def offer(self, topic_id: int, declaration: Declaration) -> TopicPolicy:
+        """Apply what a producer says of its topic, where neither file nor user say otherwise.
+
+        Returns the policy in force.
+        """
+        self._offers[topic_id] = declaration
+        if topic_id not in self.changed:
+            self._link.set_policy(topic_id, self._policy(topic_id))
+        return self._link.policy(topic_id)
+
+    def told(self, topic_id: int) -> Told:
+        """Where a topic's policy comes from."""
+        offer, name = self._offers.get(topic_id), self._link.topic(topic_id).name
+        # The file wins, key by key.
+        is_offered = offer is not None and self._policy(topic_id) != self._configured.get(name)
+        words = offer.words if offer is not None and is_offered else ""
+        return Told(self._setup.source, self.changed.get(topic_id, ()), words)
 
     def topic_id(self, name: str) -> int:
         """The id of a topic by its bus name or registry name. Raises UserError."""
-        registry, config = self._setup.registry, self._setup.config
-        prefix = f"/{config.namespace.strip('/')}/"
-        topic = registry.by_name(name.removeprefix(prefix)) or registry.by_name(name)
+        link = self._link
+        topic = link.topic_named(self._setup.name_on_air(name)) or link.topic_named(name)
         if topic is None:
+            known = Registry(link.own_topics)
             raise UserError(
-                f"topic {name}: unknown; allowed: {registry.suggest(name)} (as read at the start)"
+                f"topic {name}: unknown; allowed: {known.suggest(name)} (as read at the start)"
             )
         return topic.id
 
@@ -66,19 +89,33 @@ class Policies:
         self.changed.setdefault(topic_id, set()).update(changes)
         # Report the policy as the link has it, not as it was given.
         new = self._link.policy(topic_id)
-        self._announce()
+        self.announce_all()
         told = {key: _told(getattr(new, key)) for key in changes}
-        log.info("policy of %s: %s", self._setup.registry.topics[topic_id].name, told)
+        name = self._link.topic(topic_id).name
+        log.info("policy of %s: %s", name, told)
         return {
-            "topic": self._setup.registry.topics[topic_id].name,
+            "topic": name,
             "old": {key: _told(getattr(old, key)) for key in changes},
             "new": told,
         }
 
-    def _announce(self) -> None:
+    def announce_all(self) -> None:
+        """Announce the policies in force."""
         if self.announce is not None:
-            topics = self._setup.registry.topics
+            topics = self._link.own_topics
             self.announce({topic.id: self._link.policy(topic.id) for topic in topics})
+
+    def _configure(self, policies: Mapping[str, TopicPolicy]) -> None:
+        self._configured = policies
+        for topic in self._link.own_topics:
+            self._link.set_policy(topic.id, self._policy(topic.id))
+        self._link.set_named_policies(policies)
+
+    def _policy(self, topic_id: int) -> TopicPolicy:
+        """The policy by the file, and for the rest by the topic's producers."""
+        configured = self._configured.get(self._link.topic(topic_id).name, DEFAULT_POLICY)
+        offer = self._offers.get(topic_id)
+        return configured if offer is None else merged(configured, offer.policy)
 
 
 def _told(value: object) -> object:

@@ -6,8 +6,8 @@ from typing import Any
 from sdrlinkd import __version__
 from sdrlinkd.config import Setup
 from sdrlinkd.control import Control, Verb
+from sdrlinkd.declaring import Declaring
 from sdrlinkd.errors import UserError
-from sdrlinkd.link import Told
 from sdrlinkd.node import Node
 from sdrlinkd.opening import Opening
 from sdrlinkd.policies import Policies
@@ -24,6 +24,7 @@ def make_verbs(
     policies: Policies,
     opening: Opening,
     reloading: Reloading,
+    declaring: Declaring,
 ) -> dict[str, Verb]:
     """The verbs of the control socket by name (bus document, section 5)."""
 
@@ -51,7 +52,7 @@ def make_verbs(
         received = node.snapshot(control.requests).link.received
         names = {each.republished_as: each.topic_id for each in received}
         topic_id = names[name] if name in names else policies.topic_id(name)
-        told = Told(setup.source, policies.changed.get(topic_id, ()))
+        told = policies.told(topic_id)
         heard = [_received(each) for each in received if each.topic_id == topic_id]
         return {"why": [*node.why(topic_id, told), *heard]}
 
@@ -65,6 +66,8 @@ def make_verbs(
             lambda _: {"problems": node.audit(), "ledger": node.snapshot(control.requests).link},
             "verify that the ledger adds up",
         ),
+        "declare": Verb(declaring.declare, "take a topic from now on, with its type and QoS"),
+        "declared": Verb(lambda _: declaring.declared(), "topics that other robots declared"),
         "why": Verb(why, "explain in plain words what happens to a topic"),
         "set": Verb(set_policy, "change a topic's policy", changes=True),
         "reload": Verb(

@@ -27,6 +27,7 @@ from sdrlinkd.link import (
     DEFAULT_POLICY,
     NOT_RETAINED,
     Delivered,
+    HeardTopic,
     Retain,
     TopicPolicy,
     Verdict,
@@ -34,6 +35,7 @@ from sdrlinkd.link import (
 from sdrlinkd.localtime import UNKNOWN, LocalTimes
 from sdrlinkd.reading import SocketReader
 from sdrlinkd.reports import BusReport
+from sdrlinkd.wire import Topic
 
 # The daemon reads incoming messages at once rather than let ZeroMQ queue them, so that it counts
 # every drop under a reason. Not smaller: when a producer with a full pipe leaves, libzmq drops the
@@ -63,9 +65,6 @@ class Bus:
         self._directory = directory
         self._setup = setup
         self._intake = Intake(setup, ingress, self._tell)
-        self._names_in = {id_: name for name, id_ in setup.topics_in.items()}
-        self._types = {topic.id: topic.type for topic in setup.registry.topics}
-        self._republished_as = setup.republished_as
         self._retention = Retention()
         self._frames_out: dict[tuple[int, int], bytes] = {}
         self._received = 0
@@ -74,7 +73,8 @@ class Bus:
         self.has_consumer = asyncio.Event()
         """Set once a consumer has subscribed to messages from the air."""
         self._boot = secrets.token_hex(4)
-        self._welcome = announcement(setup, setup.policies, self._boot)
+        self._policies: Mapping[int, TopicPolicy] = setup.policies
+        self._welcome = self._announcement()
         loop = asyncio.get_running_loop()
         self._sockets: list[zmq.Socket[bytes]] = []
         self._pull = self._bind(zmq.PULL, IN_SOCKET, {zmq.RCVHWM: IN_HWM})
@@ -103,21 +103,22 @@ class Bus:
     def publish(
         self,
         message: Delivered,
+        topic: HeardTopic,
         age_s: float | None,
         received_ns: int,
         times: LocalTimes = UNKNOWN,
         retain: Retain = NOT_RETAINED,
     ) -> None:
-        """Hand a message from the air to its consumers; `age_s` is None if unknown.
+        """Hand a message of `topic` from the air to its consumers; `age_s` is None if unknown.
 
         `retain` says how many messages of its topic and source are kept for later consumers.
         """
-        topic = self._topic_out(message.src, message.topic_id)
+        frame = self._frame_out(message.src, topic)
         header = envelope.OutHeader(
             s=message.src,
             n=message.number,
             tr=received_ns,
-            ty=self._types[message.topic_id],
+            ty=topic.type,
             g=message.lost_pdus,
             h=message.hops_left,
             age=None if age_s is None else round(age_s * 1e6),
@@ -135,31 +136,46 @@ class Bus:
         if retain.depth:
             # Consumers that subscribed before now get the older messages before this one.
             self._out_reader.drain()
-            kept = Retained(topic, header, message.payload, retain.lifespan_s)
-            self._retention.keep((message.src, message.topic_id), kept, retain.depth)
-        self._out.send_multipart(envelope.encode(topic, header, message.payload))
+            kept = Retained(frame, header, message.payload, retain.lifespan_s)
+            self._retention.keep((message.src, message.series), kept, retain.depth)
+        self._out.send_multipart(envelope.encode(frame, header, message.payload))
         self._out_reader.recheck()
 
-    def publish_stop(self, src: int, topic_id: int, payload: bytes) -> None:
+    def forget_topic(self, src: int, number: int) -> None:
+        """Forget what topic `number` of a source meant: its name, and the messages kept of it."""
+        self._frames_out.pop((src, number), None)
+        self._retention.forget((src, number))
+
+    def publish_stop(self, src: int, topic: HeardTopic, payload: bytes) -> None:
         """Hand a topic's stop message to its consumers, as the topic has fallen silent."""
-        header = envelope.OutHeader(
-            s=src, n=0, tr=time.time_ns(), ty=self._types[topic_id], stop=True
-        )
-        self._out.send_multipart(envelope.encode(self._topic_out(src, topic_id), header, payload))
+        header = envelope.OutHeader(s=src, n=0, tr=time.time_ns(), ty=topic.type, stop=True)
+        self._out.send_multipart(envelope.encode(self._frame_out(src, topic), header, payload))
         self._out_reader.recheck()
 
     def announce(self, policies: Mapping[int, TopicPolicy]) -> None:
-        """Announce the limits that `policies`, by topic id, now set for producers."""
-        self._welcome = announcement(self._setup, policies, self._boot)
-        for topic_id in self._types:
-            if not policies.get(topic_id, DEFAULT_POLICY).latched:
-                self._retention.forget_topic(topic_id)
+        """Announce the topics, and the limits that `policies`, by topic id, now set for them."""
+        self._policies = policies
+        self._welcome = self._announcement()
+        for topic in self._setup.registry.topics:
+            if not policies.get(topic.id, DEFAULT_POLICY).latched:
+                self._retention.forget_topic(topic.id)
         self._out.setsockopt(zmq.XPUB_WELCOME_MSG, b"\0" + self._welcome)
         self._undropped.send(b"", [b"\0" + self._welcome])
 
+    def accept(self, name: str, topic: Topic) -> bool:
+        """Accept messages of a declared topic under bus topic `name`, from the next announcement.
+
+        Returns False if they were accepted before.
+        """
+        return self._intake.accept(name, topic)
+
+    def names_in(self) -> dict[int, str]:
+        """Names on the bus of the topics that are accepted, by topic id."""
+        return {topic.id: name for name, topic in self._intake.topics.items()}
+
     def tell(self, verdict: Verdict) -> None:
         """Send a message's verdict to its producer."""
-        name = self._names_in[verdict.topic_id]
+        name = self.names_in()[verdict.topic_id]
         self._tell(envelope.Receipt(verdict.receipt, name, *verdict[2:]))
 
     def _tell(self, told: envelope.Receipt) -> None:
@@ -174,12 +190,15 @@ class Bus:
         self._out.send_multipart([PDU_TAP, envelope.VERSION_BYTE + header, data])
         self._out_reader.recheck()
 
-    def _topic_out(self, src: int, topic_id: int) -> bytes:
-        topic = self._frames_out.get((src, topic_id))
-        if topic is None:
-            topic = self._republished_as(src, topic_id).encode() + b"\0"
-            self._frames_out[src, topic_id] = topic
-        return topic
+    def _frame_out(self, src: int, topic: HeardTopic) -> bytes:
+        frame = self._frames_out.get((src, topic.base))
+        if frame is None:
+            frame = self._setup.republished(src, topic.name).encode() + b"\0"
+            self._frames_out[src, topic.base] = frame
+        return frame
+
+    def _announcement(self) -> bytes:
+        return announcement(self._setup, self._intake.topics, self._policies, self._boot)
 
     def names_out(self) -> dict[tuple[int, int], str]:
         """Names of the bus topics published so far, by (source, topic id)."""

@@ -1,6 +1,6 @@
 """Decodes and checks messages from producers; passes them on, or refuses them with a reason."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from typing import Protocol
 
@@ -16,7 +16,7 @@ from sdrlinkd.client import (
 from sdrlinkd.config import Setup
 from sdrlinkd.errors import EnvelopeError
 from sdrlinkd.link import AS_CONFIGURED, CDR_HEADER_SIZE, QOS_BY_LABEL, Overrides
-from sdrlinkd.wire import BROADCAST
+from sdrlinkd.wire import BROADCAST, Topic
 
 
 class Ingress(Protocol):
@@ -55,13 +55,24 @@ class Intake:
     """
 
     def __init__(self, setup: Setup, ingress: Ingress, tell: TellRefused) -> None:
-        self._topic_ids = {name.encode() + b"\0": id_ for name, id_ in setup.topics_in.items()}
-        self._names = setup.topics_in
-        self._types: Mapping[int, str] = {each.id: each.type for each in setup.registry.topics}
+        self._topic_ids: dict[bytes, int] = {}
+        self._types: dict[int, str] = {}
+        self.topics: dict[str, Topic] = {}
+        """The topics that are accepted, by their names on the bus."""
+        for name, topic_id in setup.topics_in.items():
+            self.accept(name, setup.registry.topics[topic_id])
         self._most = setup.config.bus.max_message_bytes
         self._ingress = ingress
         self._tell = tell
         self._last_bad: Callable[[], str] = str
+
+    def accept(self, name: str, topic: Topic) -> bool:
+        """Accept messages under bus topic `name`; False if they were accepted before."""
+        is_new = name not in self.topics
+        self.topics[name] = topic
+        self._topic_ids[name.encode() + b"\0"] = topic.id
+        self._types[topic.id] = topic.type
+        return is_new
 
     @property
     def last_bad(self) -> str:
@@ -79,7 +90,7 @@ class Intake:
         topic_id = self._topic_ids.get(topic)
         if topic_id is None:
             # Search for the intended name only when the text is read: a flood leaves no time.
-            words = partial(unknown_topic, name := _name(topic), self._names)
+            words = partial(unknown_topic, name := _name(topic), self.topics)
             self._refuse_unowned("tx_unknown_topic", words, name, receipt, dst)
             return
         size = len(payload)

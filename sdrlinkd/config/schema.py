@@ -50,7 +50,7 @@ class BusParams(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
     runtime_dir: str = ""
     """Directory of the sockets; empty: systemd's or the user's runtime directory."""
-    max_message_bytes: Annotated[int, Meta(ge=64, le=1 << 24)] = 1 << 20
+    max_message_bytes: Annotated[int, Meta(ge=64, le=1 << 24)] = 8 << 20
     """Largest message that the bus takes."""
 
 
@@ -71,8 +71,12 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     robot_id: Annotated[int, Meta(ge=-1, le=254)] = -1
     """This robot's id on the air; -1: the last number in the namespace or, without a namespace, in
     the names of the topics taken from the bus."""
-    registry: str = "registry.csv"
-    """File with the topic registry, relative to the configuration file; the same at all nodes."""
+    registry: str = ""
+    """File with the topic registry, relative to the configuration file; the same at all nodes.
+    Empty: `registry.csv`, or no registry if that file does not exist."""
+    auto: bool | None = None
+    """Whether producers may declare topics beyond the registry, and messages larger than 255
+    fragments are sent in parts; at all robots or none. Absent: only without a registry."""
     topics: list[str] = []
     """Registry names to take from the bus; empty: all."""
     rx_format: str = "/rx_robot_{src_id}"

@@ -15,9 +15,19 @@ from sdrlinkd.config.robot_id import robot_id
 from sdrlinkd.config.schema import WITHOUT_AIR, Config
 from sdrlinkd.errors import ConfigError, RegistryError
 from sdrlinkd.link import TopicPolicy, check_access, flush_told
-from sdrlinkd.wire import Registry, equal_payload, max_message_size, parse_registry
+from sdrlinkd.wire import (
+    DECLARED_TOPIC_ID,
+    Registry,
+    equal_payload,
+    is_topic_name,
+    max_large_size,
+    max_message_size,
+    parse_registry,
+)
 
 MIN_BEACON_S = 0.01
+REGISTRY = "registry.csv"
+"""The registry beside a configuration that names none."""
 _NAMESPACE = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _RX_NAME = re.compile(r"(/[A-Za-z_]\w*)+/?", re.ASCII)
 _PLACEHOLDER = re.compile(r"\{(src_id|src)\}")
@@ -45,6 +55,10 @@ class Setup:
     """Topic ids of the topics taken from the bus, by bus topic."""
     policies: dict[int, TopicPolicy]
     dictionaries: dict[int, ZstdCompressionDict]
+    has_numbers: bool
+    """Whether producers may declare topics beyond the registry."""
+    named_policies: dict[str, TopicPolicy]
+    """The configured policies by topic name without leading slash."""
     transforms: list[int]
     """Ids of the topics to which [tf] applies."""
     warnings: list[str]
@@ -54,10 +68,28 @@ class Setup:
     """The configuration file; empty if there is none."""
 
     def republished_as(self, src: int, topic_id: int) -> str:
-        """The bus topic under which messages of robot `src` appear."""
+        """The bus topic under which messages of a registry's topic from robot `src` appear."""
         topic = self.registry.by_id(topic_id)
-        name = topic.name if topic else str(topic_id)
+        return self.republished(src, topic.name if topic else str(topic_id))
+
+    def republished(self, src: int, name: str) -> str:
+        """The bus topic under which messages of topic `name` from robot `src` appear."""
         return _PLACEHOLDER.sub(str(src), self.config.rx_format).rstrip("/") + "/" + name
+
+    def name_on_air(self, name: str) -> str:
+        """The name of a bus topic on the air: without this robot's namespace."""
+        prefix = f"/{self.config.namespace.strip('/')}/"
+        return name.removeprefix(prefix).removeprefix("/")
+
+    @property
+    def largest(self) -> int:
+        """Largest message in octets that PDUs can carry."""
+        size = self.config.link.pdu_size
+        return max_large_size(size) if self.has_numbers else max_message_size(size)
+
+    def _example(self, src: int) -> str:
+        topics = self.registry.topics
+        return self.republished(src, topics[0].name if topics else "…")
 
     @property
     def all_warnings(self) -> list[str]:
@@ -71,14 +103,15 @@ class Setup:
         other = 1 if self.node_id == 2 else 2
         return [
             f"robot {self.node_id}, namespace {config.namespace or '-'}, backend {config.backend}",
-            f"PDUs of {size} B; messages up to {max_message_size(size)} B",
+            f"PDUs of {size} B; messages up to {self.largest} B",
             flush_told(config.link.flush_s),
             *([] if config.backend in WITHOUT_AIR else [cfo_told(config.modem)]),
             *(
                 f"  {topic_id:>2}  {name}  {self.registry.topics[topic_id].type}"
                 for name, topic_id in self.topics_in.items()
             ),
-            f"received messages appear as {self.republished_as(other, 0)} (from robot {other})",
+            *(["producers declare topics"] if self.has_numbers else []),
+            f"received messages appear as {self._example(other)} (from robot {other})",
             *(f"warning: {warning}" for warning in self.all_warnings),
             *(f"not checked: {each}" for each in unchecked(config)),
         ]
@@ -96,7 +129,8 @@ def make_setup(config: Config, base: Path, source: str = "") -> Setup:
 
 
 def _resolve(config: Config, base: Path, source: str) -> Setup:
-    registry = load_registry(base / config.registry)
+    registry = _registry(config, base)
+    has_numbers = _has_numbers(config, registry)
     _check_texts(config)
     check_pdu_link(config)
     config = with_paths(config, base)
@@ -114,19 +148,45 @@ def _resolve(config: Config, base: Path, source: str) -> Setup:
             f"chrony.robot: got {node_id}, this robot itself; allowed: another robot, "
             "whose clock is the reference"
         )
-    policies = _policies(config, registry)
+    named = _named_policies(config, registry, has_numbers)
+    policies = {topic.id: named[topic.name] for topic in registry.topics if topic.name in named}
     return Setup(
         config=config,
         registry=registry,
         node_id=node_id,
         topics_in=topics_in,
         policies=policies,
+        has_numbers=has_numbers,
+        named_policies=named,
         dictionaries=load_dictionaries(policies, registry, base),
         transforms=_transforms(config, registry),
         warnings=_warnings(config, registry),
-        topic_warnings=_topic_warnings(config, registry),
+        topic_warnings={} if has_numbers else _topic_warnings(config, registry),
         source=source,
     )
+
+
+def _registry(config: Config, base: Path) -> Registry:
+    if not config.registry and not (base / REGISTRY).exists():
+        return Registry(())
+    return load_registry(base / (config.registry or REGISTRY))
+
+
+def _has_numbers(config: Config, registry: Registry) -> bool:
+    if config.auto is None:
+        return not len(registry)
+    if config.auto and not registry.has_numbers:
+        raise ConfigError(
+            f"auto: got true; it needs topic id {DECLARED_TOPIC_ID}, but the registry has "
+            f"{len(registry)} topics; allowed: false, or a registry of at most "
+            f"{DECLARED_TOPIC_ID} topics"
+        )
+    if not config.auto and not len(registry):
+        raise ConfigError(
+            "auto: got false, but there is no registry either, so there is no topic to send; "
+            "allowed: true, or name a `registry`"
+        )
+    return config.auto
 
 
 def load_registry(path: Path) -> Registry:
@@ -197,18 +257,22 @@ def _transforms(config: Config, registry: Registry) -> list[int]:
     return found
 
 
-def _policies(config: Config, registry: Registry) -> dict[int, TopicPolicy]:
-    policies = {}
-    for name, policy in config.topic.items():
-        topic = registry.by_name(name)
-        if topic is None:
+def _named_policies(
+    config: Config, registry: Registry, has_numbers: bool
+) -> dict[str, TopicPolicy]:
+    policies: dict[str, TopicPolicy] = {}
+    for given, policy in config.topic.items():
+        name = given.removeprefix("/")
+        if registry.by_name(name) is None and not has_numbers:
             raise ConfigError(
-                f'topic."{name}": unknown topic; allowed: names of the registry: '
+                f'topic."{given}": unknown topic; allowed: names of the registry: '
                 f"{registry.suggest(name)}"
             )
-        if topic.id in policies:
-            raise ConfigError(f'topic."{name}": listed twice, with and without the slash')
-        policies[topic.id] = policy
+        if not is_topic_name(name):
+            raise ConfigError(f'topic."{given}": allowed: a ROS name such as odom or camera/image')
+        if name in policies:
+            raise ConfigError(f'topic."{given}": listed twice, with and without the slash')
+        policies[name] = policy
     return policies
 
 

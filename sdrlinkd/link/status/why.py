@@ -20,10 +20,13 @@ OVERFLOW = ("tx_overflow_old", "tx_overflow_new", "tx_topic_full", "tx_supersede
 
 
 class Told(NamedTuple):
-    """Where a policy comes from: the file, and the keys that were set since."""
+    """Where a policy comes from: the file, the keys that were set since, and the QoS that its
+    producer offers, in words.
+    """
 
     source: str
     changed: Collection[str]
+    offered: str = ""
 
 
 class AirUse(NamedTuple):
@@ -88,6 +91,8 @@ class Why:
         dst = self._intake.destination(topic_id)
         to = "everyone" if dst == BROADCAST else f"robot {dst}"
         line = f"{name}: class {policy.qos}, priority {policy.priority}, to {to}"
+        if policy.kept:
+            line += f", depth {policy.kept}"
         lifespan = self._intake.lifespan(topic_id)
         if lifespan.source:
             line += f", lifespan {_seconds(lifespan.seconds)}"
@@ -96,9 +101,11 @@ class Why:
         if policy.compress != "none":
             line += f", compressed with {policy.compress}"
         if policy.durability == "transient_local":
-            line += ", last message kept for late joiners"
+            n = policy.latched
+            line += f", last {'message' if n == 1 else f'{n} messages'} kept for late joiners"
         by = f"set while running: {', '.join(sorted(told.changed))}" if told.changed else ""
-        return f"{line} ({'; '.join(each for each in (told.source, by) if each)})"
+        offered = f"the producer's offer: {told.offered}" if told.offered else ""
+        return f"{line} ({'; '.join(each for each in (told.source, offered, by) if each)})"
 
     def _said(self, reason: str, topic_id: int, policy: TopicPolicy, told: Told) -> str:
         if reason == "tx_throttled":

@@ -6,7 +6,7 @@ from math import inf
 from sdrlinkd.link.topics.own import OwnTopics
 from sdrlinkd.wire import TopicPiece, pieces
 
-TIMES_S = (0.0, 0.2, 0.7)
+TIMES_S = (0.0, 0.2, 0.7, 1.5, 3.0, 6.0)
 """When a new declaration, or all of them for a new robot, is told, in s from then."""
 PERIOD_S = 10.0
 """Time in s after which each declaration is told again."""

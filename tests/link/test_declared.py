@@ -1,0 +1,380 @@
+"""Topics beyond the registry: declared by their source, and numbered."""
+
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sdrlinkd.errors import DeclarationError
+from sdrlinkd.link import Offer, Outcome, Overrides, RelayParams, TopicPolicy
+from sdrlinkd.link.topics import HeardTopics, TopicTeller
+from sdrlinkd.link.topics.own import MOST_KEYS, N_NUMBERS, OwnTopics
+from sdrlinkd.link.topics.telling import SHARE
+from sdrlinkd.wire import (
+    Description,
+    Entry,
+    Pdu,
+    Registry,
+    Topic,
+    TopicPiece,
+    build,
+    build_records,
+    make_registry,
+    parse,
+    pieces,
+)
+from tests.laws import law
+from tests.link.world import compose, make_link, received, rx, topic_of, tx
+
+ODOM = Offer("odom", "nav_msgs/msg/Odometry")
+CDR = b"\0\1\0\0"
+HASH, OTHER_HASH = bytes(range(8)), bytes(range(1, 9))
+
+
+def auto(own_id=1, topics=(), **more):
+    return make_link(own_id, topics=topics, has_numbers=True, seed=own_id, **more)
+
+
+def name_of(link, message):
+    """The name under which a message has arrived at `link`."""
+    return link.heard_topic(message.src, message.series).name
+
+
+def step(links, now, lost=lambda: False):
+    """All links send and hear at `now`; returns (to, from, name, payload)."""
+    got = []
+    for link in links:
+        link.handle_timers(now)
+        while burst := compose(link, now, 8):
+            link.confirm(burst, Outcome.SENT, now)
+            for pdu in burst.pdus:
+                for other in links:
+                    if other is not link and not lost():
+                        got += [
+                            (
+                                other.own_id,
+                                m.src,
+                                other.heard_topic(m.src, m.series).name,
+                                m.payload,
+                            )
+                            for m in other.hear(pdu, now)
+                        ]
+    return got
+
+
+def run(links, begin, n, lost=lambda: False):
+    return [each for i in range(n) for each in step(links, begin + 0.05 * i, lost)]
+
+
+@pytest.mark.parametrize("pdu_size", [32, 64, 220, 1024])
+def test_a_declared_topic_arrives_under_its_name(pdu_size):
+    one, two = auto(1, pdu_size=pdu_size), auto(2, pdu_size=pdu_size)
+    topic = one.declare(ODOM)
+    one.submit(topic.id, CDR + bytes(700), 0.0)
+    assert run([one, two], 0.0, 60) == [(2, 1, "odom", CDR + bytes(700))]
+    assert two.heard_topic(1, topic.id).type == "nav_msgs/msg/Odometry"
+    assert one.audit() == two.audit() == []
+    assert [each.name for each in one.report(0.0).topics] == ["/odom"]
+    assert [each.name for each in two.report(0.0).received] == ["/odom"]
+
+
+def test_beside_a_registry_both_kinds_share_pdus():
+    registry = [("scan", "sensor_msgs/LaserScan"), ("imu", "sensor_msgs/Imu")]
+    one, two = auto(1, registry), auto(2, registry)
+    topic = one.declare(ODOM)
+    run([one, two], 0.0, 30)
+    for topic_id in (0, 1, topic.id):
+        one.submit(topic_id, CDR + bytes([topic_id]), 2.0)
+    (burst,) = [compose(one, 2.0, 8)]
+    (pdu,) = burst.pdus
+    assert sorted(entry.topic_id for entry in parse(pdu, 1024).entries)[:3] == [0, 1, 14]
+    assert [m.payload[4] for m in two.hear(pdu, 2.0)] == [0, 1, topic.id]
+    assert one.declare(Offer("/scan", "sensor_msgs/LaserScan")).id == 0
+
+
+@law(30)
+@given(
+    names=st.lists(st.from_regex(r"[a-z]{1,6}(/[a-z]{1,6})?", fullmatch=True), min_size=1,
+                   max_size=20, unique=True),
+    pdu_size=st.sampled_from((64, 220, 1024)), seed=st.integers(0, 99),
+)  # fmt: skip
+def test_whatever_is_lost_each_message_has_its_own_name(names, pdu_size, seed):
+    """Half of the PDUs are lost: no message ever comes under another's name or type."""
+    rng = Random(seed)
+    one, two = auto(1, pdu_size=pdu_size), auto(2, pdu_size=pdu_size)
+    ids = {name: one.declare(Offer(name, f"p/msg/T{i}")).id for i, name in enumerate(names)}
+    got = []
+    for i in range(200):
+        name = rng.choice(names)
+        one.submit(ids[name], CDR + name.encode(), 0.1 * i)
+        got += run([one, two], 0.1 * i, 2, lambda: rng.random() < 0.5)
+    assert all(payload[4:].decode() == name for _, _, name, payload in got)
+    assert len(got) > 20
+    assert two.audit() == []
+
+
+def test_messages_wait_a_second_for_their_declaration():
+    one, two = auto(1), auto(2)
+    topic = one.declare(ODOM)
+    pdus = []
+    for number in range(3):
+        one.submit(topic.id, CDR + bytes([number]), 0.1 * number)
+        burst = compose(one, 0.1 * number, 8)
+        one.confirm(burst, Outcome.SENT, 0.1 * number)
+        pdus += burst.pdus
+    assert [m for number, pdu in enumerate(pdus) for m in two.hear(pdu, 0.1 * number)] == []
+    assert (rx(two).started, rx(two).held) == (3, 3)
+    assert rx(two).held_bytes > 0
+    two.handle_timers(1.05)
+    assert (rx(two).held, rx(two).dropped["rx_unknown_topic"]) == (2, 1)
+    one.handle_timers(1.08)
+    told = compose(one, 1.08, 8).pdus
+    assert [m.payload[4] for pdu in told for m in two.hear(pdu, 1.08)] == [1, 2]
+    assert (rx(two).held, rx(two).held_bytes, rx(two).delivered) == (0, 0, 2)
+    assert two.audit() == []
+
+
+def test_a_newcomer_is_told_all_at_once_and_within_its_share_of_the_air():
+    one = auto(1)
+    for i in range(60):
+        one.declare(Offer(f"sensors/number_{i}", "sensor_msgs/msg/PointCloud2"))
+    run([one], 0.0, 100)
+    late = auto(2)
+    late.declare(ODOM)
+    run([one, late], 10.0, 60)
+    assert len(late.heard_topics()[1]) == 60
+
+
+def test_declarations_take_two_per_cent_of_the_air_at_most():
+    topics = OwnTopics(Registry(()), True, 250)
+    for i in range(200):
+        topics.declare(Offer(f"sensors/number_{i}", "sensor_msgs/msg/PointCloud2"))
+    teller = TopicTeller(topics, 250)
+    paid_s, pdu_s = 0.0, 0.01
+    for tick in range(2000):
+        now = 0.05 * tick
+        if tick % 20 == 0:
+            teller.newcomer(now)
+        list(teller.due(now))
+        if teller.may_pay(now, pdu_s):
+            paid_s += pdu_s
+    assert paid_s <= SHARE * 100 + 0.1
+    assert paid_s > 0.9 * SHARE * 100
+
+
+def test_each_producer_key_has_a_number_and_is_kept_apart():
+    one, two, late = (auto(i, beacon_s=0.3) for i in (1, 2, 3))
+    topic = one.declare(Offer("tf_static", "tf2_msgs/msg/TFMessage", depth=1))
+    one.set_policy(topic.id, TopicPolicy(durability="transient_local", depth=1))
+    for i, key in enumerate("abcab"):
+        one.submit(topic.id, CDR + key.encode() + bytes([i]), 0.0, Overrides(key=key))
+    got = run([one, two], 0.0, 40)
+    assert {each[3][4:5] for each in got} == {b"a", b"b", b"c"}
+    owed = [each for each in run([one, two, late], 3.0, 60) if each[0] == 3]
+    assert [each[3][4:] for each in owed] == [b"c\2", b"a\3", b"b\4"]
+    (heard,) = [each for each in late.report(0.0).received if each.src == 1]
+    assert (heard.name, heard.delivered) == ("/tf_static", 3)
+
+
+def test_receivers_keep_as_many_as_the_source_says():
+    one, two = auto(1, beacon_s=0.3), auto(2)
+    topic = one.declare(Offer("map", "nav_msgs/msg/OccupancyGrid", depth=3))
+    one.submit(topic.id, CDR, 0.0)
+    run([one, two], 0.0, 20)
+    burst = None
+    one.submit(topic.id, CDR, 2.0)
+    burst = compose(one, 2.0, 8)
+    (message,) = [m for pdu in burst.pdus for m in two.hear(pdu, 2.0)]
+    assert two.retain(message).depth == 3
+
+
+def test_what_may_not_be_declared_is_refused_with_given_and_allowed():
+    topics = OwnTopics(make_registry([("scan", "sensor_msgs/LaserScan")]), True, 250)
+    topics.declare(Offer("odom", "nav_msgs/Odometry", HASH))
+    for offer, says in (
+        (Offer("9lives", "p/T"), "name: got '9lives'"),
+        (Offer("a" * 200, "p/T"), "up to 128"),
+        (Offer("odom", "p/T/X/Y"), "type: got"),
+        (Offer("odom", "p/srv/T"), "type: got"),
+        (Offer("odom", "p/T"), "declared as nav_msgs/msg/Odometry"),
+        (Offer("scan", "p/T"), "declared as sensor_msgs/msg/LaserScan"),
+        (Offer("Odom", "p/T"), "differs from odom by upper and lower case"),
+        (Offer("odom2", "nav_msgs/Odometry", OTHER_HASH), "two versions"),
+    ):
+        with pytest.raises(DeclarationError, match=says):
+            topics.declare(offer)
+    for i in range(N_NUMBERS - 1):
+        topics.declare(Offer(f"topic_{i}", "p/T"))
+    with pytest.raises(DeclarationError, match="at most 240"):
+        topics.declare(Offer("one_more", "p/T"))
+    with pytest.raises(DeclarationError, match="auto"):
+        OwnTopics(make_registry([("scan", "p/T")]), False, 250).declare(Offer("odom", "p/T"))
+    with pytest.raises(DeclarationError, match=r"link\.pdu_size"):
+        OwnTopics(Registry(()), True, 14).declare(Offer("a" * 120, f"p/{'T' * 100}"))
+
+
+def test_numbers_are_the_same_after_a_restart_and_keys_share_when_they_run_out():
+    first, again = (OwnTopics(Registry(()), True, 250) for _ in range(2))
+    names = [f"topic_{i}" for i in range(20)]
+    ids = {name: first.declare(Offer(name, "p/T")).id for name in names}
+    same = sum(again.declare(Offer(name, "p/T")).id == ids[name] for name in reversed(names))
+    assert same >= 15
+    topic = first.declare(Offer("tf", "p/T"))
+    numbers = [first.number(topic.id, f"key {i}") for i in range(MOST_KEYS + 5)]
+    assert len(set(numbers)) == MOST_KEYS
+    assert first.number(topic.id, "key 36") == numbers[-1]
+    for i in range(N_NUMBERS - len(first.told)):
+        first.declare(Offer(f"more_{i}", "p/T"))
+    alone = first.declare(Offer("topic_0", "p/T")).id
+    assert {first.number(alone, key) for key in "abc"} == {alone}
+
+
+def test_another_version_of_a_type_is_refused_and_both_are_named():
+    one, two = auto(1), auto(2)
+    two.declare(Offer("/robot_9/odom", "nav_msgs/msg/Odometry", OTHER_HASH))
+    topic, other = one.declare(ODOM._replace(hash_=HASH)), one.declare(Offer("imu", "p/msg/Imu"))
+    for topic_id in (topic.id, other.id):
+        one.submit(topic_id, CDR + bytes(40), 0.0)
+    got = run([one, two], 0.0, 30)
+    assert [each[2] for each in got] == ["imu"]
+    assert received(two)[1, topic.id].dropped == {"rx_other_type": 1}
+    (notice,) = two.notices(2.0)
+    assert HASH.hex() in notice
+    assert OTHER_HASH.hex() in notice
+
+
+def test_a_robot_without_numbers_says_what_it_misses():
+    one, plain = auto(1), make_link(2)
+    topic = one.declare(ODOM)
+    one.submit(topic.id, CDR, 0.0)
+    assert run([one, plain], 0.0, 10) == []
+    assert any("auto = true" in notice for notice in plain.notices(1.0))
+    assert plain.audit() == []
+
+
+def test_after_its_restart_a_robots_numbers_are_learned_anew():
+    one, two = auto(1, beacon_s=0.2), auto(2)
+    topic = one.declare(ODOM)
+    run([one, two], 0.0, 20)
+    assert two.heard_topic(1, topic.id).name == "odom"
+    again = make_link(1, topics=(), has_numbers=True, seed=77, beacon_s=0.2)
+    run([again, two], 2.0, 10)
+    assert two.heard_topic(1, topic.id) is None
+    assert two.take_changed_topics() == [(1, topic.id)]
+
+
+def heard():
+    return HeardTopics(Registry(()), True, lambda _: bytes(8))
+
+
+def test_names_from_the_air_that_cannot_be_used_are_refused_and_named():
+    topics = heard()
+    for number, about, says in (
+        (16, Description("odom", "p/msg/T"), ""),
+        (17, Description("Odom", "p/msg/T"), "upper and lower case"),
+        (18, Description("odom", "p/msg/Other"), "both"),
+        (19, Description("no name", "p/msg/T"), "no topic name"),
+        (20, Description("x", "no type"), "no message type"),
+        (21, Description("odom", "p/msg/T"), ""),
+    ):
+        (piece,) = pieces(number, about, 250)
+        assert topics.take(5, piece) == (not says)
+        if says:
+            assert says in topics.notices()[0]
+    assert topics.refused[5] == 4
+    assert [topics.topic(5, n).base for n in (16, 21)] == [16, 16]
+
+
+@law(200)
+@given(
+    st.lists(
+        st.builds(
+            TopicPiece, st.integers(0, 255), st.integers(0, 3), st.integers(0, 15),
+            st.integers(0, 15), st.binary(max_size=40),
+        ),
+        max_size=60,
+    )
+)  # fmt: skip
+def test_any_pieces_are_learned_or_refused_within_bounds(found):
+    topics = heard()
+    for piece in found:
+        topics.take(1, piece)
+    for piece in found:
+        known = topics.topic(1, piece.number)
+        assert known is None or known.about is not None
+    topics.notices()
+
+
+@law(50)
+@given(
+    st.text(alphabet="abc_", min_size=1, max_size=60).map(lambda text: "a" + text),
+    st.integers(14, 250), st.integers(0, 255), st.randoms(),
+)  # fmt: skip
+def test_a_description_in_pieces_of_any_size_and_order(name, room, depth, rng):
+    about = Description(name, "pkg/msg/Name", HASH, depth, depth % 2 == 0)
+    found = pieces(77, about, room)
+    rng.shuffle(found)
+    topics = heard()
+    assert [topics.take(1, piece) for piece in found] == [False] * (len(found) - 1) + [True]
+    assert topics.topic(1, 77).about == about
+
+
+@law(100)
+@given(st.lists(st.binary(max_size=50), min_size=1, max_size=9), st.booleans())
+def test_any_octets_under_topic_id_14(payloads, known):
+    """No entry under topic id 0xE can harm the entries beside it."""
+    two = auto(2, [("scan", "sensor_msgs/LaserScan")])
+    one = auto(1, [("scan", "sensor_msgs/LaserScan")])
+    if known:
+        for number in range(16, 256, 40):
+            record = build_records(pieces(number, Description(f"t{number}", "p/msg/T"), 250))
+            entry = Entry(15, 0, 0, 1, record)
+            two.hear(build(Pdu(0, False, 1, 255, number, 1, [entry]), 1024), 0.0)
+    entries = [Entry(14, i, 0, 1, payload) for i, payload in enumerate(payloads)]
+    entries.append(Entry(0, 99, 0, 1, CDR + b"scan"))
+    pdu = build(Pdu(0, False, 1, 255, 3, 1, entries), 1024)
+    assert CDR + b"scan" in [m.payload for m in two.hear(pdu, 0.0)]
+    two.handle_timers(2.0)
+    two.handle_timers(4.0)
+    assert rx(two).held == 0
+    assert two.audit() == one.audit() == []
+
+
+def test_its_receipt_and_why():
+    one, two = auto(1), auto(2)
+    topic = one.declare(ODOM)
+    run([one, two], 0.0, 20)
+    one.submit(topic.id, CDR + bytes(3000), 2.0, Overrides(dst=2, receipt="a.1"))
+    run([one, two], 2.0, 20)
+    (verdict,) = one.take_verdicts()
+    assert verdict[:4] == ("a.1", topic.id, 2, "delivered")
+    assert tx(one).sent == 1
+    assert topic_of_name(one, "/odom").sent == 1
+    assert two.topic_named("odom") is None
+    assert one.topic_named("/odom") == Topic(topic.id, "odom", "nav_msgs/msg/Odometry")
+
+
+def topic_of_name(link, name):
+    return next(each for each in link.report(0.0).topics if each.name == name)
+
+
+def test_a_relay_forwards_them_unread():
+    one = auto(1, hop_limit=2)
+    relay = make_link(2, hop_limit=2, relay=RelayParams(policy="flood"), seed=2)
+    three = auto(3, hop_limit=2)
+    topic = one.declare(ODOM)
+    one.submit(topic.id, CDR + b"far", 0.0)
+    got = []
+    for i in range(40):
+        now = 0.05 * i
+        for link in (one, relay):
+            link.handle_timers(now)
+            while burst := compose(link, now, 8):
+                link.confirm(burst, Outcome.SENT, now)
+                for pdu in burst.pdus:
+                    other = relay if link is one else three
+                    got += [m.payload for m in other.hear(pdu, now)]
+    assert got == [CDR + b"far"]
+    assert relay.audit() == three.audit() == []
+    assert topic_of(relay, 0).accepted == 0
