@@ -139,14 +139,11 @@ class Node:
             if self.bus.is_tapped:
                 self.bus.tap("rx", data)
             for message in link.hear(data, at, snr_db, now, ended_at):
-                topic = link.heard_topic(message.src, message.series)
                 times, age_s = UNKNOWN, link.delivered(message, now)
-                if topic is None:
-                    continue  # its source has just restarted
                 if age_s is not None:
                     times = local_times(link, message, age_s, now, now_ns, self._headers)
                 received_ns = now_ns - round((now - message.heard_at) * 1e9)
-                self.bus.publish(message, topic, age_s, received_ns, times, link.retain(message))
+                self.bus.publish(message, age_s, received_ns, times, link.retain(message))
             for src, number in link.take_changed_topics():
                 self.bus.forget_topic(src, number)
         self._tell_verdicts()
@@ -293,9 +290,9 @@ class Node:
             stop = self._stops.get(topic_id)
             if stop is None:
                 log.error("%s: silent, but no stop message can be made for its type", name)
-                continue
-            log.warning("%s: silent, published the stop message", name)
-            self.bus.publish_stop(src, topic, stop)
+            else:
+                log.warning("%s: silent, published the stop message", name)
+                self.bus.publish_stop(src, topic, stop)
 
     def audit(self) -> list[str]:
         """Discrepancies in the ledger, as sentences; empty when it adds up."""

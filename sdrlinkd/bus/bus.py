@@ -103,22 +103,21 @@ class Bus:
     def publish(
         self,
         message: Delivered,
-        topic: HeardTopic,
         age_s: float | None,
         received_ns: int,
         times: LocalTimes = UNKNOWN,
         retain: Retain = NOT_RETAINED,
     ) -> None:
-        """Hand a message of `topic` from the air to its consumers; `age_s` is None if unknown.
+        """Hand a message from the air to its consumers; `age_s` is None if unknown.
 
         `retain` says how many messages of its topic and source are kept for later consumers.
         """
-        frame = self._frame_out(message.src, topic)
+        frame = self._frame_out(message.src, message.topic)
         header = envelope.OutHeader(
             s=message.src,
             n=message.number,
             tr=received_ns,
-            ty=topic.type,
+            ty=message.topic.type,
             g=message.lost_pdus,
             h=message.hops_left,
             age=None if age_s is None else round(age_s * 1e6),

@@ -13,21 +13,22 @@ from sdrlinkd.config.pdu_link_checks import check_pdu_link, with_paths
 from sdrlinkd.config.places import located
 from sdrlinkd.config.robot_id import robot_id
 from sdrlinkd.config.schema import WITHOUT_AIR, Config
-from sdrlinkd.errors import ConfigError, RegistryError
+from sdrlinkd.config.topics import (
+    policies_by_name,
+    registry_of,
+    topics_from_bus,
+    uses_numbers,
+)
+from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import TopicPolicy, check_access, flush_told
 from sdrlinkd.wire import (
-    DECLARED_TOPIC_ID,
     Registry,
     equal_payload,
-    is_topic_name,
     max_large_size,
     max_message_size,
-    parse_registry,
 )
 
 MIN_BEACON_S = 0.01
-REGISTRY = "registry.csv"
-"""The registry beside a configuration that names none."""
 _NAMESPACE = re.compile(r"/?[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
 _RX_NAME = re.compile(r"(/[A-Za-z_]\w*)+/?", re.ASCII)
 _PLACEHOLDER = re.compile(r"\{(src_id|src)\}")
@@ -129,12 +130,12 @@ def make_setup(config: Config, base: Path, source: str = "") -> Setup:
 
 
 def _resolve(config: Config, base: Path, source: str) -> Setup:
-    registry = _registry(config, base)
-    has_numbers = _has_numbers(config, registry)
+    registry = registry_of(config, base)
+    has_numbers = uses_numbers(config, registry)
     _check_texts(config)
     check_pdu_link(config)
     config = with_paths(config, base)
-    topics_in = _topics_in(config, registry)
+    topics_in = topics_from_bus(config, registry)
     node_id = robot_id(config, topics_in)
     check_access(config.access, node_id)
     if config.rate.adapt and not (registry.has_control and config.link.beacon_s):
@@ -148,7 +149,7 @@ def _resolve(config: Config, base: Path, source: str) -> Setup:
             f"chrony.robot: got {node_id}, this robot itself; allowed: another robot, "
             "whose clock is the reference"
         )
-    named = _named_policies(config, registry, has_numbers)
+    named = policies_by_name(config, registry, has_numbers)
     policies = {topic.id: named[topic.name] for topic in registry.topics if topic.name in named}
     return Setup(
         config=config,
@@ -164,41 +165,6 @@ def _resolve(config: Config, base: Path, source: str) -> Setup:
         topic_warnings={} if has_numbers else _topic_warnings(config, registry),
         source=source,
     )
-
-
-def _registry(config: Config, base: Path) -> Registry:
-    if not config.registry and not (base / REGISTRY).exists():
-        return Registry(())
-    return load_registry(base / (config.registry or REGISTRY))
-
-
-def _has_numbers(config: Config, registry: Registry) -> bool:
-    if config.auto is None:
-        return not len(registry)
-    if config.auto and not registry.has_numbers:
-        raise ConfigError(
-            f"auto: got true; it needs topic id {DECLARED_TOPIC_ID}, but the registry has "
-            f"{len(registry)} topics; allowed: false, or a registry of at most "
-            f"{DECLARED_TOPIC_ID} topics"
-        )
-    if not config.auto and not len(registry):
-        raise ConfigError(
-            "auto: got false, but there is no registry either, so there is no topic to send; "
-            "allowed: true, or name a `registry`"
-        )
-    return config.auto
-
-
-def load_registry(path: Path) -> Registry:
-    """The registry in `path`. Raises RegistryError."""
-    try:
-        text = path.read_text()
-    except (OSError, ValueError) as error:
-        raise RegistryError(
-            f"{str(path)!r}: the topic registry is unreadable ({error}); "
-            "it is a CSV of `name,type` lines, named by the key `registry`"
-        ) from None
-    return parse_registry(text, str(path))
 
 
 def _check_texts(config: Config) -> None:
@@ -228,21 +194,6 @@ def _check_texts(config: Config) -> None:
         )
 
 
-def _topics_in(config: Config, registry: Registry) -> dict[str, int]:
-    for name in config.topics:
-        if registry.by_name(name) is None:
-            raise ConfigError(
-                f'topics: got "{name}"; allowed: names of the registry: {registry.suggest(name)}'
-            )
-    wanted = {name.removeprefix("/") for name in config.topics}
-    prefix = "/" + config.namespace.strip("/") if config.namespace else ""
-    return {
-        f"{prefix}/{topic.name}": topic.id
-        for topic in registry.topics
-        if not wanted or topic.name in wanted
-    }
-
-
 def _transforms(config: Config, registry: Registry) -> list[int]:
     found = []
     for name in config.tf.topics:
@@ -255,25 +206,6 @@ def _transforms(config: Config, registry: Registry) -> list[int]:
             )
         found.append(topic.id)
     return found
-
-
-def _named_policies(
-    config: Config, registry: Registry, has_numbers: bool
-) -> dict[str, TopicPolicy]:
-    policies: dict[str, TopicPolicy] = {}
-    for given, policy in config.topic.items():
-        name = given.removeprefix("/")
-        if registry.by_name(name) is None and not has_numbers:
-            raise ConfigError(
-                f'topic."{given}": unknown topic; allowed: names of the registry: '
-                f"{registry.suggest(name)}"
-            )
-        if not is_topic_name(name):
-            raise ConfigError(f'topic."{given}": allowed: a ROS name such as odom or camera/image')
-        if name in policies:
-            raise ConfigError(f'topic."{given}": listed twice, with and without the slash')
-        policies[name] = policy
-    return policies
 
 
 def _warnings(config: Config, registry: Registry) -> list[str]:

@@ -73,9 +73,10 @@ from sdrlinkd.wire.declared import (
     pieces,
 )
 from sdrlinkd.wire.later import forwarded, lasting_identity, postponed
+from sdrlinkd.wire.partials import Lost, Partial, ReassemblyLimits
 from sdrlinkd.wire.pdu import Entry, Pdu, build, flags, identity, parse
 from sdrlinkd.wire.readable import ControlEntries, numbered, read_control_entries, with_topic
-from sdrlinkd.wire.reassembly import Lost, Partial, Reassembly, ReassemblyLimits
+from sdrlinkd.wire.reassembly import Reassembly
 from sdrlinkd.wire.registry import (
     BROADCAST,
     CONTROL_TOPIC_ID,

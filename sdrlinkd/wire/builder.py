@@ -6,7 +6,7 @@ from functools import lru_cache
 
 from sdrlinkd.wire.capacity import CRC_SIZE, ENTRY_HEADER_SIZE, MAX_ENTRIES, entry_budget
 from sdrlinkd.wire.control import ASKS, STAMP_RECORD, STAMP_SIZE, TLV_HEADER_SIZE, RecordType
-from sdrlinkd.wire.declared import FIRST_NUMBER, number_octet, octet
+from sdrlinkd.wire.declared import FIRST_NUMBER, number_octet
 from sdrlinkd.wire.registry import CONTROL_TOPIC_ID, DECLARED_TOPIC_ID
 
 VERSION = 0
@@ -92,7 +92,7 @@ class PduBuilder:
         Every message has a STAMP, so for speed it is built without `build_records`.
         """
         value_size = STAMP_SIZE - TLV_HEADER_SIZE + asks
-        record = STAMP_RECORD.pack(RecordType.STAMP, value_size, octet(topic_id), entry_id, age_us)
+        record = STAMP_RECORD.pack(RecordType.STAMP, value_size, topic_id & 0xFF, entry_id, age_us)
         return self.add_record(record + ASKS if asks else record)
 
     def _note_room(self) -> None:

@@ -1,86 +1,18 @@
 """Joins fragments into messages (wire document, section 5.3)."""
 
-from collections import OrderedDict
-from dataclasses import dataclass, field
-from typing import NamedTuple
-
 from sdrlinkd.wire.control import Parity
 from sdrlinkd.wire.declared import PARTS, Part
+from sdrlinkd.wire.partials import (
+    FRAGMENT_OVERHEAD,
+    PARTIAL_OVERHEAD,
+    Joined,
+    Large,
+    Lost,
+    Partial,
+    ReassemblyLimits,
+    Source,
+)
 from sdrlinkd.wire.pdu import Entry
-
-# Memory in bytes counted for an incomplete message besides its payload, so that tiny ones count.
-PARTIAL_OVERHEAD = 512
-FRAGMENT_OVERHEAD = 128
-NO_ENTRY = -1
-
-
-@dataclass(frozen=True, slots=True)
-class ReassemblyLimits:
-    """How long, and in how much memory, the receiver keeps incomplete messages."""
-
-    timeout_s: float = 1.0
-    """Time in s without a new fragment after which a message is given up."""
-    source_bytes: int = 12 << 20
-    """Largest memory for one source in bytes, including overhead."""
-    total_bytes: int = 48 << 20
-    """Largest memory for all sources together in bytes, including overhead."""
-
-
-class Lost(NamedTuple):
-    """An incomplete message that was given up, and the ledger's reason.
-
-    A large message has topic id and entry id of its last part in `stamped`, if that has arrived.
-    """
-
-    src: int
-    topic_id: int
-    stamped: tuple[int, int]
-    reason: str
-
-
-class Joined(NamedTuple):
-    """A large message that is complete, and the entry id of its last part."""
-
-    topic_id: int
-    payload: bytes
-    entry_id: int
-
-
-@dataclass(slots=True)
-class Partial:
-    """An incomplete message, with its fragments by number."""
-
-    total: int
-    touched_at: float
-    began_at: float
-    parts: dict[int, bytes] = field(default_factory=dict)
-    cost: int = PARTIAL_OVERHEAD
-    shape: tuple[int, int, int] | None = None
-    """(number of parity fragments, octets of a fragment, octets of the message) of the parity."""
-    parity: dict[int, dict[int, bytes]] = field(default_factory=dict)
-    """Pieces of parity fragments, by offset and then by number."""
-
-
-@dataclass(slots=True)
-class _Large:
-    """An incomplete large message, with its parts by number."""
-
-    n_parts: int
-    began_at: float
-    touched_at: float
-    parts: dict[int, bytes] = field(default_factory=dict)
-    entry_id: int = NO_ENTRY
-    """Entry id of the last part; NO_ENTRY until that is there."""
-    cost: int = PARTIAL_OVERHEAD
-
-
-@dataclass(slots=True)
-class _Source:
-    partials: OrderedDict[tuple[int, int], Partial] = field(default_factory=OrderedDict)
-    large: OrderedDict[tuple[int, int], _Large] = field(default_factory=OrderedDict)
-    parts_at: float = float("-inf")
-    """When a fragment of any part came last."""
-    cost: int = 0
 
 
 class Reassembly:
@@ -92,7 +24,7 @@ class Reassembly:
 
     def __init__(self, limits: ReassemblyLimits) -> None:
         self._limits = limits
-        self._sources: dict[int, _Source] = {}
+        self._sources: dict[int, Source] = {}
         # Messages given up and not yet returned by `take_lost`.
         self.lost: list[Lost] = []
         self._next_expiry = float("inf")
@@ -113,7 +45,7 @@ class Reassembly:
             self.began_at = now
             return payload
         if source is None:
-            source = self._sources[src] = _Source()
+            source = self._sources[src] = Source()
         key = (topic_id, entry_id)
         partial = source.partials.get(key)
         if partial is not None:
@@ -144,14 +76,14 @@ class Reassembly:
         """
         source = self._sources.get(src)
         if source is None:
-            source = self._sources[src] = _Source()
+            source = self._sources[src] = Source()
         key = (part.topic_id, part.number)
         large = source.large.get(key)
         if large is not None and large.n_parts != part.parts:
             self._give_up_large(src, source, key, "rx_partial_superseded")
             large = None
         if large is None:
-            large = source.large[key] = _Large(part.parts, self.began_at, now)
+            large = source.large[key] = Large(part.parts, self.began_at, now)
             source.cost += PARTIAL_OVERHEAD
             self.held_bytes += PARTIAL_OVERHEAD
             self.held += 1
@@ -237,7 +169,7 @@ class Reassembly:
         return lost
 
     def _keep(
-        self, src: int, source: _Source, key: tuple[int, int], n_bytes: int, now: float
+        self, src: int, source: Source, key: tuple[int, int], n_bytes: int, now: float
     ) -> None:
         """Note that `n_bytes` came for an incomplete message, and enforce the memory limits."""
         partial = source.partials[key]
@@ -251,7 +183,7 @@ class Reassembly:
         self.held_bytes += cost
         self._keep_bounds(src, source)
 
-    def _start(self, source: _Source, key: tuple[int, int], total: int, now: float) -> Partial:
+    def _start(self, source: Source, key: tuple[int, int], total: int, now: float) -> Partial:
         partial = source.partials[key] = Partial(total, now, now)
         source.cost += PARTIAL_OVERHEAD
         self.held_bytes += PARTIAL_OVERHEAD
@@ -269,14 +201,14 @@ class Reassembly:
         known = partial.parts.get(entry.index)
         return partial.total != entry.total or (known is not None and known != entry.payload)
 
-    def _keep_bounds(self, src: int, source: _Source) -> None:
+    def _keep_bounds(self, src: int, source: Source) -> None:
         while source.cost > self._limits.source_bytes:
             self._give_up_oldest(src, source, "rx_partial_evicted")
         while self.held_bytes > self._limits.total_bytes:
             greedy = max(self._sources, key=lambda s: self._sources[s].cost)
             self._give_up_oldest(greedy, self._sources[greedy], "rx_partial_memory")
 
-    def _give_up_oldest(self, src: int, source: _Source, reason: str) -> None:
+    def _give_up_oldest(self, src: int, source: Source, reason: str) -> None:
         """Give up what has been silent for longest: a message, a part, or a large message."""
         partial = next(iter(source.partials.items()), None)
         large = next(iter(source.large.items()), None)
@@ -285,22 +217,22 @@ class Reassembly:
         elif partial is not None:
             self._give_up(src, source, partial[0], reason)
 
-    def _give_up(self, src: int, source: _Source, key: tuple[int, int], reason: str) -> None:
+    def _give_up(self, src: int, source: Source, key: tuple[int, int], reason: str) -> None:
         self._remove(source, key)
         self.lost.append(Lost(src, key[0], key, "rx_part_lost" if key[0] == PARTS else reason))
 
-    def _give_up_large(self, src: int, source: _Source, key: tuple[int, int], reason: str) -> None:
+    def _give_up_large(self, src: int, source: Source, key: tuple[int, int], reason: str) -> None:
         large = self._remove_large(source, key)
         self.lost.append(Lost(src, key[0], (PARTS, large.entry_id), reason))
 
-    def _remove_large(self, source: _Source, key: tuple[int, int]) -> _Large:
+    def _remove_large(self, source: Source, key: tuple[int, int]) -> Large:
         large = source.large.pop(key)
         source.cost -= large.cost
         self.held_bytes -= large.cost
         self.held -= 1
         return large
 
-    def _remove(self, source: _Source, key: tuple[int, int]) -> None:
+    def _remove(self, source: Source, key: tuple[int, int]) -> None:
         partial = source.partials.pop(key)
         source.cost -= partial.cost
         self.held_bytes -= partial.cost

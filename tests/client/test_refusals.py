@@ -50,8 +50,8 @@ MESSAGES = [
     ("imu", CDR, {}, "tx_unknown_topic",
      f'topic: got "imu"; did you mean /robot_1/imu? {ALLOWED}'),
     ("/x", CDR, {}, "tx_unknown_topic", f'topic: got "/x"; {ALLOWED}'),
-    (ODOM, CDR + bytes(2_999_996), {}, "tx_too_big",
-     f"{ODOM}: too large: 3000000 B; at most 257805 B with {PDU_SIZE}"),
+    (ODOM, CDR + bytes(8_999_996), {}, "tx_too_big",
+     f"{ODOM}: too large: 9000000 B; at most 257805 B with {PDU_SIZE}"),
     (ODOM, b"abc", {}, "tx_bad_envelope",
      f"{ODOM}: too short: 3 B; CDR begins with a header of 4 B"),
     (ODOM, CDR, {"type": "sensor_msgs/msg/Imu"}, "tx_bad_envelope",
@@ -92,8 +92,8 @@ def test_send_refuses_in_the_daemons_words(start_daemon):
         wait_for(lambda says=says: daemon.snapshot().bus.bad_envelope_last == says)
     for topic, payload, wishes, reason, says in MESSAGES:
         if reason == "tx_too_big":
-            key = "bus.max_message_bytes = 1048576"
-            says = f"{ODOM}: too large: 3000000 B; at most 1048576 B with {key}"
+            key = "bus.max_message_bytes = 8388608"
+            says = f"{ODOM}: too large: 9000000 B; at most 8388608 B with {key}"
         header = ENVELOPE_VERSION + pack_map({"ty": wishes.get("type", TYPE)})
         push(daemon.directory, [f"{topic}\0".encode(), header, payload])
         wait_for(lambda says=says: daemon.snapshot().bus.bad_envelope_last == says)
@@ -123,8 +123,8 @@ def test_every_limit_is_named_by_its_key(start_daemon, tmp_path):
         for topic, most, reason, key in (
             (ODOM, 700, "tx_size_cap", "topic.odom.max_bytes = 700"),
             ("/robot_1/scan", 9000, "tx_overflow_new", "queue.max_bytes = 9000"),
-            ("/robot_1/map", 1 << 20, "tx_too_big", "bus.max_message_bytes = 1048576"),
-            ("/robot_1/tf", 1 << 20, "tx_too_big", "bus.max_message_bytes = 1048576"),
+            ("/robot_1/map", 8 << 20, "tx_too_big", "bus.max_message_bytes = 8388608"),
+            ("/robot_1/tf", 8 << 20, "tx_too_big", "bus.max_message_bytes = 8388608"),
         ):
             with pytest.raises(MessageRefusedError) as refused:
                 out.send(topic, CDR + bytes(most - 3))

@@ -168,7 +168,44 @@ def test_a_topic_that_can_be_too_large_is_warned_about():
 
 def test_a_missing_registry_says_what_it_is(tmp_path):
     with pytest.raises(RegistryError, match="registry is unreadable"):
-        make_setup(Config(), tmp_path)
+        make_setup(Config(registry="registry.csv"), tmp_path)
+
+
+def test_without_a_registry_producers_declare_topics(tmp_path):
+    setup = make_setup(Config(topic={"/odom": TopicPolicy(priority=9)}), tmp_path)
+    assert (len(setup.registry), setup.topics_in, setup.has_numbers) == (0, {}, True)
+    assert setup.named_policies == {"odom": TopicPolicy(priority=9)}
+    assert "producers declare topics" in setup.summary()
+    (tmp_path / "registry.csv").write_text("odom,nav_msgs/Odometry\n")
+    setup = make_setup(Config(), tmp_path)
+    assert (list(setup.topics_in), setup.has_numbers) == (["/robot_1/odom"], False)
+    assert make_setup(Config(auto=True), tmp_path).has_numbers
+
+
+@pytest.mark.parametrize(
+    ("n_topics", "auto", "says"),
+    [
+        (14, True, None),
+        (15, True, "auto: got true; it needs topic id 14, but the registry has 15 topics"),
+        (16, True, "at most 14 topics"),
+        (15, None, None),
+        (0, False, "auto: got false, but there is no registry"),
+    ],
+)
+def test_numbers_need_topic_id_14(tmp_path, n_topics, auto, says):
+    if n_topics:
+        text = "".join(f"topic_{i},std_msgs/String\n" for i in range(n_topics))
+        (tmp_path / "registry.csv").write_text(text)
+    if says is None:
+        assert make_setup(Config(auto=auto), tmp_path).has_numbers == bool(auto)
+    else:
+        with pytest.raises(ConfigError, match=says):
+            make_setup(Config(auto=auto), tmp_path)
+
+
+def test_a_policy_of_a_declared_topic_needs_a_ros_name(tmp_path):
+    with pytest.raises(ConfigError, match="allowed: a ROS name"):
+        make_setup(Config(topic={"no name": TopicPolicy()}), tmp_path)
 
 
 def test_a_missing_or_binary_file_is_a_user_error(tmp_path):

@@ -8,9 +8,14 @@ from hypothesis import strategies as st
 
 from sdrlinkd.errors import DeclarationError
 from sdrlinkd.link import Offer, Outcome, Overrides, RelayParams, TopicPolicy
-from sdrlinkd.link.topics import HeardTopics, TopicTeller
-from sdrlinkd.link.topics.own import MOST_KEYS, N_NUMBERS, OwnTopics
-from sdrlinkd.link.topics.telling import SHARE
+from sdrlinkd.link.topics import (
+    MOST_KEYS,
+    N_NUMBERS,
+    TELLING_SHARE,
+    HeardTopics,
+    OwnTopics,
+    TopicTeller,
+)
 from sdrlinkd.wire import (
     Description,
     Entry,
@@ -159,8 +164,8 @@ def test_declarations_take_two_per_cent_of_the_air_at_most():
         list(teller.due(now))
         if teller.may_pay(now, pdu_s):
             paid_s += pdu_s
-    assert paid_s <= SHARE * 100 + 0.1
-    assert paid_s > 0.9 * SHARE * 100
+    assert paid_s <= TELLING_SHARE * 100 + 0.1
+    assert paid_s > 0.9 * TELLING_SHARE * 100
 
 
 def test_each_producer_key_has_a_number_and_is_kept_apart():

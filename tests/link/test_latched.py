@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link import Outcome, Overrides, TopicPolicy
-from sdrlinkd.link.queue import MOST_KEYS
+from sdrlinkd.link.topics import MOST_KEYS
 from tests.link.world import compose, compose_at, make_link, topic_of
 
 LATCHED = TopicPolicy(durability="transient_local")

@@ -209,7 +209,7 @@ class Composer:
             return None
         if draft.room >= MIN_ROOM_FOR_STAMP:
             for message in draft.carried:
-                if message.awaits_stamp:
+                if not message.stamped:
                     self._writer.stamp(draft, message, start)
         if self._piggyback.waiting and draft.dst == BROADCAST:
             self._piggyback.ride(draft, start)

@@ -16,7 +16,6 @@ from sdrlinkd.wire import (
     PduBuilder,
     fragment_count,
     octet,
-    overhead,
 )
 
 NO_DST = -1
@@ -99,8 +98,8 @@ class EntryWriter:
         at = head.next_index * k
         length = min(k, size - at)
         is_last = at + length >= size
-        needs_stamp = is_last and not head.stamped and not head.parts_left
-        beside = overhead(head.channel)
+        needs_stamp = is_last and not head.stamped
+        beside = head.overhead
         if needs_stamp and length + beside + bool(head.receipt) > draft.room_beside_stamp:
             # Send the age ahead in its own PDU only if both do not fit even into an empty one.
             return draft.is_empty and self._send_stamp_ahead(lane, head, k, draft, start)
@@ -128,7 +127,7 @@ class EntryWriter:
             head.give_parity()
         if len(records) == n:
             return False
-        if head.stamped:
+        if head.stamped and not head.parts_left:
             self.stamp(draft, head, start)
         draft.carried.append(head)
         draft.join(head)
@@ -163,7 +162,7 @@ class EntryWriter:
         return True
 
     def _fragment_size(self, message: Outgoing, topics_pending: int) -> int:
-        size, own = len(message.body), overhead(message.channel)
+        size, own = len(message.body), message.overhead
         if message.channel == PARTS:
             # Full PDUs, so that a part and its parity are at most 256 fragments.
             return self._k_single - own

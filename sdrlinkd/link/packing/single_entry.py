@@ -4,7 +4,7 @@ from sdrlinkd.link.packing.draft import BuiltPdu
 from sdrlinkd.link.params import LinkParams
 from sdrlinkd.link.qos import WIRE_BITS
 from sdrlinkd.link.queue import Lane, Outbox, Outgoing
-from sdrlinkd.wire import build_full, equal_payload, flags, forwarded, overhead
+from sdrlinkd.wire import build_full, equal_payload, flags, forwarded
 
 
 class SingleEntry:
@@ -32,7 +32,7 @@ class SingleEntry:
         # The last fragment differs: it may need a STAMP and may leave room.
         k = head.k
         return (
-            k == self._k - overhead(head.channel)
+            k == self._k - head.overhead
             and not head.needs_id
             and (len(head.body) - 1) // k > head.next_index
         )

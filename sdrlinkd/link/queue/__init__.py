@@ -6,8 +6,9 @@ PDUs and knows nothing of radio or channel.
 
 from sdrlinkd.link.queue.admission import NOT_TAKEN
 from sdrlinkd.link.queue.compression import Deflated, Inflated, train_dictionary
+from sdrlinkd.link.queue.fate import STEPS, Fate, Step
 from sdrlinkd.link.queue.intake import Intake
-from sdrlinkd.link.queue.latched import MOST_KEYS, Kept, Latched, Offer
+from sdrlinkd.link.queue.latched import Kept, Latched, Offer
 from sdrlinkd.link.queue.ledger import (
     RX_PDU_REASONS,
     RX_REASONS,
@@ -18,21 +19,12 @@ from sdrlinkd.link.queue.ledger import (
 )
 from sdrlinkd.link.queue.lifespan import Lifespan, lifespan_of
 from sdrlinkd.link.queue.lives import Lives
-from sdrlinkd.link.queue.message import (
-    STEPS,
-    Fate,
-    Lane,
-    Level,
-    Outgoing,
-    Step,
-    with_first,
-)
+from sdrlinkd.link.queue.message import Lane, Level, Outgoing, with_first
 from sdrlinkd.link.queue.outbox import Outbox
 from sdrlinkd.link.queue.policy import DEFAULT_POLICY, TopicPolicy
 
 __all__ = [
     "DEFAULT_POLICY",
-    "MOST_KEYS",
     "NOT_TAKEN",
     "RX_PDU_REASONS",
     "RX_REASONS",

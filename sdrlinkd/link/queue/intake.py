@@ -233,9 +233,10 @@ class Intake:
         if frame is not None:
             payload = frame
         qos = topic.qos if qos is None else qos
+        wants_stamp = topic.stamp or (bool(receipt) and self._has_control)
         number, parting = self._own.number(topic_id, key), None
         if len(payload) > max_size(self._pdu_size, number):
-            parting = self._parting(topic, number, len(payload), qos)
+            parting = self._parting(topic, number, len(payload), qos, wants_stamp)
             if parting is None:
                 topic.tally.drop("tx_too_big")
                 return "tx_too_big"
@@ -247,7 +248,7 @@ class Intake:
             topic.dst if dst is None else dst,
             at,
             at + lifespan_s,
-            topic.stamp or (bool(receipt) and self._has_control),
+            wants_stamp,
             topic.tally,
             # Without a control channel its receipt was already answered as unknown.
             receipt=receipt if self._has_control else "",
@@ -262,11 +263,13 @@ class Intake:
             return "tx_expired"
         return self._outbox.put(message, topic.policy, bytes_per_s)
 
-    def _parting(self, topic: TopicState, number: int, size: int, qos: Qos) -> Parting | None:
+    def _parting(
+        self, topic: TopicState, number: int, size: int, qos: Qos, wants_stamp: bool
+    ) -> Parting | None:
         """How to divide a message that is too large for 255 fragments; None: it cannot be sent."""
         share = self._classes.of(qos).parity
         if not self._has_numbers or size > max_large_size(self._pdu_size, share):
             return None
         # Of equal size, as parity protects a small last part less.
         n = -(-size // part_size(self._pdu_size, share))
-        return Parting(-(-size // n), octet(number), topic.count_large())
+        return Parting(-(-size // n), octet(number), topic.count_large(), wants_stamp)

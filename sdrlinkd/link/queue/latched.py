@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from sdrlinkd.link.qos import Overrides
+from sdrlinkd.link.topics import MOST_KEYS
 from sdrlinkd.wire import BROADCAST
 
 SHARE = 0.02
@@ -13,8 +14,6 @@ SHARE = 0.02
 MOST_CREDIT_S = 1.0
 WAIT_S = 0.2
 """Wait in s after a new robot, as others often follow soon."""
-MOST_KEYS = 32
-"""Most producer keys of a topic; the one that was silent for longest goes first."""
 
 
 class Kept(NamedTuple):
@@ -44,7 +43,8 @@ class _Latched:
 class Latched:
     """Keeps latched messages by topic and producer key, and decides when one is replayed.
 
-    Messages are replayed in the order of their submission.
+    Messages are replayed in the order of their submission. Of more than MOST_KEYS keys of a topic,
+    the one that was silent for longest is dropped.
     """
 
     def __init__(self) -> None:

@@ -4,7 +4,8 @@ from collections.abc import Iterable
 from typing import ClassVar
 
 from sdrlinkd.errors import IllegalStepError
-from sdrlinkd.link.queue.message import Fate, Outgoing, Step
+from sdrlinkd.link.queue.fate import Fate, Step
+from sdrlinkd.link.queue.message import Outgoing
 
 
 class Lives:

@@ -4,44 +4,15 @@ A *lane* is one topic at one class, priority and destination; messages keep thei
 Lanes of equal class and priority form a *level*.
 """
 
-from collections import deque
-from collections.abc import Mapping, Sequence
-from enum import IntEnum, auto
+from collections import OrderedDict, deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from sdrlinkd.link.qos import Qos
+from sdrlinkd.link.queue.fate import STEPS, Fate, Step
 from sdrlinkd.link.queue.ledger import TxTally
-from sdrlinkd.wire import PARTS, Part, build_part
-
-
-class Fate(IntEnum):
-    """State of a message in the ledger."""
-
-    QUEUED = auto()
-    IN_FLIGHT = auto()
-    SENT = auto()
-    DROPPED = auto()
-
-
-class Step(IntEnum):
-    """Events in the life of a message."""
-
-    BEGIN = auto()
-    """The first fragment of the message is cut."""
-    LEAVE = auto()
-    """The radio has sent the whole message."""
-    DROP = auto()
-    """The message is dropped under one of the ledger's reasons."""
-
-
-STEPS: Mapping[tuple[Fate, Step], Fate] = {
-    (Fate.QUEUED, Step.BEGIN): Fate.IN_FLIGHT,
-    (Fate.QUEUED, Step.DROP): Fate.DROPPED,
-    (Fate.IN_FLIGHT, Step.LEAVE): Fate.SENT,
-    (Fate.IN_FLIGHT, Step.DROP): Fate.DROPPED,
-}
-"""State machine of a message: the allowed steps and the resulting states. The number of messages
-entered is the sum over all states, so this table also defines the ledger."""
+from sdrlinkd.wire import PARTS, Part, build_part, overhead
 
 
 class Parting(NamedTuple):
@@ -53,6 +24,7 @@ class Parting(NamedTuple):
     size: int
     number: int
     serial: int
+    wants_stamp: bool
 
 
 class Outgoing:
@@ -61,8 +33,8 @@ class Outgoing:
     __slots__ = (
         "_parting", "arrived_at", "body", "channel", "dst", "entry_id", "expires_at", "fate",
         "held_ids", "ids", "is_compressed", "is_expected", "is_whole", "k", "key", "lane",
-        "last_at", "next_index", "parity", "parts_left", "payload", "priority", "qos", "receipt",
-        "rests_id", "stamped", "tally", "topic_id", "total", "unconfirmed",
+        "last_at", "next_index", "overhead", "parity", "parts_left", "payload", "priority", "qos",
+        "receipt", "rests_id", "stamped", "tally", "topic_id", "total", "unconfirmed",
     )  # fmt: skip
 
     def __init__(
@@ -98,7 +70,8 @@ class Outgoing:
         self.dst = dst
         self.arrived_at = arrived_at
         self.expires_at = expires_at
-        self.stamped = not wants_stamp
+        # The age of a large message goes with its last part.
+        self.stamped = not wants_stamp or parting is not None
         self.tally = tally
         self.receipt = receipt
         self.key = key
@@ -135,6 +108,8 @@ class Outgoing:
             self.parts_left = -(-len(payload) // parting.size)
             self.channel = PARTS
             self._next_body()
+        self.overhead = overhead(self.channel)
+        """Octets of each fragment besides those of the body."""
 
     @property
     def src(self) -> int:
@@ -151,11 +126,6 @@ class Outgoing:
     def needs_id(self) -> bool:
         """Whether the next part of a message that has begun needs an entry id."""
         return bool(self.ids) and not self.total
-
-    @property
-    def awaits_stamp(self) -> bool:
-        """Whether the age may go with the present fragments: those of the last part."""
-        return not self.stamped and not self.parts_left and self.total > 0
 
     @property
     def next_size(self) -> int:
@@ -190,6 +160,8 @@ class Outgoing:
         """Note that the body becomes `total` fragments of `k` bytes, sent from `start` on."""
         self.entry_id, self.k, self.total, self.last_at = entry_id, k, total, start
         self.ids = (*self.ids, entry_id)
+        if self._parting is not None and not self.parts_left:
+            self.stamped = not self._parting.wants_stamp
         self.rests_id = total > 1 or self.channel == PARTS
 
     def go_on(self) -> bool:
@@ -265,6 +237,42 @@ class Lane:
     def head(self) -> Outgoing | None:
         """The message whose fragment is sent next."""
         return self.current or (self.waiting[0] if self.waiting else None)
+
+
+NONE_QUEUED: OrderedDict[Outgoing, None] = OrderedDict()
+
+
+@dataclass(slots=True)
+class QueuedOfTopic:
+    """One topic's messages of which no part has been sent yet, the oldest first."""
+
+    messages: OrderedDict[Outgoing, None] = field(default_factory=OrderedDict)
+    by_key: dict[str, OrderedDict[Outgoing, None]] = field(default_factory=dict)
+    n_bytes: int = 0
+
+    @property
+    def oldest(self) -> Outgoing:
+        """The oldest message."""
+        return next(iter(self.messages))
+
+    def of_key(self, key: str) -> OrderedDict[Outgoing, None]:
+        """Messages of one producer key; without a key, those without one."""
+        return self.by_key.get(key) or NONE_QUEUED
+
+    def add(self, message: Outgoing) -> None:
+        """Add the newest message."""
+        self.messages[message] = None
+        self.by_key.setdefault(message.key, OrderedDict())[message] = None
+        self.n_bytes += len(message.payload)
+
+    def remove(self, message: Outgoing) -> None:
+        """Remove a message."""
+        del self.messages[message]
+        of_key = self.by_key[message.key]
+        del of_key[message]
+        if not of_key:
+            del self.by_key[message.key]
+        self.n_bytes -= len(message.payload)
 
 
 class Level:

@@ -7,47 +7,14 @@ expiry are served round robin: a lane that gave an entry goes to the back.
 from bisect import bisect_left, insort
 from collections import OrderedDict
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from math import inf
 
 from sdrlinkd.link.params import QueueParams
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue.lives import Lives
-from sdrlinkd.link.queue.message import Lane, Level, Outgoing
+from sdrlinkd.link.queue.message import Lane, Level, Outgoing, QueuedOfTopic
 from sdrlinkd.link.queue.policy import TopicPolicy
 from sdrlinkd.wire import ENTRY_HEADER_SIZE
-
-NONE_QUEUED: OrderedDict[Outgoing, None] = OrderedDict()
-
-
-@dataclass(slots=True)
-class _Queued:
-    """One topic's messages of which no part has been sent yet, the oldest first."""
-
-    messages: OrderedDict[Outgoing, None] = field(default_factory=OrderedDict)
-    by_key: dict[str, OrderedDict[Outgoing, None]] = field(default_factory=dict)
-    n_bytes: int = 0
-
-    @property
-    def oldest(self) -> Outgoing:
-        return next(iter(self.messages))
-
-    def of_key(self, key: str) -> OrderedDict[Outgoing, None]:
-        """Messages of one producer key; without a key, those without one."""
-        return self.by_key.get(key) or NONE_QUEUED
-
-    def add(self, message: Outgoing) -> None:
-        self.messages[message] = None
-        self.by_key.setdefault(message.key, OrderedDict())[message] = None
-        self.n_bytes += len(message.payload)
-
-    def remove(self, message: Outgoing) -> None:
-        del self.messages[message]
-        of_key = self.by_key[message.key]
-        del of_key[message]
-        if not of_key:
-            del self.by_key[message.key]
-        self.n_bytes -= len(message.payload)
 
 
 def _order(lane: Lane) -> tuple[float, int]:
@@ -65,7 +32,7 @@ class Outbox:
         self._level_by_key: dict[tuple[int, int], Level] = {}
         self._by_class: dict[Qos, OrderedDict[Outgoing, None]] = {q: OrderedDict() for q in Qos}
         self._class_bytes = dict.fromkeys(Qos, 0)
-        self._by_topic: dict[int, _Queued] = {}
+        self._by_topic: dict[int, QueuedOfTopic] = {}
         self._turn = 0
         self.queued = 0
         self.queued_bytes = 0
@@ -227,7 +194,7 @@ class Outbox:
         self._by_class[message.qos][message] = None
         topic = self._by_topic.get(message.topic_id)
         if topic is None:
-            topic = self._by_topic[message.topic_id] = _Queued()
+            topic = self._by_topic[message.topic_id] = QueuedOfTopic()
         topic.add(message)
         self.queued += 1
         self._with_lifespan += message.expires_at < inf

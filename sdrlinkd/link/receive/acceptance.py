@@ -41,10 +41,10 @@ class Acceptance:
             return self._named.get(topic.name, DEFAULT_POLICY)
         return self._policies.get(topic.base, DEFAULT_POLICY)
 
-    def retain(self, topic: HeardTopic | None) -> Retain:
+    def retain(self, topic: HeardTopic) -> Retain:
         """How many messages of a topic are kept for consumers that come later."""
         policy = self.policy_of(topic)
-        if topic is not None and topic.about is not None:
+        if topic.about is not None:
             return Retain(max(topic.about.depth, policy.latched), policy.own_lifespan_s)
         # The registry has no numbers for producers: their messages are kept together.
         return Retain(RETAINED_KEYS * policy.latched, policy.own_lifespan_s)

@@ -4,10 +4,14 @@ from math import inf
 from typing import NamedTuple
 
 from sdrlinkd.link.receive.latency import Parts
+from sdrlinkd.link.topics import HeardTopic
 
 CDR_HEADER_SIZE = 4
 DELIVERED = "delivered"
 """Outcome of a delivered message, in place of a ledger's reason."""
+
+
+UNNAMED = HeardTopic(0, "", "")
 
 
 class Retain(NamedTuple):
@@ -30,7 +34,8 @@ class Delivered(NamedTuple):
     clock, and None if no STAMP came; the age at any time is that time minus `origin_at`.
     `began_at` is the preamble of the burst with the first fragment, `heard_at` that of the burst
     with the last one, and `ended_at` the last fragment's last sample. Messages of several producers
-    of a declared topic differ in `series`, the topic's number on the air.
+    of a declared topic differ in `series`, the topic's number on the air. `topic` has the name and
+    the type of the topic.
     """
 
     src: int
@@ -45,6 +50,7 @@ class Delivered(NamedTuple):
     began_at: float = 0.0
     ended_at: float = 0.0
     series: int = 0
+    topic: HeardTopic = UNNAMED
 
     def parts(self, now: float) -> Parts:
         """The parts of the message's age at `now`; without a STAMP the wait counts as 0."""

@@ -8,7 +8,7 @@ from sdrlinkd.link.packing import is_sound, missing_fragments
 from sdrlinkd.link.params import LinkParams, ReassemblyParams
 from sdrlinkd.link.receive.acceptance import Acceptance
 from sdrlinkd.link.receive.ages import Ages
-from sdrlinkd.link.receive.delivered import DELIVERED, Delivered
+from sdrlinkd.link.receive.completion import Completion
 from sdrlinkd.link.receive.events import (
     Ended,
     Event,
@@ -20,12 +20,11 @@ from sdrlinkd.link.receive.events import (
 from sdrlinkd.link.receive.neighbors import Neighbor, Neighbors
 from sdrlinkd.link.receive.relay import Relay
 from sdrlinkd.link.receive.rx_ledger import Held, RxLedger
-from sdrlinkd.link.receive.undeclared import UndeclaredMessages, Whole
+from sdrlinkd.link.receive.undeclared import Whole
 from sdrlinkd.link.topics import HeardTopics
 from sdrlinkd.wire import (
     BROADCAST,
     CONTROL_TOPIC_ID,
-    FIRST_NUMBER,
     PARTS,
     Beacon,
     ControlEntries,
@@ -81,7 +80,7 @@ class Inbox:
         self._has_control = registry.has_control
         self._has_numbers = topics.has_numbers
         self._topics = topics
-        self._undeclared = UndeclaredMessages()
+        self._completion = Completion(topics, acceptance, ledger, neighbors)
         limits = ReassemblyLimits(
             reassembly.timeout_s, reassembly.source_bytes, reassembly.total_bytes
         )
@@ -153,7 +152,7 @@ class Inbox:
                     events.append(RecordHeard(pdu.src, record, at))
             elif isinstance(record, TopicPiece):
                 if self._topics.take(pdu.src, record):
-                    self._release(pdu.src, record.number, now, events)
+                    self._completion.declared(pdu.src, record.number, now, events)
             elif not is_relayed and not isinstance(record, Parity | Stamp):
                 events.append(RecordHeard(pdu.src, record, at))
         repaired = self._repaired(pdu.src, records, at) if records else []
@@ -171,7 +170,7 @@ class Inbox:
     @property
     def held(self) -> Held:
         """Numbers of begun and of incomplete messages."""
-        reassembly, undeclared = self._reassembly, self._undeclared
+        reassembly, undeclared = self._reassembly, self._completion.undeclared
         return Held(
             reassembly.started,
             reassembly.held + len(undeclared),
@@ -186,8 +185,7 @@ class Inbox:
         events: list[Event] = []
         self._reassembly.expire(now)
         self._note_lost(now, events)
-        for message in self._undeclared.expire(now):
-            self._end(message, "rx_unknown_topic", now, events)
+        self._completion.expire(now, events)
         self._ages.expire(now, self._reassembly.holds)
         return events
 
@@ -261,66 +259,13 @@ class Inbox:
                 src, topic_id, payload, pdu.compressed, self._ages.take(src, *stamped), stamped, at,
                 ended_at, reassembly.began_at, pdu.hop, neighbor.snr_db,
             )  # fmt: skip
-            if topic_id >= FIRST_NUMBER and self._topics.topic(src, topic_id) is None:
-                for given_up in self._undeclared.hold(message, now):
-                    self._end(given_up, "rx_unknown_topic", now, events)
-            else:
-                self._take_message(message, neighbor, now, events)
+            self._completion.take(message, now, events)
         if reassembly.lost:
             self._note_lost(now, events)
-
-    def _take_message(
-        self, message: Whole, neighbor: Neighbor, now: float, events: list[Event]
-    ) -> None:
-        """Hand over a whole message, or drop it for a reason of the ledger."""
-        src, number = message.src, message.number
-        topic = self._topics.topic(src, number)
-        base = number if topic is None else topic.base
-        payload, reason = message.payload, None
-        if topic is None or self._topics.has_other_hash(topic):
-            reason = "rx_unknown_topic" if topic is None else "rx_other_type"
-        else:
-            payload, reason = self._acceptance.judge(
-                topic, payload, message.is_compressed, message.origin.at, now
-            )
-        if reason is not None:
-            self._end(message, reason, now, events)
-            return
-        self._answer(message, DELIVERED, now, events)
-        tally = self._ledger.tally(src, base)
-        tally.deliver(len(payload))
-        events.append(
-            Delivered(
-                src, base, payload, tally.delivered, neighbor.track.lost, message.origin.at,
-                message.heard_at, message.hops_left, message.snr_db, message.began_at,
-                message.ended_at, number,
-            )
-        )  # fmt: skip
-
-    def _release(self, src: int, number: int, now: float, events: list[Event]) -> None:
-        """Hand over the messages that waited for the declaration of a topic."""
-        neighbor = self._neighbors.get(src)
-        for message in self._undeclared.release(src, number):
-            if neighbor is not None:
-                self._take_message(message, neighbor, now, events)
-
-    def _end(self, message: Whole, reason: str, now: float, events: list[Event]) -> None:
-        """Drop a whole message."""
-        topic = self._topics.topic(message.src, message.number)
-        base = message.number if topic is None else topic.base
-        self._ledger.tally(message.src, base).drop(reason)
-        self._answer(message, reason, now, events)
-
-    def _answer(self, message: Whole, ended: str, now: float, events: list[Event]) -> None:
-        origin = message.origin
-        if origin.asks:
-            age_s = None if origin.at is None else now - origin.at
-            events.append(Ended(message.src, *message.stamped, ended, age_s, now))
 
     def _note_lost(self, now: float, events: list[Event]) -> None:
         for src, topic_id, stamped, reason in self._reassembly.take_lost():
             if topic_id != PARTS:
-                topic = self._topics.topic(src, topic_id)
-                self._ledger.tally(src, topic_id if topic is None else topic.base).drop(reason)
+                self._completion.drop(src, topic_id, reason)
             if self._ages.take(src, *stamped).asks:
                 events.append(Ended(src, *stamped, reason, None, now))

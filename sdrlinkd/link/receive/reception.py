@@ -74,11 +74,11 @@ class Reception:
 
     def deliver(self, message: Delivered, now: float) -> float | None:
         """Note that `message` is handed over at `now`; returns its age in s, None if unknown."""
-        return self._handover.deliver(message, self._policy_of(message), now)
+        return self._handover.deliver(message, self._acceptance.policy_of(message.topic), now)
 
     def retain(self, message: Delivered) -> Retain:
         """How many messages of this one's topic and source are kept for later consumers."""
-        return self._acceptance.retain(self._topics.topic(message.src, message.series))
+        return self._acceptance.retain(message.topic)
 
     def set_named(self, policies: Mapping[str, TopicPolicy]) -> None:
         """Treat messages of declared topics by the policy of their name from now on."""
@@ -140,9 +140,6 @@ class Reception:
     def counters(self) -> dict[Hashable, int]:
         """The counters for which rates are reported."""
         return {**self._ledger.counters(), **self.neighbors.counters()}
-
-    def _policy_of(self, message: Delivered) -> TopicPolicy:
-        return self._acceptance.policy_of(self._topics.topic(message.src, message.series))
 
     def audit(self) -> list[str]:
         """Discrepancies in the receive ledgers, as sentences; empty when they add up."""

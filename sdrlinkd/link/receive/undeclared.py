@@ -7,7 +7,8 @@ from sdrlinkd.link.receive.ages import Origin
 
 HOLD_S = 1.0
 """Time in s for which a message waits for its topic's declaration."""
-MOST_BYTES = 1 << 20
+MOST_BYTES = 12 << 20
+"""Most memory in octets, for at least one large message."""
 MOST_MESSAGES = 256
 OVERHEAD = 512
 

@@ -5,7 +5,16 @@ never sees a message.
 """
 
 from sdrlinkd.link.topics.heard import HeardTopic, HeardTopics
-from sdrlinkd.link.topics.own import Offer, OwnTopics
-from sdrlinkd.link.topics.telling import TopicTeller
+from sdrlinkd.link.topics.own import MOST_KEYS, N_NUMBERS, Offer, OwnTopics
+from sdrlinkd.link.topics.telling import TELLING_SHARE, TopicTeller
 
-__all__ = ["HeardTopic", "HeardTopics", "Offer", "OwnTopics", "TopicTeller"]
+__all__ = [
+    "MOST_KEYS",
+    "N_NUMBERS",
+    "TELLING_SHARE",
+    "HeardTopic",
+    "HeardTopics",
+    "Offer",
+    "OwnTopics",
+    "TopicTeller",
+]

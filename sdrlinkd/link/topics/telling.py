@@ -10,7 +10,7 @@ TIMES_S = (0.0, 0.2, 0.7, 1.5, 3.0, 6.0)
 """When a new declaration, or all of them for a new robot, is told, in s from then."""
 PERIOD_S = 10.0
 """Time in s after which each declaration is told again."""
-SHARE = 0.02
+TELLING_SHARE = 0.02
 """Largest share of airtime for declarations in PDUs of their own."""
 MOST_CREDIT_S = 0.2
 FIRST_CREDIT_S = 0.05
@@ -36,6 +36,11 @@ class TopicTeller:
         for number in self._due_at:
             self._plan(number, now)
 
+    @property
+    def has_news(self) -> bool:
+        """Whether a topic was declared that was never told."""
+        return len(self._said) != len(self._topics.told)
+
     def due(self, now: float) -> Iterator[TopicPiece]:
         """The records to be told at `now`."""
         for number, about in list(self._topics.told.items()):
@@ -56,7 +61,7 @@ class TopicTeller:
         """
         passed_s = 0.0 if self._looked_at is None else max(0.0, now - self._looked_at)
         self._looked_at = now
-        self._credit_s = min(MOST_CREDIT_S, self._credit_s + SHARE * passed_s)
+        self._credit_s = min(MOST_CREDIT_S, self._credit_s + TELLING_SHARE * passed_s)
         if self._credit_s < 0 or cost_s == inf:
             return False
         self._credit_s -= cost_s

@@ -90,6 +90,9 @@ class ControlRecords:
         schedule, if any.
         """
         cannot_wait = False
+        if self._teller.has_news:
+            # With the topic's first messages, if these leave room.
+            self._offer_topics(start)
         if start >= self._beacons.due_at:
             # The last beacon has found no room for a whole period.
             cannot_wait = self.is_due(start)
@@ -140,8 +143,7 @@ class ControlRecords:
 
         They use spare room or, within their share of the air, PDUs of `pdu_s` of their own.
         """
-        for piece in self._teller.due(now):
-            self._piggyback.put_topic(piece)
+        self._offer_topics(now)
         if self._piggyback.holds(RecordType.TOPIC) and self._teller.may_pay(now, pdu_s):
             self._piggyback.make_due(RecordType.TOPIC, self._room, now)
 
@@ -164,6 +166,10 @@ class ControlRecords:
     def _alone_from(self, at: float) -> float:
         """Earliest time from `at` on for a PDU that holds only records."""
         return max(at, self._told_alone_at + self.period_s) if self._n_others else at
+
+    def _offer_topics(self, now: float) -> None:
+        for piece in self._teller.due(now):
+            self._piggyback.put_topic(piece)
 
     def _offer_beacon(self, start: float, frame: Frame | None, rate: RateControl) -> None:
         records: list[Record] = self._beacons.take(start, self._neighbors, rate)

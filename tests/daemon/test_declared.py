@@ -1,0 +1,151 @@
+"""Topics that producers declare at real daemons, and messages too large for 255 fragments."""
+
+from random import Random
+
+import pytest
+
+from sdrlinkd.client import MessageRefusedError, Publisher, RefusedError, Subscriber
+from tests.backends.hubs import serving
+from tests.daemon.test_ether_daemon import AIR
+from tests.waiting import wait_for
+
+CDR = b"\0\1\0\0"
+NO_REGISTRY = 'registry = ""\n'
+HASH = "RIHS01_" + "ab" * 32
+
+
+def on_ether(hub, robot):
+    return (
+        f'{NO_REGISTRY}namespace = "robot_{robot}"\nbackend = "ether"\n'
+        f'[ether]\ndir = "{hub}"\n[modem]\nrate_hz = 1e6\n[access]\nnodes = [1, 2]\n'
+    )
+
+
+def declare(daemon, name, type_="std_msgs/msg/String", **more):
+    with daemon.control() as control:
+        return control.ask("declare", {"name": name, "type": type_, **more})
+
+
+def ask(daemon, verb, **arguments):
+    with daemon.control() as control:
+        return control.ask(verb, arguments)
+
+
+def test_a_topic_is_declared_and_used_without_a_registry(start_daemon):
+    daemon = start_daemon(NO_REGISTRY)
+    with Publisher(daemon.directory) as out:
+        with pytest.raises(MessageRefusedError, match="allowed: none"):
+            out.send("/robot_1/battery", CDR)
+        told = declare(daemon, "/robot_1/battery", hash=HASH, reliability="best_effort")
+        assert (told["name"], told["robot"], told["depth"]) == ("battery", 1, 1)
+        assert told["lifespan_s"] == 0.5
+        with Subscriber("/rx_robot_1/battery", directory=daemon.directory) as heard:
+            out.send("/robot_1/battery", CDR + b"full", type="std_msgs/msg/String")
+            message = heard.receive(20)
+        assert (message.payload, message.type) == (CDR + b"full", "std_msgs/msg/String")
+        with pytest.raises(MessageRefusedError, match="allowed: std_msgs/msg/String"):
+            out.send("/robot_1/battery", CDR, type="std_msgs/msg/Int8")
+    (sent,) = daemon.snapshot().link.topics
+    assert (sent.name, sent.subscribed, sent.sent) == ("/robot_1/battery", True, 1)
+    (heard,) = ask(daemon, "declared")
+    assert (heard["robot"], heard["name"], heard["topic"]) == (1, "battery", "/rx_robot_1/battery")
+    assert heard["hash"] == "ab" * 8
+    assert ask(daemon, "check")["problems"] == []
+
+
+@pytest.mark.parametrize(
+    ("qos", "depth", "lifespan_s", "words"),
+    [
+        ({"reliability": "best_effort"}, 1, 0.5, "depth 1, lifespan 500 ms"),
+        ({"reliability": "reliable"}, 10, 5.0, "depth 10, lifespan 5 s"),
+        ({}, 10, 5.0, "the producer's offer: reliable"),
+        ({"durability": "transient_local", "depth": 3}, 3, None, "last 3 messages kept"),
+    ],
+)
+def test_the_policy_follows_the_offer(start_daemon, qos, depth, lifespan_s, words):
+    daemon = start_daemon(NO_REGISTRY)
+    told = declare(daemon, "/robot_1/a", **qos)
+    assert (told["depth"], told["lifespan_s"]) == (depth, lifespan_s)
+    assert words in ask(daemon, "why", topic="/robot_1/a")["why"][0]
+
+
+def test_what_is_configured_or_set_wins(start_daemon):
+    daemon = start_daemon(f"{NO_REGISTRY}[topic.a]\nlifespan_s = 2.0\npriority = 9\n")
+    told = declare(daemon, "/robot_1/a")
+    assert (told["depth"], told["lifespan_s"]) == (10, 2.0)
+    ask(daemon, "set", topic="/robot_1/a", depth=4)
+    assert declare(daemon, "/robot_1/a")["depth"] == 4
+    why = ask(daemon, "why", topic="/robot_1/a")["why"][0]
+    assert "priority 9" in why
+    assert "set while running: depth" in why
+    ask(daemon, "reload")
+    assert declare(daemon, "/robot_1/a")["depth"] == 10
+
+
+def test_a_registrys_topic_can_be_offered_and_a_new_one_cannot(start_daemon):
+    daemon = start_daemon()
+    told = declare(daemon, "/robot_1/odom", "nav_msgs/msg/Odometry", reliability="best_effort")
+    assert (told["number"], told["depth"]) == (1, 1)
+    with pytest.raises(RefusedError, match="auto = true"):
+        declare(daemon, "/robot_1/battery")
+    with pytest.raises(RefusedError, match="it is declared as nav_msgs/msg/Odometry"):
+        declare(daemon, "/robot_1/odom")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ({"name": "/robot_1/a"}, "missing required field `type`"),
+        ({"name": "/no name", "type": "p/T"}, "name: got 'no name'"),
+        ({"name": "/a", "type": "p/srv/T"}, "type: got 'p/srv/T'"),
+        ({"name": "/a", "type": "p/T", "hash": "md5"}, "hash: got 'md5'"),
+        ({"name": "/a", "type": "p/T", "reliability": "maybe"}, "reliability"),
+        ({"name": "/a", "type": "p/T", "depth": 256}, "depth"),
+    ],
+)
+def test_bad_declarations_are_refused_in_words(start_daemon, arguments, says):
+    daemon = start_daemon(NO_REGISTRY)
+    with pytest.raises(RefusedError, match=says):
+        ask(daemon, "declare", **arguments)
+    assert daemon.snapshot().link.topics == []
+
+
+def test_a_large_message_arrives_equal(start_daemon):
+    """Two megabytes, in PDUs of the default size."""
+    daemon = start_daemon(NO_REGISTRY)
+    declare(daemon, "/robot_1/points", "sensor_msgs/msg/PointCloud2")
+    cloud = CDR + Random(2).randbytes(2_000_000)
+    with (
+        Subscriber("/rx_robot_1/points", directory=daemon.directory) as heard,
+        Publisher(daemon.directory) as out,
+    ):
+        out.send("/robot_1/points", cloud, receipt=True, dst=1)
+        assert heard.receive(60).payload == cloud
+        assert out.receipt(20).fate == "delivered"
+        with pytest.raises(MessageRefusedError, match=r"at most 8388608 B with bus\.max"):
+            out.send("/robot_1/points", bytes((8 << 20) + 1))
+    assert ask(daemon, "check")["problems"] == []
+
+
+def test_late_robots_and_late_consumers_get_what_each_producer_sent_last(
+    start_daemon, tmp_path_factory
+):
+    hub = tmp_path_factory.mktemp("hub")
+    with serving(hub, **AIR):
+        one = start_daemon(on_ether(hub, 1))
+        qos = {"durability": "transient_local", "depth": 1}
+        declare(one, "/tf_static", "tf2_msgs/msg/TFMessage", **qos)
+        with Publisher(one.directory) as out:
+            for number, key in enumerate(("lidar", "camera", "gps", "lidar")):
+                out.send("/tf_static", CDR + bytes([number]) + key.encode(), key=key)
+        two = start_daemon(on_ether(hub, 2))
+        # Once it has heard the other, the first robot sends the three again.
+        wait_for(lambda: one.snapshot().link.topics[0].reoffered == 3, 60)
+        wait_for(lambda: one.snapshot().link.tx.queued == one.snapshot().link.tx.in_flight == 0, 60)
+        wait_for(lambda: [each.delivered >= 3 for each in two.snapshot().link.received] == [True])
+        with Subscriber("/rx_robot_1/tf_static", directory=two.directory) as heard:
+            got = [heard.receive(20) for _ in range(3)]
+        assert [each.payload[5:] for each in got] == [b"camera", b"gps", b"lidar"]
+        assert all(each.is_late for each in got)
+        for daemon in (one, two):
+            assert ask(daemon, "check")["problems"] == []
