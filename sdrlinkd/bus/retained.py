@@ -81,7 +81,7 @@ class Retention:
             for message in series.messages
             if message.frame.startswith(prefix)
         ]
-        return iter(sorted(found, key=lambda message: message.header.tr))
+        return iter(sorted(found, key=lambda message: (message.header.tr, message.header.n)))
 
     def _count(self, series: _Series, n_bytes: int) -> None:
         series.n_bytes += n_bytes

@@ -17,8 +17,8 @@ class Arrivals:
     def __init__(self) -> None:
         self._first: list[Message] = []
         self._ready: deque[Message] = deque()
-        self._newest_ns: dict[str, int] = {}
-        """Time of reception of the newest message, by topic."""
+        self._newest: dict[str, tuple[int, int]] = {}
+        """Time of reception and number of the newest message, by topic: a burst has several."""
 
     def hold(self, frames: Sequence[bytes]) -> None:
         """Keep a message that arrived before the daemon confirmed the subscription."""
@@ -27,7 +27,7 @@ class Arrivals:
 
     def begin(self) -> None:
         """Note that the daemon has confirmed: all messages that it had kept have arrived."""
-        self._first.sort(key=lambda message: (message.received_ns, message.is_late))
+        self._first.sort(key=lambda message: (*_when(message), message.is_late))
         self._ready.extend(each for each in self._first if self._is_new(each))
         self._first.clear()
 
@@ -41,8 +41,12 @@ class Arrivals:
         return message if message is not None and self._is_new(message) else None
 
     def _is_new(self, message: Message) -> bool:
-        newest_ns = self._newest_ns.get(message.topic, 0)
-        if message.is_late and message.received_ns <= newest_ns:
+        newest = self._newest.get(message.topic, (0, 0))
+        if message.is_late and _when(message) <= newest:
             return False
-        self._newest_ns[message.topic] = max(newest_ns, message.received_ns)
+        self._newest[message.topic] = max(newest, _when(message))
         return True
+
+
+def _when(message: Message) -> tuple[int, int]:
+    return message.received_ns, message.number

@@ -140,7 +140,7 @@ def frames(number, late):
     fields = {
         "s": 1,
         "n": number,
-        "tr": 1000 + number,
+        "tr": 1000 + number // 2,
         "ty": "t",
         **({"late": True} if late else {}),
     }
