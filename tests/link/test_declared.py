@@ -31,6 +31,7 @@ from sdrlinkd.wire import (
 )
 from tests.laws import law
 from tests.link.world import compose, make_link, received, rx, topic_of, tx
+from tests.wire.vectors import BY_NAME, HI, TOPIC
 
 ODOM = Offer("odom", "nav_msgs/msg/Odometry")
 CDR = b"\0\1\0\0"
@@ -120,22 +121,23 @@ def test_whatever_is_lost_each_message_has_its_own_name(names, pdu_size, seed):
 
 
 def test_messages_wait_a_second_for_their_declaration():
+    """The PDU with the first message and the declaration is lost."""
     one, two = auto(1), auto(2)
     topic = one.declare(ODOM)
     pdus = []
-    for number in range(3):
+    for number in range(4):
         one.submit(topic.id, CDR + bytes([number]), 0.1 * number)
         burst = compose(one, 0.1 * number, 8)
         one.confirm(burst, Outcome.SENT, 0.1 * number)
         pdus += burst.pdus
-    assert [m for number, pdu in enumerate(pdus) for m in two.hear(pdu, 0.1 * number)] == []
+    assert [m for number in (1, 2, 3) for m in two.hear(pdus[number], 0.1 * number)] == []
     assert (rx(two).started, rx(two).held) == (3, 3)
     assert rx(two).held_bytes > 0
-    two.handle_timers(1.05)
+    two.handle_timers(1.15)
     assert (rx(two).held, rx(two).dropped["rx_unknown_topic"]) == (2, 1)
-    one.handle_timers(1.08)
-    told = compose(one, 1.08, 8).pdus
-    assert [m.payload[4] for pdu in told for m in two.hear(pdu, 1.08)] == [1, 2]
+    one.handle_timers(1.18)
+    told = compose(one, 1.18, 8).pdus
+    assert [m.payload[4] for pdu in told for m in two.hear(pdu, 1.18)] == [2, 3]
     assert (rx(two).held, rx(two).held_bytes, rx(two).delivered) == (0, 0, 2)
     assert two.audit() == []
 
@@ -192,6 +194,21 @@ def test_receivers_keep_as_many_as_the_source_says():
     burst = compose(one, 2.0, 8)
     (message,) = [m for pdu in burst.pdus for m in two.hear(pdu, 2.0)]
     assert two.retain(message).depth == 3
+
+
+def test_the_documents_vectors_are_heard_as_it_says():
+    two = auto(2)
+    topic = Entry(15, 0, 0, 1, TOPIC.payload)
+    two.hear(build(Pdu(0, False, 1, 255, 4, 1, [topic]), 1024), 0.0)
+    assert two.heard_topic(1, 42).about == Description(
+        "odom", "nav_msgs/msg/Odometry", bytes(range(8)), 5
+    )
+    small = auto(3, pdu_size=32)
+    for piece in pieces(42, Description("odom", "nav_msgs/msg/Odometry"), 14):
+        entry = Entry(15, 0, 0, 1, build_records([piece]))
+        small.hear(build(Pdu(0, False, 1, 255, piece.piece, 1, [entry]), 32), 0.0)
+    (message,) = small.hear(BY_NAME["numbered"].octets, 0.0)
+    assert (message.topic.name, message.payload) == ("odom", HI)
 
 
 def test_what_may_not_be_declared_is_refused_with_given_and_allowed():

@@ -16,6 +16,7 @@ from sdrlinkd.wire import (
     Receipt,
     RegistryDigest,
     Stamp,
+    TopicPiece,
     Waits,
     build,
     build_records,
@@ -49,6 +50,7 @@ RECORD_CLASSES = {
     "FRAME": Frame,
     "CLOCK": Clock,
     "WAITS": Waits,
+    "TOPIC": TopicPiece,
 }
 
 each_pdu = pytest.mark.parametrize("vector", PDUS, ids=lambda v: v.name)

@@ -244,6 +244,37 @@ _long_length = PduVector(
     ),  # k*(1) = 2047 - 13 = 2034 = 0x07F2
 )  # fmt: skip
 
+# Clause 4.4: the number 42, then the fragment.
+_numbered = PduVector(
+    "numbered",
+    32, DEFAULT, 1, EVERYONE, 5, 1,
+    (EntryFields(14, 0x2A, 0, 1, bytes([42]) + HI),),
+    with_crc(bytes([
+        0x00, 1, 0xFF, 5, 0x11,
+        0xE0,
+        0x2A, 0, 1, 0x00, 0x07, 42, 0x00, 0x01, 0x00, 0x00, 0x68, 0x69,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,  # 32 - 8 - 12 = 12
+    ])),
+)  # fmt: skip
+
+# Number 0: part 1 of 2 of large message 0x0102 of topic 42, "hi" its end; then its STAMP, where 14
+# stands for number 0: age 5 us.
+_part = PduVector(
+    "part",
+    48, DEFAULT, 1, EVERYONE, 6, 1,
+    (
+        EntryFields(14, 0x2B, 0, 1, bytes([0, 42, 1, 2, 1, 2]) + b"hi"),
+        EntryFields(15, 0x00, 0, 1, bytes([1, 6, 14, 0x2B, 0, 0, 0, 5])),
+    ),
+    with_crc(bytes([
+        0x00, 1, 0xFF, 6, 0x12,
+        0xEF,
+        0x2B, 0, 1, 0x00, 0x08, 0, 42, 1, 2, 1, 2, 0x68, 0x69,
+        0x00, 0, 1, 0x00, 0x08, 1, 6, 14, 0x2B, 0, 0, 0, 5,
+        0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,  # 48 - 8 - 26 = 14
+    ])),
+)  # fmt: skip
+
 # Table 4 of the paper.
 TABLE_4 = DigestVector(
     "table_4",
@@ -328,10 +359,25 @@ CLOCK = RecordsVector(
     + bytes([0x01, 0x2C, 9, 1, 2, 0xFF, 0xFF, 0xFF, 0x9C]),
     (("CLOCK", (0xBEEF, 0x0102, 0x0101, 4_294_967_297, 1 << 40, 300, ((9, 0x0102, -1000),))),),
 )
+# Topic 42 = 0x2A is odom, latched (flag 1) with depth 5, hash 00 01 ... 07; piece 0 of 1.
+# `sha256sum` of these octets begins with TOPIC_CHECK.
+DESCRIPTION = bytes([1, 5, *range(8)]) + b"odom\0nav_msgs/msg/Odometry"
+TOPIC_CHECK = 0x61
+TOPIC = RecordsVector(
+    "topic",
+    bytes([15, 3 + len(DESCRIPTION), 42, TOPIC_CHECK, 0x01]) + DESCRIPTION,
+    (("TOPIC", (42, TOPIC_CHECK, 0, 1, DESCRIPTION)),),
+)
+# The second of two pieces, from octet 14 on.
+TOPIC_PIECE = RecordsVector(
+    "topic_piece",
+    bytes([15, 3 + len(DESCRIPTION) - 14, 42, TOPIC_CHECK, 0x12]) + DESCRIPTION[14:],
+    (("TOPIC", (42, TOPIC_CHECK, 1, 2, DESCRIPTION[14:])),),
+)
 WAITS = RecordsVector("waits", bytes([9, 4, 3, 255, 0, 7]), (("WAITS", (3, 255, 0, 7)),))
 RECORDS = (
     STAMP, STAMP_OLD, BEACON_DIGEST, LINK_REPORT, RECEIPT, FRAME,
-    ASKING_STAMP, FULL_RECEIPT, CLOCK, WAITS,
+    ASKING_STAMP, FULL_RECEIPT, CLOCK, WAITS, TOPIC, TOPIC_PIECE,
 )  # fmt: skip
 
 _stamped = PduVector(
@@ -450,6 +496,8 @@ PDUS = (
     _three,
     _fifteen,
     _long_length,
+    _numbered,
+    _part,
     _stamped,
     _stamp_alone,
     _beacon,
@@ -462,6 +510,15 @@ BY_NAME = {vector.name: vector for vector in PDUS}
 
 # The text of clause 10.
 DOCUMENTED = {
+    "numbered": (
+        "00 01 ff 05 11 e0 2a 00 01 00 07 2a 00 01 00 00 "
+        "68 69 00 00 00 00 00 00 00 00 00 00 00 00 ca 11"
+    ),
+    "part": (
+        "00 01 ff 06 12 ef 2b 00 01 00 08 00 2a 01 02 01 "
+        "02 68 69 00 00 01 00 08 01 06 0e 2b 00 00 00 05 "
+        "00 00 00 00 00 00 00 00 00 00 00 00 00 00 16 9b"
+    ),
     "single": (
         "00 01 ff 00 11 10 2a 00 01 00 06 00 01 00 00 68 "
         "69 00 00 00 00 00 00 00 00 00 00 00 00 00 4c d0"
