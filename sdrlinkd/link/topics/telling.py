@@ -24,6 +24,8 @@ class TopicTeller:
 
     def __init__(self, topics: OwnTopics, room: int) -> None:
         self._topics = topics
+        self.told = topics.told
+        """What each declared number means."""
         self._room = room
         self._due_at: dict[int, list[float]] = {}
         """Times at which each number is to be told, the earliest first."""
@@ -35,11 +37,6 @@ class TopicTeller:
         """Tell all declarations again, as a robot was heard for the first time."""
         for number in self._due_at:
             self._plan(number, now)
-
-    @property
-    def has_news(self) -> bool:
-        """Whether a topic was declared that was never told."""
-        return len(self._said) != len(self._topics.told)
 
     def due(self, now: float) -> Iterator[TopicPiece]:
         """The records to be told at `now`."""
