@@ -1,5 +1,6 @@
 """`plan`: predicts whether the traffic fits the channel, and advises what to change."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,7 @@ from sdrlinkd.adapters import open_bag
 from sdrlinkd.cli.app import AsJson, app
 from sdrlinkd.config import Setup, load_config, make_setup
 from sdrlinkd.errors import UserError
+from sdrlinkd.link import TopicPolicy
 from sdrlinkd.plan import (
     HOST_S,
     LeftOut,
@@ -17,11 +19,14 @@ from sdrlinkd.plan import (
     Plan,
     loads_from_bag,
     make_plan,
+    names_in,
     parse_load,
     setting_of,
+    with_declared,
 )
 from sdrlinkd.tables import FittedTable, figure, screen_console, words
 from sdrlinkd.units import seconds
+from sdrlinkd.wire import Registry
 
 COLUMNS = (
     words("topic"), words("class", 4, 7), figure("Hz"), figure("bytes", 2), figure("PDUs", 1),
@@ -54,16 +59,21 @@ def plan(
     """Plan airtime and worst-case latency by topic; exit code 1 when the traffic does not fit."""
     setup = make_setup(load_config(config), config.parent, str(config))
     turnaround_s = None if turnaround is None else seconds(turnaround, "--turnaround")
-    setting = setting_of(setup.config, setup.node_id, robots, turnaround_s, seconds(host, "--host"))
-    loads = [parse_load(text, setup.registry) for text in topic or []]
+    host_s, has_numbers = seconds(host, "--host"), setup.has_numbers
+    setting = setting_of(setup.config, setup.node_id, robots, turnaround_s, host_s, has_numbers)
+    registry, policies = setup.registry, setup.policies
+    if has_numbers:
+        names = [*names_in(topic or []), *(_bare_names(bag, setup) if bag is not None else [])]
+        registry, policies = with_declared(registry, setup.named_policies, names)
+    loads = [parse_load(text, registry) for text in topic or []]
     left_out: list[LeftOut] = []
     if bag is not None:
         told = {load.topic_id for load in loads}
-        found, left_out = _from_bag(bag, setup)
+        found, left_out = _from_bag(bag, registry, policies, setup.config.topics)
         loads += [load for load in found if load.topic_id not in told]
     if not loads:
         raise UserError(_nothing(left_out))
-    made = make_plan(sorted(loads), setup.policies, setting, left_out)
+    made = make_plan(sorted(loads), policies, setting, left_out)
     if as_json:
         topics = [{**each._asdict(), "is_late": each.is_late} for each in made.topics]
         classes = [each._asdict() for each in made.classes]
@@ -107,10 +117,21 @@ def _nothing(left_out: list[LeftOut]) -> str:
     return f"--bag: no topic in it can be planned: {names}; give topics with --topic NAME:RATE:SIZE"
 
 
-def _from_bag(path: Path, setup: Setup) -> tuple[list[Load], list[LeftOut]]:
+def _bare_names(path: Path, setup: Setup) -> list[str]:
+    """Names on the air of a recording's topics."""
+    opened = open_bag(path)
+    try:
+        return [setup.name_on_air(each.name) for each in opened.topics()]
+    finally:
+        opened.close()
+
+
+def _from_bag(
+    path: Path, registry: Registry, policies: Mapping[int, TopicPolicy], taken: list[str]
+) -> tuple[list[Load], list[LeftOut]]:
     opened = open_bag(path)
     try:
         messages = ((each.topic, 1e-9 * each.time_ns, each.cdr) for each in opened.messages())
-        return loads_from_bag(messages, setup.registry, setup.policies, setup.config.topics)
+        return loads_from_bag(messages, registry, policies, taken)
     finally:
         opened.close()

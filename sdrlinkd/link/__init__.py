@@ -9,7 +9,7 @@ from sdrlinkd.link.access import (
     settle,
 )
 from sdrlinkd.link.link import Link
-from sdrlinkd.link.packing import flush_told
+from sdrlinkd.link.packing import flush_told, parity_pdus
 from sdrlinkd.link.params import LinkParams, QueueParams, ReassemblyParams
 from sdrlinkd.link.qos import (
     AS_CONFIGURED,
@@ -122,6 +122,7 @@ __all__ = [
     "flush_told",
     "lifespan_of",
     "may_share",
+    "parity_pdus",
     "percent",
     "settle",
     "train_dictionary",

@@ -3,7 +3,14 @@
 from sdrlinkd.plan.air import Setting
 from sdrlinkd.plan.model import ClassPlan, Plan, TopicPlan, make_plan
 from sdrlinkd.plan.setting import HOST_S, setting_of
-from sdrlinkd.plan.traffic import LeftOut, Load, loads_from_bag, parse_load
+from sdrlinkd.plan.traffic import (
+    LeftOut,
+    Load,
+    loads_from_bag,
+    names_in,
+    parse_load,
+    with_declared,
+)
 
 __all__ = [
     "HOST_S",
@@ -15,6 +22,8 @@ __all__ = [
     "TopicPlan",
     "loads_from_bag",
     "make_plan",
+    "names_in",
     "parse_load",
     "setting_of",
+    "with_declared",
 ]

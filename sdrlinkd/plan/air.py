@@ -22,6 +22,8 @@ class Setting(NamedTuple):
     settled: Settled
     traits: PduLinkTraits
     host_s: float
+    has_numbers: bool = False
+    """Whether messages that are too large for 255 fragments go in parts (the key `auto`)."""
     notes: tuple[str, ...] = ()
     """What a person should know about the assumptions of the plan, in sentences."""
 

@@ -10,13 +10,26 @@ from sdrlinkd.link import (
     Qos,
     TopicPolicy,
     lifespan_of,
+    parity_pdus,
 )
 from sdrlinkd.plan.advice import slower
 from sdrlinkd.plan.air import Setting
 from sdrlinkd.plan.response import FOREVER, Task, worst_s
 from sdrlinkd.plan.supply import Supply, supply_of
 from sdrlinkd.plan.traffic import LeftOut, Load, after_policy
-from sdrlinkd.wire import ENTRY_HEADER_SIZE, STAMP_SIZE, equal_payload, fragment_count
+from sdrlinkd.wire import (
+    ASKING_STAMP_SIZE,
+    ENTRY_HEADER_SIZE,
+    MAX_FRAGMENTS,
+    PART_HEADER_SIZE,
+    PART_PARITY,
+    PARTS,
+    STAMP_SIZE,
+    equal_payload,
+    fragment_count,
+    overhead,
+    part_size,
+)
 
 FULL = 0.95
 """Largest share of airtime that a plan may use."""
@@ -117,7 +130,7 @@ def _is_carried(topics: Sequence[TopicPlan], asked: Sequence[float]) -> bool:
 
 def _backlog_s(known: Sequence[tuple[Load, TopicPolicy]], setting: Setting) -> float:
     """Airtime in s of one message of each topic, in one burst."""
-    pdus = sum(_pdus(load.largest, setting.pdu_size, policy.stamp) for load, policy in known)
+    pdus = sum(_pdus(load, load.largest, policy, setting) for load, policy in known)
     return setting.one_s + (pdus - 1) * setting.each_s
 
 
@@ -135,21 +148,29 @@ def _task(
         busy_s = one_s + gap_s
         most = max(1, min(most, round((1 / beats - busy_s) / each_s)))
     overhead_s = one_s - each_s + gap_s + supply.pause_s[qos]
-    pdus = _pdus(load.size, setting.pdu_size, policy.stamp)
-    at_most = _pdus(load.largest, setting.pdu_size, policy.stamp)
+    pdus = _pdus(load, load.size, policy, setting)
+    at_most = _pdus(load, load.largest, policy, setting)
     cost_s, most_s = (n * each_s + math.ceil(n / most) * overhead_s for n in (pdus, at_most))
     rank = (qos, -policy.priority)
     bursts = math.ceil(at_most / most)
     return Task(load, policy, qos, rank, 1 / load.rate_hz, pdus, cost_s, most_s, bursts)
 
 
-def _pdus(size: float, pdu_size: int, stamp: bool) -> int:
+def _pdus(load: Load, size: float, policy: TopicPolicy, setting: Setting) -> int:
     """Number of PDUs of a message that does not share them."""
-    k = equal_payload(pdu_size, 1)
+    share = setting.classes.of(QOS_BY_LABEL[policy.qos]).parity
+    room = equal_payload(setting.pdu_size, 1)
+    k = room - overhead(load.topic_id)
     whole = max(1, math.ceil(size))
+    if setting.has_numbers and whole > MAX_FRAGMENTS * k:
+        k, share = room - overhead(PARTS), max(share, PART_PARITY)
+        n_parts = math.ceil(whole / part_size(setting.pdu_size, share))
+        total = fragment_count(math.ceil(whole / n_parts) + PART_HEADER_SIZE, k)
+        return n_parts * (total + parity_pdus(k, total, share, room - ASKING_STAMP_SIZE)) + 1
     n = fragment_count(whole, k)
     rest = whole - (n - 1) * k
-    return n + (stamp and rest + STAMP_SIZE + ENTRY_HEADER_SIZE > k)
+    parity = parity_pdus(k, n, share, room - ASKING_STAMP_SIZE)
+    return n + (policy.stamp and rest + STAMP_SIZE + ENTRY_HEADER_SIZE > k) + parity
 
 
 def _late(topics: Sequence[TopicPlan]) -> list[str]:

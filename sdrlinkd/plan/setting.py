@@ -24,10 +24,12 @@ def setting_of(
     robots: int | None = None,
     turnaround_s: float | None = None,
     host_s: float = HOST_S,
+    has_numbers: bool = False,
 ) -> Setting:
     """The setting for `robots` robots (default: as access.nodes lists), which all send the same.
 
-    `turnaround_s` replaces the radio's configured turnaround. Raises UserError, ConfigError.
+    `has_numbers` as in Setting. `turnaround_s` replaces the radio's configured turnaround. Raises
+    UserError, ConfigError.
     """
     radio = presume_radio(config, turnaround_s)
     access = config.access
@@ -51,7 +53,7 @@ def setting_of(
     longest_s = radio.traits.longest_burst_s[modem.mcs]
     return Setting(
         radio.airtimes, config.link.pdu_size, modem.mcs, longest_s, config.classes, n, settled,
-        radio.traits, host_s, tuple(notes),
+        radio.traits, host_s, has_numbers, tuple(notes),
     )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from sdrlinkd.errors import UserError
 from sdrlinkd.link import DEFAULT_POLICY, Deflated, TopicPolicy
 from sdrlinkd.units import octets
-from sdrlinkd.wire import Registry
+from sdrlinkd.wire import FIRST_NUMBER, Registry, Topic, is_topic_name
 
 _LOAD = re.compile(r"/?([\w/]+):([0-9.]+)(?:hz)?:([0-9.]+[a-z]*)", re.IGNORECASE)
 SAMPLES = 50
@@ -32,6 +32,28 @@ class LeftOut(NamedTuple):
     name: str
     messages: int
     why: str
+
+
+def with_declared(
+    registry: Registry, policies: Mapping[str, TopicPolicy], names: Iterable[str]
+) -> tuple[Registry, dict[int, TopicPolicy]]:
+    """The registry, followed by the topics `names`, and the policies by topic id.
+
+    For robots whose producers may declare topics; `policies` are by topic name.
+    """
+    known = {topic.name for topic in registry.topics}
+    more = [name for each in names if is_topic_name(name := each.removeprefix("/"))]
+    declared = [
+        Topic(FIRST_NUMBER + i, name, "")
+        for i, name in enumerate(dict.fromkeys(each for each in more if each not in known))
+    ]
+    both = Registry([*registry.topics, *declared])
+    return both, {each.id: policies[each.name] for each in both.topics if each.name in policies}
+
+
+def names_in(texts: Iterable[str]) -> list[str]:
+    """The names in loads written as `scan:50:1KB`."""
+    return [found[1] for text in texts if (found := _LOAD.fullmatch(text.replace(" ", "")))]
 
 
 def parse_load(text: str, registry: Registry) -> Load:
@@ -78,13 +100,14 @@ def loads_from_bag(
             size = len(Deflated(None).shrink(payload) or payload)
         sizes[topic.id].append(size)
     loads = []
+    names = {topic.id: topic.name for topic in registry.topics}
     for topic_id, came in sorted(times.items()):
         span = max(came) - min(came)
         shrunk = policies.get(topic_id, DEFAULT_POLICY).compress == "zstd"
         known = sizes[topic_id][:SAMPLES] if shrunk else sizes[topic_id]
         rate = (len(came) - 1) / span if span > 0 else 1.0
         mean = math.fsum(known) / len(known)
-        loads.append(Load(topic_id, registry.topics[topic_id].name, rate, mean, max(known)))
+        loads.append(Load(topic_id, names[topic_id], rate, mean, max(known)))
     left_out = [LeftOut(name, count, why) for (name, why), count in sorted(others.items())]
     return loads, left_out
 

@@ -44,18 +44,19 @@ LOADS = {
 
 
 def set_up(policy, robots, n_topics=1, qos=(), arrivals=None, listen=lambda *_: None, seed=1, *,
-           rate_hz=5e6, block_s=1e-3, turnaround_s=1e-4, fit=lambda traits: traits):  # fmt: skip
+           rate_hz=5e6, block_s=1e-3, turnaround_s=1e-4, fit=lambda traits: traits, snr_db=25,
+           has_numbers=False):  # fmt: skip
     """Simulation and setting of `robots` that send; a single sender gets a listener."""
     rng, nodes = Random(seed), range(1, max(2, robots) + 1)
     modem, air = (
         ModemParams(rate_hz=rate_hz),
-        AirParams(rate_hz=rate_hz, block_s=block_s, snr_db=25),
+        AirParams(rate_hz=rate_hz, block_s=block_s, snr_db=snr_db),
     )
     airtimes = Airtimes(modem, PDU_SIZE)
     registry = make_registry([(f"t{i}", "std_msgs/msg/ByteMultiArray") for i in range(n_topics)])
     links = {
         node: Link(LinkParams(pdu_size=PDU_SIZE), QueueParams(), ReassemblyParams(), registry,
-                   node, Random(100 * seed + node))
+                   node, Random(100 * seed + node), has_numbers=has_numbers)
         for node in nodes
     }  # fmt: skip
     for link in links.values():
@@ -73,7 +74,7 @@ def set_up(policy, robots, n_topics=1, qos=(), arrivals=None, listen=lambda *_: 
     one, sharing = sim.stations[1], robots if policy == "none" else len(nodes)
     return sim, Setting(
         airtimes, PDU_SIZE, modem.mcs, one.traits.longest_burst_s[modem.mcs], ClassesParams(),
-        sharing, one.settled, one.traits, host_s=0.0,
+        sharing, one.settled, one.traits, host_s=0.0, has_numbers=has_numbers,
     )  # fmt: skip
 
 
@@ -153,3 +154,16 @@ def test_what_fills_the_air_comes_not_much_sooner_than_the_plan_says(policy, rob
     assert plan.air > 0.75
     bulk, p99_s = plan.topics[1], np.quantile(ages[1], 0.99)
     assert bulk.worst_s / 3 < p99_s <= bulk.worst_s
+
+
+def test_a_two_megabyte_point_cloud_beside_a_scan():
+    """At 20 dB, one cloud in 12 s; all arrive, and neither topic later than the plan says."""
+    loads = [("latency", 50, 1024), ("bulk", 1 / 12, 2_000_000)]
+    plan, ages = trial("none", 1, loads, 21, seconds=36.0, snr_db=20, has_numbers=True)
+    scan, cloud = plan.topics
+    assert plan.is_feasible
+    assert cloud.pdus > 2200, "with parity"
+    assert len(ages[0]) == pytest.approx(50 * 36, abs=2)
+    assert len(ages[1]) >= 2
+    assert max(ages[0]) <= scan.worst_s
+    assert max(ages[1]) <= cloud.worst_s

@@ -35,13 +35,11 @@ def parity_records(
     n_parity = min(math.ceil(share * total), MOST - total)
     if total < LEAST_FRAGMENTS or n_parity < 1:
         return []
+    length = _piece(room)
     fragments = [payload[i * k : (i + 1) * k] for i in range(total)]
     fragments[-1] = fragments[-1].ljust(k, b"\0")
     numbers = list(range(total, total + n_parity))
     made = zfec.Encoder(total, total + n_parity).encode(fragments, numbers)
-    # Choose a length at which whole records fill a PDU.
-    longest = TLV_HEADER_SIZE + MAX_VALUE_SIZE
-    length = room // -(-room // longest) - PARITY_OVERHEAD
     return [
         build_records(
             [Parity(*ids, total, n_parity, i, at, k, len(payload), each[at : at + length])]
@@ -49,6 +47,22 @@ def parity_records(
         for at in range(0, k, length)
         for i, each in enumerate(made)
     ]
+
+
+def parity_pdus(k: int, total: int, share: float, room: int) -> int:
+    """How many PDUs the parity of a message takes; arguments as for `parity_records`."""
+    n_parity = min(math.ceil(share * total), MOST - total)
+    if total < LEAST_FRAGMENTS or n_parity < 1:
+        return 0
+    length = _piece(room)
+    records = n_parity * -(-k // length)
+    return -(-records // (room // (PARITY_OVERHEAD + length)))
+
+
+def _piece(room: int) -> int:
+    """Octets of parity in a record, so that whole records fill a PDU."""
+    longest = TLV_HEADER_SIZE + MAX_VALUE_SIZE
+    return room // -(-room // longest) - PARITY_OVERHEAD
 
 
 def is_sound(parity: Parity) -> bool:
