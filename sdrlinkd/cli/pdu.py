@@ -15,8 +15,10 @@ from sdrlinkd.errors import PduError, UserError
 from sdrlinkd.wire import (
     BROADCAST,
     CONTROL_TOPIC_ID,
+    DECLARED_TOPIC_ID,
     MAX_PDU_SIZE,
     MIN_PDU_SIZE,
+    Entry,
     Pdu,
     Registry,
     pad_length,
@@ -107,7 +109,7 @@ def one_line(data: bytes, registry: Registry | None) -> str:
     except PduError as error:
         return f"{len(data)} B refused as {error}"
     entries = " ".join(
-        f"{_topic(entry.topic_id, registry)}#{entry.entry_id} {entry.index + 1}/{entry.total} "
+        f"{_topic(entry, registry)}#{entry.entry_id} {entry.index + 1}/{entry.total} "
         f"({len(entry.payload)} B)"
         for entry in pdu.entries
     )
@@ -134,7 +136,7 @@ def explain(data: bytes, registry: Registry | None) -> str:
     end = 5 + (n + 1) // 2
     lines.append(
         f"topics  {data[5:end].hex(' ')}   "
-        + ", ".join(_topic(entry.topic_id, registry) for entry in pdu.entries)
+        + ", ".join(_topic(entry, registry) for entry in pdu.entries)
     )
     for i, entry in enumerate(pdu.entries):
         lines.append(
@@ -157,11 +159,15 @@ def _records(payload: bytes) -> list[str]:
         return ["         (not valid control records; skipped as rx_control_bad)"]
 
 
-def _topic(topic_id: int, registry: Registry | None) -> str:
-    topic = registry.by_id(topic_id) if registry else None
+def _topic(entry: Entry, registry: Registry | None) -> str:
+    topic = registry.by_id(entry.topic_id) if registry else None
     if topic is not None:
         return topic.name
-    return "control" if topic_id == CONTROL_TOPIC_ID else f"topic {topic_id}"
+    if entry.topic_id == DECLARED_TOPIC_ID and entry.payload:
+        # Or an ordinary topic, where the robots do not use numbers.
+        number = entry.payload[0]
+        return f"number {number}" if number else "part of a large message"
+    return "control" if entry.topic_id == CONTROL_TOPIC_ID else f"topic {entry.topic_id}"
 
 
 def _dst(pdu: Pdu) -> str:

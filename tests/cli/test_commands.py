@@ -15,7 +15,7 @@ from sdrlinkd.reports import Snapshot
 from tests.adapters.recordings import ros2_bag
 from tests.programs import sdrlinkctl
 from tests.waiting import wait_for
-from tests.wire.vectors import DOCUMENTED
+from tests.wire.vectors import BY_NAME, DOCUMENTED
 
 ODOM = "/robot_1/odom"
 
@@ -281,6 +281,13 @@ def test_a_truncated_bag_is_played_as_far_as_it_goes(start_daemon, ctl, recorded
     assert "played" in out
     assert "damaged" in err
     wait_for(lambda: 0 < daemon.snapshot().link.tx.sent < 200)
+
+
+def test_pdu_decode_shows_numbers(ctl):
+    for name, shown in (("numbered", "number 42"), ("part", "part of a large message, control")):
+        code, out, _ = ctl("pdu", "decode", BY_NAME[name].octets.hex())
+        assert code == 0
+        assert shown in out
 
 
 def test_pdu_decode_shows_the_layout(ctl, tmp_path):
