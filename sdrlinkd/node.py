@@ -138,14 +138,16 @@ class Node:
         for data, at, snr_db, ended_at in pdus:
             if self.bus.is_tapped:
                 self.bus.tap("rx", data)
-            for message in link.hear(data, at, snr_db, now, ended_at):
+            messages = link.hear(data, at, snr_db, now, ended_at)
+            # First, as the PDU may bring both a new meaning of a number and messages of it.
+            for src, number in link.take_changed_topics():
+                self.bus.forget_topic(src, number)
+            for message in messages:
                 times, age_s = UNKNOWN, link.delivered(message, now)
                 if age_s is not None:
                     times = local_times(link, message, age_s, now, now_ns, self._headers)
                 received_ns = now_ns - round((now - message.heard_at) * 1e9)
                 self.bus.publish(message, age_s, received_ns, times, link.retain(message))
-            for src, number in link.take_changed_topics():
-                self.bus.forget_topic(src, number)
         self._tell_verdicts()
         if link.relays:
             self._pdu_link.wake()

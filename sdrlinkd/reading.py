@@ -42,10 +42,6 @@ class SocketReader(Generic[Received]):
     def _readable(self) -> bool:
         return bool(int(self._socket.getsockopt(zmq.EVENTS)) & zmq.POLLIN)
 
-    def drain(self) -> None:
-        """Read now what there is to read, up to the limit of a turn."""
-        self._drain()
-
     def close(self) -> None:
         """Stop reading; the socket stays open."""
         self._loop.remove_reader(self._descriptor)

@@ -18,6 +18,7 @@ from sdrlinkd.client import (
     ACK_PREFIX,
     IN_PUB_SOCKET,
     IN_SOCKET,
+    LATE_PREFIX,
     OUT_SOCKET,
     RECEIPT_PREFIX,
     SYNC_PREFIX,
@@ -48,7 +49,6 @@ QUIET_S = 0.01
 QUIET_ROUNDS = 3
 LAST_MESSAGES_S = 0.3
 PDU_TAP = b"\0pdu\0"
-LATE_LANE = b"late"
 
 
 class Bus:
@@ -82,8 +82,6 @@ class Bus:
         out_options: dict[int, int | bytes] = {
             zmq.SNDHWM: setup.config.rx_depth,
             zmq.XPUB_WELCOME_MSG: b"\0" + self._welcome,
-            # Report every subscription, not just the first of a topic: its consumer may be late.
-            zmq.XPUB_VERBOSE: 1,
         }
         self._out = self._bind(zmq.XPUB, OUT_SOCKET, out_options)
         self._ingress_readers = [
@@ -133,9 +131,7 @@ class Bus:
             header.da = round(1e6 * air_s)
         self._published += 1
         if retain.depth:
-            # Consumers that subscribed before now get the older messages before this one.
-            self._out_reader.drain()
-            kept = Retained(frame, header, message.payload, retain.lifespan_s)
+            kept = Retained(frame, header, message.payload, retain.lifespan_s, time.monotonic())
             self._retention.keep((message.src, message.series), kept, retain.depth)
         self._out.send_multipart(envelope.encode(frame, header, message.payload))
         self._out_reader.recheck()
@@ -147,6 +143,7 @@ class Bus:
 
     def publish_stop(self, src: int, topic: HeardTopic, payload: bytes) -> None:
         """Hand a topic's stop message to its consumers, as the topic has fallen silent."""
+        self._retention.forget((src, topic.base))
         header = envelope.OutHeader(s=src, n=0, tr=time.time_ns(), ty=topic.type, stop=True)
         self._out.send_multipart(envelope.encode(self._frame_out(src, topic), header, payload))
         self._out_reader.recheck()
@@ -260,17 +257,18 @@ class Bus:
             self._acknowledge(topic)
         elif subscribed and topic.startswith(b"/"):
             self.has_consumer.set()
-            self._publish_again(topic)
+        elif subscribed and topic.startswith(LATE_PREFIX):
+            self._give_kept(topic)
 
-    def _publish_again(self, prefix: bytes) -> None:
-        """Publish the kept messages under `prefix` for a consumer that has just subscribed."""
-        now_ns = time.time_ns()
+    def _give_kept(self, request: bytes) -> None:
+        """Give a consumer the kept messages that it requests, on its own topic `request`."""
+        _, _, prefix = request.removeprefix(LATE_PREFIX).partition(b"\0")
+        now = time.monotonic()
         for kept in self._retention.matching(prefix):
-            if (header := kept.late(now_ns)) is not None:
-                frames = envelope.encode(kept.frame, header, kept.payload)
-                self._undropped.send(LATE_LANE, frames)
+            if (header := kept.late(now)) is not None:
+                frames = [request, *envelope.encode(kept.frame, header, kept.payload)]
+                self._undropped.send(request, frames)
+        self._undropped.send(request, [request])
 
     def _acknowledge(self, topic: bytes) -> None:
-        # A consumer takes the answer to mean that it has all kept messages.
-        lane = LATE_LANE if self._undropped.is_waiting(LATE_LANE) else topic
-        self._undropped.send(lane, [topic, self._welcome])
+        self._undropped.send(topic, [topic, self._welcome])

@@ -11,24 +11,27 @@ import msgspec
 from sdrlinkd.bus.envelope import OutHeader
 
 MOST_BYTES = 64 << 20
-"""Most payload bytes kept; beyond that, the series that was silent for longest loses its oldest."""
+"""Most bytes kept; beyond that, the series that was silent for longest loses its oldest message."""
+OVERHEAD = 512
+"""Bytes counted for a message besides its payload."""
 
 
 class Retained(NamedTuple):
-    """A message from the air as it was published, with its topic frame.
+    """A message from the air as it was published at `at`, with its topic frame.
 
-    It is too old to be given to anybody once its age exceeds `lifespan_s`.
+    `at` is in s on a clock that is never set. The message is too old to be given to anybody once
+    its age exceeds `lifespan_s`.
     """
 
     frame: bytes
     header: OutHeader
     payload: bytes
     lifespan_s: float = inf
+    at: float = 0.0
 
-    def late(self, now_ns: int) -> OutHeader | None:
-        """The header for consumers that subscribe at `now_ns`; None: the message is too old."""
-        later_us = max(0, now_ns - self.header.tr) // 1000
-        age_us = (self.header.age or 0) + later_us
+    def late(self, now: float) -> OutHeader | None:
+        """The header for consumers that subscribe at `now`; None: the message is too old."""
+        age_us = (self.header.age or 0) + round(1e6 * (now - self.at))
         if age_us > 1e6 * self.lifespan_s:
             return None
         told = age_us if self.header.age is not None else None
@@ -37,29 +40,32 @@ class Retained(NamedTuple):
 
 @dataclass(slots=True)
 class _Series:
-    messages: deque[Retained] = field(default_factory=deque)
+    messages: deque[tuple[int, Retained]] = field(default_factory=deque)
     n_bytes: int = 0
 
 
 class Retention:
-    """The last messages of each series, which is one topic of one source."""
+    """The last messages of each series, which is one topic and producer of one source."""
 
     def __init__(self, most_bytes: int = MOST_BYTES) -> None:
         self._most_bytes = most_bytes
         self._series: OrderedDict[tuple[int, int], _Series] = OrderedDict()
-        self._n_bytes = 0
+        self._n_bytes = self._count = 0
 
     def keep(self, key: tuple[int, int], message: Retained, depth: int) -> None:
         """Keep the newest message of series `key`, and of that series the last `depth`."""
         series = self._series.setdefault(key, _Series())
         self._series.move_to_end(key)
-        series.messages.append(message)
-        self._count(series, len(message.payload))
+        self._count += 1
+        series.messages.append((self._count, message))
+        self._note_size(series, message, 1)
         while len(series.messages) > depth:
-            self._count(series, -len(series.messages.popleft().payload))
+            self._drop_oldest(series)
         while self._n_bytes > self._most_bytes:
             silent, oldest = next(iter(self._series.items()))
-            self._count(oldest, -len(oldest.messages.popleft().payload))
+            if oldest is series and len(series.messages) == 1:
+                return
+            self._drop_oldest(oldest)
             if not oldest.messages:
                 self.forget(silent)
 
@@ -76,13 +82,18 @@ class Retention:
     def matching(self, prefix: bytes) -> Iterator[Retained]:
         """The kept messages whose topic frames begin with `prefix`, in order of reception."""
         found = [
-            message
+            numbered
             for series in self._series.values()
-            for message in series.messages
-            if message.frame.startswith(prefix)
+            for numbered in series.messages
+            if numbered[1].frame.startswith(prefix)
         ]
-        return iter(sorted(found, key=lambda message: (message.header.tr, message.header.n)))
+        return (message for _, message in sorted(found, key=lambda numbered: numbered[0]))
 
-    def _count(self, series: _Series, n_bytes: int) -> None:
+    def _drop_oldest(self, series: _Series) -> None:
+        _, message = series.messages.popleft()
+        self._note_size(series, message, -1)
+
+    def _note_size(self, series: _Series, message: Retained, sign: int) -> None:
+        n_bytes = sign * (len(message.payload) + OVERHEAD)
         series.n_bytes += n_bytes
         self._n_bytes += n_bytes

@@ -44,10 +44,6 @@ class Undropped:
         """Lanes with a full subscriber's queue, by lane name."""
         self._retry: asyncio.TimerHandle | None = None
 
-    def is_waiting(self, name: bytes) -> bool:
-        """Whether frames wait in lane `name`."""
-        return name in self._lanes
-
     def send(self, name: bytes, frames: Frames) -> None:
         """Send `frames` in lane `name`, now or as soon as there is room."""
         lane = self._lanes.get(name)

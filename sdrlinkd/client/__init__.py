@@ -38,6 +38,7 @@ from sdrlinkd.client.flatmap import pack_map, unpack
 from sdrlinkd.client.messages import (
     ACK_PREFIX,
     ENVELOPE_VERSION,
+    LATE_PREFIX,
     RECEIPT_PREFIX,
     SYNC_PREFIX,
     Message,
@@ -65,6 +66,7 @@ __all__ = [
     "ENVELOPE_VERSION",
     "IN_PUB_SOCKET",
     "IN_SOCKET",
+    "LATE_PREFIX",
     "OUT_SOCKET",
     "QOS",
     "RECEIPT_PREFIX",

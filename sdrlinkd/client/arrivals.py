@@ -3,50 +3,79 @@
 from collections import deque
 from collections.abc import Sequence
 
-from sdrlinkd.client.messages import Message, decode_in
+from sdrlinkd.client.messages import LATE_PREFIX, Message, decode_in, new_late_topic
 
 
 class Arrivals:
-    """Puts a subscriber's first messages in order, and drops repeats, without a socket.
+    """Requests the kept messages of topics, and puts a subscriber's messages in order.
 
-    The daemon publishes the messages that it kept to whoever has subscribed, marked as late. They
-    also reach subscribers that came earlier and know them, and the first of them may arrive after a
-    newer message.
+    It has no socket. The kept messages come on a topic of the subscriber's own, and end with a
+    frame of that topic alone. While they come, a newer message may come, too.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, filters: Sequence[bytes]) -> None:
+        self.requests = [new_late_topic(each) for each in filters]
+        """Subscriptions that request the kept messages under each filter."""
+        self._missing = set(self.requests)
         self._first: list[Message] = []
         self._ready: deque[Message] = deque()
         self._newest: dict[str, tuple[int, int]] = {}
-        """Time of reception and number of the newest message, by topic: a burst has several."""
+        """Number and time of reception of the newest message, by topic."""
+
+    @property
+    def has_kept(self) -> bool:
+        """Whether all kept messages have come."""
+        return not self._missing
 
     def hold(self, frames: Sequence[bytes]) -> None:
-        """Keep a message that arrived before the daemon confirmed the subscription."""
-        if (message := decode_in(frames)) is not None:
+        """Hold a message that comes before the subscription is complete."""
+        if (message := self._decode(frames)) is not None:
             self._first.append(message)
 
     def begin(self) -> None:
-        """Note that the daemon has confirmed: all messages that it had kept have arrived."""
-        self._first.sort(key=lambda message: (*_when(message), message.is_late))
-        self._ready.extend(each for each in self._first if self._is_new(each))
+        """Note that the subscription is complete: the messages held are ready, in order."""
+        # The numbers of a topic rise; stop messages, which have none, stay where they came.
+        numbered = sorted((each for each in self._first if each.number), key=_order)
+        stops = [each for each in self._first if not each.number]
+        seen = set[tuple[str, int]]()
+        for message in numbered:
+            if (message.topic, message.number) not in seen:
+                seen.add((message.topic, message.number))
+                self._note(message)
+                self._ready.append(message)
+        self._ready.extend(stops)
         self._first.clear()
 
     def next(self) -> Message | None:
-        """The next of the messages that arrived early."""
+        """The next of the messages that were held."""
         return self._ready.popleft() if self._ready else None
 
     def admit(self, frames: Sequence[bytes]) -> Message | None:
-        """The message in `frames`; None for an announcement, and for a repeat for others."""
-        message = decode_in(frames)
-        return message if message is not None and self._is_new(message) else None
+        """The message in `frames`; None for an announcement, and for a repeat.
 
-    def _is_new(self, message: Message) -> bool:
-        newest = self._newest.get(message.topic, (0, 0))
-        if message.is_late and _when(message) <= newest:
-            return False
-        self._newest[message.topic] = max(newest, _when(message))
-        return True
+        After the daemon has restarted, it gives the kept messages again.
+        """
+        message = self._decode(frames)
+        if message is None:
+            return None
+        number, received_ns = self._newest.get(message.topic, (0, 0))
+        if message.is_late and message.number <= number and message.received_ns <= received_ns:
+            return None
+        self._note(message)
+        return message
+
+    def _decode(self, frames: Sequence[bytes]) -> Message | None:
+        if not frames[0].startswith(LATE_PREFIX):
+            return decode_in(frames)
+        if len(frames) == 1:
+            self._missing.discard(frames[0])
+            return None
+        return decode_in(frames[1:])
+
+    def _note(self, message: Message) -> None:
+        if message.number:
+            self._newest[message.topic] = (message.number, message.received_ns)
 
 
-def _when(message: Message) -> tuple[int, int]:
-    return message.received_ns, message.number
+def _order(message: Message) -> tuple[int, bool]:
+    return message.number, not message.is_late

@@ -13,7 +13,7 @@ from sdrlinkd.client.deadline import Deadline
 from sdrlinkd.client.errors import no_daemon
 from sdrlinkd.client.messages import Message, new_ack_topic, topic_filter
 from sdrlinkd.client.paths import OUT_SOCKET, chosen_dir, endpoint
-from sdrlinkd.client.subscriber import ASK_AGAIN_S, RECEIVE_HWM
+from sdrlinkd.client.subscriber import ASK_AGAIN_S, KEPT_S, RECEIVE_HWM
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -30,14 +30,14 @@ class AsyncSubscriber(AsyncSocket):
         directory: str | os.PathLike[str] | None = None,
     ) -> None:
         super().__init__(zmq.SUB, chosen_dir(runtime_dir, directory), timeout_s)
-        self._topics = topics or ("/*",)
         self._socket.rcvhwm = RECEIVE_HWM
-        self._arrivals = Arrivals()
+        self._filters = [topic_filter(topic) for topic in topics or ("/*",)]
+        self._arrivals = Arrivals(self._filters)
 
     async def __aenter__(self) -> "Self":
         self._socket.connect(endpoint(self.runtime_dir, OUT_SOCKET))
-        for topic in self._topics:
-            self._socket.subscribe(topic_filter(topic))
+        for each in (*self._filters, *self._arrivals.requests):
+            self._socket.subscribe(each)
         try:
             await asyncio.wait_for(self._subscribed(), self._timeout_s)
         except asyncio.TimeoutError:
@@ -60,9 +60,12 @@ class AsyncSubscriber(AsyncSocket):
                 continue
             frames = await self._socket.recv_multipart()
             if frames[0] in asked:
-                self._arrivals.begin()
                 break
             self._arrivals.hold(frames)
+        deadline = Deadline(KEPT_S)
+        while not self._arrivals.has_kept and await self._socket.poll(deadline.left_ms):
+            self._arrivals.hold(await self._socket.recv_multipart())
+        self._arrivals.begin()
         for token in asked:
             self._socket.unsubscribe(token)
 

@@ -13,6 +13,9 @@ ENVELOPE_VERSION = b"\x01"
 ACK_PREFIX = b"\0ack\0"
 SYNC_PREFIX = b"\0sync\0"
 RECEIPT_PREFIX = b"\0receipt\0"
+# Only one client subscribes to a late topic, which ends with a filter. The daemon answers on it
+# with the messages that it has kept under this filter.
+LATE_PREFIX = b"\0late\0"
 WELCOME_PREFIX = b"\0" + ENVELOPE_VERSION
 """First bytes of an announcement, which is a single frame."""
 
@@ -135,6 +138,11 @@ def topic_filter(topic: str) -> bytes:
 def new_ack_topic() -> bytes:
     """A new topic for one handshake with the daemon."""
     return ACK_PREFIX + secrets.token_hex(8).encode() + b"\0"
+
+
+def new_late_topic(filter_: bytes) -> bytes:
+    """A new topic that requests the kept messages under the subscription `filter_`."""
+    return LATE_PREFIX + secrets.token_hex(8).encode() + b"\0" + filter_
 
 
 def sync_frames(ack_topic: bytes) -> list[bytes]:

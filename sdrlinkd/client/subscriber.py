@@ -14,6 +14,8 @@ from sdrlinkd.client.paths import OUT_SOCKET, chosen_dir
 
 RECEIVE_HWM = 1000
 ASK_AGAIN_S = 0.2
+KEPT_S = 1.0
+"""Longest wait in s for kept messages after the answer."""
 
 
 class Subscriber(Endpoint):
@@ -38,10 +40,11 @@ class Subscriber(Endpoint):
         """
         super().__init__(zmq.SUB, chosen_dir(runtime_dir, directory))
         self._socket.rcvhwm = depth
-        self._arrivals = Arrivals()
+        filters = [topic_filter(topic) for topic in topics or ("/*",)]
+        self._arrivals = Arrivals(filters)
         self._connect(OUT_SOCKET)
-        for topic in topics or ("/*",):
-            self._socket.subscribe(topic_filter(topic))
+        for each in (*filters, *self._arrivals.requests):
+            self._socket.subscribe(each)
         try:
             self._wait_until_subscribed(timeout_s)
         except BaseException:
@@ -66,6 +69,12 @@ class Subscriber(Endpoint):
             if message is not None:
                 yield message
 
+    def _hold_kept(self) -> None:
+        """Hold the kept messages that are still to come; they precede the answer if they can."""
+        deadline = Deadline(KEPT_S)
+        while not self._arrivals.has_kept and self._poll(deadline.left_s):
+            self._arrivals.hold(self._socket.recv_multipart())
+
     def _wait_until_subscribed(self, timeout_s: float) -> None:
         """Wait until the daemon answers an ack topic: then all earlier subscriptions are active."""
         deadline, again, asked = Deadline(timeout_s), Deadline(0), list[bytes]()
@@ -79,6 +88,7 @@ class Subscriber(Endpoint):
                 continue
             frames = self._socket.recv_multipart()
             if frames[0] in asked:
+                self._hold_kept()
                 self._arrivals.begin()
                 for token in asked:
                     self._socket.unsubscribe(token)

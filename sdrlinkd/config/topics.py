@@ -81,6 +81,11 @@ def policies_by_name(
             )
         if not is_topic_name(name):
             raise ConfigError(f'topic."{given}": allowed: a ROS name such as odom or camera/image')
+        if policy.deadman_s and registry.by_name(name) is None:
+            raise ConfigError(
+                f"topic.{name}.deadman_s: got {policy.deadman_s:g}; a stop message needs the type, "
+                "so the topic must be in the registry; allowed: 0"
+            )
         if name in policies:
             raise ConfigError(f'topic."{given}": listed twice, with and without the slash')
         policies[name] = policy

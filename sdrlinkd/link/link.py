@@ -53,6 +53,7 @@ from sdrlinkd.link.transmit import (
 )
 from sdrlinkd.reports import LinkReport
 from sdrlinkd.wire import (
+    FIRST_NUMBER,
     MAX_VALUE_SIZE,
     TLV_HEADER_SIZE,
     TOPIC_OVERHEAD,
@@ -310,7 +311,10 @@ class Link:
         self._intake.set_policy(topic_id, policy)
         if policy.durability == "volatile":
             self._latched.forget(topic_id)
-        self._reception.set_policy(topic_id, policy)
+        if topic_id < FIRST_NUMBER:
+            self._reception.set_policy(topic_id, policy)
+        else:
+            self._topics.set_depth(topic_id, policy.latched)
 
     def policy(self, topic_id: int) -> TopicPolicy:
         """The policy in force for a topic."""

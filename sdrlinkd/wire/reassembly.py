@@ -144,7 +144,13 @@ class Reassembly:
                     break
                 self._give_up(src, source, key, "rx_partial_timeout")
             for large_key, large in list(source.large.items()):
-                due = max(large.touched_at, source.parts_at) + self._limits.timeout_s
+                # Parts of a topic's messages come one message after the other.
+                is_over = any(
+                    key[0] == large_key[0] and other.began_at > large.touched_at
+                    for key, other in source.large.items()
+                )
+                active_at = large.touched_at if is_over else max(large.touched_at, source.parts_at)
+                due = active_at + self._limits.timeout_s
                 if now < due:
                     self._next_expiry = min(self._next_expiry, due)
                 else:
@@ -162,6 +168,15 @@ class Reassembly:
         return topic_id == PARTS and any(
             large.entry_id == entry_id for large in source.large.values()
         )
+
+    def forget(self, src: int) -> None:
+        """Give up all that is held of a source that has restarted and numbers messages anew."""
+        source = self._sources.pop(src, None)
+        if source is not None:
+            for key in list(source.partials):
+                self._give_up(src, source, key, "rx_partial_superseded")
+            for key in list(source.large):
+                self._give_up_large(src, source, key, "rx_partial_superseded")
 
     def take_lost(self) -> list[Lost]:
         """The messages given up since the last call."""

@@ -176,7 +176,7 @@ class EntryWriter:
         """
         if lane.current is not None and not head.needs_id:
             return True
-        entry_id = self._entry_ids.take(head.channel, start)
+        entry_id = self._entry_ids.take(head, start)
         if entry_id is None:
             return False
         size = len(head.body)

@@ -60,14 +60,14 @@ class TopicEntryIds:
         self.starved: Counter[int] = Counter()
         """By topic id: how often the topic had to wait because none of its entry ids was free."""
 
-    def take(self, topic_id: int, now: float) -> int | None:
-        """An entry id for the topic's next message; None while none is free."""
-        ids = self._by_topic.get(topic_id) or self._new(topic_id)
+    def take(self, message: Outgoing, now: float) -> int | None:
+        """An entry id for `message`, or for its next part; None while none is free."""
+        ids = self._by_topic.get(message.channel) or self._new(message.channel)
         if ids.resting:
             ids.wake(now)
         if ids.idle:
             return ids.idle.popleft()
-        self.starved[topic_id] += 1
+        self.starved[message.topic_id] += 1
         return None
 
     def retire(self, message: Outgoing, now: float) -> None:
@@ -81,9 +81,10 @@ class TopicEntryIds:
     def not_left(self, messages: Iterable[Outgoing]) -> None:
         """Hold the ids of `messages`, whose fragments leave later than planned."""
         for message in messages:
-            if not message.is_whole and not message.held_ids:
+            if not message.is_whole:
                 ids = self._by_topic[message.channel]
-                message.hold_ids(tuple(each for each in message.ids if ids.hold(each)))
+                held = (each for each in message.ids if ids.hold(each))
+                message.hold_ids((*message.held_ids, *held))
 
     def left(self, messages: Iterable[Outgoing], start: float) -> None:
         """Let the held ids of `messages` rest, as their fragments leave in a burst at `start`."""

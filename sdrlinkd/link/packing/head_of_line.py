@@ -37,4 +37,6 @@ class HeadOfLine:
 
     def abandon(self, lane: Lane, now: float) -> None:
         """Send no more fragments of the message that `lane` has begun."""
-        self._entry_ids.retire(self._outbox.withdraw_head(lane), now)
+        message = self._outbox.withdraw_head(lane)
+        if not message.needs_id:  # between two parts, it has none
+            self._entry_ids.retire(message, now)

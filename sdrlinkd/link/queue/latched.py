@@ -12,6 +12,8 @@ from sdrlinkd.wire import BROADCAST
 SHARE = 0.02
 """Largest share of airtime for replayed messages."""
 MOST_CREDIT_S = 1.0
+MOST_BYTES = 64 << 20
+"""Most payload bytes latched, as far as a topic's keys and older messages can be dropped."""
 WAIT_S = 0.2
 """Wait in s after a new robot, as others often follow soon."""
 
@@ -49,7 +51,7 @@ class Latched:
 
     def __init__(self) -> None:
         self._topics: dict[int, OrderedDict[str, deque[_Latched]]] = {}
-        self._count = 0
+        self._count = self._n_bytes = 0
         self._credit_s = 0.0
         self._looked_at: float | None = None
         self._came_at = float("-inf")
@@ -64,15 +66,22 @@ class Latched:
         messages = keys.setdefault(kept.overrides.key, deque())
         keys.move_to_end(kept.overrides.key)
         self._count += 1
-        messages.append(_Latched(topic_id, kept, self._count))
+        # A robot that is owed older messages of the key gets this one after them.
+        owed = set[int]().union(*(each.owed for each in messages))
+        messages.append(_Latched(topic_id, kept, self._count, owed))
+        self._n_bytes += len(kept.payload)
         while len(messages) > depth:
-            messages.popleft()
-        if len(keys) > MOST_KEYS:
-            keys.popitem(last=False)
+            self._n_bytes -= len(messages.popleft().kept.payload)
+        while len(keys) > 1 and (len(keys) > MOST_KEYS or self._n_bytes > MOST_BYTES):
+            _, silent = keys.popitem(last=False)
+            self._n_bytes -= sum(len(each.kept.payload) for each in silent)
+        while len(messages) > 1 and self._n_bytes > MOST_BYTES:
+            self._n_bytes -= len(messages.popleft().kept.payload)
 
     def forget(self, topic_id: int) -> None:
         """Drop the latched messages of a topic that is now volatile."""
-        self._topics.pop(topic_id, None)
+        for messages in self._topics.pop(topic_id, OrderedDict()).values():
+            self._n_bytes -= sum(len(each.kept.payload) for each in messages)
 
     def newcomer(self, node: int, now: float) -> None:
         """Note a robot that was heard for the first time or has restarted."""

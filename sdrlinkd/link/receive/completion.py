@@ -37,6 +37,11 @@ class Completion:
         for message in self.undeclared.release(src, number):
             self._judge(message, now, events)
 
+    def forget(self, src: int, now: float, events: list[Event]) -> None:
+        """Drop what waits for declarations of a robot that has restarted."""
+        for message in self.undeclared.of_source(src):
+            self._end(message, "rx_unknown_topic", now, events)
+
     def expire(self, now: float, events: list[Event]) -> None:
         """Drop the messages whose topics were not declared in time."""
         for message in self.undeclared.expire(now):
@@ -50,7 +55,7 @@ class Completion:
     def _judge(self, message: Whole, now: float, events: list[Event]) -> None:
         src, number = message.src, message.number
         topic = self._topics.topic(src, number)
-        if topic is None or self._topics.has_other_hash(topic):
+        if topic is None or self._topics.differs(topic):
             reason = "rx_unknown_topic" if topic is None else "rx_other_type"
             self._end(message, reason, now, events)
             return

@@ -141,7 +141,7 @@ class Inbox:
                     events.append(RecordHeard(pdu.src, record, at))
                 if neighbor.take_beacon(record):
                     neighbor.track.restart(seq, crc)
-                    self._topics.forget(pdu.src)
+                    self._forget(pdu.src, now, events)
                     self._announce(pdu.src, at, events)
                 else:
                     neighbor.track.goes_on()
@@ -197,6 +197,13 @@ class Inbox:
         """Add a Newcomer event for robot `src`, unless it is this robot."""
         if src != self._own_id:
             events.append(Newcomer(src, at))
+
+    def _forget(self, src: int, now: float, events: list[Event]) -> None:
+        """Forget what a robot had said and begun before its restart."""
+        self._reassembly.forget(src)
+        self._note_lost(now, events)
+        self._completion.forget(src, now, events)
+        self._topics.forget(src)
 
     def _fresh_until(self, pdu: Pdu) -> float:
         """Time at which all messages in `pdu` will be too old; infinity if unknown."""

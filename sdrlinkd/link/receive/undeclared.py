@@ -7,9 +7,12 @@ from sdrlinkd.link.receive.ages import Origin
 
 HOLD_S = 1.0
 """Time in s for which a message waits for its topic's declaration."""
-MOST_BYTES = 12 << 20
-"""Most memory in octets, for at least one large message."""
-MOST_MESSAGES = 256
+SOURCE_BYTES = 12 << 20
+"""Most memory in octets for one source: enough for a large message."""
+MOST_BYTES = 48 << 20
+"""Most memory in octets for all sources."""
+MOST_MESSAGES = 64
+"""Most messages of one source."""
 OVERHEAD = 512
 
 
@@ -49,9 +52,17 @@ class UndeclaredMessages:
         self._held[self._count] = (now + HOLD_S, message)
         self.n_bytes += _cost(message)
         given_up = []
-        while len(self._held) > MOST_MESSAGES or self.n_bytes > MOST_BYTES:
-            given_up.append(self._take(next(iter(self._held))))
+        while self._is_full(message.src):
+            given_up.append(self._take(self._oldest(message.src)))
+        while self.n_bytes > MOST_BYTES:
+            greedy = max({each.src for _, each in self._held.values()}, key=self._cost_of)
+            given_up.append(self._take(self._oldest(greedy)))
         return given_up
+
+    def of_source(self, src: int) -> list[Whole]:
+        """Take out the messages of a source."""
+        found = [key for key, (_, each) in self._held.items() if each.src == src]
+        return [self._take(key) for key in found]
 
     def release(self, src: int, number: int) -> list[Whole]:
         """Take out the messages of a number that is known now, in their order."""
@@ -67,6 +78,16 @@ class UndeclaredMessages:
                 break
             given_up.append(self._take(key))
         return given_up
+
+    def _is_full(self, src: int) -> bool:
+        held = sum(each.src == src for _, each in self._held.values())
+        return held > MOST_MESSAGES or self._cost_of(src) > SOURCE_BYTES
+
+    def _cost_of(self, src: int) -> int:
+        return sum(_cost(each) for _, each in self._held.values() if each.src == src)
+
+    def _oldest(self, src: int) -> int:
+        return next(key for key, (_, each) in self._held.items() if each.src == src)
 
     def _take(self, key: int) -> Whole:
         _, message = self._held.pop(key)

@@ -30,7 +30,6 @@ class _Source:
     checks: dict[int, int] = field(default_factory=dict)
     pieces: dict[int, dict[int, bytes]] = field(default_factory=dict)
     """Pieces of the description that a number's check belongs to."""
-    bases: dict[str, int] = field(default_factory=dict)
 
 
 class HeardTopics:
@@ -63,9 +62,16 @@ class HeardTopics:
         source = self._sources.get(src)
         return None if source is None else source.known.get(topic_id)
 
-    def has_other_hash(self, topic: HeardTopic) -> bool:
-        """Whether the source's type has other fields than the type of that name here."""
-        if topic.about is None or not any(topic.about.hash_):
+    def differs(self, topic: HeardTopic) -> bool:
+        """Whether a declared topic has another type than in our registry, or its type other fields
+        than here.
+        """
+        if topic.about is None:
+            return False
+        registered = self._registry.by_name(topic.name)
+        if registered is not None and registered.type != topic.type:
+            return True
+        if not any(topic.about.hash_):
             return False
         own = self._own_hash(topic.type)
         return any(own) and own != topic.about.hash_
@@ -82,8 +88,7 @@ class HeardTopics:
         if source.checks.get(number) != check:
             source.checks[number] = check
             source.pieces[number] = {}
-            if source.known.pop(number, None) is not None:
-                self.changed.append((src, number))
+            self._forget_number(src, source, number)
         if number in source.known:
             return False
         there = source.pieces[number]
@@ -99,7 +104,8 @@ class HeardTopics:
             return False
         finally:
             there.clear()
-        base = source.bases.setdefault(about.name, number)
+        same = (topic.base for topic in source.known.values() if topic.name == about.name)
+        base = next(same, number)
         source.known[number] = HeardTopic(base, about.name, about.type, about)
         return True
 
@@ -136,13 +142,27 @@ class HeardTopics:
         for src, topics in sorted(self.declared().items()):
             notices += [
                 f"robot {src} sends {topic.name} as {topic.type} with hash {_hash(topic)}, but "
-                f"here that type has hash {self._own_hash(topic.type).hex()}: its fields differ, "
-                "and its messages are dropped (rx_other_type); install the same version of the "
-                "package"
+                f"here it is {self._ours(topic)}; its messages are dropped (rx_other_type): use "
+                "the same type, from the same version of its package"
                 for topic in topics
-                if self.has_other_hash(topic)
+                if self.differs(topic)
             ]
         return notices
+
+    def _forget_number(self, src: int, source: _Source, number: int) -> None:
+        """Forget what a number meant; other numbers of its name are counted under one of them."""
+        if source.known.pop(number, None) is None:
+            return
+        self.changed.append((src, number))
+        left = [other for other, topic in source.known.items() if topic.base == number]
+        for other in left:
+            source.known[other] = source.known[other]._replace(base=left[0])
+            self.changed.append((src, other))
+
+    def _ours(self, topic: HeardTopic) -> str:
+        registered = self._registry.by_name(topic.name)
+        kind = topic.type if registered is None else registered.type
+        return f"{kind} with hash {self._own_hash(kind).hex()}"
 
     def _check(self, source: _Source, about: Description) -> None:
         """Raise PduError if a description contradicts what its source declared before."""
@@ -160,4 +180,4 @@ class HeardTopics:
 
 
 def _hash(topic: HeardTopic) -> str:
-    return "" if topic.about is None else topic.about.hash_.hex()
+    return "unknown" if topic.about is None else topic.about.hash_.hex()

@@ -98,9 +98,14 @@ class OwnTopics:
         if known.type != type_:
             raise DeclarationError(f"{name}: got type {type_}; it is declared as {known.type}")
         if known.id >= FIRST_NUMBER:
-            for number in self._keys[known.id].values():
+            for number in {known.id, *self._keys[known.id].values()}:
                 self.told[number] = Description(name, type_, *offer[2:])
         return known
+
+    def set_depth(self, topic_id: int, depth: int) -> None:
+        """Tell other robots how many messages of a declared topic to keep; 0: it is volatile."""
+        for number in {topic_id, *self._keys.get(topic_id, {}).values()} & self.told.keys():
+            self.told[number] = self.told[number]._replace(depth=depth)
 
     def number(self, topic_id: int, key: str) -> int:
         """The number on the air for messages of a topic from the producer `key`."""

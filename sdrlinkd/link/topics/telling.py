@@ -41,7 +41,7 @@ class TopicTeller:
     def due(self, now: float) -> Iterator[TopicPiece]:
         """The records to be told at `now`."""
         for number, about in list(self._topics.told.items()):
-            if self._said.get(number) is not about:
+            if self._said.get(number) != about:
                 self._said[number] = about
                 self._plan(number, now)
             times = self._due_at[number]
