@@ -31,6 +31,7 @@ class Declaring:
         except msgspec.ValidationError as error:
             raise DeclarationError(f"declare: {error}") from None
         name = self._setup.name_on_air(declaration.name)
+        self._check_name(declaration.name, name)
         topic = self._link.declare(declaration.offer(name))
         policy = self._policies.offer(topic.id, declaration)
         is_new = self._bus.accept(declaration.name, topic)
@@ -47,6 +48,23 @@ class Declaring:
             "lifespan_s": policy.lifespan_s,
             "durability": policy.durability,
         }
+
+    def _check_name(self, given: str, name: str) -> None:
+        """Raise DeclarationError if a bus topic cannot be that of the topic `name` on the air."""
+        if not given.startswith("/"):
+            raise DeclarationError(f"name: got {given[:128]!r}; allowed: a name with leading slash")
+        known = self._link.topic_named(name)
+        if known is None:
+            return
+        other = self._bus.names_in().get(known.id)
+        if other is None:
+            raise DeclarationError(
+                f"{given}: the daemon does not take {name} from the bus (the key `topics`)"
+            )
+        if other != given:
+            raise DeclarationError(
+                f"{given}: on the air it has the name of {other}, {name}; use one of the two"
+            )
 
     def declared(self) -> list[dict[str, Any]]:
         """The topics that other robots declared, with the bus topics of their messages."""

@@ -140,8 +140,7 @@ class Node:
                 self.bus.tap("rx", data)
             messages = link.hear(data, at, snr_db, now, ended_at)
             # First, as the PDU may bring both a new meaning of a number and messages of it.
-            for src, number in link.take_changed_topics():
-                self.bus.forget_topic(src, number)
+            self.bus.forget_topics(link.take_changed_topics())
             for message in messages:
                 times, age_s = UNKNOWN, link.delivered(message, now)
                 if age_s is not None:
@@ -289,8 +288,7 @@ class Node:
             if topic is None:
                 continue
             name = self._setup.republished(src, topic.name)
-            stop = self._stops.get(topic_id)
-            if stop is None:
+            if (stop := self._stops.get(topic_id)) is None:
                 log.error("%s: silent, but no stop message can be made for its type", name)
             else:
                 log.warning("%s: silent, published the stop message", name)

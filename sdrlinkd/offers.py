@@ -48,6 +48,17 @@ class Declaration(msgspec.Struct, frozen=True, kw_only=True):
             return TopicPolicy(durability="transient_local", depth=max(1, self.depth))
         return RELIABLE if self.reliability == "reliable" else BEST_EFFORT
 
+    def joined(self, other: "Declaration") -> "Declaration":
+        """The offer of two producers of one topic: the stronger one of each."""
+        is_reliable = "reliable" in (self.reliability, other.reliability)
+        return msgspec.structs.replace(
+            other,
+            reliability="reliable" if is_reliable else "best_effort",
+            durability=self.durability if self.is_latched else other.durability,
+            depth=max(self.depth, other.depth),
+            hash=other.hash or self.hash,
+        )
+
     def offer(self, name: str) -> Offer:
         """What the link needs to know of a topic called `name` on the air.
 
@@ -68,7 +79,7 @@ class Declaration(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def merged(configured: TopicPolicy, offered: TopicPolicy) -> TopicPolicy:
-    """The configured policy, with what it leaves at its default as offered."""
+    """The configured policy, with the keys that have their default value as offered."""
     left = {
         key: getattr(offered, key)
         for key in TopicPolicy.__struct_fields__

@@ -25,8 +25,8 @@ class Policies:
     def __init__(self, setup: Setup, link: Link) -> None:
         self._setup = setup
         self._link = link
-        self.changed: dict[int, set[str]] = {}
-        """Keys that were set since the file was read, by topic id."""
+        self.changed: dict[int, dict[str, Any]] = {}
+        """Keys that were set since the file was read, and their values, by topic id."""
         self.announce: Callable[[Mapping[int, TopicPolicy]], None] | None = None
         """Called with the policies in force after a change."""
         self._offers: dict[int, Declaration] = {}
@@ -45,16 +45,17 @@ class Policies:
 
         Returns the policy in force.
         """
-        self._offers[topic_id] = declaration
-        if topic_id not in self.changed:
-            self._link.set_policy(topic_id, self._policy(topic_id))
+        known = self._offers.get(topic_id)
+        self._offers[topic_id] = declaration if known is None else known.joined(declaration)
+        self._link.set_policy(topic_id, self._policy(topic_id))
         return self._link.policy(topic_id)
 
     def told(self, topic_id: int) -> Told:
         """Where a topic's policy comes from."""
         offer, name = self._offers.get(topic_id), self._link.topic(topic_id).name
         # The file wins, key by key.
-        is_offered = offer is not None and self._policy(topic_id) != self._configured.get(name)
+        configured = self._configured.get(name, DEFAULT_POLICY)
+        is_offered = offer is not None and merged(configured, offer.policy) != configured
         words = offer.words if offer is not None and is_offered else ""
         return Told(self._setup.source, self.changed.get(topic_id, ()), words)
 
@@ -68,6 +69,10 @@ class Policies:
                 f"topic {name}: unknown; allowed: {known.suggest(name)} (as read at the start)"
             )
         return topic.id
+
+    def name(self, topic_id: int) -> str:
+        """The name of a topic of this robot, with a leading slash."""
+        return f"/{self._link.topic(topic_id).name}"
 
     def set(self, name: str, changes: Mapping[str, Any]) -> dict[str, Any]:
         """Apply `changes`; returns the values before and after.
@@ -86,7 +91,7 @@ class Policies:
         except msgspec.ValidationError:
             raise UserError(explain_policy(changes)) from None
         self._link.set_policy(topic_id, new)
-        self.changed.setdefault(topic_id, set()).update(changes)
+        self.changed.setdefault(topic_id, {}).update({k: getattr(new, k) for k in changes})
         # Report the policy as the link has it, not as it was given.
         new = self._link.policy(topic_id)
         self.announce_all()
@@ -112,10 +117,11 @@ class Policies:
         self._link.set_named_policies(policies)
 
     def _policy(self, topic_id: int) -> TopicPolicy:
-        """The policy by the file, and for the rest by the topic's producers."""
+        """The policy by the file and the topic's producers, with what was set since."""
         configured = self._configured.get(self._link.topic(topic_id).name, DEFAULT_POLICY)
         offer = self._offers.get(topic_id)
-        return configured if offer is None else merged(configured, offer.policy)
+        policy = configured if offer is None else merged(configured, offer.policy)
+        return msgspec.structs.replace(policy, **self.changed.get(topic_id, {}))
 
 
 def _told(value: object) -> object:

@@ -13,6 +13,7 @@ from sdrlinkd.opening import Opening
 from sdrlinkd.policies import Policies
 from sdrlinkd.reloading import Reloading
 from sdrlinkd.reports import ReceivedTopicReport
+from sdrlinkd.wire import FIRST_NUMBER
 
 log = logging.getLogger("sdrlinkd")
 
@@ -50,11 +51,14 @@ def make_verbs(
     def why(arguments: dict[str, Any]) -> object:
         name = str(arguments.get("topic", ""))
         received = node.snapshot(control.requests).link.received
-        names = {each.republished_as: each.topic_id for each in received}
-        topic_id = names[name] if name in names else policies.topic_id(name)
-        told = policies.told(topic_id)
-        heard = [_received(each) for each in received if each.topic_id == topic_id]
-        return {"why": [*node.why(topic_id, told), *heard]}
+        of_name = [each for each in received if each.republished_as == name]
+        if of_name and of_name[0].topic_id >= FIRST_NUMBER:
+            # Declared by another robot: its number means nothing here.
+            return {"why": [_received(each) for each in of_name]}
+        topic_id = of_name[0].topic_id if of_name else policies.topic_id(name)
+        own = policies.name(topic_id)
+        heard = [_received(each) for each in received if each.name == own]
+        return {"why": [*node.why(topic_id, policies.told(topic_id)), *heard]}
 
     verbs = {
         "hello": Verb(hello, "who answers, and its verbs"),

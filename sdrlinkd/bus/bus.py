@@ -3,7 +3,7 @@
 import asyncio
 import secrets
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import msgspec
 import zmq
@@ -136,10 +136,11 @@ class Bus:
         self._out.send_multipart(envelope.encode(frame, header, message.payload))
         self._out_reader.recheck()
 
-    def forget_topic(self, src: int, number: int) -> None:
-        """Forget what topic `number` of a source meant: its name, and the messages kept of it."""
-        self._frames_out.pop((src, number), None)
-        self._retention.forget((src, number))
+    def forget_topics(self, changed: Iterable[tuple[int, int]]) -> None:
+        """Forget what each (source, topic number) meant: its name, and the messages kept of it."""
+        for key in changed:
+            self._frames_out.pop(key, None)
+            self._retention.forget(key)
 
     def publish_stop(self, src: int, topic: HeardTopic, payload: bytes) -> None:
         """Hand a topic's stop message to its consumers, as the topic has fallen silent."""

@@ -111,7 +111,10 @@ class Link:
         piece = min(room, TLV_HEADER_SIZE + MAX_VALUE_SIZE) - TOPIC_OVERHEAD
         self._topics = OwnTopics(registry, has_numbers, piece)
         self._heard_topics = HeardTopics(registry, has_numbers, self._topics.hash_of)
-        self._intake = Intake(params, self._topics, self._outbox, classes, dictionaries)
+        first_large = rng.randrange(1 << 16) if has_numbers else 0
+        self._intake = Intake(
+            params, self._topics, self._outbox, classes, dictionaries, first_large
+        )
         self._latched = Latched()
         self._piggyback = PiggybackRecords()
         self._composer = Composer(

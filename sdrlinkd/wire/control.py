@@ -150,7 +150,7 @@ _KNOWN = {int(number): (kind, _FORMATS[number]) for kind, number in _TYPES.items
 _PARITY = struct.Struct(">BBBBBHHI")
 PARITY_OVERHEAD = TLV_HEADER_SIZE + _PARITY.size
 """Octets of a PARITY record without its parity."""
-TOPIC_OVERHEAD = TLV_HEADER_SIZE + 3
+TOPIC_OVERHEAD = TLV_HEADER_SIZE + 4
 """Octets of a TOPIC record without its piece of the description."""
 STAMP_SIZE = TLV_HEADER_SIZE + _FORMATS[RecordType.STAMP].size
 STAMP_RECORD = struct.Struct(">BBBBI")

@@ -26,6 +26,7 @@ _PART_HEADER = struct.Struct(">BHBB")
 PART_HEADER_SIZE = _PART_HEADER.size
 HASH_SIZE = 8
 MAX_PIECES = 15
+_PIECE = struct.Struct(">BHB")
 _ABOUT = struct.Struct(f">BB{HASH_SIZE}s")
 _LATCHED, _BEST_EFFORT = 0x01, 0x02
 MAX_NAME = 128
@@ -92,7 +93,7 @@ def parse_part(octets: bytes) -> Part | None:
 class TopicPiece(NamedTuple):
     """TOPIC record: a piece of the description of a declared topic (wire document, 6.9).
 
-    `check` is the first octet of SHA-256 over the whole description, which has `pieces` pieces.
+    `check` is the first two octets of SHA-256 over the whole description, in `pieces` pieces.
     """
 
     number: int
@@ -121,12 +122,13 @@ def build_topic(piece: TopicPiece) -> bytes:
     number, check, at, n, data = piece
     if not (0 <= at <= 0xF and 0 <= n <= 0xF):
         raise ValueError(f"piece {at} of {n} of topic {number} does not fit its record")
-    return bytes((number, check, at << 4 | n)) + data
+    return _PIECE.pack(number, check, at << 4 | n) + data
 
 
 def parse_topic(value: bytes) -> TopicPiece:
-    """The piece in the value of a TOPIC record of at least three octets."""
-    return TopicPiece(value[0], value[1], value[2] >> 4, value[2] & 0x0F, value[3:])
+    """The piece in the value of a TOPIC record of at least four octets."""
+    number, check, at_n = _PIECE.unpack_from(value)
+    return TopicPiece(number, check, at_n >> 4, at_n & 0x0F, value[_PIECE.size :])
 
 
 def pieces(number: int, about: Description, room: int) -> list[TopicPiece]:
@@ -140,14 +142,14 @@ def pieces(number: int, about: Description, room: int) -> list[TopicPiece]:
     n = -(-len(octets) // max(1, room))
     if n > MAX_PIECES:
         raise ValueError(f"{about.name}: {len(octets)} octets in pieces of {room}")
-    check = hashlib.sha256(octets).digest()[0]
+    check = _check(octets)
     cut = (octets[i * room : (i + 1) * room] for i in range(n))
     return [TopicPiece(number, check, i, n, each) for i, each in enumerate(cut)]
 
 
 def parse_description(octets: bytes, check: int) -> Description:
     """The description whose joined pieces are `octets`. Raises PduError if it is none."""
-    if hashlib.sha256(octets).digest()[0] != check or len(octets) < _ABOUT.size:
+    if _check(octets) != check or len(octets) < _ABOUT.size:
         raise PduError("rx_control_bad", "the pieces of a TOPIC do not belong together")
     flags, depth, hash_ = _ABOUT.unpack_from(octets)
     name, _, kind = octets[_ABOUT.size :].decode(errors="replace").partition("\0")
@@ -159,6 +161,10 @@ def parse_description(octets: bytes, check: int) -> Description:
     depth = max(1, depth) if flags & _LATCHED else 0
     name = name.removeprefix("/")
     return Description(name, known, hash_, depth, bool(flags & _BEST_EFFORT))
+
+
+def _check(octets: bytes) -> int:
+    return int.from_bytes(hashlib.sha256(octets).digest()[:2], "big")
 
 
 def max_size(pdu_size: int, topic_id: int) -> int:

@@ -8,6 +8,8 @@ from typing import NamedTuple
 PARTIAL_OVERHEAD = 512
 FRAGMENT_OVERHEAD = 128
 NO_ENTRY = -1
+OVERTAKEN = 4
+"""Timeouts after which a large message is given up if a later one of its topic has begun."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +70,8 @@ class Large:
     entry_id: int = NO_ENTRY
     """Entry id of the last part; NO_ENTRY until that is there."""
     cost: int = PARTIAL_OVERHEAD
+    is_overtaken: bool = False
+    """Whether a part of a later message of the topic has come."""
 
 
 @dataclass(slots=True)

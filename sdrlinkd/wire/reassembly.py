@@ -4,6 +4,7 @@ from sdrlinkd.wire.control import Parity
 from sdrlinkd.wire.declared import PARTS, Part
 from sdrlinkd.wire.partials import (
     FRAGMENT_OVERHEAD,
+    OVERTAKEN,
     PARTIAL_OVERHEAD,
     Joined,
     Large,
@@ -88,6 +89,9 @@ class Reassembly:
             self.held_bytes += PARTIAL_OVERHEAD
             self.held += 1
             self.started += 1
+            for (topic_id, _), other in source.large.items():
+                # A topic's messages come one after the other, except those of other classes.
+                other.is_overtaken |= topic_id == part.topic_id and other is not large
         source.large.move_to_end(key)
         large.touched_at = now
         if part.part == part.parts - 1:
@@ -144,13 +148,9 @@ class Reassembly:
                     break
                 self._give_up(src, source, key, "rx_partial_timeout")
             for large_key, large in list(source.large.items()):
-                # Parts of a topic's messages come one message after the other.
-                is_over = any(
-                    key[0] == large_key[0] and other.began_at > large.touched_at
-                    for key, other in source.large.items()
-                )
-                active_at = large.touched_at if is_over else max(large.touched_at, source.parts_at)
-                due = active_at + self._limits.timeout_s
+                due = max(large.touched_at, source.parts_at) + self._limits.timeout_s
+                if large.is_overtaken:
+                    due = min(due, large.touched_at + OVERTAKEN * self._limits.timeout_s)
                 if now < due:
                     self._next_expiry = min(self._next_expiry, due)
                 else:

@@ -203,6 +203,11 @@ def test_numbers_need_topic_id_14(tmp_path, n_topics, auto, says):
             make_setup(Config(auto=auto), tmp_path)
 
 
+def test_a_stop_message_needs_a_type_that_the_registry_has(tmp_path):
+    with pytest.raises(ConfigError, match=r"topic\.cmd_vel\.deadman_s: got 0\.3"):
+        make_setup(Config(topic={"cmd_vel": TopicPolicy(deadman_s=0.3)}), tmp_path)
+
+
 def test_a_policy_of_a_declared_topic_needs_a_ros_name(tmp_path):
     with pytest.raises(ConfigError, match="allowed: a ROS name"):
         make_setup(Config(topic={"no name": TopicPolicy()}), tmp_path)

@@ -92,11 +92,28 @@ def test_a_registrys_topic_can_be_offered_and_a_new_one_cannot(start_daemon):
         declare(daemon, "/robot_1/odom")
 
 
+def test_a_name_on_the_air_belongs_to_one_bus_topic(start_daemon):
+    daemon = start_daemon(NO_REGISTRY)
+    declare(daemon, "/robot_1/odom")
+    with pytest.raises(RefusedError, match="on the air it has the name of /robot_1/odom"):
+        declare(daemon, "/odom")
+    assert len(daemon.snapshot().link.topics) == 1
+
+
+def test_several_producers_of_a_topic(start_daemon):
+    """The stronger offer of each holds: a volatile one does not end what another latches."""
+    daemon = start_daemon(NO_REGISTRY)
+    declare(daemon, "/tf_static", durability="transient_local", depth=2)
+    told = declare(daemon, "/tf_static", reliability="best_effort")
+    assert (told["durability"], told["depth"]) == ("transient_local", 2)
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
         ({"name": "/robot_1/a"}, "missing required field `type`"),
         ({"name": "/no name", "type": "p/T"}, "name: got 'no name'"),
+        ({"name": "a", "type": "p/T"}, "allowed: a name with leading slash"),
         ({"name": "/a", "type": "p/srv/T"}, "type: got 'p/srv/T'"),
         ({"name": "/a", "type": "p/T", "hash": "md5"}, "hash: got 'md5'"),
         ({"name": "/a", "type": "p/T", "reliability": "maybe"}, "reliability"),
@@ -147,5 +164,7 @@ def test_late_robots_and_late_consumers_get_what_each_producer_sent_last(
             got = [heard.receive(20) for _ in range(3)]
         assert [each.payload[5:] for each in got] == [b"camera", b"gps", b"lidar"]
         assert all(each.is_late for each in got)
+        (why,) = ask(two, "why", topic="/rx_robot_1/tf_static")["why"]
+        assert "received from robot 1" in why
         for daemon in (one, two):
             assert ask(daemon, "check")["problems"] == []

@@ -204,7 +204,7 @@ def test_the_documents_vectors_are_heard_as_it_says():
         "odom", "nav_msgs/msg/Odometry", bytes(range(8)), 5
     )
     small = auto(3, pdu_size=32)
-    for piece in pieces(42, Description("odom", "nav_msgs/msg/Odometry"), 14):
+    for piece in pieces(42, Description("odom", "nav_msgs/msg/Odometry"), 13):
         entry = Entry(15, 0, 0, 1, build_records([piece]))
         small.hear(build(Pdu(0, False, 1, 255, piece.piece, 1, [entry]), 32), 0.0)
     (message,) = small.hear(BY_NAME["numbered"].octets, 0.0)
@@ -233,7 +233,7 @@ def test_what_may_not_be_declared_is_refused_with_given_and_allowed():
     with pytest.raises(DeclarationError, match="auto"):
         OwnTopics(make_registry([("scan", "p/T")]), False, 250).declare(Offer("odom", "p/T"))
     with pytest.raises(DeclarationError, match=r"link\.pdu_size"):
-        OwnTopics(Registry(()), True, 14).declare(Offer("a" * 120, f"p/{'T' * 100}"))
+        OwnTopics(Registry(()), True, 13).declare(Offer("a" * 120, f"p/{'T' * 100}"))
 
 
 def test_numbers_are_the_same_after_a_restart_and_keys_share_when_they_run_out():
@@ -400,3 +400,80 @@ def test_a_relay_forwards_them_unread():
     assert got == [CDR + b"far"]
     assert relay.audit() == three.audit() == []
     assert topic_of(relay, 0).accepted == 0
+
+
+def declared_as(topics, *numbers):
+    """Let robot 5 declare (number, name); returns the bases of these numbers."""
+    for number, name in numbers:
+        (piece,) = pieces(number, Description(name, f"p/msg/{name.capitalize()}"), 250)
+        topics.take(5, piece)
+    return [topics.topic(5, number).base for number, _ in numbers]
+
+
+def test_topics_never_share_what_they_are_counted_under():
+    """A number gets another meaning, and its old name another number."""
+    topics = heard()
+    assert declared_as(topics, (20, "odom"), (21, "odom"), (22, "odom")) == [20, 20, 20]
+    assert declared_as(topics, (20, "scan")) == [20]
+    assert [topics.topic(5, n).base for n in (21, 22)] == [21, 21]
+    assert declared_as(topics, (23, "odom")) == [21]
+    assert sorted(topics.take_changed()) == [(5, 20), (5, 21), (5, 22)]
+    for number in range(1000):
+        declared_as(topics, (30, f"name_{number}"))
+    assert topics.topic(5, 30).base == 30
+
+
+def test_a_restart_ends_what_was_begun():
+    """Parts of a large message from before and after it are not joined."""
+    old, two = auto(1, pdu_size=64), auto(2, pdu_size=64)
+    new = make_link(1, topics=(), has_numbers=True, seed=77, pdu_size=64, beacon_s=0.2)
+    for link in (old, new):
+        topic = link.declare(ODOM)
+        link.submit(topic.id, CDR + bytes([link is old]) * 30_000, 0.0)
+    run([old, two], 0.0, 1)
+    old.handle_timers(0.0)
+    begun = rx(two).held
+    got = run([new, two], 0.1, 60)
+    assert [each[3] for each in got] == [CDR + bytes(30_000)]
+    assert begun == 0 or rx(two).dropped["rx_partial_superseded"]
+    assert two.audit() == []
+
+
+def test_a_name_of_the_registry_keeps_its_type():
+    one, two = auto(1), auto(2, [("odom", "nav_msgs/msg/Odometry")])
+    topic = one.declare(Offer("odom", "std_msgs/msg/String"))
+    one.submit(topic.id, CDR, 0.0)
+    assert run([one, two], 0.0, 30) == []
+    assert received(two)[1, topic.id].dropped == {"rx_other_type": 1}
+    assert "here it is nav_msgs/msg/Odometry" in two.notices(2.0)[0]
+
+
+def test_one_robot_cannot_displace_what_another_waits_for():
+    two = auto(2)
+    for src, n in ((1, 1), (66, 300)):
+        for seq in range(n):
+            entry = Entry(14, seq % 256, 0, 1, bytes([77]) + CDR)
+            two.hear(build(Pdu(0, False, src, 255, seq % 256, 1, [entry]), 1024), 0.0)
+    (piece,) = pieces(77, Description("odom", "p/msg/T"), 250)
+    entry = Entry(15, 0, 0, 1, build_records([piece]))
+    told = build(Pdu(0, False, 1, 255, 1, 1, [entry]), 1024)
+    assert [m.src for m in two.hear(told, 0.02)] == [1]
+    assert two.audit() == []
+
+
+def test_what_is_short_of_entry_ids_is_named_by_its_topic():
+    one = auto(1)
+    topic = one.declare(ODOM)
+    for number in range(600):
+        one.submit(topic.id, CDR + bytes(1500), 0.0, Overrides(key=f"k{number % 2}"))
+    while (burst := compose(one, 0.0, 63)) is not None:
+        one.confirm(burst, Outcome.SENT, 0.0)
+    assert any("odom had to wait for a free entry id" in each for each in one.notices(0.0))
+
+
+def test_the_policy_in_force_is_told():
+    one, two = auto(1), auto(2)
+    topic = one.declare(ODOM)
+    one.set_policy(topic.id, TopicPolicy(durability="transient_local", depth=4))
+    run([one, two], 0.0, 30)
+    assert two.heard_topic(1, topic.id).about.depth == 4

@@ -210,3 +210,43 @@ def test_any_octets_as_parts_are_dropped_or_joined(sent):
     receiver.handle_timers(5.0)
     assert receiver.audit() == []
     assert rx(receiver).held == 0
+
+
+def test_between_two_parts_it_ends_with_no_entry_id():
+    """A message that expires there has given its id back once."""
+    sender, _ = pair()
+    sender.submit(0, image(60_000), 0.0, Overrides(lifespan_s=1.0))
+    sizes = []
+    for step in range(2000):
+        now = 0.001 * step if step < 400 else 2.0
+        sender.handle_timers(now)
+        burst = compose(sender, now, 1)
+        if burst is None:
+            break
+        sender.confirm(burst, Outcome.SENT, now)
+    for number in range(300):
+        sender.submit(1, image(14_000, number), 4.0 + 0.01 * number)
+    now = 4.0
+    receiver = make_link(2, pdu_size=64, has_numbers=True)
+    while (burst := compose(sender, now, 63)) is not None:
+        sender.confirm(burst, Outcome.SENT, now)
+        sizes += [len(m.payload) for m in hear(receiver, burst.pdus, now)]
+        now += 0.004
+    assert sizes == [14_000] * 300
+    assert sender.audit() == receiver.audit() == []
+
+
+def test_a_stream_of_large_messages_names_the_one_that_lost_a_part():
+    sender, receiver = pair()
+    got = []
+    for number in range(12):
+        now = 0.4 * number
+        sender.submit(0, image(30_000, number), now)
+        pdus = pdus_of(sender)
+        lost = range(40, 400) if number == 3 else ()
+        got += hear(receiver, [pdu for i, pdu in enumerate(pdus) if i not in lost], now)
+        receiver.handle_timers(now + 0.3)
+    receiver.handle_timers(0.4 * 12)
+    assert len(got) == 11
+    assert received(receiver)[1, 0].dropped == {"rx_part_lost": 1}
+    assert rx(receiver).held == 0

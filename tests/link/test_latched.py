@@ -175,3 +175,19 @@ def test_any_order_of_any_producers(sent, depth):
     ]
     assert "".join(late_gets(links)) == "".join(f"{key}{number};" for _, (key, number) in kept)
     assert links[0].audit() == []
+
+
+def test_a_message_that_comes_while_older_ones_are_owed_comes_after_them_too():
+    """Whoever is new ends with the newest."""
+    links = [make_link(i, pdu_size=220, beacon_s=0.3, seed=i) for i in (1, 2)]
+    one, late = links
+    latched(one, 3)
+    keyed(one, ("", "1"), ("", "2"))
+    run([one], 0.0, 5)
+    got = []
+    for i in range(40):
+        got += exchange(links, 2.0 + 0.1 * i)
+        if i == 1:
+            one.submit(0, b"\0\1\0\0003", 2.15, Overrides())
+    heard = [payload[4:] for to, _, payload in got if to == late.own_id]
+    assert heard[-3:] == [b"1", b"2", b"3"]

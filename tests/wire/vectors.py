@@ -360,18 +360,18 @@ CLOCK = RecordsVector(
     (("CLOCK", (0xBEEF, 0x0102, 0x0101, 4_294_967_297, 1 << 40, 300, ((9, 0x0102, -1000),))),),
 )
 # Topic 42 = 0x2A is odom, latched (flag 1) with depth 5, hash 00 01 ... 07; piece 0 of 1.
-# `sha256sum` of these octets begins with TOPIC_CHECK.
+# `sha256sum` of these octets begins with 61d2.
 DESCRIPTION = bytes([1, 5, *range(8)]) + b"odom\0nav_msgs/msg/Odometry"
-TOPIC_CHECK = 0x61
+TOPIC_CHECK = 0x61D2
 TOPIC = RecordsVector(
     "topic",
-    bytes([15, 3 + len(DESCRIPTION), 42, TOPIC_CHECK, 0x01]) + DESCRIPTION,
+    bytes([15, 4 + len(DESCRIPTION), 42, 0x61, 0xD2, 0x01]) + DESCRIPTION,
     (("TOPIC", (42, TOPIC_CHECK, 0, 1, DESCRIPTION)),),
 )
 # The second of two pieces, from octet 14 on.
 TOPIC_PIECE = RecordsVector(
     "topic_piece",
-    bytes([15, 3 + len(DESCRIPTION) - 14, 42, TOPIC_CHECK, 0x12]) + DESCRIPTION[14:],
+    bytes([15, 4 + len(DESCRIPTION) - 14, 42, 0x61, 0xD2, 0x12]) + DESCRIPTION[14:],
     (("TOPIC", (42, TOPIC_CHECK, 1, 2, DESCRIPTION[14:])),),
 )
 WAITS = RecordsVector("waits", bytes([9, 4, 3, 255, 0, 7]), (("WAITS", (3, 255, 0, 7)),))

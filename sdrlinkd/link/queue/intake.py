@@ -39,7 +39,8 @@ from a recording; its age then counts from its submission."""
 class Intake:
     """Holds every topic's policy and counters, and puts messages into `outbox`.
 
-    `bytes_per_s` is the present capacity of the channel; infinity while it is unknown.
+    `bytes_per_s` is the present capacity of the channel; infinity while it is unknown. The large
+    messages of each topic are numbered from `first_large` on, which differs after a restart.
     """
 
     def __init__(
@@ -49,6 +50,7 @@ class Intake:
         outbox: Outbox,
         classes: ClassesParams,
         dictionaries: Mapping[int, ZstdCompressionDict],
+        first_large: int = 0,
     ) -> None:
         self._pdu_size = params.pdu_size
         self._dst = params.dst
@@ -57,6 +59,7 @@ class Intake:
         self._classes = classes
         self._outbox = outbox
         self._own = topics
+        self._first_large = first_large
         self._topics: dict[int, TopicState] = {}
         for topic in topics:
             self.add(topic.id, dictionaries.get(topic.id))
@@ -68,7 +71,9 @@ class Intake:
     def add(self, topic_id: int, dictionary: ZstdCompressionDict | None = None) -> None:
         """Begin to take messages of a topic."""
         if topic_id not in self._topics:
-            self._topics[topic_id] = TopicState(self._dst, self._has_control, dictionary)
+            self._topics[topic_id] = TopicState(
+                self._dst, self._has_control, dictionary, self._first_large
+            )
 
     def submit(
         self,

@@ -18,12 +18,16 @@ class TopicState:
     )  # fmt: skip
 
     def __init__(
-        self, dst: int, has_control: bool, dictionary: zstandard.ZstdCompressionDict | None
+        self,
+        dst: int,
+        has_control: bool,
+        dictionary: zstandard.ZstdCompressionDict | None,
+        first_large: int = 0,
     ) -> None:
         self._default_dst = dst
         self._has_control = has_control
         self._dictionary = dictionary
-        self._n_large = 0
+        self._n_large = first_large
         self.tally = TxTally()
         self.apply(TopicPolicy())
 
