@@ -40,6 +40,12 @@ def pub(
     cdr_file: Annotated[
         Path | None, typer.Option("--cdr", help="Send this file's CDR bytes instead.")
     ] = None,
+    declare: Annotated[
+        str | None,
+        typer.Option(
+            "--declare", help="Declare the topic with this type first, as in std_msgs/msg/String."
+        ),
+    ] = None,
     rate: Annotated[
         float, typer.Option("--rate", "-r", min=0.0, max=1e6, help="Rate in Hz; 0: send once.")
     ] = 0.0,
@@ -69,7 +75,12 @@ def pub(
     if lifespan_ms == 0:
         raise UserError(f"--lifespan: got {lifespan}; allowed: more than 0")
     with connect(runtime_dir) as control:
-        sent = topic_sent(topic, ask_status(control))
+        snapshot = ask_status(control)
+        if declare is not None:
+            full = topic if topic.startswith("/") else f"/{snapshot.namespace.strip('/')}/{topic}"
+            control.ask("declare", {"name": full, "type": declare})
+            snapshot = ask_status(control)
+        sent = topic_sent(topic, snapshot)
     topic, kind = sent.name, sent.type
     payload = _read(cdr_file) if cdr_file else _serialize(values, kind)
     if times > 1 and not rate:
@@ -187,7 +198,8 @@ def as_yaml(message: Message) -> str:
 
 def _headline(message: Message) -> str:
     age = "age unknown" if message.age_us is None else f"age {message.age_us / 1e3:.2f} ms"
-    return f"{message.topic} from robot {message.source}, number {message.number}, {age}"
+    kept = ", kept" if message.is_late else ""
+    return f"{message.topic} from robot {message.source}, number {message.number}, {age}{kept}"
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401

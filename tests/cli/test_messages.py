@@ -40,6 +40,17 @@ def test_a_bad_message_is_shown_as_bad_and_the_next_one_as_it_is(start_daemon, e
     assert shown.count("child_frame_id: ''") == 2
 
 
+def test_a_topic_is_declared_and_sent(start_daemon, ctl):
+    daemon = start_daemon('registry = ""\n')
+    dir_ = ("--runtime-dir", daemon.directory)
+    code, out, err = ctl("pub", "chatter", "{data: hi}", "--declare", "std_msgs/String", *dir_)
+    assert (code, err) == (0, "")
+    assert "on /robot_1/chatter (std_msgs/msg/String)" in out
+    assert ctl("pub", "/robot_1/chatter", "{data: ho}", *dir_)[0] == 0
+    code, _, err = ctl("pub", "chatter", "--declare", "std_msgs/Int8", *dir_)
+    assert (code, "it is declared as std_msgs/msg/String" in err) == (2, True)
+
+
 def test_ones_own_topic_is_not_what_one_hears(start_daemon, ctl):
     daemon = start_daemon("[link]\nbeacon_s = 0\n")
     nobody = "(none heard so far)"

@@ -303,8 +303,9 @@ def test_names_from_the_air_that_cannot_be_used_are_refused_and_named():
         (piece,) = pieces(number, about, 250)
         assert topics.take(5, piece) == (not says)
         if says:
-            assert says in topics.notices()[0]
-    assert topics.refused[5] == 4
+            assert says in topics.refused[5][number]
+    assert len(topics.refused[5]) == 4
+    assert "robot 5 declares topics that cannot be used (4)" in topics.notices()[0]
     assert [topics.topic(5, n).base for n in (16, 21)] == [16, 16]
 
 

@@ -1,6 +1,5 @@
 """The topics that other robots declare."""
 
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -13,6 +12,9 @@ from sdrlinkd.wire import (
     TopicPiece,
     parse_description,
 )
+
+MOST_TOLD = 3
+"""Most refused declarations of a robot that a notice names."""
 
 
 class HeardTopic(NamedTuple):
@@ -49,10 +51,8 @@ class HeardTopics:
         self._sources: dict[int, _Source] = {}
         self.changed: list[tuple[int, int]] = []
         """(source, number) whose meaning has changed and was not taken yet."""
-        self.refused: Counter[int] = Counter()
-        """Declarations that were refused, by source."""
-        self.last_refusal: dict[int, str] = {}
-        """Why the last declaration of a source was refused."""
+        self.refused: dict[int, dict[int, str]] = {}
+        """Numbers whose declarations were refused, and why, by source."""
 
     def topic(self, src: int, topic_id: int) -> HeardTopic | None:
         """The topic that an id of source `src` means; None if that is not known."""
@@ -99,19 +99,20 @@ class HeardTopics:
             about = parse_description(b"".join(there[i] for i in range(n)), check)
             self._check(source, about)
         except PduError as error:
-            self.refused[src] += 1
-            self.last_refusal[src] = str(error)
+            self.refused.setdefault(src, {})[number] = error.detail
             return False
         finally:
             there.clear()
         same = (topic.base for topic in source.known.values() if topic.name == about.name)
         base = next(same, number)
+        self.refused.get(src, {}).pop(number, None)
         source.known[number] = HeardTopic(base, about.name, about.type, about)
         return True
 
     def forget(self, src: int) -> None:
         """Forget what a robot declared, as it has restarted."""
         source = self._sources.pop(src, None)
+        self.refused.pop(src, None)
         if source is not None:
             self.changed += [(src, number) for number in source.known]
 
@@ -135,9 +136,10 @@ class HeardTopics:
             for src in sorted(self._not_understood)
         ]
         notices += [
-            f"robot {src} declared {n} {'topic' if n == 1 else 'topics'} that cannot be used; the "
-            f"last one: {self.last_refusal[src]}"
-            for src, n in sorted(self.refused.items())
+            f"robot {src} declares topics that cannot be used ({len(refused)}): "
+            f"{'; '.join(list(refused.values())[:MOST_TOLD])}"
+            for src, refused in sorted(self.refused.items())
+            if refused
         ]
         for src, topics in sorted(self.declared().items()):
             notices += [
