@@ -80,6 +80,8 @@ class Declaration(msgspec.Struct, frozen=True, kw_only=True):
 
 def merged(configured: TopicPolicy, offered: TopicPolicy) -> TopicPolicy:
     """The configured policy, with the keys that have their default value as offered."""
+    if not configured.offer:
+        return configured
     left = {
         key: getattr(offered, key)
         for key in TopicPolicy.__struct_fields__

@@ -14,9 +14,9 @@ from sdrlinkd.wire import Registry
 
 log = logging.getLogger("sdrlinkd")
 
-FIXED = ("dictionary", "stamp", "stop")
-"""Keys that cannot be changed at run time: receivers must know two of them, and the stop message is
-made at the start."""
+FIXED = ("dictionary", "offer", "stamp", "stop")
+"""Keys that cannot be changed at run time: receivers must know two of them, the stop message is
+made at the start, and what is set wins over an offer anyway."""
 
 
 class Policies:
@@ -90,8 +90,8 @@ class Policies:
             new = msgspec.convert(merged, TopicPolicy)
         except msgspec.ValidationError:
             raise UserError(explain_policy(changes)) from None
-        self._link.set_policy(topic_id, new)
         self.changed.setdefault(topic_id, {}).update({k: getattr(new, k) for k in changes})
+        self._link.set_policy(topic_id, self._policy(topic_id))
         # Report the policy as the link has it, not as it was given.
         new = self._link.policy(topic_id)
         self.announce_all()

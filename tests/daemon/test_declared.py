@@ -82,6 +82,12 @@ def test_what_is_configured_or_set_wins(start_daemon):
     assert declare(daemon, "/robot_1/a")["depth"] == 10
 
 
+def test_a_file_can_ignore_the_offer(start_daemon):
+    daemon = start_daemon(f"{NO_REGISTRY}[topic.a]\noffer = false\n")
+    told = declare(daemon, "/robot_1/a", durability="transient_local")
+    assert (told["durability"], told["depth"], told["lifespan_s"]) == ("volatile", 0, None)
+
+
 def test_a_registrys_topic_can_be_offered_and_a_new_one_cannot(start_daemon):
     daemon = start_daemon()
     told = declare(daemon, "/robot_1/odom", "nav_msgs/msg/Odometry", reliability="best_effort")

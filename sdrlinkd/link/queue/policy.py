@@ -37,6 +37,8 @@ class TopicPolicy(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     durability: Literal["volatile", "transient_local"] = "volatile"
     """transient_local: late joiners get the last `depth` messages (at least one) of each producer
     key; volatile: they do not."""
+    offer: bool = True
+    """Whether the QoS that a producer declares sets the keys that have their default value here."""
     dst: Annotated[int, Meta(ge=0, le=255)] | None = None
     """Destination robot; absent: `link.dst`."""
     stamp: bool = True
