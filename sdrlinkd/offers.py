@@ -8,11 +8,11 @@ from msgspec import Meta
 
 from sdrlinkd.errors import DeclarationError
 from sdrlinkd.link import DEFAULT_POLICY, Offer, TopicPolicy
+from sdrlinkd.wire import HASH_SIZE
 
 BEST_EFFORT = TopicPolicy(depth=1, lifespan_s=0.5)
 RELIABLE = TopicPolicy(depth=10, lifespan_s=5.0)
 _RIHS01 = re.compile(r"RIHS01_[0-9a-f]{64}")
-HASH_OCTETS = 8
 
 
 class Declaration(msgspec.Struct, frozen=True, kw_only=True):
@@ -68,11 +68,11 @@ class Declaration(msgspec.Struct, frozen=True, kw_only=True):
             raise DeclarationError(
                 f"hash: got {self.hash[:80]!r}; allowed: RIHS01_ and 64 hex digits, or nothing"
             )
-        hash_ = bytes.fromhex(self.hash.removeprefix("RIHS01_"))[:HASH_OCTETS]
+        hash_ = bytes.fromhex(self.hash.removeprefix("RIHS01_"))[:HASH_SIZE]
         return Offer(
             name,
             self.type,
-            hash_ or bytes(HASH_OCTETS),
+            hash_ or bytes(HASH_SIZE),
             max(1, self.depth) if self.is_latched else 0,
             self.reliability == "best_effort",
         )

@@ -65,9 +65,7 @@ class Policies:
         topic = link.topic_named(self._setup.name_on_air(name)) or link.topic_named(name)
         if topic is None:
             known = Registry(link.own_topics)
-            raise UserError(
-                f"topic {name}: unknown; allowed: {known.suggest(name)} (as read at the start)"
-            )
+            raise UserError(f"topic {name}: unknown; allowed: {known.suggest(name)}")
         return topic.id
 
     def name(self, topic_id: int) -> str:

@@ -73,8 +73,7 @@ class Bus:
         self.has_consumer = asyncio.Event()
         """Set once a consumer has subscribed to messages from the air."""
         self._boot = secrets.token_hex(4)
-        self._policies: Mapping[int, TopicPolicy] = setup.policies
-        self._welcome = self._announcement()
+        self._welcome = self._announcement(setup.policies)
         loop = asyncio.get_running_loop()
         self._sockets: list[zmq.Socket[bytes]] = []
         self._pull = self._bind(zmq.PULL, IN_SOCKET, {zmq.RCVHWM: IN_HWM})
@@ -151,8 +150,7 @@ class Bus:
 
     def announce(self, policies: Mapping[int, TopicPolicy]) -> None:
         """Announce the topics, and the limits that `policies`, by topic id, now set for them."""
-        self._policies = policies
-        self._welcome = self._announcement()
+        self._welcome = self._announcement(policies)
         for topic in self._setup.registry.topics:
             if not policies.get(topic.id, DEFAULT_POLICY).latched:
                 self._retention.forget_topic(topic.id)
@@ -166,13 +164,13 @@ class Bus:
         """
         return self._intake.accept(name, topic)
 
-    def names_in(self) -> dict[int, str]:
+    def names_in(self) -> Mapping[int, str]:
         """Names on the bus of the topics that are accepted, by topic id."""
-        return {topic.id: name for name, topic in self._intake.topics.items()}
+        return self._intake.names
 
     def tell(self, verdict: Verdict) -> None:
         """Send a message's verdict to its producer."""
-        name = self.names_in()[verdict.topic_id]
+        name = self._intake.names[verdict.topic_id]
         self._tell(envelope.Receipt(verdict.receipt, name, *verdict[2:]))
 
     def _tell(self, told: envelope.Receipt) -> None:
@@ -194,8 +192,8 @@ class Bus:
             self._frames_out[src, topic.base] = frame
         return frame
 
-    def _announcement(self) -> bytes:
-        return announcement(self._setup, self._intake.topics, self._policies, self._boot)
+    def _announcement(self, policies: Mapping[int, TopicPolicy]) -> bytes:
+        return announcement(self._setup, self._intake.topics, policies, self._boot)
 
     def names_out(self) -> dict[tuple[int, int], str]:
         """Names of the bus topics published so far, by (source, topic id)."""

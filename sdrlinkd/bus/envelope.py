@@ -6,14 +6,13 @@ from typing import Annotated, Literal
 import msgspec
 from msgspec import Meta
 
+from sdrlinkd.client import MAX_KEY_BYTES
 from sdrlinkd.errors import EnvelopeError
 
 VERSION_BYTE = b"\x01"
 MAX_HEADER_BYTES = 256
 MOST_LOOKED_AT = 16 * MAX_HEADER_BYTES
 """Largest header in octets that is parsed to find the sender of a refused message."""
-MAX_KEY_BYTES = 32
-"""Longest producer key (`k`) in octets."""
 MOST_SHOWN = 240
 
 

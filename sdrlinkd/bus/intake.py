@@ -56,9 +56,10 @@ class Intake:
 
     def __init__(self, setup: Setup, ingress: Ingress, tell: TellRefused) -> None:
         self._topic_ids: dict[bytes, int] = {}
-        self._types: dict[int, str] = {}
         self.topics: dict[str, Topic] = {}
         """The topics that are accepted, by their names on the bus."""
+        self.names: dict[int, str] = {}
+        """Their names on the bus, by topic id."""
         for name, topic_id in setup.topics_in.items():
             self.accept(name, setup.registry.topics[topic_id])
         self._most = setup.config.bus.max_message_bytes
@@ -71,7 +72,7 @@ class Intake:
         is_new = name not in self.topics
         self.topics[name] = topic
         self._topic_ids[name.encode() + b"\0"] = topic.id
-        self._types[topic.id] = topic.type
+        self.names[topic.id] = name
         return is_new
 
     @property
@@ -103,8 +104,8 @@ class Intake:
             self._refuse("tx_too_big", words, topic_id, receipt, dst)
         elif header is None:
             self._ingress.submit(topic_id, payload)
-        elif header.ty is not None and header.ty != self._types[topic_id]:
-            words = partial(wrong_type, _name(topic), header.ty, self._types[topic_id])
+        elif header.ty is not None and header.ty != (type_ := self._type(topic_id)):
+            words = partial(wrong_type, _name(topic), header.ty, type_)
             self._refuse("tx_bad_envelope", words, topic_id, receipt, dst)
         else:
             overrides = Overrides(
@@ -116,6 +117,9 @@ class Intake:
                 key=header.k or "",
             )
             self._ingress.submit(topic_id, payload, overrides, header.t)
+
+    def _type(self, topic_id: int) -> str:
+        return self.topics[self.names[topic_id]].type
 
     def _refuse(
         self, reason: str, words: Callable[[], str], topic_id: int, receipt: str, dst: int | None

@@ -1,6 +1,6 @@
 """`plan`: predicts whether the traffic fits the channel, and advises what to change."""
 
-from collections.abc import Mapping
+import contextlib
 from pathlib import Path
 from typing import Annotated
 
@@ -9,13 +9,11 @@ import typer
 
 from sdrlinkd.adapters import open_bag
 from sdrlinkd.cli.app import AsJson, app
-from sdrlinkd.config import Setup, load_config, make_setup
+from sdrlinkd.config import load_config, make_setup
 from sdrlinkd.errors import UserError
-from sdrlinkd.link import TopicPolicy
 from sdrlinkd.plan import (
     HOST_S,
     LeftOut,
-    Load,
     Plan,
     loads_from_bag,
     make_plan,
@@ -26,7 +24,6 @@ from sdrlinkd.plan import (
 )
 from sdrlinkd.tables import FittedTable, figure, screen_console, words
 from sdrlinkd.units import seconds
-from sdrlinkd.wire import Registry
 
 COLUMNS = (
     words("topic"), words("class", 4, 7), figure("Hz"), figure("bytes", 2), figure("PDUs", 1),
@@ -62,15 +59,21 @@ def plan(
     host_s, has_numbers = seconds(host, "--host"), setup.has_numbers
     setting = setting_of(setup.config, setup.node_id, robots, turnaround_s, host_s, has_numbers)
     registry, policies = setup.registry, setup.policies
-    if has_numbers:
-        names = [*names_in(topic or []), *(_bare_names(bag, setup) if bag is not None else [])]
-        registry, policies = with_declared(registry, setup.named_policies, names)
-    loads = [parse_load(text, registry) for text in topic or []]
-    left_out: list[LeftOut] = []
-    if bag is not None:
-        told = {load.topic_id for load in loads}
-        found, left_out = _from_bag(bag, registry, policies, setup.config.topics)
-        loads += [load for load in found if load.topic_id not in told]
+    with contextlib.ExitStack() as stack:
+        recording = None if bag is None else stack.enter_context(contextlib.closing(open_bag(bag)))
+        if has_numbers:
+            recorded = [] if recording is None else recording.topics()
+            names = [*names_in(topic or []), *(setup.name_on_air(each.name) for each in recorded)]
+            registry, policies = with_declared(registry, setup.named_policies, names)
+        loads = [parse_load(text, registry) for text in topic or []]
+        left_out: list[LeftOut] = []
+        if recording is not None:
+            told = {load.topic_id for load in loads}
+            messages = (
+                (each.topic, 1e-9 * each.time_ns, each.cdr) for each in recording.messages()
+            )
+            found, left_out = loads_from_bag(messages, registry, policies, setup.config.topics)
+            loads += [load for load in found if load.topic_id not in told]
     if not loads:
         raise UserError(_nothing(left_out))
     made = make_plan(sorted(loads), policies, setting, left_out)
@@ -115,23 +118,3 @@ def _nothing(left_out: list[LeftOut]) -> str:
         return "nothing to plan; give --bag FILE, or topics with --topic NAME:RATE:SIZE"
     names = ", ".join(f"{each.name} ({each.why})" for each in left_out)
     return f"--bag: no topic in it can be planned: {names}; give topics with --topic NAME:RATE:SIZE"
-
-
-def _bare_names(path: Path, setup: Setup) -> list[str]:
-    """Names on the air of a recording's topics."""
-    opened = open_bag(path)
-    try:
-        return [setup.name_on_air(each.name) for each in opened.topics()]
-    finally:
-        opened.close()
-
-
-def _from_bag(
-    path: Path, registry: Registry, policies: Mapping[int, TopicPolicy], taken: list[str]
-) -> tuple[list[Load], list[LeftOut]]:
-    opened = open_bag(path)
-    try:
-        messages = ((each.topic, 1e-9 * each.time_ns, each.cdr) for each in opened.messages())
-        return loads_from_bag(messages, registry, policies, taken)
-    finally:
-        opened.close()

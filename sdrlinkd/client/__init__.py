@@ -19,6 +19,7 @@ on Python 3.10 and newer.
 from typing import TYPE_CHECKING
 
 from sdrlinkd.client.announced import (
+    MAX_KEY_BYTES,
     QOS,
     check_wishes,
     too_large,
@@ -67,6 +68,7 @@ __all__ = [
     "IN_PUB_SOCKET",
     "IN_SOCKET",
     "LATE_PREFIX",
+    "MAX_KEY_BYTES",
     "OUT_SOCKET",
     "QOS",
     "RECEIPT_PREFIX",

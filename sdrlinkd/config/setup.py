@@ -20,7 +20,7 @@ from sdrlinkd.config.topics import (
     uses_numbers,
 )
 from sdrlinkd.errors import ConfigError
-from sdrlinkd.link import TopicPolicy, check_access, flush_told
+from sdrlinkd.link import Qos, TopicPolicy, check_access, flush_told
 from sdrlinkd.wire import (
     Registry,
     equal_payload,
@@ -85,8 +85,10 @@ class Setup:
     @property
     def largest(self) -> int:
         """Largest message in octets that PDUs can carry."""
-        size = self.config.link.pdu_size
-        return max_large_size(size) if self.has_numbers else max_message_size(size)
+        size, classes = self.config.link.pdu_size, self.config.classes
+        if not self.has_numbers:
+            return max_message_size(size)
+        return max_large_size(size, max(classes.of(qos).parity for qos in Qos))
 
     def _example(self, src: int) -> str:
         topics = self.registry.topics

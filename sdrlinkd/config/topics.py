@@ -22,7 +22,7 @@ def uses_numbers(config: Config, registry: Registry) -> bool:
     """Whether producers may declare topics beyond the registry. Raises ConfigError."""
     if config.auto is None:
         return not len(registry)
-    if config.auto and not registry.has_numbers:
+    if config.auto and not registry.leaves_numbers:
         raise ConfigError(
             f"auto: got true; it needs topic id {DECLARED_TOPIC_ID}, but the registry has "
             f"{len(registry)} topics; allowed: false, or a registry of at most "

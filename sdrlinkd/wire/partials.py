@@ -76,6 +76,8 @@ class Large:
 
 @dataclass(slots=True)
 class Source:
+    """What is held of one source; in both tables, the one silent for longest is first."""
+
     partials: OrderedDict[tuple[int, int], Partial] = field(default_factory=OrderedDict)
     large: OrderedDict[tuple[int, int], Large] = field(default_factory=OrderedDict)
     parts_at: float = float("-inf")

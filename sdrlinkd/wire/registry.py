@@ -81,7 +81,7 @@ class Registry:
         return len(self.topics)
 
     @property
-    def has_numbers(self) -> bool:
+    def leaves_numbers(self) -> bool:
         """Whether topic id 0xE is free for declared topics and large messages."""
         return len(self.topics) <= DECLARED_TOPIC_ID
 

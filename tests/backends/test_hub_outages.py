@@ -106,7 +106,7 @@ async def test_bursts_for_a_hub_that_went_away_are_lost_and_those_after_it_leave
         with serving(tmp_path, {1: params}):
             assert {(await each).outcome for each in lost} == {TxOutcome.LOST}
             assert ask(tmp_path).bursts == 0, "what was sent in vain stays where it is"
-            begin = radio._antenna.end + 50 * N
+            begin = radio._antenna.end + 400 * N
             report = await radio.send(TxBurst(begin, noise(300), latest=begin))
             assert report == (TxOutcome.SENT, begin, begin + 300)
             assert ask(tmp_path).bursts == 1

@@ -5,6 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sdrlinkd.link import Outcome, Overrides, TopicPolicy
+from sdrlinkd.link.queue import Kept, Latched
 from sdrlinkd.link.topics import MOST_KEYS
 from tests.link.world import compose, compose_at, make_link, topic_of
 
@@ -191,3 +192,16 @@ def test_a_message_that_comes_while_older_ones_are_owed_comes_after_them_too():
             one.submit(0, b"\0\1\0\0003", 2.15, Overrides())
     heard = [payload[4:] for to, _, payload in got if to == late.own_id]
     assert heard[-3:] == [b"1", b"2", b"3"]
+
+
+def test_memory_is_bounded_by_dropping_what_is_oldest():
+    """First the other keys, the one silent for longest first, then the key's older messages."""
+    for most, left in ((1000, "ab1 ba1 ab2 ba2"), (350, "ba1 ba2"), (150, "ba2"), (50, "ba2")):
+        latched = Latched(most)
+        for text in ("ab1", "ba1", "ab2", "ba2"):
+            payload = text.encode().ljust(100)
+            latched.keep(0, Kept(payload, 0.0, Overrides(key=text[0])), 4)
+        latched.newcomer(2, 0.0)
+        assert list(latched.due(0.1, 1e9)) == [], "others may follow"
+        offered = [each.kept.payload.strip().decode() for each in latched.due(1.0, 1e9)]
+        assert " ".join(offered) == left

@@ -11,6 +11,7 @@ import math
 import zfec
 
 from sdrlinkd.wire import (
+    MAX_CODED,
     MAX_VALUE_SIZE,
     PARITY_OVERHEAD,
     TLV_HEADER_SIZE,
@@ -19,8 +20,6 @@ from sdrlinkd.wire import (
     build_records,
 )
 
-MOST = 256
-"""Most fragments and parity fragments of a message, together."""
 LEAST_FRAGMENTS = 4
 """Fewest fragments for which parity is sent."""
 
@@ -32,7 +31,7 @@ def parity_records(
 
     `ids` is (topic id, entry id), and `room` is the number of record bytes that fit into a PDU.
     """
-    n_parity = min(math.ceil(share * total), MOST - total)
+    n_parity = min(math.ceil(share * total), MAX_CODED - total)
     if total < LEAST_FRAGMENTS or n_parity < 1:
         return []
     length = _piece(room)
@@ -51,7 +50,7 @@ def parity_records(
 
 def parity_pdus(k: int, total: int, share: float, room: int) -> int:
     """How many PDUs the parity of a message takes; arguments as for `parity_records`."""
-    n_parity = min(math.ceil(share * total), MOST - total)
+    n_parity = min(math.ceil(share * total), MAX_CODED - total)
     if total < LEAST_FRAGMENTS or n_parity < 1:
         return 0
     length = _piece(room)
@@ -71,7 +70,7 @@ def is_sound(parity: Parity) -> bool:
     return (
         k * (total - 1) < parity.size <= k * total
         and 0 < len(parity.data) <= k - parity.at
-        and parity.number < parity.n_parity <= MOST - total
+        and parity.number < parity.n_parity <= MAX_CODED - total
     )
 
 

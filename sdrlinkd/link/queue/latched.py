@@ -49,7 +49,8 @@ class Latched:
     the one that was silent for longest is dropped.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, most_bytes: int = MOST_BYTES) -> None:
+        self._most_bytes = most_bytes
         self._topics: dict[int, OrderedDict[str, deque[_Latched]]] = {}
         self._count = self._n_bytes = 0
         self._credit_s = 0.0
@@ -72,10 +73,10 @@ class Latched:
         self._n_bytes += len(kept.payload)
         while len(messages) > depth:
             self._n_bytes -= len(messages.popleft().kept.payload)
-        while len(keys) > 1 and (len(keys) > MOST_KEYS or self._n_bytes > MOST_BYTES):
+        while len(keys) > 1 and (len(keys) > MOST_KEYS or self._n_bytes > self._most_bytes):
             _, silent = keys.popitem(last=False)
             self._n_bytes -= sum(len(each.kept.payload) for each in silent)
-        while len(messages) > 1 and self._n_bytes > MOST_BYTES:
+        while len(messages) > 1 and self._n_bytes > self._most_bytes:
             self._n_bytes -= len(messages.popleft().kept.payload)
 
     def forget(self, topic_id: int) -> None:

@@ -1,6 +1,7 @@
 """Messages whose topic number has not been declared yet, held for a moment."""
 
-from collections import OrderedDict
+from collections import deque
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from sdrlinkd.link.receive.ages import Origin
@@ -35,65 +36,71 @@ class Whole(NamedTuple):
     snr_db: float | None
 
 
+@dataclass(slots=True)
+class _Source:
+    held: deque[tuple[float, Whole]] = field(default_factory=deque)
+    """(time until which it waits, message), the oldest first."""
+    n_bytes: int = 0
+
+
 class UndeclaredMessages:
-    """Holds messages of unknown topic numbers for HOLD_S, within a bound on memory."""
+    """Holds messages of unknown topic numbers for HOLD_S, within bounds on memory."""
 
     def __init__(self) -> None:
-        self._held: OrderedDict[int, tuple[float, Whole]] = OrderedDict()
-        self._count = 0
-        self.n_bytes = 0
+        self._sources: dict[int, _Source] = {}
+        self._count = self.n_bytes = 0
 
     def __len__(self) -> int:
-        return len(self._held)
+        return self._count
 
     def hold(self, message: Whole, now: float) -> list[Whole]:
         """Hold a message; returns those that are given up to make room."""
-        self._count += 1
-        self._held[self._count] = (now + HOLD_S, message)
-        self.n_bytes += _cost(message)
+        source = self._sources.setdefault(message.src, _Source())
+        source.held.append((now + HOLD_S, message))
+        self._note(source, message, 1)
         given_up = []
-        while self._is_full(message.src):
-            given_up.append(self._take(self._oldest(message.src)))
+        while len(source.held) > MOST_MESSAGES or source.n_bytes > SOURCE_BYTES:
+            given_up.append(self._take_oldest(source))
         while self.n_bytes > MOST_BYTES:
-            greedy = max({each.src for _, each in self._held.values()}, key=self._cost_of)
-            given_up.append(self._take(self._oldest(greedy)))
+            greedy = max(self._sources.values(), key=lambda each: each.n_bytes)
+            given_up.append(self._take_oldest(greedy))
         return given_up
 
     def of_source(self, src: int) -> list[Whole]:
         """Take out the messages of a source."""
-        found = [key for key, (_, each) in self._held.items() if each.src == src]
-        return [self._take(key) for key in found]
+        source = self._sources.get(src)
+        return (
+            [] if source is None else [self._take_oldest(source) for _ in range(len(source.held))]
+        )
 
     def release(self, src: int, number: int) -> list[Whole]:
         """Take out the messages of a number that is known now, in their order."""
-        found = [key for key, (_, each) in self._held.items() if each[:2] == (src, number)]
-        return [self._take(key) for key in found]
+        source = self._sources.get(src)
+        if source is None:
+            return []
+        released = [message for _, message in source.held if message.number == number]
+        source.held = deque(each for each in source.held if each[1].number != number)
+        for message in released:
+            self._note(source, message, -1)
+        return released
 
     def expire(self, now: float) -> list[Whole]:
         """Take out the messages that have waited too long."""
         given_up = []
-        while self._held:
-            key, (until, _) = next(iter(self._held.items()))
-            if now < until:
-                break
-            given_up.append(self._take(key))
+        for src, source in list(self._sources.items()):
+            while source.held and source.held[0][0] <= now:
+                given_up.append(self._take_oldest(source))
+            if not source.held:
+                del self._sources[src]
         return given_up
 
-    def _is_full(self, src: int) -> bool:
-        held = sum(each.src == src for _, each in self._held.values())
-        return held > MOST_MESSAGES or self._cost_of(src) > SOURCE_BYTES
-
-    def _cost_of(self, src: int) -> int:
-        return sum(_cost(each) for _, each in self._held.values() if each.src == src)
-
-    def _oldest(self, src: int) -> int:
-        return next(key for key, (_, each) in self._held.items() if each.src == src)
-
-    def _take(self, key: int) -> Whole:
-        _, message = self._held.pop(key)
-        self.n_bytes -= _cost(message)
+    def _take_oldest(self, source: _Source) -> Whole:
+        _, message = source.held.popleft()
+        self._note(source, message, -1)
         return message
 
-
-def _cost(message: Whole) -> int:
-    return len(message.payload) + OVERHEAD
+    def _note(self, source: _Source, message: Whole, sign: int) -> None:
+        n_bytes = sign * (len(message.payload) + OVERHEAD)
+        source.n_bytes += n_bytes
+        self.n_bytes += n_bytes
+        self._count += sign

@@ -57,6 +57,8 @@ class OwnTopics:
         self._keys: dict[int, OrderedDict[str, int]] = {}
         self.told: dict[int, Description] = {}
         """What each number means, for other robots."""
+        self.version = 0
+        """Counts the changes of `told`."""
 
     def __iter__(self) -> Iterator[Topic]:
         return iter(list(self._by_id.values()))
@@ -98,14 +100,13 @@ class OwnTopics:
         if known.type != type_:
             raise DeclarationError(f"{name}: got type {type_}; it is declared as {known.type}")
         if known.id >= FIRST_NUMBER:
-            for number in {known.id, *self._keys[known.id].values()}:
-                self.told[number] = Description(name, type_, *offer[2:])
+            self._tell(known.id, Description(name, type_, *offer[2:]))
         return known
 
     def set_depth(self, topic_id: int, depth: int) -> None:
         """Tell other robots how many messages of a declared topic to keep; 0: it is volatile."""
-        for number in {topic_id, *self._keys.get(topic_id, {}).values()} & self.told.keys():
-            self.told[number] = self.told[number]._replace(depth=depth)
+        if (about := self.told.get(topic_id)) is not None:
+            self._tell(topic_id, about._replace(depth=depth))
 
     def number(self, topic_id: int, key: str) -> int:
         """The number on the air for messages of a topic from the producer `key`."""
@@ -128,7 +129,7 @@ class OwnTopics:
             _, number = keys.popitem(last=False)
         else:
             number = self._free(f"{self._by_id[topic_id].name}\0{key}")
-            self.told[number] = self.told[topic_id]
+            self._note(number, self.told[topic_id])
         keys[key] = number
         return number
 
@@ -153,8 +154,18 @@ class OwnTopics:
         self._by_id[topic.id] = self._by_name[name] = topic
         self._by_lower[name.lower()] = name
         self._keys[topic.id] = OrderedDict()
-        self.told[topic.id] = about
+        self._note(topic.id, about)
         return topic
+
+    def _tell(self, topic_id: int, about: Description) -> None:
+        """Give all numbers of a declared topic the meaning `about`."""
+        for number in {topic_id, *self._keys[topic_id].values()}:
+            self._note(number, about)
+
+    def _note(self, number: int, about: Description) -> None:
+        if self.told.get(number) != about:
+            self.told[number] = about
+            self.version += 1
 
     def _free(self, text: str) -> int:
         """A free number, the same one for the same text as far as possible."""

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from math import inf
 
 from sdrlinkd.link.topics.own import OwnTopics
-from sdrlinkd.wire import TopicPiece, pieces
+from sdrlinkd.wire import Description, TopicPiece, pieces
 
 TIMES_S = (0.0, 0.2, 0.7, 1.5, 3.0, 6.0)
 """When a new declaration, or all of them for a new robot, is told, in s from then."""
@@ -23,13 +23,14 @@ class TopicTeller:
     """
 
     def __init__(self, topics: OwnTopics, room: int) -> None:
-        self._topics = topics
-        self.told = topics.told
-        """What each declared number means."""
+        self.topics = topics
+        """The topics that are told."""
         self._room = room
         self._due_at: dict[int, list[float]] = {}
         """Times at which each number is to be told, the earliest first."""
-        self._said: dict[int, object] = {}
+        self._said: dict[int, Description] = {}
+        self._version = 0
+        self._next_at = inf
         self._credit_s = FIRST_CREDIT_S
         self._looked_at: float | None = None
 
@@ -40,16 +41,21 @@ class TopicTeller:
 
     def due(self, now: float) -> Iterator[TopicPiece]:
         """The records to be told at `now`."""
-        for number, about in list(self._topics.told.items()):
-            if self._said.get(number) != about:
-                self._said[number] = about
-                self._plan(number, now)
-            times = self._due_at[number]
+        if self._version != self.topics.version:
+            self._version = self.topics.version
+            for number, about in self.topics.told.items():
+                if self._said.get(number) != about:
+                    self._said[number] = about
+                    self._plan(number, now)
+        if now < self._next_at:
+            return
+        for number, times in self._due_at.items():
             if times[0] <= now:
                 del times[0]
                 if not times:
                     times.append(now + PERIOD_S)
-                yield from pieces(number, about, self._room)
+                yield from pieces(number, self._said[number], self._room)
+        self._next_at = min(times[0] for times in self._due_at.values())
 
     def may_pay(self, now: float, cost_s: float) -> bool:
         """Whether a PDU of only such records, of airtime `cost_s`, is within the share at `now`.
@@ -66,3 +72,4 @@ class TopicTeller:
 
     def _plan(self, number: int, now: float) -> None:
         self._due_at[number] = [now + each_s for each_s in TIMES_S]
+        self._next_at = min(self._next_at, now)

@@ -52,7 +52,7 @@ class ControlRecords:
         self._neighbors = neighbors
         self._teller = teller
         self._room = record_room
-        self._n_topics = 0
+        self._told_version = 0
         self._most_arrivals = (record_room - CLOCK_SIZE) // ARRIVAL_SIZE
         self.fits = self._most_arrivals > 0 or not params.period_s
         """Whether PDUs have room for CLOCK records, if these are configured."""
@@ -91,7 +91,7 @@ class ControlRecords:
         schedule, if any.
         """
         cannot_wait = False
-        if len(self._teller.told) != self._n_topics:
+        if self._teller.topics.version != self._told_version:
             # With the topic's first messages, if these leave room.
             self._offer_topics(start)
         if start >= self._beacons.due_at:
@@ -169,7 +169,7 @@ class ControlRecords:
         return max(at, self._told_alone_at + self.period_s) if self._n_others else at
 
     def _offer_topics(self, now: float) -> None:
-        self._n_topics = len(self._teller.told)
+        self._told_version = self._teller.topics.version
         for piece in self._teller.due(now):
             self._piggyback.put_topic(piece)
 
