@@ -38,7 +38,7 @@ from sdrlinkd.verbs import make_verbs
 
 if TYPE_CHECKING:
     # Its package imports the bag readers, which the daemon on a robot does not need.
-    from sdrlinkd.adapters import ChronySocket, Due, Transforms
+    from sdrlinkd.adapters import ChronySocket, Due, MessageTypes, Transforms
 
 log = logging.getLogger("sdrlinkd")
 
@@ -139,16 +139,16 @@ async def _open(
     context = zmq.Context()
     # Closes sockets that a failed part left open; term() would wait for them forever.
     stack.callback(context.destroy)
-    headers, stops = _types_of(setup)
+    types, transforms = _types_of(setup), _transforms(setup)
     open_bus = partial(Bus, context, directory, setup)
     chrony = _chrony(setup, stack)
-    node = Node(setup, link, opening, open_bus, _transforms(setup), headers, stops, chrony)
+    node = Node(setup, link, opening, open_bus, transforms, types, chrony)
     stack.callback(node.bus.close)
     policies.announce = node.bus.announce
     control = Control(context, directory)
     stack.callback(control.close)
     reloading = Reloading(setup, reload, check, policies, opening)
-    declaring = Declaring(setup, link, policies, node.bus)
+    declaring = Declaring(setup, link, policies, node.bus, transforms)
     control.serve(make_verbs(setup, node, control, policies, opening, reloading, declaring))
     stack.push_async_callback(opening.close)
     stack.callback(loading.give_up)
@@ -184,12 +184,12 @@ def _make_pdu_link(
     return make_modem(config, setup.node_id, rng, patience, began_s, loading, early)
 
 
-def _types_of(setup: Setup) -> tuple[frozenset[int], dict[int, bytes]]:
-    """(ids of topics with a header, stop messages by topic id). Raises ConfigError."""
-    # These import the message types, which are slow to load.
-    from sdrlinkd.adapters import header_topics, stop_messages
+def _types_of(setup: Setup) -> "MessageTypes":
+    """What is known of the topics' types. Raises ConfigError."""
+    # This imports the message types, which are slow to load.
+    from sdrlinkd.adapters import MessageTypes
 
-    return header_topics(setup), stop_messages(setup)
+    return MessageTypes(setup)
 
 
 def _chrony(setup: Setup, stack: contextlib.AsyncExitStack) -> "ChronySocket | None":
@@ -219,7 +219,10 @@ def _transforms(setup: Setup) -> dict[int, "Transforms"]:
     # This imports the message types, which are slow to load.
     from sdrlinkd.adapters import Transforms
 
-    return {topic_id: Transforms(setup.config.tf) for topic_id in setup.transforms}
+    topics = setup.registry.topics
+    return {
+        each.id: Transforms(setup.config.tf) for each in topics if each.name in setup.transforms
+    }
 
 
 def _own_traffic(setup: Setup, stack: contextlib.AsyncExitStack) -> Iterator["Due"]:

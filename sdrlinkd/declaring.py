@@ -1,28 +1,44 @@
 """Takes topics that producers declare while the daemon runs."""
 
 import logging
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from sdrlinkd.bus import Bus
-from sdrlinkd.config import Setup
+from sdrlinkd.config import TF_TYPE, Setup
 from sdrlinkd.errors import DeclarationError
 from sdrlinkd.link import Link
 from sdrlinkd.offers import Declaration
 from sdrlinkd.policies import Policies
+from sdrlinkd.wire import topic_type
+
+if TYPE_CHECKING:
+    # Its package imports the bag readers, which the daemon on a robot does not need.
+    from sdrlinkd.adapters import Transforms
 
 log = logging.getLogger("sdrlinkd")
 
 
 class Declaring:
-    """Joins the parts that a new topic concerns: the link, its policy, and the bus."""
+    """Joins the parts that a new topic concerns: the link, its policy, [tf], and the bus.
 
-    def __init__(self, setup: Setup, link: Link, policies: Policies, bus: Bus) -> None:
+    `transforms` are the filters of transforms by topic id; those of declared topics are added.
+    """
+
+    def __init__(
+        self,
+        setup: Setup,
+        link: Link,
+        policies: Policies,
+        bus: Bus,
+        transforms: "dict[int, Transforms]",
+    ) -> None:
         self._setup = setup
         self._link = link
         self._policies = policies
         self._bus = bus
+        self._transforms = transforms
 
     def declare(self, arguments: dict[str, Any]) -> dict[str, Any]:
         """Take a topic, and return what became of it. Raises DeclarationError."""
@@ -32,7 +48,18 @@ class Declaring:
             raise DeclarationError(f"declare: {error}") from None
         name = self._setup.name_on_air(declaration.name)
         self._check_name(declaration.name, name)
+        is_filtered = name in self._setup.transforms
+        if is_filtered and topic_type(declaration.type) != TF_TYPE:
+            raise DeclarationError(
+                f"{name}: got type {declaration.type[:128]}; allowed for topics in tf.topics: "
+                f"{TF_TYPE}"
+            )
         topic = self._link.declare(declaration.offer(name))
+        if is_filtered and topic.id not in self._transforms:
+            # This imports the message types, which are slow to load.
+            from sdrlinkd.adapters import Transforms
+
+            self._transforms[topic.id] = Transforms(self._setup.config.tf)
         policy = self._policies.offer(topic.id, declaration)
         is_new = self._bus.accept(declaration.name, topic)
         self._policies.announce_all()
@@ -65,6 +92,16 @@ class Declaring:
             raise DeclarationError(
                 f"{given}: on the air it has the name of {other}, {name}; use one of the two"
             )
+
+    def demand(self, now: float) -> dict[str, Any]:
+        """Which topics other robots want, by bus topic, and the version of their declarations."""
+        names = self._bus.names_in()
+        wanted = {
+            names[topic.id]: robots
+            for name, robots in self._link.demand(now).items()
+            if (topic := self._link.topic_named(name)) is not None and topic.id in names
+        }
+        return {"boot": self._bus.boot, "version": self._link.heard_version, "wanted": wanted}
 
     def declared(self) -> list[dict[str, Any]]:
         """The topics that other robots declared, with the bus topics of their messages."""

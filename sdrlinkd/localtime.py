@@ -2,7 +2,7 @@
 
 import struct
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from typing import NamedTuple, TypeVar
 
 from sdrlinkd.link import Delivered, Link
@@ -38,11 +38,11 @@ UNKNOWN = LocalTimes()
 
 
 def local_times(
-    link: Link, message: Delivered, age_s: float, now: float, now_ns: int, stamped: Collection[int]
+    link: Link, message: Delivered, age_s: float, now: float, now_ns: int, has_header: bool
 ) -> LocalTimes:
     """The times of a message that is `age_s` old at `now`, which is `now_ns` by the host's clock.
 
-    `stamped`: ids of topics whose messages begin with a std_msgs/Header.
+    `has_header`: it begins with a std_msgs/Header.
     """
     known = link.wall_offset(message.src, now)
     if known is None:
@@ -50,7 +50,7 @@ def local_times(
     offset_ns, error_s, wall_error_s = known
     published_ns = now_ns - round(1e9 * age_s)
     published = LocalTimes(published_ns, _us(wall_error_s))
-    if message.topic_id not in stamped:
+    if not has_header:
         return published
     stamp_ns = header_stamp_ns(message.payload)
     if stamp_ns is None:

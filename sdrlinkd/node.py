@@ -3,7 +3,7 @@
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -29,14 +29,14 @@ from sdrlinkd.opening import Opening
 from sdrlinkd.pdulink import Heard, PduLink
 from sdrlinkd.reports import Snapshot
 from sdrlinkd.traffic import OwnTraffic
+from sdrlinkd.wanting import Wanting
 
 if TYPE_CHECKING:
     # Its package imports the bag readers, which the daemon on a robot does not need.
-    from sdrlinkd.adapters import ChronySocket, Due, Transforms
+    from sdrlinkd.adapters import ChronySocket, Due, MessageTypes, Transforms
 
 TICK_S = 0.05
 SHORTEST_TICK_S = 0.001
-NO_STOPS: Mapping[int, bytes] = {}
 
 log = logging.getLogger("sdrlinkd")
 
@@ -44,9 +44,8 @@ log = logging.getLogger("sdrlinkd")
 class Node:
     """Connects the link, the bus and the PDU link; it has no queue and takes no decision itself.
 
-    `headers` are the ids of topics whose messages begin with a std_msgs/Header. `stops` holds the
-    stop message of each command topic by topic id, for when the topic falls silent. `chrony`
-    receives samples of another robot's clock.
+    `types` knows which messages begin with a std_msgs/Header, and the stop messages of command
+    topics, for when they fall silent. `chrony` receives samples of another robot's clock.
     """
 
     def __init__(
@@ -56,16 +55,14 @@ class Node:
         opening: Opening,
         open_bus: Callable[[Ingress], Bus],
         transforms: Mapping[int, "Transforms"],
-        headers: Collection[int] = (),
-        stops: Mapping[int, bytes] = NO_STOPS,
+        types: "MessageTypes",
         chrony: "ChronySocket | None" = None,
     ) -> None:
         self._setup = setup
         self._link = link
         self._opening = opening
         self._transforms = transforms
-        self._headers = headers
-        self._stops = stops
+        self._types = types
         self._host_clock = HostClock(link, chrony, setup.config.chrony.robot)
         self.health = Health()
         self._publish_clock = PublishClock()
@@ -77,6 +74,7 @@ class Node:
         self._loop_lag_s = 0.0
         self._draining = False
         self.bus = open_bus(self)
+        self._wanting = Wanting(setup, link, self.bus)
 
     @property
     def _pdu_link(self) -> PduLink:
@@ -144,7 +142,8 @@ class Node:
             for message in messages:
                 times, age_s = UNKNOWN, link.delivered(message, now)
                 if age_s is not None:
-                    times = local_times(link, message, age_s, now, now_ns, self._headers)
+                    has_header = self._types.has_header(message.topic.type)
+                    times = local_times(link, message, age_s, now, now_ns, has_header)
                 received_ns = now_ns - round((now - message.heard_at) * 1e9)
                 self.bus.publish(message, age_s, received_ns, times, link.retain(message))
         self._tell_verdicts()
@@ -162,6 +161,7 @@ class Node:
                 if (gathered := transforms.flush(now)) is not None:
                     self._link.submit(topic_id, gathered, now)
                     self._pdu_link.wake()
+            self._wanting.look()
             self._link.handle_timers(now)
             self._tell_verdicts()
             self._queue_moved.set()  # messages may have expired
@@ -288,7 +288,7 @@ class Node:
             if topic is None:
                 continue
             name = self._setup.republished(src, topic.name)
-            if (stop := self._stops.get(topic_id)) is None:
+            if (stop := self._types.stop(topic)) is None:
                 log.error("%s: silent, but no stop message can be made for its type", name)
             else:
                 log.warning("%s: silent, published the stop message", name)

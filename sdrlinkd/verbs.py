@@ -72,6 +72,10 @@ def make_verbs(
         ),
         "declare": Verb(declaring.declare, "take a topic from now on, with its type and QoS"),
         "declared": Verb(lambda _: declaring.declared(), "topics that other robots declared"),
+        "demand": Verb(
+            lambda _: declaring.demand(opening.pdu_link.now()),
+            "own topics that consumers at other robots subscribe to",
+        ),
         "why": Verb(why, "explain in plain words what happens to a topic"),
         "set": Verb(set_policy, "change a topic's policy", changes=True),
         "reload": Verb(

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 import zmq
 
+from sdrlinkd.adapters import MessageTypes
 from sdrlinkd.bus import Bus, RuntimeDirectory
 from sdrlinkd.client.messages import decode_in, new_late_topic
 from sdrlinkd.client.paths import OUT_SOCKET, endpoint
@@ -31,7 +32,8 @@ async def node(tmp_path):
     link.attach(PduLinkTraits(), AccessParams(), RateParams())
     context, directory = zmq.Context(), RuntimeDirectory(tmp_path)
     opening = SimpleNamespace(pdu_link=SimpleNamespace(now=lambda: 0.0))
-    node = Node(setup, link, opening, partial(Bus, context, directory, setup), {})
+    open_bus = partial(Bus, context, directory, setup)
+    node = Node(setup, link, opening, open_bus, {}, MessageTypes(setup))
     node.directory = directory.path
     yield node
     node.bus.close()

@@ -4,9 +4,9 @@ from sdrlinkd.adapters.bags import Bag, BagMessage, BagTopic, open_bag
 from sdrlinkd.adapters.chrony import ChronySocket
 from sdrlinkd.adapters.due import Due, due_messages
 from sdrlinkd.adapters.fields import cdr_from_fields
+from sdrlinkd.adapters.message_types import MessageTypes
 from sdrlinkd.adapters.pacing import first_seconds, paced
 from sdrlinkd.adapters.robot import BuiltInRobot
-from sdrlinkd.adapters.stops import header_topics, stop_messages
 from sdrlinkd.adapters.summary import BagSummary, TopicSummary, summarise
 from sdrlinkd.adapters.transforms import Transforms
 from sdrlinkd.adapters.typestore import empty, from_cdr, knows, to_cdr
@@ -19,6 +19,7 @@ __all__ = [
     "BuiltInRobot",
     "ChronySocket",
     "Due",
+    "MessageTypes",
     "TopicSummary",
     "Transforms",
     "cdr_from_fields",
@@ -26,11 +27,9 @@ __all__ = [
     "empty",
     "first_seconds",
     "from_cdr",
-    "header_topics",
     "knows",
     "open_bag",
     "paced",
-    "stop_messages",
     "summarise",
     "to_cdr",
 ]

@@ -42,12 +42,7 @@ def _made(setup: Setup) -> dict[int, bytes]:
     return made
 
 
-def header_topics(setup: Setup) -> frozenset[int]:
-    """Ids of the topics whose messages begin with a std_msgs/Header."""
-    known = (topic for topic in setup.registry.topics if knows(topic.type))
-    return frozenset(topic.id for topic in known if _begins_with_header(topic.type))
-
-
-def _begins_with_header(kind: str) -> bool:
+def begins_with_header(kind: str) -> bool:
+    """Whether messages of the known type `kind` begin with a std_msgs/Header."""
     fields = ros2_types().fielddefs[kind][1]
     return bool(fields) and fields[0][1] == (Nodetype.NAME, HEADER)

@@ -4,10 +4,8 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from sdrlinkd.adapters.typestore import from_cdr, ros2_types, to_cdr
-from sdrlinkd.config import TransformParams
+from sdrlinkd.config import TF_TYPE, TransformParams
 from sdrlinkd.errors import CdrError
-
-TYPE = "tf2_msgs/msg/TFMessage"
 
 
 class Transforms:
@@ -21,7 +19,7 @@ class Transforms:
     def take(self, payload: bytes, now: float) -> tuple[bytes | None, str]:
         """(the message to send now, ""), or (None, the ledger's reason for sending none)."""
         try:
-            message = from_cdr(payload, TYPE)
+            message = from_cdr(payload, TF_TYPE)
         except CdrError:
             return None, "tx_bad_transform"
         wanted = [each for each in message.transforms if self._wants(each.child_frame_id)]
@@ -41,7 +39,7 @@ class Transforms:
 
     def _message(self) -> bytes:
         gathered, self._latest = list(self._latest.values()), {}
-        return to_cdr(ros2_types().types[TYPE](gathered), TYPE)
+        return to_cdr(ros2_types().types[TF_TYPE](gathered), TF_TYPE)
 
     def _wants(self, frame: str) -> bool:
         name = frame.removeprefix("/")

@@ -30,7 +30,7 @@ def _taken(setup: Setup, topic: Topic, policy: TopicPolicy) -> Taken:
     config = setup.config
     most = config.bus.max_message_bytes
     limits = [(most, f"bus.max_message_bytes = {most}", "tx_too_big")]
-    is_filtered = topic.id in setup.transforms
+    is_filtered = topic.name in setup.transforms
     if policy.max_bytes and not is_filtered:
         cap = policy.max_bytes
         limits.append((cap, f"topic.{topic.name}.max_bytes = {cap}", "tx_size_cap"))

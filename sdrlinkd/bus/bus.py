@@ -70,9 +70,12 @@ class Bus:
         self._received = 0
         self._published = 0
         self._taps = 0
+        self.filters: frozenset[bytes] = frozenset()
+        """Subscriptions to messages from the air, each the beginning of a topic frame."""
         self.has_consumer = asyncio.Event()
         """Set once a consumer has subscribed to messages from the air."""
-        self._boot = secrets.token_hex(4)
+        self.boot = secrets.token_hex(4)
+        """Differs after each start of the daemon."""
         self._welcome = self._announcement(setup.policies)
         loop = asyncio.get_running_loop()
         self._sockets: list[zmq.Socket[bytes]] = []
@@ -124,6 +127,8 @@ class Bus:
             ts=times.sampled_ns,
             es=times.sampled_error_us,
         )
+        if message.series != message.topic_id:
+            header.sr = message.series
         if age_s is not None:
             wait_s, reassembly_s, air_s, _ = message.parts(0.0)
             header.dw, header.dr = round(1e6 * wait_s), round(1e6 * reassembly_s)
@@ -193,7 +198,7 @@ class Bus:
         return frame
 
     def _announcement(self, policies: Mapping[int, TopicPolicy]) -> bytes:
-        return announcement(self._setup, self._intake.topics, policies, self._boot)
+        return announcement(self._setup, self._intake.topics, policies, self.boot)
 
     def names_out(self) -> dict[tuple[int, int], str]:
         """Names of the bus topics published so far, by (source, topic id)."""
@@ -254,8 +259,11 @@ class Bus:
         elif subscribed and topic.startswith(ACK_PREFIX):
             # Subscriptions are processed in order, so the earlier ones are active now.
             self._acknowledge(topic)
-        elif subscribed and topic.startswith(b"/"):
-            self.has_consumer.set()
+        elif not topic or topic.startswith(b"/"):
+            # XPUB reports the first client to subscribe and the last one to leave or to end.
+            self.filters = self.filters | {topic} if subscribed else self.filters - {topic}
+            if topic and subscribed:
+                self.has_consumer.set()
         elif subscribed and topic.startswith(LATE_PREFIX):
             self._give_kept(topic)
 

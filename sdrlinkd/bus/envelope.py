@@ -49,6 +49,7 @@ class OutHeader(msgspec.Struct, omit_defaults=True, gc=False):
     da: int | None = None
     stop: bool = False
     late: bool = False
+    sr: int | None = None
 
 
 class Receipt(msgspec.Struct, frozen=True, omit_defaults=True):

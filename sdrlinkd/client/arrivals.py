@@ -14,9 +14,10 @@ class Arrivals:
     """
 
     def __init__(self, filters: Sequence[bytes]) -> None:
-        self.requests = [new_late_topic(each) for each in filters]
+        self._missing: dict[bytes, bytes] = {}
+        """Filters whose kept messages are still to come, by request."""
+        self.requests = [self.request(each) for each in filters]
         """Subscriptions that request the kept messages under each filter."""
-        self._missing = set(self.requests)
         self._first: list[Message] = []
         self._ready: deque[Message] = deque()
         self._newest: dict[str, tuple[int, int]] = {}
@@ -27,19 +28,43 @@ class Arrivals:
         """Whether all kept messages have come."""
         return not self._missing
 
+    def request(self, filter_: bytes) -> bytes:
+        """A subscription that requests the kept messages under `filter_`."""
+        topic = new_late_topic(filter_)
+        self._missing[topic] = filter_
+        return topic
+
+    def take(self, frames: Sequence[bytes]) -> Message | None:
+        """The message in `frames`, or None; it may have to wait for kept ones of its topic."""
+        topic = frames[0]
+        if topic.startswith(LATE_PREFIX):
+            waits = topic in self._missing
+        else:
+            waits = any(topic.startswith(each) for each in self._missing.values())
+        if not waits:
+            return self.admit(frames)
+        self.hold(frames)
+        if not self._missing:
+            self.begin()
+        return None
+
     def hold(self, frames: Sequence[bytes]) -> None:
         """Hold a message that comes before the subscription is complete."""
         if (message := self._decode(frames)) is not None:
             self._first.append(message)
 
     def begin(self) -> None:
-        """Note that the subscription is complete: the messages held are ready, in order."""
+        """Note that the subscription is complete: the messages held are ready, in order.
+
+        Kept messages that have not come by now are not waited for.
+        """
+        self._missing.clear()
         # The numbers of a topic rise; stop messages, which have none, stay where they came.
         numbered = sorted((each for each in self._first if each.number), key=_order)
         stops = [each for each in self._first if not each.number]
         seen = set[tuple[str, int]]()
         for message in numbered:
-            if (message.topic, message.number) not in seen:
+            if (message.topic, message.number) not in seen and not self._is_known(message):
                 seen.add((message.topic, message.number))
                 self._note(message)
                 self._ready.append(message)
@@ -58,17 +83,20 @@ class Arrivals:
         message = self._decode(frames)
         if message is None:
             return None
-        number, received_ns = self._newest.get(message.topic, (0, 0))
-        if message.is_late and message.number <= number and message.received_ns <= received_ns:
+        if message.is_late and self._is_known(message):
             return None
         self._note(message)
         return message
+
+    def _is_known(self, message: Message) -> bool:
+        number, received_ns = self._newest.get(message.topic, (0, 0))
+        return message.number <= number and message.received_ns <= received_ns
 
     def _decode(self, frames: Sequence[bytes]) -> Message | None:
         if not frames[0].startswith(LATE_PREFIX):
             return decode_in(frames)
         if len(frames) == 1:
-            self._missing.discard(frames[0])
+            self._missing.pop(frames[0], None)
             return None
         return decode_in(frames[1:])
 

@@ -38,6 +38,8 @@ class Message:
     error in µs, and None when unknown. `is_stop` marks the stop message of a command topic, which
     the daemon publishes when the topic falls silent. `is_late` marks a message that was received
     before this subscriber subscribed, and kept for it; `age_us` is its age when it was handed over.
+    `series` tells apart the messages of several producers of one declared topic; it is 0 for the
+    first producer, and for topics of the registry.
     """
 
     topic: str
@@ -59,6 +61,7 @@ class Message:
     on_air_us: int | None = None
     is_stop: bool = False
     is_late: bool = False
+    series: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +129,7 @@ def decode_in(frames: Sequence[bytes]) -> Message | None:
         on_air_us=fields.get("da"),
         is_stop=fields.get("stop", False),
         is_late=fields.get("late", False),
+        series=fields.get("sr", 0),
     )
 
 

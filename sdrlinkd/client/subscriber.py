@@ -42,6 +42,8 @@ class Subscriber(Endpoint):
         self._socket.rcvhwm = depth
         filters = [topic_filter(topic) for topic in topics or ("/*",)]
         self._arrivals = Arrivals(filters)
+        self._requests = dict(zip(filters, self._arrivals.requests, strict=True))
+        self._kept_until = Deadline(KEPT_S)
         self._connect(OUT_SOCKET)
         for each in (*filters, *self._arrivals.requests):
             self._socket.subscribe(each)
@@ -51,17 +53,41 @@ class Subscriber(Endpoint):
             self.close()
             raise
 
+    def subscribe(self, topic: str) -> None:
+        """Subscribe to a further topic; a prefix if it ends with `*`.
+
+        Its first messages are those that the daemon has kept.
+        """
+        each = topic_filter(topic)
+        request = self._arrivals.request(each)
+        self._kept_until = Deadline(KEPT_S)
+        self._requests[each] = request
+        self._socket.subscribe(each)
+        self._socket.subscribe(request)
+
+    def unsubscribe(self, topic: str) -> None:
+        """Take no more messages of a topic, which was named in the same words before."""
+        each = topic_filter(topic)
+        self._socket.unsubscribe(each)
+        if (request := self._requests.pop(each, None)) is not None:
+            self._socket.unsubscribe(request)
+
     def receive(self, timeout_s: float | None = None) -> Message | None:
         """The next message; None if none arrives within `timeout_s`."""
-        deadline = Deadline(timeout_s)
-        if (first := self._arrivals.next()) is not None:
-            return first
-        while True:
-            if not self._poll(deadline.left_s):
+        deadline, arrivals = Deadline(timeout_s), self._arrivals
+        while (ready := arrivals.next()) is None:
+            left_s = deadline.left_s
+            if not arrivals.has_kept:
+                left_s = min(left_s, self._kept_until.left_s)
+            if self._poll(left_s):
+                message = arrivals.take(self._socket.recv_multipart())
+                if message is not None:
+                    return message
+            elif arrivals.has_kept or self._kept_until.left_s:
                 return None
-            message = self._arrivals.admit(self._socket.recv_multipart())
-            if message is not None:
-                return message
+            else:
+                arrivals.begin()
+        return ready
 
     def __iter__(self) -> Iterator[Message]:
         while True:

@@ -18,12 +18,14 @@ from sdrlinkd.config.topics import (
     registry_of,
     topics_from_bus,
     uses_numbers,
+    with_commands,
 )
 from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import Qos, TopicPolicy, check_access, flush_told
 from sdrlinkd.wire import (
     Registry,
     equal_payload,
+    is_topic_name,
     max_large_size,
     max_message_size,
 )
@@ -60,8 +62,8 @@ class Setup:
     """Whether producers may declare topics beyond the registry."""
     named_policies: dict[str, TopicPolicy]
     """The configured policies by topic name without leading slash."""
-    transforms: list[int]
-    """Ids of the topics to which [tf] applies."""
+    transforms: frozenset[str]
+    """Names, without leading slash, of the topics to which [tf] applies."""
     warnings: list[str]
     topic_warnings: dict[int, str]
     """Warnings by topic id, which matter only once the topic is used."""
@@ -152,6 +154,8 @@ def _resolve(config: Config, base: Path, source: str) -> Setup:
             "whose clock is the reference"
         )
     named = policies_by_name(config, registry, has_numbers)
+    if has_numbers:
+        named = with_commands(named, node_id)
     policies = {topic.id: named[topic.name] for topic in registry.topics if topic.name in named}
     return Setup(
         config=config,
@@ -162,7 +166,7 @@ def _resolve(config: Config, base: Path, source: str) -> Setup:
         has_numbers=has_numbers,
         named_policies=named,
         dictionaries=load_dictionaries(policies, registry, base),
-        transforms=_transforms(config, registry),
+        transforms=_transforms(config, registry, has_numbers),
         warnings=_warnings(config, registry),
         topic_warnings={} if has_numbers else _topic_warnings(config, registry),
         source=source,
@@ -196,18 +200,22 @@ def _check_texts(config: Config) -> None:
         )
 
 
-def _transforms(config: Config, registry: Registry) -> list[int]:
-    found = []
+def _transforms(config: Config, registry: Registry, has_numbers: bool) -> frozenset[str]:
+    found = set()
     for name in config.tf.topics:
         topic = registry.by_name(name)
+        if topic is None and has_numbers and is_topic_name(name):
+            # A producer may declare it; its type is checked then.
+            found.add(name.removeprefix("/"))
+            continue
         if topic is None or topic.type != TF_TYPE:
             fit = [each.name for each in registry.topics if each.type == TF_TYPE]
             raise ConfigError(
                 f'tf.topics: got "{name}"; allowed: topics of the registry of type '
                 f"{TF_TYPE}: {', '.join(fit) or 'none'}"
             )
-        found.append(topic.id)
-    return found
+        found.add(topic.name)
+    return frozenset(found)
 
 
 def _warnings(config: Config, registry: Registry) -> list[str]:

@@ -81,12 +81,16 @@ def policies_by_name(
             )
         if not is_topic_name(name):
             raise ConfigError(f'topic."{given}": allowed: a ROS name such as odom or camera/image')
-        if policy.deadman_s and registry.by_name(name) is None:
-            raise ConfigError(
-                f"topic.{name}.deadman_s: got {policy.deadman_s:g}; a stop message needs the type, "
-                "so the topic must be in the registry; allowed: 0"
-            )
         if name in policies:
             raise ConfigError(f'topic."{given}": listed twice, with and without the slash')
         policies[name] = policy
     return policies
+
+
+def with_commands(policies: dict[str, TopicPolicy], node_id: int) -> dict[str, TopicPolicy]:
+    """`policies` with those of the commands to this robot, unless they have policies of their own.
+
+    A command to robot 2 that appears there as cmd_vel is called robot_2/cmd_vel on the air.
+    """
+    commands = {f"robot_{node_id}/{name}": policy for name, policy in policies.items()}
+    return {**commands, **policies}

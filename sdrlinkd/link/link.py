@@ -1,6 +1,6 @@
 """The link: all traffic of one node, computed from bytes and `now`, without waiting or I/O."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from math import inf
 from random import Random
 
@@ -37,7 +37,15 @@ from sdrlinkd.link.report import NO_NAMES, Names, Reporter
 from sdrlinkd.link.schedule import ClassesParams, Forecasts
 from sdrlinkd.link.status import AirUse, Told, Why
 from sdrlinkd.link.timesync import ClockParams, Clocks, Estimate, State, Wall
-from sdrlinkd.link.topics import HeardTopic, HeardTopics, Offer, OwnTopics, TopicTeller
+from sdrlinkd.link.topics import (
+    Demand,
+    HeardTopic,
+    HeardTopics,
+    Offer,
+    OwnTopics,
+    TopicTeller,
+    Wants,
+)
 from sdrlinkd.link.traits import Opportunity, PduLinkTraits
 from sdrlinkd.link.transmit import (
     Beacons,
@@ -57,11 +65,13 @@ from sdrlinkd.wire import (
     MAX_VALUE_SIZE,
     TLV_HEADER_SIZE,
     TOPIC_OVERHEAD,
+    WANTED_OVERHEAD,
     Clock,
     Receipt,
     Registry,
     Topic,
     Waits,
+    Wanted,
     equal_payload,
 )
 
@@ -108,9 +118,12 @@ class Link:
         digest = registry.digest({i: each.dict_id() for i, each in dictionaries.items()})
         self._outbox = Outbox(queue)
         room = equal_payload(params.pdu_size, 1)
-        piece = min(room, TLV_HEADER_SIZE + MAX_VALUE_SIZE) - TOPIC_OVERHEAD
+        record = min(room, TLV_HEADER_SIZE + MAX_VALUE_SIZE)
+        piece = record - TOPIC_OVERHEAD
         self._topics = OwnTopics(registry, has_numbers, piece)
         self._heard_topics = HeardTopics(registry, has_numbers, self._topics.hash_of)
+        self._wants = Wants(record - WANTED_OVERHEAD)
+        self._demand = Demand(self._topics)
         first_large = rng.randrange(1 << 16) if has_numbers else 0
         self._intake = Intake(
             params, self._topics, self._outbox, classes, dictionaries, first_large
@@ -132,7 +145,8 @@ class Link:
         self._tx_delays = TxDelayMeters()
         self._control_records = ControlRecords(
             clock, self._clocks, beacons, self._tx_delays, self._piggyback,
-            self._reception.neighbors, TopicTeller(self._topics, piece), self._composer.k_single,
+            self._reception.neighbors, TopicTeller(self._topics, piece), self._wants,
+            self._composer.k_single,
         )  # fmt: skip
         self._forecasts = Forecasts()
         self._scheduler: BurstScheduler | NoRadio = NoRadio()
@@ -298,6 +312,19 @@ class Link:
         """(source, number) of topics whose numbers have another meaning since the last call."""
         return self._heard_topics.take_changed()
 
+    @property
+    def heard_version(self) -> int:
+        """Counts the changes of what other robots declare."""
+        return self._heard_topics.version
+
+    def want(self, wanted: Collection[tuple[int, int]]) -> None:
+        """Tell other robots that consumers here subscribe to these topics, as (source, number)."""
+        self._wants.set(wanted)
+
+    def demand(self, now: float) -> dict[str, list[int]]:
+        """The declared topics that other robots want at `now`, and which robots, by name."""
+        return self._demand.wanted(now)
+
     # Policies and clocks.
 
     def set_policies(self, policies: Mapping[int, TopicPolicy]) -> None:
@@ -451,6 +478,8 @@ class Link:
             self._receipts.hear(src, record, at)
         elif isinstance(record, Waits):
             self._reception.take_waits(src, record)
+        elif isinstance(record, Wanted):
+            self._demand.hear(src, record, at)
         else:
             self._scheduler.record_heard(src, record, at)
 

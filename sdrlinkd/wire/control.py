@@ -33,6 +33,7 @@ class RecordType(IntEnum):
     CLOCK = 8
     WAITS = 9
     TOPIC = 15
+    WANTED = 17
 
 
 class Stamp(NamedTuple):
@@ -105,6 +106,16 @@ class Waits(NamedTuple):
     again: int
 
 
+class Wanted(NamedTuple):
+    """WANTED record: topics of `node` that consumers at the sender subscribe to, one octet each.
+
+    Wire document, 6.10.
+    """
+
+    node: int
+    topics: bytes
+
+
 class Parity(NamedTuple):
     """PARITY record: octets from `at` on of a message's parity fragment `number`.
 
@@ -123,7 +134,7 @@ class Parity(NamedTuple):
 
 
 FixedRecord = Stamp | Beacon | LinkReport | Receipt | Frame | Waits
-Record = FixedRecord | RegistryDigest | Parity | Clock | TopicPiece
+Record = FixedRecord | RegistryDigest | Parity | Clock | TopicPiece | Wanted
 
 _TYPES: dict[type[FixedRecord], RecordType] = {
     Stamp: RecordType.STAMP,
@@ -152,6 +163,8 @@ PARITY_OVERHEAD = TLV_HEADER_SIZE + _PARITY.size
 """Octets of a PARITY record without its parity."""
 TOPIC_OVERHEAD = TLV_HEADER_SIZE + 4
 """Octets of a TOPIC record without its piece of the description."""
+WANTED_OVERHEAD = TLV_HEADER_SIZE + 1
+"""Octets of a WANTED record without its topics."""
 STAMP_SIZE = TLV_HEADER_SIZE + _FORMATS[RecordType.STAMP].size
 STAMP_RECORD = struct.Struct(">BBBBI")
 ASKING_STAMP_SIZE = STAMP_SIZE + len(ASKS)
@@ -162,6 +175,7 @@ _LEAST = {
     int(RecordType.PARITY): _PARITY.size,
     int(RecordType.CLOCK): CLOCK_SIZE - TLV_HEADER_SIZE,
     int(RecordType.TOPIC): TOPIC_OVERHEAD - TLV_HEADER_SIZE,
+    int(RecordType.WANTED): WANTED_OVERHEAD - TLV_HEADER_SIZE,
 }
 
 
@@ -215,6 +229,8 @@ def parse_records(payload: bytes) -> list[Record]:
             records.append(parse_clock(payload[at : at + length]))
         elif number == RecordType.TOPIC:
             records.append(parse_topic(payload[at : at + length]))
+        elif number == RecordType.WANTED:
+            records.append(Wanted(payload[at], bytes(payload[at + 1 : at + length])))
     return records
 
 
@@ -235,6 +251,10 @@ def _build(record: Record) -> bytes:
         number, value = RecordType.TOPIC, build_topic(record)
         if len(value) > MAX_VALUE_SIZE:
             raise ValueError(f"{len(record.data)} octets of a description do not fit a record")
+    elif isinstance(record, Wanted):
+        number, value = RecordType.WANTED, bytes((record.node,)) + record.topics
+        if len(value) > MAX_VALUE_SIZE:
+            raise ValueError(f"{len(record.topics)} topics do not fit a record")
     else:
         number = RecordType.CLOCK if isinstance(record, Clock) else _TYPES[type(record)]
         try:

@@ -179,3 +179,17 @@ def test_any_order_of_the_first_messages_and_repeats_after_them(before, after):
         is_new = number > newest or number // 2 > newest // 2
         assert (message is not None) == is_new
         newest = number if is_new else newest
+
+
+def test_a_topic_is_subscribed_to_later_and_its_kept_messages_come_first(start_daemon):
+    daemon = start_daemon(LATCHED)
+    published(daemon, 3)
+    with Subscriber("/rx_robot_1/odom", runtime_dir=daemon.directory) as heard:
+        heard.subscribe(HEARD)
+        assert received(heard, 3) == [(1, True), (2, True), (3, True)]
+        published(daemon, 1)
+        assert received(heard, 1) == [(4, False)]
+        heard.unsubscribe(HEARD)
+        heard.subscribe("/rx_robot_1/*")
+        published(daemon, 1)
+        assert received(heard, 1) == [(5, False)], "the others came before"

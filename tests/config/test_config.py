@@ -174,7 +174,7 @@ def test_a_missing_registry_says_what_it_is(tmp_path):
 def test_without_a_registry_producers_declare_topics(tmp_path):
     setup = make_setup(Config(topic={"/odom": TopicPolicy(priority=9)}), tmp_path)
     assert (len(setup.registry), setup.topics_in, setup.has_numbers) == (0, {}, True)
-    assert setup.named_policies == {"odom": TopicPolicy(priority=9)}
+    assert setup.named_policies["odom"] == TopicPolicy(priority=9)
     assert "producers declare topics" in setup.summary()
     (tmp_path / "registry.csv").write_text("odom,nav_msgs/Odometry\n")
     setup = make_setup(Config(), tmp_path)
@@ -203,9 +203,13 @@ def test_numbers_need_topic_id_14(tmp_path, n_topics, auto, says):
             make_setup(Config(auto=auto), tmp_path)
 
 
-def test_a_stop_message_needs_a_type_that_the_registry_has(tmp_path):
-    with pytest.raises(ConfigError, match=r"topic\.cmd_vel\.deadman_s: got 0\.3"):
-        make_setup(Config(topic={"cmd_vel": TopicPolicy(deadman_s=0.3)}), tmp_path)
+def test_a_policy_holds_for_commands_to_this_robot_too(tmp_path):
+    slow, fast = TopicPolicy(deadman_s=0.3), TopicPolicy(deadman_s=0.1)
+    given = {"cmd_vel": slow, "goal": slow, "robot_2/goal": fast}
+    setup = make_setup(Config(namespace="robot_2", topic=given), tmp_path)
+    named = setup.named_policies
+    assert (named["robot_2/cmd_vel"], named["cmd_vel"]) == (slow, slow)
+    assert named["robot_2/goal"] == fast, "a policy of its own"
 
 
 def test_a_policy_of_a_declared_topic_needs_a_ros_name(tmp_path):

@@ -1,9 +1,12 @@
 """Topics that producers declare at real daemons, and messages too large for 255 fragments."""
 
+import struct
 from random import Random
 
 import pytest
 
+from sdrlinkd.adapters import empty, to_cdr
+from sdrlinkd.adapters.typestore import ros2_types
 from sdrlinkd.client import MessageRefusedError, Publisher, RefusedError, Subscriber
 from tests.backends.hubs import serving
 from tests.daemon.test_ether_daemon import AIR
@@ -11,6 +14,10 @@ from tests.waiting import wait_for
 
 CDR = b"\0\1\0\0"
 NO_REGISTRY = 'registry = ""\n'
+TRANSFORM = to_cdr(
+    ros2_types().types["tf2_msgs/msg/TFMessage"]([empty("geometry_msgs/msg/TransformStamped")]),
+    "tf2_msgs/msg/TFMessage",
+)
 HASH = "RIHS01_" + "ab" * 32
 
 
@@ -174,3 +181,50 @@ def test_late_robots_and_late_consumers_get_what_each_producer_sent_last(
         assert "received from robot 1" in why
         for daemon in (one, two):
             assert ask(daemon, "check")["problems"] == []
+
+
+def test_a_robot_knows_which_of_its_topics_somebody_subscribes_to(start_daemon, tmp_path_factory):
+    hub = tmp_path_factory.mktemp("hub")
+    with serving(hub, **AIR):
+        one, two = (start_daemon(on_ether(hub, robot)) for robot in (1, 2))
+        for name in ("/odom", "/scan", "/imu"):
+            declare(one, name)
+        with Subscriber("/rx_robot_1/scan", directory=two.directory) as heard:
+            wait_for(lambda: ask(one, "demand")["wanted"] == {"/scan": [2]}, 60)
+            heard.subscribe("/rx_robot_1/i*")
+            wait_for(lambda: ask(one, "demand")["wanted"] == {"/imu": [2], "/scan": [2]}, 60)
+            version = ask(two, "demand")["version"]
+            assert version >= 3
+            declare(one, "/battery")
+            wait_for(lambda: ask(two, "demand")["version"] > version, 60)
+        wait_for(lambda: not ask(one, "demand")["wanted"], 60)
+
+
+def test_the_dead_man_of_a_command_stops_the_robot_in_the_commands_type(
+    start_daemon, tmp_path_factory
+):
+    hub = tmp_path_factory.mktemp("hub")
+    with serving(hub, **AIR):
+        one = start_daemon(on_ether(hub, 1))
+        policy = "[topic.cmd_vel]\ndeadman_s = 0.5\nstop = { linear = { x = -0.5 } }\n"
+        two = start_daemon(on_ether(hub, 2) + policy)
+        declare(one, "/robot_2/cmd_vel", "geometry_msgs/msg/Twist")
+        with (
+            Subscriber("/rx_robot_1/robot_2/cmd_vel", directory=two.directory) as heard,
+            Publisher(one.directory) as out,
+        ):
+            out.send("/robot_2/cmd_vel", CDR + bytes(48), dst=2)
+            first, stop = heard.receive(60), heard.receive(60)
+        assert (first.payload, first.is_stop) == (CDR + bytes(48), False)
+        assert (stop.payload[:12], stop.is_stop) == (CDR + struct.pack("<d", -0.5), True)
+        assert "no stop message" not in two.log()
+
+
+def test_transforms_are_filtered_on_topics_that_are_declared(start_daemon):
+    daemon = start_daemon(f'{NO_REGISTRY}[tf]\ntopics = ["tf"]\ndrop = ["*"]\n')
+    with pytest.raises(RefusedError, match=r"tf: got type std_msgs/msg/String; .*TFMessage"):
+        declare(daemon, "/tf")
+    declare(daemon, "/tf", "tf2_msgs/msg/TFMessage")
+    with Publisher(daemon.directory) as out:
+        out.send("/tf", TRANSFORM)
+    wait_for(lambda: daemon.snapshot().link.tx.dropped == {"tx_filtered": 1})

@@ -22,6 +22,7 @@ from sdrlinkd.wire import (
     Stamp,
     TopicPiece,
     Waits,
+    Wanted,
     build_records,
     parse_records,
 )
@@ -32,9 +33,9 @@ SEED = 6
 CASES = 20_000
 
 # Number of octets that the fields of each type need (clause 6).
-NEED = {1: 6, 2: 4, 3: 8, 4: 4, 5: 3, 6: 13, 7: 8, 8: 24, 9: 4, 15: 4}
+NEED = {1: 6, 2: 4, 3: 8, 4: 4, 5: 3, 6: 13, 7: 8, 8: 24, 9: 4, 15: 4, 17: 1}
 # Types whose records may be longer than their fields.
-OPEN = (RegistryDigest, Parity, Clock, Stamp, Receipt, TopicPiece)
+OPEN = (RegistryDigest, Parity, Clock, Stamp, Receipt, TopicPiece, Wanted)
 
 octet = st.integers(0, 255)
 u16 = st.integers(0, 0xFFFF)
@@ -45,6 +46,7 @@ records = st.one_of(
     st.builds(
         TopicPiece, octet, u16, st.integers(0, 15), st.integers(0, 15), st.binary(max_size=200)
     ),
+    st.builds(Wanted, octet, st.binary(max_size=250)),
     st.builds(
         Clock,
         u16,

@@ -18,6 +18,7 @@ from sdrlinkd.wire import (
     Stamp,
     TopicPiece,
     Waits,
+    Wanted,
     build,
     build_records,
     identity,
@@ -51,6 +52,7 @@ RECORD_CLASSES = {
     "CLOCK": Clock,
     "WAITS": Waits,
     "TOPIC": TopicPiece,
+    "WANTED": Wanted,
 }
 
 each_pdu = pytest.mark.parametrize("vector", PDUS, ids=lambda v: v.name)

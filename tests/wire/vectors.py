@@ -374,10 +374,14 @@ TOPIC_PIECE = RecordsVector(
     bytes([15, 4 + len(DESCRIPTION) - 14, 42, 0x61, 0xD2, 0x12]) + DESCRIPTION[14:],
     (("TOPIC", (42, TOPIC_CHECK, 1, 2, DESCRIPTION[14:])),),
 )
+# Robot 1's topics 16 = 0x10, 17 and 255.
+WANTED = RecordsVector(
+    "wanted", bytes([17, 4, 1, 0x10, 0x11, 0xFF]), (("WANTED", (1, b"\x10\x11\xff")),)
+)
 WAITS = RecordsVector("waits", bytes([9, 4, 3, 255, 0, 7]), (("WAITS", (3, 255, 0, 7)),))
 RECORDS = (
     STAMP, STAMP_OLD, BEACON_DIGEST, LINK_REPORT, RECEIPT, FRAME,
-    ASKING_STAMP, FULL_RECEIPT, CLOCK, WAITS, TOPIC, TOPIC_PIECE,
+    ASKING_STAMP, FULL_RECEIPT, CLOCK, WAITS, TOPIC, TOPIC_PIECE, WANTED,
 )  # fmt: skip
 
 _stamped = PduVector(

@@ -39,6 +39,7 @@ from sdrlinkd.wire import (
     RegistryDigest,
     Stamp,
     TopicPiece,
+    Wanted,
     identity,
     lasting_identity,
     numbered,
@@ -153,6 +154,9 @@ class Inbox:
             elif isinstance(record, TopicPiece):
                 if self._topics.take(pdu.src, record):
                     self._completion.declared(pdu.src, record.number, now, events)
+            elif isinstance(record, Wanted):
+                if record.node == self._own_id:
+                    events.append(RecordHeard(pdu.src, record, at))
             elif not is_relayed and not isinstance(record, Parity | Stamp):
                 events.append(RecordHeard(pdu.src, record, at))
         repaired = self._repaired(pdu.src, records, at) if records else []

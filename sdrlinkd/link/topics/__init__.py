@@ -1,20 +1,25 @@
 """Which topics there are: our own, by registry or declaration, and those that others declare.
 
-This package owns the numbers of declared topics and decides when they are told to other robots. It
-never sees a message.
+This package owns the numbers of declared topics, and knows which of them somebody subscribes to. It
+decides when both are told to other robots. It never sees a message.
 """
 
+from sdrlinkd.link.topics.demand import LEASE_S, Demand
 from sdrlinkd.link.topics.heard import HeardTopic, HeardTopics
 from sdrlinkd.link.topics.own import MOST_KEYS, N_NUMBERS, Offer, OwnTopics
 from sdrlinkd.link.topics.telling import TELLING_SHARE, TopicTeller
+from sdrlinkd.link.topics.wants import Wants
 
 __all__ = [
+    "LEASE_S",
     "MOST_KEYS",
     "N_NUMBERS",
     "TELLING_SHARE",
+    "Demand",
     "HeardTopic",
     "HeardTopics",
     "Offer",
     "OwnTopics",
     "TopicTeller",
+    "Wants",
 ]

@@ -49,6 +49,8 @@ class HeardTopics:
         self._not_understood: set[int] = set()
         self._own_hash = own_hash
         self._sources: dict[int, _Source] = {}
+        self.version = 0
+        """Counts the changes of what is known."""
         self.changed: list[tuple[int, int]] = []
         """(source, number) whose meaning has changed and was not taken yet."""
         self.refused: dict[int, dict[int, str]] = {}
@@ -107,6 +109,7 @@ class HeardTopics:
         base = next(same, number)
         self.refused.get(src, {}).pop(number, None)
         source.known[number] = HeardTopic(base, about.name, about.type, about)
+        self.version += 1
         return True
 
     def forget(self, src: int) -> None:
@@ -114,6 +117,7 @@ class HeardTopics:
         source = self._sources.pop(src, None)
         self.refused.pop(src, None)
         if source is not None:
+            self.version += 1
             self.changed += [(src, number) for number in source.known]
 
     def take_changed(self) -> list[tuple[int, int]]:
@@ -155,6 +159,7 @@ class HeardTopics:
         """Forget what a number meant; other numbers of its name are counted under one of them."""
         if source.known.pop(number, None) is None:
             return
+        self.version += 1
         self.changed.append((src, number))
         left = [other for other, topic in source.known.items() if topic.base == number]
         for other in left:

@@ -1,12 +1,13 @@
 """Times the sending of control records: in spare room, or in PDUs with a bounded share of airtime.
 
-It handles five kinds of records: beacons (with digest, link reports and WAITS), the schedule of the
-access policy (FRAME), clocks (CLOCK), RECEIPTs, and declarations (TOPIC). Each record is made when
-it is due, uses spare room in a broadcast PDU, and from a certain time on gets its own PDU. Such a
-PDU takes airtime from messages, and a half-duplex radio is deaf while it sends. So PDUs that hold
-only records take at most `clock.share` of the airtime, all robots together: with n robots, each
-sends at most one such PDU every n · pdu_s / share. This limits beacons, too, unless rate control or
-a schedule depends on them. Declarations have a share of their own.
+It handles six kinds of records: beacons (with digest, link reports and WAITS), the schedule of the
+access policy (FRAME), clocks (CLOCK), RECEIPTs, declarations (TOPIC), and what consumers here
+subscribe to (WANTED). Each record is made when it is due, uses spare room in a broadcast PDU, and
+from a certain time on gets its own PDU. Such a PDU takes airtime from messages, and a half-duplex
+radio is deaf while it sends. So PDUs that hold only records take at most `clock.share` of the
+airtime, all robots together: with n robots, each sends at most one such PDU every
+n · pdu_s / share. This limits beacons, too, unless rate control or a schedule depends on them.
+Declarations have a share of their own.
 """
 
 from math import inf
@@ -14,14 +15,14 @@ from math import inf
 from sdrlinkd.link.packing import PiggybackRecords
 from sdrlinkd.link.receive import Neighbors
 from sdrlinkd.link.timesync import ClockParams, Clocks
-from sdrlinkd.link.topics import TopicTeller
+from sdrlinkd.link.topics import TopicTeller, Wants
 from sdrlinkd.link.transmit.beacons import Beacons
 from sdrlinkd.link.transmit.rate import RateControl
 from sdrlinkd.link.transmit.tx_delay import TxDelayMeters
 from sdrlinkd.wire import ARRIVAL_SIZE, CLOCK_SIZE, Frame, Receipt, Record, RecordType
 
 PATIENCE_S = 0.05
-"""Shortest time in s that a RECEIPT waits for spare room."""
+"""Shortest time in s that a RECEIPT or a WANTED waits for spare room."""
 MOST_RECEIPTS = 256
 LESS = 1.05
 """Factor on the period, which leaves a little of the share for robots not heard yet."""
@@ -42,6 +43,7 @@ class ControlRecords:
         piggyback: PiggybackRecords,
         neighbors: Neighbors,
         teller: TopicTeller,
+        wants: Wants,
         record_room: int,
     ) -> None:
         self._params = params
@@ -51,6 +53,7 @@ class ControlRecords:
         self._piggyback = piggyback
         self._neighbors = neighbors
         self._teller = teller
+        self._wants = wants
         self._room = record_room
         self._told_version = 0
         self._most_arrivals = (record_room - CLOCK_SIZE) // ARRIVAL_SIZE
@@ -140,10 +143,12 @@ class ControlRecords:
         self.period_s = max(self._params.period_s, needed_s)
 
     def tell_topics(self, now: float, pdu_s: float) -> None:
-        """Offer the declarations of topics that are due at `now`.
+        """Offer the declarations of topics, and the wants, that are due at `now`.
 
-        They use spare room or, within their share of the air, PDUs of `pdu_s` of their own.
+        Declarations use spare room or, within their share of the air, PDUs of `pdu_s` of their own.
         """
+        for wanted in self._wants.due(now):
+            self._piggyback.put_wanted(wanted, self._alone_from(now + PATIENCE_S))
         self._offer_topics(now)
         if self._piggyback.holds(RecordType.TOPIC) and self._teller.may_pay(now, pdu_s):
             self._piggyback.make_due(RecordType.TOPIC, self._room, now)

@@ -1,0 +1,39 @@
+"""What the daemon must know of message types: stop messages, and which begin with a header."""
+
+from collections.abc import Mapping
+
+from sdrlinkd.adapters.fields import cdr_from_fields
+from sdrlinkd.adapters.stops import begins_with_header, stop_messages
+from sdrlinkd.adapters.typestore import knows
+from sdrlinkd.config import Setup
+from sdrlinkd.errors import UserError
+from sdrlinkd.link import HeardTopic
+
+
+class MessageTypes:
+    """Facts about the types of the registry's topics, and of those that other robots declare.
+
+    Raises ConfigError if the stop message of a topic of the registry cannot be made.
+    """
+
+    def __init__(self, setup: Setup) -> None:
+        self._stops: Mapping[int, bytes] = stop_messages(setup)
+        self._named = setup.named_policies
+        self._headers: dict[str, bool] = {}
+
+    def has_header(self, kind: str) -> bool:
+        """Whether messages of type `kind` begin with a std_msgs/Header; False if unknown."""
+        found = self._headers.get(kind)
+        if found is None:
+            found = self._headers[kind] = knows(kind) and begins_with_header(kind)
+        return found
+
+    def stop(self, topic: HeardTopic) -> bytes | None:
+        """The stop message of a topic as CDR; None if its type is unknown, or lacks a field."""
+        if topic.about is None:
+            return self._stops.get(topic.base)
+        policy = self._named.get(topic.name)
+        try:
+            return cdr_from_fields(topic.type, policy.stop if policy else {}, topic.name)
+        except UserError:
+            return None
