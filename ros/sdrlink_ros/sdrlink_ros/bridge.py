@@ -1,0 +1,252 @@
+"""The bridge: two nodes, two threads, and a timer that looks at ROS and at the radio."""
+
+import fcntl
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+
+from sdrlink_ros import graph
+from sdrlink_ros.daemon import Daemon, Demand
+from sdrlink_ros.echoes import Echoes
+from sdrlink_ros.incoming import Incoming, Source
+from sdrlink_ros.names import Names, unused
+from sdrlink_ros.outgoing import Outgoing
+from sdrlink_ros.parameters import Parameters
+from sdrlink_ros.routes import Routes, decide
+from sdrlink_ros.state import State
+from sdrlinkd.client import RefusedError, runtime_dir
+
+LOOK_S = 0.25
+"""Period in s of a look at the demand for topics, and at others' declarations."""
+GRAPH_LOOKS = 2
+"""The ROS graph is looked at every so many times."""
+STATE_LOOKS = 4
+SETTLED_LOOKS = 40
+"""After so many looks, patterns that match nothing are named."""
+BAD_SETUP = 2
+
+
+class BridgeError(Exception):
+    """The bridge cannot run here; the message says what to do."""
+
+
+def run(arguments: list[str], directory: "str | None") -> int:
+    """Run the bridge until it is stopped; returns the exit status of the process."""
+    rclpy.init(args=arguments)
+    bridge = None
+    try:
+        bridge = Bridge(None if directory is None else Path(directory))
+        bridge.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    except (BridgeError, RefusedError, ValueError) as error:
+        print(f"sdrlink_ros: {error}", file=sys.stderr)  # noqa: T201
+        return BAD_SETUP
+    except Exception:
+        # A signal ends rclpy in the middle of anything.
+        if rclpy.ok():
+            raise
+    finally:
+        if bridge is not None:
+            bridge.close()
+        rclpy.try_shutdown()
+    return 0
+
+
+class Bridge:
+    """Brings the topics of this robot to the radio, and those of other robots to this graph.
+
+    The node `sdrlink_bridge` has the parameters and the timer. The node `sdrlink_bridge_N` of robot
+    N has the subscriptions and publishers; no executor spins it.
+    """
+
+    def __init__(self, directory: "Path | None") -> None:
+        self._directory = directory
+        self._node = Node(graph.BRIDGE)
+        self._parameters = Parameters(self._node, self._changed)
+        self._daemon = Daemon(directory, self._say)
+        self._echoes = Echoes()
+        self._looks = self._graph_looked = 0
+        self._is_changed = True
+        self._version: tuple[str, int] = ("", -1)
+        self._routes = Routes({}, {}, {})
+        self._said: set[str] = set()
+        self._parts: _Parts | None = None
+        self._lock = -1
+        self._error: BaseException | None = None
+
+    def spin(self) -> None:
+        """Run until rclpy shuts down. Raises BridgeError."""
+        executor = SingleThreadedExecutor()
+        executor.add_node(self._node)
+        self._look()
+        self._node.create_timer(LOOK_S, self._look)
+        executor.spin()
+
+    def close(self) -> None:
+        """Stop the threads, and leave the graph."""
+        if self._parts is not None:
+            self._parts.close()
+        self._daemon.close()
+        self._node.destroy_node()
+        if self._lock >= 0:
+            os.close(self._lock)
+
+    def _look(self) -> None:
+        demand = self._daemon.look()
+        if self._parts is None:
+            if not self._daemon.node:
+                return
+            self._lock = _locked(self._directory)
+            names = Names(self._daemon.node, self._parameters.settings.rx_format)
+            self._parts = _Parts(names, self._directory, self._echoes, self._node)
+        parts, settings, now = self._parts, self._parameters.settings, time.monotonic()
+        if self._looks % GRAPH_LOOKS == 0 or self._is_changed:
+            self._look_at_graph(parts)
+        if demand is not None:
+            self._exchange(parts, demand)
+        wanted = frozenset() if demand is None else demand.wanted
+        parts.outgoing.want(self._routes.taken, wanted, now)
+        parts.incoming.look(parts.outgoing.taker.taps, now)
+        if self._looks % STATE_LOOKS == 0:
+            snapshot = self._daemon.ask("status") if demand is not None else None
+            parts.state.tell(self._daemon.node, snapshot, self._topics(parts))
+        self._looks += 1
+        if self._looks == SETTLED_LOOKS:
+            self._say_unused(settings)
+        self._is_changed = False
+
+    def _look_at_graph(self, parts: "_Parts") -> None:
+        """Decide anew what becomes of the topics on the graph. Raises BridgeError."""
+        own = self._daemon.node
+        others = graph.other_bridges(parts.data, own)
+        if others:
+            raise BridgeError(
+                f"the bridges of robots {own} and {', '.join(map(str, others))} see each other "
+                "over DDS, so every message would go round; give each robot a ROS_DOMAIN_ID of its "
+                "own, or set ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST"
+            )
+        offers = graph.offers(parts.data)
+        self._routes = decide(
+            offers, self._parameters.settings, parts.names, parts.incoming.heard()
+        )
+        for text in self._routes.refused.values():
+            self._say_once(text)
+
+    def _exchange(self, parts: "_Parts", demand: Demand) -> None:
+        """Declare our topics, and learn those of other robots."""
+        parts.outgoing.follow(self._routes.taken, self._daemon, demand.boot)
+        seen = demand.boot, demand.version
+        if seen != self._version or self._is_changed or parts.incoming.has_commands:
+            told = self._daemon.ask("declared")
+            if told is not None:
+                self._version = seen
+                sources = [Source.told(each) for each in told]
+                parts.incoming.follow(sources, self._parameters.settings)
+
+    def _changed(self) -> None:
+        self._is_changed = True
+
+    def _topics(self, parts: "_Parts") -> list[dict[str, Any]]:
+        """What becomes of each topic, for people and their programs."""
+        taker, told = parts.outgoing.taker, []
+        for name, route in self._routes.taken.items():
+            refused = parts.outgoing.refused.get(name)
+            state = "sent" if name in taker.taps else "not wanted by anybody"
+            told.append(
+                {
+                    "topic": name, "type": route.offer.kind, "direction": "out",
+                    "robot": route.robot, "state": refused or state, "sent": taker.sent[name],
+                    "lost": taker.lost[name], "refused": taker.refused[name],
+                }
+            )  # fmt: skip
+        for reasons in (self._routes.left_out, self._routes.refused):
+            told += [
+                {"topic": name, "direction": "none", "state": reason}
+                for name, reason in reasons.items()
+            ]
+        for bus, outlet in parts.incoming.outlets.items():
+            told.append(
+                {
+                    "topic": outlet.names[0], "type": outlet.kind.name, "direction": "in",
+                    "robot": outlet.source.robot,
+                    "state": "wanted" if bus in parts.incoming.wanted else "no subscriber here",
+                    "published": parts.incoming.published[bus],
+                }
+            )  # fmt: skip
+        told += [
+            {"topic": bus, "direction": "none", "state": reason}
+            for bus, reason in parts.incoming.refused.items()
+        ]
+        told += [
+            {"topic": "", "direction": "in", "state": reason, "dropped": n}
+            for reason, n in parts.incoming.dropped.items()
+        ]
+        return told
+
+    def _say_unused(self, settings: Any) -> None:  # noqa: ANN401
+        known = [*self._routes.taken, *self._routes.left_out]
+        given = {"allow": settings.allow, "deny": settings.deny, "eager": settings.eager}
+        for parameter, patterns in given.items():
+            for pattern, near in unused(patterns, known).items() if known else ():
+                hint = f"; the nearest are {', '.join(near)}" if near else ""
+                self._say_once(f"{parameter}: {pattern} matches no topic here so far{hint}")
+
+    def _say(self, text: str) -> None:
+        self._node.get_logger().warning(text)
+
+    def _say_once(self, text: str) -> None:
+        if text not in self._said:
+            self._said.add(text)
+            self._say(text)
+
+
+class _Parts:
+    """What needs the robot's id, which the daemon knows."""
+
+    def __init__(
+        self,
+        names: Names,
+        directory: "Path | None",
+        echoes: Echoes,
+        node: Node,
+    ) -> None:
+        self.names = names
+        say = node.get_logger().warning
+        self.data = Node(
+            f"{graph.BRIDGE}_{names.own}",
+            use_global_arguments=False,
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+        self.outgoing = Outgoing(self.data, directory, echoes, say)
+        self.incoming = Incoming(self.data, names, directory, echoes, say)
+        self.state = State(node)
+        self.outgoing.taker.start()
+        self.incoming.start()
+        node.get_logger().info(f"bridge of robot {names.own}")
+
+    def close(self) -> None:
+        self.outgoing.taker.stop()
+        self.incoming.stop()
+        self.data.destroy_node()
+
+
+def _locked(directory: "Path | None") -> int:
+    """A lock that a second bridge of the same robot does not get. Raises BridgeError."""
+    path = runtime_dir(directory) / "bridge.lock"
+    lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(lock)
+        raise BridgeError(
+            f"another bridge already serves this daemon ({path} is locked); stop it first"
+        ) from None
+    return lock

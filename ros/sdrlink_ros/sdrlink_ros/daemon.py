@@ -1,0 +1,97 @@
+"""The daemon as the bridge sees it: declarations, demand and status, on the control socket."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from sdrlinkd.client import ControlClient, NoDaemonError, RefusedError
+
+ANSWER_S = 1.0
+FIRST_WAIT_S = 0.25
+LONGEST_WAIT_S = 5.0
+
+
+class Demand(NamedTuple):
+    """What other robots want of this one's topics, by bus topic.
+
+    `boot` differs after each start of the daemon, and `version` when others' declarations change.
+    """
+
+    boot: str
+    version: int
+    wanted: frozenset[str]
+
+
+class Daemon:
+    """Asks the daemon, and waits longer and longer while it is away. `say` logs a sentence."""
+
+    def __init__(self, directory: "Path | None", say: Callable[[str], None]) -> None:
+        self._directory = directory
+        self._say = say
+        self._control: ControlClient | None = None
+        self._wait_s, self._try_at = FIRST_WAIT_S, 0.0
+        self._was_away = False
+        self.node = 0
+        """The robot's id; 0 until the daemon has answered."""
+        self.times_away = 0
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the daemon answered the last question."""
+        return self._control is not None
+
+    def look(self) -> Demand | None:
+        """The demand now; None without a daemon, which is said once."""
+        told = self.ask("demand")
+        if told is None:
+            return None
+        return Demand(told["boot"], told["version"], frozenset(told["wanted"]))
+
+    def declare(self, arguments: dict[str, Any]) -> int | None:
+        """Declare a topic; its number, or None without a daemon. Raises RefusedError."""
+        told = self.ask("declare", arguments)
+        return None if told is None else int(told["number"])
+
+    def ask(self, verb: str, arguments: "dict[str, Any] | None" = None) -> Any:  # noqa: ANN401
+        """The answer to a verb; None without a daemon. Raises RefusedError."""
+        control = self._control or self._connect()
+        if control is None:
+            return None
+        try:
+            return control.ask(verb, arguments)
+        except NoDaemonError as error:
+            self._gone(error)
+            return None
+
+    def close(self) -> None:
+        """Close the connection."""
+        if self._control is not None:
+            self._control.close()
+            self._control = None
+
+    def _connect(self) -> "ControlClient | None":
+        if time.monotonic() < self._try_at:
+            return None
+        try:
+            self._control = ControlClient(self._directory, ANSWER_S)
+            hello = self._control.ask("hello")
+        except NoDaemonError as error:
+            self._gone(error)
+            return None
+        if "demand" not in hello["verbs"]:
+            raise RefusedError("unknown_verb", f"sdrlinkd {hello['version']} is too old; update it")
+        self.node = hello["node"]
+        if self._was_away:
+            self._say(f"the daemon of robot {self.node} answers")
+        self._wait_s, self._was_away = FIRST_WAIT_S, False
+        return self._control
+
+    def _gone(self, error: NoDaemonError) -> None:
+        self.close()
+        if not self._was_away:
+            self.times_away += 1
+            self._say(f"waiting for the daemon; messages are lost meanwhile: {error}")
+        self._was_away = True
+        self._try_at = time.monotonic() + self._wait_s
+        self._wait_s = min(2 * self._wait_s, LONGEST_WAIT_S)

@@ -1,0 +1,183 @@
+"""A ROS 2 program that tests drive over its standard input: one JSON command a line, one answer.
+
+Runs in a Python that has rclpy. Messages are filled with values that follow from a number, so that
+both ends know what must arrive.
+"""
+
+import hashlib
+import json
+import os
+import re
+import sys
+import threading
+import time
+from random import Random
+
+import rclpy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from sdrlink_ros.kinds import kind
+
+INTEGERS = {"int8": 7, "uint8": 8, "int16": 15, "uint16": 16, "int32": 31, "uint32": 32,
+            "int64": 63, "uint64": 64, "octet": 8, "byte": 8, "char": 8}  # fmt: skip
+
+
+def filled(message, rng):
+    """`message` with all fields set."""
+    for name, text in message.get_fields_and_field_types().items():
+        setattr(message, name, value(text, getattr(message, name), rng))
+    return message
+
+
+def value(text, old, rng):
+    if hasattr(old, "get_fields_and_field_types"):
+        return filled(old, rng)
+    if text in INTEGERS:
+        number = rng.randrange(1 << INTEGERS[text])
+        return bytes([number]) if text in ("octet", "byte") else number
+    if text in ("float", "double"):
+        return rng.randrange(-1000, 1000) / 8
+    if text == "boolean":
+        return rng.random() < 0.5
+    if "string" in text and "sequence" not in text:
+        return f"text {rng.randrange(1 << 30)}"
+    if (array := re.fullmatch(r"(.+)\[(\d+)\]", text)) is not None:
+        return [value(array[1], None, rng) for _ in range(int(array[2]))]
+    inner = re.fullmatch(r"sequence<([^,>]+).*", text)[1]
+    if "/" in inner:
+        package, name = inner.split("/")
+        return [filled(kind(f"{package}/msg/{name}").message(), rng) for _ in range(2)]
+    return [value(inner, None, rng) for _ in range(360)]
+
+
+def plain(item):
+    """A message as nested lists of plain values, for comparison."""
+    if hasattr(item, "get_fields_and_field_types"):
+        return [plain(getattr(item, name)) for name in item.get_fields_and_field_types()]
+    if isinstance(item, bytes):
+        return list(item)
+    if hasattr(item, "tolist"):
+        return item.tolist()
+    if hasattr(item, "__iter__") and not isinstance(item, str):
+        return [plain(each) for each in item]
+    return item
+
+
+def digest(message):
+    return hashlib.sha256(json.dumps(plain(message)).encode()).hexdigest()[:16]
+
+
+def made(type_name, number):
+    return filled(kind(type_name).message(), Random(number))
+
+
+def profile(fields):
+    reliability, durability = ReliabilityPolicy, DurabilityPolicy
+    return QoSProfile(
+        depth=fields.get("depth", 100),
+        reliability=reliability.BEST_EFFORT if fields.get("best_effort") else reliability.RELIABLE,
+        durability=(durability.TRANSIENT_LOCAL if fields.get("latched") else durability.VOLATILE),
+    )
+
+
+class Agent:
+    """A node with whatever publishers and subscriptions the commands ask for."""
+
+    def __init__(self, name):
+        self.node = rclpy.create_node(name)
+        self.publishers, self.heard, self.senders = {}, {}, []
+
+    def pub(self, topic, type, key="", **qos):
+        made_ = self.node.create_publisher(kind(type).message, topic, profile(qos))
+        self.publishers[topic, key] = made_, type
+
+    def sub(self, topic, type, **qos):
+        heard = self.heard[topic] = []
+        message = kind(type).message
+        self.node.create_subscription(message, topic, heard.append, profile(qos), raw=True)
+        self.heard[topic, "type"] = message
+
+    def send(self, topic, first=0, n=1, hz=0.0, key=""):
+        """Publish messages of the numbers `first` and up, in the background if `hz` is given."""
+        publisher, type_ = self.publishers[topic, key]
+        messages = [made(type_, first + i) for i in range(n)]
+
+        def send_all():
+            begin = time.monotonic()
+            for i, message in enumerate(messages):
+                if hz:
+                    time.sleep(max(0.0, begin + i / hz - time.monotonic()))
+                publisher.publish(message)
+
+        if not hz:
+            send_all()
+            return
+        self.senders.append(threading.Thread(target=send_all))
+        self.senders[-1].start()
+
+    def raw(self, topic, octets, key=""):
+        self.publishers[topic, key][0].publish(bytes.fromhex(octets))
+
+    def sent(self):
+        """Wait until everything is sent."""
+        for sender in self.senders:
+            sender.join()
+
+    def expect(self, type, first, n):
+        return [digest(made(type, first + i)) for i in range(n)]
+
+    def got(self, topic):
+        message = self.heard[topic, "type"]
+        return [digest(deserialize_message(cdr, message)) for cdr in self.heard[topic]]
+
+    def got_raw(self, topic):
+        return [cdr.hex() for cdr in self.heard[topic]]
+
+    def count(self, topic):
+        return len(self.heard[topic])
+
+    def last(self, topic):
+        return plain(deserialize_message(self.heard[topic][-1], self.heard[topic, "type"]))
+
+    def matched(self, topic, key=""):
+        return self.publishers[topic, key][0].get_subscription_count()
+
+    def names(self):
+        return dict(self.node.get_topic_names_and_types())
+
+    def publishers_of(self, topic):
+        return sorted(each.node_name for each in self.node.get_publishers_info_by_topic(topic))
+
+    def set(self, node, name, value):
+        from rcl_interfaces.srv import SetParameters
+        from rclpy.parameter import Parameter
+
+        client = self.node.create_client(SetParameters, f"/{node}/set_parameters")
+        assert client.wait_for_service(10.0)
+        call = client.call_async(
+            SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+        )
+        while not call.done():
+            time.sleep(0.01)
+        (result,) = call.result().results
+        return [result.successful, result.reason]
+
+
+def main():
+    rclpy.init()
+    agent = Agent(sys.argv[1])
+    spinning = threading.Thread(target=lambda: rclpy.spin(agent.node), daemon=True)
+    spinning.start()
+    for line in sys.stdin:
+        verb, arguments = json.loads(line)
+        try:
+            answer = {"ok": getattr(agent, verb)(**arguments)}
+        except Exception as error:  # the test must see it
+            answer = {"error": repr(error)}
+        print(json.dumps(answer), flush=True)
+    # The thread that spins would outlive rclpy.
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,186 @@
+"""Names, types, frames and routes of the bridge, which need no ROS."""
+
+import struct
+import sys
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rosbags.interfaces import Nodetype
+from sdrlink_ros.echoes import Echoes
+from sdrlink_ros.frames import child_frames, producer_key
+from sdrlink_ros.kinds import UnknownTypeError, kind, least_size
+from sdrlink_ros.names import Names, command_for, is_command, left_out, matches, unused
+from sdrlink_ros.offer import Offer
+from sdrlink_ros.routes import decide
+from sdrlink_ros.settings import Settings
+
+from sdrlinkd.adapters import empty, to_cdr
+from sdrlinkd.adapters.typestore import ros2_types
+
+ODOM, IMAGE = "nav_msgs/msg/Odometry", "sensor_msgs/msg/Image"
+TF = "tf2_msgs/msg/TFMessage"
+
+
+def offer(name, kind_=ODOM, nodes=("/driver",), n=1, latched=False):
+    kinds = (kind_,) if isinstance(kind_, str) else kind_
+    return Offer(name, kinds, "", True, latched, n, nodes)
+
+
+def routes(*offers, own=1, heard=(), **settings):
+    names = Names(own, "/robot_{src}")
+    return decide({each.name: each for each in offers}, Settings(**settings), names, heard)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind_", "settings", "is_sent"),
+    [
+        ("/odom", ODOM, {}, True),
+        ("/rosout", ODOM, {}, False),
+        ("/clock", ODOM, {}, False),
+        ("/diagnostics", ODOM, {}, True),
+        ("/diagnostics_agg", ODOM, {}, False),
+        ("/a/_hidden", ODOM, {}, False),
+        ("/camera", IMAGE, {}, False),
+        ("/camera", IMAGE, {"allow": ("/*", "/camera")}, True),
+        ("/camera", IMAGE, {"allow": ("camera*",)}, True),
+        ("/odom", ODOM, {"allow": ("camera*",)}, False),
+        ("/odom", ODOM, {"deny": ("/o*",)}, False),
+        ("/odom", ODOM, {"allow": ("/odom",), "deny": ("/odom",)}, False),
+        ("/clock", ODOM, {"allow": ("/*", "/clock")}, True),
+        ("/cmd_vel", ODOM, {}, False),
+        ("/cmd_vel", ODOM, {"commands": ()}, True),
+    ],
+)
+def test_what_goes_over_the_radio(name, kind_, settings, is_sent):
+    found = routes(offer(name, kind_), **settings)
+    assert (name in found.taken) == is_sent
+    assert (name in found.left_out) != is_sent, "the reason is told"
+
+
+def test_a_name_with_a_robots_prefix_is_a_command_or_its_own():
+    found = routes(offer("/robot_2/cmd_vel"), offer("/robot_1/odom"), offer("/robot_3/a/b"))
+    assert [(each.bus, each.robot) for each in found.taken.values()] == [
+        ("/odom", None), ("/robot_2/cmd_vel", 2), ("/robot_3/a/b", 3),
+    ]  # fmt: skip
+    found = routes(offer("/robot_2/led"), heard={(2, "led")})
+    assert "robot 2 sends it, and /driver here commands it" in found.refused["/robot_2/led"]
+    assert routes(offer("/robot_2/cmd_vel"), heard={(2, "cmd_vel")}).taken, "always a command"
+    assert "no robot's id" in routes(offer("/robot_255/x")).refused["/robot_255/x"]
+    both = routes(offer("/odom"), offer("/robot_1/odom"))
+    assert list(both.taken) == ["/odom"]
+    assert "has the name of /odom" in both.refused["/robot_1/odom"]
+    two_types = routes(offer("/x", (IMAGE, ODOM)))
+    assert "use one type" in two_types.refused["/x"]
+
+
+def test_several_publishers_of_a_latched_topic_are_all_kept():
+    found = routes(offer("/map", n=3, latched=True), offer("/tf_static", TF, n=3, latched=True))
+    assert [each.depth for each in found.taken.values()] == [3, 1], "frames tell the latter apart"
+
+
+def test_names_of_other_robots_and_commands():
+    names = Names(2, "/robots/r{src}")
+    assert names.here(1, "a/odom") == "/robots/r1/a/odom"
+    assert names.address("/robots/r7/a/odom") == (7, "/a/odom")
+    assert names.address("/robots/r7") is None
+    assert (names.local("/robots/r2/odom"), names.local("/robots/r1/odom")) == (
+        "/odom", "/robots/r1/odom",
+    )  # fmt: skip
+    for bad in ("robot_{src}", "/robot", "/{src}{src}", "/a b{src}", "/{src}/"):
+        with pytest.raises(ValueError, match="rx_format: got"):
+            Names(1, bad)
+    assert command_for(2, "robot_2/cmd_vel") == "/cmd_vel"
+    assert command_for(1, "robot_2/cmd_vel") is None
+    assert [is_command(each) for each in ("robot_2/x", "robot_x/x", "odom")] == [True, False, False]
+
+
+def test_patterns_that_match_nothing_name_the_nearest():
+    assert unused(["/odmo", "/o*"], ["/odom", "/imu"]) == {"/odmo": ["/odom"]}
+    assert matches("/odom", ["odom"])
+    assert left_out("/odom", ODOM, [], []) == "not named by the parameter allow"
+
+
+def fields_of(name):
+    """A type's fields in the words of rclpy, from an independent library."""
+    package, _, last = name.partition("/")
+    found = {}
+    for field, (node, inner) in ros2_types().fielddefs[f"{package}/msg/{last}"][1]:
+        found[field] = words(node, inner)
+    return found
+
+
+def words(node, inner):
+    if node == Nodetype.NAME:
+        return inner.replace("/msg/", "/")
+    if node == Nodetype.BASE:
+        plain = {"float32": "float", "float64": "double", "bool": "boolean"}
+        return plain.get(inner[0], inner[0])
+    (item, length) = inner
+    text = words(*item)
+    return f"{text}[{length}]" if node == Nodetype.ARRAY else f"sequence<{text}>"
+
+
+def test_no_message_is_smaller_than_its_types_least_size():
+    kinds = sorted(each for each in ros2_types().fielddefs if "/msg/" in each)
+    assert len(kinds) > 100
+    for each in kinds:
+        package, _, last = each.split("/")
+        least = least_size(fields_of(f"{package}/{last}"), fields_of)
+        smallest = len(to_cdr(empty(each), each)) - 4
+        assert least <= smallest, each
+    assert least_size(fields_of("nav_msgs/Odometry"), fields_of) > 690
+    assert least_size(fields_of("geometry_msgs/Twist"), fields_of) == 48
+
+
+@pytest.mark.parametrize("name", ["no_such_msgs/msg/Thing", "this/msg/Thing", "", "a", "../b/c"])
+def test_a_type_that_is_not_installed_names_its_package(name):
+    with pytest.raises(UnknownTypeError, match="this type is not installed here; install"):
+        kind(name)
+    assert "this" not in sys.modules, "a name from the air imports nothing"
+
+
+def tf_message(*children):
+    types = ros2_types().types
+    transforms = []
+    for child in children:
+        each = empty("geometry_msgs/msg/TransformStamped")
+        each.child_frame_id, each.header.frame_id = child, "base" * (1 + len(child) % 3)
+        transforms.append(each)
+    return to_cdr(types[TF](transforms), TF)
+
+
+@given(st.lists(st.text(st.characters(min_codepoint=1, max_codepoint=0x2FF), max_size=12)))
+def test_child_frames_are_those_of_an_independent_reader(children):
+    cdr = tf_message(*children)
+    assert child_frames(cdr) == sorted(set(children))
+    assert len(producer_key(cdr).encode()) <= 32
+    assert child_frames(cdr + b"\0\0\0") == child_frames(cdr)
+
+
+@given(st.binary(max_size=200), st.integers(0, 400))
+def test_any_octets_are_frames_or_none(octets, cut):
+    assert child_frames(octets) is None or octets
+    cdr = tf_message("a", "lidar", "gps")
+    assert child_frames(cdr[:cut]) is None or cut >= len(cdr)
+    producer_key(octets)
+
+
+def test_producers_of_the_same_frames_have_one_key():
+    assert producer_key(tf_message("b", "a")) == producer_key(tf_message("a", "b")) == "a,b"
+    long = [f"frame_{i}" for i in range(20)]
+    assert producer_key(tf_message(*long)) == producer_key(tf_message(*reversed(long)))
+    assert producer_key(b"\0\1\0\0" + struct.pack("<I", 1 << 31)) == ""
+
+
+@given(st.binary(min_size=4, max_size=40), st.binary(max_size=3))
+def test_own_messages_are_known_once_each_whatever_dds_appends(cdr, more):
+    echoes = Echoes()
+    echoes.sent("/tf", cdr)
+    assert not echoes.is_own("/tf", cdr), "it does not subscribe to that"
+    echoes.watched = frozenset({"/tf"})
+    received = cdr + more[: -len(cdr) % 4] + bytes(max(0, -len(cdr) % 4 - len(more)))
+    echoes.sent("/tf", cdr)
+    echoes.sent("/tf", cdr)
+    assert not echoes.is_own("/other", received)
+    assert [echoes.is_own("/tf", received) for _ in range(3)] == [True, True, False]
