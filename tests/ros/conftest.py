@@ -2,9 +2,12 @@
 
 import os
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
+from tests.backends.hubs import serving
+from tests.daemon.test_ether_daemon import AIR
 from tests.ros.programs import Agent, Bridge
 from tests.ros.wheels import REQUIRED, python
 
@@ -18,6 +21,14 @@ def ros() -> None:
         if os.environ.get(REQUIRED) == "1":
             raise
         pytest.skip(str(error))
+
+
+@pytest.fixture(scope="module")
+def hub(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The folder of a hub with a clear air."""
+    folder = tmp_path_factory.mktemp("hub")
+    with serving(folder, **AIR, snr_db=30.0):
+        yield folder
 
 
 @pytest.fixture

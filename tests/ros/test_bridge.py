@@ -1,99 +1,30 @@
 """Teams of real ROS 2 nodes in domains of their own, over bridges, daemons and simulated air."""
 
-import json
-import struct
-
 import pytest
 
-from sdrlinkd.client import ControlClient
-from tests.backends.hubs import serving
-from tests.daemon.test_ether_daemon import AIR
-from tests.ros.programs import Agent, Bridge, new_domain
+from tests.ros.programs import Agent
+from tests.ros.team import (
+    CARRIER,
+    GRID,
+    IMU,
+    ODOM,
+    SCAN,
+    TEXT,
+    TWIST,
+    WAIT_S,
+    Robot,
+    ask,
+    config,
+    matched,
+    transforms,
+)
 from tests.waiting import wait_for
 
 pytestmark = [pytest.mark.realtime, pytest.mark.timeout(500)]
 
-WAIT_S = 60.0
 LATE_S = 2.0
-ODOM = ("/odom", "nav_msgs/msg/Odometry", 30)
-SCAN = ("/scan", "sensor_msgs/msg/LaserScan", 10)
-IMU = ("/imu", "sensor_msgs/msg/Imu", 50)
-TWIST = "geometry_msgs/msg/Twist"
-GRID = "nav_msgs/msg/OccupancyGrid"
-TEXT = "std_msgs/msg/String"
-# The wheels have no tf2_msgs, so another type carries the octets of its messages.
-CARRIER = "std_msgs/msg/ByteMultiArray"
 TRIES = 3
 """A team is run again, twice at most, if this machine was too busy for the radios."""
-
-
-@pytest.fixture(scope="module")
-def hub(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("hub")
-    with serving(folder, **AIR, snr_db=30.0):
-        yield folder
-
-
-def config(hub, robot, more=""):
-    """What a robot of this air needs: its id, the radio's rate, and who shares the air."""
-    return (
-        f'registry = ""\nnamespace = "robot_{robot}"\nbackend = "ether"\n'
-        f'[ether]\ndir = "{hub}"\n[modem]\nrate_hz = 1e6\nmcs = 5\n[access]\nnodes = [1, 2]\n{more}'
-    )
-
-
-def ask(daemon, verb, **arguments):
-    with ControlClient(daemon.directory) as control:
-        return control.ask(verb, arguments)
-
-
-def transforms(*children):
-    """A TFMessage as CDR."""
-    octets = struct.pack("<I", len(children))
-    for child in children:
-        octets += bytes(-len(octets) % 4) + struct.pack("<iI", 7, 8)
-        for name in ("base_link", child):
-            text = name.encode() + b"\0"
-            octets += bytes(-len(octets) % 4) + struct.pack("<I", len(text)) + text
-        octets += bytes(-len(octets) % 8) + struct.pack("<7d", 1, 2, 3, 0, 0, 0, 1)
-    return (b"\0\1\0\0" + octets).hex()
-
-
-class Robot:
-    """A robot: its daemon, its bridge, and a node in a domain of its own."""
-
-    def __init__(self, start, daemon, *arguments):
-        self.start, self.daemon, self.arguments = start, daemon, arguments
-        self.domain = new_domain()
-        self.node = start(Agent, self.domain, "node")
-        self.bridge = None
-
-    def bridged(self):
-        self.bridge = self.start(Bridge, self.domain, self.daemon.directory, *self.arguments)
-        return self
-
-    def states(self):
-        """What the bridge tells of each topic on /link/topics."""
-        told = json.loads(self.node.last(topic="/link/topics")[0])
-        return [(each["topic"], each["state"]) for each in told]
-
-    def watched(self):
-        self.node.sub(topic="/link/topics", type=TEXT)
-        return self
-
-    def says_of(self, topic, text):
-        wait_for(lambda: self.node.count(topic="/link/topics") > 0, WAIT_S)
-        wait_for(lambda: any(topic == t and text in s for t, s in self.states()), WAIT_S)
-
-    @property
-    def samples_lost(self):
-        counters = ask(self.daemon, "status")["carrier"]["counters"]
-        return sum(counters[name] for name in ("overflows", "samples_lost", "bursts_missed"))
-
-
-def matched(robot, *topics, n=1):
-    for topic in topics:
-        wait_for(lambda topic=topic: robot.node.matched(topic=topic) == n, WAIT_S)
 
 
 def test_a_team_sees_each_others_topics_without_configuration(start_daemon, start, hub):

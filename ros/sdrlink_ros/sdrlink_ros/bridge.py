@@ -74,6 +74,8 @@ class Bridge:
         self._echoes = Echoes()
         self._looks = self._graph_looked = 0
         self._is_changed = True
+        self._is_refused = False
+        """Whether another robot's bridge is on this graph."""
         self._version: tuple[str, int] = ("", -1)
         self._routes = Routes({}, {}, {})
         self._said: set[str] = set()
@@ -82,7 +84,7 @@ class Bridge:
         self._error: BaseException | None = None
 
     def spin(self) -> None:
-        """Run until rclpy shuts down. Raises BridgeError."""
+        """Run until rclpy shuts down. Raises BridgeError if another bridge serves the daemon."""
         executor = SingleThreadedExecutor()
         executor.add_node(self._node)
         self._look()
@@ -113,7 +115,7 @@ class Bridge:
             self._exchange(parts, demand)
         wanted = frozenset() if demand is None else demand.wanted
         parts.outgoing.want(self._routes.taken, wanted, now)
-        parts.incoming.look(parts.outgoing.taker.taps, now)
+        parts.incoming.look(parts.outgoing.taker.taps, now, self._is_refused)
         if self._looks % STATE_LOOKS == 0:
             snapshot = self._daemon.ask("status") if demand is not None else None
             parts.state.tell(self._daemon.node, snapshot, self._topics(parts))
@@ -123,16 +125,20 @@ class Bridge:
         self._is_changed = False
 
     def _look_at_graph(self, parts: "_Parts") -> None:
-        """Decide anew what becomes of the topics on the graph. Raises BridgeError."""
+        """Decide anew what becomes of the topics on the graph."""
         own = self._daemon.node
         others = graph.other_bridges(parts.data, own)
-        if others:
-            raise BridgeError(
-                f"the bridges of robots {own} and {', '.join(map(str, others))} see each other "
-                "over DDS, so every message would go round; give each robot a ROS_DOMAIN_ID of its "
-                "own, or set ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST"
+        if bool(others) != self._is_refused:
+            self._is_refused = bool(others)
+            self._say(
+                f"refused: the bridges of robots {own} and {', '.join(map(str, others))} see each "
+                "other over DDS, so messages would go round; give each robot a ROS_DOMAIN_ID of "
+                "its own, or set ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST"
+                if others
+                else "no other bridge is on this graph any more: topics are sent again"
             )
-        offers = graph.offers(parts.data)
+        # The names of a graph that two robots share say nothing about who publishes.
+        offers = {} if others else graph.offers(parts.data)
         self._routes = decide(
             offers, self._parameters.settings, parts.names, parts.incoming.heard()
         )

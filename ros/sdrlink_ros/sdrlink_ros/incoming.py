@@ -139,8 +139,14 @@ class Incoming:
             if names:
                 self._open(source, names, settings)
 
-    def look(self, taken: Mapping[str, Any], now: float) -> None:
-        """Find out which topics somebody here subscribes to; `taken` are our own subscriptions."""
+    def look(self, taken: Mapping[str, Any], now: float, is_refused: bool) -> None:
+        """Find out which topics somebody here subscribes to; `taken` are our own subscriptions.
+
+        `is_refused`: nothing is to be published, so nothing is wanted.
+        """
+        if is_refused:
+            self._wanted = frozenset()
+            return
         for outlet in self._outlets.values():
             others = sum(
                 publisher.get_subscription_count() - (name in taken)

@@ -1,0 +1,181 @@
+"""What the bridge does with bad input, faults, and changes while it runs."""
+
+import json
+import subprocess
+import sys
+import time
+
+import pytest
+
+from sdrlinkd.adapters import empty, to_cdr
+from sdrlinkd.client import Publisher, Subscriber
+from tests.ros.programs import Agent, Bridge, new_domain
+from tests.ros.team import (
+    CARRIER,
+    ODOM,
+    SCAN,
+    TEXT,
+    WAIT_S,
+    Robot,
+    ask,
+    config,
+    matched,
+    transforms,
+)
+from tests.ros.wheels import ROOT, in_domain, python
+from tests.waiting import wait_for
+
+pytestmark = [pytest.mark.realtime, pytest.mark.timeout(400)]
+
+OTHER_HASH = "RIHS01_" + "ab" * 32
+IMAGE = "sensor_msgs/msg/Image"
+DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
+
+
+def test_what_comes_from_the_air_is_published_only_under_a_type_that_it_is(
+    start_daemon, start, hub
+):
+    one = start_daemon(config(hub, 1))
+    two = Robot(start, start_daemon(config(hub, 2)), "-p", 'restamp:=["odom"]').watched().bridged()
+    topic, kind, _ = ODOM
+    two.node.sub(topic="/robot_1/odom", type=kind)
+    two.node.sub(topic="/robot_1/wrong", type=TEXT)
+    ask(one, "declare", name="/custom", type="my_msgs/msg/Thing")
+    ask(one, "declare", name="/wrong", type=TEXT, hash=OTHER_HASH)
+    ask(one, "declare", name=topic, type=kind)
+    two.bridge.says("my_msgs/msg/Thing: this type is not installed here; install its package, ros-")
+    two.bridge.says(f"robot 1 sends {TEXT} with hash {'ab' * 8}, but here it has")
+    wait_for(lambda: topic in ask(one, "demand")["wanted"], WAIT_S)
+    with Publisher(one.directory) as out:
+        out.send(topic, b"\0\1\0\0" + b"no odometry" * 6)
+        out.send(topic, b"\7\7\0\0" + bytes(700))
+        out.send("/wrong", b"\0\1\0\0\2\0\0\0a\0")
+        message = empty(kind)
+        message.header.frame_id = "base"
+        sent_ns = time.time_ns()
+
+        def is_restamped():
+            # Once the source's clock is known, messages have the time of their publication.
+            out.send(topic, to_cdr(message, kind))
+            wait_for(lambda: two.node.count(topic="/robot_1/odom") > 0, WAIT_S)
+            (seconds, ns), _ = two.node.last(topic="/robot_1/odom")[0]
+            return abs(seconds * 10**9 + ns - sent_ns) < 60 * 10**9
+
+        wait_for(is_restamped, WAIT_S)
+
+    def n_bad():
+        told = json.loads(two.node.last(topic="/link/topics")[0])
+        return [each["dropped"] for each in told if each["state"] == "rx_bad_cdr"]
+
+    wait_for(lambda: n_bad() == [2], WAIT_S)
+    assert two.node.count(topic="/robot_1/wrong") == 0
+
+
+def test_what_the_robot_sends_follows_its_publishers_and_the_parameters(start_daemon, start, hub):
+    one = Robot(start, start_daemon(config(hub, 1)), "-p", 'deny:=["/scna"]').bridged()
+    two = start_daemon(config(hub, 2))
+    one.node.pub(topic="/scan", type=SCAN[1], best_effort=True, depth=5)
+    one.node.pub(topic="/camera", type=IMAGE)
+    other = start(Agent, one.domain, "other")
+    other.pub(topic="/mixed", type=TEXT)
+    one.node.pub(topic="/mixed", type=CARRIER)
+    one.bridge.says("deny: /scna matches no topic here so far; the nearest are /scan")
+    one.bridge.says("/mixed: nodes here publish it as std_msgs/msg/ByteMultiArray and as std_msgs")
+    with Subscriber("/rx_robot_1/*", directory=two.directory) as heard:
+        matched(one, "/scan")
+        one.node.send(topic="/scan", n=20, hz=10)
+        got = [heard.receive(WAIT_S) for _ in range(20)]
+        assert {each.topic for each in got if each} == {"/rx_robot_1/scan"}, "20 of 20"
+        assert one.node.set(node="sdrlink_bridge", name="allow", value=["/*", "/camera"]) == [
+            True, "",
+        ]  # fmt: skip
+        matched(one, "/camera")
+        assert one.node.set(node="sdrlink_bridge", name="deny", value=["/scan"])[0]
+        matched(one, "/scan", n=0)
+        is_set, reason = one.node.set(node="sdrlink_bridge", name="allow", value=7)
+        assert not is_set
+        assert reason == "allow: got 7; allowed: a list of names or patterns"
+        one.node.send(topic="/camera")
+        assert heard.receive(WAIT_S).topic == "/rx_robot_1/camera"
+
+
+def test_a_daemon_that_ends_and_starts_again_is_waited_for(start_daemon, start, hub):
+    one = Robot(start, start_daemon(config(hub, 1))).bridged()
+    two = start_daemon(config(hub, 2))
+    one.node.pub(topic="/odom", type=ODOM[1])
+    with Subscriber("/rx_robot_1/odom", directory=two.directory) as heard:
+        matched(one, "/odom")
+        one.node.send(topic="/odom")
+        assert heard.receive(WAIT_S) is not None
+        one.daemon.stop()
+        one.bridge.says("waiting for the daemon; messages are lost meanwhile")
+        one.node.send(topic="/odom", first=1)
+        one.daemon.at_work()
+        one.bridge.says("the daemon of robot 1 answers")
+        matched(one, "/odom")
+        deadline = time.monotonic() + WAIT_S
+        while heard.receive(0.5) is None:
+            assert time.monotonic() < deadline
+            one.node.send(topic="/odom", first=2)
+    assert one.bridge.log().count("waiting for the daemon") == 1
+
+
+def test_transforms_of_others_are_merged_and_never_go_back(start_daemon, start, hub):
+    one = Robot(start, start_daemon(config(hub, 1)), "-p", "tf.merge:=true").bridged()
+    two = Robot(start, start_daemon(config(hub, 2)), "-p", "tf.merge:=true").bridged()
+    for robot in (one, two):
+        robot.node.pub(topic="/tf", type=CARRIER)
+        robot.node.sub(topic="/tf", type=CARRIER)
+        robot.node.sub(topic="/diagnostics", type=DIAGNOSTICS)
+    # The node and the bridge, which takes it for the other robot.
+    matched(one, "/tf", n=2)
+    matched(two, "/tf", n=2)
+    sent = {one: transforms("r1/laser"), two: transforms("r2/laser")}
+    for robot in (one, two):
+        robot.node.raw(topic="/tf", octets=sent[robot])
+    for robot in (one, two):
+        wait_for(lambda robot=robot: robot.node.count(topic="/tf") >= 2, WAIT_S)
+    # Had one gone back, it would go round for ever.
+    sent_by = [ask(robot.daemon, "status")["link"]["tx"]["accepted"] for robot in (one, two)]
+    assert sent_by == [1, 1]
+    for robot in (one, two):
+        assert sorted(robot.node.got_raw(topic="/tf")) == sorted(sent.values())
+        wait_for(lambda robot=robot: robot.node.count(topic="/diagnostics") > 0, WAIT_S)
+    _, ((level, name, words, robot_name, values),) = one.node.last(topic="/diagnostics")
+    assert (name, robot_name) == ("sdrlinkd: link of robot 1", "robot_1")
+    assert (level, words) == ([0], "OK")
+    assert "robot 2 SNR (dB)" in [key for key, _ in values]
+
+
+def test_bridges_that_see_each_other_refuse_and_name_both(start_daemon, start, hub):
+    one, two = (start_daemon(config(hub, robot)) for robot in (1, 2))
+    domain = new_domain()
+    first = start(Bridge, domain, one.directory)
+    first.says("bridge of robot 1")
+    again = start(Bridge, new_domain(), one.directory)
+    again.says("another bridge already serves this daemon")
+    assert again.process.wait(20) == 2
+    second = start(Bridge, domain, two.directory)
+    for bridge, robots in ((first, "1 and 2"), (second, "2 and 1")):
+        bridge.says(f"refused: the bridges of robots {robots} see each other over DDS")
+        bridge.says("ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST")
+    node = start(Agent, domain, "node")
+    node.pub(topic="/odom", type=ODOM[1])
+    second.end()
+    first.says("topics are sent again")
+    with Subscriber("/rx_robot_1/*", directory=two.directory):
+        wait_for(lambda: node.matched(topic="/odom") == 1, WAIT_S)
+
+
+def test_without_rclpy_or_client_it_says_what_to_run(ros):
+    for path, says in ((python(), "pip install sdrlinkd-client"), (sys.executable, "setup.bash")):
+        environment = in_domain(1, PYTHONPATH=ROOT / "ros/sdrlink_ros")
+        done = subprocess.run(
+            [path, "-m", "sdrlink_ros"],
+            capture_output=True, text=True, check=False, env=environment, cwd="/",
+        )  # fmt: skip
+        if "sdrlinkd.client" not in done.stderr and path == sys.executable:
+            assert "no rclpy" in done.stderr
+        assert done.returncode == 2
+        assert says in done.stderr
+        assert "Traceback" not in done.stderr
