@@ -21,12 +21,16 @@ ROOT = Path(__file__).parents[1]
 
 PACKAGES = {
     "zenoh": ["eclipse-zenoh"],
-    "rclpy": ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-std-msgs"],
+    "ros": [
+        "ros-jazzy-rclpy[fastrtps]", "ros-jazzy-nav-msgs", "ros-jazzy-sensor-msgs",
+        "ros-jazzy-geometry-msgs", "ros-jazzy-std-msgs", "ros-jazzy-test-msgs",
+        "ros-jazzy-diagnostic-msgs", "ros-jazzy-std-srvs", "pyzmq",
+    ],
     "mavlink": ["pymavlink==2.4.50"],
-}
+}  # fmt: skip
 CHECKS = {
     "zenoh": "import zenoh",
-    "rclpy": "import rclpy, std_msgs.msg; rclpy.init()",
+    "ros": "import rclpy, std_msgs.msg, test_msgs.msg; rclpy.init()",
     "mavlink": "import pymavlink.dialects.v20.common",
 }
 WHEELS = (3, 11)
@@ -126,7 +130,7 @@ def _what(step: list[str]) -> str:
 
 
 def _base(environment: str) -> str:
-    if environment != "rclpy" or sys.version_info[:2] == WHEELS:
+    if environment != "ros" or sys.version_info[:2] == WHEELS:
         return sys.executable
     version = ".".join(map(str, WHEELS))
     found = shutil.which(f"python{version}")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.environments import EnvironmentLackingError
 from tests.backends.hubs import serving
 from tests.daemon.test_ether_daemon import AIR
 from tests.ros.programs import Agent, Bridge
@@ -17,7 +18,7 @@ def ros() -> None:
     """Skip, with the reason, where there is no rclpy."""
     try:
         python()
-    except (RuntimeError, OSError) as error:
+    except EnvironmentLackingError as error:
         if os.environ.get(REQUIRED) == "1":
             raise
         pytest.skip(str(error))

@@ -8,7 +8,8 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from tests.ros.wheels import ROOT, in_domain, python
+from benchmarks.environments import ROOT
+from tests.ros.wheels import in_domain, python
 from tests.waiting import wait_for
 
 ANSWER_S = 60.0

@@ -22,7 +22,7 @@ from tests.ros.team import (
     matched,
     transforms,
 )
-from tests.ros.wheels import ROOT, in_domain, python
+from tests.ros.wheels import BRIDGE, in_domain, python
 from tests.waiting import wait_for
 
 pytestmark = [pytest.mark.realtime, pytest.mark.timeout(400)]
@@ -169,7 +169,7 @@ def test_bridges_that_see_each_other_refuse_and_name_both(start_daemon, start, h
 
 def test_without_rclpy_or_client_it_says_what_to_run(ros):
     for path, says in ((python(), "pip install sdrlinkd-client"), (sys.executable, "setup.bash")):
-        environment = in_domain(1, PYTHONPATH=ROOT / "ros/sdrlink_ros")
+        environment = in_domain(1, PYTHONPATH=BRIDGE)
         done = subprocess.run(
             [path, "-m", "sdrlink_ros"],
             capture_output=True, text=True, check=False, env=environment, cwd="/",

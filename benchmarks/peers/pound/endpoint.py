@@ -112,7 +112,7 @@ def open_transport(job: Job, player: Player) -> Transport:
         from benchmarks.peers.pound.zenoh_end import Zenoh
 
         return Zenoh(job, peer.transports["default"], player.hear)
-    if peer.environment == "rclpy":
+    if peer.environment == "ros":
         from benchmarks.peers.pound.fastdds_end import FastDds
 
         return FastDds(job, peer.transports["default"], player.hear)

@@ -29,8 +29,8 @@ PEERS: dict[str, Peer] = {
     "pound_like": Peer("Pound", {"default": "pound"}),
     "zenoh_drop": Peer("Zenoh", {"default": "drop"}, "zenoh"),
     "zenoh_block": Peer("Zenoh", {"default": "block"}, "zenoh"),
-    "fastdds_reliable": Peer("ROS 2, Fast DDS", {"default": "reliable"}, "rclpy"),
-    "fastdds_best_effort": Peer("ROS 2, Fast DDS", {"default": "best_effort"}, "rclpy"),
+    "fastdds_reliable": Peer("ROS 2, Fast DDS", {"default": "reliable"}, "ros"),
+    "fastdds_best_effort": Peer("ROS 2, Fast DDS", {"default": "best_effort"}, "ros"),
 }
 
 

@@ -24,9 +24,8 @@ from sdrlinkd.client import RefusedError, runtime_dir
 
 LOOK_S = 0.25
 """Period in s of a look at the demand for topics, and at others' declarations."""
-GRAPH_LOOKS = 2
-"""The ROS graph is looked at every so many times."""
-STATE_LOOKS = 4
+WHOLE_LOOKS = 4
+"""Every so many looks, and when the graph changes, each topic is looked at, and the state told."""
 SETTLED_LOOKS = 40
 """After so many looks, patterns that match nothing are named."""
 BAD_SETUP = 2
@@ -72,7 +71,8 @@ class Bridge:
         self._parameters = Parameters(self._node, self._changed)
         self._daemon = Daemon(directory, self._say)
         self._echoes = Echoes()
-        self._looks = self._graph_looked = 0
+        self._looks = 0
+        self._seen: tuple[Any, ...] = ()
         self._is_changed = True
         self._is_refused = False
         """Whether another robot's bridge is on this graph."""
@@ -109,14 +109,19 @@ class Bridge:
             names = Names(self._daemon.node, self._parameters.settings.rx_format)
             self._parts = _Parts(names, self._directory, self._echoes, self._node)
         parts, settings, now = self._parts, self._parameters.settings, time.monotonic()
-        if self._looks % GRAPH_LOOKS == 0 or self._is_changed:
+        seen = parts.seen()
+        is_due = self._looks % WHOLE_LOOKS == 0
+        if is_due or self._is_changed or seen != self._seen:
+            self._seen = seen
             self._look_at_graph(parts)
+            if demand is not None:
+                parts.outgoing.follow(self._routes.taken, self._daemon, demand.boot)
         if demand is not None:
-            self._exchange(parts, demand)
+            self._learn(parts, demand)
         wanted = frozenset() if demand is None else demand.wanted
         parts.outgoing.want(self._routes.taken, wanted, now)
         parts.incoming.look(parts.outgoing.taker.taps, now, self._is_refused)
-        if self._looks % STATE_LOOKS == 0:
+        if is_due and parts.state.is_wanted:
             snapshot = self._daemon.ask("status") if demand is not None else None
             parts.state.tell(self._daemon.node, snapshot, self._topics(parts))
         self._looks += 1
@@ -145,9 +150,8 @@ class Bridge:
         for text in self._routes.refused.values():
             self._say_once(text)
 
-    def _exchange(self, parts: "_Parts", demand: Demand) -> None:
-        """Declare our topics, and learn those of other robots."""
-        parts.outgoing.follow(self._routes.taken, self._daemon, demand.boot)
+    def _learn(self, parts: "_Parts", demand: Demand) -> None:
+        """Learn the topics of other robots."""
         seen = demand.boot, demand.version
         if seen != self._version or self._is_changed or parts.incoming.has_commands:
             told = self._daemon.ask("declared")
@@ -237,6 +241,11 @@ class _Parts:
         self.outgoing.taker.start()
         self.incoming.start()
         node.get_logger().info(f"bridge of robot {names.own}")
+
+    def seen(self) -> tuple[Any, ...]:
+        """What changes with the ROS graph, and costs little to look at."""
+        data = self.data
+        return data.get_node_names_and_namespaces(), data.get_topic_names_and_types()
 
     def close(self) -> None:
         self.outgoing.taker.stop()

@@ -91,11 +91,12 @@ class Outgoing:
             number = self._numbers.get(route.bus)
             if number is None or name in self.refused:
                 continue
-            if route.is_eager or number < FIRST_REGISTERED or route.bus in wanted:
+            if route.is_eager or route.bus in wanted or number < FIRST_REGISTERED:
                 self._wanted_at[name] = now
-            if now - self._wanted_at.get(name, -LINGER_S) < LINGER_S:
-                offer = route.offer
-                specs[name] = Spec(name, kind(offer.kind), route.bus, route.robot, *offer[3:5])
+            elif now - self._wanted_at.get(name, -LINGER_S) >= LINGER_S:
+                continue
+            offer = route.offer
+            specs[name] = Spec(name, kind(offer.kind), route.bus, route.robot, *offer[3:5])
         self.taker.take(specs)
 
     def _is_due(self, name: str) -> bool:

@@ -4,8 +4,9 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 
 TAKEN_DEPTH = 100
 """Messages of a topic that wait while the bridge is busy; the daemon decides which are too old."""
-RELIABLE_DEPTH = 10
-BEST_EFFORT_DEPTH = 5
+RELIABLE_DEPTH = 100
+"""A burst of the radio brings many messages at once."""
+BEST_EFFORT_DEPTH = 10
 
 
 def subscription(is_reliable: bool, is_latched: bool) -> QoSProfile:

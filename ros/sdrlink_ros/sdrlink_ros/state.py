@@ -18,6 +18,8 @@ DEPTH = 1
 class State:
     """The publishers of the bridge's own topics, on `node`; each gets one message a second.
 
+    The daemon's whole state is asked for only while somebody listens.
+
     /link/status has the JSON of `sdrlinkctl status --json`, and /link/topics that of a list of
     topics: what the bridge sends and publishes, and why it leaves out the others.
     """
@@ -27,6 +29,12 @@ class State:
         self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", DEPTH)
         self._status = node.create_publisher(String, "/link/status", DEPTH)
         self._topics = node.create_publisher(String, "/link/topics", DEPTH)
+
+    @property
+    def is_wanted(self) -> bool:
+        """Whether anybody here listens."""
+        publishers = (self._diagnostics, self._status, self._topics)
+        return any(publisher.get_subscription_count() for publisher in publishers)
 
     def tell(
         self, robot: int, snapshot: "Mapping[str, Any] | None", topics: list[dict[str, Any]]
