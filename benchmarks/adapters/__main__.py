@@ -14,8 +14,8 @@ from benchmarks.report import Row, main
 from sdrlinkd.client import ControlClient, Publisher, Subscriber
 
 BRIDGE = "sdrlink_ros"
-PLAIN = "benchmarks.adapters.plain"
-NODE = "benchmarks.adapters.node"
+PLAIN = "benchmarks.peers.ros.plain"
+NODE = "benchmarks.peers.ros.node"
 TOPIC, TYPE, HEARD = "/odom", "nav_msgs/msg/Odometry", "/rx_robot_1/odom"
 ODOMETRY = b"\0\1\0\0" + bytes(720)
 HZ = 1000

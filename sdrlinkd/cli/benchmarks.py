@@ -46,6 +46,10 @@ BENCHMARKS: dict[str, Benchmark] = {
     "latency": Benchmark(
         "The Sensors paper's assessment, next to MAVLink and XRCE-DDS.", 15, peers=("pymavlink",)
     ),
+    "adapters": Benchmark(
+        "The ROS 2 bridge: processor time a message, added latency, idle load.", 3,
+        peers=("ros-jazzy-rclpy",),
+    ),
     "phy_curves": Benchmark("Plots error rates next to the bound for any code.", 5, has_rows=False),
     "structure": Benchmark("Structure of the code: calls per message.", 0.2, has_rows=False),
     "radio.team": Benchmark(

@@ -6,22 +6,18 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.environments import EnvironmentLackingError
 from tests.backends.hubs import serving
 from tests.daemon.test_ether_daemon import AIR
 from tests.ros.programs import Agent, Bridge
-from tests.ros.wheels import REQUIRED, python
+from tests.ros.wheels import REQUIRED, lacking
 
 
 @pytest.fixture(scope="session")
 def ros() -> None:
     """Skip, with the reason, where there is no rclpy."""
-    try:
-        python()
-    except EnvironmentLackingError as error:
-        if os.environ.get(REQUIRED) == "1":
-            raise
-        pytest.skip(str(error))
+    if reason := lacking():
+        assert os.environ.get(REQUIRED) != "1", reason
+        pytest.skip(reason)
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from benchmarks.environments import ROOT, interpreter, variables
+from benchmarks.environments import ROOT, EnvironmentLackingError, interpreter, variables
 
 BRIDGE = ROOT / "ros/sdrlink_ros"
 REQUIRED = "SDRLINK_ROS"
@@ -24,3 +24,12 @@ def in_domain(domain: int, **more: object) -> dict[str, str]:
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         **{key: str(value) for key, value in more.items()},
     }
+
+
+def lacking() -> str:
+    """Why nothing with rclpy can run here; "" if it can."""
+    try:
+        python()
+    except EnvironmentLackingError as error:
+        return str(error)
+    return ""
