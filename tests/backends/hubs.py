@@ -37,11 +37,11 @@ def hub_air(**params):
 
 
 @contextlib.contextmanager
-def serving(folder, radios=(), paced=True, seed=0, until_s=np.inf, listen=None, **air):
-    """Run a hub on the folder, and stop it at the end."""
+def serving(folder, radios=(), paced=True, seed=0, until_s=np.inf, listen=None, world=World, **air):
+    """Run a hub on the folder, and stop it at the end. `world` makes the world of its air."""
     shared = hub_air(**air)
     hub = EtherHub(
-        folder, shared, World(shared, {}), dict(radios), paced=paced, seed=seed, until_s=until_s,
+        folder, shared, world(shared, {}), dict(radios), paced=paced, seed=seed, until_s=until_s,
         listen=listen,
     )  # fmt: skip
     ready = threading.Event()

@@ -56,7 +56,12 @@ def test_every_page_with_commands_is_run():
 def test_the_readme_fits_and_says_what_does_not_work():
     text = text_of("README.md")
     assert len(text.splitlines()) <= 200
-    for word in ("not authenticated", "No physical radio", "no retransmission", "ROS 2 topics only"):
+    for word in (
+        "not authenticated",
+        "No physical radio",
+        "no retransmission",
+        "ROS 2 topics only",
+    ):
         assert word.lower() in text.lower(), word
 
 

@@ -14,6 +14,7 @@ import time
 from random import Random
 
 import rclpy
+from rclpy.executors import MultiThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from sdrlink_ros.kinds import kind
@@ -139,6 +140,141 @@ class Agent:
     def last(self, topic):
         return plain(deserialize_message(self.heard[topic][-1], self.heard[topic, "type"]))
 
+    # Services and actions.
+
+    def serve(self, name):
+        """Serve a SetBool, and count how often each message was seen."""
+        from std_srvs.srv import SetBool
+
+        self.served = []
+
+        def answer(request, response):
+            self.served.append(request.data)
+            response.success = request.data
+            response.message = f"call {len(self.served)}"
+            return response
+
+        self.server = self.node.create_service(SetBool, name, answer)
+
+    def n_served(self):
+        return len(self.served)
+
+    def is_served(self, name):
+        """Whether somebody here serves it."""
+        return self.node.count_services(name) > 0
+
+    def call(self, name, n, at_once=1, timeout_s=60.0):
+        """Call a SetBool `n` times; the messages of the answers, None where none came in time."""
+        from std_srvs.srv import SetBool
+
+        client = self.node.create_client(SetBool, name)
+        assert client.wait_for_service(timeout_s)
+        answers = []
+        for begin in range(0, n, at_once):
+            numbers = range(begin, min(n, begin + at_once))
+            calls = [client.call_async(SetBool.Request(data=i % 2 == 0)) for i in numbers]
+            deadline = time.monotonic() + timeout_s
+            while not all(each.done() for each in calls) and time.monotonic() < deadline:
+                time.sleep(0.005)
+            answers += [
+                [each.result().success, each.result().message] if each.done() else None
+                for each in calls
+            ]
+        return answers
+
+    def call_later(self, name, n, hz):
+        """Call in the background at a steady rate; see `called`."""
+        from std_srvs.srv import SetBool
+
+        client = self.node.create_client(SetBool, name)
+        assert client.wait_for_service(60.0)
+        self.calls = []
+
+        def call_all():
+            for i in range(n):
+                self.calls.append(client.call_async(SetBool.Request(data=i % 2 == 0)))
+                time.sleep(1 / hz)
+
+        self.calling = threading.Thread(target=call_all)
+        self.calling.start()
+
+    def called(self, within_s=15.0):
+        """The answers of the calls in the background, None where none came."""
+        self.calling.join()
+        deadline = time.monotonic() + within_s
+        while not all(each.done() for each in self.calls) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        return [
+            [each.result().success, each.result().message] if each.done() else None
+            for each in self.calls
+        ]
+
+    def wait(self, seconds):
+        """Do nothing, while others do."""
+        time.sleep(seconds)
+
+    def act(self, name, step_s):
+        """Serve a Fibonacci action that takes `step_s` for each number."""
+        from rclpy.action import ActionServer, CancelResponse
+        from rclpy.callback_groups import ReentrantCallbackGroup
+        from test_msgs.action import Fibonacci
+
+        self.goals = []
+
+        def execute(goal):
+            self.goals.append(goal.request.order)
+            numbers = [0, 1]
+            while len(numbers) < goal.request.order:
+                time.sleep(step_s)
+                if goal.is_cancel_requested:
+                    goal.canceled()
+                    return Fibonacci.Result(sequence=numbers)
+                numbers.append(numbers[-1] + numbers[-2])
+                goal.publish_feedback(Fibonacci.Feedback(sequence=numbers))
+            goal.succeed()
+            return Fibonacci.Result(sequence=numbers)
+
+        self.action_server = ActionServer(
+            self.node, Fibonacci, name, execute, callback_group=ReentrantCallbackGroup(),
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+        )  # fmt: skip
+
+    def send_goal(self, name, order):
+        """Send a goal, and wait until it is accepted."""
+        from rclpy.action import ActionClient
+        from test_msgs.action import Fibonacci
+
+        self.feedback = []
+        self.action_client = ActionClient(self.node, Fibonacci, name)
+        assert self.action_client.wait_for_server(60.0)
+        future = self.action_client.send_goal_async(
+            Fibonacci.Goal(order=order),
+            lambda told: self.feedback.append(len(told.feedback.sequence)),
+        )
+        while not future.done():
+            time.sleep(0.01)
+        self.goal = future.result()
+        self.result = self.goal.get_result_async()
+        return self.goal.accepted
+
+    def n_feedback(self):
+        return len(self.feedback)
+
+    def cancel_goal(self):
+        future = self.goal.cancel_goal_async()
+        while not future.done():
+            time.sleep(0.01)
+        return len(future.result().goals_canceling)
+
+    def result_of_goal(self):
+        """(status, sequence) of the last goal; None while there is none."""
+        if not self.result.done():
+            return None
+        return [self.result.result().status, list(self.result.result().result.sequence)]
+
+    def n_goals(self):
+        return len(self.goals)
+
     def matched(self, topic, key=""):
         return self.publishers[topic, key][0].get_subscription_count()
 
@@ -166,7 +302,9 @@ class Agent:
 def main():
     rclpy.init()
     agent = Agent(sys.argv[1])
-    spinning = threading.Thread(target=lambda: rclpy.spin(agent.node), daemon=True)
+    executor = MultiThreadedExecutor(4)
+    executor.add_node(agent.node)
+    spinning = threading.Thread(target=executor.spin, daemon=True)
     spinning.start()
     for line in sys.stdin:
         verb, arguments = json.loads(line)

@@ -28,9 +28,7 @@ def generate_launch_description() -> LaunchDescription:
     """The launch description that ros2 launch asks for."""
     return LaunchDescription(
         [
-            DeclareLaunchArgument(
-                "params", default_value="", description="file of parameters"
-            ),
+            DeclareLaunchArgument("params", default_value="", description="file of parameters"),
             DeclareLaunchArgument(
                 "runtime_dir", default_value="", description="directory of the daemon's sockets"
             ),

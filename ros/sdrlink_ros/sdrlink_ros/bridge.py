@@ -11,7 +11,7 @@ import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
-from sdrlink_ros import graph
+from sdrlink_ros import directory, graph
 from sdrlink_ros.daemon import Daemon, Demand
 from sdrlink_ros.echoes import Echoes
 from sdrlink_ros.incoming import Incoming, Source
@@ -19,6 +19,7 @@ from sdrlink_ros.names import Names, unused
 from sdrlink_ros.outgoing import Outgoing
 from sdrlink_ros.parameters import Parameters
 from sdrlink_ros.routes import Routes, decide
+from sdrlink_ros.services import LOST_S, Services, calls_of
 from sdrlink_ros.state import State
 from sdrlinkd.client import RefusedError, runtime_dir
 
@@ -78,6 +79,9 @@ class Bridge:
         """Whether another robot's bridge is on this graph."""
         self._version: tuple[str, int] = ("", -1)
         self._routes = Routes({}, {}, {})
+        self._sources: list[Source] = []
+        self._declared: set[str] = set()
+        """Topics between bridges that the daemon knows."""
         self._said: set[str] = set()
         self._parts: _Parts | None = None
         self._lock = -1
@@ -111,13 +115,15 @@ class Bridge:
         parts, settings, now = self._parts, self._parameters.settings, time.monotonic()
         seen = parts.seen()
         is_due = self._looks % WHOLE_LOOKS == 0
-        if is_due or self._is_changed or seen != self._seen:
+        is_changed, self._is_changed = self._is_changed, False
+        if is_due or is_changed or seen != self._seen:
             self._seen = seen
             self._look_at_graph(parts)
             if demand is not None:
                 parts.outgoing.follow(self._routes.taken, self._daemon, demand.boot)
+                self._look_at_services(parts)
         if demand is not None:
-            self._learn(parts, demand)
+            self._learn(parts, demand, is_changed)
         wanted = frozenset() if demand is None else demand.wanted
         parts.outgoing.want(self._routes.taken, wanted, now)
         parts.incoming.look(parts.outgoing.taker.taps, now, self._is_refused)
@@ -127,7 +133,6 @@ class Bridge:
         self._looks += 1
         if self._looks == SETTLED_LOOKS:
             self._say_unused(settings)
-        self._is_changed = False
 
     def _look_at_graph(self, parts: "_Parts") -> None:
         """Decide anew what becomes of the topics on the graph."""
@@ -150,15 +155,42 @@ class Bridge:
         for text in self._routes.refused.values():
             self._say_once(text)
 
-    def _learn(self, parts: "_Parts", demand: Demand) -> None:
-        """Learn the topics of other robots."""
+    def _learn(self, parts: "_Parts", demand: Demand, is_changed: bool) -> None:
+        """Learn the topics of other robots, and what becomes of them by changed parameters."""
         seen = demand.boot, demand.version
-        if seen != self._version or self._is_changed or parts.incoming.has_commands:
+        if seen != self._version or is_changed or parts.incoming.has_commands:
             told = self._daemon.ask("declared")
             if told is not None:
+                if demand.boot != self._version[0]:
+                    self._declared.clear()
+                    parts.services.tell_again()
+                self._sources = [Source.told(each) for each in told]
+                inner = {each.bus for each in self._sources if parts.services.hears(each)}
+                if not is_changed and seen != self._version:
+                    # Calls may need topics, too.
+                    self._is_changed = True
+                others = (each for each in self._sources if each.bus not in inner)
+                parts.incoming.follow(others, self._parameters.settings, frozenset(inner))
                 self._version = seen
-                sources = [Source.told(each) for each in told]
-                parts.incoming.follow(sources, self._parameters.settings)
+
+    def _look_at_services(self, parts: "_Parts") -> None:
+        """Offer the services of this robot, and see whose robots have fallen silent."""
+        settings, services = self._parameters.settings, parts.services
+        patterns = () if self._is_refused else settings.services_allow
+        found = directory.found(parts.data, parts.names, patterns)
+        for text in found.refused.values():
+            self._say_once(text)
+        services.offer(found.services, settings.services_timeout_s)
+        for arguments in services.declarations(self._sources):
+            name = str(arguments["name"])
+            if name not in self._declared and self._daemon.declare(arguments) is not None:
+                self._declared.add(name)
+        robots = {each.robot for each in self._sources}
+        services.reach(frozenset(each for each in robots if calls_of(each) in self._declared))
+        if services.has_proxies:
+            peers = self._daemon.ask("peers") or []
+            silent = (each["src"] for each in peers if each["last_heard_s_ago"] > LOST_S)
+            services.silent(frozenset(silent))
 
     def _changed(self) -> None:
         self._is_changed = True
@@ -223,7 +255,7 @@ class _Parts:
     def __init__(
         self,
         names: Names,
-        directory: "Path | None",
+        folder: "Path | None",
         echoes: Echoes,
         node: Node,
     ) -> None:
@@ -235,11 +267,13 @@ class _Parts:
             enable_rosout=False,
             start_parameter_services=False,
         )
-        self.outgoing = Outgoing(self.data, directory, echoes, say)
-        self.incoming = Incoming(self.data, names, directory, echoes, say)
+        self.outgoing = Outgoing(self.data, folder, echoes, say)
+        self.services = Services(self.data, names, folder, say)
+        self.incoming = Incoming(self.data, names, folder, echoes, say, self.services.hear)
         self.state = State(node)
         self.outgoing.taker.start()
         self.incoming.start()
+        self.services.start()
         node.get_logger().info(f"bridge of robot {names.own}")
 
     def seen(self) -> tuple[Any, ...]:
@@ -250,6 +284,7 @@ class _Parts:
     def close(self) -> None:
         self.outgoing.taker.stop()
         self.incoming.stop()
+        self.services.stop()
         self.data.destroy_node()
 
 

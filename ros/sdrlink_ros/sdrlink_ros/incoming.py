@@ -68,7 +68,8 @@ class Outlet:
 class Incoming:
     """Publishes the topics of other robots, and wants those that somebody here subscribes to.
 
-    `node` is for publishers only. `say` logs a sentence.
+    `node` is for publishers only. `say` logs a sentence. `take_inner` takes messages of topics that
+    bridges use among themselves.
     """
 
     def __init__(
@@ -78,14 +79,17 @@ class Incoming:
         directory: Path | None,
         echoes: Echoes,
         say: Callable[[str], None],
+        take_inner: Callable[[Message], None],
     ) -> None:
         self._node = node
         self._names = names
         self._directory = directory
         self._echoes = echoes
+        self._take_inner = take_inner
         self._say = say
         self._outlets: dict[str, Outlet] = {}
         self._wanted: frozenset[str] = frozenset()
+        self._inner: frozenset[str] = frozenset()
         self._refused_sources: dict[str, Source] = {}
         self.refused: dict[str, str] = {}
         """Why a topic of another robot is not published, in words by bus topic."""
@@ -124,8 +128,12 @@ class Incoming:
         """(robot, name) of the topics that other robots declare."""
         return {(each.source.robot, each.source.name) for each in self._outlets.values()}
 
-    def follow(self, sources: Iterable[Source], settings: Settings) -> None:
-        """Publish these topics. What is no longer declared stays: its robot may only restart."""
+    def follow(self, sources: Iterable[Source], settings: Settings, inner: frozenset[str]) -> None:
+        """Publish these topics. What is no longer declared stays: its robot may only restart.
+
+        `inner` are the bus topics of bridges among themselves, which are always wanted.
+        """
+        self._inner = inner
         for source in sources:
             known = self._outlets.get(source.bus)
             names = self._names_of(source, settings)
@@ -147,6 +155,7 @@ class Incoming:
         if is_refused:
             self._wanted = frozenset()
             return
+        wanted = (bus for bus, each in self._outlets.items() if now - each.wanted_at < LINGER_S)
         for outlet in self._outlets.values():
             others = sum(
                 publisher.get_subscription_count() - (name in taken)
@@ -154,9 +163,7 @@ class Incoming:
             )
             if others > 0 or outlet.is_command:
                 outlet.wanted_at = now
-        self._wanted = frozenset(
-            bus for bus, each in self._outlets.items() if now - each.wanted_at < LINGER_S
-        )
+        self._wanted = frozenset(wanted) | self._inner
 
     def _names_of(self, source: Source, settings: Settings) -> tuple[str, ...]:
         """The names under which a topic appears here; none if it is not for this robot."""
@@ -264,7 +271,9 @@ class Incoming:
 
     def _publish(self, message: Message) -> None:
         outlet, cdr = self._outlets.get(message.topic), message.payload
-        if outlet is None:
+        if message.topic in self._inner:
+            self._take_inner(message)
+        elif outlet is None:
             self.dropped["rx_unknown_topic"] += 1
         elif message.type != outlet.kind.name:
             self.dropped["rx_other_type"] += 1

@@ -16,7 +16,17 @@ _SIZES = {
 MOST_ALIGNED = 8
 ENCAPSULATION = 4
 _LENGTH = 4
-_NAME = re.compile(r"([a-z][a-z0-9_]*)/msg/([A-Z][A-Za-z0-9]*)")
+FOLDERS = ("msg", "srv", "action")
+_NAME = re.compile(r"([a-z][a-z0-9_]*)/(msg|srv|action)/([A-Z][A-Za-z0-9_]*)")
+# The types that make an action, by the end of their names.
+_PARTS: dict[str, Callable[[Any], Any]] = {
+    "Goal": lambda action: action.Goal,
+    "Result": lambda action: action.Result,
+    "Feedback": lambda action: action.Feedback,
+    "FeedbackMessage": lambda action: action.Impl.FeedbackMessage,
+    "SendGoal": lambda action: action.Impl.SendGoalService,
+    "GetResult": lambda action: action.Impl.GetResultService,
+}
 _ARRAY = re.compile(r"(.+)\[(\d+)\]")
 _TEXT = re.compile(r"w?string(<\d+>)?")
 
@@ -34,6 +44,15 @@ class Kind(NamedTuple):
     has_header: bool
 
 
+class ServiceKind(NamedTuple):
+    """A service type; `least_request` and `least_response` are the smallest sizes of their CDR."""
+
+    name: str
+    service: Any
+    least_request: int
+    least_response: int
+
+
 Fields = dict[str, str]
 
 
@@ -44,6 +63,17 @@ def kind(name: str) -> Kind:
     fields = message.get_fields_and_field_types()
     has_header = next(iter(fields.values()), "") == "std_msgs/Header"
     return Kind(name, message, ENCAPSULATION + least_size(fields, _fields_of), has_header)
+
+
+@cache
+def service_kind(name: str) -> ServiceKind:
+    """The service type called `pkg/srv/Name`, or a part of an action. Raises UnknownTypeError."""
+    service = _load(name)
+    least = (
+        ENCAPSULATION + least_size(part.get_fields_and_field_types(), _fields_of)
+        for part in (service.Request, service.Response)
+    )
+    return ServiceKind(name, service, *least)
 
 
 def least_size(fields: Fields, of: Callable[[str], Fields]) -> int:
@@ -87,24 +117,39 @@ def _aligned(at: int, size: int) -> int:
 
 def _fields_of(name: str) -> Fields:
     package, _, last = name.partition("/")
-    return dict(_load(f"{package}/msg/{last}").get_fields_and_field_types())
+    # The parts of an action are nested types, too.
+    names = (f"{package}/{folder}/{last}" for folder in FOLDERS)
+    found = next((each for each in names if _is_there(each)), f"{package}/msg/{last}")
+    return dict(_load(found).get_fields_and_field_types())
+
+
+def _is_there(name: str) -> bool:
+    try:
+        _load(name)
+    except UnknownTypeError:
+        return False
+    return True
 
 
 def _load(name: str) -> Any:  # noqa: ANN401
     given = _NAME.fullmatch(name)
-    if given is None or not _has_messages(given[1]):
+    if given is None or not _has_messages(given[1], given[2]):
         raise _unknown(name)
     try:
-        return getattr(importlib.import_module(f"{given[1]}.msg"), given[2])
-    except (ImportError, AttributeError):
+        found = importlib.import_module(f"{given[1]}.{given[2]}")
+        if given[2] != "action":
+            return getattr(found, given[3])
+        action, _, part = given[3].rpartition("_")
+        return _PARTS[part](getattr(found, action))
+    except (ImportError, AttributeError, KeyError):
         raise _unknown(name) from None
 
 
-def _has_messages(package: str) -> bool:
-    """Whether a package has ROS messages. It is not imported: its name may come from the air."""
+def _has_messages(package: str, folder: str) -> bool:
+    """Whether a package has ROS types. It is not imported: its name may come from the air."""
     spec = importlib.util.find_spec(package)
     folders = spec.submodule_search_locations if spec is not None else None
-    return any((Path(folder) / "msg/__init__.py").exists() for folder in folders or ())
+    return any((Path(each) / folder / "__init__.py").exists() for each in folders or ())
 
 
 def _unknown(name: str) -> UnknownTypeError:

@@ -15,6 +15,7 @@ class _Parameter(NamedTuple):
     is_fixed: bool = False
 
 
+LONGEST_TIMEOUT_S = 60.0
 _PATTERNS = "Names or patterns with *, such as /camera/*."
 _PARAMETERS = (
     _Parameter("allow", "allow", "Topics of this robot for the others. A pattern other than /* "
@@ -30,6 +31,10 @@ _PARAMETERS = (
                True),
     _Parameter("tf.merge", "tf_merge", "Publish the transforms of others on /tf and /tf_static, "
                "too. Give each robot's frames a prefix: [tf] prefix in its sdrlinkd.toml."),
+    _Parameter("services.allow", "services_allow", "Services and actions of this robot that others "
+               f"may call. {_PATTERNS}"),
+    _Parameter("services.timeout_s", "services_timeout_s", "Time in s that a call may take, 0 to "
+               "60; 0: 25 round trips, and at least 5 s. Results of actions have 15 minutes."),
 )  # fmt: skip
 
 
@@ -70,6 +75,11 @@ class Parameters:
         fitting: Any = value
         if isinstance(default, tuple):
             fitting, allowed = _patterns(value), "a list of names or patterns"
+        elif isinstance(default, float):
+            allowed = f"0 to {LONGEST_TIMEOUT_S:g} s"
+            is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+            is_in = is_number and 0 <= value <= LONGEST_TIMEOUT_S
+            fitting = float(value) if is_in else None
         else:
             allowed = "true or false" if isinstance(default, bool) else "a text"
         if not isinstance(fitting, type(default)):

@@ -15,3 +15,5 @@ class Settings(NamedTuple):
     restamp: tuple[str, ...] = ()
     rx_format: str = "/robot_{src}"
     tf_merge: bool = False
+    services_allow: tuple[str, ...] = ()
+    services_timeout_s: float = 0.0

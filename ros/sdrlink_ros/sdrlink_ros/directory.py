@@ -1,0 +1,90 @@
+"""The services that a robot offers to the others: found on its graph, and told as text."""
+
+import json
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+from sdrlink_ros.graph import BRIDGE, type_hash
+from sdrlink_ros.names import Names, matches
+
+ACTION = "/_action/"
+GET_RESULT, CANCEL = f"{ACTION}get_result", f"{ACTION}cancel_goal"
+SEND_GOAL = f"{ACTION}send_goal"
+MOST_TOLD = 200
+_STRING_HEAD = 8
+"""Octets of encapsulation and length before the text of a std_msgs/String."""
+
+
+class Service(NamedTuple):
+    """A service by its name at its robot, with its type and, if known, the hash of its request."""
+
+    name: str
+    kind: str
+    hash: str
+
+    @property
+    def is_result(self) -> bool:
+        """Whether it brings the result of an action, which may take long."""
+        return self.name.endswith(GET_RESULT)
+
+    @property
+    def is_cancel(self) -> bool:
+        """Whether it cancels goals."""
+        return self.name.endswith(CANCEL)
+
+
+class Found(NamedTuple):
+    """The services that are offered, by name, and what is wrong with others, in words by name."""
+
+    services: dict[str, Service]
+    refused: dict[str, str]
+
+
+def found(node: Any, names: Names, patterns: Sequence[str]) -> Found:  # noqa: ANN401
+    """The services of this robot's nodes that `patterns` name; an action by its own name."""
+    servers: dict[str, list[str]] = {}
+    kinds: dict[str, str] = {}
+    for name, space in node.get_node_names_and_namespaces() if patterns else ():
+        if name.startswith(BRIDGE):
+            continue
+        try:
+            told = node.get_service_names_and_types_by_node(name, space)
+        except Exception:  # noqa: S112 - the node has gone in this moment
+            continue
+        for service, types in told:
+            if matches(names.local(service).split(ACTION)[0], patterns):
+                servers.setdefault(service, []).append(f"{space.rstrip('/')}/{name}")
+                kinds[service] = types[0]
+    result = Found({}, {})
+    for service, nodes in sorted(servers.items()):
+        if len(nodes) > 1:
+            result.refused[service] = (
+                f"{service}: {' and '.join(sorted(nodes))} both offer it; stop one of them"
+            )
+        else:
+            kind, hash_ = kinds[service], request_hash(node, service)
+            result.services[service] = Service(names.local(service), kind, hash_)
+    return result
+
+
+def request_hash(node: Any, service: str) -> str:  # noqa: ANN401
+    """The hash of a service's request; empty where the middleware does not tell it."""
+    topic = f"rq{service}Request"
+    endpoints = node.get_subscriptions_info_by_topic(topic, no_mangle=True)
+    return next(filter(None, (type_hash(each) for each in endpoints)), "")
+
+
+def told(services: Iterable[Service]) -> bytes:
+    """Services as a std_msgs/String in CDR."""
+    text = json.dumps([list(each) for each in services], separators=(",", ":")).encode() + b"\0"
+    return b"\0\1\0\0" + len(text).to_bytes(4, "little") + text
+
+
+def understood(cdr: bytes) -> list[Service] | None:
+    """The services in such a message; None if it is none."""
+    try:
+        given = json.loads(cdr[_STRING_HEAD:].rstrip(b"\0").decode())
+        services = [Service(*map(str, each)) for each in given[:MOST_TOLD]]
+    except (ValueError, TypeError):
+        return None
+    return [each for each in services if each.name.startswith("/")]
