@@ -5,7 +5,8 @@ from sdrlinkd.adapters.chrony import ChronySocket
 from sdrlinkd.adapters.due import Due, due_messages
 from sdrlinkd.adapters.fields import cdr_from_fields
 from sdrlinkd.adapters.message_types import MessageTypes
-from sdrlinkd.adapters.pacing import first_seconds, paced
+from sdrlinkd.adapters.pacing import first_seconds, from_second, paced
+from sdrlinkd.adapters.recorder import BagWriter, Recorded, as_text, megabytes
 from sdrlinkd.adapters.robot import BuiltInRobot
 from sdrlinkd.adapters.summary import BagSummary, TopicSummary, summarise
 from sdrlinkd.adapters.transforms import Transforms
@@ -16,18 +17,23 @@ __all__ = [
     "BagMessage",
     "BagSummary",
     "BagTopic",
+    "BagWriter",
     "BuiltInRobot",
     "ChronySocket",
     "Due",
     "MessageTypes",
+    "Recorded",
     "TopicSummary",
     "Transforms",
+    "as_text",
     "cdr_from_fields",
     "due_messages",
     "empty",
     "first_seconds",
     "from_cdr",
+    "from_second",
     "knows",
+    "megabytes",
     "open_bag",
     "paced",
     "summarise",

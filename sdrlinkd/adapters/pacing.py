@@ -28,6 +28,16 @@ def paced(
         yield message
 
 
+def from_second(messages: Iterable[BagMessage], start_s: float) -> Iterator[BagMessage]:
+    """The messages of a recording without those of its first `start_s`."""
+    first_ns: int | None = None
+    for message in messages:
+        if first_ns is None:
+            first_ns = message.time_ns
+        if (message.time_ns - first_ns) * 1e-9 >= start_s:
+            yield message
+
+
 def first_seconds(messages: Iterable[BagMessage], duration_s: float) -> Iterator[BagMessage]:
     """The messages of the first `duration_s` of a recording."""
     first_ns: int | None = None

@@ -1,12 +1,13 @@
 """The local ZeroMQ bus of one daemon, specified by README.md in this folder (the bus document)."""
 
-from sdrlinkd.bus.bus import PDU_TAP, Bus
+from sdrlinkd.bus.bus import PDU_TAP, SENT_TAP, Bus
 from sdrlinkd.bus.intake import Ingress
 from sdrlinkd.bus.sockets import MAX_DIRECTORY_BYTES, RuntimeDirectory, is_foreign
 
 __all__ = [
     "MAX_DIRECTORY_BYTES",
     "PDU_TAP",
+    "SENT_TAP",
     "Bus",
     "Ingress",
     "RuntimeDirectory",

@@ -49,6 +49,7 @@ QUIET_S = 0.01
 QUIET_ROUNDS = 3
 LAST_MESSAGES_S = 0.3
 PDU_TAP = b"\0pdu\0"
+SENT_TAP = b"\0sent\0"
 
 
 class Bus:
@@ -70,6 +71,8 @@ class Bus:
         self._received = 0
         self._published = 0
         self._taps = 0
+        self._is_copied = False
+        """Whether a client watches the messages of this robot's producers."""
         self.filters: frozenset[bytes] = frozenset()
         """Subscriptions to messages from the air, each the beginning of a topic frame."""
         self.has_consumer = asyncio.Event()
@@ -250,12 +253,16 @@ class Bus:
             return
         self._received += 1
         self._intake.take(frames)
+        if self._is_copied and len(frames) == 3:
+            self._out.send_multipart([SENT_TAP + frames[0], *frames[1:]])
 
     def _take_subscription(self, frames: list[bytes]) -> None:
         subscribed, topic = frames[0][:1] == b"\x01", frames[0][1:]
         if topic == PDU_TAP:
             # XPUB reports only the first watcher to subscribe and the last one to leave.
             self._taps = int(subscribed)
+        elif topic == SENT_TAP:
+            self._is_copied = subscribed
         elif subscribed and topic.startswith(ACK_PREFIX):
             # Subscriptions are processed in order, so the earlier ones are active now.
             self._acknowledge(topic)

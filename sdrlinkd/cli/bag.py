@@ -1,6 +1,10 @@
 """`bag info` and `bag play`: summarizes a recording, and plays one to a running daemon."""
 
+import itertools
+import math
+import struct
 from collections.abc import Iterator
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +17,7 @@ from sdrlinkd.adapters import (
     BagSummary,
     BagTopic,
     first_seconds,
+    from_second,
     open_bag,
     paced,
     summarise,
@@ -30,6 +35,9 @@ COLUMNS = (
     MofNCompleteColumn(),
     TimeRemainingColumn(),
 )
+
+CLOCK, CLOCK_TYPE = "/clock", "rosgraph_msgs/msg/Clock"
+SECOND_NS = 1_000_000_000
 
 bags = typer.Typer(help="Recordings of messages.", no_args_is_help=True)
 app.add_typer(bags, name="bag")
@@ -75,11 +83,22 @@ def play(
     rate: Annotated[
         float, typer.Option("--rate", "-r", min=0.001, help="Playback speed; 1: as recorded.")
     ] = 1.0,
+    start: Annotated[
+        float, typer.Option(min=0, help="Leave out this many seconds at its beginning.")
+    ] = 0.0,
     duration: Annotated[
-        float | None, typer.Option(min=0.001, help="Play only this many seconds from its start.")
+        float | None, typer.Option(min=0.001, help="Play only this many seconds from there.")
     ] = None,
+    loop: Annotated[
+        bool, typer.Option("--loop", "-l", help="Play it again and again, until Ctrl-C.")
+    ] = False,
+    clock: Annotated[
+        float,
+        typer.Option(min=0, max=1000, help="Send the recording's time on /clock, so often a s."),
+    ] = 0.0,
     topics: Annotated[
-        list[str] | None, typer.Option("--topics", help="Play only this topic; repeatable.")
+        list[str] | None,
+        typer.Option("--topics", help="Play only this topic, or pattern with *; repeatable."),
     ] = None,
     remap: Annotated[
         list[str] | None, typer.Option(help="FROM:=TO: play the bag's FROM as the daemon's TO.")
@@ -91,6 +110,10 @@ def play(
     opened = open_bag(bag)
     with connect(runtime_dir) as control:
         snapshot = ask_status(control)
+        if clock:
+            control.ask(
+                "declare", {"name": CLOCK, "type": CLOCK_TYPE, "reliability": "best_effort"}
+            )
     taken = {topic.name: topic for topic in snapshot.link.topics if topic.subscribed}
     route, left_out = _route(opened.topics(), taken, snapshot.namespace, topics or [], remap or [])
     for name, reason in left_out.items():
@@ -101,23 +124,37 @@ def play(
         )
 
     def messages() -> Iterator[BagMessage]:
-        taken_ones = (m for m in opened.messages() if m.topic in route)
-        return taken_ones if duration is None else first_seconds(taken_ones, duration)
+        played = opened.messages()
+        if start:
+            played = from_second(played, start)
+        if duration is not None:
+            played = first_seconds(played, duration)
+        return (message for message in played if message.topic in route)
 
     total = sum(topic.n_messages for topic in opened.topics() if topic.name in route)
-    if duration is not None:
+    if start or duration is not None:
         # Only reading all of them shows how many there are.
         total = sum(1 for _ in messages())
+    if loop and not total:
+        opened.close()
+        raise UserError(f"{bag}: no messages to play again and again; give another --start")
     sent, refused = 0, dict[str, list[str]]()
     with Publisher(runtime_dir) as publisher, Progress(*COLUMNS, console=console) as progress:
-        task = progress.add_task(bag.name, total=total)
-        for message in paced(messages(), rate):
-            try:
-                publisher.send(route[message.topic], message.cdr, type=message.type)
-                sent += 1
-            except MessageRefusedError as error:
-                refused.setdefault(message.topic, []).append(str(error))
-            progress.advance(task)
+        for _ in itertools.count() if loop else range(1):
+            task = progress.add_task(bag.name, total=total)
+            told_ns = -math.inf
+            for message in paced(messages(), rate):
+                if clock and message.time_ns - told_ns >= SECOND_NS / clock:
+                    told_ns = message.time_ns
+                    publisher.send(CLOCK, clock_message(message.time_ns))
+                try:
+                    publisher.send(route[message.topic], message.cdr, type=message.type)
+                    sent += 1
+                except MessageRefusedError as error:
+                    refused.setdefault(message.topic, []).append(str(error))
+                progress.advance(task)
+            if loop:
+                progress.remove_task(task)
     opened.close()
     for name, reasons in refused.items():
         console.print(
@@ -128,6 +165,11 @@ def play(
     typer.echo(f"played {sent} messages of {bag}")
     if opened.damage:
         raise BagError(opened.damage)
+
+
+def clock_message(time_ns: int) -> bytes:
+    """A rosgraph_msgs/Clock as CDR."""
+    return b"\0\1\0\0" + struct.pack("<iI", *divmod(time_ns, SECOND_NS))
 
 
 def _route(
@@ -147,12 +189,12 @@ def _route(
     only = [_absolute(name) for name in only]
     known = {topic.name for topic in topics}
     for name in (*only, *mapping):
-        if name not in known:
+        if not any(fnmatchcase(each, name) for each in known):
             raise UserError(f"got {name}; allowed: the bag's topics {', '.join(sorted(known))}")
     route: dict[str, str] = {}
     left_out: dict[str, str] = {}
     for topic in topics:
-        if only and topic.name not in only:
+        if only and not any(fnmatchcase(topic.name, each) for each in only):
             continue
         candidates = [mapping.get(topic.name, topic.name)]
         if namespace and topic.name not in mapping:

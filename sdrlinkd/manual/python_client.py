@@ -12,7 +12,8 @@ INTRODUCTION = """\
 
 `sdrlinkd.client` is what user programs import. It needs pyzmq and nothing else, and runs on
 Python 3.10 and newer.
-[Connect ROS 2 nodes](../howto/connect-ros2.md) has examples. ROS 2 teams use [the bridge](../ros.md).
+[Connect ROS 2 nodes](../howto/connect-ros2.md) has examples.
+ROS 2 teams use [the bridge](../ros.md).
 """
 CLASSES = (
     client.Publisher, client.Subscriber, client.AsyncPublisher, client.AsyncSubscriber,
