@@ -9,6 +9,9 @@ from sdrlinkd.config import Setup
 from sdrlinkd.errors import UserError
 from sdrlinkd.link import HeardTopic
 
+MOST_TYPES = 1000
+"""Types to be remembered, as their names come from the air."""
+
 
 class MessageTypes:
     """Facts about the types of the registry's topics, and of those that other robots declare.
@@ -25,6 +28,8 @@ class MessageTypes:
         """Whether messages of type `kind` begin with a std_msgs/Header; False if unknown."""
         found = self._headers.get(kind)
         if found is None:
+            if len(self._headers) >= MOST_TYPES:
+                self._headers.clear()
             found = self._headers[kind] = knows(kind) and begins_with_header(kind)
         return found
 

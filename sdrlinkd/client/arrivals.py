@@ -34,6 +34,11 @@ class Arrivals:
         self._missing[topic] = filter_
         return topic
 
+    def forget(self, filter_: bytes) -> None:
+        """Forget which messages under a filter have come."""
+        for topic in [each for each in self._newest if f"{each}\0".encode().startswith(filter_)]:
+            del self._newest[topic]
+
     def take(self, frames: Sequence[bytes]) -> Message | None:
         """The message in `frames`, or None; it may have to wait for kept ones of its topic."""
         topic = frames[0]

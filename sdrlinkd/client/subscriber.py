@@ -66,8 +66,12 @@ class Subscriber(Endpoint):
         self._socket.subscribe(request)
 
     def unsubscribe(self, topic: str) -> None:
-        """Take no more messages of a topic, which was named in the same words before."""
+        """Take no more messages of a topic, which was named in the same words before.
+
+        Who subscribes to it again gets what is kept then, again.
+        """
         each = topic_filter(topic)
+        self._arrivals.forget(each)
         self._socket.unsubscribe(each)
         if (request := self._requests.pop(each, None)) is not None:
             self._socket.unsubscribe(request)

@@ -189,7 +189,9 @@ def test_a_topic_is_subscribed_to_later_and_its_kept_messages_come_first(start_d
         assert received(heard, 3) == [(1, True), (2, True), (3, True)]
         published(daemon, 1)
         assert received(heard, 1) == [(4, False)]
-        heard.unsubscribe(HEARD)
         heard.subscribe("/rx_robot_1/*")
         published(daemon, 1)
         assert received(heard, 1) == [(5, False)], "the others came before"
+        heard.unsubscribe("/rx_robot_1/*")
+        heard.subscribe("/rx_robot_1/*")
+        assert received(heard, 5) == [(number, True) for number in range(1, 6)], "asked for again"

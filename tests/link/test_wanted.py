@@ -87,12 +87,13 @@ def test_subscriptions_that_come_and_go_do_not_fill_the_air():
     told = 0
     for i in range(1000):
         wants.set([(1, 16 + i % 200)])
-        told += len(wants.due(0.01 * i))
+        told += len(wants.due(0.01 * i, {1}))
     assert told <= 101, "at most every 0.1 s"
     wants.set([])
-    assert wants.due(100.0) == []
+    assert wants.due(100.0, {1}) == []
     wants.set([(src, number) for src in (1, 2) for number in range(16, 256)])
-    found = wants.due(200.0)
+    assert [each.node for each in wants.due(200.0, {2})] == [2, 2, 2], "those that are heard"
+    found = wants.due(300.0, {1, 2})
     assert [(each.node, len(each.topics)) for each in found] == [
         (1, 100), (1, 100), (1, 40), (2, 100), (2, 100), (2, 40),
     ]  # fmt: skip

@@ -153,7 +153,7 @@ def test_bridges_that_see_each_other_refuse_and_name_both(start_daemon, start, h
     first = start(Bridge, domain, one.directory)
     first.says("bridge of robot 1")
     again = start(Bridge, new_domain(), one.directory)
-    again.says("another bridge already serves this daemon")
+    again.says("another bridge already serves the daemon in")
     assert again.process.wait(20) == 2
     second = start(Bridge, domain, two.directory)
     for bridge, robots in ((first, "1 and 2"), (second, "2 and 1")):

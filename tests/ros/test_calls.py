@@ -12,6 +12,7 @@ from sdrlink_ros.calls import (
     RESULT_KEPT_S,
     Answerer,
     Asker,
+    Key,
     Kind,
     Packet,
     Status,
@@ -100,7 +101,7 @@ def test_at_a_loss_of_a_fifth_all_of_200_calls_are_answered():
 def test_an_outage_ends_no_result_and_no_call_that_has_the_time():
     world = World(2, works_s=10.0)
     world.is_out = lambda now: 5.0 < now < 13.0
-    result = world.asker.ask(1, "/fibonacci/_action/get_result", b"ab", 0.0, is_long=True)
+    result = world.asker.ask(1, "/fibonacci/_action/get_result", b"ab", 0.0)
     world.run(20.0)
     assert world.ended[result].body == b"ba"
     world.is_out = lambda now: world.now < 25.0
@@ -114,7 +115,7 @@ def test_an_outage_ends_no_result_and_no_call_that_has_the_time():
 
 def test_a_result_that_nobody_takes_is_kept_and_a_call_is_not():
     world = World(3)
-    world.asker.ask(1, "/x/_action/get_result", b"", 0.0, is_long=True)
+    world.asker.ask(1, "/x/_action/get_result", b"", 0.0)
     world.asker.ask(1, "/set", b"", 0.0)
     world.run(1.0)
     world.is_out = lambda now: True
@@ -125,6 +126,38 @@ def test_a_result_that_nobody_takes_is_kept_and_a_call_is_not():
     assert len(world.answerer._calls) == 0
 
 
+def test_a_result_comes_though_its_goal_is_long_and_the_servers_bridge_restarts():
+    world = World(4, works_s=1200.0)
+    result = world.asker.ask(1, "/x/_action/get_result", b"ab", 0.0)
+    world.run(1000.0)
+    assert world.executed == [result]
+    world.answerer, world.works = Answerer(world.now, Random(5)), []
+    world.run(1300.0)
+    assert world.executed == [result, result], "it is asked for again"
+    assert world.ended[result].body == b"ba"
+
+
+def test_a_call_whose_bridge_restarts_is_not_executed_again():
+    world = World(4, works_s=3.0)
+    call = world.asker.ask(1, "/set", b"ab", 0.0, timeout_s=20.0)
+    world.run(1.0)
+    assert world.executed == [call]
+    world.answerer, world.works = Answerer(world.now, Random(5)), []
+    world.run(20.0)
+    assert world.executed == [call]
+    assert world.ended[call].status == Status.RESTARTED
+
+
+def test_an_answer_that_is_too_large_is_told():
+    answerer = Answerer(0.0, Random(1))
+    key = answerer.hear(2, Packet(Kind.REQUEST, 7, 1, "/set"), 0.0, 10.0)
+    answerer.answer(key, Status.OK, bytes(100), 10.0)
+    (sent,) = answerer.due(10.0)
+    answerer.too_large(sent.packet, 2)
+    (sent,) = answerer.due(20.0)
+    assert (sent.packet.status, sent.packet.body) == (Status.TOO_LARGE, b"")
+
+
 def test_a_bridge_that_has_just_started_executes_nothing_older_than_itself():
     answerer = Answerer(100.0, Random(1))
     old = Packet(Kind.REQUEST, 7, 1, "/set", age_s=4.0)
@@ -132,7 +165,12 @@ def test_a_bridge_that_has_just_started_executes_nothing_older_than_itself():
     (sent,) = answerer.due(103.0)
     assert (sent.packet.kind, sent.packet.status) == (Kind.ANSWER, Status.RESTARTED)
     assert answerer.hear(2, old._replace(number=2, age_s=2.0), 0.1, 103.0) is not None
-    assert answerer.hear(2, old._replace(number=3, is_long=True), 0.1, 103.0) is not None
+    result = old._replace(number=3, name="/x/_action/get_result")
+    assert answerer.hear(2, result, 0.1, 103.0) is not None
+    # A request of unknown age may be older than the bridge.
+    assert answerer.hear(2, old._replace(number=4, age_s=0.0), None, 103.0) is None
+    assert answerer.hear(2, old._replace(number=4, age_s=0.0), None, 170.0) is None, "refused once"
+    assert answerer.hear(2, old._replace(number=5, age_s=0.0), None, 170.0) is not None
 
 
 def test_calls_of_one_robot_are_bounded():
@@ -141,6 +179,11 @@ def test_calls_of_one_robot_are_bounded():
         answerer.hear(2, Packet(Kind.REQUEST, 7, number, "/set"), 0.0, 10.0)
     statuses = [sent.packet.status for sent in answerer.due(10.0)]
     assert statuses == [Status.BUSY] * 5
+    # A second copy of what was turned away is not executed, though there is room by now.
+    answerer.answer(Key(2, 7, 0), Status.OK, b"", 10.0)
+    answerer.hear(2, Packet(Kind.ACK, 7, 0), 0.0, 10.0)
+    assert answerer.hear(2, Packet(Kind.REQUEST, 7, MOST_KEPT, "/set"), 0.0, 11.0) is None
+    assert answerer.hear(2, Packet(Kind.REQUEST, 7, 999, "/set"), 0.0, 11.0) is not None
     assert answerer.hear(3, Packet(Kind.REQUEST, 7, 1, "/set"), 0.0, 10.0) is not None
 
 
@@ -160,5 +203,5 @@ def test_any_octets_are_a_packet_or_none(octets):
 
 @pytest.mark.parametrize("kind", Kind)
 def test_a_packet_is_read_as_it_was_built(kind):
-    packet = Packet(kind, 0xFFFFFFFF, 1, "/a/b", True, Status.BUSY, 0.5, b"body")
+    packet = Packet(kind, 0xFFFFFFFF, 1, "/a/b", Status.BUSY, 0.5, b"body")
     assert Packet.parse(packet.build()) == packet

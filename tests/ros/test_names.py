@@ -184,3 +184,7 @@ def test_own_messages_are_known_once_each_whatever_dds_appends(cdr, more):
     echoes.sent("/tf", cdr)
     assert not echoes.is_own("/other", received)
     assert [echoes.is_own("/tf", received) for _ in range(3)] == [True, True, False]
+    # What was latched comes again to each new subscription, also to a later one.
+    echoes.watched = frozenset()
+    echoes.sent("/tf", cdr, is_latched=True)
+    assert [echoes.is_own("/tf", received) for _ in range(3)] == [True] * 3

@@ -1,6 +1,7 @@
 """The topics of actions: feedback and status, which are not services."""
 
 import hashlib
+from collections import OrderedDict
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -17,6 +18,7 @@ TYPES = {FEEDBACK: "sdrlink_ros/msg/Feedback", STATUS: "sdrlink_ros/msg/Status"}
 STATUS_TYPE = "action_msgs/msg/GoalStatusArray"
 MAX_KEY_BYTES = 32
 DEPTH = 10
+MOST_STATUSES = 256
 
 
 class Tap(NamedTuple):
@@ -36,6 +38,8 @@ class ActionTopics:
         self._names = names
         self._taps: dict[str, list[Tap]] = {}
         self._publishers: dict[tuple[str, str], tuple[Any, Kind]] = {}
+        self._status: OrderedDict[str, bytes] = OrderedDict()
+        """The last status of each action of other robots, by its name here."""
 
     @property
     def taps(self) -> list[Tap]:
@@ -75,6 +79,8 @@ class ActionTopics:
                         kind_.message, f"{name}{ACTION}{_last(inner)}", _profile(inner)
                     )
                     self._publishers[name, inner] = made, kind_
+                    if inner == STATUS and name in self._status:
+                        made.publish(self._status[name])
 
     def forward(self, tap: Tap, out: Publisher) -> None:
         """Send the messages of a subscription that has some."""
@@ -91,9 +97,18 @@ class ActionTopics:
         """Publish a message of another robot's action."""
         inner = next((each for each in TYPES if message.topic.endswith(f"/{each}")), "")
         body = message.payload[len(ENCAPSULATION) :]
-        name, cdr = body[1 : 1 + body[0]], body[1 + body[0] :]
+        length = body[0] if body else 0
+        name, cdr = body[1 : 1 + length], body[1 + length :]
+        if not name or not inner or cdr[:2] not in (b"\0\0", b"\0\1"):
+            return
         here = self._names.here(robot, name.decode(errors="replace").lstrip("/"))
         found = self._publishers.get((here, inner))
+        if inner == STATUS:
+            # It may come before the directory that names the action.
+            self._status[here] = cdr
+            self._status.move_to_end(here)
+            while len(self._status) > MOST_STATUSES:
+                self._status.popitem(last=False)
         if found is not None and len(cdr) >= found[1].least:
             found[0].publish(cdr)
 

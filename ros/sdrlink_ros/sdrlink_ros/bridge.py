@@ -1,7 +1,7 @@
 """The bridge: two nodes, two threads, and a timer that looks at ROS and at the radio."""
 
-import fcntl
-import os
+import hashlib
+import socket
 import sys
 import time
 from pathlib import Path
@@ -14,9 +14,10 @@ from rclpy.node import Node
 from sdrlink_ros import directory, graph
 from sdrlink_ros.daemon import Daemon, Demand
 from sdrlink_ros.echoes import Echoes
-from sdrlink_ros.incoming import Incoming, Source
+from sdrlink_ros.incoming import Incoming
 from sdrlink_ros.names import Names, unused
 from sdrlink_ros.outgoing import Outgoing
+from sdrlink_ros.outlet import Source
 from sdrlink_ros.parameters import Parameters
 from sdrlink_ros.routes import Routes, decide
 from sdrlink_ros.services import LOST_S, Services, calls_of
@@ -30,6 +31,7 @@ WHOLE_LOOKS = 4
 SETTLED_LOOKS = 40
 """After so many looks, patterns that match nothing are named."""
 BAD_SETUP = 2
+MOST_SAID = 1000
 
 
 class BridgeError(Exception):
@@ -84,7 +86,7 @@ class Bridge:
         """Topics between bridges that the daemon knows."""
         self._said: set[str] = set()
         self._parts: _Parts | None = None
-        self._lock = -1
+        self._lock: socket.socket | None = None
         self._error: BaseException | None = None
 
     def spin(self) -> None:
@@ -101,8 +103,8 @@ class Bridge:
             self._parts.close()
         self._daemon.close()
         self._node.destroy_node()
-        if self._lock >= 0:
-            os.close(self._lock)
+        if self._lock is not None:
+            self._lock.close()
 
     def _look(self) -> None:
         demand = self._daemon.look()
@@ -183,7 +185,7 @@ class Bridge:
         services.offer(found.services, settings.services_timeout_s)
         for arguments in services.declarations(self._sources):
             name = str(arguments["name"])
-            if name not in self._declared and self._daemon.declare(arguments) is not None:
+            if name not in self._declared and self._is_declared(arguments):
                 self._declared.add(name)
         robots = {each.robot for each in self._sources}
         services.reach(frozenset(each for each in robots if calls_of(each) in self._declared))
@@ -191,6 +193,14 @@ class Bridge:
             peers = self._daemon.ask("peers") or []
             silent = (each["src"] for each in peers if each["last_heard_s_ago"] > LOST_S)
             services.silent(frozenset(silent))
+
+    def _is_declared(self, arguments: dict[str, Any]) -> bool:
+        """Declare a topic for calls; False if the daemon is away, or refuses it."""
+        try:
+            return self._daemon.declare(arguments) is not None
+        except RefusedError as error:
+            self._say_once(f"calls and services: {error}")
+            return False
 
     def _changed(self) -> None:
         self._is_changed = True
@@ -228,7 +238,7 @@ class Bridge:
         ]
         told += [
             {"topic": "", "direction": "in", "state": reason, "dropped": n}
-            for reason, n in parts.incoming.dropped.items()
+            for reason, n in dict(parts.incoming.dropped).items()
         ]
         return told
 
@@ -245,6 +255,8 @@ class Bridge:
 
     def _say_once(self, text: str) -> None:
         if text not in self._said:
+            if len(self._said) >= MOST_SAID:
+                self._said.clear()
             self._said.add(text)
             self._say(text)
 
@@ -288,15 +300,19 @@ class _Parts:
         self.data.destroy_node()
 
 
-def _locked(directory: "Path | None") -> int:
-    """A lock that a second bridge of the same robot does not get. Raises BridgeError."""
-    path = runtime_dir(directory) / "bridge.lock"
-    lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+def _locked(directory: "Path | None") -> socket.socket:
+    """A lock that a second bridge of the same daemon does not get. Raises BridgeError.
+
+    It is an abstract socket: it needs no right to write, and ends with this process.
+    """
+    path = runtime_dir(directory).resolve()
+    lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    digest = hashlib.sha256(str(path).encode()).hexdigest()
     try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        lock.bind(f"\0sdrlink_bridge_{digest[:32]}")
     except OSError:
-        os.close(lock)
+        lock.close()
         raise BridgeError(
-            f"another bridge already serves this daemon ({path} is locked); stop it first"
+            f"another bridge already serves the daemon in {path}; stop it first"
         ) from None
     return lock

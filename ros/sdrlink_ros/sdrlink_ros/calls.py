@@ -22,12 +22,19 @@ GROWTH = 1.3
 """Factor between the waits for two repeats."""
 SPREAD = 0.25
 MOST_TRIES = 12
+TAKEN_WAIT_S = 10.0
+"""Time in s after which a result that is under way is asked for again."""
+UNKNOWN_AGE_S = 60.0
+"""Age in s that a request is taken to have if it is not known."""
+GET_RESULT = "/_action/get_result"
+"""End of the names of services that bring the results of actions, which may take long."""
 TIMEOUT_ROUND_TRIPS = 25
 LEAST_TIMEOUT_S = 5.0
 KEPT_S = 120.0
 """Time in s for which an answer is kept, in case its request comes again."""
 RESULT_KEPT_S = 900.0
 """Time in s for which the result of an action is kept, and asked for."""
+MOST_TURNED_AWAY = 1024
 MOST_KEPT = 256
 """Calls of one robot that are running or answered at a time."""
 
@@ -67,22 +74,25 @@ WORDS: dict[int, str] = {
 
 
 class Packet(NamedTuple):
-    """One message of a call. `age_s` is the request's age at its bridge; `is_long`: a result."""
+    """One message of a call. `age_s` is the request's age at its bridge."""
 
     kind: Kind
     boot: int
     number: int
     name: str = ""
-    is_long: bool = False
     status: int = Status.OK
     age_s: float = 0.0
     body: bytes = b""
 
+    @property
+    def is_long(self) -> bool:
+        """Whether it asks for the result of an action."""
+        return self.name.endswith(GET_RESULT)
+
     def build(self) -> bytes:
         """Its octets on the bus."""
         name = self.name.encode()
-        flags = self.status | self.is_long << 7
-        head = _HEAD.pack(self.kind, flags, self.boot, self.number, self.age_s, len(name))
+        head = _HEAD.pack(self.kind, self.status, self.boot, self.number, self.age_s, len(name))
         return ENCAPSULATION + head + name + self.body
 
     @classmethod
@@ -91,7 +101,7 @@ class Packet(NamedTuple):
         at = len(ENCAPSULATION) + _HEAD.size
         if len(octets) < at or not octets.startswith(ENCAPSULATION):
             return None
-        kind, flags, boot, number, age_s, length = _HEAD.unpack_from(octets, len(ENCAPSULATION))
+        kind, status, boot, number, age_s, length = _HEAD.unpack_from(octets, len(ENCAPSULATION))
         name = octets[at : at + length]
         if kind not in iter(Kind) or len(name) < length or not 0 <= age_s < inf:
             return None
@@ -100,7 +110,7 @@ class Packet(NamedTuple):
         except UnicodeDecodeError:
             return None
         body = octets[at + length :]
-        return cls(Kind(kind), boot, number, text, flags > 127, flags & 127, age_s, body)
+        return cls(Kind(kind), boot, number, text, status, age_s, body)
 
 
 class Sent(NamedTuple):
@@ -171,7 +181,6 @@ class Asker:
         body: bytes,
         now: float,
         *,
-        is_long: bool = False,
         timeout_s: float = 0.0,
     ) -> int:
         """Begin a call; its number."""
@@ -179,8 +188,8 @@ class Asker:
         rtt_s = self.rtt_s(robot)
         timeout_s = timeout_s or max(LEAST_TIMEOUT_S, TIMEOUT_ROUND_TRIPS * rtt_s)
         wait_s = min(max(2 * rtt_s, SHORTEST_WAIT_S), LONGEST_WAIT_S)
-        packet = Packet(Kind.REQUEST, self._boot, self._number, name, is_long, body=body)
-        deadline = now + (RESULT_KEPT_S if is_long else timeout_s)
+        packet = Packet(Kind.REQUEST, self._boot, self._number, name, body=body)
+        deadline = now + (RESULT_KEPT_S if packet.is_long else timeout_s)
         self._asked[self._number] = _Asked(robot, packet, now, deadline, _Repeats(wait_s, now))
         return self._number
 
@@ -200,6 +209,10 @@ class Asker:
             self._rtt_s[robot] = smooth_s
         if packet.kind == Kind.TAKEN:
             asked.is_taken = True
+            if asked.packet.is_long:
+                # It lasts as long as the other half knows of it.
+                asked.deadline = now + RESULT_KEPT_S
+                asked.repeats.next_at = now + TAKEN_WAIT_S
             return None
         del self._asked[packet.number]
         return Ended(packet.number, packet.status, packet.body)
@@ -209,11 +222,15 @@ class Asker:
         due, self._acks = self._acks, []
         for asked in self._asked.values():
             repeats = asked.repeats
-            may_repeat = not asked.is_taken and (repeats.tries < MOST_TRIES or asked.packet.is_long)
+            may_repeat = repeats.tries < MOST_TRIES or asked.packet.is_long
             if may_repeat and now >= repeats.next_at:
                 repeats.again(now, self._rng)
                 due.append(Sent(asked.robot, asked.packet._replace(age_s=now - asked.began_at)))
         return due
+
+    def drop(self, number: int) -> None:
+        """Forget a call that cannot be sent."""
+        self._asked.pop(number, None)
 
     def expired(self, now: float) -> list[Ended]:
         """The calls whose time is over."""
@@ -237,6 +254,7 @@ class _Running:
     since: float
     answer: Packet | None = None
     is_acknowledged: bool = False
+    """Whether the other half has the answer."""
     repeats: _Repeats | None = None
 
     def is_over(self, now: float) -> bool:
@@ -250,13 +268,18 @@ class Answerer:
         self._began_at = began_at
         self._rng = rng
         self._calls: OrderedDict[Key, _Running] = OrderedDict()
+        self._turned_away: OrderedDict[Key, None] = OrderedDict()
+        """The last calls for which there was no room."""
         self._out: list[Sent] = []
 
     def __len__(self) -> int:
         return sum(not call.is_acknowledged for call in self._calls.values())
 
-    def hear(self, robot: int, packet: Packet, took_s: float, now: float) -> Key | None:
-        """Take a packet that was `took_s` on its way; a call that is new, and to be executed."""
+    def hear(self, robot: int, packet: Packet, took_s: float | None, now: float) -> Key | None:
+        """Take a packet that was `took_s` on its way, None if unknown.
+
+        Returns a call that is new, and to be executed.
+        """
         key = Key(robot, packet.boot, packet.number)
         call = self._calls.get(key)
         if packet.kind == Kind.ACK:
@@ -267,9 +290,14 @@ class Answerer:
             return None
         if call is not None:
             # A repeat: the answer, or word that it runs, was lost.
+            if call.answer is None:
+                call.since = now
             self._out.append(Sent(robot, call.answer or _taken(key)))
             return None
-        if not self._has_room(robot):
+        if key in self._turned_away or not self._has_room(robot):
+            self._turned_away[key] = None
+            while len(self._turned_away) > MOST_TURNED_AWAY:
+                self._turned_away.popitem(last=False)
             answer = Packet(Kind.ANSWER, key.boot, key.number, status=Status.BUSY)
             self._out.append(Sent(robot, answer))
             return None
@@ -290,6 +318,12 @@ class Answerer:
         call.answer = Packet(Kind.ANSWER, key.boot, key.number, status=status, body=body)
         call.since = now
         call.repeats = _Repeats(2 * FIRST_RTT_S, now)
+
+    def too_large(self, packet: Packet, robot: int) -> None:
+        """Tell the caller that its answer does not fit the link."""
+        call = self._calls.get(Key(robot, packet.boot, packet.number))
+        if call is not None and call.answer is not None and call.answer.body:
+            call.answer = call.answer._replace(status=Status.TOO_LARGE, body=b"")
 
     def due(self, now: float) -> list[Sent]:
         """The packets to be sent at `now`."""
@@ -315,9 +349,10 @@ class Answerer:
             del self._calls[oldest]
         return oldest is not None
 
-    def _refusal(self, packet: Packet, took_s: float, now: float) -> int:
+    def _refusal(self, packet: Packet, took_s: float | None, now: float) -> int:
         # A result can be asked for as often as one likes.
-        is_older = packet.age_s + took_s > now - self._began_at
+        age_s = packet.age_s + (UNKNOWN_AGE_S if took_s is None else took_s)
+        is_older = age_s > now - self._began_at
         return Status.RESTARTED if is_older and not packet.is_long else Status.OK
 
 

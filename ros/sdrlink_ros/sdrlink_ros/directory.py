@@ -8,7 +8,7 @@ from sdrlink_ros.graph import BRIDGE, type_hash
 from sdrlink_ros.names import Names, matches
 
 ACTION = "/_action/"
-GET_RESULT, CANCEL = f"{ACTION}get_result", f"{ACTION}cancel_goal"
+CANCEL = f"{ACTION}cancel_goal"
 SEND_GOAL = f"{ACTION}send_goal"
 MOST_TOLD = 200
 _STRING_HEAD = 8
@@ -21,11 +21,6 @@ class Service(NamedTuple):
     name: str
     kind: str
     hash: str
-
-    @property
-    def is_result(self) -> bool:
-        """Whether it brings the result of an action, which may take long."""
-        return self.name.endswith(GET_RESULT)
 
     @property
     def is_cancel(self) -> bool:

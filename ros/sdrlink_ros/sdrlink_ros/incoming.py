@@ -1,68 +1,30 @@
 """From the radio to ROS: publishers, and a thread that feeds them with what the daemon hears."""
 
-import struct
 import threading
+import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from sdrlink_ros import graph, qos
 from sdrlink_ros.echoes import Echoes
-from sdrlink_ros.kinds import Kind, UnknownTypeError, kind
+from sdrlink_ros.kinds import UnknownTypeError, kind
 from sdrlink_ros.names import Names, command_for, is_command, matches
+from sdrlink_ros.outlet import LINGER_S, Outlet, Source, restamped
 from sdrlink_ros.settings import Settings
-from sdrlinkd.client import EnvelopeMismatchError, Message, NoDaemonError, Subscriber
+from sdrlinkd.client import Message, NoDaemonError, Subscriber
 
 NOTHING = "/sdrlink_bridge"
 """A bus topic that no message has, as a subscriber needs one."""
 POLL_S = 0.1
 AWAY_S = 0.5
-LINGER_S = 5.0
-"""Time in s for which the demand for a topic lasts after its last subscriber here has gone."""
 TF = ("tf", "tf_static")
 HASH_DIGITS = 16
 STOP_S = 2.0
-_LITTLE, _BIG = struct.Struct("<iI"), struct.Struct(">iI")
-SECOND_NS = 1_000_000_000
-
-
-class Source(NamedTuple):
-    """A topic that another robot declares; `kept` messages of it are kept for late joiners."""
-
-    robot: int
-    name: str
-    kind: str
-    hash: str
-    kept: int
-    is_best_effort: bool
-    bus: str
-
-    @classmethod
-    def told(cls, fields: Mapping[str, Any]) -> "Source":
-        """A topic as the daemon tells it."""
-        return cls(
-            fields["robot"], fields["name"], fields["type"], fields["hash"], fields["latched"],
-            fields["best_effort"], fields["topic"],
-        )  # fmt: skip
-
-
-class Outlet:
-    """The publishers of a topic of another robot, by name here and series of the source.
-
-    `is_command`: it commands this robot, so it is wanted whether anybody subscribes or not.
-    """
-
-    def __init__(
-        self, source: Source, kind_: Kind, names: tuple[str, ...], is_command_: bool
-    ) -> None:
-        self.source = source
-        self.kind = kind_
-        self.names = names
-        self.is_command = is_command_
-        self.is_restamped = False
-        self.publishers: dict[tuple[str, int], Any] = {}
-        self.wanted_at = -LINGER_S
+GONE_S = 60.0
+"""Time in s after which a topic goes that is neither declared nor subscribed to any more."""
+MOST_OUTLETS = 2000
 
 
 class Incoming:
@@ -88,6 +50,10 @@ class Incoming:
         self._take_inner = take_inner
         self._say = say
         self._outlets: dict[str, Outlet] = {}
+        self._lock = threading.RLock()
+        """Held while publishers are made, used or destroyed."""
+        self._fresh: set[str] = set()
+        """Topics whose publishers are new, and lack what was kept."""
         self._wanted: frozenset[str] = frozenset()
         self._inner: frozenset[str] = frozenset()
         self._refused_sources: dict[str, Source] = {}
@@ -134,7 +100,9 @@ class Incoming:
         `inner` are the bus topics of bridges among themselves, which are always wanted.
         """
         self._inner = inner
+        declared = set()
         for source in sources:
+            declared.add(source.bus)
             known = self._outlets.get(source.bus)
             names = self._names_of(source, settings)
             if known is not None and known.source == source and known.names == names:
@@ -145,7 +113,11 @@ class Incoming:
             if known is not None:
                 self._close(source.bus)
             if names:
-                self._open(source, names, settings)
+                self._open(source, names, settings, known is not None)
+        now = time.monotonic()
+        for bus, outlet in self._outlets.items():
+            is_gone = bus not in declared
+            outlet.gone_at = (outlet.gone_at or now) if is_gone else None
 
     def look(self, taken: Mapping[str, Any], now: float, is_refused: bool) -> None:
         """Find out which topics somebody here subscribes to; `taken` are our own subscriptions.
@@ -156,7 +128,10 @@ class Incoming:
             self._wanted = frozenset()
             return
         wanted = (bus for bus, each in self._outlets.items() if now - each.wanted_at < LINGER_S)
-        for outlet in self._outlets.values():
+        for bus, outlet in list(self._outlets.items()):
+            if outlet.gone_at is not None and now - max(outlet.gone_at, outlet.wanted_at) > GONE_S:
+                self._close(bus)
+                continue
             others = sum(
                 publisher.get_subscription_count() - (name in taken)
                 for (name, _), publisher in list(outlet.publishers.items())
@@ -180,14 +155,24 @@ class Incoming:
         count = self._node.count_subscribers
         return prefixed if count(prefixed) and not count(name) else name
 
-    def _open(self, source: Source, names: tuple[str, ...], settings: Settings) -> None:
+    def _open(
+        self, source: Source, names: tuple[str, ...], settings: Settings, is_again: bool
+    ) -> None:
+        if len(self._outlets) >= MOST_OUTLETS:
+            self._refuse(source, f"{names[0]}: {MOST_OUTLETS} topics of others appear here already")
+            return
         try:
             outlet = Outlet(source, kind(source.kind), names, is_command(source.name))
         except UnknownTypeError as error:
             self._refuse(source, f"{names[0]} of robot {source.robot}: {error}")
             return
-        for name in names:
-            self._publisher(outlet, name, 0)
+        try:
+            for name in names:
+                self._publisher(outlet, name, 0)
+        except Exception as error:  # a name or a type from the air must not end the others
+            self._destroy(outlet)
+            self._refuse(source, f"{names[0]} of robot {source.robot}, {source.kind}: {error}")
+            return
         own = graph.own_hash(self._node, names[0]).removeprefix("RIHS01_")[:HASH_DIGITS]
         if own and source.hash and own != source.hash:
             self._destroy(outlet)
@@ -200,9 +185,14 @@ class Incoming:
         outlet.is_restamped = self._is_restamped(source, outlet, settings)
         self._refused_sources.pop(source.bus, None)
         self.refused.pop(source.bus, None)
+        if is_again:
+            self._fresh.add(source.bus)
         self._outlets = {**self._outlets, source.bus: outlet}
 
     def _refuse(self, source: Source, text: str) -> None:
+        if len(self._refused_sources) >= MOST_OUTLETS:
+            self._refused_sources.clear()
+            self.refused.clear()
         self._refused_sources[source.bus] = source
         if self.refused.get(source.bus) != text:
             self.refused[source.bus] = text
@@ -215,8 +205,11 @@ class Incoming:
         self._destroy(outlet)
 
     def _destroy(self, outlet: Outlet) -> None:
-        for publisher in outlet.publishers.values():
-            self._node.destroy_publisher(publisher)
+        with self._lock:
+            outlet.is_closed = True
+            for publisher in outlet.publishers.values():
+                self._node.destroy_publisher(publisher)
+            outlet.publishers.clear()
 
     def _is_restamped(self, source: Source, outlet: Outlet, settings: Settings) -> bool:
         given = (f"/{source.name}", *outlet.names)
@@ -245,9 +238,14 @@ class Incoming:
             try:
                 with Subscriber(NOTHING, runtime_dir=self._directory, timeout_s=1.0) as subscriber:
                     self._hear(subscriber)
-            except (NoDaemonError, EnvelopeMismatchError):  # noqa: PERF203
+            except NoDaemonError:  # noqa: PERF203
                 # The bridge says that the daemon is away.
-                threading.Event().wait(AWAY_S)
+                time.sleep(AWAY_S)
+            except Exception as error:
+                if self._is_over or not self._node.context.ok():
+                    break
+                self._say(f"incoming topics are subscribed to again, after an error: {error}")
+                time.sleep(AWAY_S)
 
     def _hear(self, subscriber: Subscriber) -> None:
         subscribed: set[str] = set()
@@ -259,6 +257,11 @@ class Incoming:
                 for bus in subscribed - wanted:
                     subscriber.unsubscribe(bus)
                 subscribed = set(wanted)
+            if self._fresh:
+                fresh, self._fresh = self._fresh, set()
+                for bus in fresh & subscribed:
+                    subscriber.unsubscribe(bus)
+                    subscriber.subscribe(bus)
             message = subscriber.receive(POLL_S)
             if message is None:
                 continue
@@ -280,17 +283,16 @@ class Incoming:
         elif len(cdr) < outlet.kind.least or cdr[:2] not in (b"\0\0", b"\0\1"):
             self.dropped["rx_bad_cdr"] += 1
         else:
+            if outlet.is_known(message):
+                return
             if outlet.is_restamped and message.published_ns is not None:
                 cdr = restamped(cdr, message.published_ns)
-            for name in outlet.names:
-                publisher = self._publisher(outlet, name, message.series)
-                # Nodes here may publish on this name, too, and then the bridge subscribes to it.
-                self._echoes.sent(name, cdr)
-                publisher.publish(cdr)
+            with self._lock:
+                if outlet.is_closed:
+                    return
+                for name in outlet.names:
+                    publisher = self._publisher(outlet, name, message.series)
+                    # Nodes here may publish on it, too, and then the bridge subscribes to it.
+                    self._echoes.sent(name, cdr, outlet.source.kept > 0)
+                    publisher.publish(cdr)
             self.published[message.topic] += 1
-
-
-def restamped(cdr: bytes, time_ns: int) -> bytes:
-    """A message with `time_ns`, in ns since 1970, as the stamp of its std_msgs/Header."""
-    form = _LITTLE if cdr[1] & 1 else _BIG
-    return cdr[:4] + form.pack(*divmod(time_ns, SECOND_NS)) + cdr[4 + form.size :]

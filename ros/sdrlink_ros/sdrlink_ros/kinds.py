@@ -60,6 +60,8 @@ Fields = dict[str, str]
 def kind(name: str) -> Kind:
     """The type called `pkg/msg/Name`. Raises UnknownTypeError."""
     message = _load(name)
+    if not hasattr(message, "get_fields_and_field_types"):
+        raise _unknown(name)
     fields = message.get_fields_and_field_types()
     has_header = next(iter(fields.values()), "") == "std_msgs/Header"
     return Kind(name, message, ENCAPSULATION + least_size(fields, _fields_of), has_header)
@@ -69,6 +71,8 @@ def kind(name: str) -> Kind:
 def service_kind(name: str) -> ServiceKind:
     """The service type called `pkg/srv/Name`, or a part of an action. Raises UnknownTypeError."""
     service = _load(name)
+    if not hasattr(service, "Request"):
+        raise _unknown(name)
     least = (
         ENCAPSULATION + least_size(part.get_fields_and_field_types(), _fields_of)
         for part in (service.Request, service.Response)

@@ -17,7 +17,7 @@ from sdrlink_ros.kinds import Kind, UnknownTypeError, kind
 from sdrlink_ros.routes import TF_STATIC, Route
 from sdrlinkd.client import MessageRefusedError, Publisher, RefusedError
 
-LINGER_S = 5.0
+LINGER_S = 2.0
 """Time in s for which a topic is still taken after the last demand for it."""
 FIRST_REGISTERED = 16
 """Topics of the registry have smaller numbers; nobody says whether they are wanted."""
@@ -80,8 +80,8 @@ class Outgoing:
         for name, route in routes.items():
             offer = route.offer
             told = (route.bus, offer.kind, offer.hash, *offer[3:5], route.depth)
-            if self._told.get(name) != told or self._is_due(name):
-                self._declare(name, route, daemon)
+            is_new = self._told.get(name) != told or self._is_due(name)
+            if is_new and self._declare(name, route, daemon):
                 self._told[name] = told
 
     def want(self, routes: Mapping[str, Route], wanted: frozenset[str], now: float) -> None:
@@ -102,7 +102,8 @@ class Outgoing:
     def _is_due(self, name: str) -> bool:
         return name in self.refused and time.monotonic() >= self._again_at.get(name, 0.0)
 
-    def _declare(self, name: str, route: Route, daemon: Daemon) -> None:
+    def _declare(self, name: str, route: Route, daemon: Daemon) -> bool:
+        """Declare a topic; False if the daemon did not answer."""
         offer = route.offer
         arguments = {
             "name": route.bus,
@@ -118,10 +119,11 @@ class Outgoing:
         except (UnknownTypeError, RefusedError) as error:
             self._again_at[name] = time.monotonic() + AGAIN_S
             self._refuse(name, f"{name}: {error}" if name not in str(error) else str(error))
-            return
+            return True
         if number is not None:
             self._numbers[route.bus] = number
             self._clear(name)
+        return number is not None
 
     def _refuse(self, name: str, text: str) -> None:
         if self.refused.get(name) != text:
@@ -232,11 +234,14 @@ class Taker:
             )
         except MessageRefusedError as error:
             self.refused[spec.name] += 1
-            if self._told.get(spec.name) != str(error):
-                self._told[spec.name] = str(error)
-                self._say(f"{spec.name}: {error}")
+            self._say_once(spec.name, f"{spec.name}: {error}")
             return
         (self.sent if is_sent else self.lost)[spec.name] += 1
+
+    def _say_once(self, name: str, text: str) -> None:
+        if self._told.get(name) != text:
+            self._told[name] = text
+            self._say(text)
 
     def _settle(self, specs: Mapping[str, Spec]) -> None:
         """Make and destroy subscriptions, so that they are those of `specs`."""
@@ -245,15 +250,17 @@ class Taker:
                 del self.taps[name]
                 self._node.destroy_subscription(tap.subscription)
         for name, spec in specs.items():
-            if name not in self.taps:
+            if name in self.taps:
+                continue
+            profile = qos.subscription(spec.is_reliable, spec.is_latched)
+            try:
                 made = self._node.create_subscription(
-                    spec.kind.message,
-                    name,
-                    _never,
-                    qos.subscription(spec.is_reliable, spec.is_latched),
-                    raw=True,
+                    spec.kind.message, name, _never, profile, raw=True
                 )
-                self.taps[name] = Tap(spec, made, made.handle)
+            except Exception as error:
+                self._say_once(name, f"{name}: {error}")
+                continue
+            self.taps[name] = Tap(spec, made, made.handle)
         self._echoes.watched = frozenset(self.taps)
 
 

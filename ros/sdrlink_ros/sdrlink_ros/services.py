@@ -18,10 +18,10 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 from sdrlink_ros.actions import ActionTopics
 from sdrlink_ros.calls import WORDS, Answerer, Asker, Ended, Key, Kind, Packet, Sent, Status
-from sdrlink_ros.directory import Service, request_hash, told, understood
-from sdrlink_ros.incoming import Source
-from sdrlink_ros.kinds import ServiceKind, UnknownTypeError, service_kind
+from sdrlink_ros.directory import MOST_TOLD, Service, request_hash, told, understood
+from sdrlink_ros.kinds import ServiceKind, service_kind
 from sdrlink_ros.names import Names, command_name
+from sdrlink_ros.outlet import Source
 from sdrlinkd.client import Message, MessageRefusedError, Publisher
 
 DIRECTORY, CALLS = "_sdrlink/services", "_sdrlink/calls"
@@ -33,6 +33,9 @@ BUSY_S, IDLE_S = 0.02, 0.5
 LOST_S = 3.0
 """Time of silence in s after which the proxies of a robot's services go."""
 STOP_S = 2.0
+MOST_PROXIES = 500
+MOST_SHOWN = 128
+MOST_SAID = 1000
 
 
 class Proxy(NamedTuple):
@@ -229,9 +232,15 @@ class Services:
 
     def _tell(self, out: Publisher) -> bool:
         """Tell the other robots what is offered; False if the daemon does not take it yet."""
+        offered = list(self._offered.values())
+        if len(offered) > MOST_TOLD:
+            self._say_once(f"services.allow names {len(offered)} services; {MOST_TOLD} are offered")
+        text = told(offered[:MOST_TOLD])
         try:
-            return bool(out.send(f"/{DIRECTORY}", told(self._offered.values()), wait=False))
-        except MessageRefusedError:
+            return bool(out.send(f"/{DIRECTORY}", text, wait=False))
+        except MessageRefusedError as error:
+            if error.reason != "tx_unknown_topic":
+                self._say_once(f"the services cannot be offered yet: {error}")
             return False
 
     def _settle(self) -> None:
@@ -257,12 +266,15 @@ class Services:
         self._actions.show({name: proxy.service for name, proxy in self._proxies.items()})
 
     def _open(self, name: str, robot: int, service: Service) -> None:
+        if len(self._proxies) >= MOST_PROXIES:
+            self._say_once(f"{name} of robot {robot}: {MOST_PROXIES} services appear here already")
+            return
         try:
             kind = service_kind(service.kind)
-        except UnknownTypeError as error:
-            self._say_once(f"{name} of robot {robot}: {error}")
+            server = self._node.create_service(kind.service, name, _never)
+        except Exception as error:  # a name or a type from the air must not hide the others
+            self._say_once(f"{name[:MOST_SHOWN]} of robot {robot}: {error}")
             return
-        server = self._node.create_service(kind.service, name, _never)
         own = request_hash(self._node, name)
         if own and service.hash and own != service.hash:
             self._node.destroy_service(server)
@@ -285,7 +297,7 @@ class Services:
         if packet is None:
             self.counts["rx_bad_cdr"] += 1
         elif packet.kind in (Kind.REQUEST, Kind.ACK):
-            took_s = 1e-6 * (message.age_us or 0)
+            took_s = None if message.age_us is None else 1e-6 * message.age_us
             key = self._answerer.hear(robot, packet, took_s, now)
             if key is not None:
                 self._execute(key, packet, now, now + LOST_S)
@@ -301,7 +313,7 @@ class Services:
         service = proxy.service
         number = self._asker.ask(
             proxy.robot, service.name, serialize_message(request), time.monotonic(),
-            is_long=service.is_result, timeout_s=self._timeout_s,
+            timeout_s=self._timeout_s,
         )  # fmt: skip
         self._asked[number] = Asked(proxy, header)
         self.counts["asked"] += 1
@@ -326,12 +338,22 @@ class Services:
 
     def _execute(self, key: Key, packet: Packet, now: float, until: float) -> None:
         """Hand a call to its server, which has until then to be found."""
-        name = self._here(packet.name)
+        offered = self._offered
+        name = next((own for own, each in offered.items() if each.name == packet.name), None)
         if name is None:
             self._answerer.answer(key, Status.NO_SERVER, b"", now)
             return
+        try:
+            self._hand_over(key, packet, name, offered[name].kind, now, until)
+        except Exception as error:  # octets from the air that are no request end no other call
+            self._say(f"{name} called by robot {key.robot}: {error}")
+            self._answerer.answer(key, Status.OTHER_TYPE, b"", now)
+
+    def _hand_over(
+        self, key: Key, packet: Packet, name: str, type_: str, now: float, until: float
+    ) -> None:
         if name not in self._clients:
-            kind = service_kind(self._offered[name].kind)
+            kind = service_kind(type_)
             self._clients[name] = self._node.create_client(kind.service, name), kind
         client, kind = self._clients[name]
         if len(packet.body) < kind.least_request:
@@ -363,10 +385,6 @@ class Services:
                 key = self._running.pop(running)
                 self._answerer.answer(key, Status.SERVER_ENDED, b"", now)
 
-    def _here(self, name: str) -> str | None:
-        """The name on this graph of a service that others know as `name`."""
-        return next((own for own, each in self._offered.items() if each.name == name), None)
-
     def _send(self, sent: Sent, out: Publisher) -> None:
         robot, packet = sent
         if robot not in self._reached:
@@ -379,12 +397,20 @@ class Services:
                 qos="urgent" if is_cancel else "latency", wait=False,
             )  # fmt: skip
         except MessageRefusedError as error:
+            if error.reason == "tx_unknown_topic":
+                # The daemon has restarted, and does not know the topic yet.
+                return
             self._say_once(f"call of {packet.name or 'a service'}, robot {robot}: {error}")
             if packet.kind == Kind.REQUEST:
+                self._asker.drop(packet.number)
                 self._end(Ended(packet.number, Status.TOO_LARGE))
+            else:
+                self._answerer.too_large(packet, robot)
 
     def _say_once(self, text: str) -> None:
         if text not in self._said:
+            if len(self._said) >= MOST_SAID:
+                self._said.clear()
             self._said.add(text)
             self._say(text)
 

@@ -29,15 +29,16 @@ class Wants:
         self._is_new = self._is_new or not new <= self._wanted
         self._wanted = new
 
-    def due(self, now: float) -> list[Wanted]:
-        """The records to be told at `now`."""
+    def due(self, now: float, present: Collection[int]) -> list[Wanted]:
+        """The records to be told at `now`, to the robots that are `present`."""
         wait_s = SHORTEST_S if self._is_new else RENEW_S
         if not self._wanted or now < self._told_at + wait_s:
             return []
         self._told_at, self._is_new = now, False
         by_source: dict[int, list[int]] = {}
         for src, number in sorted(self._wanted):
-            by_source.setdefault(src, []).append(number)
+            if src in present:
+                by_source.setdefault(src, []).append(number)
         return [
             Wanted(src, bytes(numbers[i : i + self._most]))
             for src, numbers in by_source.items()

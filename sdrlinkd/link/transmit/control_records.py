@@ -147,7 +147,7 @@ class ControlRecords:
 
         Declarations use spare room or, within their share of the air, PDUs of `pdu_s` of their own.
         """
-        for wanted in self._wants.due(now):
+        for wanted in self._wants.due(now, self._neighbors.present(now)):
             self._piggyback.put_wanted(wanted, self._alone_from(now + PATIENCE_S))
         self._offer_topics(now)
         if self._piggyback.holds(RecordType.TOPIC) and self._teller.may_pay(now, pdu_s):

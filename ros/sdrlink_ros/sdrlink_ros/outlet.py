@@ -1,0 +1,71 @@
+"""A topic of another robot, and its publishers here."""
+
+import struct
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from sdrlink_ros.kinds import Kind
+from sdrlinkd.client import Message
+
+LINGER_S = 5.0
+"""Time in s for which the demand for a topic lasts after its last subscriber here has gone."""
+_LITTLE, _BIG = struct.Struct("<iI"), struct.Struct(">iI")
+SECOND_NS = 1_000_000_000
+
+
+class Source(NamedTuple):
+    """A topic that another robot declares; `kept` messages of it are kept for late joiners."""
+
+    robot: int
+    name: str
+    kind: str
+    hash: str
+    kept: int
+    is_best_effort: bool
+    bus: str
+
+    @classmethod
+    def told(cls, fields: Mapping[str, Any]) -> "Source":
+        """A topic as the daemon tells it."""
+        return cls(
+            fields["robot"], fields["name"], fields["type"], fields["hash"], fields["latched"],
+            fields["best_effort"], fields["topic"],
+        )  # fmt: skip
+
+
+class Outlet:
+    """The publishers of a topic of another robot, by name here and series of the source.
+
+    `is_command`: it commands this robot, so it is wanted whether anybody subscribes or not.
+    """
+
+    def __init__(
+        self, source: Source, kind_: Kind, names: tuple[str, ...], is_command_: bool
+    ) -> None:
+        self.source = source
+        self.kind = kind_
+        self.names = names
+        self.is_command = is_command_
+        self.is_restamped = False
+        self.publishers: dict[tuple[str, int], Any] = {}
+        self.wanted_at = -LINGER_S
+        self.gone_at: float | None = None
+        """Since when it is not declared any more."""
+        self.is_closed = False
+        self.newest = (0, 0)
+        """Number and time of reception of the newest message."""
+
+    def is_known(self, message: Message) -> bool:
+        """Whether a message kept for late consumers was published before; notes newer ones."""
+        came = message.number, message.received_ns
+        if message.is_late and came[0] <= self.newest[0] and came[1] <= self.newest[1]:
+            return True
+        if message.number:
+            self.newest = came
+        return False
+
+
+def restamped(cdr: bytes, time_ns: int) -> bytes:
+    """A message with `time_ns`, in ns since 1970, as the stamp of its std_msgs/Header."""
+    form = _LITTLE if cdr[1] & 1 else _BIG
+    return cdr[:4] + form.pack(*divmod(time_ns, SECOND_NS)) + cdr[4 + form.size :]
