@@ -1,11 +1,13 @@
 """What the bridge does with bad input, faults, and changes while it runs."""
 
 import json
+import struct
 import subprocess
 import sys
 import time
 
 import pytest
+from sdrlink_ros.packet import Kind, Packet, Status
 
 from sdrlinkd.adapters import empty, to_cdr
 from sdrlinkd.client import Publisher, Subscriber
@@ -145,6 +147,67 @@ def test_transforms_of_others_are_merged_and_never_go_back(start_daemon, start, 
     assert (name, robot_name) == ("sdrlinkd: link of robot 1", "robot_1")
     assert (level, words) == ([0], "OK")
     assert "robot 2 SNR (dB)" in [key for key, _ in values]
+
+
+def test_merging_at_run_time_brings_what_was_latched_before(start_daemon, start, hub):
+    one = Robot(start, start_daemon(config(hub, 1))).bridged()
+    two = Robot(start, start_daemon(config(hub, 2))).bridged()
+    one.node.pub(topic="/tf_static", type=CARRIER, latched=True)
+    one.node.raw(topic="/tf_static", octets=transforms("r1/laser"))
+    two.node.sub(topic="/robot_1/tf_static", type=CARRIER, latched=True)
+    wait_for(lambda: two.node.count(topic="/robot_1/tf_static") == 1, WAIT_S)
+    two.node.sub(topic="/tf_static", type=CARRIER, latched=True)
+    # The robot has static transforms of its own.
+    two.node.pub(topic="/tf_static", type=CARRIER, latched=True)
+    two.node.raw(topic="/tf_static", octets=transforms("r2/laser"))
+    assert two.node.set(node="sdrlink_bridge", name="tf.merge", value=True)[0]
+    wait_for(lambda: two.node.count(topic="/tf_static") == 2, WAIT_S)
+    # A demand that comes later finds the robot's own transforms only.
+    with Subscriber("/rx_robot_2/tf_static", directory=one.daemon.directory) as heard:
+        assert heard.receive(WAIT_S).payload.startswith(bytes.fromhex(transforms("r2/laser")))
+        assert heard.receive(2.0) is None
+
+
+def test_names_that_clash_and_bad_directories_end_nothing_else(start_daemon, start, hub):
+    one = start_daemon(config(hub, 1))
+    allow = ("-p", 'services.allow:=["/set"]')
+    two = Robot(start, start_daemon(config(hub, 2)), *allow).bridged().watched()
+    two.node.serve(name="/set")
+    two.node.pub(topic="/odom", type=ODOM[1])
+    latched = {"durability": "transient_local", "depth": 1}
+    # The bridge publishes this name itself, as another type.
+    ask(one, "declare", name="/robot_2/diagnostics", type=TEXT)
+    ask(one, "declare", name="/_sdrlink/services", type=TEXT, **latched)
+    ask(one, "declare", name="/robot_2/_sdrlink/calls", type="sdrlink_ros/msg/Call")
+    offered = [
+        ["/x", TEXT, ""], ["/a b", "std_srvs/srv/SetBool", ""], ["/y", "this/srv/Set", ""],
+        ["/set", "std_srvs/srv/SetBool", ""], ["/z", "no_such_msgs/srv/Set", ""],
+    ]  # fmt: skip
+    with (
+        Publisher(one.directory) as out,
+        Subscriber("/rx_robot_2/robot_1/_sdrlink/calls", directory=one.directory) as heard,
+    ):
+        text = json.dumps(offered).encode() + b"\0"
+        out.send("/_sdrlink/services", b"\0\1\0\0" + struct.pack("<I", len(text)) + text)
+        wait_for(lambda: two.node.is_served(name="/robot_1/set"), WAIT_S)
+        two.bridge.says("robot 1, std_msgs/msg/String: ")
+        two.bridge.says("no_such_msgs/srv/Set: this type is not installed here")
+        for octets in (b"\0\1\0\0", b"\0\1\0\0" + bytes(60), b"\0\1\0\0\1"):
+            out.send("/robot_2/_sdrlink/calls", octets)
+        answers = {}
+        requests = {1: ("/set", b""), 2: ("/none", b"x"), 3: ("/set", b"\0\1\0\0\1")}
+        deadline = time.monotonic() + WAIT_S
+        while len(answers) < 3 and time.monotonic() < deadline:
+            for number, (name, body) in requests.items():
+                packet = Packet(Kind.REQUEST, 9, number, name, body=body)
+                out.send("/robot_2/_sdrlink/calls", packet.build())
+            while (message := heard.receive(1.0)) is not None:
+                packet = Packet.parse(message.payload)
+                answers[packet.number] = packet.status
+        assert answers == {1: Status.OTHER_TYPE, 2: Status.NO_SERVER, 3: Status.OK}
+        assert two.node.n_served() == 1
+    with Subscriber("/rx_robot_2/odom", directory=one.directory):
+        matched(two, "/odom")
 
 
 def test_bridges_that_see_each_other_refuse_and_name_both(start_daemon, start, hub):

@@ -5,18 +5,8 @@ from random import Random
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from sdrlink_ros.calls import (
-    KEPT_S,
-    MOST_KEPT,
-    MOST_TRIES,
-    RESULT_KEPT_S,
-    Answerer,
-    Asker,
-    Key,
-    Kind,
-    Packet,
-    Status,
-)
+from sdrlink_ros.calls import KEPT_S, MOST_TRIES, RESULT_KEPT_S, Answerer, Asker, Key
+from sdrlink_ros.packet import MOST_KEPT, Kind, Packet, Status
 
 from tests.laws import law
 

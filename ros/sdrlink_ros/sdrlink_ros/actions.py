@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from sdrlink_ros.calls import ENCAPSULATION
 from sdrlink_ros.directory import ACTION, SEND_GOAL, Service
 from sdrlink_ros.kinds import Kind, UnknownTypeError, kind
 from sdrlink_ros.names import Names
+from sdrlink_ros.packet import ENCAPSULATION
 from sdrlinkd.client import Message, MessageRefusedError, Publisher
 
 FEEDBACK, STATUS = "_sdrlink/feedback", "_sdrlink/status"

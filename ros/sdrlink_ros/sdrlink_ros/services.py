@@ -17,11 +17,12 @@ from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.serialization import deserialize_message, serialize_message
 
 from sdrlink_ros.actions import ActionTopics
-from sdrlink_ros.calls import WORDS, Answerer, Asker, Ended, Key, Kind, Packet, Sent, Status
+from sdrlink_ros.calls import Answerer, Asker, Ended, Key, Sent
 from sdrlink_ros.directory import MOST_TOLD, Service, request_hash, told, understood
 from sdrlink_ros.kinds import ServiceKind, service_kind
 from sdrlink_ros.names import Names, command_name
 from sdrlink_ros.outlet import Source
+from sdrlink_ros.packet import WORDS, Kind, Packet, Status
 from sdrlinkd.client import Message, MessageRefusedError, Publisher
 
 DIRECTORY, CALLS = "_sdrlink/services", "_sdrlink/calls"
