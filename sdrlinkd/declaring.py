@@ -1,11 +1,13 @@
 """Takes topics that producers declare while the daemon runs."""
 
 import logging
+import time
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from sdrlinkd.bus import Bus
+from sdrlinkd.bus import Bus, shown
 from sdrlinkd.config import TF_TYPE, Setup
 from sdrlinkd.errors import DeclarationError
 from sdrlinkd.link import Link
@@ -16,6 +18,9 @@ from sdrlinkd.wire import topic_type
 if TYPE_CHECKING:
     # Its package imports the bag readers, which the daemon on a robot does not need.
     from sdrlinkd.adapters import Transforms
+
+SAID_S = 5.0
+"""Time in s for which what a program says of itself is shown."""
 
 log = logging.getLogger("sdrlinkd")
 
@@ -39,6 +44,7 @@ class Declaring:
         self._policies = policies
         self._bus = bus
         self._transforms = transforms
+        self._said, self._said_at = "", -inf
 
     def declare(self, arguments: dict[str, Any]) -> dict[str, Any]:
         """Take a topic, and return what became of it. Raises DeclarationError."""
@@ -93,8 +99,13 @@ class Declaring:
                 f"{given}: on the air it has the name of {other}, {name}; use one of the two"
             )
 
-    def demand(self, now: float) -> dict[str, Any]:
-        """Which topics other robots want, by bus topic, and the version of their declarations."""
+    def demand(self, now: float, arguments: dict[str, Any]) -> dict[str, Any]:
+        """Which topics other robots want, by bus topic, and the version of their declarations.
+
+        The argument `says` is what the program that asks has to say of itself, for people.
+        """
+        if (says := arguments.get("says")) is not None:
+            self._said, self._said_at = shown(str(says)), time.monotonic()
         names = self._bus.names_in()
         wanted = {
             names[topic.id]: robots
@@ -102,6 +113,10 @@ class Declaring:
             if (topic := self._link.topic_named(name)) is not None and topic.id in names
         }
         return {"boot": self._bus.boot, "version": self._link.heard_version, "wanted": wanted}
+
+    def said(self) -> list[str]:
+        """What the program that asks for the demand said of itself lately."""
+        return [self._said] if time.monotonic() - self._said_at < SAID_S else []
 
     def declared(self) -> list[dict[str, Any]]:
         """The topics that other robots declared, with the bus topics of their messages."""

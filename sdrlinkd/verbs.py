@@ -3,6 +3,8 @@
 import logging
 from typing import Any
 
+import msgspec
+
 from sdrlinkd import __version__
 from sdrlinkd.config import Setup
 from sdrlinkd.control import Control, Verb
@@ -37,6 +39,10 @@ def make_verbs(
             "verbs": {name: verb.help for name, verb in verbs.items()},
         }
 
+    def status(_: dict[str, Any]) -> object:
+        snapshot = node.snapshot(control.requests)
+        return msgspec.structs.replace(snapshot, notices=[*snapshot.notices, *declaring.said()])
+
     def reload_policies(_: dict[str, Any]) -> object:
         told = reloading.reload()
         log.info("re-read on request: %s", told)
@@ -62,7 +68,7 @@ def make_verbs(
 
     verbs = {
         "hello": Verb(hello, "who answers, and its verbs"),
-        "status": Verb(lambda _: node.snapshot(control.requests), "the whole snapshot"),
+        "status": Verb(status, "the whole snapshot"),
         "topics": Verb(lambda _: node.snapshot(control.requests).link.topics, "topics sent"),
         "peers": Verb(lambda _: node.snapshot(control.requests).link.neighbors, "robots heard"),
         "config": Verb(lambda _: opening.config, "the configuration in force"),
@@ -73,7 +79,7 @@ def make_verbs(
         "declare": Verb(declaring.declare, "take a topic from now on, with its type and QoS"),
         "declared": Verb(lambda _: declaring.declared(), "topics that other robots declared"),
         "demand": Verb(
-            lambda _: declaring.demand(opening.pdu_link.now()),
+            lambda arguments: declaring.demand(opening.pdu_link.now(), arguments),
             "own topics that consumers at other robots subscribe to",
         ),
         "why": Verb(why, "explain in plain words what happens to a topic"),

@@ -1,6 +1,7 @@
 """The local ZeroMQ bus of one daemon, specified by README.md in this folder (the bus document)."""
 
 from sdrlinkd.bus.bus import PDU_TAP, SENT_TAP, Bus
+from sdrlinkd.bus.envelope import shown
 from sdrlinkd.bus.intake import Ingress
 from sdrlinkd.bus.sockets import MAX_DIRECTORY_BYTES, RuntimeDirectory, is_foreign
 
@@ -12,4 +13,5 @@ __all__ = [
     "Ingress",
     "RuntimeDirectory",
     "is_foreign",
+    "shown",
 ]

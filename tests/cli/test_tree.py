@@ -55,7 +55,7 @@ def test_an_unknown_command_is_named_with_what_is_like_it():
 @pytest.mark.parametrize(("words", "count", "there"), [
     ("sdrlinkctl ", 1, [*COMMANDS]),
     ("sdrlinkctl re", 1, ["reload", "record", "replay"]),
-    ("sdrlinkctl bag ", 2, ["info", "play"]),
+    ("sdrlinkctl bag ", 2, ["info", "play", "record"]),
 ])  # fmt: skip
 def test_tab_completes_commands(words, count, there):
     done = subprocess.run(

@@ -60,7 +60,7 @@ def test_the_readme_fits_and_says_what_does_not_work():
         "not authenticated",
         "No physical radio",
         "no retransmission",
-        "ROS 2 topics only",
+        "one ROS 2 tested",
     ):
         assert word.lower() in text.lower(), word
 

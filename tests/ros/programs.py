@@ -3,6 +3,7 @@
 import json
 import os
 import select
+import socket
 import subprocess
 from pathlib import Path
 from random import Random
@@ -13,13 +14,23 @@ from tests.ros.wheels import in_domain, python
 from tests.waiting import wait_for
 
 ANSWER_S = 60.0
-# Each run of the tests has domains of its own, as other programs on this host may use ROS, too.
 _domains = iter(Random(os.getpid()).sample(range(1, 101), 100))
+_taken: list[socket.socket] = []
 
 
 def new_domain() -> int:
-    """A ROS domain that this run of the tests has not used."""
-    return next(_domains)
+    """A ROS domain that no test on this host uses, in this process or another."""
+    for domain in _domains:
+        lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        try:
+            # An abstract socket is free again when this process ends.
+            lock.bind(f"\0sdrlinkd-test-domain-{domain}")
+        except OSError:
+            lock.close()
+            continue
+        _taken.append(lock)
+        return domain
+    raise AssertionError("all ROS domains are in use")
 
 
 class Agent:

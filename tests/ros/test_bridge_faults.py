@@ -27,7 +27,7 @@ from tests.ros.team import (
 from tests.ros.wheels import BRIDGE, in_domain, python
 from tests.waiting import wait_for
 
-pytestmark = [pytest.mark.realtime, pytest.mark.timeout(400)]
+pytestmark = [pytest.mark.realtime, pytest.mark.timeout(400, func_only=True)]
 
 OTHER_HASH = "RIHS01_" + "ab" * 32
 IMAGE = "sensor_msgs/msg/Image"
@@ -64,6 +64,8 @@ def test_what_comes_from_the_air_is_published_only_under_a_type_that_it_is(
             return abs(seconds * 10**9 + ns - sent_ns) < 60 * 10**9
 
         wait_for(is_restamped, WAIT_S)
+
+    wait_for(lambda: two.node.count(topic="/link/topics") > 0, WAIT_S)
 
     def n_bad():
         told = json.loads(two.node.last(topic="/link/topics")[0])
@@ -120,6 +122,10 @@ def test_a_daemon_that_ends_and_starts_again_is_waited_for(start_daemon, start, 
             assert time.monotonic() < deadline
             one.node.send(topic="/odom", first=2)
     assert one.bridge.log().count("waiting for the daemon") == 1
+    # `sdrlinkctl status` shows it.
+    (notice,) = [each for each in ask(one.daemon, "status")["notices"] if "ROS bridge" in each]
+    assert notice.startswith("ROS bridge: topics out 1 (wanted 1), in 0 (wanted 0)")
+    assert "messages lost while the daemon was away" in notice
 
 
 def test_transforms_of_others_are_merged_and_never_go_back(start_daemon, start, hub):
@@ -192,6 +198,9 @@ def test_names_that_clash_and_bad_directories_end_nothing_else(start_daemon, sta
         wait_for(lambda: two.node.is_served(name="/robot_1/set"), WAIT_S)
         two.bridge.says("robot 1, std_msgs/msg/String: ")
         two.bridge.says("no_such_msgs/srv/Set: this type is not installed here")
+        with Subscriber("/rx_robot_2/_sdrlink/services", directory=one.directory) as offers:
+            while b"/set" not in offers.receive(WAIT_S).payload:
+                pass
         for octets in (b"\0\1\0\0", b"\0\1\0\0" + bytes(60), b"\0\1\0\0\1"):
             out.send("/robot_2/_sdrlink/calls", octets)
         answers = {}

@@ -11,7 +11,7 @@ from tests.ros.programs import Agent
 from tests.ros.team import WAIT_S, Robot, config
 from tests.waiting import wait_for
 
-pytestmark = [pytest.mark.realtime, pytest.mark.timeout(500)]
+pytestmark = [pytest.mark.realtime, pytest.mark.timeout(500, func_only=True)]
 
 ALLOW = ("-p", 'services.allow:=["/set", "/fibonacci"]')
 SUCCEEDED, CANCELED = 4, 5
@@ -90,18 +90,18 @@ def test_calls_in_an_outage_are_executed_once_or_not_at_all(robots, air):
     assert len(set(told)) == len(told), "no call has another's answer"
     assert len(told) <= one.node.n_served() - 1 <= 20, "none was executed twice"
     assert len(told) >= 4
-    # What has no answer is in the log, with the reason.
-    n_silent = answers.count(None)
-    assert two.bridge.log().count("/set of robot 1: no answer came in time") == n_silent
+    if None in answers:
+        # What has no answer is in the log, with the reason.
+        two.bridge.says("/set of robot 1: no answer came in time")
 
 
 def test_an_action_survives_an_outage_in_its_middle_and_can_be_cancelled(robots, air):
     one, two = robots
-    one.node.act(name="/fibonacci", step_s=0.5)
+    one.node.act(name="/fibonacci", step_s=1.0)
     wait_for(lambda: two.node.is_served(name="/robot_1/fibonacci/_action/get_result"), WAIT_S)
+    # Its goal takes 30 s.
     assert two.node.send_goal(name="/robot_1/fibonacci", order=32)
-    wait_for(lambda: two.node.n_feedback() > 2, WAIT_S)
-    two.node.wait(seconds=3.0)
+    wait_for(lambda: two.node.n_feedback() > 8, WAIT_S)
     air.is_cut = True
     two.node.wait(seconds=8.0)
     air.is_cut = False

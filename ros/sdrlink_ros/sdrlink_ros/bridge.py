@@ -107,7 +107,7 @@ class Bridge:
             self._lock.close()
 
     def _look(self) -> None:
-        demand = self._daemon.look()
+        demand = self._daemon.look(self._in_words())
         if self._parts is None:
             if not self._daemon.node:
                 return
@@ -241,6 +241,26 @@ class Bridge:
             for reason, n in dict(parts.incoming.dropped).items()
         ]
         return told
+
+    def _in_words(self) -> str:
+        """The bridge in one sentence, for `sdrlinkctl status`."""
+        parts = self._parts
+        if parts is None:
+            return "ROS bridge: starting"
+        if self._is_refused:
+            return "ROS bridge: refused, as another robot's bridge is on its DDS graph; see its log"
+        taker, incoming = parts.outgoing.taker, parts.incoming
+        outlets = incoming.outlets
+        words = (
+            f"ROS bridge: topics out {len(self._routes.taken)} (wanted {len(taker.taps)}), "
+            f"in {len(outlets)} (wanted {len(incoming.wanted & set(outlets))})"
+        )
+        refused = len(self._routes.refused) + len(parts.outgoing.refused) + len(incoming.refused)
+        if refused:
+            words += f"; {refused} refused, see /link/topics"
+        if lost := taker.lost.total():
+            words += f"; {lost} messages lost while the daemon was away"
+        return words
 
     def _say_unused(self, settings: Any) -> None:  # noqa: ANN401
         known = [*self._routes.taken, *self._routes.left_out]

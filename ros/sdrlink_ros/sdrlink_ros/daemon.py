@@ -41,9 +41,12 @@ class Daemon:
         """Whether the daemon answered the last question."""
         return self._control is not None
 
-    def look(self) -> Demand | None:
-        """The demand now; None without a daemon, which is said once."""
-        told = self.ask("demand")
+    def look(self, says: str) -> Demand | None:
+        """The demand now; None without a daemon, which is said once.
+
+        `says` is what `sdrlinkctl status` shows of the bridge.
+        """
+        told = self.ask("demand", {"says": says})
         if told is None:
             return None
         return Demand(told["boot"], told["version"], frozenset(told["wanted"]))

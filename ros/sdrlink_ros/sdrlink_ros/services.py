@@ -85,7 +85,9 @@ class Services:
         self._waiting: list[tuple[float, Key, Packet]] = []
         """Calls whose servers are not found yet, and until when they wait."""
         self._said: set[str] = set()
-        self._is_told = self._has_offered = False
+        self._has_offered = False
+        # Another thread counts the first one up, and this one catches up with it.
+        self._to_tell = self._has_told = 0
         self._inbox: SimpleQueue[Message] = SimpleQueue()
         self.counts: Counter[str] = Counter()
         """Calls by how they ended."""
@@ -111,9 +113,8 @@ class Services:
         self._timeout_s = timeout_s
         if offered != self._offered:
             self._offered, self._is_changed = dict(offered), True
-            self._is_told = False
             self._has_offered = self._has_offered or bool(offered)
-            self._news.trigger()
+            self.tell_again()
 
     @property
     def has_proxies(self) -> bool:
@@ -146,8 +147,8 @@ class Services:
         return topics
 
     def tell_again(self) -> None:
-        """Tell what is offered once more, as the daemon has restarted."""
-        self._is_told = False
+        """Tell what is offered once more, as it has changed or the daemon has restarted."""
+        self._to_tell += 1
         self._news.trigger()
 
     def hears(self, source: Source) -> bool:
@@ -178,8 +179,9 @@ class Services:
         if self._is_changed:
             self._is_changed = False
             self._settle()
-        if self._has_offered and not self._is_told:
-            self._is_told = self._tell(out)
+        to_tell = self._to_tell
+        if self._has_offered and to_tell != self._has_told and self._tell(out):
+            self._has_told = to_tell
         while True:
             try:
                 message = self._inbox.get_nowait()
