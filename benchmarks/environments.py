@@ -19,6 +19,9 @@ from benchmarks.absent import PeerError
 ROOT = Path(__file__).parents[1]
 """The folder that contains the package `benchmarks`."""
 
+BRIDGE = ROOT / "ros/sdrlink_ros"
+"""The folder of the ROS 2 package."""
+
 PACKAGES = {
     "zenoh": ["eclipse-zenoh"],
     "ros": [
@@ -98,6 +101,18 @@ def variables(tree: Path = ROOT) -> dict[str, str]:
         and not key.startswith(("PYTHON", "ROS_", "RMW_", "FASTDDS_", "FASTRTPS_", "ZENOH_"))
     }
     return kept | {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
+
+
+def in_domain(domain: int) -> dict[str, str]:
+    """Environment variables of a ROS program in `domain`, on this host alone.
+
+    Its PYTHONPATH has the bridge and this checkout.
+    """
+    return {
+        "PYTHONPATH": os.pathsep.join((str(BRIDGE), str(ROOT))),
+        "ROS_DOMAIN_ID": str(domain),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+    }
 
 
 def _make(environment: str, folder: Path) -> None:

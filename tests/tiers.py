@@ -1,4 +1,4 @@
-"""The tiers of the suite: what runs in parallel, and what is reported at the end."""
+"""The tiers of the suite, and what is reported at the end."""
 
 import signal
 
@@ -18,19 +18,12 @@ def pytest_configure() -> None:
     settings.load_profile("law")
 
 
-@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Run real-time tests last, one after the other, when the other workers are done.
-
-    A daemon takes a second to start: a test that starts one is slow, unless it is marked as quick.
-    """
+    """Mark slow tests: a daemon takes a second to start, unless a test is marked as quick."""
     for item in items:
         starts = "start_daemon" in getattr(item, "fixturenames", ())
         if starts and not item.get_closest_marker("quick"):
             item.add_marker(pytest.mark.slow)
-        if item.get_closest_marker("realtime"):
-            item.add_marker(pytest.mark.xdist_group("realtime"))
-    items.sort(key=lambda item: item.get_closest_marker("realtime") is not None)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

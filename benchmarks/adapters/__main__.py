@@ -1,17 +1,19 @@
 """The ROS 2 bridge: processor time a message, what it adds to latency, and what it costs idle."""
 
+import json
 import statistics
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from benchmarks.absent import PeerError, attempt
-from benchmarks.adapters.rig import Program, daemon, programs
+from benchmarks.adapters.rig import daemon, programs
 from benchmarks.processes import family_memory_mb, usage
 from benchmarks.report import Row, main
 from sdrlinkd.client import ControlClient, Publisher, Subscriber
+from sdrlinkd.process import Process
 
 BRIDGE = "sdrlink_ros"
 PLAIN = "benchmarks.peers.ros.plain"
@@ -64,11 +66,11 @@ def _cost_in(is_ours: bool, n: int) -> Cost:
     with daemon() as directory, programs() as start:
         bridge = _bridge(start, directory) if is_ours else start(PLAIN, directory)
         source = start(NODE, "source", HZ, n)
-        source.told()
+        source.line()
         time.sleep(QUIET_S)
         before = usage(bridge.pid).cpu_s
-        source.go()
-        source.told()
+        source.tell("")
+        source.line()
         _settled(lambda: _accepted(directory) >= n)
         used_s = usage(bridge.pid).cpu_s - before
         return Cost(1e6 * used_s / n, n - _accepted(directory))
@@ -87,7 +89,7 @@ def _cost_out(n: int) -> Cost:
     """What the bridge needs for messages from the daemon to a ROS node."""
     with daemon() as directory, programs() as start:
         bridge, sink = _bridge(start, directory), start(NODE, "sink", n)
-        sink.told()
+        sink.line()
         _declare(directory)
         _settled(lambda: TOPIC in _ask(directory, "demand")["wanted"])
         with Publisher(directory) as out:
@@ -97,8 +99,8 @@ def _cost_out(n: int) -> Cost:
             for i in range(n):
                 time.sleep(max(0.0, begin + i / HZ - time.monotonic()))
                 out.send(TOPIC, ODOMETRY)
-        sink.go()
-        received = len(sink.told())
+        sink.tell("")
+        received = len(_ages(sink))
         used_s = usage(bridge.pid).cpu_s - before
         return Cost(1e6 * used_s / n, n - received)
 
@@ -108,14 +110,14 @@ def _added_row(n: int) -> Row:
     with daemon() as directory, programs() as start:
         _bridge(start, directory)
         sink = start(NODE, "sink", n)
-        sink.told()
+        sink.line()
         source = start(NODE, "source", 100, n)
-        source.told()
+        source.line()
         time.sleep(QUIET_S)
-        source.go()
-        source.told()
-        sink.go()
-        through = sorted(sink.told())
+        source.tell("")
+        source.line()
+        sink.tell("")
+        through = sorted(_ages(sink))
     alone = _alone(n)
     if len(through) < n // 2:
         raise PeerError(f"only {len(through)} of {n} messages arrived")
@@ -146,7 +148,7 @@ def _alone(n: int) -> list[float]:
 def _idle_rows(seconds: float) -> Iterator[Row]:
     with daemon() as directory, programs() as start:
         bridge, graph = _bridge(start, directory), start(NODE, "graph", 100)
-        graph.told()
+        graph.line()
         _settled(lambda: len(_ask(directory, "declared")) >= 100)
         time.sleep(QUIET_S)
         before = usage(bridge.pid).cpu_s
@@ -161,10 +163,14 @@ def _idle_rows(seconds: float) -> Iterator[Row]:
     )  # fmt: skip
 
 
-def _bridge(start: Any, directory: Path) -> Program:  # noqa: ANN401
-    arguments = ("--runtime-dir", directory, "--ros-args", "-p", 'eager:=["/odom"]')
-    bridge: Program = start(BRIDGE, *arguments)
-    return bridge
+def _bridge(start: Callable[..., Process], directory: Path) -> Process:
+    return start(BRIDGE, "--runtime-dir", directory, "--ros-args", "-p", 'eager:=["/odom"]')
+
+
+def _ages(sink: Process) -> list[float]:
+    """The ages in ms of the messages that a sink received."""
+    ages: list[float] = json.loads(sink.line())
+    return ages
 
 
 def _declare(directory: Path) -> None:
@@ -181,7 +187,7 @@ def _accepted(directory: Path) -> int:
     return int(_ask(directory, "status")["link"]["tx"]["accepted"])
 
 
-def _settled(is_so: Any) -> None:  # noqa: ANN401
+def _settled(is_so: Callable[[], bool]) -> None:
     """Wait until a condition holds, or for long enough that the rest is lost."""
     deadline = time.monotonic() + WAIT_S
     while not is_so() and time.monotonic() < deadline:

@@ -6,7 +6,7 @@ from sdrlinkd.adapters.due import Due, due_messages
 from sdrlinkd.adapters.fields import cdr_from_fields
 from sdrlinkd.adapters.message_types import MessageTypes
 from sdrlinkd.adapters.pacing import first_seconds, from_second, paced
-from sdrlinkd.adapters.recorder import BagWriter, Recorded, as_text, megabytes
+from sdrlinkd.adapters.recorder import BagWriter, Recorded
 from sdrlinkd.adapters.robot import BuiltInRobot
 from sdrlinkd.adapters.summary import BagSummary, TopicSummary, summarise
 from sdrlinkd.adapters.transforms import Transforms
@@ -25,7 +25,6 @@ __all__ = [
     "Recorded",
     "TopicSummary",
     "Transforms",
-    "as_text",
     "cdr_from_fields",
     "due_messages",
     "empty",
@@ -33,7 +32,6 @@ __all__ = [
     "from_cdr",
     "from_second",
     "knows",
-    "megabytes",
     "open_bag",
     "paced",
     "summarise",

@@ -1,8 +1,6 @@
 """Writes bags: rosbag2 folders of MCAP files that are whole at every moment, even after a crash."""
 
-import json
 import os
-import re
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +17,6 @@ METADATA = "metadata.yaml"
 VERSION = 5
 """Version of metadata.yaml that Humble and later write or read."""
 CHUNK_BYTES = 1 << 20
-MB = 1_000_000
 SECOND_NS = 1_000_000_000
 
 
@@ -60,13 +57,14 @@ class BagWriter:
         self._split_ns, self._max_bytes = round(split_s * SECOND_NS), max_bytes
         self._all, self._of_file = _Totals(), list[_Totals]()
         self._counts: Counter[tuple[str, str, bool]] = Counter()
-        self._file: _File | None = None
         try:
             folder.mkdir(parents=True)
         except OSError as error:
             raise BagError(
                 f"{folder}: cannot be made ({error.strerror}); give a folder that does not exist"
             ) from None
+        self._file = self._next_file()
+        self._write_metadata()
 
     @property
     def n_messages(self) -> int:
@@ -80,9 +78,9 @@ class BagWriter:
 
     def add(self, message: Recorded) -> None:
         """Add a message; it is on disk after the next `sync`."""
-        if self._file is None or self._is_full(message.received_ns):
-            self._next_file()
-        assert self._file is not None  # noqa: S101
+        if self._is_full(message.received_ns):
+            self.close()
+            self._file = self._next_file()
         self._file.add(message)
         self._all.add(message.received_ns)
         self._of_file[-1].add(message.received_ns)
@@ -90,32 +88,23 @@ class BagWriter:
 
     def sync(self) -> None:
         """Write what was added, so that the bag is whole."""
-        if self._file is not None:
-            self._file.sync()
-            self._write_metadata()
+        self._file.sync()
+        self._write_metadata()
 
     def close(self) -> None:
-        """Write the rest, and close the files."""
-        if self._file is None:
-            # A bag without messages is a bag, too.
-            self._next_file()
+        """Write the rest, and close the file."""
         self.sync()
-        assert self._file is not None  # noqa: S101
         self._file.close()
 
     def _is_full(self, time_ns: int) -> bool:
-        file, totals = self._file, self._of_file[-1]
-        if file is None or not totals.n_messages:
-            return False
+        totals = self._of_file[-1]
         is_long = 0 < self._split_ns <= time_ns - totals.begin_ns
-        return is_long or 0 < self._max_bytes <= file.n_bytes
+        is_large = 0 < self._max_bytes <= self._file.n_bytes
+        return totals.n_messages > 0 and (is_long or is_large)
 
-    def _next_file(self) -> None:
-        if self._file is not None:
-            self.sync()
-            self._file.close()
+    def _next_file(self) -> "_File":
         self._of_file.append(_Totals())
-        self._file = _File(self._folder / self._name(len(self._of_file) - 1))
+        return _File(self._folder / self._name(len(self._of_file) - 1))
 
     def _name(self, number: int) -> str:
         return f"{self._folder.name}_{number}.mcap"
@@ -251,20 +240,6 @@ def qos(is_latched: bool) -> str:
         f"  liveliness: 1\n  liveliness_lease_duration:{forever}\n"
         "  avoid_ros_namespace_conventions: false"
     )
-
-
-def as_text(fields: dict[str, Any]) -> bytes:
-    """Fields as JSON in a std_msgs/String, as CDR."""
-    text = json.dumps(fields).encode() + b"\0"
-    return b"\0\1\0\0" + len(text).to_bytes(4, "little") + text
-
-
-def megabytes(text: str) -> int:
-    """A size such as `500`, `500MB` or `1.5GB` in bytes. Raises ValueError."""
-    found = re.fullmatch(r"(\d+(?:\.\d+)?)\s*(k|M|G)?B?", text.strip())
-    if found is None:
-        raise ValueError(text)
-    return round(float(found[1]) * {"k": 1000, "M": MB, "G": 1000 * MB, None: MB}[found[2]])
 
 
 def _span(totals: _Totals) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """The local ZeroMQ bus of one daemon, specified by README.md in this folder (the bus document)."""
 
 from sdrlinkd.bus.bus import PDU_TAP, SENT_TAP, Bus
-from sdrlinkd.bus.envelope import shown
+from sdrlinkd.bus.envelope import fields_of, shown
 from sdrlinkd.bus.intake import Ingress
 from sdrlinkd.bus.sockets import MAX_DIRECTORY_BYTES, RuntimeDirectory, is_foreign
 
@@ -12,6 +12,7 @@ __all__ = [
     "Bus",
     "Ingress",
     "RuntimeDirectory",
+    "fields_of",
     "is_foreign",
     "shown",
 ]

@@ -133,23 +133,26 @@ def wanted_of(frames: Sequence[bytes]) -> tuple[str, int | None, dict[str, objec
 
     A part that cannot be read is "", None or empty.
     """
-    header = frames[1] if len(frames) > 1 else b""
-    if len(header) > MOST_LOOKED_AT:
-        return "", None, {}
-    try:
-        fields = (
-            _any_msgpack.decode(header[1:])
-            if header[:1] == VERSION_BYTE
-            else _any_json.decode(header)
-        )
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
-        return "", None, {}
+    fields = fields_of(frames)
     id_, dst = fields.get("id"), fields.get("d")
     return (
         id_ if isinstance(id_, str) and len(id_) <= MAX_HEADER_BYTES else "",
         dst if isinstance(dst, int) and 0 <= dst <= 255 else None,
         fields,
     )
+
+
+def fields_of(frames: Sequence[bytes]) -> dict[str, object]:
+    """All fields in the header of a producer's message; none if it cannot be read."""
+    header = frames[1] if len(frames) > 1 else b""
+    if len(header) > MOST_LOOKED_AT:
+        return {}
+    try:
+        if header[:1] == VERSION_BYTE:
+            return _any_msgpack.decode(header[1:])
+        return _any_json.decode(header)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        return {}
 
 
 def shown(words: str) -> str:

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import struct
 from collections.abc import Iterator
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -16,6 +15,7 @@ from sdrlinkd.adapters import (
     BagMessage,
     BagSummary,
     BagTopic,
+    cdr_from_fields,
     first_seconds,
     from_second,
     open_bag,
@@ -169,7 +169,8 @@ def play(
 
 def clock_message(time_ns: int) -> bytes:
     """A rosgraph_msgs/Clock as CDR."""
-    return b"\0\1\0\0" + struct.pack("<iI", *divmod(time_ns, SECOND_NS))
+    seconds, ns = divmod(time_ns, SECOND_NS)
+    return cdr_from_fields(CLOCK_TYPE, {"clock": {"sec": seconds, "nanosec": ns}}, CLOCK)
 
 
 def _route(

@@ -1,25 +1,28 @@
 """`bag record`: writes what other robots sent, and on request what this one sends, to a bag."""
 
+import contextlib
+import json
 import signal
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 import typer
 import zmq
 from rich.console import Console
 from rich.live import Live
 
-from sdrlinkd.adapters import BagWriter, Recorded, as_text, megabytes
-from sdrlinkd.bus import SENT_TAP
+from sdrlinkd.adapters import BagWriter, Recorded, cdr_from_fields
+from sdrlinkd.bus import SENT_TAP, fields_of
 from sdrlinkd.cli.app import RuntimeDir, connect
 from sdrlinkd.cli.bag import bags
 from sdrlinkd.cli.completion import heard_names
-from sdrlinkd.client import OUT_SOCKET, Message, Subscriber, endpoint, unpack
+from sdrlinkd.cli.status import ask_status
+from sdrlinkd.client import OUT_SOCKET, Message, NoDaemonError, Subscriber, endpoint
 from sdrlinkd.client import runtime_dir as find_runtime_dir
-from sdrlinkd.errors import UserError
+from sdrlinkd.units import octets
 
 RECEPTIONS = "/link/receptions"
 TEXT = "std_msgs/msg/String"
@@ -28,7 +31,6 @@ SYNC_S = 1.0
 LONGEST_SYNC_S = 10.0
 SYNC_SHARE = 600
 """A bag that is so many times as old as SYNC_S is synced less often, as its index grows."""
-SECOND_NS = 1_000_000_000
 
 
 @bags.command()
@@ -56,10 +58,7 @@ def record(
     runtime_dir: RuntimeDir = None,
 ) -> None:
     """Record messages until Ctrl-C. The bag is whole at every moment, even after a crash."""
-    try:
-        limit = megabytes(max_size)
-    except ValueError:
-        raise UserError(f"--max-size: got {max_size!r}; allowed: such as 500MB or 2GB") from None
+    limit = octets(max_size, "--max-size")
     stopping: list[int] = []
 
     def stop(number: int, _: FrameType | None) -> None:
@@ -67,16 +66,14 @@ def record(
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, stop)
-    with connect(runtime_dir) as control:
-        latched = {each["topic"] for each in control.ask("declared") if each["latched"]}
-        types = {each["name"]: each["type"] for each in control.ask("status")["link"]["topics"]}
+    catalogue = _Catalogue(runtime_dir)
     writer = BagWriter(out, split, limit)
     begin = time.monotonic()
     console = Console(stderr=True)
     try:
         with (
             Subscriber(*(topics or ()), runtime_dir=runtime_dir) as heard,
-            _Copies(find_runtime_dir(runtime_dir), sent, types) as copies,
+            _Copies(find_runtime_dir(runtime_dir), sent, catalogue) as copies,
             Live(console=console, refresh_per_second=2, transient=True) as live,
         ):
             console.print(f"recording in {out}, until Ctrl-C", markup=False, highlight=False)
@@ -84,7 +81,7 @@ def record(
             while not stopping:
                 message = heard.receive(LOOK_S)
                 if message is not None:
-                    for each in _recorded(message, message.topic in latched):
+                    for each in _recorded(message, catalogue.is_latched(message.topic)):
                         writer.add(each)
                 for each in copies.take():
                     writer.add(each)
@@ -123,17 +120,50 @@ def _recorded(message: Message, is_latched: bool) -> Iterator[Recorded]:
         "lost_pdus": message.lost_pdus,
         "late": message.is_late,
     }
-    yield Recorded(RECEPTIONS, TEXT, as_text(fields), received_ns, received_ns)
+    text = cdr_from_fields(TEXT, {"data": json.dumps(fields)}, RECEPTIONS)
+    yield Recorded(RECEPTIONS, TEXT, text, received_ns, received_ns)
+
+
+class _Catalogue:
+    """What the daemon knows of topics; it is asked again when a name is new.
+
+    Raises NoDaemonError if no daemon answers at the start.
+    """
+
+    def __init__(self, runtime_dir: Path | None) -> None:
+        self._runtime_dir = runtime_dir
+        self._latched: dict[str, bool] = {}
+        self._types: dict[str, str] = {}
+        self._ask()
+
+    def is_latched(self, topic: str) -> bool:
+        """Whether a topic of another robot is kept for late joiners."""
+        if topic not in self._latched:
+            self._look_up()
+        return self._latched.setdefault(topic, False)
+
+    def type_of(self, topic: str) -> str:
+        """The type of a topic of this robot; empty if the daemon does not know it."""
+        if topic not in self._types:
+            self._look_up()
+        return self._types.setdefault(topic, "")
+
+    def _look_up(self) -> None:
+        with contextlib.suppress(NoDaemonError):
+            self._ask()
+
+    def _ask(self) -> None:
+        with connect(self._runtime_dir) as control:
+            heard, topics = control.ask("declared"), ask_status(control).link.topics
+        self._latched |= {each["topic"]: each["latched"] > 0 for each in heard}
+        self._types |= {each.name: each.type for each in topics}
 
 
 class _Copies:
-    """Copies of the messages that this robot's programs send; none unless `is_wanted`.
+    """Copies of the messages that this robot's programs send; none unless `is_wanted`."""
 
-    `types` are the types of the topics by name with leading slash.
-    """
-
-    def __init__(self, directory: Path, is_wanted: bool, types: dict[str, str]) -> None:
-        self._types = types
+    def __init__(self, directory: Path, is_wanted: bool, catalogue: _Catalogue) -> None:
+        self._catalogue = catalogue
         self._context = zmq.Context()
         self._socket = self._context.socket(zmq.SUB)
         self._socket.rcvhwm = 0
@@ -152,22 +182,10 @@ class _Copies:
         """The copies that have come."""
         try:
             while True:
-                topic, header, cdr = self._socket.recv_multipart(zmq.NOBLOCK)
-                now_ns = time.time_ns()
-                name = topic.removeprefix(SENT_TAP)[:-1].decode(errors="replace")
-                fields = _fields(header)
-                type_ = fields.get("ty") or self._types.get(name, "")
-                published_ns = fields.get("t")
-                sent_ns = published_ns if isinstance(published_ns, int) else now_ns
-                yield Recorded(name, str(type_), cdr, sent_ns, sent_ns)
+                frames = self._socket.recv_multipart(zmq.NOBLOCK)
+                name = frames[0].removeprefix(SENT_TAP)[:-1].decode(errors="replace")
+                published_ns = fields_of(frames).get("t")
+                sent_ns = published_ns if isinstance(published_ns, int) else time.time_ns()
+                yield Recorded(name, self._catalogue.type_of(name), frames[2], sent_ns, sent_ns)
         except zmq.Again:
             return
-
-
-def _fields(header: bytes) -> dict[str, Any]:
-    """The fields of a producer's header, as far as it can be read."""
-    try:
-        found = unpack(header[1:]) if header[:1] == b"\x01" else {}
-    except ValueError:
-        return {}
-    return found if isinstance(found, dict) else {}

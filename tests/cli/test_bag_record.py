@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
-from sdrlinkd.adapters import BagWriter, Recorded, empty, megabytes, open_bag, to_cdr
+from sdrlinkd.adapters import BagWriter, Recorded, empty, open_bag, to_cdr
 from sdrlinkd.client import Publisher, Subscriber
 from sdrlinkd.errors import BagError
 from tests.programs import sdrlinkctl
@@ -72,7 +72,7 @@ def test_what_is_recorded_outlives_the_recorder(start_daemon, tmp_path):
     found = by_mcap(bag)
     assert [each[2] for each in found if each[0] == ODOM] == sent
     assert [each[2] for each in found if each[0] == "/robot_1/odom"] == sent
-    assert {each[1] for each in found if each[0] == ODOM} == {KIND}
+    assert {each[1] for each in found if each[0] in (ODOM, "/robot_1/odom")} == {KIND}
     now = time.time_ns()
     for _, _, _, log_ns, publish_ns in found:
         assert now - 100e9 < publish_ns <= log_ns < now
@@ -130,16 +130,6 @@ def test_files_are_split_by_time_and_size(tmp_path):
         BagWriter(tmp_path / "bag")
 
 
-@pytest.mark.parametrize(
-    ("text", "size"),
-    [("500MB", 500_000_000), ("2GB", 2 * 10**9), ("1.5", 1_500_000), ("10 kB", 10_000)],
-)
-def test_sizes(text, size):
-    assert megabytes(text) == size
-    with pytest.raises(ValueError, match="apples"):
-        megabytes("12 apples")
-
-
 def test_a_part_is_played_again_and_again_with_its_clock(start_daemon, ctl, tmp_path):
     daemon = start_daemon('registry = ""\n')
     writer = BagWriter(tmp_path / "bag")
@@ -172,4 +162,4 @@ def test_a_part_is_played_again_and_again_with_its_clock(start_daemon, ctl, tmp_
     assert "no messages to play again" in err
     code, _, err = ctl("bag", "record", tmp_path / "bag", "--max-size", "huge", *dir_)
     assert code
-    assert "--max-size: got 'huge'; allowed: such as 500MB or 2GB" in err
+    assert "--max-size: got huge; allowed: a size such as" in err

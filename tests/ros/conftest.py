@@ -1,8 +1,6 @@
 """Fixtures of the tests with real ROS 2 nodes."""
 
-import fcntl
 import os
-import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -28,17 +26,6 @@ def hub(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     folder = tmp_path_factory.mktemp("hub")
     with serving(folder, **AIR, snr_db=30.0):
         yield folder
-
-
-@pytest.fixture(autouse=True)
-def _alone(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Let teams of robots run one at a time, whatever other workers do."""
-    if request.node.get_closest_marker("realtime") is None:
-        yield
-        return
-    with (Path(tempfile.gettempdir()) / "sdrlinkd-ros-tests.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
 
 
 @pytest.fixture

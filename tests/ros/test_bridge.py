@@ -22,7 +22,7 @@ from tests.ros.team import (
 )
 from tests.waiting import wait_for
 
-pytestmark = [pytest.mark.realtime, pytest.mark.timeout(500, func_only=True)]
+pytestmark = [pytest.mark.realtime, pytest.mark.timeout(500)]
 
 TRIES = 3
 """A team is run again, twice at most, if this machine was too busy for the radios."""

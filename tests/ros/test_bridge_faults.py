@@ -9,6 +9,7 @@ import time
 import pytest
 from sdrlink_ros.packet import Kind, Packet, Status
 
+from benchmarks.environments import BRIDGE
 from sdrlinkd.adapters import empty, to_cdr
 from sdrlinkd.client import Publisher, Subscriber
 from tests.ros.programs import Agent, Bridge, new_domain
@@ -24,10 +25,10 @@ from tests.ros.team import (
     matched,
     transforms,
 )
-from tests.ros.wheels import BRIDGE, in_domain, python
+from tests.ros.wheels import environment, python
 from tests.waiting import wait_for
 
-pytestmark = [pytest.mark.realtime, pytest.mark.timeout(400, func_only=True)]
+pytestmark = [pytest.mark.realtime, pytest.mark.timeout(400)]
 
 OTHER_HASH = "RIHS01_" + "ab" * 32
 IMAGE = "sensor_msgs/msg/Image"
@@ -226,7 +227,7 @@ def test_bridges_that_see_each_other_refuse_and_name_both(start_daemon, start, h
     first.says("bridge of robot 1")
     again = start(Bridge, new_domain(), one.directory)
     again.says("another bridge already serves the daemon in")
-    assert again.process.wait(20) == 2
+    assert again.wait(20) == 2
     second = start(Bridge, domain, two.directory)
     for bridge, robots in ((first, "1 and 2"), (second, "2 and 1")):
         bridge.says(f"refused: the bridges of robots {robots} see each other over DDS")
@@ -241,10 +242,10 @@ def test_bridges_that_see_each_other_refuse_and_name_both(start_daemon, start, h
 
 def test_without_rclpy_or_client_it_says_what_to_run(ros):
     for path, says in ((python(), "pip install sdrlinkd-client"), (sys.executable, "setup.bash")):
-        environment = in_domain(1, PYTHONPATH=BRIDGE)
+        variables = environment(1, PYTHONPATH=BRIDGE)
         done = subprocess.run(
             [path, "-m", "sdrlink_ros"],
-            capture_output=True, text=True, check=False, env=environment, cwd="/",
+            capture_output=True, text=True, check=False, env=variables, cwd="/",
         )  # fmt: skip
         if "sdrlinkd.client" not in done.stderr and path == sys.executable:
             assert "no rclpy" in done.stderr

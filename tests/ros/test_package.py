@@ -4,8 +4,9 @@ import re
 import shutil
 import subprocess
 
+from benchmarks.environments import BRIDGE
 from sdrlinkd import __version__
-from tests.ros.wheels import BRIDGE, in_domain, python
+from tests.ros.wheels import environment, python
 
 
 def test_the_package_installs_what_ros_looks_for(ros, tmp_path):
@@ -16,7 +17,7 @@ def test_the_package_installs_what_ros_looks_for(ros, tmp_path):
             python(), "setup.py", "-q", "install", "--root", root, "--prefix", "/usr",
             "--single-version-externally-managed", "--record", tmp_path / "record",
         ],
-        cwd=source, check=True, capture_output=True, env=in_domain(1),
+        cwd=source, check=True, capture_output=True, env=environment(1),
     )  # fmt: skip
     share = root / "usr/share"
     assert (share / "ament_index/resource_index/packages/sdrlink_ros").exists()

@@ -11,7 +11,7 @@ from tests.ros.programs import Agent
 from tests.ros.team import WAIT_S, Robot, config
 from tests.waiting import wait_for
 
-pytestmark = [pytest.mark.realtime, pytest.mark.timeout(500, func_only=True)]
+pytestmark = [pytest.mark.realtime, pytest.mark.timeout(500)]
 
 ALLOW = ("-p", 'services.allow:=["/set", "/fibonacci"]')
 SUCCEEDED, CANCELED = 4, 5

@@ -1,11 +1,9 @@
 """A Python with rclpy, in an environment of its own that is kept between runs."""
 
-import os
 from pathlib import Path
 
-from benchmarks.environments import ROOT, EnvironmentLackingError, interpreter, variables
+from benchmarks.environments import EnvironmentLackingError, in_domain, interpreter, variables
 
-BRIDGE = ROOT / "ros/sdrlink_ros"
 REQUIRED = "SDRLINK_ROS"
 """Set to 1 where the tests must not be skipped."""
 
@@ -15,15 +13,10 @@ def python() -> Path:
     return Path(interpreter("ros"))
 
 
-def in_domain(domain: int, **more: object) -> dict[str, str]:
+def environment(domain: int, **more: object) -> dict[str, str]:
     """The environment of a ROS program in `domain`, on this host alone."""
-    return {
-        **variables(),
-        "PYTHONPATH": os.pathsep.join([str(ROOT), str(BRIDGE)]),
-        "ROS_DOMAIN_ID": str(domain),
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-        **{key: str(value) for key, value in more.items()},
-    }
+    given = {key: str(value) for key, value in more.items()}
+    return {**variables(), **in_domain(domain), **given}
 
 
 def lacking() -> str:

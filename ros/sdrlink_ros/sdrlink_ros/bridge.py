@@ -1,4 +1,4 @@
-"""The bridge: two nodes, two threads, and a timer that looks at ROS and at the radio."""
+"""The bridge: two nodes, three threads, and a timer that looks at ROS and at the radio."""
 
 import hashlib
 import socket
@@ -11,15 +11,16 @@ import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
-from sdrlink_ros import directory, graph
+from sdrlink_ros import actions, directory, graph, report
 from sdrlink_ros.daemon import Daemon, Demand
 from sdrlink_ros.echoes import Echoes
 from sdrlink_ros.incoming import Incoming
 from sdrlink_ros.names import Names, unused
-from sdrlink_ros.outgoing import Outgoing
+from sdrlink_ros.outgoing import Outgoing, Spec
 from sdrlink_ros.outlet import Source
 from sdrlink_ros.parameters import Parameters
 from sdrlink_ros.routes import Routes, decide
+from sdrlink_ros.sayings import Sayings
 from sdrlink_ros.services import LOST_S, Services, calls_of
 from sdrlink_ros.state import State
 from sdrlinkd.client import RefusedError, runtime_dir
@@ -31,7 +32,6 @@ WHOLE_LOOKS = 4
 SETTLED_LOOKS = 40
 """After so many looks, patterns that match nothing are named."""
 BAD_SETUP = 2
-MOST_SAID = 1000
 
 
 class BridgeError(Exception):
@@ -72,8 +72,8 @@ class Bridge:
         self._directory = directory
         self._node = Node(graph.BRIDGE)
         self._parameters = Parameters(self._node, self._changed)
-        self._daemon = Daemon(directory, self._say)
-        self._echoes = Echoes()
+        self._sayings = Sayings(self._node.get_logger().warning)
+        self._daemon = Daemon(directory, self._sayings.say)
         self._looks = 0
         self._seen: tuple[Any, ...] = ()
         self._is_changed = True
@@ -82,12 +82,11 @@ class Bridge:
         self._version: tuple[str, int] = ("", -1)
         self._routes = Routes({}, {}, {})
         self._sources: list[Source] = []
+        self._of_actions: dict[str, Spec] = {}
         self._declared: set[str] = set()
         """Topics between bridges that the daemon knows."""
-        self._said: set[str] = set()
         self._parts: _Parts | None = None
         self._lock: socket.socket | None = None
-        self._error: BaseException | None = None
 
     def spin(self) -> None:
         """Run until rclpy shuts down. Raises BridgeError if another bridge serves the daemon."""
@@ -113,67 +112,66 @@ class Bridge:
                 return
             self._lock = _locked(self._directory)
             names = Names(self._daemon.node, self._parameters.settings.rx_format)
-            self._parts = _Parts(names, self._directory, self._echoes, self._node)
+            self._parts = _Parts(names, self._directory, self._node, self._sayings)
         parts, settings, now = self._parts, self._parameters.settings, time.monotonic()
         seen = parts.seen()
         is_due = self._looks % WHOLE_LOOKS == 0
         is_changed, self._is_changed = self._is_changed, False
-        if is_due or is_changed or seen != self._seen:
+        is_whole = is_due or is_changed or seen != self._seen
+        if demand is not None and (demand.boot, demand.version) != self._version:
+            is_whole = self._learn(parts, demand) or is_whole
+        if is_whole:
             self._seen = seen
             self._look_at_graph(parts)
             if demand is not None:
                 parts.outgoing.follow(self._routes.taken, self._daemon, demand.boot)
                 self._look_at_services(parts)
-        if demand is not None:
-            self._learn(parts, demand, is_changed)
         wanted = frozenset() if demand is None else demand.wanted
-        parts.outgoing.want(self._routes.taken, wanted, now)
+        parts.outgoing.want(self._routes.taken, wanted, self._of_actions, now)
         parts.incoming.look(parts.outgoing.taker.taps, now, self._is_refused)
         if is_due and parts.state.is_wanted:
             snapshot = self._daemon.ask("status") if demand is not None else None
-            parts.state.tell(self._daemon.node, snapshot, self._topics(parts))
+            told = report.topics(self._routes, parts.outgoing, parts.incoming, parts.services)
+            parts.state.tell(self._daemon.node, snapshot, told)
         self._looks += 1
         if self._looks == SETTLED_LOOKS:
             self._say_unused(settings)
 
     def _look_at_graph(self, parts: "_Parts") -> None:
-        """Decide anew what becomes of the topics on the graph."""
+        """Decide anew what becomes of the topics of this graph, and of those of other robots."""
         own = self._daemon.node
         others = graph.other_bridges(parts.data, own)
         if bool(others) != self._is_refused:
             self._is_refused = bool(others)
-            self._say(
+            self._sayings.say(
                 f"refused: the bridges of robots {own} and {', '.join(map(str, others))} see each "
                 "other over DDS, so messages would go round; give each robot a ROS_DOMAIN_ID of "
                 "its own, or set ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST"
                 if others
                 else "no other bridge is on this graph any more: topics are sent again"
             )
+        inner = {each.bus for each in self._sources if parts.services.hears(each)}
+        topics = (each for each in self._sources if each.bus not in inner)
+        parts.incoming.follow(topics, self._parameters.settings, frozenset(inner))
         # The names of a graph that two robots share say nothing about who publishes.
         offers = {} if others else graph.offers(parts.data)
         self._routes = decide(
             offers, self._parameters.settings, parts.names, parts.incoming.heard()
         )
         for text in self._routes.refused.values():
-            self._say_once(text)
+            self._sayings.once(text)
 
-    def _learn(self, parts: "_Parts", demand: Demand, is_changed: bool) -> None:
-        """Learn the topics of other robots, and what becomes of them by changed parameters."""
-        seen = demand.boot, demand.version
-        if seen != self._version or is_changed or parts.incoming.has_commands:
-            told = self._daemon.ask("declared")
-            if told is not None:
-                if demand.boot != self._version[0]:
-                    self._declared.clear()
-                    parts.services.tell_again()
-                self._sources = [Source.told(each) for each in told]
-                inner = {each.bus for each in self._sources if parts.services.hears(each)}
-                if not is_changed and seen != self._version:
-                    # Calls may need topics, too.
-                    self._is_changed = True
-                others = (each for each in self._sources if each.bus not in inner)
-                parts.incoming.follow(others, self._parameters.settings, frozenset(inner))
-                self._version = seen
+    def _learn(self, parts: "_Parts", demand: Demand) -> bool:
+        """Learn which topics other robots declare; False if the daemon does not answer."""
+        told = self._daemon.ask("declared")
+        if told is None:
+            return False
+        if demand.boot != self._version[0]:
+            self._declared.clear()
+            parts.services.tell_again()
+        self._sources = [Source.told(each) for each in told]
+        self._version = demand.boot, demand.version
+        return True
 
     def _look_at_services(self, parts: "_Parts") -> None:
         """Offer the services of this robot, and see whose robots have fallen silent."""
@@ -181,7 +179,7 @@ class Bridge:
         patterns = () if self._is_refused else settings.services_allow
         found = directory.found(parts.data, parts.names, patterns)
         for text in found.refused.values():
-            self._say_once(text)
+            self._sayings.once(text)
         services.offer(found.services, settings.services_timeout_s)
         for arguments in services.declarations(self._sources):
             name = str(arguments["name"])
@@ -189,6 +187,8 @@ class Bridge:
                 self._declared.add(name)
         robots = {each.robot for each in self._sources}
         services.reach(frozenset(each for each in robots if calls_of(each) in self._declared))
+        has_inner = f"/{actions.STATUS}" in self._declared
+        self._of_actions = actions.specs(found.services) if has_inner else {}
         if services.has_proxies:
             peers = self._daemon.ask("peers") or []
             silent = (each["src"] for each in peers if each["last_heard_s_ago"] > LOST_S)
@@ -199,68 +199,19 @@ class Bridge:
         try:
             return self._daemon.declare(arguments) is not None
         except RefusedError as error:
-            self._say_once(f"calls and services: {error}")
+            self._sayings.once(f"calls and services: {error}")
             return False
 
     def _changed(self) -> None:
         self._is_changed = True
 
-    def _topics(self, parts: "_Parts") -> list[dict[str, Any]]:
-        """What becomes of each topic, for people and their programs."""
-        taker, told = parts.outgoing.taker, []
-        for name, route in self._routes.taken.items():
-            refused = parts.outgoing.refused.get(name)
-            state = "sent" if name in taker.taps else "not wanted by anybody"
-            told.append(
-                {
-                    "topic": name, "type": route.offer.kind, "direction": "out",
-                    "robot": route.robot, "state": refused or state, "sent": taker.sent[name],
-                    "lost": taker.lost[name], "refused": taker.refused[name],
-                }
-            )  # fmt: skip
-        for reasons in (self._routes.left_out, self._routes.refused):
-            told += [
-                {"topic": name, "direction": "none", "state": reason}
-                for name, reason in reasons.items()
-            ]
-        for bus, outlet in parts.incoming.outlets.items():
-            told.append(
-                {
-                    "topic": outlet.names[0], "type": outlet.kind.name, "direction": "in",
-                    "robot": outlet.source.robot,
-                    "state": "wanted" if bus in parts.incoming.wanted else "no subscriber here",
-                    "published": parts.incoming.published[bus],
-                }
-            )  # fmt: skip
-        told += [
-            {"topic": bus, "direction": "none", "state": reason}
-            for bus, reason in parts.incoming.refused.items()
-        ]
-        told += [
-            {"topic": "", "direction": "in", "state": reason, "dropped": n}
-            for reason, n in dict(parts.incoming.dropped).items()
-        ]
-        return told
-
     def _in_words(self) -> str:
-        """The bridge in one sentence, for `sdrlinkctl status`."""
-        parts = self._parts
-        if parts is None:
+        """The bridge in one sentence."""
+        if self._parts is None:
             return "ROS bridge: starting"
         if self._is_refused:
             return "ROS bridge: refused, as another robot's bridge is on its DDS graph; see its log"
-        taker, incoming = parts.outgoing.taker, parts.incoming
-        outlets = incoming.outlets
-        words = (
-            f"ROS bridge: topics out {len(self._routes.taken)} (wanted {len(taker.taps)}), "
-            f"in {len(outlets)} (wanted {len(incoming.wanted & set(outlets))})"
-        )
-        refused = len(self._routes.refused) + len(parts.outgoing.refused) + len(incoming.refused)
-        if refused:
-            words += f"; {refused} refused, see /link/topics"
-        if lost := taker.lost.total():
-            words += f"; {lost} messages lost while the daemon was away"
-        return words
+        return report.in_words(self._routes, self._parts.outgoing, self._parts.incoming)
 
     def _say_unused(self, settings: Any) -> None:  # noqa: ANN401
         known = [*self._routes.taken, *self._routes.left_out]
@@ -268,17 +219,7 @@ class Bridge:
         for parameter, patterns in given.items():
             for pattern, near in unused(patterns, known).items() if known else ():
                 hint = f"; the nearest are {', '.join(near)}" if near else ""
-                self._say_once(f"{parameter}: {pattern} matches no topic here so far{hint}")
-
-    def _say(self, text: str) -> None:
-        self._node.get_logger().warning(text)
-
-    def _say_once(self, text: str) -> None:
-        if text not in self._said:
-            if len(self._said) >= MOST_SAID:
-                self._said.clear()
-            self._said.add(text)
-            self._say(text)
+                self._sayings.once(f"{parameter}: {pattern} matches no topic here so far{hint}")
 
 
 class _Parts:
@@ -288,20 +229,20 @@ class _Parts:
         self,
         names: Names,
         folder: "Path | None",
-        echoes: Echoes,
         node: Node,
+        sayings: Sayings,
     ) -> None:
         self.names = names
-        say = node.get_logger().warning
+        echoes = Echoes()
         self.data = Node(
             f"{graph.BRIDGE}_{names.own}",
             use_global_arguments=False,
             enable_rosout=False,
             start_parameter_services=False,
         )
-        self.outgoing = Outgoing(self.data, folder, echoes, say)
-        self.services = Services(self.data, names, folder, say)
-        self.incoming = Incoming(self.data, names, folder, echoes, say, self.services.hear)
+        self.outgoing = Outgoing(self.data, folder, echoes, sayings)
+        self.services = Services(self.data, names, folder, sayings)
+        self.incoming = Incoming(self.data, names, folder, echoes, sayings, self.services.hear)
         self.state = State(node)
         self.outgoing.taker.start()
         self.incoming.start()

@@ -34,12 +34,6 @@ class Daemon:
         self._was_away = False
         self.node = 0
         """The robot's id; 0 until the daemon has answered."""
-        self.times_away = 0
-
-    @property
-    def is_there(self) -> bool:
-        """Whether the daemon answered the last question."""
-        return self._control is not None
 
     def look(self, says: str) -> Demand | None:
         """The demand now; None without a daemon, which is said once.
@@ -93,7 +87,6 @@ class Daemon:
     def _gone(self, error: NoDaemonError) -> None:
         self.close()
         if not self._was_away:
-            self.times_away += 1
             self._say(f"waiting for the daemon; messages are lost meanwhile: {error}")
         self._was_away = True
         self._try_at = time.monotonic() + self._wait_s

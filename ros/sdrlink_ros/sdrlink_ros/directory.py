@@ -8,9 +8,10 @@ from sdrlink_ros.graph import BRIDGE, type_hash
 from sdrlink_ros.names import Names, matches
 
 ACTION = "/_action/"
-CANCEL = f"{ACTION}cancel_goal"
 SEND_GOAL = f"{ACTION}send_goal"
 MOST_TOLD = 200
+MOST_NAME = 200
+"""Longest name of a service, in characters; a packet has an octet for its length."""
 _STRING_HEAD = 8
 """Octets of encapsulation and length before the text of a std_msgs/String."""
 
@@ -21,11 +22,6 @@ class Service(NamedTuple):
     name: str
     kind: str
     hash: str
-
-    @property
-    def is_cancel(self) -> bool:
-        """Whether it cancels goals."""
-        return self.name.endswith(CANCEL)
 
 
 class Found(NamedTuple):
@@ -47,7 +43,8 @@ def found(node: Any, names: Names, patterns: Sequence[str]) -> Found:  # noqa: A
         except Exception:  # noqa: S112 - the node has gone in this moment
             continue
         for service, types in told:
-            if matches(names.local(service).split(ACTION)[0], patterns):
+            is_named = matches(names.local(service).split(ACTION)[0], patterns)
+            if is_named and len(service) <= MOST_NAME:
                 servers.setdefault(service, []).append(f"{space.rstrip('/')}/{name}")
                 kinds[service] = types[0]
     result = Found({}, {})
@@ -82,4 +79,4 @@ def understood(cdr: bytes) -> list[Service] | None:
         services = [Service(*map(str, each)) for each in given[:MOST_TOLD]]
     except (ValueError, TypeError):
         return None
-    return [each for each in services if each.name.startswith("/")]
+    return [each for each in services if each.name.startswith("/") and len(each.name) <= MOST_NAME]

@@ -5,13 +5,15 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
+from queue import SimpleQueue
 from typing import Any
 
 from sdrlink_ros import graph, qos
 from sdrlink_ros.echoes import Echoes
-from sdrlink_ros.kinds import UnknownTypeError, kind
+from sdrlink_ros.kinds import UnknownTypeError, is_cdr, kind
 from sdrlink_ros.names import Names, command_for, is_command, matches
 from sdrlink_ros.outlet import LINGER_S, Outlet, Source, restamped
+from sdrlink_ros.sayings import Sayings
 from sdrlink_ros.settings import Settings
 from sdrlinkd.client import Message, NoDaemonError, Subscriber
 
@@ -30,8 +32,8 @@ MOST_OUTLETS = 2000
 class Incoming:
     """Publishes the topics of other robots, and wants those that somebody here subscribes to.
 
-    `node` is for publishers only. `say` logs a sentence. `take_inner` takes messages of topics that
-    bridges use among themselves.
+    `node` is for publishers only. `take_inner` takes messages of topics that bridges use among
+    themselves.
     """
 
     def __init__(
@@ -40,7 +42,7 @@ class Incoming:
         names: Names,
         directory: Path | None,
         echoes: Echoes,
-        say: Callable[[str], None],
+        sayings: Sayings,
         take_inner: Callable[[Message], None],
     ) -> None:
         self._node = node
@@ -48,17 +50,16 @@ class Incoming:
         self._directory = directory
         self._echoes = echoes
         self._take_inner = take_inner
-        self._say = say
+        self._sayings = sayings
         self._outlets: dict[str, Outlet] = {}
         self._lock = threading.RLock()
         """Held while publishers are made, used or destroyed."""
-        self._fresh: set[str] = set()
+        self._fresh: SimpleQueue[str] = SimpleQueue()
         """Topics whose publishers are new, and lack what was kept."""
         self._wanted: frozenset[str] = frozenset()
         self._inner: frozenset[str] = frozenset()
-        self._refused_sources: dict[str, Source] = {}
-        self.refused: dict[str, str] = {}
-        """Why a topic of another robot is not published, in words by bus topic."""
+        self._refused: dict[str, tuple[Source, str]] = {}
+        """Topics that are not published, and why, by bus topic."""
         self.published: Counter[str] = Counter()
         """Messages published, by bus topic."""
         self.dropped: Counter[str] = Counter()
@@ -81,9 +82,9 @@ class Incoming:
         return self._outlets
 
     @property
-    def has_commands(self) -> bool:
-        """Whether other robots command this one; their names here depend on who subscribes."""
-        return any(each.is_command for each in self._outlets.values())
+    def refused(self) -> dict[str, str]:
+        """Why topics of other robots are not published, in words by bus topic."""
+        return {bus: text for bus, (_, text) in self._refused.items()}
 
     @property
     def wanted(self) -> frozenset[str]:
@@ -108,7 +109,7 @@ class Incoming:
             if known is not None and known.source == source and known.names == names:
                 known.is_restamped = self._is_restamped(source, known, settings)
                 continue
-            if self._refused_sources.get(source.bus) == source:
+            if source.bus in self._refused and self._refused[source.bus][0] == source:
                 continue
             if known is not None:
                 self._close(source.bus)
@@ -127,7 +128,6 @@ class Incoming:
         if is_refused:
             self._wanted = frozenset()
             return
-        wanted = (bus for bus, each in self._outlets.items() if now - each.wanted_at < LINGER_S)
         for bus, outlet in list(self._outlets.items()):
             if outlet.gone_at is not None and now - max(outlet.gone_at, outlet.wanted_at) > GONE_S:
                 self._close(bus)
@@ -138,7 +138,8 @@ class Incoming:
             )
             if others > 0 or outlet.is_command:
                 outlet.wanted_at = now
-        self._wanted = frozenset(wanted) | self._inner
+        wanted = (bus for bus, each in self._outlets.items() if now - each.wanted_at < LINGER_S)
+        self._wanted = self._inner.union(wanted)
 
     def _names_of(self, source: Source, settings: Settings) -> tuple[str, ...]:
         """The names under which a topic appears here; none if it is not for this robot."""
@@ -183,20 +184,16 @@ class Incoming:
             )
             return
         outlet.is_restamped = self._is_restamped(source, outlet, settings)
-        self._refused_sources.pop(source.bus, None)
-        self.refused.pop(source.bus, None)
+        self._refused.pop(source.bus, None)
         if is_again:
-            self._fresh.add(source.bus)
+            self._fresh.put(source.bus)
         self._outlets = {**self._outlets, source.bus: outlet}
 
     def _refuse(self, source: Source, text: str) -> None:
-        if len(self._refused_sources) >= MOST_OUTLETS:
-            self._refused_sources.clear()
-            self.refused.clear()
-        self._refused_sources[source.bus] = source
-        if self.refused.get(source.bus) != text:
-            self.refused[source.bus] = text
-            self._say(text)
+        if len(self._refused) >= MOST_OUTLETS:
+            self._refused.clear()
+        self._refused[source.bus] = source, text
+        self._sayings.once(text)
 
     def _close(self, bus: str) -> None:
         outlets = dict(self._outlets)
@@ -244,7 +241,7 @@ class Incoming:
             except Exception as error:
                 if self._is_over or not self._node.context.ok():
                     break
-                self._say(f"incoming topics are subscribed to again, after an error: {error}")
+                self._sayings.say(f"incoming topics are set up again, after an error: {error}")
                 time.sleep(AWAY_S)
 
     def _hear(self, subscriber: Subscriber) -> None:
@@ -257,9 +254,8 @@ class Incoming:
                 for bus in subscribed - wanted:
                     subscriber.unsubscribe(bus)
                 subscribed = set(wanted)
-            if self._fresh:
-                fresh, self._fresh = self._fresh, set()
-                for bus in fresh & subscribed:
+            while not self._fresh.empty():
+                if (bus := self._fresh.get()) in subscribed:
                     subscriber.unsubscribe(bus)
                     subscriber.subscribe(bus)
             message = subscriber.receive(POLL_S)
@@ -269,8 +265,8 @@ class Incoming:
                 self._publish(message)
             except Exception as error:  # one topic must not end the others
                 self.dropped["publish_failed"] += 1
-                if not self._is_over and self.dropped["publish_failed"] == 1:
-                    self._say(f"{message.topic}: not published: {error}")
+                if not self._is_over:
+                    self._sayings.once(f"{message.topic}: not published: {error}")
 
     def _publish(self, message: Message) -> None:
         outlet, cdr = self._outlets.get(message.topic), message.payload
@@ -280,7 +276,7 @@ class Incoming:
             self.dropped["rx_unknown_topic"] += 1
         elif message.type != outlet.kind.name:
             self.dropped["rx_other_type"] += 1
-        elif len(cdr) < outlet.kind.least or cdr[:2] not in (b"\0\0", b"\0\1"):
+        elif not is_cdr(cdr, outlet.kind.least):
             self.dropped["rx_bad_cdr"] += 1
         else:
             if outlet.is_known(message):

@@ -80,6 +80,11 @@ def service_kind(name: str) -> ServiceKind:
     return ServiceKind(name, service, *least)
 
 
+def is_cdr(octets: bytes, least: int) -> bool:
+    """Whether octets from the air can be CDR of a type whose least size is `least`."""
+    return len(octets) >= least and octets[:2] in (b"\0\0", b"\0\1")
+
+
 def least_size(fields: Fields, of: Callable[[str], Fields]) -> int:
     """The smallest size of a message with these fields in CDR, without its encapsulation.
 

@@ -3,7 +3,7 @@
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,6 +15,7 @@ from sdrlink_ros.echoes import Echoes
 from sdrlink_ros.frames import producer_key
 from sdrlink_ros.kinds import Kind, UnknownTypeError, kind
 from sdrlink_ros.routes import TF_STATIC, Route
+from sdrlink_ros.sayings import Sayings
 from sdrlinkd.client import MessageRefusedError, Publisher, RefusedError
 
 LINGER_S = 2.0
@@ -36,20 +37,23 @@ class Spec(NamedTuple):
     robot: int | None
     is_reliable: bool
     is_latched: bool
+    head: bytes = b""
+    """What is sent ahead of each message."""
+    key: str | None = None
+    """The producer key, if it does not depend on the message."""
 
 
 class Tap(NamedTuple):
-    """A subscription and its handle."""
+    """A subscription, and what it is for."""
 
     spec: Spec
     subscription: Any
-    handle: Any
 
 
 class Outgoing:
     """Declares the topics of this robot, and takes their messages while they are wanted.
 
-    `node` is for subscriptions only, and no executor may spin it. `say` logs a sentence.
+    `node` is for subscriptions only, and no executor may spin it.
     """
 
     def __init__(
@@ -57,12 +61,13 @@ class Outgoing:
         node: Any,  # noqa: ANN401
         directory: Path | None,
         echoes: Echoes,
-        say: Callable[[str], None],
+        sayings: Sayings,
     ) -> None:
-        self._say = say
-        self.taker = Taker(node, directory, echoes, say)
+        self._sayings = sayings
+        self.taker = Taker(node, directory, echoes, sayings)
         self._boot = ""
         self._told: dict[str, tuple[Any, ...]] = {}
+        """What the daemon was told of each topic, by name."""
         self._numbers: dict[str, int] = {}
         self._wanted_at: dict[str, float] = {}
         self._again_at: dict[str, float] = {}
@@ -78,17 +83,22 @@ class Outgoing:
         for name in [each for each in self.refused if each not in routes]:
             self._clear(name)
         for name, route in routes.items():
-            offer = route.offer
-            told = (route.bus, offer.kind, offer.hash, *offer[3:5], route.depth)
-            is_new = self._told.get(name) != told or self._is_due(name)
+            is_new = self._told.get(name) != _declaration(route) or self._is_due(name)
             if is_new and self._declare(name, route, daemon):
-                self._told[name] = told
+                self._told[name] = _declaration(route)
 
-    def want(self, routes: Mapping[str, Route], wanted: frozenset[str], now: float) -> None:
-        """Subscribe to what is wanted at `now`, and to nothing else."""
-        specs = {}
+    def want(
+        self,
+        routes: Mapping[str, Route],
+        wanted: frozenset[str],
+        more: Mapping[str, Spec],
+        now: float,
+    ) -> None:
+        """Subscribe to what is wanted at `now` and to `more`, and to nothing else."""
+        specs = dict(more)
         for name, route in routes.items():
-            number = self._numbers.get(route.bus)
+            is_declared = self._told.get(name) == _declaration(route)
+            number = self._numbers.get(route.bus) if is_declared else None
             if number is None or name in self.refused:
                 continue
             if route.is_eager or route.bus in wanted or number < FIRST_REGISTERED:
@@ -96,7 +106,9 @@ class Outgoing:
             elif now - self._wanted_at.get(name, -LINGER_S) >= LINGER_S:
                 continue
             offer = route.offer
-            specs[name] = Spec(name, kind(offer.kind), route.bus, route.robot, *offer[3:5])
+            specs[name] = Spec(
+                name, kind(offer.kind), route.bus, route.robot, offer.is_reliable, offer.is_latched
+            )
         self.taker.take(specs)
 
     def _is_due(self, name: str) -> bool:
@@ -126,9 +138,8 @@ class Outgoing:
         return number is not None
 
     def _refuse(self, name: str, text: str) -> None:
-        if self.refused.get(name) != text:
-            self.refused[name] = text
-            self._say(text)
+        self.refused[name] = text
+        self._sayings.once(text)
 
     def _clear(self, name: str) -> None:
         self.refused.pop(name, None)
@@ -138,8 +149,8 @@ class Outgoing:
 class Taker:
     """A thread that owns the subscriptions, and sends what they bring.
 
-    It waits for all of them at once without an executor, which spares two thirds of the work for
-    each message. The pattern is that of rclpy.wait_for_message.
+    It waits for all of them at once without an executor, which spares half of the work for each
+    message (`python -m benchmarks.adapters`). The pattern is that of rclpy.wait_for_message.
     """
 
     def __init__(
@@ -147,12 +158,12 @@ class Taker:
         node: Any,  # noqa: ANN401
         directory: Path | None,
         echoes: Echoes,
-        say: Callable[[str], None],
+        sayings: Sayings,
     ) -> None:
         self._node = node
         self._directory = directory
         self._echoes = echoes
-        self._say = say
+        self._sayings = sayings
         self._specs: Mapping[str, Spec] = {}
         self.taps: dict[str, Tap] = {}
         """The subscriptions that there are, by topic."""
@@ -161,7 +172,6 @@ class Taker:
         """Messages that the daemon was not there to take, by topic."""
         self.refused: Counter[str] = Counter()
         """Messages that the daemon does not accept, by topic."""
-        self._told: dict[str, str] = {}
         self._is_over = False
         self._news = node.create_guard_condition(lambda: None)
         self._thread = threading.Thread(target=self._run, name="taker", daemon=True)
@@ -190,7 +200,7 @@ class Taker:
                 except Exception as error:  # noqa: PERF203 - one topic must not end the others
                     if self._is_over or not self._node.context.ok():
                         break
-                    self._say(f"outgoing topics are set up again, as there was an error: {error}")
+                    self._sayings.say(f"outgoing topics are set up again, after an error: {error}")
                     time.sleep(1.0)
             self._settle({})
 
@@ -198,8 +208,8 @@ class Taker:
         """Take messages until the subscriptions change."""
         specs = self._specs
         self._settle(specs)
-        by_pointer = {tap.handle.pointer: tap for tap in self.taps.values()}
-        handles = [tap.handle for tap in self.taps.values()]
+        by_pointer = {tap.subscription.handle.pointer: tap for tap in self.taps.values()}
+        handles = [tap.subscription.handle for tap in self.taps.values()]
         guard = self._news.handle
         wait_set = _rclpy.WaitSet(len(handles), 1, 0, 0, 0, 0, self._node.context.handle)
         while specs is self._specs and not self._is_over:
@@ -215,7 +225,7 @@ class Taker:
         """Send the messages of a subscription that has some."""
         spec = tap.spec
         for _ in range(MOST_AT_ONCE):
-            taken = tap.handle.take_message(spec.kind.message, True)
+            taken = tap.subscription.handle.take_message(spec.kind.message, True)
             if taken is None:
                 return
             cdr, info = taken
@@ -226,22 +236,17 @@ class Taker:
         try:
             is_sent = out.send(
                 spec.bus,
-                cdr,
+                spec.head + cdr if spec.head else cdr,
                 dst=spec.robot,
-                key=_producer(spec, cdr, info),
+                key=spec.key or _producer(spec, cdr, info),
                 published_ns=info.get("source_timestamp") or None,
                 wait=False,
             )
         except MessageRefusedError as error:
             self.refused[spec.name] += 1
-            self._say_once(spec.name, f"{spec.name}: {error}")
+            self._sayings.once(f"{spec.name}: {error}")
             return
         (self.sent if is_sent else self.lost)[spec.name] += 1
-
-    def _say_once(self, name: str, text: str) -> None:
-        if self._told.get(name) != text:
-            self._told[name] = text
-            self._say(text)
 
     def _settle(self, specs: Mapping[str, Spec]) -> None:
         """Make and destroy subscriptions, so that they are those of `specs`."""
@@ -258,10 +263,17 @@ class Taker:
                     spec.kind.message, name, _never, profile, raw=True
                 )
             except Exception as error:
-                self._say_once(name, f"{name}: {error}")
+                self._sayings.once(f"{name}: {error}")
                 continue
-            self.taps[name] = Tap(spec, made, made.handle)
+            self.taps[name] = Tap(spec, made)
         self._echoes.watched = frozenset(self.taps)
+
+
+def _declaration(route: Route) -> tuple[Any, ...]:
+    """All that the daemon is told of a topic."""
+    offer = route.offer
+    is_ = offer.is_reliable, offer.is_latched
+    return route.bus, offer.kind, offer.hash, *is_, route.depth
 
 
 def _never(_: bytes) -> None:

@@ -9,6 +9,7 @@ ENCAPSULATION = b"\0\1\0\0"
 _HEAD = struct.Struct(">BBIIfB")
 GET_RESULT = "/_action/get_result"
 """End of the names of services that bring the results of actions, which may take long."""
+CANCEL_GOAL = "/_action/cancel_goal"
 MOST_KEPT = 256
 """Calls of one robot that are running or answered at a time."""
 
@@ -41,7 +42,7 @@ WORDS: dict[int, str] = {
     Status.OTHER_TYPE: "its type has other fields there; install the same version at both robots",
     Status.RESTARTED: "the bridge there has restarted since; it may or may not have been executed",
     Status.BUSY: f"{MOST_KEPT} calls are running there",
-    Status.TOO_LARGE: "its answer is too large for the link",
+    Status.TOO_LARGE: "its request or its answer is too large for the link",
     Status.TIMED_OUT: "no answer came in time",
 }
 """Why a call has no answer."""
@@ -62,6 +63,11 @@ class Packet(NamedTuple):
     def is_long(self) -> bool:
         """Whether it asks for the result of an action."""
         return self.name.endswith(GET_RESULT)
+
+    @property
+    def is_cancel(self) -> bool:
+        """Whether it cancels goals of an action."""
+        return self.name.endswith(CANCEL_GOAL)
 
     def build(self) -> bytes:
         """Its octets on the bus."""

@@ -91,10 +91,9 @@ class Parameters:
 
 def _patterns(value: Any) -> "tuple[str, ...] | None":  # noqa: ANN401
     """The patterns in a parameter's value; None if it is no list of text."""
-    if value is None:
-        return ()
-    if not isinstance(value, (list, tuple, bytes)) or (len(value) and isinstance(value, bytes)):
-        return None
     # ROS cannot tell an empty list of text from one of octets.
-    items = tuple(value)
-    return tuple(filter(None, items)) if all(isinstance(each, str) for each in items) else None
+    if value is None or value == b"":
+        return ()
+    if not isinstance(value, (list, tuple)) or not all(isinstance(each, str) for each in value):
+        return None
+    return tuple(filter(None, value))
