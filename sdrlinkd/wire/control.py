@@ -1,12 +1,23 @@
 """Control records: TLVs in entries of topic id 0xF (wire document, section 6)."""
 
 import struct
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from enum import IntEnum
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 from sdrlinkd.errors import PduError
 from sdrlinkd.wire.clock import CLOCK_SIZE, Clock, build_clock, parse_clock
+from sdrlinkd.wire.contact import (
+    CONTACT_NUMBER_SIZE,
+    KEY_SIZE,
+    Contact,
+    KeyTold,
+    build_contact,
+    build_key,
+    parse_contact,
+    parse_key,
+)
 from sdrlinkd.wire.declared import TopicPiece, build_topic, parse_topic
 from sdrlinkd.wire.registry import BROADCAST, RegistryDigest
 
@@ -34,6 +45,8 @@ class RecordType(IntEnum):
     WAITS = 9
     TOPIC = 15
     WANTED = 17
+    CONTACT = 19
+    KEY = 20
 
 
 class Stamp(NamedTuple):
@@ -134,7 +147,7 @@ class Parity(NamedTuple):
 
 
 FixedRecord = Stamp | Beacon | LinkReport | Receipt | Frame | Waits
-Record = FixedRecord | RegistryDigest | Parity | Clock | TopicPiece | Wanted
+Record = FixedRecord | RegistryDigest | Parity | Clock | TopicPiece | Wanted | Contact | KeyTold
 
 _TYPES: dict[type[FixedRecord], RecordType] = {
     Stamp: RecordType.STAMP,
@@ -152,10 +165,8 @@ _FORMATS = {
     RecordType.FRAME: struct.Struct(">BBHI"),
     RecordType.WAITS: struct.Struct(">BBBB"),
 }
-# Optional octets after the fields that a record always has.
 ASKS = b"\x01"
 _WHOSE = struct.Struct(">BHH")
-# By type number: the class and the format of a record's fields, for the parser.
 _KNOWN = {int(number): (kind, _FORMATS[number]) for kind, number in _TYPES.items()}
 
 _PARITY = struct.Struct(">BBBBBHHI")
@@ -176,7 +187,23 @@ _LEAST = {
     int(RecordType.CLOCK): CLOCK_SIZE - TLV_HEADER_SIZE,
     int(RecordType.TOPIC): TOPIC_OVERHEAD - TLV_HEADER_SIZE,
     int(RecordType.WANTED): WANTED_OVERHEAD - TLV_HEADER_SIZE,
+    int(RecordType.CONTACT): CONTACT_NUMBER_SIZE,
+    int(RecordType.KEY): KEY_SIZE,
 }
+
+
+_READERS: dict[int, Callable[[bytes], Record]] = {
+    RecordType.DIGEST: RegistryDigest.from_bytes,
+    RecordType.PARITY: lambda value: Parity._make(
+        (*_PARITY.unpack_from(value), value[_PARITY.size :])
+    ),
+    RecordType.CLOCK: parse_clock,
+    RecordType.TOPIC: parse_topic,
+    RecordType.WANTED: lambda value: Wanted(value[0], bytes(value[1:])),
+    RecordType.CONTACT: parse_contact,
+    RecordType.KEY: parse_key,
+}
+"""Readers of the values of records without fixed fields, by type number."""
 
 
 def build_records(records: Iterable[Record]) -> bytes:
@@ -220,53 +247,18 @@ def parse_records(payload: bytes) -> list[Record]:
             if length > fields.size:
                 record = _with_more(record, payload[at + fields.size : at + length])
             records.append(record)
-        elif number == RecordType.DIGEST:
-            records.append(RegistryDigest.from_bytes(payload[at : at + length]))
-        elif number == RecordType.PARITY:
-            data = payload[at + _PARITY.size : at + length]
-            records.append(Parity._make((*_PARITY.unpack_from(payload, at), data)))
-        elif number == RecordType.CLOCK:
-            records.append(parse_clock(payload[at : at + length]))
-        elif number == RecordType.TOPIC:
-            records.append(parse_topic(payload[at : at + length]))
-        elif number == RecordType.WANTED:
-            records.append(Wanted(payload[at], bytes(payload[at + 1 : at + length])))
+        elif number in _READERS:
+            records.append(_READERS[number](payload[at : at + length]))
     return records
 
 
-def _build(record: Record) -> bytes:
-    if isinstance(record, RegistryDigest):
-        number, value = RecordType.DIGEST, record.overall + record.per_topic
-        if len(record.overall) != RegistryDigest.OVERALL_SIZE or len(value) > MAX_VALUE_SIZE:
-            raise ValueError(f"a digest is 8 octets, and one a topic: {record}")
-    elif isinstance(record, Parity):
-        number = RecordType.PARITY
-        try:
-            value = _PARITY.pack(*record[:-1]) + record.data
-        except struct.error as error:
-            raise ValueError(f"{record} does not fit its record: {error}") from None
-        if len(value) > MAX_VALUE_SIZE:
-            raise ValueError(f"{len(record.data)} octets of parity do not fit a record")
-    elif isinstance(record, TopicPiece):
-        number, value = RecordType.TOPIC, build_topic(record)
-        if len(value) > MAX_VALUE_SIZE:
-            raise ValueError(f"{len(record.data)} octets of a description do not fit a record")
-    elif isinstance(record, Wanted):
-        number, value = RecordType.WANTED, bytes((record.node,)) + record.topics
-        if len(value) > MAX_VALUE_SIZE:
-            raise ValueError(f"{len(record.topics)} topics do not fit a record")
-    else:
-        number = RecordType.CLOCK if isinstance(record, Clock) else _TYPES[type(record)]
-        try:
-            value = build_clock(record) if isinstance(record, Clock) else _fixed(record, number)
-        except struct.error as error:
-            raise ValueError(f"{record} does not fit its record: {error}") from None
-        if len(value) > MAX_VALUE_SIZE:
-            raise ValueError(f"{record} does not fit its record")
-    return bytes((number, len(value))) + value
+def _build_digest(digest: RegistryDigest) -> bytes:
+    if len(digest.overall) != RegistryDigest.OVERALL_SIZE:
+        raise ValueError(f"a digest is 8 octets, and one a topic: {digest}")
+    return digest.overall + digest.per_topic
 
 
-def _fixed(record: FixedRecord, number: RecordType) -> bytes:
+def _fixed(number: RecordType, record: FixedRecord) -> bytes:
     fields = _FORMATS[number]
     if isinstance(record, Stamp):
         return fields.pack(*record[:3]) + ASKS * record.asks
@@ -274,6 +266,29 @@ def _fixed(record: FixedRecord, number: RecordType) -> bytes:
         is_whole = record[3:] != (BROADCAST, NO_AGE, 0)
         return fields.pack(*record[:3]) + (_WHOSE.pack(*record[3:]) if is_whole else b"")
     return fields.pack(*record)
+
+
+_BUILDERS: dict[type[Record], tuple[RecordType, Callable[[Any], bytes]]] = {
+    **{kind: (number, partial(_fixed, number)) for kind, number in _TYPES.items()},
+    RegistryDigest: (RecordType.DIGEST, _build_digest),
+    Parity: (RecordType.PARITY, lambda record: _PARITY.pack(*record[:-1]) + record.data),
+    Clock: (RecordType.CLOCK, build_clock),
+    TopicPiece: (RecordType.TOPIC, build_topic),
+    Wanted: (RecordType.WANTED, lambda record: bytes((record.node,)) + record.topics),
+    Contact: (RecordType.CONTACT, build_contact),
+    KeyTold: (RecordType.KEY, build_key),
+}
+
+
+def _build(record: Record) -> bytes:
+    number, build = _BUILDERS[type(record)]
+    try:
+        value = build(record)
+    except struct.error as error:
+        raise ValueError(f"{record} does not fit its record: {error}") from None
+    if len(value) > MAX_VALUE_SIZE:
+        raise ValueError(f"{record} does not fit its record")
+    return bytes((number, len(value))) + value
 
 
 def _with_more(record: FixedRecord, more: bytes) -> FixedRecord:

@@ -23,6 +23,7 @@ _AGE, _PHASE = 2, 4
 _POSTPONED = {int(RecordType.STAMP): _AGE, int(RecordType.FRAME): _PHASE}
 # A relay does not adjust FRAME: each robot announces the schedule itself.
 _FORWARDED = {int(RecordType.STAMP): _AGE}
+_STARTS = {int(RecordType.FRAME), int(RecordType.CLOCK)}
 _U32 = struct.Struct(">I")
 # The time in a RECEIPT has a smaller field, and may be absent.
 _SINCE, _SINCE_END = 6, 8
@@ -35,11 +36,21 @@ def postponed(pdu: bytes, by_us: int) -> bytes:
     """A PDU of our own, with control channel, adjusted for a burst that leaves `by_us` µs later."""
     data = bytearray(pdu)
     _move(data, by_us, _POSTPONED)
-    for kind, at, length in _records(data):
-        if kind == RecordType.RECEIPT and length >= _SINCE_END:
-            (since,) = _U16.unpack_from(data, at + _SINCE)
-            _U16.pack_into(data, at + _SINCE, min(since + by_us // RECEIPT_UNIT_US, MAX_SINCE))
-    return _sealed(data)
+    _later_receipts(data, by_us)
+    return _with_crc(data)
+
+
+def aged(pdu: bytes, by_us: int) -> bytes:
+    """An inner PDU, whose times grow by the `by_us` µs for which its sealed PDU was delayed."""
+    data = bytearray(pdu)
+    _move(data, by_us, _FORWARDED)
+    _later_receipts(data, by_us)
+    return _with_crc(data)
+
+
+def depends_on_start(pdu: bytes) -> bool:
+    """Whether a PDU with control channel holds a record whose content fits one start alone."""
+    return any(kind in _STARTS for kind, _, _ in _records(pdu))
 
 
 def forwarded(pdu: bytes, by_us: int, has_control: bool) -> bytes:
@@ -53,7 +64,7 @@ def forwarded(pdu: bytes, by_us: int, has_control: bool) -> bytes:
     data[HOP] -= 1 << 4
     if has_control:
         _move(data, by_us, _FORWARDED)
-    return _sealed(data)
+    return _with_crc(data)
 
 
 def lasting_identity(pdu: bytes) -> tuple[int, int, int]:
@@ -100,6 +111,13 @@ def _move(data: bytearray, by_us: int, kinds: dict[int, int]) -> None:
         _U32.pack_into(data, at, min(told + by_us, MAX_AGE_US))
 
 
-def _sealed(data: bytearray) -> bytes:
+def _later_receipts(data: bytearray, by_us: int) -> None:
+    for kind, at, length in _records(data):
+        if kind == RecordType.RECEIPT and length >= _SINCE_END:
+            (since,) = _U16.unpack_from(data, at + _SINCE)
+            _U16.pack_into(data, at + _SINCE, min(since + by_us // RECEIPT_UNIT_US, MAX_SINCE))
+
+
+def _with_crc(data: bytearray) -> bytes:
     data[-CRC_SIZE:] = crc_hqx(data[:-CRC_SIZE], 0).to_bytes(CRC_SIZE, "big")
     return bytes(data)

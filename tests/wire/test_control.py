@@ -14,8 +14,11 @@ from sdrlinkd.wire import (
     Arrival,
     Beacon,
     Clock,
+    Contact,
     Frame,
+    KeyTold,
     LinkReport,
+    Met,
     Parity,
     Receipt,
     RegistryDigest,
@@ -33,9 +36,9 @@ SEED = 6
 CASES = 20_000
 
 # Number of octets that the fields of each type need (clause 6).
-NEED = {1: 6, 2: 4, 3: 8, 4: 4, 5: 3, 6: 13, 7: 8, 8: 24, 9: 4, 15: 4, 17: 1}
+NEED = {1: 6, 2: 4, 3: 8, 4: 4, 5: 3, 6: 13, 7: 8, 8: 24, 9: 4, 15: 4, 17: 1, 19: 8, 20: 5}
 # Types whose records may be longer than their fields.
-OPEN = (RegistryDigest, Parity, Clock, Stamp, Receipt, TopicPiece, Wanted)
+OPEN = (RegistryDigest, Parity, Clock, Stamp, Receipt, TopicPiece, Wanted, Contact, KeyTold)
 
 octet = st.integers(0, 255)
 u16 = st.integers(0, 0xFFFF)
@@ -47,6 +50,14 @@ records = st.one_of(
         TopicPiece, octet, u16, st.integers(0, 15), st.integers(0, 15), st.binary(max_size=200)
     ),
     st.builds(Wanted, octet, st.binary(max_size=250)),
+    st.builds(
+        Contact,
+        st.binary(min_size=8, max_size=8),
+        st.lists(st.builds(Met, octet, st.binary(min_size=4, max_size=4), i31), max_size=27).map(
+            tuple
+        ),
+    ),
+    st.builds(KeyTold, st.integers(0, 3), st.booleans(), st.binary(min_size=4, max_size=4)),
     st.builds(
         Clock,
         u16,
@@ -234,6 +245,12 @@ def test_any_bytes_are_records_or_refused():
         Frame(0, 0, 0x10000, 0),
         Frame(0, 0, 0, MAX_AGE_US + 1),
         RegistryDigest(bytes(8), bytes(248)),
+        Contact(bytes(7)),
+        Contact(bytes(8), (Met(256, bytes(4), 0),)),
+        Contact(bytes(8), (Met(0, bytes(4), 1 << 31),)),
+        Contact(bytes(8), (Met(0, bytes(4), 0),) * 28),
+        KeyTold(4, False, bytes(4)),
+        KeyTold(0, False, bytes(3)),
     ],
     ids=str,
 )
