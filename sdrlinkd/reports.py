@@ -254,6 +254,33 @@ class RelayReport(msgspec.Struct, frozen=True, kw_only=True):
     """PDUs dropped, by reason (`tx_*`)."""
 
 
+class SecurityReport(msgspec.Struct, frozen=True, kw_only=True):
+    """Sealed PDUs: the keys, and the robots that have proven to be alive."""
+
+    mode: str = "off"
+    """What is sealed: off (nothing) | auth (all can read) | seal"""
+    clear: str = "accept"
+    """What happens to PDUs in the clear: accept | refuse"""
+    unproven: str = "deliver"
+    """What happens to messages of robots that are not proven: deliver | drop"""
+    kid: int | None = None
+    """Number of the key that seals, 0 to 3; null: none."""
+    fingerprint: str = ""
+    """Fingerprint of that key, in hex."""
+    further_kids: list[int] = []
+    """Numbers of the other keys that open PDUs, while keys change."""
+    proven: list[int] = []
+    """Robots that have proven to be alive now."""
+    not_proven: list[int] = []
+    """Robots that are heard and have not proven it."""
+    key_days_left: float | None = None
+    """Days for which the key can still be used; null: no key."""
+    waits: int = 0
+    """How often a burst waited for numbers of sealed PDUs."""
+    halted: str = ""
+    """Why nothing is sent any more, as a sentence; empty: all is well."""
+
+
 class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """The link: ledgers, topics, neighbors, access, and use of the channel."""
 
@@ -291,6 +318,8 @@ class LinkReport(msgspec.Struct, frozen=True, kw_only=True):
     """Whether the registry leaves a topic id free for control records."""
     registry_digest: str
     """Digest of our registry, in hex; robots with the same registry have the same digest."""
+    security: SecurityReport = SecurityReport()
+    """Sealed PDUs."""
     relayed: RelayReport = RelayReport()
     """PDUs of other robots that this robot relays."""
     fragments_repaired: int = 0

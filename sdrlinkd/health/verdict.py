@@ -44,6 +44,8 @@ def judge(snapshot: Snapshot, lately: Lately, shares_air: bool) -> VerdictReport
 
 def _down(snapshot: Snapshot) -> str:
     pdu_link = snapshot.carrier
+    if snapshot.link.security.halted:
+        return snapshot.link.security.halted
     name, since = pdu_link_name(pdu_link), span(pdu_link.since_s)
     if pdu_link.state == "opening":
         return f"no {name} yet: {pdu_link.reason}"

@@ -4,6 +4,7 @@ from collections.abc import Collection, Mapping
 from math import inf
 from random import Random
 
+import msgspec
 from zstandard import ZstdCompressionDict
 
 from sdrlinkd.link.access import AccessParams
@@ -60,6 +61,7 @@ from sdrlinkd.link.transmit import (
     fit_to,
 )
 from sdrlinkd.reports import LinkReport
+from sdrlinkd.sealing import InTheClear, Sealing
 from sdrlinkd.wire import (
     FIRST_NUMBER,
     MAX_VALUE_SIZE,
@@ -88,7 +90,8 @@ class Link:
     `now`, `start` and `at` are seconds on one clock of the caller's choice. `rng` is the only
     source of randomness. `hears_self` accepts our own PDUs, for the paper's loopback experiment.
     `has_numbers` lets producers declare topics beyond the registry, and send large messages.
-    `max_expanded` is the largest size in bytes of a decompressed message. Messages may be submitted
+    `max_expanded` is the largest size in bytes of a decompressed message. With `sealing`, PDUs are
+    sealed. Messages may be submitted
     from the start; `attach` makes the parts that need a radio.
     """
 
@@ -108,10 +111,16 @@ class Link:
         hears_self: bool = False,
         has_numbers: bool = False,
         max_expanded: int = 1 << 20,
+        sealing: Sealing | None = None,
     ) -> None:
         has_control = registry.has_control
+        clear_size = params.pdu_size
+        self.sealing = sealing or InTheClear(clear_size, has_control)
+        # Everything but the door and the last step of a burst works on inner PDUs.
+        params = msgspec.structs.replace(params, pdu_size=self.sealing.inner_size)
         self.params = params
         self.registry = registry
+        self._clear_size = clear_size
         self.own_id = own_id
         self._rng = rng
         self._classes = classes
@@ -136,7 +145,7 @@ class Link:
         )  # fmt: skip
         self._reception = Reception(
             params, reassembly, registry, self._heard_topics, own_id, relay, Inflated(dictionaries),
-            max_expanded, hears_self,
+            max_expanded, hears_self, self.sealing, clear_size,
         )  # fmt: skip
         self._receipts = Receipts(own_id, params.receipt_s)
         beacons = Beacons(params.beacon_s if has_control else 0.0, params.pdu_size, digest, rng)
@@ -145,16 +154,16 @@ class Link:
         self._tx_delays = TxDelayMeters()
         self._control_records = ControlRecords(
             clock, self._clocks, beacons, self._tx_delays, self._piggyback,
-            self._reception.neighbors, TopicTeller(self._topics, piece), self._wants,
-            self._composer.k_single,
+            self._reception.neighbors, TopicTeller(self._topics, piece), self._wants, self.sealing,
+            self._composer.k_single, own_id, clear_size,
         )  # fmt: skip
         self._forecasts = Forecasts()
         self._scheduler: BurstScheduler | NoRadio = NoRadio()
         self._why = Why(self._intake, self._outbox)
         self._reporter = Reporter(
-            params, self._topics, self._heard_topics, digest, self._outbox, self._intake,
+            self._topics, self._heard_topics, digest, self._outbox, self._intake,
             self._composer, self._control_records, self._tx_delays, self._reception, self._receipts,
-            self._clocks,
+            self._clocks, self.sealing, clear_size,
         )  # fmt: skip
 
     # The radio.
@@ -175,6 +184,7 @@ class Link:
             self._scheduler = BurstScheduler(
                 fit, self._outbox, self._composer, self._control_records, self._tx_delays,
                 self._forecasts, self._classes, self.own_id, self.registry.has_control,
+                self.sealing, self._clear_size,
             )  # fmt: skip
         else:
             self._scheduler.refit(fit)
@@ -182,6 +192,8 @@ class Link:
             # The radio's time starts now, whatever our time was.
             self._outbox.drop_all("tx_radio_down")
             self._intake.begin_anew()
+            self.sealing.begin_anew()
+        self.sealing.opener.set_uncertainty(fit.stamp_s)
         self._clocks.set_resolution(fit.stamp_s)
 
     def next_burst(self, opportunity: Opportunity) -> Burst | None:
@@ -382,6 +394,7 @@ class Link:
             self._intake.offer_again(offer, now, scheduler.bytes_per_s)
             scheduler.more_to_send()
         self._dispatch(self._reception.expire(now))
+        self.sealing.look(now)
         self._control_records.look_round(now, scheduler.record_pdu_s)
         self._control_records.tell_topics(now, scheduler.record_pdu_s)
         self._tell_dropped()

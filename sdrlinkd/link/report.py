@@ -7,7 +7,6 @@ import msgspec
 
 from sdrlinkd.link.access import Settled
 from sdrlinkd.link.packing import Composer
-from sdrlinkd.link.params import LinkParams
 from sdrlinkd.link.queue import Intake, Outbox
 from sdrlinkd.link.receipts import Receipts
 from sdrlinkd.link.receive import Reception
@@ -29,6 +28,7 @@ from sdrlinkd.reports import (
     TopicReport,
     TxReport,
 )
+from sdrlinkd.sealing import InTheClear, Sealing
 from sdrlinkd.wire import RegistryDigest
 
 Scheduler = BurstScheduler | NoRadio
@@ -50,12 +50,13 @@ class Reporter:
     """Combines the reports of the link's parts and adds rates."""
 
     def __init__(
-        self, params: LinkParams, topics: OwnTopics, heard_topics: HeardTopics,
+        self, topics: OwnTopics, heard_topics: HeardTopics,
         digest: RegistryDigest, outbox: Outbox, intake: Intake, composer: Composer,
         control_records: ControlRecords, tx_delays: TxDelayMeters, reception: Reception,
-        receipts: Receipts, clocks: Clocks,
+        receipts: Receipts, clocks: Clocks, sealing: Sealing | InTheClear, pdu_size: int,
     ) -> None:  # fmt: skip
-        self._pdu_size = params.pdu_size
+        self._sealing = sealing
+        self._pdu_size = pdu_size
         self._own = topics
         self._heard_topics = heard_topics
         self._registry = topics.registry
@@ -96,6 +97,7 @@ class Reporter:
             mcs_changes=list(sent.mcs_changes),
             control_channel=self._registry.has_control,
             registry_digest=self._digest.overall.hex(),
+            security=self._sealing.report(now),
             relayed=self._intake.report_relayed(),
             fragments_repaired=self._reception.fragments_repaired,
             receipts_untold=records.receipts_untold,
@@ -132,6 +134,7 @@ class Reporter:
         ]
         notices += self._never_met(scheduler.least_s) + scheduler.access_notices(now)
         notices += self._heard_topics.notices()
+        notices += self._sealing.notices(now)
         return notices + self._neighbors.disagreements(self._registry, self._digest)
 
     def _never_met(self, least_s: float) -> list[str]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from sdrlinkd.errors import PduError
 from sdrlinkd.wire.builder import FLAG_SEALED, HEADER, VERSION
 from sdrlinkd.wire.capacity import CRC_SIZE, HEADER_SIZE, MIN_PDU_SIZE
-from sdrlinkd.wire.later import HOP
+from sdrlinkd.wire.later import HOP, postponed
 
 TAG_SIZE = 8
 SEAL_OVERHEAD = 14
@@ -146,6 +146,11 @@ def delayed(data: bytes, by_us: int, hops: int = 0) -> bytes:
     later = held - (-max(by_us, 0) // round(1e6 * HELD_UNIT_S))
     _HELD.pack_into(changed, _HELD_AT, min(later, MAX_HELD))
     return _with_crc(bytes(changed[:-CRC_SIZE]))
+
+
+def leaves_later(pdu: bytes, by_us: int) -> bytes:
+    """A PDU of our own, with control channel, for a burst that leaves `by_us` µs later."""
+    return delayed(pdu, by_us) if is_sealed(pdu) else postponed(pdu, by_us)
 
 
 def _with_crc(body: bytes) -> bytes:

@@ -173,6 +173,11 @@ class Composer:
         """Send no more fragments of the message that `lane` has begun."""
         self._head_of_line.abandon(lane, now)
 
+    @property
+    def next_seq(self) -> int:
+        """Sequence number of our next PDU."""
+        return self._seq
+
     def end_flush(self) -> None:
         """From now on, no partly filled PDU waits for more messages."""
         self._flush.end()

@@ -16,7 +16,12 @@ from sdrlinkd.wire import (
     build_records,
 )
 
-LASTING = frozenset({RecordType.CLOCK, RecordType.RECEIPT, RecordType.TOPIC, RecordType.WANTED})
+LASTING = frozenset(
+    {
+        RecordType.CLOCK, RecordType.RECEIPT, RecordType.TOPIC, RecordType.WANTED,
+        RecordType.CONTACT,
+    }
+)  # fmt: skip
 """Record types that a new beacon does not replace."""
 
 
@@ -40,6 +45,10 @@ class PiggybackRecords:
     def holds(self, kind: RecordType) -> bool:
         """Whether a record of type `kind` waits."""
         return any(key[0] == kind for key in self.waiting)
+
+    def is_overdue(self, kind: RecordType, now: float) -> bool:
+        """Whether a record of type `kind` should have a PDU of its own at `now`."""
+        return any(key[0] == kind and each.due_at <= now for key, each in self.waiting.items())
 
     def count(self, kind: RecordType) -> int:
         """How many records of type `kind` wait."""

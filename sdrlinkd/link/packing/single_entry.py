@@ -4,7 +4,7 @@ from sdrlinkd.link.packing.draft import BuiltPdu
 from sdrlinkd.link.params import LinkParams
 from sdrlinkd.link.qos import WIRE_BITS
 from sdrlinkd.link.queue import Lane, Outbox, Outgoing
-from sdrlinkd.wire import build_full, equal_payload, flags, forwarded
+from sdrlinkd.wire import build_full, delayed, equal_payload, flags, forwarded, is_sealed
 
 
 class SingleEntry:
@@ -25,7 +25,10 @@ class SingleEntry:
         self._outbox.end(lane)
         self._outbox.served(lane)
         held_us = max(0, round(1e6 * (start - head.arrived_at)))
-        return BuiltPdu(forwarded(head.payload, held_us, self._has_control), [head], head.qos)
+        pdu = head.payload
+        if is_sealed(pdu):
+            return BuiltPdu(delayed(pdu, held_us, hops=1), [head], head.qos)
+        return BuiltPdu(forwarded(pdu, held_us, self._has_control), [head], head.qos)
 
     def fills_some(self, head: Outgoing) -> bool:
         """Whether the next fragment of `head` fills a PDU and is not the last one."""

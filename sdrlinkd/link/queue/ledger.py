@@ -24,7 +24,6 @@ TX_REASONS = {
     "tx_stalled": "no fragment of it could be sent within the receivers' reassembly timeout",
     "tx_radio_down": "no radio to send it",
     "tx_radio_failed": "the radio reported an incomplete burst",
-    "tx_no_nonce": "no packet number left (security)",
     "tx_shutdown": "the daemon stopped before it was sent",
 }
 
@@ -32,7 +31,7 @@ RX_PDU_REASONS = {
     "rx_short": "not pdu_size bytes long",
     "rx_crc": "CRC mismatch",
     "rx_version": "another version of the wire format",
-    "rx_flags": "sealed, which this node does not support",
+    "rx_flags": "sealed, and this node has no key",
     "rx_entry": "entries that contradict themselves",
     "rx_pad": "PAD is not zero",
     "rx_not_for_us": "for another destination",
@@ -41,10 +40,12 @@ RX_PDU_REASONS = {
     "rx_relayed": "for other robots; forwarded",
     "rx_control": "control records only",
     "rx_control_bad": "control entries only, and none is readable",
-    "sec_cleartext": "not sealed where sealing is required",
-    "sec_unknown_kid": "sealed with an unknown key",
-    "sec_replay": "packet number seen before",
-    "sec_bad_tag": "authentication failed",
+    "sec_cleartext": "in the clear, where only sealed PDUs count",
+    "sec_unknown_kid": "sealed with a key that is not installed here",
+    "sec_replay": "a number older than those that count",
+    "sec_bad_tag": "sealed with another key, damaged or forged",
+    "sec_late": "delayed on its way by more than it says",
+    "sec_unproven": "its source has not proven in time that it is alive",
 }
 
 RX_REASONS = {
@@ -62,6 +63,7 @@ RX_REASONS = {
     "rx_unknown_topic": "a topic id that our registry does not have, or an undeclared number",
     "rx_part_lost": "a part of a large message is missing",
     "rx_other_type": "its type has other fields here",
+    "sec_unproven": "from a robot that has not proven to be alive",
 }
 
 

@@ -41,6 +41,9 @@ class TopicPolicy(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Whether the QoS that a producer declares sets the keys that have their default value here."""
     dst: Annotated[int, Meta(ge=0, le=255)] | None = None
     """Destination robot; absent: `link.dst`."""
+    unproven: Literal["drop", "deliver"] = "drop"
+    """At a receiver with keys: what happens to messages of robots that have not proven yet that
+    they are alive now, so that these may be recordings."""
     stamp: bool = True
     """Whether to send each message's age, so that the receiver knows how late it is."""
     period_s: Annotated[float, Meta(ge=0, le=3600)] = 0.0

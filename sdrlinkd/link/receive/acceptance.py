@@ -16,9 +16,13 @@ class Acceptance:
     """The topics' policies at the receiver.
 
     A compressed message may expand to its topic's `max_bytes`, or by default to `max_expanded`.
+    `takes_all`: messages of robots that are not proven are handed over, whatever their topic.
     """
 
-    def __init__(self, registry: Registry, inflated: Inflated, max_expanded: int) -> None:
+    def __init__(
+        self, registry: Registry, inflated: Inflated, max_expanded: int, takes_all: bool
+    ) -> None:
+        self._takes_all = takes_all
         self._has_control = registry.has_control
         self._inflated = inflated
         self._max_expanded = max_expanded
@@ -32,6 +36,16 @@ class Acceptance:
     def set_named(self, policies: Mapping[str, TopicPolicy]) -> None:
         """Treat messages of declared topics by the policy of their name from now on."""
         self._named = policies
+
+    @property
+    def delivers_unproven(self) -> bool:
+        """Whether a policy lets messages through from robots that have not proven to be alive."""
+        policies = (*self._policies.values(), *self._named.values())
+        return any(policy.unproven == "deliver" for policy in policies)
+
+    def takes_unproven(self, topic: HeardTopic) -> bool:
+        """Whether messages of a topic are handed over from robots that are not proven."""
+        return self._takes_all or self.policy_of(topic).unproven == "deliver"
 
     def policy_of(self, topic: HeardTopic | None) -> TopicPolicy:
         """The policy of a topic, by default the default policy."""

@@ -9,6 +9,7 @@ from sdrlinkd.link.params import LinkParams, ReassemblyParams
 from sdrlinkd.link.receive.acceptance import Acceptance
 from sdrlinkd.link.receive.ages import Ages
 from sdrlinkd.link.receive.completion import Completion
+from sdrlinkd.link.receive.door import Admitted
 from sdrlinkd.link.receive.events import (
     Ended,
     Event,
@@ -17,6 +18,7 @@ from sdrlinkd.link.receive.events import (
     PduToRelay,
     RecordHeard,
 )
+from sdrlinkd.link.receive.heard_records import HeardRecords
 from sdrlinkd.link.receive.neighbors import Neighbor, Neighbors
 from sdrlinkd.link.receive.relay import Relay
 from sdrlinkd.link.receive.rx_ledger import Held, RxLedger
@@ -29,17 +31,14 @@ from sdrlinkd.wire import (
     Beacon,
     ControlEntries,
     Entry,
+    Frame,
     Parity,
     Pdu,
     Reassembly,
     ReassemblyLimits,
-    Receipt,
     Record,
     Registry,
-    RegistryDigest,
     Stamp,
-    TopicPiece,
-    Wanted,
     identity,
     lasting_identity,
     numbered,
@@ -70,8 +69,11 @@ class Inbox:
         acceptance: Acceptance,
         ledger: RxLedger,
         topics: HeardTopics,
+        completion: Completion,
+        clear_size: int,
     ) -> None:
         self._pdu_size = params.pdu_size
+        self._clear_size = clear_size
         self._hop_limit = params.hop_limit
         self._own_id = own_id
         self._hears_self = hears_self
@@ -81,7 +83,8 @@ class Inbox:
         self._has_control = registry.has_control
         self._has_numbers = topics.has_numbers
         self._topics = topics
-        self._completion = Completion(topics, acceptance, ledger, neighbors)
+        self._completion = completion
+        self._records = HeardRecords(own_id, topics, completion)
         limits = ReassemblyLimits(
             reassembly.timeout_s, reassembly.source_bytes, reassembly.total_bytes
         )
@@ -89,26 +92,20 @@ class Inbox:
         self._ages = Ages(reassembly.timeout_s)
         self._ledger = ledger
 
-    def hear(
-        self, data: bytes, at: float, snr_db: float | None, now: float, ended_at: float
-    ) -> list[Event]:
-        """Take a PDU and return the events that follow from it.
-
-        The preamble of its burst arrived at `at`, and the PDU's last sample at `ended_at`.
-        """
+    def hear(self, admitted: Admitted, now: float) -> list[Event]:
+        """Take a PDU and return the events that follow from it."""
+        if admitted.is_glance:
+            return self._glance(admitted)
         self._ledger.hear()
         events: list[Event] = []
+        data, at = admitted.data, admitted.at
         try:
-            pdu = parse(data, self._pdu_size)
+            read = self._read(data)
         except PduError as error:
             return self._drop(error.reason, events)
-        control = read_control_entries(pdu) if self._has_control else _NO_CONTROL
-        records = control.records
-        if self._has_numbers:
-            pdu, records = numbered(pdu), [with_topic(record) for record in records]
-        is_relayed = pdu.hop < self._hop_limit
+        pdu, control, records, is_relayed = read
         stamps = [record for record in records if isinstance(record, Stamp)]
-        if pdu.src != self._own_id or is_relayed:
+        if not admitted.was_seen and (pdu.src != self._own_id or is_relayed):
             events.append(PduHeard(pdu, stamps, at, is_relayed))
         if pdu.src == self._own_id and not self._hears_self:
             return self._drop("rx_own", events)
@@ -125,40 +122,21 @@ class Inbox:
         if control.n_bad:
             self._ledger.skip_records(control.n_bad)
         if not is_relayed:
-            neighbor.note_snr(snr_db)
+            neighbor.note_snr(admitted.snr_db)
         for stamp in stamps:
             self._ages.stamp(pdu.src, stamp, at)
         is_ours = pdu.dst in (BROADCAST, self._own_id) or self._hears_self
-        if self._relay.wants(pdu):
+        if self._relay.wants(pdu) and admitted.is_proven:
             until = min(at + self._relay.lifespan_s, self._fresh_until(pdu))
-            events.append(PduToRelay(pdu, data, at, until, is_ours))
+            events.append(PduToRelay(pdu, admitted.raw, at, until, is_ours))
             if not is_ours:
                 return self._drop("rx_relayed", events)
         if not is_ours:
             return self._drop("rx_not_for_us", events)
         for record in records:
             if isinstance(record, Beacon):
-                if not is_relayed:
-                    events.append(RecordHeard(pdu.src, record, at))
-                if neighbor.take_beacon(record):
-                    neighbor.track.restart(seq, crc)
-                    self._forget(pdu.src, now, events)
-                    self._announce(pdu.src, at, events)
-                else:
-                    neighbor.track.goes_on()
-            elif isinstance(record, RegistryDigest):
-                neighbor.take_digest(record)
-            elif isinstance(record, Receipt):
-                if pdu.dst == self._own_id or record.node == self._own_id:
-                    events.append(RecordHeard(pdu.src, record, at))
-            elif isinstance(record, TopicPiece):
-                if self._topics.take(pdu.src, record):
-                    self._completion.declared(pdu.src, record.number, now, events)
-            elif isinstance(record, Wanted):
-                if record.node == self._own_id:
-                    events.append(RecordHeard(pdu.src, record, at))
-            elif not is_relayed and not isinstance(record, Parity | Stamp):
-                events.append(RecordHeard(pdu.src, record, at))
+                self._take_beacon(record, neighbor, seq, crc, at, now, events)
+        self._records.take(pdu, admitted, neighbor, records, is_relayed, now, events)
         repaired = self._repaired(pdu.src, records, at) if records else []
         if self._reassembly.lost:
             # Parity takes memory, too, so older messages may have been evicted.
@@ -168,7 +146,7 @@ class Inbox:
             is_bad = control.n_bad >= len(entries)
             return self._drop("rx_control_bad" if is_bad else "rx_control", events)
         self._ledger.use()
-        self._take_entries(pdu, entries, neighbor, at, now, ended_at, events)
+        self._take_entries(pdu, entries, neighbor, admitted, now, events)
         return events
 
     @property
@@ -192,6 +170,43 @@ class Inbox:
         self._completion.expire(now, events)
         self._ages.expire(now, self._reassembly.holds)
         return events
+
+    def _read(self, data: bytes) -> tuple[Pdu, ControlEntries, list[Record], bool]:
+        """(PDU, its control entries, its records, whether a relay sent it). Raises PduError."""
+        # Only a PDU that came in the clear, among sealed ones, has another size.
+        pdu = parse(data, self._pdu_size if len(data) != self._clear_size else len(data))
+        control = read_control_entries(pdu) if self._has_control else _NO_CONTROL
+        records = control.records
+        if self._has_numbers:
+            pdu, records = numbered(pdu), [with_topic(record) for record in records]
+        return pdu, control, records, pdu.hop < self._hop_limit
+
+    def _glance(self, admitted: Admitted) -> list[Event]:
+        """The events that follow from the presence of a PDU whose source is not proven."""
+        try:
+            pdu, _, records, is_relayed = self._read(admitted.data)
+        except PduError:
+            return []
+        events: list[Event] = [PduHeard(pdu, [], admitted.at, is_relayed)]
+        if not is_relayed:
+            events += [
+                RecordHeard(pdu.src, record, admitted.at)
+                for record in records
+                if isinstance(record, Beacon)
+                or (isinstance(record, Frame) and admitted.may_schedule)
+            ]
+        return events
+
+    def _take_beacon(
+        self, beacon: Beacon, neighbor: Neighbor, seq: int, crc: int, at: float, now: float,
+        events: list[Event],
+    ) -> None:  # fmt: skip
+        if not neighbor.take_beacon(beacon):
+            neighbor.track.goes_on()
+            return
+        neighbor.track.restart(seq, crc)
+        self._forget(neighbor.src, now, events)
+        self._announce(neighbor.src, at, events)
 
     def _drop(self, reason: str, events: list[Event]) -> list[Event]:
         self._ledger.drop_pdu(reason)
@@ -244,12 +259,11 @@ class Inbox:
         pdu: Pdu,
         entries: Sequence[Entry],
         neighbor: Neighbor,
-        at: float,
+        admitted: Admitted,
         now: float,
-        ended_at: float,
         events: list[Event],
     ) -> None:
-        src = pdu.src
+        src, at = pdu.src, admitted.at
         reassembly = self._reassembly
         for entry in entries:
             topic_id = entry.topic_id
@@ -268,7 +282,8 @@ class Inbox:
                 stamped = (PARTS, entry_id)
             message = Whole(
                 src, topic_id, payload, pdu.compressed, self._ages.take(src, *stamped), stamped, at,
-                ended_at, reassembly.began_at, pdu.hop, neighbor.snr_db,
+                admitted.ended_at, reassembly.began_at, pdu.hop, neighbor.snr_db,
+                admitted.is_proven,
             )  # fmt: skip
             self._completion.take(message, now, events)
         if reassembly.lost:

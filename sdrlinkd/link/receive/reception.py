@@ -6,7 +6,9 @@ from sdrlinkd.link.params import LinkParams, ReassemblyParams
 from sdrlinkd.link.queue import Inflated, TopicPolicy
 from sdrlinkd.link.receive.acceptance import Acceptance
 from sdrlinkd.link.receive.air_heard import AirHeard
+from sdrlinkd.link.receive.completion import Completion
 from sdrlinkd.link.receive.delivered import Delivered, Retain
+from sdrlinkd.link.receive.door import Door
 from sdrlinkd.link.receive.events import Event
 from sdrlinkd.link.receive.handover import AgeReport, Handover
 from sdrlinkd.link.receive.inbox import Inbox
@@ -15,6 +17,7 @@ from sdrlinkd.link.receive.relay import Relay, RelayParams
 from sdrlinkd.link.receive.rx_ledger import RxLedger
 from sdrlinkd.link.topics import HeardTopics
 from sdrlinkd.reports import ReceivedTopicReport, RxReport
+from sdrlinkd.sealing import InTheClear, Sealing
 from sdrlinkd.wire import Registry, Waits
 
 
@@ -22,6 +25,7 @@ class Reception:
     """Inbox, handover, neighbors and receive ledger of one node.
 
     A compressed message may expand to its topic's `max_bytes`, or by default to `max_expanded`.
+    PDUs in the clear have `clear_size` octets, and those inside sealed ones `params.pdu_size`.
     """
 
     def __init__(
@@ -35,17 +39,23 @@ class Reception:
         inflated: Inflated,
         max_expanded: int,
         hears_self: bool,
+        sealing: Sealing | InTheClear,
+        clear_size: int,
     ) -> None:
         self._own_src = bytes((own_id,))
         self.neighbors = Neighbors(own_id)
         """The robots that are heard."""
         self._relay = Relay(relay, own_id)
         self._topics = topics
-        self._acceptance = Acceptance(registry, inflated, max_expanded)
+        self._acceptance = Acceptance(
+            registry, inflated, max_expanded, sealing.opener.delivers_unproven
+        )
         self._ledger = RxLedger(topics)
+        self._door = Door(sealing, self._acceptance, self._ledger)
+        completion = Completion(topics, self._acceptance, self._ledger, self.neighbors)
         self._inbox = Inbox(
             params, reassembly, registry, own_id, hears_self, self.neighbors, self._relay,
-            self._acceptance, self._ledger, topics,
+            self._acceptance, self._ledger, topics, completion, clear_size,
         )  # fmt: skip
         self._handover = Handover()
         self._air = AirHeard()
@@ -59,13 +69,17 @@ class Reception:
         """
         if data[1:2] != self._own_src:
             self._air.add(at, ended_at)
-        return self._inbox.hear(data, at, snr_db, now, ended_at)
+        events: list[Event] = []
+        for admitted in self._door.admit(data, at, snr_db, now, ended_at):
+            events += self._inbox.hear(admitted, now)
+        return events
 
     def expire(self, now: float) -> list[Event]:
         """Give up messages that have waited too long.
 
         Returns events for those whose senders want receipts.
         """
+        self._door.expire(now)
         return self._inbox.expire(now)
 
     def relay_refused(self) -> None:

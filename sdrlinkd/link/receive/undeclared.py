@@ -34,6 +34,8 @@ class Whole(NamedTuple):
     began_at: float
     hops_left: int
     snr_db: float | None
+    is_proven: bool = True
+    """Whether its source has proven to be alive."""
 
 
 @dataclass(slots=True)

@@ -34,6 +34,8 @@ class Burst(NamedTuple):
     """Number of the CLOCK record inside, if any."""
     tells_times: bool = False
     """Whether records inside may tell times up to `start`, such as ages; see `wire.postponed`."""
+    inner: list[bytes] = []  # noqa: RUF012  # never changed
+    """The inner PDUs of sealed ones, empty for those of other robots; none if nothing is sealed."""
 
     def is_in_vain(self, now: float) -> bool:
         """Whether all messages inside have outlived their lifespans, and there are some."""

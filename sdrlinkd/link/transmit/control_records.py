@@ -1,25 +1,40 @@
 """Times the sending of control records: in spare room, or in PDUs with a bounded share of airtime.
 
-It handles six kinds of records: beacons (with digest, link reports and WAITS), the schedule of the
-access policy (FRAME), clocks (CLOCK), RECEIPTs, declarations (TOPIC), and what consumers here
-subscribe to (WANTED). Each record is made when it is due, uses spare room in a broadcast PDU, and
-from a certain time on gets its own PDU. Such a PDU takes airtime from messages, and a half-duplex
-radio is deaf while it sends. So PDUs that hold only records take at most `clock.share` of the
-airtime, all robots together: with n robots, each sends at most one such PDU every
-n · pdu_s / share. This limits beacons, too, unless rate control or a schedule depends on them.
-Declarations have a share of their own.
+It handles seven kinds of records: beacons (with digest, link reports and WAITS), the schedule of
+the access policy (FRAME), clocks (CLOCK), RECEIPTs, declarations (TOPIC), what consumers here
+subscribe to (WANTED), and the proof that we are alive (CONTACT). Each record is made when it is
+due, uses spare room in a broadcast PDU, and from a certain time on gets its own PDU. Such a PDU
+takes airtime from messages, and a half-duplex radio is deaf while it sends. So PDUs that hold only
+records take at most `clock.share` of the airtime, all robots together: with n robots, each sends at
+most one such PDU every n · pdu_s / share. This limits beacons, too, unless rate control or a
+schedule depends on them. Declarations have a share of their own.
 """
 
 from math import inf
 
-from sdrlinkd.link.packing import PiggybackRecords
+from sdrlinkd.link.packing import BuiltPdu, PiggybackRecords
+from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.receive import Neighbors
 from sdrlinkd.link.timesync import ClockParams, Clocks
 from sdrlinkd.link.topics import TopicTeller, Wants
 from sdrlinkd.link.transmit.beacons import Beacons
 from sdrlinkd.link.transmit.rate import RateControl
 from sdrlinkd.link.transmit.tx_delay import TxDelayMeters
-from sdrlinkd.wire import ARRIVAL_SIZE, CLOCK_SIZE, Frame, Receipt, Record, RecordType
+from sdrlinkd.sealing import InTheClear, Sealing
+from sdrlinkd.wire import (
+    ARRIVAL_SIZE,
+    BROADCAST,
+    CLOCK_SIZE,
+    CONTROL_TOPIC_ID,
+    Entry,
+    Frame,
+    Pdu,
+    Receipt,
+    Record,
+    RecordType,
+    build,
+    build_records,
+)
 
 PATIENCE_S = 0.05
 """Shortest time in s that a RECEIPT or a WANTED waits for spare room."""
@@ -31,7 +46,8 @@ LESS = 1.05
 class ControlRecords:
     """Makes control records when they are due, and decides when one gets its own PDU.
 
-    `record_room` is the number of record octets in a PDU that holds only records.
+    `record_room` is the number of record octets in a PDU that holds only records. PDUs in the clear
+    have `clear_size` octets.
     """
 
     def __init__(
@@ -44,8 +60,14 @@ class ControlRecords:
         neighbors: Neighbors,
         teller: TopicTeller,
         wants: Wants,
+        sealing: Sealing | InTheClear,
         record_room: int,
+        own_id: int,
+        clear_size: int,
     ) -> None:
+        self._sealing = sealing
+        self._own_id = own_id
+        self._clear_size = clear_size
         self._params = params
         self._clocks = clocks
         self._beacons = beacons
@@ -76,12 +98,12 @@ class ControlRecords:
     @property
     def due_at(self) -> float:
         """Time from which a PDU with only records may be sent."""
-        due_at = min(self._beacons.due_at, self._piggyback.due_at)
+        due_at = min(self._beacons.due_at, self._piggyback.due_at, self._sealing.key_due_at)
         return min(due_at, self._clock_alone_at) if self._n_others else due_at
 
     def is_due(self, start: float) -> bool:
         """Whether a waiting record gets its own PDU at `start`."""
-        return self._piggyback.due_at <= start
+        return min(self._piggyback.due_at, self._sealing.key_due_at) <= start
 
     def tells_schedule(self, start: float) -> bool:
         """Whether a burst at `start` may hold the schedule, whose phase depends on the start."""
@@ -108,7 +130,9 @@ class ControlRecords:
         if start >= self._clocks.due_at and self._n_others:
             self._offer_clock(start)
             cannot_wait = cannot_wait or start >= self._clock_overdue_at
-        return cannot_wait
+        self._offer_contact(start)
+        # Nothing of ours is believed before others have it.
+        return cannot_wait or self._piggyback.is_overdue(RecordType.CONTACT, start)
 
     def took_clock(self) -> int | None:
         """The number of the CLOCK in the burst just composed; None: the CLOCK still waits."""
@@ -149,9 +173,19 @@ class ControlRecords:
         """
         for wanted in self._wants.due(now, self._neighbors.present(now)):
             self._piggyback.put_wanted(wanted, self._alone_from(now + PATIENCE_S))
+        self._offer_contact(now)
         self._offer_topics(now)
         if self._piggyback.holds(RecordType.TOPIC) and self._teller.may_pay(now, pdu_s):
             self._piggyback.make_due(RecordType.TOPIC, self._room, now)
+
+    def clear_key(self, start: float) -> BuiltPdu | None:
+        """A PDU in the clear with the KEY record that is due at `start`, if one is."""
+        told = self._sealing.clear_key(start)
+        if told is None:
+            return None
+        entry = Entry(CONTROL_TOPIC_ID, 0, 0, 1, build_records([told]))
+        pdu = Pdu(0, False, self._own_id, BROADCAST, 0, 1, [entry])
+        return BuiltPdu(build(pdu, self._clear_size), [], Qos.DEFAULT)
 
     def newcomer(self, now: float) -> None:
         """Tell all declared topics again, as a robot was heard for the first time."""
@@ -173,6 +207,11 @@ class ControlRecords:
         """Earliest time from `at` on for a PDU that holds only records."""
         return max(at, self._told_alone_at + self.period_s) if self._n_others else at
 
+    def _offer_contact(self, now: float) -> None:
+        due = self._sealing.contact(now, self._room)
+        if due is not None:
+            self._piggyback.put(*due)
+
     def _offer_topics(self, now: float) -> None:
         self._told_version = self._teller.topics.version
         for piece in self._teller.due(now):
@@ -183,6 +222,9 @@ class ControlRecords:
         records += self._tx_delays.records()
         if frame is not None:
             records.append(frame)
+        further = self._sealing.further_key()
+        if further is not None:
+            records.append(further)
         # Rate control and schedules depend on beacons; all other records can wait.
         is_needed = rate.adapts or frame is not None
         self._piggyback.offer(records, start if is_needed else self._alone_from(start))

@@ -3,7 +3,7 @@
 from bisect import insort
 
 from sdrlinkd.link.transmit.burst import Burst
-from sdrlinkd.wire import postponed
+from sdrlinkd.sealing import InTheClear, Sealing
 
 GIVE_UP_S = 2.0
 """Time in s after its first slot after which a burst that missed all its slots is given up."""
@@ -12,8 +12,8 @@ GIVE_UP_S = 2.0
 class RetryQueue:
     """Late bursts that wait for another slot, in order; the ages inside grow with the wait."""
 
-    def __init__(self, has_control: bool) -> None:
-        self._has_control = has_control
+    def __init__(self, sealing: Sealing | InTheClear) -> None:
+        self._sealing = sealing
         self.waiting: list[Burst] = []
         """The waiting bursts, in the order in which they were composed."""
         self.count = 0
@@ -34,8 +34,7 @@ class RetryQueue:
     def take(self, start: float) -> Burst:
         """Take out the next burst, adjusted to leave at `start`."""
         burst = self.waiting.pop(0)
-        pdus = burst.pdus
-        by_us = round(1e6 * (start - burst.start))
-        if self._has_control and by_us > 0:
-            pdus = [postponed(pdu, by_us) for pdu in pdus]
+        by_us, inner = round(1e6 * (start - burst.start)), burst.inner or [b""] * len(burst.pdus)
+        later = self._sealing.later
+        pdus = [later(*each, by_us, start) for each in zip(burst.pdus, inner, strict=True)]
         return burst._replace(pdus=pdus, start=start)

@@ -16,7 +16,7 @@ from math import inf
 from typing import NamedTuple
 
 from sdrlinkd.link.access import Slot, Wish
-from sdrlinkd.link.packing import BuiltPdu, Composer
+from sdrlinkd.link.packing import MAX_PDUS, BuiltPdu, Composer
 from sdrlinkd.link.qos import Qos
 from sdrlinkd.link.queue import Outbox
 from sdrlinkd.link.receive import PduHeard
@@ -30,7 +30,11 @@ from sdrlinkd.link.transmit.rate import HeardThere
 from sdrlinkd.link.transmit.report import TransmitReport
 from sdrlinkd.link.transmit.retry import RetryQueue
 from sdrlinkd.link.transmit.tx_delay import TxDelayMeters
-from sdrlinkd.wire import Record
+from sdrlinkd.sealing import InTheClear, Sealing
+from sdrlinkd.wire import TICKS_PER_S, Record
+
+TICK_S = 1 / TICKS_PER_S
+"""Time in s after which there are new numbers for sealed PDUs."""
 
 
 class _Held(NamedTuple):
@@ -55,7 +59,7 @@ class BurstScheduler:
     def __init__(
         self, fit: Fit, outbox: Outbox, composer: Composer, control_records: ControlRecords,
         tx_delays: TxDelayMeters, forecasts: Forecasts, classes: ClassesParams, own_id: int,
-        has_control: bool,
+        has_control: bool, sealing: Sealing | InTheClear, clear_size: int,
     ) -> None:  # fmt: skip
         self._outbox = outbox
         self._lives = outbox.lives
@@ -67,7 +71,11 @@ class BurstScheduler:
         self._own_id = own_id
         self._has_control = has_control
         self._number = 0
-        self._retry = RetryQueue(has_control)
+        self._sealing = sealing
+        self._clear_size = clear_size
+        self._numbers_at = -inf
+        """Time in s at which there may be numbers for sealed PDUs again."""
+        self._retry = RetryQueue(sealing)
         self._used_s = dict.fromkeys(Qos, 0.0)
         """Airtime composed so far by the class of each PDU, in s; includes bursts that failed."""
         self.airtime_s = 0.0
@@ -114,6 +122,9 @@ class BurstScheduler:
         if slot is None:
             return None
         start = slot.start
+        if not self._sealing.may_send(start, self._composer.next_seq, MAX_PDUS):
+            self._numbers_at = start + TICK_S
+            return None
         allowance = self._allowance(slot, mcs, opportunity, start >= records_due_at)
         frame = access.frame(start) if access.keeps_schedule else None
         # A schedule's phase is valid only for the planned start.
@@ -138,7 +149,7 @@ class BurstScheduler:
             records.told_alone(start)
         classes = [pdu.qos for pdu in built]
         self._spend(length_s, classes)
-        pdus = [pdu.data for pdu in built]
+        pdus, inner = self._sealed(built, start)
         access.sent(start + length_s, self._relayed_src(pdus))
         ready_at, self._ready_at = self._ready_at, None
         self._number += 1
@@ -157,6 +168,7 @@ class BurstScheduler:
             ready_at=ready_at,
             clock=clock,
             tells_times=self._has_control,
+            inner=inner,
         )
 
     def confirm(self, burst: Burst, outcome: Outcome, now: float) -> None:
@@ -196,7 +208,7 @@ class BurstScheduler:
         wakes_at = self._composer.next_wakeup(now)
         if wakes_at <= now and self._held.is_settled:
             wakes_at = self._held.until
-        return min(self._control_records.due_at, wakes_at)
+        return max(min(self._control_records.due_at, wakes_at), self._numbers_at)
 
     def clear(self) -> None:
         """Drop all bursts that wait for another slot."""
@@ -282,6 +294,9 @@ class BurstScheduler:
             if built or not may_tell or not records.is_due(start):
                 return built, 0
         alone = composer.fill_with_records(start)
+        key = records.clear_key(start) if len(built) + len(alone) < MAX_PDUS else None
+        if key is not None:
+            alone.append(key)
         return built + alone, len(alone)
 
     def _allowance(
@@ -330,6 +345,19 @@ class BurstScheduler:
         if passed_s > 0:
             self._limits.kept_free(passed_s)
             self._shares.idle(passed_s, self._outbox.waiting_classes())
+
+    def _sealed(self, built: list[BuiltPdu], start: float) -> tuple[list[bytes], list[bytes]]:
+        """The PDUs of a burst at `start` for the air, and what is inside our own sealed ones."""
+        pdus = [pdu.data for pdu in built]
+        if not self._sealing.is_on:
+            return pdus, []
+        own, size = self._own_id, self._clear_size
+        inner = [pdu if pdu[1] == own and len(pdu) != size else b"" for pdu in pdus]
+        seal = self._sealing.seal
+        sealed = [
+            seal(plain, start) if plain else pdu for pdu, plain in zip(pdus, inner, strict=True)
+        ]
+        return sealed, inner
 
     def _relayed_src(self, pdus: list[bytes]) -> int | None:
         """The robot whose PDUs a burst relays; None: our own."""

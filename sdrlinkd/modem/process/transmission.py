@@ -12,7 +12,7 @@ from sdrlinkd.config import ModemParams
 from sdrlinkd.link import Outcome
 from sdrlinkd.modem.modem import BurstOrder, BurstReport
 from sdrlinkd.modem.tempo import Tempo
-from sdrlinkd.wire import postponed
+from sdrlinkd.wire import leaves_later
 
 SHORT = 20_000
 """Longest burst in samples that is modulated on the event loop: using a thread takes longer."""
@@ -147,7 +147,7 @@ class Transmission:
         pdus = order.pdus
         if order.tells_times:
             by_us = round(1e6 * by / self._rate_hz)
-            pdus = [postponed(pdu, by_us) for pdu in pdus]
+            pdus = [leaves_later(pdu, by_us) for pdu in pdus]
         return order._replace(start=start, pdus=pdus)
 
     def _hand_over(self, made: _Modulated) -> Awaitable[TxReport] | None:

@@ -1,0 +1,116 @@
+"""The door for PDUs: opens the sealed ones, and lets those wait whose source is not proven yet."""
+
+from collections import deque
+from typing import NamedTuple
+
+from sdrlinkd.errors import PduError
+from sdrlinkd.link.receive.acceptance import Acceptance
+from sdrlinkd.link.receive.rx_ledger import RxLedger
+from sdrlinkd.sealing import InTheClear, Opened, Sealing
+from sdrlinkd.wire import is_sealed
+
+WAIT_S = 2.0
+"""Time in s for which PDUs wait for the proof of their source, and for which a schedule of a robot
+that is not proven is followed."""
+MOST_WAITING = 512
+"""Most PDUs of one source that wait."""
+
+
+class Admitted(NamedTuple):
+    """A PDU for the inbox, in the clear; `raw` is the PDU as it came.
+
+    The preamble of its burst arrived at `at`, and its last sample at `ended_at`. If `is_glance`, it
+    waits for the proof of its source, and only its presence counts. If `was_seen`, that was taken
+    before.
+    """
+
+    data: bytes
+    raw: bytes
+    at: float
+    snr_db: float | None
+    ended_at: float
+    is_proven: bool = True
+    is_glance: bool = False
+    was_seen: bool = False
+    may_schedule: bool = True
+    """Whether a schedule in it may be followed."""
+
+
+class _Waiting(NamedTuple):
+    opened: Opened
+    raw: bytes
+    at: float
+    snr_db: float | None
+    ended_at: float
+
+
+class Door:
+    """Admits PDUs to the inbox, in order, and counts those that it refuses."""
+
+    def __init__(
+        self, sealing: Sealing | InTheClear, acceptance: Acceptance, ledger: RxLedger
+    ) -> None:
+        self._sealing = sealing
+        self._opener = sealing.opener
+        self._acceptance = acceptance
+        self._ledger = ledger
+        self._waiting: dict[int, deque[_Waiting]] = {}
+        self._schedules_until: dict[int, float] = {}
+
+    def admit(
+        self, data: bytes, at: float, snr_db: float | None, now: float, ended_at: float
+    ) -> list[Admitted]:
+        """The PDUs that may be taken now that `data` has come."""
+        if not is_sealed(data):
+            if self._opener.refuses_clear(data, now):
+                self._refuse("sec_cleartext")
+                return []
+            return [Admitted(data, data, at, snr_db, ended_at)]
+        try:
+            opened = self._opener.open(data, at)
+        except PduError as error:
+            self._refuse(error.reason)
+            return []
+        src = opened.src
+        pdu = Admitted(opened.inner, data, at, snr_db, ended_at)
+        if opened.is_proven:
+            self._schedules_until.pop(src, None)
+            return [*self._release(src, now), pdu] if src in self._waiting else [pdu]
+        pdu = pdu._replace(is_proven=False, may_schedule=self._may_schedule(src, now))
+        if self._opener.delivers_unproven or self._acceptance.delivers_unproven:
+            return [pdu]
+        waiting = self._waiting.setdefault(src, deque())
+        waiting.append(_Waiting(opened, data, at, snr_db, ended_at))
+        if len(waiting) > MOST_WAITING:
+            waiting.popleft()
+            self._refuse("sec_unproven")
+        return [pdu._replace(is_glance=True)]
+
+    def expire(self, now: float) -> None:
+        """Drop the PDUs whose sources have not proven to be alive in time."""
+        for src in [src for src, each in self._waiting.items() if now - each[0].at > WAIT_S]:
+            waiting = self._waiting[src]
+            while waiting and now - waiting[0].at > WAIT_S:
+                waiting.popleft()
+                self._refuse("sec_unproven")
+            if not waiting:
+                del self._waiting[src]
+
+    def _release(self, src: int, now: float) -> list[Admitted]:
+        """The PDUs of a source that is proven now, as far as they were not delayed."""
+        released = []
+        for opened, raw, at, snr_db, ended_at in self._waiting.pop(src):
+            if now - at > WAIT_S:
+                self._refuse("sec_unproven")
+            elif self._opener.is_late(src, opened.lead_s, opened.held_s, now):
+                self._refuse("sec_late")
+            else:
+                released.append(Admitted(opened.inner, raw, at, snr_db, ended_at, was_seen=True))
+        return released
+
+    def _may_schedule(self, src: int, now: float) -> bool:
+        return now < self._schedules_until.setdefault(src, now + WAIT_S)
+
+    def _refuse(self, reason: str) -> None:
+        self._ledger.hear()
+        self._ledger.drop_pdu(reason)

@@ -1,0 +1,73 @@
+"""What becomes of the control records in a PDU that is for this robot."""
+
+from collections.abc import Iterable
+
+from sdrlinkd.link.receive.completion import Completion
+from sdrlinkd.link.receive.door import Admitted
+from sdrlinkd.link.receive.events import Event, RecordHeard
+from sdrlinkd.link.receive.neighbors import Neighbor
+from sdrlinkd.link.topics import HeardTopics
+from sdrlinkd.wire import (
+    Beacon,
+    Contact,
+    Frame,
+    KeyTold,
+    Parity,
+    Pdu,
+    Receipt,
+    Record,
+    RegistryDigest,
+    Stamp,
+    TopicPiece,
+    Wanted,
+)
+
+_ELSEWHERE = (Parity, Stamp, Contact, KeyTold)
+"""Records that others take: the inbox, and sealing."""
+
+
+class HeardRecords:
+    """Takes records about the source itself, and passes on those that other parts need."""
+
+    def __init__(self, own_id: int, topics: HeardTopics, completion: Completion) -> None:
+        self._own_id = own_id
+        self._topics = topics
+        self._completion = completion
+
+    def take(
+        self,
+        pdu: Pdu,
+        admitted: Admitted,
+        neighbor: Neighbor,
+        records: Iterable[Record],
+        is_relayed: bool,
+        now: float,
+        events: list[Event],
+    ) -> None:
+        """Take the records of a PDU, in order.
+
+        What a source that is not proven says about others is not used, nor are its clocks.
+        """
+        src, at = pdu.src, admitted.at
+        for record in records:
+            if isinstance(record, Beacon):
+                if not is_relayed and not admitted.was_seen:
+                    events.append(RecordHeard(src, record, at))
+            elif isinstance(record, RegistryDigest):
+                neighbor.take_digest(record)
+            elif isinstance(record, TopicPiece):
+                if self._topics.take(src, record):
+                    self._completion.declared(src, record.number, now, events)
+            elif isinstance(record, Frame):
+                if not is_relayed and not admitted.was_seen and admitted.may_schedule:
+                    events.append(RecordHeard(src, record, at))
+            elif not admitted.is_proven or isinstance(record, _ELSEWHERE):
+                continue
+            elif isinstance(record, Receipt):
+                if self._own_id in (pdu.dst, record.node):
+                    events.append(RecordHeard(src, record, at))
+            elif isinstance(record, Wanted):
+                if record.node == self._own_id:
+                    events.append(RecordHeard(src, record, at))
+            elif not is_relayed:
+                events.append(RecordHeard(src, record, at))

@@ -1,0 +1,91 @@
+"""The counterpart of sealing for a robot without keys: everything is in the clear."""
+
+from math import inf
+
+from sdrlinkd.errors import PduError
+from sdrlinkd.reports import SecurityReport
+from sdrlinkd.sealing.opener import Opened, clear_key_in
+from sdrlinkd.sealing.strangers import Strangers
+from sdrlinkd.wire import Contact, KeyTold, parse_sealed, postponed
+
+
+class ClearOpener:
+    """Takes PDUs in the clear, and notes sealed ones; its methods are those of `Opener`."""
+
+    delivers_unproven = True
+
+    def __init__(self, pdu_size: int) -> None:
+        self._pdu_size = pdu_size
+        self.strangers = Strangers(None)
+
+    def set_uncertainty(self, stamp_s: float) -> None:
+        """Nothing depends on the times of bursts."""
+
+    def open(self, data: bytes, at: float) -> Opened:
+        """Note a sealed PDU, which never opens. Raises PduError with the ledger's reason."""
+        pdu = parse_sealed(data, self._pdu_size)
+        self.strangers.closed(pdu.src, pdu.kid, at)
+        raise PduError("rx_flags", "sealed (E=1), and this node has no keys")
+
+    def is_late(self, src: int, lead_s: float, held_s: float, now: float) -> bool:  # noqa: ARG002  # as in Opener
+        """Whether a PDU was delayed by more than it says: nothing tells."""
+        return False
+
+    def is_proven(self, src: int, now: float) -> bool:  # noqa: ARG002  # as in Opener
+        """Whether a robot has proven to be alive: nothing tells, so all are believed."""
+        return True
+
+    def refuses_clear(self, data: bytes, now: float) -> bool:
+        """Whether a PDU in the clear is refused: never; a KEY record in it is noted."""
+        key = clear_key_in(data, self._pdu_size)
+        if key is not None:
+            self.strangers.tells(data[1], key, now)
+        return False
+
+
+class InTheClear:
+    """Leaves PDUs as they are. Its methods are those of `Sealing`."""
+
+    is_on = False
+    halted = ""
+    contact_due_at = key_due_at = inf
+
+    def __init__(self, pdu_size: int, has_control: bool) -> None:
+        self.inner_size = pdu_size
+        self._has_control = has_control
+        self.opener = ClearOpener(pdu_size)
+
+    def may_send(self, start: float, seq: int, n: int) -> bool:  # noqa: ARG002  # as in Sealing
+        """Whether a burst at `start` can hold `n` PDUs of ours: always."""
+        return True
+
+    def seal(self, inner: bytes, start: float) -> bytes:  # noqa: ARG002  # as in Sealing
+        """The PDU as it is."""
+        return inner
+
+    def later(self, pdu: bytes, inner: bytes, by_us: int, start: float) -> bytes:  # noqa: ARG002  # as in Sealing
+        """A PDU that did not leave, for a burst `by_us` µs later."""
+        return postponed(pdu, by_us) if self._has_control and by_us > 0 else pdu
+
+    def begin_anew(self) -> None:
+        """Nothing depends on a clock."""
+
+    def contact(self, now: float, room: int) -> tuple[Contact, float] | None:
+        """The CONTACT that is due: none."""
+
+    def further_key(self) -> KeyTold | None:
+        """The KEY record of a key to which this robot can change: none."""
+
+    def clear_key(self, now: float) -> KeyTold | None:
+        """The KEY record to be told in the clear: none."""
+
+    def look(self, now: float) -> None:
+        """There are no keys to change."""
+
+    def notices(self, now: float) -> list[str]:
+        """A sentence on each robot that seals its PDUs."""
+        return self.opener.strangers.notices(now)
+
+    def report(self, now: float) -> SecurityReport:  # noqa: ARG002  # as in Sealing
+        """The report: nothing is sealed."""
+        return SecurityReport()

@@ -1,0 +1,49 @@
+"""The keys held, and the ciphers that follow from them."""
+
+from collections.abc import Collection, Mapping, Sequence
+
+from sdrlinkd.sealing.keys import Ciphers, Key
+from sdrlinkd.sealing.rotation import Rotation
+from sdrlinkd.wire import KEY_PREFIX_SIZE, KeyTold
+
+
+class HeldKeys:
+    """The keys by kid, and the one that seals; `in_use` is the fingerprint of that before."""
+
+    def __init__(self, keys: Sequence[Key], mode: str, in_use: bytes) -> None:
+        self.mode = mode
+        self.rotation = Rotation(keys, in_use)
+        self.by_kid: dict[int, Ciphers] = {}
+        self._ready: Collection[bytes] = ()
+        self._take()
+
+    @property
+    def all(self) -> list[Key]:
+        """All keys that open PDUs."""
+        return self.rotation.keys
+
+    def install(self, keys: Sequence[Key]) -> None:
+        """Hold other keys from now on; the one that seals stays if it is among them."""
+        self.rotation.install(keys)
+        self._take()
+
+    def note_ready(self, fingerprints: Collection[bytes]) -> None:
+        """Note the keys whose floors are on disk."""
+        self._ready = fingerprints
+
+    def look(self, now: float, heard_at: Mapping[int, float]) -> None:
+        """Change to the next key if it is time; `heard_at`: when each other robot was heard."""
+        if self.rotation.look(now, heard_at, self._ready):
+            self._take()
+
+    def told(self, key: Key) -> KeyTold:
+        """The KEY record of a key."""
+        return KeyTold(key.kid, self.mode == "auth", key.fingerprint[:KEY_PREFIX_SIZE])
+
+    def _take(self) -> None:
+        known = {each.key: each for each in self.by_kid.values()} if self.by_kid else {}
+        self.by_kid = {}
+        for key in self.rotation.keys:
+            self.by_kid[key.kid] = known.get(key) or Ciphers(key, self.mode)
+        self.own = self.by_kid[self.rotation.own.kid]
+        """The key that seals."""

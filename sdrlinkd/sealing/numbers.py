@@ -1,0 +1,107 @@
+"""The numbers of our sealed PDUs: each (T, seq) once, whatever happens to clocks and power."""
+
+from math import floor
+
+from sdrlinkd.wire import N_TICKS, TICKS_PER_S
+
+RESERVE_S = 60.0
+"""Key time in s that is on disk ahead of use."""
+LEAST_RESERVE_S = 20.0
+"""Reserve in s at which the floor is moved on."""
+LEAP_S = 30.0
+"""Key time in s that a start skips. It is longer than a proof lasts, so that no attacker can pass a
+PDU of one life off as one of another by delaying it (see `peers`)."""
+REMEMBERED_TICKS = 10 * TICKS_PER_S
+N_SEQS = 256
+
+
+class Numbers:
+    """Gives out the numbers (T, seq), and says which floor must be on disk.
+
+    `floor` is what was on disk; 0: the key is new. No T may be used before `move_floor` tells a
+    floor above it that is on disk.
+    """
+
+    def __init__(self, floor: int) -> None:
+        begin = floor + round(LEAP_S * TICKS_PER_S) if floor else 0
+        self._begin = begin
+        self._zero: float | None = None
+        self.floor = begin
+        """T from which on nothing is on disk."""
+        self.newest = begin
+        """The largest T given out, or the first that may be."""
+        self._last = [-1] * N_SEQS
+        """The last T given out with each seq."""
+        self._used: dict[int, int] = {}
+        """The numbers given out lately: a bit for each seq, by T."""
+        self.first = begin
+        """The first T of this life."""
+
+    def clock(self, at: float) -> float:
+        """The key time in s at time `at`."""
+        if self._zero is None:
+            self._zero = at
+        return self._begin / TICKS_PER_S + (at - self._zero)
+
+    def begin_anew(self) -> None:
+        """Go on from the newest T, as another clock starts."""
+        if self._zero is not None:
+            self._begin, self._zero = self.newest + 1, None
+
+    def leap_beyond(self, floor: int) -> None:
+        """Use no T below `floor`, as another key was used up to there."""
+        if floor > self.newest:
+            self._begin, self._zero = floor + round(LEAP_S * TICKS_PER_S), None
+            self.newest = max(self.newest, self._begin)
+
+    def is_out(self, at: float) -> bool:
+        """Whether no number that is on disk is left at `at`."""
+        return self._ticks(at) >= self.floor
+
+    def is_used_up(self, at: float) -> bool:
+        """Whether the key is used up at `at`."""
+        return self._ticks(at) >= N_TICKS
+
+    def wanted_floor(self, at: float) -> int | None:
+        """The floor that should be written to disk now; None: the present one suffices."""
+        ticks = max(self._ticks(at), self.newest)
+        if self.floor - ticks > LEAST_RESERVE_S * TICKS_PER_S:
+            return None
+        return min(ticks + round(RESERVE_S * TICKS_PER_S), N_TICKS)
+
+    def move_floor(self, written: int) -> None:
+        """Note the floor that is on disk now."""
+        self.floor = max(self.floor, written)
+
+    def fits(self, at: float, seq: int, n: int) -> bool:
+        """Whether `n` PDUs from `seq` on can have numbers in a burst at `at`."""
+        ticks, last = self._ticks(at), self._last
+        if not self.first <= ticks < min(self.floor, N_TICKS):
+            return False
+        return all(last[(seq + i) % N_SEQS] < ticks for i in range(n))
+
+    def take(self, at: float, seq: int) -> int | None:
+        """The T of a PDU with `seq` in a burst at `at`; None: it must wait."""
+        if not self.fits(at, seq, 1):
+            return None
+        ticks = self._last[seq] = self._ticks(at)
+        self.newest = max(self.newest, ticks)
+        if ticks not in self._used:
+            self._used[ticks] = 0
+            while (oldest := next(iter(self._used))) < ticks - REMEMBERED_TICKS:
+                del self._used[oldest]
+        self._used[ticks] |= 1 << seq
+        return ticks
+
+    def is_foreign(self, ticks: int, seq: int) -> bool:
+        """Whether a number under our id, newer than our start, was not given out by us.
+
+        False if it is too old to know.
+        """
+        if ticks < max(self.first, self.newest - REMEMBERED_TICKS):
+            return False
+        return not self._used.get(ticks, 0) >> seq & 1
+
+    def _ticks(self, at: float) -> int:
+        # Never ahead of the key time: that no PDU seems younger than it is depends on this.
+        return floor(self.clock(at) * TICKS_PER_S)

@@ -1,0 +1,161 @@
+"""What is known about each source of sealed PDUs: what it sent already, and how late it is."""
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from math import inf
+from typing import NamedTuple
+
+from sdrlinkd.wire import TICKS_PER_S
+
+WINDOW_TICKS = 2 * TICKS_PER_S
+"""T older than the newest by more than this is refused."""
+BUCKET_S = 30.0
+SILENT_S = 20.0
+"""Time in s without a PDU after which a source must prove anew that it is alive.
+
+If it restarts, its T leaps by more than this. So an attacker who delays all PDUs of its new life by
+that leap, to make them look like those of the old one, meets a source that is not proven."""
+PROOF_S = 60.0
+"""Time in s for which a proof lasts; the drift of two clocks in it is negligible."""
+RESTARTED_S = -0.13
+"""A delay in s below which the source's clock must have begun anew."""
+
+
+class Window:
+    """The numbers opened of one source under one key; `oldest` is the least T that is taken."""
+
+    def __init__(self, oldest: int = 0) -> None:
+        self.newest = -1
+        self._oldest = oldest
+        self._seen: dict[int, int] = {}
+
+    def judge(self, ticks: int, seq: int) -> str:
+        """The ledger's reason to refuse a number; empty if it is new."""
+        if ticks < self._oldest:
+            return "sec_replay"
+        return "rx_dup" if self._seen.get(ticks, 0) >> seq & 1 else ""
+
+    def take(self, ticks: int, seq: int) -> None:
+        """Note that a PDU with this number was opened."""
+        self._seen[ticks] = self._seen.get(ticks, 0) | 1 << seq
+        if ticks > self.newest:
+            self.newest = ticks
+            self._oldest = max(self._oldest, ticks - WINDOW_TICKS)
+            for each in [each for each in self._seen if each < self._oldest]:
+                del self._seen[each]
+
+
+class Least:
+    """The least value of the last 30 to 60 s."""
+
+    def __init__(self) -> None:
+        self._begin = -inf
+        self._now = self._before = inf
+
+    @property
+    def value(self) -> float:
+        """The least value; infinity if there is none."""
+        return min(self._now, self._before)
+
+    def add(self, value: float, at: float) -> None:
+        """Note a value at time `at`."""
+        if at >= self._begin + BUCKET_S:
+            is_next = at < self._begin + 2 * BUCKET_S
+            self._before, self._now = (self._now if is_next else inf), inf
+            self._begin = at
+        self._now = min(self._now, value)
+
+
+class Peers:
+    """All sources; `oldest` gives the least T that is taken of each, by kid and source."""
+
+    def __init__(self, oldest: Callable[[int, int], int]) -> None:
+        self._oldest = oldest
+        self._by_src: dict[int, Peer] = {}
+
+    def __iter__(self) -> Iterator[tuple[int, "Peer"]]:
+        return iter(self._by_src.items())
+
+    def of(self, src: int) -> "Peer":
+        """What is known about robot `src`."""
+        if src not in self._by_src:
+            self._by_src[src] = Peer(partial(self._oldest, src))
+        return self._by_src[src]
+
+    def was_opened(self, src: int) -> bool:
+        """Whether a sealed PDU of robot `src` was ever opened in this life."""
+        known = self._by_src.get(src)
+        return known is not None and any(each.newest >= 0 for each in known.windows.values())
+
+    def newest(self, kid: int) -> dict[int, int]:
+        """The newest T of each source under a key."""
+        return {
+            src: peer.windows[kid].newest
+            for src, peer in self._by_src.items()
+            if kid in peer.windows and peer.windows[kid].newest >= 0
+        }
+
+
+class Proof(NamedTuple):
+    """A source's word at `at`: its clock is ahead of ours by at most `ahead_s`."""
+
+    ahead_s: float
+    at: float
+
+
+class Peer:
+    """One source of sealed PDUs.
+
+    `lead_s` below is our key time at a PDU's arrival minus the T in it, in s: how far our clock is
+    ahead of the source's, plus the PDU's delay.
+    """
+
+    def __init__(self, oldest: Callable[[int], int]) -> None:
+        self._oldest = oldest
+        self.windows: dict[int, Window] = {}
+        """By kid."""
+        self.least = Least()
+        """The least lead, in s."""
+        self.number: bytes | None = None
+        """Its number in CONTACT."""
+        self._proof: Proof | None = None
+        self.heard_at = -inf
+        """When its last PDU that was in time came, in s."""
+
+    def is_proven(self, now: float) -> bool:
+        """Whether it has proven to be alive in this life of ours, and was heard since."""
+        proof = self._proof
+        return proof is not None and now - self.heard_at < SILENT_S and now - proof.at < PROOF_S
+
+    def lapse(self, now: float) -> bool:
+        """Forget a proof that has lasted too long; returns whether there was one."""
+        lapses = self._proof is not None and not self.is_proven(now)
+        if lapses:
+            self._proof = None
+        return lapses
+
+    def window(self, kid: int) -> Window:
+        """The numbers opened under a key."""
+        if kid not in self.windows:
+            self.windows[kid] = Window(self._oldest(kid))
+        return self.windows[kid]
+
+    def prove(self, proof: Proof) -> None:
+        """Note that the source is alive, and how far its clock is ahead of ours."""
+        self._proof, self.heard_at = proof, proof.at
+
+    def restart(self) -> None:
+        """Forget what depends on the source's clock, which has begun anew."""
+        self._proof = None
+        self.least = Least()
+
+    def excess_s(self, lead_s: float, held_s: float) -> tuple[float, float]:
+        """By how much in s a PDU's delay exceeds `held_s`, at least and at most."""
+        least_s = lead_s - self.least.value - held_s
+        if self._proof is None:
+            return least_s, least_s
+        return least_s, lead_s + self._proof.ahead_s - held_s
+
+    def has_restarted(self, lead_s: float) -> bool:
+        """Whether a PDU arrives before it can have been sent."""
+        return self._proof is not None and lead_s + self._proof.ahead_s < RESTARTED_S
