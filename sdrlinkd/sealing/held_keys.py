@@ -1,10 +1,14 @@
 """The keys held, and the ciphers that follow from them."""
 
 from collections.abc import Collection, Mapping, Sequence
+from typing import TYPE_CHECKING
 
-from sdrlinkd.sealing.keys import Ciphers, Key
+from sdrlinkd.sealing.keys import Key
 from sdrlinkd.sealing.rotation import Rotation
 from sdrlinkd.wire import KEY_PREFIX_SIZE, KeyTold
+
+if TYPE_CHECKING:
+    from sdrlinkd.sealing.ciphers import Ciphers
 
 
 class HeldKeys:
@@ -41,6 +45,9 @@ class HeldKeys:
         return KeyTold(key.kid, self.mode == "auth", key.fingerprint[:KEY_PREFIX_SIZE])
 
     def _take(self) -> None:
+        # A robot without keys does not need the library, which takes memory and time to load.
+        from sdrlinkd.sealing.ciphers import Ciphers
+
         known = {each.key: each for each in self.by_kid.values()} if self.by_kid else {}
         self.by_kid = {}
         for key in self.rotation.keys:

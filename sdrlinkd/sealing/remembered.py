@@ -38,8 +38,11 @@ class Memory:
     def wanted(self, now: float) -> Remembered | None:
         """What should be written at `now`; None: what is on disk suffices."""
         self._is_out = self._numbers.is_out(now)
-        floor, floors = self._numbers.wanted_floor(now), self._remembered.floors
-        if floor is None and all(key.fingerprint in floors for key in self._keys.all):
+        floor, on_disk = self._numbers.wanted_floor(now), self._remembered
+        is_known = on_disk.in_use == self._keys.own.key.fingerprint and all(
+            key.fingerprint in on_disk.floors for key in self._keys.all
+        )
+        if floor is None and is_known:
             return None
         return self._present(self._numbers.floor if floor is None else floor)
 

@@ -3,7 +3,8 @@
 import pytest
 
 from sdrlinkd.errors import PduError
-from sdrlinkd.sealing.keys import Ciphers, Key
+from sdrlinkd.sealing import Key
+from sdrlinkd.sealing.ciphers import Ciphers
 from sdrlinkd.wire import (
     Contact,
     KeyTold,

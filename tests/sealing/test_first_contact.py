@@ -1,0 +1,190 @@
+"""First contact: who is believed, how soon, and by whom never."""
+
+import pytest
+
+from sdrlinkd.link import AccessParams, RelayParams
+from sdrlinkd.sealing import SecurityParams
+from tests.sealing.team import KEY, NEXT, Robot, Team
+
+CDR = b"\0\1\0\0"
+
+
+def security(team, robot_id):
+    robot = team.robots[robot_id]
+    return robot.link.report(robot.clock(team.now)).security
+
+
+def notices(team, robot_id):
+    robot = team.robots[robot_id]
+    return robot.link.notices(robot.clock(team.now))
+
+
+def dropped(team, robot_id):
+    robot = team.robots[robot_id]
+    return robot.link.report(robot.clock(team.now)).rx.pdus_dropped
+
+
+def send(team, robot_id, payload=b"", topic_id=1):
+    robot = team.robots[robot_id]
+    assert robot.link.submit(topic_id, CDR + payload, robot.clock(team.now)) is None
+
+
+def test_two_robots_prove_each_other_within_a_second():
+    team = Team(Robot(1, [KEY]), Robot(2, [KEY]))
+    team.run(1.0)
+    for robot in team.robots.values():
+        assert security(team, robot.id).proven == [3 - robot.id]
+        assert robot.link.audit() == []
+
+
+def test_what_is_sent_before_the_proof_waits_and_comes_in_order():
+    team = Team(Robot(1, [KEY]), Robot(2, [KEY]))
+    for number in range(5):
+        send(team, 1, bytes([number]))
+    team.run(0.005)
+    assert team.robots[2].heard == []
+    team.run(1.0)
+    assert [each.payload[4:] for each in team.robots[2].heard] == [bytes([n]) for n in range(5)]
+    assert all(each.age_s is not None for each in team.robots[2].heard)
+
+
+def test_who_never_hears_us_is_never_believed():
+    team = Team(Robot(1, [KEY]), Robot(2, [KEY]), hears=lambda receiver, _: receiver == 2)
+    for _ in range(20):
+        send(team, 1)
+        team.run(0.5)
+    assert team.robots[2].heard == []
+    assert security(team, 2).not_proven == [1]
+    assert dropped(team, 2)["sec_unproven"] > 15
+    assert team.robots[2].link.audit() == []
+
+
+@pytest.mark.parametrize("of_topic", [False, True])
+def test_a_station_that_only_receives_can_take_all(of_topic):
+    params = SecurityParams(mode="seal", unproven="drop" if of_topic else "deliver")
+    team = Team(Robot(1, [KEY]), Robot(2, [KEY], params), hears=lambda receiver, _: receiver == 2)
+    link = team.robots[2].link
+    if of_topic:
+        policy = link.policy(1)
+        link.set_policy(1, type(policy)(unproven="deliver"))
+    for _ in range(20):
+        send(team, 1)
+        send(team, 1, topic_id=0)
+        team.run(0.1)
+    topics = 1 if of_topic else 2
+    assert len(team.robots[2].heard) == 20 * topics
+    received = link.report(0.0).received
+    assert sum(each.dropped.get("sec_unproven", 0) for each in received) == 20 * (2 - topics)
+    assert link.audit() == []
+
+
+def test_five_robots_with_tdma_start_cold():
+    access = AccessParams(
+        policy="tdma", nodes=[1, 2, 3, 4, 5], slot_s=0.025, guard_s=0.002, minislot_s=0.0
+    )
+    team = Team(*(Robot(each, [KEY], access=access) for each in range(1, 6)))
+    team.run(10.0)
+    for each in range(1, 6):
+        assert security(team, each).proven == [other for other in range(1, 6) if other != each]
+
+
+def test_a_chain_of_three():
+    relay = RelayParams(policy="flood")
+    robots = [Robot(each, [KEY], relay=relay, hop_limit=3) for each in (1, 2, 3)]
+    team = Team(*robots, hears=lambda a, b: abs(a - b) == 1)
+    team.run(3.0)
+    assert security(team, 3).proven == [1, 2]
+    for number in range(100):
+        send(team, 1, bytes([number]), topic_id=0)
+        team.run(0.05)
+    assert [each.payload[4] for each in team.robots[3].heard] == list(range(100))
+    assert max(each.age_s for each in team.robots[3].heard) < 0.05
+
+
+def test_two_robots_with_different_keys_say_so_within_5_s():
+    team = Team(Robot(1, [KEY]), Robot(2, [other(NEXT)]))
+    team.run(5.0)
+    for each in (1, 2):
+        (notice,) = [n for n in notices(team, each) if "another key 0" in n]
+        assert f"robot {3 - each} has another key 0" in notice
+        assert other(NEXT).fingerprint[:4].hex() in notice
+        assert KEY.fingerprint[:4].hex() in notice
+    assert dropped(team, 1)["sec_bad_tag"] > 0
+    assert dropped(team, 1)["sec_cleartext"] == 1
+
+
+def other(key):
+    """The same key under kid 0."""
+    return type(key)(0, key.secret)
+
+
+def test_a_key_that_is_not_installed():
+    team = Team(Robot(1, [KEY]), Robot(2, [NEXT]))
+    team.run(5.0)
+    assert any(
+        "has another key 1" in each and "ours with none" in each for each in notices(team, 1)
+    )
+    assert dropped(team, 1)["sec_unknown_kid"] > 0
+
+
+def test_one_key_in_two_modes():
+    team = Team(Robot(1, [KEY]), Robot(2, [KEY], SecurityParams(mode="auth")))
+    team.run(5.0)
+    assert any("in the mode auth" in each and "security.mode" in each for each in notices(team, 1))
+    assert any("in the mode seal" in each and "security.mode" in each for each in notices(team, 2))
+
+
+def test_a_robot_without_a_key():
+    team = Team(Robot(1, [KEY]), Robot(2, [KEY], SecurityParams()))
+    send(team, 2)
+    team.run(3.0)
+    assert team.robots[1].heard == team.robots[2].heard == []
+    assert any("robot 2 sends in the clear" in each for each in notices(team, 1))
+    assert any("robot 1 seals its PDUs, and this robot has no key" in n for n in notices(team, 2))
+    assert dropped(team, 1)["sec_cleartext"] > 0
+    assert dropped(team, 2)["rx_flags"] > 0
+
+
+def test_clear_is_accepted_on_request_but_not_from_who_sealed_once():
+    accepts = SecurityParams(mode="seal", clear="accept")
+    team = Team(Robot(1, [KEY], accepts), Robot(2, [KEY], SecurityParams()), Robot(3, [KEY]))
+    team.run(1.0)
+    send(team, 2)
+    send(team, 3)
+    team.run(0.5)
+    assert {each.src for each in team.robots[1].heard} == {2, 3}
+    # Robot 3 begins to send in the clear, or somebody does in its name.
+    for is_new_life in (False, True):
+        if is_new_life:
+            team.robots[1].start(team.now)
+        team.robots[3].params = SecurityParams()
+        team.robots[3].start(team.now)
+        heard = len([each for each in team.robots[1].heard if each.src == 3])
+        send(team, 3)
+        team.run(1.0)
+        assert len([each for each in team.robots[1].heard if each.src == 3]) == heard
+        # What is on disk says so, too, in the next life.
+        team.robots[1].disk = team.robots[1].sealing.memory.at_stop()
+
+
+def test_another_robot_with_our_id_and_key_stops_us():
+    team = Team(Robot(1, [KEY]), Robot(2, [KEY]))
+    team.run(40.0)
+    double = Robot(1, [KEY])
+    clone = Team(double)
+    clone.run(1.0)
+    old_life = clone.on_air[0][2]
+    # It is older than our start, so it may be a recording of ourselves.
+    team.robots[1].hear(old_life, team.now)
+    assert security(team, 1).halted == ""
+    double.sealing._numbers.leap_beyond(32 * 60)  # noqa: SLF001  # as after a year
+    double.write(clone.now)
+    clone.run(12.0)
+    team.robots[1].hear(clone.on_air[-1][2], team.now)
+    assert "another robot has our id 1 and our key" in security(team, 1).halted
+    n = len(team.on_air)
+    team.run(2.0)
+    assert [src for _, src, _ in team.on_air[n:] if src == 1] == []
+    team.robots[1].start(team.now)
+    team.run(0.5)
+    assert security(team, 1).halted == ""
