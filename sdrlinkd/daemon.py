@@ -24,6 +24,7 @@ from sdrlinkd.control import Control
 from sdrlinkd.declaring import Declaring
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.health import Level
+from sdrlinkd.keeping import open_keeping
 from sdrlinkd.link import Link
 from sdrlinkd.modem import Loading, access_words, check_airtime, make_modem
 from sdrlinkd.node import Node
@@ -115,6 +116,9 @@ async def _open(
     rng = Random(os.urandom(16) if config.seed is None else config.seed)
     directory = RuntimeDirectory(_runtime_directory(config))
     stack.callback(directory.close)
+    keeping = open_keeping(setup)
+    if keeping is not None:
+        stack.callback(keeping.close)
     link = Link(
         config.link,
         config.queue,
@@ -129,6 +133,7 @@ async def _open(
         hears_self=config.hears_self,
         has_numbers=setup.has_numbers,
         max_expanded=config.bus.max_message_bytes,
+        sealing=keeping.sealing if keeping is not None else None,
     )
     policies = Policies(setup, link)
     loading = Loading()
@@ -142,12 +147,12 @@ async def _open(
     types, transforms = _types_of(setup), _transforms(setup)
     open_bus = partial(Bus, context, directory, setup)
     chrony = _chrony(setup, stack)
-    node = Node(setup, link, opening, open_bus, transforms, types, chrony)
+    node = Node(setup, link, opening, open_bus, transforms, types, chrony, keeping)
     stack.callback(node.bus.close)
     policies.announce = node.bus.announce
     control = Control(context, directory)
     stack.callback(control.close)
-    reloading = Reloading(setup, reload, check, policies, opening)
+    reloading = Reloading(setup, reload, check, policies, opening, keeping)
     declaring = Declaring(setup, link, policies, node.bus, transforms)
     control.serve(make_verbs(setup, node, control, policies, opening, reloading, declaring))
     stack.push_async_callback(opening.close)
@@ -161,6 +166,8 @@ async def _open(
         "sdrlinkd %s: robot %d on %s, %d topics, sockets in %s",
         __version__, setup.node_id, config.backend, len(setup.topics_in), directory.path,
     )  # fmt: skip
+    if keeping is None and config.backend not in WITHOUT_AIR:
+        log.info("PDUs are in the clear: anybody in range can send commands (security.mode)")
     for warning in setup.all_warnings:
         log.warning("%s", warning)
     return node, control, reloading

@@ -13,6 +13,7 @@ from sdrlinkd.bus import Bus, Ingress
 from sdrlinkd.config import Setup
 from sdrlinkd.health import Health
 from sdrlinkd.hostclock import HostClock
+from sdrlinkd.keeping import Keeping
 from sdrlinkd.link import (
     AS_CONFIGURED,
     Burst,
@@ -45,7 +46,8 @@ class Node:
     """Connects the link, the bus and the PDU link; it has no queue and takes no decision itself.
 
     `types` knows which messages begin with a std_msgs/Header, and the stop messages of command
-    topics, for when they fall silent. `chrony` receives samples of another robot's clock.
+    topics, for when they fall silent. `chrony` receives samples of another robot's clock. `keeping`
+    keeps the state of keys.
     """
 
     def __init__(
@@ -57,7 +59,9 @@ class Node:
         transforms: Mapping[int, "Transforms"],
         types: "MessageTypes",
         chrony: "ChronySocket | None" = None,
+        keeping: Keeping | None = None,
     ) -> None:
+        self._keeping = keeping
         self._setup = setup
         self._link = link
         self._opening = opening
@@ -70,8 +74,7 @@ class Node:
         self._ticked_at = float("-inf")
         self._is_lockstep = self._is_attached = False
         self._queue_moved = asyncio.Event()
-        self._started_at = time.monotonic()
-        self._loop_lag_s = 0.0
+        self._started_at, self._loop_lag_s = time.monotonic(), 0.0
         self._draining = False
         self.bus = open_bus(self)
         self._wanting = Wanting(setup, link, self.bus)
@@ -107,11 +110,7 @@ class Node:
         self._pdu_link.wake()
 
     def refuse(
-        self,
-        reason: str,
-        topic_id: int | None = None,
-        receipt: str = "",
-        dst: int | None = None,
+        self, reason: str, topic_id: int | None = None, receipt: str = "", dst: int | None = None
     ) -> None:
         """Count a message that the bus refused."""
         self._link.refuse(reason, topic_id, receipt, dst)
@@ -162,6 +161,8 @@ class Node:
                     self._link.submit(topic_id, gathered, now)
                     self._pdu_link.wake()
             self._wanting.look()
+            if self._keeping is not None:
+                self._keeping.look(now, at_once=self._is_lockstep)
             self._link.handle_timers(now)
             self._tell_verdicts()
             self._queue_moved.set()  # messages may have expired

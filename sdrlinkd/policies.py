@@ -14,9 +14,9 @@ from sdrlinkd.wire import Registry
 
 log = logging.getLogger("sdrlinkd")
 
-FIXED = ("dictionary", "offer", "stamp", "stop")
+FIXED = ("dictionary", "from_", "offer", "stamp", "stop", "unproven")
 """Keys that cannot be changed at run time: receivers must know two of them, the stop message is
-made at the start, and what is set wins over an offer anyway."""
+made at the start, what is set wins over an offer anyway, and whom to trust is for the file."""
 
 
 class Policies:
@@ -83,7 +83,7 @@ class Policies:
             if key not in known:
                 raise UserError(f"{key}: cannot be set; allowed: {', '.join(known)}")
         old = self._link.policy(topic_id)
-        merged = {**msgspec.structs.asdict(old), **changes}
+        merged = {**msgspec.to_builtins(old), **changes}
         try:
             new = msgspec.convert(merged, TopicPolicy)
         except msgspec.ValidationError:

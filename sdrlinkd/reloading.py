@@ -6,6 +6,7 @@ from collections.abc import Callable
 from backends import BUILT_IN
 from sdrlinkd.config import Config, Setup, backend_of
 from sdrlinkd.errors import UserError
+from sdrlinkd.keeping import Keeping
 from sdrlinkd.opening import Opening
 from sdrlinkd.policies import Policies
 
@@ -31,7 +32,9 @@ class Reloading:
         check: Callable[[Setup], object],
         policies: Policies,
         opening: Opening,
+        keeping: Keeping | None = None,
     ) -> None:
+        self._keeping = keeping
         self._setup = setup
         self._read = read
         self._check = check
@@ -44,6 +47,11 @@ class Reloading:
         Raises UserError and then changes nothing.
         """
         changed = self._read()
+        keys = self._keeping.reload() if self._keeping is not None else ""
+        told = self._reload(changed)
+        return f"{keys}, {told}" if keys else told
+
+    def _reload(self, changed: Setup) -> str:
         if changed.registry.digest() != self._setup.registry.digest():
             raise UserError(
                 "the topic registry has changed, and topic ids with it; restart the daemon"

@@ -22,6 +22,7 @@ COMMANDS = {
     ),
     "list": Listed("List the daemons of this host.", ("listing",)),
     "init": Listed("Write a first configuration and registry.", ("init",)),
+    "key": Listed("Keys of a team, which seal its PDUs.", ("key",)),
     "doctor": Listed(
         "Check machine, environment, radio, permissions and clock, and say what to fix.",
         ("doctor",),

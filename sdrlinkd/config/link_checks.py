@@ -8,7 +8,7 @@ from zstandard import ZstdCompressionDict, ZstdCompressor, ZstdError
 from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError
 from sdrlinkd.link import Qos, Relay, TopicPolicy
-from sdrlinkd.wire import Registry
+from sdrlinkd.wire import MIN_SEALED_SIZE, Registry
 
 
 def check_relay(config: Config, node_id: int, registry: Registry) -> None:
@@ -32,6 +32,28 @@ def check_relay(config: Config, node_id: int, registry: Registry) -> None:
                 f"classes.{qos.label}.parity: got {config.classes.of(qos).parity:g}; it "
                 "needs the control channel, so at most 15 topics; allowed here: 0"
             )
+
+
+def check_security(config: Config, registry: Registry) -> None:
+    """Check that PDUs can be sealed, if they should be.
+
+    Raises ConfigError, which begins with the key and says what was given and what is allowed.
+    """
+    security = config.security
+    if security.mode == "off":
+        return
+    if config.link.pdu_size < MIN_SEALED_SIZE:
+        raise ConfigError(
+            f"link.pdu_size: got {config.link.pdu_size}; allowed with security.mode = "
+            f'"{security.mode}": at least {MIN_SEALED_SIZE}'
+        )
+    if not registry.has_control:
+        raise ConfigError(
+            f'security.mode: got "{security.mode}"; it needs the control channel, so at most 15 '
+            'topics; allowed here: "off"'
+        )
+    if "\0" in security.keys + security.state_dir:
+        raise ConfigError("security.keys, security.state_dir: a NUL; allowed: names of files")
 
 
 def load_dictionaries(

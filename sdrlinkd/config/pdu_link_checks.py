@@ -76,6 +76,7 @@ def with_paths(config: Config, base: Path) -> Config:
         config,
         **changes,
         play=_with_whole(config.play, ("bag",), base),
+        security=_with_whole(config.security, ("keys", "state_dir"), base),
         topic={
             name: _with_whole(policy, ("dictionary",), base)
             for name, policy in config.topic.items()

@@ -33,6 +33,8 @@ from sdrlinkd.link import (
     RelayParams,
     TopicPolicy,
 )
+from sdrlinkd.sealing import SecurityParams
+from sdrlinkd.wire import SEAL_OVERHEAD
 
 WITHOUT_AIR = ("direct", "gnuradio")
 """Backends that carry PDUs instead of samples."""
@@ -94,6 +96,7 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     reassembly: ReassemblyParams = ReassemblyParams()
     classes: ClassesParams = ClassesParams()
     relay: RelayParams = RelayParams()
+    security: SecurityParams = SecurityParams()
     clock: ClockParams = ClockParams()
     chrony: ChronyParams = ChronyParams()
     tf: TransformParams = TransformParams()
@@ -112,6 +115,11 @@ class Config(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     play: PlayParams = PlayParams()
     topic: dict[str, TopicPolicy] = {}
     """Topic policies by registry name, as in `[topic.odom]`."""
+
+    @property
+    def inner_pdu_size(self) -> int:
+        """Octets of a PDU that carry entries: less than link.pdu_size, if PDUs are sealed."""
+        return self.link.pdu_size - (SEAL_OVERHEAD if self.security.mode != "off" else 0)
 
     @property
     def backend_settings(self) -> msgspec.Struct:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from zstandard import ZstdCompressionDict
 
-from sdrlinkd.config.link_checks import check_relay, load_dictionaries
+from sdrlinkd.config.link_checks import check_relay, check_security, load_dictionaries
 from sdrlinkd.config.not_checked import unchecked
 from sdrlinkd.config.offsets import cfo_told, cfo_warning
 from sdrlinkd.config.pdu_link_checks import check_pdu_link, with_paths
@@ -87,7 +87,7 @@ class Setup:
     @property
     def largest(self) -> int:
         """Largest message in octets that PDUs can carry."""
-        size, classes = self.config.link.pdu_size, self.config.classes
+        size, classes = self.config.inner_pdu_size, self.config.classes
         if not self.has_numbers:
             return max_message_size(size)
         return max_large_size(size, max(classes.of(qos).parity for qos in Qos))
@@ -110,6 +110,7 @@ class Setup:
             f"robot {self.node_id}, namespace {config.namespace or '-'}, backend {config.backend}",
             f"PDUs of {size} B; messages up to {self.largest} B",
             flush_told(config.link.flush_s),
+            _sealing_told(config),
             *([] if config.backend in WITHOUT_AIR else [cfo_told(config.modem)]),
             *(
                 f"  {topic_id:>2}  {name}  {self.registry.topics[topic_id].type}"
@@ -120,6 +121,15 @@ class Setup:
             *(f"warning: {warning}" for warning in self.all_warnings),
             *(f"not checked: {each}" for each in unchecked(config)),
         ]
+
+
+def _sealing_told(config: Config) -> str:
+    """Whether PDUs are sealed, as a sentence."""
+    security = config.security
+    if security.mode == "off":
+        return "in the clear: anybody can send commands to this robot (security.mode)"
+    readers = "everybody can read them" if security.mode == "auth" else "only the team reads them"
+    return f"PDUs are sealed: only the team's key sends, and {readers}"
 
 
 def make_setup(config: Config, base: Path, source: str = "") -> Setup:
@@ -148,6 +158,7 @@ def _resolve(config: Config, base: Path, source: str) -> Setup:
             "channel, so at most 15 topics; allowed here: false"
         )
     check_relay(config, node_id, registry)
+    check_security(config, registry)
     if config.chrony.socket and config.chrony.robot == node_id:
         raise ConfigError(
             f"chrony.robot: got {node_id}, this robot itself; allowed: another robot, "
@@ -192,7 +203,7 @@ def _check_texts(config: Config) -> None:
         )
     if "\0" in config.bus.runtime_dir:
         raise ConfigError("bus.runtime_dir: contains a NUL; allowed: a directory's name")
-    most = equal_payload(config.link.pdu_size, 1)
+    most = equal_payload(config.inner_pdu_size, 1)
     if config.link.min_fragment > most:
         raise ConfigError(
             f"link.min_fragment: got {config.link.min_fragment}; allowed: at most "
@@ -219,7 +230,7 @@ def _transforms(config: Config, registry: Registry, has_numbers: bool) -> frozen
 
 
 def _warnings(config: Config, registry: Registry) -> list[str]:
-    size, least = config.link.pdu_size, config.link.min_fragment
+    size, least = config.inner_pdu_size, config.link.min_fragment
     shared = equal_payload(size, 2)
     lonely = (
         f"link.min_fragment = {least} is more than the {shared} B that each of two topics gets in "
@@ -234,9 +245,9 @@ def _warnings(config: Config, registry: Registry) -> list[str]:
 
 
 def _topic_warnings(config: Config, registry: Registry) -> dict[int, str]:
-    size = config.link.pdu_size
+    size, inner = config.link.pdu_size, config.inner_pdu_size
     return {
-        topic.id: f"{topic.name} ({topic.type}) can be larger than the {max_message_size(size)} B "
+        topic.id: f"{topic.name} ({topic.type}) can be larger than the {max_message_size(inner)} B "
         f"that 255 fragments of {size} B PDUs carry; larger messages are refused (tx_too_big)"
         for topic in registry.topics
         if topic.type in UNBOUNDED_TYPES

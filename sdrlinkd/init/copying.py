@@ -77,8 +77,9 @@ def _beside(path: str) -> str:
 
 def _changed(struct: msgspec.Struct, default: msgspec.Struct) -> dict[str, object]:
     found: dict[str, object] = {}
-    for key in struct.__struct_fields__:
-        value, usual = getattr(struct, key), getattr(default, key)
+    names = zip(struct.__struct_encode_fields__, struct.__struct_fields__, strict=True)
+    for key, name in names:
+        value, usual = getattr(struct, name), getattr(default, name)
         if value == usual or value is None:
             continue
         if isinstance(value, msgspec.Struct):

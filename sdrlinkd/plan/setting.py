@@ -52,7 +52,7 @@ def setting_of(
     modem = config.modem
     longest_s = radio.traits.longest_burst_s[modem.mcs]
     return Setting(
-        radio.airtimes, config.link.pdu_size, modem.mcs, longest_s, config.classes, n, settled,
+        radio.airtimes, config.inner_pdu_size, modem.mcs, longest_s, config.classes, n, settled,
         radio.traits, host_s, has_numbers, tuple(notes),
     )  # fmt: skip
 

@@ -1,5 +1,6 @@
 """The counterpart of sealing for a robot without keys: everything is in the clear."""
 
+from collections.abc import Callable
 from math import inf
 
 from sdrlinkd.errors import PduError
@@ -63,21 +64,30 @@ class InTheClear:
         """The PDU as it is."""
         return inner
 
-    def later(self, pdu: bytes, inner: bytes, by_us: int, start: float) -> bytes:  # noqa: ARG002  # as in Sealing
-        """A PDU that did not leave, for a burst `by_us` µs later."""
-        return postponed(pdu, by_us) if self._has_control and by_us > 0 else pdu
+    def later(
+        self,
+        pdu: bytes,
+        inner: bytes,
+        by_us: int,
+        start: float,  # noqa: ARG002  # as in Sealing
+        next_seq: Callable[[], int],  # noqa: ARG002  # as in Sealing
+    ) -> tuple[bytes, bytes]:
+        """(PDU, nothing) that did not leave, for a burst `by_us` µs later."""
+        return (postponed(pdu, by_us) if self._has_control and by_us > 0 else pdu), inner
 
     def begin_anew(self) -> None:
         """Nothing depends on a clock."""
 
-    def contact(self, now: float, room: int) -> tuple[Contact, float] | None:
-        """The CONTACT that is due: none."""
+    def contact(self, now: float, room: int) -> tuple[Contact, float]:
+        """No CONTACT is ever due. Raises ValueError."""
+        raise ValueError(f"a CONTACT of {room} octets at {now} s, in the clear")
 
     def further_key(self) -> KeyTold | None:
         """The KEY record of a key to which this robot can change: none."""
 
-    def clear_key(self, now: float) -> KeyTold | None:
-        """The KEY record to be told in the clear: none."""
+    def clear_key(self, now: float) -> KeyTold:
+        """No KEY record is ever due. Raises ValueError."""
+        raise ValueError(f"a KEY record at {now} s, without a key")
 
     def look(self, now: float) -> None:
         """There are no keys to change."""

@@ -35,6 +35,11 @@ class Memory:
         """Why no number may be used any more, as a sentence; empty: all is well."""
         return self._failed if self._is_out else ""
 
+    @property
+    def has_failed(self) -> bool:
+        """Whether the last attempt to write has failed."""
+        return bool(self._failed)
+
     def wanted(self, now: float) -> Remembered | None:
         """What should be written at `now`; None: what is on disk suffices."""
         self._is_out = self._numbers.is_out(now)

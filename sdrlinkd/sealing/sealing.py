@@ -25,6 +25,7 @@ from sdrlinkd.wire import (
     plaintext,
     postponed,
     sealed_header,
+    with_seq,
 )
 
 DAY_S = 86400.0
@@ -103,14 +104,19 @@ class Sealing:
         body = own.seal(header, ticks, plaintext(inner))
         return build_sealed(header, own.key.kid, ticks, body)
 
-    def later(self, pdu: bytes, inner: bytes, by_us: int, start: float) -> bytes:
-        """A PDU of ours that did not leave, for a burst `by_us` µs later, at `start`.
+    def later(
+        self, pdu: bytes, inner: bytes, by_us: int, start: float, next_seq: Callable[[], int]
+    ) -> tuple[bytes, bytes]:
+        """(PDU, inner PDU) that did not leave, for a burst `by_us` µs later, at `start`.
 
-        `inner` is its inner PDU, empty if the PDU is another robot's.
+        `inner` is empty if the PDU is not ours. A PDU whose content depends on the start is made
+        anew with the sequence number that `next_seq` gives: sealed under its old number, its
+        content must never change.
         """
-        if inner and depends_on_start(inner) and self.may_send(start, inner[3], 1):
-            return self.seal(postponed(inner, by_us), start)
-        return delayed(pdu, by_us)
+        if not inner or not depends_on_start(inner) or self.halted:
+            return delayed(pdu, by_us), inner
+        inner = with_seq(postponed(inner, by_us), next_seq())
+        return self.seal(inner, start), inner
 
     def begin_anew(self) -> None:
         """Go on with another clock."""
@@ -118,10 +124,8 @@ class Sealing:
         for _, peer in self._peers:
             peer.restart()
 
-    def contact(self, now: float, room: int) -> tuple[Contact, float] | None:
-        """(our CONTACT, when it gets a PDU of its own), if one is due at `now`."""
-        if now < self._contacts.due_at:
-            return None
+    def contact(self, now: float, room: int) -> tuple[Contact, float]:
+        """(our CONTACT at `now`, of at most `room` octets, when it gets a PDU of its own)."""
         return self._contacts.record(now, room, self._peers), now + PATIENCE_S
 
     @property
@@ -139,10 +143,8 @@ class Sealing:
         key = self._keys.rotation.further
         return None if key is None else self._keys.told(key)
 
-    def clear_key(self, now: float) -> KeyTold | None:
+    def clear_key(self, now: float) -> KeyTold:
         """The KEY record to be told in the clear at `now`, as PDUs of others do not open."""
-        if now < self._strangers.key_due_at:
-            return None
         self._strangers.key_told(now)
         return self._keys.told(self._keys.own.key)
 
@@ -159,6 +161,11 @@ class Sealing:
     def notices(self, now: float) -> list[str]:
         """What a person should know, in sentences."""
         found = self._strangers.notices(now)
+        if self.opener.delivers_unproven:
+            found.append(
+                "messages of robots that have not proven to be alive are handed over, so they may "
+                'be recordings (security.unproven = "deliver")'
+            )
         days = self._days_left(now)
         if days < USED_UP_DAYS:
             found.append(

@@ -87,7 +87,14 @@ from sdrlinkd.wire.declared import (
     part_size,
     pieces,
 )
-from sdrlinkd.wire.later import aged, depends_on_start, forwarded, lasting_identity, postponed
+from sdrlinkd.wire.later import (
+    aged,
+    depends_on_start,
+    forwarded,
+    lasting_identity,
+    postponed,
+    with_seq,
+)
 from sdrlinkd.wire.partials import Lost, Partial, ReassemblyLimits
 from sdrlinkd.wire.pdu import Entry, Pdu, build, flags, identity, parse
 from sdrlinkd.wire.readable import ControlEntries, numbered, read_control_entries, with_topic
@@ -248,5 +255,6 @@ __all__ = [
     "sealed_header",
     "tellable",
     "topic_type",
+    "with_seq",
     "with_topic",
 ]

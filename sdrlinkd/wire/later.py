@@ -28,7 +28,7 @@ _U32 = struct.Struct(">I")
 # The time in a RECEIPT has a smaller field, and may be absent.
 _SINCE, _SINCE_END = 6, 8
 _U16 = struct.Struct(">H")
-HOP = 4
+_SEQ, HOP = 3, 4
 """Index of the octet with the hops left and the number of entries."""
 
 
@@ -45,6 +45,13 @@ def aged(pdu: bytes, by_us: int) -> bytes:
     data = bytearray(pdu)
     _move(data, by_us, _FORWARDED)
     _later_receipts(data, by_us)
+    return _with_crc(data)
+
+
+def with_seq(pdu: bytes, seq: int) -> bytes:
+    """A PDU with another sequence number."""
+    data = bytearray(pdu)
+    data[_SEQ] = seq
     return _with_crc(data)
 
 

@@ -11,6 +11,7 @@ from sdrlinkd.reports import (
     PduLinkReport,
     ReceivedTopicReport,
     RxReport,
+    SecurityReport,
     Snapshot,
     TopicReport,
     TxReport,
@@ -41,6 +42,7 @@ SNAPSHOT = Snapshot(
     ),
     link=LinkReport(
         pdu_size=64,
+        security=SecurityReport(mode="seal", kid=0, proven=[2]),
         access="csma: PERSIST 0.05; 7 backoffs",
         airtime_s=12.3456,
         air_sent_pct=12.5,

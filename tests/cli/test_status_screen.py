@@ -7,7 +7,7 @@ import pytest
 
 from sdrlinkd.cli.screens import StatusScreen
 from sdrlinkd.cli.status import ledger_lines
-from sdrlinkd.reports import VerdictReport
+from sdrlinkd.reports import SecurityReport, VerdictReport
 from tests.cli.pictures import assert_stored, drawn
 from tests.cli.snapshots import LONG, SNAPSHOT, busy
 
@@ -78,6 +78,12 @@ def test_line_1_is_the_verdict(level, reasons, line):
     told = VerdictReport(level=level, reasons=reasons)
     text = screen(msgspec.structs.replace(SNAPSHOT, verdict=told))
     assert text.splitlines()[0] == line
+
+
+def test_line_1_says_that_nothing_is_sealed():
+    link = msgspec.structs.replace(SNAPSHOT.link, security=SecurityReport())
+    told = msgspec.structs.replace(SNAPSHOT, link=link, verdict=VerdictReport())
+    assert screen(told).splitlines()[0] == "OK, in the clear"
 
 
 def test_a_long_name_is_whole_in_the_end():

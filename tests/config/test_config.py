@@ -27,7 +27,7 @@ def test_shipped_file_shows_every_key():
         if isinstance(value, msgspec.Struct)
     ]
     for struct in (Config, *sections, ClassParams, TopicPolicy):
-        for key in struct.__struct_fields__:
+        for key in struct.__struct_encode_fields__:
             shown = (f"\n{key} = ", f"\n# {key} = ", f"[{key}", f".{key}]")
             assert any(each in text for each in shown), key
 

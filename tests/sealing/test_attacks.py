@@ -112,7 +112,6 @@ def test_recordings_gain_nothing(make, victim, restarts):
     recorder = Recorder(team, victim, chance)
     team.run(trials(200), Commands(team, chance, restarts))
     found = judge(team.robots[victim])
-    print(recorder.played, dict(found))
     assert recorder.played > trials(10_000)
     assert found["delivered"] > trials(100)
     for gain in ("twice", "past its lifespan", "too young"):
@@ -142,7 +141,6 @@ def test_a_delay_from_the_first_pdu_on_hides_no_age(make, victim, after_s, lies)
     Delayer(team, after_s, lies)
     team.run(20, Commands(team, Random(3), restarts=False))
     found = judge(team.robots[victim])
-    print(dict(found))
     assert found["too young"] == found["twice"] == found["past its lifespan"] == 0
 
 
@@ -169,10 +167,8 @@ def test_a_new_life_does_not_pass_for_the_old_one(off_s):
     source.start(team.now)
     # How far T leaps: from what the source last used to the floor and beyond.
     leap_s = newest / 32 + 30 - before - off_s
-    heard_before = len(victim.heard)
     delayer = Delayer(team, leap_s, lies=False)
     team.tamper = lambda receiver, data: not has_contact(data) and delayer.passes(receiver, data)
     team.run(leap_s + 10.0, Commands(team, Random(4), restarts=False))
     found = judge(victim)
-    print(leap_s, len(victim.heard) - heard_before, dict(found))
     assert found["too young"] == found["past its lifespan"] == 0

@@ -74,7 +74,7 @@ def test_a_station_that_only_receives_can_take_all(of_topic):
     topics = 1 if of_topic else 2
     assert len(team.robots[2].heard) == 20 * topics
     received = link.report(0.0).received
-    assert sum(each.dropped.get("sec_unproven", 0) for each in received) == 20 * (2 - topics)
+    assert sum(each.dropped.get("rx_unproven", 0) for each in received) == 20 * (2 - topics)
     assert link.audit() == []
 
 
@@ -177,7 +177,7 @@ def test_another_robot_with_our_id_and_key_stops_us():
     # It is older than our start, so it may be a recording of ourselves.
     team.robots[1].hear(old_life, team.now)
     assert security(team, 1).halted == ""
-    double.sealing._numbers.leap_beyond(32 * 60)  # noqa: SLF001  # as after a year
+    double.sealing._numbers.leap_beyond(32 * 60)  # as after a year
     double.write(clone.now)
     clone.run(12.0)
     team.robots[1].hear(clone.on_air[-1][2], team.now)

@@ -2,7 +2,6 @@
 
 import pytest
 
-from sdrlinkd.errors import PduError
 from sdrlinkd.sealing import Key
 from sdrlinkd.sealing.ciphers import Ciphers
 from sdrlinkd.wire import (
@@ -76,12 +75,9 @@ def test_any_other_bit_closes_it():
             changed[at] ^= 1 << bit
             # What changes on the way is not sealed: the hops left, and the time held.
             is_open = (at == 4 and bit >= 4) or at in (9, 10)
-            whole = vectors.with_crc(bytes(changed[:-2]))
-            try:
-                pdu = parse_sealed(whole, len(octets))
-            except PduError as error:
-                # A wrong version, or no entries.
-                assert error.reason == ("rx_version" if at == 0 else "rx_entry")
+            if not changed[4] & 0x0F or changed[0] >> 4:
+                # No entries, or another version: not even tried.
                 continue
+            pdu = parse_sealed(vectors.with_crc(bytes(changed[:-2])), len(octets))
             # Its kid chooses the key, so there may be none to try.
             assert (ciphers.open(pdu) is not None) == is_open, (at, bit)

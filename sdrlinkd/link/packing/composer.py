@@ -75,7 +75,7 @@ class Composer:
         self._src = src
         self._outbox = outbox
         self._piggyback = piggyback
-        self._seq = rng.randrange(256)
+        self.next_seq = rng.randrange(256)
         self._control_entry_id = rng.randrange(256)
         self._patience_s = reassembly_timeout_s
         self.entry_ids = TopicEntryIds(rng, REST_FACTOR * reassembly_timeout_s)
@@ -173,10 +173,10 @@ class Composer:
         """Send no more fragments of the message that `lane` has begun."""
         self._head_of_line.abandon(lane, now)
 
-    @property
-    def next_seq(self) -> int:
-        """Sequence number of our next PDU."""
-        return self._seq
+    def take_seq(self) -> int:
+        """Take the sequence number of our next PDU, for one that is made anew."""
+        seq, self.next_seq = self.next_seq, (self.next_seq + 1) & 0xFF
+        return seq
 
     def end_flush(self) -> None:
         """From now on, no partly filled PDU waits for more messages."""
@@ -236,8 +236,8 @@ class Composer:
             return []
         if self._live(lane, start) is not head:
             return []
-        built = self._single_entry.filled(lane, start, self._seq, most)
-        self._seq = (self._seq + len(built)) & 0xFF
+        built = self._single_entry.filled(lane, start, self.next_seq, most)
+        self.next_seq = (self.next_seq + len(built)) & 0xFF
         return built
 
     def _next_src(self, first: Qos | None = None) -> int:
@@ -266,10 +266,10 @@ class Composer:
 
     def _finish(self, draft: Draft) -> BuiltPdu:
         data = draft.build(
-            FLAGS[draft.qos, draft.is_compressed], self._src, draft.dst, self._seq,
+            FLAGS[draft.qos, draft.is_compressed], self._src, draft.dst, self.next_seq,
             self._hop_limit, self._control_entry_id,
         )  # fmt: skip
-        self._seq = (self._seq + 1) & 0xFF
+        self.next_seq = (self.next_seq + 1) & 0xFF
         self._control_entry_id = (self._control_entry_id + 1) & 0xFF
         return BuiltPdu(data, draft.carried, draft.qos)
 

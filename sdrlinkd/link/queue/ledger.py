@@ -63,7 +63,8 @@ RX_REASONS = {
     "rx_unknown_topic": "a topic id that our registry does not have, or an undeclared number",
     "rx_part_lost": "a part of a large message is missing",
     "rx_other_type": "its type has other fields here",
-    "sec_unproven": "from a robot that has not proven to be alive",
+    "rx_denied": "from a robot that may not send this topic (from)",
+    "rx_unproven": "from a robot that has not proven to be alive",
 }
 
 

@@ -14,7 +14,13 @@ Positive = Annotated[float, Meta(gt=0)]
 Amount = Annotated[int, Meta(ge=0)]
 
 
-class TopicPolicy(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class TopicPolicy(
+    msgspec.Struct,
+    frozen=True,
+    kw_only=True,
+    forbid_unknown_fields=True,
+    rename={"from_": "from"},
+):
     """Policy of one topic; a producer may override class, priority, lifespan and destination."""
 
     qos: Literal["urgent", "latency", "default", "bulk"] = "default"
@@ -41,6 +47,8 @@ class TopicPolicy(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Whether the QoS that a producer declares sets the keys that have their default value here."""
     dst: Annotated[int, Meta(ge=0, le=255)] | None = None
     """Destination robot; absent: `link.dst`."""
+    from_: list[Annotated[int, Meta(ge=0, le=254)]] = []
+    """At the receiver: robots whose messages are taken; none listed: those of all robots."""
     unproven: Literal["drop", "deliver"] = "drop"
     """At a receiver with keys: what happens to messages of robots that have not proven yet that
     they are alive now, so that these may be recordings."""

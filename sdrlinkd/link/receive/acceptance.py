@@ -43,6 +43,11 @@ class Acceptance:
         policies = (*self._policies.values(), *self._named.values())
         return any(policy.unproven == "deliver" for policy in policies)
 
+    def takes_from(self, topic: HeardTopic, src: int) -> bool:
+        """Whether messages of a topic are taken from robot `src`."""
+        sources = self.policy_of(topic).from_
+        return not sources or src in sources
+
     def takes_unproven(self, topic: HeardTopic) -> bool:
         """Whether messages of a topic are handed over from robots that are not proven."""
         return self._takes_all or self.policy_of(topic).unproven == "deliver"

@@ -59,8 +59,11 @@ class Completion:
             reason = "rx_unknown_topic" if topic is None else "rx_other_type"
             self._end(message, reason, now, events)
             return
+        if not self._acceptance.takes_from(topic, src):
+            self._end(message, "rx_denied", now, events)
+            return
         if not message.is_proven and not self._acceptance.takes_unproven(topic):
-            self._end(message, "sec_unproven", now, events)
+            self._end(message, "rx_unproven", now, events)
             return
         payload, refused = self._acceptance.judge(
             topic, message.payload, message.is_compressed, message.origin.at, now

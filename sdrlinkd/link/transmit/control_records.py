@@ -130,9 +130,11 @@ class ControlRecords:
         if start >= self._clocks.due_at and self._n_others:
             self._offer_clock(start)
             cannot_wait = cannot_wait or start >= self._clock_overdue_at
-        self._offer_contact(start)
-        # Nothing of ours is believed before others have it.
-        return cannot_wait or self._piggyback.is_overdue(RecordType.CONTACT, start)
+        if self._sealing.is_on:
+            self._offer_contact(start)
+            # Nothing of ours is believed before others have it.
+            cannot_wait = cannot_wait or self._piggyback.is_overdue(RecordType.CONTACT, start)
+        return cannot_wait
 
     def took_clock(self) -> int | None:
         """The number of the CLOCK in the burst just composed; None: the CLOCK still waits."""
@@ -180,9 +182,9 @@ class ControlRecords:
 
     def clear_key(self, start: float) -> BuiltPdu | None:
         """A PDU in the clear with the KEY record that is due at `start`, if one is."""
-        told = self._sealing.clear_key(start)
-        if told is None:
+        if start < self._sealing.key_due_at:
             return None
+        told = self._sealing.clear_key(start)
         entry = Entry(CONTROL_TOPIC_ID, 0, 0, 1, build_records([told]))
         pdu = Pdu(0, False, self._own_id, BROADCAST, 0, 1, [entry])
         return BuiltPdu(build(pdu, self._clear_size), [], Qos.DEFAULT)
@@ -208,9 +210,8 @@ class ControlRecords:
         return max(at, self._told_alone_at + self.period_s) if self._n_others else at
 
     def _offer_contact(self, now: float) -> None:
-        due = self._sealing.contact(now, self._room)
-        if due is not None:
-            self._piggyback.put(*due)
+        if now >= self._sealing.contact_due_at:
+            self._piggyback.put(*self._sealing.contact(now, self._room))
 
     def _offer_topics(self, now: float) -> None:
         self._told_version = self._teller.topics.version

@@ -1,6 +1,7 @@
 """The retry queue: bursts that missed their slot and are sent in a later one."""
 
 from bisect import insort
+from collections.abc import Callable
 
 from sdrlinkd.link.transmit.burst import Burst
 from sdrlinkd.sealing import InTheClear, Sealing
@@ -12,8 +13,9 @@ GIVE_UP_S = 2.0
 class RetryQueue:
     """Late bursts that wait for another slot, in order; the ages inside grow with the wait."""
 
-    def __init__(self, sealing: Sealing | InTheClear) -> None:
+    def __init__(self, sealing: Sealing | InTheClear, next_seq: Callable[[], int]) -> None:
         self._sealing = sealing
+        self._next_seq = next_seq
         self.waiting: list[Burst] = []
         """The waiting bursts, in the order in which they were composed."""
         self.count = 0
@@ -35,6 +37,10 @@ class RetryQueue:
         """Take out the next burst, adjusted to leave at `start`."""
         burst = self.waiting.pop(0)
         by_us, inner = round(1e6 * (start - burst.start)), burst.inner or [b""] * len(burst.pdus)
-        later = self._sealing.later
-        pdus = [later(*each, by_us, start) for each in zip(burst.pdus, inner, strict=True)]
-        return burst._replace(pdus=pdus, start=start)
+        later, next_seq = self._sealing.later, self._next_seq
+        moved = [
+            later(*each, by_us, start, next_seq) for each in zip(burst.pdus, inner, strict=True)
+        ]
+        return burst._replace(
+            pdus=[pdu for pdu, _ in moved], inner=[each for _, each in moved], start=start
+        )

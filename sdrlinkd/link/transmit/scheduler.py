@@ -75,7 +75,7 @@ class BurstScheduler:
         self._clear_size = clear_size
         self._numbers_at = -inf
         """Time in s at which there may be numbers for sealed PDUs again."""
-        self._retry = RetryQueue(sealing)
+        self._retry = RetryQueue(sealing, composer.take_seq)
         self._used_s = dict.fromkeys(Qos, 0.0)
         """Airtime composed so far by the class of each PDU, in s; includes bursts that failed."""
         self.airtime_s = 0.0
@@ -110,6 +110,7 @@ class BurstScheduler:
             return self._again(opportunity)
         earliest, airtime_s, _, sensed, _ = opportunity
         rate, access, records = self._rate, self._access, self._control_records
+        composer = self._composer
         head, records_due_at = self._outbox.next_class(), records.due_at
         if self._ready_at is None:
             self._ready_at = earliest - self._fit.lead_s
@@ -122,7 +123,8 @@ class BurstScheduler:
         if slot is None:
             return None
         start = slot.start
-        if not self._sealing.may_send(start, self._composer.next_seq, MAX_PDUS):
+        sealing = self._sealing
+        if sealing.is_on and not sealing.may_send(start, composer.next_seq, MAX_PDUS):
             self._numbers_at = start + TICK_S
             return None
         allowance = self._allowance(slot, mcs, opportunity, start >= records_due_at)
@@ -149,7 +151,10 @@ class BurstScheduler:
             records.told_alone(start)
         classes = [pdu.qos for pdu in built]
         self._spend(length_s, classes)
-        pdus, inner = self._sealed(built, start)
+        pdus = [pdu.data for pdu in built]
+        inner: list[bytes] = []
+        if sealing.is_on:
+            pdus, inner = self._sealed(pdus, start)
         access.sent(start + length_s, self._relayed_src(pdus))
         ready_at, self._ready_at = self._ready_at, None
         self._number += 1
@@ -346,11 +351,8 @@ class BurstScheduler:
             self._limits.kept_free(passed_s)
             self._shares.idle(passed_s, self._outbox.waiting_classes())
 
-    def _sealed(self, built: list[BuiltPdu], start: float) -> tuple[list[bytes], list[bytes]]:
+    def _sealed(self, pdus: list[bytes], start: float) -> tuple[list[bytes], list[bytes]]:
         """The PDUs of a burst at `start` for the air, and what is inside our own sealed ones."""
-        pdus = [pdu.data for pdu in built]
-        if not self._sealing.is_on:
-            return pdus, []
         own, size = self._own_id, self._clear_size
         inner = [pdu if pdu[1] == own and len(pdu) != size else b"" for pdu in pdus]
         seal = self._sealing.seal

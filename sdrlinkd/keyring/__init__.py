@@ -1,0 +1,34 @@
+"""Keys and key times on disk: the only place that reads and writes them.
+
+This package owns the key file of a robot and the state that must survive a restart. It decides
+nothing about PDUs: `sealing` does.
+"""
+
+from sdrlinkd.keyring.files import (
+    CREDENTIAL,
+    StoredKey,
+    create_key_file,
+    key_file_text,
+    load_keys,
+    parse_key_file,
+    read_key_file,
+    write_key_file,
+)
+from sdrlinkd.keyring.making import new_key
+from sdrlinkd.keyring.state import KeyState, state_dir
+from sdrlinkd.keyring.words import words_of
+
+__all__ = [
+    "CREDENTIAL",
+    "KeyState",
+    "StoredKey",
+    "create_key_file",
+    "key_file_text",
+    "load_keys",
+    "new_key",
+    "parse_key_file",
+    "read_key_file",
+    "state_dir",
+    "words_of",
+    "write_key_file",
+]
