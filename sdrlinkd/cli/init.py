@@ -14,6 +14,7 @@ from sdrlinkd.cli.app import RuntimeDir, app, connect
 from sdrlinkd.cli.questions import Questions
 from sdrlinkd.errors import UserError
 from sdrlinkd.init import (
+    KEYS,
     RADIOS,
     REGISTRY,
     Choice,
@@ -27,6 +28,7 @@ from sdrlinkd.init import (
     team_files,
     topics_of_graph,
 )
+from sdrlinkd.keyring import key_file_text, new_key
 
 MOST_ROBOTS = 254
 
@@ -69,6 +71,10 @@ def init(
             help="With --radio ether: one computer a robot; this is the hub's address.",
         ),
     ] = "",
+    seal: Annotated[
+        bool | None,
+        typer.Option("--seal/--clear", help="Make a key, so that only the team can send and read."),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder to write to.")] = Path(),
     force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
     runtime_dir: RuntimeDir = None,
@@ -90,8 +96,11 @@ def init(
         if hub:
             _check_hub(hub, preset)
         air, sockets = (out / "air").absolute(), _socket_folder()
-        team = Team(preset, count, frequency, device, found, air, sockets, hub)
+        is_sealed = preset.shares_air and questions.is_sealed(seal)
+        team = Team(preset, count, frequency, device, found, air, sockets, hub, is_sealed)
         files = {name: text.encode() for name, text in team_files(team, ids).items()}
+        if is_sealed:
+            files[KEYS] = key_file_text([new_key(0)]).encode()
     _write(files, out, force)
     console = Console(soft_wrap=True, highlight=False, markup=False)
     console.print(f"wrote {', '.join(str(out / name) for name in files)}")
@@ -192,6 +201,8 @@ def _write(files: dict[str, bytes], out: Path, force: bool) -> None:
         with tempfile.TemporaryDirectory(dir=out, prefix=".init-") as aside:
             for name, content in files.items():
                 (Path(aside) / name).write_bytes(content)
+                if name == KEYS:
+                    (Path(aside) / name).chmod(0o600)
             for name in files:
                 (Path(aside) / name).replace(out / name)
     except OSError as error:
@@ -206,13 +217,13 @@ def _try_out(files: dict[str, bytes], out: Path) -> None:
         for name, content in files.items():
             (Path(trial) / name).write_bytes(content)
         for name in files:
-            if name.endswith(".toml"):
+            if name.endswith(".toml") and name != KEYS:
                 make_setup(parse_config(files[name].decode(), str(out / name)), Path(trial))
 
 
 def _next(files: dict[str, bytes], out: Path, preset: RadioPreset | None, hub: str) -> list[str]:
     """Lines on what to type next; `preset` is None if the kind of radio is unknown."""
-    configs = [out / name for name in files if name.endswith(".toml")]
+    configs = [out / name for name in files if name.endswith(".toml") and name != KEYS]
     is_real = preset is not None and preset.is_real
     is_here = len(configs) > 1 and not is_real and not hub
     lines = ["next:", f"  sdrlinkd --check --config {configs[0]}"]
@@ -224,13 +235,18 @@ def _next(files: dict[str, bytes], out: Path, preset: RadioPreset | None, hub: s
     if preset is not None and preset.backend == "ether":
         where = f"--listen 0.0.0.0:{hub.rpartition(':')[2]}" if hub else f"--dir {out / 'air'}"
         lines.append(f"  sdrlink-ether {where} &")
+    here = configs[: None if is_here else 1]
+    if KEYS in files:
+        lines += [f"  sdrlinkctl key install --config {each}" for each in here]
     behind = " &" if is_here else ""
-    lines += [f"  sdrlinkd --config {each}{behind}" for each in configs[: None if is_here else 1]]
+    lines += [f"  sdrlinkd --config {each}{behind}" for each in here]
     if len(configs) > 1 and not is_here:
         rest = ", ".join(each.name for each in configs[1:])
         which = rest if len(configs) == 2 else f"one of {rest}"
         to = "the other robot" if len(configs) == 2 else "each other robot"
-        lines.append(f"  copy {REGISTRY} and {which} to {to}")
+        what = f"{REGISTRY}, {KEYS} (secret)" if KEYS in files else REGISTRY
+        lines.append(f"  copy {what} and {which} to {to}")
     elif len(configs) == 1 and (preset is None or preset.shares_air):
-        lines.append(f"  each other robot needs the same {REGISTRY} and its own --id")
+        what = f"{REGISTRY} and {KEYS} (secret)" if KEYS in files else REGISTRY
+        lines.append(f"  each other robot needs the same {what}, and its own --id")
     return lines

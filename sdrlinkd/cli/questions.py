@@ -53,6 +53,14 @@ class Questions:
             lambda text: _ids(text, robots),
         )  # fmt: skip
 
+    def is_sealed(self, given: bool | None) -> bool:
+        """Whether the team seals its PDUs, as given or as answered; without a terminal, no."""
+        if given is not None or not self._can_ask:
+            return bool(given)
+        return typer.confirm(
+            "seal the link, so that only your team can send and read", default=True
+        )
+
     def topics(self) -> list[str]:
         """The topics as answered: NAME:TYPE each, or the path of a bag, or `graph`."""
         what = "which topics: NAME:TYPE NAME:TYPE …, the path of a bag, or graph (ROS 2, running)"

@@ -4,9 +4,10 @@ from sdrlinkd.init.choosing import MOST_TOPICS, Choice, FoundTopic, choose, name
 from sdrlinkd.init.copying import copy_of, dictionaries_of
 from sdrlinkd.init.graph import topics_of_graph
 from sdrlinkd.init.radios import RADIOS, RadioPreset
-from sdrlinkd.init.team import REGISTRY, Team, team_files
+from sdrlinkd.init.team import KEYS, REGISTRY, Team, team_files
 
 __all__ = [
+    "KEYS",
     "MOST_TOPICS",
     "RADIOS",
     "REGISTRY",

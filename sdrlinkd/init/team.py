@@ -8,7 +8,7 @@ import tomli_w
 from sdrlinkd.init.choosing import FoundTopic
 from sdrlinkd.init.radios import RadioPreset
 
-REGISTRY = "registry.csv"
+REGISTRY, KEYS = "registry.csv", "keys.toml"
 
 
 class Team(NamedTuple):
@@ -27,6 +27,8 @@ class Team(NamedTuple):
     """Folder of the daemons' sockets, where several run on one computer."""
     hub: str = ""
     """HOST:PORT of a hub that robots on other computers reach; empty: all are on this one."""
+    is_sealed: bool = False
+    """Whether the team seals its PDUs."""
 
 
 def team_files(team: Team, ids: list[int]) -> dict[str, str]:
@@ -64,6 +66,12 @@ def _config(team: Team, number: int, has_neighbors: bool) -> str:
         parts.append("[ether]\n" + _hub(team))
     if radio.shares_air and team.robots > 1:
         parts.append(_access(team))
+    if team.is_sealed:
+        parts.append(
+            "[security]\n"
+            + _line('mode = "seal"', "only who has the team's key can send or read")
+            + _line(f'keys = "{KEYS}"', "installed by sdrlinkctl key install")
+        )
     if has_neighbors and not radio.is_real and not team.hub:
         parts.append("[bus]\n" + _text("runtime_dir", str(team.sockets / name)))
     return "\n".join(parts)

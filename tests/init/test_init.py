@@ -289,7 +289,7 @@ def test_what_is_missing_is_asked_with_a_default(tmp_path, capsys):
         [sys.executable, "-m", "sdrlinkd.cli", "init", "--out", str(tmp_path / "team")],
         stdin=theirs, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
     )  # fmt: skip
-    os.write(ours, b"hackrff\n\n\n\n2\nodom:nav_msgs/msg/Odometry imu:sensor_msgs/msg/Imu\n")
+    os.write(ours, b"hackrff\n\n\n\n2\nodom:nav_msgs/msg/Odometry imu:sensor_msgs/msg/Imu\nn\n")
     said, _ = process.communicate(timeout=60)
     os.close(ours)
     os.close(theirs)
@@ -298,6 +298,7 @@ def test_what_is_missing_is_asked_with_a_default(tmp_path, capsys):
         'got "hackrff"; allowed', "how many robots share the channel [2]",
         "which frequency (one that your antenna and licence cover) [433.92 MHz]",
         "which robot is this, 1 to 2, or all [1]", "HackRF One (half duplex",
+        "seal the link, so that only your team can send and read [Y/n]",
     ):  # fmt: skip
         assert part in said
     assert "robot 2" in checked(tmp_path / "team" / "sdrlinkd.toml", capsys)
@@ -330,3 +331,23 @@ def test_a_team_on_the_ether_talks_at_once(init, tmp_path, monkeypatch):
                 return heard.receive(0.1)
 
             wait_until(is_heard, 60, *team)
+
+
+def test_a_sealed_team_gets_a_key(init, tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    code, said, err = init("--radio", "ether", "--robots", 2, "--id", "all", "--seal", *ODOM)
+    assert (code, err) == (0, "")
+    keys, config = tmp_path / "team" / "keys.toml", tmp_path / "team" / "robot_1.toml"
+    assert keys.stat().st_mode & 0o777 == 0o600
+    assert "PDUs are sealed: only the team's key sends" in checked(config, capsys)
+    assert f"sdrlinkctl key install --config {config}" in said
+    assert run(["key", "install", "--config", str(config)]) == 0
+    assert "installed: key 0, made " in capsys.readouterr().out
+
+
+def test_a_real_radio_is_told_to_carry_the_key_along(init, tmp_path, capsys):
+    code, said, _ = init(
+        "--radio", "hackrf", "--robots", 2, "--id", 1, "--frequency", "433.92 MHz", "--seal", *ODOM
+    )
+    assert code == 0
+    assert "each other robot needs the same registry.csv and keys.toml (secret)" in said

@@ -1,0 +1,180 @@
+"""Two daemons that seal their PDUs, joined by UDP: what a test sends there is on the air."""
+
+import socket
+
+import pytest
+
+from sdrlinkd.cli import run
+from sdrlinkd.client import Publisher, Subscriber
+from sdrlinkd.keyring import create_key_file, new_key
+from sdrlinkd.process import Process, module
+from tests.sealing import vectors
+from tests.waiting import wait_for
+
+CDR = b"\0\1\0\0"
+SIZE = 220
+
+
+@pytest.fixture
+def ports():
+    """Two UDP ports that nobody uses."""
+    sockets = [socket.socket(type=socket.SOCK_DGRAM) for _ in range(2)]
+    for each in sockets:
+        each.bind(("127.0.0.1", 0))
+    found = [each.getsockname()[1] for each in sockets]
+    for each in sockets:
+        each.close()
+    return found
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Where the state is."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return tmp_path
+
+
+def text(robot, ports, keys, mode="seal", more=""):
+    mine, other = ports if robot == 1 else ports[::-1]
+    return (
+        f'namespace = "robot_{robot}"\nbackend = "gnuradio"\n[gnuradio]\ntransport = "udp"\n'
+        f'send = "127.0.0.1:{other}"\nreceive = "127.0.0.1:{mine}"\nrate_bit_s = 1e6\n'
+        f'[link]\npdu_size = {SIZE}\n[security]\nmode = "{mode}"\nkeys = "{keys}"\n{more}'
+    )
+
+
+@pytest.fixture
+def key_file(folder):
+    path = folder / "team.key"
+    create_key_file(path, [new_key(0)])
+    return path
+
+
+def installed(write_config, folder, robot, ports, key_file, **more):
+    """A configuration, with the key installed for its robot."""
+    config = text(robot, ports, folder / f"keys_{robot}.toml", **more)
+    path = write_config(folder, config)
+    assert run(["key", "install", str(key_file), "--config", str(path)]) == 0
+    return config
+
+
+@pytest.fixture
+def team(start_daemon, write_config, folder, ports, key_file):
+    """Two daemons with one key."""
+    configs = [installed(write_config, folder, each, ports, key_file) for each in (1, 2)]
+    return [start_daemon(config) for config in configs]
+
+
+def proves(daemon, other):
+    return other in daemon.snapshot().link.security.proven
+
+
+def test_sealed_messages_arrive_and_recordings_do_not(team, ports, capsys):
+    one, two = team
+    wait_for(lambda: proves(one, 2) and proves(two, 1))
+    assert run(["key", "check", "--with", "2", "--runtime-dir", str(one.directory)]) == 0
+    assert "robot 2 has our key, and has proven to be alive" in capsys.readouterr().out
+    with (
+        Subscriber("/rx_robot_1/cmd_vel", directory=two.directory) as heard,
+        Publisher(one.directory) as out,
+    ):
+        for number in range(20):
+            out.send("/robot_1/cmd_vel", CDR + bytes([number]))
+        got = [heard.receive(5).payload[4] for _ in range(20)]
+    assert got == list(range(20))
+    with one.control() as control:
+        assert control.ask("check")["problems"] == []
+
+
+def test_nobody_else_commands(team, ports):
+    """What is sent to the port was heard on the air: clear, garbled, and of another key."""
+    one, two = team
+    wait_for(lambda: proves(two, 1))
+    stranger = socket.socket(type=socket.SOCK_DGRAM)
+    stranger.sendto(vectors.clear(vectors.SIMPLE, SIZE), ("127.0.0.1", ports[1]))
+    forged = vectors.SealedFields(SIZE, vectors.SEAL, bytes(32), 0, 1 << 20, 0, vectors.SIMPLE)
+    stranger.sendto(vectors.seal(forged), ("127.0.0.1", ports[1]))
+    stranger.close()
+
+    def dropped():
+        return two.snapshot().link.rx.pdus_dropped
+
+    wait_for(lambda: dropped().get("sec_cleartext") == 1 and dropped().get("sec_bad_tag") == 1)
+    assert two.snapshot().link.rx.delivered == 0
+    assert one.is_up()
+
+
+def test_the_keys_change_while_all_runs(team, folder, capsys):
+    one, two = team
+    wait_for(lambda: proves(one, 2) and proves(two, 1))
+    assert run(["key", "rotate", str(folder / "next.key"), "--config", str(one.config)]) == 0
+    for daemon in team:
+        capsys.readouterr()
+        line = ["key", "install", str(folder / "next.key"), "--config", str(daemon.config)]
+        assert run(line) == 0
+        assert "the daemon has re-read: keys" in capsys.readouterr().out
+    wait_for(lambda: all(each.snapshot().link.security.kid == 1 for each in team))
+
+    def shown():
+        capsys.readouterr()
+        assert run(["key", "show", "--config", str(one.config)]) == 0
+        return capsys.readouterr().out.splitlines()
+
+    # On disk, too, in a moment.
+    wait_for(lambda: shown()[1].endswith("(in use)"))
+    # A third key takes the place of the one that is out of use.
+    assert run(["key", "rotate", str(folder / "third.key"), "--config", str(one.config)]) == 0
+    line = ["key", "install", str(folder / "third.key"), "--config", str(one.config)]
+    assert run(line) == 0
+    assert [each.split(",")[0] for each in shown()] == ["key 1", "key 2"]
+
+
+def test_a_restart_is_believed_again(start_daemon, team):
+    one, two = team
+    wait_for(lambda: proves(one, 2) and proves(two, 1))
+    one.ends_well()
+    one.at_work()
+    wait_for(lambda: proves(one, 2) and proves(two, 1))
+    assert two.snapshot().link.neighbors[0].reboots == 1
+
+
+@pytest.mark.parametrize(("prepare", "says"), [
+    ("none", "cannot be read (No such file or directory); sdrlinkctl key install puts a key there"),
+    ("copied", "key 0 was never installed on this robot, or its numbers are lost"),
+    ("open", "others can read it (mode 0644); allowed: 0600"),
+    ("no state", "security.state_dir:"),
+])  # fmt: skip
+def test_without_key_or_state_it_does_not_start(
+    start_daemon, write_config, folder, ports, key_file, prepare, says
+):
+    keys, more = folder / "keys.toml", ""
+    if prepare != "none":
+        keys.write_bytes(key_file.read_bytes())
+        keys.chmod(0o644 if prepare == "open" else 0o600)
+    if prepare == "no state":
+        more = f'state_dir = "{key_file}/state"\n'
+    path = write_config(folder, text(1, ports, keys, more=more))
+    with Process(module("sdrlinkd", "--config", str(path))) as daemon:
+        assert daemon.wait() == 2
+        (line,) = [each for each in daemon.err().splitlines() if each]
+    assert says in line
+
+
+def test_a_second_daemon_of_the_same_robot_is_refused(write_config, folder, team, ports):
+    other = folder / "other"
+    other.mkdir()
+    path = write_config(other, text(1, [ports[0] + 1, ports[1] + 1], folder / "keys_1.toml"))
+    with Process(module("sdrlinkd", "--config", str(path))) as daemon:
+        assert daemon.wait() == 2
+        assert "another daemon seals as robot 1" in daemon.err()
+
+
+def test_key_install_says_what_is_left_to_do(write_config, folder, ports, key_file, capsys):
+    path = write_config(folder, text(1, ports, folder / "keys.toml", mode="off"))
+    assert run(["key", "install", str(key_file), "--config", str(path)]) == 0
+    assert 'nothing is sealed yet: set mode = "seal" in [security]' in capsys.readouterr().out
+    create_key_file(folder / "another.key", [new_key(0)])
+    line = ["key", "install", str(folder / "another.key"), "--config", str(path)]
+    assert run(line) == 2
+    assert "another key with kid 0 is installed; allowed: the next key" in capsys.readouterr().err
+    assert run([*line, "--replace"]) == 0
