@@ -129,13 +129,18 @@ def test_the_keys_change_while_all_runs(team, folder, capsys):
     assert [each.split(",")[0] for each in shown()] == ["key 1", "key 2"]
 
 
-def test_a_restart_is_believed_again(start_daemon, team):
+def test_a_restart_is_believed_again(team):
     one, two = team
     wait_for(lambda: proves(one, 2) and proves(two, 1))
     one.ends_well()
     one.at_work()
     wait_for(lambda: proves(one, 2) and proves(two, 1))
-    assert two.snapshot().link.neighbors[0].reboots == 1
+    with (
+        Subscriber("/rx_robot_1/odom", directory=two.directory) as heard,
+        Publisher(one.directory) as out,
+    ):
+        out.send("/robot_1/odom", CDR)
+        assert heard.receive(5) is not None
 
 
 @pytest.mark.parametrize(("prepare", "says"), [
