@@ -30,6 +30,10 @@ TEXTS = {
         "CPU time of one message through bus, queue and PDUs, in and out, beside ZeroMQ alone. "
         "The ratios compare with what cannot be avoided: a CRC, and a join of the fragments."
     ),
+    "sealing": (
+        "CPU time of one PDU, sealed at one robot and opened at another, beside the cipher alone; "
+        "and of one message through both links, sealed beside in the clear."
+    ),
     "modem_path": (
         "The first two rows are wall time through one daemon, its modem and a paced loopback. "
         "The others are CPU time of one core: how many times faster than the samples come."

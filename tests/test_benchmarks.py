@@ -36,6 +36,13 @@ ROWS = {
         "path_latency_ms_p50",
         "queue_cost_ratio_10_to_10000",
     },
+    "sealing": {
+        *(f"seal_and_open_over_bare_{size}B" for size in (64, 256, 1024)),
+        "core_pct_at_1000_pdus_per_s_each_way",
+        "latency_added_us",
+        *(f"goodput_kept_{size}B_pct" for size in (64, 1024)),
+        "overhead_octets",
+    },
     "modem_path": {
         "odom_30hz_latency_ms_p50",
         "odom_30hz_latency_ms_p99",

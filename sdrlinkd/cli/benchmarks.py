@@ -20,6 +20,9 @@ class Benchmark(NamedTuple):
 
 BENCHMARKS: dict[str, Benchmark] = {
     "bus": Benchmark("The inner path: bus, queue, PDUs and back.", 1),
+    "sealing": Benchmark(
+        "Sealed PDUs: processor time, latency and octets.", 0.5, peers=("cryptography",)
+    ),
     "modem_path": Benchmark("The modem in a daemon: latency, and speed relative to real time.", 2),
     "realtime": Benchmark("Whole daemons in real time: latency, ages, load and start.", 8),
     "waterfall": Benchmark("Where a message's time goes in a daemon, stage by stage.", 1),

@@ -6,7 +6,7 @@ from cryptography.hazmat.primitives.hashes import SHA256
 from cryptography.hazmat.primitives.kdf.hkdf import HKDF
 
 from sdrlinkd.sealing.keys import Key
-from sdrlinkd.wire import BROADCAST, TAG_SIZE, Sealed, associated_data, seal_nonce
+from sdrlinkd.wire import BROADCAST, TAG_SIZE, Sealed, build_sealed, seal_number, seal_parts
 
 _SUBKEY_SIZE = 16
 _MODES = {"seal": 1, "auth": 2}
@@ -17,35 +17,40 @@ class Ciphers:
 
     def __init__(self, key: Key, mode: str) -> None:
         self.key = key
+        self._ticks, self._number = -1, b""
         self._mode = _MODES[mode]
         self._is_auth = mode == "auth"
         self._by_ends: dict[tuple[int, int], AESCCM] = {}
 
-    def seal(self, header: bytes, ticks: int, plaintext: bytes) -> bytes:
-        """Body and tag of a PDU with this header and T."""
-        kid = self.key.kid
-        cipher = self._cipher(header[1], header[2])
-        nonce, associated = seal_nonce(kid, ticks, header[3]), associated_data(header, kid, ticks)
+    def seal(self, inner: bytes, ticks: int) -> bytes:
+        """The sealed PDU of an inner PDU, with this T."""
+        if ticks != self._ticks:
+            # Many PDUs have one T.
+            self._ticks, self._number = ticks, seal_number(self.key.kid, ticks)
+        head, nonce, associated, text = seal_parts(inner, self._number)
+        cipher = self._by_ends.get((inner[1], inner[2])) or self._cipher(inner[1], inner[2])
         if self._is_auth:
-            return plaintext + cipher.encrypt(nonce, b"", associated + plaintext)
-        return cipher.encrypt(nonce, plaintext, associated)
+            return build_sealed(head, text + cipher.encrypt(nonce, b"", associated + text))
+        return build_sealed(head, cipher.encrypt(nonce, text, associated))
 
     def open(self, pdu: Sealed) -> bytes | None:
         """The plaintext of a PDU; None if it does not open."""
-        cipher = self._cipher(pdu.src, pdu.dst)
+        cipher = self._by_ends.get((pdu.src, pdu.dst)) or self._cipher(pdu.src, pdu.dst)
+        nonce, associated, secret = pdu.parts()
         try:
             if self._is_auth:
-                cipher.decrypt(pdu.nonce, pdu.tag, pdu.associated + pdu.body)
-                return pdu.body
-            return cipher.decrypt(pdu.nonce, pdu.body + pdu.tag, pdu.associated)
+                body = secret[:-TAG_SIZE]
+                cipher.decrypt(nonce, secret[-TAG_SIZE:], associated + body)
+                return body
+            return cipher.decrypt(nonce, secret, associated)
         except InvalidTag:
             return None
 
     def _cipher(self, src: int, dst: int) -> AESCCM:
-        ends = (src, dst if self._pair(src, dst) else BROADCAST)
-        if ends not in self._by_ends:
-            self._by_ends[ends] = self._derived(*ends)
-        return self._by_ends[ends]
+        own = (src, dst if self._pair(src, dst) else BROADCAST)
+        if own not in self._by_ends:
+            self._by_ends[own] = self._derived(*own)
+        return self._by_ends.setdefault((src, dst), self._by_ends[own])
 
     def _pair(self, src: int, dst: int) -> bytes | None:
         return self.key.pairs.get(frozenset((src, dst))) if self.key.pairs else None

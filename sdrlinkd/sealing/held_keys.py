@@ -52,5 +52,7 @@ class HeldKeys:
         self.by_kid = {}
         for key in self.rotation.keys:
             self.by_kid[key.kid] = known.get(key) or Ciphers(key, self.mode)
+        self.is_changing = len(self.by_kid) > 1
+        """Whether there is a key besides the one that seals."""
         self.own = self.by_kid[self.rotation.own.kid]
         """The key that seals."""

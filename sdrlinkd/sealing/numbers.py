@@ -1,6 +1,6 @@
 """The numbers of our sealed PDUs: each (T, seq) once, whatever happens to clocks and power."""
 
-from math import floor
+from math import floor, inf
 
 from sdrlinkd.wire import N_TICKS, TICKS_PER_S
 
@@ -34,6 +34,9 @@ class Numbers:
         """The last T given out with each seq."""
         self._used: dict[int, int] = {}
         """The numbers given out lately: a bit for each seq, by T."""
+        self._end = begin
+        """The first T that must not be given out."""
+        self._then, self._ticks_then = -inf, 0
         self.first = begin
         """The first T of this life."""
 
@@ -46,12 +49,13 @@ class Numbers:
     def begin_anew(self) -> None:
         """Go on from the newest T, as another clock starts."""
         if self._zero is not None:
-            self._begin, self._zero = self.newest + 1, None
+            self._begin, self._zero, self._then = self.newest + 1, None, -inf
 
     def leap_beyond(self, floor: int) -> None:
         """Use no T below `floor`, as another key was used up to there."""
         if floor > self.newest:
             self._begin, self._zero = floor + round(LEAP_S * TICKS_PER_S), None
+            self._then = -inf
             self.newest = max(self.newest, self._begin)
 
     def is_out(self, at: float) -> bool:
@@ -72,25 +76,30 @@ class Numbers:
     def move_floor(self, written: int) -> None:
         """Note the floor that is on disk now."""
         self.floor = max(self.floor, written)
+        self._end = min(self.floor, N_TICKS)
 
     def fits(self, at: float, seq: int, n: int) -> bool:
         """Whether `n` PDUs from `seq` on can have numbers in a burst at `at`."""
         ticks, last = self._ticks(at), self._last
-        if not self.first <= ticks < min(self.floor, N_TICKS):
+        if not self.first <= ticks < self._end:
             return False
         return all(last[(seq + i) % N_SEQS] < ticks for i in range(n))
 
     def take(self, at: float, seq: int) -> int | None:
         """The T of a PDU with `seq` in a burst at `at`; None: it must wait."""
-        if not self.fits(at, seq, 1):
+        # The PDUs of a burst have one start.
+        ticks = self._ticks_then if at == self._then else self._ticks(at)
+        if self._last[seq] >= ticks or not self.first <= ticks < self._end:
             return None
-        ticks = self._last[seq] = self._ticks(at)
+        self._last[seq] = ticks
+        if ticks in self._used:
+            self._used[ticks] |= 1 << seq
+            return ticks
+        self._then, self._ticks_then = at, ticks
         self.newest = max(self.newest, ticks)
-        if ticks not in self._used:
-            self._used[ticks] = 0
-            while (oldest := next(iter(self._used))) < ticks - REMEMBERED_TICKS:
-                del self._used[oldest]
-        self._used[ticks] |= 1 << seq
+        self._used[ticks] = 1 << seq
+        while (oldest := next(iter(self._used))) < ticks - REMEMBERED_TICKS:
+            del self._used[oldest]
         return ticks
 
     def is_foreign(self, ticks: int, seq: int) -> bool:

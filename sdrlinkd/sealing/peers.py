@@ -51,11 +51,8 @@ class Least:
     def __init__(self) -> None:
         self._begin = -inf
         self._now = self._before = inf
-
-    @property
-    def value(self) -> float:
+        self.value = inf
         """The least value; infinity if there is none."""
-        return min(self._now, self._before)
 
     def add(self, value: float, at: float) -> None:
         """Note a value at time `at`."""
@@ -63,7 +60,10 @@ class Least:
             is_next = at < self._begin + 2 * BUCKET_S
             self._before, self._now = (self._now if is_next else inf), inf
             self._begin = at
-        self._now = min(self._now, value)
+            self.value = self._before
+        if value < self._now:
+            self._now = value
+            self.value = min(value, self._before)
 
 
 class Peers:
@@ -78,9 +78,10 @@ class Peers:
 
     def of(self, src: int) -> "Peer":
         """What is known about robot `src`."""
-        if src not in self._by_src:
-            self._by_src[src] = Peer(partial(self._oldest, src))
-        return self._by_src[src]
+        peer = self._by_src.get(src)
+        if peer is None:
+            peer = self._by_src[src] = Peer(partial(self._oldest, src))
+        return peer
 
     def was_opened(self, src: int) -> bool:
         """Whether a sealed PDU of robot `src` was ever opened in this life."""
@@ -127,18 +128,29 @@ class Peer:
         proof = self._proof
         return proof is not None and now - self.heard_at < SILENT_S and now - proof.at < PROOF_S
 
-    def lapse(self, now: float) -> bool:
-        """Forget a proof that has lasted too long; returns whether there was one."""
-        lapses = self._proof is not None and not self.is_proven(now)
-        if lapses:
-            self._proof = None
-        return lapses
-
     def window(self, kid: int) -> Window:
         """The numbers opened under a key."""
-        if kid not in self.windows:
-            self.windows[kid] = Window(self._oldest(kid))
-        return self.windows[kid]
+        window = self.windows.get(kid)
+        if window is None:
+            window = self.windows[kid] = Window(self._oldest(kid))
+        return window
+
+    def note(self, lead_s: float, at: float) -> bool:
+        """Note the lead of a PDU that opens at `at`; returns whether a proof has ended."""
+        proof, ended = self._proof, False
+        if proof is not None:
+            if lead_s + proof.ahead_s < RESTARTED_S:
+                self.restart()
+                ended = True
+            elif not self.is_proven(at):
+                self._proof, ended = None, True
+        self.least.add(lead_s, at)
+        return ended
+
+    @property
+    def has_proof(self) -> bool:
+        """Whether it was proven when the last PDU was noted."""
+        return self._proof is not None
 
     def prove(self, proof: Proof) -> None:
         """Note that the source is alive, and how far its clock is ahead of ours."""
@@ -149,13 +161,16 @@ class Peer:
         self._proof = None
         self.least = Least()
 
-    def excess_s(self, lead_s: float, held_s: float) -> tuple[float, float]:
-        """By how much in s a PDU's delay exceeds `held_s`, at least and at most."""
-        least_s = lead_s - self.least.value - held_s
-        if self._proof is None:
-            return least_s, least_s
-        return least_s, lead_s + self._proof.ahead_s - held_s
+    def is_late(self, lead_s: float, held_s: float, limit_s: float, *, is_judged: bool) -> bool:
+        """Whether a PDU's delay differs from `held_s` by more than `limit_s`.
 
-    def has_restarted(self, lead_s: float) -> bool:
-        """Whether a PDU arrives before it can have been sent."""
-        return self._proof is not None and lead_s + self._proof.ahead_s < RESTARTED_S
+        Of a source that is not proven, only the relation to its other PDUs is known: a delay of
+        these is found only if it `is_judged`.
+        """
+        least_s = lead_s - self.least.value - held_s
+        if least_s < -limit_s:
+            return True
+        if not is_judged:
+            return False
+        proof = self._proof
+        return (least_s if proof is None else lead_s + proof.ahead_s - held_s) > limit_s

@@ -19,12 +19,9 @@ from sdrlinkd.wire import (
     TICKS_PER_S,
     Contact,
     KeyTold,
-    build_sealed,
     delayed,
     depends_on_start,
-    plaintext,
     postponed,
-    sealed_header,
     with_seq,
 )
 
@@ -100,9 +97,7 @@ class Sealing:
         ticks = self._numbers.take(start, inner[3])
         if ticks is None:
             raise ValueError(f"no number for PDU {inner[3]} at {start}")
-        header, own = sealed_header(inner), self._keys.own
-        body = own.seal(header, ticks, plaintext(inner))
-        return build_sealed(header, own.key.kid, ticks, body)
+        return self._keys.own.seal(inner, ticks)
 
     def later(
         self, pdu: bytes, inner: bytes, by_us: int, start: float, next_seq: Callable[[], int]

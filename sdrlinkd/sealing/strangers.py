@@ -29,7 +29,7 @@ class Strangers:
 
     def __init__(self, keys: HeldKeys | None) -> None:
         self._keys = keys
-        self._by_src: dict[int, _Stranger] = {}
+        self.by_src: dict[int, _Stranger] = {}
         self._told_at = self._closed_at = -inf
 
     def closed(self, src: int, kid: int, now: float) -> None:
@@ -49,7 +49,7 @@ class Strangers:
 
     def opened(self, src: int) -> None:
         """Forget what was noted about robot `src`, as a PDU of it opens."""
-        self._by_src.pop(src, None)
+        self.by_src.pop(src, None)
 
     @property
     def key_due_at(self) -> float:
@@ -65,7 +65,7 @@ class Strangers:
     def notices(self, now: float) -> list[str]:
         """A sentence on each robot whose PDUs do not open, or are refused as they are clear."""
         found = []
-        for src, each in sorted(self._by_src.items()):
+        for src, each in sorted(self.by_src.items()):
             told = each.told if now - each.told_at < FORGET_S else None
             if now - each.closed_at < FORGET_S or (told is not None and self._differs(told)):
                 found.append(self._does_not_open(src, each, now))
@@ -116,4 +116,4 @@ class Strangers:
         return held is None or self._keys is None or self._keys.told(held.key) != told
 
     def _of(self, src: int) -> _Stranger:
-        return self._by_src.setdefault(src, _Stranger())
+        return self.by_src.setdefault(src, _Stranger())

@@ -65,6 +65,7 @@ from sdrlinkd.wire.control import (
     build_records,
     parse_records,
 )
+from sdrlinkd.wire.crc import crc16
 from sdrlinkd.wire.declared import (
     FIRST_NUMBER,
     HASH_SIZE,
@@ -88,6 +89,7 @@ from sdrlinkd.wire.declared import (
     pieces,
 )
 from sdrlinkd.wire.later import (
+    HOP,
     aged,
     depends_on_start,
     forwarded,
@@ -121,15 +123,13 @@ from sdrlinkd.wire.sealed import (
     TAG_SIZE,
     TICKS_PER_S,
     Sealed,
-    associated_data,
     build_sealed,
     delayed,
     is_sealed,
     leaves_later,
     parse_sealed,
-    plaintext,
-    seal_nonce,
-    sealed_header,
+    seal_number,
+    seal_parts,
 )
 
 __all__ = [
@@ -150,6 +150,7 @@ __all__ = [
     "HASH_SIZE",
     "HEADER_SIZE",
     "HELD_UNIT_S",
+    "HOP",
     "KEY_PREFIX_SIZE",
     "LAST_NUMBER",
     "MAX_AGE_US",
@@ -214,12 +215,12 @@ __all__ = [
     "Waits",
     "Wanted",
     "aged",
-    "associated_data",
     "build",
     "build_full",
     "build_part",
     "build_records",
     "build_sealed",
+    "crc16",
     "delayed",
     "depends_on_start",
     "entry_budget",
@@ -248,11 +249,10 @@ __all__ = [
     "parse_sealed",
     "part_size",
     "pieces",
-    "plaintext",
     "postponed",
     "read_control_entries",
-    "seal_nonce",
-    "sealed_header",
+    "seal_number",
+    "seal_parts",
     "tellable",
     "topic_type",
     "with_seq",

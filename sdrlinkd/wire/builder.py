@@ -1,11 +1,11 @@
 """Fills a PDU entry by entry, up to its capacity."""
 
-import binascii
 import struct
 from functools import lru_cache
 
 from sdrlinkd.wire.capacity import CRC_SIZE, ENTRY_HEADER_SIZE, MAX_ENTRIES, entry_budget
 from sdrlinkd.wire.control import ASKS, STAMP_RECORD, STAMP_SIZE, TLV_HEADER_SIZE, RecordType
+from sdrlinkd.wire.crc import crc16
 from sdrlinkd.wire.declared import FIRST_NUMBER, number_octet
 from sdrlinkd.wire.registry import CONTROL_TOPIC_ID, DECLARED_TOPIC_ID
 
@@ -133,7 +133,7 @@ class PduBuilder:
             padded = [*ids, 0]
             nibbles = bytes(padded[i] << 4 | padded[i + 1] for i in range(0, n, 2))
         body = b"".join((header, nibbles, *self._parts)).ljust(self._pdu_size - CRC_SIZE, b"\0")
-        return body + binascii.crc_hqx(body, 0).to_bytes(2, "big")
+        return body + crc16(body).to_bytes(2, "big")
 
 
 def build_full(
@@ -151,4 +151,4 @@ def build_full(
             payload,
         )
     )  # fmt: skip
-    return body + binascii.crc_hqx(body, 0).to_bytes(2, "big")
+    return body + crc16(body).to_bytes(2, "big")

@@ -1,7 +1,6 @@
 """Adjusts a PDU that leaves later than planned: postponed, or forwarded by a relay."""
 
 import struct
-from binascii import crc_hqx
 from collections.abc import Iterator
 from contextlib import suppress
 
@@ -15,6 +14,7 @@ from sdrlinkd.wire.control import (
     RecordType,
     record_spans,
 )
+from sdrlinkd.wire.crc import crc16
 from sdrlinkd.wire.pdu import identity
 from sdrlinkd.wire.registry import CONTROL_TOPIC_ID
 
@@ -83,7 +83,7 @@ def lasting_identity(pdu: bytes) -> tuple[int, int, int]:
     src, seq, crc = identity(pdu)
     end = len(pdu) - CRC_SIZE
     for at in _times(pdu, _FORWARDED):
-        crc ^= crc_hqx(pdu[at : at + _U32.size] + bytes(end - at - _U32.size), 0)
+        crc ^= crc16(pdu[at : at + _U32.size] + bytes(end - at - _U32.size))
     return src, seq, crc
 
 
@@ -126,5 +126,5 @@ def _later_receipts(data: bytearray, by_us: int) -> None:
 
 
 def _with_crc(data: bytearray) -> bytes:
-    data[-CRC_SIZE:] = crc_hqx(data[:-CRC_SIZE], 0).to_bytes(CRC_SIZE, "big")
+    data[-CRC_SIZE:] = crc16(data[:-CRC_SIZE]).to_bytes(CRC_SIZE, "big")
     return bytes(data)

@@ -1,7 +1,6 @@
 """`tdma`: each node has its own time slots, synchronized by the bursts it hears."""
 
 import math
-from binascii import crc_hqx
 from collections.abc import Sequence
 from math import inf
 from random import Random
@@ -12,7 +11,7 @@ from sdrlinkd.link.access.sightings import Sightings
 from sdrlinkd.link.access.steps import after
 from sdrlinkd.link.access.tdma_states import STEPS, Happens, State
 from sdrlinkd.link.traits import Sensed
-from sdrlinkd.wire import Frame
+from sdrlinkd.wire import Frame, crc16
 
 LISTEN_S = 2.5
 """A robot starts a schedule after hearing none for this time in s, plus 1 s per robot before it."""
@@ -79,7 +78,7 @@ class Tdma(BusyChannel):
         self.step_s = reuse * minislot_s * len(nodes)
         # Rounded to µs, as sent on the air.
         times = (round(1e6 * slot_s), round(1e6 * guard_s), round(1e6 * minislot_s) * reuse)
-        self._times_crc = crc_hqx(pack(">III", *times) + bytes(nodes), 0)
+        self._times_crc = crc16(pack(">III", *times) + bytes(nodes))
         self._origin = 0.0
         self._root, self._level, self._parent = own_id, 0, own_id
         self._lost = (-1, 0, 0.0)

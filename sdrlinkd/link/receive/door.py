@@ -34,6 +34,8 @@ class Admitted(NamedTuple):
     was_seen: bool = False
     may_schedule: bool = True
     """Whether a schedule in it may be followed."""
+    ticks: int | None = None
+    """The T of a sealed PDU, which distinguishes it from others with its sequence number."""
 
 
 class _Waiting(NamedTuple):
@@ -72,7 +74,7 @@ class Door:
             self._refuse(error.reason)
             return []
         src = opened.src
-        pdu = Admitted(opened.inner, data, at, snr_db, ended_at)
+        pdu = Admitted(opened.inner, data, at, snr_db, ended_at, ticks=opened.ticks)
         if opened.is_proven:
             self._schedules_until.pop(src, None)
             return [*self._release(src, now), pdu] if src in self._waiting else [pdu]
@@ -102,10 +104,14 @@ class Door:
         for opened, raw, at, snr_db, ended_at in self._waiting.pop(src):
             if now - at > WAIT_S:
                 self._refuse("sec_unproven")
-            elif self._opener.is_late(src, opened.lead_s, opened.held_s, now):
+            elif self._opener.is_late(src, opened.lead_s, opened.held_s):
                 self._refuse("sec_late")
             else:
-                released.append(Admitted(opened.inner, raw, at, snr_db, ended_at, was_seen=True))
+                released.append(
+                    Admitted(
+                        opened.inner, raw, at, snr_db, ended_at, was_seen=True, ticks=opened.ticks
+                    )
+                )
         return released
 
     def _may_schedule(self, src: int, now: float) -> bool:

@@ -100,7 +100,7 @@ class Inbox:
         events: list[Event] = []
         data, at = admitted.data, admitted.at
         try:
-            read = self._read(data)
+            read = self._read(admitted)
         except PduError as error:
             return self._drop(error.reason, events)
         pdu, control, records, is_relayed = read
@@ -115,6 +115,8 @@ class Inbox:
             self._announce(pdu.src, at, events)
         neighbor.heard_at(at)
         _, seq, crc = lasting_identity(data) if stamps else identity(data)
+        if admitted.ticks is not None:
+            crc = admitted.ticks
         if not neighbor.track.heard(seq, crc):
             neighbor.count_duplicate()
             return self._drop("rx_dup", events)
@@ -171,10 +173,11 @@ class Inbox:
         self._ages.expire(now, self._reassembly.holds)
         return events
 
-    def _read(self, data: bytes) -> tuple[Pdu, ControlEntries, list[Record], bool]:
+    def _read(self, admitted: Admitted) -> tuple[Pdu, ControlEntries, list[Record], bool]:
         """(PDU, its control entries, its records, whether a relay sent it). Raises PduError."""
-        # Only a PDU that came in the clear, among sealed ones, has another size.
-        pdu = parse(data, self._pdu_size if len(data) != self._clear_size else len(data))
+        is_opened = admitted.ticks is not None
+        size = self._pdu_size if is_opened else self._clear_size
+        pdu = parse(admitted.data, size, is_intact=is_opened)
         control = read_control_entries(pdu) if self._has_control else _NO_CONTROL
         records = control.records
         if self._has_numbers:
@@ -184,7 +187,7 @@ class Inbox:
     def _glance(self, admitted: Admitted) -> list[Event]:
         """The events that follow from the presence of a PDU whose source is not proven."""
         try:
-            pdu, _, records, is_relayed = self._read(admitted.data)
+            pdu, _, records, is_relayed = self._read(admitted)
         except PduError:
             return []
         events: list[Event] = [PduHeard(pdu, [], admitted.at, is_relayed)]

@@ -1,7 +1,6 @@
 """Transports of PDUs to a flowgraph and back: PMTs over ZeroMQ, or octets over UDP or TCP."""
 
 import asyncio
-import binascii
 import contextlib
 from collections.abc import Callable
 from typing import Protocol, cast
@@ -12,6 +11,7 @@ from backends import BackendError, open_endpoint
 from sdrlinkd.errors import UserError
 from sdrlinkd.pdulink.gnuradio.pdus import from_gnu_radio, to_gnu_radio
 from sdrlinkd.reading import SocketReader
+from sdrlinkd.wire import crc16
 
 Take = Callable[[bytes], None]
 AHEAD = 16
@@ -221,7 +221,7 @@ class TcpTransport(asyncio.Protocol):
         size = self._pdu_size
         while len(self._have) >= size:
             pdu = bytes(self._have[:size])
-            if binascii.crc_hqx(pdu, 0):
+            if crc16(pdu):
                 self.counters["bad_octets"] += 1
                 del self._have[0]
                 continue
