@@ -2,11 +2,13 @@
 
 import argparse
 import logging
+import signal
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sdrlinkd import __version__, spawn
+from sdrlinkd.descriptors import raise_limit
 from sdrlinkd.errors import UserError
 from sdrlinkd.journal import log_to_stderr
 from sdrlinkd.parent import end_with_parent
@@ -21,6 +23,8 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the daemon; returns 0 after a clean stop, 2 for errors that a person can fix."""
     end_with_parent()
     options = _parser().parse_args(arguments)
+    # Until the daemon can read its configuration again, a request to do so must not end it.
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
     log_to_stderr(logging.getLevelNamesMapping()[options.log_level.upper()])
     try:
         if options.check:
@@ -38,6 +42,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 def _run(path: Path) -> None:
     """Run the daemon. Raises UserError."""
+    limit = raise_limit()
     early = spawn.spawn_early(path)
     try:
         # Loaded while the modem process loads its own code.
@@ -51,7 +56,7 @@ def _run(path: Path) -> None:
         take_short_slices()
         setup = _read(path)
         with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
-            runner.run(daemon.run(setup, lambda: _read(path), early))
+            runner.run(daemon.run(setup, lambda: _read(path), early, limit))
     finally:
         early.close()
 

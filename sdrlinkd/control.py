@@ -18,6 +18,8 @@ from sdrlinkd.reading import SocketReader
 log = logging.getLogger("sdrlinkd")
 
 PROTOCOL = b"sdrl1"
+LARGEST_REQUEST = 1 << 20
+"""Largest frame of a request in octets; a client that sends more is cut off."""
 
 Arguments = dict[str, Any]
 
@@ -49,7 +51,10 @@ class Control:
     ) -> None:
         self._verbs: Mapping[str, Verb] = {}
         self._socket = directory.bind(
-            context, zmq.ROUTER, CONTROL_SOCKET, {zmq.ROUTER_MANDATORY: 1}
+            context,
+            zmq.ROUTER,
+            CONTROL_SOCKET,
+            {zmq.ROUTER_MANDATORY: 1, zmq.MAXMSGSIZE: LARGEST_REQUEST},
         )
         self._allowed_uids = {0, os.getuid()}
         self.requests = 0

@@ -22,6 +22,7 @@ from sdrlinkd.client import runtime_dir
 from sdrlinkd.config import WITHOUT_AIR, Config, Setup, backend_of, located
 from sdrlinkd.control import Control
 from sdrlinkd.declaring import Declaring
+from sdrlinkd.descriptors import Descriptors
 from sdrlinkd.errors import ConfigError, UserError
 from sdrlinkd.health import Level
 from sdrlinkd.keeping import open_keeping
@@ -58,11 +59,11 @@ STOP_S = 30.0
 Reload = Callable[[], Setup]
 
 
-async def run(setup: Setup, reload: Reload, early: EarlyModem) -> None:
+async def run(setup: Setup, reload: Reload, early: EarlyModem, descriptors: int) -> None:
     """Run the node of `setup` until SIGTERM or SIGINT.
 
-    On SIGHUP, `reload` reads the configuration again. `early` may hold a modem process. Raises
-    UserError when the node cannot be opened.
+    On SIGHUP, `reload` reads the configuration again. `early` may hold a modem process.
+    `descriptors` is how many may be open. Raises UserError when the node cannot be opened.
     """
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
@@ -71,14 +72,15 @@ async def run(setup: Setup, reload: Reload, early: EarlyModem) -> None:
     notifier = Notifier()
     async with contextlib.AsyncExitStack() as stack:
         notifier.extend(START_S)
-        node, control, reloading = await _open(setup, stack, reload, early)
+        node, control, reloading, guard = await _open(setup, stack, reload, early, descriptors)
         loop.add_signal_handler(signal.SIGHUP, reloading.on_signal)
-        stack.callback(loop.remove_signal_handler, signal.SIGHUP)
+        stack.callback(signal.signal, signal.SIGHUP, signal.SIG_IGN)
         async with _only_one_error(), asyncio.TaskGroup() as tasks:
             running = [
                 tasks.create_task(node.carry(), name="carry"),
                 tasks.create_task(node.tick(), name="tick"),
                 tasks.create_task(_watch(notifier, node, control), name="watch"),
+                tasks.create_task(guard.watch(), name="descriptors"),
             ]
             # The bus accepts messages from here on; the radio may appear later.
             notifier.ready()
@@ -110,8 +112,9 @@ async def _only_one_error() -> AsyncIterator[None]:
 
 
 async def _open(
-    setup: Setup, stack: contextlib.AsyncExitStack, reload: Reload, early: EarlyModem
-) -> tuple[Node, Control, Reloading]:
+    setup: Setup, stack: contextlib.AsyncExitStack, reload: Reload, early: EarlyModem,
+    descriptors: int,
+) -> tuple[Node, Control, Reloading, Descriptors]:  # fmt: skip
     config = setup.config
     rng = Random(os.urandom(16) if config.seed is None else config.seed)
     directory = RuntimeDirectory(_runtime_directory(config))
@@ -154,7 +157,8 @@ async def _open(
     stack.callback(control.close)
     reloading = Reloading(setup, reload, check, policies, opening, keeping)
     declaring = Declaring(setup, link, policies, node.bus, transforms)
-    control.serve(make_verbs(setup, node, control, policies, opening, reloading, declaring))
+    guard = Descriptors(descriptors, node.bus.listen)
+    control.serve(make_verbs(setup, node, control, policies, opening, reloading, declaring, guard))
     stack.push_async_callback(opening.close)
     stack.callback(loading.give_up)
     # All that is loaded so far stays: a collection would scan it and stall the daemon for 50 ms.
@@ -170,7 +174,7 @@ async def _open(
         log.info("PDUs are in the clear: anybody in range can send commands (security.mode)")
     for warning in setup.all_warnings:
         log.warning("%s", warning)
-    return node, control, reloading
+    return node, control, reloading, guard
 
 
 def _make_pdu_link(

@@ -20,6 +20,10 @@ INTERRUPTED_S = 5e-5
 """Reading three clocks takes less than this, in s, unless something comes in between."""
 STEP_NS = SECOND_NS
 """A jump of the clock by more than this, in ns, means that somebody set it."""
+SLEPT_NS = SECOND_NS
+"""A pause of the event loop in ns after which messages may have waited for it."""
+AFTERWARDS_NS = SECOND_NS // 5
+"""Time in ns after such a pause in which what had waited is read."""
 
 
 T = TypeVar("T")
@@ -103,6 +107,27 @@ class PublishClock:
     def __init__(self) -> None:
         self._ahead_ns: int | None = None
         self._set_at_ns = -OLDEST_NS
+        self._turned_ns: int | None = None
+        self._slept_ns = self._slept_until_ns = 0
+
+    def turned(self, own_ns: int) -> None:
+        """Note a turn of the event loop; what waited while the loop slept is that old at most."""
+        slept_ns = self._since_turn(own_ns)
+        if slept_ns > SLEPT_NS:
+            self._slept_ns, self._slept_until_ns = slept_ns, own_ns + AFTERWARDS_NS
+        self._turned_ns = own_ns
+
+    def age(self, published_ns: int | None, now_ns: int, own_ns: int) -> float:
+        """Age in s of a message; without publication time, what it may be after a pause."""
+        if published_ns is not None:
+            return self.age_s(published_ns, now_ns, own_ns)
+        slept_ns = self._since_turn(own_ns)
+        if slept_ns > SLEPT_NS:
+            return 1e-9 * slept_ns
+        return 1e-9 * self._slept_ns if own_ns < self._slept_until_ns else 0.0
+
+    def _since_turn(self, own_ns: int) -> int:
+        return 0 if self._turned_ns is None else own_ns - self._turned_ns
 
     def age_s(self, published_ns: int, now_ns: int, own_ns: int) -> float:
         """Age in s of a message; 0 if its time is in the future or unreliable.

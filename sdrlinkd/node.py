@@ -94,8 +94,7 @@ class Node:
     ) -> None:
         """Take a message from a producer."""
         now, clocks = at_once(self._pdu_link.now, host_clocks)
-        if published_ns is not None and not self._is_lockstep:
-            age_s = self._publish_clock.age_s(published_ns, *clocks)
+        if not self._is_lockstep and (age_s := self._publish_clock.age(published_ns, *clocks)):
             overrides = overrides._replace(age_s=age_s)
         transforms = self._transforms.get(topic_id)
         if transforms is not None:
@@ -208,6 +207,7 @@ class Node:
             silent_s = self._link.silence_at - self._pdu_link.now()
             tick_s = TICK_S if self._is_lockstep else min(TICK_S, max(silent_s, SHORTEST_TICK_S))
             due = time.monotonic() + tick_s
+            self._publish_clock.turned(host_clocks()[1])
             await asyncio.sleep(tick_s)
             self._loop_lag_s = max(time.monotonic() - due, 0.9 * self._loop_lag_s)
             if not self._is_attached:

@@ -13,6 +13,9 @@ import tomllib
 from pathlib import Path
 from typing import NamedTuple
 
+from sdrlinkd.errors import UserError
+from sdrlinkd.files import read_bounded
+
 SOCKET_BYTES = 1 << 20
 WITHOUT_MODEM = ("direct", "gnuradio")
 """Backends that carry PDUs without a modem."""
@@ -80,8 +83,8 @@ class EarlyModem:
 
 def spawn_early(config: Path) -> EarlyModem:
     """Start a modem process, if a look at the file shows that its radio will need one."""
-    with contextlib.suppress(OSError, ValueError):
-        raw = tomllib.loads(config.read_text())
+    with contextlib.suppress(OSError, ValueError, UserError):
+        raw = tomllib.loads(read_bounded(config).decode())
         backend = raw.get("backend", "direct")
         if isinstance(backend, str) and backend not in (*WITHOUT_MODEM, *LATER):
             section = raw.get(backend, {})

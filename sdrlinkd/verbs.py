@@ -9,6 +9,7 @@ from sdrlinkd import __version__
 from sdrlinkd.config import Setup
 from sdrlinkd.control import Control, Verb
 from sdrlinkd.declaring import Declaring
+from sdrlinkd.descriptors import Descriptors
 from sdrlinkd.errors import UserError
 from sdrlinkd.node import Node
 from sdrlinkd.opening import Opening
@@ -28,6 +29,7 @@ def make_verbs(
     opening: Opening,
     reloading: Reloading,
     declaring: Declaring,
+    descriptors: Descriptors,
 ) -> dict[str, Verb]:
     """The verbs of the control socket by name (bus document, section 5)."""
 
@@ -41,7 +43,8 @@ def make_verbs(
 
     def status(_: dict[str, Any]) -> object:
         snapshot = node.snapshot(control.requests)
-        return msgspec.structs.replace(snapshot, notices=[*snapshot.notices, *declaring.said()])
+        more = [*declaring.said(), *descriptors.notices()]
+        return msgspec.structs.replace(snapshot, notices=[*snapshot.notices, *more])
 
     def reload_policies(_: dict[str, Any]) -> object:
         told = reloading.reload()

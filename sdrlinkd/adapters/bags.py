@@ -1,10 +1,14 @@
 """Reads bags: rosbag2 (SQLite, MCAP) verbatim, ROS 1 bags converted, damaged bags partly."""
 
+import contextlib
+import shutil
+import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
+import zstandard
 from rosbags.highlevel import AnyReader
 
 from sdrlinkd.adapters.salvage import Piece, looks_cut, salvage
@@ -13,6 +17,7 @@ from sdrlinkd.errors import BagError
 
 # Most characters of a reader's error that are shown.
 MAX_REASON = 200
+ZSTD_HEADER_BYTES = 18
 
 
 class BagTopic(NamedTuple):
@@ -54,6 +59,7 @@ def open_bag(path: Path) -> Bag:
 
     A damaged bag opens with its readable part; see `damage`. Raises BagError if there is none.
     """
+    _refuse_bombs(path)
     try:
         if looks_cut(path):
             return _DamagedBag(path, "shorter than its header says")
@@ -71,6 +77,32 @@ def open_bag(path: Path) -> Bag:
     except Exception as error:
         # Readers report damage by many exceptions, including running out of memory.
         return _DamagedBag(path, _one_line(error))
+
+
+def _refuse_bombs(path: Path) -> None:
+    """Refuse compressed files that would fill the folder for temporary files. Raises BagError."""
+    for file in path.glob("*.zstd") if path.is_dir() else []:
+        room = shutil.disk_usage(tempfile.gettempdir()).free // 2
+        if _expands_beyond(file, room):
+            raise BagError(
+                f"{file}: expands to more than {room} bytes, half of what is free in "
+                f"{tempfile.gettempdir()}; decompress it first: zstd -d"
+            )
+
+
+def _expands_beyond(file: Path, most: int) -> bool:
+    """Whether a zstd file holds more than `most` octets; not every one says how many."""
+    with contextlib.suppress(OSError, zstandard.ZstdError), file.open("rb") as opened:
+        size = zstandard.frame_content_size(opened.read(ZSTD_HEADER_BYTES))
+        if size >= 0:
+            return size > most
+        opened.seek(0)
+        found = 0
+        for piece in zstandard.ZstdDecompressor().read_to_iter(opened):
+            found += len(piece)
+            if found > most:
+                return True
+    return False
 
 
 class _WholeBag:

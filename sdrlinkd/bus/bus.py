@@ -48,6 +48,8 @@ LINGER_MS = 200
 QUIET_S = 0.01
 QUIET_ROUNDS = 3
 LAST_MESSAGES_S = 0.3
+ENVELOPE_ROOM = 4096
+"""Octets of a bus message's frames, besides the payload, from which a program is cut off."""
 PDU_TAP = b"\0pdu\0"
 SENT_TAP = b"\0sent\0"
 
@@ -81,12 +83,15 @@ class Bus:
         """Differs after each start of the daemon."""
         self._welcome = self._announcement(setup.policies)
         loop = asyncio.get_running_loop()
-        self._sockets: list[zmq.Socket[bytes]] = []
-        self._pull = self._bind(zmq.PULL, IN_SOCKET, {zmq.RCVHWM: IN_HWM})
-        self._sub = self._bind(zmq.SUB, IN_PUB_SOCKET, {zmq.RCVHWM: IN_HWM, zmq.SUBSCRIBE: b""})
+        self._sockets: dict[str, zmq.Socket[bytes]] = {}
+        largest = setup.config.bus.max_message_bytes + ENVELOPE_ROOM
+        limits: dict[int, int | bytes] = {zmq.RCVHWM: IN_HWM, zmq.MAXMSGSIZE: largest}
+        self._pull = self._bind(zmq.PULL, IN_SOCKET, limits)
+        self._sub = self._bind(zmq.SUB, IN_PUB_SOCKET, {**limits, zmq.SUBSCRIBE: b""})
         out_options: dict[int, int | bytes] = {
             zmq.SNDHWM: setup.config.rx_depth,
             zmq.XPUB_WELCOME_MSG: b"\0" + self._welcome,
+            zmq.MAXMSGSIZE: ENVELOPE_ROOM,
         }
         self._out = self._bind(zmq.XPUB, OUT_SOCKET, out_options)
         self._ingress_readers = [
@@ -229,7 +234,7 @@ class Bus:
         self._close_ingress()
         self._undropped.close(1e-3 * LINGER_MS)
         self._out_reader.close()
-        for socket in self._sockets:
+        for socket in self._sockets.values():
             socket.close(linger=LINGER_MS)
 
     def report(self, control_requests: int) -> BusReport:
@@ -242,9 +247,14 @@ class Bus:
             bad_envelope_last=self._intake.last_bad,
         )
 
+    def listen(self, *, is_on: bool) -> None:
+        """Accept new programs, or not; those that are connected stay. Raises BusError."""
+        for name, each in self._sockets.items():
+            (self._directory.bind_again if is_on else self._directory.unbind)(each, name)
+
     def _bind(self, kind: int, name: str, options: dict[int, int | bytes]) -> zmq.Socket[bytes]:
         bound = self._directory.bind(self._context, kind, name, options)
-        self._sockets.append(bound)
+        self._sockets[name] = bound
         return bound
 
     def _take(self, frames: list[bytes]) -> None:

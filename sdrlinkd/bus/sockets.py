@@ -3,6 +3,7 @@
 import fcntl
 import os
 import socket
+import stat
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -32,7 +33,8 @@ class RuntimeDirectory:
         try:
             path.mkdir(mode=0o750, parents=True, exist_ok=True)
             _refuse_foreign(path)
-            self._lock = os.open(path / LOCK_NAME, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o640)
+            flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
+            self._lock = os.open(path / LOCK_NAME, flags, 0o640)
         except OSError as error:
             raise BusError(
                 f"bus.runtime_dir: {path} is unusable ({error.strerror}); name a directory "
@@ -79,6 +81,20 @@ class RuntimeDirectory:
         self._bound.append(path)
         return bound
 
+    def unbind(self, bound: zmq.Socket[bytes], name: str) -> None:
+        """Accept no new connections at a socket; those that exist stay."""
+        bound.unbind(endpoint(self.path, name))
+
+    def bind_again(self, bound: zmq.Socket[bytes], name: str) -> None:
+        """Accept connections again at a socket that was unbound. Raises BusError."""
+        before = os.umask(0o007)
+        try:
+            bound.bind(endpoint(self.path, name))
+        except zmq.ZMQError as error:
+            raise BusError(f"{self.path / name} cannot be bound: {error.strerror}") from None
+        finally:
+            os.umask(before)
+
     def close(self) -> None:
         """Remove the sockets that were bound here and release the lock."""
         for path in self._bound:
@@ -92,12 +108,16 @@ def is_foreign(about: os.stat_result, uid: int) -> bool:
 
     Such a user could have prepared the directory to intercept the sockets of user `uid`.
     """
-    # With the sticky bit, as on /tmp, nobody can replace another user's files.
-    is_open = bool(about.st_mode & 0o002) and not about.st_mode & 0o1000
-    return about.st_uid not in (0, uid) or is_open
+    # In a sticky directory, as /tmp is, others can put links before us.
+    return about.st_uid not in (0, uid) or bool(about.st_mode & 0o002)
 
 
 def _refuse_foreign(path: Path) -> None:
+    about = path.lstat()
+    if stat.S_ISLNK(about.st_mode) and about.st_uid not in (0, os.getuid()):
+        raise BusError(
+            f"bus.runtime_dir: {path} is a link that another user has made; name a directory"
+        )
     if is_foreign(path.stat(), os.getuid()):
         raise BusError(
             f"bus.runtime_dir: {path} belongs to another user or is open to all; name a directory "

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import zmq.asyncio
 
 from sdrlinkd.client.blocking_socket import LINGER_MS
+from sdrlinkd.client.errors import prepared
+from sdrlinkd.client.paths import is_prepared
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -16,6 +18,8 @@ class AsyncSocket:
     """A ZeroMQ socket in its own context, closed by `async with`."""
 
     def __init__(self, kind: int, runtime_dir: Path, timeout_s: float) -> None:
+        if is_prepared(runtime_dir):
+            raise prepared(runtime_dir)
         self.runtime_dir = runtime_dir
         self._timeout_s = timeout_s
         self._context = zmq.asyncio.Context()

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import zmq
 
 from sdrlinkd.client.deadline import milliseconds
-from sdrlinkd.client.errors import no_daemon
-from sdrlinkd.client.paths import endpoint
+from sdrlinkd.client.errors import no_daemon, prepared
+from sdrlinkd.client.paths import endpoint, is_prepared
 
 LINGER_MS = 200
 
@@ -32,6 +32,9 @@ class Endpoint:
         return self.runtime_dir
 
     def _connect(self, name: str, socket: "zmq.Socket[bytes] | None" = None) -> None:
+        if is_prepared(self.runtime_dir):
+            self.close()
+            raise prepared(self.runtime_dir)
         try:
             (self._socket if socket is None else socket).connect(endpoint(self.runtime_dir, name))
         except zmq.ZMQError:

@@ -20,6 +20,14 @@ class EnvelopeMismatchError(ValueError):
     """A message from the daemon does not follow version 1 of the envelope."""
 
 
+def prepared(runtime_dir: object) -> NoDaemonError:
+    """The error for a runtime directory that another user may have prepared."""
+    return NoDaemonError(
+        f"{runtime_dir} belongs to another user, in a folder where anybody may write: who answers "
+        "there is not to be trusted; name the daemon's directory"
+    )
+
+
 def no_daemon(runtime_dir: object) -> NoDaemonError:
     """The error for a runtime directory without a daemon."""
     return NoDaemonError(

@@ -43,6 +43,19 @@ def is_there(path: Path) -> bool:
         return False
 
 
+def is_prepared(directory: Path) -> bool:
+    """Whether another user may have prepared `directory` to answer in place of a daemon.
+
+    That is so if it belongs to neither this user nor root, and anybody may write beside it, as in
+    /tmp.
+    """
+    try:
+        about, beside = directory.lstat(), directory.absolute().parent.stat()
+    except (OSError, ValueError):
+        return False
+    return about.st_uid not in (0, os.getuid()) and bool(beside.st_mode & 0o002)
+
+
 def endpoint(directory: Path, socket: str) -> str:
     """The ZeroMQ endpoint of a socket in the runtime directory."""
     return f"ipc://{directory / socket}"

@@ -15,6 +15,7 @@ from sdrlinkd.config.backends import config_type
 from sdrlinkd.config.places import KeyPath, cite
 from sdrlinkd.config.schema import Config
 from sdrlinkd.errors import ConfigError
+from sdrlinkd.files import read_bounded
 from sdrlinkd.link import TopicPolicy
 
 S = TypeVar("S", bound=msgspec.Struct)
@@ -25,7 +26,7 @@ _AT = re.compile(r" - at `\$\.?(.*)`$")
 def load_config(path: Path) -> Config:
     """The configuration in `path`. Raises ConfigError."""
     try:
-        text = path.read_text()
+        text = read_bounded(path).decode()
     except OSError as error:
         raise ConfigError(
             f"{path}: cannot be read ({error.strerror}); name a configuration with --config FILE"

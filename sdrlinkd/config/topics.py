@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from sdrlinkd.config.schema import Config
-from sdrlinkd.errors import ConfigError, RegistryError
+from sdrlinkd.errors import ConfigError, RegistryError, UserError
+from sdrlinkd.files import read_bounded
 from sdrlinkd.link import TopicPolicy
 from sdrlinkd.wire import DECLARED_TOPIC_ID, Registry, is_topic_name, parse_registry
 
@@ -39,8 +40,8 @@ def uses_numbers(config: Config, registry: Registry) -> bool:
 def load_registry(path: Path) -> Registry:
     """The registry in `path`. Raises RegistryError."""
     try:
-        text = path.read_text()
-    except (OSError, ValueError) as error:
+        text = read_bounded(path).decode()
+    except (OSError, ValueError, UserError) as error:
         raise RegistryError(
             f"{str(path)!r}: the topic registry is unreadable ({error}); "
             "it is a CSV of `name,type` lines, named by the key `registry`"

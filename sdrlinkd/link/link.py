@@ -135,7 +135,13 @@ class Link:
         self._demand = Demand(self._topics)
         first_large = rng.randrange(1 << 16) if has_numbers else 0
         self._intake = Intake(
-            params, self._topics, self._outbox, classes, dictionaries, first_large
+            params,
+            self._topics,
+            self._outbox,
+            classes,
+            dictionaries,
+            first_large,
+            is_sealed=self.sealing.is_on,
         )
         self._latched = Latched()
         self._piggyback = PiggybackRecords()

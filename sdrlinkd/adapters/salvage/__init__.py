@@ -8,10 +8,9 @@ import zstandard
 
 from sdrlinkd.adapters.salvage import mcap, ros1, sqlite
 from sdrlinkd.adapters.salvage.base import Piece
+from sdrlinkd.adapters.salvage.bounds import MOST_BYTES
 
 __all__ = ["Piece", "looks_cut", "salvage"]
-
-MAX_MESSAGE_BYTES = 1 << 28
 
 _BY_SUFFIX: dict[str, Callable[[Path], Iterator[Piece]]] = {
     ".mcap": mcap.salvage,
@@ -60,6 +59,6 @@ def _is_compressed_per_message(path: Path) -> bool:
 
 def _inflate(data: bytes) -> bytes | None:
     try:
-        return zstandard.ZstdDecompressor().decompress(data, max_output_size=MAX_MESSAGE_BYTES)
+        return zstandard.ZstdDecompressor().decompress(data, max_output_size=MOST_BYTES)
     except zstandard.ZstdError:
         return None

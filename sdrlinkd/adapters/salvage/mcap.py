@@ -1,5 +1,6 @@
 """Messages from the readable part of a damaged MCAP file (https://mcap.dev/spec)."""
 
+import contextlib
 import struct
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,6 +9,7 @@ import lz4.frame
 import zstandard
 
 from sdrlinkd.adapters.salvage.base import Piece
+from sdrlinkd.adapters.salvage.bounds import MOST_BYTES, PIECE
 
 MAGIC = b"\x89MCAP0\r\n"
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 3, 4, 5, 6
@@ -61,12 +63,25 @@ def _inflate(chunk: bytes) -> bytes:
         compression, at = _text(chunk, 28)
         packed = chunk[at + 8 :]
         if compression == "zstd":
-            return zstandard.ZstdDecompressor().decompressobj().decompress(packed)
+            return _as_far_as_possible(packed)
         if compression == "lz4":
-            return bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed))
+            return bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed, MOST_BYTES))
     except (struct.error, UnicodeDecodeError, zstandard.ZstdError, RuntimeError):
         return b""
     return packed if not compression else b""
+
+
+def _as_far_as_possible(packed: bytes) -> bytes:
+    """What a zstd frame holds, up to its damage or MOST_BYTES."""
+    found = bytearray()
+    zstd = zstandard.ZstdDecompressor()
+    with (
+        contextlib.suppress(zstandard.ZstdError),
+        zstd.stream_reader(packed, read_across_frames=True) as reader,
+    ):
+        while len(found) < MOST_BYTES and (piece := reader.read(PIECE)):
+            found += piece
+    return bytes(found)
 
 
 def _text(data: bytes, at: int) -> tuple[str, int]:

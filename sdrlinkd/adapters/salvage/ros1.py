@@ -8,6 +8,7 @@ from pathlib import Path
 import lz4.frame
 
 from sdrlinkd.adapters.salvage.base import Piece
+from sdrlinkd.adapters.salvage.bounds import MOST_BYTES
 
 MAGIC = b"#ROSBAG V2.0\n"
 _MESSAGE, _CHUNK, _CONNECTION = 2, 5, 7
@@ -78,9 +79,9 @@ def _fields(data: bytes) -> Iterator[tuple[bytes, bytes]]:
 def _inflate(compression: bytes, packed: bytes) -> bytes:
     try:
         if compression == b"bz2":
-            return bz2.BZ2Decompressor().decompress(packed)
+            return bz2.BZ2Decompressor().decompress(packed, MOST_BYTES)
         if compression == b"lz4":
-            return bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed))
+            return bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed, MOST_BYTES))
     except (OSError, EOFError, RuntimeError):
         return b""
     return packed if compression == b"none" else b""

@@ -5,7 +5,7 @@ PDUs and knows nothing of radio or channel.
 """
 
 from sdrlinkd.link.queue.admission import NOT_TAKEN
-from sdrlinkd.link.queue.compression import Deflated, Inflated, train_dictionary
+from sdrlinkd.link.queue.compression import Deflated, Inflated, most_expanded, train_dictionary
 from sdrlinkd.link.queue.fate import STEPS, Fate, Step
 from sdrlinkd.link.queue.intake import Intake
 from sdrlinkd.link.queue.latched import Kept, Latched, Offer
@@ -49,6 +49,7 @@ __all__ = [
     "TxTally",
     "balance",
     "lifespan_of",
+    "most_expanded",
     "train_dictionary",
     "with_first",
 ]

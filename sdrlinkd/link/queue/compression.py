@@ -5,6 +5,10 @@ from collections.abc import Iterable, Mapping
 import zstandard
 
 LEVEL = 3
+MOST_RATIO = 64
+"""Most octets of a message for each octet of its frame, where anybody can send one."""
+ANY_RATIO_BYTES = 1 << 16
+"""Largest message in octets for which the ratio does not matter."""
 LEAST_BYTES = 64
 """Smallest message in bytes that is compressed without a dictionary."""
 
@@ -24,6 +28,15 @@ class Deflated:
             return None
         frame = self._zstd.compress(payload)
         return frame if len(frame) < len(payload) else None
+
+
+def most_expanded(frame: int) -> int:
+    """The largest message in octets for a frame of `frame` octets, where anybody can send one.
+
+    There, a larger one is sent uncompressed, and refused: a PDU full of such frames would keep a
+    robot busy for milliseconds.
+    """
+    return max(ANY_RATIO_BYTES, MOST_RATIO * frame)
 
 
 def train_dictionary(samples: Iterable[bytes], size: int) -> bytes:

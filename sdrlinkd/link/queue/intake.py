@@ -8,6 +8,7 @@ from zstandard import ZstdCompressionDict
 
 from sdrlinkd.link.params import LinkParams
 from sdrlinkd.link.qos import AS_CONFIGURED, CLASSES, Overrides, Qos
+from sdrlinkd.link.queue.compression import most_expanded
 from sdrlinkd.link.queue.latched import Offer
 from sdrlinkd.link.queue.ledger import TxTally, tx_balance
 from sdrlinkd.link.queue.lifespan import Lifespan, lifespan_of
@@ -51,7 +52,10 @@ class Intake:
         classes: ClassesParams,
         dictionaries: Mapping[int, ZstdCompressionDict],
         first_large: int = 0,
+        *,
+        is_sealed: bool = False,
     ) -> None:
+        self._is_sealed = is_sealed
         self._pdu_size = params.pdu_size
         self._dst = params.dst
         self._has_control = topics.registry.has_control
@@ -235,6 +239,8 @@ class Intake:
         if age_s <= UNLIKELY_AGE_S or lifespan_s < inf:
             at -= age_s
         frame = topic.deflated.shrink(payload) if topic.deflated else None
+        if frame is not None and not self._may_inflate(topic, len(frame), len(payload)):
+            frame = None
         if frame is not None:
             payload = frame
         qos = topic.qos if qos is None else qos
@@ -267,6 +273,10 @@ class Intake:
             self._outbox.lives.drop(message, "tx_expired")
             return "tx_expired"
         return self._outbox.put(message, topic.policy, bytes_per_s)
+
+    def _may_inflate(self, topic: TopicState, frame: int, size: int) -> bool:
+        """Whether receivers take a message of `size` octets in a frame of `frame` octets."""
+        return self._is_sealed or bool(topic.policy.max_bytes) or size <= most_expanded(frame)
 
     def _parting(
         self, topic: TopicState, number: int, size: int, qos: Qos, wants_stamp: bool

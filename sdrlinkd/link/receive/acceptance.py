@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from math import inf
 
-from sdrlinkd.link.queue import DEFAULT_POLICY, Inflated, TopicPolicy
+from sdrlinkd.link.queue import DEFAULT_POLICY, Inflated, TopicPolicy, most_expanded
 from sdrlinkd.link.receive.delivered import CDR_HEADER_SIZE, Retain
 from sdrlinkd.link.topics import HeardTopic
 from sdrlinkd.wire import Registry
@@ -17,12 +17,15 @@ class Acceptance:
 
     A compressed message may expand to its topic's `max_bytes`, or by default to `max_expanded`.
     `takes_all`: messages of robots that are not proven are handed over, whatever their topic.
+    Without a seal (`is_sealed`), frames have a largest ratio.
     """
 
     def __init__(
-        self, registry: Registry, inflated: Inflated, max_expanded: int, takes_all: bool
-    ) -> None:
+        self, registry: Registry, inflated: Inflated, max_expanded: int, takes_all: bool,
+        is_sealed: bool,
+    ) -> None:  # fmt: skip
         self._takes_all = takes_all
+        self._is_sealed = is_sealed
         self._has_control = registry.has_control
         self._inflated = inflated
         self._max_expanded = max_expanded
@@ -83,6 +86,8 @@ class Acceptance:
         policy, reason = self.policy_of(topic), None
         if is_compressed:
             most = policy.max_bytes or self._max_expanded
+            if not policy.max_bytes and not self._is_sealed:
+                most = min(most, most_expanded(len(payload)))
             payload, reason = self._inflated.expand(payload, most)
         if reason is None:
             reason = _refusal(payload, policy, origin_at, now)

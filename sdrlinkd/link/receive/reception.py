@@ -48,7 +48,7 @@ class Reception:
         self._relay = Relay(relay, own_id)
         self._topics = topics
         self._acceptance = Acceptance(
-            registry, inflated, max_expanded, sealing.opener.delivers_unproven
+            registry, inflated, max_expanded, sealing.opener.delivers_unproven, sealing.is_on
         )
         self._ledger = RxLedger(topics)
         self._door = Door(sealing, self._acceptance, self._ledger)

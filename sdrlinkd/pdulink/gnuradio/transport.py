@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import socket
 from collections.abc import Callable
 from typing import Protocol, cast
 
@@ -115,7 +116,8 @@ class ZmqTransport:
 class UdpTransport(asyncio.DatagramProtocol):
     """Carries PDUs by a UDP socket_pdu, one per datagram.
 
-    We send to `send`. PDUs come back to our port, or to `receive` if that is given.
+    We send to `send`. PDUs come back to our port, or to `receive` if that is given; only the host
+    of `send` may send them.
     """
 
     def __init__(self, send: str, receive: str) -> None:
@@ -123,24 +125,35 @@ class UdpTransport(asyncio.DatagramProtocol):
         self._own = _address(receive, "receive") if receive else None
         self._socket: asyncio.DatagramTransport | None = None
         self._take: Take = lambda _: None
-        self.counters = {"bad_messages": 0, "refused": 0}
+        self._hosts: set[str] = set()
+        """Addresses of the flowgraph's host."""
+        self.counters = {"bad_messages": 0, "refused": 0, "strangers": 0}
 
     async def open(self, take: Take) -> None:
         """Open the UDP socket. Raises UserError."""
         self._take = take
         loop = asyncio.get_running_loop()
         try:
+            if self._own is not None:
+                found = await loop.getaddrinfo(*self._peer, type=socket.SOCK_DGRAM)
+                self._hosts = {str(address[0]) for *_, address in found}
             self._socket, _ = await loop.create_datagram_endpoint(
                 lambda: self,
-                local_addr=self._own or ("0.0.0.0", 0),  # noqa: S104  # answers only
+                local_addr=self._own,
+                # Connected, so that the kernel lets only the peer's datagrams in.
+                remote_addr=None if self._own else self._peer,
             )
         except OSError as error:
             raise UserError(
-                f"gnuradio.receive: {self._own}: cannot be opened ({error.strerror})"
+                f"gnuradio.{'receive' if self._own else 'send'}: {self._own or self._peer}: cannot "
+                f"be opened ({error.strerror})"
             ) from None
 
-    def datagram_received(self, data: bytes, addr: object) -> None:  # noqa: ARG002
-        """Take a datagram, which holds one PDU."""
+    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
+        """Take a datagram of the flowgraph's host, which holds one PDU."""
+        if self._own is not None and addr[0] not in self._hosts:
+            self.counters["strangers"] += 1
+            return
         self._take(data)
 
     def error_received(self, exc: Exception) -> None:  # noqa: ARG002
@@ -155,7 +168,7 @@ class UdpTransport(asyncio.DatagramProtocol):
         """Send a PDU; False while there is no socket."""
         if self._socket is None:
             return False
-        self._socket.sendto(pdu, self._peer)
+        self._socket.sendto(pdu, self._peer if self._own else None)
         return True
 
     def close(self) -> None:

@@ -1,0 +1,83 @@
+"""Small bags that would expand without end."""
+
+import shutil
+import sqlite3
+import struct
+import subprocess
+import sys
+
+import pytest
+import zstandard
+
+from sdrlinkd.adapters import open_bag
+from sdrlinkd.adapters.salvage import mcap, sqlite
+from sdrlinkd.errors import BagError
+
+GIGABYTES = 8
+MOST_BYTES = 1 << 31
+
+
+def zeros(n):
+    """A zstd frame of n GiB of zeros, some hundred kilobytes long."""
+    compressor = zstandard.ZstdCompressor(level=3).compressobj()
+    block = bytes(1 << 24)
+    parts = [compressor.compress(block) for _ in range(64 * n)]
+    return b"".join([*parts, compressor.flush()])
+
+
+@pytest.fixture(scope="module")
+def bomb():
+    return zeros(GIGABYTES)
+
+
+@pytest.mark.slow
+def test_a_chunk_of_an_mcap_file(tmp_path, bomb):
+    """Within 2 GiB of memory, where the whole chunk would take 8."""
+    name = b"zstd"
+    chunk = struct.pack("<QQQI", 0, 0, GIGABYTES << 30, 0) + struct.pack("<I", len(name)) + name
+    content = chunk + struct.pack("<Q", len(bomb)) + bomb
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(mcap.MAGIC + struct.pack("<BQ", 6, len(content)) + content)
+    program = (
+        "import resource, sys; from pathlib import Path;"
+        "from sdrlinkd.adapters import open_bag; from sdrlinkd.errors import BagError\n"
+        "try: open_bag(Path(sys.argv[1]))\n"
+        "except BagError as error: print(error)\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(path)], capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    said, peak_kib = done.stdout.splitlines()[-2:]
+    assert "nothing in it can be recovered" in said
+    assert int(peak_kib) << 10 < MOST_BYTES
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("says_its_size", [False, True])
+def test_a_compressed_database(tmp_path, bomb, monkeypatch, says_its_size):
+    folder = tmp_path / "bag"
+    folder.mkdir()
+    frame = bomb
+    if says_its_size:
+        frame = zstandard.ZstdCompressor().compress(bytes(1 << 24))
+    (folder / "bag.db3.zstd").write_bytes(frame)
+    usage = shutil._ntuple_diskusage(1 << 26, 0, 1 << 24)  # the type of its result
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: usage)
+    with pytest.raises(BagError, match=r"expands to more than 8388608 bytes"):
+        open_bag(folder)
+
+
+def test_a_view_without_end(tmp_path, monkeypatch):
+    monkeypatch.setattr(sqlite, "MOST_STEPS", 1 << 22)
+    path = tmp_path / "cut.db3"
+    with sqlite3.connect(path) as database:
+        database.execute("CREATE TABLE topics (id, name, type)")
+        database.execute("INSERT INTO topics VALUES (1, 'odom', 'nav_msgs/msg/Odometry')")
+        database.execute(
+            "CREATE VIEW messages AS WITH RECURSIVE n(i) AS "
+            "(SELECT 1 UNION ALL SELECT i + 1 FROM n) "
+            "SELECT i AS rowid, 7 AS topic_id, i AS timestamp, x'00' AS data FROM n"
+        )
+    database.close()
+    assert list(sqlite.salvage(path)) == []
