@@ -112,3 +112,16 @@ def test_a_machine_that_always_interrupts_gets_an_answer():
         return clock[0]
 
     assert at_once(now, lambda: "told")[1] == "told"
+
+
+def test_what_waited_while_the_loop_slept_is_that_old_at_most():
+    clock, second = PublishClock(), 10**9
+    clock.turned(0)
+    assert clock.age(None, NOW_NS, second // 2) == 0.0
+    # Stopped for 30 s; what is read first may come before the loop's own timer.
+    assert clock.age(None, NOW_NS, 30 * second) == pytest.approx(30.0)
+    clock.turned(30 * second)
+    assert clock.age(None, NOW_NS, 30 * second + 1) == pytest.approx(30.0)
+    assert clock.age(None, NOW_NS, 31 * second) == 0.0
+    # Its own word counts where there is one.
+    assert clock.age(NOW_NS - second, NOW_NS, 30 * second + 1) == pytest.approx(1.0)

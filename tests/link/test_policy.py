@@ -3,6 +3,7 @@
 from itertools import pairwise
 from random import Random
 
+import msgspec
 import pytest
 import zstandard
 from hypothesis import given
@@ -236,3 +237,21 @@ def test_a_policy_that_changes_applies_to_what_comes():
     assert classes_queued(link)[Qos.URGENT] == 1
     assert classes_queued(link)[Qos.DEFAULT] == 1
     assert link.submit(0, bytes(20), 0.0, Overrides(Qos.BULK)) is None
+
+
+def test_a_frame_of_many_times_its_size_is_neither_sent_nor_taken_in_the_clear():
+    """Unless the topic says how large its messages may be."""
+    zeros, policy = bytes(1 << 17), TopicPolicy(compress="zstd")
+    for max_bytes, n_pdus in ((0, 100), (1 << 17, 0)):
+        link = make_link(pdu_size=1024, hears_self=True)
+        link.set_policy(0, msgspec.structs.replace(policy, max_bytes=max_bytes))
+        assert link.submit(0, zeros, 0.0) is None
+        pdus = send_all(link)
+        assert len(pdus) > n_pdus
+        assert (len(pdus) < 5) == (n_pdus == 0)
+        heard = [message for pdu in pdus for message in link.hear(pdu, 0.0)]
+        assert [message.payload for message in heard] == [zeros]
+    stranger = make_link(own_id=2, pdu_size=1024, seed=2)
+    for pdu in pdus:
+        assert stranger.hear(pdu, 0.0) == []
+    assert received(stranger)[1, 0].dropped["rx_inflates"] == 1
