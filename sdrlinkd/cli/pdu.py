@@ -16,14 +16,18 @@ from sdrlinkd.wire import (
     BROADCAST,
     CONTROL_TOPIC_ID,
     DECLARED_TOPIC_ID,
+    HELD_UNIT_S,
     MAX_PDU_SIZE,
     MIN_PDU_SIZE,
+    TICKS_PER_S,
     Entry,
     Pdu,
     Registry,
+    is_sealed,
     pad_length,
     parse,
     parse_records,
+    parse_sealed,
 )
 
 pdus = typer.Typer(help="PDUs on the air.", no_args_is_help=True)
@@ -56,7 +60,7 @@ def decode(
     names = load_registry(registry) if registry else None
     Console().print(explain(data, names), highlight=False, markup=False)
     try:
-        parse(data, len(data))
+        (parse_sealed if is_sealed(data) else parse)(data, len(data))
     except PduError as error:
         raise UserError(f"refused as {error.reason}: {error.detail}") from None
 
@@ -102,9 +106,23 @@ def _ask_hello(directory: Path) -> None:
         control.ask("hello")
 
 
+def _sealed_line(data: bytes) -> str:
+    """What everybody can read of a sealed PDU. Raises PduError."""
+    pdu = parse_sealed(data, len(data))
+    return (
+        f"sealed with key {pdu.kid}, T {pdu.ticks / TICKS_PER_S:.2f} s, held "
+        f"{1e3 * pdu.held * HELD_UNIT_S:.1f} ms"
+    )
+
+
 def one_line(data: bytes, registry: Registry | None) -> str:
     """A PDU in one line of text."""
     try:
+        if is_sealed(data):
+            src, dst, seq, hop = data[1], data[2], data[3], data[4] >> 4
+            told = _sealed_line(data)
+            to = "all" if dst == BROADCAST else dst
+            return f"src {src} dst {to} seq {seq} hop {hop} {QOS_NAMES[data[0] >> 2 & 3]}: {told}"
         pdu = parse(data, len(data))
     except PduError as error:
         return f"{len(data)} B refused as {error}"
@@ -129,6 +147,8 @@ def explain(data: bytes, registry: Registry | None) -> str:
             f"dst {dst}  seq {seq}  hop {hop_count >> 4}  entries {hop_count & 15}"
         )
     try:
+        if is_sealed(data):
+            return "\n".join([*lines, f"inside  {_sealed_line(data)}; not readable here"])
         pdu = parse(data, len(data))
     except PduError:
         return "\n".join(lines)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from sdrlinkd.link import (
     AccessParams,
+    Burst,
     ClassesParams,
     ClockParams,
     Link,
@@ -141,6 +142,9 @@ class Team:
         self.tamper: Callable[[int, bytes], bool] = lambda *_: True
         self.on_air: list[tuple[float, int, bytes]] = []
         self.later: dict[int, list[tuple[int, bytes]]] = defaultdict(list)
+        self.composed: list[Burst] = []
+        """All bursts, whether they left or not."""
+        self.outcome: Callable[[], Outcome] = lambda: Outcome.SENT
         self._steps = 0
         for robot in robots:
             robot.start(0.0)
@@ -173,7 +177,11 @@ class Team:
         burst = robot.link.next_burst(opportunity)
         if burst is None:
             return
-        robot.link.confirm(burst, Outcome.SENT, clock)
+        self.composed.append(burst)
+        outcome = self.outcome()
+        robot.link.confirm(burst, outcome, clock)
+        if outcome is not Outcome.SENT:
+            return
         for data in burst.pdus:
             self.on_air.append((self.now, robot.id, data))
             for other in self.robots.values():

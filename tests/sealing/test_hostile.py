@@ -1,0 +1,90 @@
+"""Any octets from the air: nothing breaks, nothing forged arrives, and the ledger adds up."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sdrlinkd.link import AccessParams, Outcome
+from sdrlinkd.sealing import SecurityParams
+from sdrlinkd.wire import parse_sealed
+from tests.laws import law
+from tests.sealing.team import KEY, Robot, Team
+from tests.sealing.vectors import with_crc
+
+CDR = b"\0\1\0\0"
+SIZE = 128
+
+
+def spoken():
+    """A robot that has proven itself to another, and what it sent."""
+    team = Team(Robot(1, [KEY]), Robot(2, [KEY]))
+    team.run(1.0)
+    for number in range(20):
+        team.robots[1].link.submit(0, CDR + bytes([number]), team.robots[1].clock(team.now))
+        team.run(0.01)
+    return team, [data for _, src, data in team.on_air if src == 1]
+
+
+changes = st.lists(st.tuples(st.integers(0, SIZE - 3), st.integers(0, 255)), min_size=1, max_size=6)
+hostile = st.one_of(
+    st.binary(max_size=SIZE + 2),
+    st.binary(min_size=SIZE - 2, max_size=SIZE - 2).map(with_crc),
+    st.builds(
+        lambda first, body: with_crc(bytes([first]) + body),
+        st.sampled_from([0x00, 0x01, 0x05, 0x0D, 0x0F, 0x11]),
+        st.binary(min_size=SIZE - 3, max_size=SIZE - 3),
+    ),
+    st.tuples(st.integers(0, 200), changes),
+)
+
+
+@law(30)
+@given(st.sampled_from(["refuse", "accept"]), st.lists(hostile, max_size=60))
+def test_whatever_comes(clear, script):
+    team, sent = spoken()
+    robot = team.robots[2]
+    robot.sealing.opener._params = SecurityParams(mode="seal", clear=clear)
+    before = list(robot.heard)
+    for each in script:
+        if isinstance(each, bytes):
+            robot.hear(each, team.now)
+            continue
+        # A PDU of the other robot, changed on its way.
+        index, changes = each
+        changed = bytearray(sent[index % len(sent)])
+        for at, value in changes:
+            changed[at] = value
+        robot.hear(with_crc(bytes(changed[:-2])), team.now)
+        team.run(0.005)
+    assert robot.heard == before
+    assert robot.link.audit() == []
+    # The robot still hears what is true.
+    n = len(robot.heard)
+    team.robots[1].link.submit(0, CDR + b"x", team.robots[1].clock(team.now))
+    team.run(0.5)
+    assert [each.payload for each in robot.heard[n:]] == [CDR + b"x"]
+
+
+def test_a_burst_that_comes_back_is_sealed_once():
+    """Only how long it was held changes; what depends on the start is made anew."""
+    access = AccessParams(policy="tdma", nodes=[1, 2], slot_s=0.025, guard_s=0.002, reuse=False)
+    team = Team(*(Robot(each, [KEY], access=access) for each in (1, 2)))
+    numbers, held, late = {}, 0, 0
+    outcomes = iter([Outcome.LATE, Outcome.LATE, Outcome.SENT] * 1000)
+    team.outcome = lambda: next(outcomes)
+    for number in range(60):
+        team.robots[1].link.submit(0, CDR + bytes([number]), team.robots[1].clock(team.now))
+        team.run(0.1)
+    for burst in team.composed:
+        for data in burst.pdus:
+            pdu = parse_sealed(data, SIZE)
+            _, _, secret = pdu.parts()
+            content = numbers.setdefault((pdu.src, pdu.ticks, pdu.seq), secret)
+            assert content == secret
+            held += pdu.held > 0
+        late += burst.start > burst.first_start
+    assert held > 20
+    assert late > 20
+    heard = team.robots[2].heard
+    assert len(heard) > 40
+    assert all(each.age_s > 0.0 for each in heard)
+    assert team.robots[2].link.audit() == team.robots[1].link.audit() == []
