@@ -14,6 +14,7 @@ from sdrlinkd.client import Publisher, Subscriber
 from sdrlinkd.reports import Snapshot
 from tests.adapters.recordings import ros2_bag
 from tests.programs import sdrlinkctl
+from tests.sealing.vectors import VECTORS
 from tests.waiting import wait_for
 from tests.wire.vectors import BY_NAME, DOCUMENTED
 
@@ -288,6 +289,15 @@ def test_pdu_decode_shows_numbers(ctl):
         code, out, _ = ctl("pdu", "decode", BY_NAME[name].octets.hex())
         assert code == 0
         assert shown in out
+
+
+def test_pdu_decode_shows_what_all_can_read_of_a_sealed_pdu(ctl):
+    octets = VECTORS["v3_limits"]
+    code, out, _ = ctl("pdu", "decode", octets.hex())
+    assert code == 0
+    assert "inside  sealed with key 3, T 33554431.97 s, held 6553.5 ms; not readable here" in out
+    code, _, err = ctl("pdu", "decode", octets[:-1].hex() + "00")
+    assert (code, "refused as rx_crc" in err) == (2, True)
 
 
 def test_pdu_decode_shows_the_layout(ctl, tmp_path):

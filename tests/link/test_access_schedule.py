@@ -272,3 +272,13 @@ def test_the_phase_is_that_of_the_frame_at_any_time():
         assert 0 <= told.phase_us <= round(1e6 * frame_s)
         off_us = (again.phase_us - told.phase_us) % (1e6 * frame_s)
         assert min(off_us, 1e6 * frame_s - off_us) <= 1.5
+
+
+@pytest.mark.parametrize(("src", "root"), [(77, 0), (2, 0), (77, 1)])
+def test_a_schedule_from_outside_the_nodes_is_ignored_and_told(src, root):
+    access = begun(make(3), 1.0)
+    before = access.state
+    access.take_frame(src, Frame(root, 0, access._times_crc, 5000), 1.1)
+    assert access.state == before
+    (told,) = access.notices(1.2)
+    assert told.startswith(f"robot {src} announces a tdma schedule and is ignored")

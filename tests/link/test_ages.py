@@ -52,6 +52,8 @@ def test_a_stale_stamp_is_forgotten():
 
 def test_stamps_that_wait_are_bounded():
     ages = Ages(timeout_s=1.0)
-    for i in range(3 * MAX_WAITING):
-        ages.stamp(i % 256, Stamp(i % 16, i // 4096, 0), 0.0)
-    assert len(ages._origins) <= MAX_WAITING
+    ages.stamp(7, Stamp(1, 1, 500), 0.0)
+    for i in range(100_000):
+        ages.stamp(i % 7, Stamp(i % 16, i // 16 % 256, 0), 0.0)
+    assert len(ages) == 7 * MAX_WAITING + 1
+    assert ages.take(7, 1, 1).at is not None, "those of others do not push it out"

@@ -87,7 +87,7 @@ class Tdma(BusyChannel):
         """State of the schedule: listening, root or follower."""
         self._told_at = 0.0
         self._begins_at = LISTEN_S + sum(node < own_id for node in nodes)
-        self._strangers = Sightings()
+        self._strangers, self._outsiders = Sightings(), Sightings()
         """Robots that announce another schedule."""
         self._unscheduled = Sightings()
         """Beacons by robot since it last announced a schedule; with a schedule, each has one."""
@@ -169,6 +169,10 @@ class Tdma(BusyChannel):
     def take_frame(self, src: int, frame: Frame, at: float) -> None:
         """Follow the lowest root, over the fewest hops."""
         self._unscheduled.clear(src)
+        if src not in self._nodes or frame.root not in self._nodes:
+            # It may be anybody's; those in `nodes` are who share the channel.
+            self._outsiders.add(src, at)
+            return
         if frame.schedule != self._times_crc:
             self._strangers.add(src, at)
             return
@@ -198,15 +202,23 @@ class Tdma(BusyChannel):
 
     def notices(self, now: float) -> list[str]:
         """Sentences on robots that keep another schedule or none."""
-        return [
-            f"robot {src} keeps no tdma schedule: its bursts fall into other robots' slots; give "
-            "it the same [access], and a radio of the same kind where access.policy is auto"
-            for src in self._unscheduled.lately(now, UNSCHEDULED)
-        ] + [
-            f"robot {src} keeps a different tdma schedule; give both the same nodes, slot_s, "
-            f"guard_s and minislot_s in [access] (ours: {self.state})"
-            for src in self._strangers.lately(now)
-        ]
+        return (
+            [
+                f"robot {src} announces a tdma schedule and is ignored: it, or the schedule's root, is "
+                "not in access.nodes; list all robots there, at every robot, or look who sends it"
+                for src in self._outsiders.lately(now)
+            ]
+            + [
+                f"robot {src} keeps no tdma schedule: its bursts fall into other robots' slots; give "
+                "it the same [access], and a radio of the same kind where access.policy is auto"
+                for src in self._unscheduled.lately(now, UNSCHEDULED)
+            ]
+            + [
+                f"robot {src} keeps a different tdma schedule; give both the same nodes, slot_s, "
+                f"guard_s and minislot_s in [access] (ours: {self.state})"
+                for src in self._strangers.lately(now)
+            ]
+        )
 
     def _go(self, happens: Happens) -> None:
         self.role = after(STEPS, self.role, happens)

@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 from sdrlinkd.wire import Stamp
 
-MAX_WAITING = 1024
+MAX_WAITING = 64
+"""Most messages of one source whose age is known before they are complete."""
 
 
 class Origin(NamedTuple):
@@ -32,37 +33,47 @@ class Ages:
 
     def __init__(self, timeout_s: float) -> None:
         self._timeout_s = timeout_s
-        self._origins: OrderedDict[tuple[int, int, int], Origin] = OrderedDict()
+        self._by_src: dict[int, OrderedDict[tuple[int, int], Origin]] = {}
 
     def stamp(self, src: int, stamp: Stamp, at: float) -> None:
         """Note a STAMP record that came in a burst whose preamble was at `at`."""
         topic_id, entry_id, age_us, asks = stamp
-        key = (src, topic_id, entry_id)
-        self._origins[key] = Origin(at - age_us * 1e-6, at, asks)
-        self._origins.move_to_end(key)
-        if len(self._origins) > MAX_WAITING:
-            self._origins.popitem(last=False)
+        origins = self._by_src.get(src)
+        if origins is None:
+            origins = self._by_src[src] = OrderedDict()
+        key = (topic_id, entry_id)
+        origins[key] = Origin(at - age_us * 1e-6, at, asks)
+        origins.move_to_end(key)
+        if len(origins) > MAX_WAITING:
+            origins.popitem(last=False)
 
     def take(self, src: int, topic_id: int, entry_id: int) -> Origin:
         """Take out the origin of a message that is complete or given up.
 
         Its `at` is None if no STAMP came.
         """
-        if not self._origins:
+        origins = self._by_src.get(src)
+        if not origins:
             return UNKNOWN
-        return self._origins.pop((src, topic_id, entry_id), UNKNOWN)
+        return origins.pop((topic_id, entry_id), UNKNOWN)
 
     def look(self, src: int, topic_id: int, entry_id: int) -> Origin:
         """The origin of a message that is not complete yet."""
-        return self._origins.get((src, topic_id, entry_id), UNKNOWN)
+        origins = self._by_src.get(src)
+        return UNKNOWN if origins is None else origins.get((topic_id, entry_id), UNKNOWN)
+
+    def __len__(self) -> int:
+        """Number of messages whose age is known before they are complete."""
+        return sum(map(len, self._by_src.values()))
 
     def expire(self, now: float, is_held: Callable[[int, int, int], bool]) -> None:
         """Forget old stamps, except those of messages that are still incomplete (`is_held`)."""
-        for _ in range(len(self._origins)):
-            key, origin = next(iter(self._origins.items()))
-            if now - origin.stamped_at < self._timeout_s:
-                return
-            if is_held(*key):
-                self._origins.move_to_end(key)
-            else:
-                del self._origins[key]
+        for src, origins in self._by_src.items():
+            for _ in range(len(origins)):
+                key, origin = next(iter(origins.items()))
+                if now - origin.stamped_at < self._timeout_s:
+                    break
+                if is_held(src, *key):
+                    origins.move_to_end(key)
+                else:
+                    del origins[key]

@@ -16,6 +16,10 @@ UNKNOWN_S = 1.0
 SILENT_S = 5.0
 """Time in s without a CLOCK after which a clock is in holdover, or SILENT_PERIODS if longer."""
 SILENT_PERIODS = 4
+WALL_STEP_S = 0.1
+"""Change of a wall clock between two CLOCKs in s that is a step, beyond the clocks' errors."""
+SUSPECT_S = 60.0
+"""Time in s after a step for which a robot's clocks count as unknown."""
 SOLVE_S = 0.2
 REMEMBERED = 16
 
@@ -60,6 +64,8 @@ class PeerClock:
         self._strange_boot_id: int | None = None
         self._arrivals: OrderedDict[int, float] = OrderedDict()
         self._told_left_at = -float("inf")
+        self._suspect_until = -float("inf")
+        """Until when the robot's clocks are not believed, as its wall clock made a step."""
         self._last_number = 0
         self._solved_at = -float("inf")
         self._has_news = False
@@ -84,7 +90,7 @@ class PeerClock:
         if len(self._arrivals) > REMEMBERED:
             self._arrivals.popitem(last=False)
         if clock.wall_ns != UNKNOWN_WALL:
-            self.wall = Wall(clock.wall_ns, 1e-6 * clock.wall_error_us)
+            self._take_wall(Wall(clock.wall_ns, 1e-6 * clock.wall_error_us), at)
         for node, number, after_ns in clock.arrivals:
             left_at = left.get(number, self._told_left_at) if node == own_id else -float("inf")
             if left_at > self._told_left_at:
@@ -95,6 +101,17 @@ class PeerClock:
                 # A CLOCK has at most one arrival of ours; any more are false.
                 break
         self.estimate(at)
+
+    def _take_wall(self, wall: Wall, at: float) -> None:
+        """Take the robot's wall clock; after a step, nothing is believed for a while.
+
+        Somebody may have set that clock, or somebody else pretends to be the robot.
+        """
+        if self.wall is not None:
+            step_s = 1e-9 * abs(wall.ns - self.wall.ns)
+            if step_s > WALL_STEP_S + wall.error_s + self.wall.error_s:
+                self._suspect_until = at + SUSPECT_S
+        self.wall = wall
 
     def arrival(self, base_s: float) -> Arrival | None:
         """The arrival of the last CLOCK heard, to be announced in our own; None if none came."""
@@ -114,7 +131,7 @@ class PeerClock:
     def state(self, now: float) -> State:
         """How well the robot's clock is known."""
         known = self.estimate(now)
-        if known is None or known.bound(now) > UNKNOWN_S:
+        if known is None or known.bound(now) > UNKNOWN_S or now < self._suspect_until:
             return State.UNSYNCED
         if now - self.last_at > max(SILENT_S, SILENT_PERIODS * self.period_s):
             return State.HOLDOVER
