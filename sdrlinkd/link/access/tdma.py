@@ -202,23 +202,22 @@ class Tdma(BusyChannel):
 
     def notices(self, now: float) -> list[str]:
         """Sentences on robots that keep another schedule or none."""
-        return (
-            [
-                f"robot {src} announces a tdma schedule and is ignored: it, or the schedule's root, is "
-                "not in access.nodes; list all robots there, at every robot, or look who sends it"
-                for src in self._outsiders.lately(now)
-            ]
-            + [
-                f"robot {src} keeps no tdma schedule: its bursts fall into other robots' slots; give "
-                "it the same [access], and a radio of the same kind where access.policy is auto"
-                for src in self._unscheduled.lately(now, UNSCHEDULED)
-            ]
-            + [
-                f"robot {src} keeps a different tdma schedule; give both the same nodes, slot_s, "
-                f"guard_s and minislot_s in [access] (ours: {self.state})"
-                for src in self._strangers.lately(now)
-            ]
-        )
+        outside = [
+            f"robot {src} announces a tdma schedule and is ignored: it or the schedule's root is "
+            "not in access.nodes; list all robots there, at every robot, or look who sends it"
+            for src in self._outsiders.lately(now)
+        ]
+        without = [
+            f"robot {src} keeps no tdma schedule: its bursts fall into other robots' slots; give "
+            "it the same [access], and a radio of the same kind where access.policy is auto"
+            for src in self._unscheduled.lately(now, UNSCHEDULED)
+        ]
+        differing = [
+            f"robot {src} keeps a different tdma schedule; give both the same nodes, slot_s, "
+            f"guard_s and minislot_s in [access] (ours: {self.state})"
+            for src in self._strangers.lately(now)
+        ]
+        return outside + without + differing
 
     def _go(self, happens: Happens) -> None:
         self.role = after(STEPS, self.role, happens)
